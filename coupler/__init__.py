@@ -1,0 +1,1 @@
+"""The coupler: cases, the coupled step, results. The only room that knows both sides."""

@@ -1,0 +1,1 @@
+"""The structure: rigid blocks, contact and cohesive joints on YADE."""
