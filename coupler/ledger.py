@@ -1,0 +1,87 @@
+"""The ledger: energy over water, interface and structure, and the volume of the water.
+
+Structure:  Δ(kinetic + gravity + joints stored + contacts stored) + dissipated = W_received        residual r_s
+Interface:  W_given − W_received = r_i,  W_given = Σ dt F·V with the velocities V of the pressure solve,
+            W_received = work of the same loads over the motion that the discrete elements made
+Water:      Δ(kinetic + potential) + W_given + D = 0,  D: numerical dissipation, a line of its own
+
+A scheme that gains energy shows D < 0; dissipation D > 0 is damping of the water by the numerics and is
+reported, not counted as an error. The energy error is (|r_s| + |r_i| + max(0, −D)) / E_in, E_in the energy that
+the scene puts in: the potential energy of the water above its level state, the potential energy the blocks give
+up, kinetic energy, or work of imposed motions, whichever is the largest so far.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+STORED = ("kinetic", "gravity", "joint_stored", "contact_stored")
+DISSIPATED = ("joint_dissipated", "joint_damping", "dashpot", "friction")
+
+
+@dataclass(frozen=True)
+class Balance:
+    """One line of the ledger, all in joules but the last, a share of the input energy."""
+
+    water_kinetic: float = 0.0
+    water_potential: float = 0.0
+    numerical_dissipation: float = 0.0
+    work_given: float = 0.0
+    work_received: float = 0.0
+    structure_residual: float = 0.0
+    input_energy: float = 0.0
+    energy_error: float = 0.0
+
+    @property
+    def interface_residual(self) -> float:
+        return self.work_given - self.work_received
+
+
+@dataclass
+class Ledger:
+    """Accumulates the balances of a run. Either side may be absent (None)."""
+
+    available: float = 0.0
+    """Potential energy of the water above its level state at the start [J]."""
+    work_given: float = 0.0
+    _water_start: tuple[float, float] | None = None
+    _structure_start: float | None = None
+    _input: float = field(default=0.0)
+
+    def start(self, water: tuple[float, float] | None, structure: dict[str, float] | None) -> None:
+        """Fix the reference state: water (kinetic, potential) [J], structure energies by name [J]."""
+        self._water_start = water
+        self._structure_start = None if structure is None else _structure_total(structure)
+        self._gravity_start = None if structure is None else structure["gravity"]
+        self._input = self.available
+
+    def give(self, work: float) -> None:
+        """Add the work that the water gave to the bodies in a step [J]."""
+        self.work_given += work
+
+    def balance(
+        self, water: tuple[float, float] | None, structure: dict[str, float] | None, driven_work: float = 0.0
+    ) -> Balance:
+        """The ledger now. driven_work: work of imposed motions on the structure so far [J]."""
+        kinetic, potential = water or (0.0, 0.0)
+        dissipation = 0.0
+        if water is not None:
+            dissipation = -(kinetic + potential - sum(self._water_start)) - self.work_given
+        received = residual = 0.0
+        if structure is not None:
+            received = structure["load_work"]
+            residual = _structure_total(structure) - self._structure_start - received - driven_work
+            released = self._gravity_start - structure["gravity"]
+            self._input = max(self._input, abs(released), structure["kinetic"], abs(driven_work))
+        self._input = max(self._input, kinetic, abs(self.work_given))
+        error = abs(residual) + max(0.0, -dissipation)
+        if water is not None and structure is not None:
+            error += abs(self.work_given - received)
+        share = error / self._input if self._input > 0.0 else 0.0
+        return Balance(
+            kinetic, potential, dissipation, self.work_given, received, residual, self._input, share
+        )
+
+
+def _structure_total(energies: dict[str, float]) -> float:
+    return sum(energies[name] for name in STORED + DISSIPATED)
