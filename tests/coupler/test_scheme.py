@@ -1,0 +1,137 @@
+"""The pressure solve with the structure inside, on a pipe of water with a piston (exact in closed form)."""
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from coupler.scheme import (
+    StructureResponse,
+    corrected_free_velocity,
+    defect,
+    mass_matrix,
+    solve_coupled,
+)
+from tests.fakes import direct_solve, piston_column
+
+WATER = 1000.0  # mass of the water in the pipe [kg]
+
+
+def piston(mass, dt, stiffness=0.0, damping=0.0, driven=False, driven_velocity=0.0):
+    n6 = sp.csr_array((6, 6))
+    K = n6 + sp.diags_array([stiffness] + [0.0] * 5)
+    C = n6 + sp.diags_array([damping] + [0.0] * 5)
+    velocity = np.zeros((1, 6))
+    velocity[0, 0] = driven_velocity
+    M = mass_matrix(np.array([mass]), np.eye(3)[None])
+    return StructureResponse(M, K, C, dt, np.array([driven]), velocity)
+
+
+def push(force):
+    load = np.zeros((1, 6))
+    load[0, 0] = force
+    return load
+
+
+@given(ratio=st.floats(1e-4, 1e4), dt=st.floats(1e-5, 0.1))
+@settings(max_examples=50, deadline=None)
+def test_a_pushed_piston_accelerates_with_its_own_and_the_waters_mass(ratio, dt):
+    """Added mass is implicit: right at any density ratio and any step, in one solve."""
+    response = piston(ratio * WATER, dt)
+    v_free = response.free_velocity(np.zeros((1, 6)), push(50.0))
+    found = solve_coupled(piston_column(dt=dt), response, v_free, direct_solve, 1e-12)
+    assert found.velocity[0, 0] == pytest.approx(50.0 * dt / (WATER * (1 + ratio)), rel=1e-7)
+
+
+def test_power_leaving_the_water_is_the_power_given_to_the_structure():
+    """-Gᵀp is the adjoint of how the body moves the water: F·V = -∫p V·n to round-off."""
+    problem = piston_column()
+    response = piston(300.0, 0.01, stiffness=1e7, damping=1e3)
+    v_free = response.free_velocity(np.ones((1, 6)), push(10.0))
+    found = solve_coupled(problem, response, v_free, direct_solve, 1e-12)
+    flux = problem.coupling @ found.velocity.ravel()
+    assert found.load.ravel() @ found.velocity.ravel() == pytest.approx(-found.x @ flux, rel=1e-12)
+
+
+def test_the_momentum_of_water_and_piston_changes_by_the_outside_force_alone():
+    dt, mass = 0.01, 250.0
+    problem = piston_column(dt=dt)
+    response = piston(mass, dt)
+    found = solve_coupled(
+        problem, response, response.free_velocity(np.zeros((1, 6)), push(80.0)), direct_solve, 1e-12
+    )
+    water = WATER * found.velocity[0, 0]  # the water moves with the piston as one body
+    assert mass * found.velocity[0, 0] + water == pytest.approx(80.0 * dt, rel=1e-10)
+
+
+def test_a_stiff_support_carries_the_load_instead_of_the_inertia():
+    """With dt K far above M/dt the piston hardly moves: a bonded wall is not taken for a loose block."""
+    dt, stiffness = 0.01, 1e12
+    response = piston(100.0, dt, stiffness=stiffness)
+    found = solve_coupled(
+        piston_column(dt=dt),
+        response,
+        response.free_velocity(np.zeros((1, 6)), push(50.0)),
+        direct_solve,
+        1e-12,
+    )
+    assert found.velocity[0, 0] == pytest.approx(50.0 / (dt * stiffness), rel=1e-3)
+
+
+def test_a_driven_piston_keeps_its_velocity_and_feels_the_whole_pressure():
+    dt, speed = 0.01, -0.3
+    response = piston(100.0, dt, driven=True, driven_velocity=speed)
+    found = solve_coupled(
+        piston_column(dt=dt),
+        response,
+        response.free_velocity(np.zeros((1, 6)), push(0.0)),
+        direct_solve,
+        1e-12,
+    )
+    assert found.velocity[0, 0] == speed
+    assert found.load[0, 0] == pytest.approx(-WATER * speed / dt, rel=1e-9)
+
+
+def test_the_known_part_of_the_pressure_pushes_the_body_and_not_the_water_again():
+    dt = 0.01
+    problem = piston_column(dt=dt, known=200.0)
+    response = piston(100.0, dt)
+    known_force = -(problem.coupling.T @ problem.known).reshape(1, 6)
+    found = solve_coupled(
+        problem, response, response.free_velocity(np.zeros((1, 6)), known_force), direct_solve, 1e-12
+    )
+    assert found.velocity[0, 0] == pytest.approx(known_force[0, 0] * dt / (WATER + 100.0), rel=1e-9)
+    assert found.load[0, 0] == pytest.approx(100.0 * found.velocity[0, 0] / dt, rel=1e-9)
+
+
+def test_a_second_pass_with_what_the_body_did_leaves_a_right_first_pass_unchanged():
+    """The correction is a fixed point: W equal to the assumed V changes nothing."""
+    problem, response = piston_column(), piston(100.0, 0.01, stiffness=1e6)
+    first = solve_coupled(
+        problem, response, response.free_velocity(np.zeros((1, 6)), push(50.0)), direct_solve, 1e-12
+    )
+    again = corrected_free_velocity(response, first.velocity, first.x, problem.coupling)
+    second = solve_coupled(problem, response, again, direct_solve, 1e-12)
+    assert second.x == pytest.approx(first.x, rel=1e-10)
+    assert defect(response.mass, first.velocity, second.velocity) < 1e-10
+
+
+def test_the_second_pass_moves_towards_a_body_that_is_stiffer_than_assumed():
+    """A support the matrix does not know of is felt through W: the force rises towards the exact one."""
+    problem, assumed = piston_column(), piston(100.0, 0.01)
+    first = solve_coupled(
+        problem, assumed, assumed.free_velocity(np.zeros((1, 6)), push(50.0)), direct_solve, 1e-12
+    )
+    held = np.zeros((1, 6))  # the elements found that the body cannot move at all
+    second = solve_coupled(
+        problem, assumed, corrected_free_velocity(assumed, held, first.x, problem.coupling), direct_solve, 1e-12
+    )
+    assert abs(second.velocity[0, 0]) < abs(first.velocity[0, 0])
+
+
+def test_defect_is_the_share_of_the_kinetic_energy_norm():
+    M = mass_matrix(np.array([2.0]), np.eye(3)[None])
+    found = np.array([[1.0, 0, 0, 0, 0, 0]])
+    assert defect(M, 0.9 * found, found) == pytest.approx(0.1)
+    assert defect(M, 0.0 * found, 0.0 * found) == 0.0
