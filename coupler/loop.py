@@ -1,0 +1,177 @@
+"""The coupled step and the run around it.
+
+One step: cut → advect → pressure with the structure inside → correct → YADE substeps → defect → ledger.
+A scene may lack either side: without water the structure runs alone, without a structure the water does.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from coupler.ledger import Balance, Ledger
+from coupler.limits import check_balance, check_finite
+
+Array = np.ndarray
+
+BLOCK_COURANT = 0.5
+"""Share of a cell that the fastest block may cross in one step: its cells are cut once a step."""
+
+
+@dataclass
+class StepRecord:
+    """What one step did, for the histories. Absent sides leave zeros."""
+
+    time: float
+    dt: float
+    iterations: int = 0
+    passes: int = 0
+    defect: float = 0.0
+    substeps: int = 0
+    substep: float = 0.0
+    opening_rate: float = 0.0
+    """Largest v dt_s / d_f of a substep: 1 and more means that a joint opened within one substep."""
+    unknowns: int = 0
+    bodies_cut: int = 0
+    load: Array = field(default_factory=lambda: np.zeros((0, 6)))
+    balance: Balance = field(default_factory=Balance)
+
+
+class Coupling:
+    """The two sides and the state of their coupling; `step` advances both.
+
+    water, structure, immersion: either side may be None (immersion only with water).
+    """
+
+    def __init__(self, water, structure, immersion, *, rtol: float, step_max: float, clock):
+        self.water, self.structure, self.immersion = water, structure, immersion
+        self.rtol, self.step_max, self.clock = rtol, step_max, clock
+        self.time = 0.0
+        self.ledger = Ledger()
+        if water is not None:
+            self.ledger.available = water.available_energy()
+        self.ledger.start(self._water_energy(), self._structure_energies())
+
+    @property
+    def coupled(self) -> bool:
+        return self.water is not None and self.structure is not None
+
+    def step_size(self, remaining: float) -> float:
+        """The largest step [s] that water, blocks and the case allow, dividing `remaining` evenly."""
+        dt = self.step_max
+        if self.water is not None:
+            dt = min(dt, self.water.stable_step())
+        if self.coupled:
+            speed = self.structure.fastest_point()
+            if speed > 0.0:
+                dt = min(dt, BLOCK_COURANT * self.water.mesh.spacing / speed)
+        return remaining / max(1, math.ceil(remaining / dt * (1.0 - 1e-9)))
+
+    def step(self, dt: float) -> StepRecord:
+        """Advance both sides by dt [s]."""
+        record = StepRecord(self.time + dt, dt)
+        if self.coupled:
+            self._coupled_step(dt, record)
+        elif self.water is not None:
+            self._water_step(dt, record)
+        else:
+            self._structure_step(dt, record)
+        self.time += dt
+        self._check_finite()
+        record.balance = self.ledger.balance(
+            self._water_energy(), self._structure_energies(), self._driven_work()
+        )
+        return record
+
+    def _coupled_step(self, dt: float, record: StepRecord) -> None:
+        from coupler.scheme import StructureResponse, defect, mass_matrix, solve_coupled
+
+        structure = self.structure
+        with self.clock("cut"):
+            if self.immersion.update():
+                self.water.move_solids(self.immersion.domain)
+            record.bodies_cut = self.immersion.cut_again
+        with self.clock("water"):
+            problem = self.water.predict(dt)
+        with self.clock("structure in pressure"):
+            mass = mass_matrix(structure.mass, structure.inertia())
+            response = StructureResponse(
+                *self._with_solids(mass, *structure.tangent()),
+                dt,
+                np.append(structure.fixed | structure.driven, np.ones(self.immersion.n_solids, bool)),
+                self._padded(structure.velocity()),
+            )
+            known = -(problem.coupling.T @ problem.known).reshape(-1, 6)
+            force = structure.gravity_force() + structure.internal_force()
+            v_free = response.free_velocity(
+                self._padded(structure.velocity()), self._padded(force) + known
+            )
+        with self.clock("pressure"):
+            found = solve_coupled(problem, response, v_free, self._solve, self.rtol)
+        with self.clock("water"):
+            self.water.correct(problem, found.x)
+        with self.clock("structure"):
+            n = structure.n
+            structure.set_load(found.load[:n])
+            report = structure.advance(dt)
+        record.iterations, record.passes, record.unknowns = found.iterations, 1, len(found.x)
+        record.load = found.load
+        record.defect = defect(mass, found.velocity[:n], report.mean_velocity)
+        record.substeps, record.substep = report.substeps, report.substep
+        record.opening_rate = report.opening_rate
+        self.ledger.give(dt * float(np.sum(found.load[:n] * found.velocity[:n])))
+
+    def _water_step(self, dt: float, record: StepRecord) -> None:
+        with self.clock("water"):
+            problem = self.water.predict(dt)
+        with self.clock("pressure"):
+            result = self._solve(problem.matrix, problem.rhs, problem.guess, self.rtol)
+        with self.clock("water"):
+            self.water.correct(problem, result.x)
+        record.load = -(problem.coupling.T @ (result.x + problem.known)).reshape(-1, 6)
+        record.iterations, record.passes, record.unknowns = result.iterations, 1, len(result.x)
+
+    def _structure_step(self, dt: float, record: StepRecord) -> None:
+        with self.clock("structure"):
+            report = self.structure.advance(dt)
+        record.substeps, record.substep = report.substeps, report.substep
+        record.opening_rate = report.opening_rate
+
+    @property
+    def _solve(self):
+        from fluid.solve import solve
+
+        return solve
+
+    def _padded(self, values: Array) -> Array:
+        """Rows of zeros appended for the fixed solids: (n, 6) → (n + m, 6)."""
+        return np.concatenate([values, np.zeros((self.immersion.n_solids, 6))])
+
+    def _with_solids(self, *matrices):
+        """Sparse (6n, 6n) matrices with empty rows for the fixed solids."""
+        import scipy.sparse as sp
+
+        size = 6 * self.immersion.n_solids
+        if size == 0:
+            return matrices
+        empty = sp.csr_array((size, size))
+        return tuple(sp.block_diag([m, empty], format="csr") for m in matrices)
+
+    def _water_energy(self) -> tuple[float, float] | None:
+        if self.water is None:
+            return None
+        return self.water.kinetic_energy(), self.water.potential_energy()
+
+    def _structure_energies(self) -> dict[str, float] | None:
+        return None if self.structure is None else self.structure.energies()
+
+    def _driven_work(self) -> float:
+        return 0.0 if self.structure is None else self.structure.driven_work
+
+    def _check_finite(self) -> None:
+        if self.water is not None:
+            check_finite(self.time, "the velocity of the water", self.water.velocity, "node")
+        if self.structure is not None:
+            check_finite(self.time, "the velocity of the structure", self.structure.velocity(), "block")
