@@ -13,13 +13,13 @@ A step that moves few bodies cuts again only the cells near their old or new pos
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy.sparse as sp
 
 from fluid.bodies import ConvexBodies
-from fluid.covers import Connection, pick_old_nodes, virtual_cells
+from fluid.covers import Connection, pick_old_nodes, virtual_cells, without_pockets
 from fluid.cut import Cuts, cut_cells
 from fluid.mesh import Background, gradients
 from fluid.near import near_pairs
@@ -260,9 +260,34 @@ def _ragged(old_start, kept, new_start, order):
 def _assembled(memory: Memory, covers: str) -> PhysicalDomain:
     mesh, cuts = memory.mesh, memory.cuts
     parent, element_of_part = _elements(memory)
-    volume = memory.whole.volume[parent]
-    centroid = memory.whole.centroid[parent]
-    second = memory.whole.second[parent]
+    volume, centroid, second, is_cut = _moments(memory, parent, element_of_part)
+    domain = PhysicalDomain(
+        nodes=mesh.nodes,
+        cells=mesh.cells[parent],
+        parent_node=np.arange(len(mesh.nodes)),
+        parent_cell=parent,
+        volume=volume,
+        centroid=centroid,
+        second=second,
+        is_cut=is_cut,
+        face_cell=element_of_part[cuts.wet_part],
+        face_body=cuts.wet_body,
+        face_area=cuts.wet[:, 0],
+        face_centroid=cuts.wet[:, 1:4],
+        face_normal=cuts.wet[:, 4:7],
+        face_points=cuts.wet[:, 7:].reshape(-1, 3, 3),
+        n_bodies=len(memory.bodies),
+        body_centre=memory.bodies.centre,
+        covers=covers,
+        memory=memory,
+    )
+    return domain if covers == "single" else _with_copies(domain, element_of_part)
+
+
+def _moments(memory, parent, element_of_part):
+    """volume, centroid, second, is_cut of the elements: of the whole cell, or of the part."""
+    cuts, whole = memory.cuts, memory.whole
+    volume, centroid, second = whole.volume[parent], whole.centroid[parent], whole.second[parent]
     is_cut = np.zeros(len(parent), dtype=bool)
     removed = ~cuts.part_whole
     at = element_of_part[removed]
@@ -270,30 +295,34 @@ def _assembled(memory: Memory, covers: str) -> PhysicalDomain:
     centroid[at] = cuts.moments[removed, 1:4]
     second[at] = cuts.moments[removed, 4:]
     is_cut[at] = True
-    if covers == "single":
-        nodes, parent_node, cells = mesh.nodes, np.arange(len(mesh.nodes)), mesh.cells[parent]
-    else:
-        cells, parent_node = virtual_cells(mesh, parent, element_of_part, cuts, memory.connection)
-        nodes = mesh.nodes[parent_node]
-    return PhysicalDomain(
-        nodes,
-        cells,
-        parent_node,
-        parent,
-        volume,
-        centroid,
-        second,
-        is_cut,
-        element_of_part[cuts.wet_part],
-        cuts.wet_body,
-        cuts.wet[:, 0],
-        cuts.wet[:, 1:4],
-        cuts.wet[:, 4:7],
-        cuts.wet[:, 7:].reshape(-1, 3, 3),
-        len(memory.bodies),
-        memory.bodies.centre,
-        covers,
-        memory,
+    return volume, centroid, second, is_cut
+
+
+def _with_copies(domain, element_of_part):
+    """The same elements on the nodes of the virtual mesh, without tiny pockets."""
+    memory = domain.memory
+    mesh, connection = memory.mesh, memory.connection
+    cells, parent_node = virtual_cells(mesh, domain.parent_cell, element_of_part, memory.cuts, connection)
+    domain = replace(domain, cells=cells, parent_node=parent_node, nodes=mesh.nodes[parent_node])
+    keep = without_pockets(cells, domain.volume, len(parent_node), connection.pocket * mesh.spacing**3)
+    return domain if keep.all() else _restricted(domain, keep)
+
+
+def _restricted(domain, keep):
+    """Only the elements keep (M,) bool, their nodes and their wetted polygons."""
+    used = np.zeros(len(domain.nodes), dtype=bool)
+    used[domain.cells[keep]] = True
+    wet = keep[domain.face_cell]
+    of_cell = ("parent_cell", "volume", "centroid", "second", "is_cut")
+    of_face = ("face_body", "face_area", "face_centroid", "face_normal", "face_points")
+    return replace(
+        domain,
+        nodes=domain.nodes[used],
+        parent_node=domain.parent_node[used],
+        cells=(np.cumsum(used) - 1)[domain.cells[keep]],
+        face_cell=(np.cumsum(keep) - 1)[domain.face_cell[wet]],
+        **{name: getattr(domain, name)[keep] for name in of_cell},
+        **{name: getattr(domain, name)[wet] for name in of_face},
     )
 
 
