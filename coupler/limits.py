@@ -1,4 +1,4 @@
-"""Why a run ends early. Each names the quantity, its value, its limit and what to change."""
+"""When a run ends before its time: out of balance, not finite, or over a limit that the case set."""
 
 from __future__ import annotations
 
@@ -7,26 +7,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-
-class RunStopped(RuntimeError):
-    """A run that ends before its time; `exit_code` is what the command returns."""
-
-    exit_code = 4
+from coupler.errors import ExitCode, RunFailed, SurgebreakError
 
 
-class Diverged(RunStopped):
-    """Not finite, unconverged or out of balance: the numbers after this are not to be used."""
+class LimitReached(SurgebreakError):
+    """A budget that the case set, or the user's own wish to stop; the results so far are sound."""
 
-    exit_code = 3
-
-
-class LimitReached(RunStopped):
-    """A limit that the case set, or the user's own wish to stop."""
+    exit_code = ExitCode.STOPPED
 
 
 @dataclass(frozen=True)
 class Limits:
-    """Shares of the reference quantity beyond which a run stops (energy and volume), and its budget."""
+    """Shares of the reference quantity beyond which a run stops (volume, energy), and its budget [CPU s]."""
 
     volume_error: float
     energy_error: float
@@ -36,28 +28,31 @@ class Limits:
 def check_balance(time: float, volume_error: float, energy_error: float, limits: Limits) -> None:
     """Stop a run whose water volume or energy no longer balances.
 
-    Raises Diverged with the quantity, its value, its limit and the remedy.
+    Raises RunFailed with the quantity, its value, its limit and the remedy.
     """
     if not math.isfinite(volume_error) or abs(volume_error) > limits.volume_error:
-        raise Diverged(
+        raise RunFailed(
             f"the water volume is off by {volume_error:+.2%} at t = {time:.4g} s; limit "
             f"{limits.volume_error:.2%} (limits.volume_error). Reduce time.cfl or tank.cell."
         )
     if not math.isfinite(energy_error) or energy_error > limits.energy_error:
-        raise Diverged(
+        raise RunFailed(
             f"the energy balance is off by {energy_error:.2%} of the input energy at t = {time:.4g} s; limit "
             f"{limits.energy_error:.2%} (limits.energy_error). Reduce time.step_max, raise joints.damping, "
             "or see history/energy.csv for the line that grows."
         )
 
 
-def check_finite(time: float, what: str, values, item: str = "node") -> None:
-    """Stop at the first NaN or infinity, naming the quantity and the item (node, block) that holds it."""
+def check_finite(time: float, what: str, values, item: str) -> None:
+    """Stop at the first NaN or infinity, naming the quantity and the item (node, block) that holds it.
+
+    Raises RunFailed.
+    """
     values = np.asarray(values)
     if np.isfinite(values).all():
         return
     bad = int(np.argwhere(~np.isfinite(values))[0][0])
-    raise Diverged(
+    raise RunFailed(
         f"{what} is not finite at {item} {bad}, t = {time:.6g} s. The last written step is sound; "
         "reduce time.step_max or time.cfl, or look for a very light or very stiff block there."
     )

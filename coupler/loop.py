@@ -105,9 +105,7 @@ class Coupling:
             )
             known = -(problem.coupling.T @ problem.known).reshape(-1, 6)
             force = structure.gravity_force() + structure.internal_force()
-            v_free = response.free_velocity(
-                self._padded(structure.velocity()), self._padded(force) + known
-            )
+            v_free = response.free_velocity(self._padded(structure.velocity()), self._padded(force) + known)
         with self.clock("pressure"):
             found = solve_coupled(problem, response, v_free, self._solve, self.rtol)
         with self.clock("water"):

@@ -117,7 +117,9 @@ def solve_coupled(
         extra=added_inertia if feels_water else None,
     )
     velocity = v_free - response.compliance(Gt @ result.x)
-    return CoupledSolution(result.x, velocity.reshape(-1, 6), water_load(problem, result.x), result.iterations)
+    return CoupledSolution(
+        result.x, velocity.reshape(-1, 6), water_load(problem, result.x), result.iterations
+    )
 
 
 def corrected_free_velocity(response: StructureResponse, mean_velocity: Array, x: Array, coupling) -> Array:

@@ -125,7 +125,11 @@ def test_the_second_pass_moves_towards_a_body_that_is_stiffer_than_assumed():
     )
     held = np.zeros((1, 6))  # the elements found that the body cannot move at all
     second = solve_coupled(
-        problem, assumed, corrected_free_velocity(assumed, held, first.x, problem.coupling), direct_solve, 1e-12
+        problem,
+        assumed,
+        corrected_free_velocity(assumed, held, first.x, problem.coupling),
+        direct_solve,
+        1e-12,
     )
     assert abs(second.velocity[0, 0]) < abs(first.velocity[0, 0])
 

@@ -1,0 +1,159 @@
+"""From a case to both sides of the scene, and nothing that the case does not ask for.
+
+A case without `[water]` imports no fluid code here, one without `[structure]` never starts YADE.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from coupler.boxes import rotation_matrix
+from coupler.case import Case
+from coupler.gauges import Gauge, make_gauge
+from coupler.loop import Coupling
+
+BOX_CORNERS = np.array(
+    [[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]],
+    float,
+)
+BOX_FACES = ((0, 4, 7, 3), (1, 2, 6, 5), (0, 1, 5, 4), (3, 7, 6, 2), (0, 3, 2, 1), (4, 5, 6, 7))
+PRESSURE_RTOL = 1e-8
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What a run works on: both sides, the gauges and what never moves."""
+
+    coupling: Coupling
+    gauges: list[Gauge]
+    solids: list[tuple[np.ndarray, tuple]]
+    tank: tuple | None
+
+
+def build(case: Case, clock) -> Scene:
+    """Build the scene of a case. clock(name) is a context that books processor time to a part of the run."""
+    solids = [(_box_vertices(s), BOX_FACES) for s in case.solid]
+    with clock("set-up"):
+        structure = _structure(case) if case.structure else None
+        water = immersion = None
+        if case.water:
+            water, immersion = _water(case, structure, solids)
+        coupling = Coupling(
+            water, structure, immersion, rtol=PRESSURE_RTOL, step_max=case.time.step_max, clock=clock
+        )
+    tank = (case.tank.lower, case.tank.upper) if case.tank else None
+    return Scene(coupling, _gauges(case, structure), solids, tank)
+
+
+def blocks_of(case: Case) -> list:
+    """All blocks of a case as the structure's Block, generators expanded, in the order of their rows."""
+    from yade_scripts.blocks import Block
+    from yade_scripts.building import building, wall
+
+    driven = {m.block: np.array(m.velocity) for m in case.motion}
+    s = case.structure
+    blocks = []
+    for b in s.block:
+        blocks.append(
+            Block(
+                name=b.name,
+                group=b.group or b.name,
+                centre=np.array(b.centre),
+                size=np.array(b.size),
+                rotation=_rotation(b.rotation),
+                density=b.density or s.density,
+                fixed=b.fixed,
+                driven=b.name in driven,
+                velocity=driven.get(b.name, np.array(b.velocity)),
+                spin=np.array(b.spin),
+            )
+        )
+    for w in s.wall:
+        blocks += wall(w.name, w.lower, w.size, w.block, density=w.density or s.density)
+    for h in s.building:
+        blocks += building(h, density=h.density or s.density)
+    return blocks
+
+
+def _rotation(turn) -> np.ndarray:
+    return np.eye(3) if turn is None else rotation_matrix(turn.axis, turn.angle)
+
+
+def _box_vertices(solid) -> np.ndarray:
+    return np.array(solid.centre) + (0.5 * np.array(solid.size) * BOX_CORNERS) @ _rotation(solid.rotation).T
+
+
+def _structure(case: Case):
+    from yade_scripts.contact import ContactLaw
+    from yade_scripts.joints import JointLaw
+    from yade_scripts.structure import Structure
+
+    c, j = case.contact, case.joints
+    contact = joints = None
+    if c:
+        contact = ContactLaw(c.stiffness, c.restitution, c.friction, rule=c.rule)
+    if j:
+        joints = JointLaw(
+            strength=j.strength,
+            opening_at_failure=j.opening_at_failure,
+            shear_ratio=j.shear_ratio,
+            closing_ratio=j.closing_ratio,
+            damping=j.damping,
+            points=j.points,
+            ground=j.ground,
+        )
+    return Structure(
+        blocks_of(case), contact, joints, ground=case.structure.ground, gravity=case.case.gravity
+    )
+
+
+def _water(case: Case, structure, solids):
+    from coupler.exchange import Immersion
+    from fluid.mesh import box_mesh
+    from fluid.parameters import WaterParameters
+    from fluid.water import Water
+
+    mesh = box_mesh(case.tank.lower, case.tank.upper, case.tank.cell)
+    immersion = Immersion(mesh, structure, solids, case.water.covers)
+    parameters = WaterParameters(
+        density=case.water.density,
+        gravity=case.case.gravity,
+        theta=case.water.theta,
+        courant=case.time.cfl,
+    )
+    water = Water(mesh, immersion.domain, _fill(case), parameters, open_sides=case.tank.open)
+    return water, immersion
+
+
+def _fill(case: Case):
+    """Level set of the union of the fill boxes: (m, 3) → (m,) [m], negative in the water.
+
+    Sides on the tank's own boundary are left out, so that the water there ends at the wall and not in a surface.
+    """
+    lower, upper = np.array(case.tank.lower), np.array(case.tank.upper)
+
+    def box(points, fill):
+        below = np.where(np.array(fill.lower) <= lower, -np.inf, np.array(fill.lower) - points)
+        above = np.where(np.array(fill.upper) >= upper, -np.inf, points - np.array(fill.upper))
+        return np.maximum(below, above).max(axis=1)
+
+    def level_set(points):
+        return np.min([box(points, fill) for fill in case.water.fill], axis=0)
+
+    return level_set
+
+
+def _gauges(case: Case, structure) -> list[Gauge]:
+    rows: dict[str, list[int]] = {}
+    n = 0
+    if structure is not None:
+        n = structure.n
+        for row, (name, group) in enumerate(zip(structure.names, structure.groups)):
+            rows.setdefault(name, []).append(row)
+            if group != name:
+                rows.setdefault(group, []).append(row)
+    for k, solid in enumerate(case.solid):
+        rows.setdefault(solid.name, []).append(n + k)
+    return [make_gauge(spec, {k: np.array(v) for k, v in rows.items()}) for spec in case.gauge]

@@ -1,0 +1,34 @@
+"""Where the processor time of a run goes: seconds of user and system time booked to named parts."""
+
+from __future__ import annotations
+
+import time
+from collections import defaultdict
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+
+class Clock:
+    """Books processor time [s] to parts by name; parts do not nest."""
+
+    def __init__(self):
+        self.seconds: dict[str, float] = defaultdict(float)
+        self._start = time.process_time()
+
+    @contextmanager
+    def __call__(self, part: str) -> Iterator[None]:
+        start = time.process_time()
+        try:
+            yield
+        finally:
+            self.seconds[part] += time.process_time() - start
+
+    def total(self) -> float:
+        """Processor seconds since the clock was made."""
+        return time.process_time() - self._start
+
+    def split(self) -> dict[str, float]:
+        """Seconds of each part, largest first, with what was booked to none as 'other'."""
+        parts = dict(self.seconds)
+        parts["other"] = max(0.0, self.total() - sum(parts.values()))
+        return dict(sorted(parts.items(), key=lambda item: -item[1]))

@@ -1,0 +1,208 @@
+"""What a run leaves behind: histories every step, fields at the output times, the crack table.
+
+`history/energy.csv`   the ledger           `history/coupling.csv`  how each step went
+`history/water.csv`    volume               `history/structure.csv` joints, momentum
+`history/forces.csv`   force gauges         `history/gauges.csv`    the other gauges
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from coupler.history import HistoryTable, write_cracks
+from coupler.output import BlockWriter, WaterWriter, write_solids
+
+ENERGY = (
+    ("time", "s", "time"),
+    ("water_kinetic", "J", "kinetic energy of the water"),
+    ("water_potential", "J", "potential energy of the water above z = 0"),
+    ("numerical_dissipation", "J", "energy the numerics took out of the water so far; negative: put in"),
+    ("work_given", "J", "work of the water on the blocks so far, with the velocities of the pressure solve"),
+    ("work_received", "J", "the same loads over the motion that the blocks made"),
+    ("blocks_kinetic", "J", "kinetic energy of the blocks"),
+    ("blocks_gravity", "J", "potential energy of the blocks"),
+    ("joint_stored", "J", "elastic energy in the joints"),
+    ("joint_dissipated", "J", "energy used to open joints so far"),
+    ("joint_damping", "J", "energy taken by the damping of the joints so far"),
+    ("contact_stored", "J", "elastic energy in contacts"),
+    ("dashpot", "J", "energy taken by contact dashpots so far"),
+    ("friction", "J", "energy taken by friction so far"),
+    ("driven_work", "J", "work of prescribed motions on the structure so far"),
+    ("structure_residual", "J", "what the structure's own ledger misses"),
+    ("interface_residual", "J", "work given less work received"),
+    ("input_energy", "J", "energy the scene has put in so far, the scale of the error"),
+    ("energy_error", "1", "unbalanced share of the input energy"),
+)
+COUPLING = (
+    ("time", "s", "time at the end of the step"),
+    ("dt", "s", "length of the step"),
+    ("passes", "1", "pressure solves in the step"),
+    ("iterations", "1", "iterations of the linear solver"),
+    ("unknowns", "1", "pressure unknowns (wet nodes)"),
+    ("bodies_cut", "1", "bodies whose cells were cut again"),
+    ("substeps", "1", "YADE substeps"),
+    ("substep", "s", "length of a substep"),
+    ("defect", "1", "share by which the blocks' mean motion missed what the water was told"),
+    ("opening_rate", "1", "largest opening in a substep over the opening at failure"),
+)
+WATER = (
+    ("time", "s", "time"),
+    ("volume", "m3", "volume of the water"),
+    (
+        "volume_error",
+        "1",
+        "change of the volume, less what left through open sides, over the volume at the start",
+    ),
+    ("reinserted", "m3", "volume the correction moved back so far, a sum of absolute values"),
+    ("clipped", "1", "nodes whose speed was capped so far (spray)"),
+    ("momentum_x", "N s", "momentum of the water"),
+    ("momentum_y", "N s", "momentum of the water"),
+    ("momentum_z", "N s", "momentum of the water"),
+)
+STRUCTURE = (
+    ("time", "s", "time"),
+    ("joints_intact", "1", "joints that still carry traction"),
+    ("joints_broken", "1", "joints that have failed"),
+    ("largest_damage", "1", "largest damage of a live joint"),
+    ("momentum_x", "N s", "momentum of the blocks"),
+    ("momentum_y", "N s", "momentum of the blocks"),
+    ("momentum_z", "N s", "momentum of the blocks"),
+    ("impulse_x", "N s", "impulse of the water on the blocks so far"),
+    ("impulse_y", "N s", "impulse of the water on the blocks so far"),
+    ("impulse_z", "N s", "impulse of the water on the blocks so far"),
+    ("fastest", "m/s", "speed of the fastest point of a block"),
+)
+
+
+class Recorder:
+    """Writes a run as it goes; absent sides leave no files.
+
+    directory: of the run · coupling: Coupling · gauges: list of Gauge · solids: [(vertices, faces)] · tank: (lower, upper)
+    """
+
+    def __init__(self, directory, coupling, gauges, solids, tank):
+        self.coupling, self.gauges = coupling, gauges
+        self.history = directory / "history"
+        self.history.mkdir(exist_ok=True)
+        self.cracks = directory / "cracks.csv"
+        water, structure = coupling.water, coupling.structure
+        self.impulse = np.zeros(3)
+        self._energy = self._table("energy", ENERGY)
+        self._coupling = self._table("coupling", COUPLING)
+        self._water = self._table("water", WATER) if water else None
+        self._structure = self._table("structure", STRUCTURE) if structure else None
+        self._gauges = self._table("gauges", self._gauge_columns()) if gauges else None
+        self._fields = WaterWriter(directory / "fields.vtkhdf") if water else None
+        self._blocks = None
+        if structure:
+            s = structure
+            self._blocks = BlockWriter(
+                directory / "blocks.vtkhdf", s.shape_vertices, s.shape_faces, s.names, s.groups
+            )
+        if solids or tank:
+            write_solids(directory / "solids.vtkhdf", [v for v, _ in solids], [f for _, f in solids], tank)
+
+    def _table(self, name: str, columns) -> HistoryTable:
+        return HistoryTable(self.history / f"{name}.csv", columns)
+
+    def _gauge_columns(self):
+        return [("time", "s", "time"), *(column for gauge in self.gauges for column in gauge.columns)]
+
+    def step(self, record) -> None:
+        """Append one row to each history."""
+        c = self.coupling
+        b = record.balance
+        e = c.structure.energies() if c.structure else {}
+        self._energy.append(
+            time=record.time,
+            water_kinetic=b.water_kinetic,
+            water_potential=b.water_potential,
+            numerical_dissipation=b.numerical_dissipation,
+            work_given=b.work_given,
+            work_received=b.work_received,
+            blocks_kinetic=e.get("kinetic", 0.0),
+            blocks_gravity=e.get("gravity", 0.0),
+            **{name: e.get(name, 0.0) for name in _STRUCTURE_LINES},
+            driven_work=c.structure.driven_work if c.structure else 0.0,
+            structure_residual=b.structure_residual,
+            interface_residual=b.interface_residual if c.coupled else 0.0,
+            input_energy=b.input_energy,
+            energy_error=b.energy_error,
+        )
+        self._coupling.append(**{name: getattr(record, name) for name, *_ in COUPLING})
+        if self._water:
+            self._append_water(record)
+        if self._structure:
+            self._append_structure(record)
+        if self._gauges:
+            values = {}
+            for gauge in self.gauges:
+                values |= gauge.read(c, record)
+            self._gauges.append(time=record.time, **values)
+
+    def _append_water(self, record) -> None:
+        w = self.coupling.water
+        self._water.append(
+            time=record.time,
+            volume=w.volume(),
+            volume_error=w.volume_error(),
+            reinserted=w.reinserted,
+            clipped=w.clipped,
+            **_xyz("momentum", w.momentum()),
+        )
+
+    def _append_structure(self, record) -> None:
+        s = self.coupling.structure
+        self.impulse += record.dt * record.load[: s.n, :3].sum(axis=0)
+        summary = s.joint_summary()
+        self._structure.append(
+            time=record.time,
+            joints_intact=summary.intact,
+            joints_broken=summary.broken,
+            largest_damage=summary.largest_damage,
+            **_xyz("momentum", (s.mass[:, None] * s.velocity()[:, :3])[~s.fixed].sum(axis=0)),
+            **_xyz("impulse", self.impulse),
+            fastest=s.fastest_point(),
+        )
+
+    def fields(self, time: float) -> None:
+        """Write water, blocks and the crack table as they are now."""
+        c = self.coupling
+        if self._fields:
+            w = c.water
+            self._fields.append(
+                time,
+                w.domain.nodes,
+                w.domain.cells,
+                {"level_set": w.level_set, "velocity": w.velocity, "pressure": w.pressure},
+                {"fluid_fraction": w.fluid_fraction()},
+            )
+        if self._blocks:
+            s = c.structure
+            self._blocks.append(
+                time,
+                s.centre(),
+                s.rotation(),
+                {"damage": s.block_damage(), "speed": np.linalg.norm(s.velocity()[:, :3], axis=1)},
+            )
+            if s.n_joints:
+                write_cracks(self.cracks, s.joint_table())
+
+    def close(self) -> None:
+        for table in (self._energy, self._coupling, self._water, self._structure, self._gauges):
+            if table:
+                table.close()
+
+
+_STRUCTURE_LINES = (
+    "joint_stored",
+    "joint_dissipated",
+    "joint_damping",
+    "contact_stored",
+    "dashpot",
+    "friction",
+)
+
+
+def _xyz(name: str, vector) -> dict[str, float]:
+    return {f"{name}_{axis}": float(v) for axis, v in zip("xyz", vector)}
