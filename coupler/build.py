@@ -49,8 +49,9 @@ def build(case: Case, clock) -> Scene:
 
 def blocks_of(case: Case) -> list:
     """All blocks of a case as the structure's Block, generators expanded, in the order of their rows."""
-    from yade_scripts.blocks import Block
     from yade_scripts.building import building, wall
+
+    from yade_scripts.blocks import Block
 
     driven = {m.block: np.array(m.velocity) for m in case.motion}
     s = case.structure
@@ -86,9 +87,10 @@ def _box_vertices(solid) -> np.ndarray:
 
 
 def _structure(case: Case):
-    from yade_scripts.contact import ContactLaw
     from yade_scripts.joints import JointLaw
     from yade_scripts.structure import Structure
+
+    from yade_scripts.contact import ContactLaw
 
     c, j = case.contact, case.joints
     contact = joints = None

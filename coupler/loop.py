@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from coupler.ledger import Balance, Ledger
-from coupler.limits import check_balance, check_finite
+from coupler.limits import check_finite
 
 Array = np.ndarray
 
