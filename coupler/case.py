@@ -1,0 +1,332 @@
+"""The case: what a `case.toml` may say, in SI, with a description and a unit for every name.
+
+A section that is absent switches its module off (`modules`). Unknown names are refused. The page
+`docs/case_file.md` and `surgebreak explain` are made from this file alone.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from coupler.units import quantity
+
+Number = quantity("")
+Length = quantity("m")
+PositiveLength = quantity("m", gt=0)
+Velocity = quantity("m/s")
+Spin = quantity("rad/s")
+Density = quantity("kg/m3", gt=0)
+PositiveTime = quantity("s", gt=0)
+
+Point = tuple[Length, Length, Length]
+Size = tuple[PositiveLength, PositiveLength, PositiveLength]
+VelocityVector = tuple[Velocity, Velocity, Velocity]
+SpinVector = tuple[Spin, Spin, Spin]
+
+Side = Literal["x-", "x+", "y-", "y+", "z-", "z+"]
+Wall = Literal["x-", "x+", "y-", "y+"]
+Switch = Annotated[bool, Field(strict=True)]
+Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]*$", max_length=60)]
+
+
+class Section(BaseModel):
+    """A table of the case file: unknown names, infinities and NaN are refused; nothing changes afterwards."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class About(Section):
+    """What the case is, and what holds everywhere in it."""
+
+    title: str = Field(description="one line for people")
+    description: str = Field("", description="what happens, where it comes from, what to look at")
+    gravity: quantity("m/s2", ge=0) = Field(
+        9.81, description="acceleration of gravity, along -z; z points up"
+    )
+
+
+class Time(Section):
+    """How long, in which steps, and how often results are written."""
+
+    end: PositiveTime = Field(description="the run ends at this time", examples=["4 s"])
+    step_max: PositiveTime = Field(0.05, description="largest step of the coupled scheme")
+    cfl: quantity("", gt=0, le=10) = Field(
+        1.0, description="cells that the fastest water may cross in one step; sets the step up to step_max"
+    )
+    output_every: PositiveTime | None = Field(
+        None, description="time between two written states; absent: a hundredth of the end time"
+    )
+
+
+class Tank(Section):
+    """The box in which water may be: a fixed mesh of tetrahedra. Closed sides are walls for blocks too."""
+
+    lower: Point = Field(description="corner with the smallest coordinates", examples=[[0, 0, 0]])
+    upper: Point = Field(description="corner with the largest coordinates", examples=[[60, 24, 16]])
+    cell: PositiveLength = Field(
+        description="edge of the mesh cells; shrunk so that a whole number fits each side", examples=["1 m"]
+    )
+    open: tuple[Side, ...] = Field(
+        ("z+",), description="sides through which air and water may leave; the others are smooth walls"
+    )
+
+
+class Fill(Section):
+    """A box full of water at the start; solids and blocks in it displace the water."""
+
+    lower: Point = Field(description="corner with the smallest coordinates", examples=[[0, 0, 0]])
+    upper: Point = Field(description="corner with the largest coordinates", examples=[[20, 24, 10]])
+
+
+class Water(Section):
+    """The water. Absent: no water, and nothing of the flow solver is loaded."""
+
+    density: Density = Field(1000.0, description="mass per volume")
+    theta: quantity("", ge=0.5, le=1) = Field(
+        0.6, description="weight of the new pressure in the projection; 0.5 damps least, 1 most"
+    )
+    covers: Literal["single", "multiple"] = Field(
+        "single",
+        description="one set of unknowns per node, or one per part of the water that a thin wall separates",
+    )
+    fill: tuple[Fill, ...] = Field((), description="where the water stands at the start; at least one box")
+
+
+class Rotation(Section):
+    """A turn about an axis through the centre, by the right-hand rule."""
+
+    axis: tuple[Number, Number, Number] = Field(description="direction of the axis; any length but zero")
+    angle: quantity("rad") = Field(description="angle of the turn", examples=["30 deg"])
+
+
+class Solid(Section):
+    """A fixed box in the water, for instance an obstacle; it carries forces but never moves."""
+
+    name: Name = Field("solid", description="for gauges and results")
+    centre: Point = Field(description="centre of the box")
+    size: Size = Field(description="edges of the box along its own axes")
+    rotation: Rotation | None = Field(None, description="turn of the box; absent: along the axes")
+
+
+class Block(Section):
+    """One rigid box that moves."""
+
+    name: Name = Field(description="for joints, gauges, motions and results; one block a name")
+    centre: Point = Field(description="centre of mass at the start")
+    size: Size = Field(description="edges of the box along its own axes")
+    rotation: Rotation | None = Field(None, description="turn of the box; absent: along the axes")
+    velocity: VelocityVector = Field((0.0, 0.0, 0.0), description="velocity of the centre at the start")
+    spin: SpinVector = Field((0.0, 0.0, 0.0), description="angular velocity at the start, world axes")
+    density: Density | None = Field(None, description="mass per volume; absent: structure.density")
+    fixed: Switch = Field(False, description="true: held in place for the whole run")
+    group: Name | None = Field(None, description="a name shared by blocks; gauges can add up a group")
+
+
+class Opening(Section):
+    """A door or a window: a rectangle without blocks in one wall of a building."""
+
+    wall: Wall = Field(description="the wall, by the side on which it stands")
+    lower: tuple[Length, Length] = Field(
+        description="its corner: distance along the wall from the wall's end with the smaller coordinate, "
+        "and height above the foot of the building",
+        examples=[[4, 0]],
+    )
+    size: tuple[PositiveLength, PositiveLength] = Field(description="width and height", examples=[[2, 3]])
+
+
+class Building(Section):
+    """Four walls of blocks, floors between the storeys and a roof, glued where blocks touch."""
+
+    name: Name = Field("building", description="the group of all its blocks")
+    lower: Point = Field(description="lowest corner of the foot, outside of the walls", examples=[[30, 7, 0]])
+    size: Size = Field(description="outside length, depth and height, roof included", examples=[[20, 10, 12]])
+    wall_thickness: PositiveLength = Field(description="thickness of the walls", examples=["1 m"])
+    block: tuple[PositiveLength, PositiveLength] = Field(
+        description="wanted length and height of the blocks; changed so that whole numbers fit",
+        examples=[["2 m", "2 m"]],
+    )
+    storeys: Annotated[int, Field(strict=True, ge=1, le=100)] = Field(
+        1, description="number of storeys of equal height, with a floor between two of them"
+    )
+    floor_thickness: PositiveLength | None = Field(
+        None, description="thickness of floors and roof; absent: wall_thickness"
+    )
+    roof: Switch = Field(True, description="false: open at the top")
+    density: Density | None = Field(None, description="mass per volume; absent: structure.density")
+    opening: tuple[Opening, ...] = Field((), description="doors and windows")
+
+
+class MasonryWall(Section):
+    """A straight wall, column or pier: a box divided into equal blocks, glued where they touch."""
+
+    name: Name = Field("wall", description="the group of all its blocks")
+    lower: Point = Field(description="corner with the smallest coordinates")
+    size: Size = Field(description="outside edges")
+    block: Size = Field(description="wanted edges of the blocks; changed so that whole numbers fit")
+    density: Density | None = Field(None, description="mass per volume; absent: structure.density")
+
+
+class Ground(Section):
+    """A flat, rough ground without end under the blocks. With a tank its floor is ground as well."""
+
+    level: Length = Field(0.0, description="height of the ground")
+
+
+class Structure(Section):
+    """Rigid blocks. Absent: nothing moves but water, and YADE is never loaded."""
+
+    density: Density = Field(2400.0, description="mass per volume of blocks that do not say their own")
+    block: tuple[Block, ...] = Field((), description="single blocks")
+    wall: tuple[MasonryWall, ...] = Field((), description="walls of equal blocks")
+    building: tuple[Building, ...] = Field((), description="buildings with floors, roof and openings")
+    ground: Ground | None = Field(None, description="flat ground under the blocks")
+
+
+class Contact(Section):
+    """Spring, dashpot and friction between touching faces."""
+
+    stiffness: quantity("N/m", gt=0) = Field(
+        description="K of a pair of faces in contact, normal and tangential", examples=["1 GN/m"]
+    )
+    restitution: quantity("", ge=0, le=1) = Field(
+        0.3, description="e, velocity after a normal impact over the velocity before"
+    )
+    friction: quantity("", ge=0) = Field(0.5, description="mu, largest tangential over normal force")
+    rule: Literal["exact", "paper"] = Field(
+        "exact",
+        description="dashpot that gives e exactly and never pulls, or the closed formula of the method",
+    )
+
+
+class Joints(Section):
+    """Cohesion between touching faces, T = 27/4 T_max d (1 - d)^2 with d = opening/opening_at_failure."""
+
+    strength: quantity("Pa", gt=0) = Field(description="T_max, largest traction", examples=["0.5 MPa"])
+    opening_at_failure: PositiveLength = Field(
+        description="opening at which nothing holds any more", examples=["5 mm"]
+    )
+    shear_ratio: quantity("", gt=0) = Field(
+        1.0, description="beta, weight of sliding in the effective opening and in the shear traction"
+    )
+    closing_ratio: quantity("", gt=0) = Field(
+        1.0, description="stiffness in compression over the first stiffness in tension"
+    )
+    damping: quantity("", ge=0, le=1) = Field(
+        0.02, description="share of critical damping, proportional to the stiffness of the joint"
+    )
+    points: Annotated[int, Field(strict=True, ge=2, le=5)] = Field(
+        3, description="Gauss points along each direction of a joined face"
+    )
+    ground: Switch = Field(True, description="blocks that stand on the ground are glued to it")
+
+
+class LevelGauge(Section):
+    """Height of the water surface above the tank's floor plane z = 0 at a place."""
+
+    kind: Literal["level"]
+    name: Name = Field(description="column of the history")
+    at: tuple[Length, Length] = Field(description="place (x, y)")
+
+
+class PressureGauge(Section):
+    """Pressure of the water at a point."""
+
+    kind: Literal["pressure"]
+    name: Name = Field(description="column of the history")
+    at: Point = Field(description="point (x, y, z); on the face of a solid or block: just outside of it")
+
+
+class VelocityGauge(Section):
+    """Velocity of the water at a point."""
+
+    kind: Literal["velocity"]
+    name: Name = Field(description="columns of the history")
+    at: Point = Field(description="point (x, y, z)")
+
+
+class VolumeGauge(Section):
+    """Volume of the water inside a box."""
+
+    kind: Literal["volume"]
+    name: Name = Field(description="column of the history")
+    lower: Point = Field(description="corner with the smallest coordinates")
+    upper: Point = Field(description="corner with the largest coordinates")
+
+
+class ForceGauge(Section):
+    """Force of the water on a block, a group, a building or a solid."""
+
+    kind: Literal["force"]
+    name: Name = Field(description="columns of the history")
+    on: Name = Field(description="name of a block, group, wall, building or solid")
+
+
+class MotionGauge(Section):
+    """Centre and velocity of one block."""
+
+    kind: Literal["motion"]
+    name: Name = Field(description="columns of the history")
+    of: Name = Field(description="name of a block")
+
+
+Gauge = Annotated[
+    LevelGauge | PressureGauge | VelocityGauge | VolumeGauge | ForceGauge | MotionGauge,
+    Field(discriminator="kind"),
+]
+
+
+class Motion(Section):
+    """A block that moves as prescribed, for instance the grip of a testing machine."""
+
+    block: Name = Field(description="name of the block")
+    velocity: VelocityVector = Field(description="its velocity for the whole run")
+
+
+class RunLimits(Section):
+    """When a run stops early because its numbers are not to be trusted, or have cost enough."""
+
+    volume_error: quantity("", gt=0) = Field(0.02, description="lost or gained share of the water")
+    energy_error: quantity("", gt=0) = Field(0.05, description="unbalanced share of the energy put in")
+    defect: quantity("", gt=0) = Field(
+        0.05, description="share by which the blocks' mean motion in a step may miss what the water was told"
+    )
+    cpu_seconds: PositiveTime | None = Field(None, description="processor time that the run may take")
+
+
+class Case(Section):
+    """A whole case file."""
+
+    case: About = Field(description="what the case is")
+    time: Time = Field(description="how long and how often")
+    tank: Tank | None = Field(None, description="the box for the water")
+    water: Water | None = Field(None, description="the water")
+    solid: tuple[Solid, ...] = Field((), description="fixed boxes")
+    structure: Structure | None = Field(None, description="rigid blocks")
+    contact: Contact | None = Field(None, description="what happens where blocks touch")
+    joints: Joints | None = Field(None, description="glue between touching faces, which may break")
+    gauge: tuple[Gauge, ...] = Field((), description="what is measured at every step")
+    motion: tuple[Motion, ...] = Field((), description="blocks that move as prescribed")
+    limits: RunLimits = Field(default_factory=RunLimits, description="when a run stops early")
+
+
+def modules(case: Case) -> dict[str, bool]:
+    """Which parts of the program a case switches on, by name, in the order in which they are told."""
+    structure = case.structure is not None
+    water = case.water is not None
+    return {
+        "water": water,
+        "structure": structure,
+        "coupling": water and structure,
+        "fixed solids": bool(case.solid),
+        "contact": case.contact is not None,
+        "joints": case.joints is not None,
+        "prescribed motion": bool(case.motion),
+        "gauges": bool(case.gauge),
+    }
+
+
+def effective(case: Case) -> dict:
+    """The case with every default filled in, as plain data in SI; `Case.model_validate` reads it back."""
+    return case.model_dump(mode="json", exclude_none=True)

@@ -1,0 +1,214 @@
+"""From a case directory to a checked case: TOML, `--set`, schema, geometry. All mistakes are told at once.
+
+A message has the form `PLACE: KEY: what is wrong; what to do`, where PLACE is `path/case.toml:LINE` or
+`--set KEY=VALUE`.
+"""
+
+from __future__ import annotations
+
+import copy
+import difflib
+import re
+import sys
+import tomllib
+from collections.abc import Iterable
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from coupler.case import Case
+from coupler.case_checks import problems
+from coupler.case_messages import explain_error
+from coupler.errors import BadCase
+from coupler.toml_lines import key_lines, line_of
+
+KeyPath = tuple[str | int, ...]
+
+
+@dataclass(frozen=True)
+class CaseFile:
+    """A case that passed every check, with where it came from."""
+
+    case: Case
+    path: Path
+    overrides: tuple[str, ...]
+
+    @property
+    def directory(self) -> Path:
+        return self.path.parent
+
+
+def load(place: Path | str, overrides: Iterable[str] = ()) -> CaseFile:
+    """Read `place` (a case.toml or the directory that holds one) and the `key=value` overrides.
+
+    Raises BadCase with one line for each mistake.
+    """
+    path = _find(Path(place))
+    text, table = _read(path)
+    overrides = tuple(overrides)
+    places = _Places(_shown(path), key_lines(text))
+    for override in overrides:
+        places.override(_apply(table, override), override)
+    case, lines = _validate(table, places)
+    if lines or case is None:
+        raise BadCase(lines)
+    return CaseFile(case, path, overrides)
+
+
+class _Places:
+    """Tells where a key path of the case was written: a line of the file or an override."""
+
+    def __init__(self, name: str, lines: dict[KeyPath, int]):
+        self.name, self.lines = name, lines
+        self.overrides: dict[KeyPath, str] = {}
+
+    def override(self, path: KeyPath, text: str) -> None:
+        self.overrides[path] = text
+
+    def line(self, path: KeyPath) -> int:
+        """Line in the file, 0 for what is not there; overrides come last."""
+        if self._override(path):
+            return sys.maxsize
+        return line_of(path, self.lines) or 0
+
+    def _override(self, path: KeyPath) -> str | None:
+        return next((text for given, text in self.overrides.items() if path[: len(given)] == given), None)
+
+    def __call__(self, path: KeyPath) -> str:
+        override = self._override(path)
+        if override:
+            return f"--set {override}"
+        line = self.line(path)
+        return f"{self.name}:{line}" if line else self.name
+
+
+def _find(place: Path) -> Path:
+    path = place / "case.toml" if place.is_dir() else place
+    if path.is_file():
+        return path
+    if place.is_dir():
+        raise BadCase([f"{place}: no case.toml in this directory; `surgebreak init {place}` writes one"])
+    around = place.parent if place.parent.is_dir() else Path(".")
+    near = difflib.get_close_matches(place.name, [child.name for child in around.iterdir()], n=1)
+    hint = f"; did you mean '{around / near[0]}'?" if near else "; give a case directory or a case.toml"
+    raise BadCase([f"{place}: no such case{hint}"])
+
+
+def _shown(path: Path) -> str:
+    """The path as the user is likely to write it: relative to here when it lies below."""
+    here = Path.cwd()
+    return str(path.relative_to(here) if path.is_absolute() and path.is_relative_to(here) else path)
+
+
+def _read(path: Path) -> tuple[str, dict]:
+    try:
+        text = path.read_text(encoding="utf-8")
+        return text, tomllib.loads(text)
+    except UnicodeDecodeError as error:
+        raise BadCase(
+            [f"{_shown(path)}: not a text in UTF-8 (byte {error.start}); save it as UTF-8"]
+        ) from error
+    except OSError as error:
+        raise BadCase([f"{_shown(path)}: cannot be read: {error.strerror}"]) from error
+    except tomllib.TOMLDecodeError as error:
+        what, line = str(error), ""
+        at = re.search(r" \(at line (\d+), column \d+\)", what)
+        if at:
+            what, line = what.replace(at[0], ""), f":{at[1]}"
+        raise BadCase([f"{_shown(path)}{line}: not valid TOML: {what}"]) from error
+
+
+# ---------------------------------------------------------------- overrides
+
+
+def _apply(table: dict, override: str) -> KeyPath:
+    """Write one `a.b=value` or `a.b[1].c=value` into the table; returns its path.
+
+    `value` is TOML; what is no TOML is taken as text, so that units need no quotes.
+    """
+    name, sign, value = override.partition("=")
+    path = _parse_path(name.strip())
+    if not sign or not path:
+        raise BadCase(
+            [f"--set {override}: write KEY=VALUE, for instance time.end=2 or joints.strength='1 MPa'"]
+        )
+    holder = table
+    for part, following in pairwise(path):
+        holder = _step_into(holder, part, [] if isinstance(following, int) else {}, override)
+    _step_into(holder, path[-1], None, override)
+    holder[path[-1]] = _value(value.strip())
+    return path
+
+
+def _parse_path(name: str) -> KeyPath:
+    if not re.fullmatch(r"[A-Za-z0-9_-]+(\[\d+\]|\.[A-Za-z0-9_-]+)*", name):
+        return ()
+    parts = re.findall(r"\[(\d+)\]|([A-Za-z0-9_-]+)", name)
+    return tuple(int(place) if place else word for place, word in parts)
+
+
+def _step_into(holder: dict | list, part: str | int, new: dict | list | None, override: str):
+    """The thing under `part`, made when a name is new; refuses places that do not exist."""
+    if isinstance(part, int):
+        if not isinstance(holder, list) or part >= len(holder):
+            size = len(holder) if isinstance(holder, list) else 0
+            raise BadCase(
+                [f"--set {override}: there is no item [{part}]; the list has {size}, counted from [0]"]
+            )
+        return holder[part]
+    if isinstance(holder, list):
+        raise BadCase(
+            [f"--set {override}: '{part}' is inside a list; say which item, for instance [0].{part}"]
+        )
+    if not isinstance(holder, dict):
+        raise BadCase([f"--set {override}: '{part}' is below a value, not below a section"])
+    return holder.setdefault(part, new) if new is not None else holder.get(part)
+
+
+def _value(text: str) -> object:
+    try:
+        return tomllib.loads(f"x = {text}")["x"]
+    except tomllib.TOMLDecodeError:
+        return text
+
+
+# ---------------------------------------------------------------- checks
+
+
+def _validate(table: dict, places: _Places) -> tuple[Case | None, list[str]]:
+    """The case and the messages. Unknown names do not hide what is wrong with the geometry."""
+    try:
+        case, found = Case.model_validate(table), []
+    except ValidationError as error:
+        found = error.errors()
+        case = _without_unknown(table, found)
+    mistakes = [explain_error(item) for item in found]
+    if case is not None:
+        mistakes += problems(case)
+    mistakes.sort(key=lambda mistake: places.line(mistake[0]))
+    lines = [_line(path, text, places) for path, text in mistakes]
+    return (case if not found else None), list(dict.fromkeys(lines))
+
+
+def _without_unknown(table: dict, found: list) -> Case | None:
+    if any(item["type"] != "extra_forbidden" for item in found):
+        return None
+    rest = copy.deepcopy(table)
+    for item in found:
+        path, _ = explain_error(item)
+        holder = rest
+        for part in path[:-1]:
+            holder = holder[part]
+        del holder[path[-1]]
+    return Case.model_validate(rest)
+
+
+def _line(path: KeyPath, text: str, places: _Places) -> str:
+    return f"{places(path)}: {shown(path)}: {text}" if path else f"{places(path)}: {text}"
+
+
+def shown(path: KeyPath) -> str:
+    """("structure", "block", 1, "size") -> "structure.block[1].size"."""
+    return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path).lstrip(".")

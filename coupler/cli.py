@@ -1,0 +1,182 @@
+"""The command `surgebreak`. Commands import what they need when they are called: help must stay quick."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from coupler.errors import ExitCode
+from coupler.failures import Failures
+
+app = typer.Typer(
+    name="surgebreak",
+    help="How a structure breaks when water hits it, and how its debris then changes the flow.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+PASS_ON = {"allow_extra_args": True, "ignore_unknown_options": True}
+
+CasePlace = Annotated[Path, typer.Argument(metavar="CASE", help="a case directory or a case.toml")]
+Overrides = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set", metavar="KEY=VALUE", help="change a value of the case, for instance time.end='2 s'"
+    ),
+]
+
+
+def main() -> None:
+    """Entry point; leaves with 0 done, 1 failure, 2 bad case, 3 diverged or out of balance, 4 stopped."""
+    with Failures():
+        app()
+
+
+@app.callback(invoke_without_command=True)
+def _root(
+    version: Annotated[bool, typer.Option("--version", help="print the version and leave")] = False,
+) -> None:
+    if version:
+        from coupler.provenance import version as number
+
+        print(f"surgebreak {number()}")
+        raise typer.Exit
+
+
+@app.command()
+def run(
+    case: CasePlace,
+    set: Overrides = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(help="a new directory for the results; else runs/<time>-<hash> beside the case"),
+    ] = None,
+    end: Annotated[str | None, typer.Option(help="short for --set time.end=...")] = None,
+) -> None:
+    """Run a case. Ctrl-C or a file named `stop` in the run directory ends it cleanly."""
+    one_thread()
+    from coupler.case_file import load
+    from coupler.progress import reporter
+    from coupler.run_directory import RunDirectory
+    from coupler.stop import StopRequest
+
+    file = load(case, [*(set or []), *([f"time.end={end}"] if end else [])])
+    from coupler.loop import run as run_case
+
+    with RunDirectory.create(file, output) as directory, StopRequest(directory.path) as stop:
+        with reporter(file.case.time.end, directory.log, stop.requested) as tell:
+            describe(file, tell.message)
+            code = ExitCode(run_case(file.case, directory, tell))
+        directory.finish(code, "reached the end" if code == ExitCode.DONE else "see log.txt")
+    print(f"results in {directory.path}")
+    raise typer.Exit(int(code))
+
+
+@app.command()
+def check(case: CasePlace, set: Overrides = None) -> None:
+    """Check a case without running it, and forecast steps, memory and disk."""
+    one_thread()
+    from coupler import terminal
+    from coupler.case_file import load
+
+    file = load(case, set or [])
+    describe(file, print)
+    from coupler.forecast import forecast
+
+    terminal.table("forecast", forecast(file.case).rows)
+
+
+def describe(file, tell) -> None:
+    """Tell which parts are on and off, and what is worth knowing before the run."""
+    from coupler.case import modules
+    from coupler.case_checks import remarks
+
+    parts = modules(file.case)
+    tell(f"{file.path}: {file.case.case.title}")
+    tell("on:  " + (", ".join(name for name, on in parts.items() if on) or "nothing"))
+    tell("off: " + (", ".join(name for name, on in parts.items() if not on) or "nothing"))
+    for remark in remarks(file.case):
+        tell(f"note: {remark}")
+
+
+@app.command(context_settings=PASS_ON)
+def render(
+    context: typer.Context,
+    run: Annotated[Path, typer.Argument(metavar="RUN", help="a run directory")],
+) -> None:
+    """Make a still and a film of a run, in a process of its own; options go to `python -m coupler.view`."""
+    need("pyvista", "view", "render")
+    raise typer.Exit(_python("-m", "coupler.view", str(run), *context.args))
+
+
+@app.command()
+def doctor() -> None:
+    """Check that Python, YADE, threads, files and pictures work here."""
+    one_thread()
+    from coupler.doctor import examine
+
+    raise typer.Exit(int(examine()))
+
+
+@app.command()
+def explain(
+    key: Annotated[
+        str | None, typer.Argument(help="a name of the case file, for instance joints.strength")
+    ] = None,
+) -> None:
+    """Say what a name of the case file means, with unit, limits and default."""
+    from coupler.case_docs import explanation
+
+    print(explanation(key))
+
+
+@app.command()
+def init(directory: Annotated[Path, typer.Argument(help="the new case directory")]) -> None:
+    """Write a small commented case that runs."""
+    from coupler.case_docs import write_first_case
+
+    path = write_first_case(directory)
+    print(f"wrote {path}; next: surgebreak check {directory}, surgebreak run {directory}")
+
+
+@app.command(context_settings=PASS_ON)
+def test(context: typer.Context) -> None:
+    """Run the tests; further words go to pytest."""
+    need("pytest", "test", "test")
+    one_thread()
+    from coupler.provenance import ROOT
+
+    raise typer.Exit(_python("-m", "pytest", *context.args, cwd=ROOT))
+
+
+def one_thread() -> None:
+    """One thread unless the user asks: reproducible, and several spinning pools are far slower."""
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
+
+
+def need(package: str, extra: str, command: str) -> None:
+    """Refuse, with the way out, when an optional package is absent."""
+    if find_spec(package) is None:
+        from coupler.errors import SurgebreakError
+
+        raise SurgebreakError(
+            f"the package {package} is not installed; `./surgebreak {command}` of the checkout installs it, "
+            f"or: pip install -c constraints.txt -e '.[{extra}]'"
+        )
+
+
+def _python(*arguments: str, cwd: Path | None = None) -> int:
+    return subprocess.run([sys.executable, *arguments], cwd=cwd, check=False).returncode
+
+
+if __name__ == "__main__":
+    main()

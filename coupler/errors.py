@@ -1,0 +1,55 @@
+"""What can go wrong, each with its exit code; the message says what, where, which value and what to do."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from enum import IntEnum
+
+
+class ExitCode(IntEnum):
+    """What the command returns to the shell."""
+
+    DONE = 0
+    CRASHED = 1
+    BAD_CASE = 2
+    DIVERGED = 3
+    STOPPED = 4
+
+
+class SurgebreakError(Exception):
+    """Base of the errors whose message is all that the user needs; no traceback is shown."""
+
+    exit_code = ExitCode.CRASHED
+
+
+class BadCase(SurgebreakError):
+    """The case cannot be run as it is written; holds every reason found, one line each."""
+
+    exit_code = ExitCode.BAD_CASE
+
+    def __init__(self, lines: Iterable[str]):
+        self.lines = list(lines)
+        super().__init__("\n".join(self.lines))
+
+
+class UnitError(ValueError):
+    """A value whose unit is missing, unknown or of another dimension."""
+
+
+class RunDirectoryExists(SurgebreakError):
+    """The directory for the results is there already; results are never overwritten."""
+
+    exit_code = ExitCode.BAD_CASE
+
+
+class CannotWrite(SurgebreakError):
+    """The directory for the results cannot be made."""
+
+    exit_code = ExitCode.BAD_CASE
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """'; did you mean ...?' with the nearest known name, or nothing when none is near."""
+    near = difflib.get_close_matches(name, list(known), n=1, cutoff=0.6)
+    return f"; did you mean '{near[0]}'?" if near else ""

@@ -1,0 +1,193 @@
+"""The directory of one run: made once, never overwritten, readable at any moment.
+
+    case.toml       copy of the case        run.json    summary for machines, replaced as a whole
+    effective.json  every value, in SI      log.txt     what was told, and tracebacks
+    history/*.csv  fields.vtkhdf  blocks.vtkhdf  solids.vtkhdf  cracks.csv  pictures/
+
+`run.json` says "running" until the run ends; after a kill it still does, with the process number that it had.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+import sys
+import time
+from datetime import UTC, datetime
+from pathlib import Path
+from types import TracebackType
+
+from coupler import provenance
+from coupler.case import effective, modules
+from coupler.case_file import CaseFile
+from coupler.errors import CannotWrite, ExitCode, RunDirectoryExists
+from coupler.failures import FULL, Failure
+
+RESERVE = 256 * 1024
+"""Bytes kept aside so that the reason can still be written when the disk is full."""
+
+
+class RunDirectory:
+    """A context: leaving it writes how the run ended, whatever the reason."""
+
+    def __init__(self, path: Path, summary: dict):
+        self.path, self.summary = path, summary
+        self.finished = False
+        self._clock = (time.monotonic(), time.process_time())
+
+    @classmethod
+    def create(cls, file: CaseFile, output: Path | None = None) -> RunDirectory:
+        """Make the directory with case, effective case, log and a first run.json.
+
+        output: a new or empty directory; None: runs/<UTC stamp>-<hash of the effective case> beside the case.
+        Raises RunDirectoryExists or CannotWrite.
+        """
+        content = effective(file.case)
+        path = _make(output, file.directory / "runs", content)
+        run = cls(path, _summary(file, content))
+        (path / "history").mkdir()
+        (path / ".reserve").write_bytes(bytes(RESERVE))
+        shutil.copyfile(file.path, path / "case.toml")
+        write_json(path / "effective.json", content)
+        run.log(f"surgebreak {provenance.version()}: {' '.join(sys.argv)}")
+        run.save()
+        return run
+
+    @property
+    def log_path(self) -> Path:
+        return self.path / "log.txt"
+
+    @property
+    def history(self) -> Path:
+        """Directory of the history tables."""
+        return self.path / "history"
+
+    def log(self, text: str) -> None:
+        """Append a line with its time to log.txt."""
+        stamp = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+        with self.log_path.open("a", encoding="utf-8") as stream:
+            stream.write(f"{stamp}  {text}\n")
+
+    def record(self, **figures: object) -> None:
+        """Set figures of the summary (numbers, texts, lists or tables of them) and write it."""
+        self.summary["figures"].update(figures)
+        self.save()
+
+    def save(self) -> None:
+        """Replace run.json as a whole, so that a reader never sees half of it."""
+        self.summary["wall_seconds"] = round(time.monotonic() - self._clock[0], 3)
+        self.summary["cpu_seconds"] = round(time.process_time() - self._clock[1], 3)
+        write_json(self.path / "run.json", self.summary)
+
+    def finish(self, code: ExitCode, reason: str) -> None:
+        """Write how the run ended; the first reason stays."""
+        if self.finished:
+            return
+        self.finished = True
+        (self.path / ".reserve").unlink(missing_ok=True)
+        self.summary |= {
+            "status": code.name.lower(),
+            "exit_code": int(code),
+            "exit_reason": reason,
+            "ended": _now().isoformat(timespec="seconds"),
+        }
+        self.save()
+        self.log(f"{code.name.lower().replace('_', ' ')}: {reason}")
+
+    def __enter__(self) -> RunDirectory:
+        return self
+
+    def __exit__(self, kind: type | None, error: BaseException | None, _: TracebackType | None) -> None:
+        if error is None:
+            self.finish(ExitCode.DONE, "reached the end")
+            return
+        error.log_path = self.log_path
+        failure = Failure.of(error)
+        try:
+            self.finish(failure.exit_code, failure.message)
+            if failure.traceback:
+                self.log(failure.traceback)
+        except OSError as second:
+            if second.errno not in FULL:
+                raise
+
+
+def write_json(path: Path, content: object) -> None:
+    """Write to a neighbour first and rename it, which either happens as a whole or not at all."""
+    part = path.with_name(f".{path.name}.part")
+    with part.open("w", encoding="utf-8") as stream:
+        json.dump(content, stream, indent=1, ensure_ascii=False, allow_nan=False, default=_plain)
+        stream.write("\n")
+        stream.flush()
+        os.fsync(stream.fileno())
+    os.replace(part, path)
+
+
+def _plain(value: object) -> object:
+    """Numpy numbers and arrays, and paths, as what JSON knows."""
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    if isinstance(value, Path):
+        return str(value)
+    raise TypeError(f"{type(value).__name__} cannot go into run.json: {value!r}")
+
+
+def _make(output: Path | None, runs: Path, content: dict) -> Path:
+    try:
+        return _make_named(output) if output is not None else _make_stamped(runs, content)
+    except OSError as error:
+        raise CannotWrite(
+            f"{output or runs}: cannot make the directory for the results ({error.strerror}); "
+            "give --output a place that you may write to"
+        ) from error
+
+
+def _make_named(output: Path) -> Path:
+    if output.exists() and not (output.is_dir() and not any(output.iterdir())):
+        raise RunDirectoryExists(
+            f"{output}: exists and is not an empty directory; results are never overwritten; "
+            "name another with --output, or leave it out for runs/<time>-<hash>"
+        )
+    output.mkdir(parents=True, exist_ok=True)
+    return output
+
+
+def _make_stamped(runs: Path, content: dict) -> Path:
+    digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:8]
+    name = f"{_now():%Y%m%dT%H%M%SZ}-{digest}"
+    runs.mkdir(parents=True, exist_ok=True)
+    for attempt in range(1, 1000):
+        path = runs / (name if attempt == 1 else f"{name}-{attempt}")
+        try:
+            path.mkdir()
+            return path
+        except FileExistsError:
+            continue  # another run of the same case began within this second
+    raise RunDirectoryExists(f"{runs / name}: exists a thousand times; remove old runs")
+
+
+def _summary(file: CaseFile, content: dict) -> dict:
+    return {
+        "program": "surgebreak",
+        "status": "running",
+        "exit_code": None,
+        "exit_reason": None,
+        "started": _now().isoformat(timespec="seconds"),
+        "ended": None,
+        "process": os.getpid(),
+        "command": sys.argv,
+        "case_file": str(file.path.resolve()),
+        "overrides": list(file.overrides),
+        "modules": modules(file.case),
+        "versions": provenance.versions(),
+        "machine": provenance.machine(),
+        "git": provenance.git_state(),
+        "figures": {},
+        "case": content,
+    }
+
+
+def _now() -> datetime:
+    return datetime.now(UTC)

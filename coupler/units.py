@@ -1,0 +1,127 @@
+"""Quantities at the door: text with a unit becomes a float in SI; plain numbers are SI already.
+
+    to_si("24 kN/m3", "N/m3") = 24000.0        to_si(24000, "N/m3") = 24000.0
+
+Units are read by pint, which is imported only when a value is text. A digit behind a letter is a power
+(`kg/m3`, `m/s2`, `s-1`), which pint itself does not read.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from functools import lru_cache, partial
+from typing import Annotated
+
+from pydantic import BeforeValidator, Field
+
+from coupler.errors import UnitError
+
+DIMENSIONS = {
+    "": "a plain number",
+    "m": "a length",
+    "m2": "an area",
+    "m3": "a volume",
+    "s": "a time",
+    "1/s": "a frequency",
+    "kg": "a mass",
+    "m/s": "a velocity",
+    "m/s2": "an acceleration",
+    "kg/m3": "a density",
+    "Pa": "a pressure",
+    "N": "a force",
+    "N/m": "a stiffness",
+    "J": "an energy",
+    "rad": "an angle",
+    "rad/s": "an angular velocity",
+}
+"""What a quantity of each unit of the case file is called."""
+
+_QUANTITY = re.compile(r"\s*([-+]?(?:\d[\d_]*\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
+_FACTOR = r"[^\W\d_%°]*[A-Za-z%°](?:(?:\^|\*\*)?-?\d+)?"
+_UNIT_TEXT = re.compile(rf"(?:(?:1\s*/\s*)?{_FACTOR}(?:(?:\s*[*/·]\s*|\s+){_FACTOR})*)?")
+_POWER = re.compile(r"(?<=[A-Za-z])(-?\d+)")
+
+
+@dataclass(frozen=True)
+class Unit:
+    """Marks a field of the case with the SI unit of its value."""
+
+    symbol: str
+
+
+def quantity(unit: str, **limits: float):
+    """The type of a case field: a float in SI `unit` or text with any unit of its kind."""
+    return Annotated[float, BeforeValidator(partial(to_si, unit=unit)), Field(**limits), Unit(unit)]
+
+
+def to_si(value: object, unit: str) -> float:
+    """value (number, or text such as "5 MN/mm") in SI `unit`.
+
+    Raises UnitError, naming the value, when the text is no quantity or one of another kind.
+    """
+    if isinstance(value, bool) or not isinstance(value, int | float | str):
+        raise UnitError(f"{value!r} is not a number{_example(unit)}")
+    if isinstance(value, int | float):
+        return float(value)
+    match = _QUANTITY.fullmatch(value)
+    if match is None:
+        raise UnitError(f"{value!r} is not a number with a unit{_example(unit)}")
+    number, given = float(match[1]), match[2]
+    if not given and unit:
+        raise UnitError(f"{value!r} has no unit{_example(unit)}")
+    return number * _factor(given, unit, value)
+
+
+@lru_cache(maxsize=256)
+def _factor(given: str, unit: str, value: str) -> float:
+    import pint
+
+    registry = _registry()
+    try:
+        if not _UNIT_TEXT.fullmatch(given):
+            raise ValueError(given)
+        source = 1.0 * registry.parse_units(_POWER.sub(r"^\1", given.replace("·", "*")))
+    except (pint.PintError, ValueError, AttributeError) as error:
+        raise UnitError(f"{value!r}: unknown unit '{given}'{_example(unit)}") from error
+    target = _si(unit)
+    of_other_kind = source.dimensionality != target.dimensionality
+    if of_other_kind or _is_angle(source) != _is_angle(target):
+        raise UnitError(f"{value!r} is {_kind(source)}, needs {DIMENSIONS[unit]}{_in(unit)}")
+    return float(source.to(target.units).magnitude)
+
+
+def _is_angle(source) -> bool:
+    """Pint counts angles as plain numbers; a friction of "30 deg" is a mistake all the same."""
+    return any(name == "radian" for name, _ in source.to_root_units().unit_items())
+
+
+@lru_cache(maxsize=1)
+def _registry():
+    import pint
+
+    return pint.UnitRegistry()
+
+
+def _si(unit: str):
+    text = _POWER.sub(r"^\1", unit).replace("1/", "dimensionless/")
+    return 1.0 * _registry().parse_units(text)
+
+
+def _kind(source) -> str:
+    """The name of the dimension of a pint quantity, in words where it has one here."""
+    for unit, name in DIMENSIONS.items():
+        known = _si(unit)
+        if known.dimensionality == source.dimensionality and _is_angle(known) == _is_angle(source):
+            return name
+    return f"of dimension {source.dimensionality}"
+
+
+def _in(unit: str) -> str:
+    return f" [{unit}]" if unit else ""
+
+
+def _example(unit: str) -> str:
+    if not unit:
+        return "; write a plain number"
+    return f'; write {DIMENSIONS[unit]} as a number in {unit}, or as text such as "2 {unit}"'
