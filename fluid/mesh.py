@@ -173,7 +173,7 @@ def _uniform_axes(nodes, spacing):
 
 
 def _bins(nodes, cells, axes, lattice):
-    """Cells of each bin as CSR: in a lattice the bin of the centroid, otherwise all bins a cell's box meets."""
+    """Cells of each bin as CSR: of the centroid in a lattice, otherwise all that the box of a cell meets."""
     x = nodes[cells]
     corners = (x.mean(axis=1), x.mean(axis=1)) if lattice else (x.min(axis=1), x.max(axis=1))
     low, high = (np.stack([_bin_of(axes[k], c[:, k]) for k in range(3)], axis=1) for c in corners)

@@ -1,0 +1,179 @@
+"""Second half of the step: the velocity that the pressure leaves.
+
+u_i = u*_i - (dt/ρ) Π(∇x)_i,   a_i = (u_i - u_adv_i) / (θ dt)                 on wet nodes, Π: weighted mean
+u'_e ← u'_e - (dt/ρ) (∇x_e - mean of Π(∇x) over the cell)                     on wholly wet cells
+u_e = u*_e + u'_e - (dt/ρ) ∇x_e                                               balances exactly: carries volume
+speed limit · divergence damping · continuation outside the water
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fluid.extension import extend_velocity
+from fluid.moments import cells_touching, wet_fraction
+from fluid.projection import cell_gradient, cell_velocity, damp_divergence, nodal_mean, with_ghosts
+from fluid.volume import Flux, edge_flux
+
+
+@dataclass(frozen=True)
+class Corrected:
+    """The state at the end of the step; names as in Water."""
+
+    velocity: np.ndarray
+    acceleration: np.ndarray
+    pressure: np.ndarray
+    remainder: np.ndarray
+    kick_remainder: np.ndarray
+    cell_velocity: np.ndarray
+    nodal_water: np.ndarray
+    flux: Flux
+    listed: np.ndarray
+    layer_start: np.ndarray
+    report: object
+
+
+def corrected(water, problem, x) -> Corrected:
+    """End the step with the pressure x (n,) [Pa]."""
+    t, kept, dt = water.topology, problem.predicted, problem.dt
+    pressure = np.zeros(len(kept.wet))
+    pressure[problem.dofs] = x
+    gradient, share = _pressure_gradient(water, kept, pressure, dt / problem.density)
+    u, mean = _projected(t, kept, gradient, share)
+    a = np.where(kept.wet[:, None], (u - kept.advected) / (kept.theta * dt), 0.0)
+    remainder, kick_remainder = _remainders(water, kept, gradient, mean, dt)
+    u_cell = kept.cell_star - gradient
+    projected = u.copy()
+    clipped = _limit_and_damp(water, kept, share, u, a)
+    listed, start = water.layers(kept.wet)
+    _continue(water, kept, listed, start, u, a)
+    cell_field, flux = _flux(water, kept, listed, start, u, u_cell)
+    report = _report(water, problem, x, projected, u, clipped)
+    return Corrected(
+        u,
+        a,
+        pressure / kept.theta,
+        remainder,
+        kick_remainder,
+        cell_field,
+        kept.nodal_water,
+        flux,
+        listed,
+        start,
+        report,
+    )
+
+
+def _pressure_gradient(water, kept, pressure, scale):
+    """(dt/ρ) ∇x of the wet cells (n, 3) [m/s], and their wet share (n,)."""
+    t = water.topology
+    full = with_ghosts(pressure, kept.wet, water._walls.open_node, kept.level_set, kept.wet_cells, t.cells)
+    gradient = cell_gradient(kept.wet_cells, full, t.cells, t.parent, t.gradients)
+    return scale * gradient, wet_fraction(kept.wet_cells, kept.level_set, t.cells)
+
+
+def _projected(t, kept, gradient, share):
+    """u (N, 3) after the pressure, and Π of the gradient (N, 3)."""
+    mean = nodal_mean(kept.wet_cells, gradient, share, t.cells, t.share, t.volume, len(kept.wet))
+    return np.where(kept.wet[:, None], kept.u_star - mean, kept.u_star), mean
+
+
+def _remainders(water, kept, gradient, mean, dt):
+    """u' (M, 3) [m/s] after this step and its rate -(∇x - Π∇x)/(θ ρ) (M, 3) [m/s²] for the next kick."""
+    t = water.topology
+    remainder, rate = np.zeros_like(water.remainder), np.zeros_like(water.remainder)
+    if water.parameters.subscale_memory:
+        whole = kept.wet[t.cells[kept.wet_cells]].all(axis=1)
+        cells = kept.wet_cells[whole]
+        left = cell_velocity(cells, mean, np.zeros_like(remainder), t.cells, t.share) - gradient[whole]
+        remainder[cells] = kept.remainder[cells] + left
+        rate[cells] = left / (kept.theta * dt)
+    return remainder, rate
+
+
+def _limit_and_damp(water, kept, share, u, a) -> int:
+    """Speed limit, divergence damping and slip, in place; the number of clipped nodes."""
+    t, parameters = water.topology, water.parameters
+    clipped = _limit_speed(water, u, a)
+    damp_divergence(
+        kept.wet_cells,
+        parameters.divergence_damping,
+        kept.wet,
+        u,
+        t.cells,
+        t.parent,
+        t.gradients,
+        t.volume,
+        t.size,
+        share,
+    )
+    water._walls.slip(u)
+    return clipped
+
+
+def _limit_speed(water, u, a) -> int:
+    """|u| ≤ speed_limit sqrt(g H) in place; clipped nodes go on in free fall."""
+    p = water.parameters
+    low, high = water.mesh.bounds
+    limit = p.speed_limit * np.sqrt(p.gravity * (high - low)[2])
+    speed = np.linalg.norm(u, axis=1)
+    fast = speed > limit
+    u[fast] *= (limit / speed[fast])[:, None]
+    a[fast] = [0.0, 0.0, -p.gravity]
+    return int(fast.sum())
+
+
+def _continue(water, kept, listed, start, u, a) -> None:
+    """Velocity and acceleration outside the water, in place; limited again, slipping again."""
+    extend_velocity(water.topology, listed, start, kept.wet, kept.wet_cells, u, a)
+    _limit_speed(water, u, a)
+    water._walls.slip(u)
+
+
+def _flux(water, kept, listed, start, u, u_cell):
+    """Velocity of the cells (M, 3) and the volume flux of the next step, extrapolated to its middle."""
+    t = water.topology
+    near = np.zeros(len(u), bool)
+    near[listed[: start[3]]] = True
+    around = cells_touching(near, t.cells)
+    cell_field = np.zeros_like(water.cell_velocity)
+    cell_field[around] = u[t.cells[around]].mean(axis=1)
+    cell_field[kept.wet_cells] = u_cell
+    had_one = water.cell_velocity.any(axis=1)
+    before = np.where(had_one[:, None], water.cell_velocity, cell_field)
+    flux = edge_flux(t, water.graph_of(listed), listed, 1.5 * cell_field - 0.5 * before)
+    return cell_field, flux
+
+
+def _report(water, problem, x, projected, u, clipped):
+    from fluid.water import StepReport, kinetic_energy
+
+    kept, p = problem.predicted, water.parameters
+    wet_after = np.where(kept.wet[:, None], u, 0.0)
+    z = water.topology.nodes[:, 2]
+
+    def energy(volume, velocity):
+        return kinetic_energy(p.density, volume, velocity) + p.density * p.gravity * float(volume @ z)
+
+    stages = [
+        energy(water.nodal_water, water.velocity),
+        energy(kept.uncorrected_water, kept.u_star),
+        energy(kept.nodal_water, kept.u_star),
+        energy(kept.nodal_water, projected),
+        energy(kept.nodal_water, np.where(kept.wet[:, None], wet_after, u)),
+    ]
+    names = ("transport and gravity", "volume correction", "pressure", "damping and limit")
+    volume = float(kept.nodal_water.sum())
+    moved_by_bodies = problem.matrix @ x - problem.rhs
+    return StepReport(
+        problem.dt,
+        volume,
+        (volume - kept.conserved_volume) / max(water.initial_volume, 1e-300),
+        kept.reinserted,
+        clipped,
+        len(x),
+        -problem.dt * float((x + problem.known) @ moved_by_bodies),
+        dict(zip(names, np.diff(stages))),
+    )

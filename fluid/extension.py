@@ -1,0 +1,166 @@
+"""Values continued from the water into the nodes around it, layer by layer.
+
+u_i = Σ_j [u_j + ∇u_j·(x_i - x_j)] / d_ij² / Σ_j 1/d_ij²  over the neighbours j in earlier layers.  The first
+two layers use the gradient (a constant continuation costs 1.4 % of the sloshing frequency at 32 cells a length),
+farther ones do not.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from fluid.moments import cells_touching
+from fluid.topology import layers_around
+
+LINEAR_LAYERS = 2
+BAND = 5
+"""Layers of nodes outside the water that carry a velocity."""
+COVERED_LAYERS = 3
+
+
+@njit(cache=True)
+def continue_outward(
+    order, layer_start, linear_layers, f, gradient, nodes, cells, node_start, node_cells, done
+):
+    """Fill f (N, m) in place on layers 1.. of `order` from layer 0; gradient (N, m, 3) read where linear.
+
+    done (N,) bool: nodes whose f is known; extended in place, layer by layer."""
+    n_layers = layer_start.shape[0] - 1
+    m = f.shape[1]
+    total = np.empty(m)
+    for layer in range(1, n_layers):
+        for s in range(layer_start[layer], layer_start[layer + 1]):
+            i = order[s]
+            weight = 0.0
+            total[:] = 0.0
+            for t in range(node_start[i], node_start[i + 1]):
+                for a in range(4):
+                    j = cells[node_cells[t], a]
+                    if not done[j]:
+                        continue
+                    dx = nodes[i, 0] - nodes[j, 0]
+                    dy = nodes[i, 1] - nodes[j, 1]
+                    dz = nodes[i, 2] - nodes[j, 2]
+                    w = 1.0 / (dx * dx + dy * dy + dz * dz)
+                    weight += w
+                    for k in range(m):
+                        value = f[j, k]
+                        if layer <= linear_layers:
+                            value += gradient[j, k, 0] * dx + gradient[j, k, 1] * dy + gradient[j, k, 2] * dz
+                        total[k] += w * value
+            for k in range(m):
+                f[i, k] = total[k] / weight
+            if layer <= linear_layers:
+                _pass_gradient(i, m, gradient, cells, node_start, node_cells, done)
+        for s in range(layer_start[layer], layer_start[layer + 1]):
+            done[order[s]] = True
+
+
+@njit(cache=True)
+def _pass_gradient(i, m, gradient, cells, node_start, node_cells, done):
+    """The gradient of a filled node: the mean of the known ones around it."""
+    gradient[i] = 0.0
+    count = 0
+    for t in range(node_start[i], node_start[i + 1]):
+        for a in range(4):
+            j = cells[node_cells[t], a]
+            if done[j]:
+                count += 1
+                for k in range(m):
+                    for d in range(3):
+                        gradient[i, k, d] += gradient[j, k, d]
+    gradient[i] /= max(count, 1)
+
+
+@njit(cache=True)
+def mean_gradients(cell_list, marked, f, cells, parent, g, volume, n_nodes):
+    """Volume-weighted mean of ∇f over the cells around each node whose corners are all marked, (N, m, 3).
+
+    f (N, m), marked (N,) bool; zero where there is no such cell."""
+    m = f.shape[1]
+    gradient = np.zeros((n_nodes, m, 3))
+    weight = np.zeros(n_nodes)
+    local = np.empty((m, 3))
+    for s in range(cell_list.shape[0]):
+        e = cell_list[s]
+        if not (marked[cells[e, 0]] and marked[cells[e, 1]] and marked[cells[e, 2]] and marked[cells[e, 3]]):
+            continue
+        local[:] = 0.0
+        for a in range(4):
+            for k in range(m):
+                for d in range(3):
+                    local[k, d] += f[cells[e, a], k] * g[parent[e], a, d]
+        for a in range(4):
+            weight[cells[e, a]] += volume[e]
+            for k in range(m):
+                for d in range(3):
+                    gradient[cells[e, a], k, d] += volume[e] * local[k, d]
+    for i in range(n_nodes):
+        if weight[i] > 0.0:
+            gradient[i] /= weight[i]
+    return gradient
+
+
+def fill_missing(topology, known, *fields):
+    """Continue each field (N, m) into the active nodes that are not `known`, layer after layer, in place."""
+    missing = topology.active & ~known
+    while missing.any():
+        before = missing.sum()
+        seed = known & topology.active
+        order, start = layers_around(seed, 4, topology.cells, topology.node_start, topology.node_cells)
+        for f in fields:
+            _fill(topology, order, start, 0, f, np.zeros((1, f.shape[1], 3)), seed.copy())
+        known = known.copy()
+        known[order] = True
+        missing = topology.active & ~known
+        if missing.sum() == before:  # a pocket without any known node: it starts at rest
+            return
+
+
+def _fill(t, order, start, linear, f, gradient, done):
+    continue_outward(order, start, linear, f, gradient, t.nodes, t.cells, t.node_start, t.node_cells, done)
+
+
+def extend_velocity(topology, order, start, wet, wet_cells, u, a):
+    """Continue u (linear, then constant) and a (constant), each (N, 3), over the layers of `order`, in place.
+
+    Nodes outside the layers are set to zero."""
+    t = topology
+    gradient = mean_gradients(wet_cells, wet, u, t.cells, t.parent, t.gradients, t.volume, len(u))
+    outside = np.ones(len(u), bool)
+    outside[order] = False
+    u[outside], a[outside] = 0.0, 0.0
+    _fill(t, order, start, LINEAR_LAYERS, u, gradient, wet.copy())
+    _fill(t, order, start, 0, a, np.zeros((1, 3, 3)), wet.copy())
+
+
+def continue_into_solids(topology, phi, listed) -> None:
+    """Continue φ (N,) linearly from outside the solids into the covered nodes among `listed`, in place.
+
+    What the surface does inside a solid means nothing, but its place there decides how much of the cut cells
+    is wet; a plane is continued exactly, so that water at rest beside a solid stays at rest."""
+    t = topology
+    covered = np.zeros(len(phi), bool)
+    covered[listed] = t.covered[listed]
+    if not covered.any():
+        return
+    beside = cells_touching(covered, t.cells)
+    seed = np.zeros(len(phi), bool)
+    seed[t.cells[beside]] = True
+    seed &= ~t.covered
+    order, start = layers_around(seed, COVERED_LAYERS, t.cells, t.node_start, t.node_cells)
+    order, start = _only(t.covered, order, start)
+    around = cells_touching(seed, t.cells)
+    f = phi[:, None].copy()
+    gradient = mean_gradients(around, ~t.covered, f, t.cells, t.parent, t.gradients, t.volume, len(phi))
+    _fill(t, order, start, COVERED_LAYERS, f, gradient, ~t.covered)
+    phi[covered] = f[covered, 0]
+
+
+def _only(marked, order, start):
+    """Layers 1.. of `order` reduced to the marked nodes; layer 0 is left as it is."""
+    layer = np.repeat(np.arange(len(start) - 1), np.diff(start))
+    keep = marked[order] | (layer == 0)
+    count = np.bincount(layer[keep], minlength=len(start) - 1)
+    return order[keep], np.concatenate([[0], np.cumsum(count)])

@@ -1,0 +1,33 @@
+"""Numbers that a case may set for the water; the defaults are the measured choice."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class WaterParameters:
+    """Parameters of the water step.
+
+    theta: weight of the new pressure in the reflected projection (1: implicit Euler, 0.5: trapezoidal).
+    courant: cells crossed per step by the fastest water; 1 for loads, 2 to 4 for drafts.
+    divergence_damping: weight c_L of the element grad-div term.
+    correction_length: κ/h, length over which the volume correction is spread.
+    kick_limit: largest acceleration carried over to the next step, in g (spray).
+    speed_limit: cap of the speed in units of sqrt(g H), H the height of the tank; clipped nodes are counted.
+    subscale_memory: keep the element-wise remainder of the velocity correction (added mass of bodies).
+    """
+
+    density: float = 1000.0
+    gravity: float = 9.81
+    theta: float = 0.6
+    courant: float = 1.0
+    divergence_damping: float = 0.05
+    correction_length: float = 5.0
+    kick_limit: float = 3.0
+    speed_limit: float = 2.0 * np.sqrt(2.0)
+    subscale_memory: bool = True
+    bulk_modulus: float = 2.2e9
+    """[Pa] compressibility of water, used only in pockets without free surface, where the pressure level floats."""

@@ -1,0 +1,159 @@
+"""First half of the step: what the water does before its pressure is known.
+
+û = uⁿ + (1-θ) dt âⁿ,   âⁿ = aⁿ f,  f = min(1, 3g/|aⁿ|)           part of the last acceleration, limited
+φ̃, u_adv = transport of φ, û by uⁿ + dt/2 âⁿ                      semi-Lagrangian, MacCormack
+φ = redistanced φ̃, corrected towards the conservative volume
+u* = u_adv + θ dt g
+(dt/ρ) K x = ∫ (u* + u')·∇N dV + G V
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fluid.advection import transport
+from fluid.extension import continue_into_solids
+from fluid.level_set import redistance
+from fluid.moments import cells_touching
+from fluid.projection import PressureProblem, cell_velocity, inflow, pressure_matrix, seal_pockets
+from fluid.volume import carry_volume, correct_volume, nodal_volume
+
+TRANSPORT_WIDTH = 5.0
+"""|φ| in cell sizes within which the level set moves; beyond, only its sign matters."""
+RESCALE_EVERY = 5
+
+
+@dataclass(frozen=True)
+class Predicted:
+    """Between predict and correct: level_set (N,), nodal_water (N,) [m³], advected (N, 3) and u_star (N, 3) [m/s],
+    wet (N,) bool, wet_cells (n,), cell_star (n, 3) [m/s] velocity of the wet cells, remainder (M, 3) [m/s],
+    kick (N,) the factor f, theta, conserved_volume and reinserted [m³], energy [J] after each stage."""
+
+    level_set: np.ndarray
+    nodal_water: np.ndarray
+    advected: np.ndarray
+    u_star: np.ndarray
+    wet: np.ndarray
+    wet_cells: np.ndarray
+    cell_star: np.ndarray
+    remainder: np.ndarray
+    theta: float
+    conserved_volume: float
+    reinserted: float
+    uncorrected_water: np.ndarray
+
+
+def predicted(water, dt: float) -> PressureProblem:
+    """Everything of the step before the solve; reads the state of `water`, changes nothing."""
+    theta, parameters = water.theta, water.parameters
+    kick = kick_factor(water.acceleration, parameters)
+    u_adv, phi = _transported(water, dt, theta, kick)
+    left = _outflow(water, dt)
+    carried = carry_volume(water.flux, water.nodal_water - left, water.topology.node_volume, dt)
+    conserved = water.conserved_volume - float(left.sum())
+    surface, uncorrected = _new_surface(water, phi, carried, conserved)
+    gravity = np.array([0.0, 0.0, -parameters.gravity])
+    u_star = u_adv + theta * dt * gravity
+    u_star[water.topology.node_start[1:] == water.topology.node_start[:-1]] = 0.0
+    water._walls.slip(u_star)
+    return _problem(water, dt, theta, kick, surface, uncorrected, conserved, u_adv, u_star)
+
+
+def kick_factor(acceleration, parameters):
+    """f = min(1, limit g / |a|) (N,): spray must not be thrown on by the acceleration of an impact."""
+    size = np.linalg.norm(acceleration, axis=1)
+    return np.minimum(1.0, parameters.kick_limit * parameters.gravity / np.maximum(size, 1e-300))
+
+
+def _transported(water, dt, theta, kick):
+    """u_adv (N, 3) and φ̃ (N,); nodes outside the list keep û and φ."""
+    a = kick[:, None] * water.acceleration
+    u_hat = water.velocity + (1.0 - theta) * dt * a
+    u_m = water.velocity + 0.5 * dt * a
+    for u in (u_hat, u_m):
+        water._walls.slip(u)
+    fields = np.column_stack([u_hat, water.level_set])
+    moved = transport(water.topology, water.listed, dt, u_m, fields)
+    u_adv, phi = u_hat, water.level_set.copy()
+    u_adv[water.listed] = moved[:, :3]
+    near = np.abs(phi[water.listed]) < TRANSPORT_WIDTH * water.mesh.spacing
+    phi[water.listed[near]] = moved[near, 3]
+    water._walls.slip(u_adv)
+    return u_adv, phi
+
+
+def _outflow(water, dt):
+    """Volume (N,) [m³] that leaves through open sides: ∮ N_i (u·n)⁺ dA dt, at most what the node holds."""
+    sides = water._walls
+    left = np.zeros(len(water.nodal_water))
+    if len(sides.open_faces) == 0:
+        return left
+    speed = np.einsum("fak,fk->fa", water.velocity[sides.open_faces], sides.open_area) / 3.0
+    np.add.at(left, sides.open_faces, dt * np.maximum(speed, 0.0))
+    return np.minimum(left, np.maximum(water.nodal_water, 0.0))
+
+
+def _new_surface(water, phi, carried, conserved):
+    """φ redistanced and corrected (VolumeCorrection), and the nodal volume before the correction."""
+    t, h = water.topology, water.mesh.spacing
+    continue_into_solids(t, phi, water.listed)
+    phi = redistance(t, phi, h, rescale=(water.steps % RESCALE_EVERY == RESCALE_EVERY - 1))
+    before = nodal_volume(t, phi)
+    corrected = correct_volume(
+        t, water.graph, water.listed, phi, carried, conserved, water.parameters.correction_length, h
+    )
+    return corrected, before
+
+
+def _problem(water, dt, theta, kick, surface, uncorrected, conserved, u_adv, u_star):
+    t, density = water.topology, water.parameters.density
+    phi = surface.level_set
+    wet = (phi < 0.0) & t.active
+    cells = cells_touching(wet, t.cells)
+    remainder = _carried_remainder(water, dt, theta, cells)
+    star = cell_velocity(cells, u_star, remainder, t.cells, t.share)
+    rhs = inflow(cells, star, t.cells, t.parent, t.gradients, t.volume, len(phi))
+    dofs = np.flatnonzero(wet & ~water._walls.open_node)
+    matrix, anchored = pressure_matrix(water.graph, phi, dofs, water._walls.open_node, dt / density)
+    known = (1.0 - theta) * kick[dofs] * water.pressure[dofs]
+    guess = theta * water.pressure[dofs]
+    matrix, extra = _sealed(water, matrix, anchored, dofs, dt, guess)
+    kept = Predicted(
+        phi,
+        nodal_volume(t, phi),
+        u_adv,
+        u_star,
+        wet,
+        cells,
+        star,
+        remainder,
+        theta,
+        conserved,
+        surface.reinserted,
+        uncorrected,
+    )
+    coupling = water.coupling[dofs]
+    return PressureProblem(matrix, rhs[dofs] + extra, coupling, known, guess, dofs, dt, density, kept)
+
+
+def _carried_remainder(water, dt, theta, cells):
+    """u'_e = β (u'_e - (1-θ) dt r_e) (M, 3) with β = 1/(1 + 2 |u_e| dt / l_e): the remainder that lives on.
+
+    It is swept out of the cell in the time that the water takes to cross it (dynamic subscales)."""
+    t = water.topology
+    out = np.zeros_like(water.remainder)
+    if not water.parameters.subscale_memory:
+        return out
+    speed = np.linalg.norm(water.velocity[t.cells[cells]].mean(axis=1), axis=1)
+    beta = 1.0 / (1.0 + 2.0 * speed * dt / t.size[cells])
+    kicked = water.remainder[cells] + (1.0 - theta) * dt * water.kick_remainder[cells]
+    out[cells] = beta[:, None] * kicked
+    return out
+
+
+def _sealed(water, matrix, anchored, dofs, dt, pressure):
+    """Closed pockets get the compressibility of water."""
+    compliance = 1.0 / (water.parameters.bulk_modulus * dt)
+    return seal_pockets(matrix, anchored, water.topology.node_volume[dofs], compliance, pressure)

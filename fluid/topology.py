@@ -1,0 +1,237 @@
+"""Who touches whom in the physical domain, laid out for the kernels of the step.
+
+The gradients of a cell are those of its parent in the background mesh (a cover is a copy with the same
+corners), so that nothing geometric is recomputed when solids move.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from fluid.mesh import Background
+
+
+@dataclass(frozen=True)
+class Topology:
+    """nodes (N, 3) [m] · cells (M, 4) · parent (M,) row of `gradients` (.., 4, 3) [1/m] ·
+    volume (M,) [m³] of the fluid part · fraction (M,) fluid share of the cell ·
+    share (M, 4) mean of N_a over the fluid part (∫ N_a = volume · share_a) · size (M,) [m] (6 |e|)^(1/3) ·
+    node_start (N+1,), node_cells (4M,) cells around each node · neighbours (M, 4) across faces, -1 none ·
+    node_volume (N,) [m³] ∫ N_i · covered (N,) bool: nodes inside a solid."""
+
+    nodes: np.ndarray
+    cells: np.ndarray
+    parent: np.ndarray
+    gradients: np.ndarray
+    volume: np.ndarray
+    fraction: np.ndarray
+    share: np.ndarray
+    size: np.ndarray
+    node_start: np.ndarray
+    node_cells: np.ndarray
+    neighbours: np.ndarray
+    node_volume: np.ndarray
+    covered: np.ndarray
+
+    @classmethod
+    def of(cls, mesh: Background, domain) -> Topology:
+        """Lay out a PhysicalDomain of the background mesh."""
+        cells, parent = np.ascontiguousarray(domain.cells), np.ascontiguousarray(domain.parent_cell)
+        nodes = np.ascontiguousarray(domain.nodes)
+        full = mesh.cell_volume[parent]
+        start, members = _cells_of_nodes(cells, len(nodes))
+        share = _shares(domain, mesh.gradients)
+        return cls(
+            nodes=nodes,
+            cells=cells,
+            parent=parent,
+            gradients=mesh.gradients,
+            volume=domain.volume,
+            fraction=domain.volume / full,
+            share=share,
+            size=np.cbrt(6.0 * full),
+            node_start=start,
+            node_cells=members,
+            neighbours=_neighbours(mesh.neighbours, cells, parent, len(mesh.cells)),
+            node_volume=np.bincount(
+                cells.ravel(), (domain.volume[:, None] * share).ravel(), minlength=len(nodes)
+            ),
+            covered=covered_nodes(domain),
+        )
+
+    @property
+    def active(self) -> np.ndarray:
+        """(N,) bool: nodes that belong to a cell with fluid volume."""
+        return np.diff(self.node_start) > 0
+
+
+def covered_nodes(domain) -> np.ndarray:
+    """(N,) bool: nodes behind every wetted polygon that some one body has in the cells around them.
+
+    A body is convex, so a node with all of its nearby faces in front of it lies inside."""
+    covered = np.zeros(len(domain.nodes), bool)
+    if len(domain.face_cell) == 0:
+        return covered
+    corners = domain.cells[domain.face_cell]
+    to_node = domain.nodes[corners] - domain.face_centroid[:, None]
+    behind = np.einsum("sak,sk->sa", to_node, domain.face_normal) < -1e-12
+    key = corners * domain.n_bodies + domain.face_body[:, None]
+    pair, where = np.unique(key.ravel(), return_inverse=True)
+    in_front = np.bincount(where.ravel(), ~behind.ravel(), minlength=len(pair))
+    covered[pair[in_front == 0] // domain.n_bodies] = True
+    return covered
+
+
+def _shares(domain, gradients):
+    """Mean of N_a over the fluid part of each cell: N_a at its centroid; exactly 1/4 in whole cells."""
+    share = np.full((len(domain.cells), 4), 0.25)
+    cut = np.flatnonzero(domain.is_cut)
+    offset = domain.centroid[cut] - domain.nodes[domain.cells[cut, 0]]
+    at_centroid = np.einsum("eak,ek->ea", gradients[domain.parent_cell[cut]], offset)
+    at_centroid[:, 0] += 1.0
+    share[cut] = np.clip(at_centroid, 0.0, 1.0)
+    return share
+
+
+@njit(cache=True)
+def _cells_of_nodes(cells, n):
+    start = np.zeros(n + 1, np.int64)
+    for e in range(cells.shape[0]):
+        for a in range(4):
+            start[cells[e, a] + 1] += 1
+    for i in range(n):
+        start[i + 1] += start[i]
+    filled = start[:-1].copy()
+    members = np.empty(4 * cells.shape[0], np.int64)
+    for e in range(cells.shape[0]):
+        for a in range(4):
+            i = cells[e, a]
+            members[filled[i]] = e
+            filled[i] += 1
+    return start, members
+
+
+@njit(cache=True)
+def _neighbours(parent_neighbours, cells, parent, n_parents):
+    """Copies of the parents' neighbours that share the three nodes of the face."""
+    start = np.zeros(n_parents + 1, np.int64)
+    for e in range(cells.shape[0]):
+        start[parent[e] + 1] += 1
+    for k in range(n_parents):
+        start[k + 1] += start[k]
+    filled = start[:-1].copy()
+    copies = np.empty(cells.shape[0], np.int64)
+    for e in range(cells.shape[0]):
+        copies[filled[parent[e]]] = e
+        filled[parent[e]] += 1
+    found = np.full(cells.shape, -1, np.int64)
+    for e in range(cells.shape[0]):
+        for a in range(4):
+            p = parent_neighbours[parent[e], a]
+            if p < 0:
+                continue
+            for s in range(start[p], start[p + 1]):
+                shared = 0
+                for b in range(4):
+                    for c in range(4):
+                        if b != a and cells[copies[s], c] == cells[e, b]:
+                            shared += 1
+                if shared == 3:
+                    found[e, a] = copies[s]
+                    break
+    return found
+
+
+@njit(cache=True)
+def layers_around(seed, depth, cells, node_start, node_cells):
+    """Nodes in order of distance from the seed nodes (bool (N,)): (list, layer_start (depth + 2,)).
+
+    Layer 0 is the seed; layer k + 1 shares a cell with layer k."""
+    n = seed.shape[0]
+    order = np.empty(n, np.int64)
+    layer_start = np.zeros(depth + 2, np.int64)
+    seen = seed.copy()
+    count = 0
+    for i in range(n):
+        if seed[i] and node_start[i + 1] > node_start[i]:
+            order[count] = i
+            count += 1
+    layer_start[1] = count
+    for layer in range(depth):
+        for s in range(layer_start[layer], layer_start[layer + 1]):
+            for t in range(node_start[order[s]], node_start[order[s] + 1]):
+                for a in range(4):
+                    j = cells[node_cells[t], a]
+                    if not seen[j]:
+                        seen[j] = True
+                        order[count] = j
+                        count += 1
+        layer_start[layer + 2] = count
+    return order[:count].copy(), layer_start
+
+
+@dataclass(frozen=True)
+class Graph:
+    """Edges of the listed nodes with the stiffness of the physical domain.
+
+    row (N,) place of a node in `nodes`, -1 if not listed · start (n+1,), neighbour, stiffness [m]: CSR without
+    diagonal, K_ij = Σ_e volume_e ∇N_i·∇N_j."""
+
+    nodes: np.ndarray
+    row: np.ndarray
+    start: np.ndarray
+    neighbour: np.ndarray
+    stiffness: np.ndarray
+
+    @classmethod
+    def of(cls, topology: Topology, nodes) -> Graph:
+        """Edges around the given nodes (n,); cost grows with n only."""
+        t = topology
+        row = np.full(len(t.nodes), -1, np.int64)
+        row[nodes] = np.arange(len(nodes))
+        start, neighbour, stiffness = _edges(
+            nodes, t.cells, t.parent, t.gradients, t.volume, t.node_start, t.node_cells
+        )
+        return cls(nodes, row, start, neighbour, stiffness)
+
+
+@njit(cache=True)
+def _edges(rows, cells, parent, g, volume, node_start, node_cells):
+    slot = np.full(node_start.shape[0] - 1, -1, np.int64)
+    start = np.zeros(rows.shape[0] + 1, np.int64)
+    capacity = 16 * rows.shape[0] + 64
+    neighbour = np.empty(capacity, np.int64)
+    stiffness = np.empty(capacity)
+    count = 0
+    for r in range(rows.shape[0]):
+        i = rows[r]
+        most = 3 * (node_start[i + 1] - node_start[i])
+        if count + most > capacity:
+            capacity = 2 * capacity + most
+            neighbour = np.concatenate((neighbour[:count], np.empty(capacity - count, np.int64)))
+            stiffness = np.concatenate((stiffness[:count], np.empty(capacity - count)))
+        for t in range(node_start[i], node_start[i + 1]):
+            e = node_cells[t]
+            p = parent[e]
+            la = 0
+            while cells[e, la] != i:
+                la += 1
+            for b in range(4):
+                if b == la:
+                    continue
+                j = cells[e, b]
+                k = volume[e] * (
+                    g[p, la, 0] * g[p, b, 0] + g[p, la, 1] * g[p, b, 1] + g[p, la, 2] * g[p, b, 2]
+                )
+                if slot[j] < start[r]:
+                    slot[j] = count
+                    neighbour[count] = j
+                    stiffness[count] = k
+                    count += 1
+                else:
+                    stiffness[slot[j]] += k
+        start[r + 1] = count
+    return start, neighbour[:count].copy(), stiffness[:count].copy()

@@ -1,0 +1,61 @@
+"""Sides of the tank: closed (u·n = 0 on their nodes, the water slips) or open (p = 0, the water leaves)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+_SAME_DIRECTION = 0.3
+"""Normals of one node that span less than this (singular value over the largest) count as one direction."""
+
+
+@dataclass(frozen=True)
+class Walls:
+    """nodes (n,) on closed sides · projector (n, 3, 3) onto the directions they leave free ·
+    open_node (N,) bool, p = 0 · open_faces (F, 3) nodes, open_area (F, 3) [m²] outward area vectors."""
+
+    nodes: np.ndarray
+    projector: np.ndarray
+    open_node: np.ndarray
+    open_faces: np.ndarray
+    open_area: np.ndarray
+
+    @classmethod
+    def of(cls, mesh, is_open=None) -> Walls:
+        """is_open: function of face normals (B, 3) and centres (B, 3) [m] → (B,) bool; None: all closed."""
+        x = mesh.nodes[mesh.boundary_faces]
+        area = 0.5 * np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
+        opened = np.zeros(len(x), bool) if is_open is None else is_open(mesh.boundary_normal, x.mean(axis=1))
+        open_node = np.zeros(len(mesh.nodes), bool)
+        open_node[mesh.boundary_faces[opened]] = True
+        nodes, projector = _projectors(mesh.boundary_faces[~opened], area[~opened])
+        return cls(nodes, projector, open_node, mesh.boundary_faces[opened], area[opened])
+
+    def on_copies(self, parent_node) -> Walls:
+        """The same sides for nodes that are copies of background nodes, parent_node (N,)."""
+        if np.array_equal(parent_node, np.arange(len(self.open_node))):
+            return self
+        place = np.full(len(self.open_node), -1)
+        place[self.nodes] = np.arange(len(self.nodes))
+        copies = np.flatnonzero(place[parent_node] >= 0)
+        projector = self.projector[place[parent_node[copies]]]
+        return Walls(copies, projector, self.open_node[parent_node], self.open_faces, self.open_area)
+
+    def slip(self, u) -> None:
+        """Take the part into the closed sides off u (N, 3), in place."""
+        u[self.nodes] = np.einsum("nij,nj->ni", self.projector, u[self.nodes])
+
+
+def _projectors(faces, area):
+    """I - Q Qᵀ at the nodes of the faces, Q: directions spanned by the normals of the faces around the node."""
+    nodes = np.unique(faces)
+    place = np.searchsorted(nodes, faces)
+    outer = np.zeros((len(nodes), 3, 3))
+    unit = area / np.linalg.norm(area, axis=1, keepdims=True)
+    for corner in range(3):
+        np.add.at(outer, place[:, corner], unit[:, :, None] * unit[:, None, :])
+    value, vector = np.linalg.eigh(outer)
+    blocked = value > _SAME_DIRECTION**2 * value[:, -1:]
+    Q = vector * blocked[:, None, :]
+    return nodes, np.eye(3) - Q @ Q.transpose(0, 2, 1)

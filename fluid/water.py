@@ -1,0 +1,237 @@
+"""The water: its state on a physical domain, and one step split around the pressure solve.
+
+    problem = water.predict(dt)        advect, correct the volume, assemble the pressure
+    x = ...                            solved by the caller, with the structure inside if there is one
+    water.correct(problem, x)          velocity, divergence damping, extension
+
+`predict` changes nothing; a caller may drop its problem and ask again with another dt.  Scheme: theory 2.2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from fluid.corrector import Corrected, corrected
+from fluid.domain import carry, wetted_coupling
+from fluid.extension import BAND, fill_missing
+from fluid.level_set import FAR, redistance
+from fluid.mesh import Background
+from fluid.parameters import WaterParameters
+from fluid.predictor import predicted
+from fluid.projection import PressureProblem
+from fluid.topology import Graph, Topology, layers_around
+from fluid.volume import Flux, edge_flux, nodal_volume
+from fluid.walls import Walls
+
+LONGEST_STEP = 0.3
+"""dt ≤ LONGEST_STEP sqrt(h/g): a step at rest."""
+
+
+@dataclass(frozen=True)
+class StepReport:
+    """What the last step did.
+
+    volume [m³] of water · volume_error, (volume - conserved) / conserved · reinserted [m³] moved by the uniform
+    shift (signed) · clipped: nodes at the speed limit · unknowns of the pressure · work_on_bodies [J] ·
+    energy_change [J]: change of kinetic + potential energy by stage (transport and gravity, volume correction,
+    pressure, damping and limit)."""
+
+    dt: float
+    volume: float
+    volume_error: float
+    reinserted: float
+    clipped: int
+    unknowns: int
+    work_on_bodies: float
+    energy_change: dict[str, float]
+
+
+class Water:
+    """Water with a free surface in a tank.
+
+    mesh: Background · domain: PhysicalDomain of it · fill: points (n, 3) [m] → signed distance (n,) [m], negative
+    in the water, or the level set (N,) itself · is_open: (normals (B, 3), centres (B, 3)) → bool (B,), sides of
+    the tank that let water out; None: all closed.
+
+    State at the nodes of the domain: level_set (N,) [m], velocity (N, 3) [m/s], acceleration (N, 3) [m/s²] and
+    pressure (N,) [Pa] of the last projection, nodal_water (N,) [m³]; at its cells: remainder (M, 3) [m/s], what the
+    nodes could not hold of the velocity correction.  Velocity goes on for some layers outside the water.
+    """
+
+    def __init__(
+        self,
+        mesh: Background,
+        domain,
+        fill: Callable | np.ndarray,
+        parameters: WaterParameters | None = None,
+        is_open: Callable | None = None,
+    ):
+        self.mesh, self.parameters = mesh, parameters or WaterParameters()
+        self.time, self.steps = 0.0, 0
+        self.report: StepReport | None = None
+        self._sides = Walls.of(mesh, is_open)
+        self._set_domain(domain)
+        n = len(self.topology.nodes)
+        level = fill(self.topology.nodes) if callable(fill) else np.asarray(fill, float)
+        self.level_set = redistance(self.topology, self._dry_if_inactive(level), mesh.spacing, rescale=False)
+        self.velocity, self.acceleration = np.zeros((n, 3)), np.zeros((n, 3))
+        self.pressure = np.zeros(n)
+        self.cell_velocity = np.zeros((len(self.topology.cells), 3))
+        self.remainder, self.kick_remainder = (
+            np.zeros_like(self.cell_velocity),
+            np.zeros_like(self.cell_velocity),
+        )
+        self.nodal_water = nodal_volume(self.topology, self.level_set)
+        self.conserved_volume = float(self.nodal_water.sum())
+        self.initial_volume = self.conserved_volume
+        self._find_band()
+        self.flux = edge_flux(self.topology, self.graph, self.listed, self.cell_velocity)
+
+    # ---- the step
+
+    @property
+    def theta(self) -> float:
+        """Weight of the new pressure: 1 for the first two steps, so that a start at rest does not ring."""
+        return 1.0 if self.steps < 2 else self.parameters.theta
+
+    def stable_step(self) -> float:
+        """dt [s]: Courant number of the fastest water, and LONGEST_STEP sqrt(h/g)."""
+        h = self.mesh.spacing
+        wet = self.level_set < 0.0
+        fastest = np.abs(self.velocity[wet]).max() if wet.any() else 0.0
+        at_rest = LONGEST_STEP * np.sqrt(h / self.parameters.gravity)
+        return float(min(at_rest, self.parameters.courant * h / max(fastest, 1e-12)))
+
+    def predict(self, dt: float) -> PressureProblem:
+        """Advection, volume and gravity over dt [s], and the system for the pressure."""
+        return predicted(self, dt)
+
+    def correct(self, problem: PressureProblem, x) -> None:
+        """Take over the pressure x (n,) [Pa] of the problem and end the step."""
+        new: Corrected = corrected(self, problem, np.asarray(x))
+        self.level_set, self.nodal_water = problem.predicted.level_set, new.nodal_water
+        self.velocity, self.acceleration, self.pressure = new.velocity, new.acceleration, new.pressure
+        self.remainder, self.kick_remainder = new.remainder, new.kick_remainder
+        self.cell_velocity, self.flux = new.cell_velocity, new.flux
+        self.listed, self.layer_start, self.graph = new.listed, new.layer_start, new.flux.graph
+        self.conserved_volume = problem.predicted.conserved_volume
+        self.report = new.report
+        self.time += problem.dt
+        self.steps += 1
+        self._domain_is_new = False
+
+    # ---- moving solids
+
+    def move_solids(self, domain) -> None:
+        """Go over to the domain that the solids leave now: every field is carried, newly wet nodes are continued
+        from their neighbours.  The volume of water in the books does not change; the next step lifts the surface
+        by what the solids displaced."""
+        old, old_topology = self.domain, self.topology
+        source = carry(old, domain)
+        self._set_domain(domain)
+        known = (source >= 0) & old_topology.active[source]
+        self._carry_nodes(source, known)
+        self._carry_cells(old_topology)
+        if not np.array_equal(source, np.arange(len(source))):
+            self.nodal_water = nodal_volume(self.topology, self.level_set)
+            self._find_band()
+            self.flux = edge_flux(self.topology, self.graph, self.listed, self.cell_velocity)
+        else:
+            self._find_band()
+
+    def _carry_nodes(self, source, known):
+        fields = [self.level_set[:, None], self.velocity, self.acceleration, self.pressure[:, None]]
+        moved = [np.ascontiguousarray(f[source]) for f in fields]
+        fill_missing(self.topology, known, *moved)
+        self.level_set, self.pressure = self._dry_if_inactive(moved[0][:, 0]), moved[3][:, 0]
+        self.velocity, self.acceleration = moved[1], moved[2]
+        self._walls.slip(self.velocity)
+
+    def _carry_cells(self, old: Topology):
+        """Cell fields go to the cell of the same parent (of several covers: to the nearest in its corners)."""
+        source = _same_cells(old, self.topology)
+        found = source >= 0
+        for name in ("cell_velocity", "remainder", "kick_remainder"):
+            moved = np.where(found[:, None], getattr(self, name)[source], 0.0)
+            setattr(self, name, moved)
+        fresh = np.flatnonzero(~found)
+        self.cell_velocity[fresh] = self.velocity[self.topology.cells[fresh]].mean(axis=1)
+
+    # ---- layout
+
+    def _set_domain(self, domain) -> None:
+        self.domain = domain
+        self.topology = Topology.of(self.mesh, domain)
+        self.coupling = wetted_coupling(domain).tocsr()
+        self._walls = self._sides.on_copies(domain.parent_node)
+        self._domain_is_new = True
+        self._whole_graph = None
+
+    def _find_band(self) -> None:
+        """The nodes that the step works on, the water and its layers, and their edges."""
+        wet = (self.level_set < 0.0) & self.topology.active
+        self.listed, self.layer_start = self.layers(wet)
+        self.graph = self.graph_of(self.listed)
+
+    def layers(self, wet):
+        """Wet nodes, then BAND layers around them: (list, layer_start)."""
+        t = self.topology
+        return layers_around(wet, BAND, t.cells, t.node_start, t.node_cells)
+
+    def graph_of(self, listed) -> Graph:
+        """Edges of the listed nodes; of all nodes, once, when the solids have stood still for a step."""
+        if self._domain_is_new:
+            return Graph.of(self.topology, listed)
+        if self._whole_graph is None:
+            self._whole_graph = Graph.of(self.topology, np.flatnonzero(self.topology.active))
+        return self._whole_graph
+
+    def _dry_if_inactive(self, level):
+        return np.where(self.topology.active, level, FAR * self.mesh.spacing)
+
+    # ---- figures
+
+    def volume(self) -> float:
+        """Water in the tank [m³]."""
+        return float(self.nodal_water.sum())
+
+    def volume_error(self) -> float:
+        """(volume - conserved volume) / initial volume, what the step could not put right."""
+        return (self.volume() - self.conserved_volume) / max(self.initial_volume, 1e-300)
+
+    def momentum(self) -> np.ndarray:
+        """∫ ρ u dV (3,) [kg m/s]."""
+        return self.parameters.density * (self.nodal_water @ self.velocity)
+
+    def kinetic_energy(self) -> float:
+        """½ ρ Σ W_i |u_i|² [J]."""
+        return kinetic_energy(self.parameters.density, self.nodal_water, self.velocity)
+
+    def potential_energy(self) -> float:
+        """∫ ρ g z dV [J], exact: Σ N_i z_i = z."""
+        p = self.parameters
+        return float(p.density * p.gravity * (self.nodal_water @ self.topology.nodes[:, 2]))
+
+    def available_energy(self) -> float:
+        """Kinetic energy, and the potential energy above that of the same water spread over the whole floor [J]."""
+        low, high = self.mesh.bounds
+        area = (high - low)[0] * (high - low)[1]
+        p, volume = self.parameters, self.volume()
+        spread = p.density * p.gravity * volume * (low[2] + 0.5 * volume / area)
+        return self.kinetic_energy() + max(self.potential_energy() - spread, 0.0)
+
+
+def kinetic_energy(density: float, nodal_water, velocity) -> float:
+    """½ ρ Σ W_i |u_i|² [J]; nodal_water (N,) [m³], velocity (N, 3) [m/s]."""
+    return float(0.5 * density * (nodal_water @ np.einsum("ij,ij->i", velocity, velocity)))
+
+
+def _same_cells(old: Topology, new: Topology):
+    """Row of the old cell with the same parent for each new one, -1 if none; of copies the one sharing a node."""
+    size = int(max(old.parent.max(), new.parent.max())) + 1
+    row = np.full(size, -1, np.int64)
+    row[old.parent[::-1]] = np.arange(len(old.parent))[::-1]
+    return row[new.parent]
