@@ -125,8 +125,22 @@ def _water(case: Case, structure, solids):
         theta=case.water.theta,
         courant=case.time.cfl,
     )
-    water = Water(mesh, immersion.domain, _fill(case), parameters, open_sides=case.tank.open)
-    return water, immersion
+    return Water(mesh, immersion.domain, _fill(case), parameters, _open_sides(case)), immersion
+
+
+def _open_sides(case: Case):
+    """(normals (B, 3), centres (B, 3)) → (B,) bool: the faces of the tank that let water out."""
+    sides = case.tank.open
+    if not sides:
+        return None
+    outward = np.zeros((len(sides), 3))
+    for row, side in enumerate(sides):
+        outward[row, "xyz".index(side[0])] = 1.0 if side[1] == "+" else -1.0
+
+    def is_open(normals, centres):
+        return (normals @ outward.T > 0.5).any(axis=1)
+
+    return is_open
 
 
 def _fill(case: Case):

@@ -7,7 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coupler.errors import ExitCode, RunFailed, SurgebreakError
+from coupler.errors import ExitCode, SurgebreakError
+
+
+class Diverged(SurgebreakError):
+    """Not finite or out of balance: what comes after is not to be used."""
+
+    exit_code = ExitCode.DIVERGED
 
 
 class LimitReached(SurgebreakError):
@@ -28,15 +34,15 @@ class Limits:
 def check_balance(time: float, volume_error: float, energy_error: float, limits: Limits) -> None:
     """Stop a run whose water volume or energy no longer balances.
 
-    Raises RunFailed with the quantity, its value, its limit and the remedy.
+    Raises Diverged with the quantity, its value, its limit and the remedy.
     """
     if not math.isfinite(volume_error) or abs(volume_error) > limits.volume_error:
-        raise RunFailed(
+        raise Diverged(
             f"the water volume is off by {volume_error:+.2%} at t = {time:.4g} s; limit "
             f"{limits.volume_error:.2%} (limits.volume_error). Reduce time.cfl or tank.cell."
         )
     if not math.isfinite(energy_error) or energy_error > limits.energy_error:
-        raise RunFailed(
+        raise Diverged(
             f"the energy balance is off by {energy_error:.2%} of the input energy at t = {time:.4g} s; limit "
             f"{limits.energy_error:.2%} (limits.energy_error). Reduce time.step_max, raise joints.damping, "
             "or see history/energy.csv for the line that grows."
@@ -46,13 +52,13 @@ def check_balance(time: float, volume_error: float, energy_error: float, limits:
 def check_finite(time: float, what: str, values, item: str) -> None:
     """Stop at the first NaN or infinity, naming the quantity and the item (node, block) that holds it.
 
-    Raises RunFailed.
+    Raises Diverged.
     """
     values = np.asarray(values)
     if np.isfinite(values).all():
         return
     bad = int(np.argwhere(~np.isfinite(values))[0][0])
-    raise RunFailed(
+    raise Diverged(
         f"{what} is not finite at {item} {bad}, t = {time:.6g} s. The last written step is sound; "
         "reduce time.step_max or time.cfl, or look for a very light or very stiff block there."
     )

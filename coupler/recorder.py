@@ -77,7 +77,8 @@ STRUCTURE = (
 class Recorder:
     """Writes a run as it goes; absent sides leave no files.
 
-    directory: of the run · coupling: Coupling · gauges: list of Gauge · solids: [(vertices, faces)] · tank: (lower, upper)
+    directory: of the run · coupling: Coupling · gauges: list of Gauge · solids: [(vertices, faces)]
+    tank: (lower, upper) or None
     """
 
     def __init__(self, directory, coupling, gauges, solids, tank):
@@ -87,6 +88,7 @@ class Recorder:
         self.cracks = directory / "cracks.csv"
         water, structure = coupling.water, coupling.structure
         self.impulse = np.zeros(3)
+        self.reinserted, self.clipped = 0.0, 0
         self._energy = self._table("energy", ENERGY)
         self._coupling = self._table("coupling", COUPLING)
         self._water = self._table("water", WATER) if water else None
@@ -142,12 +144,14 @@ class Recorder:
 
     def _append_water(self, record) -> None:
         w = self.coupling.water
+        self.reinserted += abs(w.report.reinserted)
+        self.clipped += w.report.clipped
         self._water.append(
             time=record.time,
             volume=w.volume(),
             volume_error=w.volume_error(),
-            reinserted=w.reinserted,
-            clipped=w.clipped,
+            reinserted=self.reinserted,
+            clipped=self.clipped,
             **_xyz("momentum", w.momentum()),
         )
 
@@ -175,7 +179,7 @@ class Recorder:
                 w.domain.nodes,
                 w.domain.cells,
                 {"level_set": w.level_set, "velocity": w.velocity, "pressure": w.pressure},
-                {"fluid_fraction": w.fluid_fraction()},
+                {"fluid_fraction": fluid_fraction(w.domain)},
             )
         if self._blocks:
             s = c.structure
@@ -202,6 +206,13 @@ _STRUCTURE_LINES = (
     "dashpot",
     "friction",
 )
+
+
+def fluid_fraction(domain) -> np.ndarray:
+    """(M,) share of each cell that no solid takes."""
+    x = domain.nodes[domain.cells]
+    whole = np.abs(np.linalg.det(x[:, 1:] - x[:, :1])) / 6.0
+    return domain.volume / whole
 
 
 def _xyz(name: str, vector) -> dict[str, float]:

@@ -2,54 +2,41 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-
 import numpy as np
 
 from coupler.build import Scene, build
-from coupler.case import Case, modules
+from coupler.case import Case
 from coupler.clock import Clock
-from coupler.errors import SurgebreakError
+from coupler.errors import ExitCode
 from coupler.limits import LimitReached, Limits, check_balance
 from coupler.recorder import Recorder
 
 
-@dataclass
-class Summary:
-    """Figures of a run for `run.json` and the closing lines."""
+def run(case: Case, directory, reporter) -> ExitCode:
+    """Run a case into a RunDirectory; its figures go into run.json however the run ends.
 
-    time: float = 0.0
-    steps: int = 0
-    substeps: int = 0
-    figures: dict[str, float] = field(default_factory=dict)
-    cpu_seconds: dict[str, float] = field(default_factory=dict)
-
-
-def run(case: Case, directory, reporter) -> Summary:
-    """Run a case into an existing, empty run directory (a Path).
-
-    Raises SurgebreakError when the run ends before its time; what was written until then stays. The summary so
-    far travels with the error as its attribute `summary`.
+    Raises SurgebreakError (or an error of the water or the structure) when the run ends before its time; what was
+    written until then stays.
     """
     clock = Clock()
-    summary = Summary()
-    on = modules(case)
-    reporter.message("modules on: " + ", ".join(k for k, v in on.items() if v))
-    reporter.message("modules off: " + (", ".join(k for k, v in on.items() if not v) or "none"))
+    figures: dict[str, float] = {"steps": 0, "substeps": 0}
     try:
         scene = build(case, clock)
         try:
             _describe(scene, reporter)
-            _steps(case, scene, directory, reporter, clock, summary)
+            _steps(case, scene, directory, reporter, clock, figures)
         finally:
             if scene.coupling.structure is not None:
                 scene.coupling.structure.close()
-    except SurgebreakError as error:
-        error.summary = summary
-        raise
     finally:
-        summary.cpu_seconds = clock.split()
-    return summary
+        directory.record(**figures, cpu_seconds=clock.split())
+    _tell_split(clock, reporter)
+    return ExitCode.DONE
+
+
+def _tell_split(clock: Clock, reporter) -> None:
+    parts = ", ".join(f"{name} {seconds:.1f}" for name, seconds in clock.split().items())
+    reporter.message(f"processor time {clock.total():.1f} s: {parts}")
 
 
 def _describe(scene: Scene, reporter) -> None:
@@ -67,12 +54,12 @@ def _describe(scene: Scene, reporter) -> None:
         )
 
 
-def _steps(case: Case, scene: Scene, directory, reporter, clock: Clock, summary: Summary) -> None:
+def _steps(case: Case, scene: Scene, directory, reporter, clock: Clock, figures: dict) -> None:
     coupling = scene.coupling
     limits = Limits(case.limits.volume_error, case.limits.energy_error, case.limits.cpu_seconds)
     every = case.time.output_every or case.time.end / 100
     outputs = max(1, round(case.time.end / every))
-    recorder = Recorder(directory, coupling, scene.gauges, scene.solids, scene.tank)
+    recorder = Recorder(directory.path, coupling, scene.gauges, scene.solids, scene.tank)
     try:
         with clock("output"):
             recorder.fields(0.0)
@@ -82,7 +69,7 @@ def _steps(case: Case, scene: Scene, directory, reporter, clock: Clock, summary:
                 record = coupling.step(coupling.step_size(target - coupling.time))
                 with clock("output"):
                     recorder.step(record)
-                _note(coupling, record, summary)
+                _note(coupling, record, figures)
                 reporter.step(coupling.time, _told(coupling, record))
                 check_balance(coupling.time, _volume_error(coupling), record.balance.energy_error, limits)
                 _check_budget(clock, limits, reporter)
@@ -92,30 +79,30 @@ def _steps(case: Case, scene: Scene, directory, reporter, clock: Clock, summary:
         recorder.close()
 
 
-def _note(coupling, record, summary: Summary) -> None:
-    f = summary.figures
-    summary.time = coupling.time
-    summary.steps += 1
-    summary.substeps += record.substeps
-    f["energy_error"] = record.balance.energy_error
-    f["numerical_dissipation_share"] = (
-        record.balance.numerical_dissipation / record.balance.input_energy
-        if record.balance.input_energy > 0.0
-        else 0.0
-    )
-    f["largest_energy_error"] = max(f.get("largest_energy_error", 0.0), record.balance.energy_error)
+def _note(coupling, record, figures: dict) -> None:
+    """Carry the step into the figures of the run."""
+
+    def largest(name: str, value: float) -> None:
+        figures[f"largest_{name}"] = max(figures.get(f"largest_{name}", 0.0), float(value))
+
+    balance = record.balance
+    figures["time"] = coupling.time
+    figures["steps"] += 1
+    figures["substeps"] += record.substeps
+    figures["energy_error"] = float(balance.energy_error)
+    largest("energy_error", balance.energy_error)
     if coupling.water is not None:
-        error = coupling.water.volume_error()
-        f["volume_error"] = error
-        f["largest_volume_error"] = max(f.get("largest_volume_error", 0.0), abs(error))
-        f["largest_force_N"] = max(
-            f.get("largest_force_N", 0.0), float(np.linalg.norm(record.load[:, :3].sum(axis=0)))
+        figures["numerical_dissipation"] = float(
+            balance.numerical_dissipation / max(balance.input_energy, 1e-300)
         )
+        figures["volume_error"] = coupling.water.volume_error()
+        largest("volume_error", abs(figures["volume_error"]))
+        largest("water_force", np.linalg.norm(record.load[:, :3].sum(axis=0)))
     if coupling.structure is not None:
         joints = coupling.structure.joint_summary()
-        f["joints"], f["joints_broken"] = coupling.structure.n_joints, joints.broken
-        f["largest_defect"] = max(f.get("largest_defect", 0.0), record.defect)
-        f["largest_opening_rate"] = max(f.get("largest_opening_rate", 0.0), record.opening_rate)
+        figures["joints"], figures["joints_broken"] = coupling.structure.n_joints, joints.broken
+        largest("defect", record.defect)
+        largest("opening_rate", record.opening_rate)
 
 
 def _told(coupling, record) -> dict[str, str]:
