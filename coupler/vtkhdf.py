@@ -1,0 +1,150 @@
+"""Temporal VTKHDF files: one HDF5 file that grows by one step at a time and can be read after every step.
+
+Layout (VTKHDF 2.0, https://docs.vtk.org, "VTKHDF file format"): flat arrays under /VTKHDF; the group
+/VTKHDF/Steps says where each step begins in each of them. What does not change is written once and pointed at
+again. Three rules keep a file readable whose writer is killed at any moment:
+
+* an array of a step begins at a chunk border, so no chunk that holds older data is ever written again;
+* the small tables (one number a step) are not compressed, so they are renewed in place;
+* the count of steps, `NSteps`, is written last, after everything else has reached the file.
+
+The file is opened, extended and closed for each step, without a lock: a viewer that looks on cannot stop the run.
+
+Two HDF5 layouts are combined on purpose. The file itself has the oldest one (superblock 0), because newer ones are
+marked "open for writing" when their writer is killed, and VTK then refuses them. The arrays have the layout of HDF5
+1.10, whose chunk index only grows; the older index splits its nodes about every 50th step, and a kill in just that
+moment loses the whole array. Nothing newer: the HDF5 1.14 inside VTK must read it.
+"""
+
+from contextlib import contextmanager
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+FILE_LAYOUT = ("earliest", "v110")
+ARRAY_LAYOUT = ("v110", "v110")
+COMPRESSION = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
+TABLE_CHUNK = 256
+HEADROOM = 1 << 18  # [bytes] for HDF5's own tables when a step is added
+
+
+@contextmanager
+def opened(path, mode="r+"):
+    """The HDF5 file at `path`, unlocked, in the layouts that survive a kill and that VTK reads."""
+    with h5py.File(path, mode, libver=FILE_LAYOUT if mode == "x" else ARRAY_LAYOUT, locking=False) as file:
+        yield file
+
+
+def create(path, kind, origin):
+    """Start a file of `kind` ("UnstructuredGrid" or "PolyData"); its coordinates are relative to origin (3,) [m].
+
+    Float32 has 7 digits: near zero that is 1 µm over 10 m, at map coordinates only 0.5 m.
+    """
+    with opened(Path(path), "x") as file:
+        root = file.create_group("VTKHDF")
+        root.attrs["Version"] = np.array([2, 0], dtype=np.int64)
+        root.attrs["Type"] = np.bytes_(kind)
+        scene = file.create_group("scene")
+        scene.attrs["origin"] = np.asarray(origin, dtype=float)
+        scene.attrs["units"] = "SI; points are metres relative to origin"
+
+
+def create_steps(root, cell_kinds):
+    """The empty /VTKHDF/Steps group; `cell_kinds` is 1 for an unstructured grid and 4 for polygonal data."""
+    steps = root.create_group("Steps")
+    steps.attrs["NSteps"] = np.int64(0)
+    table(steps, "Values", np.float64)
+    for name in ("PartOffsets", "NumberOfParts", "PointOffsets"):
+        table(steps, name)
+    for name in ("CellOffsets", "ConnectivityIdOffsets"):
+        table(steps, name, width=cell_kinds)
+    for name in ("PointDataOffsets", "CellDataOffsets"):
+        steps.create_group(name)
+
+
+def table(group, name, dtype=np.int64, width=None):
+    """A growing column (steps,) or (steps, width), uncompressed, so that it is renewed in place."""
+    tail = () if width is None else (width,)
+    return group.create_dataset(
+        name, shape=(0, *tail), maxshape=(None, *tail), chunks=(TABLE_CHUNK, *tail), dtype=dtype
+    )
+
+
+def growing(group, name, first, chunk=None):
+    """A compressed growing array shaped and typed like `first` (n, ...); one chunk holds `chunk` (default n) rows."""
+    tail = first.shape[1:]
+    chunk = max(1, len(first) if chunk is None else chunk)
+    return group.create_dataset(
+        name,
+        shape=(0, *tail),
+        maxshape=(None, *tail),
+        chunks=(chunk, *tail),
+        dtype=first.dtype,
+        **COMPRESSION,
+    )
+
+
+def extend(array, values, start=None):
+    """Put `values` (n, ...) behind the array at the next chunk border (or at `start`); return the row it begins at."""
+    if start is None:
+        chunk = array.chunks[0]
+        start = -(-len(array) // chunk) * chunk
+    array.resize(start + len(values), axis=0)
+    array[start:] = values
+    return start
+
+
+def set_row(column, row, value):
+    """Set one row of a table, growing it as needed (rows in between are zero)."""
+    if len(column) <= row:
+        column.resize(row + 1, axis=0)
+    column[row] = value
+
+
+def count(root):
+    """Number of complete steps."""
+    return int(root["Steps"].attrs["NSteps"])
+
+
+def write_offsets(steps, k, time, part, point, cell, connectivity):
+    """Row k of /VTKHDF/Steps: where the geometry of this step begins."""
+    set_row(steps["Values"], k, time)
+    set_row(steps["NumberOfParts"], k, 1)
+    set_row(steps["PartOffsets"], k, part)
+    set_row(steps["PointOffsets"], k, point)
+    set_row(steps["CellOffsets"], k, cell)
+    set_row(steps["ConnectivityIdOffsets"], k, connectivity)
+
+
+def write_data(root, kind, k, values, again=()):
+    """Append the arrays of one step to /VTKHDF/PointData or CellData (`kind`), and note where they begin.
+
+    Names in `again` do not change in time: they are written with step 0 and pointed at afterwards.
+    """
+    offsets = root["Steps"][kind + "Offsets"]
+    for name, array in values.items():
+        if name not in root[kind]:
+            growing(root[kind], name, array)
+            table(offsets, name)
+        start = 0 if name in again and k > 0 else extend(root[kind][name], array)
+        set_row(offsets[name], k, start)
+
+
+def publish(file, k):
+    """Make step k visible: everything else has to be in the file before the count says so."""
+    file.flush()
+    file["VTKHDF"]["Steps"].attrs.modify("NSteps", np.int64(k + 1))
+
+
+def single(array):
+    """Floats as float32 (results are not accurate to more than 7 digits), whole numbers as they are."""
+    array = np.asarray(array)
+    return np.ascontiguousarray(array, dtype=np.float32 if array.dtype.kind == "f" else array.dtype)
+
+
+def read_times(path):
+    """Times (steps,) [s] of the complete steps of a file, also while it is being written."""
+    with opened(path, "r") as file:
+        root = file["VTKHDF"]
+        return root["Steps"]["Values"][: count(root)]
