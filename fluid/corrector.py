@@ -121,7 +121,7 @@ def _limit_speed(water, u, a) -> int:
     speed = np.linalg.norm(u, axis=1)
     fast = speed > limit
     u[fast] *= (limit / speed[fast])[:, None]
-    a[fast] = [0.0, 0.0, -p.gravity]
+    a[fast] = p.weight
     return int(fast.sum())
 
 
@@ -152,10 +152,10 @@ def _report(water, problem, x, projected, u, clipped):
 
     kept, p = problem.predicted, water.parameters
     wet_after = np.where(kept.wet[:, None], u, 0.0)
-    z = water.topology.nodes[:, 2]
+    g_x = water.topology.nodes @ p.weight
 
     def energy(volume, velocity):
-        return kinetic_energy(p.density, volume, velocity) + p.density * p.gravity * float(volume @ z)
+        return kinetic_energy(p.density, volume, velocity) - p.density * float(volume @ g_x)
 
     stages = [
         energy(water.nodal_water, water.velocity),

@@ -15,6 +15,12 @@ from fluid.topology import layers_around
 
 LAYERS = 6
 FAR = 7.0
+FILM = 1e-7
+
+
+def without_films(phi, spacing: float):
+    """φ (N,) with water thinner than FILM h at a node taken as none: its pressure would be 0/0 at the surface."""
+    return np.where((phi < 0.0) & (phi > -FILM * spacing), 0.0, phi)
 
 
 @njit(cache=True)
@@ -88,11 +94,11 @@ def squared_distance(p, t):
         return _dot(cp, cp)
     vc, vb, va = d1 * d4 - d3 * d2, d5 * d2 - d1 * d6, d3 * d6 - d5 * d4
     if vc <= 0.0 and d1 >= 0.0 and d3 <= 0.0:
-        return _squared_to_line(ap, ab, d1 / (d1 - d3))
+        return _squared_to_line(ap, ab, _ratio(d1, d1 - d3))
     if vb <= 0.0 and d2 >= 0.0 and d6 <= 0.0:
-        return _squared_to_line(ap, ac, d2 / (d2 - d6))
+        return _squared_to_line(ap, ac, _ratio(d2, d2 - d6))
     if va <= 0.0 and d4 >= d3 and d5 >= d6:
-        return _squared_to_line(bp, t[2] - t[1], (d4 - d3) / ((d4 - d3) + (d5 - d6)))
+        return _squared_to_line(bp, t[2] - t[1], _ratio(d4 - d3, (d4 - d3) + (d5 - d6)))
     total = va + vb + vc
     if total <= 0.0:  # a sliver: its corners were compared above
         return min(_dot(ap, ap), _dot(bp, bp), _dot(cp, cp))
@@ -106,6 +112,12 @@ def squared_distance(p, t):
 @njit(cache=True)
 def _dot(a, b):
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@njit(cache=True)
+def _ratio(part, whole):
+    """part / whole; 0 for an edge without length."""
+    return part / whole if whole > 0.0 else 0.0
 
 
 @njit(cache=True)

@@ -22,6 +22,8 @@ class WaterParameters:
 
     density: float = 1000.0
     gravity: float = 9.81
+    down: tuple[float, float, float] = (0.0, 0.0, -1.0)
+    """Unit vector of gravity."""
     theta: float = 0.6
     courant: float = 1.0
     divergence_damping: float = 0.05
@@ -31,3 +33,8 @@ class WaterParameters:
     subscale_memory: bool = True
     bulk_modulus: float = 2.2e9
     """[Pa] compressibility of water, used only in pockets without free surface, where the pressure level floats."""
+
+    @property
+    def weight(self) -> np.ndarray:
+        """g (3,) [m/s²]."""
+        return self.gravity * np.asarray(self.down)

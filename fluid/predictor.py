@@ -15,7 +15,7 @@ import numpy as np
 
 from fluid.advection import transport
 from fluid.extension import continue_into_solids
-from fluid.level_set import redistance
+from fluid.level_set import redistance, without_films
 from fluid.moments import cells_touching
 from fluid.projection import PressureProblem, cell_velocity, inflow, pressure_matrix, seal_pockets
 from fluid.volume import carry_volume, correct_volume, nodal_volume
@@ -54,10 +54,8 @@ def predicted(water, dt: float) -> PressureProblem:
     carried = carry_volume(water.flux, water.nodal_water - left, water.topology.node_volume, dt)
     conserved = water.conserved_volume - float(left.sum())
     surface, uncorrected = _new_surface(water, phi, carried, conserved)
-    gravity = np.array([0.0, 0.0, -parameters.gravity])
-    u_star = u_adv + theta * dt * gravity
+    u_star = u_adv + theta * dt * parameters.weight
     u_star[water.topology.node_start[1:] == water.topology.node_start[:-1]] = 0.0
-    water._walls.slip(u_star)
     return _problem(water, dt, theta, kick, surface, uncorrected, conserved, u_adv, u_star)
 
 
@@ -109,7 +107,7 @@ def _new_surface(water, phi, carried, conserved):
 
 def _problem(water, dt, theta, kick, surface, uncorrected, conserved, u_adv, u_star):
     t, density = water.topology, water.parameters.density
-    phi = surface.level_set
+    phi = without_films(surface.level_set, water.mesh.spacing)
     wet = (phi < 0.0) & t.active
     cells = cells_touching(wet, t.cells)
     remainder = _carried_remainder(water, dt, theta, cells)

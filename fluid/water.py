@@ -17,13 +17,13 @@ import numpy as np
 from fluid.corrector import Corrected, corrected
 from fluid.domain import carry, wetted_coupling
 from fluid.extension import BAND, fill_missing
-from fluid.level_set import FAR, redistance
+from fluid.level_set import FAR, redistance, without_films
 from fluid.mesh import Background
 from fluid.parameters import WaterParameters
 from fluid.predictor import predicted
 from fluid.projection import PressureProblem
 from fluid.topology import Graph, Topology, layers_around
-from fluid.volume import Flux, edge_flux, nodal_volume
+from fluid.volume import edge_flux, nodal_volume
 from fluid.walls import Walls
 
 LONGEST_STEP = 0.3
@@ -76,7 +76,8 @@ class Water:
         self._set_domain(domain)
         n = len(self.topology.nodes)
         level = fill(self.topology.nodes) if callable(fill) else np.asarray(fill, float)
-        self.level_set = redistance(self.topology, self._dry_if_inactive(level), mesh.spacing, rescale=False)
+        level = redistance(self.topology, self._dry_if_inactive(level), mesh.spacing, rescale=False)
+        self.level_set = without_films(level, mesh.spacing)
         self.velocity, self.acceleration = np.zeros((n, 3)), np.zeros((n, 3))
         self.pressure = np.zeros(n)
         self.cell_velocity = np.zeros((len(self.topology.cells), 3))
@@ -211,9 +212,9 @@ class Water:
         return kinetic_energy(self.parameters.density, self.nodal_water, self.velocity)
 
     def potential_energy(self) -> float:
-        """∫ ρ g z dV [J], exact: Σ N_i z_i = z."""
+        """-∫ ρ g·x dV [J], exact: Σ N_i x_i = x."""
         p = self.parameters
-        return float(p.density * p.gravity * (self.nodal_water @ self.topology.nodes[:, 2]))
+        return -p.density * float(self.nodal_water @ (self.topology.nodes @ p.weight))
 
     def available_energy(self) -> float:
         """Kinetic energy, and the potential energy above that of the same water spread over the whole floor [J]."""
