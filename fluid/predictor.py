@@ -69,7 +69,7 @@ def _transported(water, dt, theta, kick):
     """u_adv (N, 3) and φ̃ (N,); nodes outside the list keep û and φ."""
     a = kick[:, None] * water.acceleration
     u_hat = water.velocity + (1.0 - theta) * dt * a
-    u_m = water.velocity + 0.5 * dt * a
+    u_m = water.velocity + (0.5 * dt * a if water.parameters.theta < 1.0 else 0.0)
     for u in (u_hat, u_m):
         water._walls.slip(u)
     fields = np.column_stack([u_hat, water.level_set])
