@@ -223,9 +223,9 @@ class Joints(Section):
 
 
 class LevelGauge(Section):
-    """Height of the water surface above the tank's floor plane z = 0 at a place."""
+    """Depth of water over a place: the wet length of the vertical through it."""
 
-    kind: Literal["level"]
+    kind: Literal["level"] = Field(description="what it measures: depth of water")
     name: Name = Field(description="column of the history")
     at: tuple[Length, Length] = Field(description="place (x, y)")
 
@@ -233,7 +233,7 @@ class LevelGauge(Section):
 class PressureGauge(Section):
     """Pressure of the water at a point."""
 
-    kind: Literal["pressure"]
+    kind: Literal["pressure"] = Field(description="what it measures: pressure")
     name: Name = Field(description="column of the history")
     at: Point = Field(description="point (x, y, z); on the face of a solid or block: just outside of it")
 
@@ -241,7 +241,7 @@ class PressureGauge(Section):
 class VelocityGauge(Section):
     """Velocity of the water at a point."""
 
-    kind: Literal["velocity"]
+    kind: Literal["velocity"] = Field(description="what it measures: velocity of the water")
     name: Name = Field(description="columns of the history")
     at: Point = Field(description="point (x, y, z)")
 
@@ -249,7 +249,7 @@ class VelocityGauge(Section):
 class VolumeGauge(Section):
     """Volume of the water inside a box."""
 
-    kind: Literal["volume"]
+    kind: Literal["volume"] = Field(description="what it measures: volume of water")
     name: Name = Field(description="column of the history")
     lower: Point = Field(description="corner with the smallest coordinates")
     upper: Point = Field(description="corner with the largest coordinates")
@@ -258,21 +258,29 @@ class VolumeGauge(Section):
 class ForceGauge(Section):
     """Force of the water on a block, a group, a building or a solid."""
 
-    kind: Literal["force"]
+    kind: Literal["force"] = Field(description="what it measures: force of the water")
     name: Name = Field(description="columns of the history")
     on: Name = Field(description="name of a block, group, wall, building or solid")
 
 
-class MotionGauge(Section):
-    """Centre and velocity of one block."""
+class ReactionGauge(Section):
+    """Force of joints and contacts on a block or a group, for instance on the grip of a testing machine."""
 
-    kind: Literal["motion"]
+    kind: Literal["reaction"] = Field(description="what it measures: force of joints and contacts")
+    name: Name = Field(description="columns of the history")
+    on: Name = Field(description="name of a block, group, wall or building")
+
+
+class MotionGauge(Section):
+    """Centre, velocity and rotation vector of one block."""
+
+    kind: Literal["motion"] = Field(description="what it measures: motion of a block")
     name: Name = Field(description="columns of the history")
     of: Name = Field(description="name of a block")
 
 
 Gauge = Annotated[
-    LevelGauge | PressureGauge | VelocityGauge | VolumeGauge | ForceGauge | MotionGauge,
+    LevelGauge | PressureGauge | VelocityGauge | VolumeGauge | ForceGauge | ReactionGauge | MotionGauge,
     Field(discriminator="kind"),
 ]
 

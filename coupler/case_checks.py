@@ -157,23 +157,26 @@ def _unique_names(case: Case) -> Iterator[Problem]:
     for name, places in _names(case).items():
         for path in places[1:]:
             yield (*path, "name"), f"'{name}' is taken by {_shown(places[0])}; give every body its own name"
-    seen: dict[str, int] = {}
+    seen: dict[tuple[str, str], int] = {}
     for i, gauge in enumerate(case.gauge):
-        if gauge.name in seen:
-            yield ("gauge", i, "name"), f"'{gauge.name}' is taken by gauge[{seen[gauge.name]}]"
-        seen.setdefault(gauge.name, i)
+        first = seen.setdefault((gauge.kind, gauge.name), i)
+        if first != i:
+            yield ("gauge", i, "name"), f"'{gauge.name}' is taken by gauge[{first}] of the same kind"
 
 
 def _known_names(case: Case) -> Iterator[Problem]:
     blocks = [block.name for block in case.structure.block] if case.structure else []
-    groups = {block.group for block in case.structure.block if block.group} if case.structure else set()
-    bodies = [*_names(case), *groups]
+    groups = [block.group for block in case.structure.block if block.group] if case.structure else []
+    moving = list(dict.fromkeys([name for _, name, _ in _structure(case)] + groups))
+    solids = [name for _, name, _ in _solids(case)]
     for i, motion in enumerate(case.motion):
         if case.structure and motion.block not in blocks:
             yield ("motion", i, "block"), _no_such("block", motion.block, blocks)
     for i, gauge in enumerate(case.gauge):
-        if gauge.kind == "force" and gauge.on not in bodies:
-            yield ("gauge", i, "on"), _no_such("body", gauge.on, bodies)
+        if gauge.kind == "force" and gauge.on not in moving + solids:
+            yield ("gauge", i, "on"), _no_such("body", gauge.on, moving + solids)
+        if gauge.kind == "reaction" and gauge.on not in moving:
+            yield ("gauge", i, "on"), _no_such("block or group", gauge.on, moving)
         if gauge.kind == "motion" and gauge.of not in blocks:
             yield ("gauge", i, "of"), _no_such("block", gauge.of, blocks)
 
@@ -318,7 +321,7 @@ def _hollow(path: KeyPath, building: Building) -> Iterator[Problem]:
 def _gauges(case: Case) -> Iterator[Problem]:
     for i, gauge in enumerate(case.gauge):
         path = ("gauge", i)
-        if gauge.kind != "motion" and case.water is None:
+        if gauge.kind not in ("motion", "reaction") and case.water is None:
             yield (*path, "kind"), f"a {gauge.kind} gauge measures water; write a section [water]"
         elif gauge.kind == "volume":
             yield from _corners_in_order(path, gauge)

@@ -99,8 +99,6 @@ def _tables() -> Iterator[str]:
             continue
         yield f"## {key.path}"
         yield ""
-        yield f"`{_header(key)}`: {key.description}."
-        yield ""
         for section in key.sections:
             yield from _table(section, key)
 
@@ -111,7 +109,7 @@ def _table(section: type[Section], key: Key) -> Iterator[str]:
     if kind is not None:
         yield f'`kind = "{kind.annotation.__args__[0]}"`: {title}'
     else:
-        yield title
+        yield f"`{_header(key)}`: {title}"
     yield ""
     yield "| name | unit | values | default | meaning |"
     yield "|---|---|---|---|---|"
@@ -177,12 +175,12 @@ friction = 0.4
 
 [[gauge]]
 kind = "level"
-name = "level_at_box"
+name = "in_front"
 at = [2.2, 0.5]
 
 [[gauge]]
 kind = "force"
-name = "force_on_box"
+name = "box"
 on = "box"
 """
 

@@ -7,7 +7,7 @@ from coupler.errors import did_you_mean
 
 KeyPath = tuple[str | int, ...]
 
-GAUGE_KINDS = ("level", "pressure", "velocity", "volume", "force", "motion")
+GAUGE_KINDS = ("level", "pressure", "velocity", "volume", "force", "reaction", "motion")
 
 
 def explain_error(error: dict) -> tuple[KeyPath, str]:

@@ -1,0 +1,91 @@
+"""What a case promises, and whether a run kept it: `expected.toml` against the histories of a run directory.
+
+[[expect]]
+what = "..."           for people                    table, column   of the history
+take = "last"          last | largest (by size, sign kept) | mean | at (time) | integral (from, to) | period
+value, tolerance       |taken - value| ≤ tolerance   or at_least = / at_most =
+source = "..."         where the number comes from
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from coupler.errors import SurgebreakError, did_you_mean
+
+
+class BadExpectation(SurgebreakError):
+    """An entry of expected.toml that cannot be evaluated."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """One promise: what was expected and what the run has."""
+
+    what: str
+    found: float
+    expected: str
+    kept: bool
+
+
+def verdicts(run: Path, expected: Path) -> list[Verdict]:
+    """Compare a run directory with an expected.toml. Raises BadExpectation, naming entry and column."""
+    entries = tomllib.loads(expected.read_text(encoding="utf-8"))["expect"]
+    return [_judge(entry, run, f"{expected}: expect[{i}]") for i, entry in enumerate(entries)]
+
+
+def _judge(entry: dict, run: Path, place: str) -> Verdict:
+    columns = read_columns(run / entry["table"])
+    name = entry["column"]
+    if name not in columns:
+        raise BadExpectation(f"{place}: {entry['table']} has no column '{name}'{did_you_mean(name, columns)}")
+    take = TAKE.get(entry["take"])
+    if take is None:
+        raise BadExpectation(f"{place}: take = '{entry['take']}'; one of {', '.join(TAKE)}")
+    found = float(take(columns["time"], columns[name], entry))
+    if "value" in entry:
+        kept = abs(found - entry["value"]) <= entry["tolerance"]
+        told = f"{entry['value']:g} ± {entry['tolerance']:g}"
+    else:
+        low, high = entry.get("at_least", -np.inf), entry.get("at_most", np.inf)
+        kept, told = bool(low <= found <= high), f"{low:g} to {high:g}"
+    return Verdict(entry["what"], found, told, bool(kept))
+
+
+def read_columns(path: Path) -> dict[str, np.ndarray]:
+    """Columns of a history table by name, (rows,) each; lines that begin with # are comments."""
+    lines = [line for line in path.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
+    names = lines[0].split(",")
+    rows = [line.split(",") for line in lines[1:]]
+    whole = [row for row in rows if len(row) == len(names)]  # a killed run may leave half a line
+    values = np.array([[float(cell or "nan") for cell in row] for row in whole]).reshape(-1, len(names))
+    return {name: values[:, k] for k, name in enumerate(names)}
+
+
+def _integral(time: np.ndarray, values: np.ndarray, entry: dict) -> float:
+    grid = np.unique(np.concatenate([[entry["from"], entry["to"]], time]))
+    grid = grid[(grid >= entry["from"]) & (grid <= entry["to"])]
+    return np.trapezoid(np.interp(grid, time, values), grid)
+
+
+def _period(time: np.ndarray, values: np.ndarray, entry: dict) -> float:
+    """Mean distance of upward crossings of the mean [s]; NaN with fewer than two."""
+    around = values - values.mean()
+    up = np.flatnonzero((around[:-1] < 0) & (around[1:] >= 0))
+    crossing = time[up] - around[up] * (time[up + 1] - time[up]) / (around[up + 1] - around[up])
+    return np.diff(crossing).mean() if len(crossing) > 1 else np.nan
+
+
+TAKE: dict[str, Callable[[np.ndarray, np.ndarray, dict], float]] = {
+    "last": lambda time, values, entry: values[-1],
+    "largest": lambda time, values, entry: values[np.abs(values).argmax()],
+    "mean": lambda time, values, entry: np.trapezoid(values, time) / (time[-1] - time[0]),
+    "at": lambda time, values, entry: np.interp(entry["time"], time, values),
+    "integral": _integral,
+    "period": _period,
+}
