@@ -1,0 +1,321 @@
+"""The YADE side: bodies, materials, masks and the engine list. Arrays in and out, one row a block.
+
+A block that may touch something is a clump of one Box and small node spheres; contact is Box against sphere with
+YADE's spring, dashpot and slider (`Law2_ScGeom_ViscElPhys_Basic`). A block whose joints are all intact is a plain Box
+without nodes (the joints carry it) until damage turns it into a clump.
+
+Masks (two bodies meet if they share a bit; equal masks holding bit 1 or 2 do not):
+
+    nodes of an intact block joined to the ground 1, of another intact block 9, of a damaged or loose block 14
+    box of an intact block 2, of a damaged block 3 · fixed planes 8
+
+so intact-intact pairs never meet (their joints carry compression), every other pair does.
+"""
+
+from __future__ import annotations
+
+import builtins
+import struct
+from collections import deque
+from collections.abc import Callable
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from yade_scripts.blocks import Block
+from yade_scripts.contact import ContactLaw
+from yade_scripts.engine import Engine, YadeError
+from yade_scripts.faces import FixedPlane
+from yade_scripts.nodes import node_positions, node_radius
+
+Array = np.ndarray
+
+NODE_GROUNDED, NODE_INTACT, NODE_LOOSE = 1, 9, 14
+BOX_INTACT, BOX_LOOSE, PLANE = 2, 3, 8
+RIGID = 1e30
+"""Stiffness of fixed planes: in series with a block's own, the block's own."""
+VERLET = 0.05
+"""Margin of the collision search as a share of the smallest edge of a block."""
+HOOK = "_surgebreak_substep"
+"""Name under which YADE's PyRunner finds the joints (its command runs in __main__, which may belong to a test)."""
+STATE = 13
+"""Numbers of a body: position 3, velocity 3, angular velocity 3, orientation 4 (x y z w)."""
+
+
+class SceneInUse(YadeError):
+    """YADE holds one scene in a process; close the structure that has it first."""
+
+
+class Scene:
+    """Bodies of `blocks` (local coordinates) in YADE; `face_stiffness` (n,) K [N/m]; law None: no contact at all."""
+
+    _owner: Scene | None = None
+
+    def __init__(
+        self,
+        engine: Engine,
+        blocks: list[Block],
+        planes: list[FixedPlane],
+        law: ContactLaw | None,
+        face_stiffness: Array,
+        gravity: Array,
+        with_nodes: Array,
+        substep: Callable[[], None] | None,
+    ):
+        if Scene._owner is not None:
+            raise SceneInUse("YADE holds another structure in this process; call its close() first")
+        Scene._owner = self
+        self.engine, self.O, self.blocks, self.law = engine, engine.O, blocks, law
+        self.O.reset()
+        self.K = np.asarray(face_stiffness, float)
+        self.moving = np.array([not (b.fixed or b.driven) for b in blocks], bool)
+        self.mass = np.array([b.mass for b in blocks])
+        self.ids: list[int] = []
+        self.nodes: list[list[int]] = [[] for _ in blocks]
+        self.box_id: list[int] = []
+        self.row_of: dict[int, int] = {}
+        self.frame = np.tile(np.eye(3), (len(blocks), 1, 1))
+        self._load: dict[int, tuple] = {}
+        self._materials: dict[tuple, object] = {}
+        self._subdomain = engine.wrapper.Subdomain()
+        self._add_planes(planes)
+        for row, block in enumerate(blocks):
+            self._add_block(row, block, with_nodes[row])
+        self._set_engines(gravity, substep)
+
+    # ---- building -------------------------------------------------------------------------------------------
+
+    def _add_planes(self, planes: list[FixedPlane]) -> None:
+        """Thick fixed boxes whose upper faces lie in the planes, far wider than the scene."""
+        if self.law is None or not self.blocks:
+            return
+        points = np.concatenate([b.world_vertices() for b in self.blocks])
+        span = 1e3 * (np.ptp(points, axis=0).max() + 1.0)
+        thick = 20.0 * max(b.radius for b in self.blocks)
+        material = self._plane_material()
+        for number, plane in enumerate(planes):
+            turn = _turn_to(plane.normal)
+            middle = points.mean(axis=0)
+            top = middle - plane.normal * (plane.normal @ (middle - plane.point))
+            body = self.engine.utils.box(
+                self._v(top - thick * plane.normal),
+                self._v((span, span, thick)),
+                orientation=self._q(turn),
+                fixed=True,
+                material=material,
+                mask=PLANE,
+            )
+            self.row_of[self.O.bodies.append(body)] = -1 - number
+
+    def _add_block(self, row: int, block: Block, with_nodes: bool) -> None:
+        if block.is_box:
+            box = self.engine.utils.box(
+                self._v(block.centre),
+                self._v(0.5 * block.size),
+                orientation=self._q(block.rotation),
+                material=self._material(row, node=False),
+                mask=BOX_INTACT,
+            )
+        else:
+            box = self._shapeless(block)
+        self.box_id.append(self.O.bodies.append(box))
+        self.row_of[self.box_id[row]] = row
+        self.ids.append(self.box_id[row])
+        self._set_inertia(row, np.concatenate([block.velocity, block.spin]))
+        if with_nodes and self.law is not None:
+            self.add_nodes(row)
+
+    def _shapeless(self, block: Block):
+        """A body that only integrates: a polyhedron in a scene without contact."""
+        body = self.engine.wrapper.Body()
+        body.state.pos, body.state.ori = self._v(block.centre), self._q(block.rotation)
+        body.material = self._material(0, node=False)
+        return body
+
+    def add_nodes(self, row: int) -> None:
+        """Turn the plain box of a row into a clump with contact nodes; its motion goes on unchanged."""
+        O, block = self.O, self.blocks[row]
+        state = O.bodies[self.box_id[row]].state
+        x, R = np.array(state.pos), _matrix(state.ori)
+        motion = np.concatenate([np.array(state.vel), np.array(state.angVel)])
+        radius = node_radius(block.size, self.law.node_radius)
+        material = self._material(row, node=True)
+        spheres = [
+            self.engine.utils.sphere(self._v(x + R @ p), radius, material=material, mask=NODE_INTACT)
+            for p in node_positions(block.size, self.law.nodes_per_edge, radius)
+        ]
+        self.nodes[row] = list(O.bodies.append(spheres))
+        load = self._load.pop(row, None)
+        if load is not None:
+            self._permanent(self.box_id[row], ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
+        self.ids[row] = O.bodies.clump([self.box_id[row], *self.nodes[row]])
+        # A zero force makes YADE's force container as long as the new id asks; without it the integrator aborts.
+        O.forces.addF(self.ids[row], (0.0, 0.0, 0.0))
+        self.row_of.update(dict.fromkeys(self.nodes[row], row))
+        self.frame[row] = _matrix(O.bodies[self.ids[row]].state.ori).T @ R
+        self._set_inertia(row, motion)
+        if load is not None:
+            self._load[row] = load
+            self._permanent(self.ids[row], load)
+
+    def _set_inertia(self, row: int, motion: Array) -> None:
+        """Exact mass and inertia in YADE's principal frame; velocity and angular momentum to match.
+
+        Where the frame of the body is not principal (polyhedra), the state is turned into the principal one.
+        """
+        block, state = self.blocks[row], self.O.bodies[self.ids[row]].state
+        body = self.O.bodies[self.ids[row]]
+        T = self.frame[row] @ block.inertia @ self.frame[row].T
+        if np.abs(T - np.diag(np.diag(T))).max() > 1e-12 * np.abs(T).max():
+            R = _matrix(state.ori) @ self.frame[row]
+            _, axes = np.linalg.eigh(block.inertia)
+            axes[:, 2] *= np.sign(np.linalg.det(axes))
+            self.frame[row] = axes.T
+            state.ori = self._q(R @ axes)
+            T = axes.T @ block.inertia @ axes
+        state.mass, state.inertia = block.mass, self._v(np.diag(T))
+        body.aspherical = True
+        state.vel, state.angVel = self._v(motion[:3]), self._v(motion[3:])
+        R = _matrix(state.ori)
+        state.angMom = self._v(R @ (np.diag(T) * (R.T @ motion[3:])))
+        if not self.moving[row]:
+            state.blockedDOFs = "xyzXYZ"
+
+    def _material(self, row: int, node: bool):
+        """K per node; dashpots of nodes and boxes so that pairs of equal mass and ground contacts are exact.
+
+        In series: node against plane gives 2ζ sqrt(m K)/n², node against box of an equal block
+        2ζ sqrt(m K/2)/(2 n²), hence the 2√2 - 1. Other pairs: `correct_dashpots`.
+        """
+        if self.law is None:
+            law, k, c = ContactLaw(), 0.0, 0.0
+        else:
+            law, n2 = self.law, self.law.nodes_per_edge**2
+            k = self.K[row] / n2
+            c = 2.0 * law.damping_ratio * np.sqrt(self.mass[row] * self.K[row]) / n2
+        if not node:
+            c /= 2.0 * np.sqrt(2.0) - 1.0
+        return self._viscel(k, law.shear_ratio * k, c, np.sqrt(law.shear_ratio) * c, law.friction)
+
+    def _plane_material(self):
+        law = self.law
+        mu = law.friction if law.ground_friction is None else law.ground_friction
+        c = RIGID if law.damping_ratio > 0.0 else 0.0
+        return self._viscel(RIGID, RIGID, c, c, mu)
+
+    def _viscel(self, kn, ks, cn, cs, mu):
+        key = (kn, ks, cn, cs, mu)
+        if key not in self._materials:
+            material = self.engine.wrapper.ViscElMat(
+                kn=kn, ks=ks, cn=cn, cs=cs, frictionAngle=float(np.arctan(mu)), density=1000.0
+            )
+            self.O.materials.append(material)
+            self._materials[key] = material
+        return self._materials[key]
+
+    def _set_engines(self, gravity: Array, substep: Callable[[], None] | None) -> None:
+        w = self.engine.wrapper
+        self.newton = w.NewtonIntegrator(damping=0.0, exactAsphericalRot=True, gravity=self._v(gravity))
+        self.collider = self.loop = None
+        engines = [w.ForceResetter()]
+        if self.law is not None:
+            edge = min((b.size.min() for b in self.blocks if b.is_box), default=1.0)
+            self.collider = w.InsertionSortCollider(
+                [w.Bo1_Box_Aabb(), w.Bo1_Sphere_Aabb()], verletDist=VERLET * edge, avoidSelfInteractionMask=3
+            )
+            self.loop = w.InteractionLoop(
+                [w.Ig2_Box_Sphere_ScGeom()],
+                [w.Ip2_ViscElMat_ViscElMat_ViscElPhys()],
+                [w.Law2_ScGeom_ViscElPhys_Basic()],
+            )
+            engines += [self.collider, self.loop]
+        if substep is not None:
+            setattr(builtins, HOOK, substep)
+            engines.append(w.PyRunner(command=f"{HOOK}()", iterPeriod=1, initRun=True, updateGlobals=False))
+        self.resetter = engines[0]
+        self.O.engines = [*engines, self.newton]
+
+    # ---- reading and writing --------------------------------------------------------------------------------
+
+    def read(self, rows_ids: list[int], buffer: bytearray) -> Array:
+        """States of body ids into a buffer of 8 * 13 bytes each → (k, 13) view on it.
+
+        The list must persist between calls: YADE leaks a reference per fresh item it is handed.
+        """
+        struct.pack_into(
+            f"{STATE * len(rows_ids)}d", buffer, 0, *self._subdomain.getStateValuesFromIds(rows_ids)
+        )
+        return np.frombuffer(buffer, float, STATE * len(rows_ids)).reshape(-1, STATE)
+
+    def add_forces(self, ids: list[int], F: Array) -> None:
+        """Add F (k, 6) to the bodies for the running substep (only from within the engine loop)."""
+        forces = self.O.forces
+        deque(map(forces.addF, ids, F[:, :3].tolist()), maxlen=0)
+        deque(map(forces.addT, ids, F[:, 3:].tolist()), maxlen=0)
+
+    def set_load(self, F: Array) -> None:
+        """Permanent force and moment on every block, F (n, 6)."""
+        for row, f in enumerate(F.tolist()):
+            load = (tuple(f[:3]), tuple(f[3:]))
+            if load != self._load.get(row, ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))):
+                self._load[row] = load
+                self._permanent(self.ids[row], load)
+
+    def _permanent(self, body: int, load: tuple) -> None:
+        self.O.forces.setPermF(body, load[0])
+        self.O.forces.setPermT(body, load[1])
+
+    def set_masks(self, row: int, loose: bool, grounded: bool) -> None:
+        """Meeting rules of a block by its state (see the module text)."""
+        bodies = self.O.bodies
+        node = NODE_LOOSE if loose else (NODE_GROUNDED if grounded else NODE_INTACT)
+        bodies[self.box_id[row]].mask = BOX_LOOSE if loose else BOX_INTACT
+        for i in self.nodes[row]:
+            bodies[i].mask = node
+
+    def search_contacts_now(self) -> None:
+        """Make the next substep look for contacts afresh (after masks or bodies changed)."""
+        if self.collider is not None:
+            self.collider.doSort = True
+            self.newton.maxVelocitySq = 2.0 + self.newton.maxVelocitySq
+
+    def refresh_contacts(self) -> None:
+        """Bring the geometry and forces of the contacts to the present positions without changing their history.
+
+        With dt = 0 the law adds nothing to the shear springs."""
+        if self.loop is None:
+            return
+        dt, self.O.dt = self.O.dt, 0.0
+        self.collider()
+        self.loop()
+        self.resetter()
+        self.O.dt = dt
+
+    def contacts(self) -> list:
+        """Real interactions between a node and a box, of this substep."""
+        return [i for i in self.O.interactions if i.isReal] if self.loop is not None else []
+
+    def close(self) -> None:
+        """Give the scene back; the structure cannot be used afterwards."""
+        if Scene._owner is self:
+            self.O.reset()
+            if hasattr(builtins, HOOK):
+                delattr(builtins, HOOK)
+            Scene._owner = None
+
+    def _v(self, x) -> object:
+        return self.engine.Vector3(*(float(c) for c in x))
+
+    def _q(self, R: Array):
+        x, y, z, w = Rotation.from_matrix(R).as_quat()
+        return self.engine.Quaternion(float(w), float(x), float(y), float(z))
+
+
+def _matrix(quaternion) -> Array:
+    """Rotation matrix (3, 3) of a YADE quaternion."""
+    return np.array(quaternion.toRotationMatrix(), float).reshape(3, 3)
+
+
+def _turn_to(normal: Array) -> Array:
+    """A rotation that takes z to `normal`."""
+    return Rotation.align_vectors([normal], [[0.0, 0.0, 1.0]])[0].as_matrix()
