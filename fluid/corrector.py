@@ -11,11 +11,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
 from fluid.extension import extend_velocity
 from fluid.moments import cells_touching, wet_fraction
 from fluid.projection import cell_gradient, cell_velocity, damp_divergence, nodal_mean, with_ghosts
 from fluid.volume import Flux, edge_flux
+
+FLUX_LAYERS = 3
+"""Layers of dry nodes that water may reach within the next step."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +47,7 @@ def corrected(water, problem, x) -> Corrected:
     gradient, share = _pressure_gradient(water, kept, pressure, dt / problem.density)
     u, mean = _projected(t, kept, gradient, share)
     a = np.where(kept.wet[:, None], (u - kept.advected) / (kept.theta * dt), 0.0)
-    remainder, kick_remainder = _remainders(water, kept, gradient, mean, dt)
+    remainder, kick_remainder = _remainders(water, kept, gradient, mean, share, dt)
     u_cell = kept.cell_star - gradient
     projected = u.copy()
     clipped = _limit_and_damp(water, kept, share, u, a)
@@ -67,7 +71,7 @@ def corrected(water, problem, x) -> Corrected:
 
 
 def _pressure_gradient(water, kept, pressure, scale):
-    """(dt/ρ) ∇x of the wet cells (n, 3) [m/s], and their wet share (n,)."""
+    """(dt/ρ) ∇x of the wet cells (n, 3) [m/s], and their wet share (n,), 1 exactly in wholly wet ones."""
     t = water.topology
     full = with_ghosts(pressure, kept.wet, water._walls.open_node, kept.level_set, kept.wet_cells, t.cells)
     gradient = cell_gradient(kept.wet_cells, full, t.cells, t.parent, t.gradients)
@@ -80,14 +84,14 @@ def _projected(t, kept, gradient, share):
     return np.where(kept.wet[:, None], kept.u_star - mean, kept.u_star), mean
 
 
-def _remainders(water, kept, gradient, mean, dt):
+def _remainders(water, kept, gradient, mean, share, dt):
     """u' (M, 3) [m/s] after this step and its rate -(∇x - Π∇x)/(θ ρ) (M, 3) [m/s²] for the next kick."""
     t = water.topology
     remainder, rate = np.zeros_like(water.remainder), np.zeros_like(water.remainder)
     if water.parameters.subscale_memory:
-        whole = kept.wet[t.cells[kept.wet_cells]].all(axis=1)
+        whole = np.flatnonzero(share == 1.0)
         cells = kept.wet_cells[whole]
-        left = cell_velocity(cells, mean, np.zeros_like(remainder), t.cells, t.share) - gradient[whole]
+        left = cell_velocity(cells, mean, np.zeros((0, 3)), t.cells, t.share) - gradient[whole]
         remainder[cells] = kept.remainder[cells] + left
         rate[cells] = left / (kept.theta * dt)
     return remainder, rate
@@ -135,18 +139,29 @@ def _continue(water, kept, listed, start, u, a) -> None:
 def _flux(water, kept, listed, start, u, u_cell):
     """Velocity of the cells (M, 3) and the volume flux of the next step, extrapolated to its middle."""
     t = water.topology
+    reached = listed[: start[FLUX_LAYERS + 1]]
     near = np.zeros(len(u), bool)
-    near[listed[: start[3]]] = True
+    near[reached] = True
     around = cells_touching(near, t.cells)
     cell_field = np.zeros_like(water.cell_velocity)
-    cell_field[around] = u[t.cells[around]].mean(axis=1)
+    cell_field[around] = cell_velocity(around, u, np.zeros((0, 3)), t.cells, t.share)
     cell_field[kept.wet_cells] = u_cell
-    middle = cell_field
-    if water.parameters.theta < 1.0:  # with implicit Euler the end of the step is the stable choice
-        had_one = water.cell_velocity.any(axis=1)
-        middle = np.where(had_one[:, None], 1.5 * cell_field - 0.5 * water.cell_velocity, cell_field)
-    flux = edge_flux(t, water.graph_of(listed), listed, middle)
-    return cell_field, flux
+    # with implicit Euler the velocity at the end of the step is the stable choice
+    middle = (
+        to_middle(around, cell_field, water.cell_velocity) if water.parameters.theta < 1.0 else cell_field
+    )
+    return cell_field, edge_flux(t, water.graph_of(listed), reached, middle)
+
+
+@njit(cache=True)
+def to_middle(cell_list, now, before):
+    """1.5 u - 0.5 u_before (M, 3): the velocity half a step ahead; u where there was none before."""
+    out = now.copy()
+    for e in cell_list:
+        if before[e, 0] != 0.0 or before[e, 1] != 0.0 or before[e, 2] != 0.0:
+            for k in range(3):
+                out[e, k] = 1.5 * now[e, k] - 0.5 * before[e, k]
+    return out
 
 
 def _report(water, problem, x, projected, u, clipped):

@@ -79,53 +79,41 @@ def surface_triangles(cut, phi, nodes, cells):
 @njit(cache=True)
 def squared_distance(p, t):
     """Squared distance [m²] from the point p (3,) to the triangle t (3, 3) (Ericson, Real-Time Collision
-    Detection (2005), 5.1.5)."""
-    ab, ac, ap = t[1] - t[0], t[2] - t[0], p - t[0]
-    d1, d2 = _dot(ab, ap), _dot(ac, ap)
+    Detection (2005), 5.1.5).  Scalars only: this is called millions of times a second."""
+    abx, aby, abz = t[1, 0] - t[0, 0], t[1, 1] - t[0, 1], t[1, 2] - t[0, 2]
+    acx, acy, acz = t[2, 0] - t[0, 0], t[2, 1] - t[0, 1], t[2, 2] - t[0, 2]
+    apx, apy, apz = p[0] - t[0, 0], p[1] - t[0, 1], p[2] - t[0, 2]
+    d1 = abx * apx + aby * apy + abz * apz
+    d2 = acx * apx + acy * apy + acz * apz
+    ab2 = abx * abx + aby * aby + abz * abz
+    ac2 = acx * acx + acy * acy + acz * acz
+    abac = abx * acx + aby * acy + abz * acz
+    d3, d4, d5, d6 = d1 - ab2, d2 - abac, d1 - abac, d2 - ac2
+    va, vb, vc = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
+    v, w = 0.0, 0.0
     if d1 <= 0.0 and d2 <= 0.0:
-        return _dot(ap, ap)
-    bp = p - t[1]
-    d3, d4 = _dot(ab, bp), _dot(ac, bp)
-    if d3 >= 0.0 and d4 <= d3:
-        return _dot(bp, bp)
-    cp = p - t[2]
-    d5, d6 = _dot(ab, cp), _dot(ac, cp)
-    if d6 >= 0.0 and d5 <= d6:
-        return _dot(cp, cp)
-    vc, vb, va = d1 * d4 - d3 * d2, d5 * d2 - d1 * d6, d3 * d6 - d5 * d4
-    if vc <= 0.0 and d1 >= 0.0 and d3 <= 0.0:
-        return _squared_to_line(ap, ab, _ratio(d1, d1 - d3))
-    if vb <= 0.0 and d2 >= 0.0 and d6 <= 0.0:
-        return _squared_to_line(ap, ac, _ratio(d2, d2 - d6))
-    if va <= 0.0 and d4 >= d3 and d5 >= d6:
-        return _squared_to_line(bp, t[2] - t[1], _ratio(d4 - d3, (d4 - d3) + (d5 - d6)))
-    total = va + vb + vc
-    if total <= 0.0:  # a sliver: its corners were compared above
-        return min(_dot(ap, ap), _dot(bp, bp), _dot(cp, cp))
-    v, w = vb / total, vc / total
-    away = np.empty(3)
-    for k in range(3):
-        away[k] = ap[k] - v * ab[k] - w * ac[k]
-    return _dot(away, away)
-
-
-@njit(cache=True)
-def _dot(a, b):
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+        pass
+    elif d3 >= 0.0 and d4 <= d3:
+        v = 1.0
+    elif d6 >= 0.0 and d5 <= d6:
+        w = 1.0
+    elif vc <= 0.0 and d1 >= 0.0 and d3 <= 0.0:
+        v = _ratio(d1, d1 - d3)
+    elif vb <= 0.0 and d2 >= 0.0 and d6 <= 0.0:
+        w = _ratio(d2, d2 - d6)
+    elif va <= 0.0 and d4 >= d3 and d5 >= d6:
+        w = _ratio(d4 - d3, (d4 - d3) + (d5 - d6))
+        v = 1.0 - w
+    else:
+        v, w = _ratio(vb, va + vb + vc), _ratio(vc, va + vb + vc)
+    x, y, z = apx - v * abx - w * acx, apy - v * aby - w * acy, apz - v * abz - w * acz
+    return x * x + y * y + z * z
 
 
 @njit(cache=True)
 def _ratio(part, whole):
-    """part / whole; 0 for an edge without length."""
+    """part / whole; 0 for an edge or a triangle without extent."""
     return part / whole if whole > 0.0 else 0.0
-
-
-@njit(cache=True)
-def _squared_to_line(offset, direction, s):
-    total = 0.0
-    for k in range(3):
-        total += (offset[k] - s * direction[k]) ** 2
-    return total
 
 
 @njit(cache=True)

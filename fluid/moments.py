@@ -117,7 +117,7 @@ def wet_fraction(cell_list, phi, cells):
         for a in range(4):
             local[a] = phi[cells[cell_list[s], a]]
         wet_moments(local, out, corner)
-        share[s] = out.sum()
+        share[s] = out[0] + out[1] + out[2] + out[3]
     return share
 
 

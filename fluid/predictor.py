@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
 from fluid.advection import transport
 from fluid.extension import continue_into_solids
@@ -141,13 +142,26 @@ def _carried_remainder(water, dt, theta, cells):
 
     It is swept out of the cell in the time that the water takes to cross it (dynamic subscales)."""
     t = water.topology
-    out = np.zeros_like(water.remainder)
     if not water.parameters.subscale_memory:
-        return out
-    speed = np.linalg.norm(water.velocity[t.cells[cells]].mean(axis=1), axis=1)
-    beta = 1.0 / (1.0 + 2.0 * speed * dt / t.size[cells])
-    kicked = water.remainder[cells] + (1.0 - theta) * dt * water.kick_remainder[cells]
-    out[cells] = beta[:, None] * kicked
+        return np.zeros_like(water.remainder)
+    rate = (1.0 - theta) * dt
+    return carry_remainder(
+        cells, water.remainder, water.kick_remainder, rate, water.velocity, dt, t.cells, t.size
+    )
+
+
+@njit(cache=True)
+def carry_remainder(cell_list, remainder, kick, kick_time, u, dt, cells, size):
+    """β (u' + kick_time r) (M, 3) in the listed cells, zero elsewhere."""
+    out = np.zeros_like(remainder)
+    for e in cell_list:
+        square = 0.0
+        for k in range(3):
+            mean = 0.25 * (u[cells[e, 0], k] + u[cells[e, 1], k] + u[cells[e, 2], k] + u[cells[e, 3], k])
+            square += mean * mean
+        beta = 1.0 / (1.0 + 2.0 * np.sqrt(square) * dt / size[e])
+        for k in range(3):
+            out[e, k] = beta * (remainder[e, k] + kick_time * kick[e, k])
     return out
 
 

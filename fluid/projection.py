@@ -121,12 +121,15 @@ def seal_pockets(matrix, anchored, volume, compliance: float, pressure):
 
 @njit(cache=True)
 def cell_velocity(cell_list, u, remainder, cells, share):
-    """u at the centroid of the fluid part plus the element-wise remainder, (n, 3) for the listed cells."""
-    out = np.empty((cell_list.shape[0], 3))
+    """u at the centroid of the fluid part of the listed cells plus the remainder of the cell, (n, 3).
+
+    remainder (M, 3), or (0, 3) for none."""
+    out = np.zeros((cell_list.shape[0], 3))
     for s in range(cell_list.shape[0]):
         e = cell_list[s]
         for k in range(3):
-            out[s, k] = remainder[e, k]
+            if remainder.shape[0] > 0:
+                out[s, k] = remainder[e, k]
             for a in range(4):
                 out[s, k] += share[e, a] * u[cells[e, a], k]
     return out

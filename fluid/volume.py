@@ -136,13 +136,21 @@ def carry_volume(flux: Flux, water, capacity, dt: float):
 def _diffused_shift(band, place, graph_row, start, neighbour, stiffness, c, residual, kappa, tolerance, most):
     """Equation (2) on the band nodes by conjugate gradients with the diagonal as preconditioner, (n,)."""
     n = band.shape[0]
-    diagonal = np.empty(n)
+    diagonal = c.copy()
+    first, column, entry = np.zeros(n + 1, np.int64), np.empty(40 * n, np.int64), np.empty(40 * n)
+    count = 0
     for r in range(n):
         row = graph_row[band[r]]
-        diagonal[r] = c[r]
         for s in range(start[row], start[row + 1]):
-            if place[neighbour[s]] >= 0:
-                diagonal[r] -= kappa * stiffness[s]
+            q = place[neighbour[s]]
+            if q >= 0 and stiffness[s] != 0.0:
+                if count == column.shape[0]:
+                    column = np.concatenate((column, np.empty_like(column)))
+                    entry = np.concatenate((entry, np.empty_like(entry)))
+                column[count], entry[count] = q, kappa * stiffness[s]
+                diagonal[r] -= entry[count]
+                count += 1
+        first[r + 1] = count
     typical = diagonal.mean() if n > 0 else 1.0
     x, r_, Ap = np.zeros(n), residual.copy(), np.empty(n)
     for r in range(n):
@@ -151,17 +159,14 @@ def _diffused_shift(band, place, graph_row, start, neighbour, stiffness, c, resi
     z = r_ / diagonal
     p = z.copy()
     rz = np.dot(r_, z)
-    first = rz
+    goal = tolerance * tolerance * rz
     for _ in range(most):
-        if rz <= tolerance * tolerance * first or rz <= 0.0:
+        if rz <= goal or rz <= 0.0:
             break
         for r in range(n):
-            row = graph_row[band[r]]
             total = diagonal[r] * p[r]
-            for s in range(start[row], start[row + 1]):
-                q = place[neighbour[s]]
-                if q >= 0:
-                    total += kappa * stiffness[s] * p[q]
+            for s in range(first[r], first[r + 1]):
+                total += entry[s] * p[column[s]]
             Ap[r] = total
         alpha = rz / np.dot(p, Ap)
         x += alpha * p
@@ -214,10 +219,24 @@ def correct_volume(topology, graph, listed, phi, carried, target: float, kappa: 
 def _volume_slope(t, near, phi, spacing):
     """c (N,) [m²] by a central difference over the cells that the surface can reach."""
     step = _PROBE * spacing
-    low, high = phi[t.cells[near]].min(axis=1), phi[t.cells[near]].max(axis=1)
-    cut = near[(low < step) & (high > -step)]
+    cut = _within_reach(near, phi, t.cells, step)
     wider = nodal_water(cut, -step, phi, *_of_cells(t))
     return (wider - nodal_water(cut, step, phi, *_of_cells(t))) / (2 * step)
+
+
+@njit(cache=True)
+def _within_reach(cell_list, phi, cells, step):
+    """The listed cells whose surface exists for some shift of φ within ±step."""
+    found = np.empty(cell_list.shape[0], np.int64)
+    n = 0
+    for e in cell_list:
+        low, high = np.inf, -np.inf
+        for a in range(4):
+            low, high = min(low, phi[cells[e, a]]), max(high, phi[cells[e, a]])
+        if low < step and high > -step:
+            found[n] = e
+            n += 1
+    return found[:n].copy()
 
 
 def _meet_total(t, phi, band, area, target, spacing):

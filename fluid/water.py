@@ -79,7 +79,7 @@ class Water:
         level = redistance(self.topology, self._dry_if_inactive(level), mesh.spacing, rescale=False)
         self.level_set = without_films(level, mesh.spacing)
         self.velocity, self.acceleration = np.zeros((n, 3)), np.zeros((n, 3))
-        self.pressure = np.zeros(n)
+        self.pressure = self._pressure_at_rest()
         self.cell_velocity = np.zeros((len(self.topology.cells), 3))
         self.remainder, self.kick_remainder = (
             np.zeros_like(self.cell_velocity),
@@ -189,6 +189,13 @@ class Water:
         if self._whole_graph is None:
             self._whole_graph = Graph.of(self.topology, np.flatnonzero(self.topology.active))
         return self._whole_graph
+
+    def _pressure_at_rest(self):
+        """ρ g times the depth (N,) [Pa] below the highest water: a first guess, and the level of closed pockets."""
+        wet = (self.level_set < 0.0) & self.topology.active
+        below = self.topology.nodes @ self.parameters.weight
+        top = below[wet].min() if wet.any() else 0.0
+        return np.where(wet, self.parameters.density * (below - top), 0.0)
 
     def _dry_if_inactive(self, level):
         return np.where(self.topology.active, level, FAR * self.mesh.spacing)
