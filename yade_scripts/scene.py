@@ -75,7 +75,6 @@ class Scene:
         self.box_id: list[int] = []
         self.row_of: dict[int, int] = {}
         self.frame = np.tile(np.eye(3), (len(blocks), 1, 1))
-        self._load: dict[int, tuple] = {}
         self._materials: dict[tuple, object] = {}
         self._subdomain = engine.wrapper.Subdomain()
         self._add_planes(planes)
@@ -145,18 +144,10 @@ class Scene:
             for p in node_positions(block.size, self.law.nodes_per_edge, radius)
         ]
         self.nodes[row] = list(O.bodies.append(spheres))
-        load = self._load.pop(row, None)
-        if load is not None:
-            self._permanent(self.box_id[row], ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
         self.ids[row] = O.bodies.clump([self.box_id[row], *self.nodes[row]])
-        # A zero force makes YADE's force container as long as the new id asks; without it the integrator aborts.
-        O.forces.addF(self.ids[row], (0.0, 0.0, 0.0))
         self.row_of.update(dict.fromkeys(self.nodes[row], row))
         self.frame[row] = _matrix(O.bodies[self.ids[row]].state.ori).T @ R
         self._set_inertia(row, motion)
-        if load is not None:
-            self._load[row] = load
-            self._permanent(self.ids[row], load)
 
     def _set_inertia(self, row: int, motion: Array) -> None:
         """Exact mass and inertia in YADE's principal frame; velocity and angular momentum to match.
@@ -248,22 +239,12 @@ class Scene:
         return np.frombuffer(buffer, float, STATE * len(rows_ids)).reshape(-1, STATE)
 
     def add_forces(self, ids: list[int], F: Array) -> None:
-        """Add F (k, 6) to the bodies for the running substep (only from within the engine loop)."""
+        """Add F (k, 6) to the bodies for the running substep (only from within the engine loop).
+
+        YADE's permanent forces are not used: its integrator aborts when bodies are added after one was set."""
         forces = self.O.forces
         deque(map(forces.addF, ids, F[:, :3].tolist()), maxlen=0)
         deque(map(forces.addT, ids, F[:, 3:].tolist()), maxlen=0)
-
-    def set_load(self, F: Array) -> None:
-        """Permanent force and moment on every block, F (n, 6)."""
-        for row, f in enumerate(F.tolist()):
-            load = (tuple(f[:3]), tuple(f[3:]))
-            if load != self._load.get(row, ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))):
-                self._load[row] = load
-                self._permanent(self.ids[row], load)
-
-    def _permanent(self, body: int, load: tuple) -> None:
-        self.O.forces.setPermF(body, load[0])
-        self.O.forces.setPermT(body, load[1])
 
     def set_masks(self, row: int, loose: bool, grounded: bool) -> None:
         """Meeting rules of a block by its state (see the module text)."""

@@ -30,6 +30,9 @@ GRAVITY = (0.0, 0.0, -9.81)
 FAR = 1e3
 """Scenes farther than this from the origin [m] are computed about a local one."""
 
+STANDS = 0.02
+"""A joined block stands in its place as long as it has moved less than this share of its radius."""
+
 
 class PolyhedralContact(BlockError):
     """Contact was asked for a block that is not a box."""
@@ -111,6 +114,9 @@ class Structure:
         if contact is not None:
             check_boxes(blocks)
         self._loose = self.joints.damaged_blocks(self.n) if self.joints is not None else np.ones(self.n, bool)
+        self._loose |= [bool(b.velocity.any() or b.spin.any()) for b in blocks]
+        if self.joints is not None and contact is not None:
+            self.joints.hand_over(self._loose)
         self._plain = plain_until_damage
         self._scene = Scene(
             load_yade(threads),
@@ -185,6 +191,8 @@ class Structure:
         self._update_rows()
         self._update_masks(np.arange(n))
         self._read_all()
+        self._x_start, self._R_start = self._x.copy(), self._R.copy()
+        self._radius = np.array([b.radius for b in self.blocks])
         self._start_energy = sum(self._mechanical().values())
 
     def _set_damping(self) -> None:
@@ -205,7 +213,12 @@ class Structure:
         self._ids = [scene.ids[r] for r in self._rows]
         self._buffer = bytearray(8 * STATE * len(self._ids))
         self._joined = joined
-        self._joined_ids = [scene.ids[r] for r in joined]
+        self._update_pushed()
+
+    def _update_pushed(self) -> None:
+        """Bodies that get a force in each substep: with a live joint or under load."""
+        self._pushed = np.union1d(self._joined, np.flatnonzero(self._load.any(axis=1)))
+        self._pushed_ids = [self._scene.ids[r] for r in self._pushed]
 
     def _update_masks(self, rows: Array) -> None:
         grounded = self._grounded()
@@ -219,7 +232,7 @@ class Structure:
         """Between YADE's contact forces and its integration. Errors are kept: YADE would lose them."""
         try:
             self._joint_step()
-        except Exception as error:  # noqa: BLE001 - raised again by advance(), outside YADE's loop
+        except Exception as error:  # raised again by advance(): YADE's loop would lose it
             self._failure = error
 
     def _joint_step(self) -> None:
@@ -231,8 +244,9 @@ class Structure:
             self._F[:] = 0.0
             growth = self.joints.forces(self._x, self._v, self._R, self._F, dt, advance=True)
             self._fastest = max(self._fastest, growth)
-            self._scene.add_forces(self._joined_ids, self._F[self._joined])
             self._pending_dt = dt
+        if len(self._pushed):
+            self._scene.add_forces(self._pushed_ids, self._F[self._pushed] + self._load[self._pushed])
         if self._contact_work is not None:
             self._contact_work.take(self._v, self._x, dt)
 
@@ -265,7 +279,7 @@ class Structure:
         if F.shape != (self.n, 6) or not np.isfinite(F).all():
             raise NotFinite(f"load of shape {F.shape} for {self.n} blocks, finite: {np.isfinite(F).all()}")
         self._load = F.copy()
-        self._scene.set_load(F)
+        self._update_pushed()
 
     def substep_limit(self) -> SubstepLimit:
         """Largest substep and what limits it; found anew when joints have failed."""
@@ -286,6 +300,7 @@ class Structure:
         count = max(1, int(np.ceil(dt / limit * (1.0 - 1e-12)))) if np.isfinite(limit) else 1
         self._dt = self._scene.O.dt = dt / count
         self._read_all()
+        self._release_moved()
         x0, R0, half, spin = self._x.copy(), self._R.copy(), self._half_step_place(), self._v[:, 3:].copy()
         self._fastest, self._broken = 0.0, []
         for _ in range(count):
@@ -343,6 +358,18 @@ class Structure:
         self._read_all()
         self._v[:] = v
 
+    def _release_moved(self) -> None:
+        """Blocks that left their place count as loose: intact pieces of a broken wall meet the ground and others."""
+        if self.contact is None or self._loose.all():
+            return
+        turned = np.abs(self._R - self._R_start).max(axis=(1, 2)) * self._radius
+        moved = np.linalg.norm(self._x - self._x_start, axis=1) + turned
+        newly = np.flatnonzero(~self._loose & (moved > STANDS * self._radius))
+        if len(newly):
+            self._loose[newly] = True
+            self._turn_on_contact(newly)
+            self._update_rows()
+
     def _turn_on_contact(self, newly: Array) -> None:
         self.joints.hand_over(self._loose)
         need = self._near_loose() if self._plain else np.zeros(self.n, bool)
@@ -357,6 +384,7 @@ class Structure:
         states = self._v.copy()
         self._read_all()
         self._settle_work(states[self._rows])
+        self._F[:] = 0.0
         self._update_rows()
 
     # ---- what the neighbours read ---------------------------------------------------------------------------
