@@ -29,7 +29,7 @@ class DiskFull(OSError):
         return self.strerror
 
 
-class NotFinite(ValueError):
+class NotFinite(FloatingPointError):
     """A field holds a NaN or an infinity: the computation went wrong before the output was reached."""
 
 

@@ -1,0 +1,58 @@
+"""A camera that frames any box: the direction is chosen, distance and aim follow from the corners."""
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Camera:
+    """position (3,), focus (3,) [m], up (3,), view_angle [degree] over the height of the picture."""
+
+    position: np.ndarray
+    focus: np.ndarray
+    up: np.ndarray
+    view_angle: float
+
+
+def direction(azimuth, elevation):
+    """Unit vector (3,) from the scene to the camera; degrees, azimuth from +x towards +y."""
+    a, e = np.radians([azimuth, elevation])
+    return np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
+
+
+def frame(
+    lower, upper, aspect, azimuth=-65.0, elevation=24.0, view_angle=24.0, margin=(0.05, 0.05, 0.05, 0.05)
+):
+    """The nearest camera in the given direction that sees all corners of the box [lower, upper] (3,) [m].
+
+    aspect: width over height of the picture · margin: shares of it kept free at left, right, bottom, top.
+    With d the depth of a corner behind the camera, it is inside the picture if |across| ≤ d tan(angle/2): for each
+    side that is a plane, so along each picture axis the tightest pair of planes gives aim and distance.
+    """
+    corners = np.array(list(itertools.product(*zip(lower, upper))), dtype=float)
+    back = direction(azimuth, elevation)
+    right = np.cross([0.0, 0.0, 1.0], back)
+    right /= np.linalg.norm(right)
+    up = np.cross(back, right)
+    tangent = np.tan(np.radians(view_angle) / 2)
+    left_, right_, bottom, top = margin
+    x, dx = _fit(
+        corners @ right,
+        corners @ back,
+        tangent * aspect * (1 - 2 * left_),
+        tangent * aspect * (1 - 2 * right_),
+    )
+    y, dy = _fit(corners @ up, corners @ back, tangent * (1 - 2 * bottom), tangent * (1 - 2 * top))
+    depth = max(dx, dy)
+    position = x * right + y * up + depth * back
+    return Camera(position, position - back * (depth - (corners @ back).mean()), up, view_angle)
+
+
+def _fit(across, depth, low, high):
+    """Place and depth of a camera so that -low (c - depth) ≤ across - place ≤ high (c - depth) holds tightly."""
+    upper = np.max(across + high * depth)  # place + high c ≥ upper
+    lower = np.max(-across + low * depth)  # low c - place ≥ lower
+    c = (upper + lower) / (low + high)
+    return upper - high * c, c

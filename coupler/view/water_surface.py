@@ -1,0 +1,126 @@
+"""The skin of the water: the free surface level set = 0, closed by the walls, so that the water looks like a volume.
+
+Linear functions on tetrahedra make this exact: the water in a tetrahedron is cut off by one plane, the water on a wall
+triangle by one line. Every corner of the skin lies on an edge (i, j) of the mesh, at the share w = φ_i / (φ_i − φ_j)
+of the way from i to j, or on a node (i = j). All triangles are counter-clockwise seen from outside the water.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+# Even permutations keep a right-handed tetrahedron right-handed: one per first corner, one per first two corners.
+ONE_FIRST = np.array([[0, 1, 2, 3], [1, 0, 3, 2], [2, 3, 0, 1], [3, 2, 1, 0]])
+TWO_FIRST = np.array([[0, 1, 2, 3], [0, 2, 3, 1], [0, 3, 1, 2], [1, 2, 0, 3], [1, 3, 2, 0], [2, 3, 0, 1]])
+FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
+
+
+@dataclass(frozen=True)
+class Skin:
+    """t triangles, the first `free` of them on the free surface.
+
+    pair (t, 3, 2): nodes i, j of each corner · share (t, 3): w, the value there is (1 - w) v_i + w v_j.
+    """
+
+    pair: np.ndarray
+    share: np.ndarray
+    free: int
+
+    def of(self, values):
+        """Nodal values (n, ...) at the corners of the triangles (t, 3, ...)."""
+        w = self.share.reshape(self.share.shape + (1,) * (np.ndim(values) - 1))
+        return (1 - w) * values[self.pair[..., 0]] + w * values[self.pair[..., 1]]
+
+
+def skin(nodes, cells, level_set):
+    """Skin of {level set < 0} on nodes (n, 3), tetrahedra cells (m, 4), level_set (n,) [m]."""
+    wet = cells[np.any(level_set[cells] < 0, axis=1)]
+    wet = right_handed(nodes, wet)
+    free = free_triangles(wet, level_set)
+    pair = np.concatenate([free, clipped(outer_faces(wet, len(nodes)), level_set)])
+    i, j = level_set[pair[..., 0]], level_set[pair[..., 1]]
+    share = np.where(pair[..., 0] == pair[..., 1], 0.0, i / np.where(i == j, 1.0, i - j))
+    return Skin(pair, share, len(free))
+
+
+def right_handed(nodes, cells):
+    """The same tetrahedra, with positive volume."""
+    a, b, c = np.moveaxis(nodes[cells[:, 1:]] - nodes[cells[:, :1]], 1, 0)
+    negative = np.einsum("mi,mi->m", a, np.cross(b, c)) < 0
+    return np.where(negative[:, None], cells[:, [0, 2, 1, 3]], cells)
+
+
+def free_triangles(cells, level_set):
+    """Corner pairs (t, 3, 2) of the free surface in right-handed tetrahedra: a triangle, or two if two nodes are wet."""
+    wet = level_set[cells] < 0
+    count = wet.sum(axis=1)
+    a, b, c, d = _ordered(cells[count == 1], wet[count == 1].argmax(axis=1), ONE_FIRST)
+    one = _pairs((a, b), (a, c), (a, d))
+    a, b, c, d = _ordered(cells[count == 3], wet[count == 3].argmin(axis=1), ONE_FIRST)
+    three = _pairs((a, b), (a, d), (a, c))
+    two = count == 2
+    case = np.argmax([wet[two][:, p[0]] & wet[two][:, p[1]] for p in TWO_FIRST], axis=0)
+    a, b, c, d = _ordered(cells[two], case, TWO_FIRST)
+    return np.concatenate([one, three, _pairs((a, c), (a, d), (b, d)), _pairs((a, c), (b, d), (b, c))])
+
+
+def clipped(triangles, level_set):
+    """Corner pairs (t, 3, 2) of the wet parts of triangles (k, 3)."""
+    wet = level_set[triangles] < 0
+    count = wet.sum(axis=1)
+    turn = np.array([[0, 1, 2], [1, 2, 0], [2, 0, 1]])
+    a, b, c = triangles[count == 3].T
+    whole = _pairs((a, a), (b, b), (c, c))
+    a, b, c = _ordered(triangles[count == 1], wet[count == 1].argmax(axis=1), turn)
+    one = _pairs((a, a), (a, b), (a, c))
+    a, b, c = _ordered(triangles[count == 2], wet[count == 2].argmin(axis=1), turn)
+    return np.concatenate([whole, one, _pairs((a, b), (b, b), (c, c)), _pairs((a, b), (c, c), (a, c))])
+
+
+def outer_faces(cells, n_nodes):
+    """Faces (k, 3) that belong to one of the right-handed tetrahedra only, counter-clockwise from outside."""
+    faces = cells[:, FACES].reshape(-1, 3)
+    low, middle, high = np.sort(faces, axis=1).T
+    key = (low * n_nodes + middle) * n_nodes + high
+    order = np.argsort(key)
+    key = key[order]
+    different = np.concatenate([[True], key[1:] != key[:-1], [True]])
+    return faces[order[different[:-1] & different[1:]]]
+
+
+def nodal_slope(nodes, cells, values):
+    """Gradient (n, 3) of a P1 function at its nodes, times a positive number: volume-weighted over the cells of each.
+
+    Only cells around the zero level count; elsewhere it is zero.
+    """
+    at_surface = np.zeros(len(nodes), dtype=bool)
+    at_surface[cells[np.any(values[cells] < 0, axis=1) & np.any(values[cells] >= 0, axis=1)]] = True
+    cells = right_handed(nodes, cells[at_surface[cells].any(axis=1)])
+    a, b, c = np.moveaxis(nodes[cells[:, 1:]] - nodes[cells[:, :1]], 1, 0)
+    rise = values[cells[:, 1:]] - values[cells[:, :1]]
+    # gradient = (rise_a b×c + rise_b c×a + rise_c a×b) / det, and weighting with the volume drops det
+    weighted = rise[:, :1] * np.cross(b, c) + rise[:, 1:2] * np.cross(c, a) + rise[:, 2:] * np.cross(a, b)
+    return np.stack([np.bincount(cells.ravel(), np.repeat(w, 4), len(nodes)) for w in weighted.T], axis=1)
+
+
+def shading_normals(found, nodes, cells, level_set):
+    """Unit normals (t, 3, 3) at the corners: the slope of the level set on the free surface, the wall's own elsewhere.
+
+    The slope is smooth where the small triangles of a cut are not.
+    """
+    x = found.of(nodes)
+    flat = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
+    normal = np.repeat(flat[:, None], 3, axis=1)
+    normal[: found.free] = found.of(nodal_slope(nodes, cells, level_set))[: found.free]
+    size = np.linalg.norm(normal, axis=2, keepdims=True)
+    return normal / np.where(size > 0, size, 1.0)
+
+
+def _ordered(items, case, orders):
+    """Columns of `items` (k, c), each row put in the order of its case."""
+    return np.take_along_axis(items, orders[case], axis=1).T
+
+
+def _pairs(*corners):
+    """Corner pairs (k, 3, 2) from three pairs of columns."""
+    return np.stack([np.stack(pair, axis=-1) for pair in corners], axis=1)
