@@ -52,6 +52,8 @@ class BodyShapes:
             rotation = np.asarray(rotation, dtype=np.float64)
             normals = _rotated(rotation[of_plane], normals)
             vertices = _rotated(rotation[of_vertex], vertices)
+        else:
+            rotation = np.repeat(np.eye(3)[None], len(centre), axis=0)
         offsets = self.offsets + _dot(normals, centre[of_plane])
         grown = np.zeros(len(offsets)) if growth is None else np.array(growth, dtype=np.float64)
         return ConvexBodies(
@@ -61,6 +63,7 @@ class BodyShapes:
             vertices + centre[of_vertex],
             self.vertex_start,
             centre,
+            rotation,
             grown,
             self.reach,
             shapes=self,
@@ -88,8 +91,9 @@ class ConvexBodies:
 
     normals (P, 3) outward, unit · offsets (P,) [m] · plane_start (n+1,): planes of body b are
     plane_start[b]:plane_start[b+1] · vertices (V, 3) [m], vertex_start (n+1,): of the exact position
-    centre (n, 3) [m]: point that moments refer to · growth (P,) [m] outward shift used by the cutter
-    reach (n,): see BodyShapes · shapes: the reference geometry, for `moved`.
+    centre (n, 3) [m]: point that moments refer to · rotation (n, 3, 3) body to world
+    growth (P,) [m] outward shift used by the cutter · reach (n,): see BodyShapes
+    shapes: the reference geometry, for `moved`.
     """
 
     normals: np.ndarray
@@ -98,6 +102,7 @@ class ConvexBodies:
     vertices: np.ndarray
     vertex_start: np.ndarray
     centre: np.ndarray
+    rotation: np.ndarray
     growth: np.ndarray
     reach: np.ndarray
     shapes: BodyShapes = field(repr=False, compare=False)

@@ -18,7 +18,9 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from fluid.cut import _polygon_area, _root, _shared_area, workspace
+from fluid.cut import root as find
+from fluid.pieces import workspace
+from fluid.polygons import polygon_area, shared_area
 
 # Areas of contact below this share of h^2 are round-off.
 NO_AREA = 1e-12
@@ -78,31 +80,36 @@ def without_pockets(cells, volume, n_nodes: int, least: float) -> np.ndarray:
 def pick_old_nodes(old, new) -> np.ndarray:
     """(N_new,) old virtual node for each new one, -1 = none.
 
-    Where the background node has one copy before and after, that one. Else each new element looks at the
-    old element of the same background cell (several: the nearest centroid) and votes with
-    min(V_old, V_new) for the old node at the same corner; most votes win."""
-    n = len(old.memory.mesh.nodes)
-    copies_old = np.bincount(old.parent_node, minlength=n)
-    copies_new = np.bincount(new.parent_node, minlength=n)
-    only = np.full(n, -1, dtype=np.int64)
+    Away from the bodies a node has one copy before and after. Near them each new element votes with
+    min(V_old, V_new) for the node at the same corner of an old element of the same background cell; most
+    votes win. Water moves with a wall: the old element is sought from where the wall has carried the new
+    centroid from, nearest first, and never across the wall."""
+    near = _near_bodies(old) | _near_bodies(new)
+    only = np.full(len(near), -1, dtype=np.int64)
     only[old.parent_node] = np.arange(len(old.nodes))
-    plain = (copies_old <= 1) & (copies_new <= 1)
-    source = np.where(plain[new.parent_node], only[new.parent_node], -1)
-    voters = np.flatnonzero(~plain[new.parent_node[new.cells]].all(axis=1))
-    elected = _elected(old, new, voters, plain)
-    chosen = ~plain[new.parent_node]
-    source[chosen] = elected[chosen]
+    chosen = near[new.parent_node]
+    source = only[new.parent_node]
+    voters = np.flatnonzero(near[new.parent_node[new.cells]].any(axis=1))
+    source[chosen] = _elected(old, new, voters)[chosen]
     return source
 
 
-def _elected(old, new, voters, plain):
+def _near_bodies(domain):
+    """(background nodes,) bool: nodes of cells that a body meets."""
+    memory = domain.memory
+    near = np.zeros(len(memory.mesh.nodes), dtype=bool)
+    near[memory.mesh.cells[memory.pair_cell]] = True
+    return near
+
+
+def _elected(old, new, voters):
     """Winner of the votes for every new node, -1 where nobody voted."""
     matched = _old_elements(old, new, voters)
     voters, matched = voters[matched >= 0], matched[matched >= 0]
     weight = np.minimum(old.volume[matched], new.volume[voters])
     to, frm = new.cells[voters].ravel(), old.cells[matched].ravel()
     key, inverse = np.unique(to * len(old.nodes) + frm, return_inverse=True)
-    votes = np.bincount(inverse, np.repeat(weight, 4))
+    votes = np.bincount(inverse, np.repeat(weight, 4), minlength=len(key))
     order = np.lexsort((votes, key // len(old.nodes)))
     elected = np.full(len(new.nodes), -1, dtype=np.int64)
     elected[key[order] // len(old.nodes)] = key[order] % len(old.nodes)
@@ -110,16 +117,80 @@ def _elected(old, new, voters, plain):
 
 
 def _old_elements(old, new, chosen):
-    """Old element in the same background cell nearest to each chosen new one, -1 where it was solid."""
-    first = np.searchsorted(old.parent_cell, new.parent_cell[chosen])
-    last = np.searchsorted(old.parent_cell, new.parent_cell[chosen], side="right")
-    best, nearest = np.full(len(chosen), -1, dtype=np.int64), np.full(len(chosen), np.inf)
-    for rank in range(int((last - first).max(initial=0))):
-        at = np.minimum(first + rank, len(old.parent_cell) - 1)
-        distance = ((old.centroid[at] - new.centroid[chosen]) ** 2).sum(axis=1)
-        closer = (first + rank < last) & (distance < nearest)
-        best[closer], nearest[closer] = at[closer], distance[closer]
-    return best
+    """Old element in the same background cell for each chosen new one, -1 where there is none."""
+    cell = new.parent_cell[chosen]
+    first = np.searchsorted(old.parent_cell, cell)
+    last = np.searchsorted(old.parent_cell, cell, side="right")
+    before, after = old.memory.bodies, new.memory.bodies
+    return _same_side(
+        first, last, new.centroid[chosen], _wall_of(new)[chosen], old.centroid, _wall_of(old),
+        before.centre, before.rotation, after.centre, after.rotation,
+        before.normals, before.cut_offsets(), before.plane_start,
+    )  # fmt: skip
+
+
+def _wall_of(domain):
+    """(M,) a body that each element is wetted by, -1 = none."""
+    wall = np.full(len(domain.cells), -1, dtype=np.int64)
+    wall[domain.face_cell] = domain.face_body
+    return wall
+
+
+@njit(cache=True)
+def _same_side(
+    first, last, point, wall, centroid, old_wall, centre, rotation, new_centre, new_rotation, normals,
+    offsets, plane_start,
+):  # fmt: skip
+    found = np.full(len(first), -1, dtype=np.int64)
+    for e in range(len(first)):
+        nearest = np.inf
+        for o in range(first[e], last[e]):
+            body = wall[e] if wall[e] >= 0 else old_wall[o]
+            x = point[e].copy()
+            if body >= 0:
+                _carry_back(x, centre[body], rotation[body], new_centre[body], new_rotation[body])
+            distance = 0.0
+            for c in range(3):
+                distance += (x[c] - centroid[o, c]) ** 2
+            if distance >= nearest:
+                continue
+            if body < 0 or not _blocked(
+                x, centroid[o], normals, offsets, plane_start[body], plane_start[body + 1]
+            ):
+                nearest = distance
+                found[e] = o
+    return found
+
+
+@njit(cache=True)
+def _carry_back(x, centre, rotation, new_centre, new_rotation):
+    """x <- centre + rotation new_rotation^T (x - new_centre): where a point fixed to the body came from."""
+    d, local = x - new_centre, np.zeros(3)
+    for i in range(3):
+        for j in range(3):
+            local[i] += new_rotation[j, i] * d[j]
+    for i in range(3):
+        x[i] = centre[i]
+        for j in range(3):
+            x[i] += rotation[i, j] * local[j]
+
+
+@njit(cache=True)
+def _blocked(a, b, normals, offsets, start, end):
+    """Does the segment from a to b pass through the body with planes start:end?"""
+    enter, leave = 0.0, 1.0
+    for g in range(start, end):
+        d_a, d_b = -offsets[g], -offsets[g]
+        for c in range(3):
+            d_a += normals[g, c] * a[c]
+            d_b += normals[g, c] * b[c]
+        if d_a >= 0.0 and d_b >= 0.0:
+            return False
+        if d_a > 0.0:
+            enter = max(enter, d_a / (d_a - d_b))
+        elif d_b > 0.0:
+            leave = min(leave, d_a / (d_a - d_b))
+    return enter < leave
 
 
 def _openings_by_face(cuts):
@@ -155,7 +226,7 @@ def _copies(cells, parent, several, label, n_nodes):
             if not several[node]:
                 copies[node] = 1
                 continue
-            root = _root(label, 4 * e + k)
+            root = find(label, 4 * e + k)
             if root == 4 * e + k:
                 rank[e, k] = copies[node]
                 copies[node] += 1
@@ -170,37 +241,53 @@ def _unite_corners(
     nodes, cells, neighbours, parent, part, start, several, order, open_start, polygon_start, polygon_x,
     share, least, tolerance, w,
 ):  # fmt: skip
-    """Union-find over the corners 4 e + k of the elements, at nodes that may have several copies."""
+    """Union-find over the corners 4 e + k of the elements, at nodes that may have several copies.
+
+    With a threshold, a first sweep finds the widest opening of each element, which always connects."""
     label = np.arange(4 * len(parent))
-    for e in range(len(parent)):
-        one = parent[e]
-        if not (
-            several[cells[one, 0]]
-            or several[cells[one, 1]]
-            or several[cells[one, 2]]
-            or several[cells[one, 3]]
-        ):
-            continue
-        for f in range(4):
-            two = neighbours[one, f]
-            if two < one:
+    widest = np.zeros(len(parent) if share > 0.0 else 1)
+    for sweep in range(0 if share > 0.0 else 1, 2):
+        for e in range(len(parent)):
+            one = parent[e]
+            choice = False
+            for k in range(4):
+                choice = choice or several[cells[one, k]]
+            if not choice:
                 continue
-            g = 0
-            while neighbours[two, g] != one:
-                g += 1
-            for other in range(start[two], start[two + 1]):
-                if (part[e] >= 0 or part[other] >= 0) and not _touching(
-                    nodes, cells, one, f, part[e], g, part[other], order, open_start, polygon_start,
-                    polygon_x, share, least, tolerance, w,
-                ):  # fmt: skip
+            for f in range(4):
+                two = neighbours[one, f]
+                if two < one:
                     continue
-                for k in range(4):
-                    if k != f and several[cells[one, k]]:
-                        for j in range(4):
-                            if cells[two, j] == cells[one, k]:
-                                a, b = _root(label, 4 * e + k), _root(label, 4 * other + j)
-                                label[max(a, b)] = min(a, b)
+                g = 0
+                while neighbours[two, g] != one:
+                    g += 1
+                for other in range(start[two], start[two + 1]):
+                    area, full = 1.0, 0.0
+                    if part[e] >= 0 or part[other] >= 0:
+                        area, full = _contact_area(
+                            nodes, cells, one, f, part[e], g, part[other], order, open_start, polygon_start,
+                            polygon_x, tolerance, w,
+                        )  # fmt: skip
+                        if area <= least:
+                            continue
+                    if sweep == 0:
+                        widest[e] = max(widest[e], area)
+                        widest[other] = max(widest[other], area)
+                    elif area > share * full or area == widest[e] or area == widest[other]:
+                        _unite_face(cells, one, two, f, e, other, several, label)
     return label
+
+
+@njit(cache=True)
+def _unite_face(cells, one, two, f, e, other, several, label):
+    """Make the three nodes of a face common to elements e (cell `one`, face f) and other (cell `two`)."""
+    for k in range(4):
+        if k == f or not several[cells[one, k]]:
+            continue
+        for j in range(4):
+            if cells[two, j] == cells[one, k]:
+                a, b = find(label, 4 * e + k), find(label, 4 * other + j)
+                label[max(a, b)] = min(a, b)
 
 
 @njit(cache=True)
@@ -209,7 +296,7 @@ def _load_opening(w, slot, row, polygon_start, polygon_x):
     w.corners[slot] = polygon_start[row + 1] - first
     for k in range(w.corners[slot]):
         for c in range(3):
-            w.polygon[slot, k, c] = polygon_x[first + k, c]
+            w.polygon[slot, k, 4 + c] = polygon_x[first + k, c]
 
 
 @njit(cache=True)
@@ -217,33 +304,35 @@ def _open_area(w, key, order, open_start, polygon_start, polygon_x):
     area = 0.0
     for s in range(open_start[key], open_start[key + 1]):
         _load_opening(w, 0, order[s], polygon_start, polygon_x)
-        area += _polygon_area(w, 0)
+        area += polygon_area(w, 0)
     return area
 
 
 @njit(cache=True)
-def _touching(
-    nodes, cells, cell, f, part, g, other, order, open_start, polygon_start, polygon_x, share, least,
-    tolerance, w,
-):  # fmt: skip
-    """Do two parts touch across the face opposite to corner f of `cell`? Part -1 is a whole cell."""
+def _contact_area(
+    nodes, cells, cell, f, part, g, other, order, open_start, polygon_start, polygon_x, tolerance, w
+):
+    """Area over which two parts touch across the face opposite to corner f of `cell`, area of the face.
+
+    Part -1 is a whole cell; at most one of the two is."""
     w.corners[0] = 3
     for k in range(3):
         for c in range(3):
-            w.polygon[0, k, c] = nodes[cells[cell, (f + 1 + k) % 4], c]
-    ax, ay, az = w.polygon[0, 1] - w.polygon[0, 0]
-    bx, by, bz = w.polygon[0, 2] - w.polygon[0, 0]
+            w.polygon[0, k, 4 + c] = nodes[cells[cell, (f + 1 + k) % 4], c]
+    o, a, b = w.polygon[0, 0], w.polygon[0, 1], w.polygon[0, 2]
+    ax, ay, az = a[4] - o[4], a[5] - o[5], a[6] - o[6]
+    bx, by, bz = b[4] - o[4], b[5] - o[5], b[6] - o[6]
     nx, ny, nz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
     twice = np.sqrt(nx * nx + ny * ny + nz * nz)
-    full, limit = twice / 2, max(share * twice / 2, least)
+    full = twice / 2
     if other < 0:
-        return _open_area(w, 4 * part + f, order, open_start, polygon_start, polygon_x) > limit
+        return _open_area(w, 4 * part + f, order, open_start, polygon_start, polygon_x), full
     theirs = _open_area(w, 4 * other + g, order, open_start, polygon_start, polygon_x)
     if part < 0:
-        return theirs > limit
+        return theirs, full
     ours = _open_area(w, 4 * part + f, order, open_start, polygon_start, polygon_x)
-    if min(ours, theirs) <= limit or max(ours, theirs) >= full * (1 - 1e-12):
-        return min(ours, theirs) > limit
+    if min(ours, theirs) == 0.0 or max(ours, theirs) >= full * (1 - 1e-12):
+        return min(ours, theirs), full
     # Both sides are partly closed, not necessarily in the same place.
     nx, ny, nz = nx / twice, ny / twice, nz / twice
     area = 0.0
@@ -251,19 +340,17 @@ def _touching(
         for t in range(open_start[4 * other + g], open_start[4 * other + g + 1]):
             _load_opening(w, 0, order[s], polygon_start, polygon_x)
             _load_opening(w, 1, order[t], polygon_start, polygon_x)
-            area += _shared_area(w, 0, 1, nx, ny, nz, tolerance)
-            if area > limit:
-                return True
-    return False
+            area += shared_area(w, 0, 1, nx, ny, nz, tolerance)
+    return area, full
 
 
 @njit(cache=True)
 def _components(cells, n_nodes):
     label = np.arange(n_nodes)
     for e in range(len(cells)):
-        a = _root(label, cells[e, 0])
+        a = find(label, cells[e, 0])
         for k in range(1, 4):
-            b = _root(label, cells[e, k])
+            b = find(label, cells[e, k])
             if a != b:
                 label[max(a, b)] = min(a, b)
                 a = min(a, b)
@@ -271,7 +358,7 @@ def _components(cells, n_nodes):
     component = np.empty(len(cells), dtype=np.int64)
     found = 0
     for e in range(len(cells)):
-        root = _root(label, cells[e, 0])
+        root = find(label, cells[e, 0])
         if number[root] < 0:
             number[root] = found
             found += 1

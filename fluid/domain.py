@@ -211,7 +211,7 @@ def _cut_pairs(mesh, bodies, cell, body, covers, connection):
     start = np.append(first, len(cell)).astype(np.int64)
     link_area = -1.0 if covers == "single" else connection.link_area(mesh.spacing)
     tolerance = TOLERANCE * mesh.spacing
-    return cut_cells(mesh.nodes, mesh.cells, chosen, start, body, bodies, tolerance, link_area)
+    return cut_cells(mesh.nodes, mesh.cells, chosen, start, body, bodies, tolerance, mesh.spacing, link_area)
 
 
 def _joined(old: Cuts, keep, new: Cuts) -> Cuts:

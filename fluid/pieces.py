@@ -1,0 +1,289 @@
+"""Convex pieces of a cell: polyhedra as faces of vertex numbers, split by planes.
+
+Everything is in coordinates relative to the first node of the cell, and every vertex also carries its
+barycentric coordinates in the cell. A plane is known by its distances at the four nodes: the distance at a
+vertex is their interpolation. Nodes nearer to the plane than the tolerance of the mesh have distance zero,
+the same in every cell at the node; so the faces of bodies bend by at most that tolerance, and two cells
+always agree on what lies on which side at their common face.
+
+Moments of a piece: V = ∫ dV, c = ∫ x dV / V, S = ∫ (x - c)(x - c)^T dV as (xx, yy, zz, xy, xz, yz).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+DONE, OUTPUT_FULL, WORKSPACE_FULL, BROKEN_CAP = 0, 1, 2, 3
+
+# Distances at vertices made by splitting count as zero below this share of the spacing: round-off.
+ROUND_OFF = 1e-13
+
+# Nodes of the face opposite to node k, counter-clockwise from outside for a positive tetrahedron.
+TET_FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
+
+
+class Workspace(NamedTuple):
+    """Scratch for one cell: a pool of vertices, a stack of convex pieces, a stack of polygons."""
+
+    x: np.ndarray  # (vertices, 7) barycentric coordinates, then position relative to node 0 of the cell
+    distance: np.ndarray  # (vertices,) to the plane in hand, 0 where snapped
+    following: np.ndarray  # (vertices,) next vertex of the cap in hand
+    edge: np.ndarray  # (vertices, 2) the edge a new vertex lies on
+    loop: np.ndarray  # (pieces, faces, corners)
+    size: np.ndarray  # (pieces, faces) corners of each face
+    tag: np.ndarray  # (pieces, faces) -1..-4 face of the cell; 2g outside plane g; 2g + 1 inside it
+    faces: np.ndarray  # (pieces,)
+    label: np.ndarray  # (pieces,) part of each live piece
+    polygon: np.ndarray  # (polygons, corners, 7)
+    corners: np.ndarray  # (polygons,)
+    height: np.ndarray  # (corners,) distances of a polygon to the plane in hand
+    near_body: np.ndarray  # (bodies,) bodies that meet or touch the cell
+    near_start: np.ndarray  # (bodies + 1,)
+    near_plane: np.ndarray  # (planes,) their planes that pass through or touch the cell
+    near_distance: np.ndarray  # (planes, 4) distances of the nodes of the cell to them
+
+
+def workspace(scale: int, n_bodies: int, n_planes: int) -> Workspace:
+    """Scratch arrays; `scale` doubles until the most fragmented cell fits."""
+    vertices, pieces, loops, corners, polygons = 1024 * scale, 96 * scale, 32 * scale, 32 * scale, 64 * scale
+    return Workspace(
+        np.empty((vertices, 7)),
+        np.zeros(vertices),
+        np.zeros(vertices, dtype=np.int32),
+        np.zeros((vertices, 2), dtype=np.int32),
+        np.zeros((pieces, loops, corners), dtype=np.int32),
+        np.zeros((pieces, loops), dtype=np.int32),
+        np.zeros((pieces, loops), dtype=np.int64),
+        np.zeros(pieces, dtype=np.int32),
+        np.zeros(pieces, dtype=np.int32),
+        np.empty((polygons, 3 * corners, 7)),
+        np.zeros(polygons, dtype=np.int32),
+        np.empty(3 * corners),
+        np.zeros(n_bodies + 1, dtype=np.int64),
+        np.zeros(n_bodies + 2, dtype=np.int64),
+        np.zeros(n_planes + 1, dtype=np.int64),
+        np.zeros((n_planes + 1, 4)),
+    )
+
+
+@njit(cache=True)
+def start_piece(w, x):
+    """The cell x (4, 3) itself as piece 0, positively oriented whatever the numbering of its nodes."""
+    det = 0.0
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        det += (x[1, i] - x[0, i]) * (
+            (x[2, j] - x[0, j]) * (x[3, k] - x[0, k]) - (x[2, k] - x[0, k]) * (x[3, j] - x[0, j])
+        )
+    for k in range(4):
+        for c in range(4):
+            w.x[k, c] = 1.0 if c == k else 0.0
+        for c in range(3):
+            w.x[k, 4 + c] = x[k, c] - x[0, c]
+    for f in range(4):
+        for k in range(3):
+            w.loop[0, f, k] = TET_FACES[f, k if det > 0 else 2 - k]
+        w.size[0, f] = 3
+        w.tag[0, f] = -1 - f
+    w.faces[0] = 4
+
+
+@njit(cache=True)
+def interpolated(x, d):
+    """Distance at a vertex from its barycentric coordinates and the distances of the nodes."""
+    return x[0] * d[0] + x[1] * d[1] + x[2] * d[2] + x[3] * d[3]
+
+
+@njit(cache=True)
+def classify(w, piece, d, round_off):
+    """Fill w.distance for the vertices of a piece -> lowest, highest (0 where snapped)."""
+    low, high = 0.0, 0.0
+    for f in range(w.faces[piece]):
+        for k in range(w.size[piece, f]):
+            v = w.loop[piece, f, k]
+            value = interpolated(w.x[v], d)
+            if abs(value) <= round_off:
+                value = 0.0
+            low = min(low, value)
+            high = max(high, value)
+            w.distance[v] = value
+    return low, high
+
+
+@njit(cache=True)
+def _edge_vertex(w, a, b, first_new, n_vertices):
+    """The vertex where edge ab crosses the plane: made once, shared by the two faces at the edge."""
+    if a > b:
+        a, b = b, a
+    for v in range(first_new, n_vertices):
+        if w.edge[v, 0] == a and w.edge[v, 1] == b:
+            return v, n_vertices
+    v = n_vertices
+    t = w.distance[a] / (w.distance[a] - w.distance[b])
+    for c in range(7):
+        w.x[v, c] = w.x[a, c] + t * (w.x[b, c] - w.x[a, c])
+    w.edge[v, 0] = a
+    w.edge[v, 1] = b
+    w.distance[v] = 0.0
+    return v, n_vertices + 1
+
+
+@njit(cache=True)
+def _close_caps(w, outer, inner, first, edges, plane):
+    """Close both halves of a split piece by the polygon of its cross-section."""
+    f_out, f_in = w.faces[outer], w.faces[inner]
+    v = first
+    for k in range(edges):
+        if k > 0 and v == first:
+            return BROKEN_CAP
+        w.loop[inner, f_in, k] = v
+        w.loop[outer, f_out, edges - 1 - k] = v
+        v = w.following[v]
+    if v != first or edges < 3:
+        return BROKEN_CAP
+    w.size[inner, f_in] = edges
+    w.size[outer, f_out] = edges
+    w.tag[inner, f_in] = 2 * plane + 1
+    w.tag[outer, f_out] = 2 * plane
+    w.faces[inner] += 1
+    w.faces[outer] += 1
+    return DONE
+
+
+@njit(cache=True)
+def split(w, piece, outer, inner, plane, n_vertices):
+    """Split a piece by the plane whose distances are in w.distance -> (state, number of vertices)."""
+    capacity = w.loop.shape[2]
+    if w.faces[piece] + 1 > w.loop.shape[1] or n_vertices + w.loop.shape[1] * 2 > len(w.x):
+        return WORKSPACE_FULL, n_vertices
+    first_new = n_vertices
+    f_out, f_in, edges, first = 0, 0, 0, -1
+    for f in range(w.faces[piece]):
+        corners = w.size[piece, f]
+        if corners + 2 > capacity:
+            return WORKSPACE_FULL, n_vertices
+        n_out, n_in, outside, inside = 0, 0, False, False
+        a = w.loop[piece, f, corners - 1]
+        for k in range(corners):
+            b = w.loop[piece, f, k]
+            if w.distance[a] * w.distance[b] < 0.0:
+                v, n_vertices = _edge_vertex(w, a, b, first_new, n_vertices)
+                w.loop[outer, f_out, n_out] = v
+                w.loop[inner, f_in, n_in] = v
+                n_out += 1
+                n_in += 1
+            if w.distance[b] >= 0.0:
+                w.loop[outer, f_out, n_out] = b
+                n_out += 1
+                outside = outside or w.distance[b] > 0.0
+            if w.distance[b] <= 0.0:
+                w.loop[inner, f_in, n_in] = b
+                n_in += 1
+                inside = inside or w.distance[b] < 0.0
+            a = b
+        if outside:
+            w.size[outer, f_out] = n_out
+            w.tag[outer, f_out] = w.tag[piece, f]
+            f_out += 1
+        if inside:
+            a = w.loop[inner, f_in, n_in - 1]
+            for k in range(n_in):
+                b = w.loop[inner, f_in, k]
+                if w.distance[a] == 0.0 and w.distance[b] == 0.0:
+                    w.following[b] = a
+                    first = b
+                    edges += 1
+                a = b
+            w.size[inner, f_in] = n_in
+            w.tag[inner, f_in] = w.tag[piece, f]
+            f_in += 1
+    w.faces[outer] = f_out
+    w.faces[inner] = f_in
+    if edges > capacity or f_out + 1 > w.loop.shape[1] or f_in + 1 > w.loop.shape[1]:
+        return WORKSPACE_FULL, n_vertices
+    return _close_caps(w, outer, inner, first, edges, plane), n_vertices
+
+
+@njit(cache=True)
+def copy_piece(w, source, target):
+    w.faces[target] = w.faces[source]
+    for f in range(w.faces[source]):
+        w.tag[target, f] = w.tag[source, f]
+        w.size[target, f] = w.size[source, f]
+        for k in range(w.size[source, f]):
+            w.loop[target, f, k] = w.loop[source, f, k]
+
+
+@njit(cache=True)
+def piece_moments(w, piece, m):
+    """m (10,) <- V, c, S of a convex piece: a fan of tetrahedra from one of its vertices, in coordinates
+    relative to that vertex, so that slivers keep their relative accuracy."""
+    o = w.loop[piece, 0, 0]
+    ox, oy, oz = w.x[o, 4], w.x[o, 5], w.x[o, 6]
+    m[:] = 0.0
+    for f in range(w.faces[piece]):
+        touches = False
+        for k in range(w.size[piece, f]):
+            touches = touches or w.loop[piece, f, k] == o
+        if touches:
+            continue
+        a = w.loop[piece, f, 0]
+        ax, ay, az = w.x[a, 4] - ox, w.x[a, 5] - oy, w.x[a, 6] - oz
+        b = w.loop[piece, f, 1]
+        bx, by, bz = w.x[b, 4] - ox, w.x[b, 5] - oy, w.x[b, 6] - oz
+        for k in range(2, w.size[piece, f]):
+            c = w.loop[piece, f, k]
+            cx, cy, cz = w.x[c, 4] - ox, w.x[c, 5] - oy, w.x[c, 6] - oz
+            v = (ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)) / 6.0
+            sx, sy, sz = ax + bx + cx, ay + by + cy, az + bz + cz
+            m[0] += v
+            m[1] += v * sx / 4.0
+            m[2] += v * sy / 4.0
+            m[3] += v * sz / 4.0
+            v /= 20.0
+            m[4] += v * (ax * ax + bx * bx + cx * cx + sx * sx)
+            m[5] += v * (ay * ay + by * by + cy * cy + sy * sy)
+            m[6] += v * (az * az + bz * bz + cz * cz + sz * sz)
+            m[7] += v * (ax * ay + bx * by + cx * cy + sx * sy)
+            m[8] += v * (ax * az + bx * bz + cx * cz + sx * sz)
+            m[9] += v * (ay * az + by * bz + cy * cz + sy * sz)
+            bx, by, bz = cx, cy, cz
+    if m[0] <= 0.0:
+        m[:] = 0.0
+        m[1], m[2], m[3] = ox, oy, oz
+        return
+    gx, gy, gz = m[1] / m[0], m[2] / m[0], m[3] / m[0]
+    m[4] -= m[0] * gx * gx
+    m[5] -= m[0] * gy * gy
+    m[6] -= m[0] * gz * gz
+    m[7] -= m[0] * gx * gy
+    m[8] -= m[0] * gx * gz
+    m[9] -= m[0] * gy * gz
+    m[1], m[2], m[3] = ox + gx, oy + gy, oz + gz
+
+
+@njit(cache=True)
+def merge_moments(total, m):
+    """total <- moments of the union of two disjoint sets (parallel axis theorem)."""
+    if m[0] <= 0.0:
+        return
+    if total[0] <= 0.0:
+        total[:] = m
+        return
+    v = total[0] + m[0]
+    reduced = total[0] * m[0] / v
+    share = m[0] / v
+    dx, dy, dz = m[1] - total[1], m[2] - total[2], m[3] - total[3]
+    total[0] = v
+    total[1] += share * dx
+    total[2] += share * dy
+    total[3] += share * dz
+    total[4] += m[4] + reduced * dx * dx
+    total[5] += m[5] + reduced * dy * dy
+    total[6] += m[6] + reduced * dz * dz
+    total[7] += m[7] + reduced * dx * dy
+    total[8] += m[8] + reduced * dx * dz
+    total[9] += m[9] + reduced * dy * dz
