@@ -12,11 +12,14 @@ import numpy as np
 import pyvista as pv
 from vtkmodules.vtkIOHDF import vtkHDFReader
 
+from coupler.errors import ExitCode, SurgebreakError
 from coupler.vtkhdf import read_times
 
 
-class NothingToShow(Exception):
+class NothingToShow(SurgebreakError):
     """The directory is no run, or the run has written no fields yet."""
+
+    exit_code = ExitCode.BAD_CASE
 
 
 class Series:

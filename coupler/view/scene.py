@@ -26,8 +26,9 @@ SAMPLED_STEPS = 25
 class Scene:
     """Draws the steps of a run into one window with one camera and fixed colour scales, so that pictures compare."""
 
-    def __init__(self, run, size=(1280, 720), azimuth=-62.0, elevation=22.0):
-        """run: RunFiles · size: (width, height) in pixels · azimuth, elevation of the camera in degrees."""
+    def __init__(self, run, size=(1280, 720), azimuth=-62.0, elevation=22.0, soft=True):
+        """run: RunFiles · size: (width, height) in pixels · azimuth, elevation of the camera in degrees ·
+        soft: darken corners where little light comes (costs three times as much as all the rest)."""
         self.run = run
         self.size = size
         self.lower, self.upper = bounds(run)
@@ -38,7 +39,7 @@ class Scene:
         self._set_lights()
         self._draw_still_parts()
         self._set_camera(azimuth, elevation)
-        self._soften()
+        self._smooth(soft)
 
     def draw(self, time):
         """Put the stored step nearest to `time` [s] into the window; return its time [s]."""
@@ -50,10 +51,10 @@ class Scene:
         self._draw_time(time)
         return time
 
-    def picture(self, scale=1):
-        """The window as (height, width, 3) bytes, with `scale` times as many pixels each way."""
+    def picture(self):
+        """The window as (height, width, 3) bytes."""
         self.plotter.render()
-        return self.plotter.screenshot(return_img=True, scale=scale)
+        return self.plotter.screenshot(return_img=True)
 
     def close(self):
         """Free the window."""
@@ -94,10 +95,11 @@ class Scene:
         camera.view_angle = view.view_angle
         self.plotter.reset_camera_clipping_range()
 
-    def _soften(self):
-        """Darker corners (screen-space ambient occlusion: depth is seen) and smooth edges (2 x 2 rays a pixel)."""
-        span = np.linalg.norm(self.upper - self.lower)
-        self.plotter.enable_ssao(radius=0.045 * span, bias=0.003 * span, kernel_size=16, blur=True)
+    def _smooth(self, soft):
+        """Smooth edges (2 x 2 samples a pixel) and, if `soft`, screen-space ambient occlusion: depth is seen."""
+        if soft:
+            span = np.linalg.norm(self.upper - self.lower)
+            self.plotter.enable_ssao(radius=0.045 * span, bias=0.003 * span, kernel_size=32, blur=True)
         self.plotter.enable_anti_aliasing("ssaa")
 
     def _line(self, width):
@@ -122,10 +124,11 @@ class Scene:
         length = nice_floor(0.25 * (self.upper[0] - self.lower[0]))
         step = 0.035 * (self.upper - self.lower)[:2].max()
         start = np.array([self.lower[0], self.lower[1] - step, self.lower[2]])
-        bar = pv.Line(start, start + [length, 0, 0])
+        end = start + np.array([length, 0.0, 0.0])
+        bar = pv.Line(start, end)
         self.plotter.add_mesh(bar, color=palette.INK, line_width=self._line(2.5))
         self.plotter.add_point_labels(
-            [start + [length, 0, 0]], [f" {length:g} m"], font_size=self._points(15), text_color=palette.INK,
+            [end], [f" {length:g} m"], font_size=self._points(15), text_color=palette.INK,
             shape=None, show_points=False, always_visible=True, font_file=str(LETTERS), bold=False,
             justification_vertical="center",
         )  # fmt: skip

@@ -51,7 +51,7 @@ def right_handed(nodes, cells):
 
 
 def free_triangles(cells, level_set):
-    """Corner pairs (t, 3, 2) of the free surface in right-handed tetrahedra: a triangle, or two if two nodes are wet."""
+    """Corner pairs (t, 3, 2) of the free surface in right-handed tetrahedra: one triangle, two for two wet nodes."""
     wet = level_set[cells] < 0
     count = wet.sum(axis=1)
     a, b, c, d = _ordered(cells[count == 1], wet[count == 1].argmax(axis=1), ONE_FIRST)

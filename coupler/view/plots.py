@@ -1,0 +1,98 @@
+"""Figures of the histories of a run, fit for a paper: one file per table, one panel per unit, vector and pixels."""
+
+import os
+
+os.environ.setdefault("MPLBACKEND", "agg")
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from coupler.history import read_history
+from coupler.view.palette import INK, LINES
+
+WIDTH = 6.9  # [inch] two columns of a journal
+PANEL = 1.75  # [inch]
+LINES_PER_PANEL = len(LINES)
+FORMATS = ("pdf", "svg", "png")
+UNIT_TEXT = {"1": "–", "m3": "m³", "m2": "m²", "N s": "N·s"}
+PREFIXED = ("J", "N", "N s", "Pa", "W")
+PREFIXES = {-2: "µ", -1: "m", 0: "", 1: "k", 2: "M", 3: "G", 4: "T"}
+SINCE_START = (
+    "energy",
+)  # tables whose columns count from an arbitrary zero: shown as change since the start
+STYLE = {
+    "font.family": "DejaVu Sans", "font.size": 8, "axes.labelsize": 8, "legend.fontsize": 7, "axes.linewidth": 0.6,
+    "axes.edgecolor": INK, "axes.spines.top": False, "axes.spines.right": False, "lines.linewidth": 1.1,
+    "xtick.direction": "in", "ytick.direction": "in", "axes.grid": True, "grid.color": "#dddddd", "grid.linewidth": 0.4,
+    "legend.frameon": False, "svg.hashsalt": "surgebreak", "savefig.dpi": 300, "figure.constrained_layout.use": True,
+    "axes.prop_cycle": plt.cycler(color=LINES), "axes.formatter.useoffset": False,
+}  # fmt: skip
+
+
+def plots(directory, folder):
+    """Write the figures of all tables in `directory`/history; return the paths of the PDF files."""
+    written = []
+    for table in sorted((directory / "history").glob("*.csv")):
+        history = read_history(table)
+        panels = grouped(history)
+        if panels and len(history["time"]) > 1:
+            written.append(figure(history, panels, folder / table.stem))
+    return written
+
+
+def grouped(history):
+    """Panels [(unit, [column names])] of the numbers that are not zero throughout, by unit, none too full."""
+    shown = {}
+    for column in history.columns:
+        if column.name != "time" and column.unit and np.any(np.nan_to_num(changed(history, column.name))):
+            shown.setdefault(column.unit, []).append(column.name)
+    return [
+        (unit, names[i : i + LINES_PER_PANEL]) for unit, names in shown.items() for i in range(0, len(names), LINES_PER_PANEL)
+    ]  # fmt: skip
+
+
+def changed(history, name):
+    """Values of a column; for tables of energies less the first, since their zero is arbitrary."""
+    unit = {c.name: c.unit for c in history.columns}[name]
+    values = history[name]
+    return values - values[0] if history.title in SINCE_START and unit == "J" and len(values) else values
+
+
+def figure(history, panels, stem):
+    """One figure, a panel under the other over the same time axis; saved in every format under `stem`."""
+    with plt.rc_context(STYLE):
+        drawing, axes = plt.subplots(
+            len(panels), 1, sharex=True, squeeze=False, figsize=(WIDTH, 0.35 + PANEL * len(panels))
+        )
+        for axis, (unit, names) in zip(axes[:, 0], panels):
+            panel(axis, history, unit, names)
+        axes[-1, 0].set_xlabel("time [s]")
+        for ending in FORMATS:
+            drawing.savefig(stem.with_suffix("." + ending), metadata=_undated(ending))
+        plt.close(drawing)
+    return stem.with_suffix(".pdf")
+
+
+def panel(axis, history, unit, names):
+    """The named columns of one unit over time, with a prefix that keeps the numbers short."""
+    values = {name: changed(history, name) for name in names}
+    power, text = prefixed(unit, max(np.nanmax(np.abs(v), initial=0.0) for v in values.values()))
+    for name, value in values.items():
+        axis.plot(history["time"], value / 1000.0**power, label=name.replace("_", " "))
+    since = "change since start" if history.title in SINCE_START and unit == "J" else ""
+    axis.set_ylabel(f"{since} [{text}]".strip())
+    axis.margins(x=0)
+    axis.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0)
+
+
+def prefixed(unit, largest):
+    """Power of 1000 and the unit with its prefix, so that the largest number is between 1 and 1000."""
+    if unit not in PREFIXED or largest <= 0:
+        return 0, UNIT_TEXT.get(unit, unit)
+    power = int(np.clip(np.floor(np.log10(largest) / 3), -2, 4))
+    return power, PREFIXES[power] + UNIT_TEXT.get(unit, unit)
+
+
+def _undated(ending):
+    """Metadata without a date, so that the same run gives the same file."""
+    return {"pdf": {"CreationDate": None}, "svg": {"Date": None}}.get(ending)
