@@ -31,7 +31,8 @@ class Opening:
 class Building:
     """lower, upper (2,) [m]: footprint, outer faces · height [m] to the top of the walls · base [m]: level it stands on
 
-    thickness [m] of walls, floors and roof · block: largest edge of a block along walls and slabs [m]
+    thickness [m] of walls, floors and roof · block: edge of a block along walls and slabs [m]
+    course: height of a block in the walls [m] (None: as `block`)
     storeys: number of storeys (slabs between them) · roof: slab on top · openings: doors and windows
     density [kg/m³].
     """
@@ -41,6 +42,7 @@ class Building:
     height: float
     thickness: float
     block: float
+    course: float | None = None
     storeys: int = 1
     roof: bool = True
     base: float = 0.0
@@ -106,7 +108,7 @@ def _grid(b: Building) -> tuple[Array, Array]:
 
 def _storey_walls(b: Building, storey: int, foot: float, head: float) -> list[Block]:
     x, y = _grid(b)
-    z = _cuts(foot, head, b.block)
+    z = _cuts(foot, head, b.course or b.block)
     last_x, last_y = len(x) - 2, len(y) - 2
     cells = [
         (i, j) for i in range(last_x + 1) for j in range(last_y + 1) if i in (0, last_x) or j in (0, last_y)
@@ -184,3 +186,16 @@ def column_blocks(name: str, foot, size, count: int, density: float = 2400.0) ->
         )
         for k in range(count)
     ]
+
+
+def divided_box(name: str, lower, size, block, density: float = 2400.0, group: str = "wall") -> list[Block]:
+    """A box lower (3,) + size (3,) [m] divided into equal blocks of edges near `block` (3,) [m], in stack bond."""
+    lower, size = np.asarray(lower, float), np.asarray(size, float)
+    x, y, z = (_cuts(a, a + s, edge) for a, s, edge in zip(lower, size, block))
+    found = []
+    for i, j, k in np.ndindex(len(x) - 1, len(y) - 1, len(z) - 1):
+        low, high = np.array([x[i], y[j], z[k]]), np.array([x[i + 1], y[j + 1], z[k + 1]])
+        found.append(
+            Block(f"{name}-{i}-{j}-{k}", 0.5 * (low + high), size=high - low, density=density, group=group)
+        )
+    return found

@@ -152,18 +152,16 @@ class Scene:
     def _set_inertia(self, row: int, motion: Array) -> None:
         """Exact mass and inertia in YADE's principal frame; velocity and angular momentum to match.
 
-        Where the frame of the body is not principal (polyhedra), the state is turned into the principal one.
-        """
-        block, state = self.blocks[row], self.O.bodies[self.ids[row]].state
-        body = self.O.bodies[self.ids[row]]
-        T = self.frame[row] @ block.inertia @ self.frame[row].T
-        if np.abs(T - np.diag(np.diag(T))).max() > 1e-12 * np.abs(T).max():
-            R = _matrix(state.ori) @ self.frame[row]
+        A clump has a principal frame already, and its members are placed in it; a plain body is turned into one."""
+        block, body = self.blocks[row], self.O.bodies[self.ids[row]]
+        state = body.state
+        if not block.is_box and not self.nodes[row]:
+            R = _matrix(state.ori)
             _, axes = np.linalg.eigh(block.inertia)
             axes[:, 2] *= np.sign(np.linalg.det(axes))
             self.frame[row] = axes.T
             state.ori = self._q(R @ axes)
-            T = axes.T @ block.inertia @ axes
+        T = self.frame[row] @ block.inertia @ self.frame[row].T
         state.mass, state.inertia = block.mass, self._v(np.diag(T))
         body.aspherical = True
         state.vel, state.angVel = self._v(motion[:3]), self._v(motion[3:])

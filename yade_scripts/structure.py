@@ -181,6 +181,8 @@ class Structure:
         self._contact_work = ContactWork(self._scene) if track_contacts and self.contact is not None else None
         self._contact_loss = {"dashpot": 0.0, "friction": 0.0}
         self._joint_work = 0.0
+        self._handed_over = 0.0
+        """Energy of compressed joints that went over to contacts [J]."""
         self._driving_work = 0.0
         self._pending_dt = 0.0
         self._damping_loss = 0.0
@@ -342,6 +344,7 @@ class Structure:
             return
         self._broken += broken.tolist()
         self._read_all_keeping_velocity()
+        stored = self._joint_stored()
         self.joints.retire(broken, self._x, self._R, self.time)
         self._limit = None
         ends = np.concatenate([self.joints.a[broken], self.joints.b[broken]])
@@ -350,6 +353,7 @@ class Structure:
         self._loose[newly] = True
         if self.contact is not None:
             self._turn_on_contact(newly)
+            self._handed_over += stored - self._joint_stored()
         self._update_rows_after_loss()
 
     def _read_all_keeping_velocity(self) -> None:
@@ -367,7 +371,9 @@ class Structure:
         newly = np.flatnonzero(~self._loose & (moved > STANDS * self._radius))
         if len(newly):
             self._loose[newly] = True
+            stored = self._joint_stored()
             self._turn_on_contact(newly)
+            self._handed_over += stored - self._joint_stored()
             self._update_rows()
 
     def _turn_on_contact(self, newly: Array) -> None:
@@ -478,10 +484,11 @@ class Structure:
             e["driving_work"] += self._contact_work.driving
         damped = 0.0 if self.joints is None else float(self.joints.energy[:, joint_kernel.DAMPED].sum())
         e["joint_damping"] = damped
-        e["joint_dissipated"] = -self._joint_work - e["joint_stored"] - damped
+        e["joint_dissipated"] = -self._joint_work - e["joint_stored"] - damped - self._handed_over
         if self._contact_work is not None:
             e["dashpot"] = self._contact_work.dashpot
-            e["friction"] = self._contact_work.total - e["contact_stored"] - self._contact_work.dashpot
+            taken = self._contact_work.total + self._handed_over
+            e["friction"] = taken - e["contact_stored"] - self._contact_work.dashpot
         else:
             e["dashpot"] = 0.0
             known = e["kinetic"] + e["gravity"] + e["joint_stored"] + e["joint_dissipated"] + damped
