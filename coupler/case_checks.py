@@ -245,7 +245,7 @@ def _beyond_tank(case: Case, path: KeyPath, name: str, box: Box) -> Iterator[Pro
 
 def _bodies_outside(case: Case) -> Iterator[Problem]:
     """Blocks must lie inside the tank; fixed solids may stick out of it, but not be wholly outside."""
-    bodies = _structure(case)
+    bodies = _outlines(_structure(case))
     if case.tank is not None:
         tank = Box.between(case.tank.lower, case.tank.upper)
         for path, name, box in bodies:
@@ -261,6 +261,18 @@ def _bodies_outside(case: Case) -> Iterator[Problem]:
         depth = ground.level - box.bounds()[0][2]
         if depth > TOUCH * box.size.min():
             yield path, f"'{name}' reaches {depth:.4g} m below the ground (z = {ground.level:g} m); raise it"
+
+
+def _outlines(bodies: list[Body]) -> list[Body]:
+    """One box along the axes around all parts of each body, so that a building is told once."""
+    parts: dict[tuple[KeyPath, str], list[np.ndarray]] = {}
+    for path, name, box in bodies:
+        parts.setdefault((path, name), []).append(np.array(box.bounds()))
+    outlines = []
+    for (path, name), bounds in parts.items():
+        lower, upper = np.min(bounds, axis=0)[0], np.max(bounds, axis=0)[1]
+        outlines.append((path, name, Box.between(lower, upper)))
+    return outlines
 
 
 def _overlaps(case: Case) -> Iterator[Problem]:

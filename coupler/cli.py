@@ -69,7 +69,7 @@ def run(
     from coupler.stop import StopRequest
 
     file = load(case, [*(set or []), *([f"time.end={end}"] if end else [])])
-    from coupler.loop import run as run_case
+    from coupler.run import run as run_case
 
     with RunDirectory.create(file, output) as directory, StopRequest(directory.path) as stop:
         with reporter(file.case.time.end, directory.log, stop.requested) as tell:

@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from coupler.errors import SurgebreakError, did_you_mean
+from coupler.history import read_history
 
 
 class BadExpectation(SurgebreakError):
@@ -40,7 +41,7 @@ def verdicts(run: Path, expected: Path) -> list[Verdict]:
 
 
 def _judge(entry: dict, run: Path, place: str) -> Verdict:
-    columns = read_columns(run / entry["table"])
+    columns = read_history(run / entry["table"]).values
     name = entry["column"]
     if name not in columns:
         raise BadExpectation(f"{place}: {entry['table']} has no column '{name}'{did_you_mean(name, columns)}")
@@ -55,16 +56,6 @@ def _judge(entry: dict, run: Path, place: str) -> Verdict:
         low, high = entry.get("at_least", -np.inf), entry.get("at_most", np.inf)
         kept, told = bool(low <= found <= high), f"{low:g} to {high:g}"
     return Verdict(entry["what"], found, told, bool(kept))
-
-
-def read_columns(path: Path) -> dict[str, np.ndarray]:
-    """Columns of a history table by name, (rows,) each; lines that begin with # are comments."""
-    lines = [line for line in path.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
-    names = lines[0].split(",")
-    rows = [line.split(",") for line in lines[1:]]
-    whole = [row for row in rows if len(row) == len(names)]  # a killed run may leave half a line
-    values = np.array([[float(cell or "nan") for cell in row] for row in whole]).reshape(-1, len(names))
-    return {name: values[:, k] for k, name in enumerate(names)}
 
 
 def _integral(time: np.ndarray, values: np.ndarray, entry: dict) -> float:

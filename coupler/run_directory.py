@@ -11,10 +11,12 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import os
 import shutil
 import sys
 import time
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 from types import TracebackType
@@ -118,7 +120,7 @@ def write_json(path: Path, content: object) -> None:
     """Write to a neighbour first and rename it, which either happens as a whole or not at all."""
     part = path.with_name(f".{path.name}.part")
     with part.open("w", encoding="utf-8") as stream:
-        json.dump(content, stream, indent=1, ensure_ascii=False, allow_nan=False, default=_plain)
+        json.dump(_plain(content), stream, indent=1, ensure_ascii=False, allow_nan=False)
         stream.write("\n")
         stream.flush()
         os.fsync(stream.fileno())
@@ -126,12 +128,16 @@ def write_json(path: Path, content: object) -> None:
 
 
 def _plain(value: object) -> object:
-    """Numpy numbers and arrays, and paths, as what JSON knows."""
+    """What JSON knows: numpy numbers and arrays become numbers and lists, NaN and infinities null, paths text."""
     if hasattr(value, "tolist"):
-        return value.tolist()
-    if isinstance(value, Path):
-        return str(value)
-    raise TypeError(f"{type(value).__name__} cannot go into run.json: {value!r}")
+        value = value.tolist()
+    if isinstance(value, Mapping):
+        return {str(key): _plain(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(inner) for inner in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return str(value) if isinstance(value, Path) else value
 
 
 def _make(output: Path | None, runs: Path, content: dict) -> Path:

@@ -1,0 +1,206 @@
+"""Bodies that cannot be where the case puts them, and what a box is: the geometry behind the messages."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from coupler.boxes import Box, overlap_depth, rotation_matrix
+from coupler.case import Case
+from coupler.case_checks import problems, remarks
+
+SPACE = st.floats(-3.0, 3.0)
+EDGE = st.floats(0.1, 2.0)
+
+
+@st.composite
+def boxes(draw):
+    axis = draw(st.tuples(SPACE, SPACE, SPACE).filter(lambda a: np.linalg.norm(a) > 0.1))
+    rotation = rotation_matrix(axis, draw(st.floats(-3.2, 3.2)))
+    return Box(
+        np.array(draw(st.tuples(SPACE, SPACE, SPACE))), np.array(draw(st.tuples(EDGE, EDGE, EDGE))), rotation
+    )
+
+
+@given(boxes())
+def test_a_rotation_keeps_lengths_and_handedness(box):
+    assert np.allclose(box.rotation.T @ box.rotation, np.eye(3), atol=1e-12)
+    assert np.isclose(np.linalg.det(box.rotation), 1.0, rtol=1e-12)
+
+
+@given(boxes(), boxes())
+def test_overlap_is_symmetric_and_agrees_with_points(a, b):
+    """A point in both boxes proves an overlap; the depth is the same seen from either."""
+    depth = overlap_depth(a, b)
+    assert np.isclose(depth, overlap_depth(b, a), atol=1e-9)
+    grid = np.stack(np.meshgrid(*[np.linspace(-0.49, 0.49, 5)] * 3), axis=-1).reshape(-1, 3)
+    inside_a = a.centre + (grid * a.size) @ a.rotation.T
+    if b.holds(inside_a).any():
+        assert depth > 0.0
+
+
+@given(boxes(), SPACE, SPACE)
+def test_moving_apart_by_the_depth_parts_two_boxes(a, x, y):
+    """Along one of the axes the move by the depth suffices; here the axis is a face normal of both."""
+    b = Box(a.centre + a.rotation @ [0.3 * a.size[0], 0, 0], a.size, a.rotation)
+    depth = overlap_depth(a, b)
+    assert np.isclose(depth, 0.7 * a.size[0], rtol=1e-9) or depth <= a.size.min() + 1e-9
+    apart = Box(a.centre + a.rotation @ [a.size[0], 0, 0], a.size, a.rotation)
+    assert overlap_depth(a, apart) < 1e-9
+
+
+def case(**sections):
+    """A tank of 10 m with water in its left half, and whatever sections come on top."""
+    base = {
+        "case": {"title": "x"},
+        "time": {"end": 1},
+        "tank": {"lower": [0, 0, 0], "upper": [10, 10, 10], "cell": 1},
+        "water": {"fill": [{"lower": [0, 0, 0], "upper": [5, 10, 5]}]},
+    }
+    return Case.model_validate({k: v for k, v in (base | sections).items() if v is not None})
+
+
+def structure(*blocks, **more):
+    return {
+        "structure": {
+            "block": [{"name": f"b{i}", "size": [1, 1, 1], **b} for i, b in enumerate(blocks)],
+            **more,
+        },
+        "contact": {"stiffness": 1e6},
+    }
+
+
+def told(case):
+    return [".".join(map(str, path)) + ": " + text for path, text in problems(case)]
+
+
+def test_overlapping_blocks_are_named_both_with_the_overlap():
+    found = told(case(**structure({"centre": [7, 5, 0.5]}, {"centre": [7.8, 5, 0.5]})))
+    assert found == ["structure.block.1: 'b1' overlaps 'b0' by 0.2 m; move one of them by that much"]
+
+
+def test_touching_blocks_do_not_overlap():
+    """Decimal fractions are not exact in binary: 0.1 + 0.2 against 0.3 must count as touching."""
+    a, b = {"centre": [7, 5, 0.15], "size": [1, 1, 0.3]}, {"centre": [7, 5, 0.1 + 0.2 + 0.5]}
+    assert told(case(**structure(a, b))) == []
+
+
+def test_a_block_in_a_solid_is_an_overlap():
+    solid = [{"name": "pier", "centre": [7, 5, 1], "size": [2, 2, 2]}]
+    assert told(case(solid=solid, **structure({"centre": [7, 5, 0.5]}))) == [
+        "structure.block.0: 'b0' overlaps 'pier' by 1 m; move one of them by that much"
+    ]
+
+
+def test_a_block_in_the_water_is_a_floating_or_sunken_body_and_allowed():
+    assert told(case(**structure({"centre": [2, 5, 4.5]}))) == []
+
+
+def test_a_fill_swallowed_by_a_solid_is_no_water():
+    found = told(case(solid=[{"centre": [2.5, 5, 2.5], "size": [5, 10, 5]}]))
+    assert found == ["water.fill.0: this water lies wholly inside 'solid', so there is none"]
+
+
+def test_a_block_beyond_the_tank_is_told_with_the_side_and_the_distance():
+    (found,) = told(case(**structure({"centre": [9.7, 5, 0.5]})))
+    assert "reaches 0.2 m beyond the side x+ of the tank (x = 10 m)" in found
+
+
+def test_a_turned_block_reaches_further_than_its_edges():
+    """A cube turned by 45 degrees about z is √2 wide: half of that is 0.707 m from its centre."""
+    turned = {"centre": [9.4, 5, 0.5], "rotation": {"axis": [0, 0, 2], "angle": np.pi / 4}}
+    (found,) = told(case(**structure(turned)))
+    assert "reaches 0.1071 m beyond the side x+" in found
+
+
+def test_a_block_below_the_ground():
+    dry = structure({"centre": [0, 0, 0.3]}, ground={"level": 0})
+    assert told(case(tank=None, water=None, **dry)) == [
+        "structure.block.0: 'b0' reaches 0.2 m below the ground (z = 0 m); raise it"
+    ]
+
+
+def test_an_axis_without_direction():
+    turned = {"centre": [7, 5, 0.5], "rotation": {"axis": [0, 0, 0], "angle": 1}}
+    assert told(case(**structure(turned))) == [
+        "structure.block.0.rotation.axis: [0, 0, 0] is no direction; write for instance [0, 0, 1]"
+    ]
+
+
+def building(**changes):
+    house = {"lower": [6, 2, 0], "size": [4, 6, 8], "wall_thickness": 0.5, "block": [1, 1]} | changes
+    parts = structure(**{"building": [house]})
+    return case(**parts, joints={"strength": 1e5, "opening_at_failure": 1e-3})
+
+
+def test_a_building_fits():
+    assert told(building(opening=[{"wall": "x-", "lower": [2, 0], "size": [1, 2]}])) == []
+
+
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        (
+            {"opening": [{"wall": "x-", "lower": [5.5, 0], "size": [1, 2]}]},
+            "reaches from 5.5 to 6.5 m along the wall",
+        ),
+        (
+            {"opening": [{"wall": "y+", "lower": [0, 7], "size": [1, 2]}]},
+            "reaches from 7 to 9 m in height, outside",
+        ),
+        ({"wall_thickness": 2}, "two walls of 2 m leave no room in 'building' (4 m)"),
+        ({"storeys": 16}, "storeys of 0.5 m have no room above floors of 0.5 m"),
+        ({"size": [5, 6, 8]}, "reaches 1 m beyond the side x+ of the tank"),
+    ],
+)
+def test_buildings_that_cannot_be(changes, says):
+    (found,) = told(building(**changes))
+    assert says in found
+
+
+def test_a_block_in_a_room_is_free_and_one_in_the_wall_is_not():
+    house = {"lower": [4, 2, 0], "size": [6, 6, 8], "wall_thickness": 0.5, "block": [1, 1]}
+    joints = {"strength": 1e5, "opening_at_failure": 1e-3}
+    assert told(case(**structure({"centre": [7, 5, 0.5]}, building=[house]), joints=joints)) == []
+    (found,) = told(case(**structure({"centre": [4.8, 5, 0.5]}, building=[house]), joints=joints))
+    assert "'building' overlaps 'b0' by 0.2 m" in found
+
+
+@pytest.mark.parametrize(
+    ("gauge", "says"),
+    [
+        ({"kind": "level", "at": [11, 5]}, "'g' is outside the tank: x = 11 m, not in 0 to 10 m"),
+        ({"kind": "pressure", "at": [7, 5, 1]}, "'g' lies 1 m inside the solid 'pier'; put it on the face"),
+        ({"kind": "force", "on": "peer"}, "there is no body 'peer'; did you mean 'pier'?"),
+        ({"kind": "motion", "of": "b1"}, "there is no block 'b1'; there are b0"),
+        ({"kind": "reaction", "on": "pier"}, "there is no block or group 'pier'; there are b0"),
+    ],
+)
+def test_gauges_that_measure_nothing(gauge, says):
+    solid = [{"name": "pier", "centre": [7, 5, 1], "size": [2, 2, 2]}]
+    (found,) = told(case(solid=solid, gauge=[{"name": "g", **gauge}], **structure({"centre": [2, 2, 0.5]})))
+    assert says in found
+
+
+def test_a_gauge_on_the_face_of_a_solid_is_where_it_belongs():
+    solid = [{"name": "pier", "centre": [7, 5, 1], "size": [2, 2, 2]}]
+    assert told(case(solid=solid, gauge=[{"name": "g", "kind": "pressure", "at": [6, 5, 1]}])) == []
+
+
+def test_names_are_unique():
+    found = told(case(**structure({"centre": [7, 5, 0.5]}, {"centre": [2, 5, 0.5], "name": "b0"})))
+    assert found == [
+        "structure.block.1.name: 'b0' is taken by structure.block[0]; give every body its own name"
+    ]
+
+
+def test_a_motion_needs_its_block():
+    found = told(case(motion=[{"block": "b00", "velocity": [0, 0, 1]}], **structure({"centre": [7, 5, 0.5]})))
+    assert found == ["motion.0.block: there is no block 'b00'; did you mean 'b0'?"]
+
+
+def test_walls_thinner_than_a_cell_are_remarked():
+    """Single covers lose load on walls thinner than a cell; allowed, but not in silence."""
+    thin = {"centre": [7, 5, 1], "size": [0.2, 2, 2]}
+    assert remarks(case(**structure({"centre": [7, 5, 0.5]}))) == []
+    assert remarks(case(**structure(thin)))[0].startswith("b0 is 0.2 m thick, thinner than a cell (1 m)")

@@ -1,0 +1,31 @@
+"""The cases of the checkout: each passes its checks, says what it is, and promises numbers with a source."""
+
+import tomllib
+
+import pytest
+
+from coupler.case_checks import remarks
+from coupler.case_file import load
+from coupler.expected import TAKE
+from coupler.provenance import ROOT
+
+CASES = sorted(path.parent for path in (ROOT / "cases").glob("*/case.toml"))
+
+
+@pytest.mark.parametrize("place", CASES, ids=lambda place: place.name)
+def test_a_case_of_the_checkout(place):
+    assert remarks(load(place).case) == []
+    readme = (place / "README.md").read_text(encoding="utf-8")
+    for heading in ("Physics", "Source", "Cost", "Picture", "Numbers to expect"):
+        assert f"**{heading}" in readme
+    for entry in tomllib.loads((place / "expected.toml").read_text(encoding="utf-8"))["expect"]:
+        assert {"what", "table", "column", "take", "source"} <= set(entry)
+        assert entry["take"] in TAKE
+        assert "value" in entry or "at_least" in entry or "at_most" in entry
+
+
+def test_the_strong_building_differs_in_its_joints_alone():
+    weak = load(ROOT / "cases" / "dam_break_building").case
+    strong = load(ROOT / "cases" / "dam_break_building", ["joints.strength='2 MPa'"]).case
+    assert strong.joints.strength == 20 * weak.joints.strength
+    assert strong.model_copy(update={"joints": weak.joints}) == weak

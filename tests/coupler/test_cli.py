@@ -1,0 +1,168 @@
+"""The command: exit codes, messages and files, seen from outside."""
+
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from coupler.case_docs import FIRST_CASE
+from coupler.provenance import ROOT, version
+
+from .test_case_file import BLOCKS, WATER, write
+
+COMMAND = Path(sys.executable).parent / "surgebreak"
+
+
+def surgebreak(*arguments, **environment):
+    return subprocess.run(
+        [COMMAND, *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, **environment},
+    )
+
+
+def test_version():
+    assert surgebreak("--version").stdout == f"surgebreak {version()}\n"
+
+
+def test_help_names_every_command_quickly():
+    began = time.perf_counter()
+    told = surgebreak("--help").stdout
+    assert time.perf_counter() - began < 2.0  # 0.1 s on a quiet machine
+    for command in ("run", "check", "render", "doctor", "explain", "init", "test"):
+        assert f"\n  {command} " in told
+
+
+def test_a_bad_case_ends_with_two_and_one_line_for_each_mistake(tmp_path):
+    write(tmp_path, WATER.replace("density", "densty").replace("2 s", "2 m"))
+    done = surgebreak("run", tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.splitlines() == [
+        f"{tmp_path}/case.toml:4: time.end: '2 m' is a length, needs a time [s]",
+        f"{tmp_path}/case.toml:10: water.densty: unknown name; did you mean 'density'?",
+        "surgebreak: 2 mistakes in the case; nothing was run",
+    ]
+    assert not (tmp_path / "runs").exists()
+
+
+def test_set_and_end_are_checked_like_the_file(tmp_path):
+    write(tmp_path, WATER)
+    done = surgebreak("check", tmp_path, "--set", "water.density=-1")
+    assert done.returncode == 2
+    assert done.stderr.startswith("--set water.density=-1: water.density: -1 is out of range")
+    assert surgebreak("run", tmp_path, "--end", "soon").stderr.startswith(
+        "--set time.end=soon: time.end: 'soon' is no"
+    )
+
+
+def test_an_existing_output_is_refused(tmp_path):
+    write(tmp_path, WATER)
+    done = surgebreak("run", tmp_path, "--output", tmp_path)
+    assert done.returncode == 2
+    assert "results are never overwritten" in done.stderr
+
+
+def test_an_unknown_option_is_refused(tmp_path):
+    assert surgebreak("run", tmp_path, "--ouput", "x").returncode == 2
+
+
+def test_explain_tells_unit_limits_and_example():
+    told = surgebreak("explain", "joints.strength").stdout
+    assert told == 'joints.strength [Pa] (> 0; required; for instance "0.5 MPa"): T_max, largest traction\n'
+
+
+def test_explain_offers_the_nearest_name():
+    done = surgebreak("explain", "joints.strenght")
+    assert done.returncode == 2
+    assert "did you mean 'joints.strength'?" in done.stderr
+
+
+def test_init_writes_a_case_that_passes_and_never_overwrites(tmp_path):
+    place = tmp_path / "new" / "case"
+    assert surgebreak("init", place).returncode == 0
+    from coupler.case_file import load
+
+    assert load(place).case.structure.block[0].name == "box"
+    (place / "case.toml").write_text("mine", encoding="utf-8")
+    done = surgebreak("init", place)
+    assert done.returncode == 1
+    assert "exists and is left as it is" in done.stderr
+    assert (place / "case.toml").read_text(encoding="utf-8") == "mine"
+
+
+def test_without_the_optional_packages_the_way_to_get_them_is_told(tmp_path):
+    """Called past the launcher, nothing may be installed behind the user's back."""
+    code = (
+        "import sys, coupler.cli as cli\n"
+        "cli.find_spec = lambda name: None\n"
+        "sys.argv = ['surgebreak', 'render', 'run']\n"
+        "cli.main()"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "`./surgebreak render` of the checkout installs it" in done.stderr
+
+
+def test_pytest_gets_its_words(tmp_path):
+    """`test` passes options on and returns pytest's own code: 5 when nothing was collected."""
+    done = surgebreak("test", "tests/coupler/test_cli.py", "--collect-only", "-k", "no_such_test")
+    assert done.returncode == 5
+
+
+FAKE_RUN = """
+import sys
+import types
+import coupler.cli as cli
+fake = types.ModuleType("coupler.run")
+def run(case, directory, tell):
+    for k in range(1, 11):
+        tell.step(case.time.end * k / 10, {{"dt": "1 ms"}})
+    {then}
+fake.run = run
+sys.modules["coupler.run"] = fake
+sys.argv = ["surgebreak", "run", {case!r}]
+cli.main()
+"""
+
+
+@pytest.mark.parametrize(
+    ("then", "code", "says"),
+    [
+        ("return 0", 0, "results in "),
+        ("from coupler.limits import Diverged; raise Diverged('too much')", 3, "surgebreak: too much"),
+        ("from coupler.limits import LimitReached; raise LimitReached('enough')", 4, "surgebreak: enough"),
+        ("raise OSError(28, 'No space left on device')", 4, "no room for the results"),
+        ("raise KeyError('x')", 1, "surgebreak: unexpected KeyError: 'x'"),
+    ],
+)
+def test_exit_codes_of_runs(tmp_path, then, code, says):
+    """Whatever the loop does, the shell sees the right code, the user a message, and the results stay."""
+    write(tmp_path, WATER)
+    done = subprocess.run(
+        [sys.executable, "-c", FAKE_RUN.format(then=then, case=str(tmp_path))],
+        capture_output=True, text=True, check=False, cwd=ROOT,
+    )  # fmt: skip
+    assert done.returncode == code, done.stderr
+    assert says in done.stdout + done.stderr
+    assert "on:  water" in done.stdout
+    assert "off: structure, coupling" in done.stdout
+    (run,) = (tmp_path / "runs").iterdir()
+    assert f'"exit_code": {code}' in (run / "run.json").read_text(encoding="utf-8")
+
+
+def test_a_case_with_blocks_tells_its_modules(tmp_path):
+    write(tmp_path, WATER + BLOCKS)
+    done = subprocess.run(
+        [sys.executable, "-c", FAKE_RUN.format(then="return 0", case=str(tmp_path))],
+        capture_output=True, text=True, check=False, cwd=ROOT,
+    )  # fmt: skip
+    assert "on:  water, structure, coupling, contact" in done.stdout
+
+
+def test_the_first_case_is_commented():
+    assert FIRST_CASE.count("#") > 5

@@ -1,0 +1,298 @@
+"""The launcher `./surgebreak` on machines that are not ready: what it runs, in which order, and what it says.
+
+apt, sudo, Python and the like are stand-ins on the PATH that write down how they were called.
+"""
+
+import os
+import shutil
+import subprocess
+import time
+
+import pytest
+
+from coupler.provenance import ROOT
+
+TOOLS = (
+    "sh",
+    "cat",
+    "cksum",
+    "readlink",
+    "sed",
+    "date",
+    "sleep",
+    "mkdir",
+    "rm",
+    "tail",
+    "cut",
+    "du",
+    "grep",
+    "env",
+)
+VENV = """#!/bin/sh
+# stands for python -m venv: a .venv whose python and surgebreak write down what they are asked
+mkdir -p "$1/bin"
+printf '#!/bin/sh\\n echo "python $*" >>"$CALLS"\\n case "$*" in *" pip install "*) [ -z "$PIP_FAILS" ];; esac\\n' \\
+    >"$1/bin/python"
+printf '#!/bin/sh\\n echo "surgebreak $*" >>"$CALLS"\\n' >"$1/bin/surgebreak"
+chmod +x "$1/bin/python" "$1/bin/surgebreak"
+"""
+PYTHON = """#!/bin/sh
+echo "system-python $*" >>"$CALLS"
+case $* in
+"-m venv "*) exec sh "$STUBS/make-venv" "$3" ;;
+*ensurepip*) [ -e "$STATE/venv-module" ] ;;
+*version_info*) [ -z "$OLD_PYTHON" ] ;;
+esac
+"""
+APT_GET = """#!/bin/sh
+echo "apt-get $*" >>"$CALLS"
+case $* in
+*install*) [ -z "$APT_FAILS" ] && touch "$STATE/venv-module" && mkdir -p "$STATE/yade" ;;
+esac
+"""
+
+
+class Machine:
+    """A checkout with the launcher alone, a PATH of stand-ins, and a list of the calls they got."""
+
+    def __init__(self, folder):
+        self.root, self.stubs, self.state = folder / "checkout", folder / "bin", folder / "state"
+        for place in (self.root, self.stubs, self.state):
+            place.mkdir()
+        for name in ("surgebreak", "pyproject.toml", "constraints.txt"):
+            shutil.copy(ROOT / name, self.root / name)
+        for name in (*TOOLS, "touch", "chmod"):
+            (self.stubs / name).symlink_to(shutil.which(name))
+        self.stub("make-venv", VENV)
+        self.stub("python3", PYTHON)
+        self.stub("apt-get", APT_GET)
+        self.stub("apt-cache", '#!/bin/sh\n[ -z "$NO_PACKAGE" ]\n')
+        self.stub("uname", "#!/bin/sh\necho Linux\n")
+        self.stub("dpkg-query", "#!/bin/sh\nexit 1\n")
+        self.stub("id", "#!/bin/sh\necho ${USER_NUMBER:-0}\n")
+        (folder / "os-release").write_text('PRETTY_NAME="Debian GNU/Linux 12 (bookworm)"\n', encoding="utf-8")
+        self.environment = {
+            "PATH": str(self.stubs),
+            "CALLS": str(folder / "calls"),
+            "STUBS": str(self.stubs),
+            "STATE": str(self.state),
+            "SURGEBREAK_PYTHON": str(self.stubs / "python3"),
+            "SURGEBREAK_YADE": str(self.state / "yade"),
+            "SURGEBREAK_OS_RELEASE": str(folder / "os-release"),
+        }
+
+    def stub(self, name, text):
+        path = self.stubs / name
+        path.unlink(missing_ok=True)
+        path.write_text(text, encoding="utf-8")
+        path.chmod(0o755)
+
+    def ready(self):
+        (self.state / "venv-module").touch()
+        (self.state / "yade").mkdir()
+        return self
+
+    def __call__(self, *arguments, program=None, cwd=None, **environment):
+        """Exit code, messages and the calls of this call alone."""
+        calls = self.root.parent / "calls"
+        calls.write_text("", encoding="utf-8")
+        done = subprocess.run(
+            [program or self.root / "surgebreak", *arguments],
+            capture_output=True, text=True, check=False, cwd=cwd, env=self.environment | environment, timeout=30,
+        )  # fmt: skip
+        return done.returncode, done.stderr, calls.read_text(encoding="utf-8").splitlines()
+
+
+@pytest.fixture
+def machine(tmp_path):
+    return Machine(tmp_path)
+
+
+def pip_installs(calls):
+    return [call.split(" -e ")[1].split("checkout")[1] for call in calls if " pip install " in call]
+
+
+def test_the_first_call_on_a_fresh_machine_sets_everything_up(machine):
+    """apt for YADE and venv, a .venv, the pinned packages, then the command itself."""
+    code, told, calls = machine("run", "cases/x", "--end", "1 s")
+    assert code == 0
+    assert "apt-get install -q -y --no-install-recommends -o Dpkg::Use-Pty=0 yade python3-venv" in calls
+    assert any(call.startswith("system-python -m venv") for call in calls)
+    assert pip_installs(calls) == [""]
+    assert any("-c " + str(machine.root / "constraints.txt") in call for call in calls)
+    assert calls[-1] == "surgebreak run cases/x --end 1 s"
+    assert "installing yade python3-venv from apt" in told
+    assert "set up in " in told
+
+
+def test_later_calls_start_at_once(machine):
+    """No apt, no pip, no word; and the launcher itself costs less than 50 ms (best of five, machines are busy)."""
+    machine("run")
+    code, told, calls = machine("run", "x")
+    assert (code, told, calls) == (0, "", ["surgebreak run x"])
+    costs = []
+    for _ in range(5):
+        began = time.perf_counter()
+        machine("run")
+        costs.append(time.perf_counter() - began)
+    assert min(costs) < 0.05
+
+
+def test_an_existing_yade_is_honoured(machine):
+    _, _, calls = machine.ready()("run")
+    assert not any(call.startswith("apt-get") for call in calls)
+
+
+def test_a_yade_known_to_the_package_system_is_honoured_wherever_it_is(machine):
+    machine.stub("dpkg-query", "#!/bin/sh\necho installed\n")
+    (machine.state / "venv-module").touch()
+    _, _, calls = machine("run")
+    assert not any(call.startswith("apt-get") for call in calls)
+
+
+def test_extras_come_with_the_command_that_needs_them(machine):
+    machine.ready()
+    assert pip_installs(machine("run")[2]) == [""]
+    assert pip_installs(machine("--quiet", "render", "r")[2]) == ["[view]"]
+    assert pip_installs(machine("render", "r")[2]) == []
+    assert pip_installs(machine("test")[2]) == ["[test]"]
+    assert pip_installs(machine("test", "render")[2]) == []
+
+
+def test_changed_pins_are_installed_again(machine):
+    machine.ready()("run")
+    with (machine.root / "constraints.txt").open("a", encoding="utf-8") as stream:
+        stream.write("# changed\n")
+    assert pip_installs(machine("run")[2]) == [""]
+
+
+def test_through_a_link_and_from_another_directory(machine, tmp_path):
+    machine.ready()("run")
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "link").symlink_to("checkout/surgebreak")
+    (tmp_path / "elsewhere" / "again").symlink_to("../link")
+    for program in (tmp_path / "link", tmp_path / "elsewhere" / "again", "../checkout/surgebreak"):
+        code, told, calls = machine("--version", program=program, cwd=tmp_path / "elsewhere")
+        assert (code, told, calls) == (0, "", ["surgebreak --version"])
+
+
+def test_arguments_arrive_as_they_were_given(machine):
+    machine.ready()("run")
+    machine.stub("show", "")
+    (machine.root / ".venv/bin/surgebreak").write_text(
+        '#!/bin/sh\nprintf "<%s>" "$@" >>"$CALLS"\n', encoding="utf-8"
+    )
+    assert machine("run", "--set", "a=b c", "", "*")[2] == ["<run><--set><a=b c><><*>"]
+
+
+def test_the_exit_code_of_the_command_is_returned(machine):
+    machine.ready()("run")
+    (machine.root / ".venv/bin/surgebreak").write_text("#!/bin/sh\nexit 3\n", encoding="utf-8")
+    assert machine("run")[0] == 3
+
+
+# ---------------------------------------------------------------- where it cannot work
+
+
+def test_sudo_is_used_by_ordinary_users(machine):
+    machine.stub("sudo", '#!/bin/sh\necho "sudo $*" >>"$CALLS"\n[ "$1" = -v ] || exec "$@"\n')
+    code, _, calls = machine("run", USER_NUMBER="1000")
+    assert code == 0
+    assert calls[-1] == "surgebreak run"
+    assert any(call.startswith("sudo env DEBIAN_FRONTEND=noninteractive apt-get install") for call in calls)
+    assert not any("pip" in call for call in calls if call.startswith("sudo"))
+
+
+@pytest.mark.parametrize("sudo", [None, "#!/bin/sh\nexit 1\n"], ids=["absent", "refuses"])
+def test_neither_root_nor_sudo_says_what_to_ask_for(machine, sudo):
+    if sudo:
+        machine.stub("sudo", sudo)
+    code, told, calls = machine("run", USER_NUMBER="1000")
+    assert code == 1
+    assert "    apt-get install --no-install-recommends yade python3-venv" in told
+    assert "sudo is absent or refused" in told
+    assert not any(call.startswith("apt-get") for call in calls)
+
+
+def test_without_apt(machine):
+    (machine.stubs / "apt-get").unlink()
+    code, told, _ = machine("run")
+    assert code == 1
+    assert (
+        "Debian GNU/Linux 12 (bookworm) has no apt-get; surgebreak takes the engine YADE from the packages"
+        in told
+    )
+
+
+def test_another_system(machine):
+    machine.stub("uname", "#!/bin/sh\necho Darwin\n")
+    code, told, _ = machine("run")
+    assert code == 1
+    assert "this system is Darwin; surgebreak needs Debian 12 or a derivative" in told
+
+
+def test_a_derivative_without_the_package(machine):
+    code, told, _ = machine("run", NO_PACKAGE="1")
+    assert code == 1
+    assert "offers no package 'yade'" in told
+
+
+def test_a_python_that_is_too_old(machine):
+    code, told, _ = machine.ready()("run", OLD_PYTHON="1")
+    assert code == 1
+    assert "needs the system's Python 3.11 or later" in told
+
+
+def test_a_failing_apt_is_told_and_repeated(machine):
+    code, told, calls = machine("run", APT_FAILS="1")
+    assert code == 1
+    assert "apt-get could not install yade python3-venv" in told
+    assert not any("venv" in call for call in calls if call.startswith("system-python -m"))
+    assert machine("run")[0] == 0
+
+
+def test_a_failing_pip_is_told_and_repeated_without_starting_over(machine):
+    """Without network nothing has been written yet: the next call goes on where this one stopped."""
+    machine.ready()
+    code, told, calls = machine("run", PIP_FAILS="1")
+    assert code == 1
+    assert "pip could not install the packages" in told
+    assert not any(call.startswith("surgebreak") for call in calls)
+    code, told, calls = machine("run")
+    assert (code, calls[-1]) == (0, "surgebreak run")
+    assert not any(call.startswith("system-python -m venv") for call in calls)
+
+
+def test_packages_half_written_by_an_interrupted_set_up_are_thrown_away(machine):
+    """A wheel of which half is on disk looks installed to pip; so the folder is made again."""
+    machine.ready()("run")
+    stamps = machine.root / ".venv" / ".set-up"
+    (stamps / "unfinished").write_text("pip\n", encoding="utf-8")
+    (machine.root / ".venv" / "set-up.log").write_text(
+        "Installing collected packages: numpy\n", encoding="utf-8"
+    )
+    (machine.root / ".venv" / "half").touch()
+    code, told, calls = machine("run")
+    assert code == 0
+    assert "an earlier set-up was interrupted; starting it again" in told
+    assert not (machine.root / ".venv" / "half").exists()
+    assert any(call.startswith("system-python -m venv") for call in calls)
+
+
+def test_a_folder_that_cannot_be_written(machine):
+    (machine.root / ".venv").write_text("", encoding="utf-8")
+    code, told, _ = machine.ready()("run")
+    assert code == 1
+    assert "cannot write to " in told
+
+
+def test_the_launcher_is_plain_posix():
+    """Debian's sh is dash, others' is not; `bash --posix -n` and dash both read it, shellcheck where it is there."""
+    for shell in (["dash", "-n"], ["bash", "--posix", "-n"]):
+        assert subprocess.run([*shell, ROOT / "surgebreak"], check=False).returncode == 0
+    if shutil.which("shellcheck"):
+        checked = subprocess.run(
+            ["shellcheck", ROOT / "surgebreak"], capture_output=True, text=True, check=False
+        )
+        assert checked.returncode == 0, checked.stdout
+    assert os.access(ROOT / "surgebreak", os.X_OK)

@@ -1,0 +1,107 @@
+"""Who may import whom: water and structure know nothing of each other, pictures are made from files alone."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from coupler.provenance import ROOT
+
+ALLOWED = {
+    "fluid": {"fluid"},
+    "yade_scripts": {"yade_scripts", "yade"},
+    "coupler": {"coupler", "fluid", "yade_scripts"},
+    "coupler/view": {"coupler"},
+}
+"""Packages of this project, and YADE, that each room may import."""
+
+
+def imports(path):
+    """(line, module) of every import of a file, at whatever depth."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from ((node.lineno, name.name) for name in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.level == 0:
+            yield node.lineno, node.module
+
+
+def files(room):
+    found = (ROOT / room).rglob("*.py")
+    return [path for path in found if room != "coupler" or "view" not in path.relative_to(ROOT).parts]
+
+
+@pytest.mark.parametrize("room", ALLOWED)
+def test_imports_stay_within_the_rooms(room):
+    watched = {"fluid", "yade_scripts", "coupler", "yade"}
+    wrong = [
+        f"{path.relative_to(ROOT)}:{line}: {module}"
+        for path in files(room)
+        for line, module in imports(path)
+        if module.split(".")[0] in watched - ALLOWED[room]
+    ]
+    assert wrong == []
+
+
+def test_only_the_viewer_and_the_doctors_own_processes_know_vtk():
+    """VTK after YADE in one process is a segmentation fault, so no room of the solver may import it."""
+    wrong = [
+        f"{path.relative_to(ROOT)}:{line}: {module}"
+        for room in ("fluid", "yade_scripts", "coupler")
+        for path in files(room)
+        for line, module in imports(path)
+        if module.split(".")[0] in {"vtk", "vtkmodules", "pyvista", "rasterio"}
+    ]
+    assert wrong == []
+
+
+def test_the_contracts_of_pyproject_hold():
+    """import-linter follows chains of imports, which the walk above does not."""
+    done = subprocess.run(
+        [Path(sys.executable).parent / "lint-imports", "--no-cache"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout
+
+
+HEAVY = {
+    "yade",
+    "yade_scripts",
+    "skfem",
+    "scipy",
+    "numba",
+    "vtk",
+    "pyvista",
+    "vtkmodules",
+    "matplotlib",
+    "pint",
+    "h5py",
+}
+
+
+@pytest.mark.parametrize(
+    ("command", "absent"),
+    [
+        ("--help", HEAVY | {"numpy", "pydantic"}),
+        ("run --help", HEAVY | {"numpy"}),
+        ("explain joints.strength", HEAVY | {"numpy"}),
+    ],
+)
+def test_help_and_explanations_load_little(command, absent):
+    """Help answers at once: nothing numerical is imported for it."""
+    code = (
+        "import sys; sys.argv = ['surgebreak', *sys.argv[1:]]\n"
+        "from coupler.cli import main\n"
+        "try: main()\n"
+        "except SystemExit as end: assert not end.code, end.code\n"
+        "print(*sys.modules, file=sys.stderr)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, *command.split()], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert {name.split(".")[0] for name in done.stderr.split()} & absent == set()

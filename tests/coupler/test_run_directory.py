@@ -1,0 +1,202 @@
+"""A run directory is never overwritten, always readable, and says how the run ended, whatever ended it."""
+
+import errno
+import json
+import os
+import signal
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from coupler.case_file import load
+from coupler.errors import CannotWrite, ExitCode, RunDirectoryExists, SurgebreakError
+from coupler.failures import Failure, Failures
+from coupler.run_directory import RunDirectory, write_json
+
+from .test_case_file import WATER, write
+
+
+@pytest.fixture
+def file(tmp_path):
+    (tmp_path / "case").mkdir()
+    return load(write(tmp_path / "case", WATER), ["time.end=3"])
+
+
+def summary(run):
+    return json.loads((run.path / "run.json").read_text(encoding="utf-8"))
+
+
+def test_everything_needed_to_know_what_was_run(file):
+    """Case, effective case, versions, machine and git state are there before the first step."""
+    run = RunDirectory.create(file)
+    told = summary(run)
+    assert (run.path / "case.toml").read_text(encoding="utf-8") == WATER
+    assert json.loads((run.path / "effective.json").read_text(encoding="utf-8"))["time"]["end"] == 3.0
+    assert told["status"] == "running"
+    assert told["process"] == os.getpid()
+    assert told["overrides"] == ["time.end=3"]
+    assert told["versions"]["numpy"] == np.__version__
+    assert {"system", "processor", "cores", "threads"} <= set(told["machine"])
+    assert "git" in told
+    assert told["modules"]["water"]
+
+
+def test_the_place_is_beside_the_case_with_time_and_hash(file):
+    run = RunDirectory.create(file)
+    assert run.path.parent == file.directory / "runs"
+    assert len(run.path.name.split("-")[1]) == 8
+
+
+def test_two_runs_in_one_second_have_two_directories(file):
+    assert RunDirectory.create(file).path != RunDirectory.create(file).path
+
+
+def test_an_existing_directory_is_never_touched(file, tmp_path):
+    place = tmp_path / "results"
+    place.mkdir()
+    (place / "run.json").write_text("old", encoding="utf-8")
+    with pytest.raises(
+        RunDirectoryExists, match="exists and is not an empty directory; results are never overwritten"
+    ):
+        RunDirectory.create(file, place)
+    assert (place / "run.json").read_text(encoding="utf-8") == "old"
+
+
+def test_a_file_in_the_way_is_told(file, tmp_path):
+    (tmp_path / "results").write_text("", encoding="utf-8")
+    with pytest.raises(RunDirectoryExists):
+        RunDirectory.create(file, tmp_path / "results")
+    with pytest.raises(CannotWrite, match="cannot make the directory for the results"):
+        RunDirectory.create(file, tmp_path / "results" / "below")
+
+
+def test_the_end_is_written_once(file):
+    with RunDirectory.create(file) as run:
+        run.record(steps=np.int64(12), force=np.array([1.0, 2.0]))
+        run.finish(ExitCode.STOPPED, "limit")
+    told = summary(run)
+    assert (told["status"], told["exit_code"], told["exit_reason"]) == ("stopped", 4, "limit")
+    assert told["figures"] == {"steps": 12, "force": [1.0, 2.0]}
+    assert not (run.path / ".reserve").exists()
+
+
+class Diverged(RuntimeError):
+    exit_code = 3
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "says"),
+    [
+        (Diverged("the water volume is off"), 3, "the water volume is off"),
+        (SurgebreakError("a message"), 1, "a message"),
+        (
+            OSError(errno.ENOSPC, "No space left on device", "fields.vtkhdf"),
+            4,
+            "fields.vtkhdf: no room for the results",
+        ),
+        (KeyboardInterrupt(), 4, "stopped at once by Ctrl-C"),
+        (ZeroDivisionError("division by zero"), 1, "unexpected ZeroDivisionError: division by zero"),
+    ],
+)
+def test_an_error_is_in_the_summary_and_the_log(file, error, code, says):
+    """Mistakes of the program leave their traceback in the log; errors with a message leave the message alone."""
+    run = RunDirectory.create(file)
+    run.record(steps=3)
+    with pytest.raises(type(error)), run:
+        raise error
+    told = summary(run)
+    assert told["exit_code"] == code
+    assert told["exit_reason"].startswith(says)
+    assert told["figures"] == {"steps": 3}
+    log = run.log_path.read_text(encoding="utf-8")
+    assert says in log
+    assert ("Traceback" in log) == says.startswith("unexpected")
+
+
+def test_a_command_leaves_with_the_code_of_the_error(file, capsys):
+    run = RunDirectory.create(file)
+    with pytest.raises(SystemExit) as leaving, Failures(), run:
+        raise ZeroDivisionError("division by zero")
+    assert leaving.value.code == 1
+    told = capsys.readouterr().err
+    assert "surgebreak: unexpected ZeroDivisionError: division by zero" in told
+    assert f"the traceback is in {run.log_path}" in told
+    assert "Traceback" not in told
+
+
+def test_errors_of_the_rooms_are_messages_without_traceback():
+    """fluid and yade_scripts know nothing of exit codes; their named errors are told as they are."""
+    from yade_scripts.engine import YadeMissing
+
+    failure = Failure.of(YadeMissing("YADE is not installed"))
+    assert (failure.exit_code, failure.message, failure.traceback) == (1, "YADE is not installed", "")
+
+
+FULL_DISK = """
+import sys
+from pathlib import Path
+from coupler.case_file import load
+from coupler.failures import Failures
+from coupler.run_directory import RunDirectory
+with Failures(), RunDirectory.create(load(sys.argv[1]), Path(sys.argv[2])) as run:
+    run.record(steps=1)
+    with (run.path / "fields").open("wb") as stream:
+        while True:
+            stream.write(bytes(65536))
+            stream.flush()
+"""
+
+
+def test_a_really_full_disk(file, tmp_path):
+    """On a file system of 1 MB the data fill it; the reserve lets the reason be written all the same."""
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    script = f'mount -t tmpfs -o size=1m none {disk} && "$@"; code=$?; cp -r {disk}/run {tmp_path}/copy; exit $code'
+    python = [sys.executable, "-c", FULL_DISK, str(file.path), str(disk / "run")]
+    command = ["unshare", "--mount", "--map-root-user", "sh", "-c", script, "sh", *python]
+    if subprocess.run(["unshare", "--mount", "--map-root-user", "true"], check=False).returncode != 0:
+        pytest.skip("this system does not let tests mount a small disk")
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == ExitCode.STOPPED, done.stderr
+    assert "no room for the results" in done.stderr
+    told = json.loads((tmp_path / "copy" / "run.json").read_text(encoding="utf-8"))
+    assert told["exit_code"] == ExitCode.STOPPED
+    assert told["figures"] == {"steps": 1}
+
+
+KILLED = """
+import sys, time
+from coupler.case_file import load
+from coupler.run_directory import RunDirectory
+with RunDirectory.create(load(sys.argv[1])) as run:
+    run.record(steps=7)
+    print(run.path, flush=True)
+    while True:
+        run.save()
+"""
+
+
+def test_a_killed_run_is_readable_and_says_that_it_was_running(file):
+    """SIGKILL while run.json is rewritten without pause: a reader finds a whole file, never half of one."""
+    child = subprocess.Popen(
+        [sys.executable, "-c", KILLED, str(file.path)], stdout=subprocess.PIPE, text=True
+    )
+    path = child.stdout.readline().strip()
+    child.send_signal(signal.SIGKILL)
+    child.wait()
+    child.stdout.close()
+    with open(f"{path}/run.json", encoding="utf-8") as stream:
+        told = json.load(stream)
+    assert (told["status"], told["process"], told["figures"]) == ("running", child.pid, {"steps": 7})
+
+
+def test_a_nan_among_the_figures_does_not_hide_why_the_run_ended(tmp_path):
+    """A run that diverged has NaN figures; run.json must still be written, and be JSON, which knows no NaN."""
+    write_json(tmp_path / "x.json", {"a": float("nan"), "b": np.array([1.0, np.inf]), "c": np.float64(2.0)})
+    assert json.loads((tmp_path / "x.json").read_text(encoding="utf-8")) == {
+        "a": None,
+        "b": [1.0, None],
+        "c": 2.0,
+    }
