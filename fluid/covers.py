@@ -243,10 +243,15 @@ def _unite_corners(
 ):  # fmt: skip
     """Union-find over the corners 4 e + k of the elements, at nodes that may have several copies.
 
-    With a threshold, a first sweep finds the widest opening of each element, which always connects."""
+    With a threshold, groups of cut parts that it has left without a whole cell are then joined across their
+    widest opening, until nothing changes: a threshold closes openings, it makes no pockets."""
     label = np.arange(4 * len(parent))
-    widest = np.zeros(len(parent) if share > 0.0 else 1)
-    for sweep in range(0 if share > 0.0 else 1, 2):
+    group = np.arange(len(parent))
+    anchored = part < 0
+    widest = np.zeros(len(parent))
+    joined, sweep = True, 0
+    while joined:
+        joined = False
         for e in range(len(parent)):
             one = parent[e]
             choice = False
@@ -262,6 +267,9 @@ def _unite_corners(
                 while neighbours[two, g] != one:
                     g += 1
                 for other in range(start[two], start[two + 1]):
+                    a, b = find(group, e), find(group, other)
+                    if sweep > 0 and (a == b or (anchored[a] and anchored[b])):
+                        continue
                     area, full = 1.0, 0.0
                     if part[e] >= 0 or part[other] >= 0:
                         area, full = _contact_area(
@@ -270,11 +278,26 @@ def _unite_corners(
                         )  # fmt: skip
                         if area <= least:
                             continue
-                    if sweep == 0:
-                        widest[e] = max(widest[e], area)
-                        widest[other] = max(widest[other], area)
-                    elif area > share * full or area == widest[e] or area == widest[other]:
+                    if sweep % 2 == 1:
+                        # Odd sweeps find the widest opening of each group, even ones connect it.
+                        widest[a] = max(widest[a], area)
+                        widest[b] = max(widest[b], area)
+                        joined = True
+                    elif area > share * full or (
+                        sweep > 0
+                        and (
+                            (area == widest[a] and not anchored[a]) or (area == widest[b] and not anchored[b])
+                        )
+                    ):
                         _unite_face(cells, one, two, f, e, other, several, label)
+                        group[max(a, b)] = min(a, b)
+                        anchored[min(a, b)] = anchored[a] or anchored[b]
+                        widest[min(a, b)] = 0.0
+                        joined = True
+        sweep += 1
+        joined = joined and share > 0.0
+        if sweep % 2 == 1:
+            widest[:] = 0.0
     return label
 
 
