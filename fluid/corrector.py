@@ -1,7 +1,7 @@
 """Second half of the step: the velocity that the pressure leaves.
 
 u_i = u*_i - (dt/ρ) Π(∇x)_i,   a_i = (u_i - u_adv_i) / (θ dt)                 on wet nodes, Π: weighted mean
-u'_e ← u'_e - (dt/ρ) (∇x_e - mean of Π(∇x) over the cell)                     on wholly wet cells
+u'_e ← u'_e - (dt/ρ) (∇x_e - mean of Π(∇x) over the cell)                     on deep cells
 u_e = u*_e + u'_e - (dt/ρ) ∇x_e                                               balances exactly: carries volume
 speed limit · divergence damping · continuation outside the water
 """
@@ -20,6 +20,8 @@ from fluid.volume import Flux, edge_flux
 
 FLUX_LAYERS = 3
 """Layers of dry nodes that water may reach within the next step."""
+MEMORY_DEPTH = 2.0
+"""Cells nearer to the surface than this (in cell sizes) keep no remainder: there it feeds surface noise."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,7 @@ def corrected(water, problem, x) -> Corrected:
     gradient, share = _pressure_gradient(water, kept, pressure, dt / problem.density)
     u, mean = _projected(t, kept, gradient, share)
     a = np.where(kept.wet[:, None], (u - kept.advected) / (kept.theta * dt), 0.0)
-    remainder, kick_remainder = _remainders(water, kept, gradient, mean, share, dt)
+    remainder, kick_remainder = _remainders(water, kept, gradient, mean, dt)
     u_cell = kept.cell_star - gradient
     projected = u.copy()
     clipped = _limit_and_damp(water, kept, share, u, a)
@@ -84,17 +86,31 @@ def _projected(t, kept, gradient, share):
     return np.where(kept.wet[:, None], kept.u_star - mean, kept.u_star), mean
 
 
-def _remainders(water, kept, gradient, mean, share, dt):
+def _remainders(water, kept, gradient, mean, dt):
     """u' (M, 3) [m/s] after this step and its rate -(∇x - Π∇x)/(θ ρ) (M, 3) [m/s²] for the next kick."""
     t = water.topology
     remainder, rate = np.zeros_like(water.remainder), np.zeros_like(water.remainder)
     if water.parameters.subscale_memory:
-        whole = np.flatnonzero(share == 1.0)
+        whole = _all_below(kept.wet_cells, kept.level_set, -MEMORY_DEPTH * water.mesh.spacing, t.cells)
         cells = kept.wet_cells[whole]
         left = cell_velocity(cells, mean, np.zeros((0, 3)), t.cells, t.share) - gradient[whole]
         remainder[cells] = kept.remainder[cells] + left
         rate[cells] = left / (kept.theta * dt)
     return remainder, rate
+
+
+@njit(cache=True)
+def _all_below(cell_list, phi, deep, cells):
+    """Places in the list of the cells with φ < deep at all corners."""
+    found = np.empty(cell_list.shape[0], np.int64)
+    n = 0
+    for s in range(cell_list.shape[0]):
+        e = cell_list[s]
+        highest = max(max(phi[cells[e, 0]], phi[cells[e, 1]]), max(phi[cells[e, 2]], phi[cells[e, 3]]))
+        if highest < deep:
+            found[n] = s
+            n += 1
+    return found[:n].copy()
 
 
 def _limit_and_damp(water, kept, share, u, a) -> int:
@@ -104,7 +120,9 @@ def _limit_and_damp(water, kept, share, u, a) -> int:
     damp_divergence(
         kept.wet_cells,
         parameters.divergence_damping,
-        kept.wet,
+        kept.level_set,
+        t.beside_solid,
+        -MEMORY_DEPTH * water.mesh.spacing,
         u,
         t.cells,
         t.parent,

@@ -207,28 +207,31 @@ def nodal_mean(cell_list, value, wet_share, cells, share, volume, n_nodes):
 
 
 @njit(cache=True)
-def damp_divergence(cell_list, weight, wet, u, cells, parent, g, volume, size, wet_share):
+def damp_divergence(cell_list, weight, phi, beside_solid, deep, u, cells, parent, g, volume, size, wet_share):
     """u_i -= c_L Σ_e |e| l_e² (div u)_e ∇N_i / m_i over wholly wet cells, in place on wet nodes (LSIC).
 
-    Equal-order elements leave divergence that the pressure cannot see; without this sloshing gains energy."""
+    Equal-order elements leave divergence that the pressure cannot see; without this sloshing gains energy.
+    Deep cells (φ < deep) beside solids are left out: there the remainder of the cells, not the nodes, holds the
+    balance, and damping would let the added mass of a body drift (26 % in 25 steps)."""
     mass = np.zeros(u.shape[0])
     push = np.zeros((u.shape[0], 3))
     for s in range(cell_list.shape[0]):
         e = cell_list[s]
         p = parent[e]
-        full, divergence = True, 0.0
+        highest, beside, divergence = -np.inf, False, 0.0
         for a in range(4):
             i = cells[e, a]
             mass[i] += 0.25 * volume[e] * max(wet_share[s], 1e-6)
-            full = full and wet[i]
+            highest = max(highest, phi[i])
+            beside = beside or beside_solid[i]
             for k in range(3):
                 divergence += u[i, k] * g[p, a, k]
-        if full:
+        if highest < 0.0 and not (beside and highest < deep):
             c = weight * volume[e] * size[e] * size[e] * divergence
             for a in range(4):
                 for k in range(3):
                     push[cells[e, a], k] += c * g[p, a, k]
     for i in range(u.shape[0]):
-        if wet[i] and mass[i] > 0.0:
+        if phi[i] < 0.0 and mass[i] > 0.0:
             for k in range(3):
                 u[i, k] -= push[i, k] / mass[i]

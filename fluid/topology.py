@@ -20,7 +20,8 @@ class Topology:
     volume (M,) [m³] of the fluid part · fraction (M,) fluid share of the cell ·
     share (M, 4) mean of N_a over the fluid part (∫ N_a = volume · share_a) · size (M,) [m] (6 |e|)^(1/3) ·
     node_start (N+1,), node_cells (4M,) cells around each node · neighbours (M, 4) across faces, -1 none ·
-    node_volume (N,) [m³] ∫ N_i · covered (N,) bool: nodes inside a solid."""
+    node_volume (N,) [m³] ∫ N_i · covered (N,) bool: nodes inside a solid · beside_solid (N,) bool: nodes of
+    cut cells."""
 
     nodes: np.ndarray
     cells: np.ndarray
@@ -35,6 +36,7 @@ class Topology:
     neighbours: np.ndarray
     node_volume: np.ndarray
     covered: np.ndarray
+    beside_solid: np.ndarray
 
     @classmethod
     def of(cls, mesh: Background, domain) -> Topology:
@@ -60,6 +62,7 @@ class Topology:
                 cells.ravel(), (domain.volume[:, None] * share).ravel(), minlength=len(nodes)
             ),
             covered=covered_nodes(domain),
+            beside_solid=np.isin(np.arange(len(nodes)), cells[domain.is_cut]),
         )
 
     @property
