@@ -264,9 +264,9 @@ class ForceGauge(Section):
 
 
 class ReactionGauge(Section):
-    """Force of joints and contacts on a block or a group, for instance on the grip of a testing machine."""
+    """Force that holds a block in place or to its prescribed motion, as a testing machine measures it."""
 
-    kind: Literal["reaction"] = Field(description="what it measures: force of joints and contacts")
+    kind: Literal["reaction"] = Field(description="what it measures: force that holds a block")
     name: Name = Field(description="columns of the history")
     on: Name = Field(description="name of a block, group, wall or building")
 

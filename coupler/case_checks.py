@@ -119,11 +119,6 @@ def _sections(case: Case) -> Iterator[Problem]:
     elif case.joints is not None or case.contact is not None or case.motion:
         absent = [name for name in ("contact", "joints", "motion") if getattr(case, name)]
         yield (absent[0],), f"[{absent[0]}] is for blocks; write a section [structure] or leave this one out"
-    if case.time.output_every is not None and case.time.output_every > case.time.end:
-        yield (
-            ("time", "output_every"),
-            f"longer than the run ({case.time.end:g} s)",
-        )
 
 
 def _structure_sections(case: Case) -> Iterator[Problem]:

@@ -107,14 +107,11 @@ def describe(file, tell) -> None:
         tell(f"note: {remark}")
 
 
-@app.command(context_settings=PASS_ON)
-def render(
-    context: typer.Context,
-    run: Annotated[Path, typer.Argument(metavar="RUN", help="a run directory")],
-) -> None:
-    """Make a still and a film of a run, in a process of its own; options go to `python -m coupler.view`."""
+@app.command(context_settings=PASS_ON | {"help_option_names": []})
+def render(context: typer.Context) -> None:
+    """Make stills, a film and plots of a run, in a process of its own."""
     need("pyvista", "view", "render")
-    raise typer.Exit(_python("-m", "coupler.view", str(run), *context.args))
+    raise typer.Exit(_python("-m", "coupler.view", *context.args))
 
 
 @app.command()

@@ -1,0 +1,78 @@
+"""What a case does not need is not loaded, and a wish to stop ends a real run with everything readable."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from coupler.history import read_history
+from coupler.provenance import ROOT
+
+from .test_case_file import WATER, write
+
+DRY = ROOT / "cases" / "bonded_wall_pulled"
+LOADED = (
+    "import sys; sys.argv = ['surgebreak', 'run', *sys.argv[1:]]\n"
+    "from coupler.cli import main\n"
+    "try: main()\n"
+    "except SystemExit as end: assert not end.code, end.code\n"
+    "print(*sys.modules, file=sys.stderr)"
+)
+ENVIRONMENT = {**os.environ, "OMP_NUM_THREADS": "1"}
+
+
+def loaded(*arguments):
+    """Top-level packages in the process of a run."""
+    done = subprocess.run(
+        [sys.executable, "-c", LOADED, *map(str, arguments)],
+        capture_output=True, text=True, check=False, env=ENVIRONMENT,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return {name.split(".")[0] for name in done.stderr.split()}
+
+
+def test_a_dry_case_loads_neither_the_water_nor_pictures(tmp_path):
+    packages = loaded(DRY, "--end", "2 ms", "--output", tmp_path / "run")
+    assert "yade" in packages
+    assert packages & {"skfem", "fluid", "pyamg", "vtkmodules", "pyvista", "matplotlib"} == set()
+
+
+def test_a_case_of_water_alone_never_loads_yade_or_pictures(tmp_path):
+    packages = loaded(write(tmp_path, WATER), "--end", "20 ms", "--output", tmp_path / "run")
+    assert "fluid" in packages
+    assert packages & {"yade", "yade_scripts", "vtkmodules", "pyvista", "matplotlib"} == set()
+
+
+def ask_by_file(child, directory):
+    (directory / "stop").touch()
+
+
+def ask_by_signal(child, directory):
+    child.send_signal(signal.SIGINT)
+
+
+@pytest.mark.parametrize("ask", [ask_by_file, ask_by_signal])
+def test_a_wish_to_stop_ends_a_run_cleanly(tmp_path, ask):
+    """Exit code 4, the reason in run.json, and a history of whole steps up to there."""
+    place = tmp_path / "run"
+    command = [sys.executable, "-m", "coupler.cli", "run", str(DRY), "--end", "1 h", "--output", str(place)]
+    child = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=ENVIRONMENT
+    )
+    table = place / "history" / "energy.csv"
+    until = time.monotonic() + 60
+    while not (table.exists() and table.read_text(encoding="utf-8").count("\n") > 30):
+        assert time.monotonic() < until
+        assert child.poll() is None, child.stderr.read()
+        time.sleep(0.05)
+    ask(child, place)
+    _, told = child.communicate(timeout=60)
+    assert child.returncode == 4, told
+    summary = json.loads((place / "run.json").read_text(encoding="utf-8"))
+    assert (summary["status"], summary["exit_code"]) == ("stopped", 4)
+    history = read_history(table)
+    assert history["time"][-1] == pytest.approx(summary["figures"]["time"], rel=1e-12)
