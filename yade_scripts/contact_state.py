@@ -20,7 +20,7 @@ class Contacts:
     """c node contacts. a, b (c,) rows (-1: fixed plane) · point (c, 3) [m] · normal (c, 3) from a to b
 
     depth (c,) [m] · kn, ks [N/m] · cn, cs [N s/m] · mu · normal_force, shear_force (c, 3) [N] as YADE keeps them
-    (acting on b; the shear force without its dashpot).
+    (acting on b; the shear force without its dashpot) · key (c,): number of the pair of bodies, lasts with the contact.
     """
 
     a: Array
@@ -35,6 +35,7 @@ class Contacts:
     mu: Array
     normal_force: Array
     shear_force: Array
+    key: Array
 
     def __len__(self) -> int:
         return len(self.a)
@@ -93,8 +94,9 @@ def read_contacts(scene: Scene) -> Contacts:
     row_of = scene.row_of
     geom = [i.geom for i in found]
     phys = [i.phys for i in found]
-    a = np.array([row_of[i.id1] for i in found], np.int64)
-    b = np.array([row_of[i.id2] for i in found], np.int64)
+    ids = np.array([(i.id1, i.id2) for i in found], np.int64).reshape(-1, 2)
+    a = np.array([row_of[i] for i in ids[:, 0].tolist()], np.int64)
+    b = np.array([row_of[i] for i in ids[:, 1].tolist()], np.int64)
     scalars = np.array([(p.kn, p.ks, p.cn, p.cs, p.tangensOfFrictionAngle) for p in phys]).reshape(-1, 5).T
     return Contacts(
         np.where(a < 0, -1, a),
@@ -105,6 +107,7 @@ def read_contacts(scene: Scene) -> Contacts:
         *scalars.copy(),
         _vectors([p.normalForce for p in phys]),
         _vectors([p.shearForce for p in phys]),
+        (ids[:, 0] << 32) + ids[:, 1],
     )
 
 

@@ -18,12 +18,13 @@ import builtins
 import struct
 from collections import deque
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from yade_scripts.blocks import Block
-from yade_scripts.contact import ContactLaw
+from yade_scripts.contact import ContactLaw, effective_mass
 from yade_scripts.engine import Engine, YadeError
 from yade_scripts.faces import FixedPlane
 from yade_scripts.nodes import node_positions, node_radius
@@ -36,6 +37,8 @@ RIGID = 1e30
 """Stiffness of fixed planes: in series with a block's own, the block's own."""
 VERLET = 0.05
 """Margin of the collision search as a share of the smallest edge of a block."""
+LIKE = 2.0
+"""Mass ratio up to which the dashpots of the materials serve every pair (e within 0.02)."""
 HOOK = "_surgebreak_substep"
 """Name under which YADE's PyRunner finds the joints (its command runs in __main__, which may belong to a test)."""
 STATE = 13
@@ -44,6 +47,18 @@ STATE = 13
 
 class SceneInUse(YadeError):
     """YADE holds one scene in a process; close the structure that has it first."""
+
+
+@dataclass(frozen=True)
+class SceneState:
+    """ids: body of each row then · motion: (position, orientation, velocity, spin, angular momentum) of each row
+
+    shear: tangential force of each contact (id1, id2).
+    """
+
+    ids: list[int]
+    motion: list[tuple]
+    shear: dict[tuple[int, int], object]
 
 
 class Scene:
@@ -75,6 +90,10 @@ class Scene:
         self.box_id: list[int] = []
         self.row_of: dict[int, int] = {}
         self.frame = np.tile(np.eye(3), (len(blocks), 1, 1))
+        """Fixed turn from the block frame to YADE's principal frame."""
+        self.plain_frame = self.frame.copy()
+        """The same of a block before it became a clump."""
+        self._count_seen = -1
         self._materials: dict[tuple, object] = {}
         self._subdomain = engine.wrapper.Subdomain()
         self._add_planes(planes)
@@ -273,6 +292,74 @@ class Scene:
     def contacts(self) -> list:
         """Real interactions between a node and a box, of this substep."""
         return [i for i in self.O.interactions if i.isReal] if self.loop is not None else []
+
+    def correct_dashpots(self, fresh_only: bool = True) -> None:
+        """Give new contacts the dashpot of their own pair, C = 2 ζ sqrt(m K) / points with the effective mass.
+
+        The materials in series give it for equal masses and for planes; this is for blocks of unlike mass."""
+        if self.law is None or self.O.interactions.countReal() == self._count_seen:
+            return
+        now = self.O.iter
+        for i in self.contacts():
+            if not fresh_only or i.iterMadeReal == now:
+                a, b = self.row_of[i.id1], self.row_of[i.id2]
+                if a >= 0 and b >= 0:
+                    phys, c = i.phys, self.pair_dashpot(a, b)
+                    phys.cn, phys.cs = c, c * np.sqrt(self.law.shear_ratio)
+        self._count_seen = self.O.interactions.countReal()
+
+    def pair_dashpot(self, a: int, b: int) -> float:
+        """Dashpot of one node contact between two blocks [N s/m]."""
+        ma, mb = (self.mass[r] if self.moving[r] else np.inf for r in (a, b))
+        if not self.moving[a] and not self.moving[b]:
+            return 0.0
+        K = 2.0 * self.K[a] * self.K[b] / (self.K[a] + self.K[b])
+        points = 2 * self.law.nodes_per_edge**2
+        return 2.0 * self.law.damping_ratio * float(np.sqrt(effective_mass(ma, mb) * K)) / points
+
+    @property
+    def masses_differ(self) -> bool:
+        """Whether the dashpots of the materials are off for some pair by more than a few percent."""
+        if not self.moving.any():
+            return False
+        moving = self.mass[self.moving]
+        return bool(not self.moving.all() or moving.max() > LIKE * moving.min())
+
+    # ---- saving and going back ------------------------------------------------------------------------------
+
+    def save(self) -> SceneState:
+        """Motion of the bodies and tangential springs of the contacts."""
+        states = [self.O.bodies[i].state for i in self.ids]
+        # Copies: YADE hands out views of its vectors.
+        V, Q = self.engine.Vector3, self.engine.Quaternion
+        motion = [(V(s.pos), Q(s.ori), V(s.vel), V(s.angVel), V(s.angMom)) for s in states]
+        shear = {(i.id1, i.id2): V(i.phys.shearForce) for i in self.contacts()}
+        return SceneState(list(self.ids), motion, shear)
+
+    def restore(self, saved: SceneState) -> None:
+        """Back to a saved state. Blocks that became clumps since stay clumps (at the saved place).
+
+        A contact that was lost since and comes back starts with a relaxed tangential spring."""
+        for i, (pos, ori, vel, spin, momentum), row in zip(saved.ids, saved.motion, range(len(saved.ids))):
+            state = self.O.bodies[self.ids[row]].state
+            if i == self.ids[row]:
+                state.ori = ori
+            else:
+                turn = _matrix(ori) @ self.plain_frame[row] @ self.frame[row].T
+                state.ori = self._q(turn)
+            state.pos, state.vel, state.angVel, state.angMom = pos, vel, spin, momentum
+        self._place_members()
+        self.refresh_contacts()
+        for i in self.contacts():
+            i.phys.shearForce = saved.shear.get((i.id1, i.id2), self._v((0.0, 0.0, 0.0)))
+
+    def _place_members(self) -> None:
+        """Move clump members to their clumps: an integration step of no length."""
+        dt, self.O.dt = self.O.dt, 0.0
+        self.resetter()
+        self.newton()
+        self.O.dt = dt
+        self.search_contacts_now()
 
     def close(self) -> None:
         """Give the scene back; the structure cannot be used afterwards."""

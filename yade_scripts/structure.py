@@ -16,12 +16,12 @@ from yade_scripts import joint_kernel, tangent
 from yade_scripts.blocks import Block, BlockError, polygon_area_vector
 from yade_scripts.cohesion import JointParameters
 from yade_scripts.contact import ContactError, ContactLaw
-from yade_scripts.contact_state import read_contacts, sum_on_blocks
+from yade_scripts.contact_state import Contacts, read_contacts, sum_on_blocks
 from yade_scripts.engine import load_yade
 from yade_scripts.faces import FixedPlane, touching_faces
 from yade_scripts.joints import Joints, JointTable
 from yade_scripts.ledger import ContactWork
-from yade_scripts.scene import STATE, Scene
+from yade_scripts.scene import STATE, Scene, SceneState
 from yade_scripts.timestep import SubstepLimit, substep_limit
 
 Array = np.ndarray
@@ -44,6 +44,20 @@ class SubstepFailed(RuntimeError):
 
 class NotFinite(RuntimeError):
     """Positions or velocities of blocks are no longer numbers."""
+
+
+_SUMS = ("time", "load_work", "_joint_work", "_driving_work", "_handed_over", "_dt")
+
+
+@dataclass(frozen=True)
+class StructureState:
+    """What `Structure.restore` goes back to."""
+
+    scene: SceneState
+    loose: Array
+    sums: dict[str, float]
+    joints: dict[str, Array] | None
+    contact_work: tuple | None
 
 
 @dataclass(frozen=True)
@@ -177,6 +191,7 @@ class Structure:
         self._x, self._v, self._R = np.zeros((n, 3)), np.zeros((n, 6)), np.tile(np.eye(3), (n, 1, 1))
         self._F = np.zeros((n, 6))
         self._load = np.zeros((n, 6))
+        self._contacts: Contacts | None = None
         self._failure: BaseException | None = None
         self._contact_work = ContactWork(self._scene) if track_contacts and self.contact is not None else None
         self._contact_loss = {"dashpot": 0.0, "friction": 0.0}
@@ -189,6 +204,7 @@ class Structure:
         self._fastest = 0.0
         self._broken: list[int] = []
         self._dt = 0.0
+        self._unlike = self.contact is not None and self._scene.masses_differ
         self._set_damping()
         self._update_rows()
         self._update_masks(np.arange(n))
@@ -251,6 +267,8 @@ class Structure:
             self._scene.add_forces(self._pushed_ids, self._F[self._pushed] + self._load[self._pushed])
         if self._contact_work is not None:
             self._contact_work.take(self._v, self._x, dt)
+        if self._unlike:  # after the reading: this substep's forces are those of the dashpots before
+            self._scene.correct_dashpots()
 
     def _read_rows(self) -> None:
         if len(self._rows):
@@ -337,6 +355,7 @@ class Structure:
             )
         if self.contact is not None:
             self._scene.refresh_contacts()
+            self._contacts = None
 
     def _retire_broken(self) -> None:
         broken = self.joints.broken_now()
@@ -411,6 +430,12 @@ class Structure:
         """(n, 3, 3) [kg m²] about the centres, world axes."""
         return self._R @ self._body_inertia @ self._R.transpose(0, 2, 1)
 
+    def contacts(self) -> Contacts:
+        """Contacts at the present positions, read from YADE once a step."""
+        if self._contacts is None:
+            self._contacts = read_contacts(self._scene)
+        return self._contacts
+
     def gravity_force(self) -> Array:
         """(n, 6) [N, N m]"""
         force = np.zeros((self.n, 6))
@@ -426,7 +451,7 @@ class Structure:
         if self.joints is not None:
             self.joints.forces(self._x, self._v, self._R, F, eta=None if viscous else 0.0)
         if self.contact is not None:
-            contacts = read_contacts(self._scene)
+            contacts = self.contacts()
             force = contacts.forces(self._v, self._x) if viscous else contacts.elastic_forces()
             F += sum_on_blocks(contacts, force, self._x)
         return F
@@ -442,7 +467,7 @@ class Structure:
         if self.joints is not None:
             springs = springs.and_(tangent.joint_springs(self.joints, self._x, self._R))
         if self.contact is not None:
-            springs = springs.and_(read_contacts(self._scene).springs(self._x))
+            springs = springs.and_(self.contacts().springs(self._x))
         return tangent.assemble(springs, self.n)
 
     def joint_table(self) -> JointTable | None:
@@ -487,8 +512,7 @@ class Structure:
         e["joint_dissipated"] = -self._joint_work - e["joint_stored"] - damped - self._handed_over
         if self._contact_work is not None:
             e["dashpot"] = self._contact_work.dashpot
-            taken = self._contact_work.total + self._handed_over
-            e["friction"] = taken - e["contact_stored"] - self._contact_work.dashpot
+            e["friction"] = self._contact_work.friction
         else:
             e["dashpot"] = 0.0
             known = e["kinetic"] + e["gravity"] + e["joint_stored"] + e["joint_dissipated"] + damped
@@ -525,7 +549,7 @@ class Structure:
         """Springs of the contacts half a substep ago: 1/2 k u(t) u(t + dt) in the normals [J]."""
         if self.contact is None:
             return 0.0
-        c = read_contacts(self._scene)
+        c = self.contacts()
         closing = np.einsum("ci,ci->c", c.closing_velocity(self._v, self._x), c.normal)
         depth = np.maximum(c.depth, 0.0)
         normal = 0.5 * c.kn * depth * np.maximum(depth - self._dt * closing, 0.0)
@@ -543,6 +567,31 @@ class Structure:
             "joint_stored": self._joint_stored(),
             "contact_stored": self._contact_stored(),
         }
+
+    # ---- saving and going back ------------------------------------------------------------------------------
+
+    def save(self) -> StructureState:
+        """Everything that changes in time, for a second pass over a step."""
+        sums = {name: getattr(self, name) for name in _SUMS}
+        history = self.joints.history() if self.joints is not None else None
+        work = self._contact_work.sums() if self._contact_work is not None else None
+        return StructureState(self._scene.save(), self._loose.copy(), sums, history, work)
+
+    def restore(self, saved: StructureState) -> None:
+        """Back to a saved state; blocks that got contact nodes since keep them, without effect on their motion."""
+        self._loose = saved.loose.copy()
+        for name, value in saved.sums.items():
+            setattr(self, name, value)
+        if self.joints is not None:
+            self.joints.restore(saved.joints)
+        if self._contact_work is not None:
+            self._contact_work.restore(saved.contact_work)
+        self._pending_dt, self._limit, self._contacts = 0.0, None, None
+        self._F[:] = 0.0
+        self._update_rows()
+        self._update_masks(np.arange(self.n))
+        self._scene.restore(saved.scene)
+        self._read_all()
 
     def close(self) -> None:
         """Give YADE's scene back."""
