@@ -267,10 +267,8 @@ def test_packages_half_written_by_an_interrupted_set_up_are_thrown_away(machine)
     """A wheel of which half is on disk looks installed to pip; so the folder is made again."""
     machine.ready()("run")
     stamps = machine.root / ".venv" / ".set-up"
-    (stamps / "unfinished").write_text("pip\n", encoding="utf-8")
-    (machine.root / ".venv" / "set-up.log").write_text(
-        "Installing collected packages: numpy\n", encoding="utf-8"
-    )
+    (stamps / "unfinished").write_text("view\n", encoding="utf-8")
+    (stamps / "view.log").write_text("Installing collected packages: numpy\n", encoding="utf-8")
     (machine.root / ".venv" / "half").touch()
     code, told, calls = machine("run")
     assert code == 0
