@@ -36,7 +36,7 @@ def build(case: Case, clock) -> Scene:
     """Build the scene of a case. clock(name) is a context that books processor time to a part of the run."""
     solids = [(_box_vertices(s), BOX_FACES) for s in case.solid]
     with clock("set-up"):
-        structure = _structure(case) if case.structure else None
+        structure = build_structure(case) if case.structure else None
         water = immersion = None
         if case.water:
             water, immersion = _water(case, structure, solids)
@@ -49,9 +49,8 @@ def build(case: Case, clock) -> Scene:
 
 def blocks_of(case: Case) -> list:
     """All blocks of a case as the structure's Block, generators expanded, in the order of their rows."""
-    from yade_scripts.building import building, wall
-
     from yade_scripts.blocks import Block
+    from yade_scripts.building import building_blocks, divided_box
 
     driven = {m.block: np.array(m.velocity) for m in case.motion}
     s = case.structure
@@ -72,10 +71,49 @@ def blocks_of(case: Case) -> list:
             )
         )
     for w in s.wall:
-        blocks += wall(w.name, w.lower, w.size, w.block, density=w.density or s.density)
+        blocks += divided_box(w.name, w.lower, w.size, w.block, w.density or s.density, group=w.name)
     for h in s.building:
-        blocks += building(h, density=h.density or s.density)
+        blocks += building_blocks(_building(h, h.density or s.density))
     return blocks
+
+
+def _building(spec, density: float):
+    """The generator's description of a building of the case."""
+    from yade_scripts.building import Building
+
+    lower, size = np.array(spec.lower), np.array(spec.size)
+    return Building(
+        lower=lower[:2],
+        upper=lower[:2] + size[:2],
+        height=size[2],
+        thickness=spec.wall_thickness,
+        block=spec.block[0],
+        course=spec.block[1],
+        storeys=spec.storeys,
+        roof=spec.roof,
+        base=lower[2],
+        density=density,
+        openings=tuple(_opening(spec, o) for o in spec.opening),
+        name=spec.name,
+    )
+
+
+def _opening(spec, opening):
+    """A rectangle in a wall as a box through that wall."""
+    from yade_scripts.building import Opening
+
+    lower, upper = np.array(spec.lower), np.add(spec.lower, spec.size)
+    across = "xy".index(opening.wall[0])
+    along = 1 - across
+    box_low, box_high = lower.copy(), upper.copy()
+    if opening.wall[1] == "-":
+        box_high[across] = lower[across] + spec.wall_thickness
+    else:
+        box_low[across] = upper[across] - spec.wall_thickness
+    for axis, start, length in zip((along, 2), opening.lower, opening.size):
+        box_low[axis] = lower[axis] + start
+        box_high[axis] = box_low[axis] + length
+    return Opening(box_low, box_high)
 
 
 def _rotation(turn) -> np.ndarray:
@@ -86,18 +124,18 @@ def _box_vertices(solid) -> np.ndarray:
     return np.array(solid.centre) + (0.5 * np.array(solid.size) * BOX_CORNERS) @ _rotation(solid.rotation).T
 
 
-def _structure(case: Case):
-    from yade_scripts.joints import JointLaw
-    from yade_scripts.structure import Structure
-
+def build_structure(case: Case):
+    """The structure of a case, in a new YADE scene."""
+    from yade_scripts.cohesion import JointParameters
     from yade_scripts.contact import ContactLaw
+    from yade_scripts.structure import Structure
 
     c, j = case.contact, case.joints
     contact = joints = None
     if c:
         contact = ContactLaw(c.stiffness, c.restitution, c.friction, rule=c.rule)
     if j:
-        joints = JointLaw(
+        joints = JointParameters(
             strength=j.strength,
             opening_at_failure=j.opening_at_failure,
             shear_ratio=j.shear_ratio,
@@ -106,9 +144,27 @@ def _structure(case: Case):
             points=j.points,
             ground=j.ground,
         )
-    return Structure(
-        blocks_of(case), contact, joints, ground=case.structure.ground, gravity=case.case.gravity
-    )
+    ground = case.structure.ground.level if case.structure.ground else None
+    gravity = (0.0, 0.0, -case.case.gravity)
+    return Structure(blocks_of(case), contact, joints, ground, _tank_planes(case), gravity)
+
+
+def _tank_planes(case: Case) -> list:
+    """The closed sides of the tank as walls for blocks; its floor only where the case says no ground."""
+    from yade_scripts.faces import FixedPlane
+
+    if case.tank is None:
+        return []
+    planes = []
+    for axis, name in enumerate("xyz"):
+        for sign, corner in (("-", case.tank.lower), ("+", case.tank.upper)):
+            side = name + sign
+            if side in case.tank.open or (side == "z-" and case.structure.ground is not None):
+                continue
+            normal = np.zeros(3)
+            normal[axis] = 1.0 if sign == "-" else -1.0
+            planes.append(FixedPlane(np.array(corner), normal, f"tank {side}"))
+    return planes
 
 
 def _water(case: Case, structure, solids):
@@ -162,14 +218,20 @@ def _fill(case: Case):
 
 
 def _gauges(case: Case, structure) -> list[Gauge]:
+    rows = rows_by_name(case, structure)
+    return [make_gauge(spec, rows) for spec in case.gauge]
+
+
+def rows_by_name(case: Case, structure) -> dict[str, np.ndarray]:
+    """Rows of the load table for every name a case may use: blocks, groups, walls, buildings, solids."""
     rows: dict[str, list[int]] = {}
-    n = 0
-    if structure is not None:
-        n = structure.n
-        for row, (name, group) in enumerate(zip(structure.names, structure.groups)):
-            rows.setdefault(name, []).append(row)
-            if group != name:
-                rows.setdefault(group, []).append(row)
-    for k, solid in enumerate(case.solid):
-        rows.setdefault(solid.name, []).append(n + k)
-    return [make_gauge(spec, {k: np.array(v) for k, v in rows.items()}) for spec in case.gauge]
+    names = [] if structure is None else structure.names
+    generated = () if structure is None else (*case.structure.wall, *case.structure.building)
+    for row, name in enumerate(names):
+        for known in {name, structure.groups[row]}:
+            rows.setdefault(known, []).append(row)
+    for part in generated:
+        rows[part.name] = [row for row, name in enumerate(names) if name.startswith(f"{part.name}-")]
+    for row, solid in enumerate(case.solid, start=len(names)):
+        rows.setdefault(solid.name, []).append(row)
+    return {name: np.array(found) for name, found in rows.items()}

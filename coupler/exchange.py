@@ -11,7 +11,7 @@ Array = np.ndarray
 
 STILL = 1e-3
 """Share of a cell edge that a block may move before its cells are cut again."""
-FILM = 1e-3
+FILM = 1e-4
 """Share of a cell edge by which loose blocks are drawn in, so that water reaches a face that rests on another:
 sealed or open must follow from the joints, not from the micrometres of a contact (a sealed face takes the
 buoyancy away)."""
@@ -89,6 +89,6 @@ class Immersion:
         is_loose = np.append(self._loose, np.zeros(self.n_solids, bool))
         growth[is_loose[plane_body]] = -FILM * self.mesh.spacing
         block, plane, half_gap = self.structure.joined_planes()
-        closing = np.maximum(half_gap, 0.0) + self._tolerance
+        closing = 2.0 * np.maximum(half_gap, 0.0) + self._tolerance  # the other side may be a step behind
         np.maximum.at(growth, bodies.plane_start[block] + plane, closing)
         return bodies.grown(growth)

@@ -95,7 +95,7 @@ def _motion(spec, rows_of) -> Gauge:
 
     def read(coupling, record):
         s = coupling.structure
-        tilt = _rotation_vector(s.rotation()[row] @ s.initial_rotation[row].T)
+        tilt = _rotation_vector(s.rotation()[row] @ s.blocks[row].rotation.T)
         return _named(columns, np.concatenate([s.centre()[row], s.velocity()[row, :3], tilt]))
 
     return Gauge(columns, read)
@@ -115,9 +115,9 @@ def _force(spec, rows_of) -> Gauge:
 
 def _reaction(spec, rows_of) -> Gauge:
     rows = rows_of[spec.on]
-    columns = _vector(f"{spec.name}_reaction", "N", f"force of joints and contacts on '{spec.on}'")
+    columns = _vector(f"{spec.name}_reaction", "N", f"force that holds '{spec.on}' to its prescribed motion")
 
     def read(coupling, record):
-        return _named(columns, coupling.structure.internal_force()[rows, :3].sum(axis=0))
+        return _named(columns, coupling.structure.reaction()[rows, :3].sum(axis=0))
 
     return Gauge(columns, read)

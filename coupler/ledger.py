@@ -59,10 +59,8 @@ class Ledger:
         """Add the work that the water gave to the bodies in a step [J]."""
         self.work_given += work
 
-    def balance(
-        self, water: tuple[float, float] | None, structure: dict[str, float] | None, driven_work: float = 0.0
-    ) -> Balance:
-        """The ledger now. driven_work: work of imposed motions on the structure so far [J]."""
+    def balance(self, water: tuple[float, float] | None, structure: dict[str, float] | None) -> Balance:
+        """The ledger now."""
         kinetic, potential = water or (0.0, 0.0)
         dissipation = 0.0
         if water is not None:
@@ -70,9 +68,12 @@ class Ledger:
         received = residual = 0.0
         if structure is not None:
             received = structure["load_work"]
-            residual = _structure_total(structure) - self._structure_start - received - driven_work
+            driven = structure["driving_work"]
+            residual = _structure_total(structure) - self._structure_start - received - driven
+            lost_in_contacts = structure["dashpot"] + structure["friction"]
+            residual += max(0.0, -lost_in_contacts)  # contacts can only take energy
             released = self._gravity_start - structure["gravity"]
-            self._input = max(self._input, abs(released), structure["kinetic"], abs(driven_work))
+            self._input = max(self._input, abs(released), structure["kinetic"], abs(driven))
         self._input = max(self._input, kinetic, abs(self.work_given))
         error = abs(residual) + max(0.0, -dissipation)
         if water is not None and structure is not None:

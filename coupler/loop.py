@@ -13,6 +13,7 @@ import numpy as np
 
 from coupler.ledger import Balance, Ledger
 from coupler.limits import check_finite
+from coupler.observe import fastest_point
 
 Array = np.ndarray
 
@@ -48,6 +49,9 @@ class Coupling:
     def __init__(self, water, structure, immersion, *, rtol: float, step_max: float, clock):
         self.water, self.structure, self.immersion = water, structure, immersion
         self.rtol, self.step_max, self.clock = rtol, step_max, clock
+        self.radius = np.zeros(0)
+        if structure is not None:
+            self.radius = np.array([np.linalg.norm(v, axis=1).max() for v in structure.shape_vertices])
         self.time = 0.0
         self.ledger = Ledger()
         if water is not None:
@@ -64,7 +68,7 @@ class Coupling:
         if self.water is not None:
             dt = min(dt, self.water.stable_step())
         if self.coupled:
-            speed = self.structure.fastest_point()
+            speed = fastest_point(self.structure.velocity(), self.radius)
             if speed > 0.0:
                 dt = min(dt, BLOCK_COURANT * self.water.mesh.spacing / speed)
         return remaining / max(1, math.ceil(remaining / dt * (1.0 - 1e-9)))
@@ -80,9 +84,7 @@ class Coupling:
             self._structure_step(dt, record)
         self.time += dt
         self._check_finite()
-        record.balance = self.ledger.balance(
-            self._water_energy(), self._structure_energies(), self._driven_work()
-        )
+        record.balance = self.ledger.balance(self._water_energy(), self._structure_energies())
         return record
 
     def _coupled_step(self, dt: float, record: StepRecord) -> None:
@@ -100,7 +102,7 @@ class Coupling:
             response = StructureResponse(
                 *self._with_solids(mass, *structure.tangent()),
                 dt,
-                np.append(structure.fixed | structure.driven, np.ones(self.immersion.n_solids, bool)),
+                np.append(structure.fixed, np.ones(self.immersion.n_solids, bool)),
                 self._padded(structure.velocity()),
             )
             known = -(problem.coupling.T @ problem.known).reshape(-1, 6)
@@ -117,7 +119,7 @@ class Coupling:
         record.iterations, record.passes, record.unknowns = found.iterations, 1, len(found.x)
         record.load = found.load
         record.defect = defect(mass, found.velocity[:n], report.mean_velocity)
-        record.substeps, record.substep = report.substeps, report.substep
+        record.substeps, record.substep = report.substeps, report.dt_s
         record.opening_rate = report.opening_rate
         self.ledger.give(dt * float(np.sum(found.load[:n] * found.velocity[:n])))
 
@@ -134,7 +136,7 @@ class Coupling:
     def _structure_step(self, dt: float, record: StepRecord) -> None:
         with self.clock("structure"):
             report = self.structure.advance(dt)
-        record.substeps, record.substep = report.substeps, report.substep
+        record.substeps, record.substep = report.substeps, report.dt_s
         record.opening_rate = report.opening_rate
 
     @property
@@ -164,9 +166,6 @@ class Coupling:
 
     def _structure_energies(self) -> dict[str, float] | None:
         return None if self.structure is None else self.structure.energies()
-
-    def _driven_work(self) -> float:
-        return 0.0 if self.structure is None else self.structure.driven_work
 
     def _check_finite(self) -> None:
         if self.water is not None:

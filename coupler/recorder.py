@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from coupler.history import HistoryTable, write_cracks
+from coupler.observe import block_damage, crack_columns, fastest_point, joint_counts
 from coupler.output import BlockWriter, WaterWriter, write_solids
 
 ENERGY = (
@@ -27,7 +28,7 @@ ENERGY = (
     ("contact_stored", "J", "elastic energy in contacts"),
     ("dashpot", "J", "energy taken by contact dashpots so far"),
     ("friction", "J", "energy taken by friction so far"),
-    ("driven_work", "J", "work of prescribed motions on the structure so far"),
+    ("driving_work", "J", "work of prescribed motions on the structure so far"),
     ("structure_residual", "J", "what the structure's own ledger misses"),
     ("interface_residual", "J", "work given less work received"),
     ("input_energy", "J", "energy the scene has put in so far, the scale of the error"),
@@ -125,7 +126,7 @@ class Recorder:
             blocks_kinetic=e.get("kinetic", 0.0),
             blocks_gravity=e.get("gravity", 0.0),
             **{name: e.get(name, 0.0) for name in _STRUCTURE_LINES},
-            driven_work=c.structure.driven_work if c.structure else 0.0,
+            driving_work=e.get("driving_work", 0.0),
             structure_residual=b.structure_residual,
             interface_residual=b.interface_residual if c.coupled else 0.0,
             input_energy=b.input_energy,
@@ -158,15 +159,15 @@ class Recorder:
     def _append_structure(self, record) -> None:
         s = self.coupling.structure
         self.impulse += record.dt * record.load[: s.n, :3].sum(axis=0)
-        summary = s.joint_summary()
+        joints = joint_counts(s)
         self._structure.append(
             time=record.time,
-            joints_intact=summary.intact,
-            joints_broken=summary.broken,
-            largest_damage=summary.largest_damage,
+            joints_intact=joints.intact,
+            joints_broken=joints.broken,
+            largest_damage=joints.largest_damage,
             **_xyz("momentum", (s.mass[:, None] * s.velocity()[:, :3])[~s.fixed].sum(axis=0)),
             **_xyz("impulse", self.impulse),
-            fastest=s.fastest_point(),
+            fastest=fastest_point(s.velocity(), self.coupling.radius),
         )
 
     def fields(self, time: float) -> None:
@@ -187,10 +188,11 @@ class Recorder:
                 time,
                 s.centre(),
                 s.rotation(),
-                {"damage": s.block_damage(), "speed": np.linalg.norm(s.velocity()[:, :3], axis=1)},
+                {"damage": block_damage(s), "speed": np.linalg.norm(s.velocity()[:, :3], axis=1)},
             )
-            if s.n_joints:
-                write_cracks(self.cracks, s.joint_table())
+            cracks = crack_columns(s)
+            if cracks:
+                write_cracks(self.cracks, cracks)
 
     def close(self) -> None:
         for table in (self._energy, self._coupling, self._water, self._structure, self._gauges):

@@ -9,6 +9,7 @@ from coupler.case import Case
 from coupler.clock import Clock
 from coupler.errors import ExitCode
 from coupler.limits import LimitReached, Limits, check_balance
+from coupler.observe import joint_counts
 from coupler.recorder import Recorder
 
 
@@ -50,7 +51,7 @@ def _describe(scene: Scene, reporter) -> None:
     if c.structure is not None:
         substep, pair = c.structure.stable_substep()
         reporter.message(
-            f"structure: {c.structure.n} blocks, {c.structure.n_joints} joints, substep {substep:.3g} s ({pair})"
+            f"structure: {c.structure.n} blocks, {joint_counts(c.structure).intact} joints, substep {substep:.3g} s ({pair})"
         )
 
 
@@ -99,8 +100,8 @@ def _note(coupling, record, figures: dict) -> None:
         largest("volume_error", abs(figures["volume_error"]))
         largest("water_force", np.linalg.norm(record.load[:, :3].sum(axis=0)))
     if coupling.structure is not None:
-        joints = coupling.structure.joint_summary()
-        figures["joints"], figures["joints_broken"] = coupling.structure.n_joints, joints.broken
+        joints = joint_counts(coupling.structure)
+        figures["joints"], figures["joints_broken"] = joints.intact + joints.broken, joints.broken
         largest("defect", record.defect)
         largest("opening_rate", record.opening_rate)
 
@@ -108,8 +109,8 @@ def _note(coupling, record, figures: dict) -> None:
 def _told(coupling, record) -> dict[str, str]:
     told = {"dt": f"{1e3 * record.dt:.3g} ms"}
     if coupling.structure is not None:
-        joints = coupling.structure.joint_summary()
-        told["broken"] = f"{joints.broken}/{coupling.structure.n_joints}"
+        joints = joint_counts(coupling.structure)
+        told["broken"] = f"{joints.broken}/{joints.intact + joints.broken}"
     if coupling.water is not None:
         told["force"] = f"{np.linalg.norm(record.load[:, :3].sum(axis=0)) / 1e3:.4g} kN"
         told["volume"] = f"{_volume_error(coupling):+.2%}"

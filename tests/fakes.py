@@ -1,5 +1,6 @@
 """The smallest water and the smallest structure, so that the coupler is tested without either engine."""
 
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,3 +51,85 @@ def direct_solve(A, b, x0, rtol, extra=None) -> DirectResult:
     if extra is not None:
         dense = dense + np.column_stack([extra(e) for e in np.eye(len(b))])
     return DirectResult(np.linalg.solve(dense, b), 1, 0.0)
+
+
+@contextmanager
+def no_clock(part):
+    """A clock that books nothing."""
+    yield
+
+
+@dataclass(frozen=True)
+class FakeAdvance:
+    mean_velocity: np.ndarray
+    substeps: int = 1
+    dt_s: float = 0.0
+    opening_rate: float = 0.0
+
+
+class FreeBody:
+    """One rigid box without rotation, contact or joints: the smallest structure the coupler can carry."""
+
+    def __init__(self, size, centre, density, gravity):
+        half = 0.5 * np.array(size, float)
+        corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
+        self.n = 1
+        self.names, self.groups = ["body"], ["body"]
+        self.shape_vertices = [corners * half]
+        self.shape_faces = [
+            ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+        ]
+        self.mass = np.array([density * np.prod(size)])
+        self.fixed = np.array([False])
+        self._g = np.array([0, 0, -gravity])
+        self._x, self._v = np.array([centre], float), np.zeros((1, 6))
+        self._load, self._work = np.zeros((1, 6)), 0.0
+
+    @classmethod
+    def cube(cls, side, centre, density, gravity):
+        return cls((side, side, side), centre, density, gravity)
+
+    def centre(self):
+        return self._x.copy()
+
+    def rotation(self):
+        return np.eye(3)[None]
+
+    def velocity(self):
+        return self._v.copy()
+
+    def inertia(self):
+        return 1e30 * np.eye(3)[None]
+
+    def tangent(self):
+        return sp.csr_array((6, 6)), sp.csr_array((6, 6))
+
+    def internal_force(self):
+        return np.zeros((1, 6))
+
+    def gravity_force(self):
+        return np.concatenate([self.mass[:, None] * self._g, np.zeros((1, 3))], axis=1)
+
+    def joined_planes(self):
+        return np.zeros(0, int), np.zeros(0, int), np.zeros(0)
+
+    def set_load(self, load):
+        self._load = load
+
+    def advance(self, dt):
+        before = self._v.copy()
+        self._v[:, :3] += dt * (self._load[:, :3] / self.mass[:, None] + self._g)
+        mean = 0.5 * (before + self._v)
+        self._x += dt * mean[:, :3]
+        self._work += dt * float(np.sum(self._load * mean))
+        return FakeAdvance(self._v.copy())
+
+    def energies(self):
+        height = float(self.mass @ self._x[:, 2])
+        return {
+            "kinetic": 0.5 * float(self.mass @ (self._v[:, :3] ** 2).sum(axis=1)),
+            "gravity": -self._g[2] * height,
+            "load_work": self._work,
+            **dict.fromkeys(("joint_stored", "contact_stored", "joint_dissipated", "driving_work"), 0.0),
+            **dict.fromkeys(("joint_damping", "dashpot", "friction"), 0.0),
+        }

@@ -1,0 +1,106 @@
+"""What a run will take, before it is run: steps, substeps, memory, disk, and what sets them.
+
+The steps follow from the speed that the highest water could fall to, √(2 g H); the substep is the structure's own.
+Memory and disk per cell were read off runs; they are forecasts, not bounds.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from coupler.case import Case
+from coupler.observe import joint_counts
+from coupler.terminal import Row
+
+LONGEST_REST_STEP = 0.3
+BYTES_PER_CELL = 1500
+"""Resident memory per mesh cell: topology, moments and fields of the water."""
+BYTES_PER_BLOCK = 60_000
+"""Resident memory per block with its contact nodes in YADE."""
+PROGRAM_BYTES = {"water": 250e6, "structure": 250e6}
+DISK_BYTES_PER_NODE = 12
+"""Compressed level set, velocity and pressure of one written state."""
+DISK_BYTES_PER_BLOCK = 150
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """rows: (name, value, unit, remark), in the order in which they are told."""
+
+    rows: list[Row]
+
+
+def forecast(case: Case) -> Forecast:
+    """The forecast of a case; starts YADE when the case has a structure, to ask it for the substep."""
+    rows: list[Row] = []
+    memory = 80e6
+    disk = 0.0
+    outputs = max(1, round(case.time.end / (case.time.output_every or case.time.end / 100)))
+    step = case.time.step_max
+    if case.water:
+        step = _water_rows(case, rows)
+        cells, nodes = _mesh_size(case)
+        memory += PROGRAM_BYTES["water"] + BYTES_PER_CELL * cells
+        disk += DISK_BYTES_PER_NODE * nodes * (outputs + 1)
+    steps = math.ceil(case.time.end / step)
+    rows.append(Row("steps", steps, "", "at least, while the water is fast" if case.water else ""))
+    if case.structure:
+        n = _structure_rows(case, rows)
+        memory += PROGRAM_BYTES["structure"] + BYTES_PER_BLOCK * n
+        disk += DISK_BYTES_PER_BLOCK * n * (outputs + 1)
+    rows.append(Row("written states", outputs + 1, "", ""))
+    rows.append(Row("memory", memory / 1e6, "MB", "about"))
+    rows.append(Row("disk", disk / 1e6, "MB", "about"))
+    return Forecast(rows)
+
+
+def _mesh_size(case: Case) -> tuple[int, int]:
+    """Cells and nodes of the mesh."""
+    edges = np.subtract(case.tank.upper, case.tank.lower)
+    parts = np.maximum(1, np.ceil(edges / case.tank.cell - 1e-9)).astype(int)
+    return 6 * int(parts.prod()), int((parts + 1).prod())
+
+
+def _water_rows(case: Case, rows: list[Row]) -> float:
+    """Rows of the water; the step [s] that its greatest speed allows."""
+    cells, nodes = _mesh_size(case)
+    volume = sum(float(np.prod(np.subtract(f.upper, f.lower))) for f in case.water.fill)
+    height = max(f.upper[2] for f in case.water.fill) - case.tank.lower[2]
+    g, h = case.case.gravity, case.tank.cell
+    fastest = math.sqrt(2.0 * g * height)
+    limits = {
+        "time.step_max": case.time.step_max,
+        "time.cfl at the speed of a free fall": case.time.cfl * h / fastest if fastest > 0.0 else math.inf,
+        "the cell size at rest": LONGEST_REST_STEP * math.sqrt(h / g) if g > 0.0 else math.inf,
+    }
+    reason = min(limits, key=limits.get)
+    rows.append(Row("mesh", cells, "cells", f"{nodes} nodes, edge {h:g} m"))
+    rows.append(Row("water", volume, "m3", "in the fill boxes, solids not taken off"))
+    rows.append(Row("step", 1e3 * limits[reason], "ms", f"set by {reason}"))
+    return limits[reason]
+
+
+def _structure_rows(case: Case, rows: list[Row]) -> int:
+    """Rows of the structure; the number of its blocks."""
+    from coupler.build import build_structure
+
+    structure = build_structure(case)
+    try:
+        substep, pair = structure.stable_substep()
+        rows.append(
+            Row(
+                "blocks",
+                structure.n,
+                "",
+                f"{structure.mass[~structure.fixed].sum() / 1e3:.4g} t that can move",
+            )
+        )
+        rows.append(Row("joints", joint_counts(structure).intact, "", ""))
+        rows.append(Row("substep", 1e6 * substep, "us", f"set by {pair}"))
+        rows.append(Row("substeps", math.ceil(case.time.end / substep), "", ""))
+        return structure.n
+    finally:
+        structure.close()

@@ -1,0 +1,72 @@
+"""What the coupler reads off a structure for steps, histories and pictures."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+Array = np.ndarray
+
+
+class JointCounts(NamedTuple):
+    """Joints that carry traction, joints that have failed, and the largest damage of those that carry."""
+
+    intact: int
+    broken: int
+    largest_damage: float
+
+
+def joint_counts(structure) -> JointCounts:
+    """The counts now; zeros without joints."""
+    table = structure.joint_table()
+    if table is None:
+        return JointCounts(0, 0, 0.0)
+    alive = table.alive
+    return JointCounts(
+        int(alive.sum()), int((~alive).sum()), float(table.damage[alive].max()) if alive.any() else 0.0
+    )
+
+
+def block_damage(structure) -> Array:
+    """(n,) area-weighted mean damage of the joints that each block had at the start; 0 for blocks without."""
+    table = structure.joint_table()
+    damage, area = np.zeros(structure.n), np.zeros(structure.n)
+    if table is None:
+        return damage
+    weighted = np.where(table.alive, table.mean_damage, 1.0) * table.area
+    for side in (table.a, table.b):
+        inner = side >= 0
+        np.add.at(damage, side[inner], weighted[inner])
+        np.add.at(area, side[inner], table.area[inner])
+    return np.divide(damage, area, out=np.zeros(structure.n), where=area > 0.0)
+
+
+def fastest_point(velocity: Array, radius: Array) -> float:
+    """Bound of the speed of any point of blocks with velocity (n, 6) and radius (n,) [m/s]."""
+    if len(velocity) == 0:
+        return 0.0
+    spin = np.linalg.norm(velocity[:, 3:], axis=1)
+    return float((np.linalg.norm(velocity[:, :3], axis=1) + spin * radius).max())
+
+
+def crack_columns(structure) -> dict[str, Array]:
+    """Columns of the crack table; empty without joints."""
+    t = structure.joint_table()
+    if t is None:
+        return {}
+    return {
+        "joint": np.arange(len(t)),
+        "a": t.a,
+        "b": t.b,
+        "time": t.failure_time,
+        "area": t.area,
+        "centre": t.centre,
+        "normal": t.normal,
+        "damage": t.damage,
+        "opening": t.opening,
+        "sliding": t.sliding,
+        "mode_mix": t.mode_mix,
+        "dissipated": t.dissipated,
+        "intact": t.alive.astype(int),
+    }
