@@ -69,6 +69,7 @@ class Machine:
         self.stub("apt-cache", '#!/bin/sh\n[ -z "$NO_PACKAGE" ]\n')
         self.stub("uname", "#!/bin/sh\necho Linux\n")
         self.stub("dpkg-query", "#!/bin/sh\nexit 1\n")
+        self.stub("dpkg", '#!/bin/sh\necho "dpkg $*" >>"$CALLS"\n')
         self.stub("id", "#!/bin/sh\necho ${USER_NUMBER:-0}\n")
         (folder / "os-release").write_text('PRETTY_NAME="Debian GNU/Linux 12 (bookworm)"\n', encoding="utf-8")
         self.environment = {
@@ -148,6 +149,14 @@ def test_a_yade_known_to_the_package_system_is_honoured_wherever_it_is(machine):
     (machine.state / "venv-module").touch()
     _, _, calls = machine("run")
     assert not any(call.startswith("apt-get") for call in calls)
+
+
+def test_a_yade_that_an_interrupted_apt_left_half_done_is_finished(machine):
+    """Its folder is there already, but its packages are not set up."""
+    machine.ready().stub("dpkg-query", "#!/bin/sh\necho half-configured\n")
+    _, _, calls = machine("run")
+    assert "dpkg --configure -a" in calls
+    assert "apt-get install -q -y --no-install-recommends -o Dpkg::Use-Pty=0 yade" in calls
 
 
 def test_extras_come_with_the_command_that_needs_them(machine):
