@@ -60,10 +60,10 @@ class WaterWriter:
             if changed:
                 self._place = _write_grid(root, nodes - self.origin, cells)
             k = vtkhdf.count(root)
-            vtkhdf.write_offsets(root["Steps"], k, time, **self._place)
+            vtkhdf.write_offsets(root["Steps"], k, **self._place)
             vtkhdf.write_data(root, "PointData", k, point)
             vtkhdf.write_data(root, "CellData", k, cell)
-            vtkhdf.publish(file, k)
+            vtkhdf.publish(file, k, time)
         self._geometry, self._last_time = (nodes, cells), time
 
     def _changed(self, nodes, cells):
@@ -149,9 +149,9 @@ class BlockWriter:
             root = file["VTKHDF"]
             k = vtkhdf.count(root)
             point = vtkhdf.extend(root["Points"], points)
-            vtkhdf.write_offsets(root["Steps"], k, time, part=0, point=point, cell=0, connectivity=0)
+            vtkhdf.write_offsets(root["Steps"], k, part=0, point=point, cell=0, connectivity=0)
             vtkhdf.write_data(root, "CellData", k, faces, again=("block", "group"))
-            vtkhdf.publish(file, k)
+            vtkhdf.publish(file, k, time)
         self._last_time = time
 
     def _placed(self, centre, rotation):

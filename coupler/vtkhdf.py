@@ -6,7 +6,8 @@ again. Three rules keep a file readable whose writer is killed at any moment:
 
 * an array of a step begins at a chunk border, so no chunk that holds older data is ever written again;
 * the small tables (one number a step) are not compressed, so they are renewed in place;
-* the count of steps, `NSteps`, is written last, after everything else has reached the file.
+* the count of steps, `NSteps`, is written after everything else has reached the file; only the time of the step
+  comes later still, because VTK 9.7 writes past the end of its memory if a file has more times than steps.
 
 The file is opened, extended and closed for each step, without a lock: a viewer that looks on cannot stop the run.
 
@@ -103,13 +104,14 @@ def set_row(column, row, value):
 
 
 def count(root):
-    """Number of complete steps."""
-    return int(root["Steps"].attrs["NSteps"])
+    """Number of complete steps; none before the first one, when the arrays are not there either."""
+    if "Steps" not in root:
+        return 0
+    return min(int(root["Steps"].attrs["NSteps"]), len(root["Steps"]["Values"]))
 
 
-def write_offsets(steps, k, time, part, point, cell, connectivity):
+def write_offsets(steps, k, part, point, cell, connectivity):
     """Row k of /VTKHDF/Steps: where the geometry of this step begins."""
-    set_row(steps["Values"], k, time)
     set_row(steps["NumberOfParts"], k, 1)
     set_row(steps["PartOffsets"], k, part)
     set_row(steps["PointOffsets"], k, point)
@@ -131,10 +133,13 @@ def write_data(root, kind, k, values, again=()):
         set_row(offsets[name], k, start)
 
 
-def publish(file, k):
-    """Make step k visible: everything else has to be in the file before the count says so."""
+def publish(file, k, time):
+    """Make step k at `time` [s] visible: all else has to be in the file before the count says so."""
+    steps = file["VTKHDF"]["Steps"]
     file.flush()
-    file["VTKHDF"]["Steps"].attrs.modify("NSteps", np.int64(k + 1))
+    steps.attrs.modify("NSteps", np.int64(k + 1))
+    file.flush()
+    set_row(steps["Values"], k, time)
 
 
 def single(array):
@@ -147,4 +152,37 @@ def read_times(path):
     """Times (steps,) [s] of the complete steps of a file, also while it is being written."""
     with opened(path, "r") as file:
         root = file["VTKHDF"]
-        return root["Steps"]["Values"][: count(root)]
+        steps = count(root)
+        return root["Steps"]["Values"][:steps] if steps else np.empty(0)
+
+
+def read_step(path, k):
+    """Step k: points (n, 3), and the arrays of its points and of its cells by name; cells are read apart."""
+    with opened(path, "r") as file:
+        root, steps = file["VTKHDF"], file["VTKHDF/Steps"]
+        part, start = steps["PartOffsets"][k], steps["PointOffsets"][k]
+        n = root["NumberOfPoints"][part]
+        m = root["NumberOfCells" if "NumberOfCells" in root else "Polygons/NumberOfCells"][part]
+        points = root["Points"][start : start + n]
+        return points, _read_data(root, "PointData", k, n), _read_data(root, "CellData", k, m)
+
+
+def _read_data(root, kind, k, rows):
+    offsets = root["Steps"][kind + "Offsets"]
+    return {name: root[kind][name][offsets[name][k] : offsets[name][k] + rows] for name in root[kind]}
+
+
+def read_tetrahedra(path, k):
+    """Tetrahedra (m, 4) of step k of an unstructured grid."""
+    with opened(path, "r") as file:
+        root, steps = file["VTKHDF"], file["VTKHDF/Steps"]
+        start = steps["ConnectivityIdOffsets"][k, 0]
+        size = root["NumberOfConnectivityIds"][steps["PartOffsets"][k]]
+        return root["Connectivity"][start : start + size].reshape(-1, 4)
+
+
+def read_polygons(path):
+    """Polygons of a file of faces: rows of the points one after the other, and where each polygon ends."""
+    with opened(path, "r") as file:
+        group = file["VTKHDF/Polygons"]
+        return group["Connectivity"][:], group["Offsets"][1:]

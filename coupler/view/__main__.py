@@ -1,12 +1,14 @@
 """python -m coupler.view RUN: stills, films and figures of a run, from its files alone."""
 
 import argparse
+import ctypes
 import importlib.util
 import sys
 import time
 from pathlib import Path
 
 from coupler.errors import ExitCode, SurgebreakError
+from coupler.storage import FULL
 
 NEEDED = {"pyvista": "pictures", "imageio_ffmpeg": "films", "matplotlib": "figures"}
 
@@ -86,9 +88,20 @@ def check_installed():
         )
 
 
+def check_drawing():
+    """Raise ViewNotInstalled if the system cannot draw: without a display that takes EGL and a software renderer."""
+    try:
+        ctypes.CDLL("libEGL.so.1")
+    except OSError:
+        raise ViewNotInstalled(
+            "no EGL found: run `apt install libegl1 libgl1-mesa-dri` (YADE brings it along)"
+        ) from None
+
+
 def make(options):
     """Make what the options ask for and say what was made."""
     check_installed()
+    check_drawing()
     from coupler.view.run_files import open_run
 
     run = open_run(options.run)
@@ -133,10 +146,8 @@ def main(given=None):
         print(f"surgebreak render: {error}", file=sys.stderr)
         return int(error.exit_code)
     except OSError as error:
-        print(
-            f"surgebreak render: cannot write the pictures: {error}; free some space or use --to",
-            file=sys.stderr,
-        )
+        remedy = "; free some space, or write elsewhere with --to" if error.errno in FULL else ""
+        print(f"surgebreak render: {options.run}: {error}{remedy}", file=sys.stderr)
         return int(ExitCode.STOPPED)
     return int(ExitCode.DONE)
 

@@ -12,7 +12,7 @@ GROUND = "#efedea"
 SHADOW = "#c9c5bf"
 SOLID = "#9a9a9a"
 TANK = "#8a8f96"
-WATER_ENDS = ((80.0, -16.0, -22.0), (24.0, 10.0, -50.0))  # L*, a*, b*
+WATER_ENDS = ((80.0, -16.0, -22.0), (25.0, 18.0, -48.0))  # L*, a*, b*
 DAMAGE_ENDS = ((86.0, 3.0, 18.0), (34.0, 52.0, 36.0))
 # Okabe & Ito (2008), safe for colour-blind readers; the yellow is left out: too pale for a line on white.
 LINES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#000000")

@@ -46,9 +46,8 @@ def grouped(history):
     for column in history.columns:
         if column.name != "time" and column.unit and np.any(np.nan_to_num(changed(history, column.name))):
             shown.setdefault(column.unit, []).append(column.name)
-    return [
-        (unit, names[i : i + LINES_PER_PANEL]) for unit, names in shown.items() for i in range(0, len(names), LINES_PER_PANEL)
-    ]  # fmt: skip
+    return [(unit, names[i : i + LINES_PER_PANEL]) for unit, names in shown.items()
+            for i in range(0, len(names), LINES_PER_PANEL)]  # fmt: skip
 
 
 def changed(history, name):
@@ -80,9 +79,11 @@ def panel(axis, history, unit, names):
     for name, value in values.items():
         axis.plot(history["time"], value / 1000.0**power, label=name.replace("_", " "))
     since = "change since start" if history.title in SINCE_START and unit == "J" else ""
-    axis.set_ylabel(f"{since} [{text}]".strip())
+    what = names[0].replace("_", " ") if len(names) == 1 else since
+    axis.set_ylabel(f"{what} [{text}]".strip())
     axis.margins(x=0)
-    axis.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0)
+    if len(names) > 1:
+        axis.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0)
 
 
 def prefixed(unit, largest):

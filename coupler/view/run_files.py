@@ -1,19 +1,20 @@
-"""The files of a run as VTK data sets, also while the run still writes them."""
+"""The files of a run, read step by step, also while the run still writes them.
 
-import os
+HDF5 reads them, not VTK: VTK's reader may crash on a file that grows under its hands.
+"""
+
+import time as clock
 from dataclasses import dataclass
 from pathlib import Path
-
-# A reader's lock would be in the way of the run that still writes; HDF5 reads this when it is loaded.
-os.environ.setdefault("HDF5_USE_FILE_LOCKING", "FALSE")
 
 import h5py
 import numpy as np
 import pyvista as pv
-from vtkmodules.vtkIOHDF import vtkHDFReader
 
+from coupler import vtkhdf
 from coupler.errors import ExitCode, SurgebreakError
-from coupler.vtkhdf import read_times
+
+TRIES, PAUSE = 20, 0.1  # a step that is just being added takes milliseconds
 
 
 class NothingToShow(SurgebreakError):
@@ -22,21 +23,72 @@ class NothingToShow(SurgebreakError):
     exit_code = ExitCode.BAD_CASE
 
 
+@dataclass(frozen=True)
+class Water:
+    """The water at one time: nodes (n, 3) [m], cells (m, 4), level_set (n,) [m], velocity (n, 3) [m/s]."""
+
+    nodes: np.ndarray
+    cells: np.ndarray
+    level_set: np.ndarray
+    velocity: np.ndarray
+
+
 class Series:
-    """One temporal VTKHDF file: times (steps,) [s], and the data set of each step."""
+    """The complete steps of one file: times (steps,) [s]."""
 
     def __init__(self, path):
         self.path = Path(path)
-        self.times = read_times(path)
-        self._reader = vtkHDFReader()
-        self._reader.SetFileName(str(path))
-        self._reader.UpdateInformation()
+        self.times = patiently(vtkhdf.read_times, path)
+
+    def step(self, time):
+        """Number of the step nearest to `time` [s]."""
+        return int(np.argmin(np.abs(self.times - time)))
+
+
+class WaterSeries(Series):
+    """fields.vtkhdf"""
 
     def at(self, time):
-        """The data set of the stored step nearest to `time` [s]."""
-        self._reader.SetStep(int(np.argmin(np.abs(self.times - time))))
-        self._reader.Update()
-        return pv.wrap(self._reader.GetOutputDataObject(0)).copy(deep=False)
+        """Water of the step nearest to `time` [s]."""
+        k = self.step(time)
+        nodes, values, _ = patiently(vtkhdf.read_step, self.path, k)
+        cells = patiently(vtkhdf.read_tetrahedra, self.path, k).astype(np.int64)
+        velocity = values.get("velocity", np.zeros_like(nodes))
+        return Water(nodes.astype(float), cells, values["level_set"].astype(float), velocity)
+
+
+class BlockSeries(Series):
+    """blocks.vtkhdf"""
+
+    def __init__(self, path):
+        super().__init__(path)
+        self._faces = faces_for_vtk(*patiently(vtkhdf.read_polygons, path))
+
+    def at(self, time):
+        """The blocks as a surface mesh with their data on the faces, at the step nearest to `time` [s]."""
+        points, _, values = patiently(vtkhdf.read_step, self.path, self.step(time))
+        mesh = pv.PolyData(points, self._faces)
+        for name, array in values.items():
+            mesh.cell_data[name] = array
+        return mesh
+
+
+def patiently(read, *given):
+    """read(*given), again after a moment if the run is just changing the file under our hands."""
+    for left in reversed(range(TRIES)):
+        try:
+            return read(*given)
+        except (OSError, KeyError, RuntimeError):
+            if left == 0:
+                raise
+            clock.sleep(PAUSE)
+    raise AssertionError("the last try returns or raises")
+
+
+def faces_for_vtk(connectivity, ends):
+    """Polygons in the order size, corners, size, corners, …"""
+    sizes = np.diff(ends, prepend=0)
+    return np.insert(connectivity, ends - sizes, sizes)
 
 
 @dataclass(frozen=True)
@@ -44,8 +96,8 @@ class RunFiles:
     """What a run has to show; absent parts are None. tank (2, 3) [m] relative to the origin."""
 
     directory: Path
-    water: Series | None
-    blocks: Series | None
+    water: WaterSeries | None
+    blocks: BlockSeries | None
     solids: object
     tank: np.ndarray | None
     times: np.ndarray
@@ -62,34 +114,30 @@ def open_run(directory):
         raise NothingToShow(
             f"{directory}: no such run directory; `surgebreak run CASE` makes one under runs/"
         )
-    water, blocks = (_series(directory / name) for name in ("fields.vtkhdf", "blocks.vtkhdf"))
+    water = _series(WaterSeries, directory / "fields.vtkhdf")
+    blocks = _series(BlockSeries, directory / "blocks.vtkhdf")
     if water is None and blocks is None:
         raise NothingToShow(
             f"{directory}: neither fields.vtkhdf nor blocks.vtkhdf holds a step; the run has not reached its first "
-            "output yet, or writes none (time.output_every)"
+            "output yet, or it was stopped before"
         )
     solids, tank = _solids(directory / "solids.vtkhdf")
     return RunFiles(directory, water, blocks, solids, tank, (water or blocks).times)
 
 
-def _series(path):
+def _series(kind, path):
     """The series at `path`, None if it is absent or holds no step."""
-    if not path.exists() or len(read_times(path)) == 0:
+    if not path.exists() or len(patiently(vtkhdf.read_times, path)) == 0:
         return None
-    return Series(path)
+    return kind(path)
 
 
 def _solids(path):
-    """Fixed solids and tank corners relative to the origin, None where absent."""
+    """Fixed solids (None without any) and tank corners relative to the origin (None without a tank)."""
     if not path.exists():
         return None, None
     with h5py.File(path, "r", locking=False) as file:
-        scene = file["scene"].attrs
+        scene, points = file["scene"].attrs, file["VTKHDF/Points"][:]
         tank = scene["tank"] - scene["origin"] if "tank" in scene else None
-        empty = len(file["VTKHDF/Points"]) == 0
-    if empty:
-        return None, tank
-    reader = vtkHDFReader()
-    reader.SetFileName(str(path))
-    reader.Update()
-    return pv.wrap(reader.GetOutputDataObject(0)), tank
+    faces = faces_for_vtk(*vtkhdf.read_polygons(path))
+    return (pv.PolyData(points, faces) if len(points) else None), tank

@@ -37,7 +37,7 @@ class Scene:
         self.plotter = pv.Plotter(off_screen=True, window_size=size, lighting="none")
         self.plotter.set_background(palette.PAPER)
         self._set_lights()
-        self._draw_still_parts()
+        self._draw_still_parts(azimuth)
         self._set_camera(azimuth, elevation)
         self._smooth(soft)
 
@@ -65,8 +65,9 @@ class Scene:
         return max(6, round(size * self.size[1] / 720))
 
     def _draw_time(self, time):
+        stamp = f"t = {time:.{decimals(self.run.times)}f} s"
         text = self.plotter.add_text(
-            f"t = {time:.2f} s", name="time", position=(0.025, 0.925), viewport=True, font_size=self._points(14),
+            stamp, name="time", position=(0.025, 0.925), viewport=True, font_size=self._points(14),
             color=palette.INK, render=False,
         )  # fmt: skip
         lettered(text.prop)
@@ -106,7 +107,7 @@ class Scene:
         """A line width that keeps its share of the picture's height; smoothing halves it."""
         return 2 * width * self.size[1] / 720
 
-    def _draw_still_parts(self):
+    def _draw_still_parts(self, azimuth):
         margin = 0.06 * (self.upper - self.lower)[:2].max()
         self.plotter.add_mesh(ground(self.lower, self.upper, margin), color=palette.GROUND, lighting=False)
         if self.run.solids is not None:
@@ -117,20 +118,20 @@ class Scene:
         if self.run.tank is not None:
             tank = pv.Box(np.ravel(self.run.tank, order="F")).extract_all_edges()
             self.plotter.add_mesh(tank, color=palette.TANK, line_width=self._line(0.9))
-        self._draw_scale_bar()
+        self._draw_scale_bar(azimuth)
 
-    def _draw_scale_bar(self):
-        """A bar of a round length on the ground along the front edge, with its length beside it."""
+    def _draw_scale_bar(self, azimuth):
+        """A bar of a round length on the ground along the edge that faces the camera, its length under it."""
+        side = -1 if np.sin(np.radians(azimuth)) < 0 else 1
+        step = 0.03 * side * (self.upper - self.lower)[:2].max()
         length = nice_floor(0.25 * (self.upper[0] - self.lower[0]))
-        step = 0.035 * (self.upper - self.lower)[:2].max()
-        start = np.array([self.lower[0], self.lower[1] - step, self.lower[2]])
-        end = start + np.array([length, 0.0, 0.0])
-        bar = pv.Line(start, end)
+        start = np.array([self.lower[0], (self.lower if side < 0 else self.upper)[1] + step, self.lower[2]])
+        bar = pv.Line(start, start + np.array([length, 0.0, 0.0]))
         self.plotter.add_mesh(bar, color=palette.INK, line_width=self._line(2.5))
         self.plotter.add_point_labels(
-            [end], [f" {length:g} m"], font_size=self._points(15), text_color=palette.INK,
-            shape=None, show_points=False, always_visible=True, font_file=str(LETTERS), bold=False,
-            justification_vertical="center",
+            [start + np.array([length / 2, 0.7 * step, 0.0])], [f"{length:g} m"], font_size=self._points(15),
+            text_color=palette.INK, shape=None, show_points=False, always_visible=True, font_file=str(LETTERS),
+            bold=False, justification_vertical="top", justification_horizontal="center",
         )  # fmt: skip
 
     def _draw_blocks(self, blocks):
@@ -146,7 +147,7 @@ class Scene:
         )  # fmt: skip
         self._draw_shadow(blocks, "block_shadow")
         if "damage" in blocks.cell_data:
-            self._draw_bar("blocks", "damage of blocks [–]", 0.35)
+            self._draw_bar("blocks", "damage of blocks [–]", 0.35 if self.run.water else 0.03)
 
     def _draw_water(self, grid):
         surface = water_surface(grid)
@@ -183,19 +184,13 @@ class Scene:
         )
 
 
-def water_surface(grid):
+def water_surface(water):
     """The skin of the water as a mesh with "speed" [m/s] and shading normals at its points."""
-    nodes, cells = (
-        np.asarray(grid.points, dtype=float),
-        grid.cell_connectivity.reshape(-1, 4).astype(np.int64),
-    )
-    level_set = np.asarray(grid["level_set"], dtype=float)
-    found = skin(nodes, cells, level_set)
-    corners = found.of(nodes).reshape(-1, 3)
+    found = skin(water.nodes, water.cells, water.level_set)
+    corners = found.of(water.nodes).reshape(-1, 3)
     mesh = pv.PolyData.from_regular_faces(corners, np.arange(len(corners)).reshape(-1, 3))
-    velocity = grid["velocity"] if "velocity" in grid.point_data else np.zeros_like(nodes)
-    mesh["speed"] = np.linalg.norm(found.of(velocity), axis=2).ravel()
-    mesh["normals"] = shading_normals(found, nodes, cells, level_set).reshape(-1, 3)
+    mesh["speed"] = np.linalg.norm(found.of(water.velocity), axis=2).ravel()
+    mesh["normals"] = shading_normals(found, water.nodes, water.cells, water.level_set).reshape(-1, 3)
     mesh.point_data.active_normals_name = "normals"
     return mesh
 
@@ -214,7 +209,8 @@ def bounds(run):
     if run.tank is not None:
         boxes.append(np.asarray(run.tank, dtype=float))
     elif run.water:
-        boxes.append(corners(run.water.at(0.0)))
+        nodes = run.water.at(run.water.times[0]).nodes
+        boxes.append((nodes.min(axis=0), nodes.max(axis=0)))
     if run.solids is not None:
         boxes.append(corners(run.solids))
     if run.blocks and not boxes:
@@ -239,26 +235,31 @@ def fastest_water(run):
     """Speed [m/s] that 99 % of the wet nodes stay below, at the step where that is largest."""
     speeds = [0.0]
     for time in sampled(run.water.times):
-        grid = run.water.at(time)
-        wet = grid["level_set"] < 0
-        if "velocity" in grid.point_data and wet.any():
-            speeds.append(np.percentile(np.linalg.norm(grid["velocity"][wet], axis=1), 99))
+        water = run.water.at(time)
+        wet = water.level_set < 0
+        if wet.any():
+            speeds.append(np.percentile(np.linalg.norm(water.velocity[wet], axis=1), 99))
     return max(speeds)
 
 
 def nice_ceiling(value):
-    """The next of 1, 2, 5, 10, … times a power of ten (1 for nothing that moves)."""
-    return 1.0 if value <= 0 else _nice(value, lambda steps, x: steps[steps >= x * (1 - 1e-12)][0])
+    """The next round number, so that little of a colour scale is left unused (1 for nothing that moves)."""
+    if value <= 0:
+        return 1.0
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(next(r * power for r in (1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8, 10, 12) if r * power >= value))
 
 
 def nice_floor(value):
     """The last of 1, 2, 5, 10, … times a power of ten that is not larger."""
-    return _nice(value, lambda steps, x: steps[steps <= x * (1 + 1e-12)][-1])
-
-
-def _nice(value, choose):
     power = 10.0 ** np.floor(np.log10(value))
-    return float(choose(np.array([1.0, 2.0, 5.0, 10.0]), value / power) * power)
+    return float(next(r * power for r in (5, 2, 1) if r * power <= value * (1 + 1e-12)))
+
+
+def decimals(times):
+    """Digits after the point that tell neighbouring times apart, at least two."""
+    apart = np.diff(np.unique(times))
+    return 2 if len(apart) == 0 else int(np.clip(np.ceil(-np.log10(apart.min() * 1.001)), 2, 6))
 
 
 def turned(vector, angle):

@@ -84,8 +84,9 @@ def outer_faces(cells, n_nodes):
     key = (low * n_nodes + middle) * n_nodes + high
     order = np.argsort(key)
     key = key[order]
-    different = np.concatenate([[True], key[1:] != key[:-1], [True]])
-    return faces[order[different[:-1] & different[1:]]]
+    new = np.ones(len(key) + 1, dtype=bool)
+    new[1:-1] = key[1:] != key[:-1]
+    return faces[order[new[:-1] & new[1:]]] if len(key) else faces
 
 
 def nodal_slope(nodes, cells, values):

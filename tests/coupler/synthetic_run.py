@@ -61,8 +61,8 @@ def building_blocks(corner=(28.0, 7.0, 0.0), size=(20.0, 10.0, 12.0), thickness=
     t = thickness
     block = np.array([2.0, 2.0, 2.0])
     openings = [((a[0] - 1, a[1] + 4, 0.0), (a[0] + 2, a[1] + 6, 4.0))]
-    openings += [((a[0] + s, a[1] - 1, z), (a[0] + s + 2, b[1] + 1, z + 2))
-                 for s in (4.0, 8.0, 14.0) for z in (2.0, 8.0)]  # fmt: skip
+    openings += [((a[0] + s, a[1] - 1, z), (a[0] + s + 2.1, b[1] + 1, z + 2.4))
+                 for s in (4.0, 8.0, 14.0) for z in (1.8, 7.4)]  # fmt: skip
     walls = [
         (a, np.array([a[0] + t, b[1], b[2] - t])),
         (np.array([b[0] - t, a[1], a[2]]), np.array([b[0], b[1], b[2] - t])),

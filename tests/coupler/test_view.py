@@ -1,0 +1,127 @@
+"""Pictures, films and figures from the files of a run, each in a process of its own as users make them."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from coupler.output import WaterWriter
+from coupler.view.__main__ import main, pixels, rate
+from tests.coupler.synthetic_run import tank_mesh, write_run
+
+ROOT = Path(__file__).parents[2]
+pytest.importorskip("PIL", reason="the extra `view` is not installed")
+if not all((Path(p) / "pyvista").exists() for p in sys.path if p.endswith("site-packages")):
+    pytest.skip("the extra `view` is not installed", allow_module_level=True)
+
+
+def render(*arguments, **environment):
+    """Run `python -m coupler.view` as the command does."""
+    command = [sys.executable, "-m", "coupler.view", *map(str, arguments)]
+    return subprocess.run(
+        command, cwd=ROOT, capture_output=True, text=True, env=os.environ | environment, check=False
+    )
+
+
+def colours(path):
+    """Shares of pixels that are clearly blue (water) and clearly sand to red (blocks), colour bars left out."""
+    from PIL import Image
+
+    picture = np.asarray(Image.open(path).convert("RGB")).astype(int)
+    scene = picture[: int(0.85 * len(picture))]
+    red, blue = scene[..., 0], scene[..., 2]
+    return np.mean(blue - red > 25), np.mean(red - blue > 20)
+
+
+@pytest.mark.parametrize(("water", "blocks"), [(True, True), (True, False), (False, True)])
+def test_a_still_shows_what_the_run_has(tmp_path, water, blocks):
+    """Blue where there is water, sand to red where there are blocks, and neither where there is none."""
+    run = write_run(tmp_path / "run", [0.0, 2.0], water, blocks, cell=2.0)
+    done = render(run, "--still", "--size", "320x180")
+    assert done.returncode == 0, done.stderr
+    blue, sand = colours(run / "pictures" / "still_2.000s.png")
+    assert (blue > 0.05) == water
+    assert (sand > 0.03) == blocks
+
+
+def test_film_and_figures(tmp_path):
+    """An H.264 film with a frame for each step and a second's hold, and each history in three formats."""
+    run = write_run(tmp_path / "run", [0.0, 1.0, 2.0], cell=2.0)
+    done = render(run, "--film", "--plots", "--size", "321x181", "--fps", "10")
+    assert done.returncode == 0, done.stderr
+    pictures = run / "pictures"
+    assert sorted(p.name for p in pictures.iterdir()) == sorted(
+        ["film.mp4", *(f"{name}.{end}" for name in ("energy", "load") for end in ("pdf", "png", "svg"))]
+    )
+    told = "import imageio_ffmpeg, json, sys; r = imageio_ffmpeg.read_frames(sys.argv[1]); print(json.dumps(next(r)))"
+    about = subprocess.run(
+        [sys.executable, "-c", told, str(pictures / "film.mp4")], capture_output=True, text=True, check=True
+    )
+    film = json.loads(about.stdout)
+    assert film["codec"] == "h264"
+    assert film["size"] == [320, 180]
+    assert film["duration"] == pytest.approx(1.3, abs=0.11)
+
+
+def test_a_run_that_is_still_being_written_can_be_looked_at(tmp_path):
+    """The writer goes on while the viewer has the file open: neither stops the other."""
+    nodes, cells = tank_mesh((4.0, 2.0, 2.0), 0.5)
+    writer = WaterWriter(tmp_path / "fields.vtkhdf")
+    for k in range(3):
+        writer.append(0.1 * k, nodes, cells, {"level_set": nodes[:, 2] - 1.0}, {})
+    command = [sys.executable, "-m", "coupler.view", str(tmp_path), "--still", "--size", "160x90"]
+    with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as viewer:
+        while viewer.poll() is None:
+            writer.append(0.1 * k, nodes, cells, {"level_set": nodes[:, 2] - 1.0}, {})
+            k += 1
+        assert viewer.returncode == 0, viewer.stderr.read()
+    assert k > 4
+
+
+def test_pictures_need_neither_side_of_the_solver(tmp_path):
+    """VTK crashes in a process that holds YADE: nothing on the way to a picture may import it, or the fluid."""
+    run = write_run(tmp_path / "run", [0.0, 1.0], cell=4.0)
+    code = (
+        "import sys; from coupler.view.__main__ import main; code = main(sys.argv[1:]);"
+        "loaded = {m.split('.')[0] for m in sys.modules};"
+        "print(sorted(loaded & {'yade', 'yade_scripts', 'fluid', 'skfem', 'numba'}), code)"
+    )
+    command = [sys.executable, "-c", code, str(run), "--still", "--plots", "--size", "160x90"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "[] 0"
+
+
+def test_what_cannot_be_shown_is_said(tmp_path):
+    """No such run; a run without fields; a run whose first step is not written yet."""
+    for run, said in (
+        (tmp_path / "none", "no such run directory"),
+        (tmp_path, "neither fields.vtkhdf nor blocks.vtkhdf"),
+    ):
+        done = render(run)
+        assert done.returncode == 2
+        assert said in done.stderr
+        assert "Traceback" not in done.stderr
+    WaterWriter(tmp_path / "fields.vtkhdf")
+    assert "has not reached its first output" in render(tmp_path).stderr
+
+
+def test_missing_extra_is_named_with_the_command_that_adds_it(tmp_path, monkeypatch, capsys):
+    """Without VTK the solver still works; only pictures say what they need."""
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    assert main([str(tmp_path)]) == 1
+    assert "pip install 'surgebreak[view]'" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("read", "text"), [(pixels, "1280"), (pixels, "10x10"), (pixels, "axb"), (rate, "0"), (rate, "x")]
+)
+def test_bad_options_are_refused(read, text):
+    """argparse turns these into one line and exit code 2."""
+    import argparse
+
+    with pytest.raises(argparse.ArgumentTypeError, match=text):
+        read(text)

@@ -1,0 +1,55 @@
+"""Framing works for any case, and the colour scales are what they claim to be."""
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from coupler.view import palette
+from coupler.view.camera import frame
+
+MARGIN = (0.04, 0.1, 0.17, 0.05)
+
+
+def on_picture(camera, points, aspect):
+    """Places (k, 2) of points on the picture, 0 … 1 from left to right and from bottom to top."""
+    back = camera.position - camera.focus
+    back /= np.linalg.norm(back)
+    right = np.cross(camera.up, back)
+    seen = points - camera.position
+    depth = -(seen @ back)
+    half = np.tan(np.radians(camera.view_angle) / 2) * depth
+    return np.stack([0.5 + seen @ right / (2 * half * aspect), 0.5 + seen @ camera.up / (2 * half)], axis=1)
+
+
+@given(
+    lower=st.tuples(*[st.floats(-1e3, 1e3)] * 3),
+    size=st.tuples(*[st.floats(0.05, 200.0)] * 3),
+    azimuth=st.floats(-180, 180),
+    elevation=st.floats(-5, 85),
+    aspect=st.floats(0.5, 3.0),
+)
+@settings(max_examples=100, deadline=None)
+def test_every_corner_is_inside_the_margins_and_the_box_fills_them(lower, size, azimuth, elevation, aspect):
+    """Inside: nothing is cut off. Touching two opposite margins: no camera in that direction could be nearer."""
+    lower = np.array(lower)
+    camera = frame(lower, lower + size, aspect, azimuth, elevation, margin=MARGIN)
+    corners = np.array(list(itertools.product(*zip(lower, lower + size))))
+    place = on_picture(camera, corners, aspect)
+    low, high = np.array([MARGIN[0], MARGIN[2]]), 1 - np.array([MARGIN[1], MARGIN[3]])
+    assert np.all(place >= low - 1e-6)
+    assert np.all(place <= high + 1e-6)
+    touching = (place.min(axis=0) < low + 1e-6) & (place.max(axis=0) > high - 1e-6)
+    assert touching.any()
+
+
+@pytest.mark.parametrize("ends", [palette.WATER_ENDS, palette.DAMAGE_ENDS])
+def test_lightness_falls_evenly_along_a_scale(ends):
+    """Equal steps of the value are equal steps of L*, also after sRGB; a clipped colour would bend the line."""
+    colours = palette.scale(ends, 65)
+    linear = np.where(colours <= 0.04045, colours / 12.92, ((colours + 0.055) / 1.055) ** 2.4)
+    luminance = linear @ np.array([0.2126729, 0.7151522, 0.0721750])  # IEC 61966-2-1
+    lightness = 116 * np.cbrt(luminance) - 16
+    np.testing.assert_allclose(lightness, np.linspace(ends[0][0], ends[1][0], 65), atol=0.1)
