@@ -19,6 +19,7 @@ import numpy as np
 from numba import njit
 
 from fluid.cut import root as find
+from fluid.jit import inner
 from fluid.pieces import workspace
 from fluid.polygons import polygon_area, shared_area
 
@@ -142,13 +143,15 @@ def _same_side(
     offsets, plane_start,
 ):  # fmt: skip
     found = np.full(len(first), -1, dtype=np.int64)
+    x, local = np.empty(3), np.empty(3)
     for e in range(len(first)):
         nearest = np.inf
         for o in range(first[e], last[e]):
             body = wall[e] if wall[e] >= 0 else old_wall[o]
-            x = point[e].copy()
+            for c in range(3):
+                x[c] = point[e, c]
             if body >= 0:
-                _carry_back(x, centre[body], rotation[body], new_centre[body], new_rotation[body])
+                _carry_back(x, centre[body], rotation[body], new_centre[body], new_rotation[body], local)
             distance = 0.0
             for c in range(3):
                 distance += (x[c] - centroid[o, c]) ** 2
@@ -162,20 +165,20 @@ def _same_side(
     return found
 
 
-@njit(cache=True)
-def _carry_back(x, centre, rotation, new_centre, new_rotation):
+@inner
+def _carry_back(x, centre, rotation, new_centre, new_rotation, local):
     """x <- centre + rotation new_rotation^T (x - new_centre): where a point fixed to the body came from."""
-    d, local = x - new_centre, np.zeros(3)
     for i in range(3):
+        local[i] = 0.0
         for j in range(3):
-            local[i] += new_rotation[j, i] * d[j]
+            local[i] += new_rotation[j, i] * (x[j] - new_centre[j])
     for i in range(3):
         x[i] = centre[i]
         for j in range(3):
             x[i] += rotation[i, j] * local[j]
 
 
-@njit(cache=True)
+@inner
 def _blocked(a, b, normals, offsets, start, end):
     """Does the segment from a to b pass through the body with planes start:end?"""
     enter, leave = 0.0, 1.0
@@ -249,6 +252,8 @@ def _unite_corners(
     group = np.arange(len(parent))
     anchored = part < 0
     widest = np.zeros(len(parent))
+    # With thresholds areas are compared, so they must be the true ones.
+    enough = 1.0 if share > 0.0 else 1e-6
     joined, sweep = True, 0
     while joined:
         joined = False
@@ -274,7 +279,7 @@ def _unite_corners(
                     if part[e] >= 0 or part[other] >= 0:
                         area, full = _contact_area(
                             nodes, cells, one, f, part[e], g, part[other], order, open_start, polygon_start,
-                            polygon_x, tolerance, w,
+                            polygon_x, tolerance, enough, w,
                         )  # fmt: skip
                         if area <= least:
                             continue
@@ -301,7 +306,7 @@ def _unite_corners(
     return label
 
 
-@njit(cache=True)
+@inner
 def _unite_face(cells, one, two, f, e, other, several, label):
     """Make the three nodes of a face common to elements e (cell `one`, face f) and other (cell `two`)."""
     for k in range(4):
@@ -313,7 +318,7 @@ def _unite_face(cells, one, two, f, e, other, several, label):
                 label[max(a, b)] = min(a, b)
 
 
-@njit(cache=True)
+@inner
 def _load_opening(w, slot, row, polygon_start, polygon_x):
     first = polygon_start[row]
     w.corners[slot] = polygon_start[row + 1] - first
@@ -322,7 +327,7 @@ def _load_opening(w, slot, row, polygon_start, polygon_x):
             w.polygon[slot, k, 4 + c] = polygon_x[first + k, c]
 
 
-@njit(cache=True)
+@inner
 def _open_area(w, key, order, open_start, polygon_start, polygon_x):
     area = 0.0
     for s in range(open_start[key], open_start[key + 1]):
@@ -331,13 +336,14 @@ def _open_area(w, key, order, open_start, polygon_start, polygon_x):
     return area
 
 
-@njit(cache=True)
+@inner
 def _contact_area(
-    nodes, cells, cell, f, part, g, other, order, open_start, polygon_start, polygon_x, tolerance, w
+    nodes, cells, cell, f, part, g, other, order, open_start, polygon_start, polygon_x, tolerance, enough, w
 ):
     """Area over which two parts touch across the face opposite to corner f of `cell`, area of the face.
 
-    Part -1 is a whole cell; at most one of the two is."""
+    Part -1 is a whole cell; at most one of the two is. A lower bound of the area serves where it exceeds
+    the share `enough` of the face."""
     w.corners[0] = 3
     for k in range(3):
         for c in range(3):
@@ -356,7 +362,9 @@ def _contact_area(
     ours = _open_area(w, 4 * part + f, order, open_start, polygon_start, polygon_x)
     if min(ours, theirs) == 0.0 or max(ours, theirs) >= full * (1 - 1e-12):
         return min(ours, theirs), full
-    # Both sides are partly closed, not necessarily in the same place.
+    # Both sides are partly closed, not necessarily in the same place; they share at least this much.
+    if ours + theirs > (1 + enough) * full:
+        return ours + theirs - full, full
     nx, ny, nz = nx / twice, ny / twice, nz / twice
     area = 0.0
     for s in range(open_start[4 * part + f], open_start[4 * part + f + 1]):

@@ -19,6 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from fluid.jit import inner
 from fluid.pieces import (
     BROKEN_CAP,
     DONE,
@@ -78,7 +79,7 @@ def output(parts: int, polygons: int, with_openings: bool) -> Output:
     )
 
 
-@njit(cache=True)
+@inner
 def _nearby(w, x, bodies, normals, offsets, plane_start, tolerance):
     """Bodies that meet or touch the cell x (4, 3), with the planes of each that separate some of its nodes.
 
@@ -115,7 +116,7 @@ def _nearby(w, x, bodies, normals, offsets, plane_start, tolerance):
     return n
 
 
-@njit(cache=True)
+@inner
 def _align(w, row, tolerance):
     """Give a plane the distances of an earlier one (or their negatives) that it misses by the tolerance, so
     that touching and flush faces of two bodies are in one plane exactly and not up to their noise."""
@@ -132,7 +133,7 @@ def _align(w, row, tolerance):
                 return
 
 
-@njit(cache=True)
+@inner
 def _subtract(w, piece, at, round_off, thin, top, n_vertices):
     """Take body number `at` of the cell away from a piece.
 
@@ -165,15 +166,14 @@ def _subtract(w, piece, at, round_off, thin, top, n_vertices):
     return DONE, False, fresh, n_vertices
 
 
-@njit(cache=True)
+@inner
 def _is_thin(w, piece, thin):
     """Is the volume of a piece below that of a layer `thin` over a tenth of the spacing squared?"""
-    m = np.empty(10)
-    piece_moments(w, piece, m)
-    return m[0] < thin * (thin / THIN) ** 2 * 0.01
+    piece_moments(w, piece, w.moments)
+    return w.moments[0] < thin * (thin / THIN) ** 2 * 0.01
 
 
-@njit(cache=True)
+@inner
 def _fluid_pieces(w, n_near, round_off, thin):
     """Subtract all bodies near the cell -> (state, number of pieces, nothing removed)."""
     count, n_vertices, whole_cell = 1, 4, True
@@ -198,7 +198,7 @@ def _fluid_pieces(w, n_near, round_off, thin):
     return DONE, count, whole_cell
 
 
-@njit(cache=True)
+@inner
 def _lies_in(w, piece, f, r, normals, round_off):
     """Does a face lie in near plane r, with the piece on the outer side of it?"""
     g = w.near_plane[r]
@@ -219,7 +219,7 @@ def _lies_in(w, piece, f, r, normals, round_off):
     return facing < 0.0
 
 
-@njit(cache=True)
+@inner
 def _claim(w, polygon, at, plane, round_off, top):
     """Clip a polygon in near plane `plane` by the other planes of body number `at` -> (claimed, new top).
 
@@ -243,7 +243,7 @@ def _claim(w, polygon, at, plane, round_off, top):
     return True, new_top
 
 
-@njit(cache=True)
+@inner
 def _claim_face(w, at, r, origin, normals, round_off, least, top, part, out, n_wet):
     """Let one body claim its share of the polygons 0..top of a face -> (state, new top, polygons written)."""
     planes = w.near_start[at + 1] - w.near_start[at]
@@ -271,7 +271,7 @@ def _claim_face(w, at, r, origin, normals, round_off, least, top, part, out, n_w
     return DONE, top, n_wet
 
 
-@njit(cache=True)
+@inner
 def _wetted(w, piece, origin, n_near, normals, round_off, least, part, out, n_wet):
     """Append the wetted polygons of a piece -> (state, number of polygons).
 
@@ -294,7 +294,7 @@ def _wetted(w, piece, origin, n_near, normals, round_off, least, part, out, n_we
     return DONE, n_wet
 
 
-@njit(cache=True)
+@inner
 def root(label, i):
     """Representative of item i in a union-find forest, with path halving."""
     while label[i] != i:
@@ -303,7 +303,7 @@ def root(label, i):
     return i
 
 
-@njit(cache=True)
+@inner
 def _linked_area(w, one, two, normals, round_off):
     """Area over which two pieces touch: caps of one plane, one from each side."""
     area = 0.0
@@ -320,7 +320,7 @@ def _linked_area(w, one, two, normals, round_off):
     return area
 
 
-@njit(cache=True)
+@inner
 def _reaches_faces(w, piece):
     """Does a piece have a face on a face of the cell?"""
     reaches = False
@@ -329,7 +329,7 @@ def _reaches_faces(w, piece):
     return reaches
 
 
-@njit(cache=True)
+@inner
 def _label_parts(w, count, normals, round_off, link_area):
     """Number the connected parts of the fluid in w.label -> how many. link_area < 0: one part."""
     for piece in range(count):
@@ -358,7 +358,7 @@ def _label_parts(w, count, normals, round_off, link_area):
     return parts
 
 
-@njit(cache=True)
+@inner
 def _openings(w, piece, origin, part, out, n_open):
     """Append the faces of a piece that lie on faces of the cell -> (state, number of openings)."""
     for f in range(w.faces[piece]):
@@ -378,7 +378,7 @@ def _openings(w, piece, origin, part, out, n_open):
     return DONE, n_open
 
 
-@njit(cache=True)
+@inner
 def _emit(
     w, cell, origin, count, n_near, whole, normals, round_off, least, link_area, out, n_part, n_wet, n_open
 ):
@@ -389,12 +389,12 @@ def _emit(
     for part in range(n_part, n_part + parts):
         out.part_cell[part] = cell
         out.part_whole[part] = whole
-        out.part_moments[part] = 0.0
-    m = np.empty(10)
+        for c in range(10):
+            out.part_moments[part, c] = 0.0
     for piece in range(count):
         part = n_part + w.label[piece]
-        piece_moments(w, piece, m)
-        merge_moments(out.part_moments[part], m)
+        piece_moments(w, piece, w.moments)
+        merge_moments(out.part_moments[part], w.moments)
         state, n_wet = _wetted(w, piece, origin, n_near, normals, round_off, least, part, out, n_wet)
         if state == DONE and link_area >= 0.0:
             state, n_open = _openings(w, piece, origin, part, out, n_open)

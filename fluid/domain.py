@@ -133,24 +133,34 @@ def wetted_coupling(domain: PhysicalDomain) -> sp.csr_matrix:
     if len(domain.face_cell) == 0:
         return sp.csr_matrix(shape)
     corners = domain.cells[domain.face_cell]
-    hats = hat_values(domain.nodes[corners], domain.face_points)
-    weight = domain.face_area / 3
+    hats = hat_values(domain.nodes[corners], domain.face_points) * (domain.face_area / 3)[:, None, None]
     arm = domain.face_points - domain.body_centre[domain.face_body][:, None]
     turning = np.cross(arm, domain.face_normal[:, None])
-    force = np.einsum("s,sqa,sk->sak", weight, hats, domain.face_normal)
-    torque = np.einsum("s,sqa,sqk->sak", weight, hats, turning)
-    rows = np.repeat(corners.ravel(), 6)
-    columns = 6 * domain.face_body[:, None, None] + np.arange(6)
-    columns = np.broadcast_to(columns, (len(corners), 4, 6)).ravel()
-    values = np.concatenate([force, torque], axis=2).ravel()
-    return sp.coo_matrix((values, (rows, columns)), shape=shape).tocsr()
+    block = np.empty((len(corners), 4, 6))
+    block[:, :, :3] = hats.sum(axis=1)[:, :, None] * domain.face_normal[:, None]
+    block[:, :, 3:] = np.swapaxes(hats, 1, 2) @ turning
+    return _summed_blocks(corners, domain.face_body, block.reshape(-1, 6), shape)
+
+
+def _summed_blocks(corners, body, block, shape):
+    """CSR matrix of the rows block (4 S, 6) that belong to (node, body); repeated pairs are summed."""
+    n_bodies = shape[1] // 6
+    key = (corners * n_bodies + body[:, None]).ravel()
+    order = np.argsort(key, kind="stable")
+    first = np.flatnonzero(np.diff(key[order], prepend=-1))
+    values = np.add.reduceat(block[order], first, axis=0)
+    pair = key[order[first]]
+    columns = 6 * (pair % n_bodies)[:, None] + np.arange(6)
+    start = 6 * np.searchsorted(pair // n_bodies, np.arange(shape[0] + 1))
+    return sp.csr_matrix((values.ravel(), columns.ravel(), start), shape=shape)
 
 
 def hat_values(corners, points) -> np.ndarray:
     """P1 functions of tetrahedra corners (k, 4, 3) at points (k, q, 3) -> (k, q, 4)."""
-    edges = corners[:, 1:] - corners[:, :1]
-    inverse = np.linalg.inv(edges)
-    rest = np.einsum("kqc,kca->kqa", points - corners[:, :1], inverse)
+    e1, e2, e3 = (corners[:, a] - corners[:, 0] for a in (1, 2, 3))
+    normals = np.stack([np.cross(e2, e3), np.cross(e3, e1), np.cross(e1, e2)], axis=2)
+    normals /= np.einsum("ki,ki->k", e1, normals[:, :, 0])[:, None, None]
+    rest = (points - corners[:, :1]) @ normals
     return np.concatenate([1.0 - rest.sum(axis=2, keepdims=True), rest], axis=2)
 
 

@@ -14,7 +14,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+
+from fluid.jit import inner
 
 DONE, OUTPUT_FULL, WORKSPACE_FULL, BROKEN_CAP = 0, 1, 2, 3
 
@@ -40,6 +41,7 @@ class Workspace(NamedTuple):
     polygon: np.ndarray  # (polygons, corners, 7)
     corners: np.ndarray  # (polygons,)
     height: np.ndarray  # (corners,) distances of a polygon to the plane in hand
+    moments: np.ndarray  # (10,) of the piece in hand
     near_body: np.ndarray  # (bodies,) bodies that meet or touch the cell
     near_start: np.ndarray  # (bodies + 1,)
     near_plane: np.ndarray  # (planes,) their planes that pass through or touch the cell
@@ -62,6 +64,7 @@ def workspace(scale: int, n_bodies: int, n_planes: int) -> Workspace:
         np.empty((polygons, 3 * corners, 7)),
         np.zeros(polygons, dtype=np.int32),
         np.empty(3 * corners),
+        np.empty(10),
         np.zeros(n_bodies + 1, dtype=np.int64),
         np.zeros(n_bodies + 2, dtype=np.int64),
         np.zeros(n_planes + 1, dtype=np.int64),
@@ -69,7 +72,7 @@ def workspace(scale: int, n_bodies: int, n_planes: int) -> Workspace:
     )
 
 
-@njit(cache=True)
+@inner
 def start_piece(w, x):
     """The cell x (4, 3) itself as piece 0, positively oriented whatever the numbering of its nodes."""
     det = 0.0
@@ -91,13 +94,13 @@ def start_piece(w, x):
     w.faces[0] = 4
 
 
-@njit(cache=True)
+@inner
 def interpolated(x, d):
     """Distance at a vertex from its barycentric coordinates and the distances of the nodes."""
     return x[0] * d[0] + x[1] * d[1] + x[2] * d[2] + x[3] * d[3]
 
 
-@njit(cache=True)
+@inner
 def classify(w, piece, d, round_off):
     """Fill w.distance for the vertices of a piece -> lowest, highest (0 where snapped)."""
     low, high = 0.0, 0.0
@@ -113,7 +116,7 @@ def classify(w, piece, d, round_off):
     return low, high
 
 
-@njit(cache=True)
+@inner
 def _edge_vertex(w, a, b, first_new, n_vertices):
     """The vertex where edge ab crosses the plane: made once, shared by the two faces at the edge."""
     if a > b:
@@ -131,7 +134,7 @@ def _edge_vertex(w, a, b, first_new, n_vertices):
     return v, n_vertices + 1
 
 
-@njit(cache=True)
+@inner
 def _close_caps(w, outer, inner, first, edges, plane):
     """Close both halves of a split piece by the polygon of its cross-section."""
     f_out, f_in = w.faces[outer], w.faces[inner]
@@ -153,7 +156,7 @@ def _close_caps(w, outer, inner, first, edges, plane):
     return DONE
 
 
-@njit(cache=True)
+@inner
 def split(w, piece, outer, inner, plane, n_vertices):
     """Split a piece by the plane whose distances are in w.distance -> (state, number of vertices)."""
     capacity = w.loop.shape[2]
@@ -207,7 +210,7 @@ def split(w, piece, outer, inner, plane, n_vertices):
     return _close_caps(w, outer, inner, first, edges, plane), n_vertices
 
 
-@njit(cache=True)
+@inner
 def copy_piece(w, source, target):
     w.faces[target] = w.faces[source]
     for f in range(w.faces[source]):
@@ -217,13 +220,14 @@ def copy_piece(w, source, target):
             w.loop[target, f, k] = w.loop[source, f, k]
 
 
-@njit(cache=True)
+@inner
 def piece_moments(w, piece, m):
     """m (10,) <- V, c, S of a convex piece: a fan of tetrahedra from one of its vertices, in coordinates
     relative to that vertex, so that slivers keep their relative accuracy."""
     o = w.loop[piece, 0, 0]
     ox, oy, oz = w.x[o, 4], w.x[o, 5], w.x[o, 6]
-    m[:] = 0.0
+    for c in range(10):
+        m[c] = 0.0
     for f in range(w.faces[piece]):
         touches = False
         for k in range(w.size[piece, f]):
@@ -252,8 +256,7 @@ def piece_moments(w, piece, m):
             m[9] += v * (ay * az + by * bz + cy * cz + sy * sz)
             bx, by, bz = cx, cy, cz
     if m[0] <= 0.0:
-        m[:] = 0.0
-        m[1], m[2], m[3] = ox, oy, oz
+        m[0] = 0.0
         return
     gx, gy, gz = m[1] / m[0], m[2] / m[0], m[3] / m[0]
     m[4] -= m[0] * gx * gx
@@ -265,13 +268,14 @@ def piece_moments(w, piece, m):
     m[1], m[2], m[3] = ox + gx, oy + gy, oz + gz
 
 
-@njit(cache=True)
+@inner
 def merge_moments(total, m):
     """total <- moments of the union of two disjoint sets (parallel axis theorem)."""
     if m[0] <= 0.0:
         return
     if total[0] <= 0.0:
-        total[:] = m
+        for c in range(10):
+            total[c] = m[c]
         return
     v = total[0] + m[0]
     reduced = total[0] * m[0] / v

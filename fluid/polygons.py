@@ -6,14 +6,15 @@ Corners hold barycentric coordinates in the cell, then the position relative to 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from fluid.jit import inner
 
 # Corners of the equilateral triangle with unit second moment about its centre.
 SQRT2 = np.sqrt(2.0)
 TRIANGLE = np.array([[SQRT2, 0.0], [-SQRT2 / 2, np.sqrt(1.5)], [-SQRT2 / 2, -np.sqrt(1.5)]])
 
 
-@njit(cache=True)
+@inner
 def load_face(w, piece, f, polygon):
     """Copy a face of a piece to a polygon slot."""
     for k in range(w.size[piece, f]):
@@ -23,7 +24,7 @@ def load_face(w, piece, f, polygon):
     w.corners[polygon] = w.size[piece, f]
 
 
-@njit(cache=True)
+@inner
 def copy_polygon(w, source, target):
     """Copy slot `source` to slot `target`."""
     w.corners[target] = w.corners[source]
@@ -32,7 +33,7 @@ def copy_polygon(w, source, target):
             w.polygon[target, k, c] = w.polygon[source, k, c]
 
 
-@njit(cache=True)
+@inner
 def split_polygon(w, polygon, outer, inner, round_off):
     """Split a convex polygon by the plane whose distances are in w.height -> (outside, inside) not empty.
 
@@ -72,7 +73,7 @@ def split_polygon(w, polygon, outer, inner, round_off):
     return True, True
 
 
-@njit(cache=True)
+@inner
 def polygon_area(w, polygon):
     sx, sy, sz = 0.0, 0.0, 0.0
     o = w.polygon[polygon, 0]
@@ -86,7 +87,7 @@ def polygon_area(w, polygon):
     return np.sqrt(sx * sx + sy * sy + sz * sz) / 2.0
 
 
-@njit(cache=True)
+@inner
 def _turn(w, polygon, nx, ny, nz):
     """Twice the area of a polygon, signed by its sense about n."""
     o = w.polygon[polygon, 0]
@@ -99,7 +100,7 @@ def _turn(w, polygon, nx, ny, nz):
     return turn
 
 
-@njit(cache=True)
+@inner
 def shared_area(w, one, two, nx, ny, nz, round_off):
     """Area common to the coplanar convex polygons in slots `one` and `two` (unit normal n); uses the two
     slots behind them and overwrites `one`."""
@@ -124,7 +125,7 @@ def shared_area(w, one, two, nx, ny, nz, round_off):
     return polygon_area(w, one)
 
 
-@njit(cache=True)
+@inner
 def polygon_rule(w, polygon, nx, ny, nz, least, row):
     """row (16,) <- area, centroid, normal and three points, weight area / 3, exact to degree 2.
 
