@@ -90,15 +90,18 @@ def interpolate(cell, weight, cells, f):
 
 
 @njit(cache=True)
-def _limited(listed, back_cell, f, f1, f1_ahead, cells):
-    """f2 where it stays within the range of f over the cell of the foot, f1 elsewhere, (n, m)."""
+def _limited(listed, back_cell, back_weight, f, f1, f1_ahead, cells):
+    """f2 where it stays within the range of f over the cell of the foot, f1 elsewhere, (n, m).
+
+    Only corners with weight count: a foot on a face must not depend on the side it was found from."""
     out = np.empty_like(f1)
     for s in range(listed.shape[0]):
         e = back_cell[s]
         for k in range(f.shape[1]):
-            low, high = f[cells[e, 0], k], f[cells[e, 0], k]
-            for a in range(1, 4):
-                low, high = min(low, f[cells[e, a], k]), max(high, f[cells[e, a], k])
+            low, high = np.inf, -np.inf
+            for a in range(4):
+                if back_weight[s, a] > 1e-9:
+                    low, high = min(low, f[cells[e, a], k]), max(high, f[cells[e, a], k])
             f2 = f1[s, k] + 0.5 * (f[listed[s], k] - f1_ahead[s, k])
             out[s, k] = f2 if low <= f2 <= high else f1[s, k]
     return out
@@ -114,4 +117,4 @@ def transport(topology, listed, dt: float, u_m, f):
     moved[listed] = f1
     ahead, ahead_weight = feet(listed, 1.0, dt, 0, u_m, *mesh)
     f1_ahead = interpolate(ahead, ahead_weight, t.cells, moved)
-    return _limited(listed, cell, f, f1, f1_ahead, t.cells)
+    return _limited(listed, cell, weight, f, f1, f1_ahead, t.cells)

@@ -97,9 +97,9 @@ def squared_distance(p, t):
         v = 1.0
     elif d6 >= 0.0 and d5 <= d6:
         w = 1.0
-    elif vc <= 0.0 and d1 >= 0.0 and d3 <= 0.0:
+    elif vc <= 0.0 and d1 >= 0.0 and d3 <= 0.0 and ab2 > 0.0:
         v = _ratio(d1, d1 - d3)
-    elif vb <= 0.0 and d2 >= 0.0 and d6 <= 0.0:
+    elif vb <= 0.0 and d2 >= 0.0 and d6 <= 0.0 and ac2 > 0.0:
         w = _ratio(d2, d2 - d6)
     elif va <= 0.0 and d4 >= d3 and d5 >= d6:
         w = _ratio(d4 - d3, (d4 - d3) + (d5 - d6))

@@ -1,0 +1,45 @@
+"""Small scenes shared by the tests of the water."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fluid.bodies import ConvexBodies
+from fluid.domain import cut_domain
+from fluid.mesh import box_mesh
+from fluid.parameters import WaterParameters
+from fluid.solve import solve
+from fluid.water import Water
+
+
+def tank(size, cell, fill, bodies=None, is_open=None, covers="single", **parameters) -> Water:
+    """Water in the box [0, size] with cells of the given size; fill as in Water."""
+    mesh = box_mesh(np.zeros(3), size, cell)
+    domain = cut_domain(mesh, ConvexBodies.empty() if bodies is None else bodies, covers)
+    return Water(mesh, domain, fill, WaterParameters(**parameters), is_open)
+
+
+def advance(water: Water, dt=None, body_velocity=None, rtol=1e-9):
+    """One step with bodies at a prescribed velocity (6 n_bodies,); returns (problem, x)."""
+    problem = water.predict(water.stable_step() if dt is None else dt)
+    moved = 0.0 if body_velocity is None else problem.coupling @ body_velocity
+    found = solve(problem.matrix, problem.rhs + moved, problem.guess, rtol)
+    water.correct(problem, found.x)
+    return problem, found.x
+
+
+def load(problem, x):
+    """Force and moment on each body, (n_bodies, 6) [N, N m]."""
+    return -(problem.coupling.T @ (x + problem.known)).reshape(-1, 6)
+
+
+def rotation(axis, angle):
+    """Rotation matrix about an axis (3,) by an angle [rad] (Rodrigues)."""
+    k = np.asarray(axis, float) / np.linalg.norm(axis)
+    K = np.array([[0, -k[2], k[1]], [k[2], 0, -k[0]], [-k[1], k[0], 0]])
+    return np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K
+
+
+def column(width, height):
+    """Fill: a column of water against the wall x = 0 across the tank."""
+    return lambda x: np.maximum(x[:, 0] - width, x[:, 2] - height)

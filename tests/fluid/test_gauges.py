@@ -1,0 +1,38 @@
+"""Gauges read what is there: a pool at rest has its level, its pressure and its volume everywhere."""
+
+import numpy as np
+import pytest
+
+from fluid import gauges
+from tests.fluid.scenes import advance, tank
+
+
+@pytest.fixture(scope="module")
+def pool():
+    water = tank([1, 1, 1], 0.125, lambda x: x[:, 2] - 0.437)
+    advance(water, 0.01)
+    return water
+
+
+def test_level(pool):
+    for xy in ([0.5, 0.5], [0.01, 0.99], [0.0, 0.0], [1.0, 0.3]):
+        assert abs(gauges.level(pool, xy) - 0.437) < 1e-9
+
+
+def test_pressure_at_depth_and_in_the_air(pool):
+    p = gauges.pressure_at(pool, [[0.3, 0.4, 0.1], [0.3, 0.4, 0.9]])
+    np.testing.assert_allclose(p, [9810 * 0.337, 0.0], rtol=1e-6)
+
+
+def test_velocity_at_rest(pool):
+    assert np.abs(gauges.velocity_at(pool, [[0.3, 0.4, 0.1]])).max() < 1e-9
+
+
+def test_volume_of_all_and_of_a_half(pool):
+    np.testing.assert_allclose(gauges.volume_in(pool, [0, 0, 0], [1, 1, 1]), 0.437, rtol=1e-9)
+    np.testing.assert_allclose(gauges.volume_in(pool, [0, 0, 0], [0.5, 1, 1]), 0.437 / 2, rtol=1e-9)
+
+
+def test_gauge_outside_the_tank_is_refused(pool):
+    with pytest.raises(gauges.Outside, match="lies outside the tank"):
+        gauges.pressure_at(pool, [[2.0, 0.5, 0.5]])

@@ -1,0 +1,87 @@
+"""Water at rest stays at rest, at any level, tilt and cut, and carries bodies with the exact load."""
+
+import numpy as np
+import pytest
+
+from fluid.bodies import ConvexBodies
+from tests.fluid.scenes import advance, load, rotation, tank
+
+WEIGHT = 1000.0 * 9.81
+
+
+def box(centre, size, turn):
+    return ConvexBodies.boxes(np.array([centre]), np.array([size]), np.array([turn]))
+
+
+@pytest.mark.parametrize("offset", [0.0, 1e-6, 0.01, 0.37, 0.99])
+def test_level_anywhere_between_two_layers_of_nodes(offset):
+    """Surface through the nodes, a hair above them, and anywhere between: the symmetric ghost condition is exact
+    for a linear pressure, so nothing may move."""
+    level = 0.5 + 0.125 * offset
+    water = tank([1, 1, 1], 0.125, lambda x: x[:, 2] - level)
+    for _ in range(50):
+        advance(water, 0.01)
+    assert np.abs(water.velocity).max() < 1e-9
+    depth = np.maximum(level - water.topology.nodes[:, 2], 0)
+    np.testing.assert_allclose(water.pressure, WEIGHT * depth, atol=1e-6 * WEIGHT)
+    assert abs(water.volume() - level) < 1e-6
+
+
+@pytest.mark.parametrize(("tilt", "yaw"), [(0.2, 0.3), (0.5, 0.0), (0.7, 1.0)])
+def test_tilted_tank(tilt, yaw):
+    up = np.array([np.sin(tilt) * np.cos(yaw), np.sin(tilt) * np.sin(yaw), np.cos(tilt)])
+    water = tank([1, 1, 1], 0.125, lambda x: (x - [0.5, 0.5, 0.53]) @ up, down=tuple(-up))
+    for _ in range(50):
+        advance(water, 0.01)
+    assert np.abs(water.velocity).max() < 1e-8
+
+
+def test_noise_does_not_grow():
+    """A surface just above a layer of nodes once amplified noise by 1.1 a step; it must decay or stay."""
+    water = tank([1, 1, 1], 0.125, lambda x: x[:, 2] - 0.5 - 1e-4 * 0.125)
+    water.velocity[:] = np.random.default_rng(0).normal(0, 1e-5, water.velocity.shape)
+    for _ in range(150):
+        advance(water, 0.02, rtol=1e-7)
+    assert np.abs(water.velocity).max() < 1e-4
+
+
+@pytest.mark.parametrize("turn", [np.eye(3), rotation([1, 2, 3], 0.7)], ids=["straight", "turned"])
+def test_sunken_box_feels_exactly_its_buoyancy(turn):
+    """Archimedes, force and moment, for a box at an arbitrary position: integration over the cut is exact."""
+    size = [0.3, 0.25, 0.2]
+    water = tank([1, 1, 1], 0.125, lambda x: x[:, 2] - 0.78, box([0.5, 0.45, 0.4], size, turn))
+    for _ in range(20):
+        problem, x = advance(water, 0.01)
+    expected = np.array([[0, 0, WEIGHT * np.prod(size), 0, 0, 0]])
+    np.testing.assert_allclose(load(problem, x), expected, atol=1e-6 * WEIGHT * np.prod(size))
+    assert np.abs(water.velocity).max() < 1e-8
+
+
+def test_upright_box_through_the_surface():
+    """Half out of the water: draft times area, and no current along the water line."""
+    water = tank(
+        [1, 1, 1], 0.125, lambda x: x[:, 2] - 0.53, box([0.5, 0.45, 0.5], [0.3, 0.25, 0.4], np.eye(3))
+    )
+    for _ in range(20):
+        problem, x = advance(water, 0.01)
+    np.testing.assert_allclose(load(problem, x)[0, 2], WEIGHT * 0.3 * 0.25 * 0.23, rtol=1e-9)
+    assert np.abs(water.velocity).max() < 1e-8
+
+
+def test_closed_full_tank_has_a_pressure_and_rests():
+    """No free surface: the pressure level is free, and the matrix would be singular without the compressibility."""
+    size = [0.26, 0.22, 0.24]
+    water = tank([1, 1, 1], 0.125, lambda x: x[:, 2] - 10.0, box([0.5, 0.5, 0.5], size, np.eye(3)))
+    for _ in range(5):
+        problem, x = advance(water, 0.01)
+    assert np.abs(water.velocity).max() < 1e-8
+    np.testing.assert_allclose(load(problem, x)[0, 2], WEIGHT * np.prod(size), rtol=1e-8)
+
+
+def test_tank_without_water_runs():
+    """Dry: nothing to solve, nothing to move."""
+    water = tank([1, 1, 1], 0.25, lambda x: np.full(len(x), 1.0))
+    for _ in range(3):
+        problem, _ = advance(water, 0.01)
+    assert len(problem.dofs) == 0
+    assert water.volume() == 0.0

@@ -1,0 +1,56 @@
+"""Distance to the surface: exact for planes, Eikonal near a sphere, the surface itself untouched."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fluid.bodies import ConvexBodies
+from fluid.domain import cut_domain
+from fluid.level_set import FAR, redistance, squared_distance
+from fluid.mesh import box_mesh
+from fluid.topology import Topology
+from fluid.volume import water_volume
+
+H = 0.1
+
+
+@pytest.fixture(scope="module")
+def cube():
+    mesh = box_mesh(np.zeros(3), np.ones(3), H)
+    return Topology.of(mesh, cut_domain(mesh, ConvexBodies.empty()))
+
+
+def test_level_plane_is_kept_and_cut_off(cube):
+    z = cube.nodes[:, 2] - 0.43
+    phi = redistance(cube, 3.0 * z, H, rescale=True)
+    near = np.abs(z) < 5 * H
+    np.testing.assert_allclose(phi[near], z[near], atol=1e-12)
+    assert np.abs(phi).max() <= FAR * H
+
+
+def test_sphere_distance_and_volume(cube):
+    r = np.linalg.norm(cube.nodes - 0.5, axis=1) - 0.32
+    phi = redistance(cube, r, H, rescale=False)
+    np.testing.assert_allclose(phi, r, atol=0.25 * H)
+    before, after = water_volume(cube, r), water_volume(cube, phi)
+    np.testing.assert_allclose(after, before, rtol=1e-12)
+    np.testing.assert_allclose(after, 4 / 3 * np.pi * 0.32**3, rtol=0.06)
+
+
+coordinate = st.floats(-1, 1)
+point = st.tuples(coordinate, coordinate, coordinate)
+
+
+@settings(deadline=None)  # the first call compiles
+@given(point, st.tuples(point, point, point))
+def test_distance_to_a_triangle_against_sampling(p, corners):
+    """Never above the distance to any of its points, and reached to within the spacing of the samples."""
+    t, p = np.array(corners), np.array(p)
+    a, b = np.meshgrid(np.linspace(0, 1, 25), np.linspace(0, 1, 25))
+    inside = a + b <= 1 + 1e-12
+    samples = t[0] + a[inside][:, None] * (t[1] - t[0]) + b[inside][:, None] * (t[2] - t[0])
+    nearest = np.linalg.norm(samples - p, axis=1).min()
+    found = np.sqrt(squared_distance(p, t))
+    assert found <= nearest + 1e-7
+    assert found >= nearest - 0.13

@@ -1,0 +1,124 @@
+"""The pressure: exact at the release of a dam, symmetric positive definite, equal to the forms of scikit-fem."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from skfem import asm
+
+from fluid import forms
+from fluid.bodies import ConvexBodies
+from fluid.moments import cells_touching
+from fluid.projection import cell_gradient, cell_velocity, inflow, nodal_mean
+from fluid.topology import Graph
+from fluid.volume import nodal_volume
+from tests.fluid.scenes import advance, column, rotation, tank
+
+REFERENCE = Path(__file__).parents[1] / "reference"
+
+
+@pytest.mark.parametrize("width", [0.5, 1.0])
+def test_first_pressure_after_a_dam_vanishes(width):
+    """Series solution of Laplace p = 0 in the released column (header of the CSV); error falls with h."""
+    table = np.loadtxt(
+        REFERENCE / "dam_release_initial_pressure.csv", delimiter=",", comments="#", skiprows=3
+    )
+    table = table[table[:, 0] == width]
+    errors = []
+    for cell in (0.1, 0.05):
+        water = tank([width + 0.5, 2 * cell, 1.2], cell, column(width, 1.0))
+        advance(water, 1e-4)
+        nodes = water.topology.nodes
+        errors.append(_mean_error(nodes, water.pressure / 9810.0, table))
+    assert errors[1] < 0.01
+    assert errors[1] < 0.65 * errors[0]
+
+
+def _mean_error(nodes, p, table):
+    """Mean |p - p_exact| over the tabulated points that are nodes of the middle plane."""
+    middle = np.isclose(nodes[:, 1], nodes[nodes[:, 1] > 0, 1].min())
+    found = []
+    for _, x, z, exact in table:
+        at = np.flatnonzero(middle & np.isclose(nodes[:, 0], x) & np.isclose(nodes[:, 2], z))
+        if len(at):
+            found.append(abs(p[at[0]] - exact))
+    assert len(found) > 5
+    return np.mean(found)
+
+
+@pytest.fixture(scope="module")
+def cut():
+    """A closed full tank with two tilted bodies, one through a wall: every kind of cut cell."""
+    bodies = ConvexBodies.boxes(
+        np.array([[0.5, 0.45, 0.4], [0.9, 0.5, 0.7]]),
+        np.array([[0.3, 0.25, 0.2], [0.4, 0.1, 0.3]]),
+        np.array([rotation([1, 2, 3], 0.7), rotation([0, 1, 1], 0.3)]),
+    )
+    return tank([1, 1, 1], 0.125, lambda x: x[:, 2] - 10.0, bodies)
+
+
+def test_stiffness_equals_the_form(cut):
+    K = asm(forms.stiffness, forms.basis_of(cut.domain)).toarray()
+    graph = Graph.of(cut.topology, np.flatnonzero(cut.topology.active))
+    rows = np.repeat(graph.nodes, np.diff(graph.start))
+    np.testing.assert_allclose(graph.stiffness, K[rows, graph.neighbour], atol=1e-13 * np.abs(K).max())
+    diagonal = -np.bincount(rows, graph.stiffness, minlength=len(K))
+    np.testing.assert_allclose(diagonal, np.diag(K), atol=1e-12 * np.abs(K).max())
+
+
+def test_right_hand_side_equals_the_form(cut):
+    t = cut.topology
+    u = np.random.default_rng(0).normal(size=(len(t.nodes), 3))
+    basis, vector = forms.basis_of(cut.domain), forms.vector_basis_of(cut.domain)
+    expected = asm(forms.inflow, basis, u=vector.interpolate(forms.by_component(u)))
+    cells = np.arange(len(t.cells))
+    mean = cell_velocity(cells, u, np.zeros((0, 3)), t.cells, t.share)
+    found = inflow(cells, mean, t.cells, t.parent, t.gradients, t.volume, len(u))
+    np.testing.assert_allclose(found, expected, atol=1e-13 * np.abs(expected).max())
+
+
+def test_nodal_volume_and_momentum_of_the_pressure_equal_the_forms(cut):
+    """Σ_e w_e ∇p / Σ w_e times the nodal volume is ∫ ∇p N_i dV: what the pressure takes off the momentum."""
+    t = cut.topology
+    volume = asm(forms.lumped, forms.basis_of(cut.domain))
+    np.testing.assert_allclose(nodal_volume(t, cut.level_set), volume, atol=1e-14)
+    p = np.random.default_rng(1).normal(size=len(t.nodes))
+    p_form = forms.basis_of(cut.domain).interpolate(p)
+    expected = asm(forms.pressure_gradient, forms.vector_basis_of(cut.domain), p=p_form).reshape(-1, 3)
+    cells = np.arange(len(t.cells))
+    gradient = cell_gradient(cells, p, t.cells, t.parent, t.gradients)
+    mean = nodal_mean(cells, gradient, np.ones(len(cells)), t.cells, t.share, t.volume, len(p))
+    np.testing.assert_allclose(mean * volume[:, None], expected, atol=1e-9 * np.abs(expected).max())
+
+
+def test_matrix_is_symmetric_positive_definite_with_a_surface():
+    water = tank([1, 1, 1], 0.25, lambda x: (x - 0.5) @ [0.3, 0.1, 1.0])
+    A = water.predict(0.01).matrix.toarray()
+    np.testing.assert_allclose(A, A.T, atol=1e-14 * np.abs(A).max())
+    assert np.linalg.eigvalsh(A).min() > 0
+
+
+def test_constants_are_the_null_space_of_a_closed_tank(cut):
+    """Only the compressibility of water, 1e-6 of the rest, answers to a constant pressure."""
+    A = cut.predict(0.01).matrix
+    ones = np.ones(A.shape[0])
+    expected = cut.topology.node_volume.sum() / (cut.parameters.bulk_modulus * 0.01)
+    np.testing.assert_allclose(ones @ (A @ ones), expected, rtol=1e-6)
+    assert np.abs(A @ ones).max() < 1e-4 * A.diagonal().max()
+
+
+def test_bodies_take_from_the_water_what_they_give(cut):
+    """Newton's third law on the discrete level: mass balance (A x = rhs + G V) and load (-Gᵀ p) share one G, so that
+    the momentum of the pressure over the water is minus the load on bodies and walls."""
+    t = cut.topology
+    cells = cells_touching(np.ones(len(t.nodes), bool), t.cells)
+    p = t.nodes @ [1.0, -2.0, 0.5] + 3.0
+    gradient = cell_gradient(cells, p, t.cells, t.parent, t.gradients)
+    over_water = (t.volume[cells, None] * gradient).sum(axis=0)
+    faces = cut.mesh.boundary_faces
+    x = cut.mesh.nodes[faces]
+    assert cut.coupling.shape == (len(t.nodes), 12)
+    on_bodies = -(cut.coupling.T @ p).reshape(-1, 6)[:, :3].sum(axis=0)
+    on_whole_walls = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]) / 2 * p[faces].mean(axis=1)[:, None]
+    # the second body sticks out through the wall x = 1: compare the directions its opening does not face
+    np.testing.assert_allclose((on_bodies + on_whole_walls.sum(axis=0))[1:], over_water[1:], atol=1e-10)
