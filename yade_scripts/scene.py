@@ -39,6 +39,8 @@ VERLET = 0.05
 """Margin of the collision search as a share of the smallest edge of a block."""
 LIKE = 2.0
 """Mass ratio up to which the dashpots of the materials serve every pair (e within 0.02)."""
+INSTANT = 1e-200
+"""Length of a substep in which nothing moves [s]."""
 HOOK = "_surgebreak_substep"
 """Name under which YADE's PyRunner finds the joints (its command runs in __main__, which may belong to a test)."""
 STATE = 13
@@ -94,6 +96,8 @@ class Scene:
         self.plain_frame = self.frame.copy()
         """The same of a block before it became a clump."""
         self._count_seen = -1
+        self.is_still = False
+        """True during a substep of no length; the joints are not to be counted then."""
         self._materials: dict[tuple, object] = {}
         self._subdomain = engine.wrapper.Subdomain()
         self._add_planes(planes)
@@ -277,16 +281,23 @@ class Scene:
             self.collider.doSort = True
             self.newton.maxVelocitySq = 2.0 + self.newton.maxVelocitySq
 
-    def refresh_contacts(self) -> None:
-        """Bring the geometry and forces of the contacts to the present positions without changing their history.
+    def displace(self, rows: Array, shift: Array, turn: Array) -> None:
+        """Move the blocks `rows` by shift (m, 3) and turn (m, 3, 3) about their centres, with all their members."""
+        for row, move, Q in zip(rows, shift, turn):
+            centre = np.array(self.O.bodies[self.ids[row]].state.pos)
+            for member in {self.ids[row], self.box_id[row], *self.nodes[row]}:
+                state = self.O.bodies[member].state
+                state.pos = self._v(centre + move + Q @ (np.array(state.pos) - centre))
+                state.ori = self._q(Q @ _matrix(state.ori))
 
-        With dt = 0 the law adds nothing to the shear springs."""
-        if self.loop is None:
-            return
-        dt, self.O.dt = self.O.dt, 0.0
-        self.collider()
-        self.loop()
-        self.resetter()
+    def still_step(self) -> None:
+        """A substep of no length: contacts and clump members follow the present positions, nothing moves.
+
+        (Calling YADE's contact engine by hand instead would leave its forces to be counted twice.)"""
+        dt, self.O.dt = self.O.dt, INSTANT
+        self.is_still = True
+        self.O.step()
+        self.is_still = False
         self.O.dt = dt
 
     def contacts(self) -> list:
@@ -348,18 +359,12 @@ class Scene:
                 turn = _matrix(ori) @ self.plain_frame[row] @ self.frame[row].T
                 state.ori = self._q(turn)
             state.pos, state.vel, state.angVel, state.angMom = pos, vel, spin, momentum
-        self._place_members()
-        self.refresh_contacts()
+        self.search_contacts_now()
+        self.still_step()  # moves the clump members
+        self.search_contacts_now()
+        self.still_step()  # finds their contacts
         for i in self.contacts():
             i.phys.shearForce = saved.shear.get((i.id1, i.id2), self._v((0.0, 0.0, 0.0)))
-
-    def _place_members(self) -> None:
-        """Move clump members to their clumps: an integration step of no length."""
-        dt, self.O.dt = self.O.dt, 0.0
-        self.resetter()
-        self.newton()
-        self.O.dt = dt
-        self.search_contacts_now()
 
     def close(self) -> None:
         """Give the scene back; the structure cannot be used afterwards."""

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from yade_scripts import joint_kernel, tangent
@@ -248,6 +249,10 @@ class Structure:
 
     def _substep(self) -> None:
         """Between YADE's contact forces and its integration. Errors are kept: YADE would lose them."""
+        if self._scene.is_still:
+            if self._unlike:
+                self._scene.correct_dashpots()
+            return
         try:
             self._joint_step()
         except Exception as error:  # raised again by advance(): YADE's loop would lose it
@@ -321,6 +326,7 @@ class Structure:
         self._dt = self._scene.O.dt = dt / count
         self._read_all()
         self._release_moved()
+        self._arm_targets(dt)
         x0, R0, half, spin = self._x.copy(), self._R.copy(), self._half_step_place(), self._v[:, 3:].copy()
         self._fastest, self._broken = 0.0, []
         for _ in range(count):
@@ -354,7 +360,7 @@ class Structure:
                 f"block '{bad}' has no finite position at t = {self.time:.6g} s; use a shorter substep"
             )
         if self.contact is not None:
-            self._scene.refresh_contacts()
+            self._scene.still_step()
             self._contacts = None
 
     def _retire_broken(self) -> None:
@@ -393,6 +399,23 @@ class Structure:
             stored = self._joint_stored()
             self._turn_on_contact(newly)
             self._handed_over += stored - self._joint_stored()
+            self._update_rows()
+
+    def _arm_targets(self, dt: float) -> None:
+        """Give contact nodes to plain blocks that a loose block may reach within dt: nodes born inside another block
+        would add its penetration to the energy."""
+        plain = np.flatnonzero([not nodes for nodes in self._scene.nodes])
+        if self.contact is None or not len(plain) or not self._loose.any():
+            return
+        loose = np.flatnonzero(self._loose)
+        reach = self._radius + dt * np.linalg.norm(self._v[:, :3], axis=1)
+        tree = cKDTree(self._x[plain])
+        near = tree.query_ball_point(self._x[loose], reach[loose] + reach[plain].max())
+        hit = np.unique(np.concatenate([np.array(i, np.int64) for i in near]))
+        for row in plain[hit]:
+            self._scene.add_nodes(int(row))
+        if len(hit):
+            self._update_masks(plain[hit])
             self._update_rows()
 
     def _turn_on_contact(self, newly: Array) -> None:
@@ -490,6 +513,17 @@ class Structure:
             np.concatenate([self.joints.face_a[live], self.joints.face_b[live][inner]]),
             np.concatenate([half, half[inner]]),
         )
+
+    def displace(self, rows: Array, shift: Array, turn: Array) -> None:
+        """Move blocks at once: shift (m, 3) [m], turn (m, 3, 3) about their centres; the joints take note of what
+        opens, velocities stay, and the energy accounts start anew from here."""
+        self._scene.displace(rows, shift, turn)
+        self._read_all()
+        if self.joints is not None:
+            self._F[:] = 0.0
+            self.joints.forces(self._x, self._v, self._R, self._F, advance=True)
+            self._joint_work = -self._joint_stored() - self.law_dissipation()
+        self._start_energy = sum(self._mechanical().values())
 
     # ---- energies -------------------------------------------------------------------------------------------
 
