@@ -11,11 +11,11 @@ from coupler.history import read_history
 from coupler.view.palette import INK, LINES
 
 WIDTH = 6.9  # [inch] two columns of a journal
-PANEL = 1.75  # [inch]
+PANEL, LOW_PANEL = 1.75, 1.05  # [inch] height of a panel, and of one with a pure number
 LINES_PER_PANEL = len(LINES)
 FORMATS = ("pdf", "svg", "png")
 UNIT_TEXT = {"1": "–", "m3": "m³", "m2": "m²", "N s": "N·s"}
-PREFIXED = ("J", "N", "N s", "Pa", "W")
+PREFIXED = ("J", "N", "N s", "Pa", "W", "m", "m/s", "s")
 PREFIXES = {-2: "µ", -1: "m", 0: "", 1: "k", 2: "M", 3: "G", 4: "T"}
 SINCE_START = (
     "energy",
@@ -41,13 +41,20 @@ def plots(directory, folder):
 
 
 def grouped(history):
-    """Panels [(unit, [column names])] of the numbers that are not zero throughout, by unit, none too full."""
+    """Panels [(unit, [column names])] of the numbers that are not zero throughout, by unit, none too full.
+
+    Pure numbers get a panel each: a count and a share have no scale in common.
+    """
     shown = {}
     for column in history.columns:
         if column.name != "time" and column.unit and np.any(np.nan_to_num(changed(history, column.name))):
             shown.setdefault(column.unit, []).append(column.name)
-    return [(unit, names[i : i + LINES_PER_PANEL]) for unit, names in shown.items()
-            for i in range(0, len(names), LINES_PER_PANEL)]  # fmt: skip
+    return [
+        (unit, names[i : i + most])
+        for unit, names in shown.items()
+        for most in [1 if unit == "1" else LINES_PER_PANEL]
+        for i in range(0, len(names), most)
+    ]
 
 
 def changed(history, name):
@@ -60,9 +67,11 @@ def changed(history, name):
 def figure(history, panels, stem):
     """One figure, a panel under the other over the same time axis; saved in every format under `stem`."""
     with plt.rc_context(STYLE):
+        height = [LOW_PANEL if unit == "1" else PANEL for unit, _ in panels]
         drawing, axes = plt.subplots(
-            len(panels), 1, sharex=True, squeeze=False, figsize=(WIDTH, 0.35 + PANEL * len(panels))
+            len(panels), sharex=True, squeeze=False, figsize=(WIDTH, 0.35 + sum(height)), height_ratios=height
         )
+        drawing.align_ylabels(axes[:, 0])
         for axis, (unit, names) in zip(axes[:, 0], panels):
             panel(axis, history, unit, names)
         axes[-1, 0].set_xlabel("time [s]")

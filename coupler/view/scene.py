@@ -34,6 +34,7 @@ class Scene:
         self.lower, self.upper = bounds(run)
         self.fastest = nice_ceiling(fastest_water(run)) if run.water else 0.0
         self.light, self.fill = turned(SUN, azimuth + 90.0), turned(FILL, azimuth + 90.0)
+        self.ground = ground(self.lower, self.upper, run.tank is None)
         self.plotter = pv.Plotter(off_screen=True, window_size=size, lighting="none")
         self.plotter.set_background(palette.PAPER)
         self._set_lights()
@@ -49,6 +50,7 @@ class Scene:
         if self.run.water:
             self._draw_water(self.run.water.at(time))
         self._draw_time(time)
+        self.plotter.reset_camera_clipping_range()
         return time
 
     def picture(self):
@@ -94,7 +96,6 @@ class Scene:
         camera = self.plotter.camera
         camera.position, camera.focal_point, camera.up = view.position, view.focus, view.up
         camera.view_angle = view.view_angle
-        self.plotter.reset_camera_clipping_range()
 
     def _smooth(self, soft):
         """Smooth edges (2 x 2 samples a pixel) and, if `soft`, screen-space ambient occlusion: depth is seen."""
@@ -108,8 +109,7 @@ class Scene:
         return 2 * width * self.size[1] / 720
 
     def _draw_still_parts(self, azimuth):
-        margin = 0.06 * (self.upper - self.lower)[:2].max()
-        self.plotter.add_mesh(ground(self.lower, self.upper, margin), color=palette.GROUND, lighting=False)
+        self.plotter.add_mesh(self.ground, color=palette.GROUND, lighting=False)
         if self.run.solids is not None:
             self.plotter.add_mesh(
                 self.run.solids, color=palette.SOLID, show_edges=True, edge_color="#6b6b6b", ambient=0.3
@@ -174,14 +174,19 @@ class Scene:
         lettered(bar.GetLabelTextProperty())
 
     def _draw_shadow(self, mesh, name):
-        """The shadow that the sun throws on the ground: the mesh pressed flat along the light."""
+        """The shadow that the sun throws on the ground: the mesh pressed flat along the light, as far as the plate."""
         flat = pv.PolyData(
             mesh.points - (mesh.points[:, 2:] - self.lower[2]) * self.light / self.light[2], mesh.faces
         )
         flat.points[:, 2] = self.lower[2] + 1e-3 * (self.upper[2] - self.lower[2])
-        self.plotter.add_mesh(
-            flat, name=name, color=palette.SHADOW, lighting=False, reset_camera=False, render=False
-        )
+        x0, x1, y0, y1, *_ = self.ground.bounds
+        for way, edge in (((1, 0, 0), x1), ((-1, 0, 0), x0), ((0, 1, 0), y1), ((0, -1, 0), y0)):
+            flat = flat.clip(normal=way, origin=np.abs(way) * edge)
+        self.plotter.remove_actor(name, reset_camera=False, render=False)
+        if flat.n_cells:
+            self.plotter.add_mesh(
+                flat, name=name, color=palette.SHADOW, lighting=False, reset_camera=False, render=False
+            )
 
 
 def water_surface(water):
@@ -195,8 +200,9 @@ def water_surface(water):
     return mesh
 
 
-def ground(lower, upper, margin):
+def ground(lower, upper, room_for_shadows):
     """A plate under the scene, a little larger than it."""
+    margin = 0.06 * (upper - lower)[:2].max() + (0.15 * (upper - lower)[2] if room_for_shadows else 0.0)
     x = [lower[0] - margin, upper[0] + margin]
     y = [lower[1] - margin, upper[1] + margin]
     z = lower[2] - 2e-3 * (upper[2] - lower[2])
