@@ -5,6 +5,7 @@ apt, sudo, Python and the like are stand-ins on the PATH that write down how the
 
 import os
 import shutil
+import signal
 import subprocess
 import time
 
@@ -284,6 +285,29 @@ def test_packages_half_written_by_an_interrupted_set_up_are_thrown_away(machine)
     assert "an earlier set-up was interrupted; starting it again" in told
     assert not (machine.root / ".venv" / "half").exists()
     assert any(call.startswith("system-python -m venv") for call in calls)
+
+
+def test_ctrl_c_during_the_set_up_leaves_a_state_that_the_next_call_mends(machine):
+    """The launcher and pip get the signal together, as from a terminal."""
+    machine.ready().stub("slow", "#!/bin/sh\necho started >&2\nexec sleep 20\n")
+    machine.stub("make-venv", VENV.replace('[ -z "$PIP_FAILS" ]', 'sh "$STUBS/slow"'))
+    (machine.root.parent / "calls").touch()
+    child = subprocess.Popen(
+        [machine.root / "surgebreak", "run"], env=machine.environment, stderr=subprocess.PIPE, text=True,
+        start_new_session=True, preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )  # fmt: skip
+    log = machine.root / ".venv" / ".set-up" / "core.log"
+    until = time.monotonic() + 20
+    while not (log.exists() and "started" in log.read_text(encoding="utf-8")):
+        assert time.monotonic() < until
+        time.sleep(0.02)
+    os.killpg(child.pid, signal.SIGINT)
+    _, told = child.communicate(timeout=20)
+    assert child.returncode == 130
+    assert "interrupted; the next call starts this part again" in told
+    machine.stub("slow", "#!/bin/sh\n")
+    code, _, calls = machine("run")
+    assert (code, calls[-1]) == (0, "surgebreak run")
 
 
 def test_a_folder_that_cannot_be_written(machine):
