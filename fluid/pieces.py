@@ -31,7 +31,7 @@ class Workspace(NamedTuple):
 
     x: np.ndarray  # (vertices, 7) barycentric coordinates, then position relative to node 0 of the cell
     distance: np.ndarray  # (vertices,) to the plane in hand, 0 where snapped
-    following: np.ndarray  # (vertices,) next vertex of the cap in hand
+    cap: np.ndarray  # (2, edges, 2) edges of the cross-section in hand, for the outer and the inner half
     edge: np.ndarray  # (vertices, 2) the edge a new vertex lies on
     loop: np.ndarray  # (pieces, faces, corners)
     size: np.ndarray  # (pieces, faces) corners of each face
@@ -54,7 +54,7 @@ def workspace(scale: int, n_bodies: int, n_planes: int) -> Workspace:
     return Workspace(
         np.empty((vertices, 7)),
         np.zeros(vertices),
-        np.zeros(vertices, dtype=np.int32),
+        np.zeros((2, 4 * corners, 2), dtype=np.int32),
         np.zeros((vertices, 2), dtype=np.int32),
         np.zeros((pieces, loops, corners), dtype=np.int32),
         np.zeros((pieces, loops), dtype=np.int32),
@@ -135,24 +135,52 @@ def _edge_vertex(w, a, b, first_new, n_vertices):
 
 
 @inner
-def _close_caps(w, outer, inner, first, edges, plane):
-    """Close both halves of a split piece by the polygon of its cross-section."""
-    f_out, f_in = w.faces[outer], w.faces[inner]
+def _add_cap_edges(w, piece, f, side, count):
+    """Edges of a face that lie in the plane, reversed, are edges of the cap -> their number.
+
+    Where two faces meet in an edge of the plane its two directions cancel."""
+    a = w.loop[piece, f, w.size[piece, f] - 1]
+    for k in range(w.size[piece, f]):
+        b = w.loop[piece, f, k]
+        if w.distance[a] == 0.0 and w.distance[b] == 0.0:
+            e = 0
+            while e < count and not (w.cap[side, e, 0] == a and w.cap[side, e, 1] == b):
+                e += 1
+            if e < count:
+                count -= 1
+                w.cap[side, e, 0], w.cap[side, e, 1] = w.cap[side, count, 0], w.cap[side, count, 1]
+            else:
+                w.cap[side, e, 0], w.cap[side, e, 1] = b, a
+                count += 1
+        a = b
+    return count
+
+
+@inner
+def _close_cap(w, piece, side, edges, tag):
+    """Chain the edges of the cap into the last face of a piece -> state."""
+    f = w.faces[piece]
+    if edges > w.loop.shape[2]:
+        return WORKSPACE_FULL
+    if edges < 3:
+        return BROKEN_CAP
+    first = w.cap[side, 0, 0]
     v = first
     for k in range(edges):
         if k > 0 and v == first:
             return BROKEN_CAP
-        w.loop[inner, f_in, k] = v
-        w.loop[outer, f_out, edges - 1 - k] = v
-        v = w.following[v]
-    if v != first or edges < 3:
+        w.loop[piece, f, k] = v
+        e = 0
+        while e < edges and w.cap[side, e, 0] != v:
+            e += 1
+        if e == edges:
+            return BROKEN_CAP
+        v = w.cap[side, e, 1]
+    if v != first:
         return BROKEN_CAP
-    w.size[inner, f_in] = edges
-    w.size[outer, f_out] = edges
-    w.tag[inner, f_in] = 2 * plane + 1
-    w.tag[outer, f_out] = 2 * plane
-    w.faces[inner] += 1
-    w.faces[outer] += 1
+    w.size[piece, f] = edges
+    w.tag[piece, f] = tag
+    w.faces[piece] = f + 1
     return DONE
 
 
@@ -163,10 +191,10 @@ def split(w, piece, outer, inner, plane, n_vertices):
     if w.faces[piece] + 1 > w.loop.shape[1] or n_vertices + w.loop.shape[1] * 2 > len(w.x):
         return WORKSPACE_FULL, n_vertices
     first_new = n_vertices
-    f_out, f_in, edges, first = 0, 0, 0, -1
+    f_out, f_in, edges_out, edges_in = 0, 0, 0, 0
     for f in range(w.faces[piece]):
         corners = w.size[piece, f]
-        if corners + 2 > capacity:
+        if corners + 2 > capacity or max(edges_out, edges_in) + capacity > w.cap.shape[1]:
             return WORKSPACE_FULL, n_vertices
         n_out, n_in, outside, inside = 0, 0, False, False
         a = w.loop[piece, f, corners - 1]
@@ -190,24 +218,19 @@ def split(w, piece, outer, inner, plane, n_vertices):
         if outside:
             w.size[outer, f_out] = n_out
             w.tag[outer, f_out] = w.tag[piece, f]
+            edges_out = _add_cap_edges(w, outer, f_out, 0, edges_out)
             f_out += 1
         if inside:
-            a = w.loop[inner, f_in, n_in - 1]
-            for k in range(n_in):
-                b = w.loop[inner, f_in, k]
-                if w.distance[a] == 0.0 and w.distance[b] == 0.0:
-                    w.following[b] = a
-                    first = b
-                    edges += 1
-                a = b
             w.size[inner, f_in] = n_in
             w.tag[inner, f_in] = w.tag[piece, f]
+            edges_in = _add_cap_edges(w, inner, f_in, 1, edges_in)
             f_in += 1
     w.faces[outer] = f_out
     w.faces[inner] = f_in
-    if edges > capacity or f_out + 1 > w.loop.shape[1] or f_in + 1 > w.loop.shape[1]:
-        return WORKSPACE_FULL, n_vertices
-    return _close_caps(w, outer, inner, first, edges, plane), n_vertices
+    state = _close_cap(w, outer, 0, edges_out, 2 * plane)
+    if state == DONE:
+        state = _close_cap(w, inner, 1, edges_in, 2 * plane + 1)
+    return state, n_vertices
 
 
 @inner
