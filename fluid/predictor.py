@@ -101,7 +101,14 @@ def _new_surface(water, phi, carried, conserved):
     phi = redistance(t, phi, h, rescale=(water.steps % RESCALE_EVERY == RESCALE_EVERY - 1))
     before = nodal_volume(t, phi)
     corrected = correct_volume(
-        t, water.graph, water.listed, phi, carried, conserved, water.parameters.correction_length, h
+        t,
+        water.graph_for(water.listed),
+        water.listed,
+        phi,
+        carried,
+        conserved,
+        water.parameters.correction_length,
+        h,
     )
     return corrected, before
 
@@ -115,7 +122,9 @@ def _problem(water, dt, theta, kick, surface, uncorrected, conserved, u_adv, u_s
     star = cell_velocity(cells, u_star, remainder, t.cells, t.share)
     rhs = inflow(cells, star, t.cells, t.parent, t.gradients, t.volume, len(phi))
     dofs = np.flatnonzero(wet & ~water._walls.open_node)
-    matrix, anchored = pressure_matrix(water.graph, phi, dofs, water._walls.open_node, dt / density)
+    matrix, anchored = pressure_matrix(
+        water.graph_for(water.listed), phi, dofs, water._walls.open_node, dt / density
+    )
     known = (1.0 - theta) * kick[dofs] * water.pressure[dofs]
     guess = theta * water.pressure[dofs]
     matrix, extra = _sealed(water, matrix, anchored, dofs, dt, guess)

@@ -57,7 +57,7 @@ class Topology:
             size=np.cbrt(6.0 * full),
             node_start=start,
             node_cells=members,
-            neighbours=_neighbours(mesh.neighbours, cells, parent, len(mesh.cells)),
+            neighbours=_neighbours_in(mesh, nodes, cells, parent),
             node_volume=np.bincount(
                 cells.ravel(), (domain.volume[:, None] * share).ravel(), minlength=len(nodes)
             ),
@@ -115,6 +115,15 @@ def _cells_of_nodes(cells, n):
             members[filled[i]] = e
             filled[i] += 1
     return start, members
+
+
+def _neighbours_in(mesh, nodes, cells, parent):
+    """neighbours (M, 4); where every node is its background node, those of the parents, renumbered."""
+    if len(nodes) > len(mesh.nodes):
+        return _neighbours(mesh.neighbours, cells, parent, len(mesh.cells))
+    row = np.full(len(mesh.cells) + 1, -1, np.int64)  # the last entry answers for "no neighbour", -1
+    row[parent] = np.arange(len(parent))
+    return row[mesh.neighbours[parent]]
 
 
 @njit(cache=True)
@@ -188,6 +197,10 @@ class Graph:
     start: np.ndarray
     neighbour: np.ndarray
     stiffness: np.ndarray
+
+    def covers(self, nodes) -> bool:
+        """Whether all these nodes (n,) are listed."""
+        return bool((self.row[nodes] >= 0).all())
 
     @classmethod
     def of(cls, topology: Topology, nodes) -> Graph:

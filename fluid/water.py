@@ -13,6 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
 from fluid.corrector import Corrected, corrected
 from fluid.domain import carry, wetted_coupling
@@ -89,7 +90,7 @@ class Water:
         self.conserved_volume = float(self.nodal_water.sum())
         self.initial_volume = self.conserved_volume
         self._find_band()
-        self.flux = edge_flux(self.topology, self.graph, self.listed, self.cell_velocity)
+        self.flux = edge_flux(self.topology, self.graph_for(self.listed), self.listed, self.cell_velocity)
 
     # ---- the step
 
@@ -117,7 +118,7 @@ class Water:
         self.velocity, self.acceleration, self.pressure = new.velocity, new.acceleration, new.pressure
         self.remainder, self.kick_remainder = new.remainder, new.kick_remainder
         self.cell_velocity, self.flux = new.cell_velocity, new.flux
-        self.listed, self.layer_start, self.graph = new.listed, new.layer_start, new.flux.graph
+        self.listed, self.layer_start = new.listed, new.layer_start
         self.conserved_volume = problem.predicted.conserved_volume
         self.report = new.report
         self.time += problem.dt
@@ -136,12 +137,11 @@ class Water:
         known = (source >= 0) & old_topology.active[source]
         self._carry_nodes(source, known)
         self._carry_cells(old_topology)
+        self._find_band()
         if not np.array_equal(source, np.arange(len(source))):
+            # nodes were renumbered: the flux of the last step is laid out anew
             self.nodal_water = nodal_volume(self.topology, self.level_set)
-            self._find_band()
-            self.flux = edge_flux(self.topology, self.graph, self.listed, self.cell_velocity)
-        else:
-            self._find_band()
+            self.flux = edge_flux(self.topology, self.graph_for(self.listed), self.listed, self.cell_velocity)
 
     def _carry_nodes(self, source, known):
         fields = [self.level_set[:, None], self.velocity, self.acceleration, self.pressure[:, None]]
@@ -152,13 +152,13 @@ class Water:
         self._walls.slip(self.velocity)
 
     def _carry_cells(self, old: Topology):
-        """Cell fields go to the cell of the same parent (of several covers: to the nearest in its corners)."""
-        source = _same_cells(old, self.topology)
-        found = source >= 0
+        """Cell fields go to the cell of the same parent (of several covers: the first)."""
+        if np.array_equal(old.parent, self.topology.parent):
+            return
+        source = same_cells(old.parent, self.topology.parent, len(self.mesh.cells))
         for name in ("cell_velocity", "remainder", "kick_remainder"):
-            moved = np.where(found[:, None], getattr(self, name)[source], 0.0)
-            setattr(self, name, moved)
-        fresh = np.flatnonzero(~found)
+            setattr(self, name, carried_rows(source, getattr(self, name)))
+        fresh = np.flatnonzero(source < 0)
         self.cell_velocity[fresh] = self.velocity[self.topology.cells[fresh]].mean(axis=1)
 
     # ---- layout
@@ -169,26 +169,24 @@ class Water:
         self.coupling = wetted_coupling(domain).tocsr()
         self._walls = self._sides.on_copies(domain.parent_node)
         self._domain_is_new = True
-        self._whole_graph = None
+        self._graph = None
 
     def _find_band(self) -> None:
-        """The nodes that the step works on, the water and its layers, and their edges."""
-        wet = (self.level_set < 0.0) & self.topology.active
-        self.listed, self.layer_start = self.layers(wet)
-        self.graph = self.graph_of(self.listed)
+        """The nodes that the step works on: the water and the layers around it."""
+        self.listed, self.layer_start = self.layers((self.level_set < 0.0) & self.topology.active)
 
     def layers(self, wet):
         """Wet nodes, then BAND layers around them: (list, layer_start)."""
         t = self.topology
         return layers_around(wet, BAND, t.cells, t.node_start, t.node_cells)
 
-    def graph_of(self, listed) -> Graph:
-        """Edges of the listed nodes; of all nodes, once, when the solids have stood still for a step."""
-        if self._domain_is_new:
-            return Graph.of(self.topology, listed)
-        if self._whole_graph is None:
-            self._whole_graph = Graph.of(self.topology, np.flatnonzero(self.topology.active))
-        return self._whole_graph
+    def graph_for(self, nodes) -> Graph:
+        """A graph that lists these nodes: the one at hand if it does; of all nodes, once, when the solids have
+        stood still for a step."""
+        if self._graph is None or not self._graph.covers(nodes):
+            every = nodes if self._domain_is_new else np.flatnonzero(self.topology.active)
+            self._graph = Graph.of(self.topology, every)
+        return self._graph
 
     def _pressure_at_rest(self):
         """ρ g times the depth (N,) [Pa] below the highest water: a first guess, and the level of closed pockets."""
@@ -237,9 +235,21 @@ def kinetic_energy(density: float, nodal_water, velocity) -> float:
     return float(0.5 * density * (nodal_water @ np.einsum("ij,ij->i", velocity, velocity)))
 
 
-def _same_cells(old: Topology, new: Topology):
-    """Row of the old cell with the same parent for each new one, -1 if none; of copies the one sharing a node."""
-    size = int(max(old.parent.max(), new.parent.max())) + 1
-    row = np.full(size, -1, np.int64)
-    row[old.parent[::-1]] = np.arange(len(old.parent))[::-1]
-    return row[new.parent]
+@njit(cache=True)
+def same_cells(old_parent, new_parent, n_parents):
+    """Row of the old cell with the same parent for each new one (n,), -1 if none; of several the first."""
+    row = np.full(n_parents, -1, np.int64)
+    for e in range(old_parent.shape[0] - 1, -1, -1):
+        row[old_parent[e]] = e
+    return row[new_parent]
+
+
+@njit(cache=True)
+def carried_rows(source, field):
+    """field[source] (n, 3), zero where source is -1."""
+    out = np.zeros((source.shape[0], 3))
+    for e in range(source.shape[0]):
+        if source[e] >= 0:
+            for k in range(3):
+                out[e, k] = field[source[e], k]
+    return out
