@@ -157,7 +157,7 @@ def _same_side(
                 distance += (x[c] - centroid[o, c]) ** 2
             if distance >= nearest:
                 continue
-            if body < 0 or not _blocked(
+            if body < 0 or not blocked(
                 x, centroid[o], normals, offsets, plane_start[body], plane_start[body + 1]
             ):
                 nearest = distance
@@ -179,7 +179,7 @@ def _carry_back(x, centre, rotation, new_centre, new_rotation, local):
 
 
 @inner
-def _blocked(a, b, normals, offsets, start, end):
+def blocked(a, b, normals, offsets, start, end):
     """Does the segment from a to b pass through the body with planes start:end?"""
     enter, leave = 0.0, 1.0
     for g in range(start, end):
