@@ -98,20 +98,28 @@ def cut_domain(
 ) -> PhysicalDomain:
     """Cut the background mesh by the bodies.
 
-    previous: a domain of the same mesh with as many bodies; with moved (n_bodies,) bool only the cells near
-    bodies that moved (old or new position) are cut again, which gives the same domain bit for bit as a full
-    cut, provided the planes of the bodies that did not move are the same bit for bit.
+    previous: a domain of the same mesh and bodies. Only cells near bodies whose planes changed since (old or
+    new position, growth too) are cut again, which gives the same domain bit for bit as a full cut.
+    moved (n_bodies,) bool: bodies to cut again in any case; not needed.
     connection: thresholds of the multiple covers (default: connect over any area)."""
     if covers not in ("single", "multiple"):
         raise ValueError(f"covers = {covers!r} is unknown; choose 'single' or 'multiple'")
     connection = connection or Connection()
     memory = _remembered(mesh, bodies, covers, previous, connection)
-    if memory is None or moved is None:
-        whole = memory.whole if memory else whole_cells(mesh)
-        memory = _cut_all(mesh, bodies, whole, covers, connection)
+    if memory is None:
+        memory = _cut_all(mesh, bodies, covers, connection)
     else:
-        memory = _cut_moved(memory, bodies, np.asarray(moved, dtype=bool), covers)
+        changed = changed_bodies(memory.bodies, bodies)
+        memory = _cut_moved(memory, bodies, changed if moved is None else changed | moved, covers)
     return _assembled(memory, covers)
+
+
+def changed_bodies(old: ConvexBodies, new: ConvexBodies) -> np.ndarray:
+    """(n,) bool: some plane of the body differs, in direction, position or growth."""
+    if len(new) == 0:
+        return np.zeros(0, dtype=bool)
+    planes = (old.normals != new.normals).any(axis=1) | (old.cut_offsets() != new.cut_offsets())
+    return np.logical_or.reduceat(planes, new.plane_start[:-1])
 
 
 def whole_cells(mesh) -> WholeCells:
@@ -183,19 +191,19 @@ def _remembered(mesh, bodies, covers, previous, connection):
             "cut_domain: `previous` belongs to another mesh, other covers or other thresholds; "
             "pass previous=None to start afresh"
         )
-    if len(memory.bodies) != len(bodies):
+    if not np.array_equal(memory.bodies.plane_start, bodies.plane_start):
         raise ValueError(
-            f"cut_domain: `previous` holds {len(memory.bodies)} bodies, now there are {len(bodies)}; "
-            "pass previous=None when bodies come or go"
+            f"cut_domain: `previous` holds {len(memory.bodies)} bodies of other shapes than the {len(bodies)} now; "
+            "pass previous=None when bodies come, go or change their faces"
         )
     return memory
 
 
-def _cut_all(mesh, bodies, whole, covers, connection):
+def _cut_all(mesh, bodies, covers, connection):
     every = np.arange(len(bodies))
     cell, body = near_pairs(mesh, bodies, every, SEARCH_MARGIN * mesh.spacing)
     cuts = _cut_pairs(mesh, bodies, cell, body, covers, connection)
-    return Memory(mesh, bodies, whole, cell, body, cuts, connection)
+    return Memory(mesh, bodies, whole_cells(mesh), cell, body, cuts, connection)
 
 
 def _cut_moved(memory, bodies, moved, covers):

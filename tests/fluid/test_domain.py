@@ -104,5 +104,28 @@ def test_cutting_again_near_moved_bodies_equals_a_full_cut():
         moved = rng.random(n) < (0.3 if step else 0.0)
         centre = centre + moved[:, None] * rng.normal(0, 0.4, (n, 3))
         bodies = reference.moved(centre, rotation)
-        domain = cut_domain(MESH, bodies, previous=domain, moved=moved)
+        domain = cut_domain(MESH, bodies, previous=domain)
         same(domain, cut_domain(MESH, bodies))
+
+
+def test_a_joint_that_opens_is_cut_again():
+    """A change of growth alone counts as a change of the body; cells away from it are left alone."""
+    bodies = ConvexBodies.boxes([[1.6, 2, 2], [2.602, 2, 2]], np.ones((2, 3)))
+    growth = np.zeros(12)
+    growth[[3, 6]] = 2e-3
+    closed = cut_domain(MESH, bodies.grown(growth))
+    opened = cut_domain(MESH, bodies, previous=closed)
+    same(opened, cut_domain(MESH, bodies))
+    assert opened.face_area.sum() == pytest.approx(12, rel=1e-12)
+    assert closed.face_area.sum() == pytest.approx(10.008, rel=1e-12)
+
+
+def test_a_foreign_previous_domain_is_refused():
+    two = ConvexBodies.boxes([[1, 1, 1], [2.5, 2.5, 2.5]], np.ones((2, 3)))
+    domain = cut_domain(MESH, two)
+    with pytest.raises(ValueError, match="previous=None"):
+        cut_domain(MESH, EMPTY, previous=domain)
+    with pytest.raises(ValueError, match="previous=None"):
+        cut_domain(MESH, two, "multiple", previous=domain)
+    with pytest.raises(ValueError, match="choose 'single' or 'multiple'"):
+        cut_domain(MESH, two, "double")
