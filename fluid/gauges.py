@@ -15,7 +15,7 @@ SAMPLES_PER_CELL = 4
 
 
 def level(water, xy) -> float:
-    """Height z [m] of the highest free surface above the place xy (2,) [m]; the floor where it is dry.
+    """Height [m] above the floor of the tank of the highest free surface over xy (2,) [m]; 0 where it is dry.
 
     φ is read on a vertical line, SAMPLES_PER_CELL a cell, and its highest zero taken between two samples."""
     low, high = water.mesh.bounds[:, 2]
@@ -24,34 +24,34 @@ def level(water, xy) -> float:
     phi = level_set_at(water, np.column_stack([np.full(count, xy[0]), np.full(count, xy[1]), z]))
     wet = np.flatnonzero(phi < 0.0)
     if len(wet) == 0:
-        return float(low)
+        return 0.0
     top = wet[-1]
     if top + 1 == count or not np.isfinite(phi[top + 1]):
-        return float(z[top])
-    return float(z[top] + (z[top + 1] - z[top]) * phi[top] / (phi[top] - phi[top + 1]))
+        return float(z[top] - low)
+    return float(z[top] - low + (z[top + 1] - z[top]) * phi[top] / (phi[top] - phi[top + 1]))
 
 
-def pressure_at(water, points) -> np.ndarray:
-    """Pressure [Pa] at points (m, 3) [m] → (m,); 0 in the air."""
-    points = np.atleast_2d(points)
+def pressure(water, points):
+    """Pressure [Pa] at points (m, 3) or (3,) [m] → (m,) or a number; 0 in the air, NaN inside a solid."""
     p = _interpolated(water, points, water.pressure[:, None])[:, 0]
-    return np.where(level_set_at(water, points) < 0.0, p, 0.0)
+    p = np.where(level_set_at(water, points) >= 0.0, 0.0, p)
+    return p if np.ndim(points) == 2 else float(p[0])
 
 
-def velocity_at(water, points) -> np.ndarray:
-    """Velocity [m/s] at points (m, 3) [m] → (m, 3); 0 in the air."""
-    points = np.atleast_2d(points)
+def velocity(water, points):
+    """Velocity [m/s] at points (m, 3) or (3,) [m] → the same shape; 0 in the air, NaN inside a solid."""
     u = _interpolated(water, points, water.velocity)
-    return np.where(level_set_at(water, points)[:, None] < 0.0, u, 0.0)
+    u = np.where(level_set_at(water, points)[:, None] >= 0.0, 0.0, u)
+    return u if np.ndim(points) == 2 else u[0]
 
 
 def level_set_at(water, points) -> np.ndarray:
     """φ [m] at points (m, 3) [m] → (m,), negative in the water."""
-    return _interpolated(water, np.atleast_2d(points), water.level_set[:, None])[:, 0]
+    return _interpolated(water, points, water.level_set[:, None])[:, 0]
 
 
-def volume_in(water, lower, upper) -> float:
-    """Water [m³] in the cells whose centroid lies in the box lower, upper (3,) [m]."""
+def volume_in_box(water, lower, upper) -> float:
+    """Water [m³] in the cells whose centre lies in the box lower, upper (3,) [m]: sharp to one cell."""
     t = water.topology
     cells = cells_touching(water.level_set < 0.0, t.cells)
     centre = t.nodes[t.cells[cells]].mean(axis=1)
@@ -61,25 +61,21 @@ def volume_in(water, lower, upper) -> float:
 
 
 def _interpolated(water, points, field):
-    """P1 value (m, k) of field (N, k) at points (m, 3); NaN inside solids. Raises Outside."""
-    cell = water.mesh.locate(points)
-    if np.any(cell < 0):
-        place = points[np.flatnonzero(cell < 0)[0]]
+    """P1 value (m, k) of field (N, k) at points (m, 3) or (3,); NaN inside solids. Raises Outside.
+
+    A point on the face of a solid may be found in the cell behind it: then the cell beside that one answers."""
+    points = np.atleast_2d(np.asarray(points, float))
+    parent = water.mesh.locate(points)
+    if np.any(parent < 0):
         low, high = water.mesh.bounds
-        raise Outside(f"gauge at {place} lies outside the tank {low} to {high}")
-    row = _row_of_parent(water)[cell]
-    found = row >= 0
-    value = np.full((len(points), field.shape[1]), np.nan)
-    corners = water.topology.cells[row[found]]
-    g = water.mesh.gradients[cell[found]]
-    weight = np.einsum("mak,mk->ma", g, points[found] - water.topology.nodes[corners[:, 0]])
+        place = points[np.flatnonzero(parent < 0)[0]]
+        raise Outside(f"gauge at {place} lies outside the tank {low} to {high}; move it inside")
+    row = water.topology.row_of_parent
+    beside = row[np.append(parent[:, None], water.mesh.neighbours[parent], axis=1)]
+    cell = beside[np.arange(len(points)), np.argmax(beside >= 0, axis=1)]
+    corners = water.topology.cells[cell]
+    g = water.mesh.gradients[water.topology.parent[cell]]
+    weight = np.einsum("mak,mk->ma", g, points - water.topology.nodes[corners[:, 0]])
     weight[:, 0] += 1.0
-    value[found] = np.einsum("ma,mak->mk", weight, field[corners])
-    return value
-
-
-def _row_of_parent(water):
-    """Row of the (first) cell of each background cell, -1 inside solids."""
-    row = np.full(len(water.mesh.cells), -1)
-    row[water.topology.parent[::-1]] = np.arange(len(water.topology.parent))[::-1]
-    return row
+    value = np.einsum("ma,mak->mk", weight, field[corners])
+    return np.where(cell[:, None] >= 0, value, np.nan)

@@ -7,6 +7,7 @@ corners), so that nothing geometric is recomputed when solids move.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numba import njit
@@ -64,6 +65,13 @@ class Topology:
             covered=covered_nodes(domain),
             beside_solid=np.isin(np.arange(len(nodes)), cells[domain.is_cut]),
         )
+
+    @cached_property
+    def row_of_parent(self) -> np.ndarray:
+        """Row of the (first) cell of each background cell, -1 inside solids; a last -1 for "no cell"."""
+        row = np.full(self.gradients.shape[0] + 1, -1, np.int64)
+        row[self.parent[::-1]] = np.arange(len(self.parent))[::-1]
+        return row
 
     @property
     def active(self) -> np.ndarray:

@@ -40,7 +40,11 @@ class Walls:
         place[self.nodes] = np.arange(len(self.nodes))
         copies = np.flatnonzero(place[parent_node] >= 0)
         projector = self.projector[place[parent_node[copies]]]
-        return Walls(copies, projector, self.open_node[parent_node], self.open_faces, self.open_area)
+        first = np.full(len(self.open_node), -1)
+        first[parent_node[::-1]] = np.arange(len(parent_node))[::-1]
+        faces = first[self.open_faces]
+        kept = (faces >= 0).all(axis=1)
+        return Walls(copies, projector, self.open_node[parent_node], faces[kept], self.open_area[kept])
 
     def slip(self, u) -> None:
         """Take the part into the closed sides off u (N, 3), in place."""

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from fluid import gauges
+from fluid.bodies import ConvexBodies
 from tests.fluid.scenes import advance, tank
 
 
@@ -20,19 +21,29 @@ def test_level(pool):
 
 
 def test_pressure_at_depth_and_in_the_air(pool):
-    p = gauges.pressure_at(pool, [[0.3, 0.4, 0.1], [0.3, 0.4, 0.9]])
+    p = gauges.pressure(pool, [[0.3, 0.4, 0.1], [0.3, 0.4, 0.9]])
     np.testing.assert_allclose(p, [9810 * 0.337, 0.0], rtol=1e-6)
 
 
 def test_velocity_at_rest(pool):
-    assert np.abs(gauges.velocity_at(pool, [[0.3, 0.4, 0.1]])).max() < 1e-9
+    assert np.abs(gauges.velocity(pool, [[0.3, 0.4, 0.1]])).max() < 1e-9
 
 
 def test_volume_of_all_and_of_a_half(pool):
-    np.testing.assert_allclose(gauges.volume_in(pool, [0, 0, 0], [1, 1, 1]), 0.437, rtol=1e-9)
-    np.testing.assert_allclose(gauges.volume_in(pool, [0, 0, 0], [0.5, 1, 1]), 0.437 / 2, rtol=1e-9)
+    np.testing.assert_allclose(gauges.volume_in_box(pool, [0, 0, 0], [1, 1, 1]), 0.437, rtol=1e-9)
+    np.testing.assert_allclose(gauges.volume_in_box(pool, [0, 0, 0], [0.5, 1, 1]), 0.437 / 2, rtol=1e-9)
 
 
 def test_gauge_outside_the_tank_is_refused(pool):
     with pytest.raises(gauges.Outside, match="lies outside the tank"):
-        gauges.pressure_at(pool, [[2.0, 0.5, 0.5]])
+        gauges.pressure(pool, [[2.0, 0.5, 0.5]])
+
+
+def test_pressure_on_the_face_of_a_solid():
+    """A gauge on the wall of a box that is flush with cell faces reads the water, one inside reads nothing."""
+    box = ConvexBodies.boxes(np.array([[0.5, 0.5, 0.25]]), np.array([[0.5, 0.5, 0.5]]))
+    water = tank([1, 1, 1], 0.125, lambda x: x[:, 2] - 0.8, box)
+    advance(water, 0.01)
+    for x in (0.25, 0.75):
+        np.testing.assert_allclose(gauges.pressure(water, [x, 0.5, 0.3]), 9810 * 0.5, rtol=1e-6)
+    assert np.isnan(gauges.pressure(water, [0.5, 0.5, 0.25]))
