@@ -3,9 +3,9 @@
     C = 2 ζ sqrt(m K),   ζ_paper = |ln e| / sqrt(ln² e + π²)                                              (3)
 
 m: effective mass of the pair. Equation (3) returns e when the dashpot may pull at the end of the contact. A contact
-that cannot pull ends when the force is zero, and returns (Schwager and Pöschel, Granular Matter 9 (2007) 465)
+that cannot pull ends when its force is zero, after the phase τ (Schwager and Pöschel, Granular Matter 9 (2007) 465):
 
-    e(ζ) = exp(-ζ/s · (π - arctan(2 ζ s / (2 ζ² - 1)) ...)),  s = sqrt(1 - ζ²)
+    e(ζ) = exp(-ζ τ),   tan(s τ) = 2 ζ s / (2 ζ² - 1),   s = sqrt(1 - ζ²)
 
 so `rule = "exact"` inverts this for ζ. A face is carried by several node contacts: each gets its share of K and C.
 """

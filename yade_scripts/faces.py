@@ -111,7 +111,7 @@ def _plane_faces(block: Block, world, a: int, p: int, plane: FixedPlane) -> list
 
 
 def clip(subject: Array, window: Array, normal: Array) -> Array:
-    """Part of the convex polygon `subject` (k, 3) inside `window` (l, 3); both in one plane, same sense about normal."""
+    """Part of the convex polygon `subject` (k, 3) inside `window` (l, 3); one plane, same sense about normal."""
     for start, end in zip(window, np.roll(window, -1, axis=0)):
         if len(subject) == 0:
             break

@@ -95,7 +95,6 @@ class Scene:
         """Fixed turn from the block frame to YADE's principal frame."""
         self.plain_frame = self.frame.copy()
         """The same of a block before it became a clump."""
-        self._count_seen = -1
         self.is_still = False
         """True during a substep of no length; the joints are not to be counted then."""
         self._materials: dict[tuple, object] = {}
@@ -267,6 +266,11 @@ class Scene:
         deque(map(forces.addF, ids, F[:, :3].tolist()), maxlen=0)
         deque(map(forces.addT, ids, F[:, 3:].tolist()), maxlen=0)
 
+    def set_motion(self, row: int, motion: Array) -> None:
+        """Velocity and spin (6,) of a block whose motion is prescribed."""
+        state = self.O.bodies[self.ids[row]].state
+        state.vel, state.angVel = self._v(motion[:3]), self._v(motion[3:])
+
     def set_masks(self, row: int, loose: bool, grounded: bool) -> None:
         """Meeting rules of a block by its state (see the module text)."""
         bodies = self.O.bodies
@@ -304,20 +308,16 @@ class Scene:
         """Real interactions between a node and a box, of this substep."""
         return [i for i in self.O.interactions if i.isReal] if self.loop is not None else []
 
-    def correct_dashpots(self, fresh_only: bool = True) -> None:
+    def correct_dashpots(self) -> None:
         """Give new contacts the dashpot of their own pair, C = 2 ζ sqrt(m K) / points with the effective mass.
 
         The materials in series give it for equal masses and for planes; this is for blocks of unlike mass."""
-        if self.law is None or self.O.interactions.countReal() == self._count_seen:
-            return
         now = self.O.iter
-        for i in self.contacts():
-            if not fresh_only or i.iterMadeReal == now:
-                a, b = self.row_of[i.id1], self.row_of[i.id2]
-                if a >= 0 and b >= 0:
-                    phys, c = i.phys, self.pair_dashpot(a, b)
-                    phys.cn, phys.cs = c, c * np.sqrt(self.law.shear_ratio)
-        self._count_seen = self.O.interactions.countReal()
+        for i in [i for i in self.O.interactions if i.iterMadeReal == now]:
+            a, b = self.row_of[i.id1], self.row_of[i.id2]
+            if a >= 0 and b >= 0:
+                phys, c = i.phys, self.pair_dashpot(a, b)
+                phys.cn, phys.cs = c, c * np.sqrt(self.law.shear_ratio)
 
     def pair_dashpot(self, a: int, b: int) -> float:
         """Dashpot of one node contact between two blocks [N s/m]."""
@@ -361,8 +361,8 @@ class Scene:
             state.pos, state.vel, state.angVel, state.angMom = pos, vel, spin, momentum
         self.search_contacts_now()
         self.still_step()  # moves the clump members
-        self.search_contacts_now()
-        self.still_step()  # finds their contacts
+        self.O.interactions.clear()  # contacts that the masks no longer allow would stay otherwise
+        self.still_step()  # finds the contacts of the members where they are now
         for i in self.contacts():
             i.phys.shearForce = saved.shear.get((i.id1, i.id2), self._v((0.0, 0.0, 0.0)))
 

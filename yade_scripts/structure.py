@@ -14,10 +14,17 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from yade_scripts import joint_kernel, tangent
-from yade_scripts.blocks import Block, BlockError, polygon_area_vector
+from yade_scripts.blocks import Block, BlockError
 from yade_scripts.cohesion import JointParameters
-from yade_scripts.contact import ContactError, ContactLaw
+from yade_scripts.contact import ContactLaw
 from yade_scripts.contact_state import Contacts, read_contacts, sum_on_blocks
+from yade_scripts.description import (
+    check_boxes,
+    check_names,
+    local_origin,
+    matched_stiffness,
+    moved_block,
+)
 from yade_scripts.engine import load_yade
 from yade_scripts.faces import FixedPlane, touching_faces
 from yade_scripts.joints import Joints, JointTable
@@ -28,15 +35,8 @@ from yade_scripts.timestep import SubstepLimit, substep_limit
 Array = np.ndarray
 
 GRAVITY = (0.0, 0.0, -9.81)
-FAR = 1e3
-"""Scenes farther than this from the origin [m] are computed about a local one."""
-
 STANDS = 0.02
 """A joined block stands in its place as long as it has moved less than this share of its radius."""
-
-
-class PolyhedralContact(BlockError):
-    """Contact was asked for a block that is not a box."""
 
 
 class SubstepFailed(RuntimeError):
@@ -306,6 +306,18 @@ class Structure:
         self._load = F.copy()
         self._update_pushed()
 
+    def drive(self, name: str, velocity=(0.0, 0.0, 0.0), spin=(0.0, 0.0, 0.0)) -> None:
+        """New prescribed motion of a driven block: velocity (3,) [m/s], spin (3,) [rad/s]."""
+        row = self.names.index(name)
+        if not self.blocks[row].driven:
+            raise BlockError(
+                f"block '{name}' is not driven; only blocks with driven=True take a prescribed motion"
+            )
+        self.blocks[row] = replace(self.blocks[row], velocity=velocity, spin=spin, vertices=None)
+        self._scene.set_motion(row, np.concatenate([np.asarray(velocity, float), np.asarray(spin, float)]))
+        self._limit = None
+        self._read_all()
+
     def substep_limit(self) -> SubstepLimit:
         """Largest substep and what limits it; found anew when joints have failed."""
         if self._limit is None:
@@ -555,7 +567,7 @@ class Structure:
         return e
 
     def law_dissipation(self) -> float:
-        """Energy that the damage of the joints stands for by the law, Σ A D(λ) [J]: to compare with joint_dissipated."""
+        """Energy that the damage stands for by the law, Σ A D(λ) [J]: to compare with joint_dissipated."""
         return 0.0 if self.joints is None else float(self.joints.energy[:, joint_kernel.DISSIPATED].sum())
 
     def _half_step_place(self) -> Array:
@@ -636,57 +648,3 @@ class Structure:
 
     def __exit__(self, *error) -> None:
         self.close()
-
-
-def check_names(blocks: list[Block]) -> None:
-    """Raise BlockError where two blocks share a name."""
-    seen: set[str] = set()
-    for block in blocks:
-        if block.name in seen:
-            raise BlockError(f"two blocks are called '{block.name}'; names must be unique")
-        seen.add(block.name)
-
-
-def check_boxes(blocks: list[Block]) -> None:
-    """Raise PolyhedralContact where contact is asked for a block that is not a box."""
-    odd = [b.name for b in blocks if not b.is_box]
-    if odd:
-        raise PolyhedralContact(
-            f"block '{odd[0]}' is not a box ({len(odd)} such blocks): contact is available between boxes only; "
-            "leave the contact section out (joints work for any convex polyhedron) or use boxes"
-        )
-
-
-def local_origin(blocks: list[Block]) -> Array:
-    """(3,) [m]: zero, or near the blocks where map coordinates would cost digits."""
-    if not blocks:
-        return np.zeros(3)
-    middle = np.mean([b.centre for b in blocks], axis=0)
-    return np.round(middle) if np.abs(middle).max() > FAR else np.zeros(3)
-
-
-def moved_block(block: Block, shift: Array) -> Block:
-    """The same block elsewhere."""
-    return replace(block, centre=block.centre + shift, vertices=None if block.is_box else block.vertices)
-
-
-def matched_stiffness(blocks: list[Block], joints: Joints | None) -> Array:
-    """K (n,) [N/m] of faces in contact that continues the closing stiffness of the joints: k_c times the mean area of
-    the joined faces of a block; a block without joints takes the mean of the others."""
-    if joints is None:
-        raise ContactError(
-            "contact.stiffness is not given and there are no joints to take it from; give contact.stiffness in N/m"
-        )
-    faces: dict[tuple[int, int], float] = {}
-    for ends, side in ((joints.a, joints.face_a), (joints.b, joints.face_b)):
-        for row, face in zip(ends.tolist(), side.tolist()):
-            if row >= 0:
-                faces[row, face] = float(
-                    np.linalg.norm(polygon_area_vector(blocks[row].vertices[list(blocks[row].faces[face])]))
-                )
-    K = np.full(len(blocks), np.nan)
-    for row in range(len(blocks)):
-        areas = [area for (r, _), area in faces.items() if r == row]
-        if areas:
-            K[row] = joints.parameters.closing_stiffness * np.mean(areas)
-    return np.where(np.isnan(K), np.nanmean(K), K)

@@ -62,7 +62,7 @@ def assemble(springs: Springs, n: int) -> tuple[sp.csr_array, sp.csr_array]:
 
 @njit(cache=True)
 def _accumulate(pair, swap, arm_a, arm_b, normal, kn, kt, out):
-    """Sum Bᵀ D B of each spring into its pair's (12, 12) block; the pair's first body is the one with the larger row."""
+    """Sum Bᵀ D B of each spring into its pair's (12, 12) block; its first body has the larger row."""
     B = np.zeros((3, 12))
     D = np.empty((3, 3))
     for s in range(len(pair)):

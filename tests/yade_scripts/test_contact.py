@@ -1,0 +1,157 @@
+"""Contact of blocks in YADE: restitution, sliding, rest, toppling, and the account of their work."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from tests.yade_scripts.reference import columns
+from yade_scripts.blocks import Block
+from yade_scripts.contact import (
+    ContactError,
+    ContactLaw,
+    damping_ratio,
+    paper_damping_ratio,
+    restitution_without_tension,
+)
+from yade_scripts.structure import Structure
+
+K = 1e8
+G = 9.81
+
+
+def cube(z, **more):
+    return Block("cube", (0.0, 0.0, z), size=1.0, density=2000.0, **more)
+
+
+def balance(e):
+    """Energies minus works: constant where the ledger closes."""
+    works = ("load_work", "driving_work")
+    return sum(v for k, v in e.items() if k not in works) - sum(e[k] for k in works)
+
+
+def test_damping_ratios_against_the_closed_forms():
+    ref = columns("dem_restitution_linear_dashpot")
+    for e, zeta, e_cut in zip(ref["e_in"], ref["zeta"], ref["e_cut"]):
+        assert paper_damping_ratio(e) == pytest.approx(zeta, abs=2e-6)
+        assert restitution_without_tension(paper_damping_ratio(e)) == pytest.approx(e_cut, abs=2e-6)
+        assert restitution_without_tension(damping_ratio(e)) == pytest.approx(e, rel=1e-9)
+
+
+@pytest.mark.parametrize("e", [0.1, 0.5, 0.9, 1.0])
+def test_a_face_that_lands_flat_returns_e(e):
+    """On the ground; the energies before and after account for the dashpot."""
+    law = ContactLaw(stiffness=K, restitution=e)
+    with Structure(
+        [cube(0.5 + 1e-4, velocity=(0, 0, -1.0))], law, ground=0.0, gravity=(0, 0, 0), track_contacts=True
+    ) as s:
+        before = balance(s.energies())
+        s.advance(0.04, substep=0.02 * np.sqrt(2000.0 / K))
+        after = s.energies()
+        assert s.velocity()[0, 2] == pytest.approx(e, abs=0.005)
+        assert balance(after) == pytest.approx(before, rel=1e-3)
+        assert after["dashpot"] == pytest.approx((1 - e**2) * before, rel=0.01, abs=1.0)
+
+
+def test_the_paper_rule_returns_what_its_closed_form_says():
+    """Equation (3) as printed gives 0.5503 for e = 0.5 once the contact cannot pull."""
+    law = ContactLaw(stiffness=K, restitution=0.5, rule="paper")
+    assert law.obtained_restitution == pytest.approx(0.5503, abs=1e-4)
+    with Structure([cube(0.5 + 1e-4, velocity=(0, 0, -1.0))], law, ground=0.0, gravity=(0, 0, 0)) as s:
+        s.advance(0.04, substep=0.02 * np.sqrt(2000.0 / K))
+        assert s.velocity()[0, 2] == pytest.approx(0.5503, abs=0.005)
+
+
+@pytest.mark.parametrize("density", [2000.0, 200.0, 2e6])
+def test_two_free_blocks_return_e_whatever_their_masses(density):
+    """Effective mass in the dashpot; momentum to round-off."""
+    blocks = [
+        Block("a", (0, 0, 0.5), size=1.0, density=density),
+        Block("b", (0, 0, 1.5 + 1e-4), size=1.0, density=2000.0, velocity=(0, 0, -1.0)),
+    ]
+    with Structure(blocks, ContactLaw(stiffness=K, restitution=0.5), gravity=(0, 0, 0)) as s:
+        s.advance(0.05, substep=0.02 * np.sqrt(min(density, 2000.0) / K))
+        v = s.velocity()[:, 2]
+        assert v[1] - v[0] == pytest.approx(0.5, abs=0.01)
+        assert s.mass @ v == pytest.approx(-2000.0, rel=1e-12)
+
+
+@pytest.mark.parametrize(("slope", "slides"), [(0.45, False), (0.55, True), (0.8, True)])
+def test_a_block_slides_when_the_slope_exceeds_the_friction(slope, slides):
+    """Gravity turned by `slope` = tan of the angle, μ = 0.5: a = (slope - 0.5) g_n, else it stays."""
+    n = G / np.hypot(1.0, slope)
+    with Structure(
+        [cube(0.5)], ContactLaw(stiffness=K, friction=0.5), ground=0.0, gravity=(slope * n, 0, -n)
+    ) as s:
+        s.advance(0.1)
+        v0 = s.velocity()[0, 0]
+        s.advance(0.2)
+        acceleration = (s.velocity()[0, 0] - v0) / 0.2
+    assert acceleration == pytest.approx((slope - 0.5) * n if slides else 0.0, abs=0.01)
+
+
+def test_ledger_of_a_block_that_drops_bounces_and_slides_to_rest():
+    """Kinetic + potential + springs + dashpots + friction stays within 1e-3 of the energy put in."""
+    block = cube(0.55, velocity=(3.0, 0.0, -1.0))
+    with Structure(
+        [block], ContactLaw(stiffness=K, restitution=0.5, friction=0.3), ground=0.0, track_contacts=True
+    ) as s:
+        start = s.energies()
+        s.advance(0.3, substep=0.01 * np.sqrt(2000.0 / K))
+        end = s.energies()
+    given = start["kinetic"] + 2000.0 * G * 0.05
+    assert balance(end) == pytest.approx(balance(start), abs=1e-3 * given)
+    assert end["friction"] > 0.1 * given
+    assert end["dashpot"] > 0.05 * given
+
+
+def test_a_stack_stays_where_it_was_put():
+    """Three offset blocks at rest: no drift, no spin; the lowest carries all the weight."""
+    blocks = [Block(f"b{i}", (0.1 * i, 0.05 * i, i + 0.5), size=1.0, density=2000.0) for i in range(3)]
+    with Structure(blocks, ContactLaw(stiffness=1e9, friction=0.5), ground=0.0) as s:
+        s.advance(1.0)
+        assert np.abs(s.centre() - [b.centre for b in blocks]).max() < 1e-3
+        assert np.abs(s.velocity()).max() < 1e-3
+        weight = -s.gravity_force()[:, 2]
+        np.testing.assert_allclose(s.internal_force()[:, 2], weight, rtol=0.02)
+
+
+@pytest.mark.parametrize(("tilt", "falls"), [(20.0, False), (33.0, True)])
+def test_a_tilted_block_rocks_back_or_topples(tilt, falls):
+    """Base 1, height 2: the centre passes the edge at atan(1/2) = 26.6 degrees."""
+    R = Rotation.from_euler("y", tilt, degrees=True).as_matrix()
+    foot = (R @ np.array([0.5, 0.0, -1.0]))[2]
+    block = Block("tower", (0, 0, -foot), size=(1, 1, 2), rotation=R, density=2000.0)
+    with Structure([block], ContactLaw(stiffness=1e9, restitution=0.1, friction=2.0), ground=0.0) as s:
+        s.advance(1.5)
+        upright = abs(s.rotation()[0, 2, 2])
+    assert (upright < 0.3) == falls
+
+
+def test_a_block_stops_at_a_tank_wall():
+    from yade_scripts.faces import FixedPlane
+
+    wall = FixedPlane((2.0, 0.0, 0.0), (-1.0, 0.0, 0.0), "east")
+    block = Block("b", (0.0, 0.0, 0.5), size=1.0, density=2000.0, velocity=(5.0, 0.0, 0.0))
+    with Structure(
+        [block], ContactLaw(stiffness=1e9, friction=0.0, restitution=0.5), planes=[wall], gravity=(0, 0, 0)
+    ) as s:
+        s.advance(0.5, substep=2e-5)
+        assert s.velocity()[0, 0] == pytest.approx(-2.5, abs=0.05)
+        assert s.centre()[0, 0] < 1.5
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"stiffness": -1.0},
+        {"restitution": 0.0},
+        {"restitution": 1.1},
+        {"friction": -0.1},
+        {"nodes_per_edge": 2},
+        {"rule": "x"},
+    ],
+)
+def test_impossible_constants_are_refused_by_name(wrong):
+    (name,) = wrong
+    with pytest.raises(ContactError, match=name):
+        ContactLaw(**({"stiffness": K} | wrong))
