@@ -1,7 +1,10 @@
 """Symmetric positive definite systems: conjugate gradients behind one function.
 
-Preconditioner: the diagonal below AMG_FROM unknowns, where setting up a multigrid hierarchy costs more than it
-saves; above, smoothed aggregation (pyamg).
+Preconditioner: the diagonal for small systems, where setting up a multigrid hierarchy costs more than it saves;
+else smoothed aggregation (pyamg), with prolongation weights from row sums, because estimated spectral radii start
+from random vectors and would differ from run to run.  20 000 unknowns, 1e-8: diagonal 176 iterations 0.034 s,
+multigrid 13 iterations 0.016 + 0.034 s; with a structure inside every iteration costs its solve as well, so that
+multigrid pays much earlier.
 """
 
 from __future__ import annotations
@@ -12,7 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 import pyamg
 
-AMG_FROM = 20_000
+AMG_FROM = 30_000
+AMG_FROM_WITH_EXTRA = 3_000
 MOST_ITERATIONS = 2000
 
 
@@ -41,7 +45,7 @@ def solve(A, b, x0, rtol: float, extra: Callable | None = None, most: int = MOST
     scale = np.linalg.norm(b)
     if scale == 0.0:
         return SolveResult(np.zeros_like(b), 0, 0.0)
-    precondition = _preconditioner(A)
+    precondition = _preconditioner(A, AMG_FROM if extra is None else AMG_FROM_WITH_EXTRA)
     apply = (lambda v: A @ v) if extra is None else (lambda v: A @ v + extra(v))
     x = np.array(x0, float)
     r = b - apply(x)
@@ -63,11 +67,12 @@ def solve(A, b, x0, rtol: float, extra: Callable | None = None, most: int = MOST
     return SolveResult(x, len(history) - 1, history[-1])
 
 
-def _preconditioner(A) -> Callable:
-    if A.shape[0] < AMG_FROM:
+def _preconditioner(A, multigrid_from: int) -> Callable:
+    if A.shape[0] < multigrid_from:
         inverse = 1.0 / A.diagonal()
         return lambda r: inverse * r
-    levels = pyamg.smoothed_aggregation_solver(A, max_coarse=300)
+    smooth = ("jacobi", {"weighting": "local"})
+    levels = pyamg.smoothed_aggregation_solver(A, max_coarse=300, smooth=smooth, improve_candidates=None)
     return levels.aspreconditioner(cycle="V").matvec
 
 
