@@ -169,6 +169,19 @@ def test_extras_come_with_the_command_that_needs_them(machine):
     assert pip_installs(machine("test", "render")[2]) == []
 
 
+def test_the_kernels_are_compiled_once_before_the_first_run(machine):
+    """A failure there is no reason to refuse the run, which compiles what it needs itself."""
+    machine.ready()
+    assert "python -m coupler.warm_up" not in machine("check", "x")[2]
+    (machine.root / ".venv/bin/python").write_text(
+        '#!/bin/sh\necho "python $*" >>"$CALLS"\nexit 1\n', encoding="utf-8"
+    )
+    code, told, calls = machine("run", "x")
+    assert (code, calls) == (0, ["python -m coupler.warm_up", "surgebreak run x"])
+    assert "left to the first run" in told
+    assert machine("run", "x")[2] == ["surgebreak run x"]
+
+
 def test_changed_pins_are_installed_again(machine):
     machine.ready()("run")
     with (machine.root / "constraints.txt").open("a", encoding="utf-8") as stream:

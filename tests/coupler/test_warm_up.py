@@ -1,0 +1,11 @@
+"""The warm-up must touch every kernel, or the first real run compiles after all."""
+
+from coupler.case import modules
+from coupler.case_file import load
+from coupler.warm_up import CASE
+
+
+def test_the_warm_up_case_switches_on_both_sides_and_what_joins_them(tmp_path):
+    (tmp_path / "case.toml").write_text(CASE, encoding="utf-8")
+    on = modules(load(tmp_path).case)
+    assert {name for name, switched in on.items() if not switched} == {"prescribed motion"}
