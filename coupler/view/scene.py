@@ -154,11 +154,12 @@ class Scene:
         if surface.n_cells == 0:
             self.plotter.remove_actor("water", reset_camera=False, render=False)
             return
-        self.plotter.add_mesh(
+        actor = self.plotter.add_mesh(
             surface, name="water", scalars="speed", clim=(0.0, self.fastest), opacity=WATER_OPACITY,
             cmap=ListedColormap(palette.scale(palette.WATER_ENDS)), culling="back",
             specular=0.3, specular_power=30, ambient=0.3, show_scalar_bar=False, reset_camera=False, render=False,
         )  # fmt: skip
+        behind(actor.mapper)
         self._draw_bar("water", "speed of water [m/s]", 0.03)
 
     def _draw_bar(self, actor, title, left):
@@ -260,6 +261,12 @@ def nice_floor(value):
     """The last of 1, 2, 5, 10, … times a power of ten that is not larger."""
     power = 10.0 ** np.floor(np.log10(value))
     return float(next(r * power for r in (5, 2, 1) if r * power <= value * (1 + 1e-12)))
+
+
+def behind(mapper):
+    """Let others win where surfaces coincide: a block at a wall of the tank lies in one plane with the water."""
+    mapper.SetResolveCoincidentTopologyToPolygonOffset()
+    mapper.SetRelativeCoincidentTopologyPolygonOffsetParameters(1.0, 8.0)
 
 
 def decimals(times):
