@@ -414,21 +414,35 @@ class Structure:
             self._update_rows()
 
     def _arm_targets(self, dt: float) -> None:
-        """Give contact nodes to plain blocks that a loose block may reach within dt: nodes born inside another block
-        would add its penetration to the energy."""
-        plain = np.flatnonzero([not nodes for nodes in self._scene.nodes])
-        if self.contact is None or not len(plain) or not self._loose.any():
+        """Give contact nodes to plain blocks that a loose block or a fixed plane may touch within dt: nodes born inside
+        another body would add its penetration to the energy."""
+        if self.contact is None:
             return
-        loose = np.flatnonzero(self._loose)
+        plain = np.flatnonzero([not nodes for nodes in self._scene.nodes])
         reach = self._radius + dt * np.linalg.norm(self._v[:, :3], axis=1)
+        near = np.union1d(self._near_planes(plain, reach), self._near_debris(plain, reach))
+        for row in near:
+            self._scene.add_nodes(int(row))
+        if len(near):
+            self._update_masks(near)
+            self._update_rows()
+
+    def _near_debris(self, plain: Array, reach: Array) -> Array:
+        loose = np.flatnonzero(self._loose)
+        if not len(plain) or not len(loose):
+            return np.zeros(0, np.int64)
         tree = cKDTree(self._x[plain])
         near = tree.query_ball_point(self._x[loose], reach[loose] + reach[plain].max())
-        hit = np.unique(np.concatenate([np.array(i, np.int64) for i in near]))
-        for row in plain[hit]:
-            self._scene.add_nodes(int(row))
-        if len(hit):
-            self._update_masks(plain[hit])
-            self._update_rows()
+        return plain[np.unique(np.concatenate([np.array(i, np.int64) for i in near]))]
+
+    def _near_planes(self, plain: Array, reach: Array) -> Array:
+        """Blocks within reach of a fixed plane that no joint holds to one."""
+        free = plain[~self._grounded()[plain]]
+        near = np.zeros(len(free), bool)
+        for plane in self.planes:
+            height = (self._x[free] + self._origin - plane.point) @ plane.normal
+            near |= height < reach[free]
+        return free[near]
 
     def _turn_on_contact(self, newly: Array) -> None:
         self.joints.hand_over(self._loose)
@@ -512,6 +526,15 @@ class Structure:
         table = self.joints.table(self._x, self._R)
         table.centre[:] += self._origin
         return table
+
+    def touching(self) -> Array:
+        """(n,) bool: blocks with a contact of YADE, to one another or to a fixed plane."""
+        found = np.zeros(self.n, bool)
+        if self.contact is not None:
+            contacts = read_contacts(self._scene)
+            found[contacts.a[contacts.a >= 0]] = True
+            found[contacts.b[contacts.b >= 0]] = True
+        return found
 
     def joined_planes(self) -> tuple[Array, Array, Array]:
         """Faces sealed by a live joint: block (m,), face (m,), half of the largest opening (m,) [m]."""

@@ -188,6 +188,16 @@ def test_intact_blocks_cost_no_contacts_and_a_fallen_piece_does_not_sink():
         assert s.centre()[:, 2] == pytest.approx([0.25, 0.75], abs=5e-3)
 
 
+def test_a_joined_column_on_a_ground_without_joints_stands_on_its_contact():
+    """`ground = False`: only the foot touches the ground, by contact from the first substep; it carries the weight."""
+    law = JointParameters(1e6, 1e-3, damping=0.1, ground=False)
+    with Structure(column_blocks("c", (0, 0, 0), (1.0, 1.0, 1.0), 3), ContactLaw(), law, ground=0.0) as s:
+        assert len(s.joint_table()) == 2
+        s.advance(0.3)
+        assert np.abs(s.centre()[:, 2] - [0.5, 1.5, 2.5]).max() < 1e-4
+        assert len(s.contacts()) == 9
+
+
 def test_load_work_and_mean_velocity():
     """A constant force on a free block: work F·x, mean velocity x/dt, exact for the leapfrog."""
     with Structure([Block("b", (0, 0, 0), size=1.0, density=1000.0)], gravity=STILL) as s:
@@ -258,13 +268,13 @@ def test_map_coordinates_lose_no_digits():
     """The same pull at (500 km, 4000 km): computed about a local origin."""
     far = np.array([5e5, 4e6, 0.0])
     blocks = [
-        Block("a", far + (0, 0, 0.5), size=1.0, fixed=True),
-        Block("b", far + (0, 0, 1.5), size=1.0, driven=True, velocity=(0, 0, 0.01)),
+        Block("a", far + np.array([0, 0, 0.5]), size=1.0, fixed=True),
+        Block("b", far + np.array([0, 0, 1.5]), size=1.0, driven=True, velocity=(0, 0, 0.01)),
     ]
     with Structure(blocks, None, LAW, gravity=STILL) as s:
         s.advance(0.02)
         assert s.reaction()[1, 2] == pytest.approx(6.75e6 * 0.2 * 0.8**2, rel=1e-6)
-        np.testing.assert_allclose(s.centre()[1], far + (0, 0, 1.5002), atol=1e-9)
+        np.testing.assert_allclose(s.centre()[1], far + np.array([0, 0, 1.5002]), atol=1e-9)
 
 
 def test_joints_of_any_convex_polyhedron():
