@@ -77,6 +77,8 @@ class Joints:
         self.kc = np.full(n, parameters.closing_stiffness)
         self.eta = 0.0
         """Time constant of the stiffness-proportional dashpot [s]."""
+        self.stiffest: Array | None = None
+        """Largest eigenvalues of the joints (J, 2) [1/s²], found once by `timestep.joint_frequency`."""
         self.closing = np.ones(n, bool)
         self.alive = np.ones(n, bool)
         self.live = np.arange(n)

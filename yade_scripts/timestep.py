@@ -35,14 +35,26 @@ def joint_frequency(blocks: list[Block], joints) -> tuple[float, int]:
     """Upper bound of ω_max [rad/s] and the joint that gives it (-1 without joints)."""
     if joints is None or len(joints.live) == 0:
         return 0.0, -1
+    if joints.stiffest is None:
+        joints.stiffest = _stiffest_modes(blocks, joints)
+    live = joints.live
     S = np.zeros(len(blocks) + 1)  # the last one stands for the ground
-    for j in joints.live:
-        for row in (joints.a[j], joints.b[j]):
-            if row >= 0 and not (blocks[row].fixed or blocks[row].driven):
-                S[row] += _largest_eigenvalue(blocks[row], joints, j, row)
-    pair = S[joints.a[joints.live]] + S[joints.b[joints.live]]
+    np.add.at(S, joints.a[live], joints.stiffest[live, 0])
+    np.add.at(S, joints.b[live], joints.stiffest[live, 1])
+    S[-1] = 0.0
+    pair = S[joints.a[live]] + S[joints.b[live]]
     worst = int(np.argmax(pair))
-    return float(np.sqrt(pair[worst])), int(joints.live[worst])
+    return float(np.sqrt(pair[worst])), int(live[worst])
+
+
+def _stiffest_modes(blocks: list[Block], joints) -> Array:
+    """Largest eigenvalue of M⁻¹ K of each joint for its two blocks (J, 2) [1/s²]; zero for blocks that do not yield."""
+    modes = np.zeros((len(joints), 2))
+    for j in range(len(joints)):
+        for side, row in enumerate((joints.a[j], joints.b[j])):
+            if row >= 0 and not (blocks[row].fixed or blocks[row].driven):
+                modes[j, side] = _largest_eigenvalue(blocks[row], joints, j, row)
+    return modes
 
 
 def _largest_eigenvalue(block: Block, joints, j: int, row: int) -> float:
