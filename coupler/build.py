@@ -40,11 +40,33 @@ def build(case: Case, clock) -> Scene:
         water = immersion = None
         if case.water:
             water, immersion = _water(case, structure, solids)
+        if case.joints and case.structure.start == "settled" and _settled(structure, water) and case.water:
+            water, immersion = _water(case, structure, solids)
         coupling = Coupling(
             water, structure, immersion, rtol=PRESSURE_RTOL, step_max=case.time.step_max, clock=clock
         )
     tank = (case.tank.lower, case.tank.upper) if case.tank else None
     return Scene(coupling, _gauges(case, structure), solids, tank)
+
+
+def _settled(structure, water) -> bool:
+    """Move the joined blocks to their equilibrium with weight and still water; True if any moved."""
+    from yade_scripts.equilibrium import settle
+
+    load = None if water is None else _load_at_rest(structure, water)
+    return settle(structure, load) > 0.0
+
+
+def _load_at_rest(structure, water) -> np.ndarray:
+    """Force and moment (n, 6) of the water on the blocks while these are held."""
+    from coupler.scheme import water_load
+    from fluid.solve import solve
+
+    problem = water.predict(water.stable_step())
+    if problem.coupling.nnz == 0:
+        return np.zeros((structure.n, 6))
+    x = solve(problem.matrix, problem.rhs, problem.guess, PRESSURE_RTOL).x
+    return water_load(problem, x)[: structure.n]
 
 
 def blocks_of(case: Case) -> list:

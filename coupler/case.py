@@ -182,13 +182,21 @@ class Structure(Section):
     wall: tuple[MasonryWall, ...] = Field((), description="walls of equal blocks")
     building: tuple[Building, ...] = Field((), description="buildings with floors, roof and openings")
     ground: Ground | None = Field(None, description="flat ground under the blocks")
+    start: Literal["settled", "sudden"] = Field(
+        "settled",
+        description="settled: joined blocks that reach the ground start in equilibrium with their weight and the "
+        "water around them; sudden: the weight comes on at once",
+    )
 
 
 class Contact(Section):
     """Spring, dashpot and friction between touching faces."""
 
-    stiffness: quantity("N/m", gt=0) = Field(
-        description="K of a pair of faces in contact, normal and tangential", examples=["1 GN/m"]
+    stiffness: quantity("N/m", gt=0) | None = Field(
+        None,
+        description="K of a pair of faces in contact, normal and tangential; absent: that of the joints in "
+        "closing, so that a face whose joint breaks goes on as it was",
+        examples=["1 GN/m"],
     )
     restitution: quantity("", ge=0, le=1) = Field(
         0.3, description="e, velocity after a normal impact over the velocity before"

@@ -158,6 +158,9 @@ def one_thread() -> None:
     """One thread unless the user asks: reproducible, and several spinning pools are far slower."""
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
         os.environ.setdefault(name, "1")
+    from coupler.kernel_cache import use_kernel_cache
+
+    use_kernel_cache()
 
 
 def need(package: str, extra: str, command: str) -> None:

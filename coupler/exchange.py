@@ -35,10 +35,11 @@ class Immersion:
             if shapes
             else ConvexBodies.empty()
         )
+        self._body_of_plane = np.repeat(np.arange(len(shapes)), np.diff(self._reference.plane_start))
         self._radius = np.array([np.linalg.norm(v, axis=1).max() for v, _ in shapes])
         self._tolerance = STILL * mesh.spacing
         self._centre, self._rotation = self._pose()
-        self._loose = self._loose_blocks()
+        self._growth = self._new_growth(np.zeros(len(self._body_of_plane)))
         self.bodies = self._placed()
         self.domain = cut_domain(mesh, self.bodies, covers)
         self.cut_again = 0
@@ -50,16 +51,17 @@ class Immersion:
             return False
         centre, rotation = self._pose()
         turned = np.abs(rotation - self._rotation).max(axis=(1, 2)) * self._radius
-        loose = self._loose_blocks()
         moved = np.linalg.norm(centre - self._centre, axis=1) + turned > self._tolerance
-        moved[: self.n_blocks] |= loose != self._loose
-        self.cut_again = int(moved.sum())
+        growth = self._new_growth(self._growth)
+        changed = moved.copy()
+        changed[self._body_of_plane[growth != self._growth]] = True
+        self.cut_again = int(changed.sum())
         if not self.cut_again:
             return False
         self._centre[moved], self._rotation[moved] = centre[moved], rotation[moved]
-        self._loose = loose
+        self._growth = growth
         self.bodies = self._placed()
-        self.domain = cut_domain(self.mesh, self.bodies, self.covers, previous=self.domain, moved=moved)
+        self.domain = cut_domain(self.mesh, self.bodies, self.covers, previous=self.domain)
         return True
 
     def _pose(self) -> tuple[Array, Array]:
@@ -72,23 +74,25 @@ class Immersion:
             np.concatenate([self.structure.rotation(), fixed]),
         )
 
-    def _loose_blocks(self) -> Array:
-        """(n,) bool: blocks without a live joint."""
+    def _new_growth(self, before: Array) -> Array:
+        """Outward shift of each plane (P,) [m]: sealed faces reach over the gap to the other block, loose blocks
+        that touch something are drawn in by a film. In steps, and never less while a face stays sealed, so that a
+        block that stands still keeps its planes bit for bit and is not cut again."""
+        growth = np.zeros(len(self._body_of_plane))
         if self.n_blocks == 0:
-            return np.zeros(0, bool)
+            return growth
+        block, plane, half_gap = self.structure.joined_planes()
         loose = np.ones(self.n_blocks, bool)
-        loose[self.structure.joined_planes()[0]] = False
-        return loose & ~self.structure.fixed
+        loose[block] = False
+        film = np.append(loose & self.structure.touching(), np.zeros(self.n_solids, bool))
+        growth[film[self._body_of_plane]] = -FILM * self.mesh.spacing
+        rows = self._reference.plane_start[block] + plane
+        steps = (
+            np.ceil(2.0 * np.maximum(half_gap, 0.0) / self._tolerance) + 1.0
+        )  # the other side may be a step behind
+        np.maximum.at(growth, rows, steps * self._tolerance)
+        growth[rows] = np.maximum(growth[rows], before[rows])
+        return growth
 
     def _placed(self) -> ConvexBodies:
-        bodies = self._reference.moved(self._centre, self._rotation)
-        if self.n_blocks == 0:
-            return bodies
-        growth = np.zeros(len(bodies.offsets))
-        plane_body = np.repeat(np.arange(self.n_blocks + self.n_solids), np.diff(bodies.plane_start))
-        is_loose = np.append(self._loose, np.zeros(self.n_solids, bool))
-        growth[is_loose[plane_body]] = -FILM * self.mesh.spacing
-        block, plane, half_gap = self.structure.joined_planes()
-        closing = 2.0 * np.maximum(half_gap, 0.0) + self._tolerance  # the other side may be a step behind
-        np.maximum.at(growth, bodies.plane_start[block] + plane, closing)
-        return bodies.grown(growth)
+        return self._reference.moved(self._centre, self._rotation).grown(self._growth)

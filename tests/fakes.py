@@ -113,6 +113,9 @@ class FreeBody:
     def joined_planes(self):
         return np.zeros(0, int), np.zeros(0, int), np.zeros(0)
 
+    def touching(self):
+        return np.array([False])
+
     def set_load(self, load):
         self._load = load
 

@@ -1,0 +1,9 @@
+"""One thread and the kernel cache of the present sources, before anything imports numba or YADE."""
+
+import os
+
+from coupler.kernel_cache import use_kernel_cache
+
+for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
+    os.environ.setdefault(name, "1")
+use_kernel_cache()
