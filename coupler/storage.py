@@ -21,7 +21,7 @@ class DiskFull(OSError):
         self.path = Path(path)
         super().__init__(
             cause.errno or errno.ENOSPC,
-            f"{path}: no room for the next {needed / 1e6:.3g} MB ({cause.strerror or cause}); "
+            f"{path}: no room for the next {size_text(needed)} ({cause.strerror or cause}); "
             f"the file is readable {readable}; free some space or write less often (time.output_every)",
         )
 
@@ -35,6 +35,11 @@ class NotFinite(FloatingPointError):
 
 class WrongShape(ValueError):
     """An array handed to a writer does not have the number of rows that its name asks for."""
+
+
+def size_text(size):
+    """A number of bytes for people."""
+    return f"{size / 1e6:.3g} MB" if size >= 1e5 else f"{size:.0f} bytes"
 
 
 def finite(name, values, where):
@@ -73,3 +78,14 @@ def reserve(path, needed, readable):
             raise DiskFull(path, needed, readable, error) from None
         finally:
             os.ftruncate(file.fileno(), size)
+
+
+def claim(path, needed):
+    """Make an empty file at `path` if there is room for `needed` [bytes]; FileExistsError if it is there, DiskFull."""
+    path = Path(path)
+    path.touch(exist_ok=False)
+    try:
+        reserve(path, needed, "but empty")
+    except DiskFull:
+        path.unlink()
+        raise

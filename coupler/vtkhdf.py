@@ -18,10 +18,11 @@ moment loses the whole array. Nothing newer: the HDF5 1.14 inside VTK must read 
 """
 
 from contextlib import contextmanager
-from pathlib import Path
 
 import h5py
 import numpy as np
+
+from coupler.storage import claim
 
 FILE_LAYOUT = ("earliest", "v110")
 ARRAY_LAYOUT = ("v110", "v110")
@@ -33,7 +34,7 @@ HEADROOM = 1 << 18  # [bytes] for HDF5's own tables when a step is added
 @contextmanager
 def opened(path, mode="r+"):
     """The HDF5 file at `path`, unlocked, in the layouts that survive a kill and that VTK reads."""
-    with h5py.File(path, mode, libver=FILE_LAYOUT if mode == "x" else ARRAY_LAYOUT, locking=False) as file:
+    with h5py.File(path, mode, libver=FILE_LAYOUT if mode == "w" else ARRAY_LAYOUT, locking=False) as file:
         yield file
 
 
@@ -41,8 +42,10 @@ def create(path, kind, origin):
     """Start a file of `kind` ("UnstructuredGrid" or "PolyData"); its coordinates are relative to origin (3,) [m].
 
     Float32 has 7 digits: near zero that is 1 µm over 10 m, at map coordinates only 0.5 m.
+    Raises FileExistsError (results are never overwritten) and DiskFull.
     """
-    with opened(Path(path), "x") as file:
+    claim(path, HEADROOM)
+    with opened(path, "w") as file:
         root = file.create_group("VTKHDF")
         root.attrs["Version"] = np.array([2, 0], dtype=np.int64)
         root.attrs["Type"] = np.bytes_(kind)

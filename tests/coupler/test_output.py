@@ -208,7 +208,7 @@ def test_a_killed_writer_leaves_all_its_complete_steps(tmp_path, mesh, moment):
 
 @pytest.fixture
 def small_files():
-    """A limit of 300 kB per file: the kernel refuses to grow a file further, as a full disk or a quota does."""
+    """A limit of 400 kB per file: the kernel refuses to grow a file further, as a full disk or a quota does."""
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_FSIZE, (400_000, before[1]))
@@ -237,6 +237,14 @@ def test_a_full_disk_is_named_and_harms_nothing(tmp_path, small_files):
     np.testing.assert_array_equal(
         last, fields(done - 1, len(nodes), len(cells))[0]["level_set"].astype(np.float32)
     )
+
+
+def test_a_disk_that_is_full_from_the_start_leaves_no_file_behind(tmp_path, small_files, monkeypatch):
+    """The error is the named one, and a second try is not stopped by a file that the first one left."""
+    monkeypatch.setattr(vtkhdf, "HEADROOM", 500_000)
+    with pytest.raises(DiskFull, match=r"no room for the next 0.5 MB"):
+        WaterWriter(tmp_path / "fields.vtkhdf")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_claiming_room_leaves_the_file_as_it_was(tmp_path):

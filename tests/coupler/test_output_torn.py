@@ -85,12 +85,13 @@ def test_any_torn_write_leaves_the_finished_steps(monkeypatch, steps, checked, c
 
     @contextmanager
     def opened(path, mode="r+"):
-        layout = vtkhdf.FILE_LAYOUT if mode == "x" else vtkhdf.ARRAY_LAYOUT
-        with h5py.File(file, "w" if mode == "x" else mode, libver=layout) as opened_file:
+        layout = vtkhdf.FILE_LAYOUT if mode == "w" else vtkhdf.ARRAY_LAYOUT
+        with h5py.File(file, mode, libver=layout) as opened_file:
             yield opened_file
 
     monkeypatch.setattr(vtkhdf, "opened", opened)
     monkeypatch.setattr(output, "reserve", lambda *_: None)
+    monkeypatch.setattr(vtkhdf, "claim", lambda *_: None)
     nodes, cells = tank_mesh((2.0, 2.0, 1.0), 1.0)
     writer, rng = output.WaterWriter("recorded"), np.random.default_rng(0)
     for k in range(steps):
