@@ -130,6 +130,8 @@ def _structure_sections(case: Case) -> Iterator[Problem]:
         )
     if case.contact is None:
         yield ("structure",), "blocks need a section [contact] with stiffness, restitution and friction"
+    elif case.contact.stiffness is None and case.joints is None:
+        yield ("contact",), "stiffness: missing; without [joints] there is nothing to take it from"
     if case.joints is None and (structure.building or structure.wall):
         which = "building" if structure.building else "wall"
         yield (

@@ -194,6 +194,15 @@ def test_names_are_unique():
     ]
 
 
+def test_blocks_without_joints_need_a_contact_stiffness():
+    """With joints the contact takes over their stiffness; without, there is none to take."""
+    loose = structure({"centre": [7, 5, 0.5]}) | {"contact": {}}
+    assert told(case(**loose)) == [
+        "contact: stiffness: missing; without [joints] there is nothing to take it from"
+    ]
+    assert told(case(joints={"strength": 1e5, "opening_at_failure": 1e-3}, **loose)) == []
+
+
 def test_a_motion_needs_its_block():
     found = told(case(motion=[{"block": "b00", "velocity": [0, 0, 1]}], **structure({"centre": [7, 5, 0.5]})))
     assert found == ["motion.0.block: there is no block 'b00'; did you mean 'b0'?"]

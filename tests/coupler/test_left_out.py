@@ -76,3 +76,35 @@ def test_a_wish_to_stop_ends_a_run_cleanly(tmp_path, ask):
     assert (summary["status"], summary["exit_code"]) == ("stopped", 4)
     history = read_history(table)
     assert history["time"][-1] == pytest.approx(summary["figures"]["time"], rel=1e-12)
+
+
+WITHOUT_YADE = (
+    "import sys; sys.argv = ['surgebreak', 'run', *sys.argv[1:]]\n"
+    "from yade_scripts import engine\n"
+    "engine.PACKAGED = ('/nowhere/yade',)\n"
+    "from coupler.cli import main\n"
+    "main()"
+)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "says"),
+    [
+        (False, "YADE is not installed (looked for /nowhere/yade)"),
+        (True, "is not the discrete element code YADE"),
+    ],
+)
+def test_a_run_without_the_right_yade_says_what_to_do(tmp_path, wrong, says):
+    """Another project on the package index is called yade; a user may have installed that one."""
+    if wrong:
+        (tmp_path / "yade").mkdir()
+        (tmp_path / "yade" / "__init__.py").write_text("", encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, "-c", WITHOUT_YADE, str(DRY), "--output", str(tmp_path / "run")],
+        capture_output=True, text=True, check=False, env=ENVIRONMENT | {"PYTHONPATH": str(tmp_path)},
+    )  # fmt: skip
+    assert done.returncode == 1
+    assert says in done.stderr
+    assert "apt install yade" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert json.loads((tmp_path / "run" / "run.json").read_text(encoding="utf-8"))["exit_code"] == 1
