@@ -168,7 +168,7 @@ def _flux(water, kept, listed, start, u, u_cell):
     middle = (
         to_middle(around, cell_field, water.cell_velocity) if water.parameters.theta < 1.0 else cell_field
     )
-    return cell_field, edge_flux(t, water.graph_for(reached), reached, middle)
+    return cell_field, edge_flux(t, water.graph_for(reached), reached, middle, kept.nodal_water)
 
 
 @njit(cache=True)

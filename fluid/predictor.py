@@ -19,7 +19,7 @@ from fluid.extension import continue_into_solids
 from fluid.level_set import redistance, without_films
 from fluid.moments import cells_touching
 from fluid.projection import PressureProblem, cell_velocity, inflow, pressure_matrix, seal_pockets
-from fluid.volume import carry_volume, correct_volume, nodal_volume
+from fluid.volume import correct_volume, nodal_volume
 
 TRANSPORT_WIDTH = 5.0
 """|φ| in cell sizes within which the level set moves; beyond, only its sign matters."""
@@ -51,8 +51,9 @@ def predicted(water, dt: float) -> PressureProblem:
     theta, parameters = water.theta, water.parameters
     kick = kick_factor(water.acceleration, parameters)
     u_adv, phi = _transported(water, dt, theta, kick)
-    left = _outflow(water, dt)
-    carried = carry_volume(water.flux, water.nodal_water - left, water.topology.node_volume, dt)
+    carried = water.carried_volume(dt)
+    left = _outflow(water, dt, carried)
+    carried -= left
     conserved = water.conserved_volume - float(left.sum())
     surface, uncorrected = _new_surface(water, phi, carried, conserved)
     u_star = u_adv + theta * dt * parameters.weight
@@ -83,15 +84,15 @@ def _transported(water, dt, theta, kick):
     return u_adv, phi
 
 
-def _outflow(water, dt):
+def _outflow(water, dt, carried):
     """Volume (N,) [m³] that leaves through open sides: ∮ N_i (u·n)⁺ dA dt, at most what the node holds."""
     sides = water._walls
-    left = np.zeros(len(water.nodal_water))
+    left = np.zeros(len(carried))
     if len(sides.open_faces) == 0:
         return left
     speed = np.einsum("fak,fk->fa", water.velocity[sides.open_faces], sides.open_area) / 3.0
     np.add.at(left, sides.open_faces, dt * np.maximum(speed, 0.0))
-    return np.minimum(left, np.maximum(water.nodal_water, 0.0))
+    return np.minimum(left, np.maximum(carried, 0.0))
 
 
 def _new_surface(water, phi, carried, conserved):

@@ -18,6 +18,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse as sp
 from numba import njit
 
 from fluid.moments import cells_touching, nodal_water
@@ -32,11 +33,14 @@ _PROBE = 0.05
 
 @dataclass(frozen=True)
 class Flux:
-    """Volume flux along the edges of the listed nodes (n,): rate [m³/s] out of each, on the edges of `graph`."""
+    """Volume flux along the edges of the listed nodes (n,): rate [m³/s] out of each, on the edges of `graph`;
+    water (N,) and capacity (N,) [m³]: what every node holds and could hold on the same domain."""
 
     nodes: np.ndarray
     graph: Graph
     rate: np.ndarray
+    water: np.ndarray
+    capacity: np.ndarray
 
 
 @njit(cache=True)
@@ -66,11 +70,13 @@ def _edge_rates(nodes, graph_row, start, neighbour, u_cell, cells, parent, g, vo
     return rate
 
 
-def edge_flux(topology, graph, listed, u_cell) -> Flux:
-    """Equation (1) on the edges of the listed nodes (n,); u_cell (M, 3) [m/s] projected velocity of the cells."""
+def edge_flux(topology, graph, listed, u_cell, water) -> Flux:
+    """Equation (1) on the edges of the listed nodes (n,); u_cell (M, 3) [m/s] projected velocity of the cells,
+    water (N,) [m³] volume at the nodes."""
     t, g = topology, graph
     mesh = (t.cells, t.parent, t.gradients, t.volume, t.node_start, t.node_cells)
-    return Flux(listed, g, _edge_rates(listed, g.row, g.start, g.neighbour, u_cell, *mesh))
+    rate = _edge_rates(listed, g.row, g.start, g.neighbour, u_cell, *mesh)
+    return Flux(listed, g, rate, water, t.node_volume)
 
 
 @njit(cache=True)
@@ -120,10 +126,10 @@ def _largest_turnover(nodes, graph_row, start, rate, capacity, least):
     return largest
 
 
-def carry_volume(flux: Flux, water, capacity, dt: float):
-    """W (N,) [m³] after dt [s] by the flux; Σ W is kept to round-off. capacity (N,) [m³] nodal volumes."""
-    water = water.copy()
-    capacity = np.maximum(capacity, 1e-300)
+def carry_volume(flux: Flux, dt: float):
+    """W (N,) [m³] after dt [s] by the flux; Σ W is kept to round-off."""
+    water = flux.water.copy()
+    capacity = np.maximum(flux.capacity, 1e-300)
     least = 0.3 * np.median(capacity[flux.nodes]) if len(flux.nodes) else 0.0
     g = flux.graph
     turnover = _largest_turnover(flux.nodes, g.row, g.start, flux.rate, capacity, least)
@@ -262,3 +268,22 @@ def nodal_volume(topology, phi):
 def _of_cells(topology):
     t = topology
     return t.cells, t.volume, t.share, len(t.nodes)
+
+
+def renumbering(source, old_parent, new_parent, new_volume) -> sp.csr_array:
+    """T (N_new, N_old) that hands the volume of every old node to its copies: W_new = T W_old, columns sum to 1.
+
+    source (N_new,): old node that each new one continues, -1 none · parents (N,): background node of each copy ·
+    new_volume (N_new,) [m³] by which several heirs share.  A node without heir leaves its water to the first
+    copy of its background node; without any copy the water is left to the uniform shift."""
+    heir = np.flatnonzero(source >= 0)
+    weight = np.maximum(new_volume[heir], 1e-300)
+    total = np.bincount(source[heir], weight, minlength=len(old_parent))
+    orphan = np.flatnonzero(total == 0.0)
+    first = np.full(max(old_parent.max(), new_parent.max()) + 1, -1)
+    first[new_parent[::-1]] = np.arange(len(new_parent))[::-1]
+    orphan = orphan[first[old_parent[orphan]] >= 0]
+    rows = np.concatenate([heir, first[old_parent[orphan]]])
+    columns = np.concatenate([source[heir], orphan])
+    share = np.concatenate([weight / total[source[heir]], np.ones(len(orphan))])
+    return sp.csr_array((share, (rows, columns)), shape=(len(new_parent), len(old_parent)))

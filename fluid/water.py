@@ -24,7 +24,7 @@ from fluid.parameters import WaterParameters
 from fluid.predictor import predicted
 from fluid.projection import PressureProblem
 from fluid.topology import Graph, Topology, layers_around
-from fluid.volume import edge_flux, nodal_volume
+from fluid.volume import carry_volume, edge_flux, nodal_volume, renumbering
 from fluid.walls import Walls
 
 LONGEST_STEP = 0.3
@@ -90,7 +90,10 @@ class Water:
         self.conserved_volume = float(self.nodal_water.sum())
         self.initial_volume = self.conserved_volume
         self._find_band()
-        self.flux = edge_flux(self.topology, self.graph_for(self.listed), self.listed, self.cell_velocity)
+        self._renumbered = None
+        self.flux = edge_flux(
+            self.topology, self.graph_for(self.listed), self.listed, self.cell_velocity, self.nodal_water
+        )
 
     # ---- the step
 
@@ -123,7 +126,7 @@ class Water:
         self.report = new.report
         self.time += problem.dt
         self.steps += 1
-        self._domain_is_new = False
+        self._domain_is_new, self._renumbered = False, None
 
     # ---- moving solids
 
@@ -139,9 +142,14 @@ class Water:
         self._carry_cells(old_topology)
         self._find_band()
         if not np.array_equal(source, np.arange(len(source))):
-            # nodes were renumbered: the flux of the last step is laid out anew
-            self.nodal_water = nodal_volume(self.topology, self.level_set)
-            self.flux = edge_flux(self.topology, self.graph_for(self.listed), self.listed, self.cell_velocity)
+            handed_on = renumbering(source, old.parent_node, domain.parent_node, self.topology.node_volume)
+            self.nodal_water = handed_on @ self.nodal_water
+            self._renumbered = handed_on if self._renumbered is None else handed_on @ self._renumbered
+
+    def carried_volume(self, dt: float) -> np.ndarray:
+        """Conservative volume (N,) [m³] of the nodes after dt [s], carried on the domain of the last projection."""
+        carried = carry_volume(self.flux, dt)
+        return carried if self._renumbered is None else self._renumbered @ carried
 
     def _carry_nodes(self, source, known):
         fields = [self.level_set[:, None], self.velocity, self.acceleration, self.pressure[:, None]]
