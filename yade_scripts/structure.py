@@ -531,7 +531,7 @@ class Structure:
         """(n,) bool: blocks with a contact of YADE, to one another or to a fixed plane."""
         found = np.zeros(self.n, bool)
         if self.contact is not None:
-            contacts = read_contacts(self._scene)
+            contacts = self.contacts()
             found[contacts.a[contacts.a >= 0]] = True
             found[contacts.b[contacts.b >= 0]] = True
         return found
@@ -558,7 +558,8 @@ class Structure:
             self._F[:] = 0.0
             self.joints.forces(self._x, self._v, self._R, self._F, advance=True)
             self._joint_work = -self._joint_stored() - self.law_dissipation()
-        self._start_energy = sum(self._mechanical().values())
+        self._x_start, self._R_start, self._contacts = self._x.copy(), self._R.copy(), None
+        self._start_energy = sum(self._mechanical().values()) + self.law_dissipation()
 
     # ---- energies -------------------------------------------------------------------------------------------
 

@@ -305,3 +305,17 @@ def test_errors_name_what_is_wrong():
             s.set_load(np.full((1, 6), np.nan))
     with Structure([block]) as again:
         assert again.n == 1
+
+
+def test_displaced_blocks_start_a_closed_ledger():
+    """A joint opened by hand holds its energy and its damage's; released, it swings without any loss but damage."""
+    blocks = [Block("a", (0, 0, 0.5), size=1.0, fixed=True), Block("b", (0, 0, 1.5), size=1.0)]
+    with Structure(blocks, None, LAW, gravity=STILL) as s:
+        s.displace(np.array([1]), np.array([[0.0, 0.0, 2e-4]]), np.eye(3)[None])
+        e = s.energies()
+        assert e["joint_stored"] == pytest.approx(0.5 * 6.75e9 * 0.8**2 * 4e-8, rel=1e-9)
+        assert e["joint_dissipated"] == pytest.approx(s.law_dissipation(), rel=1e-9)
+        assert e["friction"] == pytest.approx(0.0, abs=1e-9)
+        s.advance(0.05)
+        assert balance(s.energies()) == pytest.approx(balance(e), rel=1e-9)
+        assert s.energies()["kinetic"] + s.energies()["joint_stored"] <= e["joint_stored"] * 1.02
