@@ -12,6 +12,7 @@ import numpy as np
 from coupler.boxes import Box, near_pairs, overlap_depth, rotation_matrix
 from coupler.case import Building, Case
 from coupler.errors import did_you_mean
+from coupler.toml_lines import shown
 
 KeyPath = tuple[str | int, ...]
 Problem = tuple[KeyPath, str]
@@ -153,7 +154,7 @@ def _names(case: Case) -> dict[str, list[KeyPath]]:
 def _unique_names(case: Case) -> Iterator[Problem]:
     for name, places in _names(case).items():
         for path in places[1:]:
-            yield (*path, "name"), f"'{name}' is taken by {_shown(places[0])}; give every body its own name"
+            yield (*path, "name"), f"'{name}' is taken by {shown(places[0])}; give every body its own name"
     seen: dict[tuple[str, str], int] = {}
     for i, gauge in enumerate(case.gauge):
         first = seen.setdefault((gauge.kind, gauge.name), i)
@@ -354,7 +355,3 @@ def _gauge_place(case: Case, path: KeyPath, gauge) -> Iterator[Problem]:
                     (*path, "at"),
                     f"'{gauge.name}' lies {depth:.3g} m inside the solid '{name}'; put it on the face",
                 )
-
-
-def _shown(path: KeyPath) -> str:
-    return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path).lstrip(".")

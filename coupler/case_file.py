@@ -22,7 +22,7 @@ from coupler.case import Case
 from coupler.case_checks import problems
 from coupler.case_messages import explain_error
 from coupler.errors import BadCase
-from coupler.toml_lines import key_lines, line_of
+from coupler.toml_lines import key_lines, line_of, shown
 
 KeyPath = tuple[str | int, ...]
 
@@ -207,8 +207,3 @@ def _without_unknown(table: dict, found: list) -> Case | None:
 
 def _line(path: KeyPath, text: str, places: _Places) -> str:
     return f"{places(path)}: {shown(path)}: {text}" if path else f"{places(path)}: {text}"
-
-
-def shown(path: KeyPath) -> str:
-    """("structure", "block", 1, "size") -> "structure.block[1].size"."""
-    return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path).lstrip(".")

@@ -45,14 +45,10 @@ _COMPARE = {
 
 
 def _path(place: tuple) -> KeyPath:
-    """The place without the tags that pydantic adds for one-of types (gauge kinds)."""
-    return tuple(
-        part
-        for before, part in zip((None, *place), place)
-        if not (
-            isinstance(before, int) and place[0] == "gauge" and place.index(part) == 2 and part in GAUGE_KINDS
-        )
-    )
+    """The place without the gauge's kind, which pydantic puts between the list place and the key."""
+    if len(place) > 2 and place[0] == "gauge" and place[2] in GAUGE_KINDS:
+        return place[:2] + place[3:]
+    return place
 
 
 def _unknown(path: KeyPath) -> str:

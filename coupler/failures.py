@@ -72,6 +72,8 @@ class Failures:
             terminal.error(failure.traceback)
         elif failure.traceback:
             terminal.error(f"the traceback is in {log}")
+        if log is not None:
+            terminal.error(f"results so far in {log.parent}")
         raise SystemExit(int(failure.exit_code)) from None
 
 

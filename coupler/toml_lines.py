@@ -29,6 +29,11 @@ def line_of(path: Path, lines: dict[Path, int]) -> int | None:
     return None
 
 
+def shown(path: Path) -> str:
+    """("structure", "block", 1, "size") -> "structure.block[1].size"."""
+    return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path).lstrip(".")
+
+
 class _Scan:
     """One pass over the characters of a TOML text."""
 

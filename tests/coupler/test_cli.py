@@ -152,6 +152,7 @@ def test_exit_codes_of_runs(tmp_path, then, code, says):
     assert "on:  water" in done.stdout
     assert "off: structure, coupling" in done.stdout
     (run,) = (tmp_path / "runs").iterdir()
+    assert f"results {'' if code == 0 else 'so far '}in {run}" in done.stdout + done.stderr
     assert f'"exit_code": {code}' in (run / "run.json").read_text(encoding="utf-8")
 
 
