@@ -16,10 +16,10 @@ from numba import njit
 
 from fluid.advection import transport
 from fluid.extension import continue_into_solids
-from fluid.level_set import redistance, without_films
+from fluid.level_set import redistance
 from fluid.moments import cells_touching
 from fluid.projection import PressureProblem, cell_velocity, inflow, pressure_matrix, seal_pockets
-from fluid.volume import correct_volume, nodal_volume
+from fluid.volume import correct_volume
 
 TRANSPORT_WIDTH = 5.0
 """|φ| in cell sizes within which the level set moves; beyond, only its sign matters."""
@@ -30,7 +30,7 @@ RESCALE_EVERY = 5
 class Predicted:
     """Between predict and correct: level_set (N,), nodal_water (N,) [m³], advected (N, 3) and u_star (N, 3) [m/s],
     wet (N,) bool, wet_cells (n,), cell_star (n, 3) [m/s] velocity of the wet cells, remainder (M, 3) [m/s],
-    kick (N,) the factor f, theta, conserved_volume and reinserted [m³], energy [J] after each stage."""
+    theta, conserved_volume and reinserted [m³], uncorrected_water (N,) [m³] before the volume correction."""
 
     level_set: np.ndarray
     nodal_water: np.ndarray
@@ -55,10 +55,10 @@ def predicted(water, dt: float) -> PressureProblem:
     left = _outflow(water, dt, carried)
     carried -= left
     conserved = water.conserved_volume - float(left.sum())
-    surface, uncorrected = _new_surface(water, phi, carried, conserved)
+    surface = _new_surface(water, phi, carried, conserved)
     u_star = u_adv + theta * dt * parameters.weight
     u_star[water.topology.node_start[1:] == water.topology.node_start[:-1]] = 0.0
-    return _problem(water, dt, theta, kick, surface, uncorrected, conserved, u_adv, u_star)
+    return _problem(water, dt, theta, kick, surface, conserved, u_adv, u_star)
 
 
 def kick_factor(acceleration, parameters):
@@ -96,12 +96,11 @@ def _outflow(water, dt, carried):
 
 
 def _new_surface(water, phi, carried, conserved):
-    """φ redistanced and corrected (VolumeCorrection), and the nodal volume before the correction."""
+    """φ redistanced and corrected: VolumeCorrection."""
     t, h = water.topology, water.mesh.spacing
     continue_into_solids(t, phi, water.listed)
     phi = redistance(t, phi, h, rescale=(water.steps % RESCALE_EVERY == RESCALE_EVERY - 1))
-    before = nodal_volume(t, phi)
-    corrected = correct_volume(
+    return correct_volume(
         t,
         water.graph_for(water.listed),
         water.listed,
@@ -111,12 +110,11 @@ def _new_surface(water, phi, carried, conserved):
         water.parameters.correction_length,
         h,
     )
-    return corrected, before
 
 
-def _problem(water, dt, theta, kick, surface, uncorrected, conserved, u_adv, u_star):
+def _problem(water, dt, theta, kick, surface, conserved, u_adv, u_star):
     t, density = water.topology, water.parameters.density
-    phi = without_films(surface.level_set, water.mesh.spacing)
+    phi = surface.level_set
     wet = (phi < 0.0) & t.active
     cells = cells_touching(wet, t.cells)
     remainder = _carried_remainder(water, dt, theta, cells)
@@ -131,7 +129,7 @@ def _problem(water, dt, theta, kick, surface, uncorrected, conserved, u_adv, u_s
     matrix, extra = _sealed(water, matrix, anchored, dofs, dt, guess)
     kept = Predicted(
         phi,
-        nodal_volume(t, phi),
+        surface.nodal_water,
         u_adv,
         u_star,
         wet,
@@ -141,7 +139,7 @@ def _problem(water, dt, theta, kick, surface, uncorrected, conserved, u_adv, u_s
         theta,
         conserved,
         surface.reinserted,
-        uncorrected,
+        surface.uncorrected_water,
     )
     coupling = water.coupling[dofs]
     return PressureProblem(matrix, rhs[dofs] + extra, coupling, known, guess, dofs, dt, density, kept)

@@ -21,6 +21,7 @@ import numpy as np
 import scipy.sparse as sp
 from numba import njit
 
+from fluid.level_set import without_films
 from fluid.moments import cells_touching, nodal_water
 from fluid.topology import Graph
 
@@ -186,10 +187,12 @@ def _diffused_shift(band, place, graph_row, start, neighbour, stiffness, c, resi
 
 @dataclass(frozen=True)
 class VolumeCorrection:
-    """level_set (N,) · volume [m³] after it · reinserted [m³] moved by the uniform shift."""
+    """level_set (N,) · nodal_water (N,) [m³] of it, and `uncorrected_water` before · reinserted [m³] moved by the
+    uniform shift."""
 
     level_set: np.ndarray
-    volume: float
+    nodal_water: np.ndarray
+    uncorrected_water: np.ndarray
     reinserted: float
 
 
@@ -219,7 +222,8 @@ def correct_volume(topology, graph, listed, phi, carried, target: float, kappa: 
     )
     phi = phi.copy()
     phi[band] -= np.clip(shift, -LARGEST_SHIFT * spacing, LARGEST_SHIFT * spacing)
-    return _meet_total(topology, phi, band, slope.sum(), target, spacing)
+    phi, reinserted = _meet_total(topology, phi, band, slope.sum(), target, spacing)
+    return VolumeCorrection(phi, nodal_volume(topology, phi), own, reinserted)
 
 
 def _volume_slope(t, near, phi, spacing):
@@ -246,13 +250,12 @@ def _within_reach(cell_list, phi, cells, step):
 
 
 def _meet_total(t, phi, band, area, target, spacing):
-    """One uniform shift of the band towards the total volume."""
-    before = water_volume(t, phi)
+    """φ after one uniform shift of the band towards the total volume, and the volume [m³] that it should move."""
     limit = LARGEST_UNIFORM_SHIFT * spacing
-    shift = np.clip((target - before) / area, -limit, limit) if area > 0.0 else 0.0
+    missing = target - water_volume(t, phi)
+    shift = np.clip(missing / area, -limit, limit) if area > 0.0 else 0.0
     phi[band] -= shift
-    after = water_volume(t, phi)
-    return VolumeCorrection(phi, after, after - before)
+    return without_films(phi, spacing), shift * area
 
 
 def water_volume(topology, phi) -> float:

@@ -15,18 +15,22 @@ def drive(water, body, velocity, steps, dt):
     for v in np.broadcast_to(velocity, (steps, 3)):
         yield advance(water, dt, np.append(v, np.zeros(3)), rtol=1e-9)
         body = body.moved(body.centre + dt * v)
-        water.move_solids(cut_domain(water.mesh, body, previous=water.domain, moved=np.array([True])))
+        again = cut_domain(
+            water.mesh, body, water.domain.covers, previous=water.domain, moved=np.array([True])
+        )
+        water.move_solids(again)
 
 
 def box(centre, size):
     return ConvexBodies.boxes(np.array([centre]), np.array([size]))
 
 
-def test_box_pushed_under_lifts_the_surface_by_what_it_displaces():
+@pytest.mark.parametrize("covers", ["single", "multiple"])
+def test_box_pushed_under_lifts_the_surface_by_what_it_displaces(covers):
     """From dry to half sunk: the water keeps its volume, nothing is invented by the motion, the level rises by
     displaced volume / free area."""
     size, body = np.array([0.3, 0.25, 0.2]), box([0.5, 0.5, 0.63], [0.3, 0.25, 0.2])
-    water = tank([1, 1, 1], 0.125, lambda x: x[:, 2] - 0.5, body)
+    water = tank([1, 1, 1], 0.125, lambda x: x[:, 2] - 0.5, body, covers=covers)
     moved = 0.0
     for _ in drive(water, body, [0, 0, -0.5], 40, 0.01):
         moved += abs(water.report.reinserted)
