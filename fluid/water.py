@@ -72,6 +72,7 @@ class Water:
     ):
         self.mesh, self.parameters = mesh, parameters or WaterParameters()
         self.time, self.steps = 0.0, 0
+        self._surface_lag, self._solids_move = 0.0, False
         self.report: StepReport | None = None
         self._sides = Walls.of(mesh, is_open)
         self._set_domain(domain)
@@ -125,6 +126,7 @@ class Water:
         self.conserved_volume = problem.predicted.conserved_volume
         self.report = new.report
         self.time += problem.dt
+        self._surface_lag = problem.dt if self._solids_move else 0.5 * problem.dt
         self.steps += 1
         self._domain_is_new, self._renumbered = False, None
 
@@ -134,7 +136,7 @@ class Water:
         """Go over to the domain that the solids leave now: every field is carried, newly wet nodes are continued
         from their neighbours.  The volume of water in the books does not change; the next step lifts the surface
         by what the solids displaced."""
-        old, old_topology = self.domain, self.topology
+        old, old_topology, self._solids_move = self.domain, self.topology, True
         source = carry(old, domain)
         self._set_domain(domain)
         known = (source >= 0) & old_topology.active[source]
@@ -225,9 +227,14 @@ class Water:
         return kinetic_energy(self.parameters.density, self.nodal_water, self.velocity)
 
     def potential_energy(self) -> float:
-        """-∫ ρ g·x dV [J], exact: Σ N_i x_i = x."""
+        """-∫ ρ g·x dV [J] at the time of the velocity.
+
+        The surface lags: it moves at the start of the next step.  The rate -∫ ρ g·u dV brings it up: by half a step
+        on its own (centred transport), by a whole one where bodies have already moved with this step's velocity;
+        or the work on a heaving body would seem to come and go."""
         p = self.parameters
-        return -p.density * float(self.nodal_water @ (self.topology.nodes @ p.weight))
+        at_surface = -p.density * float(self.nodal_water @ (self.topology.nodes @ p.weight))
+        return at_surface - self._surface_lag * float(self.momentum() @ p.weight)
 
     def available_energy(self) -> float:
         """Kinetic energy, and the potential energy above that of the same water spread over the whole floor [J]."""
