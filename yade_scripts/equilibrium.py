@@ -41,6 +41,8 @@ def settle(structure, load: Array | None = None) -> float:
     start = structure.centre()
     outer = structure.gravity_force() + (0.0 if load is None else load)
     scale = np.abs(outer[rows]).max()
+    if scale == 0.0:
+        return 0.0
     dofs = (6 * rows[:, None] + np.arange(6)).ravel()
     for _ in range(MOST_ITERATIONS):
         residual = (outer + structure.internal_force()).ravel()[dofs]
