@@ -28,8 +28,13 @@ from fluid.topology import Graph
 BAND_WIDTH = 3.0
 LARGEST_SHIFT = 0.3
 LARGEST_UNIFORM_SHIFT = 0.02
+ANCHOR = 1e-3
+MOST_SECANTS = 4
+VOLUME_TOLERANCE = 1e-6
 _PROBE = 0.05
-"""All in cell sizes: half width of the band of (2), limits of the shifts, step of the difference for c."""
+"""Half width of the band of (2), limits of the shifts and step of the difference for c, in cell sizes; share of V/h
+added to c, so that regions without surface stay where they are; secant steps for the total volume and their
+relative tolerance."""
 
 
 @dataclass(frozen=True)
@@ -214,7 +219,7 @@ def correct_volume(topology, graph, listed, phi, carried, target: float, kappa: 
         graph.start,
         graph.neighbour,
         graph.stiffness,
-        slope[band],
+        slope[band] + ANCHOR * topology.node_volume[band] / spacing,
         (carried - own)[band],
         kappa * spacing,
         1e-2,
@@ -231,7 +236,9 @@ def _volume_slope(t, near, phi, spacing):
     step = _PROBE * spacing
     cut = _within_reach(near, phi, t.cells, step)
     wider = nodal_water(cut, -step, phi, *_of_cells(t))
-    return (wider - nodal_water(cut, step, phi, *_of_cells(t))) / (2 * step)
+    slope = (wider - nodal_water(cut, step, phi, *_of_cells(t))) / (2 * step)
+    # in slivers beside solids the last corner to get wet moves water between nodes: no slope may be negative
+    return np.maximum(slope, 0.0)
 
 
 @njit(cache=True)
@@ -250,12 +257,23 @@ def _within_reach(cell_list, phi, cells, step):
 
 
 def _meet_total(t, phi, band, area, target, spacing):
-    """φ after one uniform shift of the band towards the total volume, and the volume [m³] that it should move."""
-    limit = LARGEST_UNIFORM_SHIFT * spacing
-    missing = target - water_volume(t, phi)
-    shift = np.clip(missing / area, -limit, limit) if area > 0.0 else 0.0
-    phi[band] -= shift
-    return without_films(phi, spacing), shift * area
+    """φ after a uniform shift of the band that meets the total volume, and the volume [m³] that it moved.
+
+    Secant steps on the shift, from the slope `area`; the shift stays within LARGEST_UNIFORM_SHIFT."""
+    limit, shift = LARGEST_UNIFORM_SHIFT * spacing, 0.0
+    start = volume = water_volume(t, phi)
+    shifted = phi
+    for _ in range(MOST_SECANTS):
+        if abs(target - volume) <= VOLUME_TOLERANCE * abs(target) or area <= 0.0:
+            break
+        trial = np.clip(shift + (target - volume) / area, -limit, limit)
+        if trial == shift:
+            break
+        shifted = phi.copy()
+        shifted[band] -= trial
+        before, volume = volume, water_volume(t, shifted)
+        area, shift = (volume - before) / (trial - shift), trial
+    return without_films(shifted, spacing), volume - start
 
 
 def water_volume(topology, phi) -> float:

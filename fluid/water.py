@@ -29,6 +29,9 @@ from fluid.walls import Walls
 
 LONGEST_STEP = 0.3
 """dt ≤ LONGEST_STEP sqrt(h/g): a step at rest."""
+LEAST_COUNTED = 0.05
+"""Nodes with less fluid volume around them (in h³) do not set the step: films beside solids, which paths of any
+length cross safely."""
 
 
 @dataclass(frozen=True)
@@ -106,8 +109,8 @@ class Water:
     def stable_step(self) -> float:
         """dt [s]: Courant number of the fastest water, and LONGEST_STEP sqrt(h/g)."""
         h = self.mesh.spacing
-        wet = self.level_set < 0.0
-        fastest = np.abs(self.velocity[wet]).max() if wet.any() else 0.0
+        counted = (self.level_set < 0.0) & (self.topology.node_volume > LEAST_COUNTED * h**3)
+        fastest = np.abs(self.velocity[counted]).max() if counted.any() else 0.0
         at_rest = LONGEST_STEP * np.sqrt(h / self.parameters.gravity)
         return float(min(at_rest, self.parameters.courant * h / max(fastest, 1e-12)))
 
