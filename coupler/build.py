@@ -191,6 +191,7 @@ def _tank_planes(case: Case) -> list:
 
 def _water(case: Case, structure, solids):
     from coupler.exchange import Immersion
+    from coupler.fill import start_level
     from fluid.mesh import box_mesh
     from fluid.parameters import WaterParameters
     from fluid.water import Water
@@ -203,7 +204,9 @@ def _water(case: Case, structure, solids):
         theta=case.water.theta,
         courant=case.time.cfl,
     )
-    return Water(mesh, immersion.domain, _fill(case), parameters, _open_sides(case)), immersion
+    boxes = [(fill.lower, fill.upper) for fill in case.water.fill]
+    level = start_level(boxes, (case.tank.lower, case.tank.upper), mesh, immersion.domain)
+    return Water(mesh, immersion.domain, level, parameters, _open_sides(case)), immersion
 
 
 def _open_sides(case: Case):
@@ -219,24 +222,6 @@ def _open_sides(case: Case):
         return (normals @ outward.T > 0.5).any(axis=1)
 
     return is_open
-
-
-def _fill(case: Case):
-    """Level set of the union of the fill boxes: (m, 3) → (m,) [m], negative in the water.
-
-    Sides on the tank's own boundary are left out, so that the water there ends at the wall and not in a surface.
-    """
-    lower, upper = np.array(case.tank.lower), np.array(case.tank.upper)
-
-    def box(points, fill):
-        below = np.where(np.array(fill.lower) <= lower, -np.inf, np.array(fill.lower) - points)
-        above = np.where(np.array(fill.upper) >= upper, -np.inf, points - np.array(fill.upper))
-        return np.maximum(below, above).max(axis=1)
-
-    def level_set(points):
-        return np.min([box(points, fill) for fill in case.water.fill], axis=0)
-
-    return level_set
 
 
 def _gauges(case: Case, structure) -> list[Gauge]:

@@ -15,6 +15,11 @@ FILM = 1e-4
 """Share of a cell edge by which loose blocks are drawn in, so that water reaches a face that rests on another:
 sealed or open must follow from the joints, not from the micrometres of a contact (a sealed face takes the
 buoyancy away)."""
+SPANS = 0.02
+"""Share of a cell edge within which a block that reaches two opposite sides of the tank closes it: a slice of a long
+body. A film of micrometres there would be water of no volume, with any velocity."""
+ALONG = 1e-3
+"""Largest 1 - |n·e| of a face that counts as parallel to a side of the tank."""
 
 
 class Immersion:
@@ -92,7 +97,28 @@ class Immersion:
         )  # the other side may be a step behind
         np.maximum.at(growth, rows, steps * self._tolerance)
         growth[rows] = np.maximum(growth[rows], before[rows])
+        growth[self._closing_planes()] = 2.0 * SPANS * self.mesh.spacing
         return growth
+
+    def _closing_planes(self) -> Array:
+        """(P,) bool: faces along the tank sides of blocks that reach from one side to the opposite one."""
+        closing = np.zeros(len(self._body_of_plane), bool)
+        low, high = self.mesh.bounds
+        margin = SPANS * self.mesh.spacing
+        centre, rotation = self.structure.centre(), self.structure.rotation()
+        normals = np.einsum("pij,pj->pi", self._turns(rotation), self._reference.normals)
+        for b, (x, R, vertices) in enumerate(zip(centre, rotation, self.structure.shape_vertices)):
+            corners = x + vertices @ R.T
+            spans = (corners.min(axis=0) < low + margin) & (corners.max(axis=0) > high - margin)
+            if spans.any():
+                own = self._body_of_plane == b
+                closing[own] = (np.abs(normals[own][:, spans]) > 1.0 - ALONG).any(axis=1)
+        return closing
+
+    def _turns(self, rotation: Array) -> Array:
+        """Rotation of the body of each plane (P, 3, 3)."""
+        fixed = np.broadcast_to(np.eye(3), (self.n_solids, 3, 3))
+        return np.concatenate([rotation, fixed])[self._body_of_plane]
 
     def _placed(self) -> ConvexBodies:
         return self._reference.moved(self._centre, self._rotation).grown(self._growth)

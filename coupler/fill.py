@@ -1,0 +1,103 @@
+"""Where the water stands at the start: boxes of a case → level set at the nodes of the physical domain.
+
+A fill box often ends at a wall. That side is no surface: left as it is, the level set would be zero in the face of
+the wall and the water there without pressure; and beside a thin wall the copies of its nodes on the dry side would
+count as wet. So a side of a box counts at a node only where water and air can meet in the cells around it:
+
+    s = distance to the side, negative inside;  [s_low, s_high] over the fluid part of the cells around the node
+    solid cuts these cells short on the outer side, s_high < t   →  s ← min(s, -2 c)      wet up to the solid
+    solid cuts these cells short on the inner side, s_low > -t   →  s ← max(s, +2 c)      dry from the solid on
+
+c: cell edge, t = TOUCHES c. Elsewhere s stays, so that a level surface stays a plane up to the wall.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fluid.quadrature import part_points
+
+Array = np.ndarray
+
+TOUCHES = 0.1
+"""Share of a cell edge within which the side of a box counts as the face of the solid."""
+MISSING = 0.05
+"""Share of a cell edge that a solid must take off the cells around a node to count."""
+
+
+def start_level(boxes, tank, mesh, domain) -> Array:
+    """Level set (N,) [m] of the union of the boxes at the nodes of a PhysicalDomain, negative in the water.
+
+    boxes: list of (lower (3,), upper (3,)) [m] · tank: (lower, upper) of the tank, whose walls are no surfaces either.
+    """
+    low, high = _reach(domain.nodes, domain.cells, *_fluid_extent(domain))
+    edge = _cell_edge(mesh)
+    whole_low, whole_high = _reach(mesh.nodes, mesh.cells, *_extent(mesh.nodes[mesh.cells]))
+    cut_low = low - whole_low[domain.parent_node] > MISSING * edge
+    cut_high = whole_high[domain.parent_node] - high > MISSING * edge
+    stars = (domain.nodes, low, high, cut_low, cut_high)
+    return np.min([_box_level(box, tank, stars, edge) for box in boxes], axis=0)
+
+
+def _box_level(box, tank, stars, edge: float) -> Array:
+    """Signed distance (N,) of one box, its sides at solids and tank walls left out."""
+    nodes, low, high, cut_low, cut_high = stars
+    (box_low, box_high), (tank_low, tank_high) = box, tank
+    level = np.full(len(nodes), -np.inf)
+    for k in range(3):
+        x = nodes[:, k]
+        if box_high[k] < tank_high[k]:
+            plane = box_high[k]
+            side = _side(
+                x - plane, low[:, k] - plane, high[:, k] - plane, cut_low[:, k], cut_high[:, k], edge
+            )
+            level = np.maximum(level, side)
+        if box_low[k] > tank_low[k]:
+            plane = box_low[k]
+            side = _side(
+                plane - x, plane - high[:, k], plane - low[:, k], cut_high[:, k], cut_low[:, k], edge
+            )
+            level = np.maximum(level, side)
+    far = np.ptp(nodes, axis=0).max()  # a distance that no surface reaches
+    return np.maximum(level, -far)
+
+
+def _side(s, s_low, s_high, cut_inner, cut_outer, edge: float) -> Array:
+    """Distance to one side (N,), pushed away from the solids that stand there."""
+    touch = TOUCHES * edge
+    wet = cut_outer & (s_high < touch)
+    dry = cut_inner & (s_low > -touch)
+    sliver = wet & dry  # counts to the side on which it mostly lies
+    wet &= ~sliver | (-s_low >= s_high)
+    dry &= ~wet
+    return np.where(wet, np.minimum(s, -2.0 * edge), np.where(dry, np.maximum(s, 2.0 * edge), s))
+
+
+def _cell_edge(mesh) -> float:
+    """Longest side of the bounding boxes of the cells, the typical one [m]."""
+    corners = mesh.nodes[mesh.cells]
+    return float(np.median(np.ptp(corners, axis=1).max(axis=1)))
+
+
+def _extent(points) -> tuple[Array, Array]:
+    return points.min(axis=1), points.max(axis=1)
+
+
+def _fluid_extent(domain) -> tuple[Array, Array]:
+    """Bounds (M, 3) each of the fluid part of every cell, by the points of its quadrature."""
+    corners = domain.nodes[domain.cells]
+    low, high = _extent(corners)
+    cut = np.flatnonzero(domain.is_cut)
+    points = part_points(corners[cut], domain.volume[cut], domain.centroid[cut], domain.second[cut])
+    part_low, part_high = _extent(points)
+    low[cut], high[cut] = np.maximum(low[cut], part_low), np.minimum(high[cut], part_high)
+    return low, high
+
+
+def _reach(nodes, cells, low, high) -> tuple[Array, Array]:
+    """Bounds (N, 3) each of what the cells around every node reach."""
+    node_low, node_high = np.full(nodes.shape, np.inf), np.full(nodes.shape, -np.inf)
+    for a in range(4):
+        np.minimum.at(node_low, cells[:, a], low)
+        np.maximum.at(node_high, cells[:, a], high)
+    return node_low, node_high
