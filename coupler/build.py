@@ -168,7 +168,9 @@ def build_structure(case: Case):
         )
     ground = case.structure.ground.level if case.structure.ground else None
     gravity = (0.0, 0.0, -case.case.gravity)
-    return Structure(blocks_of(case), contact, joints, ground, _tank_planes(case), gravity)
+    audit = c is not None and c.audit
+    planes = _tank_planes(case)
+    return Structure(blocks_of(case), contact, joints, ground, planes, gravity, track_contacts=audit)
 
 
 def _tank_planes(case: Case) -> list:

@@ -202,6 +202,11 @@ class Contact(Section):
         0.3, description="e, velocity after a normal impact over the velocity before"
     )
     friction: quantity("", ge=0) = Field(0.5, description="mu, largest tangential over normal force")
+    audit: Switch = Field(
+        False,
+        description="true: count the work of dashpots and friction contact by contact in every substep (slow); "
+        "false: take their sum from the balance of the other energies",
+    )
     rule: Literal["exact", "paper"] = Field(
         "exact",
         description="dashpot that gives e exactly and never pulls, or the closed formula of the method",
