@@ -101,6 +101,19 @@ def _structure_rows(case: Case, rows: list[Row]) -> int:
         rows.append(Row("joints", joint_counts(structure).intact, "", ""))
         rows.append(Row("substep", 1e6 * substep, "us", f"set by {pair}"))
         rows.append(Row("substeps", math.ceil(case.time.end / substep), "", ""))
+        if case.joints and case.structure.start == "settled":
+            _row_at_rest(structure, rows)
         return structure.n
     finally:
         structure.close()
+
+
+def _row_at_rest(structure, rows: list[Row]) -> None:
+    """Row of the damage under the structure's own weight; raises CannotStand where that is too much."""
+    from yade_scripts.equilibrium import settle
+
+    moved = settle(structure)
+    damage = structure.joint_table().damage.max()
+    rows.append(
+        Row("damage at rest", float(damage), "", f"under its own weight; blocks move {1e3 * moved:.3g} mm")
+    )
