@@ -140,6 +140,17 @@ class Joints:
         )
         return out[joints]
 
+    def sealed_faces(self, x: Array, R: Array) -> tuple[Array, Array, Array]:
+        """Both faces of each live joint: block (m,), face (m,), half of the joint's largest opening (m,) [m]."""
+        live = self.live
+        half = 0.5 * self.openings(live, x, R)[:, 2]
+        inner = self.b[live] >= 0
+        return (
+            np.concatenate([self.a[live], self.b[live][inner]]),
+            np.concatenate([self.face_a[live], self.face_b[live][inner]]),
+            np.concatenate([half, half[inner]]),
+        )
+
     def rows(self) -> Array:
         """Blocks with a live joint, sorted."""
         ends = np.concatenate([self.a[self.live], self.b[self.live]])

@@ -14,10 +14,8 @@ so intact-intact pairs never meet (their joints carry compression), every other 
 
 from __future__ import annotations
 
-import builtins
 import struct
 from collections import deque
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,8 +39,6 @@ LIKE = 2.0
 """Mass ratio up to which the dashpots of the materials serve every pair (e within 0.02)."""
 INSTANT = 1e-200
 """Length of a substep in which nothing moves [s]."""
-HOOK = "_surgebreak_substep"
-"""Name under which YADE's PyRunner finds the joints (its command runs in __main__, which may belong to a test)."""
 STATE = 13
 """Numbers of a body: position 3, velocity 3, angular velocity 3, orientation 4 (x y z w)."""
 
@@ -77,7 +73,6 @@ class Scene:
         face_stiffness: Array,
         gravity: Array,
         with_nodes: Array,
-        substep: Callable[[], None] | None,
     ):
         if Scene._owner is not None:
             raise SceneInUse("YADE holds another structure in this process; call its close() first")
@@ -95,14 +90,13 @@ class Scene:
         """Fixed turn from the block frame to YADE's principal frame."""
         self.plain_frame = self.frame.copy()
         """The same of a block before it became a clump."""
-        self.is_still = False
-        """True during a substep of no length; the joints are not to be counted then."""
+        self._corrected_until = 0
         self._materials: dict[tuple, object] = {}
         self._subdomain = engine.wrapper.Subdomain()
+        self._set_engines(gravity)
         self._add_planes(planes)
         for row, block in enumerate(blocks):
             self._add_block(row, block, with_nodes[row])
-        self._set_engines(gravity, substep)
 
     # ---- building -------------------------------------------------------------------------------------------
 
@@ -170,6 +164,14 @@ class Scene:
         self.row_of.update(dict.fromkeys(self.nodes[row], row))
         self.frame[row] = _matrix(O.bodies[self.ids[row]].state.ori).T @ R
         self._set_inertia(row, motion)
+        self._carry_members(row, x, motion)
+
+    def _carry_members(self, row: int, x: Array, motion: Array) -> None:
+        """Velocities of clump members, which contact forces depend on (YADE sets them in its next integration)."""
+        for member in (self.box_id[row], *self.nodes[row]):
+            state = self.O.bodies[member].state
+            arm = np.array(state.pos) - x
+            state.vel, state.angVel = self._v(motion[:3] + np.cross(motion[3:], arm)), self._v(motion[3:])
 
     def _set_inertia(self, row: int, motion: Array) -> None:
         """Exact mass and inertia in YADE's principal frame; velocity and angular momentum to match.
@@ -224,27 +226,27 @@ class Scene:
             self._materials[key] = material
         return self._materials[key]
 
-    def _set_engines(self, gravity: Array, substep: Callable[[], None] | None) -> None:
+    def _set_engines(self, gravity: Array) -> None:
+        """Two groups that take turns, so that the joints act between contact forces and integration. (YADE warns of
+        forces that were not reset in the step of its integration; here that is meant.)"""
         w = self.engine.wrapper
-        self.newton = w.NewtonIntegrator(damping=0.0, exactAsphericalRot=True, gravity=self._v(gravity))
-        self.collider = self.loop = None
-        engines = [w.ForceResetter()]
+        self.newton = w.NewtonIntegrator(
+            damping=0.0, exactAsphericalRot=True, gravity=self._v(gravity), warnNoForceReset=False
+        )
+        self.collider = None
+        self._finders = [w.ForceResetter()]
         if self.law is not None:
             edge = min((b.size.min() for b in self.blocks if b.is_box), default=1.0)
             self.collider = w.InsertionSortCollider(
                 [w.Bo1_Box_Aabb(), w.Bo1_Sphere_Aabb()], verletDist=VERLET * edge, avoidSelfInteractionMask=3
             )
-            self.loop = w.InteractionLoop(
+            loop = w.InteractionLoop(
                 [w.Ig2_Box_Sphere_ScGeom()],
                 [w.Ip2_ViscElMat_ViscElMat_ViscElPhys()],
                 [w.Law2_ScGeom_ViscElPhys_Basic()],
             )
-            engines += [self.collider, self.loop]
-        if substep is not None:
-            setattr(builtins, HOOK, substep)
-            engines.append(w.PyRunner(command=f"{HOOK}()", iterPeriod=1, initRun=True, updateGlobals=False))
-        self.resetter = engines[0]
-        self.O.engines = [*engines, self.newton]
+            self._finders += [self.collider, loop]
+        self.O.engines = [*self._finders, self.newton]
 
     # ---- reading and writing --------------------------------------------------------------------------------
 
@@ -259,7 +261,7 @@ class Scene:
         return np.frombuffer(buffer, float, STATE * len(rows_ids)).reshape(-1, STATE)
 
     def add_forces(self, ids: list[int], F: Array) -> None:
-        """Add F (k, 6) to the bodies for the running substep (only from within the engine loop).
+        """Add F (k, 6) to the bodies for the integration to come.
 
         YADE's permanent forces are not used: its integrator aborts when bodies are added after one was set."""
         forces = self.O.forces
@@ -279,11 +281,36 @@ class Scene:
         for i in self.nodes[row]:
             bodies[i].mask = node
 
-    def search_contacts_now(self) -> None:
-        """Make the next substep look for contacts afresh (after masks or bodies changed)."""
+    def has_nodes(self) -> Array:
+        """(n,) bool: blocks that can touch something."""
+        return np.array([len(nodes) > 0 for nodes in self.nodes], bool)
+
+    def find_contacts(self, dt: float) -> None:
+        """Contacts and their forces at the present places; tangential springs grow by slip times dt [s]."""
+        self.O.dt = dt
+        self._take_turn(finders=True)
+
+    def integrate(self) -> None:
+        """Move on by the dt of `find_contacts`, under its forces and those added since."""
+        self._take_turn(finders=False)
+
+    def _take_turn(self, finders: bool) -> None:
+        for engine in self._finders:
+            engine.dead = not finders
+        self.newton.dead = finders
+        self.O.step()
+
+    def look(self) -> None:
+        """Contacts at the present places, for reading: nothing moves, and their forces are dropped."""
+        if self.collider is not None:
+            self.find_contacts(INSTANT)
+            self.O.forces.f(0, sync=True)  # YADE resets only forces that have been summed over its threads
+
+    def search_contacts(self) -> None:
+        """Look for pairs that may touch among all bodies (after masks or bodies changed)."""
         if self.collider is not None:
             self.collider.doSort = True
-            self.newton.maxVelocitySq = 2.0 + self.newton.maxVelocitySq
+            self.collider()
 
     def displace(self, rows: Array, shift: Array, turn: Array) -> None:
         """Move the blocks `rows` by shift (m, 3) and turn (m, 3, 3) about their centres, with all their members."""
@@ -293,27 +320,18 @@ class Scene:
                 state = self.O.bodies[member].state
                 state.pos = self._v(centre + move + Q @ (np.array(state.pos) - centre))
                 state.ori = self._q(Q @ _matrix(state.ori))
-
-    def still_step(self) -> None:
-        """A substep of no length: contacts and clump members follow the present positions, nothing moves.
-
-        (Calling YADE's contact engine by hand instead would leave its forces to be counted twice.)"""
-        dt, self.O.dt = self.O.dt, INSTANT
-        self.is_still = True
-        self.O.step()
-        self.is_still = False
-        self.O.dt = dt
+        self.look()
 
     def contacts(self) -> list:
-        """Real interactions between a node and a box, of this substep."""
-        return [i for i in self.O.interactions if i.isReal] if self.loop is not None else []
+        """Real interactions between a node and a box, at the present places."""
+        return list(self.O.interactions) if self.collider is not None else []
 
     def correct_dashpots(self) -> None:
         """Give new contacts the dashpot of their own pair, C = 2 ζ sqrt(m K) / points with the effective mass.
 
         The materials in series give it for equal masses and for planes; this is for blocks of unlike mass."""
-        now = self.O.iter
-        for i in [i for i in self.O.interactions if i.iterMadeReal == now]:
+        since, self._corrected_until = self._corrected_until, self.O.iter
+        for i in [i for i in self.O.interactions if i.iterMadeReal >= since]:
             a, b = self.row_of[i.id1], self.row_of[i.id2]
             if a >= 0 and b >= 0:
                 phys, c = i.phys, self.pair_dashpot(a, b)
@@ -359,10 +377,11 @@ class Scene:
                 turn = _matrix(ori) @ self.plain_frame[row] @ self.frame[row].T
                 state.ori = self._q(turn)
             state.pos, state.vel, state.angVel, state.angMom = pos, vel, spin, momentum
-        self.search_contacts_now()
-        self.still_step()  # moves the clump members
+        self.look()
+        self.integrate()  # over no time: moves the clump members
         self.O.interactions.clear()  # contacts that the masks no longer allow would stay otherwise
-        self.still_step()  # finds the contacts of the members where they are now
+        self.search_contacts()
+        self.look()
         for i in self.contacts():
             i.phys.shearForce = saved.shear.get((i.id1, i.id2), self._v((0.0, 0.0, 0.0)))
 
@@ -370,8 +389,6 @@ class Scene:
         """Give the scene back; the structure cannot be used afterwards."""
         if Scene._owner is self:
             self.O.reset()
-            if hasattr(builtins, HOOK):
-                delattr(builtins, HOOK)
             Scene._owner = None
 
     def _v(self, x) -> object:

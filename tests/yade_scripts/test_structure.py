@@ -131,11 +131,11 @@ def test_tangent_is_the_derivative_of_the_force():
         rigid = np.zeros((s.n, 6))
         rigid[:, :3] = (0.3, 0.2, 0.1)
         assert np.abs(K @ rigid.ravel()).max() < 1e-9 * abs(K).max()
-        x = s._x.copy()
-        s._x[1] += step[1, :3]
-        s._R[1] = Rotation.from_rotvec(step[1, 3:]).as_matrix() @ s._R[1]
+        x = s._motion.x.copy()
+        s._motion.x[1] += step[1, :3]
+        s._motion.R[1] = Rotation.from_rotvec(step[1, 3:]).as_matrix() @ s._motion.R[1]
         force = s.internal_force().ravel()
-        s._x[:] = x
+        s._motion.x[:] = x
         np.testing.assert_allclose(force, -(K @ step.ravel()), rtol=0, atol=1e-4 * np.abs(force).max())
 
 

@@ -1,0 +1,141 @@
+"""Energies of a structure and the work done on it: the ledger of the joints, the contacts and the load.
+
+Kinetic energy lives at half substeps (leapfrog), so the potentials are taken there too: that of a spring with the
+opening u is 1/2 k u(t) u(t - dt), which together with the kinetic energy is constant to round-off.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from yade_scripts import joint_kernel
+from yade_scripts.contact_state import Contacts
+from yade_scripts.joints import Joints
+from yade_scripts.ledger import ContactWork
+from yade_scripts.motion import Motion
+
+Array = np.ndarray
+
+_SUMS = ("load_work", "joint_work", "driving_work", "handed_over")
+
+
+@dataclass(frozen=True)
+class Masses:
+    """mass (n,) [kg] · body_inertia (n, 3, 3) [kg m²] in the block frames · free (n,) bool: motion not prescribed
+
+    gravity (3,) [m/s²].
+    """
+
+    mass: Array
+    body_inertia: Array
+    free: Array
+    gravity: Array
+
+    def inertia(self, R: Array) -> Array:
+        """(n, 3, 3) about the centres, world axes."""
+        return R @ self.body_inertia @ R.transpose(0, 2, 1)
+
+
+class Accounts:
+    """Running sums [J]: load_work · joint_work: what the joints did to the blocks · driving_work: done by what moves
+    the driven blocks, against joints · handed_over: energy of compressed joints that went over to contacts.
+
+    contacts: reads the present contacts · contact_work: account contact by contact, or None.
+    """
+
+    def __init__(
+        self,
+        masses: Masses,
+        motion: Motion,
+        joints: Joints | None,
+        contacts: Callable[[], Contacts],
+        contact_work: ContactWork | None,
+    ):
+        self._masses, self._motion, self._joints = masses, motion, joints
+        self._contacts, self._contact_work = contacts, contact_work
+        self.load_work = self.joint_work = self.driving_work = self.handed_over = 0.0
+        self._start = sum(self.mechanical().values())
+
+    def start_here(self) -> None:
+        """The present state is the start: blocks were displaced by hand."""
+        self.joint_work = -self.joint_stored() - self.law_dissipation()
+        self._start = sum(self.mechanical().values()) + self.law_dissipation()
+
+    def take_joints(self, F: Array, before: Array, rows: Array, dt: float) -> None:
+        """Work of the joint forces F (n, 6) on `rows` in a substep dt that began with velocities `before` (n, 6)."""
+        self.joint_work += joint_kernel.work_of(F[rows], before[rows], self._motion.v[rows], dt)
+        held = rows[~self._masses.free[rows]]
+        self.driving_work -= joint_kernel.work_of(F[held], before[held], self._motion.v[held], dt)
+
+    def work_of_load(self, load: Array, half_before: Array, turn: Array, spin_before: Array) -> float:
+        """Work of the held load (n, 6) [J] between the half substeps where the kinetic energy lives."""
+        free, m = self._masses.free, self._motion
+        moved = m.half_step_back() - half_before
+        turned = turn - 0.5 * m.dt * (m.v[:, 3:] - spin_before)
+        return float(np.sum(load[free, :3] * moved[free]) + np.sum(load[free, 3:] * turned[free]))
+
+    def energies(self) -> dict[str, float]:
+        """See `Structure.energies`."""
+        e = self.mechanical()
+        e["load_work"], e["driving_work"] = self.load_work, self.driving_work
+        e["joint_damping"] = self._joint_column(joint_kernel.DAMPED)
+        e["joint_dissipated"] = -self.joint_work - e["joint_stored"] - e["joint_damping"] - self.handed_over
+        if self._contact_work is not None:
+            e["driving_work"] += self._contact_work.driving
+            e["dashpot"], e["friction"] = self._contact_work.dashpot, self._contact_work.friction
+        else:
+            e["dashpot"], e["friction"] = 0.0, self._missing(e)
+        return e
+
+    def _missing(self, e: dict[str, float]) -> float:
+        """What the balance of the other energies leaves for dashpots and friction."""
+        known = ("kinetic", "gravity", "joint_stored", "joint_dissipated", "joint_damping", "contact_stored")
+        return e["load_work"] + e["driving_work"] + self._start - sum(e[name] for name in known)
+
+    def law_dissipation(self) -> float:
+        """See `Structure.law_dissipation`."""
+        return self._joint_column(joint_kernel.DISSIPATED)
+
+    def mechanical(self) -> dict[str, float]:
+        """Kinetic and potential energies."""
+        free, m = self._masses.free, self._motion
+        v, w = m.v[free, :3], m.v[free, 3:]
+        spin = np.einsum("ni,nij,nj->", w, self._masses.inertia(m.R)[free], w)
+        mass = self._masses.mass[free]
+        height = m.half_step_back()[free] @ self._masses.gravity
+        return {
+            "kinetic": float(0.5 * (mass @ (v**2).sum(axis=1) + spin)),
+            "gravity": float(-mass @ height),
+            "joint_stored": self.joint_stored(),
+            "contact_stored": self.contact_stored(),
+        }
+
+    def joint_stored(self) -> float:
+        """Springs of the live joints half a substep ago [J]."""
+        if self._joints is None or not len(self._joints.live):
+            return 0.0
+        m = self._motion
+        return joint_kernel.stored_between(*self._joints.arrays(), m.x, m.R, *m.before())
+
+    def contact_stored(self) -> float:
+        """Springs of the contacts half a substep ago: 1/2 k u(t) u(t - dt) in the normals [J]."""
+        c, m = self._contacts(), self._motion
+        closing = np.einsum("ci,ci->c", c.closing_velocity(m.v, m.x), c.normal)
+        depth = np.maximum(c.depth, 0.0)
+        normal = 0.5 * c.kn * depth * np.maximum(depth - m.dt * closing, 0.0)
+        return float(np.sum(normal + 0.5 * (c.shear_force**2).sum(axis=1) / c.ks))
+
+    def _joint_column(self, column: int) -> float:
+        return 0.0 if self._joints is None else float(self._joints.energy[:, column].sum())
+
+    def sums(self) -> dict[str, float]:
+        """What `restore` needs."""
+        return {name: getattr(self, name) for name in _SUMS}
+
+    def restore(self, sums: dict[str, float]) -> None:
+        """Back to earlier sums."""
+        for name, value in sums.items():
+            setattr(self, name, value)
