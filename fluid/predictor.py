@@ -99,6 +99,7 @@ def _new_surface(water, phi, carried, conserved):
     """φ redistanced and corrected: VolumeCorrection."""
     t, h = water.topology, water.mesh.spacing
     continue_into_solids(t, phi, water.listed)
+    keep_dry(t, phi, carried)
     phi = redistance(t, phi, h, rescale=(water.steps % RESCALE_EVERY == RESCALE_EVERY - 1))
     return correct_volume(
         t,
@@ -110,6 +111,19 @@ def _new_surface(water, phi, carried, conserved):
         water.parameters.correction_length,
         h,
     )
+
+
+def keep_dry(topology, phi, carried) -> None:
+    """No water where none was carried, in place: φ (N,) of covered nodes that neither hold nor touch water is kept
+    positive.  A level surface continued around the edge of a wall would put water on its dry side."""
+    t = topology
+    doubtful = t.covered & (phi < 0.0)
+    if not doubtful.any():
+        return
+    near_water = np.zeros(len(phi), bool)
+    near_water[t.cells[cells_touching(carried > 0.0, t.cells)]] = True
+    doubtful &= ~near_water
+    phi[doubtful] = -phi[doubtful]
 
 
 def _problem(water, dt, theta, kick, surface, conserved, u_adv, u_star):
