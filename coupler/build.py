@@ -43,7 +43,14 @@ def build(case: Case, clock) -> Scene:
         if case.joints and case.structure.start == "settled" and _settled(structure, water) and case.water:
             water, immersion = _water(case, structure, solids)
         coupling = Coupling(
-            water, structure, immersion, rtol=PRESSURE_RTOL, step_max=case.time.step_max, clock=clock
+            water,
+            structure,
+            immersion,
+            rtol=PRESSURE_RTOL,
+            step_max=case.time.step_max,
+            clock=clock,
+            passes=case.coupling.passes,
+            tolerance=case.coupling.tolerance,
         )
     tank = (case.tank.lower, case.tank.upper) if case.tank else None
     return Scene(coupling, _gauges(case, structure), solids, tank)

@@ -305,13 +305,28 @@ class Motion(Section):
     velocity: VelocityVector = Field(description="its velocity for the whole run")
 
 
+class Exchange(Section):
+    """How water and blocks agree on a step."""
+
+    passes: Annotated[int, Field(strict=True, ge=1, le=4)] = Field(
+        2,
+        description="most pressure solves in a step: the blocks' stiffness is in the first; with what the blocks then "
+        "did, the step is taken again while the defect is above the tolerance",
+    )
+    tolerance: quantity("", gt=0, le=1) = Field(
+        0.05, description="defect of a step above which another pass is made"
+    )
+
+
 class RunLimits(Section):
     """When a run stops early because its numbers are not to be trusted, or have cost enough."""
 
     volume_error: quantity("", gt=0) = Field(0.02, description="lost or gained share of the water")
     energy_error: quantity("", gt=0) = Field(0.05, description="unbalanced share of the energy put in")
     defect: quantity("", gt=0) = Field(
-        0.05, description="share by which the blocks' mean motion in a step may miss what the water was told"
+        0.5,
+        description="mean over the last twenty steps of the share by which the blocks missed the motion that the "
+        "water was told",
     )
     cpu_seconds: PositiveTime | None = Field(None, description="processor time that the run may take")
 
@@ -329,6 +344,7 @@ class Case(Section):
     joints: Joints | None = Field(None, description="glue between touching faces, which may break")
     gauge: tuple[Gauge, ...] = Field((), description="what is measured at every step")
     motion: tuple[Motion, ...] = Field((), description="blocks that move as prescribed")
+    coupling: Exchange = Field(default_factory=Exchange, description="how water and blocks agree on a step")
     limits: RunLimits = Field(default_factory=RunLimits, description="when a run stops early")
 
 

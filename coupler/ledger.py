@@ -55,6 +55,11 @@ class Ledger:
         self._gravity_start = None if structure is None else structure["gravity"]
         self._input = self.available
 
+    @property
+    def input_energy(self) -> float:
+        """What the scene has put in so far [J], the scale of every error."""
+        return self._input
+
     def give(self, work: float) -> None:
         """Add the work that the water gave to the bodies in a step [J]."""
         self.work_given += work

@@ -49,6 +49,19 @@ def check_balance(time: float, volume_error: float, energy_error: float, limits:
         )
 
 
+def check_defect(time: float, mean_defect: float, limit: float) -> None:
+    """Stop a run in which water and blocks no longer agree on how the blocks move.
+
+    mean_defect: over the last steps, since a joint that breaks makes a single step miss. Raises Diverged.
+    """
+    if not math.isfinite(mean_defect) or mean_defect > limit:
+        raise Diverged(
+            f"the blocks miss the motion that the water was told by {mean_defect:.0%} on the mean of the last steps, "
+            f"t = {time:.4g} s; limit {limit:.0%} (limits.defect). Reduce time.step_max to a tenth of the period of "
+            "the structure, raise coupling.passes to 2, or raise joints.damping."
+        )
+
+
 def check_finite(time: float, what: str, values, item: str) -> None:
     """Stop at the first NaN or infinity, naming the quantity and the item (node, block) that holds it.
 

@@ -7,6 +7,7 @@ A scene may lack either side: without water the structure runs alone, without a 
 from __future__ import annotations
 
 import math
+from collections import deque
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -19,6 +20,10 @@ Array = np.ndarray
 
 BLOCK_COURANT = 0.5
 """Share of a cell that the fastest block may cross in one step: its cells are cut once a step."""
+STANDS_STILL = 1e-3
+"""Share of the energy of the scene below which the motion of the structure is no measure of the defect."""
+DEFECT_STEPS = 20
+"""Steps over which the defect is averaged: a breaking joint may spoil one of them."""
 
 
 @dataclass
@@ -44,9 +49,24 @@ class Coupling:
     """The two sides and the state of their coupling; `step` advances both.
 
     water, structure, immersion: either side may be None (immersion only with water).
+    passes: most pressure solves in a step; beyond the first, the structure goes back and takes the step again, as long
+    as the defect is above `tolerance`.
     """
 
-    def __init__(self, water, structure, immersion, *, rtol: float, step_max: float, clock):
+    def __init__(
+        self,
+        water,
+        structure,
+        immersion,
+        *,
+        rtol: float,
+        step_max: float,
+        clock,
+        passes: int = 1,
+        tolerance: float = 0.05,
+    ):
+        self.passes, self.tolerance = passes, tolerance
+        self._defects: deque[float] = deque(maxlen=DEFECT_STEPS)
         self.water, self.structure, self.immersion = water, structure, immersion
         self.rtol, self.step_max, self.clock = rtol, step_max, clock
         self.radius = np.zeros(0)
@@ -61,6 +81,12 @@ class Coupling:
     @property
     def coupled(self) -> bool:
         return self.water is not None and self.structure is not None
+
+    @property
+    def mean_defect(self) -> float:
+        """Mean defect of the last DEFECT_STEPS steps; 0 before there are as many."""
+        full = len(self._defects) == DEFECT_STEPS
+        return sum(self._defects) / DEFECT_STEPS if full else 0.0
 
     def step_size(self, remaining: float) -> float:
         """The largest step [s] that water, blocks and the case allow, dividing `remaining` evenly."""
@@ -88,40 +114,63 @@ class Coupling:
         return record
 
     def _coupled_step(self, dt: float, record: StepRecord) -> None:
-        from coupler.scheme import StructureResponse, defect, mass_matrix, solve_coupled
-
-        structure = self.structure
         with self.clock("cut"):
             if self.immersion.update():
                 self.water.move_solids(self.immersion.domain)
             record.bodies_cut = self.immersion.cut_again
         with self.clock("water"):
             problem = self.water.predict(dt)
-        with self.clock("structure in pressure"):
-            mass = mass_matrix(structure.mass, structure.inertia())
-            response = StructureResponse(
-                *self._with_solids(mass, *structure.tangent()),
-                dt,
-                np.append(structure.fixed, np.ones(self.immersion.n_solids, bool)),
-                self._padded(structure.velocity()),
-            )
-            known = -(problem.coupling.T @ problem.known).reshape(-1, 6)
-            force = structure.gravity_force() + structure.internal_force()
-            v_free = response.free_velocity(self._padded(structure.velocity()), self._padded(force) + known)
-        with self.clock("pressure"):
-            found = solve_coupled(problem, response, v_free, self._solve, self.rtol)
+        found = self._exchange(problem, record)
         with self.clock("water"):
             self.water.correct(problem, found.x)
-        with self.clock("structure"):
-            n = structure.n
-            structure.set_load(found.load[:n])
-            report = structure.advance(dt)
-        record.iterations, record.passes, record.unknowns = found.iterations, 1, len(found.x)
-        record.load = found.load
-        record.defect = defect(mass, found.velocity[:n], report.mean_velocity)
-        record.substeps, record.substep = report.substeps, report.dt_s
-        record.opening_rate = report.opening_rate
+        n = self.structure.n
+        record.load, record.unknowns = found.load, len(found.x)
         self.ledger.give(dt * float(np.sum(found.load[:n] * found.velocity[:n])))
+
+    def _exchange(self, problem, record: StepRecord):
+        """Pressure with the structure inside, then the structure under it, as often as the passes allow."""
+        from coupler.scheme import corrected_free_velocity, defect, solve_coupled
+
+        structure = self.structure
+        with self.clock("structure in pressure"):
+            mass, response, v_free = self._response(problem)
+        saved = structure.save() if self.passes > 1 else None
+        found = None
+        for record.passes in range(1, self.passes + 1):
+            with self.clock("pressure"):
+                guess = None if found is None else found.x
+                found = solve_coupled(problem, response, v_free, self._solve, self.rtol, guess)
+            with self.clock("structure"):
+                if record.passes > 1:
+                    structure.restore(saved)
+                structure.set_load(found.load[: structure.n])
+                report = structure.advance(problem.dt)
+            record.iterations += found.iterations
+            record.substeps += report.substeps
+            floor = STANDS_STILL * self.ledger.input_energy
+            record.defect = defect(mass, found.velocity[: structure.n], report.mean_velocity, floor)
+            if record.defect <= self.tolerance:
+                break
+            mean = self._padded(report.mean_velocity)
+            v_free = corrected_free_velocity(response, mean, found.x, problem.coupling)
+        record.substep, record.opening_rate = report.dt_s, report.opening_rate
+        self._defects.append(record.defect)
+        return found
+
+    def _response(self, problem):
+        """Mass of the blocks, the answer of all bodies to forces, and V_free of the first pass."""
+        from coupler.scheme import StructureResponse, mass_matrix
+
+        structure = self.structure
+        mass = mass_matrix(structure.mass, structure.inertia())
+        velocity = self._padded(structure.velocity())
+        driven = np.append(structure.fixed, np.ones(self.immersion.n_solids, bool))
+        response = StructureResponse(
+            *self._with_solids(mass, *structure.tangent()), problem.dt, driven, velocity
+        )
+        known = -(problem.coupling.T @ problem.known).reshape(-1, 6)
+        force = structure.gravity_force() + structure.internal_force()
+        return mass, response, response.free_velocity(velocity, self._padded(force) + known)
 
     def _water_step(self, dt: float, record: StepRecord) -> None:
         with self.clock("water"):

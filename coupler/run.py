@@ -8,7 +8,7 @@ from coupler.build import Scene, build
 from coupler.case import Case
 from coupler.clock import Clock
 from coupler.errors import ExitCode
-from coupler.limits import LimitReached, Limits, check_balance
+from coupler.limits import LimitReached, Limits, check_balance, check_defect
 from coupler.observe import joint_counts
 from coupler.recorder import Recorder
 
@@ -73,6 +73,7 @@ def _steps(case: Case, scene: Scene, directory, reporter, clock: Clock, figures:
                 _note(coupling, record, figures)
                 reporter.step(coupling.time, _told(coupling, record))
                 check_balance(coupling.time, _volume_error(coupling), record.balance.energy_error, limits)
+                check_defect(coupling.time, coupling.mean_defect, case.limits.defect)
                 _check_budget(clock, limits, reporter)
             with clock("output"):
                 recorder.fields(coupling.time)

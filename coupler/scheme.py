@@ -127,8 +127,17 @@ def corrected_free_velocity(response: StructureResponse, mean_velocity: Array, x
     return mean_velocity.ravel() + response.compliance(coupling.T @ x)
 
 
-def defect(mass, assumed: Array, found: Array) -> float:
-    """‖found − assumed‖ / ‖found‖ in the kinetic energy norm, velocities (n, 6); 0 where nothing moves."""
-    difference = (found - assumed).ravel()
-    scale = max(found.ravel() @ (mass @ found.ravel()), assumed.ravel() @ (mass @ assumed.ravel()))
-    return float(np.sqrt(difference @ (mass @ difference) / scale)) if scale > 0.0 else 0.0
+def defect(mass, assumed: Array, found: Array, floor: float = 0.0) -> float:
+    """How far the bodies missed the motion that the water was told, velocities (n, 6) found and assumed:
+
+        sqrt( E(found − assumed) / max(E(found), E(assumed), floor) ),   E(V) = ½ V·M V
+
+    floor [J]: a share of the energy of the scene, since a structure that hardly moves has no velocity to compare with.
+    """
+    energy = [_kinetic(mass, v) for v in (found - assumed, found, assumed)]
+    scale = max(energy[1], energy[2], floor)
+    return float(np.sqrt(energy[0] / scale)) if scale > 0.0 else 0.0
+
+
+def _kinetic(mass, velocity: Array) -> float:
+    return 0.5 * float(velocity.ravel() @ (mass @ velocity.ravel()))
