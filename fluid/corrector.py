@@ -1,6 +1,7 @@
 """Second half of the step: the velocity that the pressure leaves.
 
 u_i = u*_i - (dt/ρ) Π(∇x)_i,   a_i = (u_i - u_adv_i) / (θ dt)                 on wet nodes, Π: weighted mean
+p = x + known, mean over the step, acts on the bodies;  x/θ belongs to a_i and starts the next step
 u'_e ← u'_e - (dt/ρ) (∇x_e - mean of Π(∇x) over the cell)                     on deep cells
 u_e = u*_e + u'_e - (dt/ρ) ∇x_e                                               balances exactly: carries volume
 speed limit · divergence damping · continuation outside the water
@@ -31,6 +32,7 @@ class Corrected:
     velocity: np.ndarray
     acceleration: np.ndarray
     pressure: np.ndarray
+    end_pressure: np.ndarray
     remainder: np.ndarray
     kick_remainder: np.ndarray
     cell_velocity: np.ndarray
@@ -44,9 +46,9 @@ class Corrected:
 def corrected(water, problem, x) -> Corrected:
     """End the step with the pressure x (n,) [Pa]."""
     t, kept, dt = water.topology, problem.predicted, problem.dt
-    pressure = np.zeros(len(kept.wet))
-    pressure[problem.dofs] = x
-    gradient, share = _pressure_gradient(water, kept, pressure, dt / problem.density)
+    unknown, pressure = np.zeros(len(kept.wet)), np.zeros(len(kept.wet))
+    unknown[problem.dofs], pressure[problem.dofs] = x, x + problem.known
+    gradient, share = _pressure_gradient(water, kept, unknown, dt / problem.density)
     u, mean = _projected(t, kept, gradient, share)
     a = np.where(kept.wet[:, None], (u - kept.advected) / (kept.theta * dt), 0.0)
     remainder, kick_remainder = _remainders(water, kept, gradient, mean, dt)
@@ -60,7 +62,8 @@ def corrected(water, problem, x) -> Corrected:
     return Corrected(
         u,
         a,
-        pressure / kept.theta,
+        pressure,
+        unknown / kept.theta,
         remainder,
         kick_remainder,
         cell_field,

@@ -138,8 +138,8 @@ def _problem(water, dt, theta, kick, surface, conserved, u_adv, u_star):
     matrix, anchored = pressure_matrix(
         water.graph_for(water.listed), phi, dofs, water._walls.open_node, dt / density
     )
-    known = (1.0 - theta) * kick[dofs] * water.pressure[dofs]
-    guess = theta * water.pressure[dofs]
+    known = (1.0 - theta) * kick[dofs] * water.end_pressure[dofs]
+    guess = theta * water.end_pressure[dofs]
     matrix, extra = _sealed(water, matrix, anchored, dofs, dt, guess)
     kept = Predicted(
         phi,

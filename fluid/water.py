@@ -60,8 +60,9 @@ class Water:
     in the water, or the level set (N,) itself · is_open: (normals (B, 3), centres (B, 3)) → bool (B,), sides of
     the tank that let water out; None: all closed.
 
-    State at the nodes of the domain: level_set (N,) [m], velocity (N, 3) [m/s], acceleration (N, 3) [m/s²] and
-    pressure (N,) [Pa] of the last projection, nodal_water (N,) [m³]; at its cells: remainder (M, 3) [m/s], what the
+    State at the nodes of the domain: level_set (N,) [m], velocity (N, 3) [m/s], acceleration (N, 3) [m/s²],
+    pressure (N,) [Pa] that acted over the last step, end_pressure (N,) [Pa] that goes with the acceleration at its end
+    (the two differ by up to 1/θ in an impact), nodal_water (N,) [m³]; at its cells: remainder (M, 3) [m/s], what the
     nodes could not hold of the velocity correction.  Velocity goes on for some layers outside the water.
     """
 
@@ -85,6 +86,7 @@ class Water:
         self.level_set = without_films(level, mesh.spacing)
         self.velocity, self.acceleration = np.zeros((n, 3)), np.zeros((n, 3))
         self.pressure = self._pressure_at_rest()
+        self.end_pressure = self.pressure.copy()
         self.cell_velocity = np.zeros((len(self.topology.cells), 3))
         self.remainder, self.kick_remainder = (
             np.zeros_like(self.cell_velocity),
@@ -122,7 +124,8 @@ class Water:
         """Take over the pressure x (n,) [Pa] of the problem and end the step."""
         new: Corrected = corrected(self, problem, np.asarray(x))
         self.level_set, self.nodal_water = problem.predicted.level_set, new.nodal_water
-        self.velocity, self.acceleration, self.pressure = new.velocity, new.acceleration, new.pressure
+        self.velocity, self.acceleration = new.velocity, new.acceleration
+        self.pressure, self.end_pressure = new.pressure, new.end_pressure
         self.remainder, self.kick_remainder = new.remainder, new.kick_remainder
         self.cell_velocity, self.flux = new.cell_velocity, new.flux
         self.listed, self.layer_start = new.listed, new.layer_start
@@ -157,10 +160,12 @@ class Water:
         return carried if self._renumbered is None else self._renumbered @ carried
 
     def _carry_nodes(self, source, known):
-        fields = [self.level_set[:, None], self.velocity, self.acceleration, self.pressure[:, None]]
+        scalars = np.column_stack([self.level_set, self.pressure, self.end_pressure])
+        fields = [scalars, self.velocity, self.acceleration]
         moved = [np.ascontiguousarray(f[source]) for f in fields]
         fill_missing(self.topology, known, *moved)
-        self.level_set, self.pressure = self._dry_if_inactive(moved[0][:, 0]), moved[3][:, 0]
+        self.level_set = self._dry_if_inactive(moved[0][:, 0])
+        self.pressure, self.end_pressure = moved[0][:, 1].copy(), moved[0][:, 2].copy()
         self.velocity, self.acceleration = moved[1], moved[2]
         self._walls.slip(self.velocity)
 

@@ -5,7 +5,7 @@ import pytest
 
 from fluid import gauges
 from fluid.bodies import ConvexBodies
-from tests.fluid.scenes import advance, tank
+from tests.fluid.scenes import advance, column, load, tank
 
 
 @pytest.fixture(scope="module")
@@ -47,3 +47,17 @@ def test_pressure_on_the_face_of_a_solid():
     for x in (0.25, 0.75):
         np.testing.assert_allclose(gauges.pressure(water, [x, 0.5, 0.3]), 9810 * 0.5, rtol=1e-6)
     assert np.isnan(gauges.pressure(water, [0.5, 0.5, 0.25]))
+
+
+def test_pressure_read_is_the_pressure_that_acts():
+    """The nodal pressure summed over the wetted faces of a box is the load on it, also while a front hits it and
+    the pressures of start and end of the step differ: a gauge must not read more than the structure feels."""
+    box = ConvexBodies.boxes(np.array([[0.75, 0.25, 0.2]]), np.array([[0.2, 0.5, 0.4]]))
+    water = tank([1, 0.5, 0.5], 0.0625, column(0.5, 0.4), box)
+    largest = 0.0
+    for _ in range(40):
+        problem, x = advance(water)
+        acted = -(water.coupling.T @ water.pressure).reshape(-1, 6)
+        np.testing.assert_allclose(acted, load(problem, x), rtol=1e-9, atol=1e-9)
+        largest = max(largest, np.abs(water.end_pressure - water.pressure).max())
+    assert largest > 100.0, "the scene has no impact in which the two could be confused"
