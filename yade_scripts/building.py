@@ -1,13 +1,14 @@
 """Generators of blocks: wall in stack or running bond, column, and a building with openings, floors and roof.
 
-All are lists of box blocks that touch face to face, so that `touching_faces` finds the joints. Blocks are cut to fit:
-a length is divided into the nearest whole number of equal blocks.
+All are lists of box blocks that touch face to face, wholly or in part, so that `touching_faces` finds the joints.
+Blocks are cut to fit: a length is divided into the nearest whole number of equal blocks, between the borders of
+openings where there are any.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 
@@ -16,14 +17,25 @@ from yade_scripts.blocks import Block, BlockError
 Array = np.ndarray
 
 
+SAME = 1e-6
+"""Cuts closer than this share of a block's edge are one cut."""
+CLOSE = 1.0 / 3.0
+"""Cuts that nothing asks for give way to the border of an opening within this share of a block's edge."""
+
+
 @dataclass(frozen=True)
 class Opening:
-    """A door or window: whole blocks are left out where their centre lies in the box lower (3,) .. upper (3,) [m]."""
+    """A door or window: what of the building lies in the box lower (3,) .. upper (3,) [m] is left out, exactly."""
 
     lower: Array
     upper: Array
 
+    def meets(self, low: Array, high: Array) -> bool:
+        """Whether the opening and the box low .. high share a volume."""
+        return bool(np.all(np.minimum(self.upper, high) - np.maximum(self.lower, low) > 0.0))
+
     def holds(self, point: Array) -> bool:
+        """Whether a point lies inside."""
         return bool(np.all(point > np.asarray(self.lower)) and np.all(point < np.asarray(self.upper)))
 
 
@@ -31,7 +43,7 @@ class Opening:
 class Building:
     """lower, upper (2,) [m]: footprint, outer faces · height [m] to the top of the walls · base [m]: level it stands on
 
-    thickness [m] of walls, floors and roof · block: edge of a block along walls and slabs [m]
+    thickness [m] of walls · floor_thickness [m] of floors and roof (None: as the walls) · block: edge of a block along walls and slabs [m]
     course: height of a block in the walls [m] (None: as `block`)
     storeys: number of storeys (slabs between them) · roof: slab on top · openings: doors and windows
     density [kg/m³].
@@ -43,6 +55,7 @@ class Building:
     thickness: float
     block: float
     course: float | None = None
+    floor_thickness: float | None = None
     storeys: int = 1
     roof: bool = True
     base: float = 0.0
@@ -61,11 +74,16 @@ class Building:
                 raise BlockError(
                     f"building '{self.name}': {name} = {getattr(self, name)}; it must be positive"
                 )
-        if self.storeys < 1 or self.storey_height <= self.thickness:
+        if self.storeys < 1 or self.storey_height <= self.slab:
             raise BlockError(
                 f"building '{self.name}': {self.storeys} storeys in {self.height} m leave no wall "
-                f"between slabs of {self.thickness} m"
+                f"between slabs of {self.slab} m"
             )
+
+    @property
+    def slab(self) -> float:
+        """Thickness of floors and roof [m]."""
+        return self.thickness if self.floor_thickness is None else self.floor_thickness
 
     @property
     def storey_height(self) -> float:
@@ -73,66 +91,101 @@ class Building:
         return self.height / self.storeys
 
 
-def building_blocks(b: Building) -> list[Block]:
-    """Walls, floor slabs and roof of a building.
+@dataclass(frozen=True)
+class _Part:
+    """A wall of one storey, or a slab: the box low (3,) .. high (3,) [m] and the wanted edges of its blocks (3,).
 
-    Slabs lie on the walls, over the whole footprint, and take the top `thickness` of their storey; corner piers belong
-    to the walls along y, so walls along x fit between them. Slab blocks share the wall's grid: joints are full faces.
+    wished: coordinates along x, y, z at which to cut unless an opening is near.
     """
-    blocks: list[Block] = []
-    for s in range(b.storeys):
-        foot = b.base + s * b.storey_height
-        with_slab = b.roof or s < b.storeys - 1
-        head = foot + b.storey_height - (b.thickness if with_slab else 0.0)
-        blocks += _storey_walls(b, s, foot, head)
-        if with_slab:
-            name = "roof" if s == b.storeys - 1 else "floor"
-            blocks += _slab(b, s, name, head)
-    return blocks
+
+    name: str
+    group: str
+    low: Array
+    high: Array
+    edges: tuple[float, float, float]
+    wished: tuple[tuple[float, ...], ...]
+
+
+def building_blocks(b: Building) -> list[Block]:
+    """Walls, floor slabs and roof of a building, less its openings.
+
+    Slabs lie on the walls, over the whole footprint, and take the top of their storey; corner piers belong
+    to the walls along y, so walls along x fit between them. Where no opening is near, walls and slabs share one grid.
+    The borders of an opening are cuts of the parts it meets, so it has exactly the size asked for.
+    Raises BlockError for an opening that meets no part of the building.
+    """
+    parts = [part for storey in range(b.storeys) for part in _storey_parts(b, storey)]
+    for opening in b.openings:
+        if not any(opening.meets(p.low, p.high) for p in parts):
+            raise BlockError(
+                f"building '{b.name}': the opening {np.asarray(opening.lower)} .. {np.asarray(opening.upper)} m meets "
+                "no wall and no slab; check its wall, its place and its size"
+            )
+    return [block for part in parts for block in _part_blocks(part, b)]
+
+
+def _storey_parts(b: Building, storey: int) -> list[_Part]:
+    """Four walls and the slab on top of them, if there is one."""
+    foot, t = b.base + storey * b.storey_height, b.thickness
+    with_slab = b.roof or storey < b.storeys - 1
+    head = foot + b.storey_height - (b.slab if with_slab else 0.0)
+    (x0, y0), (x1, y1) = np.asarray(b.lower, float), np.asarray(b.upper, float)
+    course = b.course or b.block
+    boxes = {
+        "x-": ((x0, y0), (x0 + t, y1)),
+        "x+": ((x1 - t, y0), (x1, y1)),
+        "y-": ((x0 + t, y0), (x1 - t, y0 + t)),
+        "y+": ((x0 + t, y1 - t), (x1 - t, y1)),
+    }
+    wished = ((x0 + t, x1 - t), (y0 + t, y1 - t), ())
+    parts = []
+    for side, (low, high) in boxes.items():
+        edges = (np.inf, b.block, course) if side[0] == "x" else (b.block, np.inf, course)
+        name = f"{b.name}-wall{storey}{side}"
+        parts.append(_Part(name, "wall", np.array([*low, foot]), np.array([*high, head]), edges, wished))
+    if with_slab:
+        kind = "roof" if storey == b.storeys - 1 else "floor"
+        low, high = np.array([x0, y0, head]), np.array([x1, y1, head + b.slab])
+        parts.append(_Part(f"{b.name}-{kind}{storey}", kind, low, high, (b.block, b.block, np.inf), wished))
+    return parts
+
+
+def _part_blocks(part: _Part, b: Building) -> list[Block]:
+    openings = [o for o in b.openings if o.meets(part.low, part.high)]
+    x, y, z = (_part_cuts(part, axis, openings) for axis in range(3))
+    found = []
+    for i, j, k in np.ndindex(len(x) - 1, len(y) - 1, len(z) - 1):
+        low, high = np.array([x[i], y[j], z[k]]), np.array([x[i + 1], y[j + 1], z[k + 1]])
+        centre = 0.5 * (low + high)
+        if not any(o.holds(centre) for o in openings):
+            name = f"{part.name}-{i}-{j}-{k}"
+            found.append(Block(name, centre, size=high - low, density=b.density, group=part.group))
+    return found
+
+
+def _part_cuts(part: _Part, axis: int, openings: list[Opening]) -> Array:
+    """Cuts of a part along an axis: its ends, the borders of openings, wished cuts, and equal blocks between."""
+    low, high, edge = part.low[axis], part.high[axis], part.edges[axis]
+    size = min(edge, high - low)
+    fixed = [low, high]
+    for opening in openings:
+        fixed += [c for c in (opening.lower[axis], opening.upper[axis]) if low < c < high]
+    fixed = _apart(fixed, SAME * size)
+    wished = [c for c in part.wished[axis] if low < c < high and np.abs(fixed - c).min() > CLOSE * size]
+    ends = _apart([*fixed, *wished], SAME * size)
+    pieces = [_cuts(start, end, edge)[:-1] for start, end in pairwise(ends)]
+    return np.concatenate([*pieces, [high]])
+
+
+def _apart(cuts, distance: float) -> Array:
+    """Sorted cuts without those within `distance` of the one before."""
+    cuts = np.sort(np.asarray(cuts, float))
+    return cuts[np.concatenate([[True], np.diff(cuts) > distance])]
 
 
 def _cuts(low: float, high: float, edge: float) -> Array:
     """Ends of equal blocks between low and high, none longer than about `edge`."""
     return np.linspace(low, high, max(1, round((high - low) / edge)) + 1)
-
-
-def _grid(b: Building) -> tuple[Array, Array]:
-    """Cuts of the footprint along x and y: wall thickness at the ends, equal blocks between."""
-    t = b.thickness
-    axes = []
-    for k in range(2):
-        low, high = float(b.lower[k]), float(b.upper[k])
-        axes.append(np.concatenate([[low], _cuts(low + t, high - t, b.block), [high]]))
-    return axes[0], axes[1]
-
-
-def _storey_walls(b: Building, storey: int, foot: float, head: float) -> list[Block]:
-    x, y = _grid(b)
-    z = _cuts(foot, head, b.course or b.block)
-    last_x, last_y = len(x) - 2, len(y) - 2
-    cells = [
-        (i, j) for i in range(last_x + 1) for j in range(last_y + 1) if i in (0, last_x) or j in (0, last_y)
-    ]
-    return _boxes(b, f"{b.name}-wall{storey}", "wall", x, y, z, cells)
-
-
-def _slab(b: Building, storey: int, kind: str, foot: float) -> list[Block]:
-    x, y = _grid(b)
-    cells = [(i, j) for i in range(len(x) - 1) for j in range(len(y) - 1)]
-    return _boxes(b, f"{b.name}-{kind}{storey}", kind, x, y, np.array([foot, foot + b.thickness]), cells)
-
-
-def _boxes(b: Building, name: str, group: str, x: Array, y: Array, z: Array, cells: Iterable) -> list[Block]:
-    found = []
-    for i, j in cells:
-        for k in range(len(z) - 1):
-            low, high = np.array([x[i], y[j], z[k]]), np.array([x[i + 1], y[j + 1], z[k + 1]])
-            centre = 0.5 * (low + high)
-            if not any(o.holds(centre) for o in b.openings):
-                found.append(
-                    Block(f"{name}-{i}-{j}-{k}", centre, size=high - low, density=b.density, group=group)
-                )
-    return found
 
 
 def wall_blocks(

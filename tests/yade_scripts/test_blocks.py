@@ -1,9 +1,13 @@
 """Mass properties of blocks, touching faces and generators: exact figures, and refusals that name the block."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial.transform import Rotation
 
 from yade_scripts.blocks import BOX_CORNERS, Block, BlockError
@@ -95,10 +99,60 @@ def test_building_has_the_volume_of_its_walls_slabs_and_openings():
     assert sum(b.volume for b in blocks) == pytest.approx(walls + 3 * 0.5 * 200.0, rel=1e-12)
     assert min(b.centre[2] - b.size[2] / 2 for b in blocks) == pytest.approx(0.0, abs=1e-12)
     assert max(b.centre[2] + b.size[2] / 2 for b in blocks) == pytest.approx(12.0)
-    with_door = building_blocks(
-        Building((0, 0), (20, 10), 12.0, 0.5, 1.9, storeys=3, openings=(Opening((8, -1, 0), (12, 1, 3)),))
+    thin = building_blocks(replace(solid, floor_thickness=0.2))
+    assert sum(b.volume for b in thin) == pytest.approx(
+        (20 * 10 - 19 * 9) * (12.0 - 3 * 0.2) + 3 * 0.2 * 200.0
     )
-    assert len(with_door) < len(blocks)
+
+
+def joined_to_ground(blocks):
+    """Number of pieces that the joints leave of the blocks together with the ground."""
+    faces = touching_faces(blocks, [GROUND])
+    a, b = np.array([f.a for f in faces]), np.array([f.b if f.b >= 0 else len(blocks) for f in faces])
+    graph = coo_matrix((np.ones(len(a)), (a, b)), shape=(len(blocks) + 1,) * 2)
+    return connected_components(graph, directed=False)[0]
+
+
+OFF_GRID = Opening((8.3, 0, 0.0), (9.41, 0.5, 2.13))
+ON_BLOCK_CENTRES = Opening((0, 4.0, 1.0), (0.5, 6.0, 2.2))
+NEAR_THE_CORNER = Opening((19.5, 0.6, 5.0), (20.0, 2.0, 6.5))
+THROUGH_A_SLAB = Opening((4.0, 9.5, 3.0), (5.0, 10.0, 4.7))
+NICHE = Opening((12.0, 0.0, 9.0), (13.0, 0.2, 10.0))
+
+
+@pytest.mark.parametrize(
+    "openings",
+    [(OFF_GRID,), (ON_BLOCK_CENTRES,), (OFF_GRID, ON_BLOCK_CENTRES, NEAR_THE_CORNER, THROUGH_A_SLAB, NICHE)],
+)
+def test_openings_have_exactly_the_size_asked_for_and_all_else_holds_together(openings):
+    """Wherever its borders lie on the grid: the volume of the box is missing, no block reaches into it, and joints
+    connect every block with the ground."""
+    solid = Building((0, 0), (20, 10), 12.0, 0.5, 1.9, storeys=3)
+    blocks = building_blocks(replace(solid, openings=openings))
+    removed = sum(np.prod(np.subtract(o.upper, o.lower)) for o in openings)
+    volume = sum(b.volume for b in building_blocks(solid))
+    assert sum(b.volume for b in blocks) == pytest.approx(volume - removed, rel=1e-12)
+    for b in blocks:
+        low, high = b.centre - 0.5 * b.size + 1e-9, b.centre + 0.5 * b.size - 1e-9
+        assert not any(o.meets(low, high) for o in openings)
+    assert joined_to_ground(blocks) == 1
+    assert min(b.size.min() for b in blocks) > 0.09
+
+
+def test_an_opening_beside_the_building_is_refused():
+    with pytest.raises(BlockError, match="meets no wall"):
+        building_blocks(Building((0, 0), (20, 10), 12.0, 0.5, 1.9, openings=(Opening((3, 3, 1), (5, 5, 3)),)))
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.floats(0.5, 15.0), st.floats(0.3, 4.0), st.floats(0.0, 2.5), st.floats(0.3, 3.0))
+def test_any_window_in_a_wall_is_exact(start, width, sill, height):
+    """A window anywhere in a wall of 20 m x 6 m; cuts within a millionth of a block count as one."""
+    window = Opening((start, 0.0, sill), (start + width, 0.4, sill + height))
+    solid = Building((0, 0), (20, 10), 6.0, 0.4, 1.5)
+    blocks = building_blocks(replace(solid, openings=(window,)))
+    volume = sum(b.volume for b in building_blocks(solid)) - width * height * 0.4
+    assert sum(b.volume for b in blocks) == pytest.approx(volume, rel=1e-7)
 
 
 def test_every_block_of_a_building_is_held():
