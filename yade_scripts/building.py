@@ -43,7 +43,8 @@ class Opening:
 class Building:
     """lower, upper (2,) [m]: footprint, outer faces · height [m] to the top of the walls · base [m]: level it stands on
 
-    thickness [m] of walls · floor_thickness [m] of floors and roof (None: as the walls) · block: edge of a block along walls and slabs [m]
+    thickness [m] of walls · floor_thickness [m] of floors and roof (None: as the walls)
+    block: edge of a block along walls and slabs [m]
     course: height of a block in the walls [m] (None: as `block`)
     storeys: number of storeys (slabs between them) · roof: slab on top · openings: doors and windows
     density [kg/m³].

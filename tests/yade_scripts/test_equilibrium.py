@@ -1,0 +1,95 @@
+"""Start at rest: settled structures do not move, deflect as beams of blocks do, and refuse what cannot stand."""
+
+import numpy as np
+import pytest
+
+from yade_scripts.blocks import Block
+from yade_scripts.building import Building, Opening, building_blocks, wall_blocks
+from yade_scripts.cohesion import JointParameters
+from yade_scripts.contact import ContactLaw
+from yade_scripts.equilibrium import CannotStand, settle
+from yade_scripts.structure import Structure
+
+G = 9.81
+STILL = 1e-6
+"""Largest speed of what is at rest [m/s]."""
+
+
+def portal():
+    """Two piers and a lintel: a wall with a door."""
+    blocks = wall_blocks("left", (0, 0, 0), "x", 1.0, 3.0, 0.5, 1.0, 1.0)
+    blocks += wall_blocks("right", (3.0, 0, 0), "x", 1.0, 3.0, 0.5, 1.0, 1.0)
+    return blocks + wall_blocks("lintel", (0, 0, 3.0), "x", 4.0, 1.0, 0.5, 1.0, 1.0)
+
+
+def tall_hall():
+    """A hall of 20 m x 10 m x 12 m in blocks of 2 m: soft joints under a high weight."""
+    door = Opening((30, 11, 0), (31, 13, 2))
+    return building_blocks(Building((30, 7), (50, 17), 12.0, 1.0, 2.0, openings=(door,)))
+
+
+@pytest.mark.parametrize(
+    ("blocks", "law"),
+    [
+        (wall_blocks("w", (0, 0, 0), "x", 4.0, 3.0, 0.5, 1.0, 0.5), JointParameters(1e6, 1e-3)),
+        (portal(), JointParameters(2e6, 1e-3)),
+        (tall_hall(), JointParameters(5e5, 0.02)),
+    ],
+    ids=["wall", "portal", "hall"],
+)
+@pytest.mark.parametrize("contact", [None, ContactLaw(stiffness=1e9)], ids=["joints", "with contact"])
+def test_a_settled_structure_stays_at_rest(blocks, law, contact):
+    """0.1 s after settling: no block moves, no joint broke, and none counts as loose."""
+    with Structure(blocks, contact, law, ground=0.0) as s:
+        assert settle(s) > 0.0
+        placed = s.centre()
+        s.advance(0.1)
+        assert np.abs(s.velocity()).max() < STILL
+        assert np.abs(s.centre() - placed).max() < 0.1 * STILL
+        assert s.joint_table().alive.all()
+        assert not s.loose().any()
+        weight = s.mass.sum() * G
+        residual = s.internal_force() + s.gravity_force()
+        assert np.abs(residual).max() < 1e-6 * weight
+
+
+def cantilever(count, fixed_end=True):
+    """Blocks of 1 m x 0.5 m x 0.5 m in a row along x, the first one fixed."""
+    return [
+        Block(f"b{i}", (i, 0.0, 5.0), size=(1.0, 0.5, 0.5), fixed=fixed_end and i == 0, density=2000.0)
+        for i in range(count)
+    ]
+
+
+def test_a_cantilever_of_blocks_deflects_as_its_joints_turn():
+    """Rigid blocks on joint springs k: each joint carries M = w (L - s)²/2 and V = w (L - s), turns by M/(k I) and
+    slides by V/(k A); the blocks follow. Small deflection, joints elastic (k = 27/4 T_max/δ_f, closing the same)."""
+    law = JointParameters(strength=1e9, opening_at_failure=1e-2)
+    count, edge = 5, 0.5
+    with Structure(cantilever(count), None, law) as s:
+        settle(s)
+        sunk, turned = s.centre()[:, 2] - 5.0, s.rotation()[:, 0, 2]
+    w, k, area, inertia = 2000.0 * G * edge**2, law.stiffness, edge**2, edge**4 / 12.0
+    z, theta = np.zeros(count), np.zeros(count)
+    for i in range(1, count):
+        out = count - i
+        bend = w * out**2 / 2.0 / (k * inertia)
+        theta[i] = theta[i - 1] + bend
+        z[i] = z[i - 1] - 0.5 * theta[i - 1] - w * out / (k * area) - 0.5 * theta[i]
+    np.testing.assert_allclose(turned, theta, rtol=5e-4, atol=1e-12)
+    np.testing.assert_allclose(sunk, z, rtol=5e-4, atol=1e-12)
+
+
+def test_a_cantilever_that_cannot_carry_itself_is_refused_by_its_joint():
+    """M at the root: 2000·9.81·0.25·5²/2 = 61 kN m against about 0.24 T_max h³ = 3 kN m."""
+    with Structure(cantilever(6), None, JointParameters(strength=1e5, opening_at_failure=1e-3)) as s:
+        with pytest.raises(CannotStand, match="'b0' with 'b1'"):
+            settle(s)
+
+
+def test_blocks_that_nothing_holds_are_left_alone():
+    """A row in the air has no equilibrium; it is not moved and falls."""
+    with Structure(cantilever(3, fixed_end=False), None, JointParameters(1e6, 1e-3)) as s:
+        assert settle(s) == 0.0
+        s.advance(0.01)
+        assert s.velocity()[:, 2] == pytest.approx(-G * 0.01, rel=0.05)
