@@ -31,8 +31,8 @@ class WaterParameters:
     kick_limit: float = 3.0
     speed_limit: float = 2.0 * np.sqrt(2.0)
     subscale_memory: bool = True
-    bulk_modulus: float = 2.2e9
-    """[Pa] compressibility of water, used only in pockets without free surface, where the pressure level floats."""
+    pocket_compliance: float = 1e-8
+    """Compressibility of pockets without free surface, where the pressure level floats, in dt/(ρ h²)."""
 
     @property
     def weight(self) -> np.ndarray:

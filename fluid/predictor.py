@@ -188,6 +188,8 @@ def carry_remainder(cell_list, remainder, kick, kick_time, u, dt, cells, size):
 
 
 def _sealed(water, matrix, anchored, dofs, dt, pressure):
-    """Closed pockets get the compressibility of water."""
-    compliance = 1.0 / (water.parameters.bulk_modulus * dt)
+    """Closed pockets get a compliance far below what the pressure differences in them feel, c ρ h²/dt ≪ (π h/L)²: real
+    water is softer than that in short steps, and its waves would take part in the added mass of bodies."""
+    p = water.parameters
+    compliance = p.pocket_compliance * dt / (p.density * water.mesh.spacing**2)
     return seal_pockets(matrix, anchored, water.topology.node_volume[dofs], compliance, pressure)

@@ -106,7 +106,7 @@ def pressure_matrix(graph, phi, dofs, open_node, scale: float):
 
 
 def seal_pockets(matrix, anchored, volume, compliance: float, pressure):
-    """Water cut off from every surface has no pressure level: give it the compressibility of water.
+    """Water cut off from every surface has no pressure level: give it a compressibility.
 
     Adds V_i · compliance [1/(Pa s)] to the diagonal of the components without an anchored row and the same times
     `pressure` (n,) [Pa] to the right hand side, so that a state at rest is unchanged.  volume (n,) [m³].

@@ -26,7 +26,7 @@ def full_tank(body, cells):
         mesh,
         immersion.domain,
         lambda x: np.full(len(x), -1.0),
-        WaterParameters(gravity=G, bulk_modulus=2.2e15),
+        WaterParameters(gravity=G),
     )
     return Coupling(water, body, immersion, rtol=1e-10, step_max=1.0, clock=no_clock)
 
