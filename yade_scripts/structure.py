@@ -31,6 +31,8 @@ from yade_scripts.timestep import SubstepLimit, substep_limit
 Array = np.ndarray
 
 GRAVITY = (0.0, 0.0, -9.81)
+TIDY = 500
+"""Substeps between two tidyings of the contacts."""
 
 
 class NotFinite(RuntimeError):
@@ -149,6 +151,7 @@ class Structure:
 
     def _start_accounts(self, track_contacts: bool) -> None:
         self.time = 0.0
+        self._since_tidy = 0
         self._scene.look()
         self._contacts: Contacts | None = None
         tracked = track_contacts and self.contact is not None
@@ -200,6 +203,7 @@ class Structure:
         m = self._motion
         m.dt = dt / count
         self._turn_on_contacts(dt)
+        self._since_tidy += count
         x0, R0, half, spin = m.x.copy(), m.R.copy(), m.half_step_back(), m.v[:, 3:].copy()
         self._substepper.fastest = 0.0
         broken = [self._one_substep(dt / count) for _ in range(count)]
@@ -222,6 +226,9 @@ class Structure:
         self._loosen(self._onset.moved())
         if self._onset.arm(dt):
             self._bodies_changed()
+        if self._since_tidy > TIDY:
+            self._scene.tidy()
+            self._since_tidy = 0
 
     def _one_substep(self, dt: float) -> Array:
         """Joints that failed, rows of the table."""
