@@ -11,7 +11,7 @@ from pathlib import Path
 
 from coupler.case import Section
 from coupler.case_schema import Key, find, keys
-from coupler.errors import BadCase, SurgebreakError, did_you_mean
+from coupler.errors import SurgebreakError, UnknownName, did_you_mean
 from coupler.provenance import ROOT
 
 PAGE = ROOT / "docs" / "case_file.md"
@@ -20,14 +20,14 @@ PAGE = ROOT / "docs" / "case_file.md"
 def explanation(name: str | None) -> str:
     """What a name of the case file means; without a name, the sections.
 
-    Raises BadCase when the schema has no such name, with the nearest one.
+    Raises UnknownName when the schema has no such name, with the nearest one.
     """
     if not name:
         return "\n".join(_entry(key) for key in keys() if "." not in key.path)
     plain = name.strip("[]").replace("[]", "")
     key = find(tuple(plain.split(".")))
     if key is None:
-        raise BadCase([f"{name}: no such name in a case file{_near(plain)}"])
+        raise UnknownName(f"{name}: no such name in a case file{_near(plain)}")
     told = [_entry(key)]
     for section in key.sections:
         told += ["", inspect.getdoc(section) or ""]

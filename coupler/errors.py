@@ -33,6 +33,12 @@ class BadCase(SurgebreakError):
         super().__init__("\n".join(self.lines))
 
 
+class UnknownName(SurgebreakError):
+    """A name that no case file knows was asked for."""
+
+    exit_code = ExitCode.BAD_CASE
+
+
 class UnitError(ValueError):
     """A value whose unit is missing, unknown or of another dimension."""
 

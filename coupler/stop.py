@@ -37,7 +37,7 @@ class StopRequest:
         if self._before and signal.getsignal(signal.SIGINT) != self._on_signal:
             self._arm()  # YADE installs handlers of its own when it is imported
         if self._reason is None and self.file.exists():
-            self._reason = f"the file {self.file} asked for it"
+            self._reason = f"stopped because the file {self.file} is there; all steps until then are written"
         return self._reason
 
     def _arm(self) -> None:
@@ -47,4 +47,5 @@ class StopRequest:
     def _on_signal(self, number: int, frame) -> None:
         if self._reason is not None:
             raise KeyboardInterrupt
-        self._reason = "Ctrl-C" if number == signal.SIGINT else "the system asked for it (SIGTERM)"
+        who = "Ctrl-C" if number == signal.SIGINT else "the system (SIGTERM)"
+        self._reason = f"stopped by {who}; all steps until then are written"

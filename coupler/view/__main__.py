@@ -102,9 +102,11 @@ def make(options):
     """Make what the options ask for and say what was made."""
     check_installed()
     check_drawing()
-    from coupler.view.run_files import open_run
+    from coupler.view.run_files import open_run, was_killed
 
     run = open_run(options.run)
+    if was_killed(options.run):
+        print(f"note: the run was killed; shown is what it wrote, until t = {run.times[-1]:g} s", flush=True)
     folder = options.to or options.run / "pictures"
     folder.mkdir(parents=True, exist_ok=True)
     camera = {"azimuth": options.azimuth, "elevation": options.elevation}

@@ -13,6 +13,7 @@ from coupler.view.palette import INK, LINES
 WIDTH = 6.9  # [inch] two columns of a journal
 PANEL, LOW_PANEL = 1.75, 1.05  # [inch] height of a panel, and of one with a pure number
 LINES_PER_PANEL = len(LINES)
+NEGLIGIBLE = 1e-9  # of the largest change in a table and unit: round-off, not shown
 FORMATS = ("pdf", "svg", "png")
 UNIT_TEXT = {"1": "–", "m3": "m³", "m2": "m²", "N s": "N·s"}
 PREFIXED = ("J", "N", "N s", "Pa", "W", "m", "m/s", "s")
@@ -41,20 +42,28 @@ def plots(directory, folder):
 
 
 def grouped(history):
-    """Panels [(unit, [column names])] of the numbers that are not zero throughout, by unit, none too full.
+    """Panels [(unit, [column names])] of the numbers that are more than round-off, by unit, none too full.
 
     Pure numbers get a panel each: a count and a share have no scale in common.
     """
-    shown = {}
+    sizes = {}
     for column in history.columns:
-        if column.name != "time" and column.unit and np.any(np.nan_to_num(changed(history, column.name))):
-            shown.setdefault(column.unit, []).append(column.name)
+        if column.name != "time" and column.unit:
+            size = np.nanmax(np.abs(changed(history, column.name)), initial=0.0)
+            sizes.setdefault(column.unit, {})[column.name] = size
+    shown = {unit: _not_negligible(named, unit) for unit, named in sizes.items()}
     return [
         (unit, names[i : i + most])
         for unit, names in shown.items()
         for most in [1 if unit == "1" else LINES_PER_PANEL]
         for i in range(0, len(names), most)
     ]
+
+
+def _not_negligible(sizes, unit):
+    """Names of the columns whose largest number counts beside that of the others in the unit; pure numbers all do."""
+    least = 0.0 if unit == "1" else NEGLIGIBLE * max(sizes.values())
+    return [name for name, size in sizes.items() if size > least]
 
 
 def changed(history, name):

@@ -79,7 +79,9 @@ def test_explain_tells_unit_limits_and_example():
 def test_explain_offers_the_nearest_name():
     done = surgebreak("explain", "joints.strenght")
     assert done.returncode == 2
-    assert "did you mean 'joints.strength'?" in done.stderr
+    assert done.stderr == (
+        "surgebreak: joints.strenght: no such name in a case file; did you mean 'joints.strength'?\n"
+    )
 
 
 def test_init_writes_a_case_that_passes_and_never_overwrites(tmp_path):

@@ -9,8 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from coupler.history import HistoryTable, read_history
 from coupler.output import WaterWriter
 from coupler.view.__main__ import main, pixels, rate
+from coupler.view.plots import grouped
 from tests.coupler.synthetic_run import tank_mesh, write_run
 
 ROOT = Path(__file__).parents[2]
@@ -107,6 +109,27 @@ def test_what_cannot_be_shown_is_said(tmp_path):
         assert "Traceback" not in done.stderr
     WaterWriter(tmp_path / "fields.vtkhdf")
     assert "has not reached its first output" in render(tmp_path).stderr
+
+
+def test_a_killed_run_is_shown_and_said_to_be_one(tmp_path):
+    """After a kill run.json still says "running"; only the missing process tells."""
+    run = write_run(tmp_path / "run", [0.0, 1.0], cell=4.0)
+    with subprocess.Popen([sys.executable, "-c", ""]) as ended:
+        ended.wait()
+    for process, killed in ((ended.pid, True), (os.getpid(), False)):
+        (run / "run.json").write_text(json.dumps({"status": "running", "process": process}))
+        done = render(run, "--still", "--size", "160x90")
+        assert done.returncode == 0, done.stderr
+        assert ("the run was killed" in done.stdout) == killed
+
+
+def test_round_off_is_not_drawn(tmp_path):
+    """A block that moves along z alone has 1e-17 m in x and y: no lines for those."""
+    table = HistoryTable(tmp_path / "gauges.csv", [(n, "m", n) for n in ("time", "x", "z")])
+    for k in range(3):
+        table.append(time=k, x=1e-17 * k, z=0.1 * k)
+    table.close()
+    assert grouped(read_history(tmp_path / "gauges.csv")) == [("m", ["z"])]
 
 
 def test_missing_extra_is_named_with_the_command_that_adds_it(tmp_path, monkeypatch, capsys):
