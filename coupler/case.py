@@ -314,7 +314,7 @@ class Exchange(Section):
         "did, the step is taken again while the defect is above the tolerance",
     )
     tolerance: quantity("", gt=0, le=1) = Field(
-        0.05, description="defect of a step above which another pass is made"
+        0.02, description="defect of a step above which another pass is made"
     )
 
 

@@ -63,7 +63,7 @@ class Coupling:
         step_max: float,
         clock,
         passes: int = 1,
-        tolerance: float = 0.05,
+        tolerance: float = 0.02,
     ):
         self.passes, self.tolerance = passes, tolerance
         self._defects: deque[float] = deque(maxlen=DEFECT_STEPS)

@@ -1,0 +1,98 @@
+"""Scenes that several coupled tests share."""
+
+import numpy as np
+
+from coupler.case import Case
+from coupler.exchange import Immersion
+from coupler.fill import start_level
+from coupler.loop import Coupling
+from fluid.mesh import box_mesh
+from fluid.parameters import WaterParameters
+from fluid.water import Water
+from tests.fakes import no_clock
+from yade_scripts.building import divided_box
+from yade_scripts.cohesion import JointParameters
+from yade_scripts.equilibrium import settle
+from yade_scripts.structure import Structure
+
+G, RHO = 9.81, 1000.0
+SLICE = 0.5
+"""Width of the tank of the walls [m]."""
+OVERHANG = 0.001
+"""The walls reach beyond the tank in y, so that its sides neither hold them nor let water past."""
+
+
+def standing_wall(
+    depth,
+    *,
+    face=1.1,
+    thickness=0.2,
+    height=2.0,
+    course=0.25,
+    strength=1e6,
+    opening=1e-3,
+    damping=0.02,
+    density=2000.0,
+    cell=0.25,
+    covers="multiple",
+    settled=True,
+    step_max=0.01,
+    passes=2,
+):
+    """A wall of full-width courses, joined to one another and to the ground, with still water of `depth` [m] on its
+    upstream face x = `face` and air behind it. Close its `structure` after use."""
+    blocks = divided_box(
+        "wall",
+        (face, -OVERHANG, 0.0),
+        (thickness, SLICE + 2 * OVERHANG, height),
+        (thickness, SLICE + 2 * OVERHANG, course),
+        density,
+        group="wall",
+    )
+    joints = JointParameters(strength=strength, opening_at_failure=opening, damping=damping)
+    structure = Structure(blocks, None, joints, ground=0.0)
+    tank = ((0.0, 0.0, 0.0), (2.5, SLICE, 2.5))
+    mesh = box_mesh(*tank, cell)
+    water, immersion = _still_water(structure, mesh, tank, (face, SLICE, depth), covers)
+    if settled:
+        try:
+            settle(structure, load_at_rest(water)[: structure.n])
+        except Exception:
+            structure.close()
+            raise
+        water, immersion = _still_water(structure, mesh, tank, (face, SLICE, depth), covers)
+    return Coupling(water, structure, immersion, rtol=1e-10, step_max=step_max, clock=no_clock, passes=passes)
+
+
+def _still_water(structure, mesh, tank, upper, covers):
+    immersion = Immersion(mesh, structure, [], covers)
+    level = start_level([((0.0, 0.0, 0.0), upper)], tank, mesh, immersion.domain)
+    water = Water(mesh, immersion.domain, level, WaterParameters(gravity=G), lambda n, _: n[:, 2] > 0.5)
+    return water, immersion
+
+
+def load_at_rest(water):
+    """Force and moment (n, 6) of the water on bodies that are held."""
+    from coupler.scheme import water_load
+    from fluid.solve import solve
+
+    problem = water.predict(water.stable_step())
+    x = solve(problem.matrix, problem.rhs, problem.guess, 1e-12).x
+    return water_load(problem, x)
+
+
+def moment_about_base(coupling, load, face, thickness):
+    """Overturning moment [N m] of block loads (n, 6) about the middle of the base, positive downstream."""
+    arm = coupling.structure.centre() - np.array([face + 0.5 * thickness, 0.0, 0.0])
+    return float((np.cross(arm, load[:, :3]) + load[:, 3:])[:, 1].sum())
+
+
+def run(coupling, end, each=lambda record: None):
+    """Step to `end` [s]; each(record) after every step."""
+    while coupling.time < end * (1 - 1e-12):
+        each(coupling.step(coupling.step_size(end - coupling.time)))
+
+
+def case(**sections) -> Case:
+    """A case of plain data, checked by the schema."""
+    return Case.model_validate({"case": {"title": "a test"}, **sections})

@@ -1,0 +1,132 @@
+"""Bodies that float: Archimedes, the heave period of potential flow, and bodies too light for a staggered coupling."""
+
+import numpy as np
+import pytest
+
+from coupler.build import build
+from tests.fakes import no_clock
+from tests.physics.scenes import RHO, G, case, run
+
+BOX = {"name": "box", "size": [0.3, 0.1, 0.2]}
+
+
+@pytest.fixture
+def scene():
+    made = []
+
+    def make(**sections):
+        made.append(build(case(**sections), no_clock).coupling)
+        return made[-1]
+
+    yield make
+    for coupling in made:
+        coupling.structure.close()
+
+
+def floating_box(scene, centre_z, level, cell=0.025):
+    """A slice of a long box of half the density of water, as wide as the tank in y; at rest its centre is at 0.5 m."""
+    return scene(
+        time={"end": 3.0, "step_max": 0.01},
+        tank={"lower": [0, 0, 0], "upper": [1, 0.1, 0.8], "cell": cell},
+        water={"fill": [{"lower": [0, 0, 0], "upper": [1, 0.1, level]}]},
+        structure={"density": 500.0, "block": [{**BOX, "centre": [0.5, 0.05, centre_z]}]},
+        contact={"stiffness": 1e6, "friction": 0.0},
+    )
+
+
+def cube(scene, density, step=0.005, side=0.3):
+    """A cube free in the middle of a pool, well under the surface."""
+    return scene(
+        time={"end": 1.0, "step_max": step},
+        tank={"lower": [0, 0, 0], "upper": [1, 1, 1.5], "cell": 0.1},
+        water={"fill": [{"lower": [0, 0, 0], "upper": [1, 1, 1]}]},
+        structure={
+            "density": density,
+            "block": [{"name": "cube", "size": [side] * 3, "centre": [0.53, 0.47, 0.35]}],
+        },
+        contact={"stiffness": 1e5},
+    )
+
+
+def test_a_box_at_its_draught_stays(scene):
+    """The load equals the weight at the start; after a second the box has moved by less than a hundredth of a cell."""
+    coupling = floating_box(scene, 0.5, 0.5)
+    lift = []
+    run(coupling, 0.5, lambda record: lift.append(record.load[0, 2]))
+    weight = coupling.structure.mass[0] * G
+    centre = coupling.structure.centre()[0]
+    assert lift[0] == pytest.approx(weight, rel=1e-4)
+    assert lift == pytest.approx(np.full(len(lift), weight), rel=0.01)
+    assert np.abs(centre - [0.5, 0.05, 0.5]).max() < 0.02 * 0.025
+    assert np.abs(coupling.structure.velocity()).max() < 2e-3
+
+
+@pytest.mark.nightly
+def test_the_heave_period_is_that_of_potential_flow(scene):
+    """Linear potential flow of body and surface in the closed tank: 0.92569 s; no growth of the motion."""
+    coupling = floating_box(scene, 0.52, 0.4914)
+    time, height, error = [], [], []
+
+    def note(record):
+        time.append(coupling.time)
+        height.append(coupling.structure.centre()[0, 2])
+        error.append(abs(coupling.water.volume_error()))
+
+    run(coupling, 3.0, note)
+    t, z = np.array(time), np.array(height) - np.mean(height)
+    up = np.flatnonzero((z[:-1] < 0) & (z[1:] >= 0))
+    crossing = t[up] - z[up] * (t[up + 1] - t[up]) / (z[up + 1] - z[up])
+    assert np.diff(crossing).mean() == pytest.approx(0.92569, rel=0.03)
+    assert np.mean(height) == pytest.approx(0.5, abs=0.002)
+    assert np.abs(z).max() < 1.1 * 0.02
+    assert max(error) < 1e-5
+
+
+@pytest.mark.parametrize("density", [50.0, 300.0, 2400.0])
+def test_momentum_of_a_free_block_is_the_impulse_of_water_and_weight(scene, density):
+    """M ΔV = Σ dt (F + weight) in YADE to round-off of the exchange, rising, floating up or sinking."""
+    coupling = cube(scene, density)
+    s = coupling.structure
+    for _ in range(10):
+        before = s.velocity()[0, :3].copy()
+        record = coupling.step(0.004)
+        force = record.load[0, :3] + s.gravity_force()[0, :3]
+        gained = s.mass[0] * (s.velocity()[0, :3] - before)
+        assert gained == pytest.approx(
+            record.dt * force, abs=1e-11 * record.dt * np.abs(record.load[0, :3]).max()
+        )
+
+
+@pytest.mark.parametrize("passes", [1, 2])
+def test_a_body_of_a_twentieth_of_the_density_of_water_shoots_up_and_floats(scene, passes):
+    """No blow-up at a density ratio far below the added mass: first acceleration as the added mass says (0.68 ± 30 % on
+    three cells a side), speed below free rise, the energy and the volume in balance through the surface."""
+    coupling = cube(scene, 50.0)
+    coupling.passes = passes
+    coupling.step(0.002)
+    acceleration = coupling.structure.velocity()[0, 2] / 0.002
+    added = G * 0.95 / acceleration - 0.05
+    assert 0.3 < added < 0.75
+    speed, error = [], []
+
+    def note(record):
+        speed.append(np.abs(coupling.structure.velocity()[0, :3]).max())
+        error.append(record.balance.energy_error)
+
+    run(coupling, 0.5, note)
+    assert max(speed) < 3.5
+    assert max(error) < 0.01
+    assert abs(coupling.water.volume_error()) < 1e-5
+
+
+def test_a_sinking_block_gives_the_water_what_it_loses(scene):
+    """Buoyancy does work -ρ V g Δz on the way down, drag and added mass take the rest: bounded by these two."""
+    coupling = cube(scene, 2400.0)
+    s = coupling.structure
+    start = s.centre()[0, 2]
+    run(coupling, 0.15)
+    fallen = start - s.centre()[0, 2]
+    given = coupling.ledger.work_given
+    assert fallen > 0.02
+    assert given < -0.95 * RHO * s.volume[0] * G * fallen
+    assert given > -s.mass[0] * G * fallen
