@@ -2,7 +2,8 @@
 
 [[expect]]
 what = "..."           for people                    table, column   of the history
-take = "last"          last | largest (by size, sign kept) | mean | at (time) | integral (from, to) | period
+take = "last"          last | largest (by size, sign kept) | mean | at (time) | integral (from, to) | period |
+                       arrival (above): first time that the column exceeds a value
 value, tolerance       |taken - value| ≤ tolerance   or at_least = / at_most =
 source = "..."         where the number comes from
 """
@@ -72,6 +73,12 @@ def _period(time: np.ndarray, values: np.ndarray, entry: dict) -> float:
     return np.diff(crossing).mean() if len(crossing) > 1 else np.nan
 
 
+def _arrival(time: np.ndarray, values: np.ndarray, entry: dict) -> float:
+    """First time at which the values exceed entry["above"] [s]; NaN if they never do."""
+    above = values > entry["above"]
+    return time[above.argmax()] if above.any() else np.nan
+
+
 TAKE: dict[str, Callable[[np.ndarray, np.ndarray, dict], float]] = {
     "last": lambda time, values, entry: values[-1],
     "largest": lambda time, values, entry: values[np.abs(values).argmax()],
@@ -79,4 +86,5 @@ TAKE: dict[str, Callable[[np.ndarray, np.ndarray, dict], float]] = {
     "at": lambda time, values, entry: np.interp(entry["time"], time, values),
     "integral": _integral,
     "period": _period,
+    "arrival": _arrival,
 }

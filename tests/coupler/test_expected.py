@@ -7,7 +7,7 @@ from coupler.expected import TAKE, BadExpectation, verdicts
 from coupler.history import HistoryTable
 
 TIME = np.linspace(0.0, 4.0, 401)
-ENTRY = {"time": 1.234, "from": 1.0, "to": 2.5}
+ENTRY = {"time": 1.234, "from": 1.0, "to": 2.5, "above": 6.0}
 
 
 @pytest.mark.parametrize(
@@ -18,6 +18,7 @@ ENTRY = {"time": 1.234, "from": 1.0, "to": 2.5}
         ("mean", 5.0 * TIME, 10.0),
         ("at", 2.0 * TIME, 2.468),
         ("integral", 2.0 * TIME, 2.5**2 - 1.0),
+        ("arrival", 5.0 * TIME, 1.21),
         ("period", 7.0 + np.cos(2 * np.pi * TIME / 0.8), 0.8),
     ],
 )
