@@ -187,24 +187,42 @@ def stored_between(
 
     Leapfrog conserves kinetic(t + dt/2) + 1/2 k δ(t)·δ(t + dt) exactly, so the product of the two openings is used.
     """
-    pa, pb, n, n0 = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    pa, pb, n, n0, d, e = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     total = 0.0
     for j in live:
-        n[:] = R[a[j]] @ normal[j]
-        n0[:] = R0[a[j]] @ normal[j]
+        turned(R, a[j], normal[j], n)
+        turned(R0, a[j], normal[j], n0)
         for p in range(start[j], start[j + 1]):
             place(a[j], R, x, xi_a[p], pa)
             place(b[j], R, x, xi_b[p], pb)
-            d = pb - pa
+            dn = split(pa, pb, n, d)
             place(a[j], R0, x0, xi_a[p], pa)
             place(b[j], R0, x0, xi_b[p], pb)
-            e = pb - pa
-            dn, en = np.dot(d, n), np.dot(e, n0)
-            slide = np.dot(d - dn * n, e - en * n0)
+            en = split(pa, pb, n0, e)
+            slide = d[0] * e[0] + d[1] * e[1] + d[2] * e[2]
             ks = secant_stiffness(largest[p], k0[j], df[j])
             kn = ks if dn + en > 0.0 else (kc[j] if closing[j] else 0.0)
             total += 0.5 * weight[p] * (kn * dn * en + beta[j] ** 2 * ks * slide)
     return total
+
+
+@njit(cache=True)
+def turned(R, row, local, out):
+    """A direction of the body frame in world axes."""
+    for k in range(3):
+        out[k] = R[row, k, 0] * local[0] + R[row, k, 1] * local[1] + R[row, k, 2] * local[2]
+
+
+@njit(cache=True)
+def split(pa, pb, n, across):
+    """Separation pb - pa: returns its part along n, leaves the part across n in `across`."""
+    normal = 0.0
+    for k in range(3):
+        across[k] = pb[k] - pa[k]
+        normal += across[k] * n[k]
+    for k in range(3):
+        across[k] -= normal * n[k]
+    return normal
 
 
 @njit(cache=True)

@@ -38,6 +38,8 @@ VERLET = 0.05
 LIKE = 4.1
 """Mass ratio up to which the dashpots of the materials serve every pair (e within 0.02); beyond it each new contact is
 looked at in Python, which takes a sixth of the time of a collapse."""
+WHITE = (1.0, 1.0, 1.0)
+"""Colour of nodes; left to itself, YADE seeds a random generator for each."""
 INSTANT = 1e-200
 """Length of a substep in which nothing moves [s]."""
 STATE = 13
@@ -157,8 +159,8 @@ class Scene:
         radius = node_radius(block.size, self.law.node_radius)
         material = self._material(row, node=True)
         spheres = [
-            self.engine.utils.sphere(self._v(x + R @ p), radius, material=material, mask=NODE_INTACT)
-            for p in node_positions(block.size, self.law.nodes_per_edge, radius)
+            self.engine.utils.sphere(self._v(p), radius, material=material, mask=NODE_INTACT, color=WHITE)
+            for p in x + node_positions(block.size, self.law.nodes_per_edge, radius) @ R.T
         ]
         self.nodes[row] = list(O.bodies.append(spheres))
         self.ids[row] = O.bodies.clump([self.box_id[row], *self.nodes[row]])
@@ -169,10 +171,11 @@ class Scene:
 
     def _carry_members(self, row: int, x: Array, motion: Array) -> None:
         """Velocities of clump members, which contact forces depend on (YADE sets them in its next integration)."""
-        for member in (self.box_id[row], *self.nodes[row]):
-            state = self.O.bodies[member].state
-            arm = np.array(state.pos) - x
-            state.vel, state.angVel = self._v(motion[:3] + np.cross(motion[3:], arm)), self._v(motion[3:])
+        states = [self.O.bodies[i].state for i in (self.box_id[row], *self.nodes[row])]
+        velocity = motion[:3] + np.cross(motion[3:], np.array([s.pos for s in states]) - x)
+        spin = self._v(motion[3:])
+        for state, v in zip(states, velocity):
+            state.vel, state.angVel = self._v(v), spin
 
     def _set_inertia(self, row: int, motion: Array) -> None:
         """Exact mass and inertia in YADE's principal frame; velocity and angular momentum to match.

@@ -223,7 +223,9 @@ class Structure:
         """Before a step: for pieces that left their place, and for blocks that may be hit within dt."""
         if self.contact is None:
             return
-        self._loosen(self._onset.moved())
+        moved = self._onset.moved()
+        if len(moved):
+            self._loosen(moved, self._accounts.joint_stored())
         if self._onset.arm(dt):
             self._bodies_changed()
         if self._since_tidy > TIDY:
@@ -240,22 +242,18 @@ class Structure:
         return broken
 
     def _retire(self, broken: Array) -> None:
-        m = self._motion
         stored = self._accounts.joint_stored()
-        self.joints.retire(broken, m.x, m.R, self.time)
+        self.joints.retire(broken, self._motion.x, self._motion.R, self.time)
         self._limit = None
+        newly = self._onset.of_failed(broken)
         if self.contact is None:
-            self._onset.loose[self._onset.of_failed(broken)] = True
+            self._onset.loose[newly] = True
+            self._bodies_changed()
         else:
-            self._accounts.handed_over += stored - self._accounts.joint_stored()
-            self._loosen(self._onset.of_failed(broken))
-        self._bodies_changed()
+            self._loosen(newly, stored)
 
-    def _loosen(self, rows: Array) -> None:
-        """Contact takes over around the blocks `rows`, and with it what their joints held in compression."""
-        if len(rows) == 0:
-            return
-        stored = self._accounts.joint_stored()
+    def _loosen(self, rows: Array, stored: float) -> None:
+        """Contact takes over around the blocks `rows`, and with it what of `stored` [J] the joints hold no more."""
         self._motion.read()
         self._onset.loosen(rows)
         self._accounts.handed_over += stored - self._accounts.joint_stored()
