@@ -75,9 +75,23 @@ def run(
         with reporter(file.case.time.end, directory.log, stop.requested) as tell:
             describe(file, tell.message)
             code = ExitCode(run_case(file.case, directory, tell))
+            compare(file, directory, tell.message)
         directory.finish(code, "reached the end" if code == ExitCode.DONE else "see log.txt")
     print(f"results in {directory.path}")
     raise typer.Exit(int(code))
+
+
+def compare(file, directory, tell) -> None:
+    """Tell whether a run of the case as it is written kept what its expected.toml promises; no file, no promise."""
+    promises = file.directory / "expected.toml"
+    if file.overrides or not promises.exists():
+        return
+    from coupler.expected import verdicts
+
+    found = verdicts(directory.path, promises)
+    for verdict in found:
+        tell(f"{'as expected' if verdict.kept else 'UNEXPECTED'}: {verdict}")
+    directory.record(expected={verdict.what: verdict.kept for verdict in found})
 
 
 @app.command()
@@ -142,6 +156,22 @@ def init(directory: Annotated[Path, typer.Argument(help="the new case directory"
 
     path = write_first_case(directory)
     print(f"wrote {path}; next: surgebreak check {directory}, surgebreak run {directory}")
+
+
+@app.command()
+def verify(
+    ids: Annotated[
+        list[str] | None, typer.Argument(metavar="[ID]...", help="cases, P01...; else all")
+    ] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="only cases that take less than a minute")] = False,
+    json: Annotated[bool, typer.Option("--json", help="one JSON object a quantity, one a line")] = False,
+    list_: Annotated[bool, typer.Option("--list", help="list the cases, and those not covered")] = False,
+) -> None:
+    """Run cases against exact solutions and measured records; leaves with 3 if one misses its tolerance."""
+    one_thread()
+    from coupler.verify.report import verify as run_cases
+
+    raise typer.Exit(int(run_cases(ids or [], quick=quick, as_json=json, only_list=list_)))
 
 
 @app.command(context_settings=PASS_ON)

@@ -1,0 +1,113 @@
+"""The list of cases: what each one checks, against what, and what its functions yield.
+
+A case is a generator of `Finding`s: a value out of a run, what it should be, and how far off it may be. The time
+between two findings is booked to the second.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Literal
+
+MODULES = ("contact", "joints", "water", "coupled")
+"""Files of this package that hold cases; their names are the groups."""
+
+NOT_COVERED = {
+    "P06": "oblique impact of a sphere: blocks are boxes or convex polyhedra",
+    "P07": "oblique impact of a sphere (Chung and Ooi test 4): blocks are boxes or convex polyhedra",
+    "P27": "comparison with YADE's stock brittle laws: no command runs them yet",
+    "P31": "Taylor-Green vortex: the water has no viscosity yet",
+    "P32": "Couette and Poiseuille flow: the water has no viscosity yet",
+    "P35": "cylinder in a channel (DFG): the water has no viscosity and no inflow yet",
+    "P38": "dam break on a wall (Lobovsky): no check written yet",
+    "P39": "water heights of SPHERIC 2: shown by cases/dam_break_box, no check written yet",
+    "P40": "pressures of SPHERIC 2: shown by cases/dam_break_box, no check written yet",
+    "P41": "dam break in a channel (Ritter, Stoker): no check written yet",
+    "P42": "run-up of a solitary wave: no wave maker yet",
+    "P43": "dam break against an isolated building: no check written yet",
+    "P53": "heave decay of a half sphere: no check written yet",
+    "P55": "falling sphere in a viscous fluid: the water has no viscosity yet",
+    "P56": "three stacked cubes in a dam break: no check written yet",
+    "P57": "cohesive wall under still water: no check written yet",
+}
+"""Reference cases without a check, and why."""
+
+Cost = Literal["S", "M", "L"]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A value of a run beside what it should be. `relative`: tolerance is a share of `expected`, else its unit."""
+
+    quantity: str
+    value: float
+    expected: float
+    tolerance: float
+    relative: bool = True
+
+    @property
+    def error(self) -> float:
+        """|value - expected|, over |expected| where the tolerance is relative."""
+        return abs(self.value - self.expected) / (abs(self.expected) if self.relative else 1.0)
+
+
+@dataclass(frozen=True)
+class Check:
+    """One reference case. cost on two cores: S below a minute, M below 15 minutes, L longer."""
+
+    id: str
+    group: str
+    title: str
+    source: str
+    cost: Cost
+    run: Callable[[], Iterator[Finding]]
+
+
+@dataclass(frozen=True)
+class Result:
+    """One quantity of a case, or why the case gave none (`reason`; then value and error are None)."""
+
+    id: str
+    quantity: str
+    value: float | None
+    expected: float | None
+    error: float | None
+    tolerance: float | None
+    relative: bool
+    passed: bool
+    cpu_s: float
+    reason: str = ""
+
+    @classmethod
+    def of(cls, id: str, found: Finding, cpu_s: float) -> Result:
+        """The judgement; a value that is not a number does not pass."""
+        passed = bool(found.error <= found.tolerance)
+        numbers = (float(found.value), float(found.expected), float(found.error), float(found.tolerance))
+        return cls(id, found.quantity, *numbers, found.relative, passed, cpu_s)
+
+    @classmethod
+    def failed(cls, id: str, reason: str, cpu_s: float) -> Result:
+        """A case that ended before its time."""
+        return cls(id, "ends", None, None, None, None, False, False, cpu_s, reason)
+
+
+_registered: dict[str, Check] = {}
+
+
+def check(id: str, title: str, source: str, cost: Cost = "S"):
+    """Register the decorated generator as a case; its group is the name of its file."""
+
+    def keep(run):
+        _registered[id] = Check(id, run.__module__.rpartition(".")[2], title, source, cost, run)
+        return run
+
+    return keep
+
+
+def checks() -> dict[str, Check]:
+    """All cases by id, in order."""
+    for name in MODULES:
+        import_module(f"coupler.verify.{name}")
+    return dict(sorted(_registered.items()))

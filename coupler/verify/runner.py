@@ -1,0 +1,57 @@
+"""Run cases one after the other, each in a process of its own."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+from coupler.errors import BadCase, did_you_mean
+from coupler.verify.registry import NOT_COVERED, Check, Result, checks
+
+TIME_LIMIT = {"S": 300, "M": 3600, "L": 6 * 3600}
+"""Wall seconds after which a case counts as failed: far more than its cost."""
+LAST_LINES = 3
+
+
+def chosen(ids: list[str], quick: bool) -> list[Check]:
+    """The cases asked for; all without ids; with quick only those of cost S. Raises BadCase for unknown ids."""
+    known = checks()
+    wrong = [_unknown(id, known) for id in ids if id.upper() not in known]
+    if wrong:
+        raise BadCase(wrong)
+    found = [known[id.upper()] for id in ids] if ids else list(known.values())
+    return [case for case in found if case.cost == "S" or not quick]
+
+
+def _unknown(id: str, known) -> str:
+    if id.upper() in NOT_COVERED:
+        return f"{id}: not covered: {NOT_COVERED[id.upper()]}"
+    return f"{id}: unknown case{did_you_mean(id.upper(), known)}; see surgebreak verify --list"
+
+
+def run(case: Check) -> Iterator[Result]:
+    """Results of one case from its own process; how that ended, when not well, is a result too."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "results"
+        command = [sys.executable, "-m", "coupler.verify.one", case.id, str(path)]
+        try:
+            done = subprocess.run(
+                command, capture_output=True, text=True, check=False, timeout=TIME_LIMIT[case.cost]
+            )
+            trouble = "" if done.returncode == 0 else _told(done)
+        except subprocess.TimeoutExpired as error:
+            trouble = f"not done after {error.timeout} s"
+        lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
+    found = [Result(**json.loads(line)) for line in lines]
+    yield from found
+    if trouble or not found:
+        yield Result.failed(case.id, trouble or "the case gave no result", 0.0)
+
+
+def _told(done: subprocess.CompletedProcess) -> str:
+    last = " | ".join(done.stderr.strip().splitlines()[-LAST_LINES:])
+    return f"its process ended with {done.returncode}: {last}"

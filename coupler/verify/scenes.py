@@ -1,0 +1,49 @@
+"""Scenes shared by the cases with water: a tank, what is in it, and their coupling."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from coupler.clock import Clock
+from coupler.exchange import Immersion
+from coupler.loop import Coupling
+from fluid.mesh import box_mesh
+from fluid.parameters import WaterParameters
+from fluid.water import Water
+
+G = 9.81
+DENSITY = 1000.0
+BOX = np.array(
+    [[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]],
+    float,
+)
+BOX_FACES = ((0, 4, 7, 3), (1, 2, 6, 5), (0, 1, 5, 4), (3, 7, 6, 2), (0, 3, 2, 1), (4, 5, 6, 7))
+
+
+def box(centre, size, rotation=None) -> tuple[np.ndarray, tuple]:
+    """A fixed box for `tank`: vertices (8, 3) [m] and faces."""
+    turn = np.eye(3) if rotation is None else rotation
+    return np.asarray(centre) + (0.5 * np.asarray(size) * BOX) @ turn.T, BOX_FACES
+
+
+def tank(
+    size, cells, fill: Callable, structure=None, solids=(), rtol: float = 1e-9, is_open=None, **parameters
+) -> Coupling:
+    """Water in [0, size] on cells (nx, ny, nz), with blocks and fixed solids; fill as in `Water`."""
+    mesh = box_mesh(np.zeros(3), size, np.asarray(size, float) / np.asarray(cells))
+    immersion = Immersion(mesh, structure, list(solids), "single")
+    parameters = WaterParameters(density=DENSITY, gravity=G, **parameters)
+    water = Water(mesh, immersion.domain, fill, parameters, is_open)
+    return Coupling(water, structure, immersion, rtol=rtol, step_max=1.0, clock=Clock())
+
+
+def level_at(z: float) -> Callable:
+    """Fill up to z."""
+    return lambda x: x[:, 2] - z
+
+
+def column(width: float, height: float) -> Callable:
+    """A column of water at the wall x = 0, over the whole depth of the tank."""
+    return lambda x: np.maximum(x[:, 0] - width, x[:, 2] - height)
