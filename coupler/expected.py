@@ -34,6 +34,9 @@ class Verdict:
     expected: str
     kept: bool
 
+    def __str__(self) -> str:
+        return f"{self.what}: {self.found:.4g}, expected {self.expected}"
+
 
 def verdicts(run: Path, expected: Path) -> list[Verdict]:
     """Compare a run directory with an expected.toml. Raises BadExpectation, naming entry and column."""

@@ -6,17 +6,15 @@ happens is a mistake in the program: its traceback belongs to the log (or to sta
 
 from __future__ import annotations
 
-import errno
 import sys
 import traceback
 from dataclasses import dataclass
 from types import TracebackType
 
 from coupler import terminal
-from coupler.errors import BadCase, ExitCode
+from coupler.errors import FULL, BadCase, ExitCode
 
 OURS = ("coupler", "fluid", "yade_scripts")
-FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 @dataclass(frozen=True)

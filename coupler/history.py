@@ -13,7 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from coupler.storage import FULL, DiskFull, NotFinite, WrongShape
+from coupler.errors import FULL
+from coupler.storage import DiskFull, NotFinite, WrongShape
 
 
 @dataclass(frozen=True)

@@ -31,17 +31,24 @@ class _Base:
 
     def __init__(self, end: float, log: Callable[[str], None], stop: Callable[[], str | None]):
         self.end, self.log, self.stop_requested = end, log, stop
-        self._started = clock.monotonic()
+        self._first: tuple[float, float] | None = None
         self._tenth = 0
 
     def _line(self, time: float, figures: Mapping[str, str]) -> str:
         share = min(1.0, time / self.end)
-        elapsed = clock.monotonic() - self._started
-        left = elapsed * (1.0 - share) / share if share > 0.0 else float("nan")
         told = "  ".join(f"{name} {text}" for name, text in figures.items())
-        return f"{share:4.0%}  t {time:.3f} of {self.end:g} s  {told}  left {duration(left)}"
+        return f"{share:4.0%}  t {time:.3f} of {self.end:g} s  {told}  {self._left(time)}".rstrip()
+
+    def _left(self, time: float) -> str:
+        """Time to go at the pace since the first step, which had to load and compile what it uses."""
+        began, started = self._first
+        if time <= began:
+            return ""
+        return f"left {duration((clock.monotonic() - started) * max(self.end - time, 0.0) / (time - began))}"
 
     def _new_tenth(self, time: float) -> bool:
+        if self._first is None:
+            self._first = (time, clock.monotonic())
         tenth = int(10.0 * time / self.end + 1e-9)
         new, self._tenth = tenth > self._tenth, max(tenth, self._tenth)
         return new

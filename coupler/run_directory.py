@@ -24,8 +24,8 @@ from types import TracebackType
 from coupler import provenance
 from coupler.case import effective, modules
 from coupler.case_file import CaseFile
-from coupler.errors import CannotWrite, ExitCode, RunDirectoryExists
-from coupler.failures import FULL, Failure
+from coupler.errors import FULL, CannotWrite, ExitCode, RunDirectoryExists
+from coupler.failures import Failure
 
 RESERVE = 256 * 1024
 """Bytes kept aside so that the reason can still be written when the disk is full."""

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+from coupler.errors import FULL
 
 
 class DiskFull(OSError):

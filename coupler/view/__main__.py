@@ -7,8 +7,7 @@ import sys
 import time
 from pathlib import Path
 
-from coupler.errors import ExitCode, SurgebreakError
-from coupler.storage import FULL
+from coupler.errors import FULL, ExitCode, SurgebreakError
 
 NEEDED = {"pyvista": "pictures", "imageio_ffmpeg": "films", "matplotlib": "figures"}
 

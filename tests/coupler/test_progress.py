@@ -30,6 +30,17 @@ def test_one_line_for_each_tenth(steps):
     assert re.match(r"100%  t 4.000 of 4 s  dt 10 ms  joints broken 3/90  left 0 s", lines[-1])
 
 
+def test_time_left_does_not_count_the_first_step(monkeypatch):
+    """The first step compiles: it took 100 s here, the others 1 s each; after two of ten steps 8 s are left."""
+    now = iter([100.0, 101.0])
+    monkeypatch.setattr("coupler.progress.clock.monotonic", lambda: next(now))
+    told = io.StringIO()
+    tell = LineReporter(10.0, lambda line: None, lambda: None, told)
+    tell.step(1.0, {})
+    tell.step(2.0, {})
+    assert told.getvalue().splitlines()[-1].endswith("left 8 s")
+
+
 def test_few_long_steps_give_a_line_each():
     stream = io.StringIO()
     run_to_the_end(LineReporter(4.0, lambda text: None, lambda: None, stream), 3)
