@@ -139,3 +139,11 @@ def test_defect_is_the_share_of_the_kinetic_energy_norm():
     found = np.array([[1.0, 0, 0, 0, 0, 0]])
     assert defect(M, 0.9 * found, found) == pytest.approx(0.1)
     assert defect(M, 0.0 * found, 0.0 * found) == 0.0
+
+
+def test_a_structure_that_hardly_moves_has_no_defect_to_speak_of():
+    """Against the energy of the scene a micrometre per second is rest, whatever share of it was missed."""
+    M = mass_matrix(np.array([1000.0]), np.eye(3)[None])
+    found = np.array([[1e-6, 0, 0, 0, 0, 0]])
+    assert defect(M, 0.0 * found, found) == 1.0
+    assert defect(M, 0.0 * found, found, floor=1.0) < 1e-4
