@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from tests.yade_scripts.reference import columns
 from yade_scripts.blocks import Block
 from yade_scripts.building import Building, Opening, building_blocks, wall_blocks
 from yade_scripts.cohesion import JointParameters
@@ -93,3 +94,25 @@ def test_blocks_that_nothing_holds_are_left_alone():
         assert settle(s) == 0.0
         s.advance(0.01)
         assert s.velocity()[:, 2] == pytest.approx(-G * 0.01, rel=0.05)
+
+
+@pytest.mark.parametrize(("share", "stands"), [(0.95, True), (1.05, False)])
+def test_a_cantilever_of_six_blocks_carries_the_strength_of_its_root(share, stands):
+    """Cubes of 0.2 m, load P at the free face, 1.2 m from the root: P = M_max/1.2 m with the root's largest moment
+    M_max = 0.3802 T_max h³ for a closing stiffness of ten times k_0 (a rigid one would give 0.4523)."""
+    ref = columns("coh_joint_Mmax_vs_N")
+    row = np.flatnonzero((ref["kc_over_K0"] == 10.0) & (ref["n"] == 0.0))[0]
+    law = JointParameters(1e6, 1e-3, closing_ratio=10.0, points=10)
+    blocks = [Block(f"b{i}", (0.2 * i, 0.0, 0.0), size=0.2, fixed=i == 0) for i in range(7)]
+    strength = ref["mmax"][row] * law.strength * 0.2**3 / 1.2
+    load = np.zeros((7, 6))
+    load[6, 2] = -share * strength
+    load[6, 4] = 0.1 * share * strength
+    with Structure(blocks, None, law, gravity=(0.0, 0.0, 0.0)) as s:
+        if not stands:
+            with pytest.raises(CannotStand, match="'b0' with 'b1'"):
+                settle(s, load)
+            return
+        settle(s, load)
+        assert np.abs(s.internal_force() + load)[1:].max() < 1e-6 * strength
+        assert 0.3 < s.joint_table().damage[0] < 1.0
