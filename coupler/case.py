@@ -226,7 +226,7 @@ class Joints(Section):
     closing_ratio: quantity("", gt=0) = Field(
         1.0, description="stiffness in compression over the first stiffness in tension"
     )
-    damping: quantity("", ge=0, le=1) = Field(
+    damping: quantity("", ge=0, lt=1) = Field(
         0.02, description="share of critical damping, proportional to the stiffness of the joint"
     )
     points: Annotated[int, Field(strict=True, ge=2, le=5)] = Field(

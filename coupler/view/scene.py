@@ -150,7 +150,7 @@ class Scene:
             self._draw_bar("blocks", "damage of blocks [–]", 0.35 if self.run.water else 0.03)
 
     def _draw_water(self, grid):
-        surface = water_surface(grid)
+        surface = water_surface(grid, np.array(self.plotter.camera.position))
         if surface.n_cells == 0:
             self.plotter.remove_actor("water", reset_camera=False, render=False)
             return
@@ -190,13 +190,21 @@ class Scene:
             )
 
 
-def water_surface(water):
-    """The skin of the water as a mesh with "speed" [m/s] and shading normals at its points."""
+def water_surface(water, eye):
+    """The skin of the water as a mesh with "speed" [m/s] and shading normals at its points.
+
+    The triangles farthest from the eye (3,) come first: each is then seen through those before it, where otherwise
+    the order of the cells would decide which of two layers shows, triangle by triangle."""
     found = skin(water.nodes, water.cells, water.level_set)
-    corners = found.of(water.nodes).reshape(-1, 3)
-    mesh = pv.PolyData.from_regular_faces(corners, np.arange(len(corners)).reshape(-1, 3))
-    mesh["speed"] = np.linalg.norm(found.of(water.velocity), axis=2).ravel()
-    mesh["normals"] = shading_normals(found, water.nodes, water.cells, water.level_set).reshape(-1, 3)
+    corners = found.of(water.nodes)
+    far_first = np.argsort(-np.linalg.norm(corners.mean(axis=1) - eye, axis=1), kind="stable")
+    normals = shading_normals(found, water.nodes, water.cells, water.level_set)
+    speed = np.linalg.norm(found.of(water.velocity), axis=2)
+    mesh = pv.PolyData.from_regular_faces(
+        corners[far_first].reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3)
+    )
+    mesh["speed"] = speed[far_first].ravel()
+    mesh["normals"] = normals[far_first].reshape(-1, 3)
     mesh.point_data.active_normals_name = "normals"
     return mesh
 

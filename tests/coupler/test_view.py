@@ -123,6 +123,23 @@ def test_a_killed_run_is_shown_and_said_to_be_one(tmp_path):
         assert ("the run was killed" in done.stdout) == killed
 
 
+def test_layers_of_water_are_drawn_from_far_to_near(tmp_path):
+    """Translucent triangles hide what is drawn after them: in the order of the cells two layers made a mosaic."""
+    run = write_run(tmp_path / "run", [0.0], cell=4.0)
+    code = (
+        "import sys, numpy as np; from coupler.view.run_files import open_run;"
+        "from coupler.view.scene import water_surface; eye = np.array([50.0, -80.0, 30.0]);"
+        "x = water_surface(open_run(sys.argv[1]).water.at(0.0), eye).points.reshape(-1, 3, 3).mean(axis=1);"
+        "print(np.diff(np.linalg.norm(x - eye, axis=1)).max(), len(x))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, str(run)], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    nearer, triangles = map(float, done.stdout.split())
+    assert nearer < 1e-4  # coordinates are 32-bit
+    assert triangles > 100
+
+
 def test_round_off_is_not_drawn(tmp_path):
     """A block that moves along z alone has 1e-17 m in x and y: no lines for those."""
     table = HistoryTable(tmp_path / "gauges.csv", [(n, "m", n) for n in ("time", "x", "z")])
