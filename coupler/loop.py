@@ -134,15 +134,17 @@ class Coupling:
         structure = self.structure
         with self.clock("structure in pressure"):
             mass, response, v_free = self._response(problem)
-        saved = structure.save() if self.passes > 1 else None
+        passes = self.passes if problem.coupling.nnz else 1  # no wetted block, nothing to correct
         found = None
-        for record.passes in range(1, self.passes + 1):
+        for record.passes in range(1, passes + 1):
             with self.clock("pressure"):
                 guess = None if found is None else found.x
                 found = solve_coupled(problem, response, v_free, self._solve, self.rtol, guess)
             with self.clock("structure"):
                 if record.passes > 1:
                     structure.restore(saved)
+                elif passes > 1:
+                    saved = structure.save()
                 structure.set_load(found.load[: structure.n])
                 report = structure.advance(problem.dt)
             record.iterations += found.iterations
