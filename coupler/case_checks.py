@@ -5,6 +5,7 @@ Every check yields (key path, message); none needs YADE or the flow solver.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 
 import numpy as np
@@ -20,6 +21,8 @@ Body = tuple[KeyPath, str, Box]
 
 TOUCH = 1e-6
 """Overlap below this share of the smallest edge is contact, not overlap (rounding of decimal fractions)."""
+BYTES_PER_CELL = 1500
+"""Memory that a cell of the mesh takes in a run."""
 
 
 def problems(case: Case) -> list[Problem]:
@@ -212,6 +215,21 @@ def _tank(case: Case) -> Iterator[Problem]:
         yield (
             ("tank", "cell"),
             f"{case.tank.cell:g} m is larger than the smallest side of the tank ({smallest:g} m)",
+        )
+    elif smallest > 0 and case.water:
+        yield from _memory(case)
+
+
+def _memory(case: Case) -> Iterator[Problem]:
+    """A mesh that this machine cannot hold: the system would kill the run without a word."""
+    cells = 6 * np.prod(np.subtract(case.tank.upper, case.tank.lower) / case.tank.cell)
+    needed, there = BYTES_PER_CELL * cells, os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    if needed > there:
+        fits = case.tank.cell * (needed / there) ** (1.0 / 3.0)
+        yield (
+            ("tank", "cell"),
+            f"{cells:.3g} cells of {case.tank.cell:g} m need about {needed / 1e9:.0f} GB, this machine has "
+            f"{there / 1e9:.0f} GB; use cells of {1.1 * fits:.2g} m or more",
         )
 
 

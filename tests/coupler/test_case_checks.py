@@ -213,3 +213,18 @@ def test_walls_thinner_than_a_cell_are_remarked():
     thin = {"centre": [7, 5, 1], "size": [0.2, 2, 2]}
     assert remarks(case(**structure({"centre": [7, 5, 0.5]}))) == []
     assert remarks(case(**structure(thin)))[0].startswith("b0 is 0.2 m thick, thinner than a cell (1 m)")
+
+
+def test_a_mesh_beyond_the_memory_of_the_machine_is_refused(monkeypatch):
+    """6000 cells do not fit into 1 MB; the message names a cell that fits."""
+    content = {
+        "time": {"end": 1},
+        "tank": {"lower": [0, 0, 0], "upper": [1, 1, 1], "cell": 0.1},
+        "water": {"fill": [{"lower": [0, 0, 0], "upper": [1, 1, 0.5]}]},
+    }
+    assert problems(Case.model_validate(content)) == []
+    monkeypatch.setattr("coupler.case_checks.os.sysconf", lambda name: 1000)
+    ((place, message),) = problems(Case.model_validate(content))
+    assert place == ("tank", "cell")
+    fits = float(message.rpartition("cells of ")[2].split()[0])
+    assert 6 * fits**-3 * 1500 < 1e6 < 6 * (0.8 * fits) ** -3 * 1500
