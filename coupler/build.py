@@ -116,6 +116,7 @@ def _building(spec, density: float):
         upper=lower[:2] + size[:2],
         height=size[2],
         thickness=spec.wall_thickness,
+        floor_thickness=spec.floor_thickness,
         block=spec.block[0],
         course=spec.block[1],
         storeys=spec.storeys,
@@ -194,7 +195,7 @@ def _tank_planes(case: Case) -> list:
                 continue
             normal = np.zeros(3)
             normal[axis] = 1.0 if sign == "-" else -1.0
-            planes.append(FixedPlane(np.array(corner), normal, f"tank {side}"))
+            planes.append(FixedPlane(np.array(corner), normal, f"tank {side}", bonds=side == "z-"))
     return planes
 
 

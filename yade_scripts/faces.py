@@ -26,11 +26,14 @@ SLIVER = 1e-6
 
 @dataclass(frozen=True)
 class FixedPlane:
-    """A fixed half space: the solid is where normal·(x - point) < 0. point (3,) [m], normal (3,) unit."""
+    """A fixed half space: the solid is where normal·(x - point) < 0. point (3,) [m], normal (3,) unit.
+
+    bonds: blocks that stand on it are joined to it where joints are asked for; False: only contact."""
 
     point: Array
     normal: Array
     name: str = "ground"
+    bonds: bool = True
 
     def __post_init__(self):
         normal = np.asarray(self.normal, float)
@@ -64,6 +67,8 @@ def touching_faces(blocks: list[Block], planes: list[FixedPlane] | tuple = ()) -
     for a, b in neighbour_pairs(blocks):
         found += _pair_faces(blocks, world, a, b)
     for p, plane in enumerate(planes):
+        if not plane.bonds:
+            continue
         for a, block in enumerate(blocks):
             found += _plane_faces(block, world[a], a, p, plane)
     return found

@@ -96,7 +96,7 @@ class Structure:
         self.planes = _with_ground(ground, planes)
         origin = self._origin = local_origin(blocks)
         local = [moved_block(b, -origin) for b in blocks]
-        local_planes = [FixedPlane(p.point - origin, p.normal, p.name) for p in self.planes]
+        local_planes = [replace(p, point=p.point - origin) for p in self.planes]
         self.joints = _make_joints(local, local_planes, joints)
         self.face_stiffness = self._face_stiffness()
         if contact is not None:

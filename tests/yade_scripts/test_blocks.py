@@ -175,3 +175,10 @@ def test_running_bond_joins_each_block_to_two_below():
 def test_column_stands_on_its_foot():
     blocks = column_blocks("c", (1, 2, 3), (0.5, 0.5, 1.0), 4)
     assert [b.centre[2] for b in blocks] == [3.5, 4.5, 5.5, 6.5]
+
+
+def test_a_block_beside_a_tank_wall_is_glued_to_the_ground_alone():
+    """A wall that fits the tank must not hang on its sides: those only support."""
+    side = FixedPlane((-0.5, 0.0, 0.0), (1.0, 0.0, 0.0), "tank x-", bonds=False)
+    found = touching_faces([Block("a", np.array([0.0, 0.0, 0.5]), size=np.ones(3))], [GROUND, side])
+    assert [f.b for f in found] == [-1]
