@@ -218,6 +218,7 @@ def test_walls_thinner_than_a_cell_are_remarked():
 def test_a_mesh_beyond_the_memory_of_the_machine_is_refused(monkeypatch):
     """6000 cells do not fit into 1 MB; the message names a cell that fits."""
     content = {
+        "case": {"title": "a tank"},
         "time": {"end": 1},
         "tank": {"lower": [0, 0, 0], "upper": [1, 1, 1], "cell": 0.1},
         "water": {"fill": [{"lower": [0, 0, 0], "upper": [1, 1, 0.5]}]},

@@ -9,7 +9,7 @@ from skfem import asm
 from fluid import forms
 from fluid.bodies import ConvexBodies
 from fluid.moments import cells_touching
-from fluid.projection import cell_gradient, cell_velocity, inflow, nodal_mean
+from fluid.projection import cell_gradient, cell_velocity, damp_divergence, inflow, nodal_mean
 from fluid.topology import Graph
 from fluid.volume import nodal_volume
 from tests.fluid.scenes import advance, column, rotation, tank
@@ -89,6 +89,23 @@ def test_nodal_volume_and_momentum_of_the_pressure_equal_the_forms(cut):
     gradient = cell_gradient(cells, p, t.cells, t.parent, t.gradients)
     mean = nodal_mean(cells, gradient, np.ones(len(cells)), t.cells, t.share, t.volume, len(p))
     np.testing.assert_allclose(mean * volume[:, None], expected, atol=1e-9 * np.abs(expected).max())
+
+
+def test_divergence_damping_equals_its_form():
+    """Mass times the change of u is -c ∫ l² (div u)(div v) dV in cells that are wet throughout."""
+    water = tank([1, 1, 1], 0.25, lambda x: x[:, 2] - 2.0)
+    t, cells = water.topology, np.arange(len(water.topology.cells))
+    u = np.random.default_rng(2).normal(size=(len(t.nodes), 3))
+    basis = forms.vector_basis_of(water.domain)
+    size = np.repeat(t.size[:, None], basis.X.shape[-1], axis=1)
+    expected = -0.05 * asm(forms.grad_div, basis, u=basis.interpolate(forms.by_component(u)), l=size)
+    damped = u.copy()
+    damp_divergence(
+        cells, 0.05, -np.ones(len(u)), t.beside_solid, -2.0, damped, t.cells, t.parent, t.gradients, t.volume,
+        t.size, np.ones(len(cells)),
+    )  # fmt: skip
+    found = (damped - u) * t.node_volume[:, None]
+    np.testing.assert_allclose(found, expected.reshape(-1, 3), atol=1e-13 * np.abs(expected).max())
 
 
 def test_matrix_is_symmetric_positive_definite_with_a_surface():
