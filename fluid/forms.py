@@ -23,12 +23,6 @@ def stiffness(p, q, w):
     return dot(grad(p), grad(q))
 
 
-@BilinearForm
-def mass(p, q, w):
-    """∫ p q dV."""
-    return p * q
-
-
 @LinearForm
 def inflow(q, w):
     """∫ u·∇q dV of the velocity w["u"]: the right hand side of the pressure."""
