@@ -14,8 +14,8 @@ from fluid import gauges
 def wall_impact():
     H, n = 0.3, 16
     cell = H / n
-    size = np.array([round(1.61 / cell) * cell, 2 * cell, 4 * H])
-    c = tank(size, (round(size[0] / cell), 2, 4 * n), column(0.6, H), rtol=1e-7)
+    size = np.array([round(1.61 / cell) * cell, 2 * cell, 2 * H])
+    c = tank(size, (round(size[0] / cell), 2, 2 * n), column(0.6, H), rtol=1e-7)
     scale = np.sqrt(G / H)
     sensor = np.array([size[0] - 1e-9, cell, 0.015])
     t, p = [0.0], [0.0]

@@ -1,0 +1,83 @@
+"""The command verify: judging, reporting, isolation. The physics is in the cases themselves."""
+
+import json
+import math
+
+import pytest
+
+from coupler.errors import BadCase, ExitCode
+from coupler.verify import registry, report, runner
+from coupler.verify.figures import columns, named_values
+from coupler.verify.registry import Check, Finding, Result
+
+
+def test_the_error_is_a_share_or_a_difference():
+    assert Finding("q", 1.02, 1.0, 0.05).error == pytest.approx(0.02)
+    assert Finding("q", 3.0, 2.0, 0.5, relative=False).error == 1.0
+
+
+@pytest.mark.parametrize(
+    ("value", "passed"), [(1.04, True), (0.96, True), (1.06, False), (math.nan, False), (math.inf, False)]
+)
+def test_a_value_passes_within_its_tolerance_and_never_without_being_a_number(value, passed):
+    assert Result.of("P99", Finding("q", value, 1.0, 0.05), 0.1).passed is passed
+
+
+def test_every_reference_case_is_checked_or_its_absence_explained():
+    """The list of reference cases runs from P01; no id is both checked and excused."""
+    checked, excused = set(registry.checks()), set(registry.NOT_COVERED)
+    assert not checked & excused
+    known = {*range(1, 12), *range(20, 28), *range(30, 44), *range(50, 58)}
+    assert checked | excused == {f"P{k:02}" for k in known}
+
+
+def test_references_name_their_source():
+    """Each table starts with lines that say where it comes from, and its numbers can be read."""
+    for path in registry_files():
+        assert path.read_text(encoding="utf-8").startswith("# ")
+    assert columns("coh_mode1_law")["T_over_Tmax"].max() == pytest.approx(1.0, abs=1e-3)
+    assert named_values("dem_simple_closed_forms")["drop 0.5 m: impact speed"] == pytest.approx(3.132092)
+
+
+def registry_files():
+    from coupler.verify.figures import FOLDER
+
+    return sorted(FOLDER.glob("*.csv"))
+
+
+def test_unknown_and_absent_cases_are_told_apart():
+    with pytest.raises(BadCase, match="did you mean"):
+        runner.chosen(["P2O"], quick=False)
+    with pytest.raises(BadCase, match=r"not covered: .*viscosity"):
+        runner.chosen(["P31"], quick=False)
+
+
+def test_quick_leaves_the_long_cases_out():
+    assert {case.cost for case in runner.chosen([], quick=True)} == {"S"}
+
+
+def test_a_process_that_dies_is_a_failed_result_with_its_last_words():
+    """An id that the child does not know makes it end with a KeyError: seen as any crash is."""
+    lost = Check("P00", "none", "nothing", "nowhere", "S", lambda: iter(()))
+    (result,) = runner.run(lost)
+    assert not result.passed
+    assert "P00" in result.reason
+    assert "FAIL" in report.line(result)
+
+
+def test_a_case_of_the_law_runs_in_its_own_process(capsys):
+    """From the command to JSON: the polynomial law and a joint pulled apart in YADE."""
+    code = report.verify(["p20"], quick=True, as_json=True, only_list=False)
+    rows = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert code == ExitCode.DONE
+    assert len(rows) == 5
+    assert {"id", "quantity", "value", "expected", "error", "tolerance", "pass", "cpu_s"} <= set(rows[0])
+    assert all(row["pass"] for row in rows)
+
+
+def test_a_failure_is_counted_and_named():
+    good = Result.of("P01", Finding("a", 1.0, 1.0, 0.1), 1.0)
+    bad = Result.of("P02", Finding("b", 2.0, 1.0, 0.1), 2.0)
+    told = report.totals([good, bad])
+    assert "1 of 2 cases pass" in told
+    assert "not: P02" in told
