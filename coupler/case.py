@@ -66,7 +66,8 @@ class Tank(Section):
     lower: Point = Field(description="corner with the smallest coordinates", examples=[[0, 0, 0]])
     upper: Point = Field(description="corner with the largest coordinates", examples=[[60, 24, 16]])
     cell: PositiveLength = Field(
-        description="edge of the mesh cells; shrunk so that a whole number fits each side", examples=["1 m"]
+        description="wanted edge of the mesh cells; changed so that a whole number fits each side",
+        examples=["1 m"],
     )
     open: tuple[Side, ...] = Field(
         ("z+",), description="sides through which air and water may leave; the others are smooth walls"

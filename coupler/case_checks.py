@@ -21,8 +21,15 @@ Body = tuple[KeyPath, str, Box]
 
 TOUCH = 1e-6
 """Overlap below this share of the smallest edge is contact, not overlap (rounding of decimal fractions)."""
-BYTES_PER_CELL = 1500
-"""Memory that a cell of the mesh takes in a run."""
+BYTES_PER_CELL = 1800
+"""Resident memory that a cell of the mesh takes in a run: topology, moments and fields of the water."""
+
+
+def mesh_size(tank) -> tuple[int, int]:
+    """Cells and nodes of the mesh of a tank: six tetrahedra a box of about the wanted edge."""
+    edges = np.subtract(tank.upper, tank.lower)
+    parts = np.maximum(1, np.rint(edges / tank.cell).astype(int))
+    return 6 * int(np.prod(parts)), int(np.prod(parts + 1))
 
 
 def problems(case: Case) -> list[Problem]:
@@ -222,7 +229,7 @@ def _tank(case: Case) -> Iterator[Problem]:
 
 def _memory(case: Case) -> Iterator[Problem]:
     """A mesh that this machine cannot hold: the system would kill the run without a word."""
-    cells = 6 * np.prod(np.subtract(case.tank.upper, case.tank.lower) / case.tank.cell)
+    cells, _ = mesh_size(case.tank)
     needed, there = BYTES_PER_CELL * cells, os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     if needed > there:
         fits = case.tank.cell * (needed / there) ** (1.0 / 3.0)

@@ -12,12 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from coupler.case import Case
+from coupler.case_checks import BYTES_PER_CELL, mesh_size
 from coupler.observe import joint_counts
 from coupler.terminal import Row
 
 LONGEST_REST_STEP = 0.3
-BYTES_PER_CELL = 1500
-"""Resident memory per mesh cell: topology, moments and fields of the water."""
 BYTES_PER_BLOCK = 60_000
 """Resident memory per block with its contact nodes in YADE."""
 PROGRAM_BYTES = {"water": 250e6, "structure": 250e6}
@@ -42,7 +41,7 @@ def forecast(case: Case) -> Forecast:
     step = case.time.step_max
     if case.water:
         step = _water_rows(case, rows)
-        cells, nodes = _mesh_size(case)
+        cells, nodes = mesh_size(case.tank)
         memory += PROGRAM_BYTES["water"] + BYTES_PER_CELL * cells
         disk += DISK_BYTES_PER_NODE * nodes * (outputs + 1)
     steps = math.ceil(case.time.end / step)
@@ -57,16 +56,9 @@ def forecast(case: Case) -> Forecast:
     return Forecast(rows)
 
 
-def _mesh_size(case: Case) -> tuple[int, int]:
-    """Cells and nodes of the mesh."""
-    edges = np.subtract(case.tank.upper, case.tank.lower)
-    parts = np.maximum(1, np.ceil(edges / case.tank.cell - 1e-9)).astype(int)
-    return 6 * int(parts.prod()), int((parts + 1).prod())
-
-
 def _water_rows(case: Case, rows: list[Row]) -> float:
     """Rows of the water; the step [s] that its greatest speed allows."""
-    cells, nodes = _mesh_size(case)
+    cells, nodes = mesh_size(case.tank)
     volume = sum(float(np.prod(np.subtract(f.upper, f.lower))) for f in case.water.fill)
     height = max(f.upper[2] for f in case.water.fill) - case.tank.lower[2]
     g, h = case.case.gravity, case.tank.cell

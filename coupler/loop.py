@@ -135,7 +135,7 @@ class Coupling:
         with self.clock("structure in pressure"):
             mass, response, v_free = self._response(problem)
         passes = self.passes if problem.coupling.nnz else 1  # no wetted block, nothing to correct
-        found = None
+        found = saved = None
         for record.passes in range(1, passes + 1):
             with self.clock("pressure"):
                 guess = None if found is None else found.x

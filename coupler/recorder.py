@@ -27,7 +27,11 @@ ENERGY = (
     ("joint_damping", "J", "energy taken by the damping of the joints so far"),
     ("contact_stored", "J", "elastic energy in contacts"),
     ("dashpot", "J", "energy taken by contact dashpots so far (counted with contact.audit)"),
-    ("friction", "J", "energy taken by friction so far; without contact.audit also by dashpots, from the balance"),
+    (
+        "friction",
+        "J",
+        "energy taken by friction so far; without contact.audit also by dashpots, from the balance",
+    ),
     ("driving_work", "J", "work of prescribed motions on the structure so far"),
     ("structure_residual", "J", "what the structure's own ledger misses"),
     ("interface_residual", "J", "work given less work received"),

@@ -50,8 +50,9 @@ def _describe(scene: Scene, reporter) -> None:
         )
     if c.structure is not None:
         substep, pair = c.structure.stable_substep()
+        joints = joint_counts(c.structure).intact
         reporter.message(
-            f"structure: {c.structure.n} blocks, {joint_counts(c.structure).intact} joints, substep {substep:.3g} s ({pair})"
+            f"structure: {c.structure.n} blocks, {joints} joints, substep {substep:.3g} s ({pair})"
         )
 
 
