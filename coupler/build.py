@@ -37,23 +37,33 @@ def build(case: Case, clock) -> Scene:
     solids = [(_box_vertices(s), BOX_FACES) for s in case.solid]
     with clock("set-up"):
         structure = build_structure(case) if case.structure else None
-        water = immersion = None
-        if case.water:
-            water, immersion = _water(case, structure, solids)
-        if case.joints and case.structure.start == "settled" and _settled(structure, water) and case.water:
-            water, immersion = _water(case, structure, solids)
-        coupling = Coupling(
-            water,
-            structure,
-            immersion,
-            rtol=PRESSURE_RTOL,
-            step_max=case.time.step_max,
-            clock=clock,
-            passes=case.coupling.passes,
-            tolerance=case.coupling.tolerance,
-        )
+        try:
+            coupling = _coupling(case, structure, solids, clock)
+        except BaseException:
+            if structure is not None:
+                structure.close()  # YADE holds one scene: the next build needs it free
+            raise
     tank = (case.tank.lower, case.tank.upper) if case.tank else None
     return Scene(coupling, _gauges(case, structure), solids, tank)
+
+
+def _coupling(case: Case, structure, solids, clock) -> Coupling:
+    """Both sides, the structure at rest if the case says so."""
+    water = immersion = None
+    if case.water:
+        water, immersion = _water(case, structure, solids)
+    if case.joints and case.structure.start == "settled" and _settled(structure, water) and case.water:
+        water, immersion = _water(case, structure, solids)
+    return Coupling(
+        water,
+        structure,
+        immersion,
+        rtol=PRESSURE_RTOL,
+        step_max=case.time.step_max,
+        clock=clock,
+        passes=case.coupling.passes,
+        tolerance=case.coupling.tolerance,
+    )
 
 
 def _settled(structure, water) -> bool:

@@ -188,7 +188,8 @@ class Structure:
         if self._limit is None:
             stiffness = self.face_stiffness if self.contact is not None else None
             damping = 0.0 if self.joints is None else self.joints.parameters.damping
-            self._limit = substep_limit(self.blocks, self.joints, stiffness, damping)
+            contact_damping = 0.0 if self.contact is None else self.contact.damping_ratio
+            self._limit = substep_limit(self.blocks, self.joints, stiffness, damping, contact_damping)
         return self._limit
 
     def stable_substep(self) -> tuple[float, str]:
