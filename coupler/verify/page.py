@@ -16,9 +16,6 @@ NOTES = {
     "out too large below 1.",
     "P10": "YADE's rotation of a body with three different inertias gains energy, 0.7 % in 6 s at 0.1 ms here, less "
     "in proportion to the substep.",
-    "P11": "At restitution 0.1 the damping ratio of the contact is 1.24, and the substep chosen for the stiffness "
-    "alone is too long for the dashpots: the stack chatters. A quarter of it, or restitution 0.3, gives the exact "
-    "penetrations.",
     "P23": "With stiff closing a joint turns about its outermost points, and of 3 x 3 Gauss points these lie 0.11 of "
     "the face inside the edge: 8 % weak at kc/K0 10, 18 % at 100. Raise `joints.points` with `joints.closing_ratio`.",
     "P24": "As P23.",
