@@ -36,13 +36,12 @@ class Scene:
 def build(case: Case, clock) -> Scene:
     """Build the scene of a case. clock(name) is a context that books processor time to a part of the run."""
     solids = [(_box_vertices(s), BOX_FACES) for s in case.solid]
-    with clock("set-up"):
-        with ExitStack() as on_failure:  # YADE holds one scene: the next build needs it free
-            structure = build_structure(case) if case.structure else None
-            if structure is not None:
-                on_failure.callback(structure.close)
-            coupling = _coupling(case, structure, solids, clock)
-            on_failure.pop_all()
+    with clock("set-up"), ExitStack() as on_failure:  # YADE holds one scene: the next build needs it free
+        structure = build_structure(case) if case.structure else None
+        if structure is not None:
+            on_failure.callback(structure.close)
+        coupling = _coupling(case, structure, solids, clock)
+        on_failure.pop_all()
     tank = (case.tank.lower, case.tank.upper) if case.tank else None
     return Scene(coupling, _gauges(case, structure), solids, tank)
 
