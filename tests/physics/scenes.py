@@ -12,7 +12,7 @@ from fluid.water import Water
 from tests.fakes import no_clock
 from yade_scripts.building import divided_box
 from yade_scripts.cohesion import JointParameters
-from yade_scripts.equilibrium import settle
+from yade_scripts.equilibrium import CannotStand, settle
 from yade_scripts.structure import Structure
 
 G, RHO = 9.81, 1000.0
@@ -57,7 +57,7 @@ def standing_wall(
     if settled:
         try:
             settle(structure, load_at_rest(water)[: structure.n])
-        except Exception:
+        except CannotStand:
             structure.close()
             raise
         water, immersion = _still_water(structure, mesh, tank, (face, SLICE, depth), covers)
