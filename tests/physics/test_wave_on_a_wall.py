@@ -51,7 +51,7 @@ def rigid():
     return history(dam_break(solid=[solid]))
 
 
-def bonded(passes, strength=2e6):
+def bonded(passes, strength=2e7):
     return dam_break(
         structure={"wall": [{"name": "wall", **WALL, "block": [0.12, 0.2, 0.1]}]},
         joints={"strength": strength, "opening_at_failure": 1e-3},
