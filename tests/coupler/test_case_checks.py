@@ -229,3 +229,13 @@ def test_a_mesh_beyond_the_memory_of_the_machine_is_refused(monkeypatch):
     assert place == ("tank", "cell")
     fits = float(message.rpartition("cells of ")[2].split()[0])
     assert 6 * fits**-3 * 1500 < 1e6 < 6 * (0.8 * fits) ** -3 * 1500
+
+
+def test_too_few_points_for_joints_that_close_stiffly_are_remarked():
+    """Three Gauss points miss the edge that such a joint turns about."""
+    block = structure({"centre": [7, 5, 0.5]})
+    joints = {"strength": 1e5, "opening_at_failure": 1e-3, "closing_ratio": 10.0}
+    assert remarks(case(joints=joints, **block))[0].startswith(
+        "joints.closing_ratio = 10 with joints.points = 3"
+    )
+    assert remarks(case(joints=joints | {"points": 8}, **block)) == []
