@@ -72,8 +72,8 @@ def remarks(case: Case) -> list[str]:
     j = case.joints
     if j and j.closing_ratio >= STIFF_CLOSING and j.points < ENOUGH_POINTS:
         found.append(
-            f"joints.closing_ratio = {j.closing_ratio:g} with joints.points = {j.points}: such joints come out too weak "
-            f"in bending (8 % at 10, 18 % at 100 with 3 points); use {ENOUGH_POINTS} or more"
+            f"joints.closing_ratio = {j.closing_ratio:g} with joints.points = {j.points}: these joints come out weak "
+            f"in bending (by 8 % at 10, 18 % at 100 with 3 points); use {ENOUGH_POINTS} or more"
         )
     return found
 
