@@ -42,6 +42,9 @@ class Immersion:
         )
         self._body_of_plane = np.repeat(np.arange(len(shapes)), np.diff(self._reference.plane_start))
         self._radius = np.array([np.linalg.norm(v, axis=1).max() for v, _ in shapes])
+        low, high = mesh.bounds
+        self._long = np.flatnonzero(2.0 * self._radius[: self.n_blocks] > (high - low).min() - mesh.spacing)
+        """Blocks long enough to reach across the tank."""
         self._tolerance = STILL * mesh.spacing
         self._centre, self._rotation = self._pose()
         self._growth = self._new_growth(np.zeros(len(self._body_of_plane)))
@@ -103,12 +106,14 @@ class Immersion:
     def _closing_planes(self) -> Array:
         """(P,) bool: faces along the tank sides of blocks that reach from one side to the opposite one."""
         closing = np.zeros(len(self._body_of_plane), bool)
+        if len(self._long) == 0:
+            return closing
         low, high = self.mesh.bounds
         margin = SPANS * self.mesh.spacing
         centre, rotation = self.structure.centre(), self.structure.rotation()
         normals = np.einsum("pij,pj->pi", self._turns(rotation), self._reference.normals)
-        for b, (x, R, vertices) in enumerate(zip(centre, rotation, self.structure.shape_vertices)):
-            corners = x + vertices @ R.T
+        for b in self._long:
+            corners = centre[b] + self.structure.shape_vertices[b] @ rotation[b].T
             spans = (corners.min(axis=0) < low + margin) & (corners.max(axis=0) > high - margin)
             if spans.any():
                 own = self._body_of_plane == b

@@ -1,0 +1,49 @@
+"""The ledger: what counts as an error of energy, and what is only shown."""
+
+import pytest
+
+from coupler.ledger import DISSIPATED, STORED, Ledger
+
+NOTHING = dict.fromkeys((*STORED, *DISSIPATED, "load_work", "driving_work"), 0.0)
+
+
+def started(available=100.0):
+    """A ledger at rest, with 100 J of water to fall."""
+    ledger = Ledger(available=available)
+    ledger.start((0.0, available), NOTHING)
+    return ledger
+
+
+def test_energy_that_goes_from_the_water_into_blocks_and_joints_balances():
+    ledger = started()
+    ledger.give(30.0)
+    blocks = NOTHING | {"kinetic": 20.0, "joint_stored": 4.0, "joint_dissipated": 6.0, "load_work": 30.0}
+    found = ledger.balance((50.0, 20.0), blocks)
+    assert found.energy_error == 0.0
+    assert found.numerical_dissipation == 0.0
+
+
+def test_what_the_water_loses_by_the_numerics_is_shown_and_what_it_gains_is_an_error():
+    assert started().balance((50.0, 30.0), NOTHING).numerical_dissipation == pytest.approx(20.0)
+    assert started().balance((50.0, 30.0), NOTHING).energy_error == 0.0
+    assert started().balance((50.0, 60.0), NOTHING).energy_error == pytest.approx(0.1)
+
+
+def test_work_that_does_not_arrive_is_an_error():
+    ledger = started()
+    ledger.give(30.0)
+    found = ledger.balance((50.0, 20.0), NOTHING | {"kinetic": 25.0, "load_work": 25.0})
+    assert found.interface_residual == pytest.approx(5.0)
+    assert found.energy_error == pytest.approx(0.05)
+
+
+def test_contacts_that_give_energy_back_are_an_error_although_the_balance_closes():
+    """Their loss is taken from the balance of the other lines, so only its fall betrays a gain."""
+    ledger = started()
+    taken = NOTHING | {"kinetic": 10.0, "friction": 20.0, "load_work": 30.0}
+    given_back = NOTHING | {"kinetic": 18.0, "friction": 12.0, "load_work": 30.0}
+    ledger.give(30.0)
+    assert ledger.balance((50.0, 20.0), taken).energy_error == 0.0
+    found = ledger.balance((50.0, 20.0), given_back)
+    assert found.structure_residual == pytest.approx(0.0)
+    assert found.energy_error == pytest.approx(0.08)
