@@ -64,6 +64,9 @@ class Water:
     pressure (N,) [Pa] that acted over the last step, end_pressure (N,) [Pa] that goes with the acceleration at its end
     (the two differ by up to 1/θ in an impact), nodal_water (N,) [m³]; at its cells: remainder (M, 3) [m/s], what the
     nodes could not hold of the velocity correction.  Velocity goes on for some layers outside the water.
+
+    body_velocity (n_bodies, 6) [m/s, rad/s] about the centres: set it before `predict` where solids that move drag the
+    water along (viscosity, friction); it is not used otherwise.
     """
 
     def __init__(
@@ -78,7 +81,9 @@ class Water:
         self.time, self.steps = 0.0, 0
         self._surface_lag, self._solids_move = 0.0, False
         self.report: StepReport | None = None
-        self._sides = Walls.of(mesh, is_open)
+        self._sides = Walls.of(mesh, is_open, no_slip=self.parameters.walls == "no-slip")
+        self.viscous = _viscosity(self.parameters)
+        self.body_velocity = np.zeros((domain.n_bodies, 6))
         self._set_domain(domain)
         n = len(self.topology.nodes)
         level = fill(self.topology.nodes) if callable(fill) else np.asarray(fill, float)
@@ -216,6 +221,25 @@ class Water:
     def _dry_if_inactive(self, level):
         return np.where(self.topology.active, level, FAR * self.mesh.spacing)
 
+    # ---- sides of the tank
+
+    @property
+    def side_nodes(self) -> np.ndarray:
+        """Nodes (n,) on closed sides."""
+        return self._walls.nodes
+
+    @property
+    def side_projector(self) -> np.ndarray:
+        """(n, 3, 3) onto what the sides leave free at those nodes."""
+        return self._walls.projector
+
+    def closed_faces(self):
+        """Faces of the closed sides that have water's side: (nodes (C, 3), outward area (C, 3) [m²], cell (C,))."""
+        w = self._walls
+        cell = self.topology.row_of_parent[w.closed_cell]
+        there = cell >= 0
+        return w.closed_faces[there], w.closed_area[there], cell[there]
+
     # ---- figures
 
     def volume(self) -> float:
@@ -251,6 +275,15 @@ class Water:
         p, volume = self.parameters, self.volume()
         spread = p.density * p.gravity * volume * (low[2] + 0.5 * volume / area)
         return self.kinetic_energy() + max(self.potential_energy() - spread, 0.0)
+
+
+def _viscosity(parameters: WaterParameters):
+    """The viscous stage, or None where the case has neither viscosity nor rough walls."""
+    if not parameters.shear:
+        return None
+    from fluid.viscosity import Viscosity
+
+    return Viscosity(parameters)
 
 
 def kinetic_energy(density: float, nodal_water, velocity) -> float:
