@@ -14,6 +14,7 @@ from numba import njit
 
 from yade_scripts.blocks import Block
 from yade_scripts.polyhedra import face_areas, polygon_area_vector
+from yade_scripts.quadrature import Rule, gauss
 
 Array = np.ndarray
 
@@ -273,24 +274,24 @@ def _without_doubles(polygon, same):
     return kept[:found]
 
 
-def gauss_points(polygon: Array, points: int) -> tuple[Array, Array]:
-    """Positions (q, 3) [m] and weights (q,) [m²] on a convex polygon (k, 3).
+def gauss_points(polygon: Array, rule: Rule | int) -> tuple[Array, Array]:
+    """Positions (q, 3) [m] and weights (q,) [m²] on a convex polygon (k, 3). rule: a number stands for that of Gauss.
 
-    A parallelogram gets the tensor rule points x points, exact for polynomials of degree 2 points - 1 in each
+    A parallelogram gets the tensor rule, with q Gauss points exact for polynomials of degree 2 q - 1 in each
     direction; any other polygon a fan of triangles with the same rule collapsed on each.
     """
+    rule = gauss(rule) if isinstance(rule, int) else rule
     if len(polygon) == 4 and np.allclose(polygon[0] + polygon[2], polygon[1] + polygon[3]):
-        return _mapped_rule(polygon, points)
+        return _mapped_rule(polygon, rule)
     centre = polygon.mean(axis=0)
     ring = zip(polygon, np.roll(polygon, -1, axis=0))
-    rules = [_mapped_rule(np.array([centre, p, q, centre]), points) for p, q in ring]
+    rules = [_mapped_rule(np.array([centre, p, q, centre]), rule) for p, q in ring]
     return np.concatenate([r[0] for r in rules]), np.concatenate([r[1] for r in rules])
 
 
-def _mapped_rule(corners: Array, points: int) -> tuple[Array, Array]:
-    """Tensor Gauss rule of the bilinear map on four corners (4, 3); two equal corners make a triangle."""
-    s, w = np.polynomial.legendre.leggauss(points)
-    s, w = 0.5 * (s + 1.0), 0.5 * w
+def _mapped_rule(corners: Array, rule: Rule) -> tuple[Array, Array]:
+    """Tensor rule of the bilinear map on four corners (4, 3); two equal corners make a triangle."""
+    s, w = rule.places, rule.weights
     u, v = (g.ravel() for g in np.meshgrid(s, s, indexing="ij"))
     shape = np.stack([(1 - u) * (1 - v), u * (1 - v), u * v, (1 - u) * v], axis=1)
     du = np.stack([-(1 - v), 1 - v, v, -v], axis=1) @ corners
