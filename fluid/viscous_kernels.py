@@ -4,11 +4,11 @@ r = f - K u: the rate of momentum [N] that stresses give to the nodes,
 
     r_i = - ∫ 2μ ε(u) ∇N_i dV  +  ∫_Γ N_i (t - λ (u - u_Γ)) dA  +  ∫_Γ (u - u_Γ)·t(N_i) dA  -  ∫_Γ N_i C (u - u_Γ)_t dA
 
-ε(u) = (∇u + ∇uᵀ)/2, t(v) = -2μ ε(v) n, n out of the body into the water, u_Γ the velocity of the body there.  The second
-and third terms hold u = u_Γ weakly (symmetric Nitsche), the last is wall friction.  With
-λ = 4 μ A/V, A wetted area and V water of the cell, the form is positive definite on every cut, since ε is constant in a cell
-(trace inequality ∫_Γ |ε n|² ≤ A/V ∫ |ε|²; De Prenter, Lehrenfeld, Massing, Comput. Math. Appl. 75 (2018) 4322).
-The body gets what the hats sum up to: -∫ (t - λ (u - u_Γ) - C (u - u_Γ)_t) dA, so that momentum is exchanged to round-off.
+ε(u) = (∇u + ∇uᵀ)/2, t(v) = -2μ ε(v) n, n out of the body into the water, u_Γ the velocity of the body there.  The
+second and third terms hold u = u_Γ weakly (symmetric Nitsche), the last is wall friction.  With λ = 4 μ A/V, A wetted
+area and V water of the cell, the form is positive definite on every cut, since ε is constant in a cell (trace
+inequality ∫_Γ |ε n|² ≤ A/V ∫ |ε|²; De Prenter, Lehrenfeld, Massing, Comput. Math. Appl. 75 (2018) 4322).
+The body gets what the hats sum up to, -∫ (t - λ (u - u_Γ) - C (u - u_Γ)_t) dA: momentum is exchanged to round-off.
 """
 
 from __future__ import annotations
@@ -137,8 +137,8 @@ def _restrict(r, node, projector, idle):
 @njit(cache=True)
 def preconditioner(terms, mass, tau):
     """1 / diagonal (N,) of M + τ K, the flux terms left out; 0 on idle nodes."""
-    cell_list, weight, walls, mu, node_drag, node, projector, idle, cells, parent, g = terms
-    cell, body, normal, hat, arm, area, nitsche, drag = walls
+    cell_list, weight, walls, _mu, node_drag, _node, _projector, idle, cells, parent, g = terms
+    cell, _body, _normal, hat, _arm, area, nitsche, drag = walls
     diagonal = mass + tau * node_drag
     for s in range(cell_list.shape[0]):
         e = cell_list[s]

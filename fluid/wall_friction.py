@@ -8,7 +8,7 @@ Manning, for beds under water of depth d (the stress of uniform flow, τ = ρ g 
 
     C_f = g n² / d^(1/3)                                                                          (2)
 
-on the floor and on faces of solids that look up (n_z > 0.5); d is the water above in the column of cells, at least one cell.
+on the floor and on faces of solids that look up (n_z > 0.5); d is the water in the column of cells, at least one cell.
 Both are linear in u_t once |u_t| is taken from before the stage, so the step stays symmetric.
 """
 
@@ -55,7 +55,7 @@ class WallFriction:
 
     def of_nodes(self, water, phi, u):
         """Drag (N,) [kg/s] of the nodes on closed sides of the tank: C times the wet area of each."""
-        t, (faces, area, cell) = water.topology, water.closed_faces()
+        t, (faces, area, cell) = water.topology, water.rough_faces()
         size = np.linalg.norm(area, axis=1)
         unit = area / size[:, None]
         if self.manning is not None:

@@ -58,7 +58,8 @@ class Water:
 
     mesh: Background · domain: PhysicalDomain of it · fill: points (n, 3) [m] → signed distance (n,) [m], negative
     in the water, or the level set (N,) itself · is_open: (normals (B, 3), centres (B, 3)) → bool (B,), sides of
-    the tank that let water out; None: all closed.
+    the tank that let water out; None: all closed · is_smooth: the same, sides that stay smooth whatever
+    `parameters.walls` says.
 
     State at the nodes of the domain: level_set (N,) [m], velocity (N, 3) [m/s], acceleration (N, 3) [m/s²],
     pressure (N,) [Pa] that acted over the last step, end_pressure (N,) [Pa] that goes with the acceleration at its end
@@ -76,12 +77,13 @@ class Water:
         fill: Callable | np.ndarray,
         parameters: WaterParameters | None = None,
         is_open: Callable | None = None,
+        is_smooth: Callable | None = None,
     ):
         self.mesh, self.parameters = mesh, parameters or WaterParameters()
         self.time, self.steps = 0.0, 0
         self._surface_lag, self._solids_move = 0.0, False
         self.report: StepReport | None = None
-        self._sides = Walls.of(mesh, is_open, no_slip=self.parameters.walls == "no-slip")
+        self._sides = Walls.of(mesh, is_open, is_smooth, no_slip=self.parameters.walls == "no-slip")
         self.viscous = _viscosity(self.parameters)
         self.body_velocity = np.zeros((domain.n_bodies, 6))
         self._set_domain(domain)
@@ -223,22 +225,16 @@ class Water:
 
     # ---- sides of the tank
 
-    @property
-    def side_nodes(self) -> np.ndarray:
-        """Nodes (n,) on closed sides."""
-        return self._walls.nodes
+    def held_by_sides(self):
+        """Nodes (n,) on the sides of the tank and projectors (n, 3, 3) onto what friction and viscosity may change."""
+        return self._walls.restriction()
 
-    @property
-    def side_projector(self) -> np.ndarray:
-        """(n, 3, 3) onto what the sides leave free at those nodes."""
-        return self._walls.projector
-
-    def closed_faces(self):
-        """Faces of the closed sides that have water's side: (nodes (C, 3), outward area (C, 3) [m²], cell (C,))."""
+    def rough_faces(self):
+        """Faces of the closed sides that rub the water: (nodes (C, 3), outward area (C, 3) [m²], cell (C,))."""
         w = self._walls
-        cell = self.topology.row_of_parent[w.closed_cell]
+        cell = self.topology.row_of_parent[w.rough_cell]
         there = cell >= 0
-        return w.closed_faces[there], w.closed_area[there], cell[there]
+        return w.rough_faces[there], w.rough_area[there], cell[there]
 
     # ---- figures
 
