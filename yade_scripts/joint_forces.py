@@ -22,7 +22,7 @@ import numpy as np
 from numba import njit
 
 from yade_scripts import laws, mixed_modes
-from yade_scripts.joint_kernel import add_force, add_velocity, dot, place, split, turned
+from yade_scripts.joint_kernel import add_forces, arm, cross, dot, parting, place, split, turned
 from yade_scripts.specialise import specialised
 
 UNIT, DF, BETA, KC, K0 = range(5)
@@ -32,17 +32,19 @@ WORK, PULL = 0, 1
 NOT_GROWING = -1.0
 SHARP = 8.0
 """The mean traction has its full weight from Δ = δ_f/SHARP on."""
+SLOW = 0.005
+"""Below Δ = SLOW δ_f the weight is under 0.2 %: the traction is T itself, which saves the account."""
 
 secant = work = measure = pace = response = stored = None  # given by `kernels_of`
 
 
 @njit(cache=True)
-def dashpot(eta, kn, kt, w, n, t):
-    """Add the traction η (k_n w_n n + k_t w_t) of the relative velocity w to t; returns its power [W/m²]."""
+def dashpot(eta, kn, kt, w, n):
+    """Traction η (k_n w_n n + k_t w_t) of the relative velocity w as a tuple, and its power [W/m²]."""
     wn = dot(w, n)
-    for k in range(3):
-        t[k] += eta * ((kn - kt) * wn * n[k] + kt * w[k])
-    return eta * ((kn - kt) * wn * wn + kt * dot(w, w))
+    along, across = eta * (kn - kt) * wn, eta * kt
+    t = (along * n[0] + across * w[0], along * n[1] + across * w[1], along * n[2] + across * w[2])
+    return t, dot(t, w)
 
 
 # ---- with a law: `secant` and `work` are its functions, the others those of the mixed mode ----------------------
@@ -61,6 +63,9 @@ def separation_work(unit, df, r, peak):
 def torn_traction(before, now, move, ks, unit, df, peak, paid):
     """Traction [Pa] of a substep in which λ grows from `before` to `now`, the measure by `move`; paid (2,) changes."""
     move = max(move, now - before)
+    if move < SLOW * df:
+        paid[PULL] = NOT_GROWING
+        return ks * now
     if paid[PULL] == NOT_GROWING:
         was = max(now - move, 0.0)
         k = softened(unit, before / df, peak)
@@ -105,48 +110,41 @@ def joint_forces(
     largest (P,) λ [m] · paid (P, 2) · eta [s] dashpot time · x (n, 3), v (n, 6), R (n, 3, 3)
     F (n, 6) is added to · damped (J,) [J] too   →   largest growth of λ/δ_f in this call
     """
-    pa, pb, mid, n = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-    s, t, w = np.empty(3), np.empty(3), np.empty(3)
     fastest = 0.0
     for j in live:
         ra, rb = a[j], b[j]
         unit, df, beta, k0 = law[j, UNIT], law[j, DF], law[j, BETA], law[j, K0]
         kc = law[j, KC] if closing[j] else 0.0
-        turned(R, ra, normal[j], n)
+        n = turned(ra, R, normal[j])
+        f0 = f1 = f2 = m0 = m1 = m2 = 0.0
         for p in range(start[j], start[j + 1]):
-            place(ra, R, x, xi_a[p], pa)
-            place(rb, R, x, xi_b[p], pb)
-            dn = split(pa, pb, n, s)
+            pa, pb = place(ra, R, x, xi_a[p]), place(rb, R, x, xi_b[p])
+            mid = (0.5 * (pa[0] + pb[0]), 0.5 * (pa[1] + pb[1]), 0.5 * (pa[2] + pb[2]))
+            dn, s = split(pa, pb, n)
             ss = dot(s, s)
             before, now = largest[p], measure(dn, ss, beta)
             after = max(before, now)
             ks = softened(unit, after / df, peak)
-            grows = advance and before < now and before < df
-            for k in range(3):
-                mid[k] = 0.5 * (pa[k] + pb[k])
-            if eta > 0.0 or grows:
-                w[:] = 0.0
-                add_velocity(rb, 1.0, x, v, mid, w)
-                add_velocity(ra, -1.0, x, v, mid, w)
-            if grows and dt > 0.0:
-                move = dt * pace(dn, ss, dot(w, n), dot(w, s), beta)
-                ks = torn_traction(before, now, move, ks, unit, df, peak, paid[p]) / now
-            elif advance:
-                paid[p, PULL] = NOT_GROWING
-            tn, kn, kt = response(ks, dn, ss, after, k0, df, beta, kc)
-            for k in range(3):
-                t[k] = tn * n[k] + kt * s[k]
-            if eta > 0.0:
-                power = dashpot(eta, kn, kt, w, n, t)
-                if advance:
-                    damped[j] += weight[p] * power * dt
             if advance:
                 largest[p] = after
                 fastest = max(fastest, (after - before) / df)
-            for k in range(3):
-                t[k] *= weight[p]
-            add_force(ra, 1.0, t, mid, x, F)
-            add_force(rb, -1.0, t, mid, x, F)
+                if before < now and before < df and dt > 0.0:
+                    w = parting(ra, rb, x, v, mid)
+                    move = dt * pace(dn, ss, dot(w, n), dot(w, s), beta)
+                    ks = torn_traction(before, now, move, ks, unit, df, peak, paid[p]) / now
+                else:
+                    paid[p, PULL] = NOT_GROWING
+            tn, kn, kt = response(ks, dn, ss, after, k0, df, beta, kc)
+            t0, t1, t2 = tn * n[0] + kt * s[0], tn * n[1] + kt * s[1], tn * n[2] + kt * s[2]
+            if eta > 0.0:
+                c, power = dashpot(eta, kn, kt, parting(ra, rb, x, v, mid), n)
+                t0, t1, t2 = t0 + c[0], t1 + c[1], t2 + c[2]
+                if advance:
+                    damped[j] += weight[p] * power * dt
+            t = (weight[p] * t0, weight[p] * t1, weight[p] * t2)
+            c0, c1, c2 = cross(arm(ra, x, mid), t)
+            f0, f1, f2, m0, m1, m2 = f0 + t[0], f1 + t[1], f2 + t[2], m0 + c0, m1 + c1, m2 + c2
+        add_forces(ra, rb, x, (f0, f1, f2), (m0, m1, m2), F)
     return fastest
 
 
@@ -157,19 +155,13 @@ def stored_between(
 
     Leapfrog conserves kinetic(t + dt/2) + 1/2 k δ(t)·δ(t + dt) exactly, so the product of the two openings is used.
     """
-    pa, pb, n, n0, d, e = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     for j in live:
         kc = law[j, KC] if closing[j] else 0.0
-        turned(R, a[j], normal[j], n)
-        turned(R0, a[j], normal[j], n0)
+        n, n0 = turned(a[j], R, normal[j]), turned(a[j], R0, normal[j])
         out[j] = 0.0
         for p in range(start[j], start[j + 1]):
-            place(a[j], R, x, xi_a[p], pa)
-            place(b[j], R, x, xi_b[p], pb)
-            dn = split(pa, pb, n, d)
-            place(a[j], R0, x0, xi_a[p], pa)
-            place(b[j], R0, x0, xi_b[p], pb)
-            en = split(pa, pb, n0, e)
+            dn, d = split(place(a[j], R, x, xi_a[p]), place(b[j], R, x, xi_b[p]), n)
+            en, e = split(place(a[j], R0, x0, xi_a[p]), place(b[j], R0, x0, xi_b[p]), n0)
             df = law[j, DF]
             ks = softened(law[j, UNIT], largest[p] / df, peak)
             out[j] += weight[p] * stored(ks, dn, en, dot(d, e), largest[p], law[j, K0], df, law[j, BETA], kc)
@@ -186,21 +178,20 @@ def lost(start, weight, law, peak, largest, out):
             out[j] += weight[p] * (separation_work(unit, df, r, peak) - back)
 
 
-def point_springs(index, joint_of, a, b, xi_a, xi_b, normal, law, closing, peak, largest, x, R, arm, nk, k):
-    """Of the points `index` (s,): arms arm (2, s, 3) from both centres, normals nk (s, 3), k_n and k_t in k (2, s)."""
-    pa, pb, n, s = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+def point_springs(
+    index, joint_of, a, b, xi_a, xi_b, normal, law, closing, peak, largest, x, R, arms, normals, k
+):
+    """Of the points `index` (s,): arms (2, s, 3) from both centres, normals (s, 3), k_n and k_t in k (2, s) [Pa/m]."""
     for i in range(len(index)):
         p = index[i]
         j = joint_of[p]
-        place(a[j], R, x, xi_a[p], pa)
-        place(b[j], R, x, xi_b[p], pb)
-        turned(R, a[j], normal[j], n)
-        dn = split(pa, pb, n, s)
+        pa, pb = place(a[j], R, x, xi_a[p]), place(b[j], R, x, xi_b[p])
+        mid = (0.5 * (pa[0] + pb[0]), 0.5 * (pa[1] + pb[1]), 0.5 * (pa[2] + pb[2]))
+        n = turned(a[j], R, normal[j])
+        dn, s = split(pa, pb, n)
+        to_a, to_b = arm(a[j], x, mid), arm(b[j], x, mid)
         for c in range(3):
-            middle = 0.5 * (pa[c] + pb[c])
-            arm[0, i, c] = middle - x[a[j], c]
-            arm[1, i, c] = middle - x[b[j], c] if b[j] >= 0 else 0.0
-            nk[i, c] = n[c]
+            arms[0, i, c], arms[1, i, c], normals[i, c] = to_a[c], to_b[c], n[c]
         df = law[j, DF]
         ks = softened(law[j, UNIT], largest[p] / df, peak)
         kc = law[j, KC] if closing[j] else 0.0
@@ -209,25 +200,23 @@ def point_springs(index, joint_of, a, b, xi_a, xi_b, normal, law, closing, peak,
 
 def point_tangents(index, joint_of, a, b, xi_a, xi_b, normal, law, closing, peak, largest, x, R, out):
     """out (s, 3, 3) [Pa/m]: ∂t/∂δ of the points `index` while λ may grow, by central differences over 1e-7 δ_f."""
-    pa, pb, n, d, s = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    d = np.empty(3)
     for i in range(len(index)):
         p = index[i]
         j = joint_of[p]
-        place(a[j], R, x, xi_a[p], pa)
-        place(b[j], R, x, xi_b[p], pb)
-        turned(R, a[j], normal[j], n)
+        pa, pb = place(a[j], R, x, xi_a[p]), place(b[j], R, x, xi_b[p])
+        n = turned(a[j], R, normal[j])
         unit, df, beta, k0 = law[j, UNIT], law[j, DF], law[j, BETA], law[j, K0]
         kc = law[j, KC] if closing[j] else 0.0
         h = 1e-7 * df
         for c in range(3):
             for side in (1.0, -1.0):
-                for k in range(3):
-                    d[k] = pb[k]
+                d[0], d[1], d[2] = pb
                 d[c] += side * h
-                dn = split(pa, d, n, s)
-                ss = dot(s, s)
-                after = max(largest[p], measure(dn, ss, beta))
-                tn, _, kt = response(softened(unit, after / df, peak), dn, ss, after, k0, df, beta, kc)
+                dn, s = split(pa, d, n)
+                after = max(largest[p], measure(dn, dot(s, s), beta))
+                ks = softened(unit, after / df, peak)
+                tn, _, kt = response(ks, dn, dot(s, s), after, k0, df, beta, kc)
                 for k in range(3):
                     change = side * (tn * n[k] + kt * s[k]) / (2.0 * h)
                     out[i, k, c] = change if side > 0.0 else out[i, k, c] + change

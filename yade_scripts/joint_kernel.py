@@ -21,64 +21,81 @@ def rotation_matrix(q, R):
 
 
 @njit(cache=True)
-def place(row, R, x, local, out):
-    """World position of a body point; row < 0 stands for the fixed world."""
-    for k in range(3):
-        if row < 0:
-            out[k] = local[k]
-        else:
-            out[k] = x[row, k] + R[row, k, 0] * local[0] + R[row, k, 1] * local[1] + R[row, k, 2] * local[2]
-
-
-@njit(cache=True)
-def add_velocity(row, sign, x, v, at, out):
-    """Add sign times the velocity of the body point now at `at`; v (n, 6) [v, ω]."""
+def place(row, R, x, local):
+    """World position of a body point local (3,), as a tuple; row < 0 stands for the fixed world."""
     if row < 0:
-        return
-    r0, r1, r2 = at[0] - x[row, 0], at[1] - x[row, 1], at[2] - x[row, 2]
-    out[0] += sign * (v[row, 0] + v[row, 4] * r2 - v[row, 5] * r1)
-    out[1] += sign * (v[row, 1] + v[row, 5] * r0 - v[row, 3] * r2)
-    out[2] += sign * (v[row, 2] + v[row, 3] * r1 - v[row, 4] * r0)
+        return local[0], local[1], local[2]
+    r0, r1, r2 = turned(row, R, local)
+    return x[row, 0] + r0, x[row, 1] + r1, x[row, 2] + r2
 
 
 @njit(cache=True)
-def add_force(row, sign, t, at, x, F):
-    """Add the force sign*t at the world point `at` to F (n, 6) [force, moment about the centre]."""
-    if row < 0:
-        return
-    r0, r1, r2 = at[0] - x[row, 0], at[1] - x[row, 1], at[2] - x[row, 2]
-    f0, f1, f2 = sign * t[0], sign * t[1], sign * t[2]
-    F[row, 0] += f0
-    F[row, 1] += f1
-    F[row, 2] += f2
-    F[row, 3] += r1 * f2 - r2 * f1
-    F[row, 4] += r2 * f0 - r0 * f2
-    F[row, 5] += r0 * f1 - r1 * f0
-
-
-@njit(cache=True)
-def turned(R, row, local, out):
-    """A direction of the body frame in world axes."""
-    for k in range(3):
-        out[k] = R[row, k, 0] * local[0] + R[row, k, 1] * local[1] + R[row, k, 2] * local[2]
-
-
-@njit(cache=True)
-def split(pa, pb, n, across):
-    """Separation pb - pa: returns its part along n, leaves the part across n in `across`."""
-    normal = 0.0
-    for k in range(3):
-        across[k] = pb[k] - pa[k]
-        normal += across[k] * n[k]
-    for k in range(3):
-        across[k] -= normal * n[k]
-    return normal
+def turned(row, R, local):
+    """A direction of the body frame in world axes, as a tuple."""
+    return (
+        R[row, 0, 0] * local[0] + R[row, 0, 1] * local[1] + R[row, 0, 2] * local[2],
+        R[row, 1, 0] * local[0] + R[row, 1, 1] * local[1] + R[row, 1, 2] * local[2],
+        R[row, 2, 0] * local[0] + R[row, 2, 1] * local[1] + R[row, 2, 2] * local[2],
+    )
 
 
 @njit(cache=True)
 def dot(a, b):
-    """a·b of two vectors (3,)."""
+    """a·b of two vectors."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@njit(cache=True)
+def cross(a, b):
+    """a × b of two vectors, as a tuple."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@njit(cache=True)
+def split(pa, pb, n):
+    """Separation pb - pa: its part along n, and what is left across n as a tuple."""
+    d = (pb[0] - pa[0], pb[1] - pa[1], pb[2] - pa[2])
+    dn = dot(d, n)
+    return dn, (d[0] - dn * n[0], d[1] - dn * n[1], d[2] - dn * n[2])
+
+
+@njit(cache=True)
+def arm(row, x, at):
+    """Lever of the world point `at` about the centre of a block, as a tuple; zero for the fixed world."""
+    if row < 0:
+        return 0.0, 0.0, 0.0
+    return at[0] - x[row, 0], at[1] - x[row, 1], at[2] - x[row, 2]
+
+
+@njit(cache=True)
+def parting(ra, rb, x, v, at):
+    """Relative velocity of b against a, both taken at the world point `at`, as a tuple; v (n, 6) [v, ω]."""
+    a0, a1, a2 = point_velocity(ra, x, v, at)
+    b0, b1, b2 = point_velocity(rb, x, v, at)
+    return b0 - a0, b1 - a1, b2 - a2
+
+
+@njit(cache=True)
+def point_velocity(row, x, v, at):
+    """Velocity of the body point now at `at`, as a tuple; v (n, 6) [v, ω]."""
+    if row < 0:
+        return 0.0, 0.0, 0.0
+    c0, c1, c2 = cross((v[row, 3], v[row, 4], v[row, 5]), arm(row, x, at))
+    return v[row, 0] + c0, v[row, 1] + c1, v[row, 2] + c2
+
+
+@njit(cache=True)
+def add_forces(ra, rb, x, force, moment, F):
+    """Add a force and its moment about the centre of block a to F (n, 6) of a, and the opposite to block b."""
+    if rb >= 0:
+        apart = (x[ra, 0] - x[rb, 0], x[ra, 1] - x[rb, 1], x[ra, 2] - x[rb, 2])
+        more = cross(apart, force)
+        for k in range(3):
+            F[rb, k] -= force[k]
+            F[rb, 3 + k] -= moment[k] + more[k]
+    for k in range(3):
+        F[ra, k] += force[k]
+        F[ra, 3 + k] += moment[k]
 
 
 @njit(cache=True)
@@ -98,21 +115,16 @@ def broken(live, start, largest, df):
 @njit(cache=True)
 def joint_openings(live, a, b, start, xi_a, xi_b, weight, normal, x, R, out):
     """Mean normal opening, mean sliding and largest normal opening of joints, out (J, 3) [m]."""
-    pa, pb, n = np.empty(3), np.empty(3), np.empty(3)
     for j in live:
-        n[:] = R[a[j]] @ normal[j]
+        n = turned(a[j], R, normal[j])
         total = open_ = slide = 0.0
         widest = -np.inf
         for p in range(start[j], start[j + 1]):
-            place(a[j], R, x, xi_a[p], pa)
-            place(b[j], R, x, xi_b[p], pb)
-            d = pb - pa
-            dn = d[0] * n[0] + d[1] * n[1] + d[2] * n[2]
-            s = d - dn * n
+            dn, s = split(place(a[j], R, x, xi_a[p]), place(b[j], R, x, xi_b[p]), n)
             total += weight[p]
             widest = max(widest, dn)
             open_ += weight[p] * dn
-            slide += weight[p] * np.sqrt(s[0] ** 2 + s[1] ** 2 + s[2] ** 2)
+            slide += weight[p] * np.sqrt(dot(s, s))
         out[j, 0], out[j, 1], out[j, 2] = open_ / total, slide / total, widest
 
 
