@@ -84,9 +84,13 @@ class Block:
         object.__setattr__(self, "faces", faces)
 
     @classmethod
-    def standing(cls, name: str, vertices: Array, faces: Faces | None = None, **more) -> Block:
-        """The convex polyhedron whose corners are at vertices (k, 3) [m] in the world."""
-        vertices, faces = convex_polyhedron(name, vertices, faces)
+    def standing(
+        cls, name: str, vertices: Array, faces: Faces | None = None, tolerance: float | None = None, **more
+    ) -> Block:
+        """The convex polyhedron whose corners are at vertices (k, 3) [m] in the world, turned by `rotation` if given.
+
+        tolerance [m]: what corners may lie off the planes of their faces, None: their rounding."""
+        vertices, faces = convex_polyhedron(name, vertices, faces, tolerance)
         centre = polyhedron_moments(vertices, faces)[1]
         return cls(name, centre, vertices=vertices - centre, faces=faces, **more)
 
