@@ -100,7 +100,7 @@ def _angle(points: Array, loop: Array, a: Array, b: Array) -> float:
     e1 = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
     e1 /= np.linalg.norm(e1)
     arm = points[loop].mean(axis=0) - a
-    return float(np.arctan2(arm @ e1, arm @ np.cross(axis, e1))) % (2.0 * np.pi)
+    return float(np.arctan2(arm @ np.cross(axis, e1), arm @ e1)) % (2.0 * np.pi)
 
 
 def convex_corners(surface: Surface, tolerance: float) -> Array:
