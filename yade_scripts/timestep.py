@@ -95,23 +95,32 @@ def _stiffest_modes(blocks: list[Block], joints) -> Array:
         if not (block.fixed or block.driven):
             root[i, :3, :3] = np.eye(3) / np.sqrt(block.mass)
             root[i, 3:, 3:] = np.linalg.inv(np.linalg.cholesky(block.inertia)).T
-    stiffest = np.maximum(np.maximum(joints.k0, joints.kc), joints.beta**2 * joints.k0)
-    k = joints.weight * stiffest[joints.joint_of]
-    modes = [
-        _largest_eigenvalues(k, arm, joints.start, root[row])
-        for arm, row in ((joints.xi_a, joints.a), (joints.xi_b, joints.b))
-    ]
-    return np.stack(modes, axis=1)
+    frame = np.array([b.rotation for b in blocks] + [np.eye(3)])
+    normal = np.einsum("jkl,jl->jk", frame[joints.a], joints.normal)
+    sides = ((joints.xi_a, joints.a), (joints.xi_b, joints.b))
+    return np.stack(
+        [_largest_eigenvalues(joints, arm, _in_frame(frame[row], normal), root[row]) for arm, row in sides],
+        axis=1,
+    )
 
 
-def _largest_eigenvalues(k: Array, arm: Array, start: Array, root: Array) -> Array:
-    """Largest eigenvalue of rootᵀ K root (J, 6, 6): springs k (P,) [N/m], the same in all directions, at arm (P, 3)."""
+def _in_frame(frame: Array, vectors: Array) -> Array:
+    """World vectors (J, 3) in the axes of frames (J, 3, 3)."""
+    return np.einsum("jkl,jk->jl", frame, vectors)
+
+
+def _largest_eigenvalues(joints, arm: Array, normal: Array, root: Array) -> Array:
+    """Largest eigenvalue of rootᵀ K root (J, 6, 6) of each joint: points at arm (P, 3), axes those of normal (J, 3);
+    k_0 or k_c, the larger, along the normals and β² k_0 across."""
+    kn, kt = np.maximum(joints.k0, joints.kc), joints.beta**2 * joints.k0
+    D = (kn - kt)[:, None, None] * normal[:, :, None] * normal[:, None, :] + kt[:, None, None] * np.eye(3)
+    D = D[joints.joint_of] * joints.weight[:, None, None]
     B = np.zeros((len(arm), 3, 6))
     B[:, range(3), range(3)] = 1.0
     B[:, 0, 4], B[:, 0, 5] = arm[:, 2], -arm[:, 1]
     B[:, 1, 3], B[:, 1, 5] = -arm[:, 2], arm[:, 0]
     B[:, 2, 3], B[:, 2, 4] = arm[:, 1], -arm[:, 0]
-    K = np.add.reduceat(k[:, None, None] * (B.transpose(0, 2, 1) @ B), start[:-1])
+    K = np.add.reduceat(B.transpose(0, 2, 1) @ (D @ B), joints.start[:-1])
     return np.linalg.eigvalsh(root.transpose(0, 2, 1) @ K @ root)[:, -1]
 
 
