@@ -45,7 +45,10 @@ def closed_surfaces(points: Array, loops: list[Array]) -> list[Surface]:
         raise SurfaceError("no polygon has an area")
     if _volume(unique, loops) < 0.0:  # all seen from inside
         loops = [loop[::-1] for loop in loops]
-    pairs = np.array([pair for edge in _edges(loops).items() for pair in _joined(unique, loops, *edge)], int)
+    middles = np.array([unique[loop].mean(axis=0) for loop in loops])
+    pairs = np.array(
+        [pair for edge in _edges(loops).items() for pair in _joined(unique, middles, *edge)], int
+    )
     graph = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(loops),) * 2)
     _, label = connected_components(graph, directed=False)
     first = [int(np.argmax(label == k)) for k in range(label.max() + 1)]
@@ -74,8 +77,8 @@ def _edges(loops: list[Array]) -> dict[tuple[int, int], list[tuple[int, bool]]]:
     return found
 
 
-def _joined(points: Array, loops: list[Array], edge: tuple[int, int], users: list) -> list[tuple[int, int]]:
-    """Pairs of polygons that bound the same body along an edge."""
+def _joined(points: Array, middles: Array, edge: tuple[int, int], users: list) -> list[tuple[int, int]]:
+    """Pairs of polygons that bound the same body along an edge; middles (·, 3) [m]: a point of each polygon."""
     if len(users) == 2:
         return [(users[0][0], users[1][0])]
     a, b = points[edge[0]], points[edge[1]]
@@ -85,7 +88,8 @@ def _joined(points: Array, loops: list[Array], edge: tuple[int, int], users: lis
             f"open surface: the edge from {shown(a)} to {shown(b)} belongs to {len(users)} polygon"
             f"{'s that do not face outwards in pairs' if len(users) > 1 else ' only'}; close the surface"
         )
-    angle = {n: _angle(points, loops[n], a, b) for n, _ in users}
+    numbers = [n for n, _ in users]
+    angle = dict(zip(numbers, _angles(middles[numbers], a, b).tolist()))
     pairs = []
     for n in forward:
         turn = [(angle[n] - angle[m]) % (2.0 * np.pi) for m in backward]
@@ -94,13 +98,13 @@ def _joined(points: Array, loops: list[Array], edge: tuple[int, int], users: lis
     return pairs
 
 
-def _angle(points: Array, loop: Array, a: Array, b: Array) -> float:
-    """Angle [rad] about the edge a → b at which a polygon lies; the body of a forward one is at smaller angles."""
+def _angles(middles: Array, a: Array, b: Array) -> Array:
+    """Angles (k,) [rad] about the edge a → b of polygons with points (k, 3); the body of a forward one is at less."""
     axis = (b - a) / np.linalg.norm(b - a)
     e1 = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
     e1 /= np.linalg.norm(e1)
-    arm = points[loop].mean(axis=0) - a
-    return float(np.arctan2(arm @ np.cross(axis, e1), arm @ e1)) % (2.0 * np.pi)
+    arms = middles - a
+    return np.arctan2(arms @ np.cross(axis, e1), arms @ e1)
 
 
 def convex_corners(surface: Surface, tolerance: float) -> Array:
