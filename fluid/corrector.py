@@ -48,6 +48,9 @@ def corrected(water, problem, x) -> Corrected:
     t, kept, dt = water.topology, problem.predicted, problem.dt
     unknown, pressure = np.zeros(len(kept.wet)), np.zeros(len(kept.wet))
     unknown[problem.dofs], pressure[problem.dofs] = x, x + problem.known
+    if kept.held is not None:
+        unknown += kept.held
+        pressure += kept.held / kept.theta
     gradient, share = _pressure_gradient(water, kept, unknown, dt / problem.density)
     u, mean = _projected(t, kept, gradient, share)
     a = np.where(kept.wet[:, None], (u - kept.advected) / (kept.theta * dt), 0.0)
@@ -78,7 +81,8 @@ def corrected(water, problem, x) -> Corrected:
 def _pressure_gradient(water, kept, pressure, scale):
     """(dt/ρ) ∇x of the wet cells (n, 3) [m/s], and their wet share (n,), 1 exactly in wholly wet ones."""
     t = water.topology
-    full = with_ghosts(pressure, kept.wet, water._walls.open_node, kept.level_set, kept.wet_cells, t.cells)
+    unheld = water._walls.open_node if kept.held is None else water._walls.open_node & (kept.held == 0.0)
+    full = with_ghosts(pressure, kept.wet, unheld, kept.level_set, kept.wet_cells, t.cells)
     gradient = cell_gradient(kept.wet_cells, full, t.cells, t.parent, t.gradients)
     return scale * gradient, wet_fraction(kept.wet_cells, kept.level_set, t.cells)
 
@@ -134,7 +138,7 @@ def _limit_and_damp(water, kept, share, u, a) -> int:
         t.size,
         share,
     )
-    water._walls.slip(u)
+    water.hold(u, kept.end)
     return clipped
 
 
@@ -154,7 +158,7 @@ def _continue(water, kept, listed, start, u, a) -> None:
     """Velocity and acceleration outside the water, in place; limited again, slipping again."""
     extend_velocity(water.topology, listed, start, kept.wet, kept.wet_cells, u, a)
     _limit_speed(water, u, a)
-    water._walls.slip(u)
+    water.hold(u, kept.end)
 
 
 def _flux(water, kept, listed, start, u, u_cell):
@@ -212,7 +216,7 @@ def _report(water, problem, x, projected, u, clipped):
     return StepReport(
         problem.dt,
         volume,
-        (volume - kept.conserved_volume) / max(water.initial_volume, 1e-300),
+        (volume - kept.conserved_volume) / max(water.handled_volume, 1e-300),
         kept.reinserted,
         clipped,
         len(x),

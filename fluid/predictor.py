@@ -18,7 +18,14 @@ from fluid.advection import transport
 from fluid.extension import continue_into_solids
 from fluid.level_set import redistance
 from fluid.moments import cells_touching
-from fluid.projection import PressureProblem, cell_velocity, inflow, pressure_matrix, seal_pockets
+from fluid.projection import (
+    PressureProblem,
+    cell_velocity,
+    inflow,
+    pressure_matrix,
+    pull_of_held,
+    seal_pockets,
+)
 from fluid.volume import correct_volume
 from fluid.waterline import waterline_load
 
@@ -31,7 +38,10 @@ RESCALE_EVERY = 5
 class Predicted:
     """Between predict and correct: level_set (N,), nodal_water (N,) [m³], advected (N, 3) and u_star (N, 3) [m/s],
     wet (N,) bool, wet_cells (n,), cell_star (n, 3) [m/s] velocity of the wet cells, remainder (M, 3) [m/s],
-    theta, conserved_volume and reinserted [m³], uncorrected_water (N,) [m³] before the volume correction."""
+    theta, conserved_volume and reinserted [m³], uncorrected_water (N,) [m³] before the volume correction,
+    shear_energy [J]: change of energy by viscosity and friction; end [s]: time at the end of the step;
+    through (N,) [m³] that comes in through sides, None without any; held (N,) [Pa]: unknown part of the pressure on
+    the nodes of seas, None without any side."""
 
     level_set: np.ndarray
     nodal_water: np.ndarray
@@ -45,6 +55,10 @@ class Predicted:
     conserved_volume: float
     reinserted: float
     uncorrected_water: np.ndarray
+    shear_energy: float
+    end: float
+    through: np.ndarray | None
+    held: np.ndarray | None
 
 
 def predicted(water, dt: float) -> PressureProblem:
@@ -56,10 +70,29 @@ def predicted(water, dt: float) -> PressureProblem:
     left = _outflow(water, dt, carried)
     carried -= left
     conserved = water.conserved_volume - float(left.sum())
+    through = inflow_rate = None
+    if water.sides is not None:
+        water.sides.surface(phi, water.time + dt)
+        u_now = water.velocity.copy()
+        water.hold(u_now, water.time + dt)
+        through, inflow_rate = water.sides.through(phi, u_now, dt, carried)
+        carried += through
+        conserved += float(through.sum())
     surface = _new_surface(water, phi, carried, conserved)
+    shear = None
+    if water.viscous is not None:
+        shear = _sheared(water, dt, theta, kick, surface, u_adv)
+        u_adv = u_adv + shear.change
     u_star = u_adv + theta * dt * parameters.weight
     u_star[water.topology.node_start[1:] == water.topology.node_start[:-1]] = 0.0
-    return _problem(water, dt, theta, kick, surface, conserved, u_adv, u_star)
+    return _problem(water, dt, theta, kick, surface, conserved, u_adv, u_star, shear, through, inflow_rate)
+
+
+def _sheared(water, dt, theta, kick, surface, u_adv):
+    """What viscosity and walls change over the step, seen from where the last pressure would lead: ViscousChange."""
+    w = u_adv + theta * dt * kick[:, None] * water.acceleration
+    water.hold(w, water.time + dt)
+    return water.viscous.change(water, surface.level_set, surface.nodal_water, w, dt)
 
 
 def kick_factor(acceleration, parameters):
@@ -74,14 +107,14 @@ def _transported(water, dt, theta, kick):
     u_hat = water.velocity + (1.0 - theta) * dt * a
     u_m = water.velocity + (0.5 * dt * a if water.parameters.theta < 1.0 else 0.0)
     for u in (u_hat, u_m):
-        water._walls.slip(u)
+        water.hold(u, water.time + dt)
     fields = np.column_stack([u_hat, water.level_set])
     moved = transport(water.topology, water.listed, dt, u_m, fields)
     u_adv, phi = u_hat, water.level_set.copy()
     u_adv[water.listed] = moved[:, :3]
     near = np.abs(phi[water.listed]) < TRANSPORT_WIDTH * water.mesh.spacing
     phi[water.listed[near]] = moved[near, 3]
-    water._walls.slip(u_adv)
+    water.hold(u_adv, water.time + dt)
     return u_adv, phi
 
 
@@ -127,7 +160,7 @@ def keep_dry(topology, phi, carried) -> None:
     phi[doubtful] = -phi[doubtful]
 
 
-def _problem(water, dt, theta, kick, surface, conserved, u_adv, u_star):
+def _problem(water, dt, theta, kick, surface, conserved, u_adv, u_star, shear, through, inflow_rate):
     t, density = water.topology, water.parameters.density
     phi = surface.level_set
     wet = (phi < 0.0) & t.active
@@ -139,6 +172,12 @@ def _problem(water, dt, theta, kick, surface, conserved, u_adv, u_star):
     matrix, anchored = pressure_matrix(
         water.graph_for(water.listed), phi, dofs, water._walls.open_node, dt / density
     )
+    held = None
+    if water.sides is not None:
+        rhs += inflow_rate
+        weight = density * water.parameters.gravity
+        held = theta * water.sides.pressure(len(phi), weight, water.time + dt)
+        rhs[dofs] += pull_of_held(water.graph_for(water.listed), dofs, held, dt / density)
     known = (1.0 - theta) * kick[dofs] * water.end_pressure[dofs]
     guess = theta * water.end_pressure[dofs]
     matrix, extra = _sealed(water, matrix, anchored, dofs, dt, guess)
@@ -155,10 +194,16 @@ def _problem(water, dt, theta, kick, surface, conserved, u_adv, u_star):
         conserved,
         surface.reinserted,
         surface.uncorrected_water,
+        0.0 if shear is None else shear.energy,
+        water.time + dt,
+        through,
+        held,
     )
     # before the first step there is no pressure to go by: still water
     acted = water.pressure if water.steps else -density * water.parameters.gravity * phi
     other = waterline_load(water.domain, phi, wet, acted, water._walls.open_node)
+    if shear is not None:
+        other += shear.load
     coupling = water.coupling[dofs]
     return PressureProblem(matrix, rhs[dofs] + extra, coupling, known, guess, dofs, dt, density, other, kept)
 

@@ -108,6 +108,23 @@ def pressure_matrix(graph, phi, dofs, open_node, scale: float):
     return matrix, anchored
 
 
+def pull_of_held(graph, dofs, held, scale: float):
+    """-Σ_j K_ij x_j scale (n,) for the wet nodes dofs (n,): what nodes with a given pressure held (N,) [Pa] add to the
+    right hand side; zero on all others."""
+    g = graph
+    return _pull(dofs, g.row, g.start, g.neighbour, g.stiffness, held, scale)
+
+
+@njit(cache=True)
+def _pull(dofs, graph_row, start, neighbour, stiffness, held, scale):
+    out = np.zeros(dofs.shape[0])
+    for r in range(dofs.shape[0]):
+        row = graph_row[dofs[r]]
+        for s in range(start[row], start[row + 1]):
+            out[r] -= scale * stiffness[s] * held[neighbour[s]]
+    return out
+
+
 def seal_pockets(matrix, anchored, volume, compliance: float, pressure):
     """Water cut off from every surface has no pressure level: give it a compressibility.
 

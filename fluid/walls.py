@@ -28,29 +28,36 @@ class Walls:
     rough_faces: np.ndarray
     rough_area: np.ndarray
     rough_cell: np.ndarray
+    flowing: np.ndarray
+    """Nodes (k,) whose velocity an inflow gives."""
 
     @classmethod
-    def of(cls, mesh, is_open=None, is_smooth=None, no_slip: bool = False) -> Walls:
+    def of(cls, mesh, is_open=None, is_smooth=None, no_slip: bool = False, sides=None) -> Walls:
         """is_open: function of face normals (B, 3) and centres (B, 3) [m] → (B,) bool; None: all closed.
         is_smooth: the same, closed sides along which water slips whatever the walls do; None: none.
-        no_slip: the other closed sides hold the water, u = 0."""
+        no_slip: the other closed sides hold the water, u = 0 · sides: `inflow.Sides` or None: seas are open, but what
+        leaves there is theirs; inflows are neither open nor rough."""
         x = mesh.nodes[mesh.boundary_faces]
         area = 0.5 * np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
         opened, smooth = (
             np.zeros(len(x), bool) if chosen is None else chosen(mesh.boundary_normal, x.mean(axis=1))
             for chosen in (is_open, is_smooth)
         )
+        sea, flowing = (_chosen(sides, mesh, x, of_sea) for of_sea in (True, False))
+        opened = (opened | sea) & ~flowing
         open_node = np.zeros(len(mesh.nodes), bool)
         open_node[mesh.boundary_faces[opened]] = True
+        open_node[mesh.boundary_faces[flowing]] = False
         open_nodes, tangential = _projectors(mesh.boundary_faces[opened], area[opened])
         faces, closed = mesh.boundary_faces, ~opened
         nodes, projector = _projectors(faces[closed], area[closed])
-        rough = closed & ~smooth
+        rough = closed & ~smooth & ~flowing
         if no_slip:
             projector[np.isin(nodes, faces[rough])] = 0.0
         of_rough = (faces[rough], area[rough], mesh.boundary_cell[rough])
         opening = (open_node, open_nodes, np.eye(3) - tangential)
-        return cls(nodes, projector, *opening, faces[opened], area[opened], *of_rough)
+        free = opened & ~sea
+        return cls(nodes, projector, *opening, faces[free], area[free], *of_rough, np.unique(faces[flowing]))
 
     def on_copies(self, parent_node) -> Walls:
         """The same sides for nodes that are copies of background nodes, parent_node (N,)."""
@@ -73,6 +80,7 @@ class Walls:
             rough[left],
             self.rough_area[left],
             self.rough_cell[left],
+            _copies(self.flowing, parent_node)[0],
         )
 
     def restriction(self):
@@ -85,11 +93,22 @@ class Walls:
         P = projector[place[both]]
         projector[place[both]] = P @ self.open_projector[both] @ P
         nodes = np.concatenate([self.nodes, self.open_nodes[~both]])
-        return nodes, np.concatenate([projector, self.open_projector[~both]])
+        projector = np.concatenate([projector, self.open_projector[~both]])
+        projector[np.isin(nodes, self.flowing)] = 0.0
+        return nodes, projector
 
     def slip(self, u) -> None:
         """Take the part into the closed sides off u (N, 3), in place."""
         u[self.nodes] = np.einsum("nij,nj->ni", self.projector, u[self.nodes])
+
+
+def _chosen(sides, mesh, x, of_sea: bool):
+    """(B,) bool: boundary faces of all seas, or of all inflows."""
+    chosen = np.zeros(len(x), bool)
+    for side in sides.every if sides is not None else ():
+        if side.is_sea == of_sea:
+            chosen |= side.chosen(mesh.boundary_normal, x.mean(axis=1))
+    return chosen
 
 
 def _copies(nodes, parent_node):

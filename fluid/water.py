@@ -59,7 +59,7 @@ class Water:
     mesh: Background · domain: PhysicalDomain of it · fill: points (n, 3) [m] → signed distance (n,) [m], negative
     in the water, or the level set (N,) itself · is_open: (normals (B, 3), centres (B, 3)) → bool (B,), sides of
     the tank that let water out; None: all closed · is_smooth: the same, sides that stay smooth whatever
-    `parameters.walls` says.
+    `parameters.walls` says · sides: `inflow.Sides`, where water is led in or a sea stands; None: nowhere.
 
     State at the nodes of the domain: level_set (N,) [m], velocity (N, 3) [m/s], acceleration (N, 3) [m/s²],
     pressure (N,) [Pa] that acted over the last step, end_pressure (N,) [Pa] that goes with the acceleration at its end
@@ -78,17 +78,22 @@ class Water:
         parameters: WaterParameters | None = None,
         is_open: Callable | None = None,
         is_smooth: Callable | None = None,
+        sides=None,
     ):
         self.mesh, self.parameters = mesh, parameters or WaterParameters()
         self.time, self.steps = 0.0, 0
         self._surface_lag, self._solids_move = 0.0, False
         self.report: StepReport | None = None
-        self._sides = Walls.of(mesh, is_open, is_smooth, no_slip=self.parameters.walls == "no-slip")
+        self.sides = sides
+        no_slip = self.parameters.walls == "no-slip"
+        self._sides = Walls.of(mesh, is_open, is_smooth, no_slip, sides)
         self.viscous = _viscosity(self.parameters)
         self.body_velocity = np.zeros((domain.n_bodies, 6))
         self._set_domain(domain)
         n = len(self.topology.nodes)
         level = fill(self.topology.nodes) if callable(fill) else np.asarray(fill, float)
+        if sides is not None:
+            sides.surface(level, 0.0)
         self.level_set = self._first_surface(self._dry_if_inactive(level))
         self.velocity, self.acceleration = np.zeros((n, 3)), np.zeros((n, 3))
         self.pressure = self._pressure_at_rest()
@@ -147,6 +152,8 @@ class Water:
         self.cell_velocity, self.flux = new.cell_velocity, new.flux
         self.listed, self.layer_start = new.listed, new.layer_start
         self.conserved_volume = problem.predicted.conserved_volume
+        if self.sides is not None:
+            self.sides.book(problem.predicted.through)
         self.report = new.report
         self.time += problem.dt
         self._surface_lag = problem.dt if self._solids_move else 0.5 * problem.dt
@@ -184,7 +191,7 @@ class Water:
         self.level_set = self._dry_if_inactive(moved[0][:, 0])
         self.pressure, self.end_pressure = moved[0][:, 1].copy(), moved[0][:, 2].copy()
         self.velocity, self.acceleration = moved[1], moved[2]
-        self._walls.slip(self.velocity)
+        self.hold(self.velocity, self.time)
 
     def _carry_cells(self, old: Topology):
         """Cell fields go to the cell of the same parent (of several covers: the first)."""
@@ -203,6 +210,8 @@ class Water:
         self.topology = Topology.of(self.mesh, domain)
         self.coupling = wetted_coupling(domain).tocsr()
         self._walls = self._sides.on_copies(domain.parent_node)
+        if self.sides is not None:
+            self.sides.place(domain.parent_node, len(self.mesh.nodes), self.topology.active)
         self._domain_is_new = True
         self._graph = None
 
@@ -213,7 +222,13 @@ class Water:
     def layers(self, wet):
         """Wet nodes, then BAND layers around them: (list, layer_start)."""
         t = self.topology
-        return layers_around(wet, BAND, t.cells, t.node_start, t.node_cells)
+        order, start = layers_around(wet, BAND, t.cells, t.node_start, t.node_cells)
+        if self.sides is None:
+            return order, start
+        # sides count with the last layer wherever they are: water may come in far from all water
+        missing = np.setdiff1d(self.sides.nodes(), order)
+        start[-1] += len(missing)
+        return np.concatenate([order, missing]), start
 
     def graph_for(self, nodes) -> Graph:
         """A graph that lists these nodes: the one at hand if it does; of all nodes, once, when the solids have
@@ -235,6 +250,17 @@ class Water:
 
     # ---- sides of the tank
 
+    def hold(self, u, time: float) -> None:
+        """What the sides of the tank do to u (N, 3) [m/s] at a time [s], in place."""
+        self._walls.slip(u)
+        if self.sides is not None:
+            self.sides.hold(u, time)
+
+    @property
+    def handled_volume(self) -> float:
+        """Water at the start and what came in since [m³]: the scale of volume errors."""
+        return self.initial_volume + (0.0 if self.sides is None else self.sides.entered)
+
     def held_by_sides(self):
         """Nodes (n,) on the sides of the tank and projectors (n, 3, 3) onto what friction and viscosity may change."""
         return self._walls.restriction()
@@ -253,8 +279,8 @@ class Water:
         return float(self.nodal_water.sum())
 
     def volume_error(self) -> float:
-        """(volume - conserved volume) / initial volume, what the step could not put right."""
-        return (self.volume() - self.conserved_volume) / max(self.initial_volume, 1e-300)
+        """(volume - conserved volume) / handled volume, what the step could not put right."""
+        return (self.volume() - self.conserved_volume) / max(self.handled_volume, 1e-300)
 
     def momentum(self) -> np.ndarray:
         """∫ ρ u dV (3,) [kg m/s]."""
