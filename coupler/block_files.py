@@ -101,7 +101,11 @@ def read_mesh(path: Path) -> tuple[Array, dict[str, Array], bool]:
         raise BlockFileError(f"{path.name}: its points are not rows of three finite coordinates")
     cells: dict[str, list] = {}
     for block in mesh.cells:
-        cells.setdefault(block.type, []).append(np.asarray(block.data))
+        rows = np.asarray(block.data)
+        if rows.size and not 0 <= rows.min() <= rows.max() < len(mesh.points):
+            raise BlockFileError(f"{path.name}: a cell names point {rows.max()} of {len(mesh.points)} points")
+        kind = f"polygon{rows.shape[1]}" if block.type == "polygon" else block.type
+        cells.setdefault(kind, []).append(rows)
     single = mesh.points.dtype == np.float32 or path.suffix.lower() == ".stl"
     return mesh.points.astype(float), {kind: np.concatenate(rows) for kind, rows in cells.items()}, single
 

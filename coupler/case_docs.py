@@ -9,8 +9,8 @@ import inspect
 from collections.abc import Iterator
 from pathlib import Path
 
-from coupler.case import Section
 from coupler.case_schema import Key, find, keys
+from coupler.case_types import Section
 from coupler.errors import SurgebreakError, UnknownName, did_you_mean
 from coupler.provenance import ROOT
 
@@ -76,7 +76,7 @@ def page() -> str:
 def _opening() -> Iterator[str]:
     yield "# The case file"
     yield ""
-    yield "<!-- Made from coupler/case.py by `python -m coupler.case_docs`; changes here are lost. -->"
+    yield "<!-- Made from coupler/case*.py by `python -m coupler.case_docs`; changes here are lost. -->"
     yield ""
     yield "A case is a directory with a `case.toml` ([TOML](https://toml.io)). Plain numbers are SI; text may carry"
     yield 'any unit of the right kind (`"5 MN/mm"`, `"2.4 t/m3"`, `"30 deg"`). z points up. A section that is absent'

@@ -8,7 +8,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from coupler.bodies import Body, overlap_depth, rotation_matrix
-from coupler.case import Building, Case
+from coupler.case import Case
+from coupler.case_structure import Building
 from coupler.parts import Part
 
 KeyPath = tuple[str | int, ...]

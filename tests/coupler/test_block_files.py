@@ -9,7 +9,7 @@ from scipy.spatial import Delaunay
 from scipy.spatial.transform import Rotation
 
 from coupler.block_files import VOLUME_FACES, BlockFileError, blocks_from_file
-from coupler.case import BlockFile
+from coupler.case_structure import BlockFile
 from yade_scripts.blocks import BOX_CORNERS, BOX_FACES
 from yade_scripts.faces import touching_faces
 
