@@ -174,6 +174,35 @@ def verify(
     raise typer.Exit(int(run_cases(ids or [], quick=quick, as_json=json, only_list=list_)))
 
 
+@app.command(name="compare")
+def compare_laws(
+    case: CasePlace,
+    laws: Annotated[
+        str,
+        typer.Option(
+            help="comma-separated; else all of ours, cohfrict, jcfpm, mortar and cpm; `--list` names them"
+        ),
+    ] = "",
+    set: Overrides = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(help="a new directory for the results; else runs/compare-<time> beside the case"),
+    ] = None,
+    substeps: Annotated[
+        str, typer.Option(help="multiples of the case's own substep, for error against run time")
+    ] = "1,2,4,8",
+    records: Annotated[int, typer.Option(min=10, help="rows of the tables")] = 1000,
+    list_: Annotated[
+        bool, typer.Option("--list", help="list the laws and what the stock ones do not match")
+    ] = False,
+) -> None:
+    """Run a dry case under our laws and YADE's own, matched; table, figure, CSV, JSON, and the scripts for yade."""
+    one_thread()
+    from coupler.compare.command import compare, show_laws
+
+    raise typer.Exit(int(show_laws() if list_ else compare(case, laws, set or [], output, substeps, records)))
+
+
 @app.command(context_settings=PASS_ON)
 def test(context: typer.Context) -> None:
     """Run the tests; further words go to pytest."""

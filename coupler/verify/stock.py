@@ -17,7 +17,7 @@ from yade_scripts.blocks import Block
 from yade_scripts.cohesion import JointParameters
 from yade_scripts.faces import touching_faces
 from yade_scripts.stock.mortar import inside
-from yade_scripts.stock.scene import StockScene
+from yade_scripts.stock.scene import described, timed
 from yade_scripts.stock.script import StockRun, run_script, stock_law
 
 BRITTLE = ("cohfrict", "jcfpm", "mortar")
@@ -38,11 +38,11 @@ def pairs(velocities, driven: bool) -> list[Block]:
 
 def ran(name: str, blocks, end: float, substep: float, records: int, joints=LAW, **mortar) -> StockRun:
     """Run a stock law on blocks without weight; mortar: further numbers of its envelope."""
-    scene = StockScene(blocks, touching_faces(blocks), joints, 3, 0.5, (0, 0, 0), end, substep, records)
-    described = scene.described(stock_law(name).variant)
-    described["joint"] |= mortar
+    scene = described(blocks, touching_faces(blocks), joints, 3, 0.5, (0, 0, 0))
+    scene["joint"] |= mortar
+    law = stock_law(name)
     with tempfile.TemporaryDirectory() as folder:
-        return run_script(stock_law(name), described, Path(folder))
+        return run_script(law, timed(scene, law.variant, end, substep, records), Path(folder))
 
 
 @check("P27", "stock brittle laws at the same strength and stiffness", "linear bond: T_max²/(2 K_0)")

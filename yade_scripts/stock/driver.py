@@ -15,6 +15,8 @@ import time
 
 WEIGHTLESS = 1e-6
 """Density of the spheres [kg/m³]: the core carries mass and inertia."""
+INITIAL = {"energy": 0.0}
+"""Kinetic, elastic and of weight, at the start [J]."""
 NOTHING_MOVES = 1e-200
 """Length [s] of the step in which YADE sets up its bonds."""
 
@@ -114,7 +116,7 @@ def measure(ids, members, bonds, last, failed_at):
     """A record, see COLUMNS; joints without any bond left get their time in `failed_at`."""
     now = O.time - NOTHING_MOVES
     speed = max([math.hypot(*b["velocity"]) for b in SCENE["blocks"] if b["held"]], default=0.0)
-    pull, kinetic = pull_and_kinetic(ids, members, speed)
+    pull, kinetic, potential = pull_and_energies(ids, members, speed)
     elastic, whole, gone = 0.0, set(), 0
     for first, second, joint, numbers in bonds:
         listed = O.interactions.has(first, second, True)
@@ -128,22 +130,30 @@ def measure(ids, members, bonds, last, failed_at):
     for joint in {bond[2] for bond in bonds} - whole:
         failed_at.setdefault(joint, now)
     work = 0.0 if last is None else last[5] + 0.5 * (last[2] + pull) * (now - last[0]) * speed
-    return (now, now * speed, pull, kinetic, elastic, work, gone, len(failed_at))
+    lost = 0.0 if last is None else work - (kinetic + potential + elastic) + INITIAL["energy"]
+    if last is None:
+        INITIAL["energy"] = kinetic + potential + elastic
+    return (now, now * speed, pull, kinetic, elastic, work, lost, gone, len(failed_at))
 
 
-def pull_and_kinetic(ids, members, speed):
-    """Force that moves the driven blocks along their motion [N], kinetic energy of the others [J]."""
-    power, kinetic = 0.0, 0.0
+def pull_and_energies(ids, members, speed):
+    """Force on the driven blocks along their motion [N]; of the others kinetic energy and that of weight [J]."""
+    power, kinetic, potential = 0.0, 0.0, 0.0
     for block, number, force in zip(SCENE["blocks"], ids, force_on_blocks(members)):
         if block["held"]:
             power -= sum(f * v for f, v in zip(force, block["velocity"]))
         else:
-            kinetic += kinetic_energy(O.bodies[number].state)
-    return (power / speed if speed else 0.0), kinetic
+            state = O.bodies[number].state
+            kinetic += kinetic_energy(state)
+            potential -= state.mass * state.pos.dot(Vector3(*SCENE["gravity"]))
+    return (power / speed if speed else 0.0), kinetic, potential
 
 
-COLUMNS = ("time", "displacement", "force", "kinetic", "stored", "work", "bonds_broken", "joints_broken")
-"""[s, m, N, J, J, J, -, -]: force and displacement of the driven blocks along their motion, work of that force."""
+COLUMNS = (
+    "time", "displacement", "force", "kinetic", "stored", "work", "dissipated", "bonds_broken", "joints_broken"
+)  # fmt: skip
+"""[s, m, N, J, J, J, -, -]: force and displacement of the driven blocks along their motion, its work;
+dissipated is what the balance of energy leaves to the bonds (and to friction)."""
 
 
 def force_on_blocks(members):

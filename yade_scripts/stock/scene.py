@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -20,58 +18,63 @@ THIN = 0.25
 """The same over the smallest width of the block."""
 
 
-@dataclass(frozen=True)
-class StockScene:
-    """What all stock laws share. blocks; faces that are joined; joints: the law to match; points: bonds along each
-    edge of a face; friction; gravity (3,) [m/s²]; end, substep [s]; records of the run."""
+def described(
+    blocks: list[Block],
+    faces: list[TouchingFaces],
+    joints: JointParameters,
+    points: int,
+    friction: float,
+    gravity,
+) -> dict:
+    """Blocks, bonds and the numbers to match, for JSON; the blocks lie near the origin.
 
-    blocks: list[Block]
-    faces: list[TouchingFaces]
-    joints: JointParameters
-    points: int
-    friction: float
-    gravity: tuple[float, float, float]
-    end: float
-    substep: float
-    records: int
+    points: bonds along each edge of a face, at Gauss points (stock spheres need room to the border)
+    friction: tan φ · gravity (3,) [m/s²]
+    """
+    bonds = [bond for number, face in enumerate(faces) for bond in _bonds(blocks, number, face, points)]
+    edge = min(_width(b) for b in blocks)
+    return {
+        "joint": joint_numbers(joints, friction, edge),
+        "gravity": [float(g) for g in gravity],
+        "radius": min((bond["radius"] for bond in bonds), default=edge),
+        "blocks": [described_block(b) for b in blocks],
+        "points": bonds,
+    }
 
-    def described(self, variant: str) -> dict:
-        """For JSON: blocks, points, joint and times; the substep is cut so that records are whole substeps."""
-        points = [p for number, face in enumerate(self.faces) for p in self._bonds(number, face)]
-        count = max(1, int(np.ceil(self.end / self.records / self.substep * (1.0 - 1e-12))))
-        return {
-            "variant": variant,
-            "joint": joint_numbers(self.joints, self.friction, self.edge) | {"variant": variant},
-            "gravity": [float(g) for g in self.gravity],
-            "radius": min((p["radius"] for p in points), default=self.edge),
-            "records": self.records,
-            "substeps_per_record": count,
-            "substep": self.end / self.records / count,
-            "blocks": [described_block(b) for b in self.blocks],
-            "points": points,
+
+def timed(scene: dict, variant: str, end: float, substep: float, records: int) -> dict:
+    """A described scene with the variant of a law, the end [s], and equal records of whole substeps [s], none longer
+    than `substep`."""
+    records = min(records, max(1, int(np.ceil(end / substep * (1.0 - 1e-12)))))
+    count = max(1, int(np.ceil(end / records / substep * (1.0 - 1e-12))))
+    return scene | {
+        "variant": variant,
+        "joint": scene["joint"] | {"variant": variant},
+        "records": records,
+        "substeps_per_record": count,
+        "substep": end / records / count,
+    }
+
+
+def _bonds(blocks: list[Block], number: int, face: TouchingFaces, points: int) -> list[dict]:
+    places, areas = gauss_points(face.polygon, points)
+    thin = THIN * min(_width(blocks[row]) for row in (face.a, face.b) if row >= 0)
+    return [
+        {
+            "joint": number,
+            "a": int(face.a),
+            "b": int(max(face.b, -1)),
+            "place": [float(x) for x in place],
+            "normal": [float(x) for x in face.normal],
+            "area": float(area),
+            "radius": min(thin, INSET * border_distance(face.polygon, place)),
         }
+        for place, area in zip(places, areas)
+    ]
 
-    @property
-    def edge(self) -> float:
-        """Smallest width of a block [m]."""
-        return min(float(np.ptp(b.vertices, axis=0).min()) for b in self.blocks)
 
-    def _bonds(self, number: int, face: TouchingFaces) -> list[dict]:
-        places, areas = gauss_points(face.polygon, self.points)
-        widths = [self.blocks[r] for r in (face.a, face.b) if r >= 0]
-        thin = THIN * min(float(np.ptp(b.vertices, axis=0).min()) for b in widths)
-        return [
-            {
-                "joint": number,
-                "a": int(face.a),
-                "b": int(max(face.b, -1)),
-                "place": [float(x) for x in place],
-                "normal": [float(x) for x in face.normal],
-                "area": float(area),
-                "radius": min(thin, INSET * border_distance(face.polygon, place)),
-            }
-            for place, area in zip(places, areas)
-        ]
+def _width(block: Block) -> float:
+    return float(np.ptp(block.vertices, axis=0).min())
 
 
 def joint_numbers(joints: JointParameters, friction: float, edge: float) -> dict:

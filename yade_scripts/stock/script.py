@@ -70,7 +70,7 @@ def stock_names() -> list[str]:
 
 
 def script_text(law: StockLaw, scene: dict) -> str:
-    """A script that `yade -x -n` runs: the scene (`StockScene.described`), the file of the law, and the driver."""
+    """A script that `yade -x -n` runs: the scene (`scene.timed`), the file of the law, and the driver."""
     described = json.dumps(scene, indent=1)
     head = (
         f'"""{law.title} on the blocks of a case. Run with: yade -x -n {law.stem}.py\n\n'

@@ -1,0 +1,114 @@
+"""python -m coupler.view.comparison DIRECTORY: the figure of a comparison of laws, from its files alone.
+
+Load over opening, energies over opening, broken joints over time, cost of a substep, error against run time.
+"""
+
+import csv
+import json
+import sys
+from pathlib import Path
+
+from coupler.view.palette import LINES
+from coupler.view.plots import FORMATS, STYLE, _undated, plt, prefixed
+
+SIZE = (6.9, 7.2)
+"""[inch] two columns of a journal."""
+OURS, STOCK = "-", "--"
+
+
+def draw(folder):
+    """comparison.png, .pdf and .svg in the directory; returns the path of the PNG."""
+    about = json.loads((folder / "comparison.json").read_text(encoding="utf-8"))
+    first = min(row["multiple"] for row in about["laws"])
+    laws = [row for row in about["laws"] if row["multiple"] == first]
+    look = {row["law"]: _look(number, row) for number, row in enumerate(laws)}
+    tables = {row["law"]: read(folder / f"{row['files']}.csv") for row in laws}
+    with plt.rc_context(STYLE):
+        drawing, axes = plt.subplots(3, 2, figsize=SIZE)
+        load(axes[0, 0], tables, look)
+        energy(axes[0, 1], tables, look, "dissipated", "taken by the joints")
+        energy(axes[1, 0], tables, look, "stored", "stored")
+        broken(axes[1, 1], tables, look)
+        cost(axes[2, 0], laws, look)
+        accuracy(axes[2, 1], about, look)
+        handles = [plt.Line2D([], [], label=name, **style) for name, style in look.items()]
+        drawing.legend(handles=handles, loc="outside upper center", ncols=min(4, len(handles)))
+        for ending in FORMATS:
+            drawing.savefig(folder / f"comparison.{ending}", metadata=_undated(ending))
+        plt.close(drawing)
+    return folder / "comparison.png"
+
+
+def _look(number, row):
+    """Colour and line of a law: ours in full lines, those of YADE dashed."""
+    return {"color": LINES[number % len(LINES)], "linestyle": STOCK if row["stock"] else OURS}
+
+
+def read(path):
+    """Columns of a table by name."""
+    with path.open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    return {name: [float(row[name]) for row in rows] for name in rows[0]}
+
+
+def along(tables):
+    """What the curves run over: the displacement where something is driven, else time; its scale and label."""
+    moved = max(table["displacement"][-1] for table in tables.values())
+    column = "displacement" if moved > 0.0 else "time"
+    power, unit = prefixed("m" if moved > 0.0 else "s", moved or max(t["time"][-1] for t in tables.values()))
+    return column, 1000.0**power, f"{column} [{unit}]"
+
+
+def curves(axis, tables, look, column, unit):
+    """A column of each law over the displacement; returns the prefixed unit."""
+    over, scale, label = along(tables)
+    largest = max(abs(value) for table in tables.values() for value in table[column])
+    power, text = prefixed(unit, largest)
+    for name, table in tables.items():
+        axis.plot([x / scale for x in table[over]], [y / 1000.0**power for y in table[column]], **look[name])
+    axis.set_xlabel(label)
+    axis.margins(x=0)
+    return text
+
+
+def load(axis, tables, look):
+    axis.set_ylabel(f"force [{curves(axis, tables, look, 'force', 'N')}]")
+
+
+def energy(axis, tables, look, column, what):
+    axis.set_ylabel(f"energy {what} [{curves(axis, tables, look, column, 'J')}]")
+
+
+def broken(axis, tables, look):
+    for name, table in tables.items():
+        axis.step(table["time"], table["joints_broken"], where="post", **look[name])
+    axis.set_xlabel("time [s]")
+    axis.set_ylabel("joints broken")
+    axis.yaxis.get_major_locator().set_params(integer=True)
+    axis.margins(x=0)
+
+
+def cost(axis, laws, look):
+    """CPU time of a substep and joint, a bar a law."""
+    names = [row["law"] for row in laws]
+    axis.barh(names, [row["us_per_joint_substep"] for row in laws], color=[look[n]["color"] for n in names])
+    axis.invert_yaxis()
+    axis.grid(axis="y", visible=False)
+    axis.set_xlabel("CPU time of a substep per joint [µs]")
+
+
+def accuracy(axis, about, look):
+    """Largest error against CPU time, a point a substep."""
+    for name, style in look.items():
+        runs = sorted((r for r in about["laws"] if r["law"] == name), key=lambda r: r["cpu_seconds"])
+        points = [(r["cpu_seconds"], r["largest_error"]) for r in runs if r["largest_error"]]
+        if points:
+            axis.plot(*zip(*points), marker="o", markersize=3, **style)
+    axis.set_xscale("log")
+    axis.set_yscale("log")
+    axis.set_xlabel("CPU time of the run [s]")
+    axis.set_ylabel("error against " + ("the exact answer" if about["exact"] else about["reference"]))
+
+
+if __name__ == "__main__":
+    print(f"figure: {draw(Path(sys.argv[1]))}")
