@@ -99,6 +99,10 @@ def _shape(kind: str, value: object, context: dict, key: Key | None, message: st
         return f"{value!r} is not a section; {_is(key)}"
     if kind == "too_long":
         return f"{len(value)} values where {context['max_length']} belong; {_is(key)}"
+    if kind == "too_short":
+        return f"{len(value)} values where at least {context['min_length']} belong; {_is(key)}"
+    if kind == "string_too_short":
+        return f"{value!r} is empty; {_is(key)}"
     if kind == "bool_type":
         return f"{value!r} is neither true nor false"
     if kind == "finite_number":
