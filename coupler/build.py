@@ -185,9 +185,8 @@ def build_structure(case: Case):
         )
     ground = case.structure.ground.level if case.structure.ground else None
     gravity = (0.0, 0.0, -case.case.gravity)
-    audit = c is not None and c.audit
     planes = _tank_planes(case)
-    return Structure(blocks_of(case), contact, joints, ground, planes, gravity, track_contacts=audit)
+    return Structure(blocks_of(case), contact, joints, ground, planes, gravity)
 
 
 def _tank_planes(case: Case) -> list:

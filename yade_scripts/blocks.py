@@ -45,7 +45,7 @@ class Block:
     rotation: Array = field(default_factory=lambda: np.eye(3))
     density: float = 2400.0
     group: str = "block"
-    material: str = ""
+    material: str = "block"
     fixed: bool = False
     driven: bool = False
     velocity: Array = field(default_factory=lambda: np.zeros(3))

@@ -28,12 +28,14 @@ SLIVER = 1e-6
 class FixedPlane:
     """A fixed half space: the solid is where normal·(x - point) < 0. point (3,) [m], normal (3,) unit.
 
-    bonds: blocks that stand on it are joined to it where joints are asked for; False: only contact."""
+    bonds: blocks that stand on it are joined to it where joints are asked for; False: only contact
+    material: for friction."""
 
     point: Array
     normal: Array
     name: str = "ground"
     bonds: bool = True
+    material: str = "ground"
 
     def __post_init__(self):
         normal = np.asarray(self.normal, float)
