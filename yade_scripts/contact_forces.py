@@ -20,8 +20,8 @@ Array = np.ndarray
 class ContactForces:
     """Contacts of the blocks with what `neighbours` says is near.
 
-    blocks, planes: in the scene's coordinates · face_stiffness (n,) K [N/m] · neighbours() → (p, 2) pairs of rows
-    whose bounding boxes are close now · reach [m]: how far a block can move before `neighbours` is asked again
+    blocks, planes: in the scene's coordinates · face_stiffness (n,) K [N/m] · neighbours(now) → (p, 2) pairs of
+    rows whose bounding boxes are close · reach [m]: how far a block can move before `neighbours` is asked again
     free (n,) bool: motion not prescribed.
 
     Running sums [J]: taken by dashpots, by friction and by springs let go; driving: put in by driven blocks.
@@ -35,7 +35,7 @@ class ContactForces:
         face_stiffness: Array,
         free: Array,
         motion: Motion,
-        neighbours: Callable[[], Array],
+        neighbours: Callable[[bool], Array],
         reach: float,
     ):
         self._motion, self._neighbours, self._reach = motion, neighbours, reach
@@ -67,11 +67,13 @@ class ContactForces:
             self._on[rows] = True
         newly = np.zeros(len(self._free), bool)
         newly[rows] = True
-        self.search(newly)
+        self.search(True, newly)
 
-    def search(self, newly: Array | None = None) -> None:
-        """Renew the pairs. newly (n+m,) bool: bodies whose new pairs take over from joints."""
-        near = self._neighbours()
+    def search(self, now: bool, newly: Array | None = None) -> None:
+        """Renew the pairs from YADE's last search, or from one made now.
+
+        newly (n+m,) bool: bodies whose new pairs take over from joints."""
+        near = self._neighbours(now)
         near = near[self._on[near].any(axis=1)]
         pairs = np.concatenate([near, self._near_planes()])
         pairs = np.stack([pairs.min(axis=1), pairs.max(axis=1)], axis=1)
@@ -97,25 +99,24 @@ class ContactForces:
         slots = kernel.Slots(
             np.full(total, -1, np.int64), np.zeros(total), np.zeros(total), np.zeros((total, 3))
         )
-        fresh = np.zeros(len(a), bool)
-        known = np.zeros(len(a), bool)
+        fresh, known, touching = (np.zeros(len(a), bool) for _ in range(3))
         if hasattr(self, "_pairs") and len(self._pairs.a):
-            known = self._carry(a, b, start, slots)
+            known = self._carry(a, b, start, touching, slots)
         if newly is not None:
             fresh = ~known & (newly[a] | newly[b])
-        self._pairs = kernel.Pairs(a, b, start, fresh, np.zeros(len(a)))
+        self._pairs = kernel.Pairs(a, b, start, fresh, touching, np.zeros(len(a)))
         self._slots = slots
         if not hasattr(self, "_rows") or len(self._rows.a) < total:
             self._rows = kernel.empty_rows(total + total // 4)
 
-    def _carry(self, a: Array, b: Array, start: Array, slots: kernel.Slots) -> Array:
+    def _carry(self, a: Array, b: Array, start: Array, touching: Array, slots: kernel.Slots) -> Array:
         """Copy the slots of pairs that were known before; (p,) bool."""
         old, size = self._pairs, len(self._free)
         old_keys, keys = old.a * size + old.b, a * size + b
         spot = np.minimum(np.searchsorted(old_keys, keys), len(old_keys) - 1)
         known = old_keys[spot] == keys
         self.friction += kernel.carry_slots(
-            old, self._slots, np.flatnonzero(known), spot[known], start, slots, self._law.shear
+            old, self._slots, np.flatnonzero(known), spot[known], start, touching, slots, self._law.shear
         )
         return known
 
@@ -173,10 +174,11 @@ class ContactForces:
         """Back to a saved state, the blocks being where they were then."""
         self._on[:], self._on_planes[:] = saved["on"], saved["on_planes"]
         self._set_pairs(np.zeros((0, 2), np.int64))
-        self.search()
+        self.search(True)
         keys = self._pairs.a * len(self._free) + self._pairs.b
         pair = np.searchsorted(keys, saved["a"] * len(self._free) + saved["b"])
         slot = self._pairs.start[pair] + saved["node"]
+        self._pairs.touching[pair] = True
         for name in ("face", "k", "rest", "shear"):
             getattr(self._slots, name)[slot] = saved[name]
         self.dashpot, self.friction, self.driving = saved["sums"].tolist()

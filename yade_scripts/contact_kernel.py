@@ -54,14 +54,15 @@ class Law(NamedTuple):
 class Pairs(NamedTuple):
     """a < b (p,) bodies; b may be a plane · start (p+1,) first slot: the nodes of a, then those of b
 
-    fresh (p,) bool: contact takes over from a joint, with the depth there is · calm (p,) [m]: way that the two must
-    move before they can touch.
+    fresh (p,) bool: contact takes over from a joint, with the depth there is · touching (p,) bool: had contacts last
+    time · calm (p,) [m]: way that the two must move before they can touch.
     """
 
     a: Array
     b: Array
     start: Array
     fresh: Array
+    touching: Array
     calm: Array
 
 
@@ -119,195 +120,183 @@ def contact_forces(shapes, bodies, law, pairs, slots, x, v, R, dt, last_dt, rows
     → (contacts, work of friction and of springs that were let go [J])
     """
     count, lost = 0, 0.0
-    Rba, tba = np.empty((3, 3)), np.empty(3)
+    planes = np.empty((np.diff(shapes.face_start).max(), 4))
     for p in range(len(pairs.a)):
         a, b = pairs.a[p], pairs.b[p]
         if pairs.calm[p] > 0.0:
-            pairs.calm[p] -= last_dt * _closing_bound(shapes, a, b, v)
+            pairs.calm[p] -= last_dt * _closing_bound(v, a, b, shapes.radius[a], shapes.radius[b])
             if pairs.calm[p] > 0.0:
                 continue
-        first = count
-        for node, face in ((a, b), (b, a)):
-            count, lost = _scan(
-                shapes, bodies, law.shear, pairs, slots, p, node, face, x, v, R, last_dt, Rba, tba, rows, count, lost
+        first, apart = count, -np.inf
+        for node_body, face_body in ((a, b), (b, a)):
+            begin, end = shapes.node_start[node_body], shapes.node_start[node_body + 1]
+            if begin == end:
+                continue
+            faces = _planes_seen_from(
+                shapes.face_start, shapes.normal, shapes.offset, node_body, face_body, x, R, planes
             )
-        pairs.fresh[p] = False
+            margin = min(shapes.margin[node_body], shapes.margin[face_body])
+            gap, nearest = _separation(shapes.node, begin, shapes.vertex_end[node_body], planes, faces)
+            apart = max(apart, gap)
+            if gap <= margin or pairs.touching[p]:
+                slot = pairs.start[p] if node_body == a else pairs.start[p + 1] - (end - begin)
+                count, lost = _scan(
+                    shapes, bodies, law.shear, slots, slot, pairs.fresh[p], node_body, face_body, planes, faces,
+                    nearest, margin, x, v, R, last_dt, rows, count, lost,
+                )  # fmt: skip
+        pairs.fresh[p], pairs.touching[p] = False, count > first
         if count > first:
             _set_dashpots(bodies, law, a, b, R, rows, first, count)
-            lost += _apply(law, bodies, slots, x, v, R, dt, rows, first, count, F)
-        else:
-            pairs.calm[p] = max(
-                _separation(shapes, a, b, x, R, Rba, tba), _separation(shapes, b, a, x, R, Rba, tba)
-            )
+            lost += _apply(slots, x, v, R, dt, rows, first, count, F)
+        pairs.calm[p] = apart if count == first else 0.0
     return count, lost
 
 
 @njit(cache=True)
-def _closing_bound(shapes, a, b, v):
-    """Upper bound of the speed at which points of two bodies approach [m/s]."""
+def _closing_bound(v, a, b, radius_a, radius_b):
+    """Upper bound of the speed at which points of two bodies approach [m/s]; planes (radius inf) stand still."""
     linear = turn_a = turn_b = 0.0
     for k in range(3):
         linear += (v[a, k] - v[b, k]) ** 2
         turn_a += v[a, 3 + k] ** 2
         turn_b += v[b, 3 + k] ** 2
-    speed = np.sqrt(linear) + np.sqrt(turn_a) * shapes.radius[a]
-    return speed + np.sqrt(turn_b) * shapes.radius[b] if turn_b > 0.0 else speed
+    speed = np.sqrt(linear) + np.sqrt(turn_a) * radius_a
+    return speed + np.sqrt(turn_b) * radius_b if turn_b > 0.0 else speed
 
 
 @njit(cache=True)
-def _relative(a, b, x, R, Rba, tba):
-    """Frame of a seen from b: y = Rba ξ + tba."""
-    for i in range(3):
-        tba[i] = 0.0
-        for k in range(3):
-            tba[i] += R[b, k, i] * (x[a, k] - x[b, k])
+def _planes_seen_from(face_start, normal, offset, a, b, x, R, planes):
+    """Face planes of b in the frame of a: depth of a point ξ of a behind face g is d - m·ξ, planes (g, 4) = (m, d).
+
+    → number of faces"""
+    first = face_start[b]
+    count = face_start[b + 1] - first
+    for g in range(count):
+        n0, n1, n2 = normal[first + g, 0], normal[first + g, 1], normal[first + g, 2]
+        w0 = R[b, 0, 0] * n0 + R[b, 0, 1] * n1 + R[b, 0, 2] * n2
+        w1 = R[b, 1, 0] * n0 + R[b, 1, 1] * n1 + R[b, 1, 2] * n2
+        w2 = R[b, 2, 0] * n0 + R[b, 2, 1] * n1 + R[b, 2, 2] * n2
         for j in range(3):
-            Rba[i, j] = R[b, 0, i] * R[a, 0, j] + R[b, 1, i] * R[a, 1, j] + R[b, 2, i] * R[a, 2, j]
+            planes[g, j] = R[a, 0, j] * w0 + R[a, 1, j] * w1 + R[a, 2, j] * w2
+        between = w0 * (x[a, 0] - x[b, 0]) + w1 * (x[a, 1] - x[b, 1]) + w2 * (x[a, 2] - x[b, 2])
+        planes[g, 3] = offset[first + g] - between
+    return count
 
 
 @njit(cache=True)
-def _separation(shapes, a, b, x, R, Rba, tba):
-    """Largest distance of all nodes of a from one face plane of b [m]: the two are at least that far apart."""
-    if shapes.node_start[a + 1] == shapes.node_start[a]:
-        return -np.inf
-    _relative(a, b, x, R, Rba, tba)
-    best = -np.inf
-    for f in range(shapes.face_start[b], shapes.face_start[b + 1]):
-        n0, n1, n2 = shapes.normal[f, 0], shapes.normal[f, 1], shapes.normal[f, 2]
-        m0 = n0 * Rba[0, 0] + n1 * Rba[1, 0] + n2 * Rba[2, 0]
-        m1 = n0 * Rba[0, 1] + n1 * Rba[1, 1] + n2 * Rba[2, 1]
-        m2 = n0 * Rba[0, 2] + n1 * Rba[1, 2] + n2 * Rba[2, 2]
+def _separation(node, begin, end, planes, faces):
+    """Largest distance of all nodes begin .. end before one plane [m], and that plane: two bodies are at least that far
+    apart. The vertices are enough."""
+    best, witness = -np.inf, 0
+    for g in range(faces):
+        m0, m1, m2 = planes[g, 0], planes[g, 1], planes[g, 2]
         nearest = np.inf
-        for i in range(shapes.node_start[a], shapes.node_start[a + 1]):
-            nearest = min(nearest, m0 * shapes.node[i, 0] + m1 * shapes.node[i, 1] + m2 * shapes.node[i, 2])
-        nearest += n0 * tba[0] + n1 * tba[1] + n2 * tba[2] - shapes.offset[f]
-        best = max(best, nearest)
-    return best
+        for i in range(begin, end):
+            nearest = min(nearest, m0 * node[i, 0] + m1 * node[i, 1] + m2 * node[i, 2])
+        if nearest - planes[g, 3] > best:
+            best, witness = nearest - planes[g, 3], g
+    return best, witness
 
 
 @njit(cache=True)
-def _scan(shapes, bodies, shear, pairs, slots, p, a, b, x, v, R, last_dt, Rba, tba, rows, count, lost):
-    """Contacts of the nodes of a with the faces of b; contacts that ended leave their springs' energy in `lost`."""
-    _relative(a, b, x, R, Rba, tba)
-    first = shapes.node_start[a]
-    slot = pairs.start[p] if a == pairs.a[p] else pairs.start[p + 1] - (shapes.node_start[a + 1] - first)
-    margin = min(shapes.margin[a], shapes.margin[b]) if shapes.margin[b] > 0.0 else 0.0
-    y = np.empty(3)
-    for i in range(first, shapes.node_start[a + 1]):
-        s = slot + i - first
-        for k in range(3):
-            y[k] = (
-                Rba[k, 0] * shapes.node[i, 0] + Rba[k, 1] * shapes.node[i, 1] + Rba[k, 2] * shapes.node[i, 2] + tba[k]
-            )
-        f = slots.face[s]
-        if f >= 0:
-            depth = _depth(shapes, f, y)
-            if depth <= 0.0 or _beside(shapes, b, y, margin):
-                lost += _let_go(slots, s, depth, shear)
+def _scan(
+    shapes, bodies, shear, slots, slot, fresh, a, b, planes, faces, nearest, margin, x, v, R, last_dt, rows, count, lost
+):
+    """Contacts of the nodes of a with the faces of b; contacts that ended leave their springs' energy in `lost`.
+
+    Most nodes are outside the plane `nearest`, so it is asked first."""
+    begin, base = shapes.node_start[a], shapes.face_start[b]
+    for i in range(begin, shapes.node_start[a + 1]):
+        s = slot + i - begin
+        xi0, xi1, xi2 = shapes.node[i, 0], shapes.node[i, 1], shapes.node[i, 2]
+        smallest = _behind(planes, nearest, xi0, xi1, xi2)
+        for g in range(faces):
+            if smallest < -margin:
+                break
+            smallest = min(smallest, _behind(planes, g, xi0, xi1, xi2))
+        g = slots.face[s] - base if slots.face[s] >= 0 else -1
+        if g >= 0:
+            depth = _behind(planes, g, xi0, xi1, xi2)
+            if depth <= 0.0 or smallest < -margin:
+                lost += _let_go(slots.face, slots.k, slots.rest, slots.shear, s, depth, shear)
                 continue
+        elif smallest < -margin:
+            continue
         else:
-            f = _entered(shapes, a, b, i, y, Rba, margin)
-            if f < 0:
+            g, own = _entered(
+                shapes.of_start, shapes.of, shapes.normal, i, xi0, xi1, xi2, planes, faces, smallest, margin
+            )
+            if g < 0:
                 continue
-            depth = _depth(shapes, f, y)
-            _begin(shapes, bodies, slots, s, a, b, i, f, Rba)
-            if not pairs.fresh[p]:
-                closing = _closing_speed(shapes, a, b, i, f, x, v, R)
-                slots.rest[s] = max(0.0, depth - ARRIVED * last_dt * max(closing, 0.0))
+            depth = _behind(planes, g, xi0, xi1, xi2)
+            slots.face[s] = base + g
+            slots.k[s] = _spring(bodies.stiffness[a], bodies.stiffness[b]) / shapes.face_nodes[own]
+            slots.shear[s, 0] = slots.shear[s, 1] = slots.shear[s, 2] = 0.0
+            closing = 0.0 if fresh else _closing_speed(v, R, x, a, b, xi0, xi1, xi2, planes[g])
+            slots.rest[s] = 0.0 if fresh else max(0.0, depth - ARRIVED * last_dt * max(closing, 0.0))
         slots.rest[s] = min(slots.rest[s], depth)
-        _write_row(shapes, slots, rows, count, a, b, s, f, y, depth, x, R)
+        _write_row(rows, count, a, b, s, planes[g], depth, xi0, xi1, xi2, x, R)
+        rows.depth[count], rows.kn[count] = depth - slots.rest[s], slots.k[s]
         count += 1
     return count, lost
 
 
 @njit(cache=True)
-def _depth(shapes, f, y):
-    """Distance of the point y behind the plane of face f [m]."""
-    n = shapes.normal[f]
-    return shapes.offset[f] - n[0] * y[0] - n[1] * y[1] - n[2] * y[2]
+def _behind(planes, g, xi0, xi1, xi2):
+    """Depth of the point ξ behind a plane [m]."""
+    return planes[g, 3] - planes[g, 0] * xi0 - planes[g, 1] * xi1 - planes[g, 2] * xi2
 
 
 @njit(cache=True)
-def _beside(shapes, b, y, margin):
-    """Whether y lies farther than the margin outside some face of b."""
-    for g in range(shapes.face_start[b], shapes.face_start[b + 1]):
-        if _depth(shapes, g, y) < -margin:
-            return True
-    return False
-
-
-@njit(cache=True)
-def _entered(shapes, a, b, i, y, Rba, margin):
-    """Face of b that the node i of a, now at y, is behind; -1 if it is outside.
+def _entered(of_start, of, normal, i, xi0, xi1, xi2, planes, faces, smallest, margin):
+    """Face g of b that node i of a is behind, and the face of a opposite; -1 if it is outside.
 
     Of the faces that the node can have run into, the nearest; one that the node is still before keeps it outside."""
-    smallest, face, best = np.inf, -1, np.inf
-    for g in range(shapes.face_start[b], shapes.face_start[b + 1]):
-        depth = _depth(shapes, g, y)
-        if depth < -margin:
-            return -1
-        smallest = min(smallest, depth)
-        if depth < best and _opposed(shapes, i, g, Rba)[0] > ALIGNED:
-            face, best = g, depth
+    face, own, best = -1, -1, np.inf
+    for g in range(faces):
+        depth = _behind(planes, g, xi0, xi1, xi2)
+        if depth >= best:
+            continue
+        cosine = ALIGNED
+        for at in range(of_start[i], of_start[i + 1]):
+            f = of[at]
+            c = -(planes[g, 0] * normal[f, 0] + planes[g, 1] * normal[f, 1] + planes[g, 2] * normal[f, 2])
+            if c > cosine:
+                cosine, face, own, best = c, g, f, depth
     if best <= 0.0 or (smallest < 0.0 and best > SHALLOW * margin):
-        return -1
-    return face
+        return -1, -1
+    return face, own
 
 
 @njit(cache=True)
-def _opposed(shapes, i, g, Rba):
-    """Largest cosine between the inward normal of face g of b and the faces of a that hold node i; that face."""
-    best, face = -1.0, -1
-    n = shapes.normal[g]
-    m0 = n[0] * Rba[0, 0] + n[1] * Rba[1, 0] + n[2] * Rba[2, 0]
-    m1 = n[0] * Rba[0, 1] + n[1] * Rba[1, 1] + n[2] * Rba[2, 1]
-    m2 = n[0] * Rba[0, 2] + n[1] * Rba[1, 2] + n[2] * Rba[2, 2]
-    for at in range(shapes.of_start[i], shapes.of_start[i + 1]):
-        f = shapes.of[at]
-        cosine = -(m0 * shapes.normal[f, 0] + m1 * shapes.normal[f, 1] + m2 * shapes.normal[f, 2])
-        if cosine > best:
-            best, face = cosine, f
-    return best, face
-
-
-@njit(cache=True)
-def _begin(shapes, bodies, slots, s, a, b, i, f, Rba):
-    """A new contact: its share of the stiffness of the face of a that lies opposite.
+def _spring(K_a, K_b):
+    """Stiffness of a face of a against b [N/m].
 
     Both faces carry nodes where two blocks meet, and their springs are in series; a plane is rigid."""
-    own = _opposed(shapes, i, f, Rba)[1]
-    K = bodies.stiffness[a]
-    if bodies.stiffness[b] < np.inf:
-        K = K * bodies.stiffness[b] / (K + bodies.stiffness[b])
-    slots.face[s] = f
-    slots.k[s] = K / shapes.face_nodes[own]
-    slots.rest[s] = 0.0
-    slots.shear[s] = 0.0
+    return K_a * K_b / (K_a + K_b) if K_b < np.inf else K_a
 
 
 @njit(cache=True)
-def _let_go(slots, s, depth, shear):
+def _let_go(face, k, rest, spring, s, depth, shear):
     """End a contact; what its springs still held is lost [J]."""
-    slots.face[s] = -1
-    left = 0.5 * slots.k[s] * max(depth - slots.rest[s], 0.0) ** 2
-    S = slots.shear[s]
-    left += 0.5 * (S[0] ** 2 + S[1] ** 2 + S[2] ** 2) / (shear * slots.k[s])
-    slots.rest[s] = 0.0
+    face[s] = -1
+    left = 0.5 * k[s] * max(depth - rest[s], 0.0) ** 2
+    left += 0.5 * (spring[s, 0] ** 2 + spring[s, 1] ** 2 + spring[s, 2] ** 2) / (shear * k[s])
+    rest[s] = 0.0
     return left
 
 
 @njit(cache=True)
-def _closing_speed(shapes, a, b, i, f, x, v, R):
-    """Speed of node i of a into face f of b [m/s]."""
-    arm, point, n = np.empty(3), np.empty(3), np.empty(3)
+def _closing_speed(v, R, x, a, b, xi0, xi1, xi2, plane):
+    """Speed of the point ξ of a into a face of b, whose normal in the frame of a is plane[:3] [m/s]."""
+    arm, point, speed = np.empty(3), np.empty(3), 0.0
     for k in range(3):
-        arm[k] = R[a, k, 0] * shapes.node[i, 0] + R[a, k, 1] * shapes.node[i, 1] + R[a, k, 2] * shapes.node[i, 2]
+        arm[k] = R[a, k, 0] * xi0 + R[a, k, 1] * xi1 + R[a, k, 2] * xi2
         point[k] = x[a, k] + arm[k] - x[b, k]
-        n[k] = (
-            R[b, k, 0] * shapes.normal[f, 0] + R[b, k, 1] * shapes.normal[f, 1] + R[b, k, 2] * shapes.normal[f, 2]
-        )
     w = _slip(v, a, b, arm, point)
-    return -(w[0] * n[0] + w[1] * n[1] + w[2] * n[2])
+    for k in range(3):
+        speed -= w[k] * (R[a, k, 0] * plane[0] + R[a, k, 1] * plane[1] + R[a, k, 2] * plane[2])
+    return speed
 
 
 @njit(cache=True)
@@ -323,18 +312,15 @@ def _slip(v, a, b, arm_a, arm_b):
 
 
 @njit(cache=True)
-def _write_row(shapes, slots, rows, c, a, b, s, f, y, depth, x, R):
-    """Geometry of a contact: half way between the node y (frame of b) and the face."""
+def _write_row(rows, c, a, b, s, plane, depth, xi0, xi1, xi2, x, R):
+    """Geometry of a contact: half way between the node ξ and the face."""
     rows.a[c], rows.b[c], rows.slot[c] = a, b, s
-    n = shapes.normal[f]
     for k in range(3):
-        rows.normal[c, k] = R[b, k, 0] * n[0] + R[b, k, 1] * n[1] + R[b, k, 2] * n[2]
-        arm = R[b, k, 0] * y[0] + R[b, k, 1] * y[1] + R[b, k, 2] * y[2] + 0.5 * depth * rows.normal[c, k]
-        rows.arm_b[c, k] = arm
-        rows.point[c, k] = x[b, k] + arm
-        rows.arm_a[c, k] = rows.point[c, k] - x[a, k]
-    rows.depth[c] = depth - slots.rest[s]
-    rows.kn[c] = slots.k[s]
+        n = R[a, k, 0] * plane[0] + R[a, k, 1] * plane[1] + R[a, k, 2] * plane[2]
+        arm = R[a, k, 0] * xi0 + R[a, k, 1] * xi1 + R[a, k, 2] * xi2 + 0.5 * depth * n
+        rows.normal[c, k], rows.arm_a[c, k] = n, arm
+        rows.point[c, k] = x[a, k] + arm
+        rows.arm_b[c, k] = rows.point[c, k] - x[b, k]
 
 
 @njit(cache=True)
@@ -399,7 +385,7 @@ def _all_turning(bodies, a, R, arm):
 
 
 @njit(cache=True)
-def _apply(law, bodies, slots, x, v, R, dt, rows, first, count, F):
+def _apply(slots, x, v, R, dt, rows, first, count, F):
     """Forces of the contacts first .. count of a pair on F; → work of friction [J]."""
     lost, w, S, n, local = 0.0, np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     for c in range(first, count):
@@ -481,12 +467,13 @@ def _power(force, arm, v):
 
 
 @njit(cache=True)
-def carry_slots(old_pairs, old, new_index, old_index, start, new, shear):
+def carry_slots(old_pairs, old, new_index, old_index, start, new_touching, new, shear):
     """Copy the memory of pairs old_index to pairs new_index; → energy of contacts in pairs that are no more [J]."""
     kept = np.zeros(len(old_pairs.a), np.bool_)
     for i in range(len(new_index)):
         p, q = new_index[i], old_index[i]
         kept[q] = True
+        new_touching[p] = old_pairs.touching[q]
         for s in range(start[p + 1] - start[p]):
             to, source = start[p] + s, old_pairs.start[q] + s
             new.face[to] = old.face[source]
@@ -498,5 +485,5 @@ def carry_slots(old_pairs, old, new_index, old_index, start, new, shear):
         if not kept[q]:
             for s in range(old_pairs.start[q], old_pairs.start[q + 1]):
                 if old.face[s] >= 0:
-                    lost += _let_go(old, s, old.rest[s], shear)
+                    lost += _let_go(old.face, old.k, old.rest, old.shear, s, old.rest[s], shear)
     return lost

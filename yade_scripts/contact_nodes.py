@@ -24,13 +24,14 @@ MARGIN = 0.01
 class Shapes(NamedTuple):
     """Blocks, then fixed planes, as bodies 0 .. n-1, n .. n+m-1; points and normals in the frame of their body.
 
-    node_start (n+m+1,) · node (N, 3) [m] · of_start (N+1,), of (.,): faces that hold a node
+    node_start (n+m+1,) · node (N, 3) [m] · vertex_end (n+m,): the vertices come first · of_start (N+1,), of (.,): faces that hold a node
     face_start (n+m+1,) · normal (F, 3) outward · offset (F,) [m]: inside is normal·x < offset
     face_nodes (F,): nodes on a face · radius, margin (n+m,) [m].
     """
 
     node_start: Array
     node: Array
+    vertex_end: Array
     of_start: Array
     of: Array
     face_start: Array
@@ -76,20 +77,22 @@ def contact_shapes(blocks: list[Block], planes: list[FixedPlane], per_edge: int)
         holders += [[faces_before + f for f in held] for held in holding]
         normals.append(normal)
         offsets.append(offset)
-        counts.append((len(points), len(normal)))
+        counts.append((len(points), len(normal), len(block.vertices)))
         faces_before += len(normal)
     for plane in planes:
         normals.append(plane.normal[None])
         offsets.append(np.zeros(1))
-        counts.append((0, 1))
-    node_count, face_count = np.array(counts, np.int64).reshape(-1, 2).T
+        counts.append((0, 1, 0))
+    node_count, face_count, vertex_count = np.array(counts, np.int64).reshape(-1, 3).T
+    node_start = _starts(node_count)
     of = np.array([f for held in holders for f in held], np.int64)
     number_of_faces = int(face_count.sum())
-    inner = np.array([b.planes[1].min() for b in blocks] + [0.0] * len(planes))
+    inner = np.array([b.planes[1].min() for b in blocks] + [np.inf] * len(planes))
     radius = np.array([b.radius for b in blocks] + [np.inf] * len(planes))
     return Shapes(
-        _starts(node_count),
+        node_start,
         np.concatenate(nodes) if nodes else np.zeros((0, 3)),
+        node_start[:-1] + vertex_count,
         _starts([len(held) for held in holders]),
         of,
         _starts(face_count),

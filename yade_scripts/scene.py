@@ -137,19 +137,18 @@ class Scene:
         for i, free in zip(self.ids, loose.tolist()):
             self.O.bodies[i].mask = LOOSE if free else STANDING
 
-    def neighbours(self) -> Array:
-        """Pairs of rows (p, 2) whose bounding boxes are within the margin, at the present places."""
-        self.collider.doSort = True
-        self.collider()
-        return self._pairs()
-
-    def searched(self) -> bool:
-        """Whether YADE has looked for neighbours since the last time this or `neighbours` was asked."""
-        return self.collider is not None and self.collider.numAction != self._searched
-
-    def _pairs(self) -> Array:
+    def neighbours(self, now: bool) -> Array:
+        """Pairs of rows (p, 2) whose bounding boxes are within the margin; now: looked for at the present places, after
+        bodies were moved by hand or became loose."""
+        if now:
+            self.collider.doSort = True
+            self.collider()
         self._searched = self.collider.numAction
         return np.array([(i.id1, i.id2) for i in self.O.interactions.all()], np.int64).reshape(-1, 2)
+
+    def searched(self) -> bool:
+        """Whether YADE has looked for neighbours since `neighbours` was asked."""
+        return self.collider.numAction != self._searched
 
     def displace(self, rows: Array, shift: Array, turn: Array) -> None:
         """Move the blocks `rows` by shift (m, 3) and turn (m, 3, 3) about their centres."""

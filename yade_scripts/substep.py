@@ -72,4 +72,4 @@ class Substepper:
         if self._contacts is not None:
             self._contacts.settle(dt)
             if self._scene.searched():
-                self._contacts.search()
+                self._contacts.search(now=False)
