@@ -10,10 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coupler.boxes import rotation_matrix
+from coupler.bodies import rotation_matrix
 from coupler.case import Case
 from coupler.gauges import Gauge, make_gauge
 from coupler.loop import Coupling
+from coupler.parts import Part, parts_of
 
 BOX_CORNERS = np.array(
     [[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]],
@@ -43,7 +44,7 @@ def build(case: Case, clock) -> Scene:
         coupling = _coupling(case, structure, solids, clock)
         on_failure.pop_all()
     tank = (case.tank.lower, case.tank.upper) if case.tank else None
-    return Scene(coupling, _gauges(case, structure), solids, tank)
+    return Scene(coupling, _gauges(case), solids, tank)
 
 
 def _coupling(case: Case, structure, solids, clock) -> Coupling:
@@ -85,76 +86,6 @@ def _load_at_rest(structure, water) -> np.ndarray:
     return water_load(problem, x)[: structure.n]
 
 
-def blocks_of(case: Case) -> list:
-    """All blocks of a case as the structure's Block, generators expanded, in the order of their rows."""
-    from yade_scripts.blocks import Block
-    from yade_scripts.building import building_blocks, divided_box
-
-    driven = {m.block: np.array(m.velocity) for m in case.motion}
-    s = case.structure
-    blocks = []
-    for b in s.block:
-        blocks.append(
-            Block(
-                name=b.name,
-                group=b.group or b.name,
-                centre=np.array(b.centre),
-                size=np.array(b.size),
-                rotation=_rotation(b.rotation),
-                density=b.density or s.density,
-                fixed=b.fixed,
-                driven=b.name in driven,
-                velocity=driven.get(b.name, np.array(b.velocity)),
-                spin=np.array(b.spin),
-            )
-        )
-    for w in s.wall:
-        blocks += divided_box(w.name, w.lower, w.size, w.block, w.density or s.density, group=w.name)
-    for h in s.building:
-        blocks += building_blocks(_building(h, h.density or s.density))
-    return blocks
-
-
-def _building(spec, density: float):
-    """The generator's description of a building of the case."""
-    from yade_scripts.building import Building
-
-    lower, size = np.array(spec.lower), np.array(spec.size)
-    return Building(
-        lower=lower[:2],
-        upper=lower[:2] + size[:2],
-        height=size[2],
-        thickness=spec.wall_thickness,
-        floor_thickness=spec.floor_thickness,
-        block=spec.block[0],
-        course=spec.block[1],
-        storeys=spec.storeys,
-        roof=spec.roof,
-        base=lower[2],
-        density=density,
-        openings=tuple(_opening(spec, o) for o in spec.opening),
-        name=spec.name,
-    )
-
-
-def _opening(spec, opening):
-    """A rectangle in a wall as a box through that wall."""
-    from yade_scripts.building import Opening
-
-    lower, upper = np.array(spec.lower), np.add(spec.lower, spec.size)
-    across = "xy".index(opening.wall[0])
-    along = 1 - across
-    box_low, box_high = lower.copy(), upper.copy()
-    if opening.wall[1] == "-":
-        box_high[across] = lower[across] + spec.wall_thickness
-    else:
-        box_low[across] = upper[across] - spec.wall_thickness
-    for axis, start, length in zip((along, 2), opening.lower, opening.size):
-        box_low[axis] = lower[axis] + start
-        box_high[axis] = box_low[axis] + length
-    return Opening(box_low, box_high)
-
-
 def _rotation(turn) -> np.ndarray:
     return np.eye(3) if turn is None else rotation_matrix(turn.axis, turn.angle)
 
@@ -182,11 +113,26 @@ def build_structure(case: Case):
             damping=j.damping,
             points=j.points,
             ground=j.ground,
+            law=j.law,
+            peak=j.peak,
+            mixed_mode=j.mixed_mode,
         )
-    ground = case.structure.ground.level if case.structure.ground else None
     gravity = (0.0, 0.0, -case.case.gravity)
-    planes = _tank_planes(case)
-    return Structure(blocks_of(case), contact, joints, ground, planes, gravity)
+    planes = [*_ground(case), *_tank_planes(case)]
+    blocks = [block for part in parts_of(case) for block in part.blocks]
+    return Structure(blocks, contact, joints, None, planes, gravity)
+
+
+def _ground(case: Case) -> list:
+    """The ground as a plane, none without one."""
+    from yade_scripts.faces import FixedPlane
+
+    ground = case.structure.ground
+    return (
+        [FixedPlane((0.0, 0.0, ground.level), (0.0, 0.0, 1.0), "ground", material=ground.material)]
+        if ground
+        else []
+    )
 
 
 def _tank_planes(case: Case) -> list:
@@ -203,7 +149,7 @@ def _tank_planes(case: Case) -> list:
                 continue
             normal = np.zeros(3)
             normal[axis] = 1.0 if sign == "-" else -1.0
-            planes.append(FixedPlane(np.array(corner), normal, f"tank {side}", bonds=side == "z-"))
+            planes.append(FixedPlane(np.array(corner), normal, f"tank {side}", side == "z-", "tank"))
     return planes
 
 
@@ -242,21 +188,21 @@ def _open_sides(case: Case):
     return is_open
 
 
-def _gauges(case: Case, structure) -> list[Gauge]:
-    rows = rows_by_name(case, structure)
+def _gauges(case: Case) -> list[Gauge]:
+    rows = rows_by_name(case, parts_of(case))
     return [make_gauge(spec, rows) for spec in case.gauge]
 
 
-def rows_by_name(case: Case, structure) -> dict[str, np.ndarray]:
-    """Rows of the load table for every name a case may use: blocks, groups, walls, buildings, solids."""
+def rows_by_name(case: Case, parts: tuple[Part, ...]) -> dict[str, np.ndarray]:
+    """Rows of the load table for every name a case may use: blocks, groups, parts of the structure, solids."""
     rows: dict[str, list[int]] = {}
-    names = [] if structure is None else structure.names
-    generated = () if structure is None else (*case.structure.wall, *case.structure.building)
-    for row, name in enumerate(names):
-        for known in {name, structure.groups[row]}:
-            rows.setdefault(known, []).append(row)
-    for part in generated:
-        rows[part.name] = [row for row, name in enumerate(names) if name.startswith(f"{part.name}-")]
-    for row, solid in enumerate(case.solid, start=len(names)):
+    row = 0
+    for part in parts:
+        for block in part.blocks:
+            for known in {block.name, block.group, part.name}:
+                rows.setdefault(known, []).append(row)
+            row += 1
+    for solid in case.solid:
         rows.setdefault(solid.name, []).append(row)
+        row += 1
     return {name: np.array(found) for name, found in rows.items()}

@@ -1,128 +1,92 @@
-"""What a schema cannot see: sections that need each other, names that must exist, bodies that do not fit.
+"""What a schema cannot see: sections that need each other, names that must exist, bodies that cannot be made.
 
 Every check yields (key path, message); none needs YADE or the flow solver.
 """
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
+from contextlib import suppress
 
 import numpy as np
 
-from coupler.boxes import Box, near_pairs, overlap_depth, rotation_matrix
-from coupler.case import Building, Case
+from coupler.case import Case
 from coupler.errors import did_you_mean
+from coupler.parts import Part, parts_of, recipes
+from coupler.place_checks import frame_problems, opening_problems, place_problems, solid_bodies
 from coupler.toml_lines import shown
 
 KeyPath = tuple[str | int, ...]
 Problem = tuple[KeyPath, str]
-Body = tuple[KeyPath, str, Box]
-
-TOUCH = 1e-6
-"""Overlap below this share of the smallest edge is contact, not overlap (rounding of decimal fractions)."""
-STIFF_CLOSING = 5.0
-ENOUGH_POINTS = 8
-"""A joint that closes stiffly turns about its outermost points: 3 x 3 are 8 % weak in bending at ten times (P23)."""
-BYTES_PER_CELL = 1800
-"""Resident memory that a cell of the mesh takes in a run: topology, moments and fields of the water."""
-
-
-def mesh_size(tank) -> tuple[int, int]:
-    """Cells and nodes of the mesh of a tank: six tetrahedra a box of about the wanted edge."""
-    edges = np.subtract(tank.upper, tank.lower)
-    parts = np.maximum(1, np.rint(edges / tank.cell).astype(int))
-    return 6 * int(np.prod(parts)), int(np.prod(parts + 1))
 
 
 def problems(case: Case) -> list[Problem]:
     """Everything that is wrong with a case whose sections are valid one by one."""
-    found = [*_sections(case), *_axes(case), *_tank(case)]
-    if any(path[-1:] in (("axis",), ("upper",)) for path, _ in found):
+    wrong_frames = list(frame_problems(case))
+    found = [*_sections(case), *wrong_frames]
+    if wrong_frames:
         return found  # without a direction or a tank the rest would report nonsense
-    for check in (
-        _unique_names,
-        _known_names,
-        _fills,
-        _openings,
-        _overlaps,
-        _bodies_outside,
-        _submerged_fills,
-        _gauges,
-    ):
-        found += check(case)
-    return found
+    shapes = [*_shapes(case), *opening_problems(case)]
+    parts, refused = _made(case, {path[:3] for path, _ in shapes})
+    found += [*shapes, *refused, *_unique_names(case, parts), *_known_names(case, parts)]
+    return [*found, *_law(case), *place_problems(case, parts)]
 
 
 def remarks(case: Case) -> list[str]:
     """What is allowed but worth knowing before the run."""
-    found = []
-    if case.tank and case.water and case.water.covers == "single":
-        thin = [
-            (name, box.size.min())
-            for _, name, box in [*_solids(case), *_structure(case)]
-            if box.size.min() < case.tank.cell
-        ]
-        if thin:
-            name, size = min(thin, key=lambda item: item[1])
-            found.append(
-                f"{name} is {size:g} m thick, thinner than a cell ({case.tank.cell:g} m): with single covers "
-                "the water on its two sides is one field there and the load comes out too small"
-            )
-    j = case.joints
-    if j and j.closing_ratio >= STIFF_CLOSING and j.points < ENOUGH_POINTS:
-        found.append(
-            f"joints.closing_ratio = {j.closing_ratio:g} with joints.points = {j.points}: these joints come out weak "
-            f"in bending (by 8 % at 10, 18 % at 100 with 3 points); use {ENOUGH_POINTS} or more"
+    return [*_thin_remarks(case), *_joint_remarks(case), *_loose_remarks(case)]
+
+
+def _thin_remarks(case: Case) -> Iterator[str]:
+    if case.tank is None or case.water is None or case.water.covers != "single":
+        return
+    thin = [(name, width) for name, width in _widths(case) if width < case.tank.cell]
+    if thin:
+        name, width = min(thin, key=lambda item: item[1])
+        yield (
+            f"{name} is {width:g} m thick, thinner than a cell ({case.tank.cell:g} m): with single covers "
+            "the water on its two sides is one field there and the load comes out too small"
         )
-    return found
 
 
-# ---------------------------------------------------------------- bodies as boxes
+def _widths(case: Case) -> Iterator[tuple[str, float]]:
+    """Name and smallest width [m] of solids, walls and floors as wholes, and of all other blocks."""
+    from coupler.bodies import Body
+
+    for _, name, body in solid_bodies(case):
+        yield name, body.thickness()
+    for part in parts_of(case):
+        spec = getattr(case.structure, str(part.path[1]))[part.path[2]]
+        if part.path[1] == "wall":
+            yield part.name, min(spec.size)
+        elif part.path[1] == "building":
+            yield part.name, min(spec.wall_thickness, spec.floor_thickness or np.inf)
+        else:
+            yield part.name, min(Body.of_block(b).thickness() for b in part.blocks)
 
 
-def _solids(case: Case) -> list[Body]:
-    return [(("solid", i), solid.name, _box(solid)) for i, solid in enumerate(case.solid)]
+def _joint_remarks(case: Case) -> Iterator[str]:
+    j = case.joints
+    if j is None:
+        return
+    from yade_scripts.quadrature import enough
+
+    if j.points != "auto" and j.points < len(enough(j.closing_ratio, 3)):
+        yield (
+            f"joints.points = {j.points} with joints.closing_ratio = {j.closing_ratio:g}: too few for the strength in "
+            f"bending (3 are 8 % weak at 10, 16 % at 100); 'auto' takes {len(enough(j.closing_ratio, 3))} or more"
+        )
 
 
-def _structure(case: Case) -> list[Body]:
-    """Blocks, walls, and the walls, floors and roof of buildings."""
-    if case.structure is None:
-        return []
-    parts = case.structure
-    bodies = [(("structure", "block", i), b.name, _box(b)) for i, b in enumerate(parts.block)]
-    for i, wall in enumerate(parts.wall):
-        box = Box.between(wall.lower, np.add(wall.lower, wall.size))
-        bodies.append((("structure", "wall", i), wall.name, box))
-    for i, building in enumerate(parts.building):
-        bodies += [(("structure", "building", i), building.name, box) for box in _slabs(building)]
-    return bodies
+def _loose_remarks(case: Case) -> Iterator[str]:
+    """Walls and buildings are rarely meant to be dry."""
+    if case.structure is None or case.joints is not None:
+        return
+    for part in (*case.structure.wall, *case.structure.building):
+        yield f"the blocks of '{part.name}' lie loose on one another; a section [joints] glues them"
 
 
-def _box(block) -> Box:
-    turn = block.rotation
-    rotation = np.eye(3) if turn is None else rotation_matrix(turn.axis, turn.angle)
-    return Box(np.array(block.centre), np.array(block.size), rotation)
-
-
-def _slabs(building: Building) -> list[Box]:
-    """The walls, floors and roof of a building as boxes that overlap at the corners."""
-    lower, size = np.array(building.lower), np.array(building.size)
-    upper, thick = lower + size, building.wall_thickness
-    boxes = []
-    for axis in (0, 1):
-        inner_upper, inner_lower = upper.copy(), lower.copy()
-        inner_upper[axis] = lower[axis] + thick
-        inner_lower[axis] = upper[axis] - thick
-        boxes += [Box.between(lower, inner_upper), Box.between(inner_lower, upper)]
-    floor = building.floor_thickness or thick
-    for storey in range(1, building.storeys + building.roof):
-        top = lower[2] + size[2] * storey / building.storeys
-        boxes.append(Box.between([*lower[:2], top - floor], [*upper[:2], top]))
-    return boxes
-
-
-# ---------------------------------------------------------------- sections and names
+# ---------------------------------------------------------------- sections
 
 
 def _sections(case: Case) -> Iterator[Problem]:
@@ -142,38 +106,104 @@ def _sections(case: Case) -> Iterator[Problem]:
 
 
 def _structure_sections(case: Case) -> Iterator[Problem]:
-    structure = case.structure
-    if not (structure.block or structure.wall or structure.building):
+    if not any(True for _ in recipes(case)):
         yield (
             ("structure",),
-            "no block: write [[structure.block]], .wall or .building in double brackets",
+            "no block: write [[structure.block]], .wall, .building, .column, .arch, .rubble or .file in double "
+            "brackets",
         )
     if case.contact is None:
         yield ("structure",), "blocks need a section [contact] with stiffness, restitution and friction"
     elif case.contact.stiffness is None and case.joints is None:
         yield ("contact",), "stiffness: missing; without [joints] there is nothing to take it from"
-    if case.joints is None and (structure.building or structure.wall):
-        which = "building" if structure.building else "wall"
+
+
+def _law(case: Case) -> Iterator[Problem]:
+    if case.joints is None:
+        return
+    from yade_scripts import laws
+
+    law = case.joints.law
+    if law not in laws.names():
+        yield ("joints", "law"), _no_such("law", law, laws.names())
+    if case.joints.mixed_mode == "needleman" and law != "polynomial":
         yield (
-            ("structure", which),
-            f"the blocks of a {which} need a section [joints] that glues them; single blocks may lie loose",
+            ("joints", "mixed_mode"),
+            f"'needleman' is a potential for the law polynomial, not {law}; use 'effective'",
         )
 
 
-def _names(case: Case) -> dict[str, list[KeyPath]]:
-    """Name of every body and group -> where it is given."""
-    found: dict[str, list[KeyPath]] = {}
-    for path, name, _ in [*_solids(case), *_structure(case)]:
-        places = found.setdefault(name, [])
-        if path not in places:
-            places.append(path)
-    return found
+# ---------------------------------------------------------------- parts of the structure
 
 
-def _unique_names(case: Case) -> Iterator[Problem]:
-    for name, places in _names(case).items():
-        for path in places[1:]:
-            yield (*path, "name"), f"'{name}' is taken by {shown(places[0])}; give every body its own name"
+def _shapes(case: Case) -> Iterator[Problem]:
+    """Tables that say too little or too much about the shape of their blocks."""
+    structure = case.structure
+    for i, block in enumerate(structure.block if structure else ()):
+        path = ("structure", "block", i)
+        if block.size is None and block.vertices is None:
+            yield (
+                (*path, "size"),
+                "missing; give size (edges of a box) or vertices (corners of a convex polyhedron)",
+            )
+        elif block.size is not None and block.vertices is not None:
+            yield (*path, "vertices"), "size is given as well; a block is a box or a polyhedron"
+        elif block.size is not None and block.centre is None:
+            yield (*path, "centre"), "missing; centre of mass of the box at the start [m]"
+    for i, column in enumerate(structure.column if structure else ()):
+        path = ("structure", "column", i)
+        if (column.size is None) == (column.radius is None):
+            yield (
+                path,
+                f"'{column.name}' needs either size (drums are boxes) or radius (drums have many sides)",
+            )
+        elif column.size is not None and column.top_radius is not None:
+            yield (*path, "top_radius"), "is for round drums; leave it out, or give radius instead of size"
+
+
+def _made(case: Case, skipped: set[KeyPath]) -> tuple[list[Part], list[Problem]]:
+    """The parts that can be made, and why the others cannot; those in `skipped` are known to be wrong."""
+    if case.structure is None:
+        return [], []
+    from coupler.block_files import BlockFileError
+    from yade_scripts.polyhedra import BlockError
+
+    if not skipped:
+        with suppress(BlockError, BlockFileError, OSError):
+            return list(parts_of(case)), []
+    made, refused = [], []
+    for recipe in recipes(case):
+        if recipe.path in skipped:
+            continue
+        try:
+            made.append(Part(recipe.path, recipe.name, tuple(recipe.make())))
+        except BlockError as error:
+            refused.append((recipe.path, str(error)))
+        except BlockFileError as error:
+            refused.append(((*recipe.path, "path"), str(error)))
+    return made, refused
+
+
+# ---------------------------------------------------------------- names
+
+
+def _unique_names(case: Case, parts: list[Part]) -> Iterator[Problem]:
+    """One name for one body, group of blocks, or gauge of a kind."""
+    places: dict[str, KeyPath] = {}
+    bodies = [(("solid", i), solid.name) for i, solid in enumerate(case.solid)]
+    for path, name in [*bodies, *((r.path, r.name) for r in recipes(case))]:
+        first = places.setdefault(name, path)
+        if first != path:
+            yield (*path, "name"), f"'{name}' is taken by {shown(first)}; give every body its own name"
+    for part in parts:
+        for name in (block.name for block in part.blocks if block.name != part.name):
+            first = places.setdefault(name, part.path)
+            if first != part.path:
+                yield (
+                    (*part.path, "name"),
+                    f"a block of '{part.name}' would be called '{name}' as {shown(first)} is",
+                )
+                break
     seen: dict[tuple[str, str], int] = {}
     for i, gauge in enumerate(case.gauge):
         first = seen.setdefault((gauge.kind, gauge.name), i)
@@ -181,211 +211,28 @@ def _unique_names(case: Case) -> Iterator[Problem]:
             yield ("gauge", i, "name"), f"'{gauge.name}' is taken by gauge[{first}] of the same kind"
 
 
-def _known_names(case: Case) -> Iterator[Problem]:
-    blocks = [block.name for block in case.structure.block] if case.structure else []
-    groups = [block.group for block in case.structure.block if block.group] if case.structure else []
-    moving = list(dict.fromkeys([name for _, name, _ in _structure(case)] + groups))
-    solids = [name for _, name, _ in _solids(case)]
+def _known_names(case: Case, parts: list[Part]) -> Iterator[Problem]:
+    """Motions and gauges name what there is; what could not be made is taken for granted."""
+    blocks = [block.name for part in parts for block in part.blocks]
+    several = [part.name for part in parts] + [b.group for part in parts for b in part.blocks]
+    moving, solids = list(dict.fromkeys([*several, *blocks])), [solid.name for solid in case.solid]
+    unmade = {r.name for r in recipes(case)} - {part.name for part in parts}
+
+    def absent(name: str, known: list[str]) -> bool:
+        return name not in known and not any(name == n or name.startswith(f"{n}-") for n in unmade)
+
     for i, motion in enumerate(case.motion):
-        if case.structure and motion.block not in blocks:
+        if case.structure and absent(motion.block, blocks):
             yield ("motion", i, "block"), _no_such("block", motion.block, blocks)
     for i, gauge in enumerate(case.gauge):
-        if gauge.kind == "force" and gauge.on not in moving + solids:
+        if gauge.kind == "force" and absent(gauge.on, moving + solids):
             yield ("gauge", i, "on"), _no_such("body", gauge.on, moving + solids)
-        if gauge.kind == "reaction" and gauge.on not in moving:
+        if gauge.kind == "reaction" and absent(gauge.on, moving):
             yield ("gauge", i, "on"), _no_such("block or group", gauge.on, moving)
-        if gauge.kind == "motion" and gauge.of not in blocks:
+        if gauge.kind == "motion" and absent(gauge.of, blocks):
             yield ("gauge", i, "of"), _no_such("block", gauge.of, blocks)
 
 
 def _no_such(kind: str, name: str, known: list[str]) -> str:
     hint = did_you_mean(name, known)
     return f"there is no {kind} '{name}'" + (hint or (f"; there are {', '.join(known[:8])}" if known else ""))
-
-
-# ---------------------------------------------------------------- geometry
-
-
-def _axes(case: Case) -> Iterator[Problem]:
-    turned = [(("solid", i), solid) for i, solid in enumerate(case.solid)]
-    turned += [
-        (("structure", "block", i), b) for i, b in enumerate(case.structure.block if case.structure else ())
-    ]
-    for path, body in turned:
-        if body.rotation is not None and not np.any(body.rotation.axis):
-            yield (*path, "rotation", "axis"), "[0, 0, 0] is no direction; write for instance [0, 0, 1]"
-
-
-def _corners_in_order(path: KeyPath, box) -> Iterator[Problem]:
-    for axis, low, high in zip("xyz", box.lower, box.upper):
-        if low >= high:
-            yield (*path, "upper"), f"{axis}: upper ({high:g} m) must be greater than lower ({low:g} m)"
-
-
-def _tank(case: Case) -> Iterator[Problem]:
-    if case.tank is None:
-        return
-    yield from _corners_in_order(("tank",), case.tank)
-    smallest = min(np.subtract(case.tank.upper, case.tank.lower))
-    if 0 < smallest < case.tank.cell:
-        yield (
-            ("tank", "cell"),
-            f"{case.tank.cell:g} m is larger than the smallest side of the tank ({smallest:g} m)",
-        )
-    elif smallest > 0 and case.water:
-        yield from _memory(case)
-
-
-def _memory(case: Case) -> Iterator[Problem]:
-    """A mesh that this machine cannot hold: the system would kill the run without a word."""
-    cells, _ = mesh_size(case.tank)
-    needed, there = BYTES_PER_CELL * cells, os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    if needed > there:
-        fits = case.tank.cell * (needed / there) ** (1.0 / 3.0)
-        yield (
-            ("tank", "cell"),
-            f"{cells:.3g} cells of {case.tank.cell:g} m need about {needed / 1e9:.0f} GB, this machine has "
-            f"{there / 1e9:.0f} GB; use cells of {1.1 * fits:.2g} m or more",
-        )
-
-
-def _fills(case: Case) -> Iterator[Problem]:
-    for i, fill in enumerate(case.water.fill if case.water else ()):
-        path = ("water", "fill", i)
-        yield from _corners_in_order(path, fill)
-        if case.tank is not None:
-            yield from _beyond_tank(case, path, f"water fill {i}", Box.between(fill.lower, fill.upper))
-
-
-def _beyond_tank(case: Case, path: KeyPath, name: str, box: Box) -> Iterator[Problem]:
-    lower, upper = box.bounds()
-    slack = TOUCH * box.size.min()
-    for axis, letter in enumerate("xyz"):
-        for side, excess, limit in (
-            ("-", case.tank.lower[axis] - lower[axis], case.tank.lower[axis]),
-            ("+", upper[axis] - case.tank.upper[axis], case.tank.upper[axis]),
-        ):
-            if excess > slack:
-                yield (
-                    path,
-                    (
-                        f"{name} reaches {excess:.4g} m beyond the side {letter}{side} of the tank "
-                        f"({letter} = {limit:g} m); move it or enlarge the tank"
-                    ),
-                )
-
-
-def _bodies_outside(case: Case) -> Iterator[Problem]:
-    """Blocks must lie inside the tank; fixed solids may stick out of it, but not be wholly outside."""
-    bodies = _outlines(_structure(case))
-    if case.tank is not None:
-        tank = Box.between(case.tank.lower, case.tank.upper)
-        for path, name, box in bodies:
-            yield from _beyond_tank(case, path, f"'{name}'", box)
-        for path, name, box in _solids(case):
-            if overlap_depth(tank, box) <= 0:
-                yield (
-                    path,
-                    f"'{name}' lies outside the tank, where there is no water; move it or leave it out",
-                )
-    ground = case.structure.ground if case.structure else None
-    for path, name, box in bodies if ground else ():
-        depth = ground.level - box.bounds()[0][2]
-        if depth > TOUCH * box.size.min():
-            yield path, f"'{name}' reaches {depth:.4g} m below the ground (z = {ground.level:g} m); raise it"
-
-
-def _outlines(bodies: list[Body]) -> list[Body]:
-    """One box along the axes around all parts of each body, so that a building is told once."""
-    parts: dict[tuple[KeyPath, str], list[np.ndarray]] = {}
-    for path, name, box in bodies:
-        parts.setdefault((path, name), []).append(np.array(box.bounds()))
-    outlines = []
-    for (path, name), bounds in parts.items():
-        lower, upper = np.min(bounds, axis=0)[0], np.max(bounds, axis=0)[1]
-        outlines.append((path, name, Box.between(lower, upper)))
-    return outlines
-
-
-def _overlaps(case: Case) -> Iterator[Problem]:
-    bodies = [*_solids(case), *_structure(case)]
-    told = set()
-    for i, j in near_pairs([box for _, _, box in bodies]):
-        (path, name, a), (other_path, other, b) = bodies[i], bodies[j]
-        if path == other_path or path[0] == other_path[0] == "solid" or (path, other_path) in told:
-            continue
-        depth = overlap_depth(a, b)
-        if depth > TOUCH * min(a.size.min(), b.size.min()):
-            told.add((path, other_path))
-            yield other_path, f"'{other}' overlaps '{name}' by {depth:.4g} m; move one of them by that much"
-
-
-def _submerged_fills(case: Case) -> Iterator[Problem]:
-    """A body in the water displaces it; a fill that one body swallows whole is a mistake."""
-    for i, fill in enumerate(case.water.fill if case.water else ()):
-        corners = Box.between(fill.lower, fill.upper).corners()
-        for _, name, box in [*_solids(case), *_structure(case)]:
-            if box.holds(corners, TOUCH).all():
-                yield ("water", "fill", i), f"this water lies wholly inside '{name}', so there is none"
-                break
-
-
-def _openings(case: Case) -> Iterator[Problem]:
-    for i, building in enumerate(case.structure.building if case.structure else ()):
-        path = ("structure", "building", i)
-        yield from _hollow(path, building)
-        for j, opening in enumerate(building.opening):
-            width = building.size[1] if opening.wall[0] == "x" else building.size[0]
-            limits = (("along the wall", width), ("in height", building.size[2]))
-            for (direction, limit), start, length in zip(limits, opening.lower, opening.size):
-                if start < -TOUCH or start + length > limit + TOUCH:
-                    yield (
-                        (*path, "opening", j),
-                        f"reaches from {start:g} to {start + length:g} m {direction}, outside the wall "
-                        f"{opening.wall} of '{building.name}' (0 to {limit:g} m)",
-                    )
-
-
-def _hollow(path: KeyPath, building: Building) -> Iterator[Problem]:
-    inside = min(building.size[:2]) - 2 * building.wall_thickness
-    if inside <= 0:
-        yield (
-            (*path, "wall_thickness"),
-            f"two walls of {building.wall_thickness:g} m leave no room in '{building.name}' "
-            f"({min(building.size[:2]):g} m); use [[structure.wall]] for a solid body",
-        )
-    floor = building.floor_thickness or building.wall_thickness
-    if building.size[2] / building.storeys <= floor:
-        yield (
-            (*path, "storeys"),
-            f"storeys of {building.size[2] / building.storeys:.4g} m have no room above floors of {floor:g} m",
-        )
-
-
-def _gauges(case: Case) -> Iterator[Problem]:
-    for i, gauge in enumerate(case.gauge):
-        path = ("gauge", i)
-        if gauge.kind not in ("motion", "reaction") and case.water is None:
-            yield (*path, "kind"), f"a {gauge.kind} gauge measures water; write a section [water]"
-        elif gauge.kind == "volume":
-            yield from _corners_in_order(path, gauge)
-        elif gauge.kind in ("level", "pressure", "velocity") and case.tank is not None:
-            yield from _gauge_place(case, path, gauge)
-
-
-def _gauge_place(case: Case, path: KeyPath, gauge) -> Iterator[Problem]:
-    for axis, value in enumerate(gauge.at):
-        low, high = case.tank.lower[axis], case.tank.upper[axis]
-        if not low <= value <= high:
-            yield (
-                (*path, "at"),
-                f"'{gauge.name}' is outside the tank: {'xyz'[axis]} = {value:g} m, not in {low:g} to {high:g} m",
-            )
-    if len(gauge.at) == 3:
-        for _, name, box in _solids(case):
-            depth = (box.size / 2 - np.abs((np.array(gauge.at) - box.centre) @ box.rotation)).min()
-            if depth > TOUCH * box.size.min():
-                yield (
-                    (*path, "at"),
-                    f"'{gauge.name}' lies {depth:.3g} m inside the solid '{name}'; put it on the face",
-                )

@@ -51,10 +51,20 @@ def load(place: Path | str, overrides: Iterable[str] = ()) -> CaseFile:
     places = _Places(_shown(path), key_lines(text))
     for override in overrides:
         places.override(_apply(table, override), override)
+    _place_files(table, path.parent)
     case, lines = _validate(table, places)
     if lines or case is None:
         raise BadCase(lines)
     return CaseFile(case, path, overrides)
+
+
+def _place_files(table: dict, directory: Path) -> None:
+    """Paths of files of blocks are meant from the directory of the case; what is no path is refused later."""
+    structure = table.get("structure")
+    files = structure.get("file") if isinstance(structure, dict) else None
+    for entry in files if isinstance(files, list) else ():
+        if isinstance(entry, dict) and isinstance(entry.get("path"), str) and entry["path"]:
+            entry["path"] = str((directory / Path(entry["path"]).expanduser()).resolve())
 
 
 class _Places:

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from coupler.case import Case
-from coupler.case_checks import BYTES_PER_CELL, mesh_size
 from coupler.observe import joint_counts
+from coupler.place_checks import BYTES_PER_CELL, mesh_size
 from coupler.terminal import Row
 
 LONGEST_REST_STEP = 0.3

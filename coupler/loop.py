@@ -161,7 +161,7 @@ class Coupling:
 
     def _response(self, problem):
         """Mass of the blocks, the answer of all bodies to forces, and V_free of the first pass."""
-        from coupler.scheme import StructureResponse, mass_matrix
+        from coupler.scheme import StructureResponse, mass_matrix, water_load
 
         structure = self.structure
         mass = mass_matrix(structure.mass, structure.inertia())
@@ -170,18 +170,20 @@ class Coupling:
         response = StructureResponse(
             *self._with_solids(mass, *structure.tangent()), problem.dt, driven, velocity
         )
-        known = -(problem.coupling.T @ problem.known).reshape(-1, 6)
+        known = water_load(problem, 0.0)
         force = structure.gravity_force() + structure.internal_force()
         return mass, response, response.free_velocity(velocity, self._padded(force) + known)
 
     def _water_step(self, dt: float, record: StepRecord) -> None:
+        from coupler.scheme import water_load
+
         with self.clock("water"):
             problem = self.water.predict(dt)
         with self.clock("pressure"):
             result = self._solve(problem.matrix, problem.rhs, problem.guess, self.rtol)
         with self.clock("water"):
             self.water.correct(problem, result.x)
-        record.load = -(problem.coupling.T @ (result.x + problem.known)).reshape(-1, 6)
+        record.load = water_load(problem, result.x)
         record.iterations, record.passes, record.unknowns = result.iterations, 1, len(result.x)
 
     def _structure_step(self, dt: float, record: StepRecord) -> None:

@@ -15,8 +15,9 @@ C: their dashpots. Eliminating V gives one symmetric positive definite system,
     [(dt/ρ) K + G D⁻¹ Gᵀ] x = ∫ u*·∇q + G V_free,   V = V_free − D⁻¹ Gᵀ x,                             (3)
     V_free = D⁻¹ (M/dt V^n + f − Gᵀ known).
 
-The force on the bodies, −Gᵀ (x + known), is the exact adjoint of how they move the water in (1), so the power
-leaving the water through the wetted surfaces is the power given to the velocities V, to round-off.
+The force −Gᵀ (x + known) is the exact adjoint of how the bodies move the water in (1), so the power leaving the water
+through the wetted surfaces is the power given to the velocities V, to round-off. `other_load` of the water (wall
+shear; its surface in the cells of a body) is part of f.
 A second pass replaces the guess of (2) by what the discrete elements did under the first load x₁, whose mean
 velocity over the step was W:  V_free = W + D⁻¹ Gᵀ x₁.
 """
@@ -89,8 +90,8 @@ class CoupledSolution:
 
 
 def water_load(problem, x: Array) -> Array:
-    """−Gᵀ (x + known): force and moment of the water on each body, (n_bodies, 6) [N, N m]."""
-    return -(problem.coupling.T @ (x + problem.known)).reshape(-1, 6)
+    """−Gᵀ (x + known) + other_load: force and moment of the water on each body, (n_bodies, 6) [N, N m]."""
+    return problem.other_load - (problem.coupling.T @ (x + problem.known)).reshape(-1, 6)
 
 
 def solve_coupled(

@@ -203,6 +203,10 @@ def _report(water, problem, x, projected, u, clipped):
         energy(kept.nodal_water, np.where(kept.wet[:, None], wet_after, u)),
     ]
     names = ("transport and gravity", "volume correction", "pressure", "damping and limit")
+    change = dict(zip(names, np.diff(stages)))
+    if water.viscous is not None:
+        change["transport and gravity"] -= kept.shear_energy
+        change["viscosity and friction"] = kept.shear_energy
     volume = float(kept.nodal_water.sum())
     moved_by_bodies = problem.matrix @ x - problem.rhs
     return StepReport(
@@ -213,5 +217,5 @@ def _report(water, problem, x, projected, u, clipped):
         clipped,
         len(x),
         -problem.dt * float((x + problem.known) @ moved_by_bodies),
-        dict(zip(names, np.diff(stages))),
+        change,
     )

@@ -55,7 +55,7 @@ class Output(NamedTuple):
     part_moments: np.ndarray  # (parts, 10) V, c, S
     wet_part: np.ndarray  # (wetted polygons,) row of the part it bounds
     wet_body: np.ndarray  # (wetted polygons,)
-    wet: np.ndarray  # (wetted polygons, 16) area, centroid, normal, three quadrature points
+    wet: np.ndarray  # (wetted triangles, 25) area, centroid, normal, three quadrature points, corners
     open_part: np.ndarray  # (open polygons,)  pieces' faces on faces of the cell
     open_face: np.ndarray  # (open polygons,)  0..3
     open_start: np.ndarray  # (open polygons + 1,)
@@ -71,7 +71,7 @@ def output(parts: int, polygons: int, with_openings: bool) -> Output:
         np.zeros((parts, 10)),
         np.zeros(polygons, dtype=np.int64),
         np.zeros(polygons, dtype=np.int64),
-        np.zeros((polygons, 16)),
+        np.zeros((polygons, 25)),
         np.zeros(openings, dtype=np.int64),
         np.zeros(openings, dtype=np.int64),
         np.zeros(openings + 1, dtype=np.int64),
@@ -254,21 +254,41 @@ def _claim_face(w, at, r, origin, normals, round_off, least, top, part, out, n_w
         claimed, top = _claim(w, polygon, at, r, round_off, top)
         if not claimed:
             continue
-        if n_wet >= len(out.wet_part):
-            return OUTPUT_FULL, top, n_wet
-        row = out.wet[n_wet]
-        polygon_rule(w, polygon, normals[g, 0], normals[g, 1], normals[g, 2], least, row)
-        if row[0] > 0.0:
-            for c in range(3):
-                for q in (1, 7, 10, 13):
-                    row[q + c] += origin[c]
-            out.wet_part[n_wet] = part
-            out.wet_body[n_wet] = w.near_body[at]
-            n_wet += 1
+        state, n_wet = _append(w, polygon, at, g, origin, normals, least, part, out, n_wet)
+        if state != DONE:
+            return state, top, n_wet
         if polygon != top:
             copy_polygon(w, top, polygon)
         top -= 1
     return DONE, top, n_wet
+
+
+@inner
+def _append(w, polygon, at, g, origin, normals, least, part, out, n_wet):
+    """Write a polygon in plane g of body number `at` as triangles -> (state, triangles written).
+
+    Triangles, because the water surface may clip them later."""
+    triangle = len(w.corners) - 1
+    w.corners[triangle] = 3
+    for second in range(1, w.corners[polygon] - 1):
+        if n_wet >= len(out.wet_part):
+            return OUTPUT_FULL, n_wet
+        row = out.wet[n_wet]
+        for k in range(3):
+            corner = 0 if k == 0 else second + k - 1
+            for c in range(7):
+                w.polygon[triangle, k, c] = w.polygon[polygon, corner, c]
+            for c in range(3):
+                row[16 + 3 * k + c] = w.polygon[polygon, corner, 4 + c]
+        polygon_rule(w, triangle, normals[g, 0], normals[g, 1], normals[g, 2], least, row)
+        if row[0] > 0.0:
+            for c in range(3):
+                for q in (1, 7, 10, 13, 16, 19, 22):
+                    row[q + c] += origin[c]
+            out.wet_part[n_wet] = part
+            out.wet_body[n_wet] = w.near_body[at]
+            n_wet += 1
+    return DONE, n_wet
 
 
 @inner
@@ -442,7 +462,8 @@ class Cuts(NamedTuple):
     """Fluid parts of the cells that were cut, in the order of the cells.
 
     part_cell (K,) · part_whole (K,) nothing removed · moments (K, 10) V [m3], c [m], S [m5]
-    wet_part (S,) row of the part · wet_body (S,) · wet (S, 16) area [m2], centroid, normal, 3 points
+    wet_part (S,) row of the part · wet_body (S,) · wet (S, 25) triangles: area [m2], centroid, normal, 3 points,
+    3 corners
     open_part (O,), open_face (O,) 0..3 (opposite to node k), open_start (O+1,), open_x [m]: the faces of
     the parts on the faces of their cells (only with connected parts)."""
 

@@ -65,6 +65,7 @@ class PhysicalDomain:
     is_cut (M,): something was removed from the cell
     face_cell (S,) row of `cells` · face_body (S,) · face_area (S,) [m2] · face_centroid (S, 3) [m]
     face_normal (S, 3) out of the body · face_points (S, 3, 3) [m] three points, weight area / 3, degree 2
+    face_corners (S, 3, 3) [m] (the polygons are triangles)
     n_bodies · body_centre (n_bodies, 3) [m] · covers "single" or "multiple".
     """
 
@@ -82,6 +83,7 @@ class PhysicalDomain:
     face_centroid: np.ndarray
     face_normal: np.ndarray
     face_points: np.ndarray
+    face_corners: np.ndarray
     n_bodies: int
     body_centre: np.ndarray
     covers: str
@@ -293,7 +295,8 @@ def _assembled(memory: Memory, covers: str) -> PhysicalDomain:
         face_area=cuts.wet[:, 0],
         face_centroid=cuts.wet[:, 1:4],
         face_normal=cuts.wet[:, 4:7],
-        face_points=cuts.wet[:, 7:].reshape(-1, 3, 3),
+        face_points=cuts.wet[:, 7:16].reshape(-1, 3, 3),
+        face_corners=cuts.wet[:, 16:].reshape(-1, 3, 3),
         n_bodies=len(memory.bodies),
         body_centre=memory.bodies.centre,
         covers=covers,
@@ -332,7 +335,7 @@ def _restricted(domain, keep):
     used[domain.cells[keep]] = True
     wet = keep[domain.face_cell]
     of_cell = ("parent_cell", "volume", "centroid", "second", "is_cut")
-    of_face = ("face_body", "face_area", "face_centroid", "face_normal", "face_points")
+    of_face = ("face_body", "face_area", "face_centroid", "face_normal", "face_points", "face_corners")
     return replace(
         domain,
         nodes=domain.nodes[used],

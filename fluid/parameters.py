@@ -18,6 +18,9 @@ class WaterParameters:
     kick_limit: largest acceleration carried over to the next step, in g (spray).
     speed_limit: cap of the speed in units of sqrt(g H), H the height of the tank; clipped nodes are counted.
     subscale_memory: keep the element-wise remainder of the velocity correction (added mass of bodies).
+    viscosity: dynamic viscosity [Pa s]; 0 leaves the term out.
+    walls: what sides of the tank and solids do to the water along them: "slip", "no-slip" (needs viscosity) or
+    "friction" with either roughness k_s [m] (log law) or manning n [s/m^(1/3)] (bed).
     """
 
     density: float = 1000.0
@@ -31,8 +34,17 @@ class WaterParameters:
     kick_limit: float = 3.0
     speed_limit: float = 2.0 * np.sqrt(2.0)
     subscale_memory: bool = True
+    viscosity: float = 0.0
+    walls: str = "slip"
+    roughness: float | None = None
+    manning: float | None = None
     pocket_compliance: float = 1e-8
     """Compressibility of pockets without free surface, where the pressure level floats, in dt/(ρ h²)."""
+
+    @property
+    def shear(self) -> bool:
+        """Whether anything but pressure acts along walls or within the water."""
+        return self.viscosity > 0.0 or self.walls != "slip"
 
     @property
     def weight(self) -> np.ndarray:

@@ -20,6 +20,7 @@ from fluid.level_set import redistance
 from fluid.moments import cells_touching
 from fluid.projection import PressureProblem, cell_velocity, inflow, pressure_matrix, seal_pockets
 from fluid.volume import correct_volume
+from fluid.waterline import waterline_load
 
 TRANSPORT_WIDTH = 5.0
 """|φ| in cell sizes within which the level set moves; beyond, only its sign matters."""
@@ -155,8 +156,11 @@ def _problem(water, dt, theta, kick, surface, conserved, u_adv, u_star):
         surface.reinserted,
         surface.uncorrected_water,
     )
+    # before the first step there is no pressure to go by: still water
+    acted = water.pressure if water.steps else -density * water.parameters.gravity * phi
+    other = waterline_load(water.domain, phi, wet, acted, water._walls.open_node)
     coupling = water.coupling[dofs]
-    return PressureProblem(matrix, rhs[dofs] + extra, coupling, known, guess, dofs, dt, density, kept)
+    return PressureProblem(matrix, rhs[dofs] + extra, coupling, known, guess, dofs, dt, density, other, kept)
 
 
 def _carried_remainder(water, dt, theta, cells):

@@ -31,10 +31,12 @@ SMALLEST_WET_SHARE = 1e-6
 
 @dataclass(frozen=True)
 class PressureProblem:
-    """(dt/ρ) K x = rhs + G V for the unknown part x of the pressure; p = x + known acts on the bodies.
+    """(dt/ρ) K x = rhs + G V for the unknown part x of the pressure; p = x + known acts on the bodies, with the load
+    -Gᵀp + other_load.
 
     matrix csr (n, n) [m³/(s Pa)], SPD · rhs (n,) [m³/s], without body velocities · coupling csr (n, 6 n_bodies)
-    [m², m³] · known (n,) [Pa] · guess (n,) [Pa] · dofs (n,) node of each unknown · dt [s] · density [kg/m³].
+    [m², m³] · known (n,) [Pa] · guess (n,) [Pa] · dofs (n,) node of each unknown · dt [s] · density [kg/m³] ·
+    other_load (n_bodies, 6) [N, N m]: what the pressure does not do (wall shear) or does otherwise (`waterline.py`).
     """
 
     matrix: sp.csr_array
@@ -45,6 +47,7 @@ class PressureProblem:
     dofs: np.ndarray
     dt: float
     density: float
+    other_load: np.ndarray
     predicted: object = None
     """What the water keeps between predict and correct."""
 

@@ -1,4 +1,4 @@
-"""Sides of the tank: closed (u·n = 0 on their nodes, the water slips) or open (p = 0, the water leaves)."""
+"""Sides of the tank: closed (u·n = 0 on their nodes and the water slips, or u = 0) or open (p = 0, water leaves)."""
 
 from __future__ import annotations
 
@@ -13,42 +13,91 @@ _SAME_DIRECTION = 0.3
 @dataclass(frozen=True)
 class Walls:
     """nodes (n,) on closed sides · projector (n, 3, 3) onto the directions they leave free ·
-    open_node (N,) bool, p = 0 · open_faces (F, 3) nodes, open_area (F, 3) [m²] outward area vectors."""
+    open_node (N,) bool, p = 0; open_nodes (k,) the same, open_projector (k, 3, 3) onto their normals ·
+    open_faces (F, 3) nodes, open_area (F, 3) [m²] outward area vectors ·
+    rough_faces (C, 3), rough_area (C, 3) [m²], rough_cell (C,) background cell: the same of closed sides that may hold
+    or rub the water."""
 
     nodes: np.ndarray
     projector: np.ndarray
     open_node: np.ndarray
+    open_nodes: np.ndarray
+    open_projector: np.ndarray
     open_faces: np.ndarray
     open_area: np.ndarray
+    rough_faces: np.ndarray
+    rough_area: np.ndarray
+    rough_cell: np.ndarray
 
     @classmethod
-    def of(cls, mesh, is_open=None) -> Walls:
-        """is_open: function of face normals (B, 3) and centres (B, 3) [m] → (B,) bool; None: all closed."""
+    def of(cls, mesh, is_open=None, is_smooth=None, no_slip: bool = False) -> Walls:
+        """is_open: function of face normals (B, 3) and centres (B, 3) [m] → (B,) bool; None: all closed.
+        is_smooth: the same, closed sides along which water slips whatever the walls do; None: none.
+        no_slip: the other closed sides hold the water, u = 0."""
         x = mesh.nodes[mesh.boundary_faces]
         area = 0.5 * np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
-        opened = np.zeros(len(x), bool) if is_open is None else is_open(mesh.boundary_normal, x.mean(axis=1))
+        opened, smooth = (
+            np.zeros(len(x), bool) if chosen is None else chosen(mesh.boundary_normal, x.mean(axis=1))
+            for chosen in (is_open, is_smooth)
+        )
         open_node = np.zeros(len(mesh.nodes), bool)
         open_node[mesh.boundary_faces[opened]] = True
-        nodes, projector = _projectors(mesh.boundary_faces[~opened], area[~opened])
-        return cls(nodes, projector, open_node, mesh.boundary_faces[opened], area[opened])
+        open_nodes, tangential = _projectors(mesh.boundary_faces[opened], area[opened])
+        faces, closed = mesh.boundary_faces, ~opened
+        nodes, projector = _projectors(faces[closed], area[closed])
+        rough = closed & ~smooth
+        if no_slip:
+            projector[np.isin(nodes, faces[rough])] = 0.0
+        of_rough = (faces[rough], area[rough], mesh.boundary_cell[rough])
+        opening = (open_node, open_nodes, np.eye(3) - tangential)
+        return cls(nodes, projector, *opening, faces[opened], area[opened], *of_rough)
 
     def on_copies(self, parent_node) -> Walls:
         """The same sides for nodes that are copies of background nodes, parent_node (N,)."""
         if np.array_equal(parent_node, np.arange(len(self.open_node))):
             return self
-        place = np.full(len(self.open_node), -1)
-        place[self.nodes] = np.arange(len(self.nodes))
-        copies = np.flatnonzero(place[parent_node] >= 0)
-        projector = self.projector[place[parent_node[copies]]]
+        copies, row = _copies(self.nodes, parent_node)
+        open_copies, open_row = _copies(self.open_nodes, parent_node)
         first = np.full(len(self.open_node), -1)
         first[parent_node[::-1]] = np.arange(len(parent_node))[::-1]
-        faces = first[self.open_faces]
-        kept = (faces >= 0).all(axis=1)
-        return Walls(copies, projector, self.open_node[parent_node], faces[kept], self.open_area[kept])
+        faces, rough = first[self.open_faces], first[self.rough_faces]
+        kept, left = (faces >= 0).all(axis=1), (rough >= 0).all(axis=1)
+        return Walls(
+            copies,
+            self.projector[row],
+            self.open_node[parent_node],
+            open_copies,
+            self.open_projector[open_row],
+            faces[kept],
+            self.open_area[kept],
+            rough[left],
+            self.rough_area[left],
+            self.rough_cell[left],
+        )
+
+    def restriction(self):
+        """Nodes (n,) on sides and projectors (n, 3, 3) onto what stresses in the water may change there: what closed
+        sides leave free, and only the normal velocity on open ones."""
+        place = np.searchsorted(self.nodes, self.open_nodes)
+        place = np.minimum(place, max(len(self.nodes) - 1, 0))
+        both = self.nodes[place] == self.open_nodes if len(self.nodes) else np.zeros(len(place), bool)
+        projector = self.projector.copy()
+        P = projector[place[both]]
+        projector[place[both]] = P @ self.open_projector[both] @ P
+        nodes = np.concatenate([self.nodes, self.open_nodes[~both]])
+        return nodes, np.concatenate([projector, self.open_projector[~both]])
 
     def slip(self, u) -> None:
         """Take the part into the closed sides off u (N, 3), in place."""
         u[self.nodes] = np.einsum("nij,nj->ni", self.projector, u[self.nodes])
+
+
+def _copies(nodes, parent_node):
+    """Copies (m,) of the background nodes, in order, and the row in `nodes` of each."""
+    place = np.full(max(parent_node.max(), nodes.max(initial=0)) + 1, -1)
+    place[nodes] = np.arange(len(nodes))
+    copies = np.flatnonzero(place[parent_node] >= 0)
+    return copies, place[parent_node[copies]]
 
 
 def _projectors(faces, area):

@@ -17,11 +17,11 @@ from numba import njit
 
 from fluid.corrector import Corrected, corrected
 from fluid.domain import carry, wetted_coupling
-from fluid.extension import BAND, fill_missing
+from fluid.extension import BAND, continue_into_solids, fill_missing
 from fluid.level_set import FAR, redistance, without_films
 from fluid.mesh import Background
 from fluid.parameters import WaterParameters
-from fluid.predictor import predicted
+from fluid.predictor import keep_dry, predicted
 from fluid.projection import PressureProblem
 from fluid.topology import Graph, Topology, layers_around
 from fluid.volume import carry_volume, edge_flux, nodal_volume, renumbering
@@ -58,12 +58,16 @@ class Water:
 
     mesh: Background · domain: PhysicalDomain of it · fill: points (n, 3) [m] → signed distance (n,) [m], negative
     in the water, or the level set (N,) itself · is_open: (normals (B, 3), centres (B, 3)) → bool (B,), sides of
-    the tank that let water out; None: all closed.
+    the tank that let water out; None: all closed · is_smooth: the same, sides that stay smooth whatever
+    `parameters.walls` says.
 
     State at the nodes of the domain: level_set (N,) [m], velocity (N, 3) [m/s], acceleration (N, 3) [m/s²],
     pressure (N,) [Pa] that acted over the last step, end_pressure (N,) [Pa] that goes with the acceleration at its end
     (the two differ by up to 1/θ in an impact), nodal_water (N,) [m³]; at its cells: remainder (M, 3) [m/s], what the
     nodes could not hold of the velocity correction.  Velocity goes on for some layers outside the water.
+
+    body_velocity (n_bodies, 6) [m/s, rad/s] about the centres: set it before `predict` where solids that move drag the
+    water along (viscosity, friction); it is not used otherwise.
     """
 
     def __init__(
@@ -73,17 +77,19 @@ class Water:
         fill: Callable | np.ndarray,
         parameters: WaterParameters | None = None,
         is_open: Callable | None = None,
+        is_smooth: Callable | None = None,
     ):
         self.mesh, self.parameters = mesh, parameters or WaterParameters()
         self.time, self.steps = 0.0, 0
         self._surface_lag, self._solids_move = 0.0, False
         self.report: StepReport | None = None
-        self._sides = Walls.of(mesh, is_open)
+        self._sides = Walls.of(mesh, is_open, is_smooth, no_slip=self.parameters.walls == "no-slip")
+        self.viscous = _viscosity(self.parameters)
+        self.body_velocity = np.zeros((domain.n_bodies, 6))
         self._set_domain(domain)
         n = len(self.topology.nodes)
         level = fill(self.topology.nodes) if callable(fill) else np.asarray(fill, float)
-        level = redistance(self.topology, self._dry_if_inactive(level), mesh.spacing, rescale=False)
-        self.level_set = without_films(level, mesh.spacing)
+        self.level_set = self._first_surface(self._dry_if_inactive(level))
         self.velocity, self.acceleration = np.zeros((n, 3)), np.zeros((n, 3))
         self.pressure = self._pressure_at_rest()
         self.end_pressure = self.pressure.copy()
@@ -100,6 +106,17 @@ class Water:
         self.flux = edge_flux(
             self.topology, self.graph_for(self.listed), self.listed, self.cell_velocity, self.nodal_water
         )
+
+    def _first_surface(self, level):
+        """φ (N,) as the steps make it, so that the first one finds nothing to correct beside solids."""
+        t, h = self.topology, self.mesh.spacing
+        level = redistance(t, level, h, rescale=False)
+        for _ in range(2):  # the first continuation still sees a surface bent inside the solids
+            held = nodal_volume(t, level)
+            continue_into_solids(t, level, self.layers((level < 0.0) & t.active)[0])
+            keep_dry(t, level, held)
+            level = redistance(t, level, h, rescale=False)
+        return without_films(level, h)
 
     # ---- the step
 
@@ -216,6 +233,19 @@ class Water:
     def _dry_if_inactive(self, level):
         return np.where(self.topology.active, level, FAR * self.mesh.spacing)
 
+    # ---- sides of the tank
+
+    def held_by_sides(self):
+        """Nodes (n,) on the sides of the tank and projectors (n, 3, 3) onto what friction and viscosity may change."""
+        return self._walls.restriction()
+
+    def rough_faces(self):
+        """Faces of the closed sides that rub the water: (nodes (C, 3), outward area (C, 3) [m²], cell (C,))."""
+        w = self._walls
+        cell = self.topology.row_of_parent[w.rough_cell]
+        there = cell >= 0
+        return w.rough_faces[there], w.rough_area[there], cell[there]
+
     # ---- figures
 
     def volume(self) -> float:
@@ -251,6 +281,15 @@ class Water:
         p, volume = self.parameters, self.volume()
         spread = p.density * p.gravity * volume * (low[2] + 0.5 * volume / area)
         return self.kinetic_energy() + max(self.potential_energy() - spread, 0.0)
+
+
+def _viscosity(parameters: WaterParameters):
+    """The viscous stage, or None where the case has neither viscosity nor rough walls."""
+    if not parameters.shear:
+        return None
+    from fluid.viscosity import Viscosity
+
+    return Viscosity(parameters)
 
 
 def kinetic_energy(density: float, nodal_water, velocity) -> float:

@@ -16,6 +16,7 @@ class FakeProblem:
     coupling: sp.csr_array
     known: np.ndarray
     guess: np.ndarray
+    other_load: np.ndarray
 
 
 def piston_column(length=1.0, area=1.0, cells=10, dt=0.01, density=1000.0, known=0.0) -> FakeProblem:
@@ -35,6 +36,7 @@ def piston_column(length=1.0, area=1.0, cells=10, dt=0.01, density=1000.0, known
         sp.csr_array(coupling),
         np.full(cells, known),
         np.zeros(cells),
+        np.zeros((1, 6)),
     )
 
 

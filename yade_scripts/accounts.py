@@ -75,7 +75,7 @@ class Accounts:
         """See `Structure.energies`."""
         e = self.mechanical()
         e["load_work"], e["driving_work"] = self.load_work, self.driving_work
-        e["joint_damping"] = self._joint_column(joint_kernel.DAMPED)
+        e["joint_damping"] = 0.0 if self._joints is None else float(self._joints.damped.sum())
         e["joint_dissipated"] = -self.joint_work - e["joint_stored"] - e["joint_damping"] - self.handed_over
         e["dashpot"] = e["friction"] = 0.0
         if self._contacts is not None:
@@ -85,7 +85,7 @@ class Accounts:
 
     def law_dissipation(self) -> float:
         """See `Structure.law_dissipation`."""
-        return self._joint_column(joint_kernel.DISSIPATED)
+        return 0.0 if self._joints is None else float(self._joints.lost().sum())
 
     def mechanical(self) -> dict[str, float]:
         """Kinetic and potential energies."""
@@ -106,7 +106,7 @@ class Accounts:
         if self._joints is None or not len(self._joints.live):
             return 0.0
         m = self._motion
-        return joint_kernel.stored_between(*self._joints.arrays(), m.x, m.R, *m.before())
+        return float(self._joints.stored_between(m.x, m.R, *m.before()).sum())
 
     def contact_stored(self) -> float:
         """Springs of the contacts half a substep ago: 1/2 k u(t) u(t - dt) in the normals [J]."""
@@ -117,9 +117,6 @@ class Accounts:
         depth = np.maximum(c.depth, 0.0)
         normal = 0.5 * c.kn * depth * np.maximum(depth - m.dt * closing, 0.0)
         return float(np.sum(normal + 0.5 * (c.shear_force**2).sum(axis=1) / c.ks))
-
-    def _joint_column(self, column: int) -> float:
-        return 0.0 if self._joints is None else float(self._joints.energy[:, column].sum())
 
     def sums(self) -> dict[str, float]:
         """What `restore` needs."""

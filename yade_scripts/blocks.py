@@ -6,11 +6,12 @@ World position of a body point:  x = c + R ξ.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
+
+from yade_scripts.polyhedra import BlockError, Faces, convex_polyhedron, face_planes, polyhedron_moments
 
 Array = np.ndarray
 
@@ -22,15 +23,15 @@ BOX_FACES = ((0, 4, 7, 3), (1, 2, 6, 5), (0, 1, 5, 4), (3, 7, 6, 2), (0, 3, 2, 1
 """Corners of each face seen from outside, in the order -x +x -y +y -z +z."""
 
 
-class BlockError(ValueError):
-    """A block that cannot be built; the message names the block, the quantity, its value and the remedy."""
+BOX_NORMALS = np.repeat(np.eye(3), 2, axis=0) * np.array([-1.0, 1.0] * 3)[:, None]
 
 
 @dataclass(frozen=True)
 class Block:
     """One rigid block.
 
-    name: unique · group: free text for reports (wall, floor, ...) · centre (3,) [m] centre of mass, world
+    name: unique · group: free text for reports (wall, floor, ...) · material: what friction by pairs goes by
+    centre (3,) [m] centre of mass, world
     size (3,) [m] of a box, or vertices (k, 3) [m] with faces (lists of rows of vertices, seen from outside)
     of a convex polyhedron; vertices may have any origin, they are moved to the centre of mass
     rotation (3, 3): body frame → world · density [kg/m³] · velocity (3,) [m/s] · spin (3,) [rad/s]
@@ -41,7 +42,7 @@ class Block:
     centre: Array
     size: Array | None = None
     vertices: Array | None = None
-    faces: tuple[tuple[int, ...], ...] | None = None
+    faces: Faces | None = None
     rotation: Array = field(default_factory=lambda: np.eye(3))
     density: float = 2400.0
     group: str = "block"
@@ -78,12 +79,26 @@ class Block:
         object.__setattr__(self, "faces", BOX_FACES)
 
     def _as_polyhedron(self) -> None:
-        vertices = np.asarray(self.vertices, float)
-        faces = self.faces if self.faces is not None else hull_faces(self.name, vertices)
-        check_convex(self.name, vertices, faces)
+        vertices, faces = convex_polyhedron(self.name, self.vertices, self.faces)
+        object.__setattr__(self, "vertices", vertices - polyhedron_moments(vertices, faces)[1])
+        object.__setattr__(self, "faces", faces)
+
+    @classmethod
+    def standing(
+        cls, name: str, vertices: Array, faces: Faces | None = None, tolerance: float | None = None, **more
+    ) -> Block:
+        """The convex polyhedron whose corners are at vertices (k, 3) [m] in the world, turned by `rotation` if given.
+
+        tolerance [m]: what corners may lie off the planes of their faces, None: their rounding."""
+        vertices, faces = convex_polyhedron(name, vertices, faces, tolerance)
         centre = polyhedron_moments(vertices, faces)[1]
-        object.__setattr__(self, "vertices", vertices - centre)
-        object.__setattr__(self, "faces", tuple(tuple(int(i) for i in f) for f in faces))
+        return cls(name, centre, vertices=vertices - centre, faces=faces, **more)
+
+    def changed(self, **changes) -> Block:
+        """The same block, changed in what is given."""
+        if self.is_box:
+            changes = {"vertices": None, "faces": None} | changes
+        return replace(self, **changes)
 
     @property
     def is_box(self) -> bool:
@@ -111,8 +126,9 @@ class Block:
     @cached_property
     def planes(self) -> tuple[Array, Array]:
         """Outward normals (f, 3) and offsets (f,) of the faces, body frame: inside is normals @ x <= offsets."""
-        normals = np.array([face_normal(self.vertices[list(f)]) for f in self.faces])
-        return normals, np.array([n @ self.vertices[f[0]] for n, f in zip(normals, self.faces)])
+        if self.is_box:
+            return BOX_NORMALS, 0.5 * np.repeat(self.size, 2)
+        return face_planes(self.vertices, self.faces)
 
     @property
     def radius(self) -> float:
@@ -128,74 +144,3 @@ def check_rotation(name: str, rotation: Array) -> None:
     """Raise BlockError unless rotation is a proper orthogonal matrix (to 1e-9)."""
     if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-9 or np.linalg.det(rotation) < 0.0:
         raise BlockError(f"block '{name}': rotation is not a proper rotation matrix:\n{rotation}")
-
-
-def face_normal(corners: Array) -> Array:
-    """Unit normal of a planar polygon (k, 3), right-handed about the order of its corners (Newell's sum)."""
-    area = polygon_area_vector(corners)
-    return area / np.linalg.norm(area)
-
-
-def polygon_area_vector(corners: Array) -> Array:
-    """Area times unit normal of a planar polygon (k, 3) [m²]."""
-    arm = corners - corners[0]
-    return 0.5 * np.cross(arm[1:-1], arm[2:]).sum(axis=0)
-
-
-def polyhedron_moments(vertices: Array, faces) -> tuple[float, Array, Array]:
-    """Volume [m³], centroid (3,) [m] and central second moments ∫ ξξᵀ dV (3, 3) [m⁵] of a closed polyhedron.
-
-    Exact: sum over tetrahedra spanned by an inner point and the triangles of the faces;
-    over one with corners p₀..p₃, ∫ xxᵀ dV = V/20 (Σ pᵢpᵢᵀ + (Σpᵢ)(Σpᵢ)ᵀ).
-    """
-    origin = vertices.mean(axis=0)
-    x = vertices - origin
-    tri = np.array([(f[0], f[i], f[i + 1]) for f in faces for i in range(1, len(f) - 1)])
-    p = x[tri]
-    volume = np.einsum("ij,ij->i", p[:, 0], np.cross(p[:, 1], p[:, 2])) / 6.0
-    total = p.sum(axis=1)
-    V = volume.sum()
-    centroid = (volume[:, None] * total).sum(axis=0) / (4.0 * V)
-    second = np.einsum("t,tia,tib->ab", volume, p, p) + np.einsum("t,ta,tb->ab", volume, total, total)
-    return float(V), origin + centroid, second / 20.0 - V * np.outer(centroid, centroid)
-
-
-def hull_faces(name: str, vertices: Array) -> tuple[tuple[int, ...], ...]:
-    """Faces of the convex hull of vertices (k, 3): coplanar triangles are merged, corners seen from outside."""
-    try:
-        hull = ConvexHull(vertices)
-    except QhullError as error:
-        raise BlockError(f"block '{name}': its {len(vertices)} vertices span no volume") from error
-    merged: list[tuple[Array, set]] = []
-    for simplex, plane in zip(hull.simplices, hull.equations):
-        for known, corners in merged:
-            if np.abs(known - plane).max() < 1e-9 * max(1.0, np.abs(vertices).max()):
-                corners.update(simplex.tolist())
-                break
-        else:
-            merged.append((plane, set(simplex.tolist())))
-    return tuple(_ordered(vertices, np.array(sorted(c)), plane[:3]) for plane, c in merged)
-
-
-def _ordered(vertices: Array, corners: Array, normal: Array) -> tuple[int, ...]:
-    e1 = vertices[corners[1]] - vertices[corners[0]]
-    e1 = e1 / np.linalg.norm(e1)
-    e2 = np.cross(normal, e1)
-    arm = vertices[corners] - vertices[corners].mean(axis=0)
-    return tuple(corners[np.argsort(np.arctan2(arm @ e2, arm @ e1))].tolist())
-
-
-def check_convex(name: str, vertices: Array, faces) -> None:
-    """Raise BlockError where a vertex lies outside a face plane, or the faces do not close."""
-    extent = np.ptp(vertices, axis=0).max()
-    for index, face in enumerate(faces):
-        n = face_normal(vertices[list(face)])
-        height = (vertices - vertices[face[0]]) @ n
-        if height.max() > 1e-7 * extent:
-            raise BlockError(
-                f"block '{name}' is not convex (or face {index} is seen from inside): vertex {height.argmax()} lies "
-                f"{height.max():.3g} m outside face {index}; split it into convex blocks"
-            )
-    gap = sum(polygon_area_vector(vertices[list(f)]) for f in faces)
-    if np.abs(gap).max() > 1e-7 * extent**2:
-        raise BlockError(f"block '{name}' is not closed: its face areas sum to {gap} m², not to zero")

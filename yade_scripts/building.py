@@ -12,7 +12,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from yade_scripts.blocks import Block, BlockError
+from yade_scripts.blocks import Block
+from yade_scripts.generators.cuts import equal_cuts
+from yade_scripts.polyhedra import BlockError
 
 Array = np.ndarray
 
@@ -47,7 +49,7 @@ class Building:
     block: edge of a block along walls and slabs [m]
     course: height of a block in the walls [m] (None: as `block`)
     storeys: number of storeys (slabs between them) · roof: slab on top · openings: doors and windows
-    density [kg/m³].
+    density [kg/m³] · material: of its blocks
     """
 
     lower: Array
@@ -63,6 +65,7 @@ class Building:
     density: float = 2400.0
     openings: tuple[Opening, ...] = field(default_factory=tuple)
     name: str = "building"
+    material: str = "block"
 
     def __post_init__(self):
         span = np.asarray(self.upper, float) - np.asarray(self.lower, float)
@@ -160,7 +163,9 @@ def _part_blocks(part: _Part, b: Building) -> list[Block]:
         centre = 0.5 * (low + high)
         if not any(o.holds(centre) for o in openings):
             name = f"{part.name}-{i}-{j}-{k}"
-            found.append(Block(name, centre, size=high - low, density=b.density, group=part.group))
+            found.append(
+                Block(name, centre, size=high - low, density=b.density, group=part.group, material=b.material)
+            )
     return found
 
 
@@ -174,7 +179,7 @@ def _part_cuts(part: _Part, axis: int, openings: list[Opening]) -> Array:
     fixed = _apart(fixed, SAME * size)
     wished = [c for c in part.wished[axis] if low < c < high and np.abs(fixed - c).min() > CLOSE * size]
     ends = _apart([*fixed, *wished], SAME * size)
-    pieces = [_cuts(start, end, edge)[:-1] for start, end in pairwise(ends)]
+    pieces = [equal_cuts(start, end, edge)[:-1] for start, end in pairwise(ends)]
     return np.concatenate([*pieces, [high]])
 
 
@@ -182,11 +187,6 @@ def _apart(cuts, distance: float) -> Array:
     """Sorted cuts without those within `distance` of the one before."""
     cuts = np.sort(np.asarray(cuts, float))
     return cuts[np.concatenate([[True], np.diff(cuts) > distance])]
-
-
-def _cuts(low: float, high: float, edge: float) -> Array:
-    """Ends of equal blocks between low and high, none longer than about `edge`."""
-    return np.linspace(low, high, max(1, round((high - low) / edge)) + 1)
 
 
 def wall_blocks(
@@ -210,8 +210,8 @@ def wall_blocks(
     if along not in ("x", "y"):
         raise BlockError(f"wall '{name}': along = {along!r}; it must be 'x' or 'y'")
     axis = 0 if along == "x" else 1
-    levels = _cuts(0.0, height, course)
-    regular = _cuts(0.0, length, block)
+    levels = equal_cuts(0.0, height, course)
+    regular = equal_cuts(0.0, length, block)
     half = 0.5 * (regular[1] - regular[0])
     shifted = np.concatenate([[0.0], regular[:-1] + half, [length]])
     blocks = []
@@ -245,7 +245,7 @@ def column_blocks(name: str, foot, size, count: int, density: float = 2400.0) ->
 def divided_box(name: str, lower, size, block, density: float = 2400.0, group: str = "wall") -> list[Block]:
     """A box lower (3,) + size (3,) [m] divided into equal blocks of edges near `block` (3,) [m], in stack bond."""
     lower, size = np.asarray(lower, float), np.asarray(size, float)
-    x, y, z = (_cuts(a, a + s, edge) for a, s, edge in zip(lower, size, block))
+    x, y, z = (equal_cuts(a, a + s, edge) for a, s, edge in zip(lower, size, block))
     found = []
     for i, j, k in np.ndindex(len(x) - 1, len(y) - 1, len(z) - 1):
         low, high = np.array([x[i], y[j], z[k]]), np.array([x[i + 1], y[j + 1], z[k + 1]])

@@ -1,38 +1,58 @@
-"""Cohesive law in polynomial form (paper eq. 4; Needleman, J. Appl. Mech. 54 (1987) 525) with history and mixed mode.
+"""What a cohesive law is, and the parameters of the joints.
 
-    T = 27/4 T_max r (1 - r)²,  r = δ/δ_f ≤ 1, else 0;   peak T_max at r = 1/3;   G_c = 9/16 T_max δ_f        (4)
+With r = λ/δ_f, λ = largest opening so far, and p the place of the peak, a law gives two functions without dimensions:
 
-Secant form for normal opening δ_n, sliding δ_t and history λ = max sqrt(<δ_n>² + β² |δ_t|²):
+    secant   s(r, p) = T/(T_max r),    work   w(r, p) = ∫₀^r T/T_max dr'           0 ≤ r ≤ 1
 
-    k_s = k_0 (1 - λ/δ_f)²,   k_0 = 27/4 T_max/δ_f
-    t_n = k_s δ_n (δ_n > 0),  k_c δ_n (δ_n < 0),   t_t = β² k_s δ_t
-
-so unloading goes to the origin and damage never heals. Areas, works and stiffnesses are per unit area of the joint.
-All functions take floats or arrays and run inside numba kernels as well. Openings [m], tractions [Pa], works [J/m²].
+and everything else follows from them: k_s = s T_max/δ_f, k_0 = k_s(0), W = w T_max δ_f, G_c = W(1), energy lost for
+good D = W - k_s λ²/2. Unloading goes to the origin and damage never heals. Beyond r = 1 nothing holds.
+Tractions, works and stiffnesses are per unit area of the joint.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
-from numba import vectorize
 
-ENERGY_SHARE = 9.0 / 16.0
-"""G_c / (T_max δ_f)."""
-STIFFNESS_SHARE = 27.0 / 4.0
-"""k_0 δ_f / T_max."""
+from yade_scripts import laws, mixed_modes, quadrature
+
+Array = np.ndarray
 
 
 class JointParameterError(ValueError):
     """A joint parameter out of range; the message names it, its value and the range."""
+
+    exit_code = 2
+
+
+@dataclass(frozen=True)
+class CohesiveLaw:
+    """secant(r, p), work(r, p): numba functions of floats, 0 ≤ r ≤ 1; the joint cuts the secant off at 1 itself
+
+    peak: p where the user gives none · lowest_peak, highest_peak: what p may be
+    points: Gauss points along an edge that a joint as stiff in closing as in opening needs
+    potential: whether Needleman's potential of 1987 belongs to it
+    """
+
+    secant: Callable[[float, float], float]
+    work: Callable[[float, float], float]
+    peak: float
+    lowest_peak: float
+    highest_peak: float
+    points: int = 3
+    potential: bool = False
 
 
 @dataclass(frozen=True)
 class JointParameters:
     """strength T_max [Pa] · opening_at_failure δ_f [m] · shear_ratio β · closing_ratio k_c/k_0
     damping: share of critical damping of the stiffest joint mode, acts as a stiffness-proportional dashpot
-    points: Gauss points along each edge of a joined face · ground: join faces that stand on the ground too
+    points: Gauss points along each edge of a joined face, "auto": as many as the law and k_c/k_0 need
+    ground: join faces that stand on the ground too · law: file of `yade_scripts/laws` · peak: opening at T_max over
+    δ_f, None: that of the law · mixed_mode: how opening and sliding act together, see `mixed_modes`
     """
 
     strength: float
@@ -40,8 +60,11 @@ class JointParameters:
     shear_ratio: float = 1.0
     closing_ratio: float = 1.0
     damping: float = 0.0
-    points: int = 3
+    points: int | Literal["auto"] = "auto"
     ground: bool = True
+    law: str = "polynomial"
+    peak: float | None = None
+    mixed_mode: str = "effective"
 
     def __post_init__(self):
         for name in ("strength", "opening_at_failure", "shear_ratio", "closing_ratio"):
@@ -50,15 +73,51 @@ class JointParameters:
                 raise JointParameterError(f"joints.{name} = {value}; it must be positive and finite")
         if not 0.0 <= self.damping < 1.0:
             raise JointParameterError(f"joints.damping = {self.damping}; it must lie in [0, 1)")
-        if not 1 <= self.points <= 10:
+        if self.points != "auto" and not 1 <= self.points <= quadrature.MOST:
             raise JointParameterError(
-                f"joints.points = {self.points}; it must lie in 1..10 (3 is exact to 1 %)"
+                f"joints.points = {self.points}; it must be 'auto' or lie in 1..{quadrature.MOST}"
             )
+        self._check_law()
+
+    def _check_law(self) -> None:
+        low, high = self.cohesive_law.lowest_peak, self.cohesive_law.highest_peak
+        if not low <= self.peak_share <= high:
+            raise JointParameterError(
+                f"joints.peak = {self.peak}; the law '{self.law}' has its peak at "
+                + (f"{low:.4g} δ_f, leave it out" if low == high else f"{low:g} to {high:g} δ_f")
+            )
+        mixed_modes.find(self.mixed_mode)
+        if self.mixed_mode == "needleman" and not self.cohesive_law.potential:
+            raise JointParameterError(
+                f"joints.mixed_mode = 'needleman' with joints.law = '{self.law}'; the potential belongs to the law "
+                "'polynomial', use that or mixed_mode = 'effective'"
+            )
+
+    @property
+    def cohesive_law(self) -> CohesiveLaw:
+        """The law by its name."""
+        return laws.find(self.law)
+
+    @property
+    def peak_share(self) -> float:
+        """p, opening at T_max over δ_f."""
+        return self.cohesive_law.peak if self.peak is None else self.peak
+
+    def _share(self, function, r: Array) -> Array:
+        """A function of the law at r (n,) without dimensions, in plain Python: nothing to compile."""
+        return np.reshape([function.py_func(q, self.peak_share) for q in np.ravel(r)], np.shape(r))
+
+    @property
+    def rule(self) -> quadrature.Rule:
+        """Points and weights along an edge of a joined face."""
+        if self.points == "auto":
+            return quadrature.enough(self.closing_ratio, self.cohesive_law.points)
+        return quadrature.gauss(self.points)
 
     @property
     def stiffness(self) -> float:
         """k_0 [Pa/m]."""
-        return STIFFNESS_SHARE * self.strength / self.opening_at_failure
+        return float(self._share(self.cohesive_law.secant, 0.0)) * self.strength / self.opening_at_failure
 
     @property
     def closing_stiffness(self) -> float:
@@ -68,49 +127,23 @@ class JointParameters:
     @property
     def work_of_separation(self) -> float:
         """G_c [J/m²]."""
-        return ENERGY_SHARE * self.strength * self.opening_at_failure
+        return float(self.work_of_opening(self.opening_at_failure))
 
+    def secant_stiffness(self, largest: Array) -> Array:
+        """k_s of the largest opening so far (n,) [m], zero from δ_f on   →   (n,) [Pa/m]."""
+        r = np.asarray(largest, float) / self.opening_at_failure
+        share = np.where(r < 1.0, self._share(self.cohesive_law.secant, np.minimum(r, 1.0)), 0.0)
+        return share * self.strength / self.opening_at_failure
 
-@vectorize(["f8(f8,f8,f8)"], cache=True)
-def traction(opening, strength, opening_at_failure):
-    """T = 27/4 T_max r (1 - r)² for 0 ≤ r = δ/δ_f ≤ 1, else 0   (paper eq. 4) [Pa]."""
-    r = opening / opening_at_failure
-    return 6.75 * strength * r * (1.0 - r) ** 2 if 0.0 < r < 1.0 else 0.0
+    def traction(self, opening: Array) -> Array:
+        """T of an opening (n,) [m] that is the largest so far   →   (n,) [Pa]."""
+        return self.secant_stiffness(np.maximum(opening, 0.0)) * np.maximum(opening, 0.0)
 
+    def work_of_opening(self, largest: Array) -> Array:
+        """W = ∫ T dδ up to the opening (n,) [m], G_c beyond δ_f   →   (n,) [J/m²]."""
+        r = np.minimum(np.asarray(largest, float) / self.opening_at_failure, 1.0)
+        return self._share(self.cohesive_law.work, r) * self.strength * self.opening_at_failure
 
-@vectorize(["f8(f8,f8,f8)"], cache=True)
-def secant_stiffness(largest, stiffness, opening_at_failure):
-    """k_s = k_0 (1 - λ/δ_f)², zero beyond failure [Pa/m]."""
-    r = largest / opening_at_failure
-    return stiffness * (1.0 - r) ** 2 if r < 1.0 else 0.0
-
-
-@vectorize(["f8(f8,f8,f8)"], cache=True)
-def work_of_opening(largest, stiffness, opening_at_failure):
-    """W(λ) = ∫₀^λ T dδ = k_0 δ_f² (r²/2 - 2r³/3 + r⁴/4), G_c beyond failure [J/m²]."""
-    r = min(largest / opening_at_failure, 1.0)
-    return stiffness * opening_at_failure**2 * (r * r / 2.0 - 2.0 * r**3 / 3.0 + r**4 / 4.0)
-
-
-@vectorize(["f8(f8,f8,f8)"], cache=True)
-def dissipated(largest, stiffness, opening_at_failure):
-    """Work that damage λ has taken for good: W(λ) - k_s λ²/2 [J/m²]."""
-    r = min(largest / opening_at_failure, 1.0)
-    return stiffness * opening_at_failure**2 * (2.0 * r**3 / 6.0 - r**4 / 4.0)
-
-
-@vectorize(["f8(f8,f8,f8,f8)"], cache=True)
-def step_stiffness(before, after, stiffness, opening_at_failure):
-    """Secant stiffness that acts over a substep in which λ grows from `before` to `after` [Pa/m].
-
-    Slow opening: k_s(after). Fast opening: the mean traction over the path, [W(after) - W(before)]/(Δλ after), so
-    that a joint torn open in a few substeps still takes G_c. Weight of the mean: min(1, (4 Δλ/δ_f)²).
-    """
-    ks = secant_stiffness(after, stiffness, opening_at_failure)
-    grown = after - before
-    if grown <= 0.0:
-        return ks
-    share = min(1.0, (4.0 * grown / opening_at_failure) ** 2)
-    work = work_of_opening(after, stiffness, opening_at_failure)
-    work -= work_of_opening(before, stiffness, opening_at_failure)
-    return (1.0 - share) * ks + share * work / (grown * after)
+    def dissipated(self, largest: Array) -> Array:
+        """D = W - k_s λ²/2, what damage λ (n,) [m] has taken for good   →   (n,) [J/m²]."""
+        return self.work_of_opening(largest) - 0.5 * self.secant_stiffness(largest) * np.square(largest)

@@ -6,9 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from yade_scripts.blocks import Block, BlockError, polygon_area_vector
+from yade_scripts.blocks import Block, BlockError
 from yade_scripts.contact import ContactError
 from yade_scripts.joints import Joints
+from yade_scripts.polyhedra import polygon_area_vector
 
 Array = np.ndarray
 

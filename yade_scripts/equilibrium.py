@@ -3,10 +3,12 @@
 A building whose weight comes on at once swings to twice its deflection, and may break before anything has hit it. So
 the joined blocks are moved to their equilibrium first,
 
-    f(u) = f_joints(u) + f_weight + f_load = 0,      K_sec(u) Δu = f(u),   u ← u + Δu,
+    f(u) = f_joints(u) + f_weight + f_load = 0,      K(u) Δu = f(u),   u ← u + a Δu,
 
-with the secant stiffness K_sec of the joints (the law of the joints makes this converge as long as they can carry
-the load; softening joints need several iterations, joints that cannot carry it make it diverge).
+by Newton's method with the tangent of the joints as they open. K is then the curvature of an energy that equilibrium
+makes smallest: where softening makes K indefinite the secant stiffness takes its place, whose step still goes
+downhill, and a is cut until f(u + a Δu)·Δu does not point back strongly (stiff closing flips points between open and
+closed). Joints that cannot carry the load open beyond their opening at failure, or the search finds no end.
 """
 
 from __future__ import annotations
@@ -20,7 +22,14 @@ from scipy.spatial.transform import Rotation
 Array = np.ndarray
 
 TOLERANCE = 1e-7
-MOST_ITERATIONS = 60
+MOST_ITERATIONS = 100
+ROUNDING = 8.0
+"""Units in the last place that a position may be off."""
+MOST_TRIALS = 12
+SLACK = 0.5
+"""A step may overshoot by this share of the work that it set out with."""
+SHORTEST = 0.1
+"""Least share of a step that the next trial keeps."""
 
 
 class CannotStand(RuntimeError):
@@ -36,23 +45,98 @@ def settle(structure, load: Array | None = None) -> float:
     Raises CannotStand with the joint of largest damage.
     """
     rows = supported_blocks(structure)
-    if len(rows) == 0:
-        return 0.0
-    start = structure.centre()
     outer = structure.gravity_force() + (0.0 if load is None else load)
-    scale = np.abs(outer[rows]).max()
+    scale = np.abs(outer[rows]).max(initial=0.0)
     if scale == 0.0:
         return 0.0
-    dofs = (6 * rows[:, None] + np.arange(6)).ravel()
+    start = structure.centre()
+    search = Search(structure, rows, outer)
+    enough = max(TOLERANCE * scale, search.rounding())
     for _ in range(MOST_ITERATIONS):
-        residual = (outer + structure.internal_force()).ravel()[dofs]
-        if np.abs(residual).max() <= TOLERANCE * scale:
+        residual = search.residual()
+        if np.abs(residual).max() <= enough:
+            search.keep()
             return float(np.linalg.norm(structure.centre() - start, axis=1).max())
-        stiffness = structure.tangent()[0][dofs, :][:, dofs]
-        step = _solved(structure, stiffness, residual)
-        structure.displace(rows, step[:, :3], Rotation.from_rotvec(step[:, 3:]).as_matrix())
-        _check_joints(structure)
+        search.along(search.direction(residual), residual)
     raise CannotStand(_message(structure, f"no equilibrium after {MOST_ITERATIONS} iterations"))
+
+
+class Search:
+    """Trial places of the blocks `rows` under the forces `outer` (n, 6). Damage is measured from the start of the
+    search, so that a step too far leaves none behind."""
+
+    def __init__(self, structure, rows: Array, outer: Array):
+        self._structure, self._rows, self._outer = structure, rows, outer
+        self._dofs = (6 * rows[:, None] + np.arange(6)).ravel()
+        self._history = structure.joints.history()
+
+    def rounding(self) -> float:
+        """Forces [N] that the rounding of positions makes in the stiffest joints."""
+        stiffest = self._structure.tangent()[0].diagonal().reshape(-1, 6)[:, :3].max()
+        extent = np.ptp(self._structure.centre(), axis=0).max() + max(
+            b.radius for b in self._structure.blocks
+        )
+        return ROUNDING * np.finfo(float).eps * extent * float(stiffest)
+
+    def residual(self) -> Array:
+        """Forces that are not balanced, of the unknowns (6 rows,)."""
+        return (self._outer + self._structure.internal_force()).ravel()[self._dofs]
+
+    def direction(self, residual: Array) -> Array:
+        """Newton's step where the tangent is positive definite, else the step of the secant stiffness."""
+        tangent = _factors(self._part(self._structure.opening_tangent()))
+        if tangent is None:
+            tangent = _factors(self._part(self._structure.tangent()[0]))
+        if tangent is None:
+            raise CannotStand(_message(self._structure, "joints have lost their stiffness"))
+        return tangent.solve(residual)
+
+    def along(self, step: Array, residual: Array) -> None:
+        """Go along the step (6 rows,) until the unbalanced forces do little work on it any more."""
+        share, first = 1.0, residual @ step
+        self._move(step)
+        for _ in range(MOST_TRIALS):
+            left = self.residual() @ step
+            if -SLACK * first <= left:
+                break
+            shorter = max(first / (first - left), SHORTEST) * share
+            self._move((shorter - share) * step)
+            share = shorter
+        self._check()
+
+    def keep(self) -> None:
+        """The joints take note of the present places."""
+        self._move(np.zeros(len(self._dofs)), note=True)
+
+    def _move(self, step: Array, note: bool = False) -> None:
+        step = step.reshape(-1, 6)
+        turn = Rotation.from_rotvec(step[:, 3:]).as_matrix()
+        self._structure.displace(self._rows, step[:, :3], turn)
+        self.damage = self._structure.joint_table().damage
+        if not note:
+            self._structure.joints.restore(self._history)
+
+    def _check(self) -> None:
+        if not np.isfinite(self.damage).all() or self.damage.max() >= 1.0:
+            self.keep()
+            raise CannotStand(_message(self._structure, "a joint opens beyond its opening at failure"))
+
+    def _part(self, matrix):
+        return csc_matrix(matrix[self._dofs, :][:, self._dofs])
+
+
+def _factors(matrix):
+    """Factors of a symmetric matrix if it is positive definite, else None.
+
+    Pivots stay on the diagonal, so by Sylvester's law their signs are those of the eigenvalues."""
+    try:
+        factors = splu(
+            matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+        )
+    except RuntimeError:  # exactly singular
+        return None
+    definite = (factors.perm_r == factors.perm_c).all() and (factors.U.diagonal() > 0.0).all()
+    return factors if definite else None
 
 
 def supported_blocks(structure) -> Array:
@@ -68,19 +152,6 @@ def supported_blocks(structure) -> Array:
     graph = csc_matrix((np.ones(links.shape[1]), links), shape=(n + 1, n + 1))
     component = connected_components(graph, directed=False)[1]
     return np.flatnonzero((component[:n] == component[n]) & ~structure.fixed)
-
-
-def _solved(structure, stiffness, residual: Array) -> Array:
-    try:
-        return splu(csc_matrix(stiffness)).solve(residual).reshape(-1, 6)
-    except RuntimeError as error:
-        raise CannotStand(_message(structure, "joints have lost their stiffness")) from error
-
-
-def _check_joints(structure) -> None:
-    damage = structure.joint_table().damage
-    if not np.isfinite(damage).all() or damage.max() >= 1.0:
-        raise CannotStand(_message(structure, "a joint opens beyond its opening at failure"))
 
 
 def _message(structure, reason: str) -> str:

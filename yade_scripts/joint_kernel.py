@@ -1,4 +1,4 @@
-"""The loop over joints: positions and velocities of the blocks → joint forces, damage and energies.
+"""Points of joints in the world: where they are, how fast they part, forces on the blocks, openings; no law.
 
 A point of a joint sits at ξ_a in block a and ξ_b in block b (or at a fixed place). With the separation
 d = x_b - x_a, the normal n turning with block a:  δ_n = d·n, δ_t = d - δ_n n. The traction acts on both blocks at the
@@ -9,11 +9,6 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-
-from yade_scripts.cohesion import dissipated, secant_stiffness, step_stiffness
-
-STORED, DISSIPATED, DAMPED = 0, 1, 2
-"""Columns of the energies of a joint [J]."""
 
 
 @njit(cache=True)
@@ -26,122 +21,81 @@ def rotation_matrix(q, R):
 
 
 @njit(cache=True)
-def place(row, R, x, local, out):
-    """World position of a body point; row < 0 stands for the fixed world."""
-    for k in range(3):
-        if row < 0:
-            out[k] = local[k]
-        else:
-            out[k] = x[row, k] + R[row, k, 0] * local[0] + R[row, k, 1] * local[1] + R[row, k, 2] * local[2]
-
-
-@njit(cache=True)
-def point_velocity(row, x, v, at, out):
-    """Velocity of the body point now at `at`; v (n, 6) [v, ω]."""
+def place(row, R, x, local):
+    """World position of a body point local (3,), as a tuple; row < 0 stands for the fixed world."""
     if row < 0:
-        out[:] = 0.0
-        return
-    r0, r1, r2 = at[0] - x[row, 0], at[1] - x[row, 1], at[2] - x[row, 2]
-    out[0] = v[row, 0] + v[row, 4] * r2 - v[row, 5] * r1
-    out[1] = v[row, 1] + v[row, 5] * r0 - v[row, 3] * r2
-    out[2] = v[row, 2] + v[row, 3] * r1 - v[row, 4] * r0
+        return local[0], local[1], local[2]
+    r0, r1, r2 = turned(row, R, local)
+    return x[row, 0] + r0, x[row, 1] + r1, x[row, 2] + r2
 
 
 @njit(cache=True)
-def add_force(row, sign, t, at, x, F):
-    """Add the force sign*t at the world point `at` to F (n, 6) [force, moment about the centre]."""
+def turned(row, R, local):
+    """A direction of the body frame in world axes, as a tuple."""
+    return (
+        R[row, 0, 0] * local[0] + R[row, 0, 1] * local[1] + R[row, 0, 2] * local[2],
+        R[row, 1, 0] * local[0] + R[row, 1, 1] * local[1] + R[row, 1, 2] * local[2],
+        R[row, 2, 0] * local[0] + R[row, 2, 1] * local[1] + R[row, 2, 2] * local[2],
+    )
+
+
+@njit(cache=True)
+def dot(a, b):
+    """a·b of two vectors."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@njit(cache=True)
+def cross(a, b):
+    """a × b of two vectors, as a tuple."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@njit(cache=True)
+def split(pa, pb, n):
+    """Separation pb - pa: its part along n, and what is left across n as a tuple."""
+    d = (pb[0] - pa[0], pb[1] - pa[1], pb[2] - pa[2])
+    dn = dot(d, n)
+    return dn, (d[0] - dn * n[0], d[1] - dn * n[1], d[2] - dn * n[2])
+
+
+@njit(cache=True)
+def arm(row, x, at):
+    """Lever of the world point `at` about the centre of a block, as a tuple; zero for the fixed world."""
     if row < 0:
-        return
-    r0, r1, r2 = at[0] - x[row, 0], at[1] - x[row, 1], at[2] - x[row, 2]
-    f0, f1, f2 = sign * t[0], sign * t[1], sign * t[2]
-    F[row, 0] += f0
-    F[row, 1] += f1
-    F[row, 2] += f2
-    F[row, 3] += r1 * f2 - r2 * f1
-    F[row, 4] += r2 * f0 - r0 * f2
-    F[row, 5] += r0 * f1 - r1 * f0
+        return 0.0, 0.0, 0.0
+    return at[0] - x[row, 0], at[1] - x[row, 1], at[2] - x[row, 2]
 
 
 @njit(cache=True)
-def joint_forces(
-    live,
-    a,
-    b,
-    start,
-    xi_a,
-    xi_b,
-    weight,
-    normal,
-    k0,
-    df,
-    beta,
-    kc,
-    closing,
-    eta,
-    x,
-    v,
-    R,
-    largest,
-    dt,
-    advance,
-    F,
-    energy,
-):
-    """Forces of the live joints on the blocks; with `advance` also their history and energies.
+def parting(ra, rb, x, v, at):
+    """Relative velocity of b against a, both taken at the world point `at`, as a tuple; v (n, 6) [v, ω]."""
+    a0, a1, a2 = point_velocity(ra, x, v, at)
+    b0, b1, b2 = point_velocity(rb, x, v, at)
+    return b0 - a0, b1 - a1, b2 - a2
 
-    live (l,) joints to visit · a, b (J,) rows · start (J+1,) first point of a joint · xi_a, xi_b (P, 3) [m]
-    weight (P,) [m²] · normal (J, 3) in block a · k0, df, beta, kc (J,) law · closing (J,) bool: carries compression
-    eta [s] dashpot time · x (n, 3), v (n, 6), R (n, 3, 3) · largest (P,) λ [m] · F (n, 6) is added to
-    energy (J, 3): STORED now; DISSIPATED now; DAMPED summed over dt   →   largest growth of λ/δ_f in this call
-    """
-    pa, pb, mid, n, t = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-    va, vb = np.empty(3), np.empty(3)
-    fastest = 0.0
-    for j in live:
-        ra, rb = a[j], b[j]
+
+@njit(cache=True)
+def point_velocity(row, x, v, at):
+    """Velocity of the body point now at `at`, as a tuple; v (n, 6) [v, ω]."""
+    if row < 0:
+        return 0.0, 0.0, 0.0
+    c0, c1, c2 = cross((v[row, 3], v[row, 4], v[row, 5]), arm(row, x, at))
+    return v[row, 0] + c0, v[row, 1] + c1, v[row, 2] + c2
+
+
+@njit(cache=True)
+def add_forces(ra, rb, x, force, moment, F):
+    """Add a force and its moment about the centre of block a to F (n, 6) of a, and the opposite to block b."""
+    if rb >= 0:
+        apart = (x[ra, 0] - x[rb, 0], x[ra, 1] - x[rb, 1], x[ra, 2] - x[rb, 2])
+        more = cross(apart, force)
         for k in range(3):
-            n[k] = R[ra, k, 0] * normal[j, 0] + R[ra, k, 1] * normal[j, 1] + R[ra, k, 2] * normal[j, 2]
-        stored = lost = damped = 0.0
-        for p in range(start[j], start[j + 1]):
-            place(ra, R, x, xi_a[p], pa)
-            place(rb, R, x, xi_b[p], pb)
-            d0, d1, d2 = pb[0] - pa[0], pb[1] - pa[1], pb[2] - pa[2]
-            dn = d0 * n[0] + d1 * n[1] + d2 * n[2]
-            s0, s1, s2 = d0 - dn * n[0], d1 - dn * n[1], d2 - dn * n[2]
-            ss = s0 * s0 + s1 * s1 + s2 * s2
-            opening = np.sqrt(max(dn, 0.0) ** 2 + beta[j] ** 2 * ss)
-            before = largest[p]
-            after = max(before, opening)
-            ks = step_stiffness(before, after, k0[j], df[j]) if before < df[j] else 0.0
-            kn = ks if dn > 0.0 else (kc[j] if closing[j] else 0.0)
-            kt = beta[j] ** 2 * ks
-            t[0], t[1], t[2] = kn * dn * n[0] + kt * s0, kn * dn * n[1] + kt * s1, kn * dn * n[2] + kt * s2
-            for k in range(3):
-                mid[k] = 0.5 * (pa[k] + pb[k])
-            if eta > 0.0:
-                point_velocity(ra, x, v, mid, va)
-                point_velocity(rb, x, v, mid, vb)
-                w0, w1, w2 = vb[0] - va[0], vb[1] - va[1], vb[2] - va[2]
-                wn = w0 * n[0] + w1 * n[1] + w2 * n[2]
-                power = (kn - kt) * wn * wn + kt * (w0 * w0 + w1 * w1 + w2 * w2)
-                damped += weight[p] * eta * power * dt
-                for k, wk in enumerate((w0, w1, w2)):
-                    t[k] += eta * ((kn - kt) * wn * n[k] + kt * wk)
-            for k in range(3):
-                t[k] *= weight[p]
-            add_force(ra, 1.0, t, mid, x, F)
-            add_force(rb, -1.0, t, mid, x, F)
-            if advance:
-                fastest = max(fastest, (after - before) / df[j])
-                largest[p] = after
-                k_left = secant_stiffness(after, k0[j], df[j])
-                k_open = k_left if dn > 0.0 else (kc[j] if closing[j] else 0.0)
-                stored += 0.5 * weight[p] * (k_open * dn * dn + beta[j] ** 2 * k_left * ss)
-                lost += weight[p] * dissipated(after, k0[j], df[j])
-        if advance:
-            energy[j, 0], energy[j, 1] = stored, lost
-            energy[j, 2] += damped
-    return fastest
+            F[rb, k] -= force[k]
+            F[rb, 3 + k] -= moment[k] + more[k]
+    for k in range(3):
+        F[ra, k] += force[k]
+        F[ra, 3 + k] += moment[k]
 
 
 @njit(cache=True)
@@ -161,68 +115,17 @@ def broken(live, start, largest, df):
 @njit(cache=True)
 def joint_openings(live, a, b, start, xi_a, xi_b, weight, normal, x, R, out):
     """Mean normal opening, mean sliding and largest normal opening of joints, out (J, 3) [m]."""
-    pa, pb, n = np.empty(3), np.empty(3), np.empty(3)
     for j in live:
-        n[:] = R[a[j]] @ normal[j]
+        n = turned(a[j], R, normal[j])
         total = open_ = slide = 0.0
         widest = -np.inf
         for p in range(start[j], start[j + 1]):
-            place(a[j], R, x, xi_a[p], pa)
-            place(b[j], R, x, xi_b[p], pb)
-            d = pb - pa
-            dn = d[0] * n[0] + d[1] * n[1] + d[2] * n[2]
-            s = d - dn * n
+            dn, s = split(place(a[j], R, x, xi_a[p]), place(b[j], R, x, xi_b[p]), n)
             total += weight[p]
             widest = max(widest, dn)
             open_ += weight[p] * dn
-            slide += weight[p] * np.sqrt(s[0] ** 2 + s[1] ** 2 + s[2] ** 2)
+            slide += weight[p] * np.sqrt(dot(s, s))
         out[j, 0], out[j, 1], out[j, 2] = open_ / total, slide / total, widest
-
-
-@njit(cache=True)
-def stored_between(
-    live, a, b, start, xi_a, xi_b, weight, normal, k0, df, beta, kc, closing, largest, x, R, x0, R0
-):
-    """Elastic energy [J] of the live joints half a substep before (x, R), between it and the earlier place (x0, R0).
-
-    Leapfrog conserves kinetic(t + dt/2) + 1/2 k δ(t)·δ(t + dt) exactly, so the product of the two openings is used.
-    """
-    pa, pb, n, n0, d, e = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-    total = 0.0
-    for j in live:
-        turned(R, a[j], normal[j], n)
-        turned(R0, a[j], normal[j], n0)
-        for p in range(start[j], start[j + 1]):
-            place(a[j], R, x, xi_a[p], pa)
-            place(b[j], R, x, xi_b[p], pb)
-            dn = split(pa, pb, n, d)
-            place(a[j], R0, x0, xi_a[p], pa)
-            place(b[j], R0, x0, xi_b[p], pb)
-            en = split(pa, pb, n0, e)
-            slide = d[0] * e[0] + d[1] * e[1] + d[2] * e[2]
-            ks = secant_stiffness(largest[p], k0[j], df[j])
-            kn = ks if dn + en > 0.0 else (kc[j] if closing[j] else 0.0)
-            total += 0.5 * weight[p] * (kn * dn * en + beta[j] ** 2 * ks * slide)
-    return total
-
-
-@njit(cache=True)
-def turned(R, row, local, out):
-    """A direction of the body frame in world axes."""
-    for k in range(3):
-        out[k] = R[row, k, 0] * local[0] + R[row, k, 1] * local[1] + R[row, k, 2] * local[2]
-
-
-@njit(cache=True)
-def split(pa, pb, n, across):
-    """Separation pb - pa: returns its part along n, leaves the part across n in `across`."""
-    normal = 0.0
-    for k in range(3):
-        across[k] = pb[k] - pa[k]
-        normal += across[k] * n[k]
-    for k in range(3):
-        across[k] -= normal * n[k]
-    return normal
 
 
 @njit(cache=True)

@@ -10,6 +10,7 @@ from yade_scripts import joint_kernel as kernel
 from yade_scripts.blocks import Block
 from yade_scripts.cohesion import JointParameters
 from yade_scripts.faces import TouchingFaces, gauss_points
+from yade_scripts.joint_forces import NOT_GROWING, PULL, kernels_of
 
 Array = np.ndarray
 
@@ -54,12 +55,13 @@ class Joints:
 
     def __init__(self, blocks: list[Block], faces: list[TouchingFaces], parameters: JointParameters):
         self.parameters = parameters
+        self.kernels = kernels_of(parameters.law, parameters.mixed_mode)
         n = len(faces)
         self.a = np.array([f.a for f in faces], np.int64)
         self.b = np.array([max(f.b, -1) for f in faces], np.int64)
         self.face_a = np.array([f.face_a for f in faces], np.int64)
         self.face_b = np.array([f.face_b for f in faces], np.int64)
-        rules = [gauss_points(f.polygon, parameters.points) for f in faces]
+        rules = [gauss_points(f.polygon, parameters.rule) for f in faces]
         self.start = np.concatenate([[0], np.cumsum([len(w) for _, w in rules])]).astype(np.int64)
         self.weight = np.concatenate([w for _, w in rules]) if n else np.zeros(0)
         place = np.concatenate([p for p, _ in rules]) if n else np.zeros((0, 3))
@@ -75,6 +77,9 @@ class Joints:
         self.df = np.full(n, parameters.opening_at_failure)
         self.beta = np.full(n, parameters.shear_ratio)
         self.kc = np.full(n, parameters.closing_stiffness)
+        unit = np.full(n, parameters.strength / parameters.opening_at_failure)
+        self.law = np.stack([unit, self.df, self.beta, self.kc, self.k0], axis=1)
+        """Columns as in `joint_forces`."""
         self.eta = 0.0
         """Time constant of the stiffness-proportional dashpot [s]."""
         self.stiffest: Array | None = None
@@ -83,7 +88,10 @@ class Joints:
         self.alive = np.ones(n, bool)
         self.live = np.arange(n)
         self.largest = np.zeros(len(self.weight))
-        self.energy = np.zeros((n, 3))
+        self.paid = np.zeros((len(self.weight), 2))
+        self.paid[:, PULL] = NOT_GROWING
+        self.damped = np.zeros(n)
+        """Energy that the dashpots of each joint have taken [J]."""
         self.failure_time = np.full(n, np.nan)
         self.final_openings = np.zeros((n, 3))
 
@@ -91,18 +99,35 @@ class Joints:
         return len(self.a)
 
     def forces(self, x, v, R, F, dt: float = 0.0, advance: bool = False, eta: float | None = None) -> float:
-        """Add the joint forces on the blocks to F (n, 6); see `joint_kernel.joint_forces`."""
-        return kernel.joint_forces(
-            self.live, self.a, self.b, self.start, self.xi_a, self.xi_b, self.weight, self.normal, self.k0, self.df,
-            self.beta, self.kc, self.closing, self.eta if eta is None else eta, x, v, R, self.largest, dt, advance, F,
-            self.energy,
+        """Add the joint forces on the blocks to F (n, 6); see `joint_forces.joint_forces`."""
+        return self.kernels.joint_forces(
+            *self._arrays(), self.paid, self.eta if eta is None else eta, x, v, R, dt, advance, F, self.damped
+        )
+
+    def _arrays(self) -> tuple:
+        """What the kernels of the law read of the live joints, in their order."""
+        return (
+            self.live, self.a, self.b, self.start, self.xi_a, self.xi_b, self.weight, self.normal, self.law,
+            self.closing, self.parameters.peak_share, self.largest,
         )  # fmt: skip
 
-    def arrays(self) -> tuple:
-        """What `joint_kernel.stored_between` reads of the joints, in its order."""
+    def stored_between(self, x: Array, R: Array, x0: Array, R0: Array) -> Array:
+        """Elastic energy of each joint between two places of the blocks, (J,) [J]."""
+        out = np.zeros(len(self))
+        self.kernels.stored_between(*self._arrays(), x, R, x0, R0, out)
+        return out
+
+    def lost(self) -> Array:
+        """Energy that the damage of each joint stands for by its law, G_c A once it has failed, (J,) [J]."""
+        out = np.empty(len(self))
+        self.kernels.lost(self.start, self.weight, self.law, self.parameters.peak_share, self.largest, out)
+        return out
+
+    def of_points(self, index: Array) -> tuple:
+        """What the kernels of single points read of the points `index`, in their order."""
         return (
-            self.live, self.a, self.b, self.start, self.xi_a, self.xi_b, self.weight, self.normal, self.k0, self.df,
-            self.beta, self.kc, self.closing, self.largest,
+            index, self.joint_of, self.a, self.b, self.xi_a, self.xi_b, self.normal, self.law, self.closing,
+            self.parameters.peak_share, self.largest,
         )  # fmt: skip
 
     def broken_now(self) -> Array:
@@ -113,7 +138,6 @@ class Joints:
         """Take failed joints out: they have dissipated G_c A and cost nothing from now on."""
         self.final_openings[joints] = self.openings(joints, x, R)
         self.alive[joints] = False
-        self.energy[joints, kernel.STORED] = 0.0
         self.failure_time[joints] = time
         self.live = self.live[self.alive[self.live]]
 
@@ -181,7 +205,8 @@ class Joints:
         mix = np.divide(shear, effective, out=np.zeros(len(self)), where=effective > 0.0)
         return JointTable(
             self.a, self.b, self.face_a, self.face_b, self.area, centre, normal, damage, mean, opening[:, 0],
-            opening[:, 1], mix, *self.energy.T.copy(), self.failure_time.copy(), self.alive.copy(),
+            opening[:, 1], mix, self.stored_between(x, R, x, R), self.lost(), self.damped.copy(),
+            self.failure_time.copy(), self.alive.copy(),
         )  # fmt: skip
 
     def _centre_in_a(self) -> Array:
@@ -192,7 +217,7 @@ class Joints:
 
     def history(self) -> dict[str, Array]:
         """Copies of everything that changes in time, for `restore`."""
-        names = ("closing", "alive", "live", "largest", "energy", "failure_time", "final_openings")
+        names = ("closing", "alive", "live", "largest", "paid", "damped", "failure_time", "final_openings")
         return {name: getattr(self, name).copy() for name in names}
 
     def restore(self, history: dict[str, Array]) -> None:

@@ -318,6 +318,13 @@ class Structure:
             springs = springs.and_(tangent.joint_springs(self.joints, self._motion.x, self._motion.R))
         return tangent.assemble(springs, self.n)
 
+    def opening_tangent(self) -> sp.csr_array:
+        """(6n, 6n): as K of `tangent`, with the joints as they answer while they open further: softening counts."""
+        contacts = tangent.assemble(self.contacts().springs(self._motion.x), self.n)[0]
+        if self.joints is None:
+            return contacts
+        return contacts + tangent.joint_tangent(self.joints, self._motion.x, self._motion.R, self.n)
+
     def joint_table(self) -> JointTable | None:
         """State of every joint, None without joints."""
         if self.joints is None:

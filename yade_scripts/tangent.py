@@ -12,8 +12,6 @@ import numpy as np
 import scipy.sparse as sp
 from numba import njit
 
-from yade_scripts.joint_kernel import place
-
 Array = np.ndarray
 
 
@@ -49,33 +47,38 @@ class Springs:
 
 def assemble(springs: Springs, n: int) -> tuple[sp.csr_array, sp.csr_array]:
     """Stiffness and damping, each (6n, 6n), symmetric and positive semi-definite."""
+    K = _assembled(springs, _across(springs.normal, springs.kn, springs.kt), n)
+    return K, _assembled(springs, _across(springs.normal, springs.cn, springs.ct), n)
+
+
+def _across(normal: Array, kn: Array, kt: Array) -> Array:
+    """k_n nnᵀ + k_t (I - nnᵀ) of each spring, (s, 3, 3)."""
+    D = (kn - kt)[:, None, None] * normal[:, :, None] * normal[:, None, :]
+    D[:, range(3), range(3)] += kt[:, None]
+    return D
+
+
+def _assembled(springs: Springs, D: Array, n: int) -> sp.csr_array:
+    """Sum of Bᵀ D B over the springs, (6n, 6n)."""
     first = np.maximum(springs.a, springs.b)
     second = np.minimum(springs.a, springs.b)
     keys, pair = np.unique(first * (n + 1) + second + 1, return_inverse=True)
-    row_a, row_b = keys // (n + 1), keys % (n + 1) - 1
-    blocks = np.zeros((2, len(keys), 12, 12))
-    swap = springs.a < springs.b
-    _accumulate(pair, swap, springs.arm_a, springs.arm_b, springs.normal, springs.kn, springs.kt, blocks[0])
-    _accumulate(pair, swap, springs.arm_a, springs.arm_b, springs.normal, springs.cn, springs.ct, blocks[1])
-    return _sparse(blocks[0], row_a, row_b, n), _sparse(blocks[1], row_a, row_b, n)
+    blocks = np.zeros((len(keys), 12, 12))
+    _accumulate(pair, springs.a < springs.b, springs.arm_a, springs.arm_b, D, blocks)
+    return _sparse(blocks, keys // (n + 1), keys % (n + 1) - 1, n)
 
 
 @njit(cache=True)
-def _accumulate(pair, swap, arm_a, arm_b, normal, kn, kt, out):
+def _accumulate(pair, swap, arm_a, arm_b, D, out):
     """Sum Bᵀ D B of each spring into its pair's (12, 12) block; its first body has the larger row."""
     B = np.zeros((3, 12))
-    D = np.empty((3, 3))
     for s in range(len(pair)):
-        if kn[s] == 0.0 and kt[s] == 0.0:
+        if not D[s].any():
             continue
         first, second = (arm_b[s], arm_a[s]) if swap[s] else (arm_a[s], arm_b[s])
         _relative(B, 0, 1.0, first)
         _relative(B, 6, -1.0, second)
-        for i in range(3):
-            for j in range(3):
-                D[i, j] = (kn[s] - kt[s]) * normal[s, i] * normal[s, j]
-            D[i, i] += kt[s]
-        out[pair[s]] += B.T @ (D @ B)
+        out[pair[s]] += B.T @ (D[s] @ B)
 
 
 @njit(cache=True)
@@ -102,38 +105,21 @@ def _sparse(blocks: Array, row_a: Array, row_b: Array, n: int) -> sp.csr_array:
 
 def joint_springs(joints, x: Array, R: Array) -> Springs:
     """Springs of the live joints at places x (n, 3), R (n, 3, 3): secant k_s where open, k_c where closed."""
-    alive = joints.alive[joints.joint_of]
-    index = np.flatnonzero(alive)
-    out = np.zeros((5, len(index), 3))
-    stiffness = np.zeros((2, len(index)))
-    _joint_springs(
-        index, joints.joint_of, joints.a, joints.b, joints.xi_a, joints.xi_b, joints.weight, joints.normal, joints.k0,
-        joints.df, joints.beta, joints.kc, joints.closing, joints.largest, x, R, out, stiffness,
-    )  # fmt: skip
+    index = np.flatnonzero(joints.alive[joints.joint_of])
+    arm, normal, k = np.zeros((2, len(index), 3)), np.zeros((len(index), 3)), np.zeros((2, len(index)))
+    joints.kernels.point_springs(*joints.of_points(index), x, R, arm, normal, k)
     j = joints.joint_of[index]
-    kn, kt = stiffness
-    return Springs(joints.a[j], joints.b[j], out[0], out[1], out[2], kn, kt, joints.eta * kn, joints.eta * kt)
+    kn, kt = k * joints.weight[index]
+    return Springs(joints.a[j], joints.b[j], *arm, normal, kn, kt, joints.eta * kn, joints.eta * kt)
 
 
-@njit(cache=True)
-def _joint_springs(
-    index, joint_of, a, b, xi_a, xi_b, weight, normal, k0, df, beta, kc, closing, largest, x, R, out, k
-):
-    pa, pb = np.empty(3), np.empty(3)
-    for i in range(len(index)):
-        p = index[i]
-        j = joint_of[p]
-        place(a[j], R, x, xi_a[p], pa)
-        place(b[j], R, x, xi_b[p], pb)
-        n = R[a[j]] @ normal[j]
-        mid = 0.5 * (pa + pb)
-        out[0, i] = mid - x[a[j]]
-        if b[j] >= 0:
-            out[1, i] = mid - x[b[j]]
-        out[2, i] = n
-        r = largest[p] / df[j]
-        ks = k0[j] * (1.0 - r) ** 2 if r < 1.0 else 0.0
-        closed = np.dot(pb - pa, n) <= 0.0
-        # An unopened point under a tiny gap is stiff either way; the closing stiffness is taken where it is closed.
-        k[0, i] = weight[p] * ((kc[j] if closing[j] else 0.0) if closed else ks)
-        k[1, i] = weight[p] * beta[j] ** 2 * ks
+def joint_tangent(joints, x: Array, R: Array, n: int) -> sp.csr_array:
+    """Tangent stiffness (6n, 6n) of the live joints while they open further; softening makes it indefinite.
+
+    The turning of the normals with the blocks is left out: it is of the order of the tractions times the openings."""
+    springs = joint_springs(joints, x, R)
+    index = np.flatnonzero(joints.alive[joints.joint_of])
+    D = np.zeros((len(index), 3, 3))
+    joints.kernels.point_tangents(*joints.of_points(index), x, R, D)
+    D = 0.5 * (D + D.transpose(0, 2, 1)) * joints.weight[index][:, None, None]
+    return _assembled(springs, D, n)

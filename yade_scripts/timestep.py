@@ -9,17 +9,22 @@ the damage make the leapfrog gain energy at larger steps). A dashpot of ratio z 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.linalg import eigsh
 
 from yade_scripts.blocks import Block
+from yade_scripts.tangent import assemble, joint_springs
 
 Array = np.ndarray
 
 JOINT_SHARE = 0.1
 CONTACT_SHARE = 0.2
 DRIVEN_SHARE = 0.002
+DENSE = 60
+"""Unknowns up to which the exact frequency is found with full matrices."""
 
 
 @dataclass(frozen=True)
@@ -47,31 +52,76 @@ def joint_frequency(blocks: list[Block], joints) -> tuple[float, int]:
     return float(np.sqrt(pair[worst])), int(live[worst])
 
 
+def exact_joint_frequency(blocks: list[Block], joints) -> float:
+    """ω_max [rad/s] of the live joints: the largest eigenvalue of M⁻¹ K, K with k_0 or k_c, the larger, in the normals
+    and β² k_0 across. Takes a sparse eigenvalue problem of six unknowns a block."""
+    held = [b.fixed or b.driven for b in blocks]
+    free = np.flatnonzero(~np.repeat(held, 6))
+    if joints is None or len(joints.live) == 0 or len(free) == 0:
+        return 0.0
+    x, R = np.array([b.centre for b in blocks]), np.array([b.rotation for b in blocks])
+    springs = _first_springs(joints, x, R)
+    root = sp.block_diag([_inverse_root(b) for b in blocks], format="csr")
+    K = (root.T @ assemble(springs, len(blocks))[0] @ root)[free][:, free]
+    if len(free) <= DENSE:
+        return float(np.sqrt(np.linalg.eigvalsh(K.toarray())[-1]))
+    start = np.cos(np.arange(len(free)))  # fixed, so that the same blocks give the same number
+    return float(np.sqrt(eigsh(K, k=1, which="LA", v0=start, return_eigenvectors=False)[0]))
+
+
+def _first_springs(joints, x: Array, R: Array):
+    """Springs of the undamaged live joints, closed or open, whichever is stiffer; arms in world axes."""
+    springs = joint_springs(joints, x, R)
+    index = np.flatnonzero(joints.alive[joints.joint_of])
+    j = joints.joint_of[index]
+    kn = joints.weight[index] * np.maximum(joints.k0[j], joints.kc[j])
+    kt = joints.weight[index] * joints.beta[j] ** 2 * joints.k0[j]
+    return replace(springs, kn=kn, kt=kt)
+
+
+def _inverse_root(block: Block) -> Array:
+    """A with A Aᵀ = M⁻¹ (6, 6), world axes."""
+    root = np.zeros((6, 6))
+    root[:3, :3] = np.eye(3) / np.sqrt(block.mass)
+    turned = block.rotation @ block.inertia @ block.rotation.T
+    root[3:, 3:] = np.linalg.inv(np.linalg.cholesky(turned)).T
+    return root
+
+
 def _stiffest_modes(blocks: list[Block], joints) -> Array:
     """Largest eigenvalue of M⁻¹ K of each joint for its two blocks (J, 2) [1/s²]; zero for blocks that do not yield."""
-    modes = np.zeros((len(joints), 2))
-    for j in range(len(joints)):
-        for side, row in enumerate((joints.a[j], joints.b[j])):
-            if row >= 0 and not (blocks[row].fixed or blocks[row].driven):
-                modes[j, side] = _largest_eigenvalue(blocks[row], joints, j, row)
-    return modes
+    root = np.zeros((len(blocks) + 1, 6, 6))  # the last one stands for the ground
+    for i, block in enumerate(blocks):
+        if not (block.fixed or block.driven):
+            root[i, :3, :3] = np.eye(3) / np.sqrt(block.mass)
+            root[i, 3:, 3:] = np.linalg.inv(np.linalg.cholesky(block.inertia)).T
+    frame = np.array([b.rotation for b in blocks] + [np.eye(3)])
+    normal = np.einsum("jkl,jl->jk", frame[joints.a], joints.normal)
+    sides = ((joints.xi_a, joints.a), (joints.xi_b, joints.b))
+    return np.stack(
+        [_largest_eigenvalues(joints, arm, _in_frame(frame[row], normal), root[row]) for arm, row in sides],
+        axis=1,
+    )
 
 
-def _largest_eigenvalue(block: Block, joints, j: int, row: int) -> float:
-    """Largest eigenvalue of M⁻¹ K of one block held by one joint [1/s²], body frame."""
-    p = slice(joints.start[j], joints.start[j + 1])
-    stiff = joints.weight[p] * joints.k0[j] * max(1.0, joints.kc[j] / joints.k0[j], joints.beta[j] ** 2)
-    arm = joints.xi_a[p] if row == joints.a[j] else joints.xi_b[p]
+def _in_frame(frame: Array, vectors: Array) -> Array:
+    """World vectors (J, 3) in the axes of frames (J, 3, 3)."""
+    return np.einsum("jkl,jk->jl", frame, vectors)
+
+
+def _largest_eigenvalues(joints, arm: Array, normal: Array, root: Array) -> Array:
+    """Largest eigenvalue of rootᵀ K root (J, 6, 6) of each joint: points at arm (P, 3), axes those of normal (J, 3);
+    k_0 or k_c, the larger, along the normals and β² k_0 across."""
+    kn, kt = np.maximum(joints.k0, joints.kc), joints.beta**2 * joints.k0
+    D = (kn - kt)[:, None, None] * normal[:, :, None] * normal[:, None, :] + kt[:, None, None] * np.eye(3)
+    D = D[joints.joint_of] * joints.weight[:, None, None]
     B = np.zeros((len(arm), 3, 6))
     B[:, range(3), range(3)] = 1.0
     B[:, 0, 4], B[:, 0, 5] = arm[:, 2], -arm[:, 1]
     B[:, 1, 3], B[:, 1, 5] = -arm[:, 2], arm[:, 0]
     B[:, 2, 3], B[:, 2, 4] = arm[:, 1], -arm[:, 0]
-    K = np.einsum("p,pki,pkj->ij", stiff, B, B)
-    M = np.zeros((6, 6))
-    M[:3, :3], M[3:, 3:] = block.mass * np.eye(3), block.inertia
-    L = np.linalg.inv(np.linalg.cholesky(M))
-    return float(np.linalg.eigvalsh(L @ K @ L.T)[-1])
+    K = np.add.reduceat(B.transpose(0, 2, 1) @ (D @ B), joints.start[:-1])
+    return np.linalg.eigvalsh(root.transpose(0, 2, 1) @ K @ root)[:, -1]
 
 
 def substep_limit(

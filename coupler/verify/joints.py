@@ -13,7 +13,7 @@ import numpy as np
 from coupler.verify.figures import columns
 from coupler.verify.registry import Finding, check
 from yade_scripts.blocks import Block
-from yade_scripts.cohesion import JointParameters, traction, work_of_opening
+from yade_scripts.cohesion import JointParameters
 from yade_scripts.equilibrium import CannotStand, settle
 from yade_scripts.structure import Structure
 
@@ -36,11 +36,11 @@ def driven_pair(law: JointParameters, velocity=STILL, spin=STILL) -> Structure:
 @check("P20", "mode I law: traction, peak, work", "closed form of the polynomial law")
 def mode_one():
     table = columns("coh_mode1_law")
-    T = traction(table["r"] * FAILURE, STRENGTH, FAILURE) / STRENGTH
+    T = LAW.traction(table["r"] * FAILURE) / STRENGTH
     yield Finding(
         "law: largest |T - T_exact|/T_max", np.abs(T - table["T_over_Tmax"]).max(), 0.0, 1e-6, False
     )
-    W = work_of_opening(table["r"] * FAILURE, LAW.stiffness, FAILURE) / (STRENGTH * FAILURE)
+    W = LAW.work_of_opening(table["r"] * FAILURE) / (STRENGTH * FAILURE)
     worst = np.abs(W - table["work_over_Tmax_df"]).max()
     yield Finding("law: largest |W - W_exact|/(T_max df)", worst, 0.0, 1e-6, False)
     speed = 0.01

@@ -11,13 +11,12 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Literal
 
-MODULES = ("contact", "joints", "water", "dam_breaks", "coupled", "wall")
+MODULES = ("contact", "joints", "stock", "water", "dam_breaks", "coupled", "wall")
 """Files of this package that hold cases; their names are the groups."""
 
 NOT_COVERED = {
     "P06": "oblique impact of a sphere: blocks are boxes or convex polyhedra",
     "P07": "oblique impact of a sphere (Chung and Ooi test 4): blocks are boxes or convex polyhedra",
-    "P27": "comparison with YADE's stock brittle laws: no command runs them yet",
     "P31": "Taylor-Green vortex: the water has no viscosity yet",
     "P32": "Couette and Poiseuille flow: the water has no viscosity yet",
     "P35": "cylinder in a channel (DFG): the water has no viscosity and no inflow yet",

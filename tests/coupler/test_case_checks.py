@@ -2,51 +2,88 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.optimize import linprog
 
-from coupler.boxes import Box, overlap_depth, rotation_matrix
+from coupler.bodies import Body, overlap_depth, rotation_matrix
 from coupler.case import Case
 from coupler.case_checks import problems, remarks
+from yade_scripts.blocks import Block
 
 SPACE = st.floats(-3.0, 3.0)
 EDGE = st.floats(0.1, 2.0)
 
 
+def turns(draw):
+    axis = draw(st.tuples(SPACE, SPACE, SPACE).filter(lambda a: np.linalg.norm(a) > 0.1))
+    return rotation_matrix(axis, draw(st.floats(-3.2, 3.2)))
+
+
 @st.composite
 def boxes(draw):
-    axis = draw(st.tuples(SPACE, SPACE, SPACE).filter(lambda a: np.linalg.norm(a) > 0.1))
-    rotation = rotation_matrix(axis, draw(st.floats(-3.2, 3.2)))
-    return Box(
-        np.array(draw(st.tuples(SPACE, SPACE, SPACE))), np.array(draw(st.tuples(EDGE, EDGE, EDGE))), rotation
+    """Centre, size, rotation."""
+    return (
+        np.array(draw(st.tuples(SPACE, SPACE, SPACE))),
+        np.array(draw(st.tuples(EDGE, EDGE, EDGE))),
+        turns(draw),
     )
+
+
+@st.composite
+def stones(draw):
+    """A box, or a random hull of ten corners."""
+    if draw(st.booleans()):
+        return Body.box(*draw(boxes()))
+    random = np.random.default_rng(draw(st.integers(0, 10**6)))
+    x = random.normal(size=(10, 3))
+    x /= np.linalg.norm(x, axis=1)[:, None]
+    return Body.of_block(Block.standing("h", x + random.uniform(-2, 2, 3)))
 
 
 @given(boxes())
 def test_a_rotation_keeps_lengths_and_handedness(box):
-    assert np.allclose(box.rotation.T @ box.rotation, np.eye(3), atol=1e-12)
-    assert np.isclose(np.linalg.det(box.rotation), 1.0, rtol=1e-12)
+    rotation = box[2]
+    assert np.allclose(rotation.T @ rotation, np.eye(3), atol=1e-12)
+    assert np.isclose(np.linalg.det(rotation), 1.0, rtol=1e-12)
 
 
-@given(boxes(), boxes())
-def test_overlap_is_symmetric_and_agrees_with_points(a, b):
-    """A point in both boxes proves an overlap; the depth is the same seen from either."""
+@settings(deadline=None)
+@given(stones(), stones())
+def test_overlap_is_symmetric_and_agrees_with_points_and_planes(a, b):
+    """A point in both bodies proves an overlap; corners on far sides of a plane prove that there is none; the depth is
+    the same seen from either."""
     depth = overlap_depth(a, b)
     assert np.isclose(depth, overlap_depth(b, a), atol=1e-9)
-    grid = np.stack(np.meshgrid(*[np.linspace(-0.49, 0.49, 5)] * 3), axis=-1).reshape(-1, 3)
-    inside_a = a.centre + (grid * a.size) @ a.rotation.T
-    if b.holds(inside_a).any():
+    share = np.random.default_rng(0).dirichlet(np.full(len(a.vertices), 0.3), 100)
+    inside_a = share @ a.vertices
+    if (b.depth(inside_a) > 0.0).any():
         assert depth > 0.0
+    heights = linprog_gap(a.vertices, b.vertices)
+    assert (depth <= 1e-9) == heights if abs(depth) > 1e-6 else True
 
 
-@given(boxes(), SPACE, SPACE)
-def test_moving_apart_by_the_depth_parts_two_boxes(a, x, y):
-    """Along one of the axes the move by the depth suffices; here the axis is a face normal of both."""
-    b = Box(a.centre + a.rotation @ [0.3 * a.size[0], 0, 0], a.size, a.rotation)
-    depth = overlap_depth(a, b)
-    assert np.isclose(depth, 0.7 * a.size[0], rtol=1e-9) or depth <= a.size.min() + 1e-9
-    apart = Box(a.centre + a.rotation @ [a.size[0], 0, 0], a.size, a.rotation)
-    assert overlap_depth(a, apart) < 1e-9
+def linprog_gap(a, b):
+    """Whether a plane n·x = c has a on one side and b on the other: a linear program, not an axis test."""
+    rows = np.vstack([np.c_[a, -np.ones(len(a))], np.c_[-b, np.ones(len(b))]])
+    found = linprog(np.zeros(4), A_ub=rows, b_ub=-np.ones(len(rows)), bounds=[(None, None)] * 4)
+    return found.status == 0
+
+
+@settings(deadline=None)
+@given(stones(), SPACE, SPACE, SPACE)
+def test_moving_apart_by_more_than_the_depth_can_part_two_bodies(a, x, y, z):
+    """The depth is a length by which some move parts them: never more than a body's own thickness plus the other's."""
+    b = Body(a.vertices + np.array([x, y, z]), a.normals, a.edges)
+    assert overlap_depth(a, b) <= 2 * a.thickness() + 1e-9
+    far = Body(a.vertices + a.normals[0] * 1.0001 * np.ptp(a.vertices @ a.normals[0]), a.normals, a.edges)
+    assert overlap_depth(a, far) < 0.0
+
+
+def test_the_depth_of_boxes_is_that_of_the_face_they_share():
+    a = Body.box((0, 0, 0), (1, 1, 1), rotation_matrix((1, 2, 3), 0.7))
+    b = Body.box(rotation_matrix((1, 2, 3), 0.7) @ [0.7, 0, 0], (1, 1, 1), rotation_matrix((1, 2, 3), 0.7))
+    assert np.isclose(overlap_depth(a, b), 0.3, rtol=1e-12)
 
 
 def case(**sections):
@@ -224,7 +261,7 @@ def test_a_mesh_beyond_the_memory_of_the_machine_is_refused(monkeypatch):
         "water": {"fill": [{"lower": [0, 0, 0], "upper": [1, 1, 0.5]}]},
     }
     assert problems(Case.model_validate(content)) == []
-    monkeypatch.setattr("coupler.case_checks.os.sysconf", lambda name: 1000)
+    monkeypatch.setattr("coupler.place_checks.os.sysconf", lambda name: 1000)
     ((place, message),) = problems(Case.model_validate(content))
     assert place == ("tank", "cell")
     fits = float(message.rpartition("cells of ")[2].split()[0])
@@ -235,7 +272,19 @@ def test_too_few_points_for_joints_that_close_stiffly_are_remarked():
     """Three Gauss points miss the edge that such a joint turns about."""
     block = structure({"centre": [7, 5, 0.5]})
     joints = {"strength": 1e5, "opening_at_failure": 1e-3, "closing_ratio": 10.0}
-    assert remarks(case(joints=joints, **block))[0].startswith(
-        "joints.closing_ratio = 10 with joints.points = 3"
+    assert remarks(case(joints=joints | {"points": 3}, **block))[0].startswith(
+        "joints.points = 3 with joints.closing_ratio = 10"
     )
-    assert remarks(case(joints=joints | {"points": 8}, **block)) == []
+    for enough in (6, "auto"):
+        assert remarks(case(joints=joints | {"points": enough}, **block)) == []
+
+
+def test_a_law_that_does_not_exist_or_has_no_potential_is_refused():
+    block = structure({"centre": [7, 5, 0.5]})
+    joints = {"strength": 1e5, "opening_at_failure": 1e-3}
+    ((place, message),) = problems(case(joints=joints | {"law": "bilineer"}, **block))
+    assert place == ("joints", "law")
+    assert "did you mean 'bilinear'" in message
+    wrong = joints | {"law": "bilinear", "mixed_mode": "needleman"}
+    ((place, _),) = problems(case(joints=wrong, **block))
+    assert place == ("joints", "mixed_mode")

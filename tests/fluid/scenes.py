@@ -30,7 +30,7 @@ def advance(water: Water, dt=None, body_velocity=None, rtol=1e-9):
 
 def load(problem, x):
     """Force and moment on each body, (n_bodies, 6) [N, N m]."""
-    return -(problem.coupling.T @ (x + problem.known)).reshape(-1, 6)
+    return problem.other_load - (problem.coupling.T @ (x + problem.known)).reshape(-1, 6)
 
 
 def rotation(axis, angle):

@@ -63,7 +63,7 @@ def test_a_dented_block_is_refused_with_the_face():
         Block("dented", np.zeros(3), vertices=corners, faces=BOX_FACES)
 
 
-@settings(max_examples=30)
+@settings(max_examples=30, deadline=None)
 @given(st.floats(-0.9, 0.9), st.floats(-0.9, 0.9), st.integers(0, 1000))
 def test_overlap_of_two_faces_is_exact_wherever_they_stand(dx, dy, seed):
     """Unit cubes shifted by (dx, dy) on one another overlap on (1-|dx|)(1-|dy|), in any orientation."""

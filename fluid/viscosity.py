@@ -1,0 +1,151 @@
+"""Viscosity and walls that hold the water: the stage of a step between transport and pressure.
+
+    M du/dt = r(u) + M (w - uⁿ)/dt,   u(0) = uⁿ         r = f - K u: `viscous_kernels`, symmetric gradient, walls
+
+w = u_adv + θ dt âⁿ is where transport and the last pressure would lead without viscosity; its rate is the source, so
+that a steady state is steady for any dt (transport, then diffusion: 5 % off in a channel) and walls are felt by
+what stays after the projection.  The change δ = u - w is added to u_adv.  In time the two-stage
+method of order two that damps stiff parts fully (Alexander, SIAM J. Numer. Anal. 14 (1977) 1006), γ = 1 - 1/√2:
+
+    u₁ = uⁿ + γ (w - uⁿ) + γ dt M⁻¹ r(u₁)
+    u = w + dt M⁻¹ [(1-γ) r(u₁) + γ r(u)],        impulse on bodies  dt [(1-γ) F(u₁) + γ F(u)].
+
+M: the water at each node, ∫_{φ<0} ρ N_i dV; cells count with their water.  No traction on the free surface (natural).
+Sides of the tank: no-slip holds u = 0 on their nodes; friction acts on their nodes.  On open sides only the normal
+velocity changes: the tangential one leaves as it came, or the missing ∇uᵀ n would bend a parallel stream.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fluid.domain import hat_values
+from fluid.moments import wet_fraction
+from fluid.solve import NotConverged
+from fluid.viscous_kernels import implicit_change, momentum_rate
+
+GAMMA = 1.0 - np.sqrt(0.5)
+TOLERANCE = 1e-7
+MOST_ITERATIONS = 1000
+STEEPEST = 1e6
+"""Largest A/V of a cell in 1/h: slivers."""
+
+
+@dataclass(frozen=True)
+class ViscousChange:
+    """velocity change δ (N, 3) [m/s] · load (n_bodies, 6) [N, N m], mean over the step · energy [J] of the water,
+    change · iterations."""
+
+    change: np.ndarray
+    load: np.ndarray
+    energy: float
+    iterations: int
+
+
+class WettedWalls:
+    """Polygons of a domain with the values of the hats at their points; made once per domain.
+
+    cell, body (S,) · normal (S, 3) · hat (S, 3, 4) · arm (S, 3, 3) [m] from the centre of the body · area (S,) [m²] ·
+    per_volume (S,) [1/m] wetted area of the cell over the volume left of it."""
+
+    def __init__(self, domain, spacing: float):
+        d = domain
+        self.domain = d
+        corners = d.nodes[d.cells[d.face_cell]]
+        self.cell, self.body = d.face_cell.astype(np.int64), d.face_body.astype(np.int64)
+        self.normal = np.ascontiguousarray(d.face_normal)
+        self.hat = (
+            np.ascontiguousarray(hat_values(corners, d.face_points))
+            if len(self.cell)
+            else np.zeros((0, 3, 4))
+        )
+        self.arm = np.ascontiguousarray(d.face_points - d.body_centre[d.face_body][:, None])
+        self.area = d.face_area
+        wetted = np.bincount(d.face_cell, d.face_area, minlength=len(d.cells))[d.face_cell]
+        self.per_volume = wetted / np.maximum(d.volume[d.face_cell], wetted * spacing / STEEPEST)
+
+    def at_points(self, f, cells):
+        """P1 values (S, 3) or (S, 3, k) of nodal f (N,) or (N, k) at the points of the polygons."""
+        return np.einsum("sqa,sa...->sq...", self.hat, f[cells[self.cell]])
+
+
+class Viscosity:
+    """The stage for a Water with viscosity or walls that are not smooth."""
+
+    def __init__(self, parameters):
+        self.parameters = parameters
+        self._walls: WettedWalls | None = None
+        self.friction = None
+        if parameters.walls == "friction":
+            from fluid.wall_friction import WallFriction
+
+            self.friction = WallFriction.of(parameters)
+
+    def change(self, water, phi, nodal_water, w, dt: float) -> ViscousChange:
+        """δ over dt [s] on the way of the water to w (N, 3) [m/s]; surface phi (N,), nodal_water (N,) [m³].
+
+        Raises NotConverged."""
+        mass = self.parameters.density * nodal_water
+        terms = self._terms(water, phi, mass, w)
+        V = water.body_velocity
+        first, n1 = self._stage(terms, mass, dt, water.velocity + GAMMA * (w - water.velocity), V)
+        _, load1 = momentum_rate(terms, water.velocity + GAMMA * (w - water.velocity) + first, V)
+        second, n2 = self._stage(terms, mass, dt, w + (1.0 - GAMMA) / GAMMA * first, V)
+        u = w + (1.0 - GAMMA) / GAMMA * first + second
+        _, load2 = momentum_rate(terms, u, V)
+        energy = 0.5 * float(mass @ (np.einsum("ij,ij->i", u, u) - np.einsum("ij,ij->i", w, w)))
+        return ViscousChange(u - w, (1.0 - GAMMA) * load1 + GAMMA * load2, energy, n1 + n2)
+
+    def _stage(self, terms, mass, dt, start, V):
+        """d with (M + γ dt K) d = γ dt r(start)."""
+        tau = GAMMA * dt
+        rate, _ = momentum_rate(terms, start, V)
+        d, count, left = implicit_change(terms, mass, tau, tau * rate, len(V), TOLERANCE, MOST_ITERATIONS)
+        if not left <= TOLERANCE:
+            raise NotConverged(
+                f"the viscous step stopped after {count} iterations at a residual of {left:.3g}, "
+                f"wanted {TOLERANCE:.3g}; reduce time.step_max or time.cfl",
+                np.array([left]),
+            )
+        return d, count
+
+    def _terms(self, water, phi, mass, w):
+        t, p = water.topology, self.parameters
+        if self._walls is None or self._walls.domain is not water.domain:
+            self._walls = WettedWalls(water.domain, water.mesh.spacing)
+        wet = (phi < 0.0) & t.active
+        cells = np.flatnonzero(wet[t.cells].any(axis=1))
+        share = wet_fraction(cells, phi, t.cells)
+        cells, share = cells[share > 0.0], share[share > 0.0]
+        idle = mass <= 0.0
+        drag = np.zeros(len(phi)) if self.friction is None else self.friction.of_nodes(water, phi, w)
+        return (
+            cells,
+            2.0 * p.viscosity * share * t.volume[cells],
+            self._wall_terms(water, phi, w, cells, share),
+            p.viscosity,
+            drag,
+            *water.held_by_sides(),
+            idle,
+            t.cells,
+            t.parent,
+            t.gradients,
+        )
+
+    def _wall_terms(self, water, phi, w, wet_cells, share):
+        """The polygons that the water touches, with λ and C; λ rises as the surface takes water off a cell."""
+        p, k, cells = self.parameters, self._walls, water.topology.cells
+        water_share = np.ones(len(cells))
+        water_share[wet_cells] = np.maximum(share, 1.0 / STEEPEST)
+        wet = k.at_points(phi, cells) < 0.0
+        area = np.where(wet, k.area[:, None] / 3.0, 0.0)
+        nothing = np.zeros(len(k.cell))
+        nitsche = 4.0 * p.viscosity * k.per_volume / water_share[k.cell] if p.walls == "no-slip" else nothing
+        drag = nothing if self.friction is None else self.friction.of_faces(water, k, phi, w)
+        use = (area > 0.0).any(axis=1) & ((nitsche > 0.0) | (drag > 0.0))
+        return tuple(
+            np.ascontiguousarray(a[use])
+            for a in (k.cell, k.body, k.normal, k.hat, k.arm, area, nitsche, drag)
+        )

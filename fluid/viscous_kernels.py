@@ -1,0 +1,198 @@
+"""Viscous stress and wall stress of P1 velocities, and conjugate gradients on them, without a matrix.
+
+r = f - K u: the rate of momentum [N] that stresses give to the nodes,
+
+    r_i = - ∫ 2μ ε(u) ∇N_i dV  +  ∫_Γ N_i (t - λ (u - u_Γ)) dA  +  ∫_Γ (u - u_Γ)·t(N_i) dA  -  ∫_Γ N_i C (u - u_Γ)_t dA
+
+ε(u) = (∇u + ∇uᵀ)/2, t(v) = -2μ ε(v) n, n out of the body into the water, u_Γ the velocity of the body there.  The
+second and third terms hold u = u_Γ weakly (symmetric Nitsche), the last is wall friction.  With λ = 4 μ A/V, A wetted
+area and V water of the cell, the form is positive definite on every cut, since ε is constant in a cell (trace
+inequality ∫_Γ |ε n|² ≤ A/V ∫ |ε|²; De Prenter, Lehrenfeld, Massing, Comput. Math. Appl. 75 (2018) 4322).
+The body gets what the hats sum up to, -∫ (t - λ (u - u_Γ) - C (u - u_Γ)_t) dA: momentum is exchanged to round-off.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+
+@njit(cache=True)
+def cell_stress(cell_list, weight, u, cells, parent, g, out):
+    """out (N, 3) -= Σ_e w_e ε(u) ∇N_i over the listed cells, weight (n,) = 2μ times their water [N s/m]."""
+    G = np.empty((3, 3))
+    for s in range(cell_list.shape[0]):
+        e = cell_list[s]
+        p = parent[e]
+        G[:] = 0.0
+        for a in range(4):
+            i = cells[e, a]
+            for k in range(3):
+                for m in range(3):
+                    G[k, m] += u[i, k] * g[p, a, m]
+        for a in range(4):
+            i = cells[e, a]
+            for k in range(3):
+                total = 0.0
+                for m in range(3):
+                    total += (G[k, m] + G[m, k]) * g[p, a, m]
+                out[i, k] -= 0.5 * weight[s] * total
+
+
+@njit(cache=True)
+def wall_stress(walls, mu, u, body_velocity, cells, parent, g, out, load):
+    """The terms on Γ added to out (N, 3), and what the bodies get to load (n_bodies, 6).
+
+    walls: (cell (S,), body (S,), normal (S, 3), hat (S, 3, 4), arm (S, 3, 3) [m], area (S, 3) [m²] of each point,
+    nitsche (S,) λ [kg/(m² s)], drag (S,) C [kg/(m² s)]) · body_velocity (n_bodies, 6)."""
+    cell, body, normal, hat, arm, area, nitsche, drag = walls
+    t, v, f = np.empty(3), np.empty(3), np.empty(3)
+    for s in range(cell.shape[0]):
+        e, b = cell[s], body[s]
+        p = parent[e]
+        held = nitsche[s] > 0.0
+        t[:] = 0.0
+        if held:
+            _traction(e, mu, u, normal[s], cells, g[p], t)
+        for q in range(3):
+            w = area[s, q]
+            if w == 0.0:
+                continue
+            _slip_velocity(s, q, e, b, u, hat, arm, body_velocity, cells, v)
+            into = v[0] * normal[s, 0] + v[1] * normal[s, 1] + v[2] * normal[s, 2]
+            for k in range(3):
+                f[k] = w * (t[k] - nitsche[s] * v[k] - drag[s] * (v[k] - into * normal[s, k]))
+            for a in range(4):
+                i = cells[e, a]
+                across, along = 0.0, 0.0
+                if held:
+                    for k in range(3):
+                        across += g[p, a, k] * normal[s, k]
+                        along += g[p, a, k] * v[k]
+                for k in range(3):
+                    out[i, k] += hat[s, q, a] * f[k] - w * mu * (v[k] * across + normal[s, k] * along)
+            for k in range(3):
+                load[b, k] -= f[k]
+            load[b, 3] -= arm[s, q, 1] * f[2] - arm[s, q, 2] * f[1]
+            load[b, 4] -= arm[s, q, 2] * f[0] - arm[s, q, 0] * f[2]
+            load[b, 5] -= arm[s, q, 0] * f[1] - arm[s, q, 1] * f[0]
+
+
+@njit(cache=True)
+def _traction(e, mu, u, n, cells, g, t):
+    """t = -2μ ε(u) n of the cell e, in place; g (4, 3) its gradients."""
+    for k in range(3):
+        t[k] = 0.0
+    for a in range(4):
+        i = cells[e, a]
+        across = g[a, 0] * n[0] + g[a, 1] * n[1] + g[a, 2] * n[2]
+        along = u[i, 0] * n[0] + u[i, 1] * n[1] + u[i, 2] * n[2]
+        for k in range(3):
+            t[k] -= mu * (u[i, k] * across + g[a, k] * along)
+
+
+@njit(cache=True)
+def _slip_velocity(s, q, e, b, u, hat, arm, V, cells, v):
+    """v = u - u_Γ at a point of a polygon, in place."""
+    v[0] = -(V[b, 0] + V[b, 4] * arm[s, q, 2] - V[b, 5] * arm[s, q, 1])
+    v[1] = -(V[b, 1] + V[b, 5] * arm[s, q, 0] - V[b, 3] * arm[s, q, 2])
+    v[2] = -(V[b, 2] + V[b, 3] * arm[s, q, 1] - V[b, 4] * arm[s, q, 0])
+    for a in range(4):
+        for k in range(3):
+            v[k] += hat[s, q, a] * u[cells[e, a], k]
+
+
+@njit(cache=True)
+def momentum_rate(terms, u, body_velocity):
+    """r (N, 3) [N] and load (n_bodies, 6) [N, N m].  terms: see `implicit_change`."""
+    cell_list, weight, walls, mu, node_drag, node, projector, idle, cells, parent, g = terms
+    r = np.zeros_like(u)
+    load = np.zeros_like(body_velocity)
+    cell_stress(cell_list, weight, u, cells, parent, g, r)
+    wall_stress(walls, mu, u, body_velocity, cells, parent, g, r, load)
+    for i in range(u.shape[0]):
+        if node_drag[i] != 0.0:
+            for k in range(3):
+                r[i, k] -= node_drag[i] * u[i, k]
+    _restrict(r, node, projector, idle)
+    return r, load
+
+
+@njit(cache=True)
+def _restrict(r, node, projector, idle):
+    """Only what the sides of the tank leave free, in place."""
+    moved = np.empty(3)
+    for s in range(node.shape[0]):
+        for k in range(3):
+            moved[k] = 0.0
+            for m in range(3):
+                moved[k] += projector[s, k, m] * r[node[s], m]
+        r[node[s]] = moved
+    for i in range(r.shape[0]):
+        if idle[i]:
+            for k in range(3):
+                r[i, k] = 0.0
+
+
+@njit(cache=True)
+def preconditioner(terms, mass, tau):
+    """1 / diagonal (N,) of M + τ K, the flux terms left out; 0 on idle nodes."""
+    cell_list, weight, walls, _mu, node_drag, _node, _projector, idle, cells, parent, g = terms
+    cell, _body, _normal, hat, _arm, area, nitsche, drag = walls
+    diagonal = mass + tau * node_drag
+    for s in range(cell_list.shape[0]):
+        e = cell_list[s]
+        for a in range(4):
+            square = 0.0
+            for k in range(3):
+                square += g[parent[e], a, k] ** 2
+            diagonal[cells[e, a]] += tau * 2.0 / 3.0 * weight[s] * square
+    for s in range(cell.shape[0]):
+        for q in range(3):
+            for a in range(4):
+                diagonal[cells[cell[s], a]] += tau * area[s, q] * (nitsche[s] + drag[s]) * hat[s, q, a] ** 2
+    inverse = np.zeros_like(diagonal)
+    for i in range(diagonal.shape[0]):
+        if not idle[i] and diagonal[i] > 0.0:
+            inverse[i] = 1.0 / diagonal[i]
+    return inverse
+
+
+@njit(cache=True)
+def implicit_change(terms, mass, tau, right, n_bodies, tolerance, most):
+    """d (N, 3) with (M + τ K) d = right by conjugate gradients: (d, iterations, residual reached over the first).
+
+    terms: (cells in the water (n,), 2μ times their water (n,), walls of `wall_stress`, μ, drag of the nodes on sides
+    (N,) [kg/s], nodes on sides (n,), their projectors (n, 3, 3), idle (N,) bool: nodes that keep their velocity, cells,
+    parent, gradients) · mass (N,) [kg] · tau [s] · right (N, 3) [N s]."""
+    still = np.zeros((n_bodies, 6))
+    inverse = preconditioner(terms, mass, tau)
+    d, r = np.zeros_like(right), right.copy()
+    z = _scaled(inverse, r)
+    p = z.copy()
+    rz = np.sum(r * z)
+    first = rz
+    count = 0
+    while rz > tolerance * tolerance * first and count < most:
+        change, _ = momentum_rate(terms, p, still)
+        Ap = np.empty_like(p)
+        for i in range(p.shape[0]):
+            for k in range(3):
+                Ap[i, k] = mass[i] * p[i, k] - tau * change[i, k]
+        alpha = rz / np.sum(p * Ap)
+        d += alpha * p
+        r -= alpha * Ap
+        z = _scaled(inverse, r)
+        before, rz = rz, np.sum(r * z)
+        p = z + (rz / before) * p
+        count += 1
+    return d, count, np.sqrt(rz / first) if first > 0.0 else 0.0
+
+
+@njit(cache=True)
+def _scaled(factor, r):
+    out = np.empty_like(r)
+    for i in range(r.shape[0]):
+        for k in range(3):
+            out[i, k] = factor[i] * r[i, k]
+    return out

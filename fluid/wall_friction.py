@@ -1,0 +1,103 @@
+"""Friction of rough walls: shear stress τ = ρ C_f |u_t| u_t against the tangential velocity beside the wall.
+
+Log law of a wall with sand roughness k_s (Nikuradse), velocity taken at half a cell, y = h/2:
+
+    C_f = [κ / ln(1 + y/z₀)]²,   κ = 0.41,   z₀ = k_s/30                                           (1)
+
+Manning, for beds under water of depth d (the stress of uniform flow, τ = ρ g n² |u| u / d^(1/3)):
+
+    C_f = g n² / d^(1/3)                                                                          (2)
+
+on the floor and on faces of solids that look up (n_z > 0.5); d is the water in the column of cells, at least one cell.
+Both are linear in u_t once |u_t| is taken from before the stage, so the step stays symmetric.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+KARMAN = 0.41
+LOOKS_UP = 0.5
+
+
+@dataclass(frozen=True)
+class WallFriction:
+    """roughness k_s [m] or manning n [s/m^(1/3)], the other None · density [kg/m³] · gravity [m/s²]."""
+
+    roughness: float | None
+    manning: float | None
+    density: float
+    gravity: float
+
+    @classmethod
+    def of(cls, parameters) -> WallFriction:
+        """Raises ValueError unless one of roughness and manning is given."""
+        p = parameters
+        if (p.roughness is None) == (p.manning is None):
+            raise ValueError(
+                f"walls = 'friction' needs roughness or manning, one of them; got {p.roughness} and {p.manning}"
+            )
+        return cls(p.roughness, p.manning, p.density, p.gravity)
+
+    def of_faces(self, water, walls, phi, u):
+        """C (S,) [kg/(m² s)] of the polygons of cut walls (WettedWalls); u (N, 3) [m/s]."""
+        t = water.topology
+        slip = walls.at_points(u, t.cells).mean(axis=1) - _rigid_velocity(water, walls)
+        across = np.einsum("sk,sk->s", slip, walls.normal)
+        speed = np.linalg.norm(slip - across[:, None] * walls.normal, axis=1)
+        if self.manning is None:
+            return self.density * log_law(0.5 * t.size[walls.cell], self.roughness) * speed
+        depth = column_depth(water, phi)[walls.cell]
+        bed = walls.normal[:, 2] > LOOKS_UP
+        return np.where(bed, self.density * self._bed(depth, water.mesh.spacing) * speed, 0.0)
+
+    def of_nodes(self, water, phi, u):
+        """Drag (N,) [kg/s] of the nodes on closed sides of the tank: C times the wet area of each."""
+        t, (faces, area, cell) = water.topology, water.rough_faces()
+        size = np.linalg.norm(area, axis=1)
+        unit = area / size[:, None]
+        if self.manning is not None:
+            floor = unit[:, 2] < -LOOKS_UP
+            faces, size, cell, unit = faces[floor], size[floor], cell[floor], unit[floor]
+            factor = self._bed(column_depth(water, phi)[cell], water.mesh.spacing)
+        else:
+            factor = log_law(0.5 * t.size[cell], self.roughness)
+        size = size * t.fraction[cell]  # what solids stand on does not slide
+        drag = np.zeros(len(phi))
+        for corner in range(3):
+            node = faces[:, corner]
+            across = np.einsum("fk,fk->f", u[node], unit)
+            speed = np.linalg.norm(u[node] - across[:, None] * unit, axis=1)
+            np.add.at(drag, node, np.where(phi[node] < 0.0, self.density * factor * speed * size / 3.0, 0.0))
+        return drag
+
+    def _bed(self, depth, least):
+        return self.gravity * self.manning**2 / np.cbrt(np.maximum(depth, least))
+
+
+def log_law(distance, roughness: float):
+    """C_f of equation (1); distance (n,) [m], roughness k_s [m]."""
+    return (KARMAN / np.log1p(30.0 * distance / roughness)) ** 2
+
+
+def column_depth(water, phi):
+    """Depth of water (M,) [m] in the column of bins over each cell: its water over the area of the bin."""
+    from fluid.moments import wet_fraction
+
+    t, mesh = water.topology, water.mesh
+    x, y = mesh.axes[0], mesh.axes[1]
+    centre = mesh.nodes[mesh.cells[t.parent]].mean(axis=1)
+    i = np.clip(np.searchsorted(x, centre[:, 0]) - 1, 0, len(x) - 2)
+    j = np.clip(np.searchsorted(y, centre[:, 1]) - 1, 0, len(y) - 2)
+    column = i * (len(y) - 1) + j
+    area = np.outer(np.diff(x), np.diff(y)).ravel()
+    volume = t.volume * wet_fraction(np.arange(len(t.cells)), phi, t.cells)
+    return (np.bincount(column, volume, minlength=len(area)) / area)[column]
+
+
+def _rigid_velocity(water, walls):
+    """Velocity (S, 3) of the bodies at the middle of the polygons."""
+    V = water.body_velocity[walls.body]
+    return V[:, :3] + np.cross(V[:, 3:], walls.arm.mean(axis=1))

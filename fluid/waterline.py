@@ -1,0 +1,128 @@
+"""The load on solids where the water surface passes through their cells.
+
+The coupling G of the pressure solve takes the wetted polygons of a cell whole.  It has to: for every hat function of
+a wet node, ∫ V·∇N_i dV + G V = 0 must hold for water and solid that move together, and that leaves no other G.  As a
+load, -Gᵀp is then wrong by what the hat functions of the wet corners reach up the dry part of a face, up to
+(h/depth)²/2, or all over a deck less than a cell above the water.  The pressure itself ends at the surface,
+
+    F = -∫_{φ<0} p n dA,        p = Σ_wet p_i N_i + Σ_dry p_j N_j,                                        (1)
+
+with the dry values p_j continued through the zero at the surface (`projection.with_ghosts`).  The difference
+
+    R = F + Gᵀp = -∫_{φ<0} p n dA + ∫ Σ_wet p_i N_i n dA                                                  (2)
+
+is added to the load as a known force, with the pressure of the step before.  It opposes a share of Gᵀp itself, which
+the solve has inside, so its lag cannot grow: with a share ε of the added mass m_a of a body of mass m, an error of the
+acceleration is multiplied by ε m_a / (m + m_a) < 1 in every step.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from fluid.domain import hat_values
+from fluid.moments import cells_touching
+from fluid.projection import with_ghosts
+
+
+def waterline_load(domain, phi, wet, pressure, open_node) -> np.ndarray:
+    """R of (2): force and moment on every body (n_bodies, 6) [N, N m].
+
+    phi (N,) [m] · wet (N,) bool · pressure (N,) [Pa], read on wet nodes · open_node (N,) bool: p = 0."""
+    load = np.zeros((domain.n_bodies, 6))
+    corners = domain.cells[domain.face_cell]
+    count = wet[corners].sum(axis=1)
+    at = np.flatnonzero((count > 0) & (count < 4))
+    if len(at) == 0:
+        return load
+    corners = corners[at]
+    p = np.where(wet & ~open_node, pressure, 0.0)
+    beside = cells_touching(np.isin(np.arange(len(phi)), corners), domain.cells)
+    ghosts = with_ghosts(p, wet, open_node, phi, beside, domain.cells)
+    hats = hat_values(domain.nodes[corners], domain.face_corners[at])
+    height, full, acting = (np.einsum("kqa,ka->kq", hats, f[corners]) for f in (phi, ghosts, p))
+    body = domain.face_body[at]
+    arm = domain.face_corners[at] - domain.body_centre[body][:, None]
+    force, first = _differences(height, full, acting, arm, domain.face_area[at])
+    normal = domain.face_normal[at]
+    np.add.at(load[:, :3], body, force[:, None] * normal)
+    np.add.at(load[:, 3:], body, np.cross(first, normal))
+    return load
+
+
+@njit(cache=True)
+def _differences(height, full, acting, arm, area):
+    """∫ p_acting - ∫_{height<0} p_full over triangles with corner values (k, 3): (k,), and times the arm: (k, 3)."""
+    n = height.shape[0]
+    force, first = np.zeros(n), np.zeros((n, 3))
+    share = np.empty((2, 3, 3))
+    corner = np.eye(3)
+    for s in range(n):
+        _add(1.0, area[s], corner, acting[s], arm[s], force, first, s)
+        for k in range(_wet_triangles(height[s], share)):
+            part = share[k]
+            _add(-1.0, area[s] * _relative_area(part), part, full[s], arm[s], force, first, s)
+    return force, first
+
+
+@njit(cache=True)
+def _wet_triangles(height, share):
+    """Barycentric corners (·, 3, 3) of the part with height < 0, as 0, 1 or 2 triangles → how many."""
+    share[:] = 0.0
+    n_wet = 0
+    for k in range(3):
+        n_wet += height[k] < 0.0
+    if n_wet == 0:
+        return 0
+    if n_wet == 3:
+        for k in range(3):
+            share[0, k, k] = 1.0
+        return 1
+    a = 0  # the corner alone on its side
+    while (height[a] < 0.0) != (n_wet == 1):
+        a += 1
+    b, c = (a + 1) % 3, (a + 2) % 3
+    to_b, to_c = height[a] / (height[a] - height[b]), height[a] / (height[a] - height[c])
+    if n_wet == 1:
+        share[0, 0, a] = 1.0
+        share[0, 1, a], share[0, 1, b] = 1.0 - to_b, to_b
+        share[0, 2, a], share[0, 2, c] = 1.0 - to_c, to_c
+        return 1
+    share[0, 0, b], share[0, 1, c] = 1.0, 1.0
+    share[0, 2, a], share[0, 2, b] = 1.0 - to_b, to_b
+    share[1, 0, c] = 1.0
+    share[1, 1, a], share[1, 1, b] = 1.0 - to_b, to_b
+    share[1, 2, a], share[1, 2, c] = 1.0 - to_c, to_c
+    return 2
+
+
+@njit(cache=True)
+def _relative_area(part):
+    """|det| of barycentric corners (3, 3): the area of the part over that of the triangle."""
+    d = part[0, 0] * (part[1, 1] * part[2, 2] - part[1, 2] * part[2, 1])
+    d -= part[0, 1] * (part[1, 0] * part[2, 2] - part[1, 2] * part[2, 0])
+    d += part[0, 2] * (part[1, 0] * part[2, 1] - part[1, 1] * part[2, 0])
+    return abs(d)
+
+
+@njit(cache=True)
+def _add(sign, area, part, p, arm, force, first, s):
+    """force[s] += sign ∫ p dA, first[s] += sign ∫ p arm dA over the part with barycentric corners (3, 3).
+
+    Products of linear functions f, g over a triangle: A/12 (Σ f_k g_k + Σ f_k Σ g_k)."""
+    total = 0.0
+    value, place, sum_place = np.empty(3), np.zeros((3, 3)), np.zeros(3)
+    for k in range(3):
+        value[k] = part[k, 0] * p[0] + part[k, 1] * p[1] + part[k, 2] * p[2]
+        total += value[k]
+        for c in range(3):
+            for q in range(3):
+                place[k, c] += part[k, q] * arm[q, c]
+            sum_place[c] += place[k, c]
+    force[s] += sign * area * total / 3.0
+    for c in range(3):
+        mixed = total * sum_place[c]
+        for k in range(3):
+            mixed += value[k] * place[k, c]
+        first[s, c] += sign * area * mixed / 12.0

@@ -1,0 +1,338 @@
+"""Joints as kernels see them, against plain formulas: tractions, work at any speed, energy on unloading, time step."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from yade_scripts.blocks import Block
+from yade_scripts.building import wall_blocks
+from yade_scripts.cohesion import JointParameters
+from yade_scripts.faces import FixedPlane, touching_faces
+from yade_scripts.joints import Joints
+from yade_scripts.timestep import exact_joint_frequency, joint_frequency
+
+LAWS = [
+    ("polynomial", None),
+    ("bilinear", None),
+    ("bilinear", 0.5),
+    ("exponential", None),
+    ("exponential", 0.2),
+]
+EVERY = pytest.mark.parametrize(("name", "peak"), LAWS)
+
+
+class Pair:
+    """Two unit cubes glued face to face in free space, without YADE; only the second one moves."""
+
+    def __init__(self, law):
+        self.blocks = [Block("a", (0, 0, 0), size=1.0, fixed=True), Block("b", (0, 0, 1), size=1.0)]
+        self.joints = Joints(self.blocks, touching_faces(self.blocks), law)
+        self.x = np.array([b.centre for b in self.blocks], float)
+        self.R = np.array([np.eye(3)] * 2)
+        self.v = np.zeros((2, 6))
+
+    def force(self, shift, dt=0.0, advance=False, eta=0.0):
+        """Force (3,) that the joint exerts on the first cube with the second one moved by `shift`."""
+        F = np.zeros((2, 6))
+        x = self.x.copy()
+        x[1] += shift
+        self.joints.forces(x, self.v, self.R, F, dt, advance, eta)
+        assert np.abs(F.sum(axis=0)[:3]).max() <= 1e-9 * (1.0 + np.abs(F).max())
+        return F[0, :3]
+
+    def pull_off(self, start, velocity, dt, steps):
+        """Kinetic energy lost by a cube of mass 1 on a straight way at first: leapfrog, no rotation."""
+        shift, v = np.array(start, float), np.array(velocity, float)
+        for _ in range(steps):
+            self.v[1, :3] = v
+            v = v - dt * self.force(shift, dt, advance=True)
+            shift = shift + dt * v
+            if len(self.joints.broken_now()):
+                break
+        return 0.5 * (np.dot(velocity, velocity) - v @ v)
+
+
+def largest_substep(law, mass=1.0):
+    """A tenth of the explicit limit of one mass on the face."""
+    return 0.1 * 2.0 / np.sqrt(law.stiffness / mass)
+
+
+@EVERY
+@pytest.mark.parametrize("beta", [1.0, 0.7])
+def test_tractions_follow_the_law_along_any_straight_opening(name, peak, beta):
+    """t_n = T(λ) δ_n/λ and t_t = β² T(λ) δ_t/λ with λ = sqrt(δ_n² + β² δ_t²)."""
+    law = JointParameters(1e6, 1e-3, law=name, peak=peak, shear_ratio=beta)
+    way = np.array([0.6, 0.3, 0.5])
+    pair = Pair(law)
+    for far in np.linspace(0.02, 1.2, 60) * 1e-3:
+        shift = far * way
+        lam = np.hypot(shift[2], beta * np.hypot(*shift[:2]))
+        T = law.traction(lam) / lam
+        np.testing.assert_allclose(
+            pair.force(shift, advance=True), T * shift * [beta**2, beta**2, 1.0], rtol=1e-9, atol=1e-9 * 1e6
+        )
+
+
+@EVERY
+@settings(max_examples=60, deadline=None)
+@given(
+    speed=st.floats(1.05, 120.0),
+    direction=st.floats(0.0, np.pi / 2),
+    phase=st.floats(0.0, 1.0),
+)
+def test_work_of_separation_is_exact_at_any_speed(name, peak, speed, direction, phase):
+    """From just above the critical speed to 10 δ_f a substep, opening, sliding and between, from any place before
+    the joint pulls: what a free mass loses is G_c to 0.5 %."""
+    law = JointParameters(1e6, 1e-3, law=name, peak=peak, points=1)
+    dt = largest_substep(law)
+    velocity = (
+        speed * np.sqrt(2.0 * law.work_of_separation) * np.array([np.sin(direction), 0, np.cos(direction)])
+    )
+    start = np.array([0.0, 0.0, -phase * velocity[2] * dt]) if direction == 0.0 else np.zeros(3)
+    pair = Pair(law)
+    pair.joints.closing[:] = False  # nothing but the law acts
+    lost = pair.pull_off(start, velocity, dt, 2000)
+    assert lost == pytest.approx(law.work_of_separation, rel=5e-3)
+
+
+@EVERY
+@pytest.mark.parametrize(("strength", "failure"), [(1e3, 0.1), (1e3, 1e-8), (1e8, 1e-8), (1e8, 0.1)])
+@pytest.mark.parametrize("speed", [1.1, 3.0, 30.0, 300.0])
+def test_extreme_strengths_and_openings_keep_the_work_exact(name, peak, strength, failure, speed):
+    law = JointParameters(strength, failure, law=name, peak=peak, points=1)
+    velocity = speed * np.sqrt(2.0 * law.work_of_separation) * np.array([0.0, 0.0, 1.0])
+    lost = Pair(law).pull_off(np.zeros(3), velocity, largest_substep(law), 2000)
+    # openings of 1e-8 m are known to 1e-16 m, the rounding of the position
+    assert lost == pytest.approx(law.work_of_separation, rel=5e-3)
+
+
+@EVERY
+def test_a_vibration_that_does_not_break_the_joint_gains_no_more_than_leapfrog_alone(name, peak):
+    """Largest energy over the start's in 2000 substeps, with the account of work and with T itself: kink between
+    tension and compression and damage let leapfrog gain some per cent; the account must not add to it."""
+    law = JointParameters(1e6, 1e-3, law=name, peak=peak, points=1)
+    dt = largest_substep(law)
+
+    def gain(share, account):
+        pair = Pair(law)
+        v = share * np.sqrt(2.0 * law.work_of_separation)
+        first, z, worst = 0.5 * v * v, 0.0, 0.0
+        for _ in range(1000):
+            pair.v[1, 2] = v if account else 0.0
+            f = pair.force(np.array([0.0, 0.0, z]), dt if account else 0.0, advance=True)[2]
+            v -= dt * f
+            before, z = z, z + dt * v
+            x = np.array([pair.x[0], pair.x[1] + [0, 0, z]])
+            x0 = np.array([pair.x[0], pair.x[1] + [0, 0, before]])
+            held = pair.joints.stored_between(x, pair.R, x0, pair.R).sum() + pair.joints.lost().sum()
+            worst = max(worst, (0.5 * v * v + held) / first)
+        return worst
+
+    for share in (0.3, 0.6, 0.8, 0.9, 0.97):
+        assert gain(share, True) <= gain(share, False) + 0.01
+
+
+# ---- Needleman's potential --------------------------------------------------------------------------------------
+
+POTENTIAL = JointParameters(1e6, 1e-3, mixed_mode="needleman", shear_ratio=0.8)
+
+
+def test_needleman_gives_the_tractions_of_his_potential():
+    pair = Pair(POTENTIAL)
+    C, alpha = 27.0 / 4.0 * 1e6, 0.64
+    for u in np.linspace(0.01, 0.99, 25):  # every new opening is the largest
+        v = 0.3 * u + 0.1
+        T = pair.force(np.array([v * 1e-3, 0.0, u * 1e-3]), advance=True)
+        assert T[2] == pytest.approx(C * (u * (1 - u) ** 2 - alpha * v * v * (1 - u)), rel=1e-9)
+        assert T[0] == pytest.approx(C * alpha * v * (1 - u) ** 2, rel=1e-9)
+
+
+def test_needleman_takes_the_work_of_pure_opening_in_every_mode():
+    """Sliding stores energy that the opening gets back: G_c = 9/16 T_max δ_f for any sliding on the way."""
+    for slide in (0.0, 0.2, 0.6):
+        pair, work, t = Pair(POTENTIAL), 0.0, np.zeros(3)
+        way = np.concatenate(
+            [
+                np.linspace([0, 0, 0], [slide, 0, 0], 1000),
+                np.linspace([slide, 0, 0], [slide, 0, 1.0001], 4000),
+            ]
+        )
+        for a, b in zip(1e-3 * way[:-1], 1e-3 * way[1:]):
+            new = pair.force(b, advance=True)
+            work += 0.5 * (t + new) @ (b - a)
+            t = new
+        assert work == pytest.approx(POTENTIAL.work_of_separation, rel=2e-3)
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.lists(st.tuples(st.floats(-0.6, 0.6), st.floats(-0.2, 0.9)), min_size=2, max_size=6))
+def test_needleman_never_gives_more_than_it_got(stops):
+    """Along any way through opening, closing and sliding: work done on the joint = stored + lost, lost never falls."""
+    pair, work, t, place, lost = Pair(POTENTIAL), 0.0, np.zeros(3), np.zeros(3), 0.0
+    for slide, open_ in stops:
+        goal = 1e-3 * np.array([slide, 0.0, open_])
+        for share in np.linspace(0.0, 1.0, 201)[1:]:
+            new_place = place + share * (goal - place)
+            new = pair.force(new_place, advance=True)
+            work += 0.5 * (t + new) @ (new_place - (place + (share - 0.005) * (goal - place)))
+            t = new
+        place = goal
+        x = np.array([pair.x[0], pair.x[1] + place])
+        stored = pair.joints.stored_between(x, pair.R, x, pair.R).sum()
+        new_lost = pair.joints.lost().sum()
+        assert new_lost >= lost
+        lost = new_lost
+        assert work == pytest.approx(stored + lost, abs=2e-3 * POTENTIAL.work_of_separation)
+        assert stored >= 0.0
+
+
+def test_needleman_does_not_soften_in_pure_shear():
+    """As his potential has it: shear grows without limit as long as nothing opens, and the joint does not fail."""
+    pair = Pair(POTENTIAL)
+    T = [pair.force(np.array([v * 1e-3, 0.0, 0.0]), advance=True)[0] for v in (0.5, 1.0, 5.0)]
+    np.testing.assert_allclose(T, 27.0 / 4.0 * 1e6 * 0.64 * np.array([0.5, 1.0, 5.0]), rtol=1e-9)
+    assert len(pair.joints.broken_now()) == 0
+
+
+# ---- faces and points -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("shift", [(0.5, 0.0), (0.25, -0.4), (0.9, 0.7)])
+@EVERY
+def test_faces_that_overlap_partly_carry_their_share(name, peak, shift):
+    """Force and moment of a joint between offset faces: law times overlap, acting at the centre of the overlap."""
+    law = JointParameters(1e6, 1e-3, law=name, peak=peak)
+    blocks = [Block("a", (0, 0, 0), size=1.0, fixed=True), Block("b", (*shift, 1), size=1.0)]
+    joints = Joints(blocks, touching_faces(blocks), law)
+    area = np.prod(1.0 - np.abs(shift))
+    assert joints.area.sum() == pytest.approx(area, rel=1e-12)
+    x = np.array([b.centre for b in blocks], float)
+    x[1, 2] += 0.25e-3
+    F = np.zeros((2, 6))
+    joints.forces(x, np.zeros((2, 6)), np.array([np.eye(3)] * 2), F)
+    T = law.traction(0.25e-3) * area
+    np.testing.assert_allclose(F[0, :3], [0, 0, T], rtol=1e-9, atol=1e-6)
+    np.testing.assert_allclose(F[0, 3:], [0.5 * shift[1] * T, -0.5 * shift[0] * T, 0], rtol=1e-9, atol=1e-6)
+
+
+def test_running_bond_joins_every_block_to_those_above_and_below():
+    """Each full brick inside meets two in the course above and two below, half a face each; ground included."""
+    blocks = [
+        Block(f"{c}-{i}", (i + 0.5 * (c % 2), 0, 0.25 + 0.5 * c), size=(1, 0.5, 0.5))
+        for c in range(3)
+        for i in range(4)
+    ]
+    joints = Joints(
+        blocks, touching_faces(blocks, [FixedPlane((0, 0, 0), (0, 0, 1))]), JointParameters(1e6, 1e-3)
+    )
+    row = [b.name for b in blocks].index("1-1")
+    touching = (joints.a == row) | (joints.b == row)
+    flat = np.abs(joints.normal[:, 2]) > 0.5
+    np.testing.assert_allclose(joints.area[touching & flat], 0.25)
+    assert (touching & flat).sum() == 4
+    assert (touching & ~flat).sum() == 2
+    assert joints.area[flat & (joints.b < 0)].sum() == pytest.approx(4 * 0.5)
+
+
+@pytest.mark.parametrize(
+    ("ratio", "law", "points"),
+    [
+        (1.0, "polynomial", 9),
+        (10.0, "polynomial", 36),
+        (100.0, "polynomial", 49),
+        (1e4, "polynomial", 36),
+        (1.0, "exponential", 16),
+        (1.0, "bilinear", 64),
+    ],
+)
+def test_auto_takes_as_many_points_as_law_and_closing_stiffness_need(ratio, law, points):
+    pair = Pair(JointParameters(1e6, 1e-3, law=law, closing_ratio=ratio))
+    assert len(pair.joints.weight) == points
+    assert pair.joints.weight.sum() == pytest.approx(1.0, rel=1e-12)
+
+
+# ---- time step --------------------------------------------------------------------------------------------------
+
+
+def rubble_wall(seed, columns, rows):
+    """Blocks of uneven sizes and densities in columns on the ground."""
+    rng = np.random.default_rng(seed)
+    blocks, x = [], 0.0
+    for c in range(columns):
+        width, z = rng.uniform(0.2, 2.0), 0.0
+        for r in range(rows):
+            height = rng.uniform(0.2, 2.0)
+            size = (width, 0.7, height)
+            density = 10.0 ** rng.uniform(2.0, 4.3)
+            blocks.append(Block(f"{c}-{r}", (x + width / 2, 0, z + height / 2), size=size, density=density))
+            z += height
+        x += width
+    return blocks
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("ratio", [1.0, 30.0])
+def test_the_cheap_bound_is_never_below_the_exact_frequency(seed, ratio):
+    blocks = rubble_wall(seed, 4, 4)
+    law = JointParameters(1e6, 1e-3, closing_ratio=ratio, shear_ratio=1.3)
+    joints = Joints(blocks, touching_faces(blocks, [FixedPlane((0, 0, 0), (0, 0, 1))]), law)
+    exact = exact_joint_frequency(blocks, joints)
+    bound = joint_frequency(blocks, joints)[0]
+    assert 0.5 * bound < exact <= bound * (1 + 1e-12)
+
+
+def test_the_exact_frequency_of_two_free_cubes():
+    """Cubes of mass m on a face of k per area: parting ω² = 2 k A/m; sliding with turning in the same sense
+    ω² = 2 k A/m (1 + (b/2)²·6/b²) = 5 k A/m, the largest."""
+    blocks = [Block("a", (0, 0, 0), size=1.0, density=1000), Block("b", (0, 0, 1), size=1.0, density=1000)]
+    law = JointParameters(1e6, 1e-3)
+    exact = exact_joint_frequency(blocks, Joints(blocks, touching_faces(blocks), law))
+    assert exact == pytest.approx(np.sqrt(5.0 * law.stiffness / 1000.0), rel=1e-9)
+
+
+def test_full_and_sparse_eigenvalues_agree(monkeypatch):
+    blocks = wall_blocks("w", (0, 0, 0), "x", 4.0, 3.0, 0.5, 1.0, 1.0)
+    joints = Joints(blocks, touching_faces(blocks), JointParameters(1e6, 1e-3))
+    sparse = exact_joint_frequency(blocks, joints)
+    monkeypatch.setattr("yade_scripts.timestep.DENSE", 10**6)
+    assert exact_joint_frequency(blocks, joints) == pytest.approx(sparse, rel=1e-9)
+
+
+# ---- report -----------------------------------------------------------------------------------------------------
+
+
+@EVERY
+def test_the_table_tells_damage_mode_and_energy(name, peak):
+    """Half opened and half slid: opening, sliding, share of shear; stored and lost add up to the work of the law."""
+    law = JointParameters(1e6, 1e-3, law=name, peak=peak, shear_ratio=1.5)
+    pair = Pair(law)
+    shift = np.array([0.2e-3, 0.0, 0.4e-3])
+    pair.force(shift, advance=True)
+    x = np.array([pair.x[0], pair.x[1] + shift])
+    table = pair.joints.table(x, pair.R)
+    lam = np.hypot(0.4e-3, 1.5 * 0.2e-3)
+    assert table.damage[0] == pytest.approx(lam / 1e-3, rel=1e-9)
+    assert table.opening[0] == pytest.approx(0.4e-3, rel=1e-9)
+    assert table.sliding[0] == pytest.approx(0.2e-3, rel=1e-9)
+    assert table.mode_mix[0] == pytest.approx(0.6, rel=1e-9)
+    assert table.stored[0] + table.dissipated[0] == pytest.approx(float(law.work_of_opening(lam)), rel=1e-9)
+    assert np.isnan(table.failure_time[0])
+    pair.force(np.array([0.0, 0.0, 1e-3 * 1.01]), advance=True)
+    pair.joints.retire(pair.joints.broken_now(), x, pair.R, 0.5)
+    table = pair.joints.table(x, pair.R)
+    assert table.dissipated[0] == pytest.approx(law.work_of_separation, rel=1e-9)
+    assert (table.stored[0], table.failure_time[0], table.alive[0]) == (0.0, 0.5, False)
+
+
+def test_history_brings_everything_back():
+    """Restored in the middle of a tearing, the same steps give the same forces to the last bit."""
+    law = JointParameters(1e6, 1e-3)
+    pair = Pair(law)
+    pair.v[1, 2] = 300.0
+    pair.force(np.array([0, 0, 0.2e-3]), 1e-6, advance=True)
+    saved = pair.joints.history()
+    first = [pair.force(np.array([0, 0, z]), 1e-6, advance=True) for z in (0.4e-3, 0.7e-3, 0.9e-3)]
+    pair.joints.restore(saved)
+    again = [pair.force(np.array([0, 0, z]), 1e-6, advance=True) for z in (0.4e-3, 0.7e-3, 0.9e-3)]
+    np.testing.assert_array_equal(first, again)
