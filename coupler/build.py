@@ -118,10 +118,9 @@ def build_structure(case: Case):
             mixed_mode=j.mixed_mode,
         )
     gravity = (0.0, 0.0, -case.case.gravity)
-    audit = c is not None and c.audit
     planes = [*_ground(case), *_tank_planes(case)]
     blocks = [block for part in parts_of(case) for block in part.blocks]
-    return Structure(blocks, contact, joints, None, planes, gravity, track_contacts=audit)
+    return Structure(blocks, contact, joints, None, planes, gravity)
 
 
 def _ground(case: Case) -> list:

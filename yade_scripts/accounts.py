@@ -6,15 +6,13 @@ opening u is 1/2 k u(t) u(t - dt), which together with the kinetic energy is con
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from yade_scripts import joint_kernel
-from yade_scripts.contact_state import Contacts
+from yade_scripts.contact_forces import ContactForces
 from yade_scripts.joints import Joints
-from yade_scripts.ledger import ContactWork
 from yade_scripts.motion import Motion
 
 Array = np.ndarray
@@ -43,7 +41,7 @@ class Accounts:
     """Running sums [J]: load_work · joint_work: what the joints did to the blocks · driving_work: done by what moves
     the driven blocks, against joints · handed_over: energy of compressed joints that went over to contacts.
 
-    contacts: reads the present contacts · contact_work: account contact by contact, or None.
+    contacts: they keep the account of their own work; None in a scene without contact.
     """
 
     def __init__(
@@ -51,18 +49,14 @@ class Accounts:
         masses: Masses,
         motion: Motion,
         joints: Joints | None,
-        contacts: Callable[[], Contacts],
-        contact_work: ContactWork | None,
+        contacts: ContactForces | None,
     ):
-        self._masses, self._motion, self._joints = masses, motion, joints
-        self._contacts, self._contact_work = contacts, contact_work
+        self._masses, self._motion, self._joints, self._contacts = masses, motion, joints, contacts
         self.load_work = self.joint_work = self.driving_work = self.handed_over = 0.0
-        self._start = sum(self.mechanical().values())
 
     def start_here(self) -> None:
         """The present state is the start: blocks were displaced by hand."""
         self.joint_work = -self.joint_stored() - self.law_dissipation()
-        self._start = sum(self.mechanical().values()) + self.law_dissipation()
 
     def take_joints(self, F: Array, before: Array, rows: Array, dt: float) -> None:
         """Work of the joint forces F (n, 6) on `rows` in a substep dt that began with velocities `before` (n, 6)."""
@@ -83,17 +77,11 @@ class Accounts:
         e["load_work"], e["driving_work"] = self.load_work, self.driving_work
         e["joint_damping"] = 0.0 if self._joints is None else float(self._joints.damped.sum())
         e["joint_dissipated"] = -self.joint_work - e["joint_stored"] - e["joint_damping"] - self.handed_over
-        if self._contact_work is not None:
-            e["driving_work"] += self._contact_work.driving
-            e["dashpot"], e["friction"] = self._contact_work.dashpot, self._contact_work.friction
-        else:
-            e["dashpot"], e["friction"] = 0.0, self._missing(e)
+        e["dashpot"] = e["friction"] = 0.0
+        if self._contacts is not None:
+            e["driving_work"] += self._contacts.driving
+            e["dashpot"], e["friction"] = self._contacts.dashpot, self._contacts.friction
         return e
-
-    def _missing(self, e: dict[str, float]) -> float:
-        """What the balance of the other energies leaves for dashpots and friction."""
-        known = ("kinetic", "gravity", "joint_stored", "joint_dissipated", "joint_damping", "contact_stored")
-        return e["load_work"] + e["driving_work"] + self._start - sum(e[name] for name in known)
 
     def law_dissipation(self) -> float:
         """See `Structure.law_dissipation`."""
@@ -122,7 +110,9 @@ class Accounts:
 
     def contact_stored(self) -> float:
         """Springs of the contacts half a substep ago: 1/2 k u(t) u(t - dt) in the normals [J]."""
-        c, m = self._contacts(), self._motion
+        if self._contacts is None:
+            return 0.0
+        c, m = self._contacts.now(), self._motion
         closing = np.einsum("ci,ci->c", c.closing_velocity(m.v, m.x), c.normal)
         depth = np.maximum(c.depth, 0.0)
         normal = 0.5 * c.kn * depth * np.maximum(depth - m.dt * closing, 0.0)

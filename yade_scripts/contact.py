@@ -27,28 +27,43 @@ class ContactError(ValueError):
 
 
 @dataclass(frozen=True)
+class PairFriction:
+    """μ where the materials a and b meet."""
+
+    a: str
+    b: str
+    friction: float
+
+    def __post_init__(self):
+        _within(f"pair {self.a}-{self.b}: friction", self.friction, -1e-300, np.inf, "-")
+
+
+@dataclass(frozen=True)
 class ContactLaw:
     """stiffness K [N/m] of a whole face in contact; None: that of the joints in closing (k_c A), so that a face
     that loses its joint goes on with the stiffness it had · restitution e in (0, 1] · friction μ ≥ 0
-    shear_ratio: K_s/K_n (1 in the paper) · rule: "exact" returns e, "paper" uses equation (3) as printed
-    nodes_per_edge: contact nodes along an edge of a block, ≥ 3 · node_radius: share of the half size of a block
+    shear_ratio: K_t/K_n (1 in the paper) · rule: "exact" returns e, "paper" uses equation (3) as printed
+    tangential_restitution in (0, 1]: sets the tangential dashpot by equation (3), with the effective mass along the
+    face; None: the normal dashpot times sqrt(shear_ratio) · pairs: friction of pairs of materials that have their own
+    nodes_per_edge: contact nodes along an edge of a block, ≥ 3
     """
 
     stiffness: float | None = None
     restitution: float = 0.3
     friction: float = 0.5
-    ground_friction: float | None = None
     shear_ratio: float = 1.0
+    tangential_restitution: float | None = None
     rule: Rule = "exact"
     nodes_per_edge: int = 3
-    node_radius: float = 0.01
+    pairs: tuple[PairFriction, ...] = ()
 
     def __post_init__(self):
         _within("stiffness", self.stiffness if self.stiffness is not None else 1.0, 0.0, np.inf, "N/m")
         _within("restitution", self.restitution, 0.0, 1.0, "-", closed_above=True)
         _within("friction", self.friction, -1e-300, np.inf, "-")
         _within("shear_ratio", self.shear_ratio, 0.0, 10.0, "-")
-        _within("node_radius", self.node_radius, 0.0, 0.2, "of the half size")
+        if self.tangential_restitution is not None:
+            _within("tangential_restitution", self.tangential_restitution, 0.0, 1.0, "-", closed_above=True)
         if self.rule not in ("exact", "paper"):
             raise ContactError(f"contact.rule = {self.rule!r}; it must be 'exact' or 'paper'")
         if self.nodes_per_edge < 3:
@@ -62,6 +77,23 @@ class ContactLaw:
         return (
             paper_damping_ratio(self.restitution) if self.rule == "paper" else damping_ratio(self.restitution)
         )
+
+    @property
+    def tangential_damping_ratio(self) -> float:
+        """ζ of the tangential dashpot; -1: the normal dashpot decides. (The tangential spring may pull, so equation (3)
+        is exact for it.)"""
+        e = self.tangential_restitution
+        return -1.0 if e is None else paper_damping_ratio(e)
+
+    def friction_table(self, materials: list[str]) -> np.ndarray:
+        """μ (m, m) of all pairs of `materials`."""
+        table = np.full((len(materials), len(materials)), float(self.friction))
+        row = {name: i for i, name in enumerate(materials)}
+        for pair in self.pairs:
+            if pair.a in row and pair.b in row:
+                i, j = row[pair.a], row[pair.b]
+                table[i, j] = table[j, i] = pair.friction
+        return table
 
     @property
     def obtained_restitution(self) -> float:

@@ -1,4 +1,4 @@
-"""The contacts that YADE holds now, as arrays; their energies, forces and springs."""
+"""The contacts there are now, as arrays; their forces and springs."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from yade_scripts.scene import Scene
+from yade_scripts.contact_kernel import Rows, empty_rows
 from yade_scripts.tangent import Springs
 
 Array = np.ndarray
@@ -17,10 +17,10 @@ SLIPS = 1.0 - 1e-9
 
 @dataclass(frozen=True)
 class Contacts:
-    """c node contacts. a, b (c,) rows (-1: fixed plane) · point (c, 3) [m] · normal (c, 3) from a to b
+    """c node contacts. a, b (c,) rows · point (c, 3) [m] · normal (c, 3) from a to b
 
-    depth (c,) [m] · kn, ks [N/m] · cn, cs [N s/m] · mu · normal_force, shear_force (c, 3) [N] as YADE keeps them
-    (acting on b; the shear force without its dashpot) · key (c,): number of the pair of bodies, lasts with the contact.
+    depth (c,) [m] · kn, ks [N/m] · cn, cs [N s/m], cs zero while it slides · mu · normal_force (with dashpot),
+    shear_force (without) (c, 3) [N] on b. a is the block of the node, b that of the face or -1 for a fixed plane.
     """
 
     a: Array
@@ -35,7 +35,6 @@ class Contacts:
     mu: Array
     normal_force: Array
     shear_force: Array
-    key: Array
 
     def __len__(self) -> int:
         return len(self.a)
@@ -88,28 +87,17 @@ def sum_on_blocks(contacts: Contacts, force: Array, x: Array) -> Array:
     return total
 
 
-def read_contacts(scene: Scene) -> Contacts:
-    """Everything YADE knows about its real interactions: one pass in Python, the only one."""
-    found = scene.contacts()
-    row_of = scene.row_of
-    geom = [i.geom for i in found]
-    phys = [i.phys for i in found]
-    ids = np.array([(i.id1, i.id2) for i in found], np.int64).reshape(-1, 2)
-    a = np.array([row_of[i] for i in ids[:, 0].tolist()], np.int64)
-    b = np.array([row_of[i] for i in ids[:, 1].tolist()], np.int64)
-    scalars = np.array([(p.kn, p.ks, p.cn, p.cs, p.tangensOfFrictionAngle) for p in phys]).reshape(-1, 5).T
+def contacts_of_rows(rows: Rows, count: int, n: int) -> Contacts:
+    """Copies of the first `count` contacts of a kernel, the first n bodies being blocks."""
+    r = Rows(*(array[:count].copy() for array in rows))
+    on_face = r.b < n
+    normal_force = np.einsum("ci,ci->c", r.force, r.normal)
     return Contacts(
-        np.where(a < 0, -1, a),
-        np.where(b < 0, -1, b),
-        _vectors([g.contactPoint for g in geom]),
-        _vectors([g.normal for g in geom]),
-        np.array([g.penetrationDepth for g in geom], float),
-        *scalars.copy(),
-        _vectors([p.normalForce for p in phys]),
-        _vectors([p.shearForce for p in phys]),
-        (ids[:, 0] << 32) + ids[:, 1],
-    )
+        r.a, np.where(on_face, r.b, -1), r.point, -r.normal, r.depth, r.kn, r.kt, r.cn, r.ct, r.mu,
+        -normal_force[:, None] * r.normal, -r.shear,
+    )  # fmt: skip
 
 
-def _vectors(items: list) -> Array:
-    return np.array([(v[0], v[1], v[2]) for v in items], float).reshape(-1, 3)
+def no_contacts() -> Contacts:
+    """Those of a scene without contact."""
+    return contacts_of_rows(empty_rows(0), 0, 0)

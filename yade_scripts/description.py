@@ -17,10 +17,6 @@ FAR = 1e3
 """Scenes farther than this from the origin [m] are computed about a local one."""
 
 
-class PolyhedralContact(BlockError):
-    """Contact was asked for a block that is not a box."""
-
-
 def check_names(blocks: list[Block]) -> None:
     """Raise BlockError where two blocks share a name."""
     seen: set[str] = set()
@@ -28,16 +24,6 @@ def check_names(blocks: list[Block]) -> None:
         if block.name in seen:
             raise BlockError(f"two blocks are called '{block.name}'; names must be unique")
         seen.add(block.name)
-
-
-def check_boxes(blocks: list[Block]) -> None:
-    """Raise PolyhedralContact where contact is asked for a block that is not a box."""
-    odd = [b.name for b in blocks if not b.is_box]
-    if odd:
-        raise PolyhedralContact(
-            f"block '{odd[0]}' is not a box ({len(odd)} such blocks): contact is available between boxes only; "
-            "leave the contact section out (joints work for any convex polyhedron) or use boxes"
-        )
 
 
 def local_origin(blocks: list[Block]) -> Array:

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from yade_scripts import joint_kernel
+from yade_scripts.faces import FixedPlane
 from yade_scripts.scene import STATE, Scene
 
 Array = np.ndarray
@@ -17,21 +18,23 @@ Array = np.ndarray
 class Motion:
     """x (n, 3) [m] centres in the scene's coordinates · R (n, 3, 3) body frame → world · v (n, 6) [v, ω]
 
-    dt [s]: length of the substep that led here. The lists of bodies persist between readings, because YADE leaks a
-    reference for each fresh item that it is handed.
+    all_x, all_v, all_R: the same with a row for each fixed plane behind · dt [s]: length of the substep that led here.
+    The lists of bodies persist between readings, because YADE leaks a reference for each fresh item that it is handed.
     """
 
-    def __init__(self, scene: Scene):
+    def __init__(self, scene: Scene, planes: list[FixedPlane]):
         self._scene = scene
-        n = len(scene.ids)
-        self.x, self.v, self.R = np.zeros((n, 3)), np.zeros((n, 6)), np.tile(np.eye(3), (n, 1, 1))
+        n, size = len(scene.ids), len(scene.ids) + len(planes)
+        self.all_x, self.all_v = np.zeros((size, 3)), np.zeros((size, 6))
+        self.all_R = np.tile(np.eye(3), (size, 1, 1))
+        self.x, self.v, self.R = self.all_x[:n], self.all_v[:n], self.all_R[:n]
+        self.all_x[n:] = np.array([p.point for p in planes]).reshape(-1, 3)
         self.dt = 0.0
         self._all = _Rows(np.arange(n), scene.ids)
         self._watched = _Rows(np.zeros(0, np.int64), scene.ids)
 
     def watch(self, rows: Array) -> None:
-        """Rows that `read_watched` reads; bodies may have changed since."""
-        self._all = _Rows(self._all.rows, self._scene.ids)
+        """Rows that `read_watched` reads."""
         self._watched = _Rows(rows, self._scene.ids)
 
     def read(self) -> None:

@@ -16,23 +16,22 @@ from yade_scripts.accounts import Accounts, Masses
 from yade_scripts.blocks import Block, BlockError
 from yade_scripts.cohesion import JointParameters
 from yade_scripts.contact import ContactLaw
-from yade_scripts.contact_state import Contacts, read_contacts, sum_on_blocks
-from yade_scripts.description import check_boxes, check_names, local_origin, matched_stiffness, moved_block
+from yade_scripts.contact_forces import ContactForces
+from yade_scripts.contact_state import Contacts, no_contacts, sum_on_blocks
+from yade_scripts.description import check_names, local_origin, matched_stiffness, moved_block
 from yade_scripts.engine import load_yade
 from yade_scripts.faces import FixedPlane, touching_faces
 from yade_scripts.joints import Joints, JointTable
-from yade_scripts.ledger import ContactWork
 from yade_scripts.motion import Motion
-from yade_scripts.onset import ContactOnset, loose_at_start, near_loose
-from yade_scripts.scene import Scene, SceneState
+from yade_scripts.onset import ContactOnset, loose_at_start
+from yade_scripts.scene import Scene
+from yade_scripts.spin import SpinCorrection
 from yade_scripts.substep import Substepper
 from yade_scripts.timestep import SubstepLimit, substep_limit
 
 Array = np.ndarray
 
 GRAVITY = (0.0, 0.0, -9.81)
-TIDY = 500
-"""Substeps between two tidyings of the contacts."""
 
 
 class NotFinite(RuntimeError):
@@ -43,13 +42,15 @@ class NotFinite(RuntimeError):
 class StructureState:
     """What `Structure.restore` goes back to."""
 
-    scene: SceneState
+    motion: Array
     time: float
     dt: float
-    loose: Array
+    load: Array
+    lent_spin: Array
+    onset: dict[str, Array]
     sums: dict[str, float]
     joints: dict[str, Array] | None
-    contact_work: tuple | None
+    contacts: dict[str, Array] | None
 
 
 @dataclass(frozen=True)
@@ -72,9 +73,6 @@ class Structure:
 
     blocks: list of Block, unique names · ground: level of a horizontal floor [m] or None
     planes: further fixed planes (tank walls) · gravity (3,) [m/s²]
-    plain_until_damage: blocks whose joints are intact carry no contact nodes until damage comes near
-    track_contacts: count the work of dashpots and friction contact by contact in every substep (a Python pass over
-        the contacts); without it their sum is taken from the balance of the other energies
 
     One structure in a process at a time (YADE has one scene): use it as a context manager or call close().
     """
@@ -87,8 +85,6 @@ class Structure:
         ground: float | None = None,
         planes: list[FixedPlane] | tuple = (),
         gravity=GRAVITY,
-        plain_until_damage: bool = True,
-        track_contacts: bool = False,
         threads: int = 1,
     ):
         self._describe(blocks, gravity)
@@ -99,22 +95,16 @@ class Structure:
         local_planes = [replace(p, point=p.point - origin) for p in self.planes]
         self.joints = _make_joints(local, local_planes, joints)
         self.face_stiffness = self._face_stiffness()
-        if contact is not None:
-            check_boxes(blocks)
         self._set_damping()
-        loose = loose_at_start(blocks, self.joints)
-        if self.joints is not None and contact is not None:
-            self.joints.hand_over(loose)
-        nodes = near_loose(loose, self.joints) if plain_until_damage else np.ones(self.n, bool)
-        self._scene = Scene(
-            load_yade(threads), local, local_planes, contact, self.face_stiffness, self._masses.gravity, nodes
-        )
-        self._motion = Motion(self._scene)
+        self._scene = Scene(load_yade(threads), local, contact is not None, self.gravity)
+        self._motion = Motion(self._scene, local_planes)
         self._motion.read()
+        self._contacts = self._contact_forces(local, local_planes)
+        loose = loose_at_start(blocks, self.joints)
         self._onset = ContactOnset(
-            self._scene, self._motion, self.joints, local_planes, self._radius, loose, plain_until_damage
+            self._scene, self._motion, self.joints, self._contacts, self._radius, loose
         )
-        self._start_accounts(track_contacts)
+        self._start_accounts()
 
     # ---- setting up -----------------------------------------------------------------------------------------
 
@@ -133,6 +123,7 @@ class Structure:
         self.gravity = np.asarray(gravity, float)
         inertia = np.array([b.inertia for b in blocks]).reshape(-1, 3, 3)
         self._masses = Masses(self.mass, inertia, ~self.fixed, self.gravity)
+        self._spin = SpinCorrection(inertia, ~self.fixed)
         self._radius = np.array([b.radius for b in blocks])
 
     def _face_stiffness(self) -> Array:
@@ -143,23 +134,27 @@ class Structure:
             return np.full(self.n, self.contact.stiffness)
         return matched_stiffness(self.blocks, self.joints)
 
+    def _contact_forces(self, blocks: list[Block], planes: list[FixedPlane]) -> ContactForces | None:
+        if self.contact is None:
+            return None
+        scene = self._scene
+        return ContactForces(
+            blocks, planes, self.contact, self.face_stiffness, ~self.fixed, self._motion, scene.neighbours, scene.margin
+        )
+
     def _set_damping(self) -> None:
         """Dashpot time η = 2 z/ω of the stiffest joint mode."""
         self._limit: SubstepLimit | None = None
         if self.joints is not None and self.joints.parameters.damping > 0.0:
             self.joints.eta = 2.0 * self.joints.parameters.damping / self.substep_limit().omega
 
-    def _start_accounts(self, track_contacts: bool) -> None:
+    def _start_accounts(self) -> None:
         self.time = 0.0
-        self._since_tidy = 0
-        self._scene.look()
-        self._contacts: Contacts | None = None
-        tracked = track_contacts and self.contact is not None
-        self._contact_work = ContactWork(self._scene) if tracked else None
-        self._accounts = Accounts(self._masses, self._motion, self.joints, self.contacts, self._contact_work)
+        self._accounts = Accounts(self._masses, self._motion, self.joints, self._contacts)
         self._substepper = Substepper(
-            self._scene, self._motion, self.joints, self._accounts, self._contact_work
+            self._scene, self._motion, self.joints, self._contacts, self._spin, self._accounts
         )
+        self._substepper.list_bodies(self._onset.loose)
 
     # ---- moving on ------------------------------------------------------------------------------------------
 
@@ -169,7 +164,7 @@ class Structure:
         if F.shape != (self.n, 6) or not np.isfinite(F).all():
             raise NotFinite(f"load of shape {F.shape} for {self.n} blocks, finite: {np.isfinite(F).all()}")
         self._substepper.load = F.copy()
-        self._substepper.list_bodies()
+        self._substepper.list_bodies(self._onset.loose)
 
     def drive(self, name: str, velocity=(0.0, 0.0, 0.0), spin=(0.0, 0.0, 0.0)) -> None:
         """New prescribed motion of a driven block: velocity (3,) [m/s], spin (3,) [rad/s]."""
@@ -202,16 +197,12 @@ class Structure:
         limit = self.stable_substep()[0] if substep is None else substep
         count = max(1, int(np.ceil(dt / limit * (1.0 - 1e-12)))) if np.isfinite(limit) else 1
         m = self._motion
-        m.dt = dt / count
-        self._turn_on_contacts(dt)
-        self._since_tidy += count
+        self._turn_on_contacts()
         x0, R0, half, spin = m.x.copy(), m.R.copy(), m.half_step_back(), m.v[:, 3:].copy()
         self._substepper.fastest = 0.0
         broken = [self._one_substep(dt / count) for _ in range(count)]
         m.read()
         self._check_finite()
-        self._scene.look()
-        self._contacts = None
         turn = m.turned_since(R0)
         work = self._accounts.work_of_load(self._substepper.load, half, turn, spin)
         self._accounts.load_work += work
@@ -220,18 +211,13 @@ class Structure:
             count, dt / count, self._substepper.fastest, mean, work, np.concatenate(broken).astype(np.int64)
         )
 
-    def _turn_on_contacts(self, dt: float) -> None:
-        """Before a step: for pieces that left their place, and for blocks that may be hit within dt."""
+    def _turn_on_contacts(self) -> None:
+        """Before a step: for pieces that left their place."""
         if self.contact is None:
             return
         moved = self._onset.moved()
         if len(moved):
             self._loosen(moved, self._accounts.joint_stored())
-        if self._onset.arm(dt):
-            self._bodies_changed()
-        if self._since_tidy > TIDY:
-            self._scene.tidy()
-            self._since_tidy = 0
 
     def _one_substep(self, dt: float) -> Array:
         """Joints that failed, rows of the table."""
@@ -246,23 +232,14 @@ class Structure:
         stored = self._accounts.joint_stored()
         self.joints.retire(broken, self._motion.x, self._motion.R, self.time)
         self._limit = None
-        newly = self._onset.of_failed(broken)
-        if self.contact is None:
-            self._onset.loose[newly] = True
-            self._bodies_changed()
-        else:
-            self._loosen(newly, stored)
+        self._loosen(self._onset.of_failed(broken), stored)
 
     def _loosen(self, rows: Array, stored: float) -> None:
         """Contact takes over around the blocks `rows`, and with it what of `stored` [J] the joints hold no more."""
         self._motion.read()
         self._onset.loosen(rows)
         self._accounts.handed_over += stored - self._accounts.joint_stored()
-        self._bodies_changed()
-
-    def _bodies_changed(self) -> None:
-        self._substepper.list_bodies()
-        self._contacts = None
+        self._substepper.list_bodies(self._onset.loose)
 
     def _check_finite(self) -> None:
         wrong = np.flatnonzero(~np.isfinite(self._motion.x).all(axis=1))
@@ -280,7 +257,9 @@ class Structure:
         if self.joints is not None:
             self.joints.forces(m.x, m.v, m.R, np.zeros((self.n, 6)), advance=True)
         self._onset.rest_here()
-        self._contacts = None
+        if self._contacts is not None:
+            self._contacts.search(now=True)
+            self._contacts.moved()
         self._accounts.start_here()
 
     # ---- what the neighbours read ---------------------------------------------------------------------------
@@ -306,10 +285,8 @@ class Structure:
         return self._onset.loose.copy()
 
     def contacts(self) -> Contacts:
-        """Contacts at the present positions, read from YADE once a step."""
-        if self._contacts is None:
-            self._contacts = read_contacts(self._scene)
-        return self._contacts
+        """Contacts at the present positions."""
+        return no_contacts() if self._contacts is None else self._contacts.now()
 
     def gravity_force(self) -> Array:
         """(n, 6) [N, N m]"""
@@ -357,7 +334,7 @@ class Structure:
         return table
 
     def touching(self) -> Array:
-        """(n,) bool: blocks with a contact of YADE, to one another or to a fixed plane."""
+        """(n,) bool: blocks with a contact, to one another or to a fixed plane."""
         found = np.zeros(self.n, bool)
         for rows in (self.contacts().a, self.contacts().b):
             found[rows[rows >= 0]] = True
@@ -373,10 +350,9 @@ class Structure:
         """Ledger [J]: kinetic + gravity + joint_stored + joint_dissipated + joint_damping + contact_stored + dashpot
         + friction changes by load_work + driving_work.
 
-        Kinetic energy lives at half substeps (leapfrog), so the potentials are taken there too. joint_dissipated is
-        the work that the joints took and did not store, from force times velocity in every substep.
-        With track_contacts, dashpot and friction are sums over contacts of force times velocity; without, `friction`
-        holds both, from the balance.
+        Kinetic energy lives at half substeps (leapfrog), so the potentials are taken there too. joint_dissipated,
+        dashpot and friction are sums over substeps of force times velocity; friction holds the springs of contacts
+        that ended as well.
         """
         return self._accounts.energies()
 
@@ -392,25 +368,27 @@ class Structure:
             self._scene.save(),
             self.time,
             self._motion.dt,
-            self._onset.loose.copy(),
+            self._substepper.load.copy(),
+            self._spin.save(),
+            self._onset.save(),
             self._accounts.sums(),
             self.joints.history() if self.joints is not None else None,
-            self._contact_work.sums() if self._contact_work is not None else None,
+            self._contacts.save() if self._contacts is not None else None,
         )
 
     def restore(self, saved: StructureState) -> None:
-        """Back to a saved state; blocks that got contact nodes since keep them, without effect on their motion."""
+        """Back to a saved state, bit for bit."""
         self.time, self._motion.dt, self._limit = saved.time, saved.dt, None
-        self._onset.loose[:] = saved.loose
+        self._scene.restore(saved.motion)
+        self._motion.read()
+        self._spin.restore(saved.lent_spin)
+        self._onset.restore(saved.onset)
         self._accounts.restore(saved.sums)
         if self.joints is not None:
             self.joints.restore(saved.joints)
-        if self._contact_work is not None:
-            self._contact_work.restore(saved.contact_work)
-        self._onset.set_masks(np.arange(self.n))
-        self._scene.restore(saved.scene)
-        self._bodies_changed()
-        self._motion.read()
+        if self._contacts is not None:
+            self._contacts.restore(saved.contacts)
+        self.set_load(saved.load)
 
     def close(self) -> None:
         """Give YADE's scene back."""

@@ -1,14 +1,15 @@
-"""One substep: contact forces of YADE, on top of them those of joints and load, then the integration of YADE."""
+"""One substep: forces of contacts, joints and load on the blocks, then the integration of YADE."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from yade_scripts.accounts import Accounts
+from yade_scripts.contact_forces import ContactForces
 from yade_scripts.joints import Joints
-from yade_scripts.ledger import ContactWork
 from yade_scripts.motion import Motion
 from yade_scripts.scene import Scene
+from yade_scripts.spin import SpinCorrection
 
 Array = np.ndarray
 
@@ -24,50 +25,51 @@ class Substepper:
         scene: Scene,
         motion: Motion,
         joints: Joints | None,
+        contacts: ContactForces | None,
+        spin: SpinCorrection,
         accounts: Accounts,
-        contact_work: ContactWork | None,
     ):
-        self._scene, self._motion, self._joints = scene, motion, joints
-        self._accounts, self._contact_work = accounts, contact_work
+        self._scene, self._motion, self._joints, self._contacts = scene, motion, joints, contacts
+        self._spin, self._accounts = spin, accounts
         self.load = np.zeros((len(scene.ids), 6))
         self.fastest = 0.0
         self._F = np.zeros_like(self.load)
-        self._unlike = scene.law is not None and scene.masses_differ
-        self.list_bodies()
+        self._joint_F = np.zeros_like(self.load)
+        self.list_bodies(np.ones(len(scene.ids), bool))
 
-    def list_bodies(self) -> None:
-        """Find the bodies to read and push: after joints failed, the load changed or blocks became clumps.
+    def list_bodies(self, loose: Array) -> None:
+        """Find the bodies to read and push: after joints failed, the load changed or blocks became loose (n,) bool.
 
-        Read are those with a live joint, or all when contacts are tracked; pushed those with a joint or under load."""
+        Read are those with a live joint, in reach of contact, or free to tumble; pushed also those under load."""
         none = np.zeros(0, np.int64)
         self._joined = self._joints.rows() if self._joints is not None else none
-        self._motion.watch(np.arange(len(self.load)) if self._contact_work is not None else self._joined)
-        self._pushed = np.union1d(self._joined, np.flatnonzero(self.load.any(axis=1)))
+        self._turning = np.flatnonzero(self._spin.unequal)
+        meeting = np.flatnonzero(loose) if self._contacts is not None else none
+        watched = np.union1d(np.union1d(self._joined, meeting), self._turning)
+        self._motion.watch(watched)
+        self._pushed = np.union1d(watched, np.flatnonzero(self.load.any(axis=1)))
         self._pushed_ids = [self._scene.ids[r] for r in self._pushed]
 
     def step(self, dt: float) -> None:
         """From the present places to those at dt [s] later."""
-        before = self._motion.v.copy()
-        self._scene.find_contacts(dt)
-        self._push(dt)
-        if self._contact_work is not None:
-            self._contact_work.take(before, self._motion.x, dt)
-        if self._unlike:  # after the reading: the present forces are those of the dashpots before
-            self._scene.correct_dashpots()
-        self._scene.integrate()
-        self._motion.dt = dt
-        self._motion.read_watched()
-        if len(self._joined):
-            self._accounts.take_joints(self._F, before, self._joined, dt)
-        if self._contact_work is not None:
-            self._contact_work.settle(self._motion.v)
-
-    def _push(self, dt: float) -> None:
         m = self._motion
+        before = m.v.copy()
+        self._F[:] = self.load
         if len(self._joined):
-            self._F[:] = 0.0
-            growth = self._joints.forces(m.x, m.v, m.R, self._F, dt, advance=True)
+            self._joint_F[:] = 0.0
+            growth = self._joints.forces(m.x, m.v, m.R, self._joint_F, dt, advance=True)
             self.fastest = max(self.fastest, growth)
-        if len(self._pushed):
-            joints = self._F[self._pushed] if len(self._joined) else 0.0
-            self._scene.add_forces(self._pushed_ids, joints + self.load[self._pushed])
+            self._F += self._joint_F
+        if self._contacts is not None:
+            self._contacts.add_forces(dt, self._F)
+        if len(self._turning):
+            self._spin.add(self._turning, m.R, m.v, dt, m.dt, self._F)
+        self._scene.step(dt, self._pushed_ids, self._F[self._pushed])
+        m.dt = dt
+        m.read_watched()
+        if len(self._joined):
+            self._accounts.take_joints(self._joint_F, before, self._joined, dt)
+        if self._contacts is not None:
+            self._contacts.settle(dt)
+            if self._scene.searched():
+                self._contacts.search(now=False)

@@ -42,7 +42,7 @@ def test_a_face_that_lands_flat_returns_e(e):
     """On the ground; the energies before and after account for the dashpot."""
     law = ContactLaw(stiffness=K, restitution=e)
     with Structure(
-        [cube(0.5 + 1e-4, velocity=(0, 0, -1.0))], law, ground=0.0, gravity=(0, 0, 0), track_contacts=True
+        [cube(0.5 + 1e-4, velocity=(0, 0, -1.0))], law, ground=0.0, gravity=(0, 0, 0)
     ) as s:
         before = balance(s.energies())
         s.advance(0.04, substep=0.02 * np.sqrt(2000.0 / K))
@@ -93,7 +93,7 @@ def test_ledger_of_a_block_that_drops_bounces_and_slides_to_rest():
     """Kinetic + potential + springs + dashpots + friction stays within 1e-3 of the energy put in."""
     block = cube(0.55, velocity=(3.0, 0.0, -1.0))
     with Structure(
-        [block], ContactLaw(stiffness=K, restitution=0.5, friction=0.3), ground=0.0, track_contacts=True
+        [block], ContactLaw(stiffness=K, restitution=0.5, friction=0.3), ground=0.0
     ) as s:
         start = s.energies()
         s.advance(0.3, substep=0.01 * np.sqrt(2000.0 / K))

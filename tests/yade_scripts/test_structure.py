@@ -11,7 +11,6 @@ from yade_scripts.building import column_blocks, wall_blocks
 from yade_scripts.cohesion import JointParameters
 from yade_scripts.contact import ContactLaw
 from yade_scripts.contact_state import sum_on_blocks
-from yade_scripts.description import PolyhedralContact
 from yade_scripts.scene import SceneInUse
 from yade_scripts.structure import NotFinite, Structure
 
@@ -145,7 +144,7 @@ def test_ledger_of_a_wall_broken_by_a_block():
         *wall_blocks("w", (0, 0, 0), "x", 3.0, 3.0, 0.5, 1.0, 1.0),
         Block("shot", (1.5, -1.0, 1.5), size=0.6, density=5000.0, velocity=(0, 12.0, 0)),
     ]
-    with Structure(blocks, ContactLaw(), JointParameters(2e5, 2e-3), ground=0.0, track_contacts=True) as s:
+    with Structure(blocks, ContactLaw(), JointParameters(2e5, 2e-3), ground=0.0) as s:
         start = s.energies()
         for _ in range(8):
             s.advance(0.01, substep=0.5 * s.stable_substep()[0])
@@ -156,12 +155,11 @@ def test_ledger_of_a_wall_broken_by_a_block():
     assert min(end["dashpot"], end["friction"], end["joint_dissipated"]) > 0.0
 
 
-@pytest.mark.parametrize("plain", [True, False])
-def test_contact_takes_over_from_a_broken_joint_without_a_jump(plain):
+def test_contact_takes_over_from_a_broken_joint_without_a_jump():
     """A column at rest loses a joint under compression: same face stiffness, so nothing moves by more than a few µm."""
     blocks = column_blocks("c", (0, 0, 0), (1.0, 1.0, 1.0), 4)
     law = JointParameters(2e5, 1e-3, damping=0.3)
-    with Structure(blocks, ContactLaw(friction=0.6), law, ground=0.0, plain_until_damage=plain) as s:
+    with Structure(blocks, ContactLaw(friction=0.6), law, ground=0.0) as s:
         s.advance(1.2)
         before = s.centre()
         depth = 2400.0 * 9.81 * 2 / law.closing_stiffness
@@ -232,9 +230,7 @@ def test_restore_repeats_the_step():
         *wall_blocks("w", (0, 0, 0), "x", 3.0, 3.0, 0.5, 1.0, 1.0),
         Block("shot", (1.5, -0.7, 1.5), size=0.6, density=5000.0, velocity=(0, 12.0, 0)),
     ]
-    with Structure(
-        blocks, ContactLaw(), JointParameters(2e5, 2e-3), ground=0.0, plain_until_damage=False
-    ) as s:
+    with Structure(blocks, ContactLaw(), JointParameters(2e5, 2e-3), ground=0.0) as s:
         s.advance(0.012)
         for _ in range(3):
             saved = s.save()
@@ -242,12 +238,10 @@ def test_restore_repeats_the_step():
             x, v, e = s.centre(), s.velocity(), s.energies()
             s.restore(saved)
             again = s.advance(0.005)
-            np.testing.assert_allclose(s.centre(), x, rtol=0, atol=1e-9)
-            np.testing.assert_allclose(s.velocity(), v, rtol=0, atol=1e-6)
+            np.testing.assert_array_equal(s.centre(), x)
+            np.testing.assert_array_equal(s.velocity(), v)
             assert again.broken.tolist() == first.broken.tolist()
-            assert s.energies()["joint_dissipated"] == pytest.approx(
-                e["joint_dissipated"], rel=1e-6, abs=1e-6
-            )
+            assert s.energies() == e
 
 
 def test_contacts_act_and_react():
@@ -290,8 +284,6 @@ def test_joints_of_any_convex_polyhedron():
         assert table.area == pytest.approx([np.sqrt(2.0)])
         s.advance(0.01)
         assert np.abs(s.velocity()).max() < 1e-9
-    with pytest.raises(PolyhedralContact, match="low"):
-        Structure(blocks, ContactLaw(stiffness=1e8), LAW)
 
 
 def test_errors_name_what_is_wrong():

@@ -1,0 +1,195 @@
+"""Contact between blocks, and of blocks with fixed planes: candidate pairs, history, forces and their account."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from yade_scripts import contact_kernel as kernel
+from yade_scripts.blocks import Block
+from yade_scripts.contact import ContactLaw
+from yade_scripts.contact_nodes import contact_shapes
+from yade_scripts.contact_state import Contacts, contacts_of_rows
+from yade_scripts.faces import FixedPlane
+from yade_scripts.motion import Motion
+
+Array = np.ndarray
+
+
+class ContactForces:
+    """Contacts of the blocks with what `neighbours` says is near.
+
+    blocks, planes: in the scene's coordinates · face_stiffness (n,) K [N/m] · neighbours(now) → (p, 2) pairs of
+    rows whose bounding boxes are close · reach [m]: how far a block can move before `neighbours` is asked again
+    free (n,) bool: motion not prescribed.
+
+    Running sums [J]: taken by dashpots, by friction and by springs let go; driving: put in by driven blocks.
+    """
+
+    def __init__(
+        self,
+        blocks: list[Block],
+        planes: list[FixedPlane],
+        law: ContactLaw,
+        face_stiffness: Array,
+        free: Array,
+        motion: Motion,
+        neighbours: Callable[[bool], Array],
+        reach: float,
+    ):
+        self._motion, self._neighbours, self._reach = motion, neighbours, reach
+        self._planes = planes
+        self._n = len(blocks)
+        self._shapes = contact_shapes(blocks, planes, law.nodes_per_edge)
+        names = [b.material for b in blocks] + [p.material for p in planes]
+        materials = sorted(set(names))
+        rows = np.array([materials.index(name) for name in names], np.int64)
+        self._bodies = _bodies(blocks, len(planes), face_stiffness, free, rows)
+        self._law = kernel.Law(
+            law.shear_ratio, law.damping_ratio, law.tangential_damping_ratio, law.friction_table(materials)
+        )
+        self._free = np.concatenate([free, np.zeros(len(planes), bool)])
+        self._nodes = np.diff(self._shapes.node_start)
+        self._on = np.zeros(self._n, bool)
+        self._on_planes = np.zeros(self._n, bool)
+        self._set_pairs(np.zeros((0, 2), np.int64))
+        self._count, self._read = 0, None
+        self.dashpot = self.friction = self.driving = 0.0
+
+    # ---- pairs ----------------------------------------------------------------------------------------------
+
+    def switch_on(self, rows: Array, only_planes: bool = False) -> None:
+        """Blocks that meet others, or only the fixed planes, by contact from now on: as deep as they are, since joints
+        hand over to it."""
+        self._on_planes[rows] = True
+        if not only_planes:
+            self._on[rows] = True
+        newly = np.zeros(len(self._free), bool)
+        newly[rows] = True
+        self.search(True, newly)
+
+    def search(self, now: bool, newly: Array | None = None) -> None:
+        """Renew the pairs from YADE's last search, or from one made now.
+
+        newly (n+m,) bool: bodies whose new pairs take over from joints."""
+        near = self._neighbours(now)
+        near = near[self._on[near].any(axis=1)]
+        pairs = np.concatenate([near, self._near_planes()])
+        pairs = np.stack([pairs.min(axis=1), pairs.max(axis=1)], axis=1)
+        pairs = pairs[self._free[pairs].any(axis=1)]
+        self._set_pairs(pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))], newly)
+
+    def _near_planes(self) -> Array:
+        """Blocks that may reach a plane before the next search, (k, 2)."""
+        rows = np.flatnonzero(self._on_planes)
+        radius = self._shapes.radius[rows] + 2.0 * self._reach
+        found = [np.zeros((0, 2), np.int64)]
+        for number, plane in enumerate(self._planes):
+            near = rows[(self._motion.x[rows] - plane.point) @ plane.normal < radius]
+            found.append(np.stack([near, np.full(len(near), self._n + number)], axis=1))
+        return np.concatenate(found)
+
+    def _set_pairs(self, pairs: Array, newly: Array | None = None) -> None:
+        """Pairs (p, 2) in order; what known pairs remember goes on."""
+        a, b = pairs.T.copy()
+        size = self._nodes[a] + self._nodes[b]
+        start = np.concatenate([[0], np.cumsum(size)]).astype(np.int64)
+        total = int(start[-1])
+        slots = kernel.Slots(
+            np.full(total, -1, np.int64), np.zeros(total), np.zeros(total), np.zeros((total, 3))
+        )
+        fresh, known, touching = (np.zeros(len(a), bool) for _ in range(3))
+        if hasattr(self, "_pairs") and len(self._pairs.a):
+            known = self._carry(a, b, start, touching, slots)
+        if newly is not None:
+            fresh = ~known & (newly[a] | newly[b])
+        self._pairs = kernel.Pairs(a, b, start, fresh, touching, np.zeros(len(a)))
+        self._slots = slots
+        if not hasattr(self, "_rows") or len(self._rows.a) < total:
+            self._rows = kernel.empty_rows(total + total // 4)
+
+    def _carry(self, a: Array, b: Array, start: Array, touching: Array, slots: kernel.Slots) -> Array:
+        """Copy the slots of pairs that were known before; (p,) bool."""
+        old, size = self._pairs, len(self._free)
+        old_keys, keys = old.a * size + old.b, a * size + b
+        spot = np.minimum(np.searchsorted(old_keys, keys), len(old_keys) - 1)
+        known = old_keys[spot] == keys
+        self.friction += kernel.carry_slots(
+            old, self._slots, np.flatnonzero(known), spot[known], start, touching, slots, self._law.shear
+        )
+        return known
+
+    # ---- forces ---------------------------------------------------------------------------------------------
+
+    def add_forces(self, dt: float, F: Array) -> None:
+        """Add the contact forces at the present places to F (n, 6) for a substep of dt [s]."""
+        m = self._motion
+        self._count, lost = kernel.contact_forces(
+            self._shapes, self._bodies, self._law, self._pairs, self._slots, m.all_x, m.all_v, m.all_R, dt, m.dt,
+            self._rows, F,
+        )  # fmt: skip
+        self.friction += lost
+        self._read = None
+
+    def settle(self, dt: float) -> None:
+        """Book the work of the contacts over the substep that has just ended."""
+        dashpot, driving = kernel.contact_work(
+            self._rows, self._count, self._motion.all_v, ~self._free, dt
+        )
+        self.dashpot += dashpot
+        self.driving += driving
+
+    def now(self) -> Contacts:
+        """Contacts at the present places, found afresh after `moved`."""
+        if self._read is None:
+            self.add_forces(0.0, np.zeros((self._n, 6)))
+            self._read = contacts_of_rows(self._rows, self._count, self._n)
+        return self._read
+
+    def moved(self) -> None:
+        """Places have changed since the last evaluation."""
+        self._read = None
+
+    # ---- saving and going back ------------------------------------------------------------------------------
+
+    def save(self) -> dict[str, Array]:
+        """History of the contacts there are, and the sums."""
+        index = np.flatnonzero(self._slots.face >= 0)
+        pair = np.searchsorted(self._pairs.start, index, side="right") - 1
+        return {
+            "on": self._on.copy(),
+            "on_planes": self._on_planes.copy(),
+            "a": self._pairs.a[pair],
+            "b": self._pairs.b[pair],
+            "node": index - self._pairs.start[pair],
+            "face": self._slots.face[index],
+            "k": self._slots.k[index],
+            "rest": self._slots.rest[index],
+            "shear": self._slots.shear[index],
+            "sums": np.array([self.dashpot, self.friction, self.driving]),
+        }
+
+    def restore(self, saved: dict[str, Array]) -> None:
+        """Back to a saved state, the blocks being where they were then."""
+        self._on[:], self._on_planes[:] = saved["on"], saved["on_planes"]
+        self._set_pairs(np.zeros((0, 2), np.int64))
+        self.search(True)
+        keys = self._pairs.a * len(self._free) + self._pairs.b
+        pair = np.searchsorted(keys, saved["a"] * len(self._free) + saved["b"])
+        slot = self._pairs.start[pair] + saved["node"]
+        self._pairs.touching[pair] = True
+        for name in ("face", "k", "rest", "shear"):
+            getattr(self._slots, name)[slot] = saved[name]
+        self.dashpot, self.friction, self.driving = saved["sums"].tolist()
+        self._read = None
+
+
+def _bodies(blocks, planes: int, face_stiffness: Array, free: Array, material: Array) -> kernel.Bodies:
+    inverse_mass = np.array([1.0 / b.mass if f else 0.0 for b, f in zip(blocks, free)] + [0.0] * planes)
+    inverse_inertia = np.zeros((len(blocks) + planes, 3, 3))
+    for row, block in enumerate(blocks):
+        if free[row]:
+            inverse_inertia[row] = np.linalg.inv(block.inertia)
+    stiffness = np.concatenate([face_stiffness, np.full(planes, np.inf)])
+    return kernel.Bodies(inverse_mass, inverse_inertia, stiffness, material)

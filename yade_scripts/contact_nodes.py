@@ -1,0 +1,108 @@
+"""Contact nodes of convex blocks: the points of a block that meet faces of other blocks.
+
+A node of one block inside another, near one of its faces, is one contact point. Nodes are the vertices, points along
+the edges and the middle of every face: with three an edge a box carries 26, nine on a face, so that resting, stacking,
+toppling and sliding come out right (two an edge let offset blocks fall over). Two edges that cross between nodes sink
+into each other by up to half the distance of the nodes along them: more points an edge where that matters.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from yade_scripts.blocks import Block
+from yade_scripts.faces import FixedPlane
+
+Array = np.ndarray
+
+MARGIN = 0.01
+"""A face reaches beyond its edges by this share of the block's inner radius, so that flush blocks carry each other."""
+
+
+class Shapes(NamedTuple):
+    """Blocks, then fixed planes, as bodies 0 .. n-1, n .. n+m-1; points and normals in the frame of their body.
+
+    node_start (n+m+1,) · node (N, 3) [m] · vertex_end (n+m,): the vertices come first · of_start (N+1,), of (.,): faces that hold a node
+    face_start (n+m+1,) · normal (F, 3) outward · offset (F,) [m]: inside is normal·x < offset
+    face_nodes (F,): nodes on a face · radius, margin (n+m,) [m].
+    """
+
+    node_start: Array
+    node: Array
+    vertex_end: Array
+    of_start: Array
+    of: Array
+    face_start: Array
+    normal: Array
+    offset: Array
+    face_nodes: Array
+    radius: Array
+    margin: Array
+
+
+def block_nodes(block: Block, per_edge: int) -> tuple[Array, list[list[int]]]:
+    """Nodes (k, 3) [m] of a block in its frame, and the faces that hold each.
+
+    Vertices, then per_edge - 2 points along each edge, then the middles of the faces.
+    """
+    points, holders = [*block.vertices], [[] for _ in block.vertices]
+    edges: dict[tuple[int, int], list[int]] = {}
+    for number, face in enumerate(block.faces):
+        for i, j in zip(face, (*face[1:], face[0])):
+            holders[i].append(number)
+            edges.setdefault((min(i, j), max(i, j)), []).append(number)
+    for (i, j), faces in sorted(edges.items()):
+        for s in np.linspace(0.0, 1.0, per_edge)[1:-1]:
+            points.append((1.0 - s) * block.vertices[i] + s * block.vertices[j])
+            holders.append(faces)
+    for number, face in enumerate(block.faces):
+        points.append(block.vertices[list(face)].mean(axis=0))
+        holders.append([number])
+    return np.array(points), holders
+
+
+def contact_shapes(blocks: list[Block], planes: list[FixedPlane], per_edge: int) -> Shapes:
+    """Nodes and faces of all blocks and planes in one set of arrays."""
+    nodes, holders, normals, offsets, counts = [], [], [], [], []
+    faces_before = 0
+    known: dict[tuple, tuple] = {}
+    for block in blocks:
+        key = (block.vertices.tobytes(), block.faces)
+        if key not in known:
+            known[key] = (*block_nodes(block, per_edge), *block.planes)
+        points, holding, normal, offset = known[key]
+        nodes.append(points)
+        holders += [[faces_before + f for f in held] for held in holding]
+        normals.append(normal)
+        offsets.append(offset)
+        counts.append((len(points), len(normal), len(block.vertices)))
+        faces_before += len(normal)
+    for plane in planes:
+        normals.append(plane.normal[None])
+        offsets.append(np.zeros(1))
+        counts.append((0, 1, 0))
+    node_count, face_count, vertex_count = np.array(counts, np.int64).reshape(-1, 3).T
+    node_start = _starts(node_count)
+    of = np.array([f for held in holders for f in held], np.int64)
+    number_of_faces = int(face_count.sum())
+    inner = np.array([b.planes[1].min() for b in blocks] + [np.inf] * len(planes))
+    radius = np.array([b.radius for b in blocks] + [np.inf] * len(planes))
+    return Shapes(
+        node_start,
+        np.concatenate(nodes) if nodes else np.zeros((0, 3)),
+        node_start[:-1] + vertex_count,
+        _starts([len(held) for held in holders]),
+        of,
+        _starts(face_count),
+        np.concatenate(normals) if normals else np.zeros((0, 3)),
+        np.concatenate(offsets) if offsets else np.zeros(0),
+        np.bincount(of, minlength=number_of_faces),
+        radius,
+        MARGIN * inner,
+    )
+
+
+def _starts(counts) -> Array:
+    return np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
