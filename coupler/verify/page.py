@@ -16,10 +16,6 @@ NOTES = {
     "out too large below 1.",
     "P10": "YADE's rotation of a body with three different inertias gains energy, 0.7 % in 6 s at 0.1 ms here, less "
     "in proportion to the substep.",
-    "P23": "With stiff closing a joint turns about its outermost points, and of 3 x 3 Gauss points these lie 0.11 of "
-    "the face inside the edge: 8 % weak at kc/K0 10, 18 % at 100. Raise `joints.points` with `joints.closing_ratio`.",
-    "P24": "As P23.",
-    "P25": "As P23.",
     "P33": "The projection with θ = 0.6 damps waves in proportion to the step.",
     "P36": "No gate and no bed friction: the front leads.",
     "P38": "The pressure after the impact lies well above the measured band, with cells of H/32 and in a taller tank "
@@ -32,7 +28,6 @@ NOTES = {
     "P51": "Linear elements underestimate the added mass of a cube with sharp edges: 13 % at a/6, 5.5 % at a/12, "
     "3.8 % at a/16. It is the same at every density ratio.",
     "P52": "The period is measured over few swings and moves by 1 to 2 % with the substep and the number of passes.",
-    "P57": "As P23.",
 }
 """What is known about cases that miss a tolerance."""
 

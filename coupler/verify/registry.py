@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Literal
 
-MODULES = ("contact", "joints", "stock", "water", "dam_breaks", "coupled", "wall")
+MODULES = ("contact", "joints", "bending", "stock", "water", "dam_breaks", "coupled", "wall")
 """Files of this package that hold cases; their names are the groups."""
 
 NOT_COVERED = {

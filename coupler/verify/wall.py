@@ -34,7 +34,7 @@ def exact_depth(ratio: float) -> float:
     return (6.0 * moment / (RHO * G)) ** (1.0 / 3.0)
 
 
-def wall(depth: float, ratio: float = 1.0, points: int = 3, start: str = "settled", opening: float = 2e-4):
+def wall(depth: float, ratio: float = 1.0, start: str = "settled", opening: float = 2e-4):
     """The coupled scene from a case; raises CannotStand where a settled start finds no equilibrium."""
     course = [THICKNESS, SLICE + 2 * OVERHANG, 0.25]
     case = Case.model_validate(
@@ -60,7 +60,6 @@ def wall(depth: float, ratio: float = 1.0, points: int = 3, start: str = "settle
                 "strength": STRENGTH,
                 "opening_at_failure": opening,
                 "closing_ratio": ratio,
-                "points": points,
                 "damping": 0.02,
             },
         }
@@ -70,9 +69,9 @@ def wall(depth: float, ratio: float = 1.0, points: int = 3, start: str = "settle
 
 @check("P57", "cohesive wall under still water", "strength of the base joint under axial load")
 def wall_under_still_water():
-    for ratio, points in ((1.0, 3), (100.0, 3), (100.0, 5)):
-        what = f"depth that breaks the base joint [m], kc/K0 {ratio:g}, {points} x {points} points"
-        yield Finding(what, _critical_depth(ratio, points), exact_depth(ratio), 0.07)
+    for ratio in (1.0, 10.0, 100.0):
+        what = f"depth that breaks the base joint [m], kc/K0 {ratio:g}"
+        yield Finding(what, _critical_depth(ratio), exact_depth(ratio), 0.03)
     depth = exact_depth(1.0)
     stands = wall(0.93 * depth)
     _run(stands, 0.3)
@@ -85,17 +84,17 @@ def wall_under_still_water():
     falls.structure.close()
 
 
-def _critical_depth(ratio: float, points: int) -> float:
+def _critical_depth(ratio: float) -> float:
     """By bisection: does a start at rest find an equilibrium?"""
     low, high = 0.5, 1.5
     while high - low > 0.005:
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if _stands(middle, ratio, points) else (low, middle)
+        low, high = (middle, high) if _stands(middle, ratio) else (low, middle)
     return 0.5 * (low + high)
 
 
-def _stands(depth: float, ratio: float, points: int) -> bool:
-    coupling = wall(depth, ratio, points, start="sudden")
+def _stands(depth: float, ratio: float) -> bool:
+    coupling = wall(depth, ratio, start="sudden")
     structure = coupling.structure
     try:
         settle(structure, _load_at_rest(coupling.water)[: structure.n])
