@@ -18,8 +18,10 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from coupler.closed_surfaces import SurfaceError, closed_surfaces, convex_corners, shown
+from coupler.closed_surfaces import SurfaceError, closed_surfaces, convex_corners
 from coupler.errors import ExitCode, SurgebreakError, did_you_mean
+from yade_scripts.blocks import Block
+from yade_scripts.polyhedra import BlockError, fans, shown
 
 Array = np.ndarray
 
@@ -60,9 +62,6 @@ class BlockFileError(SurgebreakError):
 
 def blocks_from_file(spec, **common) -> list:
     """Blocks NAME-0 .. of a `[[structure.file]]`; common: for every Block. Raises BlockFileError."""
-    from yade_scripts.blocks import Block
-    from yade_scripts.polyhedra import BlockError
-
     path = Path(spec.path)
     points, cells, single = read_mesh(path)
     points = points * spec.scale + np.array(spec.offset)
@@ -179,8 +178,7 @@ def _cells(points: Array, volumes: dict[str, Array]):
 def _volume(x: Array, faces) -> float:
     """Signed volume [m³] within faces that fan out from their first corner."""
     x = x - x.mean(axis=0)
-    triangles = np.array([(f[0], f[i], f[i + 1]) for f in faces for i in range(1, len(f) - 1)])
-    p = x[triangles]
+    p = x[fans(faces)[0]]
     return float(np.einsum("ij,ij->", p[:, 0], np.cross(p[:, 1], p[:, 2]))) / 6.0
 
 

@@ -13,6 +13,8 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, QhullError
 
+from yade_scripts.polyhedra import fans, polygon_area_vector, shown
+
 Array = np.ndarray
 
 SAME_ANGLE = 1e-4
@@ -57,9 +59,7 @@ def closed_surfaces(points: Array, loops: list[Array]) -> list[Surface]:
 
 def _volume(points: Array, loops: list[Array]) -> float:
     """Six times the signed volume [m³] within the polygons."""
-    x = points - points.mean(axis=0)
-    triangles = np.array([(p[0], p[i], p[i + 1]) for p in loops for i in range(1, len(p) - 1)])
-    p = x[triangles]
+    p = (points - points.mean(axis=0))[fans(loops)[0]]
     return float(np.einsum("ij,ij->", p[:, 0], np.cross(p[:, 1], p[:, 2])))
 
 
@@ -123,11 +123,10 @@ def convex_corners(surface: Surface, tolerance: float) -> Array:
     area = 0.0
     for loop in surface.loops:
         corners = surface.points[loop] - middle
-        arm = corners - corners[0]
-        vector = 0.5 * np.cross(arm[1:-1], arm[2:]).sum(axis=0)
+        vector = polygon_area_vector(corners)
         size = np.linalg.norm(vector)
         area += size
-        if size < tolerance * np.linalg.norm(arm, axis=1).max():
+        if size < tolerance * np.ptp(corners, axis=0).max():
             continue
         height = (x - middle - corners.mean(axis=0)) @ (vector / size)
         if min(height.max(), -height.min()) > tolerance:
@@ -142,8 +141,3 @@ def convex_corners(surface: Surface, tolerance: float) -> Array:
             "each face once"
         )
     return x
-
-
-def shown(point: Array) -> str:
-    """A place for messages: (x, y, z) m."""
-    return "(" + ", ".join(f"{c:.7g}" for c in point) + ") m"

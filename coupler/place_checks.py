@@ -158,6 +158,7 @@ def _outlines(bodies: list[Placed]) -> list[tuple[KeyPath, str, np.ndarray]]:
 def _overlaps(solids: list[Placed], blocks: list[Placed], block_names: list[str]) -> Iterator[Problem]:
     """Bodies of different parts, and blocks of one file, that share a volume; told once for two parts, the deepest."""
     from yade_scripts.faces import touching_bounds
+    from yade_scripts.polyhedra import shown
 
     if not blocks:
         return
@@ -175,21 +176,13 @@ def _overlaps(solids: list[Placed], blocks: list[Placed], block_names: list[str]
             deepest[path, other] = depth, i, j
     for (path, other), (depth, i, j) in deepest.items():
         if path == other:
-            place = ", ".join(
-                f"{c:.7g}"
-                for c in np.mean(
-                    [bodies[i][2].vertices.mean(axis=0), bodies[j][2].vertices.mean(axis=0)], axis=0
-                )
-            )
-            yield (
-                other,
-                f"'{names[j]}' overlaps '{names[i]}' by {depth:.4g} m near ({place}) m; mend the file",
-            )
+            place = 0.5 * (bodies[i][2].vertices.mean(axis=0) + bodies[j][2].vertices.mean(axis=0))
+            text = f"'{names[j]}' overlaps '{names[i]}' by {depth:.4g} m near {shown(place)}; mend the file"
         else:
-            yield (
-                other,
-                f"'{bodies[j][1]}' overlaps '{bodies[i][1]}' by {depth:.4g} m; move one of them by that much",
+            text = (
+                f"'{bodies[j][1]}' overlaps '{bodies[i][1]}' by {depth:.4g} m; move one of them by that much"
             )
+        yield other, text
 
 
 def _may_overlap(path: KeyPath, other: KeyPath) -> bool:
