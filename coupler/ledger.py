@@ -6,11 +6,9 @@ Interface:  W_given − W_received = r_i,  W_given = Σ dt F·V with the velocit
 Water:      Δ(kinetic + potential) + W_given + D = 0,  D: numerical dissipation, a line of its own
 
 A scheme that gains energy shows D < 0; dissipation D > 0 is damping of the water by the numerics and is
-reported, not counted as an error. Contacts can only take energy: what they give back, R (the fall of dashpots +
-friction below their largest value), is an error too, also where their loss is taken from the balance of the others
-and r_s is therefore zero. The energy error is (|r_s| + R + |r_i| + max(0, −D)) / E_in, E_in the energy that
-the scene puts in: the potential energy of the water above its level state, the potential energy the blocks give
-up, kinetic energy, or work of imposed motions, whichever is the largest so far.
+reported, not counted as an error. The energy error is (|r_s| + |r_i| + max(0, −D)) / E_in, E_in the energy that the
+scene puts in: the potential energy of the water above its level state, the potential energy the blocks give up,
+kinetic energy, or work of imposed motions, whichever is the largest so far.
 """
 
 from __future__ import annotations
@@ -49,7 +47,6 @@ class Ledger:
     _water_start: tuple[float, float] | None = None
     _structure_start: float | None = None
     _input: float = field(default=0.0)
-    _most_lost: float = 0.0
 
     def start(self, water: tuple[float, float] | None, structure: dict[str, float] | None) -> None:
         """Fix the reference state: water (kinetic, potential) [J], structure energies by name [J]."""
@@ -73,18 +70,15 @@ class Ledger:
         dissipation = 0.0
         if water is not None:
             dissipation = -(kinetic + potential - sum(self._water_start)) - self.work_given
-        received = residual = regained = 0.0
+        received = residual = 0.0
         if structure is not None:
             received = structure["load_work"]
             driven = structure["driving_work"]
             residual = _structure_total(structure) - self._structure_start - received - driven
-            lost = structure["dashpot"] + structure["friction"]
-            self._most_lost = max(self._most_lost, lost)
-            regained = self._most_lost - lost
             released = self._gravity_start - structure["gravity"]
             self._input = max(self._input, abs(released), structure["kinetic"], abs(driven))
         self._input = max(self._input, kinetic, abs(self.work_given))
-        error = abs(residual) + regained + max(0.0, -dissipation)
+        error = abs(residual) + max(0.0, -dissipation)
         if water is not None and structure is not None:
             error += abs(self.work_given - received)
         share = error / self._input if self._input > 0.0 else 0.0

@@ -26,11 +26,11 @@ ENERGY = (
     ("joint_dissipated", "J", "energy used to open joints so far"),
     ("joint_damping", "J", "energy taken by the damping of the joints so far"),
     ("contact_stored", "J", "elastic energy in contacts"),
-    ("dashpot", "J", "energy taken by contact dashpots so far (counted with contact.audit)"),
+    ("dashpot", "J", "energy taken by contact dashpots so far"),
     (
         "friction",
         "J",
-        "energy taken by friction so far; without contact.audit also by dashpots, from the balance",
+        "energy taken by friction so far, with the springs of contacts that ended",
     ),
     ("driving_work", "J", "work of prescribed motions on the structure so far"),
     ("structure_residual", "J", "what the structure's own ledger misses"),
