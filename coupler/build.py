@@ -97,13 +97,22 @@ def _box_vertices(solid) -> np.ndarray:
 def build_structure(case: Case):
     """The structure of a case, in a new YADE scene."""
     from yade_scripts.cohesion import JointParameters
-    from yade_scripts.contact import ContactLaw
+    from yade_scripts.contact import ContactLaw, PairFriction
     from yade_scripts.structure import Structure
 
     c, j = case.contact, case.joints
     contact = joints = None
     if c:
-        contact = ContactLaw(c.stiffness, c.restitution, c.friction, rule=c.rule)
+        contact = ContactLaw(
+            c.stiffness,
+            c.restitution,
+            c.friction,
+            shear_ratio=c.shear_ratio,
+            tangential_restitution=c.tangential_restitution,
+            rule=c.rule,
+            nodes_per_edge=c.nodes_per_edge,
+            pairs=tuple(PairFriction(*pair.materials, pair.friction) for pair in c.pair),
+        )
     if j:
         joints = JointParameters(
             strength=j.strength,

@@ -95,28 +95,44 @@ class Solid(Section):
     rotation: Rotation | None = Field(None, description="turn of the box; absent: along the axes")
 
 
+class ContactPair(Section):
+    """Friction between two materials that differs from the rest."""
+
+    materials: tuple[Name, Name] = Field(
+        description="names that blocks, ground (ground) or tank sides (tank) give as their material",
+        examples=[["brick", "ground"]],
+    )
+    friction: quantity("", ge=0) = Field(description="mu of this pair")
+
+
 class Contact(Section):
     """Spring, dashpot and friction between touching faces."""
 
     stiffness: quantity("N/m", gt=0) | None = Field(
         None,
-        description="K of a pair of faces in contact, normal and tangential; absent: that of the joints in "
-        "closing, so that a face whose joint breaks goes on as it was",
+        description="K of a whole face in contact; absent: that of the joints in closing, so that a face whose joint "
+        "breaks goes on as it was",
         examples=["1 GN/m"],
     )
-    restitution: quantity("", ge=0, le=1) = Field(
+    restitution: quantity("", gt=0, le=1) = Field(
         0.3, description="e, velocity after a normal impact over the velocity before"
     )
     friction: quantity("", ge=0) = Field(0.5, description="mu, largest tangential over normal force")
-    audit: Switch = Field(
-        False,
-        description="true: count the work of dashpots and friction contact by contact in every substep (slow); "
-        "false: take their sum from the balance of the other energies",
+    shear_ratio: quantity("", gt=0, le=10) = Field(
+        1.0, description="tangential over normal stiffness, K_t/K_n"
+    )
+    tangential_restitution: quantity("", gt=0, le=1) | None = Field(
+        None,
+        description="the same as restitution along the face; absent: the dashpot goes with the stiffness",
     )
     rule: Literal["exact", "paper"] = Field(
         "exact",
         description="dashpot that gives e exactly and never pulls, or the closed formula of the method",
     )
+    nodes_per_edge: Annotated[int, Field(strict=True, ge=3, le=33)] = Field(
+        3, description="contact nodes along an edge of a block; more where edges may cross between them"
+    )
+    pair: tuple[ContactPair, ...] = Field((), description="pairs of materials with a friction of their own")
 
 
 class Joints(Section):

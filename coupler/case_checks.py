@@ -12,7 +12,7 @@ import numpy as np
 
 from coupler.case import Case
 from coupler.errors import did_you_mean
-from coupler.parts import Part, parts_of, recipes
+from coupler.parts import PARTS, Part, parts_of, recipes
 from coupler.place_checks import frame_problems, opening_problems, place_problems, solid_bodies
 from coupler.toml_lines import shown
 
@@ -28,7 +28,7 @@ def problems(case: Case) -> list[Problem]:
         return found  # without a direction or a tank the rest would report nonsense
     shapes = [*_shapes(case), *opening_problems(case)]
     parts, refused = _made(case, {path[:3] for path, _ in shapes})
-    found += [*shapes, *refused, *_unique_names(case, parts), *_known_names(case, parts)]
+    found += [*shapes, *refused, *_unique_names(case, parts), *_known_names(case, parts), *_pairs(case)]
     return [*found, *_law(case), *place_problems(case, parts)]
 
 
@@ -231,6 +231,34 @@ def _known_names(case: Case, parts: list[Part]) -> Iterator[Problem]:
             yield ("gauge", i, "on"), _no_such("block or group", gauge.on, moving)
         if gauge.kind == "motion" and absent(gauge.of, blocks):
             yield ("gauge", i, "of"), _no_such("block", gauge.of, blocks)
+
+
+def _pairs(case: Case) -> Iterator[Problem]:
+    """Friction by pairs: materials that something has, each pair once."""
+    if case.contact is None or case.structure is None:
+        return
+    known = list(_materials(case))
+    seen: dict[frozenset[str], int] = {}
+    for i, pair in enumerate(case.contact.pair):
+        path = ("contact", "pair", i)
+        for material in dict.fromkeys(pair.materials):
+            if material not in known:
+                yield (*path, "materials"), _no_such("material", material, known)
+        first = seen.setdefault(frozenset(pair.materials), i)
+        if first != i:
+            yield (*path, "materials"), f"this pair is given by contact.pair[{first}] already; leave one out"
+
+
+def _materials(case: Case) -> dict[str, None]:
+    """Materials of blocks, ground and tank, each once."""
+    structure = case.structure
+    tables = [spec for kind in PARTS for spec in getattr(structure, kind)]
+    found = [spec.material for spec in tables]
+    if structure.ground is not None:
+        found.append(structure.ground.material)
+    if case.tank is not None:
+        found.append("tank")
+    return dict.fromkeys(found)
 
 
 def _no_such(kind: str, name: str, known: list[str]) -> str:

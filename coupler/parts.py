@@ -195,3 +195,5 @@ _MAKERS = {
     "rubble": _rubble,
     "file": _file,
 }
+PARTS = tuple(_MAKERS)
+"""Tables of the structure that make blocks, in the order of their rows."""

@@ -46,6 +46,25 @@ size = [2, 2, 2]
 count = 5
 diameter = [0.3, 0.5]
 """
+PAIRS = (
+    """\
+[[contact.pair]]
+materials = ["brick", "ground"]
+friction = 0.3
+[[contact.pair]]
+materials = ["block", "brick"]
+friction = 0.9
+[structure.ground]
+"""
+    + BLOCK
+    + """\
+[[structure.wall]]
+lower = [30, 0, 0]
+size = [4, 0.2, 1]
+block = [0.4, 0.2, 0.2]
+material = "brick"
+"""
+)
 WALL = """\
 [[structure.wall]]
 lower = [30, 0, 0]
@@ -168,3 +187,18 @@ def test_one_mistake_one_line(tmp_path, text, wrong, right, message):
         load(write(tmp_path, changed))
     (line,) = [line.replace(f"{tmp_path}/", "") for line in refusal.value.lines]
     assert line.startswith(f"case.toml:{message}")
+
+
+def test_friction_by_pairs_of_materials_reaches_the_contact_law(tmp_path, monkeypatch):
+    """Order does not matter; pairs that are not given have the friction of all."""
+    from coupler import build
+    from yade_scripts import structure
+
+    seen = {}
+    monkeypatch.setattr(structure, "Structure", lambda blocks, contact, joints, ground, planes, gravity: seen.update(
+        contact=contact, planes=planes, materials={b.material for b in blocks}))  # fmt: skip
+    build.build_structure(load(write(tmp_path, PAIRS)).case)
+    table = seen["contact"].friction_table(["block", "brick", "ground"])
+    np.testing.assert_allclose(table, [[0.5, 0.9, 0.5], [0.9, 0.5, 0.3], [0.5, 0.3, 0.5]])
+    assert seen["materials"] == {"block", "brick"}
+    assert [plane.material for plane in seen["planes"]] == ["ground"]
