@@ -203,6 +203,18 @@ def compare_laws(
     raise typer.Exit(int(show_laws() if list_ else compare(case, laws, set or [], output, substeps, records)))
 
 
+@app.command()
+def benchmark(
+    quick: Annotated[bool, typer.Option("--quick", help="1000 joints only")] = False,
+    json: Annotated[bool, typer.Option("--json", help="one JSON object")] = False,
+) -> None:
+    """Measure what a substep costs: joints, whole scenes, and YADE's own laws; leaves with 3 if a target is missed."""
+    one_thread()
+    from coupler.benchmark.command import benchmark as measure
+
+    raise typer.Exit(int(measure(quick, json)))
+
+
 @app.command(context_settings=PASS_ON)
 def test(context: typer.Context) -> None:
     """Run the tests; further words go to pytest."""

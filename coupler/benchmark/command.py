@@ -1,0 +1,159 @@
+"""The command `surgebreak benchmark`: all measurements in one run, each in a process of its own."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tempfile
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from coupler import provenance
+from coupler.benchmark import scenes
+from coupler.benchmark.part import LAW
+from coupler.errors import ExitCode, SurgebreakError
+from yade_scripts.faces import touching_faces
+from yade_scripts.stock.scene import described, timed
+from yade_scripts.stock.script import LAWS, run_script, stock_law
+
+SIZES, QUICK_SIZES = (56, 500, 1000, 5000), (1000,)
+AT = 1000
+"""Joints at which targets are set."""
+POINTS = (1, 3)
+"""Stock bonds along each edge of a joint: one a joint, as usual, and nine as in our joints."""
+VISITS = 2_000_000
+"""Bonds times substeps of a stock measurement, in RECORDS parts of which the cheapest counts."""
+RECORDS = 5
+MOST_PER_JOINT, MOST_PER_BUILDING = 1.0, 1000.0
+"""Targets [us]: the joint engine a joint and substep at AT joints, an intact building of 500 blocks a substep."""
+
+
+class PartFailed(SurgebreakError):
+    """A measurement ended with an error."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """One figure in CPU microseconds a substep; of: what it was divided by; target: its limit or None."""
+
+    what: str
+    blocks: int
+    joints: int
+    us: float
+    of: str
+    target: float | None = None
+
+    @property
+    def kept(self) -> bool:
+        return self.target is None or self.us <= self.target
+
+
+def benchmark(quick: bool, as_json: bool) -> ExitCode:
+    """Measure and tell; leaves with DIVERGED where a target is missed."""
+    sizes = QUICK_SIZES if quick else SIZES
+    lines: list[Line] = []
+    if not as_json:
+        print(_heading(), flush=True)
+    for measured in (_engine, _scenes, _dead, _stock):
+        for line in measured(sizes):
+            lines.append(line)
+            if not as_json:
+                print(_told(line), flush=True)
+    if as_json:
+        about = {"machine": provenance.machine(), "versions": provenance.versions()}
+        print(json.dumps(about | {"lines": [asdict(line) | {"kept": line.kept} for line in lines]}, indent=1))
+    return ExitCode.DONE if all(line.kept for line in lines) else ExitCode.DIVERGED
+
+
+def _heading() -> str:
+    machine, versions = provenance.machine(), provenance.versions()
+    named = ", ".join(
+        f"{name} {versions[name]}" for name in ("surgebreak", "yade", "numba", "numpy") if name in versions
+    )
+    columns = f"{'CPU time of a substep':58}{'blocks':>8}{'joints':>8}{'us':>10}"
+    return f"{machine['processor']}, {machine['cores']} cores, one thread; {named}\n{columns}"
+
+
+def _told(line: Line) -> str:
+    target = "" if line.target is None else f"  target {line.target:g}: {'kept' if line.kept else 'MISSED'}"
+    return f"{line.what:58}{line.blocks:8}{line.joints:8}{line.us:10.3g} {line.of}{target}"
+
+
+def _part(kind: str, size: int = 0) -> dict:
+    command = [sys.executable, "-m", "coupler.benchmark.part", kind, str(size)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        last = " | ".join(done.stderr.strip().splitlines()[-3:])
+        raise PartFailed(f"benchmark {kind} {size}: its process ended with {done.returncode}: {last}")
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+def _engine(sizes):
+    """The joint engine: what joints add to blocks without them, and its kernel by itself."""
+    for size in sizes:
+        m = _part("joints", size)
+        n, J = m["blocks"], m["joints"]
+        added = 1e6 * (m["substep"] - m["without_joints"]) / J
+        alone = 1e6 * m["kernel"] / J
+        yield Line("joint engine", n, J, added, "a joint", MOST_PER_JOINT if size == AT else None)
+        yield Line("  of it the kernel, 9 points a joint", n, J, alone, "a joint")
+        yield Line("  of it reading, writing, accounts", n, J, added - alone, "a joint")
+        yield Line(
+            "  blocks without joints (YADE's integration)", n, J, 1e6 * m["without_joints"] / n, "a block"
+        )
+
+
+def _scenes(sizes):
+    m = _part("building")
+    whole = 1e6 * m["substep"]
+    limit = MOST_PER_BUILDING * m["blocks"] / 500.0
+    yield Line("intact building, joints and contact on", m["blocks"], m["joints"], whole, "in all", limit)
+    yield Line("  the same", m["blocks"], m["joints"], whole / m["blocks"], "a block")
+    m = _part("pile")
+    what = f"pile of loose blocks, {m['contacts']} contacts"
+    yield Line(what, m["blocks"], 0, 1e6 * m["substep"] / m["blocks"], "a block")
+    yield Line("  the same", m["blocks"], 0, 1e6 * m["substep"] / m["contacts"], "a contact")
+
+
+SLACK = 1.3
+"""Scatter allowed to the cost of what should cost nothing."""
+
+
+def _dead(sizes):
+    """Joints that died cost nothing: with all dead a substep costs what it does without any."""
+    m = _part("dead", AT)
+    bare = 1e6 * m["without_joints"]
+    for alive, cost in zip(m["alive"], m["cost"]):
+        target = SLACK * bare if alive == 0 else None
+        yield Line(
+            f"wall with {alive} of {m['joints']} joints alive",
+            m["blocks"],
+            alive,
+            1e6 * cost,
+            "in all",
+            target,
+        )
+    yield Line("  the same blocks without joints", m["blocks"], 0, bare, "in all")
+
+
+def _stock(sizes):
+    """YADE's own laws on the same walls."""
+    for size in sizes:
+        for points in POINTS if size == AT else POINTS[:1]:
+            blocks = scenes.wall(size)
+            faces = touching_faces(blocks)
+            scene = described(blocks, faces, LAW, points, 0.5, (0.0, 0.0, 0.0))
+            for name in LAWS:
+                yield _stock_line(name, scene, len(blocks), len(faces), points)
+
+
+def _stock_line(name: str, scene: dict, blocks: int, joints: int, points: int) -> Line:
+    law = stock_law(name)
+    count = max(20, VISITS // (joints * points**2 * RECORDS))
+    substep = 1e-5
+    made = timed(scene, law.variant, RECORDS * count * substep, substep, RECORDS)
+    with tempfile.TemporaryDirectory() as folder:
+        figures = run_script(law, made, Path(folder)).figures
+    what = f"{law.title}, {points**2} bond{'s' if points > 1 else ''} a joint"
+    return Line(what, blocks, joints, 1e6 * figures["cheapest_substep"] / joints, "a joint, whole substep")
