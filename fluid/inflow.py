@@ -5,8 +5,13 @@ Inflow: u and the level are given.  On its nodes u = u_in (all components) and �
     q_i = -∮_wet N_i u·n dA,                                                                    (1)
 
 n outward, joins the mass balance of the pressure, the conservative volume and the ledger.
-Sea: p = ρ g (level - z) and φ = z - level on its nodes; the water goes through as it likes, equation (1) with its own
-velocity, both signs.  Far from waves: what reaches a sea partly comes back, as from any side.
+Sea: φ = z - level on its nodes and there
+
+    p = ρ g (level - z) - ½ ρ min(u·n, 0)²                                                     (2)
+
+(what comes in was at rest: Bernoulli; it comes in straight.  With the static pressure alone, water that goes to and fro
+through the side gains energy at every turn).  Equation (1) holds with the water's own velocity, both signs.  For water
+far from waves: what reaches a sea partly comes back, as from any side.
 """
 
 from __future__ import annotations
@@ -31,7 +36,7 @@ class Side:
     """A part of the boundary with its nodes on a domain.
 
     chosen: face normals (B, 3), centres (B, 3) [m] → (B,) bool · flow: Flow, or None for a sea · level(time) [m] ·
-    faces (F, 3), area (F, 3) [m²] outward · nodes (n,), place (n, 3) [m]."""
+    faces (F, 3), area (F, 3) [m²] outward · nodes (n,), place (n, 3) [m], normal (n, 3) outward."""
 
     chosen: Callable
     flow: Flow | None
@@ -40,6 +45,7 @@ class Side:
     area: np.ndarray
     nodes: np.ndarray
     place: np.ndarray
+    normal: np.ndarray
 
     @classmethod
     def of(cls, mesh, chosen: Callable, flow: Flow | None = None, level: Callable | None = None) -> Side:
@@ -48,8 +54,13 @@ class Side:
         there = chosen(mesh.boundary_normal, x.mean(axis=1))
         area = 0.5 * np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
         faces = mesh.boundary_faces[there]
-        nodes = np.unique(faces)
-        return cls(chosen, flow, flow.level if flow else level, faces, area[there], nodes, mesh.nodes[nodes])
+        nodes, row = np.unique(faces, return_inverse=True)
+        normal = np.zeros((len(nodes), 3))
+        np.add.at(normal, row.reshape(faces.shape), area[there][:, None])
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        return cls(
+            chosen, flow, flow.level if flow else level, faces, area[there], nodes, mesh.nodes[nodes], normal
+        )
 
     def on_copies(self, first, active) -> Side:
         """The same side where first (N_mesh,) is the first copy of each background node, -1 none, and active (N,)."""
@@ -64,6 +75,7 @@ class Side:
             area=self.area[kept],
             nodes=nodes[there],
             place=self.place[there],
+            normal=self.normal[there],
         )
 
     @property
@@ -71,17 +83,22 @@ class Side:
         return self.flow is None
 
     def hold(self, u, time: float) -> None:
-        """u (N, 3) on the nodes of an inflow, in place."""
+        """u (N, 3) on the nodes of an inflow, in place; what comes in from a sea goes along the normal."""
         if self.flow is not None:
             u[self.nodes] = self.flow.velocity(self.place, time)
+            return
+        across = np.einsum("nk,nk->n", u[self.nodes], self.normal)
+        coming = across < 0.0
+        u[self.nodes[coming]] = across[coming, None] * self.normal[coming]
 
     def surface(self, phi, time: float) -> None:
         """φ (N,) of the given level on the nodes, in place."""
         phi[self.nodes] = self.place[:, 2] - self.level(time)
 
-    def pressure(self, weight: float, time: float):
-        """ρ g (level - z) (n,) [Pa] at the nodes, negative above the level: the continuation that keeps rest exact."""
-        return weight * (self.level(time) - self.place[:, 2])
+    def pressure(self, density: float, gravity: float, u, time: float):
+        """Equation (2) at the nodes (n,) [Pa], u (N, 3) [m/s]; the weight goes on above the level: exact at rest."""
+        coming = np.minimum(np.einsum("nk,nk->n", u[self.nodes], self.normal), 0.0)
+        return density * (gravity * (self.level(time) - self.place[:, 2]) - 0.5 * coming**2)
 
     def rate(self, phi, u):
         """q (N,) [m³/s] of equation (1): what enters at each node; phi (N,), u (N, 3) [m/s]."""
@@ -143,12 +160,12 @@ class Sides:
         for side in self.now:
             side.surface(phi, time)
 
-    def pressure(self, n: int, weight: float, time: float):
-        """(N,) [Pa] on the nodes of seas, zero elsewhere."""
-        p = np.zeros(n)
+    def pressure(self, density: float, gravity: float, u, time: float):
+        """(N,) [Pa] on the nodes of seas, zero elsewhere; u (N, 3) [m/s]."""
+        p = np.zeros(len(u))
         for side in self.now:
             if side.is_sea:
-                p[side.nodes] = side.pressure(weight, time)
+                p[side.nodes] = side.pressure(density, gravity, u, time)
         return p
 
     def through(self, phi, u, dt: float, carried):

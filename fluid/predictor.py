@@ -175,8 +175,8 @@ def _problem(water, dt, theta, kick, surface, conserved, u_adv, u_star, shear, t
     held = None
     if water.sides is not None:
         rhs += inflow_rate
-        weight = density * water.parameters.gravity
-        held = theta * water.sides.pressure(len(phi), weight, water.time + dt)
+        gravity = water.parameters.gravity
+        held = theta * water.sides.pressure(density, gravity, water.velocity, water.time + dt)
         rhs[dofs] += pull_of_held(water.graph_for(water.listed), dofs, held, dt / density)
     known = (1.0 - theta) * kick[dofs] * water.end_pressure[dofs]
     guess = theta * water.end_pressure[dofs]
