@@ -1,5 +1,12 @@
 """Cohesive laws: what every one must hold, closed forms of the shipped ones, and a law of one's own."""
 
+import os
+import re
+import subprocess
+import sys
+import time
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -97,7 +104,9 @@ def test_the_cut_of_the_exponential_tail_is_small_and_counted():
 
 
 def test_an_unknown_law_is_refused_with_the_nearest_one():
-    with pytest.raises(laws.UnknownLaw, match=r"'bilineer'.*did you mean 'bilinear'.*exponential, polynomial"):
+    with pytest.raises(
+        laws.UnknownLaw, match=r"'bilineer'.*did you mean 'bilinear'.*exponential, polynomial"
+    ):
         parameters("bilineer").stiffness  # noqa: B018
 
 
@@ -118,3 +127,72 @@ def test_what_a_law_cannot_do_is_refused_by_name(wrong, told):
 def test_an_unknown_mixed_mode_is_refused_with_the_nearest_one():
     with pytest.raises(ValueError, match=r"'needelman'.*did you mean 'needleman'"):
         JointParameters(1e6, 1e-3, mixed_mode="needelman")
+
+
+# ---- a law of one's own, as docs/add_a_law.md has it -------------------------------------------------------------
+
+ROOT = Path(__file__).parents[2]
+PAGE = ROOT / "docs" / "add_a_law.md"
+
+TORN = """
+import sys
+import numpy as np
+from yade_scripts import laws
+laws.__path__.append(sys.argv[1])
+from yade_scripts.blocks import Block
+from yade_scripts.cohesion import JointParameters
+from yade_scripts.faces import touching_faces
+from yade_scripts.joints import Joints
+blocks = [Block("held", (0, 0, 0), size=1.0), Block("moved", (0, 0, 1), size=1.0)]
+joints = Joints(blocks, touching_faces(blocks), JointParameters(1e6, 1e-3, law="trapezoidal", peak=0.05))
+x, v, R, force = np.array([b.centre for b in blocks], float), np.zeros((2, 6)), np.array([np.eye(3)] * 2), []
+for _ in range(2001):
+    F = np.zeros((2, 6))
+    joints.forces(x, v, R, F, advance=True)
+    force.append(F[0, 2])
+    x[1, 2] += 0.5e-6
+print(max(force) / 1e6, sum(force) * 0.5e-6 / 1e3, len(joints.broken_now()))
+stats = joints.kernels.joint_forces.stats
+print(sum(stats.cache_misses.values()))
+print(stats.cache_path)
+"""
+
+
+def test_the_law_of_the_page_runs_from_its_one_file_and_is_compiled_once(tmp_path):
+    """Peak T_max, work G_c = (3/2 - 0.05)/2 T_max δ_f, joint broken. The second process compiles nothing anew; a
+    changed file does not get the kernels of the old one."""
+    (source,) = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    source += f"# of the test run {os.getpid()} at {time.time_ns()}: its kernels are not yet on disk\n"
+
+    def torn(text):
+        (tmp_path / "trapezoidal.py").write_text(text, encoding="utf-8")
+        command = [sys.executable, "-c", TORN, str(tmp_path)]
+        ran = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=True)
+        figures, compiled, kept = ran.stdout.splitlines()[-3:]
+        return [*map(float, figures.split()), int(compiled)], Path(kept)
+
+    kept = tmp_path
+    try:
+        for compiled in (1, 0):
+            figures, kept = torn(source)
+            assert figures == [pytest.approx(1.0, rel=1e-6), pytest.approx(0.725, rel=1e-3), 1.0, compiled]
+        weaker = source.replace("min(1.0, 2.0 * (1.0 - r))", "min(0.5, 2.0 * (1.0 - r))")
+        assert torn(weaker)[0][3] == 1
+    finally:
+        for file in kept.glob("*trapezoidal*"):
+            file.unlink()
+
+
+def test_the_law_of_the_page_holds_what_a_law_must(tmp_path, monkeypatch):
+    (source,) = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    (tmp_path / "trapezoidal.py").write_text(source, encoding="utf-8")
+    monkeypatch.setattr(laws, "__path__", [*laws.__path__, str(tmp_path)])
+    try:
+        assert "trapezoidal" in laws.names()
+        test_the_peak_is_the_strength_at_the_stated_opening("trapezoidal", 0.2, 2e6, 1e-3)
+        test_damage_only_softens_and_only_dissipates("trapezoidal", 0.2)
+        law = parameters("trapezoidal", 0.2)
+        assert law.work_of_separation == pytest.approx(0.65 * STRENGTH * FAILURE, rel=1e-12)
+        assert law.stiffness == pytest.approx(5.0 * STRENGTH / FAILURE, rel=1e-12)
+    finally:
+        sys.modules.pop("yade_scripts.laws.trapezoidal", None)
