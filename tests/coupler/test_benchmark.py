@@ -1,0 +1,60 @@
+"""The command benchmark: scenes of the size they say, times per unit, targets. The times themselves are not tested."""
+
+import json
+import time
+
+import pytest
+
+from coupler.benchmark import command, part, scenes
+from coupler.benchmark.command import Line
+from coupler.errors import ExitCode
+from yade_scripts.faces import touching_faces
+
+
+@pytest.mark.parametrize("joints", [56, 500, 1000])
+def test_a_wall_has_about_the_joints_asked_for(joints):
+    assert len(touching_faces(scenes.wall(joints))) == pytest.approx(joints, rel=0.1)
+
+
+def test_the_building_has_500_blocks_and_the_pile_touches_everywhere():
+    assert len(scenes.building()) == pytest.approx(500, abs=5)
+    assert len(touching_faces(scenes.pile(3))) == 3 * 9 * 2
+
+
+def test_the_best_time_is_that_of_one_unit():
+    """Work that takes 1 ms a unit on this processor's clock."""
+
+    def work(count):
+        until = time.process_time() + 1e-3 * count
+        while time.process_time() < until:
+            pass
+
+    assert part.best(work) == pytest.approx(1e-3, rel=0.05)
+
+
+def test_a_wall_taken_apart_costs_what_blocks_without_joints_cost(monkeypatch):
+    """Joints that died cost nothing, and only bodies with a live joint are read and pushed: a factor 2 is far below
+    what a wall with its joints costs (5 times and more)."""
+    monkeypatch.setattr(part, "CHUNK", 0.03)
+    found = part.dead(56)
+    assert found["alive"][0] == found["joints"]
+    assert found["alive"][-1] == 0
+    assert found["cost"][-1] < 2.0 * found["without_joints"]
+    assert found["cost"][0] > 3.0 * found["without_joints"]
+
+
+def test_a_line_without_target_is_kept_and_a_missed_one_is_told():
+    assert Line("x", 1, 1, 5.0, "a joint").kept
+    missed = Line("x", 1, 1, 5.0, "a joint", 1.0)
+    assert not missed.kept
+    assert "MISSED" in command._told(missed)
+
+
+def test_json_is_one_object_and_a_missed_target_is_the_exit_code(monkeypatch, capsys):
+    monkeypatch.setattr(command, "_engine", lambda sizes: [Line("a", 1, 1, 5.0, "a joint", 1.0)])
+    for name in ("_scenes", "_dead", "_stock"):
+        monkeypatch.setattr(command, name, lambda sizes: [])
+    assert command.benchmark(quick=True, as_json=True) == ExitCode.DIVERGED
+    told = json.loads(capsys.readouterr().out)
+    assert told["lines"][0]["kept"] is False
+    assert {"machine", "versions"} <= told.keys()
