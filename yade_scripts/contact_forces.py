@@ -155,6 +155,7 @@ class ContactForces:
 
     def save(self) -> dict[str, Array]:
         """History of the contacts there are, and the sums."""
+        self.now()  # contacts that are to take over from joints begin here, not after the way back
         index = np.flatnonzero(self._slots.face >= 0)
         pair = np.searchsorted(self._pairs.start, index, side="right") - 1
         return {

@@ -26,6 +26,7 @@ from yade_scripts.motion import Motion
 from yade_scripts.onset import ContactOnset, loose_at_start
 from yade_scripts.scene import Scene
 from yade_scripts.spin import SpinCorrection
+from yade_scripts.structure_state import StructureState, check_belongs
 from yade_scripts.substep import Substepper
 from yade_scripts.timestep import SubstepLimit, substep_limit
 
@@ -36,21 +37,6 @@ GRAVITY = (0.0, 0.0, -9.81)
 
 class NotFinite(RuntimeError):
     """Positions, velocities or loads of blocks are no numbers."""
-
-
-@dataclass(frozen=True)
-class StructureState:
-    """What `Structure.restore` goes back to."""
-
-    motion: Array
-    time: float
-    dt: float
-    load: Array
-    lent_spin: Array
-    onset: dict[str, Array]
-    sums: dict[str, float]
-    joints: dict[str, Array] | None
-    contacts: dict[str, Array] | None
 
 
 @dataclass(frozen=True)
@@ -73,6 +59,7 @@ class Structure:
 
     blocks: list of Block, unique names · ground: level of a horizontal floor [m] or None
     planes: further fixed planes (tank walls) · gravity (3,) [m/s²]
+    substep: used in place of the one that `substep_limit` finds accurate, None: that one
 
     One structure in a process at a time (YADE has one scene): use it as a context manager or call close().
     """
@@ -86,6 +73,7 @@ class Structure:
         planes: list[FixedPlane] | tuple = (),
         gravity=GRAVITY,
         threads: int = 1,
+        substep: float | None = None,
     ):
         self._describe(blocks, gravity)
         self.contact = contact
@@ -96,6 +84,9 @@ class Structure:
         self.joints = _make_joints(local, local_planes, joints)
         self.face_stiffness = self._face_stiffness()
         self._set_damping()
+        self._substep = substep
+        if substep is not None:
+            self.substep_limit().check(substep)
         self._scene = Scene(load_yade(threads), local, contact is not None, self.gravity)
         self._motion = Motion(self._scene, local_planes)
         self._motion.read()
@@ -139,14 +130,22 @@ class Structure:
             return None
         scene = self._scene
         return ContactForces(
-            blocks, planes, self.contact, self.face_stiffness, ~self.fixed, self._motion, scene.neighbours, scene.margin
+            blocks,
+            planes,
+            self.contact,
+            self.face_stiffness,
+            ~self.fixed,
+            self._motion,
+            scene.neighbours,
+            scene.margin,
         )
 
     def _set_damping(self) -> None:
-        """Dashpot time η = 2 z/ω of the stiffest joint mode."""
+        """Dashpot time η = 2 z/ω of the stiffest joint mode; none where all joined blocks are held."""
         self._limit: SubstepLimit | None = None
         if self.joints is not None and self.joints.parameters.damping > 0.0:
-            self.joints.eta = 2.0 * self.joints.parameters.damping / self.substep_limit().omega
+            omega = self.substep_limit().omega
+            self.joints.eta = 2.0 * self.joints.parameters.damping / omega if omega > 0.0 else 0.0
 
     def _start_accounts(self) -> None:
         self.time = 0.0
@@ -173,7 +172,7 @@ class Structure:
             raise BlockError(
                 f"block '{name}' is not driven; only blocks with driven=True take a prescribed motion"
             )
-        self.blocks[row] = replace(self.blocks[row], velocity=velocity, spin=spin, vertices=None)
+        self.blocks[row] = self.blocks[row].changed(velocity=velocity, spin=spin)
         self._scene.set_motion(row, np.concatenate([np.asarray(velocity, float), np.asarray(spin, float)]))
         self._limit = None
         self._motion.read()
@@ -192,9 +191,15 @@ class Structure:
         limit = self.substep_limit()
         return limit.dt, limit.what
 
+    def substep(self) -> float:
+        """[s] as asked for, else the accurate one."""
+        return self.stable_substep()[0] if self._substep is None else self._substep
+
     def advance(self, dt: float, substep: float | None = None) -> AdvanceReport:
-        """Move on by dt [s] under the load of `set_load`, in equal substeps no longer than `substep` or the limit."""
-        limit = self.stable_substep()[0] if substep is None else substep
+        """Move on by dt [s] under the load of `set_load`, in equal substeps no longer than `substep`, by default that
+        of the structure. Raises SubstepTooLong where the motion would be unstable."""
+        limit = self.substep() if substep is None else substep
+        self.substep_limit().check(min(limit, dt))
         count = max(1, int(np.ceil(dt / limit * (1.0 - 1e-12)))) if np.isfinite(limit) else 1
         m = self._motion
         self._turn_on_contacts()
@@ -363,7 +368,7 @@ class Structure:
     # ---- saving and going back ------------------------------------------------------------------------------
 
     def save(self) -> StructureState:
-        """Everything that changes in time, for a second pass over a step."""
+        """Everything that changes in time, for a second pass over a step, or for a file (`StructureState.arrays`)."""
         return StructureState(
             self._scene.save(),
             self.time,
@@ -377,9 +382,14 @@ class Structure:
         )
 
     def restore(self, saved: StructureState) -> None:
-        """Back to a saved state, bit for bit."""
+        """Back to a saved state, bit for bit; it may come from another process, with the structure built alike.
+
+        Raises OtherStructure if the state has other blocks or joints."""
+        points = None if self.joints is None else len(self.joints.largest)
+        check_belongs(saved, self.n, points, self._contacts is not None)
         self.time, self._motion.dt, self._limit = saved.time, saved.dt, None
         self._scene.restore(saved.motion)
+        self._take_driven(saved.motion)
         self._motion.read()
         self._spin.restore(saved.lent_spin)
         self._onset.restore(saved.onset)
@@ -389,6 +399,14 @@ class Structure:
         if self._contacts is not None:
             self._contacts.restore(saved.contacts)
         self.set_load(saved.load)
+
+    def _take_driven(self, motion: Array) -> None:
+        """Prescribed motions as they were, in case `drive` has changed them since."""
+        for row in np.flatnonzero([b.driven for b in self.blocks]):
+            velocity, spin = motion[row, 7:10], motion[row, 10:13]
+            block = self.blocks[row]
+            if (block.velocity != velocity).any() or (block.spin != spin).any():
+                self.blocks[row] = block.changed(velocity=velocity, spin=spin)
 
     def close(self) -> None:
         """Give YADE's scene back."""

@@ -1,0 +1,186 @@
+"""The state of a structure goes through a file into a new process, which goes on bit for bit."""
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from yade_scripts.blocks import Block
+from yade_scripts.building import column_blocks, wall_blocks
+from yade_scripts.cohesion import JointParameters
+from yade_scripts.contact import ContactLaw
+from yade_scripts.structure import Structure
+from yade_scripts.structure_state import OtherStructure, StructureState
+
+STILL = (0.0, 0.0, 0.0)
+WEDGE = np.array([[0, 0, 0], [0.5, 0, 0], [0, 0.4, 0], [0, 0, 0.3]], float)
+
+
+def torn():
+    """A joint being torn by a driven block, half open at half time, with damping and shear."""
+    blocks = [
+        Block("a", (0, 0, 0.5), size=1.0, fixed=True),
+        Block("b", (0, 0, 1.5), size=1.0, driven=True, velocity=(0.004, 0, 0.01), spin=(0, 1e-3, 0)),
+    ]
+    return Structure(blocks, None, JointParameters(1e6, 1e-3, damping=0.05), gravity=STILL)
+
+
+def hanging():
+    """A chain that stretches under a load that is held, opening its joints part of the way, faster and faster."""
+    blocks = column_blocks("c", (0, 0, 0), (1.0, 1.0, 1.0), 3)
+    s = Structure(blocks, None, JointParameters(1e6, 2e-3, law="bilinear"), ground=0.0, gravity=STILL)
+    load = np.zeros((3, 6))
+    load[2] = (2e5, 1e5, 4e5, 1e4, -2e4, 3e4)
+    s.set_load(load)
+    return s
+
+
+def bouncing():
+    """Blocks that spin, bounce and slide: a box and a wedge on the ground, one on the other."""
+    blocks = [
+        Block("box", (0, 0, 0.3), size=(0.5, 0.4, 0.3), velocity=(1.0, 0.2, -1.0), spin=(1.0, 4.0, 2.0)),
+        Block.standing("wedge", WEDGE + (0.1, 0.0, 0.6), velocity=(0.5, 0, -2.0), spin=(2.0, 1.0, 0)),
+    ]
+    return Structure(blocks, ContactLaw(stiffness=1e6, restitution=0.6, friction=0.3), None, ground=0.0)
+
+
+def collapsing():
+    """A wall that a shot breaks: joints half open and gone, pieces sliding on one another and on the ground."""
+    blocks = [
+        *wall_blocks("w", (0, 0, 0), "x", 3.0, 3.0, 0.5, 1.0, 1.0),
+        Block("shot", (1.5, -0.7, 1.5), size=0.6, density=5000.0, velocity=(0, 12.0, 0)),
+    ]
+    return Structure(blocks, ContactLaw(), JointParameters(2e5, 2e-3), ground=0.0)
+
+
+SCENES = {
+    "torn": (torn, 0.004, 10),
+    "hanging": (hanging, 0.004, 10),
+    "bouncing": (bouncing, 0.02, 20),
+    "collapsing": (collapsing, 0.004, 16),
+}
+"""How to build it, length of a step [s], steps."""
+
+
+def steps(s, name, first, last):
+    """Go from step `first` to `last`; every figure that a step leaves."""
+    rows = []
+    for _ in range(first, last):
+        report = s.advance(SCENES[name][1])
+        e = s.energies()
+        rows.append(
+            [s.time, report.substeps, report.load_work, len(report.broken), len(s.contacts()), *e.values()]
+        )
+    return np.array(rows)
+
+
+def figures(s, rows):
+    """All that tells the end of a scene."""
+    out = {"rows": rows, "centre": s.centre(), "rotation": s.rotation(), "velocity": s.velocity()}
+    table = s.joint_table()
+    if table is not None:
+        out |= {f"joints.{name}": value for name, value in vars(table).items()}
+    contacts = s.contacts()
+    out |= {f"contacts.{name}": value for name, value in vars(contacts).items()}
+    return out
+
+
+CHILD = """
+import sys
+import numpy as np
+from tests.yade_scripts.test_restart import SCENES, figures, steps
+from yade_scripts.structure_state import StructureState
+name, state, result = sys.argv[1:]
+build, _, count = SCENES[name]
+with build() as s, np.load(state) as arrays:
+    s.restore(StructureState.of(arrays))
+    np.savez(result, **figures(s, steps(s, name, count // 2, count)))
+"""
+
+
+def in_a_new_process(*words):
+    subprocess.run([sys.executable, "-c", CHILD, *map(str, words)], check=True, env=os.environ)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_continued_and_restarted_are_the_same_to_the_last_bit(name, tmp_path):
+    """Positions, velocities, contacts, joints, energies and substeps of the second half of a scene: in the process that
+    began it, and in a new one that knows only how it was built and the file."""
+    build, _, count = SCENES[name]
+    with build() as s:
+        steps(s, name, 0, count // 2)
+        table, contacts = s.joint_table(), s.contacts()
+        if name == "collapsing":
+            assert 0 < (~table.alive).sum() < len(table)
+            assert ((table.damage > 0.05) & table.alive).any()
+            assert contacts.slides.any()
+        if name in ("torn", "hanging"):
+            assert ((table.damage > 0.05) & table.alive).all()
+        np.savez(tmp_path / "state.npz", **s.save().arrays())
+        expected = figures(s, steps(s, name, count // 2, count))
+    in_a_new_process(name, tmp_path / "state.npz", tmp_path / "result.npz")
+    with np.load(tmp_path / "result.npz") as found:
+        assert set(found) == set(expected)
+        for key in expected:
+            np.testing.assert_array_equal(found[key], expected[key], err_msg=key)
+    assert expected["rows"][:, 1].min() > 1
+
+
+def test_arrays_and_back_lose_nothing():
+    with collapsing() as s:
+        steps(s, "collapsing", 0, 5)
+        state = s.save()
+        flat = StructureState.of(state.arrays()).arrays()
+    assert set(flat) == set(state.arrays())
+    for name, value in state.arrays().items():
+        np.testing.assert_array_equal(flat[name], value, err_msg=name)
+
+
+def test_contacts_that_are_just_taking_over_from_a_joint_are_part_of_the_state():
+    """A joint under compression fails in the very last substep before the state is saved: the contact begins with the
+    depth that the joint had, in both."""
+    with Structure(
+        column_blocks("c", (0, 0, 0), (1.0, 1.0, 1.0), 4),
+        ContactLaw(),
+        JointParameters(2e5, 1e-3),
+        ground=0.0,
+    ) as s:
+        s.advance(0.05)
+        s.joints.largest[s.joints.joint_of == 1] = 1.01e-3
+        assert s.advance(s.stable_substep()[0]).broken.tolist() == [1]
+        state = s.save()
+        s.advance(0.002)
+        expected = s.centre()
+        s.restore(state)
+        s.advance(0.002)
+        assert len(s.contacts()) > 0
+        np.testing.assert_array_equal(s.centre(), expected)
+
+
+def test_the_speed_of_a_driven_block_is_restored_with_the_substep_that_it_asks_for():
+    """`drive` after the start is part of the state: the limit of the substep follows the motion, not the description."""
+    with torn() as s:
+        s.drive("b", velocity=(0, 0, 0.03))
+        limit = s.stable_substep()
+        s.advance(0.004)
+        state = s.save()
+        s.drive("b", velocity=(0, 0, -0.001))
+        s.restore(state)
+        assert s.stable_substep() == limit
+        assert s.velocity()[1, 2] == 0.03
+
+
+def test_a_state_of_another_structure_is_refused_with_the_difference():
+    with collapsing() as s:
+        state = s.save()
+    with (
+        bouncing() as s,
+        pytest.raises(OtherStructure, match="blocks: 10 in the state, 2 here; points of joints: "),
+    ):
+        s.restore(state)
+    arrays = state.arrays()
+    del arrays["motion"]
+    with pytest.raises(OtherStructure, match="motion missing"):
+        StructureState.of(arrays)
