@@ -129,7 +129,7 @@ def build_structure(case: Case):
     gravity = (0.0, 0.0, -case.case.gravity)
     planes = [*_ground(case), *_tank_planes(case)]
     blocks = [block for part in parts_of(case) for block in part.blocks]
-    return Structure(blocks, contact, joints, None, planes, gravity)
+    return Structure(blocks, contact, joints, None, planes, gravity, substep=case.structure.substep)
 
 
 def _ground(case: Case) -> list:

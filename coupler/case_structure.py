@@ -12,6 +12,7 @@ from coupler.case_types import (
     Name,
     Point,
     PositiveLength,
+    PositiveTime,
     Rotation,
     Section,
     Size,
@@ -214,4 +215,9 @@ class Structure(Section):
         "settled",
         description="settled: joined blocks that reach the ground start in equilibrium with their weight and the "
         "water around them; sudden: the weight comes on at once",
+    )
+    substep: PositiveTime | None = Field(
+        None,
+        description="longest step of the motion of the blocks; absent: the one at which energy is accurate. Longer "
+        "ones are taken up to the limit of stability, with a note, and refused beyond",
     )

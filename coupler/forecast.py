@@ -81,7 +81,7 @@ def _structure_rows(case: Case, rows: list[Row]) -> int:
 
     structure = build_structure(case)
     try:
-        substep, pair = structure.stable_substep()
+        limit, substep = structure.substep_limit(), structure.substep()
         rows.append(
             Row(
                 "blocks",
@@ -91,7 +91,10 @@ def _structure_rows(case: Case, rows: list[Row]) -> int:
             )
         )
         rows.append(Row("joints", joint_counts(structure).intact, "", ""))
-        rows.append(Row("substep", 1e6 * substep, "us", f"set by {pair}"))
+        reason = (
+            limit.remark(substep) or f"set by {limit.what if case.structure.substep is None else 'the case'}"
+        )
+        rows.append(Row("substep", 1e6 * substep, "us", reason))
         rows.append(Row("substeps", math.ceil(case.time.end / substep), "", ""))
         if case.joints and case.structure.start == "settled":
             _row_at_rest(structure, rows)

@@ -12,6 +12,9 @@ from coupler.limits import LimitReached, Limits, check_balance, check_defect
 from coupler.observe import joint_counts
 from coupler.recorder import Recorder
 
+FAST_OPENING = 0.25
+"""Growth of λ/δ_f in a substep from which tearing counts as averaged over it."""
+
 
 def run(case: Case, directory, reporter) -> ExitCode:
     """Run a case into a RunDirectory; its figures go into run.json however the run ends.
@@ -31,8 +34,18 @@ def run(case: Case, directory, reporter) -> ExitCode:
                 scene.coupling.structure.close()
     finally:
         directory.record(**figures, cpu_seconds=clock.split())
+    _tell_fast_openings(figures, reporter)
     _tell_split(clock, reporter)
     return ExitCode.DONE
+
+
+def _tell_fast_openings(figures: dict, reporter) -> None:
+    rate = figures.get("largest_opening_rate", 0.0)
+    if rate > FAST_OPENING:
+        reporter.message(
+            f"note: a joint opened by {rate:.2g} of joints.opening_at_failure in one substep: its work of "
+            "separation is kept, its softening is not resolved in time. Reduce structure.substep where that matters"
+        )
 
 
 def _tell_split(clock: Clock, reporter) -> None:
@@ -49,11 +62,13 @@ def _describe(scene: Scene, reporter) -> None:
             f"({int(d.is_cut.sum())} cut), {c.water.volume():.6g} m3"
         )
     if c.structure is not None:
-        substep, pair = c.structure.stable_substep()
+        limit, substep = c.structure.substep_limit(), c.structure.substep()
         joints = joint_counts(c.structure).intact
         reporter.message(
-            f"structure: {c.structure.n} blocks, {joints} joints, substep {substep:.3g} s ({pair})"
+            f"structure: {c.structure.n} blocks, {joints} joints, substep {substep:.3g} s ({limit.what})"
         )
+        if limit.remark(substep):
+            reporter.message(f"note: {limit.remark(substep)}")
 
 
 def _steps(case: Case, scene: Scene, directory, reporter, clock: Clock, figures: dict) -> None:

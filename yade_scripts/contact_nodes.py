@@ -24,7 +24,8 @@ MARGIN = 0.01
 class Shapes(NamedTuple):
     """Blocks, then fixed planes, as bodies 0 .. n-1, n .. n+m-1; points and normals in the frame of their body.
 
-    node_start (n+m+1,) · node (N, 3) [m] · vertex_end (n+m,): the vertices come first · of_start (N+1,), of (.,): faces that hold a node
+    node_start (n+m+1,) · node (N, 3) [m] · vertex_end (n+m,): the vertices come first
+    of_start (N+1,), of (.,): faces that hold a node
     face_start (n+m+1,) · normal (F, 3) outward · offset (F,) [m]: inside is normal·x < offset
     face_nodes (F,): nodes on a face · radius, margin (n+m,) [m].
     """

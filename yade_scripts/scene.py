@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import struct
 from collections import deque
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial.transform import Rotation

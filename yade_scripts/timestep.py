@@ -2,9 +2,10 @@
 
     dt = min( 0.1 * 2/ω_max,  0.2 sqrt(m/K) ),   ω_max² ≤ max over joints (S_i + S_j)
 
-S_i: sum over the joints of block i of the largest eigenvalue of M_i⁻¹ K_ii (never below the exact ω_max). The explicit
-limit is 2/ω_max; a tenth of it keeps the energy of a half-broken joint (the kink between tension and compression and
-the damage make the leapfrog gain energy at larger steps). A dashpot of ratio z shortens the limit by sqrt(1+z²) - z.
+K_ii: what a joint holds block i with; c = 2, or 1 where its other side is fixed, since |d_a - d_b|² ≤ 2 |d_a|² + 2 |d_b|².
+As M_i⁻¹ Σ K_ii is part of the whole, the bound is at most √2 of the exact ω_max. The explicit limit is 2/ω_max; a
+tenth of it keeps the energy of a half-broken joint (the kink between tension and compression and the damage make the
+leapfrog gain energy at larger steps). A dashpot of ratio z shortens the limit by sqrt(1+z²) - z.
 """
 
 from __future__ import annotations
@@ -22,18 +23,47 @@ Array = np.ndarray
 
 JOINT_SHARE = 0.1
 CONTACT_SHARE = 0.2
+"""Of √(m/K), which is the explicit limit 2/ω of a chain of equal blocks in contact, ω² ≤ 4 K/m."""
 DRIVEN_SHARE = 0.002
 DENSE = 60
 """Unknowns up to which the exact frequency is found with full matrices."""
 
 
+class SubstepTooLong(ValueError):
+    """A substep was asked for at which the explicit scheme is not stable."""
+
+    exit_code = 2
+
+
 @dataclass(frozen=True)
 class SubstepLimit:
-    """dt [s] · what: the joint or block that limits it, in words · omega [rad/s] of the joints (0 without)."""
+    """dt [s] · what: the joint or block that limits it, in words · omega [rad/s] of the joints (0 without)
+
+    stable [s], stable_what: the same for the explicit limit, beyond which energy grows without end.
+    """
 
     dt: float
     what: str
     omega: float
+    stable: float = np.inf
+    stable_what: str = ""
+
+    def check(self, substep: float) -> None:
+        """Raise SubstepTooLong beyond the explicit limit."""
+        if substep > self.stable * (1.0 + 1e-9):
+            raise SubstepTooLong(
+                f"substep {substep:.4g} s is too long: the motion is unstable beyond {self.stable:.4g} s "
+                f"({self.stable_what}); accurate up to {self.dt:.4g} s ({self.what}). Take that, or leave it out"
+            )
+
+    def remark(self, substep: float) -> str:
+        """What is worth knowing of a substep that is stable, "" if it is accurate too."""
+        if substep <= self.dt * (1.0 + 1e-9):
+            return ""
+        return (
+            f"substep {substep:.4g} s is stable, but longer than the {self.dt:.4g} s that the accuracy of energy asks "
+            f"for ({self.what})"
+        )
 
 
 def joint_frequency(blocks: list[Block], joints) -> tuple[float, int]:
@@ -131,23 +161,27 @@ def substep_limit(
     damping: float = 0.0,
     contact_damping: float = 0.0,
 ) -> SubstepLimit:
-    """The substep that joints and contacts allow. face_stiffness (n,) [N/m], None without contact.
+    """The substep that joints and contacts allow, and the explicit limit.
 
     damping, contact_damping: ζ of joints and contacts; a dashpot in parallel shortens the limit of the explicit
     scheme by √(1 + ζ²) - ζ."""
     best = SubstepLimit(np.inf, "nothing limits the substep (no joints, no contact)", 0.0)
     omega, j = joint_frequency(blocks, joints)
     if omega > 0.0:
-        dt = JOINT_SHARE * 2.0 / omega * _dashpot_share(damping)
+        stable = 2.0 / omega * _dashpot_share(damping)
         other = blocks[joints.b[j]].name if joints.b[j] >= 0 else "ground"
-        best = SubstepLimit(dt, f"joint {blocks[joints.a[j]].name} - {other}, ω ≤ {omega:.4g} rad/s", omega)
+        text = f"joint {blocks[joints.a[j]].name} - {other}, ω ≤ {omega:.4g} rad/s"
+        best = SubstepLimit(JOINT_SHARE * stable, text, omega, stable, text)
     if face_stiffness is not None and len(blocks):
         mass = np.array([np.inf if b.fixed or b.driven else b.mass for b in blocks])
-        limit = CONTACT_SHARE * _dashpot_share(contact_damping) * np.sqrt(mass / face_stiffness)
+    face_stiffness (n,) [N/m], None without contact
+        limit = _dashpot_share(contact_damping) * np.sqrt(mass / face_stiffness)
         i = int(np.argmin(limit))
-        if limit[i] < best.dt:
-            text = f"contact of block {blocks[i].name}: m = {mass[i]:.4g} kg, K = {face_stiffness[i]:.4g} N/m"
-            best = SubstepLimit(float(limit[i]), text, omega)
+        text = f"contact of block {blocks[i].name}: m = {mass[i]:.4g} kg, K = {face_stiffness[i]:.4g} N/m"
+        if CONTACT_SHARE * limit[i] < best.dt:
+            best = replace(best, dt=float(CONTACT_SHARE * limit[i]), what=text)
+        if limit[i] < best.stable:
+            best = replace(best, stable=float(limit[i]), stable_what=text)
     return _driven_limit(blocks, joints, best)
 
 
@@ -164,7 +198,6 @@ def _driven_limit(blocks: list[Block], joints, best: SubstepLimit) -> SubstepLim
         speed = np.linalg.norm(block.velocity) + np.linalg.norm(block.spin) * block.radius
         if block.driven and speed * best.dt > DRIVEN_SHARE * joints.df.min():
             dt = DRIVEN_SHARE * joints.df.min() / speed
-            best = SubstepLimit(
-                float(dt), f"prescribed motion of block {block.name}, {speed:.4g} m/s", best.omega
-            )
+            text = f"prescribed motion of block {block.name}, {speed:.4g} m/s"
+            best = replace(best, dt=float(dt), what=text)
     return best

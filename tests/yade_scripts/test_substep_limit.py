@@ -1,0 +1,60 @@
+"""Substeps that are forced: refused beyond the explicit limit, with the pair; told where only accuracy suffers."""
+
+from dataclasses import replace
+
+import pytest
+
+from yade_scripts.blocks import Block
+from yade_scripts.cohesion import JointParameters
+from yade_scripts.contact import ContactLaw
+from yade_scripts.structure import Structure
+from yade_scripts.timestep import SubstepTooLong, exact_joint_frequency
+
+STILL = (0.0, 0.0, 0.0)
+JOINT = JointParameters(1e6, 1e-3)
+
+
+def two_cubes(**more):
+    return [
+        Block("low", (0, 0, 0.5), size=1.0, density=2000.0),
+        Block("high", (0, 0, 1.5), size=1.0, density=2000.0, **more),
+    ]
+
+
+def test_a_substep_beyond_the_explicit_limit_is_refused_with_the_pair():
+    """In a single step and for the whole structure; nothing has moved then."""
+    with Structure(two_cubes(), None, JOINT, gravity=STILL) as s:
+        limit = s.substep_limit()
+        assert limit.stable == pytest.approx(10.0 * limit.dt)
+        with pytest.raises(SubstepTooLong, match="joint low - high"):
+            s.advance(1.0, substep=1.01 * limit.stable)
+        assert s.time == 0.0
+    with pytest.raises(SubstepTooLong, match="unstable beyond"):
+        Structure(two_cubes(), None, JOINT, gravity=STILL, substep=1.01 * limit.stable)
+
+
+def test_a_substep_that_is_only_inaccurate_is_told():
+    with Structure(two_cubes(), ContactLaw(1e8), gravity=STILL) as s:
+        limit = s.substep_limit()
+        assert limit.remark(limit.dt) == ""
+        assert "contact of block" in limit.remark(2.0 * limit.dt)
+
+
+def test_the_substep_of_the_structure_is_taken():
+    with Structure(two_cubes(), None, JOINT, gravity=STILL, substep=1e-6) as s:
+        assert s.advance(1e-5).substeps == 10
+
+
+@pytest.mark.parametrize("share", [0.9, 1.1])
+def test_the_explicit_limit_is_where_energy_starts_to_grow(share):
+    """Two blocks swing across an elastic joint, far below damage: at 0.9 of 2/ω the energy stays in bounds, at 1.1 it
+    breaks the joint."""
+    with Structure(two_cubes(velocity=(1e-7, 0.0, 0.0)), None, JOINT, gravity=STILL) as s:
+        dt = share * 2.0 / exact_joint_frequency(s.blocks, s.joints)
+        s._limit = replace(s.substep_limit(), stable=2.0 * dt)
+        s.advance(200 * dt, substep=dt)
+        grown = s.joint_table().damage.max()
+        if share < 1.0:
+            assert grown < 1e-2
+        else:
+            assert grown == 1.0
