@@ -82,8 +82,8 @@ class Joints:
         """Columns as in `joint_forces`."""
         self.eta = 0.0
         """Time constant of the stiffness-proportional dashpot [s]."""
-        self.stiffest: Array | None = None
-        """Largest eigenvalues of the joints (J, 2) [1/s²], found once by `timestep.joint_frequency`."""
+        self.stiffness_on: tuple[Array, Array] | None = None
+        """What each joint adds to the stiffness of its blocks (J, 6, 6), kept by `timestep.joint_frequency`."""
         self.closing = np.ones(n, bool)
         self.alive = np.ones(n, bool)
         self.live = np.arange(n)

@@ -1,8 +1,8 @@
 """Time step of the structure: accuracy of joints and contacts, with the pair of blocks that limits it.
 
-    dt = min( 0.1 * 2/ω_max,  0.2 sqrt(m/K) ),   ω_max² ≤ max over joints (S_i + S_j)
+    dt = min( 0.1 * 2/ω_max,  0.2 sqrt(m/K) ),   ω_max² ≤ max over blocks of the largest eigenvalue of M_i⁻¹ Σ c K_ii
 
-K_ii: what a joint holds block i with; c = 2, or 1 where its other side is fixed, since |d_a - d_b|² ≤ 2 |d_a|² + 2 |d_b|².
+K_ii: what a joint holds block i with; c = 2, since |d_a - d_b|² ≤ 2 |d_a|² + 2 |d_b|², or 1 where d_b = 0 is fixed.
 As M_i⁻¹ Σ K_ii is part of the whole, the bound is at most √2 of the exact ω_max. The explicit limit is 2/ω_max; a
 tenth of it keeps the energy of a half-broken joint (the kink between tension and compression and the damage make the
 leapfrog gain energy at larger steps). A dashpot of ratio z shortens the limit by sqrt(1+z²) - z.
@@ -67,19 +67,22 @@ class SubstepLimit:
 
 
 def joint_frequency(blocks: list[Block], joints) -> tuple[float, int]:
-    """Upper bound of ω_max [rad/s] and the joint that gives it (-1 without joints)."""
+    """Upper bound of ω_max [rad/s], at most √2 of it, and the joint that gives most to it (-1 without joints)."""
     if joints is None or len(joints.live) == 0:
         return 0.0, -1
-    if joints.stiffest is None:
-        joints.stiffest = _stiffest_modes(blocks, joints)
+    if joints.stiffness_on is None:
+        joints.stiffness_on = _stiffness_on_blocks(blocks, joints)
     live = joints.live
-    S = np.zeros(len(blocks) + 1)  # the last one stands for the ground
-    np.add.at(S, joints.a[live], joints.stiffest[live, 0])
-    np.add.at(S, joints.b[live], joints.stiffest[live, 1])
-    S[-1] = 0.0
-    pair = S[joints.a[live]] + S[joints.b[live]]
-    worst = int(np.argmax(pair))
-    return float(np.sqrt(pair[worst])), int(live[worst])
+    K = np.zeros((len(blocks) + 1, 6, 6))  # the last one stands for the ground
+    for side, row in zip(joints.stiffness_on, (joints.a, joints.b)):
+        np.add.at(K, row[live], side[live])
+    largest = np.linalg.eigvalsh(K)[:, -1]
+    worst = int(np.argmax(largest))
+    share = [
+        np.where(row[live] % len(K) == worst, np.trace(side[live], axis1=1, axis2=2), 0.0)
+        for side, row in zip(joints.stiffness_on, (joints.a, joints.b))
+    ]
+    return float(np.sqrt(largest[worst])), int(live[np.argmax(share[0] + share[1])])
 
 
 def exact_joint_frequency(blocks: list[Block], joints) -> float:
@@ -118,8 +121,10 @@ def _inverse_root(block: Block) -> Array:
     return root
 
 
-def _stiffest_modes(blocks: list[Block], joints) -> Array:
-    """Largest eigenvalue of M⁻¹ K of each joint for its two blocks (J, 2) [1/s²]; zero for blocks that do not yield."""
+def _stiffness_on_blocks(blocks: list[Block], joints) -> tuple[Array, Array]:
+    """What each joint adds to 2 M⁻¹ᐟ² K_ii M⁻¹ᐟ² of its block a and its block b, (J, 6, 6) each [1/s²].
+
+    Once instead of twice where the other side does not yield; zero for blocks that do not."""
     root = np.zeros((len(blocks) + 1, 6, 6))  # the last one stands for the ground
     for i, block in enumerate(blocks):
         if not (block.fixed or block.driven):
@@ -127,11 +132,17 @@ def _stiffest_modes(blocks: list[Block], joints) -> Array:
             root[i, 3:, 3:] = np.linalg.inv(np.linalg.cholesky(block.inertia)).T
     frame = np.array([b.rotation for b in blocks] + [np.eye(3)])
     normal = np.einsum("jkl,jl->jk", frame[joints.a], joints.normal)
+    yields = root.any(axis=(1, 2))
+    count = np.where(yields[joints.a] & yields[joints.b], 2.0, 1.0)[:, None, None]
     sides = ((joints.xi_a, joints.a), (joints.xi_b, joints.b))
-    return np.stack(
-        [_largest_eigenvalues(joints, arm, _in_frame(frame[row], normal), root[row]) for arm, row in sides],
-        axis=1,
+    first, second = (
+        count
+        * root[row].transpose(0, 2, 1)
+        @ _block_stiffness(joints, arm, _in_frame(frame[row], normal))
+        @ root[row]
+        for arm, row in sides
     )
+    return first, second
 
 
 def _in_frame(frame: Array, vectors: Array) -> Array:
@@ -139,8 +150,8 @@ def _in_frame(frame: Array, vectors: Array) -> Array:
     return np.einsum("jkl,jk->jl", frame, vectors)
 
 
-def _largest_eigenvalues(joints, arm: Array, normal: Array, root: Array) -> Array:
-    """Largest eigenvalue of rootᵀ K root (J, 6, 6) of each joint: points at arm (P, 3), axes those of normal (J, 3);
+def _block_stiffness(joints, arm: Array, normal: Array) -> Array:
+    """K (J, 6, 6) that each joint holds one of its blocks with: points at arm (P, 3), axes those of normal (J, 3);
     k_0 or k_c, the larger, along the normals and β² k_0 across."""
     kn, kt = np.maximum(joints.k0, joints.kc), joints.beta**2 * joints.k0
     D = (kn - kt)[:, None, None] * normal[:, :, None] * normal[:, None, :] + kt[:, None, None] * np.eye(3)
@@ -150,8 +161,7 @@ def _largest_eigenvalues(joints, arm: Array, normal: Array, root: Array) -> Arra
     B[:, 0, 4], B[:, 0, 5] = arm[:, 2], -arm[:, 1]
     B[:, 1, 3], B[:, 1, 5] = -arm[:, 2], arm[:, 0]
     B[:, 2, 3], B[:, 2, 4] = arm[:, 1], -arm[:, 0]
-    K = np.add.reduceat(B.transpose(0, 2, 1) @ (D @ B), joints.start[:-1])
-    return np.linalg.eigvalsh(root.transpose(0, 2, 1) @ K @ root)[:, -1]
+    return np.add.reduceat(B.transpose(0, 2, 1) @ (D @ B), joints.start[:-1])
 
 
 def substep_limit(
@@ -163,6 +173,7 @@ def substep_limit(
 ) -> SubstepLimit:
     """The substep that joints and contacts allow, and the explicit limit.
 
+    face_stiffness (n,) [N/m], None without contact
     damping, contact_damping: ζ of joints and contacts; a dashpot in parallel shortens the limit of the explicit
     scheme by √(1 + ζ²) - ζ."""
     best = SubstepLimit(np.inf, "nothing limits the substep (no joints, no contact)", 0.0)
@@ -174,7 +185,6 @@ def substep_limit(
         best = SubstepLimit(JOINT_SHARE * stable, text, omega, stable, text)
     if face_stiffness is not None and len(blocks):
         mass = np.array([np.inf if b.fixed or b.driven else b.mass for b in blocks])
-    face_stiffness (n,) [N/m], None without contact
         limit = _dashpot_share(contact_damping) * np.sqrt(mass / face_stiffness)
         i = int(np.argmin(limit))
         text = f"contact of block {blocks[i].name}: m = {mass[i]:.4g} kg, K = {face_stiffness[i]:.4g} N/m"
