@@ -48,13 +48,13 @@ def test_the_substep_of_the_structure_is_taken():
 @pytest.mark.parametrize("share", [0.9, 1.1])
 def test_the_explicit_limit_is_where_energy_starts_to_grow(share):
     """Two blocks swing across an elastic joint, far below damage: at 0.9 of 2/ω the energy stays in bounds, at 1.1 it
-    breaks the joint."""
+    damages the joint."""
     with Structure(two_cubes(velocity=(1e-7, 0.0, 0.0)), None, JOINT, gravity=STILL) as s:
         dt = share * 2.0 / exact_joint_frequency(s.blocks, s.joints)
         s._limit = replace(s.substep_limit(), stable=2.0 * dt)
         s.advance(200 * dt, substep=dt)
         grown = s.joint_table().damage.max()
         if share < 1.0:
-            assert grown < 1e-2
+            assert grown < 1e-4
         else:
-            assert grown == 1.0
+            assert grown > 0.1
