@@ -15,7 +15,7 @@ from yade_scripts.structure import Structure
 from yade_scripts.structure_state import OtherStructure, StructureState
 
 STILL = (0.0, 0.0, 0.0)
-WEDGE = np.array([[0, 0, 0], [0.5, 0, 0], [0, 0.4, 0], [0, 0, 0.3]], float)
+WEDGE = np.array([[0.1, 0, 0.6], [0.6, 0, 0.6], [0.1, 0.4, 0.6], [0.1, 0, 0.9]])
 
 
 def torn():
@@ -41,7 +41,7 @@ def bouncing():
     """Blocks that spin, bounce and slide: a box and a wedge on the ground, one on the other."""
     blocks = [
         Block("box", (0, 0, 0.3), size=(0.5, 0.4, 0.3), velocity=(1.0, 0.2, -1.0), spin=(1.0, 4.0, 2.0)),
-        Block.standing("wedge", WEDGE + (0.1, 0.0, 0.6), velocity=(0.5, 0, -2.0), spin=(2.0, 1.0, 0)),
+        Block.standing("wedge", WEDGE, velocity=(0.5, 0, -2.0), spin=(2.0, 1.0, 0)),
     ]
     return Structure(blocks, ContactLaw(stiffness=1e6, restitution=0.6, friction=0.3), None, ground=0.0)
 
@@ -160,7 +160,7 @@ def test_contacts_that_are_just_taking_over_from_a_joint_are_part_of_the_state()
 
 
 def test_the_speed_of_a_driven_block_is_restored_with_the_substep_that_it_asks_for():
-    """`drive` after the start is part of the state: the limit of the substep follows the motion, not the description."""
+    """`drive` after the start is part of the state: the substep follows the motion, not the description."""
     with torn() as s:
         s.drive("b", velocity=(0, 0, 0.03))
         limit = s.stable_substep()
