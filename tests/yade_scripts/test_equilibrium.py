@@ -102,7 +102,7 @@ def test_a_cantilever_of_six_blocks_carries_the_strength_of_its_root(share, stan
     M_max = 0.3802 T_max h³ for a closing stiffness of ten times k_0 (a rigid one would give 0.4523)."""
     ref = columns("coh_joint_Mmax_vs_N")
     row = np.flatnonzero((ref["kc_over_K0"] == 10.0) & (ref["n"] == 0.0))[0]
-    law = JointParameters(1e6, 1e-3, closing_ratio=10.0, points=10)
+    law = JointParameters(1e6, 1e-3, closing_ratio=10.0)
     blocks = [Block(f"b{i}", (0.2 * i, 0.0, 0.0), size=0.2, fixed=i == 0) for i in range(7)]
     strength = ref["mmax"][row] * law.strength * 0.2**3 / 1.2
     load = np.zeros((7, 6))
@@ -116,3 +116,47 @@ def test_a_cantilever_of_six_blocks_carries_the_strength_of_its_root(share, stan
         settle(s, load)
         assert np.abs(s.internal_force() + load)[1:].max() < 1e-6 * strength
         assert 0.3 < s.joint_table().damage[0] < 1.0
+
+
+@pytest.mark.parametrize("law", ["polynomial", "bilinear", "exponential"])
+@pytest.mark.parametrize("ratio", [10.0, 1e4])
+def test_stiff_closing_settles_too(law, ratio):
+    """A door frame that leans on its open and closed joints: no load out of balance but what the rounding of positions
+    (1e-16 of 4 m) makes in joints of up to 5e13 N/m, and it stays at rest."""
+    parameters = JointParameters(2e6, 1e-3, closing_ratio=ratio, law=law)
+    with Structure(portal(), None, parameters, ground=0.0) as s:
+        settle(s)
+        residual = s.internal_force() + s.gravity_force()
+        assert np.abs(residual).max() < (1e-6 if ratio == 10.0 else 5e-5) * s.mass.sum() * G
+        placed = s.centre()
+        s.advance(0.02 / np.sqrt(ratio))
+        assert np.abs(s.velocity()).max() < STILL
+        assert np.abs(s.centre() - placed).max() < 0.1 * STILL
+
+
+def test_a_search_that_went_too_far_leaves_no_damage_behind():
+    """The damage after settling is that of the equilibrium: with slow loading in small steps one gets the same."""
+    law = JointParameters(1.2e6, 1e-3, closing_ratio=1e3)
+    with Structure(portal(), None, law, ground=0.0) as s:
+        settle(s)
+        at_once = s.joint_table().damage
+    with Structure(portal(), None, law, ground=0.0) as s:
+        for share in np.linspace(0.1, 1.0, 10):
+            settle(s, (share - 1.0) * s.gravity_force())
+        np.testing.assert_allclose(at_once, s.joint_table().damage, rtol=1e-3, atol=1e-6)
+    assert at_once.max() > 1e-3
+
+
+def test_stiff_closing_does_not_carry_what_it_cannot():
+    """The same frame a thousand times weaker is refused, not settled somewhere else."""
+    law = JointParameters(2e3, 1e-3, closing_ratio=1e4)
+    with Structure(portal(), None, law, ground=0.0) as s, pytest.raises(CannotStand):
+        settle(s)
+
+
+def test_needleman_settles_where_sliding_pushes_the_faces_apart():
+    law = JointParameters(2e6, 1e-3, mixed_mode="needleman")
+    with Structure(portal(), None, law, ground=0.0) as s:
+        settle(s)
+        residual = s.internal_force() + s.gravity_force()
+        assert np.abs(residual).max() < 1e-6 * s.mass.sum() * G
