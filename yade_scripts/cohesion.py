@@ -93,6 +93,13 @@ class JointParameters:
                 "'polynomial', use that or mixed_mode = 'effective'"
             )
 
+    def described(self) -> str:
+        """One line for people: what the strength of a joint depends on."""
+        return (
+            f"{self.law} law with its peak at {self.peak_share:.3g} δ_f, mixed mode {self.mixed_mode}, kc/K0 "
+            f"{self.closing_ratio:g}, {len(self.rule)} points an edge, G_c {self.work_of_separation:.4g} J/m²"
+        )
+
     @property
     def cohesive_law(self) -> CohesiveLaw:
         """The law by its name."""
