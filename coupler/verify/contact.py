@@ -1,7 +1,7 @@
 """Contact of blocks: restitution, sliding, toppling, oblique impact, rocking, corner impact, free spin, rest.
 
-Spheres of the reference cases are replaced by blocks: by boxes where the answer does not depend on the shape, in a short
-impact by a bipyramid on its tip with the mass, the arm and the inertia of the sphere.
+Spheres of the reference cases are replaced by blocks: by boxes where the answer does not depend on the shape, for a
+short time by a bipyramid on its tip with the mass, the arm and the inertia of the sphere.
 """
 
 from __future__ import annotations
@@ -61,7 +61,19 @@ def on_a_slope(degrees: float, law: ContactLaw, size=1.0, **more) -> Structure:
     return Structure([block], law, ground=0.0, gravity=(G * np.sin(a), 0.0, -G * np.cos(a)))
 
 
-@check("P03", "block slides on an incline of 30 degrees", "closed form")
+RADIUS = 0.1
+
+
+def sphere_like(velocity) -> Block:
+    """A bipyramid with tips at ±R and I = 2/5 m R² about the level axes: in a short impact on its tip, a solid sphere.
+
+    Tips at ±a level: I = m (a² + R²)/10, so a² = 3 R²."""
+    a = np.sqrt(3.0) * RADIUS
+    tips = np.array([[a, 0, 0], [-a, 0, 0], [0, a, 0], [0, -a, 0], [0, 0, RADIUS], [0, 0, -RADIUS]])
+    return Block("body", (0, 0, RADIUS + 1e-6), vertices=tips, density=DENSITY, velocity=velocity)
+
+
+@check("P03", "block and sphere on an incline of 30 degrees", "closed form")
 def incline():
     with on_a_slope(30.0, ContactLaw(K, 0.3, 0.4)) as s:
         s.advance(0.2)
@@ -73,6 +85,28 @@ def incline():
     with on_a_slope(30.0, ContactLaw(K, 0.3, 0.6)) as s:
         s.advance(0.5)
         yield Finding("speed at friction 0.6 after 0.5 s [m/s]", s.velocity()[0, 0], 0.0, 1e-3, False)
+    known = named_values("dem_simple_closed_forms")
+    a, _ = _sphere_on_a_slope(0.5)
+    exact = known["sphere rolls, incline 30deg mu=0.5 (mu>2/7 tan): accel"]
+    yield Finding("sphere rolls: acceleration [m/s²]", a, exact, 5e-3)
+    a, spin = _sphere_on_a_slope(0.1)
+    exact = known["sphere slides+spins, incline 30deg mu=0.10: accel"]
+    yield Finding("sphere slides and spins: acceleration [m/s²]", a, exact, 5e-3)
+    yield Finding("the same: angular acceleration [rad/s²]", spin, known["same: angular accel R=0.1"], 5e-3)
+
+
+def _sphere_on_a_slope(friction: float) -> tuple[float, float]:
+    """Acceleration [m/s²] and angular acceleration [rad/s²] before the sphere-like body has tilted by 1e-3 rad."""
+    slope = np.radians(30.0)
+    gravity = (G * np.sin(slope), 0.0, -G * np.cos(slope))
+    with Structure(
+        [sphere_like((0, 0, 0))], ContactLaw(1e11, 0.05, friction), ground=0.0, gravity=gravity
+    ) as s:
+        s.advance(1e-3)
+        before = s.velocity()[0]
+        s.advance(3e-3)
+        change = (s.velocity()[0] - before) / 3e-3
+    return float(change[0]), float(change[4])
 
 
 @check("P04", "block slides to rest", "closed form")
@@ -119,18 +153,6 @@ def _moves_on_table(degrees: float, size, friction: float, moves) -> bool:
             if moves(s):
                 return True
     return False
-
-
-RADIUS = 0.1
-
-
-def sphere_like(velocity) -> Block:
-    """A bipyramid with tips at ±R and I = 2/5 m R² about the level axes: in a short impact on its tip, a solid sphere.
-
-    Tips at ±a level: I = m (a² + R²)/10, so a² = 3 R²."""
-    a = np.sqrt(3.0) * RADIUS
-    tips = np.array([[a, 0, 0], [-a, 0, 0], [0, a, 0], [0, -a, 0], [0, 0, RADIUS], [0, 0, -RADIUS]])
-    return Block("body", (0, 0, RADIUS + 1e-6), vertices=tips, density=DENSITY, velocity=velocity)
 
 
 def _oblique(law: ContactLaw, normal: float, tangential: float) -> tuple[float, float]:
