@@ -10,6 +10,7 @@ from yade_scripts.building import wall_blocks
 from yade_scripts.cohesion import JointParameters
 from yade_scripts.faces import FixedPlane, touching_faces
 from yade_scripts.joints import Joints
+from yade_scripts.structure import Structure
 from yade_scripts.timestep import exact_joint_frequency, joint_frequency
 
 LAWS = [
@@ -131,6 +132,29 @@ def test_a_vibration_that_does_not_break_the_joint_gains_no_more_than_leapfrog_a
 
     for share in (0.3, 0.6, 0.8, 0.9, 0.97):
         assert gain(share, True) <= gain(share, False) + 0.01
+
+
+@pytest.mark.parametrize("name", ["polynomial", "bilinear", "exponential"])
+@pytest.mark.parametrize(("speed", "tolerance"), [(1.0, 0.005), (10.0, 0.04)])
+def test_a_wall_that_flies_apart_takes_the_energy_of_its_law(name, speed, tolerance):
+    """Blocks of 1 m with velocities and spins of up to 14 times the critical speed: what the forces took (force times
+    velocity) is what the damage stands for. Joints are torn in one substep there, from compression too."""
+    rng = np.random.default_rng(1)
+    blocks = [
+        Block(
+            f"{i}-{j}",
+            (i, 0, j),
+            size=1.0,
+            velocity=speed * rng.normal(size=3),
+            spin=speed * rng.normal(size=3),
+        )
+        for i in range(4)
+        for j in range(4)
+    ]
+    with Structure(blocks, None, JointParameters(1e6, 1e-3, law=name), gravity=(0.0, 0.0, 0.0)) as s:
+        s.advance(0.03 / np.sqrt(speed))
+        assert (~s.joint_table().alive).sum() > 20
+        assert s.energies()["joint_dissipated"] == pytest.approx(s.law_dissipation(), rel=tolerance)
 
 
 # ---- Needleman's potential --------------------------------------------------------------------------------------
