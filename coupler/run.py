@@ -28,6 +28,8 @@ def run(case: Case, directory, reporter) -> ExitCode:
         scene = build(case, clock)
         try:
             _describe(scene, reporter)
+            if scene.coupling.structure is not None:
+                directory.record(laws=laws_of(scene.coupling.structure))
             _steps(case, scene, directory, reporter, clock, figures)
         finally:
             if scene.coupling.structure is not None:
@@ -69,6 +71,18 @@ def _describe(scene: Scene, reporter) -> None:
         )
         if limit.remark(substep):
             reporter.message(f"note: {limit.remark(substep)}")
+        for what, law in laws_of(c.structure).items():
+            reporter.message(f"{what}: {law}")
+
+
+def laws_of(structure) -> dict[str, str]:
+    """What its contact and joints go by, in words: what every result of theirs depends on."""
+    found = {}
+    if structure.contact is not None:
+        found["contact"] = structure.contact.described(structure.face_stiffness)
+    if structure.joints is not None:
+        found["joints"] = structure.joints.parameters.described()
+    return found
 
 
 def _steps(case: Case, scene: Scene, directory, reporter, clock: Clock, figures: dict) -> None:

@@ -95,6 +95,16 @@ class ContactLaw:
                 table[i, j] = table[j, i] = pair.friction
         return table
 
+    def described(self, face_stiffness) -> str:
+        """One line for people; face_stiffness (n,) [N/m] that the blocks have."""
+        K, obtained = np.atleast_1d(face_stiffness), self.obtained_restitution
+        stiffness = f"{K.min():.3g}" + (f" to {K.max():.3g}" if K.max() > 1.001 * K.min() else "")
+        own = "".join(f", {p.friction:g} between {p.a} and {p.b}" for p in self.pairs)
+        return (
+            f"K {stiffness} N/m, e {obtained:.3g} obtained for {self.restitution:g} asked (rule '{self.rule}'), "
+            f"friction {self.friction:g}{own}"
+        )
+
     @property
     def obtained_restitution(self) -> float:
         """The e that a face contact between free bodies returns."""
