@@ -9,6 +9,7 @@ from yade_scripts.blocks import Block
 from yade_scripts.contact import (
     ContactError,
     ContactLaw,
+    PairFriction,
     damping_ratio,
     paper_damping_ratio,
     restitution_without_tension,
@@ -41,9 +42,7 @@ def test_damping_ratios_against_the_closed_forms():
 def test_a_face_that_lands_flat_returns_e(e):
     """On the ground; the energies before and after account for the dashpot."""
     law = ContactLaw(stiffness=K, restitution=e)
-    with Structure(
-        [cube(0.5 + 1e-4, velocity=(0, 0, -1.0))], law, ground=0.0, gravity=(0, 0, 0)
-    ) as s:
+    with Structure([cube(0.5 + 1e-4, velocity=(0, 0, -1.0))], law, ground=0.0, gravity=(0, 0, 0)) as s:
         before = balance(s.energies())
         s.advance(0.04, substep=0.02 * np.sqrt(2000.0 / K))
         after = s.energies()
@@ -92,9 +91,7 @@ def test_a_block_slides_when_the_slope_exceeds_the_friction(slope, slides):
 def test_ledger_of_a_block_that_drops_bounces_and_slides_to_rest():
     """Kinetic + potential + springs + dashpots + friction stays within 1e-3 of the energy put in."""
     block = cube(0.55, velocity=(3.0, 0.0, -1.0))
-    with Structure(
-        [block], ContactLaw(stiffness=K, restitution=0.5, friction=0.3), ground=0.0
-    ) as s:
+    with Structure([block], ContactLaw(stiffness=K, restitution=0.5, friction=0.3), ground=0.0) as s:
         start = s.energies()
         s.advance(0.3, substep=0.01 * np.sqrt(2000.0 / K))
         end = s.energies()
@@ -155,3 +152,76 @@ def test_impossible_constants_are_refused_by_name(wrong):
     (name,) = wrong
     with pytest.raises(ContactError, match=name):
         ContactLaw(**({"stiffness": K} | wrong))
+
+
+def prism(corners, height, **more):
+    """A regular prism of circumradius 0.5 m standing on z = 0."""
+    angle = 2.0 * np.pi * np.arange(corners) / corners
+    ring = 0.5 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    ends = [np.column_stack([ring, np.full(corners, z)]) for z in (0.0, height)]
+    return Block("prism", (0.0, 0.0, 0.5 * height + 1e-4), vertices=np.concatenate(ends), **more)
+
+
+@pytest.mark.parametrize("corners", [3, 5, 8])
+def test_a_prism_that_lands_flat_returns_e_and_sinks_by_its_weight_over_k(corners):
+    """Any number of nodes on the face shares K and one dashpot among them."""
+    e, block = 0.5, prism(corners, 0.8, velocity=(0, 0, -1.0))
+    with Structure([block], ContactLaw(K, e), ground=0.0, gravity=(0, 0, 0)) as s:
+        s.advance(0.06, substep=0.02 * np.sqrt(block.mass / K))
+        assert s.velocity()[0, 2] == pytest.approx(e, abs=0.005)
+        assert np.abs(s.velocity()[0, 3:]).max() < 1e-9
+    with Structure([prism(corners, 0.8)], ContactLaw(K, 0.1), ground=0.0) as s:
+        s.advance(1.0)
+        assert 0.4 - s.centre()[0, 2] == pytest.approx(block.mass * G / K, rel=1e-3)
+
+
+def test_friction_goes_by_the_pair_of_materials():
+    """On a slope of 30 degrees: a = g (sin - mu cos) with the friction of the two materials that touch."""
+    law = ContactLaw(K, 0.3, 0.8, pairs=(PairFriction("ice", "ground", 0.1),))
+    blocks = [
+        Block("sledge", (0, 0, 0.5), size=1.0, material="ice"),
+        Block("stone", (0, 3, 0.5), size=1.0),
+    ]
+    slope = np.radians(30.0)
+    with Structure(blocks, law, ground=0.0, gravity=(G * np.sin(slope), 0, -G * np.cos(slope))) as s:
+        s.advance(0.2)
+        before = s.velocity()[:, 0]
+        s.advance(0.3)
+        a = (s.velocity()[:, 0] - before) / 0.3
+    assert a[0] == pytest.approx(G * (np.sin(slope) - 0.1 * np.cos(slope)), rel=1e-3)
+    assert abs(a[1]) < 1e-3
+
+
+@pytest.mark.parametrize("shear_ratio", [1.0, 0.3])
+def test_the_tangential_restitution_is_that_of_the_contact_point(shear_ratio):
+    """A tip that sticks: after half a swing of the tangential spring the slip has turned round, e_t of it."""
+    e_t, speed = 0.6, 0.05
+    tips = 0.1 * np.array(
+        [[3**0.5, 0, 0], [-(3**0.5), 0, 0], [0, 3**0.5, 0], [0, -(3**0.5), 0], [0, 0, 1], [0, 0, -1]]
+    )
+    block = Block("b", (0, 0, 0.1 - 2e-5), vertices=tips, velocity=(speed, 0, 0))
+    law = ContactLaw(1e9, 1.0, 1e6, shear_ratio=shear_ratio, tangential_restitution=e_t)
+    effective, k = (
+        block.mass / 3.5,
+        shear_ratio * 1e9 / 7,
+    )  # a sphere yields 3.5 times as much at its surface; 7 nodes
+    zeta = paper_damping_ratio(e_t)
+    swing = np.pi * np.sqrt(effective / k / (1.0 - zeta**2))
+    with Structure([block], law, ground=0.0, gravity=(0, 0, 0)) as s:
+        s.set_load(np.array([[0, 0, -1e9 / 7 * 2e-5, 0, 0, 0]]))
+        s.advance(swing, substep=swing / 2000)
+        v = s.velocity()[0]
+    assert (v[0] - v[4] * 0.1) / speed == pytest.approx(-e_t, rel=0.01)
+
+
+def test_a_slab_between_unequal_blocks_carries_a_thousandfold_mass():
+    """A heavy block on a light one on the ground, set down as deep as the weights above press them: nothing moves."""
+    foot, joint = 20020.0 * G / 1e9, 20000.0 * G / 1e9
+    blocks = [
+        Block("light", (0, 0, 0.5 - foot), size=1.0, density=20.0),
+        Block("heavy", (0, 0, 1.5 - foot - joint), size=1.0, density=20000.0),
+    ]
+    with Structure(blocks, ContactLaw(1e9, 0.1), ground=0.0) as s:
+        s.advance(0.5)
+        np.testing.assert_allclose(s.centre(), [b.centre for b in blocks], atol=1e-10)
+        assert np.abs(s.velocity()).max() < 1e-9
