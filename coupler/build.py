@@ -10,17 +10,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coupler.bodies import rotation_matrix
+from coupler.build_water import water_of
 from coupler.case import Case
 from coupler.gauges import Gauge, make_gauge
 from coupler.loop import Coupling
 from coupler.parts import Part, parts_of
+from coupler.solids import solids_of
 
-BOX_CORNERS = np.array(
-    [[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]],
-    float,
-)
-BOX_FACES = ((0, 4, 7, 3), (1, 2, 6, 5), (0, 1, 5, 4), (3, 7, 6, 2), (0, 3, 2, 1), (4, 5, 6, 7))
 PRESSURE_RTOL = 1e-8
 
 
@@ -36,7 +32,7 @@ class Scene:
 
 def build(case: Case, clock) -> Scene:
     """Build the scene of a case. clock(name) is a context that books processor time to a part of the run."""
-    solids = [(_box_vertices(s), BOX_FACES) for s in case.solid]
+    solids = [(solid.vertices, solid.faces) for solid in solids_of(case)]
     with clock("set-up"), ExitStack() as on_failure:  # YADE holds one scene: the next build needs it free
         structure = build_structure(case) if case.structure else None
         if structure is not None:
@@ -51,9 +47,9 @@ def _coupling(case: Case, structure, solids, clock) -> Coupling:
     """Both sides, the structure at rest if the case says so."""
     water = immersion = None
     if case.water:
-        water, immersion = _water(case, structure, solids)
+        water, immersion = water_of(case, structure, solids)
     if case.joints and case.structure.start == "settled" and _settled(structure, water) and case.water:
-        water, immersion = _water(case, structure, solids)
+        water, immersion = water_of(case, structure, solids)
     return Coupling(
         water,
         structure,
@@ -84,14 +80,6 @@ def _load_at_rest(structure, water) -> np.ndarray:
         return np.zeros((structure.n, 6))
     x = solve(problem.matrix, problem.rhs, problem.guess, PRESSURE_RTOL).x
     return water_load(problem, x)[: structure.n]
-
-
-def _rotation(turn) -> np.ndarray:
-    return np.eye(3) if turn is None else rotation_matrix(turn.axis, turn.angle)
-
-
-def _box_vertices(solid) -> np.ndarray:
-    return np.array(solid.centre) + (0.5 * np.array(solid.size) * BOX_CORNERS) @ _rotation(solid.rotation).T
 
 
 def build_structure(case: Case):
@@ -162,41 +150,6 @@ def _tank_planes(case: Case) -> list:
     return planes
 
 
-def _water(case: Case, structure, solids):
-    from coupler.exchange import Immersion
-    from coupler.fill import start_level
-    from fluid.mesh import box_mesh
-    from fluid.parameters import WaterParameters
-    from fluid.water import Water
-
-    mesh = box_mesh(case.tank.lower, case.tank.upper, case.tank.cell)
-    immersion = Immersion(mesh, structure, solids, case.water.covers)
-    parameters = WaterParameters(
-        density=case.water.density,
-        gravity=case.case.gravity,
-        theta=case.water.theta,
-        courant=case.time.cfl,
-    )
-    boxes = [(fill.lower, fill.upper) for fill in case.water.fill]
-    level = start_level(boxes, (case.tank.lower, case.tank.upper), mesh, immersion.domain)
-    return Water(mesh, immersion.domain, level, parameters, _open_sides(case)), immersion
-
-
-def _open_sides(case: Case):
-    """(normals (B, 3), centres (B, 3)) → (B,) bool: the faces of the tank that let water out."""
-    sides = case.tank.open
-    if not sides:
-        return None
-    outward = np.zeros((len(sides), 3))
-    for row, side in enumerate(sides):
-        outward[row, "xyz".index(side[0])] = 1.0 if side[1] == "+" else -1.0
-
-    def is_open(normals, centres):
-        return (normals @ outward.T > 0.5).any(axis=1)
-
-    return is_open
-
-
 def _gauges(case: Case) -> list[Gauge]:
     rows = rows_by_name(case, parts_of(case))
     return [make_gauge(spec, rows) for spec in case.gauge]
@@ -211,7 +164,7 @@ def rows_by_name(case: Case, parts: tuple[Part, ...]) -> dict[str, np.ndarray]:
             for known in {block.name, block.group, part.name}:
                 rows.setdefault(known, []).append(row)
             row += 1
-    for solid in case.solid:
+    for solid in solids_of(case):
         rows.setdefault(solid.name, []).append(row)
         row += 1
     return {name: np.array(found) for name, found in rows.items()}

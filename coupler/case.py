@@ -1,7 +1,7 @@
 """The case: what a `case.toml` may say, in SI, with a description and a unit for every name.
 
 A section that is absent switches its module off (`modules`). Unknown names are refused. The page
-`docs/case_file.md` and `surgebreak explain` are made from this file and `case_structure`.
+`docs/case_file.md` and `surgebreak explain` are made from this file, `case_structure` and `case_water`.
 """
 
 from __future__ import annotations
@@ -12,19 +12,17 @@ from pydantic import Field
 
 from coupler.case_structure import Structure
 from coupler.case_types import (
-    Density,
     Length,
     Name,
     Point,
     PositiveLength,
     PositiveTime,
-    Rotation,
     Section,
     Side,
-    Size,
     Switch,
     VelocityVector,
 )
+from coupler.case_water import Solid, Water
 from coupler.units import quantity
 
 
@@ -49,6 +47,11 @@ class Time(Section):
     output_every: PositiveTime | None = Field(
         None, description="time between two written states; absent: a hundredth of the end time"
     )
+    checkpoint_every: quantity("s", ge=0) | None = Field(
+        None,
+        description="time between two checkpoints, from which `surgebreak resume` goes on; absent: a tenth of the end "
+        "time; 0: none, also when the run is stopped",
+    )
 
 
 class Tank(Section):
@@ -61,38 +64,12 @@ class Tank(Section):
         examples=["1 m"],
     )
     open: tuple[Side, ...] = Field(
-        ("z+",), description="sides through which air and water may leave; the others are smooth walls"
+        ("z+",), description="sides through which air and water may leave; the others are walls"
     )
-
-
-class Fill(Section):
-    """A box full of water at the start; solids and blocks in it displace the water."""
-
-    lower: Point = Field(description="corner with the smallest coordinates", examples=[[0, 0, 0]])
-    upper: Point = Field(description="corner with the largest coordinates", examples=[[20, 24, 10]])
-
-
-class Water(Section):
-    """The water. Absent: no water, and nothing of the flow solver is loaded."""
-
-    density: Density = Field(1000.0, description="mass per volume")
-    theta: quantity("", ge=0.5, le=1) = Field(
-        0.6, description="weight of the new pressure in the projection; 0.5 damps least, 1 most"
+    smooth: tuple[Side, ...] = Field(
+        (),
+        description="closed sides along which water slips whatever water.walls says, for instance of a slice",
     )
-    covers: Literal["single", "multiple"] = Field(
-        "single",
-        description="one set of unknowns per node, or one per part of the water that a thin wall separates",
-    )
-    fill: tuple[Fill, ...] = Field((), description="where the water stands at the start; at least one box")
-
-
-class Solid(Section):
-    """A fixed box in the water, for instance an obstacle; it carries forces but never moves."""
-
-    name: Name = Field("solid", description="for gauges and results")
-    centre: Point = Field(description="centre of the box")
-    size: Size = Field(description="edges of the box along its own axes")
-    rotation: Rotation | None = Field(None, description="turn of the box; absent: along the axes")
 
 
 class ContactPair(Section):
@@ -270,7 +247,9 @@ class RunLimits(Section):
         description="mean over the last twenty steps of the share by which the blocks missed the motion that the "
         "water was told",
     )
-    cpu_seconds: PositiveTime | None = Field(None, description="processor time that the run may take")
+    cpu_seconds: PositiveTime | None = Field(
+        None, description="processor time that the run may take; a resumed run has as much again"
+    )
 
 
 class Case(Section):
@@ -280,7 +259,7 @@ class Case(Section):
     time: Time = Field(description="how long and how often")
     tank: Tank | None = Field(None, description="the box for the water")
     water: Water | None = Field(None, description="the water")
-    solid: tuple[Solid, ...] = Field((), description="fixed boxes")
+    solid: tuple[Solid, ...] = Field((), description="fixed bodies in the water")
     structure: Structure | None = Field(None, description="rigid blocks")
     contact: Contact | None = Field(None, description="what happens where blocks touch")
     joints: Joints | None = Field(None, description="glue between touching faces, which may break")
@@ -296,6 +275,9 @@ def modules(case: Case) -> dict[str, bool]:
     water = case.water is not None
     return {
         "water": water,
+        "viscosity": water and case.water.viscosity > 0.0,
+        "wall friction": water and case.water.walls == "friction",
+        "inflow": water and bool(case.water.inflow or case.water.sea),
         "structure": structure,
         "coupling": water and structure,
         "fixed solids": bool(case.solid),

@@ -14,7 +14,9 @@ from coupler.case import Case
 from coupler.errors import did_you_mean
 from coupler.parts import PARTS, Part, parts_of, recipes
 from coupler.place_checks import frame_problems, opening_problems, place_problems, solid_bodies
+from coupler.solids import refused_solids
 from coupler.toml_lines import shown
+from coupler.water_checks import water_problems
 
 KeyPath = tuple[str | int, ...]
 Problem = tuple[KeyPath, str]
@@ -22,7 +24,7 @@ Problem = tuple[KeyPath, str]
 
 def problems(case: Case) -> list[Problem]:
     """Everything that is wrong with a case whose sections are valid one by one."""
-    wrong_frames = list(frame_problems(case))
+    wrong_frames = [*frame_problems(case), *refused_solids(case)]
     found = [*_sections(case), *wrong_frames]
     if wrong_frames:
         return found  # without a direction or a tank the rest would report nonsense
@@ -96,8 +98,7 @@ def _sections(case: Case) -> Iterator[Problem]:
         yield ("water",), "the water needs a section [tank] that says where it may be"
     if case.tank is not None and case.water is None and case.structure is None:
         yield ("tank",), "a tank without water; write a section [water] with [[water.fill]]"
-    if case.water is not None and not case.water.fill:
-        yield ("water",), "no water: write at least one [[water.fill]] with lower and upper"
+    yield from water_problems(case)
     if case.structure is not None:
         yield from _structure_sections(case)
     elif case.joints is not None or case.contact is not None or case.motion:

@@ -59,12 +59,13 @@ def load(place: Path | str, overrides: Iterable[str] = ()) -> CaseFile:
 
 
 def _place_files(table: dict, directory: Path) -> None:
-    """Paths of files of blocks are meant from the directory of the case; what is no path is refused later."""
-    structure = table.get("structure")
-    files = structure.get("file") if isinstance(structure, dict) else None
-    for entry in files if isinstance(files, list) else ():
-        if isinstance(entry, dict) and isinstance(entry.get("path"), str) and entry["path"]:
-            entry["path"] = str((directory / Path(entry["path"]).expanduser()).resolve())
+    """Paths in the case are meant from its directory; what is no path is refused later."""
+    for above, name in (("structure", "file"), ("water", "inflow"), (None, "solid")):
+        section = table if above is None else table.get(above)
+        entries = section.get(name) if isinstance(section, dict) else None
+        for entry in entries if isinstance(entries, list) else ():
+            if isinstance(entry, dict) and isinstance(entry.get("path"), str) and entry["path"]:
+                entry["path"] = str((directory / Path(entry["path"]).expanduser()).resolve())
 
 
 class _Places:

@@ -3,7 +3,8 @@
 Structure:  Δ(kinetic + gravity + joints stored + contacts stored) + dissipated = W_received        residual r_s
 Interface:  W_given − W_received = r_i,  W_given = Σ dt F·V with the velocities V of the pressure solve,
             W_received = work of the same loads over the motion that the discrete elements made
-Water:      Δ(kinetic + potential) + W_given + D = 0,  D: numerical dissipation, a line of its own
+Water:      Δ(kinetic + potential) + W_given + D = E_sides,  D: dissipation, numerical and viscous, a line of its own;
+            E_sides: energy of the water that came in through sides, with the work of its pressure
 
 A scheme that gains energy shows D < 0; dissipation D > 0 is damping of the water by the numerics and is
 reported, not counted as an error. The energy error is (|r_s| + |r_i| + max(0, −D)) / E_in, E_in the energy that the
@@ -14,6 +15,8 @@ kinetic energy, or work of imposed motions, whichever is the largest so far.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+
+import numpy as np
 
 STORED = ("kinetic", "gravity", "joint_stored", "contact_stored")
 DISSIPATED = ("joint_dissipated", "joint_damping", "dashpot", "friction")
@@ -44,6 +47,8 @@ class Ledger:
     available: float = 0.0
     """Potential energy of the water above its level state at the start [J]."""
     work_given: float = 0.0
+    entered: float = 0.0
+    """Energy that came with water through the sides of the tank so far [J]."""
     _water_start: tuple[float, float] | None = None
     _structure_start: float | None = None
     _input: float = field(default=0.0)
@@ -54,6 +59,16 @@ class Ledger:
         self._structure_start = None if structure is None else _structure_total(structure)
         self._gravity_start = None if structure is None else structure["gravity"]
         self._input = self.available
+
+    def save(self) -> dict[str, np.ndarray]:
+        """Everything that it holds, by name."""
+        return {name: np.array(value) for name, value in vars(self).items() if value is not None}
+
+    def restore(self, saved: dict[str, np.ndarray]) -> None:
+        """Back to what was saved."""
+        for name, array in saved.items():
+            value = array.tolist()
+            setattr(self, name, tuple(value) if isinstance(value, list) else value)
 
     @property
     def input_energy(self) -> float:
@@ -69,7 +84,7 @@ class Ledger:
         kinetic, potential = water or (0.0, 0.0)
         dissipation = 0.0
         if water is not None:
-            dissipation = -(kinetic + potential - sum(self._water_start)) - self.work_given
+            dissipation = self.entered - (kinetic + potential - sum(self._water_start)) - self.work_given
         received = residual = 0.0
         if structure is not None:
             received = structure["load_work"]
@@ -77,7 +92,7 @@ class Ledger:
             residual = _structure_total(structure) - self._structure_start - received - driven
             released = self._gravity_start - structure["gravity"]
             self._input = max(self._input, abs(released), structure["kinetic"], abs(driven))
-        self._input = max(self._input, kinetic, abs(self.work_given))
+        self._input = max(self._input, kinetic, abs(self.work_given), abs(self.entered))
         error = abs(residual) + max(0.0, -dissipation)
         if water is not None and structure is not None:
             error += abs(self.work_given - received)

@@ -78,6 +78,15 @@ class Coupling:
             self.ledger.available = water.available_energy()
         self.ledger.start(self._water_energy(), self._structure_energies())
 
+    def save(self) -> dict[str, Array]:
+        """What the coupling itself remembers between two steps; both sides and the ledger save theirs."""
+        return {"time": np.array(self.time), "defects": np.array(self._defects, float)}
+
+    def restore(self, saved: dict[str, Array]) -> None:
+        """Back to what was saved."""
+        self.time = float(saved["time"])
+        self._defects = deque(saved["defects"].tolist(), maxlen=DEFECT_STEPS)
+
     @property
     def coupled(self) -> bool:
         return self.water is not None and self.structure is not None
@@ -110,6 +119,8 @@ class Coupling:
             self._structure_step(dt, record)
         self.time += dt
         self._check_finite()
+        if self.water is not None and self.water.sides is not None:
+            self.ledger.entered = self.water.sides.energy
         record.balance = self.ledger.balance(self._water_energy(), self._structure_energies())
         return record
 
@@ -118,6 +129,8 @@ class Coupling:
             if self.immersion.update():
                 self.water.move_solids(self.immersion.domain)
             record.bodies_cut = self.immersion.cut_again
+        if self.water.viscous is not None:
+            self.water.body_velocity = self._padded(self.structure.velocity())
         with self.clock("water"):
             problem = self.water.predict(dt)
         found = self._exchange(problem, record)

@@ -7,10 +7,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from coupler.bodies import Body, overlap_depth, rotation_matrix
+from coupler.bodies import Body, overlap_depth
 from coupler.case import Case
 from coupler.case_structure import Building
 from coupler.parts import Part
+from coupler.solids import solids_of
 
 KeyPath = tuple[str | int, ...]
 Problem = tuple[KeyPath, str]
@@ -31,14 +32,7 @@ def mesh_size(tank) -> tuple[int, int]:
 
 def solid_bodies(case: Case) -> list[Placed]:
     """The fixed solids."""
-    return [(("solid", i), solid.name, _body(solid)) for i, solid in enumerate(case.solid)]
-
-
-def _body(solid) -> Body:
-    turn = solid.rotation
-    return Body.box(
-        solid.centre, solid.size, None if turn is None else rotation_matrix(turn.axis, turn.angle)
-    )
+    return [(solid.path, solid.name, solid.body) for solid in solids_of(case)]
 
 
 def frame_problems(case: Case) -> Iterator[Problem]:
@@ -157,11 +151,11 @@ def _outlines(bodies: list[Placed]) -> list[tuple[KeyPath, str, np.ndarray]]:
 
 def _overlaps(solids: list[Placed], blocks: list[Placed], block_names: list[str]) -> Iterator[Problem]:
     """Bodies of different parts, and blocks of one file, that share a volume; told once for two parts, the deepest."""
+    if not blocks:
+        return
     from yade_scripts.faces import touching_bounds
     from yade_scripts.polyhedra import shown
 
-    if not blocks:
-        return
     bodies, names = [*solids, *blocks], [*(name for _, name, _ in solids), *block_names]
     bounds = np.array([body.bounds() for _, _, body in bodies])
     deepest: dict[tuple[KeyPath, KeyPath], tuple[float, int, int]] = {}

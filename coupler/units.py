@@ -29,6 +29,7 @@ DIMENSIONS = {
     "m/s2": "an acceleration",
     "kg/m3": "a density",
     "Pa": "a pressure",
+    "Pa s": "a dynamic viscosity",
     "N": "a force",
     "N/m": "a stiffness",
     "J": "an energy",

@@ -137,12 +137,13 @@ def wet_shares(phi):
 class Sides:
     """All inflows and seas of a tank: what the step asks of them.
 
-    entered, left [m³]: water that came in and went out through them so far."""
+    entered, left [m³]: water that came in and went out through them so far · energy [J] that they brought: kinetic,
+    potential, and the work of the pressure."""
 
     def __init__(self, sides):
         self.every = tuple(sides)
         self.now = self.every
-        self.entered = self.left = 0.0
+        self.entered = self.left = self.energy = 0.0
 
     def place(self, parent_node, n_background: int, active) -> None:
         """Follow the nodes of a domain: parent_node (N,), active (N,) bool."""
@@ -179,10 +180,11 @@ class Sides:
                 rate += q
         return np.maximum(volume, -np.maximum(carried, 0.0)), rate
 
-    def book(self, volume) -> None:
-        """Add what came in at the nodes in a step (N,) [m³] to entered and left."""
+    def book(self, volume, head) -> None:
+        """Add what came in at the nodes in a step: volume (N,) [m³], head (N,) [J/m³] its energy and pressure."""
         self.entered += float(volume[volume > 0.0].sum())
         self.left -= float(volume[volume < 0.0].sum())
+        self.energy += float(volume @ head)
 
     def nodes(self) -> np.ndarray:
         """Nodes (n,) of all sides."""

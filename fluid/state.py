@@ -22,7 +22,7 @@ NUMBERS = {
     "_solids_move": bool,
     "_domain_is_new": bool,
 }
-SIDES = ("entered", "left")
+SIDES = ("entered", "left", "energy")
 
 
 class NotAfterAStep(RuntimeError):

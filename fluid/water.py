@@ -153,7 +153,7 @@ class Water:
         self.listed, self.layer_start = new.listed, new.layer_start
         self.conserved_volume = problem.predicted.conserved_volume
         if self.sides is not None:
-            self.sides.book(problem.predicted.through)
+            self.sides.book(problem.predicted.through, self.head())
         self.report = new.report
         self.time += problem.dt
         self._surface_lag = problem.dt if self._solids_move else 0.5 * problem.dt
@@ -299,6 +299,12 @@ class Water:
         p = self.parameters
         at_surface = -p.density * float(self.nodal_water @ (self.topology.nodes @ p.weight))
         return at_surface - self._surface_lag * float(self.momentum() @ p.weight)
+
+    def head(self) -> np.ndarray:
+        """½ ρ u² - ρ g·x + p (N,) [J/m³] at the nodes."""
+        p = self.parameters
+        kinetic = 0.5 * p.density * np.einsum("ij,ij->i", self.velocity, self.velocity)
+        return kinetic - p.density * (self.topology.nodes @ p.weight) + self.pressure
 
     def available_energy(self) -> float:
         """Kinetic energy, and the potential energy above that of the same water spread over the whole floor [J]."""

@@ -1,0 +1,115 @@
+"""The water of a case: mesh, solids in it, walls, and the sides where it comes in or goes out."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from coupler.case import Case
+
+
+def water_of(case: Case, structure, solids):
+    """(Water, Immersion) of a case with a structure or None and fixed solids [(vertices, faces)]."""
+    from coupler.exchange import Immersion
+    from coupler.fill import start_level
+    from fluid.mesh import box_mesh
+    from fluid.parameters import WaterParameters
+    from fluid.water import Water
+
+    w = case.water
+    mesh = box_mesh(case.tank.lower, case.tank.upper, case.tank.cell)
+    immersion = Immersion(mesh, structure, solids, w.covers)
+    parameters = WaterParameters(
+        density=w.density,
+        gravity=case.case.gravity,
+        theta=w.theta,
+        courant=case.time.cfl,
+        viscosity=w.viscosity,
+        walls=w.walls,
+        roughness=w.roughness,
+        manning=w.manning,
+    )
+    level = np.full(len(immersion.domain.nodes), np.ptp(mesh.bounds, axis=0).max())
+    if w.fill:
+        boxes = [(fill.lower, fill.upper) for fill in w.fill]
+        level = start_level(boxes, (case.tank.lower, case.tank.upper), mesh, immersion.domain)
+    opened, smooth = sides_named(case.tank.open), sides_named(case.tank.smooth)
+    return Water(mesh, immersion.domain, level, parameters, opened, smooth, _flows(case, mesh)), immersion
+
+
+def sides_named(names):
+    """Face normals (B, 3), centres (B, 3) → (B,) bool: those on the sides of these names; None without any."""
+    if not names:
+        return None
+    outward = np.array([_outward(name) for name in names])
+
+    def chosen(normals, centres):
+        return (normals @ outward.T > 0.5).any(axis=1)
+
+    return chosen
+
+
+def _outward(side: str) -> np.ndarray:
+    direction = np.zeros(3)
+    direction["xyz".index(side[0])] = 1.0 if side[1] == "+" else -1.0
+    return direction
+
+
+def _flows(case: Case, mesh):
+    """Inflows and seas; None without any, and then their code is not loaded."""
+    if not (case.water.inflow or case.water.sea):
+        return None
+    from fluid.inflow import Side, Sides
+
+    sides = [Side.of(mesh, sides_named([i.side]), flow_of(case, i)) for i in case.water.inflow]
+    for sea in case.water.sea:
+        sides.append(Side.of(mesh, sides_named([sea.side]), level=lambda time, level=sea.level: level))
+    return Sides(sides)
+
+
+def flow_of(case: Case, spec):
+    """What an inflow of the case brings."""
+    from fluid import waves
+
+    inward, bed, gravity = -_outward(spec.side), case.tank.lower[2], case.case.gravity
+    if spec.kind == "steady":
+        return waves.steady(inward, spec.level, spec.velocity)
+    if spec.kind == "bore":
+        _, speed = waves.bore_speed(spec.ahead - bed, spec.level - bed, gravity)
+        return waves.steady(inward, spec.level, speed)
+    if spec.kind == "solitary":
+        order = 1 if spec.theory == "goring" else 3
+        wave = waves.SolitaryWave(spec.level - bed, spec.height, gravity, spec.crest, order)
+        return wave.flow(inward, bed)
+    return waves.record(inward, *record_columns(spec.path))
+
+
+class RecordError(ValueError):
+    """The table of an inflow cannot be used; the message says why."""
+
+
+def record_columns(path: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Columns time [s], level [m], velocity [m/s] of a CSV file. Raises RecordError."""
+    names = ("time", "level", "velocity")
+    try:
+        with open(path, encoding="utf-8") as file:
+            lines = [line for line in file if line.strip() and not line.startswith("#")]
+    except (OSError, UnicodeDecodeError) as error:
+        raise RecordError(f"{path}: cannot be read ({error})") from error
+    head = [name.strip() for name in lines[0].split(",")] if lines else []
+    missing = [name for name in names if name not in head]
+    if missing:
+        raise RecordError(
+            f"{path}: no column {', '.join(missing)}; its first line must name {', '.join(names)}"
+        )
+    try:
+        table = np.array([[float(entry) for entry in line.split(",")] for line in lines[1:]])
+    except ValueError as error:
+        raise RecordError(f"{path}: {error}") from error
+    if table.ndim != 2 or table.shape[1] != len(head) or not np.isfinite(table).all():
+        raise RecordError(f"{path}: every line needs {len(head)} finite numbers, one a column")
+    time, level, velocity = (table[:, head.index(name)] for name in names)
+    if np.any(np.diff(time) <= 0.0):
+        raise RecordError(
+            f"{path}: times must increase; they do not at {time[np.argmax(np.diff(time) <= 0)]:g} s"
+        )
+    return time, level, velocity

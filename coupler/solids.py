@@ -1,0 +1,92 @@
+"""The fixed solids of a case as convex bodies in space: boxes, hulls of points, bodies of files."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from coupler.bodies import Body, rotation_matrix
+from coupler.case import Case
+
+KeyPath = tuple[str | int, ...]
+BOX_CORNERS = np.array(
+    [[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]],
+    float,
+)
+BOX_FACES = ((0, 4, 7, 3), (1, 2, 6, 5), (0, 1, 5, 4), (3, 7, 6, 2), (0, 3, 2, 1), (4, 5, 6, 7))
+
+
+@dataclass(frozen=True)
+class FixedSolid:
+    """One convex body: path of its table, name, vertices (k, 3) [m] and faces in space, the same for checks."""
+
+    path: KeyPath
+    name: str
+    vertices: np.ndarray
+    faces: tuple
+    body: Body
+
+
+def solids_of(case: Case) -> tuple[FixedSolid, ...]:
+    """All fixed bodies in the order of their rows; a file may hold several.
+
+    Raises BlockError or BlockFileError where a table makes none. Kept for the next call unless a file changed."""
+    return _made(case.solid, tuple(_stamp(s.path) for s in case.solid if s.path))
+
+
+def refused_solids(case: Case) -> Iterator[tuple[KeyPath, str]]:
+    """Tables that are no solid, and why."""
+    for i, spec in enumerate(case.solid):
+        path = ("solid", i)
+        ways = [spec.centre is not None or spec.size is not None, spec.vertices is not None, bool(spec.path)]
+        if sum(ways) != 1:
+            yield path, "give centre and size (a box), vertices (their hull) or path (a file), one of them"
+        elif ways[0] and (spec.centre is None or spec.size is None):
+            yield path, f"{'centre' if spec.centre is None else 'size'}: missing; a box needs centre and size"
+        elif not ways[0]:
+            yield from _refused(path, spec)
+
+
+def _refused(path: KeyPath, spec) -> Iterator[tuple[KeyPath, str]]:
+    from coupler.block_files import BlockFileError
+    from yade_scripts.polyhedra import BlockError
+
+    try:
+        list(_bodies(path, spec))
+    except (BlockError, BlockFileError) as error:
+        yield path, str(error)
+
+
+@lru_cache(maxsize=1)
+def _made(specs, stamps) -> tuple[FixedSolid, ...]:
+    return tuple(solid for i, spec in enumerate(specs) for solid in _bodies(("solid", i), spec))
+
+
+def _stamp(path: str) -> tuple[int, int]:
+    there = os.stat(path)
+    return there.st_mtime_ns, there.st_size
+
+
+def _bodies(path: KeyPath, spec) -> Iterator[FixedSolid]:
+    if spec.size is not None:
+        turn = (
+            np.eye(3) if spec.rotation is None else rotation_matrix(spec.rotation.axis, spec.rotation.angle)
+        )
+        corners = np.array(spec.centre) + (0.5 * np.array(spec.size) * BOX_CORNERS) @ turn.T
+        yield FixedSolid(path, spec.name, corners, BOX_FACES, Body.box(spec.centre, spec.size, turn))
+        return
+    for block in _blocks(spec):
+        yield FixedSolid(path, spec.name, block.world_vertices(), block.faces, Body.of_block(block))
+
+
+def _blocks(spec) -> list:
+    from coupler.block_files import blocks_from_file
+    from yade_scripts.blocks import Block
+
+    if spec.path:
+        return blocks_from_file(spec)
+    return [Block.standing(spec.name, np.array(spec.vertices))]

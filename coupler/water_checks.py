@@ -1,0 +1,96 @@
+"""What is wrong with the water of a case: walls, friction, inflows and seas. Every check yields (key path, message)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from coupler.build_water import RecordError, record_columns
+from coupler.case import Case
+
+KeyPath = tuple[str | int, ...]
+Problem = tuple[KeyPath, str]
+
+HIGHEST_WAVE = 0.78
+"""Height of a solitary wave over the depth beyond which it breaks."""
+
+
+def water_problems(case: Case) -> Iterator[Problem]:
+    """Everything about [water] that needs more than one of its names."""
+    if case.water is None:
+        return
+    w = case.water
+    if not (w.fill or w.inflow or w.sea):
+        yield (
+            ("water",),
+            "no water: write at least one [[water.fill]] with lower and upper, or an inflow or a sea",
+        )
+    yield from _walls(w)
+    if case.tank is not None:
+        yield from _sides(case)
+
+
+def _walls(w) -> Iterator[Problem]:
+    if w.walls == "no-slip" and w.viscosity == 0.0:
+        yield ("water", "walls"), "walls that hold the water need water.viscosity"
+    laws = [name for name in ("roughness", "manning") if getattr(w, name) is not None]
+    if w.walls == "friction" and len(laws) != 1:
+        yield (
+            ("water", "walls"),
+            f"friction needs water.roughness or water.manning, one of them; there are {len(laws)}",
+        )
+    if w.walls != "friction" and laws:
+        yield ("water", laws[0]), f'is for walls = "friction"; they are "{w.walls}"'
+
+
+def _sides(case: Case) -> Iterator[Problem]:
+    taken = {side: "tank.open" for side in case.tank.open}
+    for kind in ("inflow", "sea"):
+        for i, spec in enumerate(getattr(case.water, kind)):
+            path = ("water", kind, i)
+            if spec.side in taken:
+                yield (
+                    (*path, "side"),
+                    f"{spec.side} is given to {taken[spec.side]} already; take it out of one of them",
+                )
+            taken[spec.side] = f"water.{kind}[{i}]"
+            yield from _levels(case, path, spec)
+
+
+def _levels(case: Case, path: KeyPath, spec) -> Iterator[Problem]:
+    bed, top = case.tank.lower[2], case.tank.upper[2]
+    if _kind(spec) == "record":
+        yield from _record(path, spec, bed)
+        return
+    if not bed < spec.level <= top:
+        yield (
+            (*path, "level"),
+            f"z = {spec.level:g} m is not between the floor ({bed:g} m) and the top ({top:g} m)",
+        )
+    elif _kind(spec) == "bore" and not bed < spec.ahead < spec.level:
+        yield (
+            (*path, "ahead"),
+            f"z = {spec.ahead:g} m must lie above the floor ({bed:g} m) and below the level behind ({spec.level:g} m); "
+            'over a dry bed write kind = "steady"',
+        )
+    elif _kind(spec) == "solitary" and spec.height > HIGHEST_WAVE * (spec.level - bed):
+        yield (
+            (*path, "height"),
+            f"{spec.height:g} m breaks at once on a depth of {spec.level - bed:g} m; at most {HIGHEST_WAVE:g} of it",
+        )
+
+
+def _record(path: KeyPath, spec, bed: float) -> Iterator[Problem]:
+    try:
+        _, level, _ = record_columns(spec.path)
+    except RecordError as error:
+        yield (*path, "path"), str(error)
+        return
+    if level.min() < bed:
+        yield (
+            (*path, "path"),
+            f"its level falls to z = {level.min():g} m, below the floor of the tank ({bed:g} m)",
+        )
+
+
+def _kind(spec) -> str:
+    return getattr(spec, "kind", "sea")
