@@ -73,12 +73,13 @@ class ContactForces:
         """Renew the pairs from YADE's last search, or from one made now.
 
         newly (n+m,) bool: bodies whose new pairs take over from joints."""
+        self._set_pairs(_in_order(self._near(now)), newly)
+
+    def _near(self, now: bool) -> Array:
+        """Pairs that may touch before the next search, (p, 2)."""
         near = self._neighbours(now)
-        near = near[self._on[near].any(axis=1)]
-        pairs = np.concatenate([near, self._near_planes()])
-        pairs = np.stack([pairs.min(axis=1), pairs.max(axis=1)], axis=1)
-        pairs = pairs[self._free[pairs].any(axis=1)]
-        self._set_pairs(pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))], newly)
+        near = np.concatenate([near[self._on[near].any(axis=1)], self._near_planes()])
+        return near[self._free[near].any(axis=1)]
 
     def _near_planes(self) -> Array:
         """Blocks that may reach a plane before the next search, (k, 2)."""
@@ -101,22 +102,23 @@ class ContactForces:
         )
         fresh, known, touching = (np.zeros(len(a), bool) for _ in range(3))
         if hasattr(self, "_pairs") and len(self._pairs.a):
-            known = self._carry(a, b, start, touching, slots)
+            known = self._carry(a, b, start, fresh, touching, slots)
         if newly is not None:
-            fresh = ~known & (newly[a] | newly[b])
+            fresh |= ~known & (newly[a] | newly[b])
         self._pairs = kernel.Pairs(a, b, start, fresh, touching, np.zeros(len(a)))
         self._slots = slots
         if not hasattr(self, "_rows") or len(self._rows.a) < total:
             self._rows = kernel.empty_rows(total + total // 4)
 
-    def _carry(self, a: Array, b: Array, start: Array, touching: Array, slots: kernel.Slots) -> Array:
+    def _carry(self, a, b, start, fresh: Array, touching: Array, slots: kernel.Slots) -> Array:
         """Copy the slots of pairs that were known before; (p,) bool."""
         old, size = self._pairs, len(self._free)
         old_keys, keys = old.a * size + old.b, a * size + b
         spot = np.minimum(np.searchsorted(old_keys, keys), len(old_keys) - 1)
         known = old_keys[spot] == keys
+        fresh[known], touching[known] = old.fresh[spot[known]], old.touching[spot[known]]
         self.friction += kernel.carry_slots(
-            old, self._slots, np.flatnonzero(known), spot[known], start, touching, slots, self._law.shear
+            old, self._slots, np.flatnonzero(known), spot[known], start, slots, self._law.shear
         )
         return known
 
@@ -134,9 +136,7 @@ class ContactForces:
 
     def settle(self, dt: float) -> None:
         """Book the work of the contacts over the substep that has just ended."""
-        dashpot, driving = kernel.contact_work(
-            self._rows, self._count, self._motion.all_v, ~self._free, dt
-        )
+        dashpot, driving = kernel.contact_work(self._rows, self._count, self._motion.all_v, ~self._free, dt)
         self.dashpot += dashpot
         self.driving += driving
 
@@ -175,7 +175,8 @@ class ContactForces:
         """Back to a saved state, the blocks being where they were then."""
         self._on[:], self._on_planes[:] = saved["on"], saved["on_planes"]
         self._set_pairs(np.zeros((0, 2), np.int64))
-        self.search(True)
+        in_contact = np.stack([saved["a"], saved["b"]], axis=1)
+        self._set_pairs(_in_order(np.concatenate([self._near(now=True), in_contact])))
         keys = self._pairs.a * len(self._free) + self._pairs.b
         pair = np.searchsorted(keys, saved["a"] * len(self._free) + saved["b"])
         slot = self._pairs.start[pair] + saved["node"]
@@ -184,6 +185,11 @@ class ContactForces:
             getattr(self._slots, name)[slot] = saved[name]
         self.dashpot, self.friction, self.driving = saved["sums"].tolist()
         self._read = None
+
+
+def _in_order(pairs: Array) -> Array:
+    """Pairs (p, 2) with the smaller row first, sorted, each once."""
+    return np.unique(np.sort(pairs, axis=1), axis=0)
 
 
 def _bodies(blocks, planes: int, face_stiffness: Array, free: Array, material: Array) -> kernel.Bodies:

@@ -200,7 +200,25 @@ def _separation(node, begin, end, planes, faces):
 
 @njit(cache=True)
 def _scan(
-    shapes, bodies, shear, slots, slot, fresh, a, b, planes, faces, nearest, margin, x, v, R, last_dt, rows, count, lost
+    shapes,
+    bodies,
+    shear,
+    slots,
+    slot,
+    fresh,
+    a,
+    b,
+    planes,
+    faces,
+    nearest,
+    margin,
+    x,
+    v,
+    R,
+    last_dt,
+    rows,
+    count,
+    lost,
 ):
     """Contacts of the nodes of a with the faces of b; contacts that ended leave their springs' energy in `lost`.
 
@@ -398,7 +416,11 @@ def _apply(slots, x, v, R, dt, rows, first, count, F):
         size = 0.0
         for k in range(3):
             rows.velocity[c, k] = w[k]
-            old = R[b, k, 0] * slots.shear[s, 0] + R[b, k, 1] * slots.shear[s, 1] + R[b, k, 2] * slots.shear[s, 2]
+            old = (
+                R[b, k, 0] * slots.shear[s, 0]
+                + R[b, k, 1] * slots.shear[s, 1]
+                + R[b, k, 2] * slots.shear[s, 2]
+            )
             S[k] = old - dt * rows.kt[c] * (w[k] - wn * n[k])
             size += S[k] ** 2
         size, limit = np.sqrt(size), rows.mu[c] * N
@@ -467,13 +489,12 @@ def _power(force, arm, v):
 
 
 @njit(cache=True)
-def carry_slots(old_pairs, old, new_index, old_index, start, new_touching, new, shear):
+def carry_slots(old_pairs, old, new_index, old_index, start, new, shear):
     """Copy the memory of pairs old_index to pairs new_index; → energy of contacts in pairs that are no more [J]."""
     kept = np.zeros(len(old_pairs.a), np.bool_)
     for i in range(len(new_index)):
         p, q = new_index[i], old_index[i]
         kept[q] = True
-        new_touching[p] = old_pairs.touching[q]
         for s in range(start[p + 1] - start[p]):
             to, source = start[p] + s, old_pairs.start[q] + s
             new.face[to] = old.face[source]

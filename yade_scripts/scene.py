@@ -14,6 +14,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from yade_scripts.blocks import Block
+from yade_scripts.contact_nodes import MARGIN
 from yade_scripts.engine import Engine, YadeError
 
 Array = np.ndarray
@@ -79,12 +80,15 @@ class Scene:
             state.blockedDOFs = "xyzXYZ"
 
     def _shape(self, block: Block):
-        """Its box, or a sphere around it: what the search for neighbours sees."""
+        """Its box, or a sphere around it, with the margin of its faces: what the search for neighbours sees."""
+        margin = MARGIN * block.planes[1].min()
         if block.is_box:
             return self.engine.utils.box(
-                self._v(block.centre), self._v(0.5 * block.size), mask=STANDING, color=WHITE
+                self._v(block.centre), self._v(0.5 * block.size + margin), mask=STANDING, color=WHITE
             )
-        return self.engine.utils.sphere(self._v(block.centre), block.radius, mask=STANDING, color=WHITE)
+        return self.engine.utils.sphere(
+            self._v(block.centre), block.radius + margin, mask=STANDING, color=WHITE
+        )
 
     def _set_engines(self, gravity: Array, meets: bool) -> None:
         """Integration first: forces are handed over before the step. (YADE warns of forces that were not reset in the
