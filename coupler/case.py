@@ -1,7 +1,7 @@
 """The case: what a `case.toml` may say, in SI, with a description and a unit for every name.
 
 A section that is absent switches its module off (`modules`). Unknown names are refused. The page
-`docs/case_file.md` and `surgebreak explain` are made from this file, `case_structure` and `case_water`.
+`docs/case_file.md` and `surgebreak explain` are made from this file and the others named `case_...`.
 """
 
 from __future__ import annotations
@@ -10,9 +10,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from coupler.case_gauges import Gauge
 from coupler.case_structure import Structure
 from coupler.case_types import (
-    Length,
     Name,
     Point,
     PositiveLength,
@@ -150,71 +150,6 @@ class Joints(Section):
         "with closing_ratio and the law",
     )
     ground: Switch = Field(True, description="blocks that stand on the ground are glued to it")
-
-
-class LevelGauge(Section):
-    """Depth of water over a place: the wet length of the vertical through it."""
-
-    kind: Literal["level"] = Field(description="what it measures: depth of water")
-    name: Name = Field(description="column of the history")
-    at: tuple[Length, Length] = Field(description="place (x, y)")
-
-
-class PressureGauge(Section):
-    """Pressure of the water at a point."""
-
-    kind: Literal["pressure"] = Field(description="what it measures: pressure")
-    name: Name = Field(description="column of the history")
-    at: Point = Field(description="point (x, y, z); on the face of a solid or block: just outside of it")
-
-
-class VelocityGauge(Section):
-    """Velocity of the water at a point."""
-
-    kind: Literal["velocity"] = Field(description="what it measures: velocity of the water")
-    name: Name = Field(description="columns of the history")
-    at: Point = Field(description="point (x, y, z)")
-
-
-class VolumeGauge(Section):
-    """Volume of the water inside a box."""
-
-    kind: Literal["volume"] = Field(description="what it measures: volume of water")
-    name: Name = Field(description="column of the history")
-    lower: Point = Field(description="corner with the smallest coordinates")
-    upper: Point = Field(description="corner with the largest coordinates")
-
-
-class ForceGauge(Section):
-    """Force of the water on a block, a group, a building or a solid."""
-
-    kind: Literal["force"] = Field(description="what it measures: force of the water")
-    name: Name = Field(description="columns of the history")
-    on: Name = Field(
-        description="name of a block, a group, a part of the structure (wall, arch, ...) or a solid"
-    )
-
-
-class ReactionGauge(Section):
-    """Force that holds a block in place or to its prescribed motion, as a testing machine measures it."""
-
-    kind: Literal["reaction"] = Field(description="what it measures: force that holds a block")
-    name: Name = Field(description="columns of the history")
-    on: Name = Field(description="name of a block, a group or a part of the structure (wall, arch, ...)")
-
-
-class MotionGauge(Section):
-    """Centre, velocity and rotation vector of one block."""
-
-    kind: Literal["motion"] = Field(description="what it measures: motion of a block")
-    name: Name = Field(description="columns of the history")
-    of: Name = Field(description="name of a block")
-
-
-Gauge = Annotated[
-    LevelGauge | PressureGauge | VelocityGauge | VolumeGauge | ForceGauge | ReactionGauge | MotionGauge,
-    Field(discriminator="kind"),
-]
 
 
 class Motion(Section):

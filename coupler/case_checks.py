@@ -16,7 +16,7 @@ from coupler.parts import PARTS, Part, parts_of, recipes
 from coupler.place_checks import frame_problems, opening_problems, place_problems, solid_bodies
 from coupler.solids import refused_solids
 from coupler.toml_lines import shown
-from coupler.water_checks import water_problems
+from coupler.water_checks import water_problems, water_remarks
 
 KeyPath = tuple[str | int, ...]
 Problem = tuple[KeyPath, str]
@@ -36,7 +36,7 @@ def problems(case: Case) -> list[Problem]:
 
 def remarks(case: Case) -> list[str]:
     """What is allowed but worth knowing before the run."""
-    return [*_thin_remarks(case), *_joint_remarks(case), *_loose_remarks(case)]
+    return [*_thin_remarks(case), *water_remarks(case), *_joint_remarks(case), *_loose_remarks(case)]
 
 
 def _thin_remarks(case: Case) -> Iterator[str]:

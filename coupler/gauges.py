@@ -7,6 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from coupler.errors import SurgebreakError
+from coupler.gauge_windows import Windows
+
 
 @dataclass(frozen=True)
 class Gauge:
@@ -21,7 +24,9 @@ def make_gauge(spec, rows_of: dict[str, np.ndarray]) -> Gauge:
     makers = {
         "level": _level,
         "pressure": _pressure,
+        "patch": _patch,
         "velocity": _velocity,
+        "flux": _flux,
         "volume": _volume,
         "motion": _motion,
         "force": _force,
@@ -62,7 +67,85 @@ def _pressure(spec, rows_of) -> Gauge:
 
         return pressure(coupling.water, at)
 
-    return _scalar(spec, "Pa", f"pressure at {spec.at}, zero in the air", value)
+    return _in_time(spec, "pressure", "Pa", f"pressure at {spec.at}, zero in the air", value)
+
+
+def _patch(spec, rows_of) -> Gauge:
+    points = parallelogram(spec.at, spec.edges) if spec.edges else disc(spec.at, spec.radius, spec.normal)
+
+    def value(coupling):
+        from fluid.gauges import pressure
+
+        return _mean_outside_solids(spec.name, pressure(coupling.water, points))
+
+    return _in_time(spec, "pressure", "Pa", f"mean pressure over the patch at {spec.at}", value)
+
+
+class Covered(SurgebreakError):
+    """A patch lies wholly inside a solid."""
+
+
+def _mean_outside_solids(name: str, values) -> float:
+    there = np.isfinite(values)
+    if not there.any():
+        raise Covered(
+            f"the patch of gauge '{name}' lies inside a solid or block; move it to the face, outside"
+        )
+    return float(values[there].mean())
+
+
+def _in_time(spec, what: str, unit: str, meaning: str, value: Callable) -> Gauge:
+    """A gauge of one number with the windows that the case asks for."""
+    windows = Windows(spec.impulse, spec.mean_over)
+    name = f"{spec.name}_{what}"
+    columns = ((name, unit, meaning), *windows.columns(spec.name, unit, ("",)))
+
+    def read(coupling, record):
+        now = value(coupling)
+        return _named(columns, [now, *windows.add(record.time, record.dt, now)])
+
+    return Gauge(columns, read)
+
+
+PATCH_POINTS = 6
+"""Points along each edge of a patch, and rings of a disc."""
+
+
+def parallelogram(centre, edges, points: int = PATCH_POINTS) -> np.ndarray:
+    """(points², 3) [m] middles of equal parts of the parallelogram with these edges (2, 3)."""
+    s = (np.arange(points) + 0.5) / points - 0.5
+    u, v = np.meshgrid(s, s, indexing="ij")
+    return np.asarray(centre) + np.column_stack([u.ravel(), v.ravel()]) @ np.asarray(edges, float)
+
+
+def disc(centre, radius: float, normal, rings: int = PATCH_POINTS) -> np.ndarray:
+    """Points (m, 3) [m] of equal parts of a disc: ring k, 6 k - 3 points at sqrt(mean r²) of its area."""
+    n = np.asarray(normal, float) / np.linalg.norm(normal)
+    first = np.cross(n, np.eye(3)[np.argmin(np.abs(n))])
+    first /= np.linalg.norm(first)
+    second = np.cross(n, first)
+    found = []
+    for k in range(1, rings + 1):
+        r = radius * np.sqrt(((k - 1) ** 2 + k**2) / 2.0) / rings
+        angle = 2 * np.pi * (np.arange(6 * k - 3) + 0.5 * (k % 2)) / (6 * k - 3)
+        found.append(r * (np.outer(np.cos(angle), first) + np.outer(np.sin(angle), second)))
+    return np.asarray(centre) + np.concatenate(found)
+
+
+def _flux(spec, rows_of) -> Gauge:
+    area = np.cross(*np.asarray(spec.edges, float))
+
+    def value(coupling):
+        from fluid.gauges import velocity
+
+        longest = np.linalg.norm(spec.edges, axis=1).max()
+        count = max(PATCH_POINTS, int(np.ceil(2.0 * longest / coupling.water.mesh.spacing)))
+        u = velocity(coupling.water, parallelogram(spec.at, spec.edges, count))
+        return float(
+            np.nan_to_num(u).mean(axis=0) @ area
+        )  # zero in the air and in solids: they count as area
+
+    return _scalar(spec, "m3/s", f"water through the patch at {spec.at}", value)
 
 
 def _velocity(spec, rows_of) -> Gauge:
@@ -109,8 +192,22 @@ def _rotation_vector(R) -> np.ndarray:
 
 def _force(spec, rows_of) -> Gauge:
     rows = rows_of[spec.on]
+    windows = Windows(spec.impulse, spec.mean_over)
     columns = _vector(f"{spec.name}_force", "N", f"force of the water on '{spec.on}'")
-    return Gauge(columns, lambda coupling, record: _named(columns, record.load[rows, :3].sum(axis=0)))
+    if spec.about is not None:
+        columns += _vector(f"{spec.name}_moment", "N m", f"moment on '{spec.on}' about {spec.about}")
+    columns += windows.columns(spec.name, "N", ("_x", "_y", "_z"))
+
+    def read(coupling, record):
+        load = record.load[rows]
+        values = list(load[:, :3].sum(axis=0))
+        force = values[:3]
+        if spec.about is not None:
+            arm = coupling.water.domain.body_centre[rows] - np.array(spec.about)
+            values += list((load[:, 3:] + np.cross(arm, load[:, :3])).sum(axis=0))
+        return _named(columns, [*values, *windows.add(record.time, record.dt, force)])
+
+    return Gauge(columns, read)
 
 
 def _reaction(spec, rows_of) -> Gauge:

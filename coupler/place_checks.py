@@ -232,12 +232,30 @@ def _hollow(path: KeyPath, building: Building) -> Iterator[Problem]:
 def _gauges(case: Case, solids: list[Placed]) -> Iterator[Problem]:
     for i, gauge in enumerate(case.gauge):
         path = ("gauge", i)
+        window = getattr(gauge, "impulse", None)
+        if window is not None and window[0] >= window[1]:
+            yield (
+                (*path, "impulse"),
+                f"from {window[0]:g} s to {window[1]:g} s: the end must come after the start",
+            )
         if gauge.kind not in ("motion", "reaction") and case.water is None:
             yield (*path, "kind"), f"a {gauge.kind} gauge measures water; write a section [water]"
         elif gauge.kind == "volume":
             yield from _corners_in_order(path, gauge)
-        elif gauge.kind in ("level", "pressure", "velocity") and case.tank is not None:
+        elif gauge.kind in ("level", "pressure", "patch", "velocity", "flux") and case.tank is not None:
             yield from _gauge_place(case, path, gauge, solids)
+            yield from _patch(path, gauge)
+
+
+def _patch(path: KeyPath, gauge) -> Iterator[Problem]:
+    """Patches have a shape and an area, windows a length."""
+    if gauge.kind == "patch" and (gauge.edges is None) == (gauge.radius is None):
+        yield path, f"'{gauge.name}' needs either edges (a parallelogram) or radius and normal (a disc)"
+    elif gauge.kind == "patch" and gauge.radius is not None and not np.any(gauge.normal or 0.0):
+        yield (*path, "normal"), f"'{gauge.name}' is a disc and needs a normal, for instance [-1, 0, 0]"
+    edges = getattr(gauge, "edges", None)
+    if edges is not None and not np.any(np.cross(*edges)):
+        yield (*path, "edges"), f"the edges of '{gauge.name}' are parallel: the patch has no area"
 
 
 def _gauge_place(case: Case, path: KeyPath, gauge, solids: list[Placed]) -> Iterator[Problem]:
@@ -248,7 +266,7 @@ def _gauge_place(case: Case, path: KeyPath, gauge, solids: list[Placed]) -> Iter
                 (*path, "at"),
                 f"'{gauge.name}' is outside the tank: {'xyz'[axis]} = {value:g} m, not in {low:g} to {high:g} m",
             )
-    if len(gauge.at) == 3:
+    if len(gauge.at) == 3 and gauge.kind != "flux":
         for _, name, body in solids:
             (depth,) = body.depth(np.array([gauge.at]))
             if depth > TOUCH * body.thickness():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 from coupler.build_water import RecordError, record_columns
@@ -12,6 +13,9 @@ Problem = tuple[KeyPath, str]
 
 HIGHEST_WAVE = 0.78
 """Height of a solitary wave over the depth beyond which it breaks."""
+
+EARLY = 0.05
+"""Share of its height that a solitary wave may have at the start without a remark."""
 
 
 def water_problems(case: Case) -> Iterator[Problem]:
@@ -27,6 +31,24 @@ def water_problems(case: Case) -> Iterator[Problem]:
     yield from _walls(w)
     if case.tank is not None:
         yield from _sides(case)
+
+
+def water_remarks(case: Case) -> Iterator[str]:
+    """Waves that are under way at the start."""
+    for spec in case.water.inflow if case.water and case.tank else ():
+        if spec.kind == "solitary":
+            share = _share_at_start(spec, spec.level - case.tank.lower[2], case.case.gravity)
+            if share > EARLY:
+                yield (
+                    f"the solitary wave at {spec.side} starts at {100 * share:.0f} % of its height: a jump that "
+                    f"strikes; let its crest come later than {spec.crest:g} s"
+                )
+
+
+def _share_at_start(spec, depth: float, gravity: float) -> float:
+    """sech²(κ c t_crest), the first-order wave."""
+    phase = math.sqrt(0.75 * spec.height / depth**3) * math.sqrt(gravity * (depth + spec.height)) * spec.crest
+    return 1.0 / math.cosh(min(phase, 100.0)) ** 2
 
 
 def _walls(w) -> Iterator[Problem]:

@@ -1,0 +1,59 @@
+"""What a gauge makes of its values in time: impulse over a window, running mean, and the peak of that mean.
+
+Values v_n hold over the step that ends at t_n:
+
+    impulse   I(t) = Σ v_n |[t_n - dt_n, t_n] ∩ [from, to]|
+    mean      m(t) = 1/T ∫_{t-T}^{t} v dt,  T the time since the start if that is shorter
+    peak      max over the time so far of |m|
+
+A peak is only as sharp as its mean is short; those of different runs compare at the same `mean_over` only.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+
+
+class Windows:
+    """The accumulated values of one gauge; impulse (from, to) [s] or None, mean_over [s] or None."""
+
+    def __init__(self, impulse, mean_over: float | None):
+        self.impulse, self.mean_over = impulse, mean_over
+        self.total = 0.0
+        self.peak = 0.0
+        self._steps: deque = deque()
+
+    def columns(self, name: str, unit: str, axes) -> tuple[tuple[str, str, str], ...]:
+        """What is added to the columns of a gauge `name`; axes: endings of its components, ("",) of a number."""
+        found = []
+        if self.impulse:
+            window = "{:g} to {:g} s".format(*self.impulse)
+            found += [(f"{name}_impulse{a}", f"{unit} s", f"impulse so far, within {window}") for a in axes]
+        if self.mean_over:
+            found += [(f"{name}_mean{a}", unit, f"mean over the last {self.mean_over:g} s") for a in axes]
+            found.append((f"{name}_peak", unit, f"largest mean over {self.mean_over:g} s so far"))
+        return tuple(found)
+
+    def add(self, time: float, dt: float, value) -> list[float]:
+        """Take the value(s) of the step that ends at `time`; what `columns` names, in that order."""
+        value = np.atleast_1d(np.asarray(value, float))
+        found: list[float] = []
+        if self.impulse:
+            within = min(time, self.impulse[1]) - max(time - dt, self.impulse[0])
+            self.total = self.total + max(within, 0.0) * value
+            found += list(self.total)
+        if self.mean_over:
+            mean = self._mean(time, dt, value)
+            self.peak = max(self.peak, float(np.linalg.norm(mean)))
+            found += [*mean, self.peak]
+        return found
+
+    def _mean(self, time: float, dt: float, value) -> np.ndarray:
+        self._steps.append((time - dt, time, value))
+        start = time - self.mean_over
+        while self._steps[0][1] <= start:
+            self._steps.popleft()
+        spans = [(end - max(begin, start), v) for begin, end, v in self._steps]
+        return sum(span * v for span, v in spans) / sum(span for span, _ in spans)

@@ -1,0 +1,66 @@
+"""Impulses, means and peaks do not depend on how the time is cut into steps; patches cover their area evenly."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from coupler.gauge_windows import Windows
+from coupler.gauges import disc, parallelogram
+
+STEPS = st.lists(st.tuples(st.floats(1e-3, 0.5), st.floats(-10, 10)), min_size=1, max_size=30)
+
+
+def run(windows, steps):
+    time, told = 0.0, None
+    for dt, value in steps:
+        time += dt
+        told = windows.add(time, dt, value)
+    return time, told
+
+
+@given(STEPS)
+def test_impulse_over_all_time_is_the_sum(steps):
+    _, (total,) = run(Windows((0.0, 1e9), None), steps)
+    assert total == pytest.approx(sum(dt * v for dt, v in steps), abs=1e-9)
+
+
+@given(STEPS)
+def test_halving_every_step_changes_nothing(steps):
+    """Windows cut through steps: impulse and mean are integrals of the held values, wherever the steps end."""
+    halves = [(0.5 * dt, v) for dt, v in steps for _ in range(2)]
+    one, two = Windows((0.2, 0.7), 0.3), Windows((0.2, 0.7), 0.3)
+    np.testing.assert_allclose(run(one, steps)[1][:2], run(two, halves)[1][:2], atol=1e-9)
+
+
+def test_mean_of_a_jump_rises_linearly_and_its_peak_stays():
+    windows = Windows(None, 0.4)
+    told = [windows.add(0.1 * (k + 1), 0.1, 0.0 if k < 10 else 2.0 if k < 30 else 0.0) for k in range(40)]
+    mean, peak = np.array(told).T
+    np.testing.assert_allclose(mean[9:15], [0.0, 0.5, 1.0, 1.5, 2.0, 2.0], atol=1e-12)
+    assert mean[-1] == pytest.approx(0.0, abs=1e-12)
+    assert peak[-1] == pytest.approx(2.0)
+
+
+def test_vectors_have_a_column_for_each_component_and_the_peak_of_their_length():
+    windows = Windows((0.0, 1.0), 0.1)
+    names = [name for name, *_ in windows.columns("g", "N", ("_x", "_y", "_z"))]
+    told = dict(zip(names, windows.add(0.5, 0.5, [3.0, 0.0, 4.0])))
+    assert told["g_impulse_x"] == pytest.approx(1.5)
+    assert told["g_mean_z"] == pytest.approx(4.0)
+    assert told["g_peak"] == pytest.approx(5.0)
+
+
+def test_points_of_a_disc_have_its_moments():
+    """Mean of r² is R²/2 by construction; the points lie in the plane, around the centre."""
+    normal = np.array([1.0, 2.0, -1.0])
+    points = disc([1, 2, 3], 0.4, normal) - [1, 2, 3]
+    assert np.mean((points**2).sum(axis=1)) == pytest.approx(0.5 * 0.4**2 * (1 - 0.0), rel=0.02)
+    np.testing.assert_allclose(points @ normal, 0.0, atol=1e-12)
+    np.testing.assert_allclose(points.mean(axis=0), 0.0, atol=1e-12)
+
+
+def test_points_of_a_parallelogram_are_its_middle_on_the_mean():
+    points = parallelogram([1, 2, 3], [[0.2, 0, 0], [0.1, 0, 0.3]])
+    np.testing.assert_allclose(points.mean(axis=0), [1, 2, 3])
+    np.testing.assert_allclose(np.ptp(points[:, 2]), 0.25)

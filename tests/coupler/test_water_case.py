@@ -1,0 +1,165 @@
+"""The water of a case: what is refused, what is built, and runs through sides whose books must balance."""
+
+import numpy as np
+import pytest
+
+from coupler.build import build
+from coupler.build_water import RecordError, record_columns
+from coupler.case import Case, modules
+from coupler.case_checks import problems, remarks
+from tests.fakes import no_clock
+
+TANK = {"lower": [0, 0, 0], "upper": [2, 0.2, 1], "cell": 0.1, "smooth": ["y-", "y+"]}
+FILL = [{"lower": [0, 0, 0], "upper": [2, 0.2, 0.5]}]
+
+
+def case(water=None, **more):
+    sections = {
+        "case": {"title": "t"},
+        "time": {"end": 1.0},
+        "tank": TANK,
+        "water": {"fill": FILL} | (water or {}),
+    }
+    return Case.model_validate(sections | more)
+
+
+def told(*args, **kwargs):
+    return [f"{'.'.join(map(str, path))}: {text}" for path, text in problems(case(*args, **kwargs))]
+
+
+def run(found, end):
+    coupling, rows = build(found, no_clock), []
+    while coupling.coupling.time < end - 1e-9:
+        record = coupling.coupling.step(coupling.coupling.step_size(end - coupling.coupling.time))
+        rows.append({k: v for g in coupling.gauges for k, v in g.read(coupling.coupling, record).items()})
+    return coupling.coupling, record, rows
+
+
+@pytest.mark.parametrize(
+    ("water", "message"),
+    [
+        ({"walls": "no-slip"}, "water.walls: walls that hold the water need water.viscosity"),
+        ({"walls": "friction"}, "friction needs water.roughness or water.manning"),
+        ({"roughness": 0.01}, 'water.roughness: is for walls = "friction"'),
+        ({"fill": []}, "no water: write at least one"),
+        ({"sea": [{"side": "x+", "level": 1.5}]}, "z = 1.5 m is not between the floor"),
+        (
+            {"sea": [{"side": "x+", "level": 0.5}, {"side": "x+", "level": 0.4}]},
+            "x+ is given to water.sea[0] already",
+        ),
+        (
+            {"inflow": [{"kind": "bore", "side": "x-", "ahead": 0.6, "level": 0.5}]},
+            "z = 0.6 m must lie above the floor",
+        ),
+        (
+            {"inflow": [{"kind": "solitary", "side": "x-", "level": 0.2, "height": 0.2, "crest": 1.0}]},
+            "breaks at once on a depth of 0.2 m",
+        ),
+        ({"inflow": [{"kind": "record", "side": "x-", "path": "/nowhere.csv"}]}, "cannot be read"),
+    ],
+)
+def test_what_cannot_be_is_refused_with_its_place(water, message):
+    assert any(message in line for line in told(water)), told(water)
+
+
+def test_a_wave_that_has_begun_before_the_start_is_remarked():
+    """At the first step it would come in as a jump, and strike."""
+    wave = {"kind": "solitary", "side": "x-", "level": 0.5, "height": 0.05}
+    early, late = (remarks(case({"inflow": [wave | {"crest": crest}]})) for crest in (0.6, 2.0))
+    assert "59 % of its height" in early[0]
+    assert late == []
+
+
+def test_a_dry_start_is_allowed_where_water_comes_in():
+    assert (
+        told({"fill": [], "inflow": [{"kind": "steady", "side": "x-", "level": 0.3, "velocity": 1.0}]}) == []
+    )
+
+
+def test_modules_tell_what_is_on():
+    on = modules(case({"viscosity": "1 mPa s", "sea": [{"side": "x+", "level": 0.5}]}))
+    assert (on["viscosity"], on["wall friction"], on["inflow"]) == (True, False, True)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("time,level\n0,1\n", "no column velocity"),
+        ("time,level,velocity\n0,1\n", "every line needs 3"),
+        ("time,level,velocity\n1,1,0\n0,1,0\n", "times must increase"),
+        ("time,level,velocity\n0,a,0\n", "could not convert"),
+        ("", "no column"),
+    ],
+)
+def test_records_that_cannot_be_read_say_why(tmp_path, text, says):
+    path = tmp_path / "r.csv"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(RecordError, match=says):
+        record_columns(str(path))
+
+
+def test_columns_of_a_record_may_stand_in_any_order(tmp_path):
+    path = tmp_path / "r.csv"
+    path.write_text("# a wave\nlevel, velocity, time\n1.0, 2.0, 0\n1.5, 2.5, 3\n", encoding="utf-8")
+    time, level, velocity = record_columns(str(path))
+    assert (list(time), list(level), list(velocity)) == ([0, 3], [1, 1.5], [2, 2.5])
+
+
+@pytest.mark.parametrize(
+    "solid",
+    [
+        {},
+        {"centre": [1, 0.1, 0.2]},
+        {"centre": [1, 0.1, 0.2], "size": [0.2, 0.2, 0.2], "vertices": [[0, 0, 0]]},
+        {"vertices": [[1, 0, 0], [1.2, 0, 0], [1, 0.1, 0]]},
+        {"path": "/nowhere.stl"},
+    ],
+)
+def test_solids_that_are_none_are_refused(solid):
+    assert any(line.startswith("solid.0") for line in told(solid=[solid]))
+
+
+def test_water_at_rest_lifts_a_hull_and_a_box_of_one_shape_alike():
+    """A wedge half under water as a hull of points: the force gauge gives its displaced weight and the moment about
+    a point, whatever shape the table has."""
+    low, high = np.array([0.8, 0.05, 0.2]), np.array([1.1, 0.15, 0.4])
+    corners = [[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])]
+    middle = 0.5 * (low + high)
+    gauge = {"kind": "force", "name": "f", "on": "s", "about": [0, 0, 0]}
+    tables = (
+        {"name": "s", "vertices": [list(map(float, c)) for c in corners]},
+        {"name": "s", "centre": list(middle), "size": list(high - low)},
+    )
+    weight = 1000 * 9.81 * np.prod(high - low)
+    for solid in tables:
+        _, _, rows = run(case(solid=[solid], gauge=[gauge]), 0.05)
+        assert rows[-1]["f_force_z"] == pytest.approx(weight, rel=1e-6)
+        assert rows[-1]["f_moment_x"] == pytest.approx(middle[1] * weight, rel=1e-5)
+        assert rows[-1]["f_moment_y"] == pytest.approx(-middle[0] * weight, rel=1e-5)
+
+
+def test_wave_onto_a_beach_keeps_its_books():
+    """Solitary wave, rough beach from a hull, sea behind: volume to 1e-4 of what was handled, energy never gained."""
+    beach = [[1, -1, 0], [2.5, -1, 0], [2.5, -1, 0.4], [1, 1, 0], [2.5, 1, 0], [2.5, 1, 0.4]]
+    inflow = [{"kind": "solitary", "side": "x-", "level": 0.5, "height": 0.05, "crest": 1.6}]
+    water = {
+        "viscosity": "1 mPa s", "walls": "friction", "manning": 0.025,
+        "inflow": inflow, "sea": [{"side": "x+", "level": 0.5}],
+    }  # fmt: skip
+    gauges = [
+        {"kind": "flux", "name": "q", "at": [0.4, 0.1, 0.5], "edges": [[0, 0.2, 0], [0, 0, 1]]},
+        {
+            "kind": "patch",
+            "name": "p",
+            "at": [0.01, 0.1, 0.1],
+            "edges": [[0, 0.1, 0], [0, 0, 0.1]],
+            "mean_over": 0.1,
+        },
+    ]
+    coupling, record, rows = run(case(water, solid=[{"name": "beach", "vertices": beach}], gauge=gauges), 2.1)
+    assert coupling.water.sides.entered > 0.005
+    assert abs(coupling.water.volume_error()) < 1e-4
+    assert record.balance.energy_error < 0.02
+    # the crest brings c H in a second over the width, give or take the coarse cells
+    assert max(row["q_flux"] for row in rows) == pytest.approx(2.33 * 0.05 * 0.2, rel=0.25)
+    assert max(row["p_peak"] for row in rows) == pytest.approx(9810 * 0.45, rel=0.05)
