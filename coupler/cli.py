@@ -174,6 +174,22 @@ def verify(
     raise typer.Exit(int(run_cases(ids or [], quick=quick, as_json=json, only_list=list_)))
 
 
+@app.command()
+def stress(
+    scenes: Annotated[
+        list[str] | None, typer.Argument(metavar="[ID]...", help="scenes, S01..., or groups; else all")
+    ] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="only scenes that take less than a minute")] = False,
+    json: Annotated[bool, typer.Option("--json", help="one JSON object a scene, one a line")] = False,
+    list_: Annotated[bool, typer.Option("--list", help="list the scenes")] = False,
+) -> None:
+    """Run stiff and extreme scenes: passed, refused with a message, or failed; leaves with 3 if one failed."""
+    one_thread()
+    from coupler.stress.report import stress as run_scenes
+
+    raise typer.Exit(int(run_scenes(scenes or [], quick=quick, as_json=json, only_list=list_)))
+
+
 @app.command(name="compare")
 def compare_laws(
     case: CasePlace,
