@@ -11,7 +11,8 @@ import numpy as np
 class WaterParameters:
     """Parameters of the water step.
 
-    theta: weight of the new pressure in the reflected projection (1: implicit Euler, 0.5: trapezoidal).
+    theta: weight of the new pressure in the reflected projection (1: implicit Euler, 0.5: trapezoidal) in water that
+        crosses a cell in a step; calm_theta: in water that hardly moves, where it is what damps waves.
     courant: cells crossed per step by the fastest water; 1 for loads, 2 to 4 for drafts.
     divergence_damping: weight c_L of the element grad-div term.
     correction_length: κ/h, length over which the volume correction is spread.
@@ -28,6 +29,7 @@ class WaterParameters:
     down: tuple[float, float, float] = (0.0, 0.0, -1.0)
     """Unit vector of gravity."""
     theta: float = 0.6
+    calm_theta: float = 0.535
     courant: float = 1.0
     divergence_damping: float = 0.05
     correction_length: float = 5.0

@@ -63,7 +63,7 @@ class Predicted:
 
 def predicted(water, dt: float) -> PressureProblem:
     """Everything of the step before the solve; reads the state of `water`, changes nothing."""
-    theta, parameters = water.theta, water.parameters
+    theta, parameters = water.theta(dt), water.parameters
     kick = kick_factor(water.acceleration, parameters)
     u_adv, phi = _transported(water, dt, theta, kick)
     carried = water.carried_volume(dt)

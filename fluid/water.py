@@ -125,18 +125,26 @@ class Water:
 
     # ---- the step
 
-    @property
-    def theta(self) -> float:
-        """Weight of the new pressure: 1 for the first two steps, so that a start at rest does not ring."""
-        return 1.0 if self.steps < 2 else self.parameters.theta
+    def theta(self, dt: float) -> float:
+        """Weight of the new pressure in a step dt [s]: from `calm_theta` in slow water to `theta` where the fastest
+        crosses a cell in a step; 1 for the first two steps, so that a start at rest does not ring, and always where
+        `theta` is 1."""
+        p = self.parameters
+        if self.steps < 2 or p.theta == 1.0:
+            return 1.0
+        crossed = min(1.0, self.fastest() * dt / self.mesh.spacing)
+        return min(p.theta, p.calm_theta + (p.theta - p.calm_theta) * crossed)
 
     def stable_step(self) -> float:
         """dt [s]: Courant number of the fastest water, and LONGEST_STEP sqrt(h/g)."""
         h = self.mesh.spacing
-        counted = (self.level_set < 0.0) & (self.topology.node_volume > LEAST_COUNTED * h**3)
-        fastest = np.abs(self.velocity[counted]).max() if counted.any() else 0.0
         at_rest = LONGEST_STEP * np.sqrt(h / self.parameters.gravity)
-        return float(min(at_rest, self.parameters.courant * h / max(fastest, 1e-12)))
+        return float(min(at_rest, self.parameters.courant * h / max(self.fastest(), 1e-12)))
+
+    def fastest(self) -> float:
+        """Largest component of the velocity of the water [m/s], films beside solids left out."""
+        counted = (self.level_set < 0.0) & (self.topology.node_volume > LEAST_COUNTED * self.mesh.spacing**3)
+        return float(np.abs(self.velocity[counted]).max()) if counted.any() else 0.0
 
     def predict(self, dt: float) -> PressureProblem:
         """Advection, volume and gravity over dt [s], and the system for the pressure."""
