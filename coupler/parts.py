@@ -102,7 +102,7 @@ def _wall(spec, common: dict) -> list:
 
 
 def _building(spec, common: dict) -> list:
-    from yade_scripts.building import Building, building_blocks
+    from yade_scripts.generators.building import Building, building_blocks
 
     lower, size = np.array(spec.lower), np.array(spec.size)
     return building_blocks(
@@ -126,7 +126,7 @@ def _building(spec, common: dict) -> list:
 
 def _opening(spec, opening):
     """A rectangle in a wall as a box through that wall."""
-    from yade_scripts.building import Opening
+    from yade_scripts.generators.building import Opening
 
     lower, upper = np.array(spec.lower), np.add(spec.lower, spec.size)
     across = "xy".index(opening.wall[0])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from yade_scripts.blocks import Block
-from yade_scripts.building import Building, building_blocks
+from yade_scripts.generators.building import Building, building_blocks
 
 RATTLE = 1e-7
 """Speed [m/s] of blocks in random directions: joints open and close, none is damaged."""

@@ -10,9 +10,9 @@ from fluid.mesh import box_mesh
 from fluid.parameters import WaterParameters
 from fluid.water import Water
 from tests.fakes import no_clock
-from yade_scripts.building import divided_box
 from yade_scripts.cohesion import JointParameters
 from yade_scripts.equilibrium import CannotStand, settle
+from yade_scripts.generators.wall import wall_of_blocks
 from yade_scripts.structure import Structure
 
 G, RHO = 9.81, 1000.0
@@ -41,12 +41,12 @@ def standing_wall(
 ):
     """A wall of full-width courses, joined to one another and to the ground, with still water of `depth` [m] on its
     upstream face x = `face` and air behind it. Close its `structure` after use."""
-    blocks = divided_box(
+    blocks = wall_of_blocks(
         "wall",
         (face, -OVERHANG, 0.0),
         (thickness, SLICE + 2 * OVERHANG, height),
         (thickness, SLICE + 2 * OVERHANG, course),
-        density,
+        density=density,
         group="wall",
     )
     joints = JointParameters(strength=strength, opening_at_failure=opening, damping=damping)

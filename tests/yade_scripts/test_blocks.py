@@ -11,8 +11,8 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial.transform import Rotation
 
 from yade_scripts.blocks import BOX_CORNERS, Block, BlockError
-from yade_scripts.building import Building, Opening, building_blocks, column_blocks, wall_blocks
 from yade_scripts.faces import FixedPlane, gauss_points, touching_faces
+from yade_scripts.generators.building import Building, Opening, building_blocks
 
 GROUND = FixedPlane((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
 edges = st.tuples(*[st.floats(0.01, 50.0)] * 3)
@@ -162,19 +162,6 @@ def test_every_block_of_a_building_is_held():
     held = {f.a for f in faces} | {f.b for f in faces}
     assert held >= set(range(len(blocks)))
     assert all(f.area > 1e-3 for f in faces)
-
-
-def test_running_bond_joins_each_block_to_two_below():
-    blocks = wall_blocks("w", (0, 0, 0), "x", 10.0, 2.0, 0.3, 1.0, 0.5, bond="running")
-    faces = touching_faces(blocks)
-    bed = [f for f in faces if abs(f.normal[2]) > 0.5]
-    assert sum(f.area for f in bed) == pytest.approx(3 * 10.0 * 0.3, rel=1e-12)
-    assert {round(f.area, 6) for f in bed} == {0.15}
-
-
-def test_column_stands_on_its_foot():
-    blocks = column_blocks("c", (1, 2, 3), (0.5, 0.5, 1.0), 4)
-    assert [b.centre[2] for b in blocks] == [3.5, 4.5, 5.5, 6.5]
 
 
 def test_a_block_beside_a_tank_wall_is_glued_to_the_ground_alone():

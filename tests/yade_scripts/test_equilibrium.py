@@ -5,10 +5,11 @@ import pytest
 
 from tests.yade_scripts.reference import columns
 from yade_scripts.blocks import Block
-from yade_scripts.building import Building, Opening, building_blocks, wall_blocks
 from yade_scripts.cohesion import JointParameters
 from yade_scripts.contact import ContactLaw
 from yade_scripts.equilibrium import CannotStand, settle
+from yade_scripts.generators.building import Building, Opening, building_blocks
+from yade_scripts.generators.wall import wall_of_blocks
 from yade_scripts.structure import Structure
 
 G = 9.81
@@ -18,9 +19,9 @@ STILL = 1e-6
 
 def portal():
     """Two piers and a lintel: a wall with a door."""
-    blocks = wall_blocks("left", (0, 0, 0), "x", 1.0, 3.0, 0.5, 1.0, 1.0)
-    blocks += wall_blocks("right", (3.0, 0, 0), "x", 1.0, 3.0, 0.5, 1.0, 1.0)
-    return blocks + wall_blocks("lintel", (0, 0, 3.0), "x", 4.0, 1.0, 0.5, 1.0, 1.0)
+    blocks = wall_of_blocks("left", (0, -0.25, 0), (1.0, 0.5, 3.0), (1.0, 0.5, 1.0))
+    blocks += wall_of_blocks("right", (3.0, -0.25, 0), (1.0, 0.5, 3.0), (1.0, 0.5, 1.0))
+    return blocks + wall_of_blocks("lintel", (0, -0.25, 3.0), (4.0, 0.5, 1.0), (1.0, 0.5, 1.0))
 
 
 def tall_hall():
@@ -32,7 +33,7 @@ def tall_hall():
 @pytest.mark.parametrize(
     ("blocks", "law"),
     [
-        (wall_blocks("w", (0, 0, 0), "x", 4.0, 3.0, 0.5, 1.0, 0.5), JointParameters(1e6, 1e-3)),
+        (wall_of_blocks("w", (0, -0.25, 0), (4.0, 0.5, 3.0), (1.0, 0.5, 0.5)), JointParameters(1e6, 1e-3)),
         (portal(), JointParameters(2e6, 1e-3)),
         (tall_hall(), JointParameters(5e5, 0.02)),
     ],

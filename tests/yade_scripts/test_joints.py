@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from yade_scripts.blocks import Block
-from yade_scripts.building import wall_blocks
 from yade_scripts.cohesion import JointParameters
 from yade_scripts.faces import FixedPlane, touching_faces
+from yade_scripts.generators.wall import wall_of_blocks
 from yade_scripts.joints import Joints
 from yade_scripts.structure import Structure
 from yade_scripts.timestep import exact_joint_frequency, joint_frequency
@@ -320,7 +320,7 @@ def test_the_exact_frequency_of_two_free_cubes():
 
 
 def test_full_and_sparse_eigenvalues_agree(monkeypatch):
-    blocks = wall_blocks("w", (0, 0, 0), "x", 4.0, 3.0, 0.5, 1.0, 1.0)
+    blocks = wall_of_blocks("w", (0, -0.25, 0), (4.0, 0.5, 3.0), (1.0, 0.5, 1.0))
     joints = Joints(blocks, touching_faces(blocks), JointParameters(1e6, 1e-3))
     sparse = exact_joint_frequency(blocks, joints)
     monkeypatch.setattr("yade_scripts.timestep.DENSE", 10**6)

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from yade_scripts.blocks import Block
-from yade_scripts.building import column_blocks, wall_blocks
 from yade_scripts.cohesion import JointParameters
 from yade_scripts.contact import ContactLaw
+from yade_scripts.generators.column import column_of_boxes
+from yade_scripts.generators.wall import wall_of_blocks
 from yade_scripts.structure import Structure
 from yade_scripts.structure_state import OtherStructure, StructureState
 
@@ -29,7 +30,7 @@ def torn():
 
 def hanging():
     """A chain that stretches under a load that is held, opening its joints part of the way, faster and faster."""
-    blocks = column_blocks("c", (0, 0, 0), (1.0, 1.0, 1.0), 3)
+    blocks = column_of_boxes("c", (0, 0, 0), (1.0, 1.0, 3), 3)
     s = Structure(blocks, None, JointParameters(1e6, 2e-3, law="bilinear"), ground=0.0, gravity=STILL)
     load = np.zeros((3, 6))
     load[2] = (2e5, 1e5, 4e5, 1e4, -2e4, 3e4)
@@ -49,7 +50,7 @@ def bouncing():
 def collapsing():
     """A wall that a shot breaks: joints half open and gone, pieces sliding on one another and on the ground."""
     blocks = [
-        *wall_blocks("w", (0, 0, 0), "x", 3.0, 3.0, 0.5, 1.0, 1.0),
+        *wall_of_blocks("w", (0, -0.25, 0), (3.0, 0.5, 3.0), (1.0, 0.5, 1.0)),
         Block("shot", (1.5, -0.7, 1.5), size=0.6, density=5000.0, velocity=(0, 12.0, 0)),
     ]
     return Structure(blocks, ContactLaw(), JointParameters(2e5, 2e-3), ground=0.0)
@@ -142,7 +143,7 @@ def test_contacts_that_are_just_taking_over_from_a_joint_are_part_of_the_state()
     """A joint under compression fails in the very last substep before the state is saved: the contact begins with the
     depth that the joint had, in both."""
     with Structure(
-        column_blocks("c", (0, 0, 0), (1.0, 1.0, 1.0), 4),
+        column_of_boxes("c", (0, 0, 0), (1.0, 1.0, 4), 4),
         ContactLaw(),
         JointParameters(2e5, 1e-3),
         ground=0.0,

@@ -1,6 +1,5 @@
-"""Generators of blocks: wall in stack or running bond, column, and a building with openings, floors and roof.
+"""A building of box blocks: walls, floors, roof, doors and windows.
 
-All are lists of box blocks that touch face to face, wholly or in part, so that `touching_faces` finds the joints.
 Blocks are cut to fit: a length is divided into the nearest whole number of equal blocks, between the borders of
 openings where there are any.
 """
@@ -187,69 +186,3 @@ def _apart(cuts, distance: float) -> Array:
     """Sorted cuts without those within `distance` of the one before."""
     cuts = np.sort(np.asarray(cuts, float))
     return cuts[np.concatenate([[True], np.diff(cuts) > distance])]
-
-
-def wall_blocks(
-    name: str,
-    start,
-    along,
-    length: float,
-    height: float,
-    thickness: float,
-    block: float,
-    course: float,
-    bond: str = "stack",
-    density: float = 2400.0,
-) -> list[Block]:
-    """A straight wall. start (3,) [m]: lower corner on its centre line · along: 'x' or 'y' · course: block height [m]
-
-    bond: "stack" (joints in line) or "running" (every other course shifted by half a block, half blocks at the ends).
-    """
-    if bond not in ("stack", "running"):
-        raise BlockError(f"wall '{name}': bond = {bond!r}; it must be 'stack' or 'running'")
-    if along not in ("x", "y"):
-        raise BlockError(f"wall '{name}': along = {along!r}; it must be 'x' or 'y'")
-    axis = 0 if along == "x" else 1
-    levels = equal_cuts(0.0, height, course)
-    regular = equal_cuts(0.0, length, block)
-    half = 0.5 * (regular[1] - regular[0])
-    shifted = np.concatenate([[0.0], regular[:-1] + half, [length]])
-    blocks = []
-    for k in range(len(levels) - 1):
-        cuts = shifted if bond == "running" and k % 2 else regular
-        for i in range(len(cuts) - 1):
-            centre, size = np.array(start, float), np.full(3, thickness)
-            centre[axis] += 0.5 * (cuts[i] + cuts[i + 1])
-            centre[2] += 0.5 * (levels[k] + levels[k + 1])
-            size[axis], size[2] = cuts[i + 1] - cuts[i], levels[k + 1] - levels[k]
-            blocks.append(Block(f"{name}-{k}-{i}", centre, size=size, density=density, group="wall"))
-    return blocks
-
-
-def column_blocks(name: str, foot, size, count: int, density: float = 2400.0) -> list[Block]:
-    """`count` equal blocks `size` (3,) [m] on one another, the first standing on foot (3,) [m]."""
-    size = np.asarray(size, float)
-    rise = np.array([0.0, 0.0, size[2]])
-    return [
-        Block(
-            f"{name}-{k}",
-            np.asarray(foot, float) + (k + 0.5) * rise,
-            size=size,
-            density=density,
-            group="column",
-        )
-        for k in range(count)
-    ]
-
-
-def divided_box(name: str, lower, size, block, density: float = 2400.0, group: str = "wall") -> list[Block]:
-    """A box lower (3,) + size (3,) [m] divided into equal blocks of edges near `block` (3,) [m], in stack bond."""
-    lower, size = np.asarray(lower, float), np.asarray(size, float)
-    x, y, z = (equal_cuts(a, a + s, edge) for a, s, edge in zip(lower, size, block))
-    found = []
-    for i, j, k in np.ndindex(len(x) - 1, len(y) - 1, len(z) - 1):
-        low, high = np.array([x[i], y[j], z[k]]), np.array([x[i + 1], y[j + 1], z[k + 1]])
-        found.append(
-            Block(f"{name}-{i}-{j}-{k}", 0.5 * (low + high), size=high - low, density=density, group=group)
-        )
-    return found
