@@ -115,10 +115,21 @@ HEADS = (
 )
 
 
+MEANINGLESS = 1e3
+"""An error above this is one against round-off: nothing was driven, or nothing was lost."""
+
+
+def _cell(value, form: str) -> str:
+    """A cell of the table; a dash for errors that say nothing."""
+    if form.endswith("%}") and not abs(value) < MEANINGLESS:
+        return "-"
+    return form.format(value)
+
+
 def table(plan: Plan, outcomes: list[Outcome], found: list[dict], exact: dict[str, Exact]) -> str:
     """For the terminal: the runs at the case's own substep, and what the errors are against."""
     cells = [HEADS] + [
-        tuple(form.format(row[name]) for name, form in SHOWN)
+        tuple(_cell(row[name], form) for name, form in SHOWN)
         for row, o in zip(found, outcomes)
         if o.multiple == plan.substeps[0]
     ]

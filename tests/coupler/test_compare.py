@@ -156,6 +156,14 @@ def test_table_csv_and_json_say_the_same(tmp_path):
     assert "against 1e+06 (T_max A)" in told
 
 
+def test_errors_against_nothing_are_not_shown(tmp_path):
+    """Where nothing is driven the reference has no force, and an error against it would be NaN or absurd."""
+    plan = make_plan(PULLED, [], ["cohfrict"], [1], 100)
+    outcomes = [outcome("polynomial", [0.0, 0.0], lost=1e-12), outcome("cohfrict", [0.0, 0.0], lost=1.0)]
+    told = table(plan, outcomes, rows(outcomes, {}), {}).splitlines()
+    assert told[2].split()[1:6] == ["0", "-", "1", "-", "-"]
+
+
 def test_all_laws_are_listed_with_their_class_in_yade(capsys):
     show_laws()
     told = capsys.readouterr().out
