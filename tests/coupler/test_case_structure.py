@@ -195,8 +195,11 @@ def test_friction_by_pairs_of_materials_reaches_the_contact_law(tmp_path, monkey
     from yade_scripts import structure
 
     seen = {}
-    monkeypatch.setattr(structure, "Structure", lambda blocks, contact, joints, ground, planes, gravity: seen.update(
-        contact=contact, planes=planes, materials={b.material for b in blocks}))  # fmt: skip
+
+    def keep(blocks, contact, joints, ground, planes, *_, **__):
+        seen.update(contact=contact, planes=planes, materials={b.material for b in blocks})
+
+    monkeypatch.setattr(structure, "Structure", keep)
     build.build_structure(load(write(tmp_path, PAIRS)).case)
     table = seen["contact"].friction_table(["block", "brick", "ground"])
     np.testing.assert_allclose(table, [[0.5, 0.9, 0.5], [0.9, 0.5, 0.3], [0.5, 0.3, 0.5]])
