@@ -30,25 +30,28 @@ class Scene:
     tank: tuple | None
 
 
-def build(case: Case, clock) -> Scene:
-    """Build the scene of a case. clock(name) is a context that books processor time to a part of the run."""
+def build(case: Case, clock, from_start: bool = True) -> Scene:
+    """Build the scene of a case. clock(name) is a context that books processor time to a part of the run.
+
+    from_start: bring the blocks to rest if the case says so; not before a state is restored."""
     solids = [(solid.vertices, solid.faces) for solid in solids_of(case)]
     with clock("set-up"), ExitStack() as on_failure:  # YADE holds one scene: the next build needs it free
         structure = build_structure(case) if case.structure else None
         if structure is not None:
             on_failure.callback(structure.close)
-        coupling = _coupling(case, structure, solids, clock)
+        coupling = _coupling(case, structure, solids, clock, from_start)
         on_failure.pop_all()
     tank = (case.tank.lower, case.tank.upper) if case.tank else None
     return Scene(coupling, _gauges(case), solids, tank)
 
 
-def _coupling(case: Case, structure, solids, clock) -> Coupling:
+def _coupling(case: Case, structure, solids, clock, from_start: bool) -> Coupling:
     """Both sides, the structure at rest if the case says so."""
     water = immersion = None
     if case.water:
         water, immersion = water_of(case, structure, solids)
-    if case.joints and case.structure.start == "settled" and _settled(structure, water) and case.water:
+    settles = from_start and case.joints and case.structure.start == "settled"
+    if settles and _settled(structure, water) and case.water:
         water, immersion = water_of(case, structure, solids)
     return Coupling(
         water,

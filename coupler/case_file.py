@@ -40,9 +40,10 @@ class CaseFile:
         return self.path.parent
 
 
-def load(place: Path | str, overrides: Iterable[str] = ()) -> CaseFile:
+def load(place: Path | str, overrides: Iterable[str] = (), files: Path | None = None) -> CaseFile:
     """Read `place` (a case.toml or the directory that holds one) and the `key=value` overrides.
 
+    files: directory that paths in the case are meant from, by default its own.
     Raises BadCase with one line for each mistake.
     """
     path = _find(Path(place))
@@ -51,7 +52,7 @@ def load(place: Path | str, overrides: Iterable[str] = ()) -> CaseFile:
     places = _Places(_shown(path), key_lines(text))
     for override in overrides:
         places.override(_apply(table, override), override)
-    _place_files(table, path.parent)
+    _place_files(table, files or path.parent)
     case, lines = _validate(table, places)
     if lines or case is None:
         raise BadCase(lines)

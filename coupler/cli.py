@@ -64,17 +64,44 @@ def run(
     """Run a case. Ctrl-C or a file named `stop` in the run directory ends it cleanly."""
     one_thread()
     from coupler.case_file import load
-    from coupler.progress import reporter
     from coupler.run_directory import RunDirectory
-    from coupler.stop import StopRequest
 
     file = load(case, [*(set or []), *([f"time.end={end}"] if end else [])])
-    from coupler.run import run as run_case
+    carry_out(file, RunDirectory.create(file, output))
 
-    with RunDirectory.create(file, output) as directory, StopRequest(directory.path) as stop:
+
+@app.command()
+def resume(
+    run: Annotated[Path, typer.Argument(metavar="RUN", help="the directory of a run that stopped")],
+    end: Annotated[str | None, typer.Option(help="another end; short for --set time.end=...")] = None,
+    set: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set", metavar="KEY=VALUE", help="change time.end, time.cfl, time.step_max, limits.* ..."
+        ),
+    ] = None,
+    any_version: Annotated[
+        bool, typer.Option("--any-version", help="go on although the program has changed since")
+    ] = False,
+) -> None:
+    """Go on with a run from its newest checkpoint, as if it had never stopped."""
+    one_thread()
+    from coupler.resume import prepare
+
+    found = prepare(run, [*(set or []), *([f"time.end={end}"] if end else [])], any_version)
+    carry_out(found.file, found.directory, found.checkpoint)
+
+
+def carry_out(file, directory, checkpoint=None) -> None:
+    """Run a case in its directory to the end, and leave with the code of how it ended."""
+    from coupler.progress import reporter
+    from coupler.run import run as run_case
+    from coupler.stop import StopRequest
+
+    with directory, StopRequest(directory.path) as stop:
         with reporter(file.case.time.end, directory.log, stop.requested) as tell:
             describe(file, tell.message)
-            code = ExitCode(run_case(file.case, directory, tell))
+            code = ExitCode(run_case(file.case, directory, tell, checkpoint))
             compare(file, directory, tell.message)
         directory.finish(code, "reached the end" if code == ExitCode.DONE else "see log.txt")
     print(f"results in {directory.path}")

@@ -9,10 +9,15 @@ from contextlib import contextmanager
 
 
 class Clock:
-    """Books processor time [s] to parts by name; parts do not nest."""
+    """Books processor time [s] to parts by name; parts do not nest.
 
-    def __init__(self):
-        self.seconds: dict[str, float] = defaultdict(float)
+    before: `split` of the processes that the run was in before this one.
+    """
+
+    def __init__(self, before: dict[str, float] | None = None):
+        self._before = sum((before or {}).values())
+        self.seconds: dict[str, float] = defaultdict(float, before or {})
+        self.seconds.pop("other", None)
         self._start = time.process_time()
 
     @contextmanager
@@ -24,7 +29,11 @@ class Clock:
             self.seconds[part] += time.process_time() - start
 
     def total(self) -> float:
-        """Processor seconds since the clock was made."""
+        """Processor seconds of the run, in all its processes."""
+        return self._before + self.here()
+
+    def here(self) -> float:
+        """Processor seconds since the clock was made, in this process."""
         return time.process_time() - self._start
 
     def split(self) -> dict[str, float]:

@@ -53,6 +53,12 @@ class RunDirectoryExists(SurgebreakError):
     exit_code = ExitCode.BAD_CASE
 
 
+class NoRun(SurgebreakError):
+    """A directory was named that holds no run."""
+
+    exit_code = ExitCode.BAD_CASE
+
+
 class CannotWrite(SurgebreakError):
     """The directory for the results cannot be made."""
 

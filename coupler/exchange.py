@@ -72,6 +72,22 @@ class Immersion:
         self.domain = cut_domain(self.mesh, self.bodies, self.covers, previous=self.domain)
         return True
 
+    def save(self) -> dict[str, Array]:
+        """Where the solids stood when their cells were last cut."""
+        return {
+            "centre": self._centre.copy(),
+            "rotation": self._rotation.copy(),
+            "growth": self._growth.copy(),
+        }
+
+    def restore(self, saved: dict[str, Array]) -> None:
+        """The domain that these places leave, cut anew: the same, bit for bit."""
+        self._centre, self._rotation = saved["centre"].copy(), saved["rotation"].copy()
+        self._growth = saved["growth"].copy()
+        self.bodies = self._placed()
+        self.domain = cut_domain(self.mesh, self.bodies, self.covers)
+        self.cut_again = 0
+
     def _pose(self) -> tuple[Array, Array]:
         """Centre (n + m, 3) and rotation (n + m, 3, 3) of blocks and fixed solids now."""
         fixed = np.broadcast_to(np.eye(3), (self.n_solids, 3, 3))

@@ -29,7 +29,9 @@ class Failure:
     def of(cls, error: BaseException) -> Failure:
         """What an exception means for the user."""
         if isinstance(error, KeyboardInterrupt):
-            return cls(ExitCode.STOPPED, "stopped at once by Ctrl-C; the last written state is sound")
+            return cls(
+                ExitCode.STOPPED, "stopped at once by Ctrl-C; the last written state and checkpoint are sound"
+            )
         if isinstance(error, OSError) and error.errno in FULL:
             return cls(ExitCode.STOPPED, _full(error))
         code = getattr(error, "exit_code", None)

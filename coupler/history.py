@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from coupler.errors import FULL
+from coupler.errors import FULL, SurgebreakError
 from coupler.storage import DiskFull, NotFinite, WrongShape
 
 
@@ -58,16 +58,45 @@ CRACK_COLUMNS = tuple(
 )
 
 
-class HistoryTable:
-    """A growing CSV table; columns: Column or (name, unit, meaning)."""
+class CannotContinue(SurgebreakError):
+    """A file of results is not what the run left; it cannot be continued."""
 
-    def __init__(self, path, columns, title=None):
+
+class HistoryTable:
+    """A growing CSV table; columns: Column or (name, unit, meaning).
+
+    keep: `place` at which an existing table is continued; what stands behind is cut off. Raises CannotContinue.
+    """
+
+    def __init__(self, path, columns, title=None, keep=None):
         self.path = Path(path)
         self.columns = tuple(c if isinstance(c, Column) else Column(*c) for c in columns)
         self._title = title or self.path.stem
         self._rows = 0
-        self._file = open(self.path, "x", newline="", encoding="utf-8")  # noqa: SIM115 (lives as long as the run)
-        self._write(header(self._title, self.columns))
+        mode = "x" if keep is None else "r+"
+        if keep is not None:
+            self._check_kept(keep)
+        self._file = open(self.path, mode, newline="", encoding="utf-8")  # noqa: SIM115 (lives as long as the run)
+        if keep is None:
+            self._write(header(self._title, self.columns))
+        else:
+            self._rows, size = keep
+            self._file.truncate(size)
+            self._file.seek(size)
+
+    def _check_kept(self, keep):
+        """The table is there, has these columns, and is at least as long as it was."""
+        if not self.path.exists() or self.path.stat().st_size < keep[1]:
+            raise CannotContinue(f"{self.path} is shorter than it was when the checkpoint was written")
+        with open(self.path, newline="", encoding="utf-8") as file:
+            wanted = header(self._title, self.columns)
+            if file.read(len(wanted)) != wanted:
+                raise CannotContinue(f"{self.path} has other columns than this version of the program writes")
+
+    @property
+    def place(self):
+        """Rows and bytes written so far."""
+        return self._rows, self._file.tell()
 
     def append(self, **row):
         """Write one row, every column by its name; None leaves a cell empty, NaN and infinity are refused.

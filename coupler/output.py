@@ -22,15 +22,23 @@ NO_CELLS = (
 
 
 class WaterWriter:
-    """Water fields in time, on a mesh that may stay (written once) or change (written again) from step to step."""
+    """Water fields in time, on a mesh that may stay (written once) or change (written again) from step to step.
 
-    def __init__(self, path, origin=(0.0, 0.0, 0.0)):
+    keep: steps after which an existing file is continued.
+    """
+
+    def __init__(self, path, origin=(0.0, 0.0, 0.0), keep=None):
         self.path = Path(path)
         self.origin = np.asarray(origin, dtype=float)
         self._geometry = None
         self._place = None
         self._last_time = None
-        vtkhdf.create(self.path, "UnstructuredGrid", self.origin)
+        if keep is None:
+            vtkhdf.create(self.path, "UnstructuredGrid", self.origin)
+        else:
+            vtkhdf.cut_back(self.path, keep)
+            self._place, self._geometry = _last_grid(self.path, keep)
+            self._last_time = last_time(self.path)
 
     def append(self, time, nodes, cells, point_data, cell_data):
         """Write one step.
@@ -67,13 +75,38 @@ class WaterWriter:
         self._geometry, self._last_time = (nodes, cells), time
 
     def _changed(self, nodes, cells):
-        """Whether the mesh differs from that of the last step (the same arrays need no comparison)."""
+        """Whether the mesh differs from that of the last step, as far as the file can tell (the same arrays need no
+        comparison)."""
         if self._geometry is None:
             return True
-        return any(
-            new is not old and not np.array_equal(new, old)
-            for new, old in zip((nodes, cells), self._geometry)
-        )
+        old_nodes, old_cells = self._geometry
+        if nodes is not old_nodes and not np.array_equal(self._in_file(nodes), self._in_file(old_nodes)):
+            return True
+        return cells is not old_cells and not np.array_equal(cells, old_cells)
+
+    def _in_file(self, nodes):
+        """Coordinates as the file has them; those that were read from it are so already."""
+        return nodes if nodes.dtype == np.float32 else (nodes - self.origin).astype(np.float32)
+
+
+def _last_grid(path, steps):
+    """Where the grid of the last step begins, and its points (float32) and cells."""
+    with vtkhdf.opened(path, "r") as file:
+        found = file["VTKHDF/Steps"]
+        k = steps - 1
+        place = {
+            "part": int(found["PartOffsets"][k]),
+            "point": int(found["PointOffsets"][k]),
+            "cell": int(found["CellOffsets"][k, 0]),
+            "connectivity": int(found["ConnectivityIdOffsets"][k, 0]),
+        }
+    return place, (vtkhdf.read_step(path, k)[0], vtkhdf.read_tetrahedra(path, k))
+
+
+def last_time(path):
+    """Time [s] of the last complete step, None before the first."""
+    times = vtkhdf.read_times(path)
+    return float(times[-1]) if len(times) else None
 
 
 def _create_grid(root, nodes, cells):
@@ -110,9 +143,9 @@ def _write_grid(root, points, cells):
 class BlockWriter:
     """Blocks in time: faces of rigid polyhedra, x = centre + rotation @ vertex."""
 
-    def __init__(self, path, shape_vertices, shape_faces, names, groups, origin=(0.0, 0.0, 0.0)):
+    def __init__(self, path, shape_vertices, shape_faces, names, groups, origin=(0.0, 0.0, 0.0), keep=None):
         """shape_vertices: per block (k, 3) [m] about its centre · shape_faces: per block lists of rows of them ·
-        names, groups: per block, text."""
+        names, groups: per block, text · keep: steps after which an existing file is continued."""
         self.path = Path(path)
         self.origin = np.asarray(origin, dtype=float)
         self._vertices = np.concatenate([np.asarray(v, dtype=float) for v in shape_vertices])
@@ -123,6 +156,13 @@ class BlockWriter:
         self._last_time = None
         group_names, group_of_block = np.unique(np.asarray(groups, dtype=str), return_inverse=True)
         self._group_of_face = group_of_block.astype(np.int32)[self._block_of_face]
+        if keep is None:
+            self._create(names, group_names)
+        else:
+            vtkhdf.cut_back(self.path, keep)
+            self._last_time = last_time(self.path)
+
+    def _create(self, names, group_names):
         vtkhdf.create(self.path, "PolyData", self.origin)
         with vtkhdf.opened(self.path) as file:
             _create_faces(file["VTKHDF"], len(self._vertices), self._faces)

@@ -83,10 +83,10 @@ class Recorder:
     """Writes a run as it goes; absent sides leave no files.
 
     directory: of the run · coupling: Coupling · gauges: list of Gauge · solids: [(vertices, faces)]
-    tank: (lower, upper) or None
+    tank: (lower, upper) or None · kept: what `save` gave, to continue the files from there. Raises CannotContinue.
     """
 
-    def __init__(self, directory, coupling, gauges, solids, tank):
+    def __init__(self, directory, coupling, gauges, solids, tank, kept=None):
         self.coupling, self.gauges = coupling, gauges
         self.history = directory / "history"
         self.history.mkdir(exist_ok=True)
@@ -94,23 +94,45 @@ class Recorder:
         water, structure = coupling.water, coupling.structure
         self.impulse = np.zeros(3)
         self.reinserted, self.clipped = 0.0, 0
+        self._kept = kept
+        self._tables: dict[str, HistoryTable] = {}
         self._energy = self._table("energy", ENERGY)
         self._coupling = self._table("coupling", COUPLING)
         self._water = self._table("water", WATER) if water else None
         self._structure = self._table("structure", STRUCTURE) if structure else None
         self._gauges = self._table("gauges", self._gauge_columns()) if gauges else None
-        self._fields = WaterWriter(directory / "fields.vtkhdf") if water else None
+        self._written = 0 if kept is None else int(kept["outputs"])
+        keep = None if kept is None else self._written
+        self._fields = WaterWriter(directory / "fields.vtkhdf", keep=keep) if water else None
         self._blocks = None
         if structure:
             s = structure
-            self._blocks = BlockWriter(
-                directory / "blocks.vtkhdf", s.shape_vertices, s.shape_faces, s.names, s.groups
-            )
-        if solids or tank:
+            shapes = (s.shape_vertices, s.shape_faces, s.names, s.groups)
+            self._blocks = BlockWriter(directory / "blocks.vtkhdf", *shapes, keep=keep)
+        if kept is not None:
+            self._restore_sums(kept)
+        elif solids or tank:
             write_solids(directory / "solids.vtkhdf", [v for v, _ in solids], [f for _, f in solids], tank)
 
     def _table(self, name: str, columns) -> HistoryTable:
-        return HistoryTable(self.history / f"{name}.csv", columns)
+        keep = None if self._kept is None else self._kept[f"table_{name}"].tolist()
+        self._tables[name] = HistoryTable(self.history / f"{name}.csv", columns, keep=keep)
+        return self._tables[name]
+
+    def _restore_sums(self, kept) -> None:
+        self.impulse = kept["impulse"].copy()
+        self.reinserted, self.clipped = float(kept["reinserted"]), int(kept["clipped"])
+        self._write_cracks()
+
+    def save(self) -> dict[str, np.ndarray]:
+        """Sums so far, and how far the files go: written states, rows and bytes of each table."""
+        places = {f"table_{name}": np.array(table.place) for name, table in self._tables.items()}
+        return places | {
+            "outputs": np.array(self._written),
+            "impulse": self.impulse.copy(),
+            "reinserted": np.array(self.reinserted),
+            "clipped": np.array(self.clipped),
+        }
 
     def _gauge_columns(self):
         return [("time", "s", "time"), *(column for gauge in self.gauges for column in gauge.columns)]
@@ -194,14 +216,18 @@ class Recorder:
                 s.rotation(),
                 {"damage": block_damage(s), "speed": np.linalg.norm(s.velocity()[:, :3], axis=1)},
             )
-            cracks = crack_columns(s)
-            if cracks:
-                write_cracks(self.cracks, cracks)
+        self._write_cracks()
+        self._written += 1
+
+    def _write_cracks(self) -> None:
+        structure = self.coupling.structure
+        cracks = crack_columns(structure) if structure else {}
+        if cracks:
+            write_cracks(self.cracks, cracks)
 
     def close(self) -> None:
-        for table in (self._energy, self._coupling, self._water, self._structure, self._gauges):
-            if table:
-                table.close()
+        for table in self._tables.values():
+            table.close()
 
 
 _STRUCTURE_LINES = (

@@ -5,32 +5,39 @@ from __future__ import annotations
 import numpy as np
 
 from coupler.build import Scene, build
-from coupler.case import Case
+from coupler.case import Case, effective
 from coupler.clock import Clock
 from coupler.errors import ExitCode
 from coupler.limits import LimitReached, Limits, check_balance, check_defect
 from coupler.observe import joint_counts
 from coupler.recorder import Recorder
+from coupler.schedule import Schedule, checkpoint_interval
 
 FAST_OPENING = 0.25
 """Growth of λ/δ_f in a substep from which tearing counts as averaged over it."""
 
 
-def run(case: Case, directory, reporter) -> ExitCode:
+def run(case: Case, directory, reporter, checkpoint=None) -> ExitCode:
     """Run a case into a RunDirectory; its figures go into run.json however the run ends.
+
+    checkpoint: Checkpoint of an earlier process from which the run goes on.
 
     Raises SurgebreakError (or an error of the water or the structure) when the run ends before its time; what was
     written until then stays.
     """
-    clock = Clock()
+    clock = Clock(checkpoint.about["cpu_seconds"] if checkpoint else None)
     figures: dict[str, float] = {"steps": 0, "substeps": 0}
+    if checkpoint:
+        figures |= checkpoint.about["figures"]
     try:
-        scene = build(case, clock)
+        scene = build(case, clock, from_start=checkpoint is None)
         try:
+            if checkpoint:
+                _restore(scene, checkpoint, clock)
             _describe(scene, reporter)
             if scene.coupling.structure is not None:
                 directory.record(laws=laws_of(scene.coupling.structure))
-            _steps(case, scene, directory, reporter, clock, figures)
+            _steps(case, scene, directory, reporter, clock, figures, checkpoint)
         finally:
             if scene.coupling.structure is not None:
                 scene.coupling.structure.close()
@@ -48,6 +55,13 @@ def _tell_fast_openings(figures: dict, reporter) -> None:
             f"note: a joint opened by {rate:.2g} of joints.opening_at_failure in one substep: its work of "
             "separation is kept, its softening is not resolved in time. Reduce structure.substep where that matters"
         )
+
+
+def _restore(scene: Scene, checkpoint, clock: Clock) -> None:
+    from coupler.checkpoint import restore
+
+    with clock("set-up"):
+        restore(scene.coupling, checkpoint)
 
 
 def _tell_split(clock: Clock, reporter) -> None:
@@ -85,30 +99,60 @@ def laws_of(structure) -> dict[str, str]:
     return found
 
 
-def _steps(case: Case, scene: Scene, directory, reporter, clock: Clock, figures: dict) -> None:
+def _steps(
+    case: Case, scene: Scene, directory, reporter, clock: Clock, figures: dict, checkpoint=None
+) -> None:
     coupling = scene.coupling
     limits = Limits(case.limits.volume_error, case.limits.energy_error, case.limits.cpu_seconds)
-    every = case.time.output_every or case.time.end / 100
-    outputs = max(1, round(case.time.end / every))
-    recorder = Recorder(directory.path, coupling, scene.gauges, scene.solids, scene.tank)
+    schedule = checkpoint.schedule(case.time.end) if checkpoint else Schedule.of(case)
+    kept = checkpoint.part("recorder") if checkpoint else None
+    recorder = Recorder(directory.path, coupling, scene.gauges, scene.solids, scene.tank, kept)
+    checkpoints = _checkpoints(case, scene, directory, recorder, schedule)
     try:
-        with clock("output"):
-            recorder.fields(0.0)
-        for output in range(1, outputs + 1):
-            target = case.time.end * output / outputs
-            while coupling.time < target * (1 - 1e-12):
-                record = coupling.step(coupling.step_size(target - coupling.time))
-                with clock("output"):
-                    recorder.step(record)
-                _note(coupling, record, figures)
-                reporter.step(coupling.time, _told(coupling, record))
-                check_balance(coupling.time, _volume_error(coupling), record.balance.energy_error, limits)
-                check_defect(coupling.time, coupling.mean_defect, case.limits.defect)
-                _check_budget(clock, limits, reporter)
+        if checkpoint is None:
             with clock("output"):
-                recorder.fields(coupling.time)
+                recorder.fields(0.0)
+        while not _reached(coupling.time, schedule.end):
+            target = schedule.next_output(coupling.time)
+            record = coupling.step(coupling.step_size(target - coupling.time))
+            with clock("output"):
+                recorder.step(record)
+            _note(coupling, record, figures)
+            reporter.step(coupling.time, _told(coupling, record))
+            check_balance(coupling.time, _volume_error(coupling), record.balance.energy_error, limits)
+            check_defect(coupling.time, coupling.mean_defect, case.limits.defect)
+            if _reached(coupling.time, target):
+                with clock("output"):
+                    recorder.fields(coupling.time)
+            at_end = _reached(coupling.time, schedule.end)
+            wish = None if at_end else _wish_to_stop(clock, limits, reporter)
+            if checkpoints is not None and (wish or at_end or checkpoints.due()):
+                _save(checkpoints, directory, figures, clock)
+            if wish:
+                way_on = f"; `surgebreak resume {directory.path}` goes on" if checkpoints is not None else ""
+                raise LimitReached(wish + way_on)
     finally:
         recorder.close()
+
+
+def _reached(time: float, target: float) -> bool:
+    return time >= target * (1.0 - 1e-12)
+
+
+def _checkpoints(case: Case, scene: Scene, directory, recorder: Recorder, schedule: Schedule):
+    """Checkpoints of the run, None if the case wants none; then nothing of theirs is loaded."""
+    every = checkpoint_interval(case)
+    if every == 0.0:
+        return None
+    from coupler.checkpoint import Checkpoints
+
+    return Checkpoints(directory.path, every, effective(case), schedule, scene, recorder)
+
+
+def _save(checkpoints, directory, figures: dict, clock: Clock) -> None:
+    with clock("output"):
+        checkpoints.write(figures, clock.split())
+    directory.record(**figures, cpu_seconds=clock.split())
 
 
 def _note(coupling, record, figures: dict) -> None:
@@ -155,12 +199,11 @@ def _volume_error(coupling) -> float:
     return 0.0 if coupling.water is None else coupling.water.volume_error()
 
 
-def _check_budget(clock: Clock, limits: Limits, reporter) -> None:
-    reason = reporter.stop_requested()
-    if reason:
-        raise LimitReached(reason)
-    if limits.cpu_seconds is not None and clock.total() > limits.cpu_seconds:
-        raise LimitReached(
-            f"the run has used {clock.total():.0f} s of processor time; limit {limits.cpu_seconds:.0f} s "
-            "(limits.cpu_seconds). Raise it, or use a coarser tank.cell."
+def _wish_to_stop(clock: Clock, limits: Limits, reporter) -> str | None:
+    """Why the run is to end now, None to go on."""
+    if limits.cpu_seconds is not None and clock.here() > limits.cpu_seconds:
+        return (
+            f"the run has used {clock.here():.0f} s of processor time; limit {limits.cpu_seconds:.0f} s "
+            "(limits.cpu_seconds). Raise it, or use a coarser tank.cell"
         )
+    return reporter.stop_requested()

@@ -2,7 +2,7 @@
 
     case.toml       copy of the case        run.json    summary for machines, replaced as a whole
     effective.json  every value, in SI      log.txt     what was told, and tracebacks
-    history/*.csv  fields.vtkhdf  blocks.vtkhdf  solids.vtkhdf  cracks.csv  pictures/
+    history/*.csv  fields.vtkhdf  blocks.vtkhdf  solids.vtkhdf  cracks.csv  checkpoints/  pictures/
 
 `run.json` says "running" until the run ends; after a kill it still does, with the process number that it had.
 """
@@ -24,7 +24,7 @@ from types import TracebackType
 from coupler import provenance
 from coupler.case import effective, modules
 from coupler.case_file import CaseFile
-from coupler.errors import FULL, CannotWrite, ExitCode, RunDirectoryExists
+from coupler.errors import FULL, CannotWrite, ExitCode, NoRun, RunDirectoryExists
 from coupler.failures import Failure
 
 RESERVE = 256 * 1024
@@ -38,6 +38,8 @@ class RunDirectory:
         self.path, self.summary = path, summary
         self.finished = False
         self._clock = (time.monotonic(), time.process_time())
+        self._before = (0.0, 0.0)
+        """Wall and processor seconds of the processes that the run was in before."""
 
     @classmethod
     def create(cls, file: CaseFile, output: Path | None = None) -> RunDirectory:
@@ -52,6 +54,22 @@ class RunDirectory:
         (path / "history").mkdir()
         (path / ".reserve").write_bytes(bytes(RESERVE))
         shutil.copyfile(file.path, path / "case.toml")
+        write_json(path / "effective.json", content)
+        run.log(f"surgebreak {provenance.version()}: {' '.join(sys.argv)}")
+        run.save()
+        return run
+
+    @classmethod
+    def reopen(cls, path: Path, file: CaseFile, again: dict) -> RunDirectory:
+        """The directory of a run that goes on: it is running again, and `again` says from where and how."""
+        before = read_summary(path)
+        content = effective(file.case)
+        now = _summary(file, content)
+        now |= {name: before[name] for name in ("started", "case_file", "figures")}
+        now["resumed"] = [*before.get("resumed", []), {"at": now_text(), "command": sys.argv, **again}]
+        run = cls(path, now)
+        run._before = (before.get("wall_seconds", 0.0), before.get("cpu_seconds", 0.0))
+        (path / ".reserve").write_bytes(bytes(RESERVE))
         write_json(path / "effective.json", content)
         run.log(f"surgebreak {provenance.version()}: {' '.join(sys.argv)}")
         run.save()
@@ -79,8 +97,9 @@ class RunDirectory:
 
     def save(self) -> None:
         """Replace run.json as a whole, so that a reader never sees half of it."""
-        self.summary["wall_seconds"] = round(time.monotonic() - self._clock[0], 3)
-        self.summary["cpu_seconds"] = round(time.process_time() - self._clock[1], 3)
+        wall, cpu = self._before
+        self.summary["wall_seconds"] = round(wall + time.monotonic() - self._clock[0], 3)
+        self.summary["cpu_seconds"] = round(cpu + time.process_time() - self._clock[1], 3)
         write_json(self.path / "run.json", self.summary)
 
     def finish(self, code: ExitCode, reason: str) -> None:
@@ -93,7 +112,7 @@ class RunDirectory:
             "status": code.name.lower(),
             "exit_code": int(code),
             "exit_reason": reason,
-            "ended": _now().isoformat(timespec="seconds"),
+            "ended": now_text(),
         }
         self.save()
         self.log(f"{code.name.lower().replace('_', ' ')}: {reason}")
@@ -180,7 +199,7 @@ def _summary(file: CaseFile, content: dict) -> dict:
         "status": "running",
         "exit_code": None,
         "exit_reason": None,
-        "started": _now().isoformat(timespec="seconds"),
+        "started": now_text(),
         "ended": None,
         "process": os.getpid(),
         "command": sys.argv,
@@ -193,6 +212,18 @@ def _summary(file: CaseFile, content: dict) -> dict:
         "figures": {},
         "case": content,
     }
+
+
+def read_summary(path: Path) -> dict:
+    """What run.json in a run directory says.  Raises NoRun."""
+    try:
+        return json.loads((path / "run.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise NoRun(f"{path}: not the directory of a run (run.json: {error})") from error
+
+
+def now_text() -> str:
+    return _now().isoformat(timespec="seconds")
 
 
 def _now() -> datetime:

@@ -145,6 +145,18 @@ def publish(file, k, time):
     set_row(steps["Values"], k, time)
 
 
+def cut_back(path, steps):
+    """Take back all but the first `steps` steps; the rows that they left in the arrays stay unused.
+
+    The times go first, because a reader must never find more of them than steps are counted."""
+    with opened(path) as file:
+        found = file["VTKHDF"]["Steps"]
+        if len(found["Values"]) > steps:
+            found["Values"].resize(steps, axis=0)
+            file.flush()
+        found.attrs.modify("NSteps", np.int64(steps))
+
+
 def single(array):
     """Floats as float32 (results are not accurate to more than 7 digits), whole numbers as they are."""
     array = np.asarray(array)

@@ -1,0 +1,144 @@
+"""Checkpoints: everything that a run needs to go on later as if it had never stopped.
+
+`checkpoints/<steps>.h5`: water, immersed solids, blocks with their joints and contacts, loads, ledger, how far the
+result files go, figures and processor time; with it the case and the program that it belongs to.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from coupler.array_file import read_arrays, write_arrays
+from coupler.errors import ExitCode, SurgebreakError
+from coupler.fingerprint import differences, program, scene_parts
+from coupler.schedule import Schedule, next_multiple
+
+FOLDER = "checkpoints"
+KEPT = 2
+LAYOUT = 1
+UNSET = ("structure/joints/failure_time",)
+"""Arrays in which NaN has a meaning."""
+
+
+class OtherScene(SurgebreakError):
+    """A checkpoint does not fit the scene that was built for it."""
+
+    exit_code = ExitCode.BAD_CASE
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """One that was read. path · arrays by name · about: what it belongs to and what is no array."""
+
+    path: Path
+    arrays: dict[str, np.ndarray]
+    about: dict
+
+    @classmethod
+    def read(cls, path: Path) -> Checkpoint:
+        """Raises Damaged."""
+        arrays, text = read_arrays(path)
+        return cls(path, arrays, json.loads(text))
+
+    def part(self, name: str) -> dict[str, np.ndarray]:
+        """Arrays of one part: coupling, ledger, water, immersion, structure, recorder."""
+        start = name + "/"
+        return {key.removeprefix(start): a for key, a in self.arrays.items() if key.startswith(start)}
+
+    @cached_property
+    def time(self) -> float:
+        """[s]"""
+        return float(self.arrays["coupling/time"])
+
+    def schedule(self, end: float) -> Schedule:
+        """Outputs of the run, up to another end [s]."""
+        return Schedule(*self.about["outputs"], end=end)
+
+
+class Checkpoints:
+    """Writes those of a run: the newest KEPT stay.
+
+    directory: of the run · every [s] · case: effective · scene, recorder: what is saved
+    """
+
+    def __init__(self, directory: Path, every: float, case: dict, schedule: Schedule, scene, recorder):
+        self.folder = directory / FOLDER
+        self.folder.mkdir(exist_ok=True)
+        self.every, self.scene, self.recorder = every, scene, recorder
+        self._about = {
+            "layout": LAYOUT,
+            "case": case,
+            "program": program(),
+            "scene": scene_parts(scene.coupling),
+            "outputs": [schedule.span, schedule.count],
+        }
+        self._last = scene.coupling.time
+        self._next = next_multiple(self._last, every)
+
+    def due(self) -> bool:
+        return self.scene.coupling.time >= self._next * (1.0 - 1e-12)
+
+    def write(self, figures: dict, cpu_seconds: dict[str, float]) -> None:
+        """One now, unless the last one is of this very step.  Raises NotFinite, DiskFull."""
+        coupling = self.scene.coupling
+        if coupling.time == self._last:
+            return
+        about = self._about | {
+            "figures": figures,
+            "cpu_seconds": cpu_seconds,
+            "written": datetime.now(UTC).isoformat(timespec="seconds"),
+        }
+        path = self.folder / f"{figures['steps']:08d}.h5"
+        write_arrays(path, _arrays(coupling, self.recorder), json.dumps(about, default=_plain), UNSET)
+        self._last = coupling.time
+        self._next = next_multiple(coupling.time, self.every)
+        for old in listed(self.folder)[KEPT:]:
+            old.unlink()
+
+
+def _arrays(coupling, recorder) -> dict[str, np.ndarray]:
+    parts = {"coupling": coupling.save(), "ledger": coupling.ledger.save(), "recorder": recorder.save()}
+    if coupling.water is not None:
+        from fluid import state
+
+        parts["water"] = state.save(coupling.water)
+        parts["immersion"] = coupling.immersion.save()
+    if coupling.structure is not None:
+        parts["structure"] = coupling.structure.save().arrays()
+    return {f"{part}/{name}": np.asarray(a) for part, found in parts.items() for name, a in found.items()}
+
+
+def restore(coupling, checkpoint: Checkpoint) -> None:
+    """Put a coupling, built from the same case, into the state of a checkpoint.  Raises OtherScene."""
+    wrong = differences(checkpoint.about["scene"], scene_parts(coupling))
+    if wrong:
+        raise OtherScene(
+            f"{checkpoint.path} belongs to another scene: {'; '.join(wrong)}. Has a file that the case names changed?"
+        )
+    if coupling.structure is not None:
+        from yade_scripts.structure_state import StructureState
+
+        coupling.structure.restore(StructureState.of(checkpoint.part("structure")))
+    if coupling.water is not None:
+        from fluid import state
+
+        coupling.immersion.restore(checkpoint.part("immersion"))
+        state.restore(coupling.water, coupling.immersion.domain, checkpoint.part("water"))
+    coupling.restore(checkpoint.part("coupling"))
+    coupling.ledger.restore(checkpoint.part("ledger"))
+
+
+def listed(folder: Path) -> list[Path]:
+    """Files of checkpoints, the newest first."""
+    return sorted(folder.glob("[0-9]*.h5"), reverse=True)
+
+
+def _plain(value: object) -> object:
+    """Numbers of numpy as JSON knows them."""
+    return value.tolist()

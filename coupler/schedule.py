@@ -1,0 +1,57 @@
+"""When a run writes: output times that divide it evenly, and times of checkpoints."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from coupler.case import Case
+
+ROUNDING = 1e-9
+"""Share of an interval within which a time counts as reached."""
+OUTPUTS, CHECKPOINTS = 100, 10
+"""Of a run that does not say how many."""
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """Outputs at span k/count for k = 1, 2, ... before `end`, and at `end` [s].
+
+    A run that goes on beyond its first end, span, keeps the interval of its outputs.
+    """
+
+    span: float
+    count: int
+    end: float
+
+    @classmethod
+    def of(cls, case: Case) -> Schedule:
+        """That of a new run."""
+        end = case.time.end
+        return cls(end, max(1, round(end / (case.time.output_every or end / OUTPUTS))), end)
+
+    def until(self, end: float) -> Schedule:
+        """The same outputs with another end [s]."""
+        return replace(self, end=end)
+
+    def next_output(self, time: float) -> float:
+        """The first output after a time [s]."""
+        k = _intervals(time, self.span / self.count) + 1
+        target = self.span * k / self.count
+        return target if target < self.end * (1.0 - ROUNDING) else self.end
+
+
+def checkpoint_interval(case: Case) -> float:
+    """Time between two checkpoints [s], 0 for none at all."""
+    every = case.time.checkpoint_every
+    return case.time.end / CHECKPOINTS if every is None else every
+
+
+def next_multiple(time: float, every: float) -> float:
+    """The first multiple of an interval [s] after a time [s]."""
+    return every * (_intervals(time, every) + 1)
+
+
+def _intervals(time: float, every: float) -> int:
+    """Whole intervals up to a time, which counts as the next multiple if only rounding misses it."""
+    return math.floor(time / every * (1.0 + 1e-12) + ROUNDING)
