@@ -50,6 +50,16 @@ class Windows:
             found += [*mean, self.peak]
         return found
 
+    def save(self) -> dict[str, np.ndarray]:
+        """What has been accumulated; steps (k, 2 + values): begin and end [s] of each, and its values."""
+        steps = [np.r_[begin, end, value] for begin, end, value in self._steps]
+        return {"total": np.array(self.total), "peak": np.array(self.peak), "steps": np.array(steps)}
+
+    def restore(self, saved: dict[str, np.ndarray]) -> None:
+        """Back to what was saved."""
+        self.total, self.peak = saved["total"][()], float(saved["peak"])
+        self._steps = deque((float(row[0]), float(row[1]), row[2:].copy()) for row in saved["steps"])
+
     def _mean(self, time: float, dt: float, value) -> np.ndarray:
         self._steps.append((time - dt, time, value))
         start = time - self.mean_over

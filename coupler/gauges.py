@@ -13,10 +13,11 @@ from coupler.gauge_windows import Windows
 
 @dataclass(frozen=True)
 class Gauge:
-    """columns: (name, unit, meaning) · read(coupling, record) → {name: value}"""
+    """columns: (name, unit, meaning) · read(coupling, record) → {name: value} · windows: what it has accumulated"""
 
     columns: tuple[tuple[str, str, str], ...]
     read: Callable
+    windows: Windows | None = None
 
 
 def make_gauge(spec, rows_of: dict[str, np.ndarray]) -> Gauge:
@@ -104,7 +105,7 @@ def _in_time(spec, what: str, unit: str, meaning: str, value: Callable) -> Gauge
         now = value(coupling)
         return _named(columns, [now, *windows.add(record.time, record.dt, now)])
 
-    return Gauge(columns, read)
+    return Gauge(columns, read, windows)
 
 
 PATCH_POINTS = 6
@@ -207,7 +208,7 @@ def _force(spec, rows_of) -> Gauge:
             values += list((load[:, 3:] + np.cross(arm, load[:, :3])).sum(axis=0))
         return _named(columns, [*values, *windows.add(record.time, record.dt, force)])
 
-    return Gauge(columns, read)
+    return Gauge(columns, read, windows)
 
 
 def _reaction(spec, rows_of) -> Gauge:

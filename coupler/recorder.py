@@ -122,17 +122,35 @@ class Recorder:
     def _restore_sums(self, kept) -> None:
         self.impulse = kept["impulse"].copy()
         self.reinserted, self.clipped = float(kept["reinserted"]), int(kept["clipped"])
+        for k, gauge in enumerate(self.gauges):
+            if gauge.windows is not None:
+                start = f"gauge_{k}_"
+                own = {name.removeprefix(start): a for name, a in kept.items() if name.startswith(start)}
+                gauge.windows.restore(own)
         self._write_cracks()
+
+    def _gauge_memory(self) -> dict[str, np.ndarray]:
+        """What the gauges have accumulated, by number of the gauge."""
+        return {
+            f"gauge_{k}_{name}": array
+            for k, gauge in enumerate(self.gauges)
+            if gauge.windows is not None
+            for name, array in gauge.windows.save().items()
+        }
 
     def save(self) -> dict[str, np.ndarray]:
         """Sums so far, and how far the files go: written states, rows and bytes of each table."""
         places = {f"table_{name}": np.array(table.place) for name, table in self._tables.items()}
-        return places | {
-            "outputs": np.array(self._written),
-            "impulse": self.impulse.copy(),
-            "reinserted": np.array(self.reinserted),
-            "clipped": np.array(self.clipped),
-        }
+        return (
+            places
+            | self._gauge_memory()
+            | {
+                "outputs": np.array(self._written),
+                "impulse": self.impulse.copy(),
+                "reinserted": np.array(self.reinserted),
+                "clipped": np.array(self.clipped),
+            }
+        )
 
     def _gauge_columns(self):
         return [("time", "s", "time"), *(column for gauge in self.gauges for column in gauge.columns)]
