@@ -15,20 +15,21 @@ SAMPLES_PER_CELL = 4
 
 
 def level(water, xy) -> float:
-    """Height [m] above the floor of the tank of the highest free surface over xy (2,) [m]; 0 where it is dry.
+    """Depth [m] of water over xy (2,) [m]: the wet length of a vertical line, as a wire gauge measures it.
 
-    φ is read on a vertical line, SAMPLES_PER_CELL a cell, and its highest zero taken between two samples."""
+    φ is read on the line, SAMPLES_PER_CELL a cell, and taken as linear between two samples; inside solids it is dry.
+    Spray and the space under an overturning crest do not count; over a solid that stands on the floor the depth is
+    that above it."""
     low, high = water.mesh.bounds[:, 2]
     count = int(np.ceil(SAMPLES_PER_CELL * (high - low) / water.mesh.spacing)) + 1
     z = np.linspace(low, high, count)
     phi = level_set_at(water, np.column_stack([np.full(count, xy[0]), np.full(count, xy[1]), z]))
-    wet = np.flatnonzero(phi < 0.0)
-    if len(wet) == 0:
-        return 0.0
-    top = wet[-1]
-    if top + 1 == count or not np.isfinite(phi[top + 1]):
-        return float(z[top] - low)
-    return float(z[top] - low + (z[top + 1] - z[top]) * phi[top] / (phi[top] - phi[top + 1]))
+    wet = np.fmax(-phi, 0.0)  # NaN inside solids
+    length = np.abs(phi[1:] - phi[:-1])
+    share = np.divide(np.abs(wet[1:] - wet[:-1]), length, out=(wet[1:] > 0.0) * 1.0, where=length > 0.0)
+    both = (phi[1:] < 0.0) & (phi[:-1] < 0.0)
+    open_water = np.isfinite(phi[1:]) & np.isfinite(phi[:-1])
+    return float((z[1] - z[0]) * np.where(both, 1.0, share)[open_water].sum())
 
 
 def pressure(water, points):

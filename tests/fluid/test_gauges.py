@@ -29,6 +29,12 @@ def test_velocity_at_rest(pool):
     assert np.abs(gauges.velocity(pool, [[0.3, 0.4, 0.1]])).max() < 1e-9
 
 
+def test_level_is_the_wet_length():
+    """A sheet of water in the air over a pool counts with its thickness, not with its height."""
+    water = tank([1, 1, 1], 0.125, lambda x: np.minimum(x[:, 2] - 0.3, np.abs(x[:, 2] - 0.75) - 0.19))
+    assert abs(gauges.level(water, (0.51, 0.32)) - 0.68) < 0.01
+
+
 def test_volume_of_all_and_of_a_half(pool):
     np.testing.assert_allclose(gauges.volume_in_box(pool, [0, 0, 0], [1, 1, 1]), 0.437, rtol=1e-9)
     np.testing.assert_allclose(gauges.volume_in_box(pool, [0, 0, 0], [0.5, 1, 1]), 0.437 / 2, rtol=1e-9)
