@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -100,7 +101,7 @@ class JointParameters:
             f"{self.closing_ratio:g}, {len(self.rule)} points an edge, G_c {self.work_of_separation:.4g} J/m²"
         )
 
-    @property
+    @cached_property
     def cohesive_law(self) -> CohesiveLaw:
         """The law by its name."""
         return laws.find(self.law)
