@@ -50,8 +50,7 @@ def continue_outward(
                             value += gradient[j, k, 0] * dx + gradient[j, k, 1] * dy + gradient[j, k, 2] * dz
                         total[k] += w * value
             for k in range(m):
-                # nothing known around: a side where water is yet to come in
-                f[i, k] = total[k] / weight if weight > 0.0 else 0.0
+                f[i, k] = total[k] / weight
             if layer <= linear_layers:
                 _pass_gradient(i, m, gradient, cells, node_start, node_cells, done)
         for s in range(layer_start[layer], layer_start[layer + 1]):
@@ -105,18 +104,24 @@ def mean_gradients(cell_list, marked, f, cells, parent, g, volume, n_nodes):
 
 @njit(cache=True)
 def smoothed(cell_list, marked, field, cells):
-    """The field (N, m, 3) averaged over the corners of the listed cells, each cell counts; zero stays zero elsewhere.
+    """The field (N, m, 3) averaged over the corners of the listed cells, each cell counts: at the nodes beside cells
+    that are not all marked, from which values are continued (elsewhere it is not to be read).
 
     Only nodes of cells whose corners are all marked have a field, the average runs over these.  Waves of one or two
     cells, whose slope the continuation carries to the surface many times too large, grow without it: by 0.01 to 0.02
     a step where the surface lies just below a layer of nodes."""
-    has = np.zeros(field.shape[0], np.bool_)
+    has, edge = np.zeros(field.shape[0], np.bool_), np.zeros(field.shape[0], np.bool_)
     for e in cell_list:
-        if marked[cells[e, 0]] and marked[cells[e, 1]] and marked[cells[e, 2]] and marked[cells[e, 3]]:
-            for a in range(4):
+        inside = marked[cells[e, 0]] and marked[cells[e, 1]] and marked[cells[e, 2]] and marked[cells[e, 3]]
+        for a in range(4):
+            if inside:
                 has[cells[e, a]] = True
+            else:
+                edge[cells[e, a]] = True
     mean, total, count = np.zeros_like(field), np.empty(field.shape[1:]), np.zeros(field.shape[0])
     for e in cell_list:
+        if not (edge[cells[e, 0]] or edge[cells[e, 1]] or edge[cells[e, 2]] or edge[cells[e, 3]]):
+            continue
         total[:] = 0.0
         known = 0
         for a in range(4):
@@ -128,7 +133,7 @@ def smoothed(cell_list, marked, field, cells):
                 mean[cells[e, a]] += total
                 count[cells[e, a]] += known
     for i in range(field.shape[0]):
-        if has[i]:
+        if count[i] > 0.0:
             mean[i] /= count[i]
     return mean
 
