@@ -35,15 +35,16 @@ def write_arrays(path: Path, arrays: dict[str, np.ndarray], text: str, unset=())
     part = path.with_name(f".{path.name}.part")
     part.unlink(missing_ok=True)
     size = sum(a.nbytes + 512 for a in arrays.values()) + len(text) + HEADROOM
-    claim(part, size)
     try:
+        claim(part, size)
         _write(part, arrays, text)
         os.replace(part, path)
     except OSError as error:
         part.unlink(missing_ok=True)
         if error.errno not in FULL:
             raise
-        raise DiskFull(path, size, "as it was before", error) from None
+        why = OSError(error.errno, os.strerror(error.errno))
+        raise DiskFull(path, size, "as it was before, if there was one", why) from None
     _flush_directory(path.parent)
 
 

@@ -83,10 +83,10 @@ def _check_idle(path: Path, summary: dict) -> None:
 def _is_ours(process: int) -> bool:
     """Whether the number belongs to a process of this program, and not to a later one that got the same."""
     try:
-        words = Path(f"/proc/{process}/cmdline").read_bytes()
+        words = Path(f"/proc/{process}/cmdline").read_text(encoding="utf-8", errors="replace").split("\0")
     except OSError:
         return False
-    return b"surgebreak" in words or b"coupler" in words
+    return any(Path(word).name == "surgebreak" or word.startswith("coupler.") for word in words[1:])
 
 
 def _check_free(overrides: tuple[str, ...]) -> None:

@@ -17,7 +17,7 @@ OUTPUTS, CHECKPOINTS = 100, 10
 class Schedule:
     """Outputs at span k/count for k = 1, 2, ... before `end`, and at `end` [s].
 
-    A run that goes on beyond its first end, span, keeps the interval of its outputs.
+    A run that goes on beyond its first end keeps the interval of its outputs.
     """
 
     span: float
@@ -26,9 +26,11 @@ class Schedule:
 
     @classmethod
     def of(cls, case: Case) -> Schedule:
-        """That of a new run."""
-        end = case.time.end
-        return cls(end, max(1, round(end / (case.time.output_every or end / OUTPUTS))), end)
+        """That of a new run: with the interval of the case if it divides the end, else with one near it that does."""
+        end, every = case.time.end, case.time.output_every
+        count = max(1, round(end / every)) if every else OUTPUTS
+        divides = every is not None and abs(every * count - end) < ROUNDING * every
+        return cls(every, 1, end) if divides else cls(end, count, end)
 
     def until(self, end: float) -> Schedule:
         """The same outputs with another end [s]."""

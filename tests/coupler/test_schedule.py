@@ -1,0 +1,54 @@
+"""Times of outputs and checkpoints: a run that is stopped and extended meets the same ones."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from coupler.schedule import Schedule, checkpoint_interval, next_multiple
+from tests.physics.scenes import case
+
+TIMES = st.floats(1e-3, 1e5)
+COUNTS = st.integers(1, 1000)
+
+
+def timed(**time):
+    return case(time=time)
+
+
+@given(TIMES, COUNTS)
+def test_outputs_come_one_by_one_and_end_with_the_run(end, count):
+    """Also from times that rounding has left just before or behind an output."""
+    schedule = Schedule(end, count, end)
+    for k in {0, count // 2, count - 1}:
+        for time in (end * k / count * (1 - 1e-13), end * k / count * (1 + 1e-13)):
+            assert schedule.next_output(time) == pytest.approx(end * (k + 1) / count, rel=1e-9)
+    assert schedule.next_output(end * (count - 0.5) / count) == end
+
+
+def test_a_longer_end_keeps_the_interval():
+    schedule = Schedule.of(timed(end=1.0)).until(1.5)
+    assert schedule.next_output(0.995) == 1.0
+    assert schedule.next_output(1.0) == pytest.approx(1.01)
+    assert schedule.next_output(1.4999) == 1.5
+
+
+def test_the_interval_divides_the_first_end():
+    assert Schedule.of(timed(end=1.0, output_every=0.3)) == Schedule(1.0, 3, 1.0)
+    assert Schedule.of(timed(end=1.0, output_every=5.0)) == Schedule(1.0, 1, 1.0)
+    short, long = (Schedule.of(timed(end=end, output_every=0.01)) for end in (0.06, 0.1))
+    assert [short.next_output(0.01 * k) for k in range(5)] == [long.next_output(0.01 * k) for k in range(5)]
+
+
+def test_how_often_checkpoints_are_written():
+    """A tenth of the end unless the case says otherwise; zero means none."""
+    assert checkpoint_interval(timed(end=4.0)) == 0.4
+    assert checkpoint_interval(timed(end=4.0, checkpoint_every=1.5)) == 1.5
+    assert checkpoint_interval(timed(end=4.0, checkpoint_every=0)) == 0.0
+
+
+@given(TIMES, COUNTS)
+def test_the_next_multiple_lies_ahead_by_at_most_one_interval(every, k):
+    time = every * k
+    assert next_multiple(time, every) == pytest.approx(time + every)
+    assert next_multiple(time * (1 - 1e-13), every) == pytest.approx(time + every)
+    assert next_multiple(0.999 * time, every) > 0.999 * time
