@@ -50,7 +50,8 @@ def continue_outward(
                             value += gradient[j, k, 0] * dx + gradient[j, k, 1] * dy + gradient[j, k, 2] * dz
                         total[k] += w * value
             for k in range(m):
-                f[i, k] = total[k] / weight
+                # nothing known around: a side where water is yet to come in
+                f[i, k] = total[k] / weight if weight > 0.0 else 0.0
             if layer <= linear_layers:
                 _pass_gradient(i, m, gradient, cells, node_start, node_cells, done)
         for s in range(layer_start[layer], layer_start[layer + 1]):
