@@ -15,7 +15,7 @@ MODULES = ("contact", "joints", "bending", "stock", "water", "viscous", "dam_bre
 """Files of this package that hold cases; their names are the groups."""
 
 NOT_COVERED = {
-    "P42": "run-up of a solitary wave: no check written yet",
+    "P42": "run-up of a solitary wave: the water line on a slope of 1:20 is not resolved well enough yet",
     "P43": "dam break against an isolated building: no check written yet",
     "P53": "heave decay of a half sphere: no check written yet",
     "P55": "falling sphere in a viscous fluid: no check written yet",
