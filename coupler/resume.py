@@ -60,15 +60,22 @@ def prepare(
     _check_case(path, checkpoint, file)
     _check_program(checkpoint, any_version, tell)
     _check_end(path, checkpoint, file)
-    for newer in listed(path / FOLDER):
-        if newer.name > checkpoint.path.name:
-            newer.unlink()
-    (path / FILE_NAME).unlink(missing_ok=True)
+    _clear(path, checkpoint)
     again = {"from": checkpoint.path.name, "time": checkpoint.time, "changed": list(overrides)}
     tell(
         f"going on from {checkpoint.path}, t = {checkpoint.time:.6g} s, step {checkpoint.about['figures']['steps']}"
     )
     return Resumption(file, RunDirectory.reopen(path, file, again), checkpoint)
+
+
+def _clear(path: Path, checkpoint: Checkpoint) -> None:
+    """Remove what the run would take for its own: newer checkpoints, half-written ones, a wish to stop that was met."""
+    for newer in listed(path / FOLDER):
+        if newer.name > checkpoint.path.name:
+            newer.unlink()
+    for part in (path / FOLDER).glob(".*.part"):
+        part.unlink()
+    (path / FILE_NAME).unlink(missing_ok=True)
 
 
 def _check_idle(path: Path, summary: dict) -> None:
