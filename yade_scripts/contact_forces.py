@@ -52,38 +52,44 @@ class ContactForces:
         self._free = np.concatenate([free, np.zeros(len(planes), bool)])
         self._nodes = np.diff(self._shapes.node_start)
         self._on = np.zeros(self._n, bool)
-        self._on_planes = np.zeros(self._n, bool)
+        self._joined = np.zeros(0, np.int64)
         self._set_pairs(np.zeros((0, 2), np.int64))
         self._count, self._read = 0, None
         self.dashpot = self.friction = self.driving = 0.0
 
     # ---- pairs ----------------------------------------------------------------------------------------------
 
-    def switch_on(self, rows: Array, only_planes: bool = False) -> None:
-        """Blocks that meet others, or only the fixed planes, by contact from now on: as deep as they are, since joints
-        hand over to it."""
-        self._on_planes[rows] = True
-        if not only_planes:
-            self._on[rows] = True
-        newly = np.zeros(len(self._free), bool)
-        newly[rows] = True
-        self.search(True, newly)
+    def switch_on(self, rows: Array, as_deep: bool = False) -> None:
+        """Blocks that meet others by contact from now on. as_deep: with the depth there is; else counted from here."""
+        self._on[rows] = True
+        self.search(True, as_deep=as_deep)
 
-    def search(self, now: bool, newly: Array | None = None) -> None:
-        """Renew the pairs from YADE's last search, or from one made now.
+    def leave_out(self, joined: Array) -> None:
+        """Pairs (p, 2) that live joints hold, in compression too; pairs that were among them before and are no more go
+        on by contact, with the depth there is."""
+        keys = np.unique(self._key(*np.sort(joined, axis=1).T))
+        parted = np.setdiff1d(self._joined, keys)
+        self._joined = keys
+        if len(parted):
+            self.search(True, parted)
 
-        newly (n+m,) bool: bodies whose new pairs take over from joints."""
-        self._set_pairs(_in_order(self._near(now)), newly)
+    def search(self, now: bool, parted: Array | None = None, as_deep: bool = False) -> None:
+        """Renew the pairs from YADE's last search, or from one made now."""
+        self._set_pairs(_in_order(self._near(now)), parted, as_deep)
+
+    def _key(self, a: Array, b: Array) -> Array:
+        return a * len(self._free) + b
 
     def _near(self, now: bool) -> Array:
         """Pairs that may touch before the next search, (p, 2)."""
         near = self._neighbours(now)
         near = np.concatenate([near[self._on[near].any(axis=1)], self._near_planes()])
-        return near[self._free[near].any(axis=1)]
+        near = np.sort(near[self._free[near].any(axis=1)], axis=1)
+        return near[~np.isin(self._key(*near.T), self._joined)]
 
     def _near_planes(self) -> Array:
         """Blocks that may reach a plane before the next search, (k, 2)."""
-        rows = np.flatnonzero(self._on_planes)
+        rows = np.arange(self._n)
         radius = self._shapes.radius[rows] + 2.0 * self._reach
         found = [np.zeros((0, 2), np.int64)]
         for number, plane in enumerate(self._planes):
@@ -91,10 +97,11 @@ class ContactForces:
             found.append(np.stack([near, np.full(len(near), self._n + number)], axis=1))
         return np.concatenate(found)
 
-    def _set_pairs(self, pairs: Array, newly: Array | None = None) -> None:
-        """Pairs (p, 2) in order; what known pairs remember goes on."""
+    def _set_pairs(self, pairs: Array, parted: Array | None = None, as_deep: bool = False) -> None:
+        """Pairs (p, 2) in order; what known pairs remember goes on. Others begin with the depth there is where a joint
+        has parted (keys `parted`) or as_deep."""
         a, b = pairs.T.copy()
-        size = self._nodes[a] + self._nodes[b]
+        size = self._nodes[a] + self._nodes[b] + 1
         start = np.concatenate([[0], np.cumsum(size)]).astype(np.int64)
         total = int(start[-1])
         slots = kernel.Slots(
@@ -103,8 +110,8 @@ class ContactForces:
         fresh, known, touching = (np.zeros(len(a), bool) for _ in range(3))
         if hasattr(self, "_pairs") and len(self._pairs.a):
             known = self._carry(a, b, start, fresh, touching, slots)
-        if newly is not None:
-            fresh |= ~known & (newly[a] | newly[b])
+        if as_deep or parted is not None:
+            fresh |= ~known & (as_deep or np.isin(self._key(a, b), parted))
         self._pairs = kernel.Pairs(a, b, start, fresh, touching, np.zeros(len(a)))
         self._slots = slots
         if not hasattr(self, "_rows") or len(self._rows.a) < total:
@@ -112,8 +119,8 @@ class ContactForces:
 
     def _carry(self, a, b, start, fresh: Array, touching: Array, slots: kernel.Slots) -> Array:
         """Copy the slots of pairs that were known before; (p,) bool."""
-        old, size = self._pairs, len(self._free)
-        old_keys, keys = old.a * size + old.b, a * size + b
+        old = self._pairs
+        old_keys, keys = self._key(old.a, old.b), self._key(a, b)
         spot = np.minimum(np.searchsorted(old_keys, keys), len(old_keys) - 1)
         known = old_keys[spot] == keys
         fresh[known], touching[known] = old.fresh[spot[known]], old.touching[spot[known]]
@@ -160,7 +167,7 @@ class ContactForces:
         pair = np.searchsorted(self._pairs.start, index, side="right") - 1
         return {
             "on": self._on.copy(),
-            "on_planes": self._on_planes.copy(),
+            "joined": self._joined.copy(),
             "a": self._pairs.a[pair],
             "b": self._pairs.b[pair],
             "node": index - self._pairs.start[pair],
@@ -173,12 +180,11 @@ class ContactForces:
 
     def restore(self, saved: dict[str, Array]) -> None:
         """Back to a saved state, the blocks being where they were then."""
-        self._on[:], self._on_planes[:] = saved["on"], saved["on_planes"]
+        self._on[:], self._joined = saved["on"], saved["joined"].copy()
         self._set_pairs(np.zeros((0, 2), np.int64))
         in_contact = np.stack([saved["a"], saved["b"]], axis=1)
         self._set_pairs(_in_order(np.concatenate([self._near(now=True), in_contact])))
-        keys = self._pairs.a * len(self._free) + self._pairs.b
-        pair = np.searchsorted(keys, saved["a"] * len(self._free) + saved["b"])
+        pair = np.searchsorted(self._key(self._pairs.a, self._pairs.b), self._key(saved["a"], saved["b"]))
         slot = self._pairs.start[pair] + saved["node"]
         self._pairs.touching[pair] = True
         for name in ("face", "k", "rest", "shear"):

@@ -90,7 +90,6 @@ def joint_forces(
     weight,
     normal,
     law,
-    closing,
     peak,
     largest,
     paid,
@@ -106,7 +105,7 @@ def joint_forces(
     """Forces of the live joints on the blocks; with `advance` also their history and what their dashpots take.
 
     live (l,) joints to visit · a, b (J,) rows · start (J+1,) first point of a joint · xi_a, xi_b (P, 3) [m]
-    weight (P,) [m²] · normal (J, 3) in block a · law (J, 5) · closing (J,) bool: carries compression · peak p
+    weight (P,) [m²] · normal (J, 3) in block a · law (J, 5) · peak p
     largest (P,) λ [m] · paid (P, 2) · eta [s] dashpot time · x (n, 3), v (n, 6), R (n, 3, 3)
     F (n, 6) is added to · damped (J,) [J] too   →   largest growth of λ/δ_f in this call
     """
@@ -114,7 +113,7 @@ def joint_forces(
     for j in live:
         ra, rb = a[j], b[j]
         unit, df, beta, k0 = law[j, UNIT], law[j, DF], law[j, BETA], law[j, K0]
-        kc = law[j, KC] if closing[j] else 0.0
+        kc = law[j, KC]
         n = turned(ra, R, normal[j])
         f0 = f1 = f2 = m0 = m1 = m2 = 0.0
         for p in range(start[j], start[j + 1]):
@@ -148,15 +147,13 @@ def joint_forces(
     return fastest
 
 
-def stored_between(
-    live, a, b, start, xi_a, xi_b, weight, normal, law, closing, peak, largest, x, R, x0, R0, out
-):
+def stored_between(live, a, b, start, xi_a, xi_b, weight, normal, law, peak, largest, x, R, x0, R0, out):
     """Elastic energy out (J,) [J] of the live joints half a substep before (x, R), between it and the place (x0, R0).
 
     Leapfrog conserves kinetic(t + dt/2) + 1/2 k δ(t)·δ(t + dt) exactly, so the product of the two openings is used.
     """
     for j in live:
-        kc = law[j, KC] if closing[j] else 0.0
+        kc = law[j, KC]
         n, n0 = turned(a[j], R, normal[j]), turned(a[j], R0, normal[j])
         out[j] = 0.0
         for p in range(start[j], start[j + 1]):
@@ -178,9 +175,7 @@ def lost(start, weight, law, peak, largest, out):
             out[j] += weight[p] * (separation_work(unit, df, r, peak) - back)
 
 
-def point_springs(
-    index, joint_of, a, b, xi_a, xi_b, normal, law, closing, peak, largest, x, R, arms, normals, k
-):
+def point_springs(index, joint_of, a, b, xi_a, xi_b, normal, law, peak, largest, x, R, arms, normals, k):
     """Of the points `index` (s,): arms (2, s, 3) from both centres, normals (s, 3), k_n and k_t in k (2, s) [Pa/m]."""
     for i in range(len(index)):
         p = index[i]
@@ -194,11 +189,11 @@ def point_springs(
             arms[0, i, c], arms[1, i, c], normals[i, c] = to_a[c], to_b[c], n[c]
         df = law[j, DF]
         ks = softened(law[j, UNIT], largest[p] / df, peak)
-        kc = law[j, KC] if closing[j] else 0.0
+        kc = law[j, KC]
         _, k[0, i], k[1, i] = response(ks, dn, dot(s, s), largest[p], law[j, K0], df, law[j, BETA], kc)
 
 
-def point_tangents(index, joint_of, a, b, xi_a, xi_b, normal, law, closing, peak, largest, x, R, out):
+def point_tangents(index, joint_of, a, b, xi_a, xi_b, normal, law, peak, largest, x, R, out):
     """out (s, 3, 3) [Pa/m]: ∂t/∂δ of the points `index` while λ may grow, by central differences over 1e-7 δ_f."""
     d = np.empty(3)
     for i in range(len(index)):
@@ -207,7 +202,7 @@ def point_tangents(index, joint_of, a, b, xi_a, xi_b, normal, law, closing, peak
         pa, pb = place(a[j], R, x, xi_a[p]), place(b[j], R, x, xi_b[p])
         n = turned(a[j], R, normal[j])
         unit, df, beta, k0 = law[j, UNIT], law[j, DF], law[j, BETA], law[j, K0]
-        kc = law[j, KC] if closing[j] else 0.0
+        kc = law[j, KC]
         h = 1e-7 * df
         for c in range(3):
             for side in (1.0, -1.0):

@@ -59,6 +59,8 @@ class Joints:
         n = len(faces)
         self.a = np.array([f.a for f in faces], np.int64)
         self.b = np.array([max(f.b, -1) for f in faces], np.int64)
+        self.plane = np.array([-1 - f.b for f in faces], np.int64)
+        """Number of the fixed plane where b = -1."""
         self.face_a = np.array([f.face_a for f in faces], np.int64)
         self.face_b = np.array([f.face_b for f in faces], np.int64)
         rules = [gauss_points(f.polygon, parameters.rule) for f in faces]
@@ -84,7 +86,6 @@ class Joints:
         """Time constant of the stiffness-proportional dashpot [s]."""
         self.stiffness_on: tuple[Array, Array] | None = None
         """What each joint adds to the stiffness of its blocks (J, 6, 6), kept by `timestep.joint_frequency`."""
-        self.closing = np.ones(n, bool)
         self.alive = np.ones(n, bool)
         self.live = np.arange(n)
         self.largest = np.zeros(len(self.weight))
@@ -108,7 +109,7 @@ class Joints:
         """What the kernels of the law read of the live joints, in their order."""
         return (
             self.live, self.a, self.b, self.start, self.xi_a, self.xi_b, self.weight, self.normal, self.law,
-            self.closing, self.parameters.peak_share, self.largest,
+            self.parameters.peak_share, self.largest,
         )  # fmt: skip
 
     def stored_between(self, x: Array, R: Array, x0: Array, R0: Array) -> Array:
@@ -126,7 +127,7 @@ class Joints:
     def of_points(self, index: Array) -> tuple:
         """What the kernels of single points read of the points `index`, in their order."""
         return (
-            index, self.joint_of, self.a, self.b, self.xi_a, self.xi_b, self.normal, self.law, self.closing,
+            index, self.joint_of, self.a, self.b, self.xi_a, self.xi_b, self.normal, self.law,
             self.parameters.peak_share, self.largest,
         )  # fmt: skip
 
@@ -141,10 +142,9 @@ class Joints:
         self.failure_time[joints] = time
         self.live = self.live[self.alive[self.live]]
 
-    def hand_over(self, blocks_loose: Array) -> None:
-        """Leave compression to YADE's contact wherever one of the two blocks is loose. blocks_loose (n,) bool"""
-        loose_b = np.where(self.b >= 0, blocks_loose[self.b], False)
-        self.closing &= ~(blocks_loose[self.a] | loose_b)
+    def joined_pairs(self, n: int) -> Array:
+        """Pairs of bodies (p, 2) with a live joint; fixed planes are bodies n, n + 1, ..."""
+        return np.stack([self.a[self.live], np.where(self.b < 0, n + self.plane, self.b)[self.live]], axis=1)
 
     def openings(self, joints: Array, x: Array, R: Array) -> Array:
         """Mean normal opening, mean sliding, largest normal opening of the points of `joints`, (len, 3) [m]."""
@@ -217,7 +217,7 @@ class Joints:
 
     def history(self) -> dict[str, Array]:
         """Copies of everything that changes in time, for `restore`."""
-        names = ("closing", "alive", "live", "largest", "paid", "damped", "failure_time", "final_openings")
+        names = ("alive", "live", "largest", "paid", "damped", "failure_time", "final_openings")
         return {name: getattr(self, name).copy() for name in names}
 
     def restore(self, history: dict[str, Array]) -> None:

@@ -1,8 +1,8 @@
 """Where contact sets in: which blocks are loose.
 
-A block is loose once it has lost a joint, moves on its own, or has left its place. Pairs with a loose block meet by
-contact; their joints leave compression to it. Other pairs do not meet: their joints carry them, and most of a building
-costs no contact at all before it is hit.
+Two blocks with a live joint do not meet: the joint carries them, in compression too. When it fails, contact goes on
+with the depth there is. Other pairs meet as soon as one of them is loose: it has lost a joint, moves on its own, or has
+left its place. So most of a building costs no contact at all before it is hit. Fixed planes meet all blocks.
 """
 
 from __future__ import annotations
@@ -28,15 +28,6 @@ def loose_at_start(blocks: list[Block], joints: Joints | None) -> Array:
     return loose | np.array([bool(b.velocity.any() or b.spin.any()) for b in blocks], bool)
 
 
-def grounded(n: int, joints: Joints | None) -> Array:
-    """(n,) bool: blocks with a live joint to a fixed plane."""
-    held = np.zeros(n, bool)
-    if joints is not None:
-        on_plane = joints.live[joints.b[joints.live] < 0]
-        held[joints.a[on_plane]] = True
-    return held
-
-
 class ContactOnset:
     """Keeps the search for neighbours and the contacts in step with the state of the joints.
 
@@ -56,9 +47,8 @@ class ContactOnset:
         self._radius = radius
         self.loose = np.zeros(len(loose), bool)
         self.rest_here()
-        if contacts is not None:
-            contacts.switch_on(np.flatnonzero(~grounded(len(loose), joints)), only_planes=True)
-        self.loosen(np.flatnonzero(loose))
+        self.leave_out_joined()
+        self.loosen(np.flatnonzero(loose), as_deep=True)
 
     def rest_here(self) -> None:
         """The present places are those that the blocks stand in."""
@@ -78,17 +68,17 @@ class ContactOnset:
         ends = np.unique(ends[ends >= 0])
         return ends[~self.loose[ends]]
 
-    def loosen(self, rows: Array) -> None:
-        """Contact takes over around the blocks `rows`."""
-        if len(rows) == 0:
-            return
+    def leave_out_joined(self) -> None:
+        """Contact goes on where a joint has failed; live joints carry compression themselves."""
+        if self._contacts is not None and self._joints is not None:
+            self._contacts.leave_out(self._joints.joined_pairs(len(self.loose)))
+
+    def loosen(self, rows: Array, as_deep: bool = False) -> None:
+        """The blocks `rows` meet all others from now on; as_deep: with the depth there is."""
         self.loose[rows] = True
-        if self._contacts is None:
-            return
-        if self._joints is not None:
-            self._joints.hand_over(self.loose)
-        self._scene.set_loose(self.loose)
-        self._contacts.switch_on(rows)
+        if self._contacts is not None and (len(rows) or as_deep):
+            self._scene.set_loose(self.loose)
+            self._contacts.switch_on(rows, as_deep)
 
     def save(self) -> dict[str, Array]:
         return {"loose": self.loose.copy(), "x_rest": self._x_rest.copy(), "R_rest": self._R_rest.copy()}

@@ -223,7 +223,9 @@ class Structure:
             return
         moved = self._onset.moved()
         if len(moved):
-            self._loosen(moved, self._accounts.joint_stored())
+            self._motion.read()
+            self._onset.loosen(moved)
+            self._substepper.list_bodies(self._onset.loose)
 
     def _one_substep(self, dt: float) -> Array:
         """Joints that failed, rows of the table."""
@@ -235,15 +237,13 @@ class Structure:
         return broken
 
     def _retire(self, broken: Array) -> None:
+        """Take failed joints out; contact goes on with what of their energy was compression."""
         stored = self._accounts.joint_stored()
+        self._motion.read()
         self.joints.retire(broken, self._motion.x, self._motion.R, self.time)
         self._limit = None
-        self._loosen(self._onset.of_failed(broken), stored)
-
-    def _loosen(self, rows: Array, stored: float) -> None:
-        """Contact takes over around the blocks `rows`, and with it what of `stored` [J] the joints hold no more."""
-        self._motion.read()
-        self._onset.loosen(rows)
+        self._onset.loosen(self._onset.of_failed(broken))
+        self._onset.leave_out_joined()
         self._accounts.handed_over += stored - self._accounts.joint_stored()
         self._substepper.list_bodies(self._onset.loose)
 

@@ -181,7 +181,7 @@ def test_intact_blocks_cost_no_contacts_and_a_fallen_piece_does_not_sink():
         blocks, ContactLaw(stiffness=1e8), JointParameters(1e7, 1e-3, damping=0.02), ground=0.0
     ) as s:
         assert len(s.joint_table()) == 1
-        for _ in range(10):
+        for _ in range(20):
             s.advance(0.05)
         assert s.joint_table().alive.all()
         assert s.centre()[:, 2] == pytest.approx([0.25, 0.75], abs=5e-3)
