@@ -18,6 +18,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fluid.moments import cells_touching, wet_fraction
+
 KARMAN = 0.41
 LOOKS_UP = 0.5
 
@@ -49,7 +51,7 @@ class WallFriction:
         speed = np.linalg.norm(slip - across[:, None] * walls.normal, axis=1)
         if self.manning is None:
             return self.density * log_law(0.5 * t.size[walls.cell], self.roughness) * speed
-        depth = column_depth(water, phi)[walls.cell]
+        depth = column_depth(water, phi, walls.cell)
         bed = walls.normal[:, 2] > LOOKS_UP
         return np.where(bed, self.density * self._bed(depth, water.mesh.spacing) * speed, 0.0)
 
@@ -61,7 +63,7 @@ class WallFriction:
         if self.manning is not None:
             floor = unit[:, 2] < -LOOKS_UP
             faces, size, cell, unit = faces[floor], size[floor], cell[floor], unit[floor]
-            factor = self._bed(column_depth(water, phi)[cell], water.mesh.spacing)
+            factor = self._bed(column_depth(water, phi, cell), water.mesh.spacing)
         else:
             factor = log_law(0.5 * t.size[cell], self.roughness)
         size = size * t.fraction[cell]  # what solids stand on does not slide
@@ -82,19 +84,24 @@ def log_law(distance, roughness: float):
     return (KARMAN / np.log1p(30.0 * distance / roughness)) ** 2
 
 
-def column_depth(water, phi):
-    """Depth of water (M,) [m] in the column of bins over each cell: its water over the area of the bin."""
-    from fluid.moments import wet_fraction
+def column_depth(water, phi, cells):
+    """Depth of water (n,) [m] in the columns of bins over the cells (n,): their water over the area of the bin."""
+    t, (x, y, _) = water.topology, water.mesh.axes
+    wet = cells_touching(phi < 0.0, t.cells)
+    area = np.outer(np.diff(x), np.diff(y)).ravel()
+    volume = np.bincount(
+        _column(water, wet), t.volume[wet] * wet_fraction(wet, phi, t.cells), minlength=len(area)
+    )
+    return (volume / area)[_column(water, cells)]
 
-    t, mesh = water.topology, water.mesh
-    x, y = mesh.axes[0], mesh.axes[1]
-    centre = mesh.nodes[mesh.cells[t.parent]].mean(axis=1)
+
+def _column(water, cells):
+    """Number of the column of bins that holds the centre of each cell (n,)."""
+    x, y, _ = water.mesh.axes
+    centre = water.topology.nodes[water.topology.cells[cells]].mean(axis=1)
     i = np.clip(np.searchsorted(x, centre[:, 0]) - 1, 0, len(x) - 2)
     j = np.clip(np.searchsorted(y, centre[:, 1]) - 1, 0, len(y) - 2)
-    column = i * (len(y) - 1) + j
-    area = np.outer(np.diff(x), np.diff(y)).ravel()
-    volume = t.volume * wet_fraction(np.arange(len(t.cells)), phi, t.cells)
-    return (np.bincount(column, volume, minlength=len(area)) / area)[column]
+    return i * (len(y) - 1) + j
 
 
 def _rigid_velocity(water, walls):
