@@ -172,18 +172,18 @@ def hull_faces(name: str, vertices: Array, tolerance: float) -> Faces:
 
 def _merged(vertices: Array, hull: ConvexHull, tolerance: float) -> list[tuple[Array, set]]:
     """Normal and corners of each face; the largest triangles come first, small ones join the plane they lie in."""
-    found: list[tuple[Array, float, set]] = []
     p = vertices[hull.simplices]
+    normals, offsets = hull.equations[:, :3], hull.equations[:, 3]
     size = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)
-    for row in np.argsort(-size, kind="stable"):
-        simplex, (*normal, offset) = hull.simplices[row], hull.equations[row]
-        for n, o, corners in found:
-            if np.dot(n, normal) > 0.0 and np.abs(vertices[simplex] @ n + o).max() <= tolerance:
-                corners.update(simplex.tolist())
-                break
-        else:
-            found.append((np.array(normal), offset, set(simplex.tolist())))
-    return [(n, corners) for n, _, corners in found]
+    left = np.argsort(-size, kind="stable")
+    found = []
+    while len(left):
+        n, o = normals[left[0]], offsets[left[0]]
+        within = (normals[left] @ n > 0.0) & (np.abs(p[left] @ n + o).max(axis=1) <= tolerance)
+        within[0] = True
+        found.append((n, set(hull.simplices[left[within]].ravel().tolist())))
+        left = left[~within]
+    return found
 
 
 def _check_all_outside(name: str, vertices: Array, hull: ConvexHull, tolerance: float) -> None:

@@ -109,7 +109,7 @@ def _sphere_on_a_slope(friction: float) -> tuple[float, float]:
     return float(change[0]), float(change[4])
 
 
-@check("P04", "block slides to rest", "closed form")
+@check("P04", "block slides to rest, sphere slides until it rolls", "closed form")
 def stop():
     known = named_values("dem_simple_closed_forms")
     size = (1.0, 1.0, 0.2)
@@ -122,6 +122,33 @@ def stop():
         way = s.centre()[0, 0] - start
     yield Finding("way [m]", way, known["block v0=2 m/s on flat mu=0.3: stop distance"], 5e-3)
     yield Finding("time [s]", time, known["block v0=2 m/s on flat mu=0.3: stop time"], 5e-3)
+
+    speed, time = _slide_until_rolling()
+    yield Finding(
+        "sphere: time until it rolls [s]",
+        time,
+        known["sphere v0=2 m/s no spin, flat mu=0.3: time to rolling"],
+        5e-3,
+    )
+    yield Finding("sphere: speed then [m/s]", speed, known["sphere same: final speed"], 5e-3)
+
+
+def _slide_until_rolling() -> tuple[float, float]:
+    """Speed [m/s] and time [s] at which a body of 1000 corners on a sphere stops sliding on level ground.
+
+    The slip falls in proportion to the time; its last twentieth, rough from corner to corner, is left out."""
+    number = np.arange(1000) + 0.5
+    polar, turn = np.arccos(1.0 - 2.0 * number / 1000), np.pi * (1.0 + np.sqrt(5.0)) * number
+    corners = np.stack([np.cos(turn) * np.sin(polar), np.sin(turn) * np.sin(polar), np.cos(polar)], axis=1)
+    ball = Block("ball", (0, 0, RADIUS), vertices=RADIUS * corners, density=DENSITY, velocity=(2.0, 0, 0))
+    with Structure([ball], ContactLaw(1e6, 1.0, 0.3), ground=0.0) as s:
+        slip = 2.0
+        while slip > 0.1:
+            s.advance(1e-3)
+            slip = s.velocity()[0, 0] - RADIUS * s.velocity()[0, 4]
+        time = s.time / (1.0 - slip / 2.0)
+        s.advance(0.3 - s.time)
+        return float(s.velocity()[0, 0]), time
 
 
 @check("P05", "tilting table: topples, slides", "atan(b/h), atan(mu)")
