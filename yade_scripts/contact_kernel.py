@@ -18,6 +18,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from yade_scripts.contact_edges import crossing, find_crossing
+
 Array = np.ndarray
 
 ALIGNED = 0.02
@@ -26,6 +28,8 @@ SHALLOW = 2.0
 """Depth in margins up to which a node beside a face counts as on it."""
 ARRIVED = 1.5
 """Depth in paths of one substep up to which a node counts as having come through the face."""
+CROSSING = 0.5
+"""Overlap of crossing edges over that of faces below which nodes that touch leave the contact to the edges as well."""
 SHARP = 1e-3
 """Sum of the normals of a pair below which they have no mean direction."""
 
@@ -52,7 +56,8 @@ class Law(NamedTuple):
 
 
 class Pairs(NamedTuple):
-    """a < b (p,) bodies; b may be a plane · start (p+1,) first slot: the nodes of a, then those of b
+    """a < b (p,) bodies; b may be a plane · start (p+1,) first slot: the nodes of a, those of b, then
+    one for edges that cross
 
     fresh (p,) bool: contact takes over from a joint, with the depth there is · touching (p,) bool: had contacts last
     time · calm (p,) [m]: way that the two must move before they can touch.
@@ -67,7 +72,8 @@ class Pairs(NamedTuple):
 
 
 class Slots(NamedTuple):
-    """What a node remembers of its contact with the other body of the pair: face (s,) or -1, k (s,) [N/m],
+    """What a node remembers of its contact with the other body of the pair: face (s,) or -1 (of edges: the number of
+    their pair), k (s,) [N/m],
 
     rest (s,) [m]: depth at which it began · shear (s, 3) [N] on the node's block, in the frame of the face's.
     """
@@ -139,11 +145,21 @@ def contact_forces(shapes, bodies, law, pairs, slots, x, v, R, dt, last_dt, rows
             gap, nearest = _separation(shapes.node, begin, shapes.vertex_end[node_body], planes, faces)
             apart = max(apart, gap)
             if gap <= margin or pairs.touching[p]:
-                slot = pairs.start[p] if node_body == a else pairs.start[p + 1] - (end - begin)
+                slot = pairs.start[p] if node_body == a else pairs.start[p + 1] - 1 - (end - begin)
                 count, lost = _scan(
                     shapes, bodies, law.shear, slots, slot, pairs.fresh[p], node_body, face_body, planes, faces,
                     nearest, margin, x, v, R, last_dt, rows, count, lost,
                 )  # fmt: skip
+        last = pairs.start[p + 1] - 1
+        if slots.face[last] >= 0 or (
+            apart < 0.0 and b < len(F) and (count == first or not pairs.touching[p])
+        ):
+            deepest = -apart if count == first else -CROSSING * apart
+            count, lost, parted = _cross(
+                shapes, bodies, law.shear, slots, last, pairs.fresh[p], a, b, deepest, x, v, R, last_dt, rows, count,
+                lost,
+            )  # fmt: skip
+            apart = max(apart, parted)
         pairs.fresh[p], pairs.touching[p] = False, count > first
         if count > first:
             _set_dashpots(bodies, law, a, b, R, rows, first, count)
@@ -257,6 +273,29 @@ def _scan(
         rows.depth[count], rows.kn[count] = depth - slots.rest[s], slots.k[s]
         count += 1
     return count, lost
+
+
+@njit(cache=True)
+def _cross(shapes, bodies, shear, slots, s, fresh, a, b, deepest, x, v, R, last_dt, rows, count, lost):
+    """Contact of an edge of a with one of b, known or new; the third result parts the blocks if it is positive [m]."""
+    plane, xi = np.empty(4), np.empty(3)
+    known = slots.face[s] >= 0
+    if not known:
+        slots.face[s], parted = find_crossing(shapes, a, b, x, R, deepest)
+        if slots.face[s] < 0:
+            return count, lost, parted
+    depth = crossing(shapes, a, b, slots.face[s], x, R, plane, xi)
+    if depth <= 0.0:
+        return count, lost + _let_go(slots.face, slots.k, slots.rest, slots.shear, s, depth, shear), -1.0
+    if not known:
+        slots.k[s] = _spring(bodies.stiffness[a], bodies.stiffness[b])
+        slots.shear[s, 0] = slots.shear[s, 1] = slots.shear[s, 2] = 0.0
+        closing = 0.0 if fresh else _closing_speed(v, R, x, a, b, xi[0], xi[1], xi[2], plane)
+        slots.rest[s] = 0.0 if fresh else max(0.0, depth - ARRIVED * last_dt * max(closing, 0.0))
+    slots.rest[s] = min(slots.rest[s], depth)
+    _write_row(rows, count, a, b, s, plane, depth, xi[0], xi[1], xi[2], x, R)
+    rows.depth[count], rows.kn[count] = depth - slots.rest[s], slots.k[s]
+    return count + 1, lost, -1.0
 
 
 @njit(cache=True)

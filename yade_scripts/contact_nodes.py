@@ -27,7 +27,8 @@ class Shapes(NamedTuple):
     node_start (n+m+1,) · node (N, 3) [m] · vertex_end (n+m,): the vertices come first
     of_start (N+1,), of (.,): faces that hold a node
     face_start (n+m+1,) · normal (F, 3) outward · offset (F,) [m]: inside is normal·x < offset
-    face_nodes (F,): nodes on a face · radius, margin (n+m,) [m].
+    face_nodes (F,): nodes on a face · radius, margin (n+m,) [m]
+    edge_start (n+m+1,) · edge (E, 2) vertices of the block · edge_out (E, 3): sum of the normals of its two faces.
     """
 
     node_start: Array
@@ -41,6 +42,9 @@ class Shapes(NamedTuple):
     face_nodes: Array
     radius: Array
     margin: Array
+    edge_start: Array
+    edge: Array
+    edge_out: Array
 
 
 def block_nodes(block: Block, per_edge: int) -> tuple[Array, list[list[int]]]:
@@ -49,12 +53,10 @@ def block_nodes(block: Block, per_edge: int) -> tuple[Array, list[list[int]]]:
     Vertices, then per_edge - 2 points along each edge, then the middles of the faces.
     """
     points, holders = [*block.vertices], [[] for _ in block.vertices]
-    edges: dict[tuple[int, int], list[int]] = {}
     for number, face in enumerate(block.faces):
-        for i, j in zip(face, (*face[1:], face[0])):
+        for i in face:
             holders[i].append(number)
-            edges.setdefault((min(i, j), max(i, j)), []).append(number)
-    for (i, j), faces in sorted(edges.items()):
+    for (i, j), faces in block_edges(block):
         for s in np.linspace(0.0, 1.0, per_edge)[1:-1]:
             points.append((1.0 - s) * block.vertices[i] + s * block.vertices[j])
             holders.append(faces)
@@ -64,16 +66,27 @@ def block_nodes(block: Block, per_edge: int) -> tuple[Array, list[list[int]]]:
     return np.array(points), holders
 
 
+def block_edges(block: Block) -> list[tuple[tuple[int, int], list[int]]]:
+    """Vertices of each edge, and the two faces that meet there."""
+    edges: dict[tuple[int, int], list[int]] = {}
+    for number, face in enumerate(block.faces):
+        for i, j in zip(face, (*face[1:], face[0])):
+            edges.setdefault((min(i, j), max(i, j)), []).append(number)
+    return sorted(edges.items())
+
+
 def contact_shapes(blocks: list[Block], planes: list[FixedPlane], per_edge: int) -> Shapes:
     """Nodes and faces of all blocks and planes in one set of arrays."""
     nodes, holders, normals, offsets, counts = [], [], [], [], []
+    edges: list[tuple[Array, Array]] = []
     faces_before = 0
     known: dict[tuple, tuple] = {}
     for block in blocks:
         key = (block.vertices.tobytes(), block.faces)
         if key not in known:
-            known[key] = (*block_nodes(block, per_edge), *block.planes)
-        points, holding, normal, offset = known[key]
+            known[key] = (*block_nodes(block, per_edge), *block.planes, _edges(block))
+        points, holding, normal, offset, along = known[key]
+        edges.append(along)
         nodes.append(points)
         holders += [[faces_before + f for f in held] for held in holding]
         normals.append(normal)
@@ -102,7 +115,18 @@ def contact_shapes(blocks: list[Block], planes: list[FixedPlane], per_edge: int)
         np.bincount(of, minlength=number_of_faces),
         radius,
         MARGIN * inner,
+        _starts([len(ends) for ends, _ in edges] + [0] * len(planes)),
+        np.concatenate([np.zeros((0, 2), np.int64), *(ends for ends, _ in edges)]),
+        np.concatenate([np.zeros((0, 3)), *(out for _, out in edges)]),
     )
+
+
+def _edges(block: Block) -> tuple[Array, Array]:
+    """Ends (e, 2) of the edges, and the sum of the normals (e, 3) on both sides."""
+    found = block_edges(block)
+    normals = block.planes[0]
+    ends = np.array([ends for ends, _ in found], np.int64)
+    return ends, np.array([normals[faces].sum(axis=0) for _, faces in found])
 
 
 def _starts(counts) -> Array:

@@ -20,28 +20,24 @@ DENSITY = 2000.0
 
 @scene("S50", "tower of 100 loose blocks at rest for 60 s", cost="M")
 def tower() -> Iterator[Measure]:
-    """Slabs of 5 x 5 x 0.25 m, so that the springs stand up to buckling: K > ρ g n³ h²."""
+    """Slabs of 5 x 5 x 0.25 m, so that the springs stand up to buckling, K > ρ g n³ h²; they start as deep in each
+    other as the weight above presses them."""
     count, edge, height, stiffness = 100, 5.0, 0.25, 3e9
-    blocks = [
-        Block(f"b{i}", (0, 0, (i + 0.5) * height), size=(edge, edge, height), density=DENSITY)
-        for i in range(count)
-    ]
-    weight = blocks[0].mass * G
-    sunk = weight * count * (count + 1) / (2.0 * stiffness)
+    weight = DENSITY * edge**2 * height * G
+    depth = weight * np.arange(count, 0, -1) / stiffness
+    z = (np.arange(count) + 0.5) * height - np.cumsum(depth)
+    blocks = [Block(f"b{i}", (0, 0, z[i]), size=(edge, edge, height), density=DENSITY) for i in range(count)]
     with Structure(blocks, ContactLaw(stiffness, 0.1), ground=0.0) as s:
-        watch = Watch(s, weight * sunk * count / 3.0)
-        watch.advance(30.0, looks=60)
-        early = s.centre().copy()
-        top = height * (count - 0.5) - early[-1, 2]
-        watch.advance(30.0, looks=60)
+        watch = Watch(s, 0.5 * weight * count * depth.sum() / 3.0)
+        fastest = 0.0
+        for _ in range(120):
+            watch.advance(0.5, looks=1)
+            fastest = max(fastest, speed(s))
         yield Measure(
-            "settlement of the top, off its weight/K",
-            top * stiffness / (weight * count * (count + 1) / 2) - 1.0,
-            1e-3,
+            "creep of any block", float(np.abs(s.centre() - np.stack([0 * z, 0 * z, z], 1)).max()), 1e-7, "m"
         )
-        yield Measure("creep in the second half", float(np.abs(s.centre() - early).max()), 1e-7, "m")
-        yield Measure("sideways drift", float(np.abs(s.centre()[:, :2]).max()), 1e-6, "m")
-        yield Measure("speed at the end", speed(s), 1e-7, "m/s")
+        yield Measure("largest speed", fastest, 1e-7, "m/s")
+        yield Measure("turn of any block", float(np.abs(s.rotation() - np.eye(3)).max()), 1e-7, "rad")
     yield from watch.measures()
 
 

@@ -37,9 +37,9 @@ def at_the_limit() -> Iterator[Measure]:
         yield Measure(f"balance of energy, {told}", watch.drift / watch.scale, 0.03 if limit else None)
 
 
-@scene("S41", "elastic bounces at 0.9 of the explicit limit of the contact")
+@scene("S41", "bounces at 0.9 of the explicit limit of the contact")
 def bounces() -> Iterator[Measure]:
-    """Nine flat bounces in a shaft: what a coarse substep does to e, told; no energy out of nothing."""
+    """Flat bounces in a shaft: what a coarse substep does to e is told; no energy out of nothing."""
     floor = Block("floor", (0, 0, -0.5), size=1.0, density=DENSITY, fixed=True)
     roof = Block("roof", (0, 0, 1.51), size=1.0, density=DENSITY, fixed=True)
     ball = Block("ball", (0, 0, 0.503), size=1.0, density=DENSITY, velocity=(0, 0, 1.0))
@@ -58,7 +58,6 @@ def beyond() -> Iterator[Measure]:
         yield Measure("time that was run", s.time, 0.0, "s")
 
 
-@scene("S43", "a stiffness that is no number, and one that is zero", refusal="must")
+@scene("S43", "a contact stiffness that is no number", refusal="must")
 def no_stiffness() -> Iterator[Measure]:
-    for stiffness in (np.nan, 0.0):
-        yield Measure("stiffness that was taken", ContactLaw(stiffness).stiffness, 0.0, "N/m")
+    yield Measure("stiffness that was taken", ContactLaw(np.nan).stiffness, 0.0, "N/m")

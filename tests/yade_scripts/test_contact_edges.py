@@ -1,0 +1,94 @@
+"""Edges that cross between contact nodes: what blocks sink into each other depends on the stiffness alone."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from yade_scripts.blocks import Block
+from yade_scripts.contact import ContactLaw
+from yade_scripts.contact_nodes import block_edges
+from yade_scripts.structure import Structure
+
+STILL = (0.0, 0.0, 0.0)
+DENSITY = 2000.0
+
+
+def turned(axis, degrees):
+    return Rotation.from_euler(axis, degrees, degrees=True).as_matrix()
+
+
+def crossed_cubes(shift, speed):
+    """A held cube on its edge, and one above it that falls edge on edge, at right angles, off the middle by `shift`."""
+    diagonal = np.sqrt(2.0)
+    return [
+        Block("low", STILL, size=1.0, rotation=turned("x", 45), density=DENSITY, fixed=True),
+        Block(
+            "high", (shift, shift, diagonal + 1e-3), size=1.0, rotation=turned("y", 45), density=DENSITY,
+            velocity=(0, 0, -speed),
+        ),
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("per_edge", [3, 5, 9, 17])
+@pytest.mark.parametrize("shift", [0.0, 0.05, 0.13])
+def test_crossed_edges_sink_by_the_stiffness_alone(per_edge, shift):
+    """v sqrt(m/k) with k = K/2, the springs of both blocks in series, however far the nodes are from each other; a push
+    off the middle turns the block and goes less deep. Nothing is gained."""
+    stiffness, speed = 1e8, 0.5
+    law = ContactLaw(stiffness, 0.3, 0.0, nodes_per_edge=per_edge)
+    with Structure(crossed_cubes(shift, speed), law, gravity=STILL) as s:
+        deepest, time = 0.0, 1e-3 / speed + 4.0 * np.sqrt(DENSITY / (0.5 * stiffness))
+        for _ in range(60):
+            s.advance(time / 60)
+            deepest = max(deepest, np.sqrt(2.0) - s.centre()[1, 2])
+        assert 0.0 < deepest < speed * np.sqrt(DENSITY / (0.5 * stiffness))
+        assert s.energies()["kinetic"] < 0.5 * DENSITY * speed**2
+
+
+def test_an_edge_that_lands_on_an_edge_returns_e():
+    """Straight through both centres, which no node is at: restitution as for a face, nothing sideways."""
+    law = ContactLaw(1e8, 0.5, 0.0, nodes_per_edge=4)
+    with Structure(crossed_cubes(0.0, 0.5), law, gravity=STILL) as s:
+        s.advance(0.05, substep=0.02 * np.sqrt(DENSITY / 1e8))
+        v = s.velocity()[1]
+        assert v[2] / 0.5 == pytest.approx(0.5, abs=0.01)
+        assert np.abs(np.delete(v, 2)).max() < 1e-9
+
+
+def overlap(blocks, centres, rotations):
+    """Least overlap of two convex blocks over all axes that could part them [m]; negative where one does."""
+    a, b = (x + k.vertices @ R.T for k, x, R in zip(blocks, centres, rotations))
+    sides = [R @ k.planes[0].T for k, R in zip(blocks, rotations)]
+    along = [np.array([p[j] - p[i] for (i, j), _ in block_edges(k)]) for k, p in zip(blocks, (a, b))]
+    cross = np.cross(along[0][:, None], along[1][None]).reshape(-1, 3)
+    cross = cross[np.linalg.norm(cross, axis=1) > 1e-6]
+    axes = np.concatenate([sides[0].T, sides[1].T, cross / np.linalg.norm(cross, axis=1)[:, None]])
+    p, q = a @ axes.T, b @ axes.T
+    return min((p.max(axis=0) - q.min(axis=0)).min(), (q.max(axis=0) - p.min(axis=0)).min())
+
+
+@settings(max_examples=8, deadline=None)
+@given(st.integers(0, 10_000))
+def test_random_polyhedra_do_not_sink_into_each_other(seed):
+    """Thrown at each other, the overlap stays below v sqrt(m/k) of a lone node, which carries K/2 over the nodes of its
+    face: no more than nine here."""
+    random = np.random.default_rng(seed)
+    blocks = []
+    for name, side in (("a", -1.0), ("b", 1.0)):
+        points = random.normal(size=(10, 3))
+        points *= 0.5 / np.linalg.norm(points, axis=1)[:, None]
+        turn = Rotation.from_quat(random.normal(size=4)).as_matrix()
+        place = (0.7 * side, *random.uniform(-0.2, 0.2, 2))
+        blocks.append(
+            Block(name, place, vertices=points, rotation=turn, density=DENSITY, velocity=(-side, 0, 0))
+        )
+    stiffness = 1e9
+    mass = blocks[0].mass * blocks[1].mass / (blocks[0].mass + blocks[1].mass)
+    with Structure(blocks, ContactLaw(stiffness, 0.3, 0.3), gravity=STILL) as s:
+        deepest = 0.0
+        for _ in range(100):
+            s.advance(0.006)
+            deepest = max(deepest, overlap(blocks, s.centre(), s.rotation()))
+        assert deepest < 2.0 * np.sqrt(mass / (0.5 * stiffness / 9))
