@@ -2,8 +2,8 @@
 
 A node of one block inside another, near one of its faces, is one contact point. Nodes are the vertices, points along
 the edges and the middle of every face: with three an edge a box carries 26, nine on a face, so that resting, stacking,
-toppling and sliding come out right (two an edge let offset blocks fall over). Two edges that cross between nodes sink
-into each other by up to half the distance of the nodes along them: more points an edge where that matters.
+toppling and sliding come out right (two an edge let offset blocks fall over). Edges that cross between nodes carry each
+other (`contact_edges`).
 """
 
 from __future__ import annotations
