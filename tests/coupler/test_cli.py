@@ -34,7 +34,7 @@ def test_help_names_every_command_quickly():
     began = time.perf_counter()
     told = surgebreak("--help").stdout
     assert time.perf_counter() - began < 2.0  # 0.1 s on a quiet machine
-    for command in ("run", "check", "render", "doctor", "explain", "init", "test"):
+    for command in ("run", "resume", "check", "render", "doctor", "explain", "init", "test"):
         assert f"\n  {command} " in told
 
 
@@ -121,7 +121,7 @@ import sys
 import types
 import coupler.cli as cli
 fake = types.ModuleType("coupler.run")
-def run(case, directory, tell):
+def run(case, directory, tell, checkpoint=None):
     for k in range(1, 11):
         tell.step(case.time.end * k / 10, {{"dt": "1 ms"}})
     {then}
@@ -152,7 +152,7 @@ def test_exit_codes_of_runs(tmp_path, then, code, says):
     assert done.returncode == code, done.stderr
     assert says in done.stdout + done.stderr
     assert "on:  water" in done.stdout
-    assert "off: structure, coupling" in done.stdout
+    assert "inflow, structure, coupling" in done.stdout.partition("off: ")[2]
     (run,) = (tmp_path / "runs").iterdir()
     assert f"results {'' if code == 0 else 'so far '}in {run}" in done.stdout + done.stderr
     assert f'"exit_code": {code}' in (run / "run.json").read_text(encoding="utf-8")
