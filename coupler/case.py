@@ -107,7 +107,7 @@ class Contact(Section):
         description="dashpot that gives e exactly and never pulls, or the closed formula of the method",
     )
     nodes_per_edge: Annotated[int, Field(strict=True, ge=3, le=33)] = Field(
-        3, description="contact nodes along an edge of a block; more where edges may cross between them"
+        3, description="contact nodes along an edge of a block; crossing edges hold each other whatever it is"
     )
     pair: tuple[ContactPair, ...] = Field((), description="pairs of materials with a friction of their own")
 
