@@ -86,9 +86,9 @@ def corner() -> Iterator[Measure]:
     yield from watch.measures()
 
 
-@scene("S14", "prism wedged between two fixed slopes of 45 degrees, without friction")
+@scene("S14", "prism wedged between two fixed slopes, without and with friction")
 def wedge() -> Iterator[Measure]:
-    """W = √2 N: the forces on both slopes; then the wedge on 60-degree slopes with friction that holds it."""
+    """Both slopes together carry the weight, W = 2 N sin(half the angle between them) without friction."""
     for half, friction in ((45.0, 0.0), (15.0, 0.4)):
         a = np.radians(half)
         tip = np.array([[0, 0], [np.sin(a), np.cos(a)], [-np.sin(a), np.cos(a)]])
