@@ -1,4 +1,5 @@
-"""One thread and the kernel cache of the present sources, before anything imports numba or YADE."""
+"""One thread and the kernel cache of the present sources, before anything imports numba or YADE; what needs VTK first,
+since it cannot be imported any more once YADE is."""
 
 import os
 
@@ -7,3 +8,7 @@ from coupler.kernel_cache import use_kernel_cache
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
     os.environ.setdefault(name, "1")
 use_kernel_cache()
+
+
+def pytest_collection_modifyitems(items):
+    items.sort(key=lambda item: item.get_closest_marker("before_yade") is None)

@@ -4,6 +4,8 @@ import pytest
 
 from coupler import doctor
 
+pytestmark = pytest.mark.before_yade
+
 
 def test_all_parts_work_here(capsys):
     assert doctor.examine() == 0

@@ -23,6 +23,8 @@ from coupler.output import BlockWriter, WaterWriter, write_solids
 from coupler.storage import DiskFull, NotFinite, WrongShape
 from tests.coupler.synthetic_run import BOX_FACES, box_vertices, rotations, tank_mesh
 
+pytestmark = pytest.mark.before_yade
+
 HERE = Path(__file__).parent
 TETRAHEDRON = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
 

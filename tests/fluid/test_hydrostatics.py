@@ -88,8 +88,8 @@ def test_tank_without_water_runs():
 
 
 def test_noise_dies_where_the_surface_lies_just_below_a_layer_of_nodes():
-    """Grid-scale noise of 1e-5 m/s in still water, at two thirds of the largest step: a continuation of the velocity that
-    follows its slope let it grow fivefold in these 200 steps."""
+    """Grid-scale noise of 1e-5 m/s in still water, at two thirds of the largest step: a continuation of the velocity
+    that follows its slope let it grow fivefold in these 200 steps."""
     n, rng = 10, np.random.default_rng(0)
     water = tank([1, 1, 1], 1 / n, lambda x: x[:, 2] - 0.5 - 0.95 / n)
     speed = []

@@ -84,9 +84,9 @@ def test_the_heave_period_is_that_of_potential_flow(scene):
 
 @pytest.mark.parametrize("density", [50.0, 300.0, 2400.0])
 def test_momentum_of_a_free_block_is_the_impulse_of_water_and_weight(scene, density):
-    """M ΔV = Σ dt (F + weight) in YADE to round-off of the exchange, rising, floating up or sinking. Velocities live half
-    a substep before the end of a step, so each step counts from half a substep before it to half a substep before its
-    end."""
+    """M ΔV = Σ dt (F + weight) in YADE to round-off of the exchange, rising, floating up or sinking. Velocities live
+    half a substep before the end of a step, so each step counts from half a substep before it to half a substep before
+    its end."""
     coupling = cube(scene, density)
     s = coupling.structure
     late = 0.0
