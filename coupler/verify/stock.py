@@ -85,6 +85,8 @@ def _border(angle: float) -> float:
     low, high = 0.0, 2.0 * COMPRESSION
     while high - low > 1e-9 * high:
         s = 0.5 * (low + high)
-        within = inside(s * np.cos(angle), s * np.sin(angle), TENSION, COHESION, FRICTION, COMPRESSION, ASPECT)
+        within = inside(
+            s * np.cos(angle), s * np.sin(angle), TENSION, COHESION, FRICTION, COMPRESSION, ASPECT
+        )
         low, high = (s, high) if within else (low, s)
     return 0.5 * (low + high)
