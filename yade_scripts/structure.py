@@ -151,9 +151,8 @@ class Structure:
         self.time = 0.0
         self._accounts = Accounts(self._masses, self._motion, self.joints, self._contacts)
         self._substepper = Substepper(
-            self._scene, self._motion, self.joints, self._contacts, self._spin, self._accounts,
-            self.gravity_force()[:, :3],
-        )  # fmt: skip
+            self._scene, self._motion, self.joints, self._contacts, self._spin, self._accounts
+        )
         self._substepper.list_bodies(self._onset.loose)
 
     # ---- moving on ------------------------------------------------------------------------------------------

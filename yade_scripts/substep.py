@@ -1,9 +1,9 @@
 """One substep: forces of contacts, joints and load on the blocks, then the integration of YADE.
 
-    v(t + dt/2) = v(t - dt'/2) + (dt + dt')/2 F(t)/m
+    v⁺ = v + dt F(x)/m,   x⁺ = x + dt v⁺
 
-where dt' is the length of the substep before, 0 at the start, where the velocities given are those of t = 0. YADE takes
-dt for the mean of both, so a substep of another length goes with forces and weights in the ratio of the two.
+so that a load F held over substeps of any length gives the momentum F dt exactly, as the water is told. Energies are
+taken at the time of the velocities, half a substep before the places.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ Array = np.ndarray
 
 
 class Substepper:
-    """Moves the scene by one substep at a time. load (n, 6) [N, N m] acts in every substep; weight (n, 3) [N].
+    """Moves the scene by one substep at a time. load (n, 6) [N, N m] acts in every substep.
 
     fastest: largest growth of λ/δ_f in a substep since it was set to zero.
     """
@@ -34,10 +34,9 @@ class Substepper:
         contacts: ContactForces | None,
         spin: SpinCorrection,
         accounts: Accounts,
-        weight: Array,
     ):
         self._scene, self._motion, self._joints, self._contacts = scene, motion, joints, contacts
-        self._spin, self._accounts, self._weight = spin, accounts, weight
+        self._spin, self._accounts = spin, accounts
         self.load = np.zeros((len(scene.ids), 6))
         self.fastest = 0.0
         self._F = np.zeros_like(self.load)
@@ -69,19 +68,14 @@ class Substepper:
             self._F += self._joint_F
         if self._contacts is not None:
             self._contacts.add_forces(dt, self._F)
-        kick, pushed, ids = 0.5 * (dt + m.dt), self._pushed, self._pushed_ids
-        if dt != m.dt:
-            self._F *= kick / dt
-            self._F[:, :3] += (kick / dt - 1.0) * self._weight
-            pushed, ids = slice(None), self._scene.ids
         if len(self._turning):
             self._spin.add(self._turning, m.R, m.v, dt, m.dt, self._F)
-        self._scene.step(dt, ids, self._F[pushed])
+        self._scene.step(dt, self._pushed_ids, self._F[self._pushed])
         m.dt = dt
         m.read_watched()
         if len(self._joined):
-            self._accounts.take_joints(self._joint_F, before, self._joined, kick)
+            self._accounts.take_joints(self._joint_F, before, self._joined, dt)
         if self._contacts is not None:
-            self._contacts.settle(kick)
+            self._contacts.settle(dt)
             if self._scene.searched():
                 self._contacts.search(now=False)

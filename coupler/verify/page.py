@@ -10,17 +10,11 @@ from coupler.provenance import machine, versions
 from coupler.verify.registry import NOT_COVERED, Result, checks
 
 NOTES = {
-    "P05": "The contact nodes lie 1 % of the half size inside the edge (`node_radius`), so the base is that much "
-    "narrower: atan(0.99 b/h) = 26.3°.",
-    "P09": "The dashpot is tuned for a face and the whole mass; at a corner the effective mass is smaller and e comes "
-    "out too large below 1.",
-    "P10": "YADE's rotation of a body with three different inertias gains energy, 0.7 % in 6 s at 0.1 ms here, less "
-    "in proportion to the substep.",
     "P36": "No gate and no bed friction: the front leads.",
     "P38": "The water is frictionless and keeps its head: at t* = 4 the dam break of shallow water (Ritter) "
     "has a total head of 0.85 above the sensor, computed 0.93 to 0.97, measured 0.59. Cells of H/32, half the step, "
     "θ = 1, no limit on the carried acceleration and a taller tank leave it there; the force on the wall and the "
-    "momentum of the water agree to 10 %.",
+    "momentum of the water agree to 10 %. The cause is not proven.",
     "P39": "H3 lies behind the box, where the jet comes down: it differs from run to run by some centimetres.",
     "P41": "Measured between 5 and 11 depths from the gate; 0.018 m is two cells, and a run that differed by round-off "
     "gave 1.16 m/s there.",

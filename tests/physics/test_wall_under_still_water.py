@@ -173,4 +173,4 @@ def test_a_second_pass_takes_the_same_step_again(wall):
         assert record.defect < 0.02
         first = record if first is None else first
     assert first.passes == 2
-    assert abs(record.balance.structure_residual) < 1e-8 * record.balance.input_energy
+    assert abs(record.balance.structure_residual) < 1e-9 * record.balance.input_energy
