@@ -286,7 +286,10 @@ def _cross(shapes, bodies, shear, slots, s, fresh, a, b, deepest, x, v, R, last_
             return count, lost, parted
     depth = crossing(shapes, a, b, slots.face[s], x, R, plane, xi)
     if depth <= 0.0:
-        return count, lost + _let_go(slots.face, slots.k, slots.rest, slots.shear, s, depth, shear), -1.0
+        if known:
+            lost += _let_go(slots.face, slots.k, slots.rest, slots.shear, s, depth, shear)
+        slots.face[s] = -1
+        return count, lost, -1.0
     if not known:
         slots.k[s] = _spring(bodies.stiffness[a], bodies.stiffness[b])
         slots.shear[s, 0] = slots.shear[s, 1] = slots.shear[s, 2] = 0.0

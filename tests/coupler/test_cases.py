@@ -4,6 +4,7 @@ import tomllib
 
 import pytest
 
+from coupler.build import build_structure
 from coupler.case_checks import remarks
 from coupler.case_file import load
 from coupler.expected import TAKE
@@ -29,3 +30,20 @@ def test_the_strong_building_differs_in_its_joints_alone():
     strong = load(ROOT / "cases" / "dam_break_building", ["joints.strength='3 MPa'"]).case
     assert strong.joints.strength == 20 * weak.joints.strength
     assert strong.model_copy(update={"joints": weak.joints}) == weak
+
+
+DRY = [place for place in CASES if "\n[tank]" not in (place / "case.toml").read_text(encoding="utf-8")]
+
+
+@pytest.mark.parametrize("place", DRY, ids=lambda place: place.name)
+def test_a_dry_case_starts_and_keeps_its_energy(place):
+    """Blocks as they touch in real scenes: flush faces, voussoirs, stones in the air."""
+    with build_structure(load(place).case) as s:
+        start = s.energies()
+        s.advance(5e-3)
+        end = s.energies()
+    works = ("load_work", "driving_work")
+    gained = sum(end[k] - start[k] for k in end if k not in works) - sum(end[k] for k in works)
+    assert abs(gained) < 1e-3 * (
+        sum(abs(end[k]) for k in works) + abs(end["kinetic"]) + abs(end["contact_stored"])
+    )
