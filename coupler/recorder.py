@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from coupler.crack_surfaces import write_crack_surfaces
 from coupler.history import HistoryTable, write_cracks
 from coupler.observe import block_damage, crack_columns, fastest_point, joint_counts
 from coupler.output import BlockWriter, WaterWriter, write_solids
@@ -242,6 +243,7 @@ class Recorder:
         cracks = crack_columns(structure) if structure else {}
         if cracks:
             write_cracks(self.cracks, cracks)
+            write_crack_surfaces(self.cracks.with_suffix(".vtu"), *structure.joint_polygons(), cracks)
 
     def close(self) -> None:
         for table in self._tables.values():

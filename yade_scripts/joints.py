@@ -71,6 +71,10 @@ class Joints:
         self.area = np.bincount(self.joint_of, self.weight, minlength=n)
         centre = np.array([b.centre for b in blocks]).reshape(-1, 3)
         R = np.array([b.rotation for b in blocks]).reshape(-1, 3, 3)
+        corners = np.concatenate([f.polygon for f in faces]) if n else np.zeros((0, 3))
+        self.corner_start = np.concatenate([[0], np.cumsum([len(f.polygon) for f in faces])]).astype(np.int64)
+        self._corner_of = np.repeat(np.arange(n), np.diff(self.corner_start))
+        self._corner = _to_body(corners, self.a[self._corner_of], centre, R)
         self.xi_a = _to_body(place, self.a[self.joint_of], centre, R)
         self.xi_b = _to_body(place, self.b[self.joint_of], centre, R)
         normal = np.array([f.normal for f in faces]).reshape(-1, 3)
@@ -208,6 +212,11 @@ class Joints:
             opening[:, 1], mix, self.stored_between(x, R, x, R), self.lost(), self.damped.copy(),
             self.failure_time.copy(), self.alive.copy(),
         )  # fmt: skip
+
+    def corners(self, x: Array, R: Array) -> Array:
+        """Corners of the joined faces (c, 3) [m] where block a is, joint j from corner_start[j] to corner_start[j + 1]."""
+        a = self.a[self._corner_of]
+        return x[a] + np.einsum("nij,nj->ni", R[a], self._corner)
 
     def _centre_in_a(self) -> Array:
         weighted = self.xi_a * self.weight[:, None]

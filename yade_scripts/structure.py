@@ -338,6 +338,13 @@ class Structure:
         table.centre[:] += self._origin
         return table
 
+    def joint_polygons(self) -> tuple[Array, Array]:
+        """Joined faces as polygons where block a of each is: corners (c, 3) [m], first corner of each (J + 1,)."""
+        if self.joints is None:
+            return np.zeros((0, 3)), np.zeros(1, np.int64)
+        m = self._motion
+        return self.joints.corners(m.x, m.R) + self._origin, self.joints.corner_start
+
     def touching(self) -> Array:
         """(n,) bool: blocks with a contact, to one another or to a fixed plane."""
         found = np.zeros(self.n, bool)
