@@ -214,7 +214,7 @@ class Joints:
         )  # fmt: skip
 
     def corners(self, x: Array, R: Array) -> Array:
-        """Corners of the joined faces (c, 3) [m] where block a is, joint j from corner_start[j] to corner_start[j + 1]."""
+        """Corners of the joined faces (c, 3) [m] where block a is, those of joint j from corner_start[j]."""
         a = self.a[self._corner_of]
         return x[a] + np.einsum("nij,nj->ni", R[a], self._corner)
 
