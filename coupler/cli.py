@@ -122,7 +122,13 @@ def compare(file, directory, tell) -> None:
 
 
 @app.command()
-def check(case: CasePlace, set: Overrides = None) -> None:
+def check(
+    case: CasePlace,
+    set: Overrides = None,
+    exact: Annotated[
+        bool, typer.Option("--exact", help="solve for the exact frequency of the joints as well")
+    ] = False,
+) -> None:
     """Check a case without running it, and forecast steps, memory and disk."""
     one_thread()
     from coupler import terminal
@@ -132,7 +138,7 @@ def check(case: CasePlace, set: Overrides = None) -> None:
     describe(file, print)
     from coupler.forecast import forecast
 
-    terminal.table("forecast", forecast(file.case).rows)
+    terminal.table("forecast", forecast(file.case, exact).rows)
 
 
 def describe(file, tell) -> None:

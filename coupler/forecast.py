@@ -32,8 +32,10 @@ class Forecast:
     rows: list[Row]
 
 
-def forecast(case: Case) -> Forecast:
-    """The forecast of a case; starts YADE when the case has a structure, to ask it for the substep."""
+def forecast(case: Case, exact: bool = False) -> Forecast:
+    """The forecast of a case; starts YADE when the case has a structure, to ask it for the substep.
+
+    exact: with the exact frequency of the joints beside the bound that sets the substep (an eigenvalue problem)."""
     rows: list[Row] = []
     memory = 80e6
     disk = 0.0
@@ -47,7 +49,7 @@ def forecast(case: Case) -> Forecast:
     steps = math.ceil(case.time.end / step)
     rows.append(Row("steps", steps, "", "at least, while the water is fast" if case.water else ""))
     if case.structure:
-        n = _structure_rows(case, rows)
+        n = _structure_rows(case, rows, exact)
         memory += PROGRAM_BYTES["structure"] + BYTES_PER_BLOCK * n
         disk += DISK_BYTES_PER_BLOCK * n * (outputs + 1)
     rows.append(Row("written states", outputs + 1, "", ""))
@@ -75,7 +77,7 @@ def _water_rows(case: Case, rows: list[Row]) -> float:
     return limits[reason]
 
 
-def _structure_rows(case: Case, rows: list[Row]) -> int:
+def _structure_rows(case: Case, rows: list[Row], exact: bool) -> int:
     """Rows of the structure; the number of its blocks."""
     from coupler.build import build_structure
 
@@ -95,6 +97,8 @@ def _structure_rows(case: Case, rows: list[Row]) -> int:
             limit.remark(substep) or f"set by {limit.what if case.structure.substep is None else 'the case'}"
         )
         rows.append(Row("substep", 1e6 * substep, "us", reason))
+        if exact and structure.joints is not None:
+            rows.append(_frequency_row(structure, limit.omega))
         rows.append(Row("substeps", math.ceil(case.time.end / substep), "", ""))
         if case.joints and case.structure.start == "settled":
             _row_at_rest(structure, rows)
@@ -112,3 +116,12 @@ def _row_at_rest(structure, rows: list[Row]) -> None:
     rows.append(
         Row("damage at rest", float(damage), "", f"under its own weight; blocks move {1e3 * moved:.3g} mm")
     )
+
+
+def _frequency_row(structure, bound: float) -> Row:
+    """ω_max of the joints from the eigenvalue problem of all blocks, and how far the bound is above it."""
+    from yade_scripts.timestep import exact_joint_frequency
+
+    omega = exact_joint_frequency(structure.blocks, structure.joints)
+    remark = f"the bound is {bound / omega:.3f} of it" if omega > 0.0 else "no joint can move"
+    return Row("frequency of the joints, exact", omega, "rad/s", remark)

@@ -8,6 +8,7 @@ from coupler.build import build_structure
 from coupler.case_checks import remarks
 from coupler.case_file import load
 from coupler.expected import TAKE
+from coupler.forecast import forecast
 from coupler.provenance import ROOT
 
 CASES = sorted(path.parent for path in (ROOT / "cases").glob("*/case.toml"))
@@ -47,3 +48,14 @@ def test_a_dry_case_starts_and_keeps_its_energy(place):
     assert abs(gained) < 1e-3 * (
         sum(abs(end[k]) for k in works) + abs(end["kinetic"]) + abs(end["contact_stored"])
     )
+
+
+def test_the_exact_frequency_of_the_joints_is_told_on_request():
+    """The bound that sets the substep lies between it and √2 of it."""
+    case = load(ROOT / "cases" / "bonded_wall_pulled").case
+    name = "frequency of the joints, exact"
+    assert name not in [row.name for row in forecast(case).rows]
+    row = next(row for row in forecast(case, exact=True).rows if row.name == name)
+    with build_structure(case) as s:
+        assert row.value <= s.substep_limit().omega * (1.0 + 1e-12)
+        assert s.substep_limit().omega <= 2.0**0.5 * row.value * (1.0 + 1e-12)
