@@ -47,7 +47,9 @@ def impulse(time, force):
 
 @pytest.fixture(scope="module")
 def rigid():
-    solid = {"name": "wall", "centre": [1.70, 0.1, 0.4], "size": WALL["size"]}
+    """A tenth of a millimetre off its place: the splash after the impact turns on less. At 0.8 s the impulse on a wall
+    that never leaves its place is 10 % below that on one moved by a micrometre."""
+    solid = {"name": "wall", "centre": [1.7001, 0.1, 0.4], "size": WALL["size"]}
     return history(dam_break(solid=[solid]))
 
 
