@@ -18,7 +18,7 @@ from coupler.terminal import Row
 
 LONGEST_REST_STEP = 0.3
 BYTES_PER_BLOCK = 60_000
-"""Resident memory per block with its contact nodes in YADE."""
+"""Resident memory per block, its contact nodes included."""
 PROGRAM_BYTES = {"water": 250e6, "structure": 250e6}
 DISK_BYTES_PER_NODE = 12
 """Compressed level set, velocity and pressure of one written state."""

@@ -147,8 +147,3 @@ def damping_ratio(e: float) -> float:
     while restitution_without_tension(high) > e:
         high *= 2.0
     return float(brentq(lambda z: restitution_without_tension(z) - e, 0.0, high, xtol=1e-14))
-
-
-def effective_mass(a, b):
-    """m_a m_b / (m_a + m_b) [kg]; an infinite mass stands for a fixed body."""
-    return 1.0 / (1.0 / np.asarray(a) + 1.0 / np.asarray(b))

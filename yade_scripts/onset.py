@@ -81,6 +81,7 @@ class ContactOnset:
             self._contacts.switch_on(rows, as_deep)
 
     def save(self) -> dict[str, Array]:
+        """Which blocks are loose, and the places that the others stand in."""
         return {"loose": self.loose.copy(), "x_rest": self._x_rest.copy(), "R_rest": self._R_rest.copy()}
 
     def restore(self, saved: dict[str, Array]) -> None:

@@ -40,9 +40,11 @@ class SpinCorrection:
         _correct(rows, R, v, self._inertia, self._inverse, dt, last_dt, self._lent, F)
 
     def save(self) -> Array:
+        """What was lent in the last substep, (n, 3) [N m s]."""
         return self._lent.copy()
 
     def restore(self, saved: Array) -> None:
+        """Back to what `save` gave."""
         self._lent[:] = saved
 
 
