@@ -185,6 +185,41 @@ def _close_cap(w, piece, side, edges, tag):
 
 
 @inner
+def _take_flat_faces(w, piece, target, side, edges):
+    """Give the faces of a piece that lie wholly in the plane to one of its halves -> edges of the cap.
+
+    The piece goes on on both sides, so such a face has no area: it is what is left of a point or an edge where
+    three planes meet up to round-off. It belongs to either half, but the cap of one of them may touch itself
+    where it is left out."""
+    for f in range(w.faces[piece]):
+        flat = True
+        for k in range(w.size[piece, f]):
+            flat = flat and w.distance[w.loop[piece, f, k]] == 0.0
+        if not flat:
+            continue
+        row = w.faces[target]
+        for k in range(w.size[piece, f]):
+            w.loop[target, row, k] = w.loop[piece, f, k]
+        w.size[target, row] = w.size[piece, f]
+        w.tag[target, row] = w.tag[piece, f]
+        w.faces[target] = row + 1
+        edges = _add_cap_edges(w, target, row, side, edges)
+    return edges
+
+
+@inner
+def _close_half(w, piece, target, side, edges, tag):
+    """Close one half of a split piece by its cross-section -> state."""
+    kept = w.faces[target]
+    state = _close_cap(w, target, side, edges, tag)
+    if state == BROKEN_CAP:
+        edges = _take_flat_faces(w, piece, target, side, edges)
+        if w.faces[target] > kept:
+            state = _close_cap(w, target, side, edges, tag)
+    return state
+
+
+@inner
 def split(w, piece, outer, inner, plane, n_vertices):
     """Split a piece by the plane whose distances are in w.distance -> (state, number of vertices)."""
     capacity = w.loop.shape[2]
@@ -227,9 +262,9 @@ def split(w, piece, outer, inner, plane, n_vertices):
             f_in += 1
     w.faces[outer] = f_out
     w.faces[inner] = f_in
-    state = _close_cap(w, outer, 0, edges_out, 2 * plane)
+    state = _close_half(w, piece, outer, 0, edges_out, 2 * plane)
     if state == DONE:
-        state = _close_cap(w, inner, 1, edges_in, 2 * plane + 1)
+        state = _close_half(w, piece, inner, 1, edges_in, 2 * plane + 1)
     return state, n_vertices
 
 
