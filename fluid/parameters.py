@@ -19,6 +19,7 @@ class WaterParameters:
     kick_limit: largest acceleration carried over to the next step, in g (spray).
     speed_limit: cap of the speed in units of sqrt(g H), H the height of the tank; clipped nodes are counted.
     subscale_memory: keep the element-wise remainder of the velocity correction (added mass of bodies).
+    advection: "semi-lagrangian", or "supg" for stabilised finite elements (the reference; slower).
     viscosity: dynamic viscosity [Pa s]; 0 leaves the term out.
     walls: what sides of the tank and solids do to the water along them: "slip", "no-slip" (needs viscosity) or
     "friction" with either roughness k_s [m] (log law) or manning n [s/m^(1/3)] (bed).
@@ -36,6 +37,7 @@ class WaterParameters:
     kick_limit: float = 3.0
     speed_limit: float = 2.0 * np.sqrt(2.0)
     subscale_memory: bool = True
+    advection: str = "semi-lagrangian"
     viscosity: float = 0.0
     walls: str = "slip"
     roughness: float | None = None

@@ -109,7 +109,12 @@ def _transported(water, dt, theta, kick):
     for u in (u_hat, u_m):
         water.hold(u, water.time + dt)
     fields = np.column_stack([u_hat, water.level_set])
-    moved = transport(water.topology, water.listed, dt, u_m, fields)
+    if water.parameters.advection == "supg":
+        from fluid import supg
+
+        moved = supg.transport(water, dt, u_m, fields)
+    else:
+        moved = transport(water.topology, water.listed, dt, u_m, fields)
     u_adv, phi = u_hat, water.level_set.copy()
     u_adv[water.listed] = moved[:, :3]
     near = np.abs(phi[water.listed]) < TRANSPORT_WIDTH * water.mesh.spacing
