@@ -21,6 +21,7 @@ def water_of(case: Case, structure, solids):
     parameters = WaterParameters(
         density=w.density,
         gravity=case.case.gravity,
+        advection=w.advection,
         theta=w.theta,
         courant=case.time.cfl,
         viscosity=w.viscosity,

@@ -210,6 +210,7 @@ def modules(case: Case) -> dict[str, bool]:
     water = case.water is not None
     return {
         "water": water,
+        "stabilised transport": water and case.water.advection == "supg",
         "viscosity": water and case.water.viscosity > 0.0,
         "wall friction": water and case.water.walls == "friction",
         "inflow": water and bool(case.water.inflow or case.water.sea),

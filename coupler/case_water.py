@@ -107,6 +107,11 @@ class Water(Section):
         description="Manning's n [s/m^(1/3)] of the floor and of faces that look up, for friction of a bed",
         examples=[0.025],
     )
+    advection: Literal["semi-lagrangian", "supg"] = Field(
+        "semi-lagrangian",
+        description="how the flow carries velocity and surface: along paths, or by stabilised finite elements, the "
+        "reference, which costs some four times as much a step",
+    )
     theta: quantity("", ge=0.5, le=1) = Field(
         0.6, description="weight of the new pressure in the projection; 0.5 damps least, 1 most"
     )

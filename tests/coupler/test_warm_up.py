@@ -10,6 +10,7 @@ def test_the_warm_up_case_switches_on_both_sides_and_what_joins_them(tmp_path):
     on = modules(load(tmp_path).case)
     rare = {
         "prescribed motion",
+        "stabilised transport",
         "viscosity",
         "wall friction",
         "inflow",
