@@ -147,29 +147,3 @@ def test_noisy_brick_walls_lose_no_face(exponent):
         bodies = ConvexBodies.boxes(centre, np.full(at.shape, 0.25), turn)
         for growth in (0.0, 1e-6, -1e-6):
             assert divergence_defect(cut_domain(MESH, bodies.grown(growth))) < 1e-8
-
-
-def scaled_condition(domain):
-    """Condition number of the diagonally scaled P1 stiffness with p = 0 on the top of the mesh."""
-    g, _ = gradients(domain.nodes, domain.cells)
-    K = np.zeros((len(domain.nodes),) * 2)
-    for a in range(4):
-        for b in range(4):
-            entry = domain.volume * (g[:, a] * g[:, b]).sum(axis=1)
-            np.add.at(K, (domain.cells[:, a], domain.cells[:, b]), entry)
-    used = (np.diag(K) > 0) & (domain.nodes[:, 2] < 1 - 1e-9)
-    scale = 1 / np.sqrt(np.diag(K)[used])
-    return np.linalg.cond(K[np.ix_(used, used)] * scale[:, None] * scale)
-
-
-def test_conditioning_is_independent_of_the_cut():
-    """A floor that passes the nodes by 0.5 to 1e-12 of a cell: slivers need no threshold, a diagonal
-    scaling suffices."""
-    mesh = box_mesh((0, 0, 0), (1, 1, 1), 0.25)
-    tilt = Rotation.from_euler("xy", [0.0, 0.0]).as_matrix()[None]
-
-    def floor(delta):
-        return ConvexBodies.boxes([[0.5, 0.5, 0.5 - delta * 0.25 - 2.5]], [[9, 9, 5]], tilt)
-
-    condition = [scaled_condition(cut_domain(mesh, floor(10.0**-k))) for k in range(1, 13)]
-    assert max(condition) < 1.5 * condition[0]
