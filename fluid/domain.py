@@ -16,13 +16,17 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-import scipy.sparse as sp
+from numba import njit
 
 from fluid.bodies import ConvexBodies
-from fluid.covers import Connection, pick_old_nodes, virtual_cells, without_pockets
+from fluid.contacts import Contacts, find_contacts
+from fluid.covers import Connection, virtual_cells, without_pockets
 from fluid.cut import Cuts, cut_cells
+from fluid.heirs import pick_old_nodes
+from fluid.joined import joined
 from fluid.mesh import Background, gradients
 from fluid.near import near_pairs
+from fluid.wetted import wetted_coupling
 
 __all__ = ["PhysicalDomain", "carry", "cut_domain", "gradients", "wetted_coupling"]
 
@@ -45,7 +49,8 @@ class WholeCells:
 
 @dataclass(frozen=True)
 class Memory:
-    """What the next cut needs of this one: mesh, bodies, pairs sorted by (cell, body), cut parts."""
+    """What the next cut needs of this one: mesh, bodies, pairs sorted by (cell, body), cut parts; contacts of the parts
+    with multiple covers, else None."""
 
     mesh: Background
     bodies: ConvexBodies
@@ -54,6 +59,19 @@ class Memory:
     pair_body: np.ndarray
     cuts: Cuts
     connection: Connection
+    contacts: Contacts | None
+
+
+@dataclass(frozen=True)
+class Elements:
+    """Fluid elements in the order of the background cells: parent (M,) background cell · part (M,) row of the cut
+    part, -1 whole or nothing removed · start (cells + 1,) first element of each cell · of_part (K,) element of each cut
+    part."""
+
+    parent: np.ndarray
+    part: np.ndarray
+    start: np.ndarray
+    of_part: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -109,11 +127,17 @@ def cut_domain(
     connection = connection or Connection()
     memory = _remembered(mesh, bodies, covers, previous, connection)
     if memory is None:
-        memory = _cut_all(mesh, bodies, covers, connection)
+        memory, again = _cut_all(mesh, bodies, covers, connection), None
     else:
         changed = changed_bodies(memory.bodies, bodies)
-        memory = _cut_moved(memory, bodies, changed if moved is None else changed | moved, covers)
-    return _assembled(memory, covers)
+        memory, again = _cut_moved(memory, bodies, changed if moved is None else changed | moved, covers)
+    elements = _elements(memory)
+    if covers == "multiple":
+        contacts = find_contacts(
+            mesh, elements.part, elements.start, memory.cuts, connection.enough, memory.contacts, again
+        )
+        memory = replace(memory, contacts=contacts)
+    return _assembled(memory, elements, covers)
 
 
 def changed_bodies(old: ConvexBodies, new: ConvexBodies) -> np.ndarray:
@@ -131,38 +155,6 @@ def whole_cells(mesh) -> WholeCells:
     d = x - centroid[:, None]
     second = (d[:, :, XX] * d[:, :, YY]).sum(axis=1) * (mesh.cell_volume / 20)[:, None]
     return WholeCells(mesh.cell_volume, centroid, second)
-
-
-def wetted_coupling(domain: PhysicalDomain) -> sp.csr_matrix:
-    """G (N, 6 n_bodies): G[i, 6b:6b+3] = ∫ N_i n dA [m2], G[i, 6b+3:6b+6] = ∫ N_i (x - x_b) x n dA [m3].
-
-    n points out of body b, so a pressure field p loads it by force and torque -G^T p, and G V is the flux
-    that the body's motion V = (v, omega) pushes into the test functions. Exact: the integrands are of
-    degree 2."""
-    shape = (len(domain.nodes), 6 * domain.n_bodies)
-    if len(domain.face_cell) == 0:
-        return sp.csr_matrix(shape)
-    corners = domain.cells[domain.face_cell]
-    hats = hat_values(domain.nodes[corners], domain.face_points) * (domain.face_area / 3)[:, None, None]
-    arm = domain.face_points - domain.body_centre[domain.face_body][:, None]
-    turning = np.cross(arm, domain.face_normal[:, None])
-    block = np.empty((len(corners), 4, 6))
-    block[:, :, :3] = hats.sum(axis=1)[:, :, None] * domain.face_normal[:, None]
-    block[:, :, 3:] = np.swapaxes(hats, 1, 2) @ turning
-    return _summed_blocks(corners, domain.face_body, block.reshape(-1, 6), shape)
-
-
-def _summed_blocks(corners, body, block, shape):
-    """CSR matrix of the rows block (4 S, 6) that belong to (node, body); repeated pairs are summed."""
-    n_bodies = shape[1] // 6
-    key = (corners * n_bodies + body[:, None]).ravel()
-    order = np.argsort(key, kind="stable")
-    first = np.flatnonzero(np.diff(key[order], prepend=-1))
-    values = np.add.reduceat(block[order], first, axis=0)
-    pair = key[order[first]]
-    columns = 6 * (pair % n_bodies)[:, None] + np.arange(6)
-    start = 6 * np.searchsorted(pair // n_bodies, np.arange(shape[0] + 1))
-    return sp.csr_matrix((values.ravel(), columns.ravel(), start), shape=shape)
 
 
 def hat_values(corners, points) -> np.ndarray:
@@ -205,11 +197,12 @@ def _cut_all(mesh, bodies, covers, connection):
     every = np.arange(len(bodies))
     cell, body = near_pairs(mesh, bodies, every, SEARCH_MARGIN * mesh.spacing)
     cuts = _cut_pairs(mesh, bodies, cell, body, covers, connection)
-    return Memory(mesh, bodies, whole_cells(mesh), cell, body, cuts, connection)
+    return Memory(mesh, bodies, whole_cells(mesh), cell, body, cuts, connection, None)
 
 
 def _cut_moved(memory, bodies, moved, covers):
-    """Replace the pairs of moved bodies and cut the cells of the pairs that went or came."""
+    """Replace the pairs of moved bodies and cut the cells of the pairs that went or came → Memory with the contacts
+    from before, and these cells (cells,) bool."""
     mesh = memory.mesh
     gone = moved[memory.pair_body]
     new_cell, new_body = near_pairs(mesh, bodies, np.flatnonzero(moved), SEARCH_MARGIN * mesh.spacing)
@@ -222,8 +215,8 @@ def _cut_moved(memory, bodies, moved, covers):
     cell, body = cell[order], body[order]
     again = touched[cell]
     fresh = _cut_pairs(mesh, bodies, cell[again], body[again], covers, memory.connection)
-    cuts = _joined(memory.cuts, ~touched[memory.cuts.part_cell], fresh)
-    return Memory(mesh, bodies, memory.whole, cell, body, cuts, memory.connection)
+    cuts = joined(memory.cuts, touched, fresh)
+    return replace(memory, bodies=bodies, pair_cell=cell, pair_body=body, cuts=cuts), touched
 
 
 def _cut_pairs(mesh, bodies, cell, body, covers, connection):
@@ -234,126 +227,121 @@ def _cut_pairs(mesh, bodies, cell, body, covers, connection):
     return cut_cells(mesh.nodes, mesh.cells, chosen, start, body, bodies, tolerance, mesh.spacing, link_area)
 
 
-def _joined(old: Cuts, keep, new: Cuts) -> Cuts:
-    """Parts of `old` that are kept together with `new`, in the order of the cells."""
-    part_cell = np.concatenate([old.part_cell[keep], new.part_cell])
-    order = np.argsort(part_cell, kind="stable")
-    place = np.empty(len(order), dtype=np.int64)
-    place[order] = np.arange(len(order))
-    old_place = np.cumsum(keep) - 1
-    new_place = np.arange(len(new.part_cell)) + keep.sum()
-
-    def parts(a, b):
-        return np.concatenate([a[keep], b])[order]
-
-    def rows(old_part, new_part):
-        kept = keep[old_part]
-        part = place[np.concatenate([old_place[old_part[kept]], new_place[new_part]])]
-        return kept, part, np.argsort(part_cell[order][part], kind="stable")
-
-    wet_kept, wet_part, wet_order = rows(old.wet_part, new.wet_part)
-    open_kept, open_part, open_order = rows(old.open_part, new.open_part)
-    start, corner = _ragged(old.open_start, open_kept, new.open_start, open_order)
-    return Cuts(
-        part_cell[order],
-        parts(old.part_whole, new.part_whole),
-        parts(old.moments, new.moments),
-        wet_part[wet_order],
-        np.concatenate([old.wet_body[wet_kept], new.wet_body])[wet_order],
-        np.concatenate([old.wet[wet_kept], new.wet])[wet_order],
-        open_part[open_order],
-        np.concatenate([old.open_face[open_kept], new.open_face])[open_order],
-        start,
-        np.concatenate([old.open_x, new.open_x])[corner],
-    )
-
-
-def _ragged(old_start, kept, new_start, order):
-    """Start and source index of the ragged rows old[kept] + new taken in a new order."""
-    length = np.concatenate([np.diff(old_start)[kept], np.diff(new_start)])[order]
-    begin = np.concatenate([old_start[:-1][kept], new_start[:-1] + old_start[-1]])[order]
-    start = np.concatenate([[0], np.cumsum(length)]).astype(np.int64)
-    source = np.repeat(begin - start[:-1], length) + np.arange(start[-1])
-    return start, source
-
-
-def _assembled(memory: Memory, covers: str) -> PhysicalDomain:
+def _assembled(memory: Memory, elements: Elements, covers: str) -> PhysicalDomain:
     mesh, cuts = memory.mesh, memory.cuts
-    parent, element_of_part = _elements(memory)
-    volume, centroid, second, is_cut = _moments(memory, parent, element_of_part)
-    domain = PhysicalDomain(
-        nodes=mesh.nodes,
-        cells=mesh.cells[parent],
-        parent_node=np.arange(len(mesh.nodes)),
+    if covers == "single":
+        cells, parent_node = mesh.cells[elements.parent], np.arange(len(mesh.nodes))
+    else:
+        cells, parent_node = virtual_cells(
+            mesh, elements.parent, elements.part, elements.start, memory.contacts, memory.connection
+        )
+    volume = _volume(memory, elements)
+    face_cell, wet, wet_body = elements.of_part[cuts.wet_part], cuts.wet, cuts.wet_body
+    parent, part = elements.parent, elements.part
+    keep = np.ones(len(parent), bool)
+    if covers == "multiple":
+        least = memory.connection.pocket * mesh.spacing**3
+        keep = without_pockets(cells, volume, len(parent_node), least)
+    if not keep.all():
+        used, renumbered, cells = _compressed(cells, keep, len(parent_node))
+        parent_node = parent_node[used]
+        left = keep[face_cell]
+        face_cell, wet, wet_body = renumbered[face_cell[left]], wet[left], wet_body[left]
+        parent, part, volume = parent[keep], part[keep], volume[keep]
+    centroid, second = _moments(parent, part, memory.whole.centroid, memory.whole.second, cuts.moments)
+    return PhysicalDomain(
+        nodes=mesh.nodes if covers == "single" else mesh.nodes[parent_node],
+        cells=cells,
+        parent_node=parent_node,
         parent_cell=parent,
         volume=volume,
         centroid=centroid,
         second=second,
-        is_cut=is_cut,
-        face_cell=element_of_part[cuts.wet_part],
-        face_body=cuts.wet_body,
-        face_area=cuts.wet[:, 0],
-        face_centroid=cuts.wet[:, 1:4],
-        face_normal=cuts.wet[:, 4:7],
-        face_points=cuts.wet[:, 7:16].reshape(-1, 3, 3),
-        face_corners=cuts.wet[:, 16:].reshape(-1, 3, 3),
+        is_cut=part >= 0,
+        face_cell=face_cell,
+        face_body=wet_body,
+        face_area=wet[:, 0],
+        face_centroid=wet[:, 1:4],
+        face_normal=wet[:, 4:7],
+        face_points=wet[:, 7:16].reshape(-1, 3, 3),
+        face_corners=wet[:, 16:].reshape(-1, 3, 3),
         n_bodies=len(memory.bodies),
         body_centre=memory.bodies.centre,
         covers=covers,
         memory=memory,
     )
-    return domain if covers == "single" else _with_copies(domain, element_of_part)
 
 
-def _moments(memory, parent, element_of_part):
-    """volume, centroid, second, is_cut of the elements: of the whole cell, or of the part."""
-    cuts, whole = memory.cuts, memory.whole
-    volume, centroid, second = whole.volume[parent], whole.centroid[parent], whole.second[parent]
-    is_cut = np.zeros(len(parent), dtype=bool)
-    removed = ~cuts.part_whole
-    at = element_of_part[removed]
-    volume[at] = cuts.moments[removed, 0]
-    centroid[at] = cuts.moments[removed, 1:4]
-    second[at] = cuts.moments[removed, 4:]
-    is_cut[at] = True
-    return volume, centroid, second, is_cut
+def _volume(memory, elements):
+    """Fluid volume (M,) [m3] of the elements: of the whole cell, or of the part."""
+    volume = memory.whole.volume[elements.parent]
+    cut = elements.part >= 0
+    volume[cut] = memory.cuts.moments[elements.part[cut], 0]
+    return volume
 
 
-def _with_copies(domain, element_of_part):
-    """The same elements on the nodes of the virtual mesh, without tiny pockets."""
-    memory = domain.memory
-    mesh, connection = memory.mesh, memory.connection
-    cells, parent_node = virtual_cells(mesh, domain.parent_cell, element_of_part, memory.cuts, connection)
-    domain = replace(domain, cells=cells, parent_node=parent_node, nodes=mesh.nodes[parent_node])
-    keep = without_pockets(cells, domain.volume, len(parent_node), connection.pocket * mesh.spacing**3)
-    return domain if keep.all() else _restricted(domain, keep)
+@njit(cache=True)
+def _moments(parent, part, centroid, second, moments):
+    """Centroid (M, 3) [m] and second moments (M, 6) [m5] of the elements: of the whole cell, or of the part."""
+    c, s = np.empty((len(parent), 3)), np.empty((len(parent), 6))
+    for e in range(len(parent)):
+        if part[e] >= 0:
+            for k in range(3):
+                c[e, k] = moments[part[e], 1 + k]
+            for k in range(6):
+                s[e, k] = moments[part[e], 4 + k]
+        else:
+            for k in range(3):
+                c[e, k] = centroid[parent[e], k]
+            for k in range(6):
+                s[e, k] = second[parent[e], k]
+    return c, s
 
 
-def _restricted(domain, keep):
-    """Only the elements keep (M,) bool, their nodes and their wetted polygons."""
-    used = np.zeros(len(domain.nodes), dtype=bool)
-    used[domain.cells[keep]] = True
-    wet = keep[domain.face_cell]
-    of_cell = ("parent_cell", "volume", "centroid", "second", "is_cut")
-    of_face = ("face_body", "face_area", "face_centroid", "face_normal", "face_points", "face_corners")
-    return replace(
-        domain,
-        nodes=domain.nodes[used],
-        parent_node=domain.parent_node[used],
-        cells=(np.cumsum(used) - 1)[domain.cells[keep]],
-        face_cell=(np.cumsum(keep) - 1)[domain.face_cell[wet]],
-        **{name: getattr(domain, name)[keep] for name in of_cell},
-        **{name: getattr(domain, name)[wet] for name in of_face},
-    )
+@njit(cache=True)
+def _compressed(cells, keep, n_nodes):
+    """Nodes (N,) bool of the elements to keep (M,) bool, the new number of each element, and its nodes renumbered."""
+    used = np.zeros(n_nodes, np.bool_)
+    renumbered = np.empty(len(cells), np.int64)
+    n = 0
+    for e in range(len(cells)):
+        renumbered[e] = n
+        if keep[e]:
+            n += 1
+            for k in range(4):
+                used[cells[e, k]] = True
+    number = np.cumsum(used) - 1
+    left = np.empty((n, 4), np.int64)
+    for e in range(len(cells)):
+        if keep[e]:
+            for k in range(4):
+                left[renumbered[e], k] = number[cells[e, k]]
+    return used, renumbered, left
 
 
-def _elements(memory):
-    """Fluid elements in the order of the background cells: parent (M,), element of each cut part."""
+def _elements(memory) -> Elements:
     cuts = memory.cuts
-    count = np.ones(len(memory.mesh.cells), dtype=np.int64)
-    count[memory.pair_cell] = 0
-    count += np.bincount(cuts.part_cell, minlength=len(count))
-    start = np.cumsum(count) - count
-    parts = np.arange(len(cuts.part_cell))
-    first = np.searchsorted(cuts.part_cell, cuts.part_cell)
-    return np.repeat(np.arange(len(count)), count), start[cuts.part_cell] + parts - first
+    met = np.zeros(len(memory.mesh.cells), bool)
+    met[memory.pair_cell] = True
+    return Elements(*_listed(met, cuts.part_cell, cuts.part_whole))
+
+
+@njit(cache=True)
+def _listed(met, part_cell, part_whole):
+    """Elements: each cell that no body meets, and each part of the others."""
+    most = len(met) + len(part_cell)
+    parent, part, n = np.empty(most, np.int64), np.full(most, -1, np.int64), 0
+    start, of_part, k = np.empty(len(met) + 1, np.int64), np.empty(len(part_cell), np.int64), 0
+    for cell in range(len(met)):
+        start[cell] = n
+        if not met[cell]:
+            parent[n] = cell
+            n += 1
+        while k < len(part_cell) and part_cell[k] == cell:
+            parent[n], of_part[k] = cell, n
+            if not part_whole[k]:
+                part[n] = k
+            n += 1
+            k += 1
+    start[-1] = n
+    return parent[:n].copy(), part[:n].copy(), start, of_part

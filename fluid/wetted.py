@@ -1,0 +1,127 @@
+"""What pressure on wetted surfaces does to bodies, and bodies to the water: the coupling matrix G."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from numba import njit
+
+
+def wetted_coupling(domain) -> sp.csr_matrix:
+    """G (N, 6 n_bodies): G[i, 6b:6b+3] = ∫ N_i n dA [m2], G[i, 6b+3:6b+6] = ∫ N_i (x - x_b) x n dA [m3].
+
+    n points out of body b, so a pressure field p loads it by force and torque -G^T p, and G V is the flux
+    that the body's motion V = (v, omega) pushes into the test functions. Exact: the integrands are of
+    degree 2. domain: PhysicalDomain."""
+    shape = (len(domain.nodes), 6 * domain.n_bodies)
+    if len(domain.face_cell) == 0:
+        return sp.csr_matrix(shape)
+    cell = domain.face_cell
+    block = _blocks(
+        cell, domain.face_body, domain.face_area, domain.face_normal, domain.face_points, domain.body_centre,
+        domain.nodes, domain.cells, domain.parent_cell, domain.memory.mesh.gradients,
+    )  # fmt: skip
+    start, members = _polygons_of_nodes(cell, domain.cells, shape[0])
+    row = _distinct(start, members, domain.face_body)
+    values, columns = _summed(start, members, domain.face_body, block, row)
+    return sp.csr_matrix((values.ravel(), columns.ravel(), 6 * row), shape=shape)
+
+
+@njit(cache=True)
+def _blocks(face_cell, face_body, area, normal, points, centre, nodes, cells, parent, g):
+    """∫ N_a (n, (x - x_b) x n) dA over every polygon, (S, 4, 6), a the corners of its cell."""
+    block = np.zeros((len(face_cell), 4, 6))
+    x, hat, turning = np.empty(3), np.empty(4), np.empty(3)
+    for s in range(len(face_cell)):
+        e, b = face_cell[s], face_body[s]
+        p, o = parent[e], cells[e, 0]
+        n0, n1, n2 = normal[s, 0], normal[s, 1], normal[s, 2]
+        for q in range(3):
+            for c in range(3):
+                x[c] = points[s, q, c]
+            hat[0] = 1.0
+            for a in range(1, 4):
+                hat[a] = 0.0
+                for c in range(3):
+                    hat[a] += g[p, a, c] * (x[c] - nodes[o, c])
+                hat[0] -= hat[a]
+            for c in range(3):
+                x[c] -= centre[b, c]
+            turning[0], turning[1], turning[2] = (
+                x[1] * n2 - x[2] * n1,
+                x[2] * n0 - x[0] * n2,
+                x[0] * n1 - x[1] * n0,
+            )
+            for a in range(4):
+                w = hat[a] * area[s] / 3.0
+                block[s, a, 0] += w * n0
+                block[s, a, 1] += w * n1
+                block[s, a, 2] += w * n2
+                for c in range(3):
+                    block[s, a, 3 + c] += w * turning[c]
+    return block
+
+
+@njit(cache=True)
+def _polygons_of_nodes(face_cell, cells, n_nodes):
+    """4 s + a of every polygon s at every node (its cell's corner a): start (N + 1,), members."""
+    start = np.zeros(n_nodes + 1, np.int64)
+    for s in range(len(face_cell)):
+        for a in range(4):
+            start[cells[face_cell[s], a] + 1] += 1
+    for i in range(n_nodes):
+        start[i + 1] += start[i]
+    filled, members = start[:-1].copy(), np.empty(4 * len(face_cell), np.int64)
+    for s in range(len(face_cell)):
+        for a in range(4):
+            i = cells[face_cell[s], a]
+            members[filled[i]] = 4 * s + a
+            filled[i] += 1
+    return start, members
+
+
+@njit(cache=True)
+def _distinct(start, members, body):
+    """Row start (N + 1,) of the pairs (node, body)."""
+    row = np.zeros(len(start), np.int64)
+    seen = np.full(body.max() + 1, -1, np.int64)
+    for i in range(len(start) - 1):
+        row[i + 1] = row[i]
+        for t in range(start[i], start[i + 1]):
+            b = body[members[t] // 4]
+            if seen[b] != i:
+                seen[b] = i
+                row[i + 1] += 1
+    return row
+
+
+@njit(cache=True)
+def _summed(start, members, body, block, row):
+    """Values and columns (pairs, 6) of the rows, bodies in ascending order."""
+    values, columns = np.zeros((row[-1], 6)), np.empty((row[-1], 6), np.int64)
+    place = np.full(body.max() + 1, -1, np.int64)
+    for i in range(len(start) - 1):
+        n = 0
+        around = columns[row[i] : row[i + 1], 0]
+        for t in range(start[i], start[i + 1]):
+            b = body[members[t] // 4]
+            if place[b] < row[i]:
+                place[b] = row[i]
+                k = n
+                while k > 0 and around[k - 1] > b:
+                    around[k] = around[k - 1]
+                    k -= 1
+                around[k] = b
+                n += 1
+        for k in range(n):
+            place[around[k]] = row[i] + k
+        for t in range(start[i], start[i + 1]):
+            s, a = members[t] // 4, members[t] % 4
+            at = place[body[s]]
+            for c in range(6):
+                values[at, c] += block[s, a, c]
+        for k in range(n):
+            first = 6 * around[k]
+            for c in range(6):
+                columns[row[i] + k, c] = first + c
+    return values, columns
