@@ -54,6 +54,11 @@ class Accounts:
         self._masses, self._motion, self._joints, self._contacts = masses, motion, joints, contacts
         self.load_work = self.joint_work = self.driving_work = self.handed_over = 0.0
 
+    @property
+    def free(self) -> Array:
+        """Rows of the blocks whose motion is not prescribed."""
+        return np.flatnonzero(self._masses.free)
+
     def start_here(self) -> None:
         """The present state is the start: blocks were displaced by hand."""
         self.joint_work = -self.joint_stored() - self.law_dissipation()

@@ -120,6 +120,11 @@ class Scene:
         )
         return np.frombuffer(buffer, float, STATE * len(rows_ids)).reshape(-1, STATE)
 
+    def angular_momentum(self, rows: Array) -> Array:
+        """About their own centres, as the integrator keeps it, of the blocks `rows` (k,) → (k, 3) [N m s]."""
+        bodies = self.O.bodies
+        return np.array([tuple(bodies[self.ids[r]].state.angMom) for r in rows], float).reshape(-1, 3)
+
     def step(self, dt: float, ids: list[int], F: Array) -> None:
         """Move on by dt [s] under the forces and moments F (k, 6) on the bodies `ids`.
 

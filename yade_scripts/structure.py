@@ -21,6 +21,7 @@ from yade_scripts.contact_state import Contacts, no_contacts, sum_on_blocks
 from yade_scripts.description import check_names, local_origin, matched_stiffness, moved_block
 from yade_scripts.engine import load_yade
 from yade_scripts.faces import FixedPlane, touching_faces
+from yade_scripts.impulses import Impulses, ImpulseSums
 from yade_scripts.joints import Joints, JointTable
 from yade_scripts.motion import Motion
 from yade_scripts.onset import ContactOnset, loose_at_start
@@ -44,6 +45,7 @@ class AdvanceReport:
     """substeps · dt_s [s] · opening_rate: largest growth of λ/δ_f in a substep (beyond about 0.25 the tearing is
     averaged over the substep) · mean_velocity (n, 6) = displacement and rotation vector over the step / dt
     load_work [J] done by the load · broken: joints that failed, rows of the joint table
+    impulses: what contacts and joints gave to every block
     """
 
     substeps: int
@@ -52,6 +54,7 @@ class AdvanceReport:
     mean_velocity: Array
     load_work: float
     broken: Array
+    impulses: Impulses
 
 
 class Structure:
@@ -150,8 +153,15 @@ class Structure:
     def _start_accounts(self) -> None:
         self.time = 0.0
         self._accounts = Accounts(self._masses, self._motion, self.joints, self._contacts)
+        self._impulses = ImpulseSums(self.n, self._origin)
         self._substepper = Substepper(
-            self._scene, self._motion, self.joints, self._contacts, self._spin, self._accounts
+            self._scene,
+            self._motion,
+            self.joints,
+            self._contacts,
+            self._spin,
+            self._accounts,
+            self._impulses,
         )
         self._substepper.list_bodies(self._onset.loose)
 
@@ -205,6 +215,7 @@ class Structure:
         self._turn_on_contacts()
         x0, R0, half, spin = m.x.copy(), m.R.copy(), m.half_step_back(), m.v[:, 3:].copy()
         self._substepper.fastest = 0.0
+        self._impulses.start()
         broken = [self._one_substep(dt / count) for _ in range(count)]
         m.read()
         self._check_finite()
@@ -212,8 +223,9 @@ class Structure:
         work = self._accounts.work_of_load(self._substepper.load, half, turn, spin)
         self._accounts.load_work += work
         mean = np.concatenate([m.x - x0, turn], axis=1) / dt
+        failed = np.concatenate(broken).astype(np.int64)
         return AdvanceReport(
-            count, dt / count, self._substepper.fastest, mean, work, np.concatenate(broken).astype(np.int64)
+            count, dt / count, self._substepper.fastest, mean, work, failed, self._impulses.taken()
         )
 
     def _turn_on_contacts(self) -> None:
@@ -280,6 +292,16 @@ class Structure:
     def velocity(self) -> Array:
         """(n, 6) [m/s, rad/s]"""
         return self._motion.v.copy()
+
+    def momentum(self, about: Array) -> Array:
+        """Momentum, and angular momentum about a point (3,), of the blocks that move freely (6,) [N s, N m s].
+
+        Of the velocities, half a substep before the places; with these it changes by the impulses to round-off."""
+        free = self._accounts.free
+        p = self.mass[free, None] * self._motion.v[free, :3]
+        orbital = np.cross(self._motion.x[free] + (self._origin - np.asarray(about)), p)
+        spin = self._scene.angular_momentum(free) - self._spin.save()[free]
+        return np.concatenate([p.sum(axis=0), (orbital + spin).sum(axis=0)])
 
     def inertia(self) -> Array:
         """(n, 3, 3) [kg m²] about the centres, world axes."""

@@ -12,6 +12,7 @@ import numpy as np
 
 from yade_scripts.accounts import Accounts
 from yade_scripts.contact_forces import ContactForces
+from yade_scripts.impulses import ImpulseSums
 from yade_scripts.joints import Joints
 from yade_scripts.motion import Motion
 from yade_scripts.scene import Scene
@@ -34,24 +35,26 @@ class Substepper:
         contacts: ContactForces | None,
         spin: SpinCorrection,
         accounts: Accounts,
+        impulses: ImpulseSums,
     ):
         self._scene, self._motion, self._joints, self._contacts = scene, motion, joints, contacts
-        self._spin, self._accounts = spin, accounts
+        self._spin, self._accounts, self._impulses = spin, accounts, impulses
         self.load = np.zeros((len(scene.ids), 6))
         self.fastest = 0.0
         self._F = np.zeros_like(self.load)
         self._joint_F = np.zeros_like(self.load)
+        self._without_contact = np.zeros_like(self.load)
         self.list_bodies(np.ones(len(scene.ids), bool))
 
     def list_bodies(self, loose: Array) -> None:
         """Find the bodies to read and push: after joints failed, the load changed or blocks became loose (n,) bool.
 
-        Read are those with a live joint, in reach of contact, or free to tumble; pushed also those under load."""
+        Read are those with a live joint, in reach of contact, or free to move; pushed also those under load."""
         none = np.zeros(0, np.int64)
         self._joined = self._joints.rows() if self._joints is not None else none
         self._turning = np.flatnonzero(self._spin.unequal)
         meeting = np.flatnonzero(loose) if self._contacts is not None else none
-        watched = np.union1d(np.union1d(self._joined, meeting), self._turning)
+        watched = np.union1d(np.union1d(self._joined, meeting), self._accounts.free)
         self._motion.watch(watched)
         self._pushed = np.union1d(watched, np.flatnonzero(self.load.any(axis=1)))
         self._pushed_ids = [self._scene.ids[r] for r in self._pushed]
@@ -61,13 +64,15 @@ class Substepper:
         m = self._motion
         before = m.v.copy()
         self._F[:] = self.load
+        self._joint_F[:] = 0.0
         if len(self._joined):
-            self._joint_F[:] = 0.0
             growth = self._joints.forces(m.x, m.v, m.R, self._joint_F, dt, advance=True)
             self.fastest = max(self.fastest, growth)
             self._F += self._joint_F
+        self._without_contact[:] = self._F
         if self._contacts is not None:
             self._contacts.add_forces(dt, self._F)
+        self._impulses.add(dt, m.x, self._joint_F, self._without_contact, self._F)
         if len(self._turning):
             self._spin.add(self._turning, m.R, m.v, dt, m.dt, self._F)
         self._scene.step(dt, self._pushed_ids, self._F[self._pushed])
