@@ -62,6 +62,7 @@ def _coupling(case: Case, structure, solids, clock, from_start: bool) -> Couplin
         clock=clock,
         passes=case.coupling.passes,
         tolerance=case.coupling.tolerance,
+        most_defect=case.limits.defect,
     )
 
 

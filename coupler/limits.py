@@ -62,6 +62,20 @@ def check_defect(time: float, mean_defect: float, limit: float) -> None:
         )
 
 
+def check_misses(time: float, defects: list[float], most: int, limit: float, dt: float) -> None:
+    """Stop where the last `most` steps missed by more than the limit although they were halved as often as allowed.
+
+    Raises Diverged.
+    """
+    if len(defects) < most or min(defects) <= limit:
+        return
+    raise Diverged(
+        f"the blocks miss the motion that the water was told by {defects[-1]:.0%} at t = {time:.4g} s, in {most} steps "
+        f"in a row, the last of {dt:.3g} s; limit {limit:.0%} (limits.defect). A shorter step does not help: raise "
+        "coupling.passes or joints.damping, or use a larger tank.cell or heavier blocks."
+    )
+
+
 def check_finite(time: float, what: str, values, item: str) -> None:
     """Stop at the first NaN or infinity, naming the quantity and the item (node, block) that holds it.
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from coupler.ledger import Balance, Ledger
-from coupler.limits import check_finite
+from coupler.limits import Diverged, check_finite, check_misses
 from coupler.observe import fastest_point
 
 Array = np.ndarray
@@ -24,6 +24,12 @@ STANDS_STILL = 1e-3
 """Share of the energy of the scene below which the motion of the structure is no measure of the defect."""
 DEFECT_STEPS = 20
 """Steps over which the defect is averaged: a breaking joint may spoil one of them."""
+RETRIES = 3
+"""Times that a step which failed is halved and taken again."""
+MISSES = 3
+"""Steps in a row that may miss by more than `most_defect` at their shortest before the run stops."""
+REGROWTH = 1.5
+"""By which the longest step grows again with every step that needs no retry."""
 
 
 @dataclass
@@ -41,6 +47,8 @@ class StepRecord:
     """Largest v dt_s / d_f of a substep: 1 and more means that a joint opened within one substep."""
     unknowns: int = 0
     bodies_cut: int = 0
+    retries: int = 0
+    """Times that the step was halved, and dt with it, because it failed or its defect was above `most_defect`."""
     load: Array = field(default_factory=lambda: np.zeros((0, 6)))
     balance: Balance = field(default_factory=Balance)
 
@@ -51,6 +59,7 @@ class Coupling:
     water, structure, immersion: either side may be None (immersion only with water).
     passes: most pressure solves in a step; beyond the first, the structure goes back and takes the step again, as long
     as the defect is above `tolerance`.
+    most_defect: above it, or where no pressure is found, both sides go back and take half of the step.
     """
 
     def __init__(
@@ -64,8 +73,12 @@ class Coupling:
         clock,
         passes: int = 1,
         tolerance: float = 0.02,
+        most_defect: float = 0.5,
     ):
-        self.passes, self.tolerance = passes, tolerance
+        self.passes, self.tolerance, self.most_defect = passes, tolerance, most_defect
+        self.longest = math.inf
+        """Longest step [s] after one that had to be halved."""
+        self._before = None
         self._defects: deque[float] = deque(maxlen=DEFECT_STEPS)
         self.water, self.structure, self.immersion = water, structure, immersion
         self.rtol, self.step_max, self.clock = rtol, step_max, clock
@@ -80,12 +93,14 @@ class Coupling:
 
     def save(self) -> dict[str, Array]:
         """What the coupling itself remembers between two steps; both sides and the ledger save theirs."""
-        return {"time": np.array(self.time), "defects": np.array(self._defects, float)}
+        found = {"time": np.array(self.time), "defects": np.array(self._defects, float)}
+        return found if math.isinf(self.longest) else found | {"longest": np.array(self.longest)}
 
     def restore(self, saved: dict[str, Array]) -> None:
         """Back to what was saved."""
         self.time = float(saved["time"])
         self._defects = deque(saved["defects"].tolist(), maxlen=DEFECT_STEPS)
+        self.longest = float(saved.get("longest", math.inf))
 
     @property
     def coupled(self) -> bool:
@@ -99,7 +114,7 @@ class Coupling:
 
     def step_size(self, remaining: float) -> float:
         """The largest step [s] that water, blocks and the case allow, dividing `remaining` evenly."""
-        dt = self.step_max
+        dt = min(self.step_max, self.longest)
         if self.water is not None:
             dt = min(dt, self.water.stable_step())
         if self.coupled:
@@ -109,7 +124,9 @@ class Coupling:
         return remaining / max(1, math.ceil(remaining / dt * (1.0 - 1e-9)))
 
     def step(self, dt: float) -> StepRecord:
-        """Advance both sides by dt [s]."""
+        """Advance both sides by dt [s], or by the half of it, its half, ... where a whole one fails: `record.dt`.
+
+        Raises Diverged, or what the pressure solver says, when that does not help either."""
         record = StepRecord(self.time + dt, dt)
         if self.coupled:
             self._coupled_step(dt, record)
@@ -117,7 +134,8 @@ class Coupling:
             self._water_step(dt, record)
         else:
             self._structure_step(dt, record)
-        self.time += dt
+        self.time += record.dt
+        record.time = self.time
         self._check_finite()
         if self.water is not None and self.water.sides is not None:
             self.ledger.entered = self.water.sides.energy
@@ -131,33 +149,70 @@ class Coupling:
             record.bodies_cut = self.immersion.cut_again
         if self.water.viscous is not None:
             self.water.body_velocity = self._padded(self.structure.velocity())
-        with self.clock("water"):
-            problem = self.water.predict(dt)
-        found = self._exchange(problem, record)
+        problem, found = self._attempts(dt, record)
         with self.clock("water"):
             self.water.correct(problem, found.x)
         n = self.structure.n
         record.load, record.unknowns = found.load, len(found.x)
-        self.ledger.give(dt * float(np.sum(found.load[:n] * found.velocity[:n])))
+        self.ledger.give(record.dt * float(np.sum(found.load[:n] * found.velocity[:n])))
+
+    def _attempts(self, dt: float, record: StepRecord):
+        """Problem and solution of a step of dt; of its half, and so on, where that has none or the blocks miss by more
+        than `most_defect`. `predict` changes nothing in the water, and the structure goes back to where it stood."""
+        from fluid.solve import NotConverged
+        from yade_scripts.structure import NotFinite
+
+        self._before = None
+        for record.retries in range(RETRIES + 1):
+            last = record.retries == RETRIES
+            record.dt = dt / 2**record.retries
+            try:
+                with self.clock("water"):
+                    problem = self.water.predict(record.dt)
+                found = self._exchange(problem, record)
+            except (NotConverged, NotFinite) as error:
+                if last or (self._before is None and isinstance(error, NotFinite)):
+                    raise Diverged(
+                        f"t = {self.time:.4g} s: {error} Steps down to {record.dt:.3g} s did not help."
+                    ) from error
+            else:
+                if last or self._before is None or record.defect <= self.most_defect:
+                    break
+            if self._before is not None:
+                self.structure.restore(self._before)
+        self._note_defect(record)
+        return problem, found
+
+    def _note_defect(self, record: StepRecord) -> None:
+        """Keep the next steps short after a retry, and stop where the shortest ones keep missing."""
+        self._defects.append(record.defect)
+        if record.retries > 0:
+            self.longest = record.dt
+        else:
+            self.longest = self.longest * REGROWTH if self.longest < self.step_max else math.inf
+        if record.retries == RETRIES:
+            check_misses(self.time, list(self._defects)[-MISSES:], MISSES, self.most_defect, record.dt)
 
     def _exchange(self, problem, record: StepRecord):
-        """Pressure with the structure inside, then the structure under it, as often as the passes allow."""
+        """Pressure with the structure inside, then the structure under it, as often as the passes allow.
+
+        `_before` keeps the structure as it stood; None where no block is wetted, then nothing is to be corrected."""
         from coupler.scheme import corrected_free_velocity, defect, solve_coupled
 
         structure = self.structure
         with self.clock("structure in pressure"):
             mass, response, v_free = self._response(problem)
-        passes = self.passes if problem.coupling.nnz else 1  # no wetted block, nothing to correct
-        found = saved = None
-        for record.passes in range(1, passes + 1):
+        wetted = problem.coupling.nnz > 0
+        with self.clock("structure"):
+            self._before = structure.save() if wetted else None
+        found = None
+        for record.passes in range(1, (self.passes if wetted else 1) + 1):
             with self.clock("pressure"):
                 guess = None if found is None else found.x
                 found = solve_coupled(problem, response, v_free, self._solve, self.rtol, guess)
             with self.clock("structure"):
                 if record.passes > 1:
-                    structure.restore(saved)
-                elif passes > 1:
-                    saved = structure.save()
+                    structure.restore(self._before)
                 structure.set_load(found.load[: structure.n])
                 report = structure.advance(problem.dt)
             record.iterations += found.iterations
@@ -169,7 +224,6 @@ class Coupling:
             mean = self._padded(report.mean_velocity)
             v_free = corrected_free_velocity(response, mean, found.x, problem.coupling)
         record.substep, record.opening_rate = report.dt_s, report.opening_rate
-        self._defects.append(record.defect)
         return found
 
     def _response(self, problem):

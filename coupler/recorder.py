@@ -46,6 +46,7 @@ COUPLING = (
     ("iterations", "1", "iterations of the linear solver"),
     ("unknowns", "1", "pressure unknowns (wet nodes)"),
     ("bodies_cut", "1", "bodies whose cells were cut again"),
+    ("retries", "1", "times that the step was halved and taken again"),
     ("substeps", "1", "YADE substeps"),
     ("substep", "s", "length of a substep"),
     ("defect", "1", "share by which the blocks' mean motion missed what the water was told"),

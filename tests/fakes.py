@@ -121,6 +121,12 @@ class FreeBody:
     def set_load(self, load):
         self._load = load
 
+    def save(self):
+        return self._x.copy(), self._v.copy(), self._work
+
+    def restore(self, saved):
+        self._x, self._v, self._work = saved[0].copy(), saved[1].copy(), saved[2]
+
     def advance(self, dt):
         before = self._v.copy()
         self._v[:, :3] += dt * (self._load[:, :3] / self.mass[:, None] + self._g)
