@@ -1,4 +1,5 @@
-"""One case in this process: `python -m coupler.verify.one ID FILE` writes a line of JSON for each result."""
+"""One case in this process: `python -m coupler.verify.one ID FILE [FIGURES]` writes a line of JSON for each result,
+and for each figure where a second file is named."""
 
 from __future__ import annotations
 
@@ -6,15 +7,23 @@ import json
 import os
 import sys
 from collections.abc import Iterator
+from contextlib import nullcontext
 from dataclasses import asdict
 
+from coupler.verify.curves import Figure, as_json
 from coupler.verify.registry import Check, Result, checks
 
 
-def results(case: Check) -> Iterator[Result]:
-    """Run a case. An error ends the process: `runner` reports it with what it said."""
+def results(case: Check, figures=None) -> Iterator[Result]:
+    """Run a case. An error ends the process: `runner` reports it with what it said.
+
+    figures: a text file for the figures that the case has; None: they are dropped."""
     began = cpu_seconds()
     for found in case.run():
+        if isinstance(found, Figure):
+            if figures is not None:
+                print(json.dumps(as_json(found)), file=figures, flush=True)
+            continue
         now = cpu_seconds()
         yield Result.of(case.id, found, now - began)
         began = now
@@ -28,10 +37,14 @@ def cpu_seconds() -> float:
 
 def main() -> None:
     """Write the results one by one, so that those before a crash are kept."""
-    id, path = sys.argv[1:]
-    with open(path, "w", encoding="utf-8") as file:
-        for result in results(checks()[id]):
+    id, path, *more = sys.argv[1:]
+    with open(path, "w", encoding="utf-8") as file, _figures(*more) as figures:
+        for result in results(checks()[id], figures):
             print(json.dumps(asdict(result)), file=file, flush=True)
+
+
+def _figures(path: str = ""):
+    return open(path, "w", encoding="utf-8") if path else nullcontext()
 
 
 if __name__ == "__main__":

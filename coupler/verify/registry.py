@@ -11,7 +11,10 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Literal
 
-MODULES = ("contact", "joints", "bending", "stock", "water", "viscous", "dam_breaks", "coupled", "wall")
+MODULES = (
+    "contact", "joints", "bending", "stock", "coupled", "wall",
+    "rest", "water", "collapse", "viscous", "dam_breaks", "bores",
+)  # fmt: skip
 """Files of this package that hold cases; their names are the groups."""
 
 NOT_COVERED = {

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from dataclasses import asdict
+from pathlib import Path
 
 from coupler.errors import ExitCode
 from coupler.verify.registry import NOT_COVERED, Check, Result
@@ -13,22 +16,38 @@ HEAD = ("case", "quantity", "value", "expected", "error", "limit", "", "cpu s")
 FORM = "{:5} {:73} {:>12} {:>12} {:>9} {:>8} {:4} {:>7}"
 
 
-def verify(ids: list[str], quick: bool, as_json: bool, only_list: bool) -> ExitCode:
-    """Run the cases asked for and print each result as it comes; DIVERGED if one did not pass."""
+def verify(
+    ids: list[str], quick: bool, as_json: bool, only_list: bool, plots: Path | None = None
+) -> ExitCode:
+    """Run the cases asked for and print each result as it comes; DIVERGED if one did not pass.
+
+    plots: a folder for figures of computed curves over measured ones, one or more a case that has any."""
     cases = chosen(ids, quick)
     if only_list:
         print(listing(cases))
         return ExitCode.DONE
+    if plots is not None:
+        plots.mkdir(parents=True, exist_ok=True)
     if not as_json:
         print(head())
     results = []
     for case in cases:
-        for result in run(case):
+        for result in run(case, plots):
             results.append(result)
             print(json_line(result) if as_json else line(result), flush=True)
     if not as_json:
         print(totals(results))
+    if plots is not None:
+        draw(plots, [case.id for case in cases])
     return ExitCode.DONE if all(r.passed for r in results) else ExitCode.DIVERGED
+
+
+def draw(plots: Path, ids: list[str]) -> None:
+    """Draw the figures that the cases left, in a process of its own, and tell the pictures on stderr."""
+    there = [str(path) for id in ids if (path := plots / f"{id}.json").exists() and path.stat().st_size]
+    if there:
+        command = [sys.executable, "-m", "coupler.view.curves", str(plots), *there]
+        subprocess.run(command, check=True, stdout=sys.stderr)
 
 
 def head() -> str:

@@ -33,11 +33,14 @@ def _unknown(id: str, known) -> str:
     return f"{id}: unknown case{did_you_mean(id.upper(), known)}; see surgebreak verify --list"
 
 
-def run(case: Check) -> Iterator[Result]:
-    """Results of one case from its own process; how that ended, when not well, is a result too."""
+def run(case: Check, plots: Path | None = None) -> Iterator[Result]:
+    """Results of one case from its own process; how that ended, when not well, is a result too.
+
+    plots: an existing folder for the figures of the case, <id>.json; None: it has none to write."""
+    figures = [] if plots is None else [str(plots / f"{case.id}.json")]
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "results"
-        command = [sys.executable, "-m", "coupler.verify.one", case.id, str(path)]
+        command = [sys.executable, "-m", "coupler.verify.one", case.id, str(path), *figures]
         try:
             done = subprocess.run(
                 command, capture_output=True, text=True, check=False, timeout=TIME_LIMIT[case.cost]

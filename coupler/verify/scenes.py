@@ -29,14 +29,33 @@ def box(centre, size, rotation=None) -> tuple[np.ndarray, tuple]:
 
 
 def tank(
-    size, cells, fill: Callable, structure=None, solids=(), rtol: float = 1e-9, is_open=None, **parameters
+    size,
+    cells,
+    fill: Callable,
+    structure=None,
+    solids=(),
+    rtol: float = 1e-9,
+    is_open=None,
+    is_smooth=None,
+    covers: str = "single",
+    **parameters,
 ) -> Coupling:
-    """Water in [0, size] on cells (nx, ny, nz), with blocks and fixed solids; fill as in `Water`."""
+    """Water in [0, size] on cells (nx, ny, nz) with blocks and fixed solids; fill, is_open, is_smooth: see `Water`."""
     mesh = box_mesh(np.zeros(3), size, np.asarray(size, float) / np.asarray(cells))
-    immersion = Immersion(mesh, structure, list(solids), "single")
-    parameters = WaterParameters(density=DENSITY, gravity=G, **parameters)
-    water = Water(mesh, immersion.domain, fill, parameters, is_open)
+    immersion = Immersion(mesh, structure, list(solids), covers)
+    parameters = WaterParameters(**({"density": DENSITY, "gravity": G} | parameters))
+    water = Water(mesh, immersion.domain, fill, parameters, is_open, is_smooth)
     return Coupling(water, structure, immersion, rtol=rtol, step_max=1.0, clock=Clock())
+
+
+def slice_sides(normal, centre):
+    """Sides of a slice of a wide flow, which do not rub it: those that y pierces."""
+    return np.abs(normal[:, 1]) > 0.5
+
+
+def top(normal, centre):
+    """The open top of a tank."""
+    return normal[:, 2] > 0.5
 
 
 def level_at(z: float) -> Callable:

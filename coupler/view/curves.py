@@ -1,0 +1,98 @@
+"""python -m coupler.view.curves FOLDER FILE...: figures of computed curves over measured ones.
+
+Each line of a file is one figure (coupler/verify/curves.py): panels of curves of the kinds computed, other, measured,
+band and exact. Writes FOLDER/NAME.png, .pdf and .svg.
+"""
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from coupler.view.palette import INK, LINES
+from coupler.view.plots import FORMATS, STYLE, WIDTH, _undated, plt
+
+PANEL_HEIGHT, SINGLE = 2.1, 2.9
+"""[inch] of a panel among others, and of one alone."""
+MARKERS = "osv^D"
+"""Of the measured points, in their order."""
+MOST_POINTS = 60
+"""Measured points drawn one by one; a denser record is a line."""
+BAND = "#d9d9d9"
+OWN = LINES
+"""Computed curves, in their order."""
+
+
+def draw(figure, folder):
+    """Draw one figure (the parsed JSON of it) and return the path of its PNG."""
+    panels, columns = figure["panels"], figure.get("columns", 1)
+    rows = -(-len(panels) // columns)
+    height = SINGLE if len(panels) == 1 else PANEL_HEIGHT * rows
+    with plt.rc_context(STYLE):
+        drawing, axes = plt.subplots(rows, columns, squeeze=False, figsize=(WIDTH, 0.45 + height))
+        for axis, panel in zip(axes.ravel(), panels):
+            draw_panel(axis, panel)
+        for axis in axes.ravel()[len(panels) :]:
+            axis.set_axis_off()
+        stem = Path(folder) / figure["name"]
+        for ending in FORMATS:
+            drawing.savefig(stem.with_suffix("." + ending), metadata=_undated(ending))
+        plt.close(drawing)
+    return stem.with_suffix(".png")
+
+
+def draw_panel(axis, panel):
+    """All curves of a panel, measured ones below the computed ones, with axes and legend."""
+    seen = {"computed": 0, "measured": 0}
+    for curve in panel["curves"]:
+        style = look(curve, seen)
+        x, y = np.array(curve["x"], float), np.array(curve["y"], float)
+        if curve["kind"] == "band":
+            axis.fill_between(x, y, np.array(curve["upper"], float), **style)
+        else:
+            axis.plot(x, y, **style)
+    axis.set_xlabel(panel["x_label"])
+    axis.set_ylabel(panel["y_label"])
+    axis.margins(x=0)
+    if panel.get("x_range"):
+        axis.set_xlim(panel["x_range"])
+    if panel.get("y_range"):
+        axis.set_ylim(panel["y_range"])
+    axis.legend(loc="best", frameon=True, framealpha=0.85, edgecolor="none", borderpad=0.2)
+
+
+def look(curve, seen):
+    """Style of a curve; seen: how many computed and measured ones there were so far, counted on."""
+    kind, style = curve["kind"], {"label": curve["label"]}
+    if kind == "band":
+        return style | {"color": BAND, "linewidth": 0, "zorder": 1}
+    if kind == "exact":
+        return style | {"color": INK, "linestyle": "--", "linewidth": 0.9, "zorder": 2.5}
+    if kind == "measured":
+        return style | measured(len(curve["x"]), seen)
+    colour = OWN[seen["computed"] % len(OWN)]
+    seen["computed"] += 1
+    return style | {"color": colour, "linestyle": "-" if kind == "computed" else "-.", "zorder": 3}
+
+
+def measured(count, seen):
+    """Style of a measured curve: points, or a line where they are too many."""
+    if count > MOST_POINTS:
+        return {"color": INK, "linewidth": 1.0, "zorder": 2}
+    marker = MARKERS[seen["measured"] % len(MARKERS)]
+    seen["measured"] += 1
+    points = {"linestyle": "none", "marker": marker, "markersize": 3.4, "markerfacecolor": "white"}
+    return {"color": INK, "zorder": 2, **points}
+
+
+def main(folder, *files):
+    """Draw the figures of all files; tell the pictures."""
+    Path(folder).mkdir(parents=True, exist_ok=True)
+    for file in files:
+        for line in Path(file).read_text(encoding="utf-8").splitlines():
+            print(draw(json.loads(line), folder), flush=True)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
