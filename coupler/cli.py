@@ -199,12 +199,17 @@ def verify(
     quick: Annotated[bool, typer.Option("--quick", help="only cases that take less than a minute")] = False,
     json: Annotated[bool, typer.Option("--json", help="one JSON object a quantity, one a line")] = False,
     list_: Annotated[bool, typer.Option("--list", help="list the cases, and those not covered")] = False,
+    plots: Annotated[
+        Path | None, typer.Option(help="a folder for figures: computed curves over measured ones")
+    ] = None,
 ) -> None:
     """Run cases against exact solutions and measured records; leaves with 3 if one misses its tolerance."""
     one_thread()
+    if plots is not None:
+        need("matplotlib", "view", "render")
     from coupler.verify.report import verify as run_cases
 
-    raise typer.Exit(int(run_cases(ids or [], quick=quick, as_json=json, only_list=list_)))
+    raise typer.Exit(int(run_cases(ids or [], quick=quick, as_json=json, only_list=list_, plots=plots)))
 
 
 @app.command()
