@@ -13,7 +13,7 @@ from numba import njit
 
 from fluid.jit import inner
 from fluid.pieces import workspace
-from fluid.polygons import polygon_area, shared_area
+from fluid.polygons import shared_area
 
 CLIP = 1e-12
 """Tolerance for clipping the open polygons, as a share of h."""
@@ -152,11 +152,20 @@ def _load_opening(w, slot, row, polygon_start, polygon_x):
 
 
 @inner
-def _open_area(w, key, order, open_start, polygon_start, polygon_x):
+def _open_area(key, order, open_start, polygon_start, x):
+    """Area [m2] of the openings of a part in a face, key = 4 part + face."""
     area = 0.0
     for s in range(open_start[key], open_start[key + 1]):
-        _load_opening(w, 0, order[s], polygon_start, polygon_x)
-        area += polygon_area(w, 0)
+        o = polygon_start[order[s]]
+        sx, sy, sz = 0.0, 0.0, 0.0
+        ax, ay, az = x[o + 1, 0] - x[o, 0], x[o + 1, 1] - x[o, 1], x[o + 1, 2] - x[o, 2]
+        for k in range(o + 2, polygon_start[order[s] + 1]):
+            bx, by, bz = x[k, 0] - x[o, 0], x[k, 1] - x[o, 1], x[k, 2] - x[o, 2]
+            sx += ay * bz - az * by
+            sy += az * bx - ax * bz
+            sz += ax * by - ay * bx
+            ax, ay, az = bx, by, bz
+        area += np.sqrt(sx * sx + sy * sy + sz * sz) / 2.0
     return area
 
 
@@ -168,22 +177,18 @@ def _contact_area(
 
     Part -1 is a whole cell; at most one of the two is. A lower bound of the area serves where it exceeds
     the share `enough` of the face."""
-    w.corners[0] = 3
-    for k in range(3):
-        for c in range(3):
-            w.polygon[0, k, 4 + c] = nodes[cells[cell, (f + 1 + k) % 4], c]
-    o, a, b = w.polygon[0, 0], w.polygon[0, 1], w.polygon[0, 2]
-    ax, ay, az = a[4] - o[4], a[5] - o[5], a[6] - o[6]
-    bx, by, bz = b[4] - o[4], b[5] - o[5], b[6] - o[6]
+    i, j, k = cells[cell, (f + 1) % 4], cells[cell, (f + 2) % 4], cells[cell, (f + 3) % 4]
+    ax, ay, az = nodes[j, 0] - nodes[i, 0], nodes[j, 1] - nodes[i, 1], nodes[j, 2] - nodes[i, 2]
+    bx, by, bz = nodes[k, 0] - nodes[i, 0], nodes[k, 1] - nodes[i, 1], nodes[k, 2] - nodes[i, 2]
     nx, ny, nz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
     twice = np.sqrt(nx * nx + ny * ny + nz * nz)
     full = twice / 2
     if other < 0:
-        return _open_area(w, 4 * part + f, order, open_start, polygon_start, polygon_x), full
-    theirs = _open_area(w, 4 * other + g, order, open_start, polygon_start, polygon_x)
+        return _open_area(4 * part + f, order, open_start, polygon_start, polygon_x), full
+    theirs = _open_area(4 * other + g, order, open_start, polygon_start, polygon_x)
     if part < 0:
         return theirs, full
-    ours = _open_area(w, 4 * part + f, order, open_start, polygon_start, polygon_x)
+    ours = _open_area(4 * part + f, order, open_start, polygon_start, polygon_x)
     if min(ours, theirs) == 0.0 or max(ours, theirs) >= full * (1 - 1e-12):
         return min(ours, theirs), full
     # Both sides are partly closed, not necessarily in the same place; they share at least this much.
@@ -196,4 +201,6 @@ def _contact_area(
             _load_opening(w, 0, order[s], polygon_start, polygon_x)
             _load_opening(w, 1, order[t], polygon_start, polygon_x)
             area += shared_area(w, 0, 1, nx, ny, nz, tolerance)
+            if area > enough * full:
+                return area, full
     return area, full

@@ -510,7 +510,7 @@ def cut_cells(nodes, cells, chosen, body_start, bodies, solids, tolerance, spaci
     most_bodies = int(np.diff(body_start).max()) if len(chosen) else 0
     most_planes = int(np.diff(solids.plane_start).max()) if len(solids) else 0
     w = workspace(scale, most_bodies, most_bodies * most_planes)
-    out = output(len(chosen) * 2 + 64, len(chosen) * 4 + 256, link_area >= 0)
+    out = output(len(chosen) * 2 + 64, len(chosen) * 8 + 256, link_area >= 0)
     offsets = solids.cut_offsets()
     while True:
         state = _cut_cells(

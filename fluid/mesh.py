@@ -79,6 +79,16 @@ class Background:
         return np.array([self.nodes.min(axis=0), self.nodes.max(axis=0)])
 
     @cached_property
+    def cell_size(self) -> np.ndarray:
+        """(M,) [m] edge of the brick that holds six such cells, (6 |e|)^(1/3)."""
+        return np.cbrt(6.0 * self.cell_volume)
+
+    @cached_property
+    def products(self) -> np.ndarray:
+        """∇N_a·∇N_b (M, 6) [1/m²] of the pairs ab = 01, 02, 03, 12, 13, 23."""
+        return _products(self.gradients)
+
+    @cached_property
     def skfem(self) -> MeshTet:
         """The same mesh for scikit-fem (node and cell numbers unchanged)."""
         return MeshTet(self.nodes.T.copy(), self.cells.T.copy(), sort_t=False, validate=False)
@@ -197,6 +207,18 @@ def _fill_bins(low, high, nx, ny, nz):
     order = np.argsort(bin_of_entry, kind="stable")
     start = np.concatenate([[0], np.cumsum(np.bincount(bin_of_entry, minlength=nx * ny * nz))])
     return start, cell[order]
+
+
+@njit(cache=True)
+def _products(g):
+    out = np.empty((g.shape[0], 6))
+    for e in range(g.shape[0]):
+        n = 0
+        for a in range(4):
+            for b in range(a + 1, 4):
+                out[e, n] = g[e, a, 0] * g[e, b, 0] + g[e, a, 1] * g[e, b, 1] + g[e, a, 2] * g[e, b, 2]
+                n += 1
+    return out
 
 
 @njit(cache=True)

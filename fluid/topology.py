@@ -13,11 +13,12 @@ import numpy as np
 from numba import njit
 
 from fluid.mesh import Background
+from fluid.wetted import polygons_of_nodes
 
 
 @dataclass(frozen=True)
 class Topology:
-    """nodes (N, 3) [m] · cells (M, 4) · parent (M,) row of `gradients` (.., 4, 3) [1/m] ·
+    """nodes (N, 3) [m] · cells (M, 4) · parent (M,) row of `gradients` (.., 4, 3) [1/m] and of their `products` ·
     volume (M,) [m³] of the fluid part · fraction (M,) fluid share of the cell ·
     share (M, 4) mean of N_a over the fluid part (∫ N_a = volume · share_a) · size (M,) [m] (6 |e|)^(1/3) ·
     node_start (N+1,), node_cells (4M,) cells around each node · neighbours (M, 4) across faces, -1 none ·
@@ -28,6 +29,7 @@ class Topology:
     cells: np.ndarray
     parent: np.ndarray
     gradients: np.ndarray
+    products: np.ndarray
     volume: np.ndarray
     fraction: np.ndarray
     share: np.ndarray
@@ -44,26 +46,27 @@ class Topology:
         """Lay out a PhysicalDomain of the background mesh."""
         cells, parent = np.ascontiguousarray(domain.cells), np.ascontiguousarray(domain.parent_cell)
         nodes = np.ascontiguousarray(domain.nodes)
-        full = mesh.cell_volume[parent]
         start, members = _cells_of_nodes(cells, len(nodes))
-        share = _shares(domain, mesh.gradients)
+        share, fraction, size, node_volume, beside_solid = _measures(
+            nodes, cells, parent, mesh.gradients, mesh.cell_volume, mesh.cell_size, domain.volume, domain.centroid,
+            domain.is_cut,
+        )  # fmt: skip
         return cls(
             nodes=nodes,
             cells=cells,
             parent=parent,
             gradients=mesh.gradients,
+            products=mesh.products,
             volume=domain.volume,
-            fraction=domain.volume / full,
+            fraction=fraction,
             share=share,
-            size=np.cbrt(6.0 * full),
+            size=size,
             node_start=start,
             node_cells=members,
             neighbours=_neighbours_in(mesh, nodes, cells, parent),
-            node_volume=np.bincount(
-                cells.ravel(), (domain.volume[:, None] * share).ravel(), minlength=len(nodes)
-            ),
+            node_volume=node_volume,
             covered=covered_nodes(domain),
-            beside_solid=np.isin(np.arange(len(nodes)), cells[domain.is_cut]),
+            beside_solid=beside_solid,
         )
 
     @cached_property
@@ -83,28 +86,56 @@ def covered_nodes(domain) -> np.ndarray:
     """(N,) bool: nodes behind every wetted polygon that some one body has in the cells around them.
 
     A body is convex, so a node with all of its nearby faces in front of it lies inside."""
-    covered = np.zeros(len(domain.nodes), bool)
-    if len(domain.face_cell) == 0:
-        return covered
-    corners = domain.cells[domain.face_cell]
-    to_node = domain.nodes[corners] - domain.face_centroid[:, None]
-    behind = np.einsum("sak,sk->sa", to_node, domain.face_normal) < -1e-12
-    key = corners * domain.n_bodies + domain.face_body[:, None]
-    pair, where = np.unique(key.ravel(), return_inverse=True)
-    in_front = np.bincount(where.ravel(), ~behind.ravel(), minlength=len(pair))
-    covered[pair[in_front == 0] // domain.n_bodies] = True
+    d = domain
+    if len(d.face_cell) == 0:
+        return np.zeros(len(d.nodes), bool)
+    start, members = polygons_of_nodes(d.face_cell, d.cells, len(d.nodes))
+    return _covered(start, members, d.nodes, d.face_body, d.face_centroid, d.face_normal)
+
+
+@njit(cache=True)
+def _covered(start, members, nodes, body, centroid, normal):
+    covered = np.zeros(len(nodes), np.bool_)
+    # marks of the node in hand: a body seen at all, a body with a face that the node is in front of
+    seen, in_front = np.full(body.max() + 1, -1, np.int64), np.full(body.max() + 1, -1, np.int64)
+    for i in range(len(nodes)):
+        behind = 0
+        for t in range(start[i], start[i + 1]):
+            s = members[t] // 4
+            b = body[s]
+            if seen[b] != i:
+                seen[b] = i
+                behind += 1
+            height = 0.0
+            for c in range(3):
+                height += (nodes[i, c] - centroid[s, c]) * normal[s, c]
+            if height >= -1e-12 and in_front[b] != i:
+                in_front[b] = i
+                behind -= 1
+        covered[i] = behind > 0
     return covered
 
 
-def _shares(domain, gradients):
-    """Mean of N_a over the fluid part of each cell: N_a at its centroid; exactly 1/4 in whole cells."""
-    share = np.full((len(domain.cells), 4), 0.25)
-    cut = np.flatnonzero(domain.is_cut)
-    offset = domain.centroid[cut] - domain.nodes[domain.cells[cut, 0]]
-    at_centroid = np.einsum("eak,ek->ea", gradients[domain.parent_cell[cut]], offset)
-    at_centroid[:, 0] += 1.0
-    share[cut] = np.clip(at_centroid, 0.0, 1.0)
-    return share
+@njit(cache=True)
+def _measures(nodes, cells, parent, g, full, full_size, volume, centroid, is_cut):
+    """share (M, 4), fraction (M,), size (M,), node_volume (N,) and beside_solid (N,) of Topology.
+
+    Mean of N_a over the fluid part of a cell: N_a at its centroid; exactly 1/4 in whole cells."""
+    share, fraction, size = np.empty(cells.shape), np.empty(len(cells)), np.empty(len(cells))
+    node_volume, beside_solid = np.zeros(len(nodes)), np.zeros(len(nodes), np.bool_)
+    for e in range(len(cells)):
+        p = parent[e]
+        fraction[e], size[e] = volume[e] / full[p], full_size[p]
+        for a in range(4):
+            share[e, a] = 0.25
+            if is_cut[e]:
+                at = 0.0
+                for k in range(3):
+                    at += g[p, a, k] * (centroid[e, k] - nodes[cells[e, 0], k])
+                share[e, a] = min(max(at + 1.0 if a == 0 else at, 0.0), 1.0)
+                beside_solid[cells[e, a]] = True
+            node_volume[cells[e, a]] += volume[e] * share[e, a]
+    return share, fraction, size, node_volume, beside_solid
 
 
 @njit(cache=True)
@@ -142,25 +173,20 @@ def _neighbours(parent_neighbours, cells, parent, n_parents):
         start[parent[e] + 1] += 1
     for k in range(n_parents):
         start[k + 1] += start[k]
-    filled = start[:-1].copy()
-    copies = np.empty(cells.shape[0], np.int64)
-    for e in range(cells.shape[0]):
-        copies[filled[parent[e]]] = e
-        filled[parent[e]] += 1
     found = np.full(cells.shape, -1, np.int64)
     for e in range(cells.shape[0]):
         for a in range(4):
             p = parent_neighbours[parent[e], a]
             if p < 0:
                 continue
-            for s in range(start[p], start[p + 1]):
+            for other in range(start[p], start[p + 1]):  # elements are in the order of their parents
                 shared = 0
                 for b in range(4):
                     for c in range(4):
-                        if b != a and cells[copies[s], c] == cells[e, b]:
+                        if b != a and cells[other, c] == cells[e, b]:
                             shared += 1
                 if shared == 3:
-                    found[e, a] = copies[s]
+                    found[e, a] = other
                     break
     return found
 
@@ -217,13 +243,17 @@ class Graph:
         row = np.full(len(t.nodes), -1, np.int64)
         row[nodes] = np.arange(len(nodes))
         start, neighbour, stiffness = _edges(
-            nodes, t.cells, t.parent, t.gradients, t.volume, t.node_start, t.node_cells
+            nodes, t.cells, t.parent, t.products, t.volume, t.node_start, t.node_cells
         )
         return cls(nodes, row, start, neighbour, stiffness)
 
 
+_PAIR = np.array([[-1, 0, 1, 2], [0, -1, 3, 4], [1, 3, -1, 5], [2, 4, 5, -1]])
+"""Column of Background.products that holds the corners a, b."""
+
+
 @njit(cache=True)
-def _edges(rows, cells, parent, g, volume, node_start, node_cells):
+def _edges(rows, cells, parent, products, volume, node_start, node_cells):
     slot = np.full(node_start.shape[0] - 1, -1, np.int64)
     start = np.zeros(rows.shape[0] + 1, np.int64)
     capacity = 16 * rows.shape[0] + 64
@@ -247,9 +277,7 @@ def _edges(rows, cells, parent, g, volume, node_start, node_cells):
                 if b == la:
                     continue
                 j = cells[e, b]
-                k = volume[e] * (
-                    g[p, la, 0] * g[p, b, 0] + g[p, la, 1] * g[p, b, 1] + g[p, la, 2] * g[p, b, 2]
-                )
+                k = volume[e] * products[p, _PAIR[la, b]]
                 if slot[j] < start[r]:
                     slot[j] = count
                     neighbour[count] = j

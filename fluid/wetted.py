@@ -21,7 +21,7 @@ def wetted_coupling(domain) -> sp.csr_matrix:
         cell, domain.face_body, domain.face_area, domain.face_normal, domain.face_points, domain.body_centre,
         domain.nodes, domain.cells, domain.parent_cell, domain.memory.mesh.gradients,
     )  # fmt: skip
-    start, members = _polygons_of_nodes(cell, domain.cells, shape[0])
+    start, members = polygons_of_nodes(cell, domain.cells, shape[0])
     row = _distinct(start, members, domain.face_body)
     values, columns = _summed(start, members, domain.face_body, block, row)
     return sp.csr_matrix((values.ravel(), columns.ravel(), 6 * row), shape=shape)
@@ -63,7 +63,7 @@ def _blocks(face_cell, face_body, area, normal, points, centre, nodes, cells, pa
 
 
 @njit(cache=True)
-def _polygons_of_nodes(face_cell, cells, n_nodes):
+def polygons_of_nodes(face_cell, cells, n_nodes):
     """4 s + a of every polygon s at every node (its cell's corner a): start (N + 1,), members."""
     start = np.zeros(n_nodes + 1, np.int64)
     for s in range(len(face_cell)):
