@@ -16,6 +16,7 @@ from numba import njit
 
 from fluid.extension import extend_velocity
 from fluid.moments import cells_touching, wet_fraction
+from fluid.momentum import Stages, momentum_change
 from fluid.projection import cell_gradient, cell_velocity, damp_divergence, nodal_mean, with_ghosts
 from fluid.volume import Flux, edge_flux
 
@@ -57,11 +58,15 @@ def corrected(water, problem, x) -> Corrected:
     remainder, kick_remainder = _remainders(water, kept, gradient, mean, dt)
     u_cell = kept.cell_star - gradient
     projected = u.copy()
-    clipped = _limit_and_damp(water, kept, share, u, a)
+    clipped, limited, damped = _limit_and_damp(water, kept, share, u, a)
+    slipping = u.copy()
     listed, start = water.layers(kept.wet)
     _continue(water, kept, listed, start, u, a)
     cell_field, flux = _flux(water, kept, listed, start, u, u_cell)
-    report = _report(water, problem, x, projected, u, clipped)
+    momentum = momentum_change(
+        water, problem, unknown, pressure, Stages(projected, limited, damped, slipping, u)
+    )
+    report = _report(water, problem, x, projected, u, clipped, momentum)
     return Corrected(
         u,
         a,
@@ -120,10 +125,12 @@ def _all_below(cell_list, phi, deep, cells):
     return found[:n].copy()
 
 
-def _limit_and_damp(water, kept, share, u, a) -> int:
-    """Speed limit, divergence damping and slip, in place; the number of clipped nodes."""
+def _limit_and_damp(water, kept, share, u, a):
+    """Speed limit, divergence damping and slip, in place; the number of clipped nodes, and the velocity (N, 3) after
+    the first and after the second."""
     t, parameters = water.topology, water.parameters
     clipped = _limit_speed(water, u, a)
+    limited = u.copy()
     damp_divergence(
         kept.wet_cells,
         parameters.divergence_damping,
@@ -138,8 +145,9 @@ def _limit_and_damp(water, kept, share, u, a) -> int:
         t.size,
         share,
     )
+    damped = u.copy()
     water.hold(u, kept.end)
-    return clipped
+    return clipped, limited, damped
 
 
 def _limit_speed(water, u, a) -> int:
@@ -189,7 +197,7 @@ def to_middle(cell_list, now, before):
     return out
 
 
-def _report(water, problem, x, projected, u, clipped):
+def _report(water, problem, x, projected, u, clipped, momentum):
     from fluid.water import StepReport, kinetic_energy
 
     kept, p = problem.predicted, water.parameters
@@ -209,8 +217,8 @@ def _report(water, problem, x, projected, u, clipped):
     names = ("transport and gravity", "volume correction", "pressure", "damping and limit")
     change = dict(zip(names, np.diff(stages)))
     if water.viscous is not None:
-        change["transport and gravity"] -= kept.shear_energy
-        change["viscosity and friction"] = kept.shear_energy
+        change["transport and gravity"] -= kept.shear.energy
+        change["viscosity and friction"] = kept.shear.energy
     volume = float(kept.nodal_water.sum())
     moved_by_bodies = problem.matrix @ x - problem.rhs
     return StepReport(
@@ -222,4 +230,15 @@ def _report(water, problem, x, projected, u, clipped):
         len(x),
         -problem.dt * float((x + problem.known) @ moved_by_bodies),
         change,
+        momentum,
+        *_outflow(water, kept),
     )
+
+
+def _outflow(water, kept) -> tuple[float, float]:
+    """What left through open sides in the step: volume [m³], and energy [J] with the velocity that it had."""
+    if kept.left is None:
+        return 0.0, 0.0
+    p = water.parameters
+    head = 0.5 * np.einsum("ij,ij->i", water.velocity, water.velocity) - water.topology.nodes @ p.weight
+    return float(kept.left.sum()), p.density * float(kept.left @ head)

@@ -39,7 +39,8 @@ class Predicted:
     """Between predict and correct: level_set (N,), nodal_water (N,) [m³], advected (N, 3) and u_star (N, 3) [m/s],
     wet (N,) bool, wet_cells (n,), cell_star (n, 3) [m/s] velocity of the wet cells, remainder (M, 3) [m/s],
     theta, conserved_volume and reinserted [m³], uncorrected_water (N,) [m³] before the volume correction,
-    shear_energy [J]: change of energy by viscosity and friction; end [s]: time at the end of the step;
+    shear: ViscousChange by viscosity and friction, None without; end [s]: time at the end of the step; left (N,) [m³]
+    that leaves through open sides, None if none;
     through (N,) [m³] that comes in through sides, None without any; held (N,) [Pa]: unknown part of the pressure on
     the nodes of seas, None without any side."""
 
@@ -55,8 +56,9 @@ class Predicted:
     conserved_volume: float
     reinserted: float
     uncorrected_water: np.ndarray
-    shear_energy: float
+    shear: object | None
     end: float
+    left: np.ndarray | None
     through: np.ndarray | None
     held: np.ndarray | None
 
@@ -85,7 +87,9 @@ def predicted(water, dt: float) -> PressureProblem:
         u_adv = u_adv + shear.change
     u_star = u_adv + theta * dt * parameters.weight
     u_star[water.topology.node_start[1:] == water.topology.node_start[:-1]] = 0.0
-    return _problem(water, dt, theta, kick, surface, conserved, u_adv, u_star, shear, through, inflow_rate)
+    return _problem(
+        water, dt, theta, kick, surface, conserved, u_adv, u_star, shear, left, through, inflow_rate
+    )
 
 
 def _sheared(water, dt, theta, kick, surface, u_adv):
@@ -165,7 +169,7 @@ def keep_dry(topology, phi, carried) -> None:
     phi[doubtful] = -phi[doubtful]
 
 
-def _problem(water, dt, theta, kick, surface, conserved, u_adv, u_star, shear, through, inflow_rate):
+def _problem(water, dt, theta, kick, surface, conserved, u_adv, u_star, shear, left, through, inflow_rate):
     t, density = water.topology, water.parameters.density
     phi = surface.level_set
     wet = (phi < 0.0) & t.active
@@ -199,8 +203,9 @@ def _problem(water, dt, theta, kick, surface, conserved, u_adv, u_star, shear, t
         conserved,
         surface.reinserted,
         surface.uncorrected_water,
-        0.0 if shear is None else shear.energy,
+        shear,
         water.time + dt,
+        left if left.any() else None,
         through,
         held,
     )

@@ -23,8 +23,9 @@ import numpy as np
 
 from fluid.domain import hat_values
 from fluid.moments import wet_fraction
+from fluid.momentum import momentum_of
 from fluid.solve import NotConverged
-from fluid.viscous_kernels import implicit_change, momentum_rate
+from fluid.viscous_kernels import implicit_change, momentum_rate, unheld_rate
 
 GAMMA = 1.0 - np.sqrt(0.5)
 TOLERANCE = 1e-7
@@ -36,12 +37,13 @@ STEEPEST = 1e6
 @dataclass(frozen=True)
 class ViscousChange:
     """velocity change δ (N, 3) [m/s] · load (n_bodies, 6) [N, N m], mean over the step · energy [J] of the water,
-    change · iterations."""
+    change · iterations · tank (6,) [N, N m] of the sides of the tank on the water, mean over the step."""
 
     change: np.ndarray
     load: np.ndarray
     energy: float
     iterations: int
+    tank: np.ndarray
 
 
 class WettedWalls:
@@ -90,13 +92,15 @@ class Viscosity:
         mass = self.parameters.density * nodal_water
         terms = self._terms(water, phi, mass, w)
         V = water.body_velocity
-        first, n1 = self._stage(terms, mass, dt, water.velocity + GAMMA * (w - water.velocity), V)
-        _, load1 = momentum_rate(terms, water.velocity + GAMMA * (w - water.velocity) + first, V)
+        half_way = water.velocity + GAMMA * (w - water.velocity)
+        first, n1 = self._stage(terms, mass, dt, half_way, V)
+        load1, tank1 = _acting(water, terms, half_way + first)
         second, n2 = self._stage(terms, mass, dt, w + (1.0 - GAMMA) / GAMMA * first, V)
         u = w + (1.0 - GAMMA) / GAMMA * first + second
-        _, load2 = momentum_rate(terms, u, V)
+        load2, tank2 = _acting(water, terms, u)
         energy = 0.5 * float(mass @ (np.einsum("ij,ij->i", u, u) - np.einsum("ij,ij->i", w, w)))
-        return ViscousChange(u - w, (1.0 - GAMMA) * load1 + GAMMA * load2, energy, n1 + n2)
+        load, tank = ((1.0 - GAMMA) * one + GAMMA * two for one, two in ((load1, load2), (tank1, tank2)))
+        return ViscousChange(u - w, load, energy, n1 + n2, tank)
 
     def _stage(self, terms, mass, dt, start, V):
         """d with (M + γ dt K) d = γ dt r(start)."""
@@ -149,3 +153,11 @@ class Viscosity:
             np.ascontiguousarray(a[use])
             for a in (k.cell, k.body, k.normal, k.hat, k.arm, area, nitsche, drag)
         )
+
+
+def _acting(water, terms, u):
+    """Loads (n_bodies, 6) of the velocity u (N, 3) on the bodies, and (6,) of the sides of the tank on the water."""
+    held, load = momentum_rate(terms, u, water.body_velocity)
+    free, _ = unheld_rate(terms, u, water.body_velocity)
+    arm = water.topology.nodes - water.reference
+    return load, momentum_of(np.ones(len(u)), held - free, arm)

@@ -105,16 +105,24 @@ def _slip_velocity(s, q, e, b, u, hat, arm, V, cells, v):
 @njit(cache=True)
 def momentum_rate(terms, u, body_velocity):
     """r (N, 3) [N] and load (n_bodies, 6) [N, N m].  terms: see `implicit_change`."""
-    cell_list, weight, walls, mu, node_drag, node, projector, idle, cells, parent, g = terms
-    r = np.zeros_like(u)
-    load = np.zeros_like(body_velocity)
-    cell_stress(cell_list, weight, u, cells, parent, g, r)
-    wall_stress(walls, mu, u, body_velocity, cells, parent, g, r, load)
+    node_drag, node, projector, idle = terms[4], terms[5], terms[6], terms[7]
+    r, load = unheld_rate(terms, u, body_velocity)
     for i in range(u.shape[0]):
         if node_drag[i] != 0.0:
             for k in range(3):
                 r[i, k] -= node_drag[i] * u[i, k]
     _restrict(r, node, projector, idle)
+    return r, load
+
+
+@njit(cache=True)
+def unheld_rate(terms, u, body_velocity):
+    """The same without the sides of the tank: without drag on their nodes, and as if they held nothing."""
+    cell_list, weight, walls, mu, _drag, _node, _projector, _idle, cells, parent, g = terms
+    r = np.zeros_like(u)
+    load = np.zeros_like(body_velocity)
+    cell_stress(cell_list, weight, u, cells, parent, g, r)
+    wall_stress(walls, mu, u, body_velocity, cells, parent, g, r, load)
     return r, load
 
 

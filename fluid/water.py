@@ -20,6 +20,7 @@ from fluid.domain import carry, wetted_coupling
 from fluid.extension import BAND, continue_into_solids, fill_missing
 from fluid.level_set import FAR, redistance, without_films
 from fluid.mesh import Background
+from fluid.momentum import MomentumChange
 from fluid.parameters import WaterParameters
 from fluid.predictor import keep_dry, predicted
 from fluid.projection import PressureProblem
@@ -41,7 +42,7 @@ class StepReport:
     volume [m³] of water · volume_error, (volume - conserved) / conserved · reinserted [m³] moved by the uniform
     shift (signed) · clipped: nodes at the speed limit · unknowns of the pressure · work_on_bodies [J] ·
     energy_change [J]: change of kinetic + potential energy by stage (transport and gravity, volume correction,
-    pressure, damping and limit)."""
+    pressure, damping and limit) · momentum: what changed it · left [m³], left_energy [J]: through open sides."""
 
     dt: float
     volume: float
@@ -51,6 +52,9 @@ class StepReport:
     unknowns: int
     work_on_bodies: float
     energy_change: dict[str, float]
+    momentum: MomentumChange
+    left: float
+    left_energy: float
 
 
 class Water:
@@ -85,8 +89,12 @@ class Water:
         self._surface_lag, self._solids_move = 0.0, False
         self.report: StepReport | None = None
         self.sides = sides
+        self.reference = mesh.bounds.mean(axis=0)
+        """Point (3,) [m] that angular momentum is taken about."""
         no_slip = self.parameters.walls == "no-slip"
         self._sides = Walls.of(mesh, is_open, is_smooth, no_slip, sides)
+        self._on_sides = np.zeros(len(mesh.nodes), bool)
+        self._on_sides[mesh.boundary_faces] = True
         self.viscous = _viscosity(self.parameters)
         self.body_velocity = np.zeros((domain.n_bodies, 6))
         self._set_domain(domain)
@@ -218,6 +226,8 @@ class Water:
         self.topology = Topology.of(self.mesh, domain)
         self.coupling = wetted_coupling(domain).tocsr()
         self._walls = self._sides.on_copies(domain.parent_node)
+        self.on_sides = self._on_sides[domain.parent_node]
+        """(N,) bool: nodes on the sides of the tank."""
         if self.sides is not None:
             self.sides.place(domain.parent_node, len(self.mesh.nodes), self.topology.active)
         self._domain_is_new = True

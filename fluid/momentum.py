@@ -1,0 +1,225 @@
+"""The momentum of the water and what changes it in a step, line by line.
+
+    P = ρ Σ W_i u_i,    L = ρ Σ W_i (x_i - x_0) × u_i         W_i: nodal volume, x_0: `Water.reference`
+
+A vector of six holds both, [N s, N m s]; every line is what it adds to the water in the step.
+
+Pressure.  A cell gets -|e| dt ∇p_e.  For every hat function ∫ ∇N_i dV = b_i - G_i over the physical domain, with b_i
+= ∮ N_i n dA over the sides of the tank and G_i the coupling to the bodies, and the same with arms, since products of
+linear functions are integrated exactly.  So
+
+    -dt Σ_e |e| ∇p_e  =  -dt Σ_i p_i b_i  +  dt Σ_i p_i G_i                                               (1)
+       the cells              the tank           the bodies, -Gᵀp on them
+
+to round-off, whatever the pressure is: `pressure_closure` is what is missing.  b_i is summed over the cells around
+nodes of the sides, so that (1) is a check of the cutting and not an identity.
+
+What the nodes make of it differs from (1) where the surface cuts cells, and where the part of the last pressure that is
+carried over acts on other nodes than it came from.  These differences, and what transport, volume correction, damping,
+limit and slip do, are lines of their own: the semi-Lagrangian transport does not conserve momentum.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from fluid.predictor import kick_factor
+
+NUMERICAL = (
+    "transport",
+    "volume_correction",
+    "carried",
+    "surface",
+    "damping",
+    "limit",
+    "slip",
+    "shear_solve",
+)
+"""Lines of the scheme, in the order of the step."""
+PHYSICAL = ("weight", "tank", "tank_shear", "sides", "bodies")
+"""Lines of what acts on the water."""
+
+
+@dataclass(frozen=True)
+class MomentumChange:
+    """before, after (6,) [N s, N m s]: momentum of the water at both ends of the step · lines: name → (6,), all of
+    PHYSICAL and NUMERICAL · pressure_closure (6,): what (1) misses, the residual of the step."""
+
+    before: np.ndarray
+    after: np.ndarray
+    lines: dict[str, np.ndarray]
+    pressure_closure: np.ndarray
+
+
+@dataclass(frozen=True)
+class Stages:
+    """Velocities (N, 3) [m/s] through the second half of the step: after the pressure, the speed limit, the damping,
+    the slip along the sides, and at the end."""
+
+    projected: np.ndarray
+    limited: np.ndarray
+    damped: np.ndarray
+    slipping: np.ndarray
+    end: np.ndarray
+
+
+def momentum_of(weight, u, arm) -> np.ndarray:
+    """Σ m_i [u_i; r_i × u_i] (6,); weight m (n,), u (n, 3), arm r (n, 3)."""
+    weighted = weight[:, None] * u
+    M = arm.T @ weighted
+    return np.concatenate([weighted.sum(axis=0), [M[1, 2] - M[2, 1], M[2, 0] - M[0, 2], M[0, 1] - M[1, 0]]])
+
+
+def about(point, load, centre) -> np.ndarray:
+    """Loads (n, 6) about their centres (n, 3) → their sum (6,) about a point (3,)."""
+    load, arm = np.reshape(load, (-1, 6)), np.reshape(centre, (-1, 3)) - point
+    return np.concatenate([load[:, :3].sum(axis=0), (load[:, 3:] + np.cross(arm, load[:, :3])).sum(axis=0)])
+
+
+def momentum(water) -> np.ndarray:
+    """P, L (6,) of a Water now."""
+    arm = water.topology.nodes - water.reference
+    return momentum_of(water.parameters.density * water.nodal_water, water.velocity, arm)
+
+
+def momentum_change(water, problem, unknown, pressure, stages: Stages) -> MomentumChange:
+    """The lines of a step that ends; `water` still holds the state at its beginning.
+
+    unknown, pressure (N,) [Pa]: x and x + known on wet nodes and seas."""
+    kept, dt = problem.predicted, problem.dt
+    x, p = np.where(kept.wet, unknown, 0.0), np.where(kept.wet, pressure, 0.0)
+    at = _momenta(water, kept, dt, stages)
+    cells, tank, held = _reactions(water, kept.wet_cells, x, p, dt)
+    told, shear_told, tank_shear = _loads(water, problem, p)
+    through, side_pressure = _through(water, kept), -dt * _pressure_on_sides(water, p)
+    weight = dt * at["weight"]
+    lines = {
+        "weight": weight,
+        "tank": tank - side_pressure,
+        "tank_shear": tank_shear,
+        "sides": through + side_pressure,
+        "bodies": -told,
+        "transport": at["carried"] - at["kicked"] - through,
+        "volume_correction": at["advected"] - at["carried"],
+        "carried": at["kicked"] - at["before"] + at["star"] - at["sheared"] - weight - cells[1],
+        "surface": at["projected"]
+        - at["star"]
+        - cells[0]
+        + at["end"]
+        - at["slipping"]
+        + told
+        + held
+        - shear_told,
+        "damping": at["damped"] - at["limited"],
+        "limit": at["limited"] - at["projected"],
+        "slip": at["slipping"] - at["damped"],
+        "shear_solve": at["sheared"] - at["advected"] + shear_told - tank_shear,
+    }
+    return MomentumChange(at["before"], at["end"], lines, cells[0] + cells[1] - tank - held)
+
+
+def _momenta(water, kept, dt, stages: Stages) -> dict[str, np.ndarray]:
+    """Momentum (6,) after every stage of the step; "weight" [N, N m]: that of the water."""
+    W0, own, W1 = water.nodal_water, kept.uncorrected_water, kept.nodal_water
+    rows = np.flatnonzero((W0 > 0.0) | (own > 0.0) | (W1 > 0.0))
+    arm = water.topology.nodes[rows] - water.reference
+    density, parameters = water.parameters.density, water.parameters
+    kick = (1.0 - kept.theta) * dt * kick_factor(water.acceleration, parameters)[:, None]
+    unsheared = kept.advected if kept.shear is None else kept.advected - kept.shear.change
+    found = {
+        "before": (W0, water.velocity),
+        "kicked": (W0, water.velocity + kick * water.acceleration),
+        "carried": (own, unsheared),
+        "advected": (W1, unsheared),
+        "sheared": (W1, kept.advected),
+        "star": (W1, kept.u_star),
+        "weight": (W1, np.broadcast_to(parameters.weight, unsheared.shape)),
+    }
+    found |= {name: (W1, u) for name, u in vars(stages).items()}
+    return {name: momentum_of(density * volume[rows], u[rows], arm) for name, (volume, u) in found.items()}
+
+
+def _reactions(water, cells, x, p, dt):
+    """Impulses on the water: by the cells, of x and of p - x; by the sides of the tank and by the bodies, of p."""
+    t, at_side = water.topology, water.on_sides
+    mesh = (t.nodes, t.cells, t.parent, t.gradients, t.volume, t.share)
+    of_x, of_p, of_sides = hat_forces(cells, x, p, at_side, water.reference, *mesh)
+    of_sides += _on_bodies(water, np.where(at_side, p, 0.0))
+    return (-dt * of_x, -dt * (of_p - of_x)), -dt * of_sides, dt * _on_bodies(water, p)
+
+
+def _on_bodies(water, p):
+    """Gᵀ p about the reference (6,) [N, N m]."""
+    return about(water.reference, water.coupling.T @ p, water.domain.body_centre)
+
+
+def _loads(water, problem, p):
+    """Impulses: told to the bodies, of it the wall shear, and that of the sides of the tank on the water by shear."""
+    centre, dt, shear = water.domain.body_centre, problem.dt, problem.predicted.shear
+    told = problem.other_load - (problem.coupling.T @ p[problem.dofs]).reshape(-1, 6)
+    told = dt * about(water.reference, told, centre)
+    if shear is None:
+        return told, np.zeros(6), np.zeros(6)
+    return told, dt * about(water.reference, shear.load, centre), dt * shear.tank
+
+
+def _through(water, kept):
+    """Momentum (6,) that came in with the water through sides, less what left."""
+    total = np.zeros(6)
+    arm = water.topology.nodes - water.reference
+    density = water.parameters.density
+    if kept.left is not None:
+        total -= momentum_of(density * kept.left, water.velocity, arm)
+    if kept.through is not None:
+        u = water.velocity.copy()
+        water.hold(u, kept.end)
+        total += momentum_of(density * kept.through, u, arm)
+    return total
+
+
+def _pressure_on_sides(water, p):
+    """∮ p [n; r × n] dA (6,) over inflows and seas, n outward; whole faces also where a solid cuts them."""
+    total = np.zeros(6)
+    for side in water.sides.now if water.sides is not None else ():
+        place = water.topology.nodes[side.faces] - water.reference
+        value = p[side.faces]
+        mean, middle = value.sum(axis=1) / 12.0, place.sum(axis=1)
+        first = np.einsum("fa,fak->fk", value, place) / 12.0 + mean[:, None] * middle
+        total[:3] += (value.mean(axis=1)[:, None] * side.area).sum(axis=0)
+        total[3:] += np.cross(first, side.area).sum(axis=0)
+    return total
+
+
+@njit(cache=True)
+def hat_forces(cell_list, x, p, at_side, reference, nodes, cells, parent, g, volume, share):
+    """Σ_e |e| [∇f; (c_e - x_0) × ∇f] (3, 6) over the listed cells for f = x, p, and p on the nodes at_side (N,) only.
+
+    c_e: centroid of the fluid part; exact for linear f."""
+    out = np.zeros((3, 6))
+    force = np.empty((3, 3))
+    arm = np.empty(3)
+    for e in cell_list:
+        q = parent[e]
+        force[:] = 0.0
+        for k in range(3):
+            arm[k] = -reference[k]
+        for a in range(4):
+            i = cells[e, a]
+            for k in range(3):
+                arm[k] += share[e, a] * nodes[i, k]
+                force[0, k] += x[i] * g[q, a, k]
+                force[1, k] += p[i] * g[q, a, k]
+                if at_side[i]:
+                    force[2, k] += p[i] * g[q, a, k]
+        for m in range(3):
+            f0, f1, f2 = volume[e] * force[m, 0], volume[e] * force[m, 1], volume[e] * force[m, 2]
+            out[m, 0] += f0
+            out[m, 1] += f1
+            out[m, 2] += f2
+            out[m, 3] += arm[1] * f2 - arm[2] * f1
+            out[m, 4] += arm[2] * f0 - arm[0] * f2
+            out[m, 5] += arm[0] * f1 - arm[1] * f0
+    return out
