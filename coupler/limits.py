@@ -76,6 +76,26 @@ def check_misses(time: float, defects: list[float], most: int, limit: float, dt:
     )
 
 
+HIGHEST_PRESSURE = 1e8
+"""[Pa] beyond any impact: water hammer at 70 m/s."""
+
+
+def check_pressure(time: float, pressure, nodes) -> None:
+    """Stop where water has no room: a chamber without a free surface that something driven makes smaller.
+
+    pressure (N,) [Pa] at nodes (N, 3) [m]. Raises Diverged.
+    """
+    worst = int(np.argmax(np.abs(pressure))) if len(pressure) else 0
+    if len(pressure) == 0 or abs(pressure[worst]) <= HIGHEST_PRESSURE:
+        return
+    place = ", ".join(f"{x:.3g}" for x in nodes[worst])
+    raise Diverged(
+        f"the pressure is {pressure[worst]:.3g} Pa at ({place}) m, t = {time:.4g} s; limit {HIGHEST_PRESSURE:.0e} Pa. "
+        "Water has no room to go there: look for a full chamber that a driven block or an inflow makes smaller, and "
+        "leave it an opening or some air."
+    )
+
+
 def check_finite(time: float, what: str, values, item: str) -> None:
     """Stop at the first NaN or infinity, naming the quantity and the item (node, block) that holds it.
 

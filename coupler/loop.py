@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from coupler.ledger import Balance, Ledger
-from coupler.limits import Diverged, check_finite, check_misses
+from coupler.limits import Diverged, check_finite, check_misses, check_pressure
 from coupler.observe import fastest_point
 
 Array = np.ndarray
@@ -290,5 +290,6 @@ class Coupling:
     def _check_finite(self) -> None:
         if self.water is not None:
             check_finite(self.time, "the velocity of the water", self.water.velocity, "node")
+            check_pressure(self.time, self.water.pressure, self.water.topology.nodes)
         if self.structure is not None:
             check_finite(self.time, "the velocity of the structure", self.structure.velocity(), "block")

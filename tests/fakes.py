@@ -115,8 +115,8 @@ class FreeBody:
     def joined_planes(self):
         return np.zeros(0, int), np.zeros(0, int), np.zeros(0)
 
-    def touching(self):
-        return np.array([False])
+    def overlaps(self):
+        return np.zeros(0, int), np.zeros((0, 3)), np.zeros(0)
 
     def set_load(self, load):
         self._load = load

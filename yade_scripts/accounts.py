@@ -69,12 +69,18 @@ class Accounts:
         held = rows[~self._masses.free[rows]]
         self.driving_work -= joint_kernel.work_of(F[held], before[held], self._motion.v[held], dt)
 
-    def work_of_load(self, load: Array, half_before: Array, turn: Array, spin_before: Array) -> float:
-        """Work of the held load (n, 6) [J] between the half substeps where the kinetic energy lives."""
-        free, m = self._masses.free, self._motion
-        moved = m.half_step_back() - half_before
-        turned = turn - 0.5 * m.dt * (m.v[:, 3:] - spin_before)
-        return float(np.sum(load[free, :3] * moved[free]) + np.sum(load[free, 3:] * turned[free]))
+    def take_load(
+        self, load: Array, before: Array, half_before: Array, turn: Array, spin_before: Array
+    ) -> float:
+        """Work of the held load (n, 6) [J] between the half substeps where the kinetic energy lives; on blocks of
+        prescribed motion over their whole way from `before` (n, 3): what drives them takes it up."""
+        m, free = self._motion, self._masses.free[:, None]
+        moved = np.where(free, m.half_step_back() - half_before, m.x - before)
+        turned = np.where(free, turn - 0.5 * m.dt * (m.v[:, 3:] - spin_before), turn)
+        work = np.sum(load[:, :3] * moved, axis=1) + np.sum(load[:, 3:] * turned, axis=1)
+        self.load_work += float(work.sum())
+        self.driving_work -= float(work[~self._masses.free].sum())
+        return float(work.sum())
 
     def energies(self) -> dict[str, float]:
         """See `Structure.energies`."""

@@ -220,8 +220,7 @@ class Structure:
         m.read()
         self._check_finite()
         turn = m.turned_since(R0)
-        work = self._accounts.work_of_load(self._substepper.load, half, turn, spin)
-        self._accounts.load_work += work
+        work = self._accounts.take_load(self._substepper.load, x0, half, turn, spin)
         mean = np.concatenate([m.x - x0, turn], axis=1) / dt
         failed = np.concatenate(broken).astype(np.int64)
         return AdvanceReport(
@@ -367,12 +366,12 @@ class Structure:
         m = self._motion
         return self.joints.corners(m.x, m.R) + self._origin, self.joints.corner_start
 
-    def touching(self) -> Array:
-        """(n,) bool: blocks with a contact, to one another or to a fixed plane."""
-        found = np.zeros(self.n, bool)
-        for rows in (self.contacts().a, self.contacts().b):
-            found[rows[rows >= 0]] = True
-        return found
+    def overlaps(self) -> tuple[Array, Array, Array]:
+        """Contacts seen from each block in them: block (m,), direction to the other body (m, 3), depth (m,) [m]."""
+        c = self.contacts()
+        other = c.b >= 0
+        rows = np.concatenate([c.a, c.b[other]])
+        return rows, np.concatenate([c.normal, -c.normal[other]]), np.concatenate([c.depth, c.depth[other]])
 
     def joined_planes(self) -> tuple[Array, Array, Array]:
         """Faces sealed by a live joint: block (m,), face (m,), half of the largest opening (m,) [m]."""

@@ -17,7 +17,8 @@ class Pipe:
     """Water that does nothing but solve its pressure; with `fails_above` only in steps up to that length."""
 
     viscous = sides = None
-    velocity = np.zeros((1, 3))
+    velocity, pressure = np.zeros((1, 3)), np.zeros(1)
+    topology = SimpleNamespace(nodes=np.zeros((1, 3)))
     mesh = SimpleNamespace(spacing=1.0)
 
     def __init__(self, fails_above=np.inf):
