@@ -14,7 +14,7 @@ import numpy as np
 
 from coupler.ledger import Balance, Ledger
 from coupler.limits import Diverged, check_finite, check_misses, check_pressure
-from coupler.observe import fastest_point
+from coupler.observe import fastest_point, surface_area
 
 Array = np.ndarray
 
@@ -24,6 +24,9 @@ STANDS_STILL = 1e-3
 """Share of the energy of the scene below which the motion of the structure is no measure of the defect."""
 DEFECT_STEPS = 20
 """Steps over which the defect is averaged: a breaking joint may spoil one of them."""
+SHEAR = 0.05
+"""dt ≤ SHEAR (m/A) h/μ for blocks of mass m and surface A in water that sticks to them: the shear of a step goes by
+the velocity that they had at its start, and a longer step turns their spin round (measured on a sphere)."""
 RETRIES = 3
 """Times that a step which failed is halved and taken again."""
 MISSES = 3
@@ -121,7 +124,17 @@ class Coupling:
             speed = fastest_point(self.structure.velocity(), self.radius)
             if speed > 0.0:
                 dt = min(dt, BLOCK_COURANT * self.water.mesh.spacing / speed)
+            dt = min(dt, self._shear_limit())
         return remaining / max(1, math.ceil(remaining / dt * (1.0 - 1e-9)))
+
+    def _shear_limit(self) -> float:
+        """Longest step [s] for the lightest block that the water sticks to."""
+        p, s = self.water.parameters, self.structure
+        free = np.flatnonzero(~s.fixed)
+        if self.water.viscous is None or p.walls != "no-slip" or len(free) == 0:
+            return math.inf
+        least = min(s.mass[b] / surface_area(s.shape_vertices[b], s.shape_faces[b]) for b in free)
+        return SHEAR * least * self.water.mesh.spacing / p.viscosity
 
     def step(self, dt: float) -> StepRecord:
         """Advance both sides by dt [s], or by the half of it, its half, ... where a whole one fails: `record.dt`.

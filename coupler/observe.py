@@ -28,6 +28,22 @@ def joint_counts(structure) -> JointCounts:
     )
 
 
+def size(coupling) -> dict[str, int]:
+    """How large the scene is now: cells outside solids, those cut by them, those with water; blocks, joints.
+
+    Absent sides are left out."""
+    found = {}
+    if coupling.water is not None:
+        water, topology = coupling.water, coupling.water.topology
+        found["cells"] = len(topology.cells)
+        found["cut_cells"] = int(water.domain.is_cut.sum())
+        found["wet_cells"] = int((water.level_set[topology.cells] < 0.0).any(axis=1).sum())
+    if coupling.structure is not None:
+        found["blocks"] = coupling.structure.n
+        found["joints"] = joint_counts(coupling.structure).intact
+    return found
+
+
 def block_damage(structure) -> Array:
     """(n,) area-weighted mean damage of the joints that each block had at the start; 0 for blocks without."""
     table = structure.joint_table()
@@ -48,6 +64,15 @@ def fastest_point(velocity: Array, radius: Array) -> float:
         return 0.0
     spin = np.linalg.norm(velocity[:, 3:], axis=1)
     return float((np.linalg.norm(velocity[:, :3], axis=1) + spin * radius).max())
+
+
+def surface_area(vertices: Array, faces) -> float:
+    """Surface [m²] of a polyhedron: vertices (k, 3) [m], faces as rows of vertices."""
+    total = 0.0
+    for face in faces:
+        arm = vertices[list(face)] - vertices[face[0]]
+        total += 0.5 * float(np.linalg.norm(np.cross(arm[1:-1], arm[2:]).sum(axis=0)))
+    return total
 
 
 def crack_columns(structure) -> dict[str, Array]:
