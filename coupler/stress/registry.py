@@ -13,6 +13,8 @@ from typing import Literal
 
 GROUPS: dict[str, tuple[str, ...]] = {
     "structure": ("strength", "contacts", "masses", "places", "steps", "piles"),
+    "water": ("still", "violent"),
+    "coupling": ("bodies", "crowds"),
 }
 """Packages in this folder and their files with scenes."""
 
