@@ -66,11 +66,25 @@ class Stages:
     end: np.ndarray
 
 
-def momentum_of(weight, u, arm) -> np.ndarray:
-    """Σ m_i [u_i; r_i × u_i] (6,); weight m (n,), u (n, 3), arm r (n, 3)."""
-    weighted = weight[:, None] * u
-    M = arm.T @ weighted
-    return np.concatenate([weighted.sum(axis=0), [M[1, 2] - M[2, 1], M[2, 0] - M[0, 2], M[0, 1] - M[1, 0]]])
+def momentum_of(weight, u, place) -> np.ndarray:
+    """Σ m_i [u_i; r_i × u_i] (6,); weight m (n,), u (n, 3), place r (n, 3)."""
+    return _momentum(np.arange(len(weight)), 1.0, weight, u, place, np.zeros(3))
+
+
+@njit(cache=True)
+def _momentum(rows, density, volume, u, nodes, reference):
+    out = np.zeros(6)
+    for i in rows:
+        m = density * volume[i]
+        r0, r1, r2 = nodes[i, 0] - reference[0], nodes[i, 1] - reference[1], nodes[i, 2] - reference[2]
+        p0, p1, p2 = m * u[i, 0], m * u[i, 1], m * u[i, 2]
+        out[0] += p0
+        out[1] += p1
+        out[2] += p2
+        out[3] += r1 * p2 - r2 * p1
+        out[4] += r2 * p0 - r0 * p2
+        out[5] += r0 * p1 - r1 * p0
+    return out
 
 
 def about(point, load, centre) -> np.ndarray:
@@ -81,8 +95,9 @@ def about(point, load, centre) -> np.ndarray:
 
 def momentum(water) -> np.ndarray:
     """P, L (6,) of a Water now."""
-    arm = water.topology.nodes - water.reference
-    return momentum_of(water.parameters.density * water.nodal_water, water.velocity, arm)
+    wet = np.flatnonzero(water.nodal_water > 0.0)
+    state = (water.nodal_water, water.velocity, water.topology.nodes, water.reference)
+    return _momentum(wet, water.parameters.density, *state)
 
 
 def momentum_change(water, problem, unknown, pressure, stages: Stages) -> MomentumChange:
@@ -125,21 +140,26 @@ def _momenta(water, kept, dt, stages: Stages) -> dict[str, np.ndarray]:
     """Momentum (6,) after every stage of the step; "weight" [N, N m]: that of the water."""
     W0, own, W1 = water.nodal_water, kept.uncorrected_water, kept.nodal_water
     rows = np.flatnonzero((W0 > 0.0) | (own > 0.0) | (W1 > 0.0))
-    arm = water.topology.nodes[rows] - water.reference
-    density, parameters = water.parameters.density, water.parameters
-    kick = (1.0 - kept.theta) * dt * kick_factor(water.acceleration, parameters)[:, None]
+    nodes, parameters = water.topology.nodes, water.parameters
+    kicked = water.velocity.copy()
+    a = water.acceleration[rows]
+    kicked[rows] += (1.0 - kept.theta) * dt * kick_factor(a, parameters)[:, None] * a
     unsheared = kept.advected if kept.shear is None else kept.advected - kept.shear.change
     found = {
         "before": (W0, water.velocity),
-        "kicked": (W0, water.velocity + kick * water.acceleration),
+        "kicked": (W0, kicked),
         "carried": (own, unsheared),
         "advected": (W1, unsheared),
         "sheared": (W1, kept.advected),
         "star": (W1, kept.u_star),
-        "weight": (W1, np.broadcast_to(parameters.weight, unsheared.shape)),
     }
     found |= {name: (W1, u) for name, u in vars(stages).items()}
-    return {name: momentum_of(density * volume[rows], u[rows], arm) for name, (volume, u) in found.items()}
+    density, about_point = parameters.density, water.reference
+    at = {name: _momentum(rows, density, W, u, nodes, about_point) for name, (W, u) in found.items()}
+    at["weight"] = _momentum(
+        rows, density, W1, np.broadcast_to(parameters.weight, nodes.shape), nodes, about_point
+    )
+    return at
 
 
 def _reactions(water, cells, x, p, dt):

@@ -55,6 +55,8 @@ def differences(one, two, at="water", found=None):
             found.append(at)
         for k, (a, b) in enumerate(zip(one, two)):
             differences(a, b, f"{at}[{k}]", found)
+    elif isinstance(one, dict):
+        differences([*one, *one.values()], [*two, *two.values()], at, found)
     elif hasattr(one, "toarray"):
         differences([one.data, one.indices, one.indptr], [two.data, two.indices, two.indptr], at, found)
     elif hasattr(one, "__dict__") and type(one).__module__.startswith("fluid"):
