@@ -12,6 +12,7 @@ from pydantic import Field
 
 from coupler.case_gauges import Gauge
 from coupler.case_structure import Structure
+from coupler.case_study import Study
 from coupler.case_types import (
     Name,
     Point,
@@ -202,6 +203,7 @@ class Case(Section):
     motion: tuple[Motion, ...] = Field((), description="blocks that move as prescribed")
     coupling: Exchange = Field(default_factory=Exchange, description="how water and blocks agree on a step")
     limits: RunLimits = Field(default_factory=RunLimits, description="when a run stops early")
+    study: Study | None = Field(None, exclude=True, description="what `surgebreak study` varies and measures")
 
 
 def modules(case: Case) -> dict[str, bool]:

@@ -25,13 +25,21 @@ Problem = tuple[KeyPath, str]
 def problems(case: Case) -> list[Problem]:
     """Everything that is wrong with a case whose sections are valid one by one."""
     wrong_frames = [*frame_problems(case), *refused_solids(case)]
-    found = [*_sections(case), *wrong_frames]
+    found = [*_sections(case), *_study(case), *wrong_frames]
     if wrong_frames:
         return found  # without a direction or a tank the rest would report nonsense
     shapes = [*_shapes(case), *opening_problems(case)]
     parts, refused = _made(case, {path[:3] for path, _ in shapes})
     found += [*shapes, *refused, *_unique_names(case, parts), *_known_names(case, parts), *_pairs(case)]
     return [*found, *_law(case), *place_problems(case, parts)]
+
+
+def _study(case: Case) -> Iterator[Problem]:
+    if case.study is None:
+        return
+    from coupler.study.names import study_problems
+
+    yield from study_problems(case.study)
 
 
 def remarks(case: Case) -> list[str]:

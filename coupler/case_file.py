@@ -21,10 +21,13 @@ from pydantic import ValidationError
 from coupler.case import Case
 from coupler.case_checks import problems
 from coupler.case_messages import explain_error
-from coupler.errors import BadCase
+from coupler.case_schema import find, keys
+from coupler.errors import BadCase, did_you_mean
 from coupler.toml_lines import key_lines, line_of, shown
 
 KeyPath = tuple[str | int, ...]
+ABSENT = "absent"
+"""Value of an override that leaves the name out, as if it had not been written."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +64,7 @@ def load(place: Path | str, overrides: Iterable[str] = (), files: Path | None = 
 
 def _place_files(table: dict, directory: Path) -> None:
     """Paths in the case are meant from its directory; what is no path is refused later."""
-    for above, name in (("structure", "file"), ("water", "inflow"), (None, "solid")):
+    for above, name in (("structure", "file"), ("water", "inflow"), ("study", "quantity"), (None, "solid")):
         section = table if above is None else table.get(above)
         entries = section.get(name) if isinstance(section, dict) else None
         for entry in entries if isinstance(entries, list) else ():
@@ -138,7 +141,7 @@ def _read(path: Path) -> tuple[str, dict]:
 def _apply(table: dict, override: str) -> KeyPath:
     """Write one `a.b=value` or `a.b[1].c=value` into the table; returns its path.
 
-    `value` is TOML; what is no TOML is taken as text, so that units need no quotes.
+    `value` is TOML; what is no TOML is taken as text, so that units need no quotes. `a.b=absent` leaves a.b out.
     """
     name, sign, value = override.partition("=")
     path = _parse_path(name.strip())
@@ -146,12 +149,32 @@ def _apply(table: dict, override: str) -> KeyPath:
         raise BadCase(
             [f"--set {override}: write KEY=VALUE, for instance time.end=2 or joints.strength='1 MPa'"]
         )
+    if value.strip() == ABSENT:
+        _leave_out(table, path, override)
+        return path
     holder = table
     for part, following in pairwise(path):
         holder = _step_into(holder, part, [] if isinstance(following, int) else {}, override)
     _step_into(holder, path[-1], None, override)
     holder[path[-1]] = _value(value.strip())
     return path
+
+
+def _leave_out(table: dict, path: KeyPath, override: str) -> None:
+    """Take a name of the schema out of the table, if it is there."""
+    if find(path) is None:
+        name = shown(path)
+        raise BadCase(
+            [f"--set {override}: {name}: unknown name{did_you_mean(name, [key.path for key in keys()])}"]
+        )
+    holder = table
+    for part in path[:-1]:
+        if isinstance(holder, dict) and part not in holder:
+            return
+        holder = _step_into(holder, part, None, override)
+    _step_into(holder, path[-1], None, override)
+    if not isinstance(holder, dict) or path[-1] in holder:
+        del holder[path[-1]]
 
 
 def _parse_path(name: str) -> KeyPath:

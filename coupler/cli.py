@@ -258,6 +258,40 @@ def compare_laws(
 
 
 @app.command()
+def study(
+    words: Annotated[
+        list[Path],
+        typer.Argument(metavar="CASE | compare A B", help="a case with a section [study], or two studies"),
+    ],
+    ladder: Annotated[str, typer.Option(help="comma-separated names of ladders; else all of the case")] = "",
+    repeat: Annotated[
+        int | None, typer.Option(min=1, help="times that each run is made; else study.repeat of the case")
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option(help="directory of the study; else runs/study beside the case")
+    ] = None,
+    larger: Annotated[bool, typer.Option("--larger", help="with the larger rungs of the ladders")] = False,
+    any_version: Annotated[
+        bool, typer.Option("--any-version", help="keep runs that another version of the program made")
+    ] = False,
+    error: Annotated[float, typer.Option(min=1.0, help="compare: largest ratio of errors, B over A")] = 1.1,
+    cpu: Annotated[float, typer.Option(min=1.0, help="compare: largest ratio of CPU seconds")] = 1.2,
+) -> None:
+    """Error against run time over ladders of a case; goes on where it stopped. `compare A B`: 3 if B is worse."""
+    one_thread()
+    if len(words) == 3 and str(words[0]) == "compare":
+        from coupler.study.against import compare as compare_studies
+
+        raise typer.Exit(int(compare_studies(words[1], words[2], error, cpu)))
+    if len(words) != 1:
+        raise typer.BadParameter("give one case, or: compare A B")
+    from coupler.study.command import study as make_study
+
+    names = [name.strip() for name in ladder.split(",") if name.strip()]
+    raise typer.Exit(int(make_study(words[0], names, repeat, output, larger, any_version)))
+
+
+@app.command()
 def benchmark(
     quick: Annotated[bool, typer.Option("--quick", help="1000 joints only")] = False,
     json: Annotated[bool, typer.Option("--json", help="one JSON object")] = False,

@@ -2,8 +2,8 @@
 
 [[expect]]
 what = "..."           for people                    table, column   of the history
-take = "last"          last | largest (by size, sign kept) | mean | at (time) | integral (from, to) | period |
-                       arrival (above): first time that the column exceeds a value
+take = "last"          last | largest (by size, sign kept) | max | min | mean | at (time) | integral (from, to) |
+                       period | arrival (above): first time that the column exceeds a value
 value, tolerance       |taken - value| ≤ tolerance   or at_least = / at_most =
 source = "..."         where the number comes from
 """
@@ -85,6 +85,8 @@ def _arrival(time: np.ndarray, values: np.ndarray, entry: dict) -> float:
 TAKE: dict[str, Callable[[np.ndarray, np.ndarray, dict], float]] = {
     "last": lambda time, values, entry: values[-1],
     "largest": lambda time, values, entry: values[np.abs(values).argmax()],
+    "max": lambda time, values, entry: values.max(),
+    "min": lambda time, values, entry: values.min(),
     "mean": lambda time, values, entry: np.trapezoid(values, time) / (time[-1] - time[0]),
     "at": lambda time, values, entry: np.interp(entry["time"], time, values),
     "integral": _integral,

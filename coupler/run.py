@@ -9,7 +9,7 @@ from coupler.case import Case, effective
 from coupler.clock import Clock
 from coupler.errors import ExitCode
 from coupler.limits import LimitReached, Limits, check_balance, check_defect
-from coupler.observe import joint_counts
+from coupler.observe import joint_counts, size
 from coupler.recorder import Recorder
 from coupler.schedule import Schedule, checkpoint_interval
 
@@ -35,6 +35,7 @@ def run(case: Case, directory, reporter, checkpoint=None) -> ExitCode:
             if checkpoint:
                 _restore(scene, checkpoint, clock)
             _describe(scene, reporter)
+            directory.record(size=size(scene.coupling))
             if scene.coupling.structure is not None:
                 directory.record(laws=laws_of(scene.coupling.structure))
             _steps(case, scene, directory, reporter, clock, figures, checkpoint)

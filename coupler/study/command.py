@@ -1,0 +1,49 @@
+"""The command `surgebreak study`: plan, runs, errors, tables, figures."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Iterable
+from importlib.util import find_spec
+from pathlib import Path
+
+from coupler.errors import ExitCode
+from coupler.study.laws import law_points
+from coupler.study.page import page
+from coupler.study.plan import make_plan
+from coupler.study.report import content, write
+from coupler.study.results import collect
+from coupler.study.runner import Runs
+
+
+def study(
+    case: Path,
+    ladders: Iterable[str],
+    repeat: int | None,
+    output: Path | None,
+    larger: bool,
+    any_version: bool,
+) -> ExitCode:
+    """Make the study of a case in its directory and tell its tables; leaves with DIVERGED if a run failed.
+
+    Runs that are done stay: a study that was stopped goes on, larger rungs are added to it. Raises BadCase.
+    """
+    plan = make_plan(case, ladders, larger)
+    folder = output or plan.file.directory / "runs" / "study"
+    runs = Runs(plan, folder, any_version, lambda text: print(text, flush=True))
+    found = collect(plan, runs, repeat or plan.study.repeat)
+    told = content(plan, runs, found, law_points(plan, runs))
+    write(folder, told)
+    print(page(told))
+    _draw(folder)
+    print(f"results in {folder}")
+    return ExitCode.DIVERGED if any(outcome.run.failed for outcome in found.values()) else ExitCode.DONE
+
+
+def _draw(folder: Path) -> None:
+    """The figures, in a process of their own; told where matplotlib is absent."""
+    if find_spec("matplotlib") is None:
+        print("no figures: matplotlib is not installed (pip install -c constraints.txt -e '.[view]')")
+        return
+    subprocess.run([sys.executable, "-m", "coupler.view.study", str(folder)], check=True)

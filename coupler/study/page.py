@@ -1,0 +1,187 @@
+"""A study as Markdown, and docs/studies.md out of several: `python -m coupler.study.page STUDY...`."""
+
+from __future__ import annotations
+
+import json
+import math
+import shlex
+import sys
+from pathlib import Path
+
+AGAINST = {
+    "exact": "the exact answer",
+    "measured": "the measurement",
+    "finest": "the finest run",
+}
+
+TIMES = ("cpu_seconds", "set_up_seconds", "start_seconds", "compile_seconds", "wall_seconds")
+
+
+def page(told: dict, level: int = 1, pictures: str = "") -> str:
+    """One study; pictures: where its figures are, from the page."""
+    mark = "#" * level
+    parts = [
+        f"{mark} {told['title']}",
+        _where(told),
+        *(_quantity(told, q, mark, pictures) for q in told["quantities"]),
+        f"{mark}# Runs\n\n{_runs(told)}",
+        f"{mark}# Cheapest setting for an error\n\n{_cheapest(told)}",
+    ]
+    if told["orders"]:
+        parts.append(f"{mark}# Observed order of convergence\n\n{_orders(told)}")
+    if told["laws"]:
+        parts.append(f"{mark}# Laws of YADE and ours\n\n{_laws(told)}")
+    if told["parts"]:
+        parts.append(f"{mark}# What parts of the program cost\n\n{_parts(told)}")
+    failed = _failed(told)
+    if failed:
+        parts.append(f"{mark}# Runs that failed\n\n{failed}")
+    return "\n\n".join(parts) + "\n"
+
+
+def _where(told: dict) -> str:
+    machine, versions = told["machine"], told["versions"]
+    packages = ", ".join(f"{name} {number}" for name, number in versions.items())
+    commit = f", commit {told['git']['commit'][:12]}" if told["git"] else ""
+    return (
+        f"`{shlex.join(told['command'])}`  \n{machine['processor']}, {machine['cores']} cores, one thread; "
+        f"{packages}{commit}."
+    )
+
+
+def _quantity(told: dict, q: dict, mark: str, pictures: str) -> str:
+    against = AGAINST[q["against"]]
+    if q["finest"]:
+        against += f" ({q['finest']['ladder']} {q['finest']['label']})"
+    source = f": {q['source']}" if q["source"] else ""
+    figure = f"\n\n![{q['what']}]({pictures}{q['name']}.png)" if _drawn(told, q) else ""
+    return f"**{q['what']}**, error against {against}{source}.{figure}"
+
+
+def _drawn(told: dict, q: dict) -> bool:
+    readings = [point["readings"].get(q["name"], {}) for point in told["points"]]
+    return any(reading.get("error") for reading in readings)
+
+
+def table(head: list[str], rows: list[list[str]]) -> str:
+    """A Markdown table; the first column is text, the others are numbers."""
+    rule = "|---|" + "--:|" * (len(head) - 1)
+    lines = ["| " + " | ".join(row) + " |" for row in [head, *rows]]
+    return "\n".join([lines[0], rule, *lines[1:]])
+
+
+def _name(point: dict) -> str:
+    curve = f" ({point['curve']})" if point["curve"] else ""
+    return f"{point['ladder']} {point['label']}{curve}"
+
+
+def percent(value) -> str:
+    """A share for people; a dash for none."""
+    return "–" if not _number(value) else f"{100 * value:.3g} %"
+
+
+def _number(value) -> bool:
+    return isinstance(value, int | float) and math.isfinite(value)
+
+
+def _runs(told: dict) -> str:
+    quantities = told["quantities"]
+    head = ["run", *(f"error: {q['name']}" for q in quantities)]
+    head += [
+        "CPU s",
+        "set-up",
+        "start",
+        "compile",
+        "wall s",
+        "MB",
+        "cells",
+        "wet",
+        "blocks",
+        "steps",
+        "passes",
+    ]
+    return table(head, [_run_row(told, point, quantities) for point in told["points"]])
+
+
+def _run_row(told: dict, point: dict, quantities: list[dict]) -> list[str]:
+    run = told["runs"][point["setting"]]
+    size = run["size"]
+    errors = [percent(point["readings"].get(q["name"], {}).get("error")) for q in quantities]
+    if point["reason"]:
+        errors = ["failed"] * len(quantities)
+    return [
+        _name(point),
+        *errors,
+        *(f"{run[name]:.3g}" for name in TIMES),
+        f"{run['peak_memory'] / 1e6:.0f}",
+        *(str(size.get(name, "–")) for name in ("cells", "wet_cells", "blocks")),
+        str(run["steps"]),
+        f"{run['passes']:.2f}" if run["passes"] else "–",
+    ]
+
+
+def _cheapest(told: dict) -> str:
+    what = {q["name"]: q["what"] for q in told["quantities"]}
+    rows = []
+    for entry in told["cheapest"]:
+        rung = entry["rung"]
+        setting = "none of these" if rung is None else _name(rung)
+        cost = "–" if rung is None else f"{entry['cpu_seconds']:.3g}"
+        rows.append(
+            [f"{what[entry['quantity']]}, {100 * entry['level']:g} %", setting, percent(entry["error"]), cost]
+        )
+    return table(["quantity and error", "setting", "its error", "CPU s"], rows)
+
+
+def _orders(told: dict) -> str:
+    def shown(value) -> str:
+        return f"{value + 0.0:.2f}".replace("-0.00", "0.00") if _number(value) else "–"
+
+    rows = [
+        [f"{o['quantity']}, {o['ladder']}" + (f" ({o['curve']})" if o["curve"] else ""), shown(o["overall"]),
+         shown(o["finest"]), o["how"]]
+        for o in told["orders"]
+    ]  # fmt: skip
+    return table(["quantity, ladder", "all runs", "finest runs", "from"], rows)
+
+
+def _laws(told: dict) -> str:
+    names = list(told["laws"][0]["readings"])
+    rows = [
+        [f"{row['law']}{' (YADE)' if row['stock'] else ''}, {row['multiple']} x substep",
+         *(percent(row["readings"][name]["error"]) for name in names), f"{row['cpu_seconds']:.3g}"]
+        for row in told["laws"]
+    ]  # fmt: skip
+    head = ["law", *(f"error: {name}" for name in names), "CPU s of stepping"]
+    return table(head, rows)
+
+
+def _parts(told: dict) -> str:
+    rows = [
+        [part["name"], part["reason"] or f"{part['cpu_seconds']:.3g}", percent(part["share"]),
+         f"{part['memory'] / 1e6:.0f}"]
+        for part in told["parts"]
+    ]  # fmt: skip
+    whole = told["runs"][told["base"]]["cpu_seconds"]
+    rows.append(
+        ["the whole case", f"{whole:.3g}", "100 %", f"{told['runs'][told['base']]['peak_memory'] / 1e6:.0f}"]
+    )
+    return table(["part", "CPU s", "share", "MB"], rows)
+
+
+def _failed(told: dict) -> str:
+    lines = [f"- {_name(point)}: {point['reason']}" for point in told["points"] if point["reason"]]
+    return "\n".join(dict.fromkeys(lines))
+
+
+def main() -> None:
+    """Pages of studies under one heading, figures in pictures/studies/NAME/."""
+    print("# Studies: error against run time\n")
+    for folder in map(Path, sys.argv[1:]):
+        told = json.loads((folder / "study.json").read_text(encoding="utf-8"))
+        name = Path(told["case"]).parent.name
+        print(page(told, level=2, pictures=f"pictures/studies/{name}_"))
+
+
+if __name__ == "__main__":
+    main()

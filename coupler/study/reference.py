@@ -1,0 +1,100 @@
+"""What a quantity is compared with, of one kind for all its runs: exact, measured, or the finest run."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from coupler.case_study import Quantity
+from coupler.errors import BadCase, did_you_mean
+from coupler.study.formula import evaluate
+from coupler.study.reading import Curve, taken
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A quantity in one run: value, what it was compared with, error (a share), band (a share; 0 without)."""
+
+    value: float
+    reference: float
+    error: float
+    band: float = 0.0
+
+
+def against_number(q: Quantity, value: float, reference: float, place: str) -> Reading:
+    """|value - reference| over the scale: |reference| unless the quantity has one. Raises BadCase for a scale of 0."""
+    scale = abs(reference) if q.scale is None else abs(q.scale)
+    if scale == 0.0:
+        raise BadCase(
+            [
+                f"{place}: the reference is 0, so an error has no share of it; give scale, what it counts against"
+            ]
+        )
+    band = half_band(q) / scale if q.against == "measured" else 0.0
+    return Reading(value, reference, abs(value - reference) / scale, band)
+
+
+def against_curve(q: Quantity, found: Curve) -> Reading:
+    """Root mean square distance from the reference curve, over its root mean square (or the scale).
+
+    Both are compared at the times of the reference that lie in the window and in the run.
+    """
+    reference = file_curve(q).within(q.window)
+    inside = (reference.time >= found.time[0]) & (reference.time <= found.time[-1])
+    time, values = reference.time[inside], reference.values[inside]
+    difference = rms(time, np.interp(time, found.time, found.values) - values)
+    scale = rms(time, values) if q.scale is None else abs(q.scale)
+    band = 0.0
+    if q.band is not None:
+        band = q.band / scale
+    elif q.band_columns is not None:
+        low, high = (file_curve(q, name).within(q.window) for name in q.band_columns)
+        band = rms(low.time, 0.5 * (high.values - low.values)) / scale
+    return Reading(difference, 0.0, difference / scale, band)
+
+
+def rms(time, values) -> float:
+    """(1/T ∫ v² dt)^(1/2)"""
+    return float(np.sqrt(np.trapezoid(values**2, time) / (time[-1] - time[0])))
+
+
+def fixed_reference(q: Quantity, case: dict) -> float:
+    """The exact or measured number of a quantity, for a run with this effective case."""
+    return evaluate(q.value, case) if q.value is not None else taken(q, file_curve(q))
+
+
+def half_band(q: Quantity) -> float:
+    """Half the scatter of a measured number; of two curves, that of what is taken from them."""
+    if q.band is not None:
+        return abs(q.band)
+    low, high = (taken(q, file_curve(q, name)) for name in q.band_columns)
+    return 0.5 * abs(high - low)
+
+
+def file_curve(q: Quantity, column: str | None = None) -> Curve:
+    """Columns of the reference file: time and value, or time and another one. Raises BadCase."""
+    table = _table(Path(q.path))
+    found = []
+    for name in (q.columns[0], column or q.columns[1]):
+        if name not in table:
+            raise BadCase(
+                [f"{q.path}: no column '{name}'{did_you_mean(name, table)}; there are {', '.join(table)}"]
+            )
+        found.append(table[name])
+    return Curve(*found)
+
+
+@lru_cache(maxsize=32)
+def _table(path: Path) -> dict[str, np.ndarray]:
+    """Columns of a CSV by their heading; lines that begin with # are skipped. Raises BadCase."""
+    try:
+        text = path.read_text(encoding="utf-8")
+        rows = list(csv.reader(line for line in text.splitlines() if line and not line.startswith("#")))
+        values = np.array([[float(entry) for entry in row] for row in rows[1:]], float)
+        return {name.strip(): values[:, k] for k, name in enumerate(rows[0])}
+    except (OSError, ValueError, IndexError) as error:
+        raise BadCase([f"{path}: no table of numbers under a line of names: {error}"]) from error

@@ -1,0 +1,37 @@
+"""Texts beside points of a figure, each where it covers neither a point nor another text."""
+
+PLACES = [(x, y) for far in (4, 11, 19) for x, y in ((far, far), (far, -far), (-far, far), (-far, -far), (0, 1.5 * far),
+                                                     (0, -1.5 * far), (1.5 * far, 0), (-1.5 * far, 0))]  # fmt: skip
+"""Offsets [points] of a text from its point, in the order in which they are tried."""
+ROOM = 1.0
+"""Free space around a text [pixels]."""
+
+
+def place_labels(drawing, axis, labels, size):
+    """Write labels [(x, y, text, colour)] (data coordinates); those for which no place is free go to the last one."""
+    drawing.draw_without_rendering()
+    renderer = drawing.canvas.get_renderer()
+    points = [axis.transData.transform((x, y)) for x, y, *_ in labels]
+    taken = []
+    for x, y, text, colour in labels:
+        written = _written(axis, x, y, text, colour, size)
+        for offset in PLACES:
+            _move(written, offset)
+            box = written.get_window_extent(renderer).padded(ROOM)
+            if not any(box.overlaps(other) for other in taken) and not any(box.contains(*p) for p in points):
+                break
+        taken.append(box)
+
+
+def _written(axis, x, y, text, colour, size):
+    return axis.annotate(
+        text, (x, y), xytext=PLACES[0], textcoords="offset points", fontsize=size, color=colour, zorder=4
+    )
+
+
+def _move(written, offset):
+    """The side of the text that faces the point follows from where it stands."""
+    x, y = offset
+    written.set_position(offset)
+    written.set_horizontalalignment("left" if x > 0 else "right" if x < 0 else "center")
+    written.set_verticalalignment("bottom" if y > 0 else "top" if y < 0 else "center")

@@ -1,0 +1,193 @@
+"""python -m coupler.view.study DIRECTORY: error against run time, one figure a quantity, from study.json alone.
+
+Both axes are logarithmic. A line is a ladder of runs, its points carry their settings; a run that failed is a cross on
+the upper edge at the time that it took, with its reason below; grey is the scatter of the measurement.
+"""
+
+import json
+import math
+import sys
+import textwrap
+from pathlib import Path
+
+from coupler.view.labels import place_labels
+from coupler.view.palette import INK, LINES, SOLID
+from coupler.view.plots import FORMATS, STYLE, _undated, plt
+
+SIZE = (5.2, 3.7)
+"""[inch] one and a half columns of a journal."""
+MARKS = "osD^vP*X"
+LEVELS = (0.01, 0.05, 0.10)
+"""Errors for which the cheapest setting is told: thin lines."""
+LOWEST = 1e-6
+"""Errors below this are drawn here: they are round-off."""
+NOTE_WIDTH = 105
+"""Letters in a line below a figure."""
+
+
+def draw(folder):
+    """NAME.png, .pdf and .svg for every quantity with an error, NAME_laws.* where laws were compared; their paths."""
+    told = json.loads((folder / "study.json").read_text(encoding="utf-8"))
+    written = []
+    for q in told["quantities"]:
+        curves = ladder_curves(told, q["name"])
+        if any(points for _, points in curves):
+            failed = [point for point in told["points"] if point["reason"]]
+            written.append(figure(folder / q["name"], q, curves, failed, "CPU time of the run [s]"))
+        laws = law_curves(told, q["name"])
+        if laws:
+            written.append(
+                figure(folder / f"{q['name']}_laws", q, laws, [], "CPU time of stepping alone [s]")
+            )
+    return written
+
+
+def ladder_curves(told, name):
+    """[(legend, [(CPU s, error, label, band)])] of a quantity, a curve for each ladder and value across it."""
+    what = {ladder["name"]: ladder["what"] for ladder in told["ladders"]}
+    curves = {}
+    for point in told["points"]:
+        legend = what[point["ladder"]] + (f", {point['curve']}" if point["curve"] else "")
+        points = curves.setdefault(legend, [])
+        reading = point["readings"].get(name)
+        if reading and reading["error"] is not None and not point["reason"]:
+            points.append((point["cpu_seconds"], reading["error"], point["label"], reading["band"]))
+    return list(curves.items())
+
+
+def law_curves(told, name):
+    """The same for laws of YADE and ours, a curve a law, a point a substep."""
+    curves = {}
+    for row in told["laws"]:
+        if name in row["readings"]:
+            reading = row["readings"][name]
+            legend = f"{row['law']} (YADE)" if row["stock"] else row["law"]
+            label = "" if row["multiple"] == 1 else f"×{row['multiple']}"
+            curves.setdefault(legend, []).append(
+                (row["cpu_seconds"], reading["error"], label, reading["band"])
+            )
+    return list(curves.items())
+
+
+def figure(stem, q, curves, failed, along):
+    """One quantity; saved in every format under `stem`; returns the PNG."""
+    with plt.rc_context(STYLE):
+        notes = footnotes(failed)
+        drawing, axis = plt.subplots(figsize=(SIZE[0], SIZE[1] + 0.14 * len(notes)))
+        axis.set_xscale("log")
+        axis.set_yscale("log")
+        shown = [(legend, points) for legend, points in curves if points]
+        band(axis, shown)
+        for number, (legend, points) in enumerate(shown):
+            line(axis, number, legend, points)
+        limits(axis, shown, failed)
+        axis.set_xlabel(along)
+        axis.set_ylabel(ylabel(q))
+        if len(shown) > 1 or q["against"] == "measured":
+            drawing.legend(loc="outside upper center", ncols=min(3, len(shown) + 1))
+        if notes:
+            drawing.supxlabel("\n".join(notes), x=0.01, ha="left", fontsize=6, color=INK)
+        crosses(axis, failed)
+        place_labels(drawing, axis, labels(shown), 6)
+        for ending in FORMATS:
+            drawing.savefig(stem.with_name(f"{stem.name}.{ending}"), metadata=_undated(ending))
+        plt.close(drawing)
+    return stem.with_name(f"{stem.name}.png")
+
+
+def ylabel(q):
+    """What the error is of, and against what: never of two kinds in one figure."""
+    against = {"exact": "exact answer", "measured": "measurement", "finest": "finest run"}[q["against"]]
+    return "\n".join(textwrap.wrap(f"error of {q['what']} against the {against}", 48))
+
+
+def line(axis, number, legend, points):
+    """A ladder: its points joined in their order."""
+    x, y = [p[0] for p in points], [max(p[1], LOWEST) for p in points]
+    mark = MARKS[number % len(MARKS)]
+    axis.plot(x, y, marker=mark, markersize=4, color=colour(number), label=legend, zorder=3)
+
+
+def colour(number):
+    """Of a curve."""
+    return LINES[number % len(LINES)]
+
+
+def labels(curves):
+    """(CPU s, error, setting, colour) of every point; the same place is told once."""
+    found = {}
+    for number, (_, points) in enumerate(curves):
+        for cpu, error, label, _ in points:
+            text = label if error >= LOWEST else f"{label} (below {share(LOWEST)})"
+            found.setdefault((cpu, max(error, LOWEST)), (text, colour(number)))
+    return [(*place, *text) for place, text in found.items()]
+
+
+def band(axis, curves):
+    """The scatter of the measurement: errors inside it say nothing."""
+    bands = {p[3] for _, points in curves for p in points if p[3]}
+    if bands:
+        axis.axhspan(
+            LOWEST, max(bands), color=SOLID, alpha=0.25, lw=0, label="scatter of the measurement", zorder=1
+        )
+
+
+def limits(axis, curves, failed):
+    """Axes about the points, whole decades up; the levels of the tables as thin lines."""
+    x = [p[0] for _, points in curves for p in points] + [
+        p["cpu_seconds"] for p in failed if p["cpu_seconds"] > 0
+    ]
+    y = [max(p[1], LOWEST) for _, points in curves for p in points]
+    axis.set_xlim(0.7 * min(x), 1.9 * max(x))
+    low, high = 10.0 ** math.floor(math.log10(0.8 * min(y))), 10.0 ** math.ceil(math.log10(1.3 * max(y)))
+    axis.set_ylim(low, high)
+    for level in LEVELS:
+        if low < level < high:
+            axis.axhline(level, color=INK, lw=0.5, ls=":", zorder=2)
+    axis.xaxis.set_major_formatter(plt.FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.yaxis.set_major_formatter(plt.FuncFormatter(lambda value, _: share(value)))
+    if max(x) / min(x) < 8.0:
+        axis.xaxis.set_minor_formatter(plt.FuncFormatter(ticks))
+
+
+def share(value):
+    """A share as per cent, with no more digits than it needs."""
+    return f"{100 * value:g} %"
+
+
+def ticks(value, _):
+    """Numbers at 2 and 5 of each decade, where an axis is shorter than one."""
+    first = value / 10.0 ** math.floor(math.log10(value))
+    return f"{value:g}" if min(abs(first - k) for k in (2.0, 5.0)) < 1e-6 else ""
+
+
+def crosses(axis, failed):
+    """Failed runs, numbered, on the upper edge; one whose process took no time that counts stands at the left."""
+    top, left = axis.get_ylim()[1], axis.get_xlim()[0]
+    for number, point in enumerate(failed, start=1):
+        x = max(point["cpu_seconds"], left)
+        axis.plot([x], [top], marker="x", color=LINES[1], markersize=6, clip_on=False, zorder=5)
+        axis.annotate(
+            f"{number}",
+            (x, top),
+            xytext=(0, -5),
+            textcoords="offset points",
+            ha="center",
+            va="top",
+            fontsize=6,
+        )
+
+
+def footnotes(failed):
+    """Lines that say which runs failed, and why."""
+    lines = []
+    for number, point in enumerate(failed, start=1):
+        curve = f" ({point['curve']})" if point["curve"] else ""
+        text = f"× {number}  failed: {point['ladder']} {point['label']}{curve}: {point['reason']}"
+        lines += textwrap.wrap(text, NOTE_WIDTH, subsequent_indent="      ", max_lines=2, placeholder=" ...")
+    return lines
+
+
+if __name__ == "__main__":
+    for path in draw(Path(sys.argv[1])):
+        print(f"figure: {path}")

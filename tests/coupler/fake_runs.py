@@ -1,0 +1,110 @@
+"""Runs of a study that come from a formula instead of a computation: the process is replaced, everything else is real.
+
+A run with time.step_max = h gives the value 2 (1 + h²) at a cost of 1 s/h; what a study should find is then known.
+"""
+
+import json
+from pathlib import Path
+
+from coupler.case_file import load
+from coupler.errors import ExitCode
+from coupler.history import HistoryTable
+from coupler.study.runner import Cost
+
+CASE = """\
+[case]
+title = "fake"
+[time]
+end = 4
+step_max = 0.1
+[structure]
+[[structure.block]]
+name = "box"
+size = [1, 1, 1]
+centre = [0, 0, 0.5]
+[contact]
+stiffness = 1e6
+
+[study]
+[[study.quantity]]
+name = "exact"
+table = "history/gauges.csv"
+column = "value"
+against = "exact"
+value = "structure.block[0].size[2] * 2"
+[[study.quantity]]
+name = "measured"
+table = "history/gauges.csv"
+column = "value"
+against = "measured"
+value = 2.02
+band = 0.1
+[[study.quantity]]
+name = "finest"
+table = "history/gauges.csv"
+column = "value"
+take = "mean"
+against = "finest"
+ladder = "dt"
+[[study.ladder]]
+name = "dt"
+key = "time.step_max"
+values = [0.4, 0.2, "100 ms"]
+larger = [0.05]
+[[study.ladder]]
+name = "rule"
+key = "contact.rule"
+values = ["exact", "paper"]
+[[study.off]]
+name = "friction"
+set = ["contact.friction=0"]
+"""
+
+
+class FakeProcesses:
+    """Stands in for `measure`. calls: settings that were run · broken: steps whose runs fail, with the reason ·
+    stop_after: calls after which Ctrl-C is pressed · compiling: CPU seconds that compilation takes in the next run."""
+
+    def __init__(self):
+        self.calls, self.broken, self.stop_after, self.compiling = [], {}, None, 0.0
+
+    def __call__(self, command: list[str], log: Path) -> Cost:
+        if "coupler.warm_up" in command:
+            return Cost(1.0, 1.0, 0, 0)
+        if self.stop_after is not None and len(self.calls) >= self.stop_after:
+            raise KeyboardInterrupt
+        self.calls.append(command)
+        sets = [command[i + 1] for i, word in enumerate(command) if word == "--set"]
+        case = load(command[command.index("run") + 1], sets).case
+        place = Path(command[command.index("--output") + 1])
+        reason = self.broken.get(case.time.step_max, "")
+        write_run(place, case.time.step_max, case.contact.friction, reason)
+        compiled = json.dumps({"compile_seconds": self.compiling})
+        Path(command[command.index("run") - 1]).write_text(compiled, encoding="utf-8")
+        self.compiling = 0.0
+        return Cost(
+            3.0 + 1.0 / case.time.step_max, 9.0, 10**8, ExitCode.DIVERGED if reason else ExitCode.DONE
+        )
+
+
+def write_run(place: Path, h: float, friction: float, reason: str) -> None:
+    """The files of a run that a study reads."""
+    (place / "history").mkdir(parents=True)
+    with HistoryTable(
+        place / "history" / "gauges.csv", [("time", "s", "time"), ("value", "1", "v")]
+    ) as table:
+        for k in range(5):
+            table.append(time=float(k), value=2.0 * (1.0 + h**2))
+    with HistoryTable(
+        place / "history" / "coupling.csv", [("time", "s", "time"), ("passes", "1", "p")]
+    ) as table:
+        table.append(time=0.0, passes=1)
+        table.append(time=1.0, passes=2)
+    cost = 1.0 / h + (0.25 if friction else 0.0)
+    figures = {
+        "steps": 4,
+        "cpu_seconds": {"structure": cost - 0.5, "set-up": 0.75, "other": 0.5},
+        "size": {"blocks": 1},
+    }
+    summary = {"status": "diverged" if reason else "done", "exit_reason": reason or "reached the end"}
+    (place / "run.json").write_text(json.dumps(summary | {"figures": figures}), encoding="utf-8")

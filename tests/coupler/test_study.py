@@ -1,0 +1,202 @@
+"""A study from the case to its figures: errors, orders, costs, going on, and what it refuses."""
+
+import json
+
+import pytest
+
+from coupler.errors import BadCase, ExitCode
+from coupler.study import command, runner
+from coupler.study.formula import BadFormula
+from coupler.study.plan import make_plan
+
+from .fake_runs import CASE, FakeProcesses
+
+
+@pytest.fixture
+def fake(monkeypatch, request):
+    processes = FakeProcesses()
+    monkeypatch.setattr(runner, "measure", processes)
+    if "with_figures" not in request.fixturenames:
+        monkeypatch.setattr(command, "_draw", lambda folder: None)
+    return processes
+
+
+@pytest.fixture
+def with_figures():
+    """Asked for by a test that draws; the others go without, which takes a second each."""
+
+
+@pytest.fixture
+def case(tmp_path):
+    (tmp_path / "case.toml").write_text(CASE, encoding="utf-8")
+    return tmp_path
+
+
+def made(case, *, ladders=(), repeat=None, larger=False, any_version=False):
+    """The exit code, and what study.json says."""
+    code = command.study(case, ladders, repeat, case / "out", larger, any_version)
+    return code, json.loads((case / "out" / "study.json").read_text(encoding="utf-8"))
+
+
+def test_errors_are_those_of_the_formula(fake, case):
+    """value = 2 (1 + h²): h² from the exact answer 2; against 2.02 it is |h² - 0.01|/1.01."""
+    code, told = made(case)
+    assert code == ExitCode.DONE
+    for point, h in zip(told["points"], (0.4, 0.2, 0.1)):
+        found = point["readings"]
+        assert found["exact"]["error"] == pytest.approx(h**2)
+        assert found["measured"]["error"] == pytest.approx(abs(h**2 - 0.01) / 1.01, abs=1e-12)
+        assert found["measured"]["band"] == pytest.approx(0.1 / 2.02)
+        if h == 0.1:
+            assert found["finest"]["error"] is None  # the reference has no error against itself
+        else:
+            assert found["finest"]["error"] == pytest.approx((h**2 - 0.01) / 1.01)
+
+
+def test_the_order_is_that_of_the_formula_whatever_the_reference(fake, case):
+    """2 from the errors, and from three runs without knowing the limit; a law has no size and no order."""
+    _, told = made(case)
+    orders = {(o["quantity"], o["ladder"]): o for o in told["orders"]}
+    assert orders["exact", "dt"]["overall"] == pytest.approx(2.0)
+    assert orders["exact", "dt"]["finest"] == pytest.approx(2.0)
+    assert orders["finest", "dt"]["finest"] == pytest.approx(2.0)
+    assert orders["finest", "dt"]["overall"] is None
+    assert ("exact", "rule") not in orders
+
+
+def test_cost_is_that_of_the_steps_with_start_set_up_and_compilation_apart(fake, case):
+    """1/h + 0.25 s of steps in a process of 3 + 1/h s, 0.75 s of them set-up."""
+    _, told = made(case, ladders=["dt"])
+    run = told["runs"][told["points"][0]["setting"]]
+    assert run["cpu_seconds"] == pytest.approx(1 / 0.4 + 0.25)
+    assert run["set_up_seconds"] == pytest.approx(0.75)
+    assert run["start_seconds"] == pytest.approx(3.0 - 0.25 - 0.75)
+    assert (run["passes"], run["peak_memory"], run["size"]) == (1.5, 10**8, {"blocks": 1})
+
+
+def test_a_run_that_had_to_compile_is_made_again(fake, case):
+    """Kernels that the warm-up did not need are compiled by the first run; its cost is not that of the setting."""
+    fake.compiling = 2.0
+    _, told = made(case, ladders=["dt"])
+    assert len(fake.calls) == 4
+    assert {run["compile_seconds"] for run in told["runs"].values()} == {0.0}
+
+
+def test_the_cheapest_setting_is_found_and_what_a_part_costs(fake, case):
+    """Errors 16, 4 and 1 %: 5 % needs h = 0.2; friction costs a quarter of a second of 10.25."""
+    _, told = made(case)
+    found = {(c["quantity"], c["level"]): c["rung"] for c in told["cheapest"]}
+    assert found["exact", 0.05]["label"] == "0.2"
+    assert found["exact", 0.10]["label"] == "0.2"
+    (part,) = told["parts"]
+    assert part["name"] == "friction"
+    assert part["cpu_seconds"] == pytest.approx(0.25)
+    assert part["share"] == pytest.approx(0.25 / 10.25)
+
+
+def test_the_same_setting_is_run_once(fake, case):
+    """dt = 0.1 and rule = exact are the case as it stands."""
+    made(case)
+    assert len(fake.calls) == 5  # h = 0.4, 0.2, the case itself, rule = paper, no friction
+
+
+def test_a_study_that_was_stopped_goes_on(fake, case):
+    fake.stop_after = 2
+    with pytest.raises(KeyboardInterrupt):
+        made(case)
+    assert len(fake.calls) == 2
+    fake.stop_after = None
+    _, told = made(case)
+    assert len(fake.calls) == 5
+    made(case)
+    assert len(fake.calls) == 5  # nothing is left to do
+    assert len(told["points"]) == 5
+
+
+def test_larger_rungs_are_added_to_what_is_there(fake, case):
+    made(case)
+    _, told = made(case, larger=True)
+    assert len(fake.calls) == 6
+    assert [p["label"] for p in told["points"]] == ["0.4", "0.2", "100 ms", "0.05", "exact", "paper"]
+    # the finest run is another one now, and is named
+    assert told["quantities"][2]["finest"] == {"ladder": "dt", "label": "0.05"}
+
+
+def test_runs_of_another_version_are_made_again_unless_told_otherwise(fake, case, monkeypatch):
+    made(case)
+    monkeypatch.setattr(runner, "program", lambda: {"surgebreak": "another"})
+    made(case, any_version=True)
+    assert len(fake.calls) == 5
+    made(case)
+    assert len(fake.calls) == 10
+
+
+def test_repeats_tell_the_cheapest_run_and_whether_they_agree(fake, case):
+    _, told = made(case, ladders=["dt"], repeat=3)
+    assert len(fake.calls) == 9
+    run = next(iter(told["runs"].values()))
+    assert len(run["repeats"]) == 3
+    assert run["same"] is True
+
+
+def test_a_failed_run_is_told_with_its_reason_and_is_no_reference(fake, case, capsys):
+    """The finest run fails: errors against it are absent, never taken against the next finest."""
+    fake.broken = {0.1: "the energy balance is off by 9 %"}
+    code, told = made(case, ladders=["dt"])
+    assert code == ExitCode.DIVERGED
+    assert [p["reason"] for p in told["points"]] == ["", "", "the energy balance is off by 9 %"]
+    assert told["points"][0]["readings"]["finest"]["error"] is None
+    assert "off by 9 %" in capsys.readouterr().out
+    assert len(fake.calls) == 3
+    made(case, ladders=["dt"])
+    assert len(fake.calls) == 3  # it would fail the same way again
+
+
+def test_files_say_all_of_it_and_figures_are_drawn(fake, case, with_figures):
+    fake.broken = {0.4: "too long a step"}
+    made(case)
+    rows = (case / "out" / "study.csv").read_text(encoding="utf-8").splitlines()
+    assert len(rows) == 1 + 5 * 3
+    text = (case / "out" / "study.md").read_text(encoding="utf-8")
+    for words in ("Cheapest setting", "Observed order", "What parts", "too long a step", "numba"):
+        assert words in text
+    for name in ("exact", "measured", "finest"):
+        assert (case / "out" / f"{name}.png").stat().st_size > 10_000
+        assert (case / "out" / f"{name}.pdf").exists()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ('column = "value"\nagainst = "exact"', 'column = "valu"\nagainst = "exact"', "did you mean 'value'?"),
+        ("history/gauges.csv", "history/gauge.csv", "did you mean 'history/gauges.csv'?"),
+        ("block[0].size[2]", "block[0].siz[2]", "did you mean 'size'?"),
+        ('value = "structure', 'value = "0 * structure', "give scale"),
+    ],
+)  # fmt: skip
+def test_a_wrong_name_ends_the_study_at_the_first_run(fake, case, old, new, says):
+    """Columns are known only from a run; the study does not spend the time of all of them first."""
+    (case / "case.toml").write_text(CASE.replace(old, new, 1), encoding="utf-8")
+    with pytest.raises((BadCase, BadFormula)) as told:
+        made(case)
+    assert says in str(told.value)
+    assert len(fake.calls) == 1
+
+
+def test_unknown_ladders_are_refused_with_the_nearest(case):
+    with pytest.raises(BadCase, match="did you mean 'rule'"):
+        make_plan(case, ["rul"])
+
+
+def test_a_rung_that_is_no_case_is_refused_before_any_run(fake, case):
+    text = CASE.replace('values = ["exact", "paper"]', 'values = ["exact", "papr"]')
+    (case / "case.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(BadCase, match="did you mean 'paper'"):
+        made(case)
+    assert fake.calls == []
+
+
+def test_a_case_without_a_study_says_what_to_write(case):
+    (case / "case.toml").write_text(CASE.partition("[study]")[0], encoding="utf-8")
+    with pytest.raises(BadCase, match=r"\[\[study.quantity\]\]"):
+        make_plan(case)

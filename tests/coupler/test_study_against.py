@@ -1,0 +1,90 @@
+"""`study compare`: exit codes for what got worse, and refusals of what does not compare."""
+
+import copy
+import json
+
+import pytest
+
+from coupler.errors import BadCase, ExitCode
+from coupler.study.against import compare
+
+
+def point(label, cpu, error, reason=""):
+    readings = {} if reason else {"force": {"value": 1.0, "reference": 1.0, "error": error, "band": 0.0}}
+    return {
+        "ladder": "h",
+        "curve": "",
+        "label": label,
+        "cpu_seconds": cpu,
+        "reason": reason,
+        "readings": readings,
+    }
+
+
+BEFORE = {
+    "machine": {"processor": "one"},
+    "quantities": [{"name": "force", "against": "exact", "finest": None}],
+    "points": [point("1", 10.0, 0.1), point("2", 20.0, 1e-14)],
+}
+
+
+def compared(tmp_path, now, error=1.1, cpu=1.2):
+    for name, told in (("a", BEFORE), ("b", now)):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "study.json").write_text(json.dumps(told), encoding="utf-8")
+    return compare(tmp_path / "a", tmp_path / "b", error, cpu)
+
+
+def changed(**values):
+    now = copy.deepcopy(BEFORE)
+    for name, value in values.items():
+        if name == "error":
+            now["points"][0]["readings"]["force"]["error"] = value
+        else:
+            now["points"][0][name] = value
+    return now
+
+
+@pytest.mark.parametrize(
+    ("change", "code"),
+    [
+        ({}, ExitCode.DONE),
+        ({"error": 0.109}, ExitCode.DONE),
+        ({"error": 0.111}, ExitCode.DIVERGED),
+        ({"error": 0.001}, ExitCode.DONE),
+        ({"cpu_seconds": 11.9}, ExitCode.DONE),
+        ({"cpu_seconds": 12.1}, ExitCode.DIVERGED),
+        ({"reason": "diverged"}, ExitCode.DIVERGED),
+    ],
+)
+def test_the_exit_code_says_whether_something_got_worse(tmp_path, change, code):
+    assert compared(tmp_path, changed(**change)) == code
+
+
+def test_limits_are_those_given(tmp_path):
+    assert compared(tmp_path, changed(error=0.15, cpu_seconds=15.0), error=1.6, cpu=1.6) == ExitCode.DONE
+
+
+def test_errors_of_round_off_do_not_get_worse(tmp_path):
+    now = copy.deepcopy(BEFORE)
+    now["points"][1]["readings"]["force"]["error"] = 5e-12
+    assert compared(tmp_path, now) == ExitCode.DONE
+
+
+def test_references_of_two_kinds_are_refused(tmp_path):
+    now = copy.deepcopy(BEFORE)
+    now["quantities"][0]["against"] = "measured"
+    with pytest.raises(BadCase, match="against exact and against measured do not compare"):
+        compared(tmp_path, now)
+
+
+def test_studies_without_a_common_run_are_refused(tmp_path):
+    now = copy.deepcopy(BEFORE)
+    now["points"] = [point("3", 1.0, 0.1)]
+    with pytest.raises(BadCase, match="no run in common"):
+        compared(tmp_path, now)
+
+
+def test_a_place_without_a_study_is_told(tmp_path):
+    with pytest.raises(BadCase, match="not the result of a study"):
+        compare(tmp_path, tmp_path, 1.1, 1.2)

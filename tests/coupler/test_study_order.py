@@ -1,0 +1,73 @@
+"""Orders of convergence and reductions of synthetic data, whose answers are known."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from coupler.case_study import Quantity
+from coupler.study.order import last_slope, slope, three_run_order
+from coupler.study.reading import Curve, taken
+from coupler.study.reference import against_curve
+
+ORDERS = st.floats(0.3, 5.0)
+SIZES = st.sampled_from([(0.4, 0.2, 0.1), (0.1, 0.07, 0.05), (1.0, 0.5, 0.4), (3e-3, 1e-3, 5e-4)])
+
+
+@given(p=ORDERS, sizes=SIZES, C=st.floats(1e-3, 1e3))
+def test_the_slope_of_a_power_is_its_exponent(p, sizes, C):
+    errors = [C * (h / sizes[0]) ** p for h in sizes]
+    assert slope(sizes, errors) == pytest.approx(p, rel=1e-6)
+    assert last_slope(sizes, errors) == pytest.approx(p, rel=1e-6)
+
+
+@given(p=ORDERS, sizes=SIZES, limit=st.floats(-10.0, 10.0))
+def test_three_runs_tell_the_order_without_the_limit(p, sizes, limit):
+    values = [limit + 3.0 * (h / sizes[0]) ** p for h in sizes]
+    assert three_run_order(sizes, values) == pytest.approx(p, rel=1e-3)
+    assert three_run_order(sizes[::-1], values[::-1]) == pytest.approx(p, rel=1e-3)  # in any order
+
+
+@pytest.mark.parametrize("values", [(1.0, 2.0, 1.5), (1.0, 1.0, 1.0), (1.0, 2.0, 2.0)])
+def test_runs_that_do_not_approach_a_limit_have_no_order(values):
+    assert np.isnan(three_run_order((0.4, 0.2, 0.1), values))
+
+
+def test_two_runs_or_errors_of_zero_give_no_order_where_there_is_none():
+    assert np.isnan(three_run_order((0.2, 0.1), (1.0, 2.0)))
+    assert np.isnan(slope((0.2, 0.1), (0.0, 1e-3)))
+    assert np.isnan(slope((0.1, 0.1), (1e-2, 1e-3)))
+
+
+def quantity(**given):
+    return Quantity.model_validate(
+        {"name": "q", "table": "t", "column": "c", "against": "exact", "value": 1.0} | given
+    )
+
+
+def test_reductions_count_within_their_window_alone():
+    """A ramp v = t to 10 s: its mean, ends and integral between 2.5 and 4.5 s, which are no sample times."""
+    ramp = Curve(np.arange(11.0), np.arange(11.0))
+    window = (2.5, 4.5)
+    assert taken(quantity(take="mean", window=window), ramp) == pytest.approx(3.5)
+    assert taken(quantity(take="max", window=window), ramp) == pytest.approx(4.5)
+    assert taken(quantity(take="min", window=window), ramp) == pytest.approx(2.5)
+    assert taken(quantity(take="integral", window=window), ramp) == pytest.approx(7.0)
+    assert taken(quantity(take="at", time=3.25), ramp) == pytest.approx(3.25)
+    assert taken(quantity(take="arrival", above=6.5), ramp) == 7.0
+    assert np.isnan(taken(quantity(take="arrival", above=60.0), ramp))
+
+
+def test_the_distance_of_two_curves_is_their_root_mean_square(tmp_path):
+    """2 against 1.9 is off by 5 %, whatever the times of the samples; the scatter 1.7 to 2.3 is 15 % wide a side."""
+    (tmp_path / "ref.csv").write_text(
+        "# who\nt,v,low,high\n0,2,1.7,2.3\n1,2,1.7,2.3\n3,2,1.7,2.3\n9,2,1.7,2.3\n"
+    )
+    q = Quantity.model_validate(
+        {"name": "q", "table": "t", "column": "c", "take": "curve", "against": "measured", "columns": ("t", "v"),
+         "path": str(tmp_path / "ref.csv"), "band_columns": ("low", "high")}
+    )  # fmt: skip
+    found = against_curve(q, Curve(np.linspace(0.0, 4.0, 50), np.full(50, 1.9)))
+    assert found.value == pytest.approx(0.1)
+    assert found.error == pytest.approx(0.05)
+    assert found.band == pytest.approx(0.15)
