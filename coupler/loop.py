@@ -53,7 +53,14 @@ class StepRecord:
     retries: int = 0
     """Times that the step was halved, and dt with it, because it failed or its defect was above `most_defect`."""
     load: Array = field(default_factory=lambda: np.zeros((0, 6)))
+    shear_load: Array = field(default_factory=lambda: np.zeros((0, 6)))
+    """The part of `load` that walls of bodies take by viscosity and friction."""
+    surface_load: Array = field(default_factory=lambda: np.zeros((0, 6)))
+    """The part of `load` that corrects the pressure where the surface passes through the cells of a body."""
+    impulses: object = None
+    """What contacts and joints gave to the blocks; None without a structure."""
     balance: Balance = field(default_factory=Balance)
+    momentum: MomentumBalance | None = None
 
 
 class Coupling:
@@ -93,6 +100,7 @@ class Coupling:
         if water is not None:
             self.ledger.available = water.available_energy()
         self.ledger.start(self._water_energy(), self._structure_energies())
+        self.momentum = momentum_ledger(water, structure)
 
     def save(self) -> dict[str, Array]:
         """What the coupling itself remembers between two steps; both sides and the ledger save theirs."""
@@ -153,6 +161,7 @@ class Coupling:
         if self.water is not None and self.water.sides is not None:
             self.ledger.entered = self.water.sides.energy
         record.balance = self.ledger.balance(self._water_energy(), self._structure_energies())
+        record.momentum = book_step(self, record)
         return record
 
     def _coupled_step(self, dt: float, record: StepRecord) -> None:
@@ -168,6 +177,16 @@ class Coupling:
         n = self.structure.n
         record.load, record.unknowns = found.load, len(found.x)
         self.ledger.give(record.dt * float(np.sum(found.load[:n] * found.velocity[:n])))
+        self._note_loads(problem, record, found.velocity)
+
+    def _note_loads(self, problem, record: StepRecord, velocity: Array) -> None:
+        """The parts of the load, and the energy of the step that is neither given nor numerical; velocity (n_bodies, 6)."""
+        shear = problem.predicted.shear
+        record.shear_load = np.zeros_like(record.load) if shear is None else shear.load
+        record.surface_load = problem.other_load - record.shear_load
+        if shear is not None:
+            self.ledger.shear -= shear.energy + record.dt * float(np.sum(shear.load * velocity))
+        self.ledger.left += self.water.report.left_energy
 
     def _attempts(self, dt: float, record: StepRecord):
         """Problem and solution of a step of dt; of its half, and so on, where that has none or the blocks miss by more
@@ -237,6 +256,7 @@ class Coupling:
             mean = self._padded(report.mean_velocity)
             v_free = corrected_free_velocity(response, mean, found.x, problem.coupling)
         record.substep, record.opening_rate = report.dt_s, report.opening_rate
+        record.impulses = report.impulses
         return found
 
     def _response(self, problem):
@@ -265,12 +285,13 @@ class Coupling:
             self.water.correct(problem, result.x)
         record.load = water_load(problem, result.x)
         record.iterations, record.passes, record.unknowns = result.iterations, 1, len(result.x)
+        self._note_loads(problem, record, self.water.body_velocity)
 
     def _structure_step(self, dt: float, record: StepRecord) -> None:
         with self.clock("structure"):
             report = self.structure.advance(dt)
         record.substeps, record.substep = report.substeps, report.dt_s
-        record.opening_rate = report.opening_rate
+        record.opening_rate, record.impulses = report.opening_rate, report.impulses
 
     @property
     def _solve(self):
