@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from coupler.verify import courant
 from coupler.verify.curves import Curve, Figure, Panel
 from coupler.verify.figures import columns
 from coupler.verify.losses import Losses
@@ -55,6 +56,19 @@ def wall_impact():
     )
     yield from slipping.losses.findings("walls that slip: ")
     yield _impact_figure(rubbed, slipping, table, sph)
+    yield _cells_figure({16: _impact(16, **RUBBED), 24: _impact(24, **RUBBED), 32: rubbed}, table)
+
+
+def _cells_figure(runs: dict[int, Impact], table) -> Figure:
+    """Sensor 2 with rubbed walls on different cells."""
+    some = slice(None, None, 10)
+    t = table["tstar"][some]
+    curves = [Curve("measured, 2.5 to 97.5 %", "band", t, table["p2p5"][some], table["p97p5"][some])]
+    curves += [Curve(f"smooth walls, H/{n}", "computed", run.t, run.p[:, 1]) for n, run in runs.items()]
+    return Figure("P38_cells", (Panel(*P_AXES, tuple(curves), (2.2, 6.6), (-0.1, 3.0)),))
+
+
+P_AXES = ("time $t\\sqrt{g/H}$ [–]", "pressure $p/\\rho g H$ [–], z = 15 mm")
 
 
 def _impact_findings(where: str, run: Impact, table):
@@ -102,7 +116,7 @@ def _impact_figure(rubbed: Impact, slipping: Impact, table, sph) -> Figure:
         Curve("walls that slip, H/16", "computed", slipping.t, slipping.p[:, 1]),
         Curve("δ-SPH, walls that slip, H/400", "other", sph["tstar"], sph["pstar"]),
     )
-    panels = [Panel(axes[0], f"{axes[1]}, z = 15 mm", second, (2.2, 6.6), (-0.1, 2.5))]
+    panels = [Panel(axes[0], f"{axes[1]}, z = 15 mm", second, (2.2, 6.6), (-0.1, 3.0))]
     for row, name, height in ((0, "lobovsky_p1_H300", "3 mm"), (2, "lobovsky_p3_H300", "30 mm")):
         single = columns(name)
         curves = (
@@ -163,6 +177,7 @@ def levels():
         yield Finding(f"H4 at {at:g} s [m]", level, measured, 0.05, False)
     yield from losses.findings()
     yield _box_figure("P39_levels", found, table, PROBES, until, "depth of water at {} [m]", 1.0)
+    yield Figure("P39_losses", losses.panels("cells of 5 cm, CFL 1"), columns=2)
 
 
 @check("P40", "SPHERIC test 2: impulse of the pressure", "Kleefsman et al. 2005", "M")
@@ -178,6 +193,8 @@ def impulses():
     yield from losses.findings()
     shown = time <= 2.0
     yield _box_figure("P40_pressures", found, table, ("P1", "P3"), shown, "pressure at {} [kPa]", 1e-3)
+    runs = {number: spheric(1.0, courant=number)[0] for number in courant.NUMBERS}
+    yield from courant.findings(runs, time, table["P1_Pa"])
 
 
 def _box_figure(name, found, table, probes, shown, label: str, unit: float) -> Figure:

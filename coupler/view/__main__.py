@@ -24,7 +24,11 @@ def arguments(given):
     )
     parser.add_argument("--still", action="store_true", help="one picture for print, of --time")
     parser.add_argument("--film", action="store_true", help="H.264 film, one frame per stored step")
-    parser.add_argument("--plots", action="store_true", help="histories as PDF, SVG and PNG")
+    parser.add_argument(
+        "--plots",
+        action="store_true",
+        help="histories, and curves over the data of the case, as PDF, SVG and PNG",
+    )
     parser.add_argument(
         "--time", type=float, metavar="S", help="of the still [s]; default: the last stored step"
     )
@@ -117,6 +121,9 @@ def make(options):
         from coupler.view.plots import plots
 
         report(plots, options.run, folder)
+        from coupler.view.over_data import over_data
+
+        report(over_data, options.run, folder)
     if options.film:
         from coupler.view.pictures import film
 

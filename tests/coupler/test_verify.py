@@ -45,11 +45,12 @@ def registry_files():
     return sorted(FOLDER.glob("*.csv"))
 
 
-def test_unknown_and_absent_cases_are_told_apart():
+def test_unknown_and_absent_cases_are_told_apart(monkeypatch):
     with pytest.raises(BadCase, match="did you mean"):
         runner.chosen(["P2O"], quick=False)
-    with pytest.raises(BadCase, match=r"not covered: .*cubes"):
-        runner.chosen(["P56"], quick=False)
+    monkeypatch.setitem(registry.NOT_COVERED, "P99", "a reference that nobody has")
+    with pytest.raises(BadCase, match=r"not covered: .*nobody"):
+        runner.chosen(["P99"], quick=False)
 
 
 def test_quick_leaves_the_long_cases_out():
