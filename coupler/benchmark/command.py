@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from coupler import provenance
-from coupler.benchmark import scenes
+from coupler.benchmark import cutting, scenes
 from coupler.benchmark.part import LAW
 from coupler.errors import ExitCode, SurgebreakError
 from yade_scripts.faces import touching_faces
@@ -35,7 +35,8 @@ class PartFailed(SurgebreakError):
 
 @dataclass(frozen=True)
 class Line:
-    """One figure in CPU microseconds a substep; of: what it was divided by; target: its limit or None."""
+    """One figure in CPU microseconds, of a substep unless it says otherwise; of: what it was divided by; target: its
+    limit or None."""
 
     what: str
     blocks: int
@@ -55,7 +56,7 @@ def benchmark(quick: bool, as_json: bool) -> ExitCode:
     lines: list[Line] = []
     if not as_json:
         print(_heading(), flush=True)
-    for measured in (_engine, _scenes, _dead, _stock):
+    for measured in (_engine, _scenes, _dead, _cutting, _stock):
         for line in measured(sizes):
             lines.append(line)
             if not as_json:
@@ -135,6 +136,12 @@ def _dead(sizes):
             target,
         )
     yield Line("  the same blocks without joints", m["blocks"], 0, bare, "in all")
+
+
+def _cutting(sizes):
+    """The water's side: cells that blocks cut."""
+    for what, bodies, us, target in cutting.figures(_part("cutting")):
+        yield Line(what, bodies, 0, us, "a cut cell", target)
 
 
 def _stock(sizes):

@@ -13,6 +13,7 @@ from collections.abc import Callable
 import numpy as np
 
 from coupler.benchmark import scenes
+from coupler.benchmark.cutting import cutting
 from yade_scripts.cohesion import JointParameters
 from yade_scripts.contact import ContactLaw
 from yade_scripts.structure import Structure
@@ -108,7 +109,7 @@ def _take_away(structure: Structure, rows: np.ndarray) -> None:
         structure.displace(rows, shift, np.tile(np.eye(3), (len(rows), 1, 1)))
 
 
-KINDS = {"joints": joints, "building": building, "pile": pile, "dead": dead}
+KINDS = {"joints": joints, "building": building, "pile": pile, "dead": dead, "cutting": cutting}
 
 
 def main() -> None:

@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from coupler.benchmark import command, part, scenes
+from coupler.benchmark import command, cutting, part, scenes
 from coupler.benchmark.command import Line
 from coupler.errors import ExitCode
 from yade_scripts.faces import touching_faces
@@ -50,9 +50,23 @@ def test_a_line_without_target_is_kept_and_a_missed_one_is_told():
     assert "MISSED" in command._told(missed)
 
 
+def test_cutting_is_measured_per_cell_that_lost_something(monkeypatch):
+    """A coarse mesh: every wall and number of bodies has its line, the limits belong to them, finer walls cut the same
+    cells, and more bodies near a cell cost more."""
+    monkeypatch.setattr(cutting, "CELLS_ALONG", 10)
+    monkeypatch.setattr(cutting, "BOXES", 60)
+    monkeypatch.setattr(cutting, "REPEATS", 1)
+    monkeypatch.setattr(cutting, "NEAR", (1, 2))
+    measured = cutting.cutting(0)
+    assert len({cells for _, cells, _ in measured["walls"]}) == 1
+    lines = list(cutting.figures(measured))
+    assert [limit for *_, limit in lines] == [4.6, 5.8, 9.0, 35.0, None, 10.7]
+    assert lines[3][2] > lines[0][2] > 0
+
+
 def test_json_is_one_object_and_a_missed_target_is_the_exit_code(monkeypatch, capsys):
     monkeypatch.setattr(command, "_engine", lambda sizes: [Line("a", 1, 1, 5.0, "a joint", 1.0)])
-    for name in ("_scenes", "_dead", "_stock"):
+    for name in ("_scenes", "_dead", "_cutting", "_stock"):
         monkeypatch.setattr(command, name, lambda sizes: [])
     assert command.benchmark(quick=True, as_json=True) == ExitCode.DIVERGED
     told = json.loads(capsys.readouterr().out)
