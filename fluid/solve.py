@@ -1,10 +1,7 @@
 """Symmetric positive definite systems: conjugate gradients behind one function.
 
-Preconditioner: the diagonal for small systems, where setting up a multigrid hierarchy costs more than it saves;
-else smoothed aggregation (pyamg), with prolongation weights from row sums, because estimated spectral radii start
-from random vectors and would differ from run to run.  20 000 unknowns, 1e-8: diagonal 176 iterations 0.034 s,
-multigrid 13 iterations 0.016 + 0.034 s; with a structure inside every iteration costs its solve as well, so that
-multigrid pays much earlier.
+Preconditioner: the diagonal for small systems, else a multigrid cycle (`multigrid.py`). `surgebreak benchmark --solver`
+compares it with others on pressure systems.
 """
 
 from __future__ import annotations
@@ -13,10 +10,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import pyamg
 
-AMG_FROM = 30_000
-AMG_FROM_WITH_EXTRA = 3_000
+from fluid.multigrid import Multigrid
+
+MULTIGRID_FROM = 1_000
+MULTIGRID_FROM_WITH_EXTRA = 300
+"""Unknowns from which multigrid pays; earlier with an extra operator, which costs a solve in every iteration."""
 MOST_ITERATIONS = 2000
 
 
@@ -45,7 +44,7 @@ def solve(A, b, x0, rtol: float, extra: Callable | None = None, most: int = MOST
     scale = np.linalg.norm(b)
     if scale == 0.0:
         return SolveResult(np.zeros_like(b), 0, 0.0)
-    precondition = _preconditioner(A, AMG_FROM if extra is None else AMG_FROM_WITH_EXTRA)
+    precondition = _preconditioner(A, MULTIGRID_FROM if extra is None else MULTIGRID_FROM_WITH_EXTRA)
     apply = (lambda v: A @ v) if extra is None else (lambda v: A @ v + extra(v))
     x = np.array(x0, float)
     r = b - apply(x)
@@ -71,9 +70,7 @@ def _preconditioner(A, multigrid_from: int) -> Callable:
     if A.shape[0] < multigrid_from:
         inverse = 1.0 / A.diagonal()
         return lambda r: inverse * r
-    smooth = ("jacobi", {"weighting": "local"})
-    levels = pyamg.smoothed_aggregation_solver(A, max_coarse=300, smooth=smooth, improve_candidates=None)
-    return levels.aspreconditioner(cycle="V").matvec
+    return Multigrid(A)
 
 
 def _failure(what: str, history, rtol: float, n: int) -> NotConverged:

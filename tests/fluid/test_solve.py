@@ -19,7 +19,7 @@ def laplace(n):
 
 @pytest.mark.parametrize("multigrid_from", [10, 10**9], ids=["multigrid", "diagonal"])
 def test_solution_meets_the_tolerance(multigrid_from, monkeypatch):
-    monkeypatch.setattr(solver, "AMG_FROM", multigrid_from)
+    monkeypatch.setattr(solver, "MULTIGRID_FROM", multigrid_from)
     A = laplace(12)
     exact = np.random.default_rng(0).normal(size=A.shape[0])
     result = solve(A, A @ exact, np.zeros(A.shape[0]), 1e-10)

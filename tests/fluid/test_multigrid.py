@@ -1,0 +1,102 @@
+"""The multigrid cycle: a symmetric positive definite preconditioner whose work does not depend on size or shape."""
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from fluid.bodies import ConvexBodies
+from fluid.multigrid import Multigrid
+from fluid.solve import solve
+from tests.fluid.scenes import tank
+
+
+def laplace(nx, ny, nz, weights=(1.0, 1.0, 1.0)):
+    """Seven-point Laplacian, zero outside; weights of the three directions."""
+
+    def line(n):
+        return sp.diags_array([-1.0, 2.0, -1.0], offsets=[-1, 0, 1], shape=(n, n))
+
+    one = [sp.eye_array(n) for n in (nx, ny, nz)]
+    terms = [
+        sp.kron(sp.kron(line(nx), one[1]), one[2]),
+        sp.kron(sp.kron(one[0], line(ny)), one[2]),
+        sp.kron(sp.kron(one[0], one[1]), line(nz)),
+    ]
+    return sp.csr_array(sum(w * t for w, t in zip(weights, terms)))
+
+
+def applied(A):
+    """M⁻¹ as a dense matrix."""
+    cycle = Multigrid(A)
+    return np.column_stack([cycle(e) for e in np.eye(A.shape[0])])
+
+
+def pressure_system(cell):
+    """Water half full in a tank with a box and a tilted surface."""
+    box = ConvexBodies.boxes([[1.3, 0.5, 0.3]], [[0.2, 0.4, 0.6]])
+    water = tank((2, 1, 1), cell, lambda x: x[:, 2] - 0.5 + 0.1 * (x[:, 0] - 1.0), box)
+    return water.predict(water.stable_step())
+
+
+@pytest.mark.parametrize("shape", [(5, 6, 7), (40, 3, 3), (300, 1, 1)])
+def test_the_cycle_is_symmetric_and_positive_definite(shape):
+    """What conjugate gradients need of it."""
+    M = applied(laplace(*shape))
+    np.testing.assert_allclose(M, M.T, atol=1e-13 * np.abs(M).max())
+    assert np.linalg.eigvalsh((M + M.T) / 2).min() > 0.0
+
+
+def test_iterations_hardly_grow_with_the_number_of_unknowns():
+    """By a factor 1.3 at most from 1 100 to 8 000 unknowns, where the diagonal needs twice as many."""
+    count = []
+    for cell in (0.1, 0.05):
+        p = pressure_system(cell)
+        count.append(solve(p.matrix, p.rhs, np.zeros(len(p.rhs)), 1e-8).iterations)
+    assert count[0] < 20
+    assert count[-1] <= 1.3 * count[0]
+
+
+@pytest.mark.parametrize("weights", [(1, 1, 100), (1, 100, 100), (1, 10, 1000)])
+def test_flat_cells_cost_few_iterations_more(weights):
+    """Strong couplings are taken together first: 12 x 12 x 12 lattices stretched up to 30-fold."""
+    A = laplace(12, 12, 12, weights)
+    b = np.random.default_rng(0).normal(size=A.shape[0])
+    assert solve(A, b, np.zeros(len(b)), 1e-8).iterations < 30
+
+
+def test_nothing_is_joined_that_is_not_coupled():
+    """Two tanks in one matrix, no entry between them: every aggregate lies in one of them."""
+    one = laplace(8, 8, 8)
+    A = sp.csr_array(sp.block_diag([one, one]))
+    cycle = Multigrid(A)
+    tank_of = np.repeat([0, 1], 512)
+    for level in cycle.levels:
+        count = level.aggregate.max() + 1
+        share = np.bincount(level.aggregate, tank_of, minlength=count) / np.bincount(level.aggregate)
+        assert set(share) == {0.0, 1.0}
+        tank_of = share.astype(int)
+
+
+def test_single_unknowns_and_drops_are_solved():
+    """Spray: a thousand unknowns without neighbours and a thousand pairs beside a body of water."""
+    pairs = sp.block_diag([np.array([[2.0, -1.0], [-1.0, 2.0]])] * 1000)
+    A = sp.csr_array(sp.block_diag([laplace(10, 10, 10), sp.diags_array(np.linspace(1, 10, 1000)), pairs]))
+    exact = np.random.default_rng(1).normal(size=A.shape[0])
+    result = solve(A, A @ exact, np.zeros(A.shape[0]), 1e-12)
+    assert result.iterations < 25
+    np.testing.assert_allclose(result.x, exact, atol=1e-9)
+
+
+def test_a_last_level_too_large_for_its_inverse_is_swept():
+    """Positive couplings are never joined, so this matrix has one level: the cycle is then Gauss-Seidel, and still
+    symmetric."""
+    A = sp.csr_array(sp.diags_array([0.3, 1.0, 0.3], offsets=[-1, 0, 1], shape=(250, 250)))
+    M = applied(A)
+    np.testing.assert_allclose(M, M.T, atol=1e-13)
+    np.testing.assert_allclose(M @ (A @ np.ones(250)), np.ones(250), rtol=1e-3)
+
+
+def test_every_run_gives_the_same_digits():
+    p = pressure_system(0.1)
+    first, second = (solve(p.matrix, p.rhs, np.zeros(len(p.rhs)), 1e-8).x for _ in range(2))
+    np.testing.assert_array_equal(first, second)
