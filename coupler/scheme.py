@@ -56,18 +56,26 @@ class StructureResponse:
         self.imposed = np.where(driven[:, None], driven_velocity, 0.0).ravel()
         self.free = np.flatnonzero(np.repeat(~driven, 6))
         self.matrix = sp.csc_array(mass / dt + damping + dt * stiffness)
+        tied = _tied(self.matrix) & ~driven
+        alone = np.flatnonzero(~driven & ~tied)
+        self._alone = (6 * alone[:, None] + np.arange(6)).ravel()
+        self._inverse = np.linalg.inv(_own_blocks(self.matrix)[alone])
+        self._tied = np.flatnonzero(np.repeat(tied, 6))
         self._factor = None
-        if len(self.free):
-            free_block = self.matrix[:, self.free][self.free, :]
+        if len(self._tied):
+            block = self.matrix[:, self._tied][self._tied, :]
             self._factor = splu(
-                sp.csc_matrix(free_block), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}
+                sp.csc_matrix(block), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}
             )
 
     def compliance(self, force: Array) -> Array:
-        """D⁻¹ force over the free bodies, zero on the driven ones. force (6n,) [N, N m] → (6n,) [m/s, rad/s]"""
+        """D⁻¹ force over the free bodies, zero on the driven ones. force (6n,) [N, N m] → (6n,) [m/s, rad/s]
+
+        Bodies that nothing ties to others are solved each by itself."""
         velocity = np.zeros_like(force)
+        velocity[self._alone] = (self._inverse @ force[self._alone].reshape(-1, 6, 1)).ravel()
         if self._factor is not None:
-            velocity[self.free] = self._factor.solve(np.ascontiguousarray(force[self.free]))
+            velocity[self._tied] = self._factor.solve(np.ascontiguousarray(force[self._tied]))
         return velocity
 
     def velocity(self, force: Array) -> Array:
@@ -77,6 +85,26 @@ class StructureResponse:
     def free_velocity(self, velocity: Array, force: Array) -> Array:
         """V_free of (3) from the velocities at t^n and the force without the unknown pressure, each (n, 6)."""
         return self.velocity(self.mass @ velocity.ravel() / self.dt + force.ravel())
+
+
+def _tied(matrix) -> Array:
+    """(n,) bool: bodies with entries in the rows of others. matrix (6n, 6n) sparse."""
+    entries = sp.coo_array(matrix)
+    row, column = entries.row // 6, entries.col // 6
+    between = (row != column) & (entries.data != 0.0)
+    tied = np.zeros(matrix.shape[0] // 6, bool)
+    tied[row[between]] = tied[column[between]] = True
+    return tied
+
+
+def _own_blocks(matrix) -> Array:
+    """Diagonal blocks (n, 6, 6) of a sparse (6n, 6n) matrix."""
+    entries = sp.coo_array(matrix)
+    own = entries.row // 6 == entries.col // 6
+    row, column = entries.row[own], entries.col[own]
+    blocks = np.zeros((matrix.shape[0] // 6, 6, 6))
+    np.add.at(blocks, (row // 6, row % 6, column % 6), entries.data[own])
+    return blocks
 
 
 @dataclass(frozen=True)
