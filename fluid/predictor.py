@@ -113,12 +113,11 @@ def _transported(water, dt, theta, kick):
     for u in (u_hat, u_m):
         water.hold(u, water.time + dt)
     fields = np.column_stack([u_hat, water.level_set])
+    moved = transport(water.topology, water.listed, dt, u_m, fields)
     if water.parameters.advection == "supg":
-        from fluid import supg
+        from fluid.supg import carried_velocity
 
-        moved = supg.transport(water, dt, u_m, fields)
-    else:
-        moved = transport(water.topology, water.listed, dt, u_m, fields)
+        moved[:, :3] = carried_velocity(water, dt, u_m, u_hat)
     u_adv, phi = u_hat, water.level_set.copy()
     u_adv[water.listed] = moved[:, :3]
     near = np.abs(phi[water.listed]) < TRANSPORT_WIDTH * water.mesh.spacing
@@ -190,6 +189,9 @@ def _problem(water, dt, theta, kick, surface, conserved, u_adv, u_star, shear, l
     known = (1.0 - theta) * kick[dofs] * water.end_pressure[dofs]
     guess = theta * water.end_pressure[dofs]
     matrix, extra = _sealed(water, matrix, anchored, dofs, dt, guess)
+    if water.slits is not None:
+        lumped, drive = water.slits.pressure_terms(dofs, known, water.parameters.weight, dt, density)
+        matrix, extra = matrix + lumped, extra + drive
     kept = Predicted(
         phi,
         surface.nodal_water,

@@ -42,6 +42,8 @@ def save(water) -> dict[str, np.ndarray]:
     arrays |= {"graph_nodes": water.flux.graph.nodes, "flux_nodes": water.flux.nodes, "flux": water.flux.rate}
     if water.sides is not None:
         arrays |= {name: np.array(getattr(water.sides, name)) for name in SIDES}
+    if water.slits is not None:
+        arrays |= {"slit_name": water.slits.name, "slit_flow": water.slits.flow}
     return arrays
 
 
@@ -65,6 +67,10 @@ def restore(water, domain, arrays) -> None:
     if water.sides is not None:
         for name in SIDES:
             setattr(water.sides, name, float(arrays[name]))
+    if "slit_name" in arrays:
+        from fluid.slits import Slits
+
+        water.slits = Slits.remembered(np.array(arrays["slit_name"]), np.array(arrays["slit_flow"]))
 
 
 def _check(domain, arrays, sides) -> None:

@@ -89,6 +89,7 @@ class Water:
         self._surface_lag, self._solids_move = 0.0, False
         self.report: StepReport | None = None
         self.sides = sides
+        self.slits = None
         self.reference = mesh.bounds.mean(axis=0)
         """Point (3,) [m] that angular momentum is taken about."""
         no_slip = self.parameters.walls == "no-slip"
@@ -170,6 +171,10 @@ class Water:
         self.conserved_volume = problem.predicted.conserved_volume
         if self.sides is not None:
             self.sides.book(problem.predicted.through, self.head())
+        if self.slits is not None:
+            p = self.parameters
+            pressure = x + problem.known
+            self.slits = self.slits.advanced(problem.dofs, pressure, p.weight, problem.dt, p.density)
         self.report = new.report
         self.time += problem.dt
         self._surface_lag = problem.dt if self._solids_move else 0.5 * problem.dt
@@ -194,10 +199,17 @@ class Water:
             self.nodal_water = handed_on @ self.nodal_water
             self._renumbered = handed_on if self._renumbered is None else handed_on @ self._renumbered
 
+    def set_cracks(self, cracks) -> None:
+        """Lump the flow through these `slits.Cracks`: anew after every change of the domain or of the cracks."""
+        from fluid.slits import Slits
+
+        self.slits = Slits.of(self.domain, cracks, self.mesh.spacing, self.slits)
+
     def carried_volume(self, dt: float) -> np.ndarray:
         """Conservative volume (N,) [m³] of the nodes after dt [s], carried on the domain of the last projection."""
         carried = carry_volume(self.flux, dt)
-        return carried if self._renumbered is None else self._renumbered @ carried
+        carried = carried if self._renumbered is None else self._renumbered @ carried
+        return carried if self.slits is None else carried + self.slits.carried(dt)
 
     def _carry_nodes(self, source, known):
         scalars = np.column_stack([self.level_set, self.pressure, self.end_pressure])
