@@ -139,7 +139,7 @@ class Ladder(Section):
     sizes: tuple[quantity("", gt=0), ...] = Field(
         (),
         description="lengths, times or other measures of the runs for the order of convergence; absent: the values, "
-        "where they are numbers or quantities",
+        "where they have a unit",
     )
     across: Name | None = Field(
         None, description="another ladder: a curve for each of its values; that one has none of its own then"

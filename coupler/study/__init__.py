@@ -12,5 +12,6 @@ cheapest   the cheapest setting for an error; what parts of the program cost
 report     JSON, CSV, tables
 against    two studies of one case: what got worse
 command    the command; figures are made by coupler/view/study.py
-page       docs/studies.md out of studies
+page       a study as Markdown
+pages      docs/studies.md out of several
 """

@@ -1,12 +1,9 @@
-"""A study as Markdown, and docs/studies.md out of several: `python -m coupler.study.page STUDY...`."""
+"""A study as Markdown: what was run where, errors, cheapest settings, orders, what parts cost."""
 
 from __future__ import annotations
 
-import json
 import math
 import shlex
-import sys
-from pathlib import Path
 
 AGAINST = {
     "exact": "the exact answer",
@@ -30,7 +27,7 @@ def page(told: dict, level: int = 1, pictures: str = "") -> str:
     if told["orders"]:
         parts.append(f"{mark}# Observed order of convergence\n\n{_orders(told)}")
     if told["laws"]:
-        parts.append(f"{mark}# Laws of YADE and ours\n\n{_laws(told)}")
+        parts.append(f"{mark}# Laws of YADE and ours\n\n{_laws(told, pictures)}")
     if told["parts"]:
         parts.append(f"{mark}# What parts of the program cost\n\n{_parts(told)}")
     failed = _failed(told)
@@ -45,7 +42,17 @@ def _where(told: dict) -> str:
     commit = f", commit {told['git']['commit'][:12]}" if told["git"] else ""
     return (
         f"`{shlex.join(told['command'])}`  \n{machine['processor']}, {machine['cores']} cores, one thread; "
-        f"{packages}{commit}."
+        f"{packages}{commit}.{_first_step(told)}"
+    )
+
+
+def _first_step(told: dict) -> str:
+    first = told["first_step"]
+    if first is None:
+        return ""
+    return (
+        f" A process of one step, apart from the runs: {first['cpu_seconds']:.3g} CPU s, "
+        f"{first['compile_seconds']:.3g} of them to compile."
     )
 
 
@@ -70,7 +77,8 @@ def table(head: list[str], rows: list[list[str]]) -> str:
     return "\n".join([lines[0], rule, *lines[1:]])
 
 
-def _name(point: dict) -> str:
+def point_name(point: dict) -> str:
+    """Ladder and setting of a point or rung."""
     curve = f" ({point['curve']})" if point["curve"] else ""
     return f"{point['ladder']} {point['label']}{curve}"
 
@@ -110,7 +118,7 @@ def _run_row(told: dict, point: dict, quantities: list[dict]) -> list[str]:
     if point["reason"]:
         errors = ["failed"] * len(quantities)
     return [
-        _name(point),
+        point_name(point),
         *errors,
         *(f"{run[name]:.3g}" for name in TIMES),
         f"{run['peak_memory'] / 1e6:.0f}",
@@ -125,7 +133,7 @@ def _cheapest(told: dict) -> str:
     rows = []
     for entry in told["cheapest"]:
         rung = entry["rung"]
-        setting = "none of these" if rung is None else _name(rung)
+        setting = "none of these" if rung is None else point_name(rung)
         cost = "–" if rung is None else f"{entry['cpu_seconds']:.3g}"
         rows.append(
             [f"{what[entry['quantity']]}, {100 * entry['level']:g} %", setting, percent(entry["error"]), cost]
@@ -145,7 +153,7 @@ def _orders(told: dict) -> str:
     return table(["quantity, ladder", "all runs", "finest runs", "from"], rows)
 
 
-def _laws(told: dict) -> str:
+def _laws(told: dict, pictures: str) -> str:
     names = list(told["laws"][0]["readings"])
     rows = [
         [f"{row['law']}{' (YADE)' if row['stock'] else ''}, {row['multiple']} x substep",
@@ -153,7 +161,8 @@ def _laws(told: dict) -> str:
         for row in told["laws"]
     ]  # fmt: skip
     head = ["law", *(f"error: {name}" for name in names), "CPU s of stepping"]
-    return table(head, rows)
+    figures = "".join(f"\n\n![{name}, laws]({pictures}{name}_laws.png)" for name in names)
+    return table(head, rows) + figures
 
 
 def _parts(told: dict) -> str:
@@ -170,18 +179,5 @@ def _parts(told: dict) -> str:
 
 
 def _failed(told: dict) -> str:
-    lines = [f"- {_name(point)}: {point['reason']}" for point in told["points"] if point["reason"]]
+    lines = [f"- {point_name(point)}: {point['reason']}" for point in told["points"] if point["reason"]]
     return "\n".join(dict.fromkeys(lines))
-
-
-def main() -> None:
-    """Pages of studies under one heading, figures in pictures/studies/NAME/."""
-    print("# Studies: error against run time\n")
-    for folder in map(Path, sys.argv[1:]):
-        told = json.loads((folder / "study.json").read_text(encoding="utf-8"))
-        name = Path(told["case"]).parent.name
-        print(page(told, level=2, pictures=f"pictures/studies/{name}_"))
-
-
-if __name__ == "__main__":
-    main()

@@ -148,12 +148,12 @@ def toml(value) -> str:
 
 
 def _size(name: str, value) -> float | None:
-    """The value in SI, if it is a quantity with a unit or a plain number; None where it is a name or a list."""
+    """The value in SI where it is a length, a time or has another unit; None for plain numbers and names."""
     key = find(without_places(name))
-    if isinstance(value, bool) or not isinstance(value, int | float | str):
+    if key is None or not key.unit or isinstance(value, bool) or not isinstance(value, int | float | str):
         return None
     try:
-        size = to_si(value, key.unit if key else "")
+        size = to_si(value, key.unit)
     except UnitError:
         return None
     return size if size > 0.0 else None

@@ -36,7 +36,7 @@ def content(plan: Plan, runs: Runs, found: dict[str, Outcome], laws: list[LawPoi
         "machine": provenance.machine(),
         "versions": provenance.versions(),
         "git": provenance.git_state(),
-        "warm_up": None if runs.warm is None else asdict(runs.warm),
+        "first_step": None if runs.first_step is None else asdict(runs.first_step),
         "quantities": [_quantity(plan, q) for q in plan.study.quantity],
         "ladders": [
             {"name": ladder.name, "what": ladder.what or ladder.name} for ladder in plan.study.ladder

@@ -28,7 +28,7 @@ from coupler.study.plan import Plan, Setting
 
 LAST_LINES = 3
 COMPILED = 0.05
-"""Share of the time of the steps from which a run that had to compile is made again: it compiled what the warm-up
+"""Share of the time of the steps from which a run that had to compile is made again: it compiled what the first step
 does not need, and finds it the second time."""
 ENDED = (ExitCode.DONE, ExitCode.BAD_CASE, ExitCode.DIVERGED, ExitCode.STOPPED)
 """Exit codes of runs that would end the same way again."""
@@ -42,6 +42,15 @@ class Cost:
     wall_seconds: float
     peak_memory: int
     exit_code: int
+
+
+@dataclass(frozen=True)
+class FirstStep:
+    """CPU seconds of a process that takes one step, those of them in the compiler, and wall seconds."""
+
+    cpu_seconds: float
+    compile_seconds: float
+    wall_seconds: float
 
 
 @dataclass(frozen=True)
@@ -81,7 +90,7 @@ class Runs:
         self.folder = folder / "runs"
         self.folder.mkdir(parents=True, exist_ok=True)
         self.program = program()
-        self.warm: Cost | None = None
+        self.first_step: FirstStep | None = None
 
     def place(self, setting: str, number: int) -> Path:
         """Run directory of a run."""
@@ -92,9 +101,8 @@ class Runs:
         known = self.known(setting, number)
         if known is not None:
             return known
-        if self.warm is None:
-            self.warm = warm_up(self.folder)
-            self.tell(f"kernels ready after {self.warm.cpu_seconds:.1f} CPU s")
+        if self.first_step is None:
+            self.first_step = self._first_step(setting)
         made = self._make(setting, number)
         if made.compile_seconds > COMPILED * made.cpu_seconds:
             self.tell(f"compiled for {made.compile_seconds:.1f} CPU s, made again")
@@ -120,6 +128,29 @@ class Runs:
             return None
         return found
 
+    def _first_step(self, setting: Setting) -> FirstStep:
+        """One step of a setting in a process of its own: it compiles what the case needs, once for all runs."""
+        place, time = self.folder / "first_step", setting.case["time"]
+        shutil.rmtree(place, ignore_errors=True)
+        short = f"time.end={min(time['end'], time['step_max'])!r}"
+        cost, compiling = self._process((*setting.overrides, short), place)
+        shutil.rmtree(place, ignore_errors=True)
+        self.tell(f"first step: {cost.cpu_seconds:.1f} CPU s, {compiling:.1f} of them to compile")
+        return FirstStep(cost.cpu_seconds, compiling, cost.wall_seconds)
+
+    def _process(self, overrides: tuple[str, ...], place: Path) -> tuple[Cost, float]:
+        """Run the case into a directory; what it cost, and the CPU seconds in the compiler."""
+        compiled = place.with_suffix(".compiled")
+        compiled.unlink(missing_ok=True)
+        sets = [word for override in overrides for word in ("--set", override)]
+        command = ["run", str(self.plan.file.path), *sets, "--output", str(place)]
+        cost = measure([sys.executable, "-m", "coupler.study.one", str(compiled), *command], log_of(place))
+        compiling = (
+            json.loads(compiled.read_text(encoding="utf-8"))["compile_seconds"] if compiled.exists() else 0.0
+        )
+        compiled.unlink(missing_ok=True)
+        return cost, compiling
+
     def _figures(self, setting: str, number: int) -> Path:
         return self.folder / f"{setting}-{number}.json"
 
@@ -129,15 +160,15 @@ class Runs:
         figures.unlink(missing_ok=True)
         if place.exists():
             shutil.rmtree(place)  # of a study that was stopped, or of another version
-        compiled = place.with_suffix(".compiled")
-        sets = [word for override in setting.overrides for word in ("--set", override)]
-        command = ["run", str(self.plan.file.path), *sets, "--output", str(place)]
-        log = place.with_suffix(".log")
-        cost = measure([sys.executable, "-m", "coupler.study.one", str(compiled), *command], log)
-        found = _measured(setting, number, place, cost, compiled, log, self.program)
+        cost, compiling = self._process(setting.overrides, place)
+        found = _measured(setting, number, place, cost, compiling, self.program)
         write_json(figures, asdict(found))
-        compiled.unlink(missing_ok=True)
         return found
+
+
+def log_of(place: Path) -> Path:
+    """What the process of a run told."""
+    return place.with_suffix(".log")
 
 
 def measure(command: list[str], log: Path) -> Cost:
@@ -156,26 +187,18 @@ def measure(command: list[str], log: Path) -> Cost:
     return Cost(used.ru_utime + used.ru_stime, wall, used.ru_maxrss * 1024, child.returncode)
 
 
-def warm_up(folder: Path) -> Cost:
-    """Compile what the sources need, in a process of its own; quick when they were compiled before."""
-    return measure([sys.executable, "-m", "coupler.warm_up"], folder / "warm_up.log")
-
-
 def _measured(
-    setting: Setting, number: int, place: Path, cost: Cost, compiled: Path, log: Path, program: dict
+    setting: Setting, number: int, place: Path, cost: Cost, compiling: float, program: dict
 ) -> Measured:
     summary = read_summary(place) if (place / "run.json").exists() else {}
     figures = summary.get("figures", {})
     split = figures.get("cpu_seconds", {})
     inside, set_up = sum(split.values()), split.get("set-up", 0.0)
-    compiling = (
-        json.loads(compiled.read_text(encoding="utf-8"))["compile_seconds"] if compiled.exists() else 0.0
-    )
     return Measured(
         setting=setting.id,
         number=number,
         exit_code=cost.exit_code,
-        reason=_reason(summary, cost, log),
+        reason=_reason(summary, cost, log_of(place)),
         cpu_seconds=max(inside - set_up - compiling, 0.0),
         set_up_seconds=set_up,
         start_seconds=max(cost.cpu_seconds - max(inside, compiling), 0.0),

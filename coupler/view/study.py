@@ -77,9 +77,9 @@ def figure(stem, q, curves, failed, along):
         axis.set_xscale("log")
         axis.set_yscale("log")
         shown = [(legend, points) for legend, points in curves if points]
-        band(axis, shown)
         for number, (legend, points) in enumerate(shown):
             line(axis, number, legend, points)
+        band(axis, shown)
         limits(axis, shown, failed)
         axis.set_xlabel(along)
         axis.set_ylabel(ylabel(q))
@@ -98,7 +98,7 @@ def figure(stem, q, curves, failed, along):
 def ylabel(q):
     """What the error is of, and against what: never of two kinds in one figure."""
     against = {"exact": "exact answer", "measured": "measurement", "finest": "finest run"}[q["against"]]
-    return "\n".join(textwrap.wrap(f"error of {q['what']} against the {against}", 48))
+    return "\n".join([*textwrap.wrap(f"error of {q['what']}", 46), f"against the {against}"])
 
 
 def line(axis, number, legend, points):
@@ -139,14 +139,14 @@ def limits(axis, curves, failed):
     ]
     y = [max(p[1], LOWEST) for _, points in curves for p in points]
     axis.set_xlim(0.7 * min(x), 1.9 * max(x))
-    low, high = 10.0 ** math.floor(math.log10(0.8 * min(y))), 10.0 ** math.ceil(math.log10(1.3 * max(y)))
+    low, high = 10.0 ** math.floor(math.log10(0.95 * min(y))), 10.0 ** math.ceil(math.log10(1.2 * max(y)))
     axis.set_ylim(low, high)
     for level in LEVELS:
         if low < level < high:
             axis.axhline(level, color=INK, lw=0.5, ls=":", zorder=2)
     axis.xaxis.set_major_formatter(plt.FuncFormatter(lambda value, _: f"{value:g}"))
     axis.yaxis.set_major_formatter(plt.FuncFormatter(lambda value, _: share(value)))
-    if max(x) / min(x) < 8.0:
+    if max(x) / min(x) < 30.0:
         axis.xaxis.set_minor_formatter(plt.FuncFormatter(ticks))
 
 

@@ -69,14 +69,14 @@ class FakeProcesses:
         self.calls, self.broken, self.stop_after, self.compiling = [], {}, None, 0.0
 
     def __call__(self, command: list[str], log: Path) -> Cost:
-        if "coupler.warm_up" in command:
+        place = Path(command[command.index("--output") + 1])
+        if place.name == "first_step":
             return Cost(1.0, 1.0, 0, 0)
         if self.stop_after is not None and len(self.calls) >= self.stop_after:
             raise KeyboardInterrupt
         self.calls.append(command)
         sets = [command[i + 1] for i, word in enumerate(command) if word == "--set"]
         case = load(command[command.index("run") + 1], sets).case
-        place = Path(command[command.index("--output") + 1])
         reason = self.broken.get(case.time.step_max, "")
         write_run(place, case.time.step_max, case.contact.friction, reason)
         compiled = json.dumps({"compile_seconds": self.compiling})

@@ -200,3 +200,53 @@ def test_a_case_without_a_study_says_what_to_write(case):
     (case / "case.toml").write_text(CASE.partition("[study]")[0], encoding="utf-8")
     with pytest.raises(BadCase, match=r"\[\[study.quantity\]\]"):
         make_plan(case)
+
+
+REAL = """\
+[case]
+title = "a block falls"
+[time]
+end = 0.1
+step_max = 0.05
+output_every = 0.1
+checkpoint_every = 0
+[structure]
+[[structure.block]]
+name = "box"
+size = [1, 1, 1]
+centre = [0, 0, 5]
+[contact]
+stiffness = 1e6
+[[gauge]]
+kind = "motion"
+name = "box"
+of = "box"
+[study]
+[[study.quantity]]
+name = "way"
+table = "history/gauges.csv"
+column = "box_centre_z"
+against = "exact"
+value = "5 - 0.5 * case.gravity * time.end**2"
+scale = 0.049
+[[study.ladder]]
+name = "dt"
+key = ["structure.substep", "time.step_max"]
+values = [["20 ms", "20 ms"], ["10 ms", "10 ms"]]
+"""
+
+
+def test_a_real_study_of_a_falling_block(tmp_path):
+    """Processes as a user runs them. The velocity of a step moves the block through it, so the way of a fall from rest
+    is off by the share that the step has of the fall, whose error is of first order."""
+    (tmp_path / "case.toml").write_text(REAL)
+    code, told = made(tmp_path)
+    assert code == ExitCode.DONE
+    errors = [point["readings"]["way"]["error"] for point in told["points"]]
+    assert errors == pytest.approx([0.2, 0.1], rel=0.02)
+    assert told["orders"][0]["overall"] == pytest.approx(1.0, abs=0.05)
+    for run in told["runs"].values():
+        assert run["size"] == {"blocks": 1, "joints": 0}
+        assert run["peak_memory"] > 50e6
+        assert run["cpu_seconds"] > 0.0
+        assert run["start_seconds"] > 0.1
