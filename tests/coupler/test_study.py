@@ -113,6 +113,17 @@ def test_a_study_that_was_stopped_goes_on(fake, case):
     assert len(told["points"]) == 5
 
 
+def test_a_half_written_run_is_made_again(fake, case):
+    """A machine that went down leaves a run directory without what it cost."""
+    made(case)
+    folder = case / "out" / "runs"
+    figures = sorted(folder.glob("*-1.json"))[0]
+    figures.unlink()
+    (folder / figures.stem / "run.json").write_text('{"status": "running"', encoding="utf-8")
+    made(case)
+    assert len(fake.calls) == 6
+
+
 def test_larger_rungs_are_added_to_what_is_there(fake, case):
     made(case)
     _, told = made(case, larger=True)

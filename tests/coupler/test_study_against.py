@@ -4,7 +4,9 @@ import copy
 import json
 
 import pytest
+from typer.testing import CliRunner
 
+from coupler.cli import app
 from coupler.errors import BadCase, ExitCode
 from coupler.study.against import compare
 
@@ -88,3 +90,13 @@ def test_studies_without_a_common_run_are_refused(tmp_path):
 def test_a_place_without_a_study_is_told(tmp_path):
     with pytest.raises(BadCase, match="not the result of a study"):
         compare(tmp_path, tmp_path, 1.1, 1.2)
+
+
+def test_the_command_leaves_with_the_code(tmp_path):
+    """As a pipeline calls it: 0, or 3 when B got worse; what is neither a case nor a comparison is refused with 2."""
+    compared(tmp_path, changed(error=0.15))
+    run = CliRunner().invoke
+    place = [str(tmp_path / "a"), str(tmp_path / "b")]
+    assert run(app, ["study", "compare", *place]).exit_code == 3
+    assert run(app, ["study", "compare", *place, "--error", "2"]).exit_code == 0
+    assert run(app, ["study", *place]).exit_code == 2

@@ -1,5 +1,8 @@
 """The section [study]: references of one kind, names that exist, and no trace in a run."""
 
+import subprocess
+import sys
+
 import pytest
 
 from coupler.case import effective
@@ -50,6 +53,18 @@ def test_a_run_takes_no_notice_of_the_study(tmp_path):
     with_study = effective(load(tmp_path).case)
     (tmp_path / "case.toml").write_text(CASE.partition("[study]")[0], encoding="utf-8")
     assert with_study == effective(load(tmp_path).case)
+
+
+def test_a_case_without_a_study_loads_nothing_of_it(tmp_path):
+    (tmp_path / "case.toml").write_text(CASE.partition("[study]")[0], encoding="utf-8")
+    code = (
+        "import sys; from coupler.case_file import load; load(sys.argv[1]); "
+        "print([name for name in sys.modules if name.startswith('coupler.study')])"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, str(tmp_path)], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == "[]"
 
 
 def test_formulas_know_names_and_functions_of_a_case():
