@@ -17,7 +17,8 @@ Kind = Literal["computed", "other", "measured", "band", "exact"]
 
 @dataclass(frozen=True)
 class Curve:
-    """A line or points: x, y (n,) in the units of its panel; a band reaches from y to upper (n,)."""
+    """A line or points: x, y (n,) in the units of its panel; a band reaches from y to upper (n,). No label: not in the
+    legend."""
 
     label: str
     kind: Kind

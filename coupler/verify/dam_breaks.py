@@ -44,9 +44,10 @@ SENSORS = (0.003, 0.015, 0.030)
 @check("P38", "dam break on a wall, sensor 2", "Lobovsky et al., J. Fluids Struct. 48 (2014) 407", "M")
 def wall_impact():
     table = columns("lobovsky_p2_percentiles_H300")
-    rubbed, slipping = _impact(32, **RUBBED), _impact(16)
-    yield from _impact_findings("", rubbed, table)
-    yield from rubbed.losses.findings()
+    runs, slipping = {n: _impact(n, **RUBBED) for n in (16, 24, 32)}, _impact(16)
+    for n, run in runs.items():
+        yield from _impact_findings(f"cells H/{n}: ", run, table)
+        yield from run.losses.findings(f"cells H/{n}: ")
     sph = columns("decourcy_p2_sph")
     at = np.linspace(3.0, 6.0, 301)
     differs = slipping.within(at, 1) - np.interp(at, sph["tstar"], sph["pstar"])
@@ -55,8 +56,8 @@ def wall_impact():
         "walls that slip: rms difference of p* to published δ-SPH, 3 < t* < 6", rms, 0.0, 0.05, False
     )
     yield from slipping.losses.findings("walls that slip: ")
-    yield _impact_figure(rubbed, slipping, table, sph)
-    yield _cells_figure({16: _impact(16, **RUBBED), 24: _impact(24, **RUBBED), 32: rubbed}, table)
+    yield _impact_figure(runs[32], slipping, table, sph)
+    yield _cells_figure(runs, table)
 
 
 def _cells_figure(runs: dict[int, Impact], table) -> Figure:

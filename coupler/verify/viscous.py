@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from coupler.verify.curves import Curve, Figure, Panel
 from coupler.verify.figures import columns
 from coupler.verify.registry import Finding, check
 from fluid import gauges
@@ -39,20 +40,38 @@ def step(water: Water, dt: float, rtol: float = 1e-8):
 @check("P31", "decay of Taylor-Green vortices", "exp(-4 nu k² t), exact")
 def vortices():
     nu, k = 0.05, np.pi
-    errors = {}
-    for n in (8, 16, 32):
-        errors[n], energy = _vortex(n, nu, k)
+    errors, curves = {}, []
     exact = columns("taylor_green_2d")
+    for n in (8, 16, 32):
+        errors[n], times, energies = _vortex(n, nu, k)
+        curves.append(Curve(f"{n} cells", "computed", times, energies))
     left = exact["E_over_E0"][exact["nu_k2_t"] == 0.25][0]
-    yield Finding("energy left at nu k² t = 0.25, 32 cells", energy, left, 0.02)
+    yield Finding("energy left at nu k² t = 0.25, 32 cells", float(energies[-1]), left, 0.02)
     for coarse, fine in ((8, 16), (16, 32)):
         order = min(np.log2(errors[coarse] / errors[fine]), 2.0)
         yield Finding(f"order of the L2 error, 2 at most, {coarse} to {fine} cells", order, 2.0, 0.2, False)
     yield Finding("L2 error of the velocity, 32 cells", errors[32], 0.0, 0.02, False)
+    yield _vortex_figure(errors, curves)
 
 
-def _vortex(n: int, nu: float, k: float) -> tuple[float, float]:
-    """(relative L2 error, energy left) at ν k² t = 0.25 between smooth walls; dt falls with the cells."""
+def _vortex_figure(errors, curves) -> Figure:
+    t = np.linspace(0.0, 0.25, 100)
+    curves.append(Curve("exact", "exact", t, np.exp(-4.0 * t)))
+    cells = np.log10(list(errors))
+    found = np.log10(list(errors.values()))
+    order = (
+        Curve("computed", "computed", cells, found),
+        Curve("second order", "exact", cells, found[0] - 2.0 * (cells - cells[0])),
+    )
+    panels = (
+        Panel("time $\\nu k^2 t$ [–]", "energy left [–]", tuple(curves)),
+        Panel("log$_{10}$ of the cells an edge", "log$_{10}$ of the $L_2$ error", order),
+    )
+    return Figure("P31_vortices", panels, columns=2)
+
+
+def _vortex(n: int, nu: float, k: float):
+    """(relative L2 error at ν k² t = 0.25, times ν k² t, energy left) between smooth walls; dt falls with the cells."""
     mesh = box_mesh(np.zeros(3), [1, 1 / n, 1], 1 / n)
     domain = cut_domain(mesh, ConvexBodies.empty())
     water = Water(mesh, domain, full, WaterParameters(viscosity=DENSITY * nu))
@@ -61,21 +80,26 @@ def _vortex(n: int, nu: float, k: float) -> tuple[float, float]:
     water.velocity[:, 2] = -0.2 * np.cos(x[:, 0]) * np.sin(x[:, 2])
     water.cell_velocity[:] = water.velocity[water.topology.cells].mean(axis=1)
     start, steps = water.velocity.copy(), 3 * n // 8
-    for _ in range(steps):
-        step(water, end / steps)
-    exact = start * np.exp(-2 * nu * k**2 * end)
 
     def square(u):
         return float(water.nodal_water @ (u**2).sum(axis=1))
 
-    return np.sqrt(square(water.velocity - exact) / square(exact)), square(water.velocity) / square(start)
+    energies = [1.0]
+    for _ in range(steps):
+        step(water, end / steps)
+        energies.append(square(water.velocity) / square(start))
+    exact = start * np.exp(-2 * nu * k**2 * end)
+    error = np.sqrt(square(water.velocity - exact) / square(exact))
+    return error, np.linspace(0.0, 0.25, steps + 1), np.array(energies)
 
 
 @check("P32", "start of flow between plates that cut the cells; square duct", "series, exact")
 def plates_and_duct():
-    table = columns("startup_couette_poiseuille")
+    table, panels = columns("startup_couette_poiseuille"), []
     for flow, gravity, speed in (("couette", 1e-9, 1.0), ("poiseuille", 1.0, 0.0)):
-        worst, force = _plates(16, gravity, speed, table, f"u_{flow}")
+        worst, force, curves = _plates(16, gravity, speed, table, f"u_{flow}")
+        axes = (f"velocity, {flow} [–]", "height between the plates [–]")
+        panels.append(Panel(*axes, tuple(curves), None, (0.0, 1.0)))
         yield Finding(
             f"{flow}: largest error / largest speed from t = 0.05 H²/nu on", worst, 0.0, 0.02, False
         )
@@ -85,6 +109,7 @@ def plates_and_duct():
     duct = columns("square_duct_poiseuille")
     yield Finding("square duct, 16 cells: largest speed mu/(G a²)", fastest, duct["u"].max(), 0.02)
     yield Finding("square duct, 16 cells: flow rate mu/(G a⁴)", rate, 0.0351443, 0.02)
+    yield Figure("P32_plates", tuple(panels), columns=2)
 
 
 NU = 0.1
@@ -100,15 +125,15 @@ def _channel(size, n: int, bodies: ConvexBodies, gravity: float, smooth=None) ->
     return Water(mesh, cut_domain(mesh, bodies), full, settings, across(0), smooth)
 
 
-def _plates(n: int, gravity: float, speed: float, table, name: str) -> tuple[float, float]:
-    """(largest error over the largest speed, last stress on the lower plate over ρ); the upper one moves with `speed`.
+def _plates(n: int, gravity: float, speed: float, table, name: str):
+    """(largest error over the largest speed, last stress on the lower plate over ρ, profiles); the upper one moves.
 
     Gap 1 m; the plates are bodies that cut their cells at 0.37."""
     foot = 1.37 / n
     plates = ConvexBodies.boxes([[0.0, 0.0, foot + 2.0], [0.0, 0.0, foot - 1.0]], [[4.0, 4.0, 2.0]] * 2)
     water = _channel([1 / n, 1 / n, 1 + 4 / n], n, plates, gravity, across(1))
     water.body_velocity[0, 0] = speed
-    worst, scale = 0.0, speed or gravity / NU
+    worst, scale, curves = 0.0, speed or gravity / NU, []
     for t in np.unique(table["t"]):
         steps = np.ceil((t / NU - water.time) / 0.025 - 1e-9)
         dt = (t / NU - water.time) / steps
@@ -118,9 +143,11 @@ def _plates(n: int, gravity: float, speed: float, table, name: str) -> tuple[flo
         y = np.clip(table["y"][at], 1e-6, 1 - 1e-6)
         place = np.column_stack([np.full_like(y, 0.5 / n), np.full_like(y, 0.5 / n), foot + y])
         u = gauges.velocity(water, place)[:, 0] / scale
+        curves.append(Curve("" if curves else "series", "measured", table[name][at], y))
+        curves.append(Curve(f"$\\nu t/H^2$ = {t:g}", "computed", u, y))
         if t >= 0.05:
             worst = max(worst, np.abs(u - table[name][at]).max() / table[name][at].max())
-    return worst, load[1, 0] * n**2 / DENSITY
+    return worst, load[1, 0] * n**2 / DENSITY, curves
 
 
 def _duct(n: int) -> tuple[float, float]:

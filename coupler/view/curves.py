@@ -32,7 +32,7 @@ def draw(figure, folder):
     with plt.rc_context(STYLE):
         drawing, axes = plt.subplots(rows, columns, squeeze=False, figsize=(WIDTH, 0.45 + height))
         for axis, panel in zip(axes.ravel(), panels):
-            draw_panel(axis, panel)
+            draw_panel(axis, panel, legend_columns=3 if columns == 1 else 2)
         for axis in axes.ravel()[len(panels) :]:
             axis.set_axis_off()
         stem = Path(folder) / figure["name"]
@@ -42,8 +42,8 @@ def draw(figure, folder):
     return stem.with_suffix(".png")
 
 
-def draw_panel(axis, panel):
-    """All curves of a panel, measured ones below the computed ones, with axes and legend."""
+def draw_panel(axis, panel, legend_columns):
+    """All curves of a panel, measured ones below the computed ones, with axes; the legend stands above, on no curve."""
     seen = {"computed": 0, "measured": 0}
     for curve in panel["curves"]:
         style = look(curve, seen)
@@ -59,12 +59,18 @@ def draw_panel(axis, panel):
         axis.set_xlim(panel["x_range"])
     if panel.get("y_range"):
         axis.set_ylim(panel["y_range"])
-    axis.legend(loc="best", frameon=True, framealpha=0.85, edgecolor="none", borderpad=0.2)
+    axis.legend(
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        ncols=legend_columns,
+        borderaxespad=0.2,
+        columnspacing=1.2,
+    )
 
 
 def look(curve, seen):
     """Style of a curve; seen: how many computed and measured ones there were so far, counted on."""
-    kind, style = curve["kind"], {"label": curve["label"]}
+    kind, style = curve["kind"], {"label": curve["label"] or "_unnamed"}
     if kind == "band":
         return style | {"color": BAND, "linewidth": 0, "zorder": 1}
     if kind == "exact":
