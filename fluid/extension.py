@@ -145,7 +145,7 @@ def fill_missing(topology, known, *fields):
     while missing.any():
         before = missing.sum()
         seed = known & topology.active
-        order, start = layers_around(seed, 4, topology.cells, topology.node_start, topology.node_cells)
+        order, start = layers_around(seed, 4, *topology.around)
         for f in fields:
             _fill(topology, order, start, 0, f, np.zeros((1, f.shape[1], 3)), seed.copy())
         known = known.copy()
@@ -187,7 +187,7 @@ def continue_into_solids(topology, phi, listed) -> None:
     seed = np.zeros(len(phi), bool)
     seed[t.cells[beside]] = True
     seed &= ~t.covered
-    order, start = layers_around(seed, COVERED_LAYERS, t.cells, t.node_start, t.node_cells)
+    order, start = layers_around(seed, COVERED_LAYERS, *t.around)
     order, start = _only(t.covered, order, start)
     around = cells_touching(seed, t.cells)
     f = phi[:, None].copy()

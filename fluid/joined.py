@@ -13,7 +13,7 @@ def joined(old: Cuts, again, new: Cuts) -> Cuts:
     take, kept, fresh = _merged(old.part_cell, new.part_cell, again)
     wet = _of_parts(kept, fresh, old.wet_part, new.wet_part)
     opened = _of_parts(kept, fresh, old.open_part, new.open_part)
-    start, x = _ragged(opened, old.open_start, new.open_start, old.open_x, new.open_x)
+    start, corner = _ragged(opened, old.open_start, new.open_start)
     return Cuts(
         _rows(take, old.part_cell, new.part_cell),
         _rows(take, old.part_whole, new.part_whole),
@@ -24,7 +24,7 @@ def joined(old: Cuts, again, new: Cuts) -> Cuts:
         _places(opened, kept, fresh, old.open_part, new.open_part),
         _rows(opened, old.open_face, new.open_face),
         start,
-        x,
+        _rows(corner, old.open_x, new.open_x),
     )
 
 
@@ -83,6 +83,8 @@ def _places(take, kept, fresh, old_part, new_part):
 
 def _rows(take, a, b):
     """Rows of a (take ≥ 0) and of b."""
+    if len(take) == 0:
+        return b[:0].copy()
     return _numbers(take, a, b) if a.ndim == 1 else _table(take, a, b)
 
 
@@ -105,17 +107,16 @@ def _table(take, a, b):
 
 
 @njit(cache=True)
-def _ragged(take, old_start, new_start, old_x, new_x):
-    """start (n + 1,) and x of the taken polygons."""
+def _ragged(take, old_start, new_start):
+    """start (n + 1,) of the taken polygons, and where each of their corners comes from, as in `take`."""
     start = np.zeros(len(take) + 1, np.int64)
     for s in range(len(take)):
         t = take[s]
         length = old_start[t + 1] - old_start[t] if t >= 0 else new_start[-t] - new_start[-1 - t]
         start[s + 1] = start[s] + length
-    x = np.empty((start[-1], 3))
+    corner = np.empty(start[-1], np.int64)
     for s in range(len(take)):
-        source, first = (old_x, old_start[take[s]]) if take[s] >= 0 else (new_x, new_start[-1 - take[s]])
+        t = take[s]
         for k in range(start[s + 1] - start[s]):
-            for c in range(3):
-                x[start[s] + k, c] = source[first + k, c]
-    return start, x
+            corner[start[s] + k] = old_start[t] + k if t >= 0 else -1 - (new_start[-1 - t] + k)
+    return start, corner

@@ -117,7 +117,7 @@ def _ratio(part, whole):
 
 
 @njit(cache=True)
-def _closest_in_layers(order, layer_start, triangles, owner, nodes, cells, node_start, node_cells):
+def _closest_in_layers(order, layer_start, triangles, owner, nodes, cells, start, around):
     """Distance (N,) [m] of the nodes of `order` to the triangles, handed outward; two sweeps a layer."""
     n = nodes.shape[0]
     closest = np.full(n, -1, np.int64)
@@ -133,15 +133,14 @@ def _closest_in_layers(order, layer_start, triangles, owner, nodes, cells, node_
         for _ in range(2):
             for s in range(layer_start[layer], layer_start[layer + 1]):
                 i = order[s]
-                for t in range(node_start[i], node_start[i + 1]):
-                    for a in range(4):
-                        c = closest[cells[node_cells[t], a]]
-                        if c < 0 or tried[c] == i:
-                            continue
-                        tried[c] = i
-                        d = squared_distance(nodes[i], triangles[c])
-                        if d < best[i]:
-                            best[i], closest[i] = d, c
+                for t in range(start[i], start[i + 1]):
+                    c = closest[around[t]]
+                    if c < 0 or tried[c] == i:
+                        continue
+                    tried[c] = i
+                    d = squared_distance(nodes[i], triangles[c])
+                    if d < best[i]:
+                        best[i], closest[i] = d, c
     return np.sqrt(best)
 
 
@@ -174,11 +173,9 @@ def redistance(topology, phi, spacing: float, rescale: bool):
         return far
     front = np.zeros(len(phi), bool)
     front[t.cells[cut]] = True
-    order, start = layers_around(front, LAYERS, t.cells, t.node_start, t.node_cells)
+    order, start = layers_around(front, LAYERS, *t.around)
     triangles, owner = surface_triangles(cut, phi, t.nodes, t.cells)
-    distance = _closest_in_layers(
-        order, start, triangles, owner, t.nodes, t.cells, t.node_start, t.node_cells
-    )
+    distance = _closest_in_layers(order, start, triangles, owner, t.nodes, t.cells, *t.around)
     listed = order[start[1] :]
     far[listed] = np.copysign(np.minimum(distance[listed], FAR * spacing), phi[listed])
     far[front] = phi[front]

@@ -101,10 +101,13 @@ def nodal_water(cell_list, shift, phi, cells, fluid_volume, share, n_nodes):
         e = cell_list[s]
         for a in range(4):
             local[a] = phi[cells[e, a]] + shift
+        if local[0] < 0.0 and local[1] < 0.0 and local[2] < 0.0 and local[3] < 0.0:
+            for a in range(4):
+                total[cells[e, a]] += fluid_volume[e] * share[e, a]
+            continue
         wet_moments(local, out, corner)
-        whole = local[0] < 0.0 and local[1] < 0.0 and local[2] < 0.0 and local[3] < 0.0
         for a in range(4):
-            total[cells[e, a]] += fluid_volume[e] * (share[e, a] if whole else out[a])
+            total[cells[e, a]] += fluid_volume[e] * out[a]
     return total
 
 

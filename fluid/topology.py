@@ -76,6 +76,11 @@ class Topology:
         row[self.parent[::-1]] = np.arange(len(self.parent))[::-1]
         return row
 
+    @cached_property
+    def around(self) -> tuple[np.ndarray, np.ndarray]:
+        """start (N+1,), neighbours: the nodes that share a cell with each node."""
+        return _nodes_around(self.cells, self.node_start, self.node_cells)
+
     @property
     def active(self) -> np.ndarray:
         """(N,) bool: nodes that belong to a cell with fluid volume."""
@@ -192,29 +197,52 @@ def _neighbours(parent_neighbours, cells, parent, n_parents):
 
 
 @njit(cache=True)
-def layers_around(seed, depth, cells, node_start, node_cells):
+def _nodes_around(cells, node_start, node_cells):
+    """start (N + 1,), neighbours: nodes that share a cell with each node, in the order of its cells."""
+    n = node_start.shape[0] - 1
+    start = np.zeros(n + 1, np.int64)
+    seen = np.full(n, -1, np.int64)
+    around = np.empty(16 * n + 64, np.int32)
+    count = 0
+    for i in range(n):
+        most = 3 * (node_start[i + 1] - node_start[i])
+        if count + most > around.shape[0]:
+            around = np.concatenate((around, np.empty(around.shape[0] + most, np.int32)))
+        seen[i] = i
+        for t in range(node_start[i], node_start[i + 1]):
+            for a in range(4):
+                j = cells[node_cells[t], a]
+                if seen[j] != i:
+                    seen[j] = i
+                    around[count] = j
+                    count += 1
+        start[i + 1] = count
+    return start, around[:count].copy()
+
+
+@njit(cache=True)
+def layers_around(seed, depth, start, around):
     """Nodes in order of distance from the seed nodes (bool (N,)): (list, layer_start (depth + 2,)).
 
-    Layer 0 is the seed; layer k + 1 shares a cell with layer k."""
+    Layer 0 is the seed; layer k + 1 shares a cell with layer k. start, around: `Topology.around`."""
     n = seed.shape[0]
     order = np.empty(n, np.int64)
     layer_start = np.zeros(depth + 2, np.int64)
     seen = seed.copy()
     count = 0
     for i in range(n):
-        if seed[i] and node_start[i + 1] > node_start[i]:
+        if seed[i] and start[i + 1] > start[i]:
             order[count] = i
             count += 1
     layer_start[1] = count
     for layer in range(depth):
         for s in range(layer_start[layer], layer_start[layer + 1]):
-            for t in range(node_start[order[s]], node_start[order[s] + 1]):
-                for a in range(4):
-                    j = cells[node_cells[t], a]
-                    if not seen[j]:
-                        seen[j] = True
-                        order[count] = j
-                        count += 1
+            for t in range(start[order[s]], start[order[s] + 1]):
+                j = around[t]
+                if not seen[j]:
+                    seen[j] = True
+                    order[count] = j
+                    count += 1
         layer_start[layer + 2] = count
     return order[:count].copy(), layer_start
 

@@ -53,26 +53,28 @@ class Flux:
 def _edge_rates(nodes, graph_row, start, neighbour, u_cell, cells, parent, g, volume, node_start, node_cells):
     rate = np.zeros(neighbour.shape[0])
     slot = np.empty(node_start.shape[0] - 1, np.int64)
-    flow = np.empty(4)
+    flow, there = np.empty(cells.shape), np.zeros(cells.shape[0], np.bool_)
     for i in nodes:
         r = graph_row[i]
         for s in range(start[r], start[r + 1]):
             slot[neighbour[s]] = s
         for t in range(node_start[i], node_start[i + 1]):
             e = node_cells[t]
-            p = parent[e]
-            own = 0.0
+            if not there[e]:
+                there[e] = True
+                p = parent[e]
+                for a in range(4):
+                    flow[e, a] = (
+                        0.25
+                        * volume[e]
+                        * (g[p, a, 0] * u_cell[e, 0] + g[p, a, 1] * u_cell[e, 1] + g[p, a, 2] * u_cell[e, 2])
+                    )
+            own = 0
+            while cells[e, own] != i:
+                own += 1
             for a in range(4):
-                flow[a] = (
-                    0.25
-                    * volume[e]
-                    * (g[p, a, 0] * u_cell[e, 0] + g[p, a, 1] * u_cell[e, 1] + g[p, a, 2] * u_cell[e, 2])
-                )
-                if cells[e, a] == i:
-                    own = flow[a]
-            for a in range(4):
-                if cells[e, a] != i:
-                    rate[slot[cells[e, a]]] += flow[a] - own
+                if a != own:
+                    rate[slot[cells[e, a]]] += flow[e, a] - flow[e, own]
     return rate
 
 

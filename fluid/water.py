@@ -252,7 +252,7 @@ class Water:
     def layers(self, wet):
         """Wet nodes, then BAND layers around them: (list, layer_start)."""
         t = self.topology
-        order, start = layers_around(wet, BAND, t.cells, t.node_start, t.node_cells)
+        order, start = layers_around(wet, BAND, *t.around)
         if self.sides is None:
             return order, start
         # sides count with the last layer wherever they are: water may come in far from all water
