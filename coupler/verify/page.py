@@ -11,7 +11,7 @@ from coupler.verify.registry import NOT_COVERED, Result, checks
 
 NOTES = {
     "P36": "No gate: the front leads by T = 0.26 on every mesh; the lead is there before Z = 1.5 and stays. Friction "
-    "by the log law takes 0.06 of it on cells of a/16 and nothing on a/32, whose boundary layer is laminar and not resolved.",
+    "by the log law takes 0.06 of it on cells of a/16 and nothing on a/32; the boundary layer is laminar.",
     "P38": "Without friction the pressure is that of published frictionless δ-SPH to 0.03. Friction of smooth walls "
     "brings it down to the measured one, but by an amount that depends on the cells, as nothing mixes the boundary "
     "layer: docs/water.md.",
