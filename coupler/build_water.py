@@ -17,7 +17,7 @@ def water_of(case: Case, structure, solids):
 
     w = case.water
     mesh = box_mesh(case.tank.lower, case.tank.upper, case.tank.cell)
-    immersion = Immersion(mesh, structure, solids, w.covers)
+    immersion = Immersion(mesh, structure, solids, w.covers, _narrow_cracks(w.cracks, structure, mesh))
     parameters = WaterParameters(
         density=w.density,
         gravity=case.case.gravity,
@@ -34,7 +34,19 @@ def water_of(case: Case, structure, solids):
         boxes = [(fill.lower, fill.upper) for fill in w.fill]
         level = start_level(boxes, (case.tank.lower, case.tank.upper), mesh, immersion.domain)
     opened, smooth = sides_named(case.tank.open), sides_named(case.tank.smooth)
-    return Water(mesh, immersion.domain, level, parameters, opened, smooth, _flows(case, mesh)), immersion
+    water = Water(mesh, immersion.domain, level, parameters, opened, smooth, _flows(case, mesh))
+    if immersion.cracks is not None and immersion.cracks.lumped:
+        water.set_cracks(immersion.cracks.cracks())
+    return water, immersion
+
+
+def _narrow_cracks(kind: str, structure, mesh):
+    """What keeps narrow cracks closed; None where they are open or nothing can break."""
+    if kind == "open" or structure is None or structure.joints is None:
+        return None
+    from coupler.cracks import NarrowCracks
+
+    return NarrowCracks(structure, mesh.spacing, lumped=kind == "slit")
 
 
 def sides_named(names):

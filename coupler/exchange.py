@@ -29,11 +29,12 @@ ALONG = 1e-3
 class Immersion:
     """The solids in the water: n blocks of the structure, then m fixed solids; keeps the domain they leave.
 
-    mesh: Background · structure: Structure or None · solids: list of (vertices (k, 3), faces) fixed in space.
+    mesh: Background · structure: Structure or None · solids: list of (vertices (k, 3), faces) fixed in space ·
+    cracks: `NarrowCracks` of the structure, or None: broken joints are open.
     """
 
-    def __init__(self, mesh, structure, solids, covers: str):
-        self.mesh, self.structure, self.covers = mesh, structure, covers
+    def __init__(self, mesh, structure, solids, covers: str, cracks=None):
+        self.mesh, self.structure, self.covers, self.cracks = mesh, structure, covers, cracks
         self.n_blocks = 0 if structure is None else structure.n
         self.n_solids = len(solids)
         self._solid_centre = np.array([v.mean(axis=0) for v, _ in solids]).reshape(-1, 3)
@@ -109,7 +110,7 @@ class Immersion:
         growth = np.zeros(len(self._body_of_plane))
         if self.n_blocks == 0:
             return growth
-        block, plane, half_gap = self.structure.joined_planes()
+        block, plane, half_gap = self._closed_faces()
         loose = np.ones(self.n_blocks, bool)
         loose[block] = False
         growth -= self._films(loose)
@@ -121,6 +122,13 @@ class Immersion:
         growth[rows] = np.maximum(growth[rows], before[rows])
         growth[self._closing_planes()] = 2.0 * SPANS * self.mesh.spacing
         return growth
+
+    def _closed_faces(self) -> tuple[Array, Array, Array]:
+        """Faces that joints close, or narrow cracks that count as closed: block (m,), face (m,), half gap (m,) [m]."""
+        joined = self.structure.joined_planes()
+        if self.cracks is None:
+            return joined
+        return tuple(np.concatenate(two) for two in zip(joined, self.cracks.faces()))
 
     def _films(self, loose: Array) -> Array:
         """How far each plane (P,) [m] is drawn in for the contacts of the loose blocks (n,) bool."""

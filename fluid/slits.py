@@ -57,7 +57,7 @@ class Cracks:
 
 @dataclass(frozen=True)
 class Slits:
-    """s slits, each between two mouths: a piece of a crack no longer than a cell.
+    """s slits, each between two mouths: a piece of a crack about a cell long.
 
     difference csr (N, s): d of every slit · conductance (s,) κ [m] · area (s,) C_d g L [m²] ·
     rise (s, 3) Δx [m] from the second mouth to the first · flow (s,) Q [m³/s] from the first to the second ·
@@ -171,7 +171,7 @@ class _Mouths:
 
 
 def _mouths_of(crack: int, name: int, corners, spacing: float) -> list:
-    """Pairs of facing edges of a convex polygon (k, 3), cut into pieces no longer than the spacing."""
+    """Pairs of facing edges of a convex polygon (k, 3), cut into pieces about as long as the spacing."""
     ahead = np.roll(corners, -1, axis=0) - corners
     normal = np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)
     normal = normal / np.linalg.norm(normal)
@@ -187,7 +187,7 @@ def _mouths_of(crack: int, name: int, corners, spacing: float) -> list:
             low, high = max(s[0], 0.0), min(s[1], length[e])
             if high - low <= 1e-6 * length[e]:
                 continue
-            pieces = int(np.ceil((high - low) / spacing * (1 - 1e-9)))
+            pieces = max(1, int(np.ceil((high - low) / spacing - 0.1)))
             step = (high - low) / pieces
             for k in range(pieces):
                 begin = low + k * step

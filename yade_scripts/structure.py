@@ -379,6 +379,17 @@ class Structure:
             return np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0)
         return self.joints.sealed_faces(self._motion.x, self._motion.R)
 
+    def broken_joints(self) -> tuple[Array, Array, Array, Array]:
+        """Joints that carry nothing any more: number (m,), blocks and their faces (m, 2), -1 a fixed plane, and now
+        their mean normal opening, mean sliding and largest normal opening (m, 3) [m]."""
+        if self.joints is None:
+            none = np.zeros((0, 2), np.int64)
+            return np.zeros(0, np.int64), none, none, np.zeros((0, 3))
+        j, m = self.joints, self._motion
+        dead = np.flatnonzero(~j.alive)
+        blocks, faces = np.column_stack([j.a, j.b])[dead], np.column_stack([j.face_a, j.face_b])[dead]
+        return dead, blocks, faces, j.openings(dead, m.x, m.R)
+
     def energies(self) -> dict[str, float]:
         """Ledger [J]: kinetic + gravity + joint_stored + joint_dissipated + joint_damping + contact_stored + dashpot
         + friction changes by load_work + driving_work.

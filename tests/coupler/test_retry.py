@@ -16,7 +16,7 @@ from tests.fakes import FakeAdvance, FreeBody, no_clock, piston_column
 class Pipe:
     """Water that does nothing but solve its pressure; with `fails_above` only in steps up to that length."""
 
-    viscous = sides = None
+    viscous = sides = slits = None
     velocity, pressure = np.zeros((1, 3)), np.zeros(1)
     topology = SimpleNamespace(nodes=np.zeros((1, 3)))
     mesh = SimpleNamespace(spacing=1.0)
