@@ -121,8 +121,8 @@ class Water(Section):
     )
     cracks: Literal["open", "closed", "slit"] = Field(
         "open",
-        description="broken joints of walls thinner than two cells, while narrower than a quarter of a cell: openings as "
-        "the mesh sees them (one cell wide at least), closed, or closed with the flow through them lumped",
+        description="broken joints of walls thinner than two cells, while narrower than a quarter of a cell: openings "
+        "as the mesh sees them (one cell wide at least), closed, or closed with the flow through them lumped",
     )
     fill: tuple[Fill, ...] = Field(
         (), description="where the water stands at the start; at least one box, or an inflow or a sea"
