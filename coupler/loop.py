@@ -168,6 +168,8 @@ class Coupling:
         with self.clock("cut"):
             if self.immersion.update():
                 self.water.move_solids(self.immersion.domain)
+            if self.water.slits is not None:
+                self.water.set_cracks(self.immersion.cracks.cracks())
             record.bodies_cut = self.immersion.cut_again
         if self.water.viscous is not None:
             self.water.body_velocity = self._padded(self.structure.velocity())
