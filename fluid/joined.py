@@ -18,10 +18,10 @@ def joined(old: Cuts, again, new: Cuts) -> Cuts:
         _rows(take, old.part_cell, new.part_cell),
         _rows(take, old.part_whole, new.part_whole),
         _rows(take, old.moments, new.moments),
-        _places(wet, kept, fresh, old.wet_part, new.wet_part),
+        _rows(wet, kept[old.wet_part], fresh[new.wet_part]),
         _rows(wet, old.wet_body, new.wet_body),
         _rows(wet, old.wet, new.wet),
-        _places(opened, kept, fresh, old.open_part, new.open_part),
+        _rows(opened, kept[old.open_part], fresh[new.open_part]),
         _rows(opened, old.open_face, new.open_face),
         start,
         _rows(corner, old.open_x, new.open_x),
@@ -70,15 +70,6 @@ def _of_parts(kept, fresh, old_part, new_part):
         take[n] = -1 - rest
         n += 1
     return take[:n].copy()
-
-
-@njit(cache=True)
-def _places(take, kept, fresh, old_part, new_part):
-    """Joined part of every taken row."""
-    out = np.empty(len(take), np.int64)
-    for s in range(len(take)):
-        out[s] = kept[old_part[take[s]]] if take[s] >= 0 else fresh[new_part[-1 - take[s]]]
-    return out
 
 
 def _rows(take, a, b):
