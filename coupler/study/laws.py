@@ -13,9 +13,10 @@ from pathlib import Path
 
 from coupler.case_study import Ladder, Quantity
 from coupler.errors import SurgebreakError
+from coupler.study import runner
 from coupler.study.plan import Plan, fingerprint
 from coupler.study.reference import Reading, against_number, fixed_reference
-from coupler.study.runner import LAST_LINES, Runs, measure
+from coupler.study.runner import LAST_LINES, Runs
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,7 @@ def _comparison(plan: Plan, ladder: Ladder, runs: Runs) -> Path:
     sets = [word for override in overrides for word in ("--set", override)]
     substeps = ",".join(str(multiple) for multiple in ladder.substeps)
     options = ["--laws", ",".join(ladder.laws), "--substeps", substeps, "--output", str(place)]
-    cost = measure(
+    cost = runner.measure(
         [sys.executable, "-m", "coupler.cli", "compare", str(plan.file.path), *options, *sets], log
     )
     if cost.exit_code:

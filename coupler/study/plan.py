@@ -53,6 +53,12 @@ class Plan:
     off: dict[str, str]
     laws: tuple[Ladder, ...]
 
+    @property
+    def needed(self) -> set[str]:
+        """Settings that are run: those of rungs and variants, and with variants the case as it stands."""
+        variants = {self.base, *self.off.values()} if self.off else set()
+        return {rung.setting for rung in self.rungs} | variants
+
 
 def make_plan(place: Path, chosen: Iterable[str] = (), larger: bool = False) -> Plan:
     """The plan of the case's [study]; chosen: ladders by name, all without; larger: with the larger rungs.

@@ -45,14 +45,15 @@ def collect(plan: Plan, runs: Runs, repeat: int) -> dict[str, Outcome]:
     The names of columns and figures are known when the first run is done; a wrong one ends the study there.
     """
     found = {}
-    for count, setting in enumerate(plan.settings.values(), start=1):
+    needed = [setting for setting in plan.settings.values() if setting.id in plan.needed]
+    for count, setting in enumerate(needed, start=1):
         made = [runs.measured(setting, number) for number in range(1, repeat + 1)]
         best = min(made, key=lambda m: (m.failed, m.cpu_seconds))
         readings = {} if best.failed else _readings(plan, runs, best)
         same = best.failed or all(_values(plan, runs, m) == _values(plan, runs, best) for m in made)
         found[setting.id] = Outcome(best, tuple(m.cpu_seconds for m in made), readings, same)
         what = best.reason or f"{best.steps} steps, {best.cpu_seconds:.3g} CPU s"
-        runs.tell(f"{count}/{len(plan.settings)}  {_named(plan, setting.id)}: {what}")
+        runs.tell(f"{count}/{len(needed)}  {_named(plan, setting.id)}: {what}")
     return _against_finest(plan, found)
 
 

@@ -90,7 +90,8 @@ class Runs:
         self.folder = folder / "runs"
         self.folder.mkdir(parents=True, exist_ok=True)
         self.program = program()
-        self.first_step: FirstStep | None = None
+        self.first_step = self._known_first_step()
+        self._warm = False
 
     def place(self, setting: str, number: int) -> Path:
         """Run directory of a run."""
@@ -101,8 +102,8 @@ class Runs:
         known = self.known(setting, number)
         if known is not None:
             return known
-        if self.first_step is None:
-            self.first_step = self._first_step(setting)
+        if not self._warm:
+            self.first_step, self._warm = self._first_step(setting), True
         made = self._make(setting, number)
         if made.compile_seconds > COMPILED * made.cpu_seconds:
             self.tell(f"compiled for {made.compile_seconds:.1f} CPU s, made again")
@@ -136,7 +137,14 @@ class Runs:
         cost, compiling = self._process((*setting.overrides, short), place)
         shutil.rmtree(place, ignore_errors=True)
         self.tell(f"first step: {cost.cpu_seconds:.1f} CPU s, {compiling:.1f} of them to compile")
-        return FirstStep(cost.cpu_seconds, compiling, cost.wall_seconds)
+        found = FirstStep(cost.cpu_seconds, compiling, cost.wall_seconds)
+        write_json(self.folder / "first_step.json", asdict(found))
+        return found
+
+    def _known_first_step(self) -> FirstStep | None:
+        """That of the study before it was stopped."""
+        path = self.folder / "first_step.json"
+        return FirstStep(**json.loads(path.read_text(encoding="utf-8"))) if path.exists() else None
 
     def _process(self, overrides: tuple[str, ...], place: Path) -> tuple[Cost, float]:
         """Run the case into a directory; what it cost, and the CPU seconds in the compiler."""

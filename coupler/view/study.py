@@ -146,8 +146,8 @@ def limits(axis, curves, failed):
             axis.axhline(level, color=INK, lw=0.5, ls=":", zorder=2)
     axis.xaxis.set_major_formatter(plt.FuncFormatter(lambda value, _: f"{value:g}"))
     axis.yaxis.set_major_formatter(plt.FuncFormatter(lambda value, _: share(value)))
-    if max(x) / min(x) < 30.0:
-        axis.xaxis.set_minor_formatter(plt.FuncFormatter(ticks))
+    axis.xaxis.set_minor_formatter(plt.FuncFormatter(minor(max(x) / min(x) < 30.0, "{:g}")))
+    axis.yaxis.set_minor_formatter(plt.FuncFormatter(minor(high / low < 30.0, "{:g} %", 100.0)))
 
 
 def share(value):
@@ -155,10 +155,15 @@ def share(value):
     return f"{100 * value:g} %"
 
 
-def ticks(value, _):
-    """Numbers at 2 and 5 of each decade, where an axis is shorter than one."""
-    first = value / 10.0 ** math.floor(math.log10(value))
-    return f"{value:g}" if min(abs(first - k) for k in (2.0, 5.0)) < 1e-6 else ""
+def minor(short, form, scale=1.0):
+    """Names of the ticks between decades: 2 and 5 on an axis that is short, else none."""
+
+    def ticks(value, _):
+        first = value / 10.0 ** math.floor(math.log10(value))
+        shown = short and min(abs(first - k) for k in (2.0, 5.0)) < 1e-6
+        return form.format(scale * value) if shown else ""
+
+    return ticks
 
 
 def crosses(axis, failed):

@@ -75,6 +75,9 @@ class FakeProcesses:
         if self.stop_after is not None and len(self.calls) >= self.stop_after:
             raise KeyboardInterrupt
         self.calls.append(command)
+        if "compare" in command:
+            write_comparison(place)
+            return Cost(5.0, 9.0, 10**8, ExitCode.DONE)
         sets = [command[i + 1] for i, word in enumerate(command) if word == "--set"]
         case = load(command[command.index("run") + 1], sets).case
         reason = self.broken.get(case.time.step_max, "")
@@ -85,6 +88,25 @@ class FakeProcesses:
         return Cost(
             3.0 + 1.0 / case.time.step_max, 9.0, 10**8, ExitCode.DIVERGED if reason else ExitCode.DONE
         )
+
+
+def write_comparison(place: Path) -> None:
+    """What `surgebreak compare` leaves, of one law of ours and one of YADE: off by 1 % and 4 % a multiple."""
+    place.mkdir()
+    rows = [
+        {
+            "law": law,
+            "multiple": multiple,
+            "substep": 1e-5 * multiple,
+            "stock": stock,
+            "cpu_seconds": 1.0 / multiple,
+            "peak_force": 2.0 * (1.0 + share * multiple),
+            "dissipated": 1.0,
+        }
+        for law, stock, share in (("polynomial", False, 0.01), ("cohfrict", True, 0.04))
+        for multiple in (2, 1)
+    ]
+    (place / "comparison.json").write_text(json.dumps({"laws": rows}), encoding="utf-8")
 
 
 def write_run(place: Path, h: float, friction: float, reason: str) -> None:

@@ -176,6 +176,27 @@ def test_files_say_all_of_it_and_figures_are_drawn(fake, case, with_figures):
         assert (case / "out" / f"{name}.pdf").exists()
 
 
+LAWS = """
+[[study.ladder]]
+name = "laws"
+laws = ["polynomial", "cohfrict"]
+substeps = [2, 1]
+"""
+
+
+def test_laws_of_yade_have_points_and_a_figure_of_their_own(fake, case, with_figures):
+    """From one comparison, at the CPU time of stepping alone; it is not made twice."""
+    text = CASE.replace('against = "exact"', 'against = "exact"\ncompared = "peak_force"') + LAWS
+    (case / "case.toml").write_text(text, encoding="utf-8")
+    for _ in range(2):
+        _, told = made(case, ladders=["laws"])
+        assert len(fake.calls) == 1
+    errors = {(row["law"], row["multiple"]): row["readings"]["exact"]["error"] for row in told["laws"]}
+    assert errors["polynomial", 2] == pytest.approx(0.02)
+    assert errors["cohfrict", 1] == pytest.approx(0.04)
+    assert (case / "out" / "exact_laws.png").exists()
+
+
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
