@@ -116,10 +116,9 @@ class Runs:
         if not path.exists():
             return None
         told = json.loads(path.read_text(encoding="utf-8"))
+        # of an older program, or crashed: memory, a full disk, a mistake that may be mended
         if told.keys() != Measured.__dataclass_fields__.keys() or told["exit_code"] not in ENDED:
-            return (
-                None  # of an older program; or it crashed: memory, a full disk, a mistake that may be mended
-            )
+            return None
         found = Measured(**told)
         changed = differences(found.program, self.program)
         if changed and not self.any_version:
