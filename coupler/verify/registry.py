@@ -12,7 +12,7 @@ from importlib import import_module
 from typing import Literal
 
 MODULES = (
-    "contact", "joints", "bending", "stock", "coupled", "wall", "spheres", "cubes",
+    "contact", "joints", "bending", "stock", "coupled", "wall", "spheres", "cubes", "stability",
     "rest", "water", "collapse", "viscous", "dam_breaks", "bores", "run_up", "isolated_building",
 )  # fmt: skip
 """Files of this package that hold cases; their names are the groups."""
