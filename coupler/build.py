@@ -12,7 +12,7 @@ import numpy as np
 
 from coupler.build_water import water_of
 from coupler.case import Case
-from coupler.gauges import Gauge, make_gauge
+from coupler.gauges import Bodies, Gauge, make_gauges
 from coupler.loop import Coupling
 from coupler.parts import Part, parts_of
 from coupler.solids import solids_of
@@ -155,8 +155,26 @@ def _tank_planes(case: Case) -> list:
 
 
 def _gauges(case: Case) -> list[Gauge]:
-    rows = rows_by_name(case, parts_of(case))
-    return [make_gauge(spec, rows) for spec in case.gauge]
+    if not case.gauge:
+        return []
+    bodies = _bodies(case)
+    return [gauge for spec in case.gauge for gauge in make_gauges(spec, bodies)]
+
+
+def _bodies(case: Case) -> Bodies:
+    """Blocks and fixed solids as gauges know them."""
+    parts, solids = parts_of(case), solids_of(case)
+    blocks = [block for part in parts for block in part.blocks]
+    centre = [block.centre for block in blocks] + [solid.vertices.mean(axis=0) for solid in solids]
+    mass = [block.mass for block in blocks] + [1.0] * len(solids)
+    names = [block.name for block in blocks] + [solid.name for solid in solids]
+    present = {
+        "pressure": case.water, "friction": case.water, "contact": case.contact, "joint": case.joints,
+        "weight": case.structure,
+    }  # fmt: skip
+    loads = [name for name, section in present.items() if section is not None]
+    rows = rows_by_name(case, parts)
+    return Bodies(names, np.array(centre, float).reshape(-1, 3), np.array(mass), rows, loads)
 
 
 def rows_by_name(case: Case, parts: tuple[Part, ...]) -> dict[str, np.ndarray]:

@@ -178,6 +178,9 @@ class RunLimits(Section):
 
     volume_error: quantity("", gt=0) = Field(0.02, description="lost or gained share of the water")
     energy_error: quantity("", gt=0) = Field(0.05, description="unbalanced share of the energy put in")
+    momentum_error: quantity("", gt=0) = Field(
+        1e-8, description="share of the impulses of a step by which the books of momentum miss"
+    )
     defect: quantity("", gt=0) = Field(
         0.5,
         description="mean over the last twenty steps of the share by which the blocks missed the motion that the "

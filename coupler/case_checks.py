@@ -234,7 +234,7 @@ def _known_names(case: Case, parts: list[Part]) -> Iterator[Problem]:
         if case.structure and absent(motion.block, blocks):
             yield ("motion", i, "block"), _no_such("block", motion.block, blocks)
     for i, gauge in enumerate(case.gauge):
-        if gauge.kind == "force" and absent(gauge.on, moving + solids):
+        if gauge.kind in ("force", "loads") and absent(gauge.on, moving + solids):
             yield ("gauge", i, "on"), _no_such("body", gauge.on, moving + solids)
         if gauge.kind == "reaction" and absent(gauge.on, moving):
             yield ("gauge", i, "on"), _no_such("block or group", gauge.on, moving)

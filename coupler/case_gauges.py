@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from coupler.case_types import Length, Name, Number, Point, PositiveLength, PositiveTime, Section
+from coupler.case_types import Length, Name, Number, Point, PositiveLength, PositiveTime, Section, Switch
 from coupler.units import quantity
 
 Time = quantity("s", ge=0)
@@ -31,6 +31,7 @@ class LevelGauge(Section):
     kind: Literal["level"] = Field(description="what it measures: depth of water")
     name: Name = Field(description="column of the history")
     at: tuple[Length, Length] = Field(description="place (x, y)")
+    mean_over: PositiveTime | None = MEAN_OVER
 
 
 class PressureGauge(Section):
@@ -66,6 +67,7 @@ class VelocityGauge(Section):
     kind: Literal["velocity"] = Field(description="what it measures: velocity of the water")
     name: Name = Field(description="columns of the history")
     at: Point = Field(description="point (x, y, z)")
+    mean_over: PositiveTime | None = MEAN_OVER
 
 
 class FluxGauge(Section):
@@ -78,6 +80,12 @@ class FluxGauge(Section):
         description="its two edges, as vectors; first x second points downstream",
         examples=[[[0, 1, 0], [0, 0, 1]]],
     )
+    impulse: Window | None = Field(
+        None,
+        description="from and to when to add up value times step: a column of the volume that has passed so far",
+        examples=[["0 s", "10 s"]],
+    )
+    mean_over: PositiveTime | None = MEAN_OVER
 
 
 class VolumeGauge(Section):
@@ -90,7 +98,7 @@ class VolumeGauge(Section):
 
 
 class ForceGauge(Section):
-    """Force of the water on a block, a group, a building or a solid; pressure and wall stress together."""
+    """Force of the water on a block, a group, a building or a solid; pressure and wall stress together, or split."""
 
     kind: Literal["force"] = Field(description="what it measures: force of the water")
     name: Name = Field(description="columns of the history")
@@ -100,7 +108,43 @@ class ForceGauge(Section):
     about: Point | None = Field(
         None, description="point fixed in space about which to give the moment as well; absent: no moment"
     )
+    parts: Switch = Field(
+        False,
+        description="true: further columns for pressure on whole cells, its correction where the surface of the water "
+        "passes through their cells (surface), and friction; they add up to the force",
+    )
     impulse: Window | None = IMPULSE
+    mean_over: PositiveTime | None = MEAN_OVER
+
+
+class LoadsGauge(Section):
+    """All loads on a group of blocks or a solid, split into pressure, friction, contact, joint and weight, in a table
+    of their own, history/loads_NAME.csv: force and moment as means over the step, impulses, peaks over mean_over."""
+
+    kind: Literal["loads"] = Field(description="what it measures: loads by what they come from")
+    name: Name = Field(description="the table is history/loads_NAME.csv")
+    on: Name = Field(
+        description="name of a block, a group, a part of the structure (wall, arch, ...) or a solid"
+    )
+    about: Point | None = Field(
+        None,
+        description="point fixed in space of the moments; absent: centre of mass of all its blocks at the start",
+    )
+    each_block: Switch = Field(
+        False,
+        description="true: beside the sums a row for each block, in history/loads_NAME_blocks.csv, with moments about "
+        "its own centre at the start",
+    )
+    every: PositiveTime | None = Field(
+        None,
+        description="time between the rows of each block, which are means over it; absent: a row every step",
+        examples=["10 ms"],
+    )
+    impulse: Window | None = Field(
+        None,
+        description="from and to when to add up force times step; absent: the whole run",
+        examples=[["0.35 s", "1 s"]],
+    )
     mean_over: PositiveTime | None = MEAN_OVER
 
 
@@ -128,6 +172,7 @@ Gauge = Annotated[
     | FluxGauge
     | VolumeGauge
     | ForceGauge
+    | LoadsGauge
     | ReactionGauge
     | MotionGauge,
     Field(discriminator="kind"),

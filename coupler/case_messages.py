@@ -7,7 +7,9 @@ from coupler.errors import did_you_mean
 
 KeyPath = tuple[str | int, ...]
 
-GAUGE_KINDS = ("level", "pressure", "velocity", "volume", "force", "reaction", "motion")
+GAUGE_KINDS = (
+    "level", "pressure", "patch", "velocity", "flux", "volume", "force", "loads", "reaction", "motion",
+)  # fmt: skip
 
 
 def explain_error(error: dict) -> tuple[KeyPath, str]:

@@ -21,7 +21,7 @@ from coupler.schedule import Schedule, next_multiple
 
 FOLDER = "checkpoints"
 KEPT = 2
-LAYOUT = 1
+LAYOUT = 2
 UNSET = ("structure/joints/failure_time",)
 """Arrays in which NaN has a meaning."""
 
@@ -104,6 +104,7 @@ class Checkpoints:
 
 def _arrays(coupling, recorder) -> dict[str, np.ndarray]:
     parts = {"coupling": coupling.save(), "ledger": coupling.ledger.save(), "recorder": recorder.save()}
+    parts["momentum"] = coupling.momentum.save()
     if coupling.water is not None:
         from fluid import state
 
@@ -132,6 +133,7 @@ def restore(coupling, checkpoint: Checkpoint) -> None:
         state.restore(coupling.water, coupling.immersion.domain, checkpoint.part("water"))
     coupling.restore(checkpoint.part("coupling"))
     coupling.ledger.restore(checkpoint.part("ledger"))
+    coupling.momentum.restore(checkpoint.part("momentum"))
 
 
 def listed(folder: Path) -> list[Path]:

@@ -1,4 +1,4 @@
-"""Gauges of a case: what is read every step, as columns of `history/gauges.csv`."""
+"""Gauges of a case: what is read every step, as columns of `history/gauges.csv` or in a table of its own."""
 
 from __future__ import annotations
 
@@ -9,19 +9,52 @@ import numpy as np
 
 from coupler.errors import SurgebreakError
 from coupler.gauge_windows import Windows
+from coupler.loads import BlockLoads, GroupLoads
 
 
 @dataclass(frozen=True)
 class Gauge:
-    """columns: (name, unit, meaning) · read(coupling, record) → {name: value} · windows: what it has accumulated"""
+    """columns: (name, unit, meaning) · read(coupling, record) → {name: value} · windows: what it has accumulated, with
+    `save` and `restore`
+
+    table: name of a table of its own, None for `gauges`; then the columns begin with the time, and read gives a list of
+    rows."""
 
     columns: tuple[tuple[str, str, str], ...]
     read: Callable
-    windows: Windows | None = None
+    windows: Windows | GroupLoads | BlockLoads | None = None
+    table: str | None = None
+
+
+@dataclass(frozen=True)
+class Bodies:
+    """What gauges can be on, in the rows of the load table: names, centre (k, 3) [m] at the start, mass (k,) [kg] (1
+    for solids); rows_of: rows for each name of a block, group, part or solid · parts: of the loads that there are."""
+
+    names: list[str]
+    centre: np.ndarray
+    mass: np.ndarray
+    rows_of: dict[str, np.ndarray]
+    parts: list[str]
+
+
+def make_gauges(spec, bodies: Bodies) -> list[Gauge]:
+    """The gauges of one entry of a case, one for each table that it fills."""
+    if spec.kind != "loads":
+        return [make_gauge(spec, bodies.rows_of)]
+    rows = bodies.rows_of[spec.on]
+    mass = bodies.mass[rows]
+    point = mass @ bodies.centre[rows] / mass.sum() if spec.about is None else np.array(spec.about)
+    tables = {f"loads_{spec.name}": GroupLoads(rows, point, bodies.parts, spec.impulse, spec.mean_over)}
+    if spec.each_block:
+        names = [bodies.names[row] for row in rows]
+        each = BlockLoads(rows, names, bodies.centre[rows], bodies.parts, spec.every)
+        tables[f"loads_{spec.name}_blocks"] = each
+    return [Gauge(tuple(found.columns()), found.read, found, name) for name, found in tables.items()]
 
 
 def make_gauge(spec, rows_of: dict[str, np.ndarray]) -> Gauge:
-    """The gauge that a case asks for. rows_of: rows of the load table for each name of a block, group or solid."""
+    """A gauge in the common table. rows_of: rows of the load table for each name of a block, group or solid."""
     makers = {
         "level": _level,
         "pressure": _pressure,
@@ -57,7 +90,7 @@ def _level(spec, rows_of) -> Gauge:
 
         return level(coupling.water, at)
 
-    return _scalar(spec, "m", f"depth of water over (x, y) = {spec.at}", value)
+    return _in_time(spec, "level", "m", f"depth of water over (x, y) = {spec.at}", value)
 
 
 def _pressure(spec, rows_of) -> Gauge:
@@ -97,7 +130,7 @@ def _mean_outside_solids(name: str, values) -> float:
 
 def _in_time(spec, what: str, unit: str, meaning: str, value: Callable) -> Gauge:
     """A gauge of one number with the windows that the case asks for."""
-    windows = Windows(spec.impulse, spec.mean_over)
+    windows = Windows(getattr(spec, "impulse", None), spec.mean_over)
     name = f"{spec.name}_{what}"
     columns = ((name, unit, meaning), *windows.columns(spec.name, unit, ("",)))
 
@@ -134,30 +167,26 @@ def disc(centre, radius: float, normal, rings: int = PATCH_POINTS) -> np.ndarray
 
 
 def _flux(spec, rows_of) -> Gauge:
-    area = np.cross(*np.asarray(spec.edges, float))
-
     def value(coupling):
-        from fluid.gauges import velocity
+        from fluid.gauges import flux
 
-        longest = np.linalg.norm(spec.edges, axis=1).max()
-        count = max(PATCH_POINTS, int(np.ceil(2.0 * longest / coupling.water.mesh.spacing)))
-        u = velocity(coupling.water, parallelogram(spec.at, spec.edges, count))
-        return float(
-            np.nan_to_num(u).mean(axis=0) @ area
-        )  # zero in the air and in solids: they count as area
+        return flux(coupling.water, spec.at, spec.edges)
 
-    return _scalar(spec, "m3/s", f"water through the patch at {spec.at}", value)
+    return _in_time(spec, "flux", "m3/s", f"water through the patch at {spec.at}", value)
 
 
 def _velocity(spec, rows_of) -> Gauge:
+    windows = Windows(None, spec.mean_over)
     columns = _vector(f"{spec.name}_velocity", "m/s", f"velocity of the water at {spec.at}")
+    columns += windows.columns(f"{spec.name}_velocity", "m/s", ("_x", "_y", "_z"))
 
     def read(coupling, record):
         from fluid.gauges import velocity
 
-        return _named(columns, velocity(coupling.water, np.array(spec.at)))
+        now = velocity(coupling.water, np.array(spec.at))
+        return _named(columns, [*now, *windows.add(record.time, record.dt, now)])
 
-    return Gauge(columns, read)
+    return Gauge(columns, read, windows)
 
 
 def _volume(spec, rows_of) -> Gauge:
@@ -191,24 +220,50 @@ def _rotation_vector(R) -> np.ndarray:
     return Rotation.from_matrix(R).as_rotvec()
 
 
+FORCE_PARTS = {
+    "pressure": "pressure, taken over all of every cell that water reaches",
+    "surface": "correction of it where the surface of the water passes through the cells",
+    "friction": "viscosity and friction along the faces",
+}
+
+
 def _force(spec, rows_of) -> Gauge:
     rows = rows_of[spec.on]
     windows = Windows(spec.impulse, spec.mean_over)
-    columns = _vector(f"{spec.name}_force", "N", f"force of the water on '{spec.on}'")
-    if spec.about is not None:
-        columns += _vector(f"{spec.name}_moment", "N m", f"moment on '{spec.on}' about {spec.about}")
+    columns = _force_columns(spec, spec.name, f"force of the water on '{spec.on}'")
+    for part, meaning in FORCE_PARTS.items() if spec.parts else ():
+        columns += _force_columns(spec, f"{spec.name}_{part}", f"on '{spec.on}': {meaning}")
     columns += windows.columns(spec.name, "N", ("_x", "_y", "_z"))
 
     def read(coupling, record):
-        load = record.load[rows]
-        values = list(load[:, :3].sum(axis=0))
+        def summed(load):
+            return _force_values(spec, coupling, rows, load[rows])
+
+        values = summed(record.load)
         force = values[:3]
-        if spec.about is not None:
-            arm = coupling.water.domain.body_centre[rows] - np.array(spec.about)
-            values += list((load[:, 3:] + np.cross(arm, load[:, :3])).sum(axis=0))
+        if spec.parts:
+            pressure = record.load - record.surface_load - record.shear_load
+            for load in (pressure, record.surface_load, record.shear_load):
+                values += summed(load)
         return _named(columns, [*values, *windows.add(record.time, record.dt, force)])
 
     return Gauge(columns, read, windows)
+
+
+def _force_columns(spec, name: str, meaning: str):
+    columns = _vector(f"{name}_force", "N", meaning)
+    if spec.about is not None:
+        columns += _vector(f"{name}_moment", "N m", f"its moment about {spec.about}")
+    return columns
+
+
+def _force_values(spec, coupling, rows, load) -> list[float]:
+    """Sum of loads (k, 6) on the bodies `rows`, with the moment about the point of the gauge if it has one."""
+    values = list(load[:, :3].sum(axis=0))
+    if spec.about is not None:
+        arm = coupling.water.domain.body_centre[rows] - np.array(spec.about)
+        values += list((load[:, 3:] + np.cross(arm, load[:, :3])).sum(axis=0))
+    return values
 
 
 def _reaction(spec, rows_of) -> Gauge:

@@ -3,8 +3,10 @@
 Structure:  Δ(kinetic + gravity + joints stored + contacts stored) + dissipated = W_received        residual r_s
 Interface:  W_given − W_received = r_i,  W_given = Σ dt F·V with the velocities V of the pressure solve,
             W_received = work of the same loads over the motion that the discrete elements made
-Water:      Δ(kinetic + potential) + W_given + D = E_sides,  D: dissipation, numerical and viscous, a line of its own;
-            E_sides: energy of the water that came in through sides, with the work of its pressure
+Water:      Δ(kinetic + potential) + W_given + D_shear + D = E_sides − E_left
+            D_shear: taken by viscosity and by friction of walls; D: what is missing, the dissipation of the numerics;
+            E_sides: energy of the water that came in through inflows and seas, with the work of its pressure;
+            E_left: energy of the water that fell out through open sides
 
 A scheme that gains energy shows D < 0; dissipation D > 0 is damping of the water by the numerics and is
 reported, not counted as an error. The energy error is (|r_s| + |r_i| + max(0, −D)) / E_in, E_in the energy that the
@@ -29,6 +31,9 @@ class Balance:
     water_kinetic: float = 0.0
     water_potential: float = 0.0
     numerical_dissipation: float = 0.0
+    shear_dissipation: float = 0.0
+    entered: float = 0.0
+    left: float = 0.0
     work_given: float = 0.0
     work_received: float = 0.0
     structure_residual: float = 0.0
@@ -48,7 +53,11 @@ class Ledger:
     """Potential energy of the water above its level state at the start [J]."""
     work_given: float = 0.0
     entered: float = 0.0
-    """Energy that came with water through the sides of the tank so far [J]."""
+    """Energy that came with water through inflows and seas so far, less what left there [J]."""
+    left: float = 0.0
+    """Energy of the water that fell out through open sides so far [J]."""
+    shear: float = 0.0
+    """Energy that viscosity and friction of walls took out of the water so far [J]."""
     _water_start: tuple[float, float] | None = None
     _structure_start: float | None = None
     _input: float = field(default=0.0)
@@ -84,7 +93,8 @@ class Ledger:
         kinetic, potential = water or (0.0, 0.0)
         dissipation = 0.0
         if water is not None:
-            dissipation = self.entered - (kinetic + potential - sum(self._water_start)) - self.work_given
+            change = kinetic + potential - sum(self._water_start)
+            dissipation = self.entered - self.left - change - self.work_given - self.shear
         received = residual = 0.0
         if structure is not None:
             received = structure["load_work"]
@@ -98,7 +108,17 @@ class Ledger:
             error += abs(self.work_given - received)
         share = error / self._input if self._input > 0.0 else 0.0
         return Balance(
-            kinetic, potential, dissipation, self.work_given, received, residual, self._input, share
+            kinetic,
+            potential,
+            dissipation,
+            self.shear,
+            self.entered,
+            self.left,
+            self.work_given,
+            received,
+            residual,
+            self._input,
+            share,
         )
 
 

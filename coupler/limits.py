@@ -24,11 +24,12 @@ class LimitReached(SurgebreakError):
 
 @dataclass(frozen=True)
 class Limits:
-    """Shares of the reference quantity beyond which a run stops (volume, energy), and its budget [CPU s]."""
+    """Shares of the reference quantity beyond which a run stops (volume, energy, momentum), and its budget [CPU s]."""
 
     volume_error: float
     energy_error: float
     cpu_seconds: float | None
+    momentum_error: float = 1e-8
 
 
 def check_balance(time: float, volume_error: float, energy_error: float, limits: Limits) -> None:
@@ -46,6 +47,16 @@ def check_balance(time: float, volume_error: float, energy_error: float, limits:
             f"the energy balance is off by {energy_error:.2%} of the input energy at t = {time:.4g} s; limit "
             f"{limits.energy_error:.2%} (limits.energy_error). Reduce time.step_max, raise joints.damping, "
             "or see history/energy.csv for the line that grows."
+        )
+
+
+def check_momentum(time: float, momentum_error: float, limit: float) -> None:
+    """Stop a run whose forces no longer balance its momentum. Raises Diverged."""
+    if not math.isfinite(momentum_error) or momentum_error > limit:
+        raise Diverged(
+            f"the lines of momentum miss {momentum_error:.2g} of the impulses of the step at t = {time:.4g} s; limit "
+            f"{limit:.2g} (limits.momentum_error). They close to round-off wherever solids cut the cells; look in "
+            "history/momentum.csv from when the residual grows, and for blocks or solids that overlap there."
         )
 
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from coupler.ledger import Balance, Ledger
 from coupler.limits import Diverged, check_finite, check_misses, check_pressure
+from coupler.momentum import MomentumBalance, book_step, momentum_ledger
 from coupler.observe import fastest_point, surface_area
 
 Array = np.ndarray
@@ -182,7 +183,7 @@ class Coupling:
         self._note_loads(problem, record, found.velocity)
 
     def _note_loads(self, problem, record: StepRecord, velocity: Array) -> None:
-        """The parts of the load, and the energy of the step that is neither given nor numerical; velocity (n_bodies, 6)."""
+        """The parts of the load, and the energy that shear and outflow take; velocity (n_bodies, 6) of the bodies."""
         shear = problem.predicted.shear
         record.shear_load = np.zeros_like(record.load) if shear is None else shear.load
         record.surface_load = problem.other_load - record.shear_load

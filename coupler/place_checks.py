@@ -238,7 +238,9 @@ def _gauges(case: Case, solids: list[Placed]) -> Iterator[Problem]:
                 (*path, "impulse"),
                 f"from {window[0]:g} s to {window[1]:g} s: the end must come after the start",
             )
-        if gauge.kind not in ("motion", "reaction") and case.water is None:
+        if gauge.kind == "loads" and gauge.every is not None and not gauge.each_block:
+            yield (*path, "every"), "is for the rows of each block; add each_block = true"
+        if gauge.kind not in ("motion", "reaction", "loads") and case.water is None:
             yield (*path, "kind"), f"a {gauge.kind} gauge measures water; write a section [water]"
         elif gauge.kind == "volume":
             yield from _corners_in_order(path, gauge)

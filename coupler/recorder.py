@@ -1,8 +1,9 @@
 """What a run leaves behind: histories every step, fields at the output times, the crack table.
 
-`history/energy.csv`   the ledger           `history/coupling.csv`  how each step went
-`history/water.csv`    volume               `history/structure.csv` joints, momentum
-`history/forces.csv`   force gauges         `history/gauges.csv`    the other gauges
+`history/energy.csv`   energy               `history/momentum.csv`, `angular_momentum.csv`  the books of momentum
+`history/coupling.csv` how each step went   `history/water.csv`     volume
+`history/gauges.csv`   the gauges           `history/structure.csv` joints, fastest block
+`history/loads_*.csv`  loads by what they come from, where a case asks for them
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import numpy as np
 
 from coupler.crack_surfaces import write_crack_surfaces
 from coupler.history import HistoryTable, write_cracks
+from coupler.momentum import LINES
 from coupler.observe import block_damage, crack_columns, fastest_point, joint_counts
 from coupler.output import BlockWriter, WaterWriter, write_solids
 
@@ -19,6 +21,9 @@ ENERGY = (
     ("water_kinetic", "J", "kinetic energy of the water"),
     ("water_potential", "J", "potential energy of the water above z = 0"),
     ("numerical_dissipation", "J", "energy the numerics took out of the water so far; negative: put in"),
+    ("shear_dissipation", "J", "energy that viscosity and friction of walls took out of the water so far"),
+    ("entered", "J", "energy that came with water through inflows and seas so far, less what left there"),
+    ("left", "J", "energy of the water that fell out through open sides so far"),
     ("work_given", "J", "work of the water on the blocks so far, with the velocities of the pressure solve"),
     ("work_received", "J", "the same loads over the motion that the blocks made"),
     ("blocks_kinetic", "J", "kinetic energy of the blocks"),
@@ -55,12 +60,15 @@ COUPLING = (
 WATER = (
     ("time", "s", "time"),
     ("volume", "m3", "volume of the water"),
+    ("entered", "m3", "volume that came in through inflows and seas so far"),
+    ("left", "m3", "volume that left through open sides, inflows and seas so far"),
     (
         "volume_error",
         "1",
-        "change of the volume, less what left through open sides, over the volume at the start",
+        "volume + left - entered - volume at the start, over the volume at the start and what entered",
     ),
-    ("reinserted", "m3", "volume the correction moved back so far, a sum of absolute values"),
+    ("reinserted", "m3", "volume that the uniform correction moved so far, a sum of absolute values"),
+    ("reinserted_net", "m3", "the same with its sign: positive where the transport had lost water"),
     ("clipped", "1", "nodes whose speed was capped so far (spray)"),
     ("momentum_x", "N s", "momentum of the water"),
     ("momentum_y", "N s", "momentum of the water"),
@@ -81,6 +89,20 @@ STRUCTURE = (
 )
 
 
+MOMENTUM_TITLE = "momentum: each line is what it has added to water and free blocks since the start"
+
+
+def momentum_columns(unit: str, of: str) -> tuple[tuple[str, str, str], ...]:
+    """Columns of the books of momentum; of: what a vector is, behind the name of its line."""
+    sums = (
+        ("water", f"{of} of the water"),
+        ("blocks", f"{of} of the blocks that move freely"),
+        ("residual", "what the lines miss so far: round-off"),
+    )
+    told = (*sums[:2], *LINES, sums[2])
+    return (("time", "s", "time"), *((f"{n}_{a}", unit, m) for n, m in told for a in "xyz"))
+
+
 class Recorder:
     """Writes a run as it goes; absent sides leave no files.
 
@@ -96,13 +118,19 @@ class Recorder:
         water, structure = coupling.water, coupling.structure
         self.impulse = np.zeros(3)
         self.reinserted, self.clipped = 0.0, 0
+        self.reinserted_net = self.left = 0.0
         self._kept = kept
         self._tables: dict[str, HistoryTable] = {}
         self._energy = self._table("energy", ENERGY)
         self._coupling = self._table("coupling", COUPLING)
+        about = "({:g}, {:g}, {:g})".format(*coupling.momentum.about)
+        of = f"angular momentum about {about}"
+        self._momentum = self._table("momentum", momentum_columns("N s", "momentum"))
+        self._angular = self._table("angular_momentum", momentum_columns("N m s", of))
         self._water = self._table("water", WATER) if water else None
         self._structure = self._table("structure", STRUCTURE) if structure else None
-        self._gauges = self._table("gauges", self._gauge_columns()) if gauges else None
+        self._gauges = self._table("gauges", self._gauge_columns()) if self._together() else None
+        self._own = [(gauge, self._table(gauge.table, gauge.columns)) for gauge in gauges if gauge.table]
         self._written = 0 if kept is None else int(kept["outputs"])
         keep = None if kept is None else self._written
         self._fields = WaterWriter(directory / "fields.vtkhdf", keep=keep) if water else None
@@ -124,6 +152,7 @@ class Recorder:
     def _restore_sums(self, kept) -> None:
         self.impulse = kept["impulse"].copy()
         self.reinserted, self.clipped = float(kept["reinserted"]), int(kept["clipped"])
+        self.reinserted_net, self.left = float(kept["reinserted_net"]), float(kept["left"])
         for k, gauge in enumerate(self.gauges):
             if gauge.windows is not None:
                 start = f"gauge_{k}_"
@@ -150,12 +179,18 @@ class Recorder:
                 "outputs": np.array(self._written),
                 "impulse": self.impulse.copy(),
                 "reinserted": np.array(self.reinserted),
+                "reinserted_net": np.array(self.reinserted_net),
+                "left": np.array(self.left),
                 "clipped": np.array(self.clipped),
             }
         )
 
+    def _together(self):
+        """The gauges that share a table."""
+        return [gauge for gauge in self.gauges if gauge.table is None]
+
     def _gauge_columns(self):
-        return [("time", "s", "time"), *(column for gauge in self.gauges for column in gauge.columns)]
+        return [("time", "s", "time"), *(column for gauge in self._together() for column in gauge.columns)]
 
     def step(self, record) -> None:
         """Append one row to each history."""
@@ -167,6 +202,9 @@ class Recorder:
             water_kinetic=b.water_kinetic,
             water_potential=b.water_potential,
             numerical_dissipation=b.numerical_dissipation,
+            shear_dissipation=b.shear_dissipation,
+            entered=b.entered,
+            left=b.left,
             work_given=b.work_given,
             work_received=b.work_received,
             blocks_kinetic=e.get("kinetic", 0.0),
@@ -179,25 +217,42 @@ class Recorder:
             energy_error=b.energy_error,
         )
         self._coupling.append(**{name: getattr(record, name) for name, *_ in COUPLING})
+        self._append_momentum(record)
         if self._water:
             self._append_water(record)
         if self._structure:
             self._append_structure(record)
         if self._gauges:
             values = {}
-            for gauge in self.gauges:
+            for gauge in self._together():
                 values |= gauge.read(c, record)
             self._gauges.append(time=record.time, **values)
+        for gauge, table in self._own:
+            for row in gauge.read(c, record):
+                table.append(**row)
+
+    def _append_momentum(self, record) -> None:
+        m = record.momentum
+        vectors = {"water": m.water, "blocks": m.blocks, **m.lines, "residual": m.residual}
+        for table, part in ((self._momentum, slice(0, 3)), (self._angular, slice(3, 6))):
+            row = {n: v for name, vector in vectors.items() for n, v in _xyz(name, vector[part]).items()}
+            table.append(time=record.time, **row)
 
     def _append_water(self, record) -> None:
         w = self.coupling.water
         self.reinserted += abs(w.report.reinserted)
+        self.reinserted_net += w.report.reinserted
         self.clipped += w.report.clipped
+        self.left += w.report.left
+        sides = w.sides
         self._water.append(
             time=record.time,
             volume=w.volume(),
+            entered=0.0 if sides is None else sides.entered,
+            left=self.left + (0.0 if sides is None else sides.left),
             volume_error=w.volume_error(),
             reinserted=self.reinserted,
+            reinserted_net=self.reinserted_net,
             clipped=self.clipped,
             **_xyz("momentum", w.momentum()),
         )

@@ -8,7 +8,7 @@ from coupler.build import Scene, build
 from coupler.case import Case, effective
 from coupler.clock import Clock
 from coupler.errors import ExitCode
-from coupler.limits import LimitReached, Limits, check_balance, check_defect
+from coupler.limits import LimitReached, Limits, check_balance, check_defect, check_momentum
 from coupler.observe import joint_counts, size
 from coupler.recorder import Recorder
 from coupler.schedule import Schedule, checkpoint_interval
@@ -104,7 +104,8 @@ def _steps(
     case: Case, scene: Scene, directory, reporter, clock: Clock, figures: dict, checkpoint=None
 ) -> None:
     coupling = scene.coupling
-    limits = Limits(case.limits.volume_error, case.limits.energy_error, case.limits.cpu_seconds)
+    wanted = case.limits
+    limits = Limits(wanted.volume_error, wanted.energy_error, wanted.cpu_seconds, wanted.momentum_error)
     schedule = checkpoint.schedule(case.time.end) if checkpoint else Schedule.of(case)
     kept = checkpoint.part("recorder") if checkpoint else None
     recorder = Recorder(directory.path, coupling, scene.gauges, scene.solids, scene.tank, kept)
@@ -121,6 +122,7 @@ def _steps(
             _note(coupling, record, figures)
             reporter.step(coupling.time, _told(coupling, record))
             check_balance(coupling.time, _volume_error(coupling), record.balance.energy_error, limits)
+            check_momentum(coupling.time, record.momentum.error, limits.momentum_error)
             check_defect(coupling.time, coupling.mean_defect, case.limits.defect)
             if _reached(coupling.time, target):
                 with clock("output"):
@@ -168,10 +170,12 @@ def _note(coupling, record, figures: dict) -> None:
     figures["substeps"] += record.substeps
     figures["energy_error"] = float(balance.energy_error)
     largest("energy_error", balance.energy_error)
+    largest("momentum_error", record.momentum.error)
     if coupling.water is not None:
         figures["numerical_dissipation"] = float(
             balance.numerical_dissipation / max(balance.input_energy, 1e-300)
         )
+        figures["numerical_impulse"] = record.momentum.scheme
         figures["volume_error"] = coupling.water.volume_error()
         largest("volume_error", abs(figures["volume_error"]))
         largest("water_force", np.linalg.norm(record.load[:, :3].sum(axis=0)))

@@ -23,6 +23,12 @@ def water_problems(case: Case) -> Iterator[Problem]:
     if case.water is None:
         return
     w = case.water
+    if case.case.gravity == 0.0:
+        yield (
+            ("case", "gravity"),
+            "0: water needs a weight, by which its step, its spray and its pressure at the start go; give a small one, "
+            "for instance 0.01 m/s2, or leave [water] out",
+        )
     if not (w.fill or w.inflow or w.sea):
         yield (
             ("water",),

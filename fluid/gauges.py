@@ -1,9 +1,11 @@
-"""Reading the water at places: level, pressure, velocity, volume in a box."""
+"""Reading the water at places: level, pressure, velocity, flux through a plane, volume in a box."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from fluid.clip import clipped, volumes
+from fluid.inflow import wet_shares
 from fluid.moments import cells_touching, wet_fraction
 
 
@@ -51,14 +53,55 @@ def level_set_at(water, points) -> np.ndarray:
     return _interpolated(water, points, water.level_set[:, None])[:, 0]
 
 
+def flux(water, at, edges) -> float:
+    """Water [m³/s] through the parallelogram with the centre `at` (3,) and edges (2, 3) [m], positive along the cross
+    product of the edges: ∫_{φ<0} u·n dA.
+
+    φ and u are read on a lattice of triangles no longer than half a cell and taken as linear in each; a triangle with a
+    corner inside a solid counts as dry."""
+    edges = np.asarray(edges, float)
+    m, n = (int(np.ceil(2.0 * np.linalg.norm(e) / water.mesh.spacing)) for e in edges)
+    i, j = np.meshgrid(np.arange(m + 1), np.arange(n + 1), indexing="ij")
+    place = np.column_stack([i.ravel() / m - 0.5, j.ravel() / n - 0.5])
+    points = np.asarray(at, float) + place @ edges
+    phi = level_set_at(water, points)
+    through = _interpolated(water, points, water.velocity) @ np.cross(*edges) / (2.0 * m * n)
+    corner = np.arange((m + 1) * (n + 1)).reshape(m + 1, n + 1)
+    low, right, up, top = (
+        c.ravel() for c in (corner[:-1, :-1], corner[1:, :-1], corner[:-1, 1:], corner[1:, 1:])
+    )
+    triangles = np.concatenate([np.column_stack([low, right, top]), np.column_stack([low, top, up])])
+    triangles = triangles[np.isfinite(phi[triangles]).all(axis=1)]
+    return float((wet_shares(phi[triangles]) * through[triangles]).sum())
+
+
 def volume_in_box(water, lower, upper) -> float:
-    """Water [m³] in the cells whose centre lies in the box lower, upper (3,) [m]: sharp to one cell."""
+    """Water [m³] in the box from lower to upper (3,) [m]: exact for the surface φ = 0 as the cells have it.
+
+    A cell that the border of the box and a solid cut at once counts with its share outside the solid."""
     t = water.topology
-    cells = cells_touching(water.level_set < 0.0, t.cells)
-    centre = t.nodes[t.cells[cells]].mean(axis=1)
-    inside = np.all((centre >= lower) & (centre < upper), axis=1)
-    share = wet_fraction(cells[inside], water.level_set, t.cells)
-    return float(share @ t.volume[cells[inside]])
+    wet = cells_touching(water.level_set < 0.0, t.cells)
+    x = t.nodes[t.cells[wet]]
+    inside = ((x >= lower) & (x <= upper)).all(axis=(1, 2))
+    beyond = ((x <= lower).all(axis=1) | (x >= upper).all(axis=1)).any(axis=1)
+    whole, border = wet[inside], wet[~inside & ~beyond]
+    total = float(wet_fraction(whole, water.level_set, t.cells) @ t.volume[whole])
+    return total + float(_in_box(water, border, lower, upper) @ t.fraction[border])
+
+
+def _in_box(water, cells, lower, upper):
+    """Water (n,) [m³] of the cells (n,) inside the box, solids not taken off."""
+    t = water.topology
+    number = np.broadcast_to(np.arange(len(cells))[:, None, None], (len(cells), 4, 1))
+    parts = np.concatenate(
+        [t.nodes[t.cells[cells]], water.level_set[t.cells[cells]][..., None], number], axis=2
+    )
+    for axis in range(3):
+        parts = clipped(parts, lower[axis] - parts[:, :, axis])
+        parts = clipped(parts, parts[:, :, axis] - upper[axis])
+    parts = clipped(parts, parts[:, :, 3])
+    of_cell = np.rint(parts[:, 0, 4]).astype(np.int64)
+    return np.bincount(of_cell, volumes(parts), minlength=len(cells))
 
 
 def _interpolated(water, points, field):

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
+from yade_scripts.impulses import Impulses
+
 
 @dataclass(frozen=True)
 class FakeProblem:
@@ -64,6 +66,7 @@ def no_clock(part):
 @dataclass(frozen=True)
 class FakeAdvance:
     mean_velocity: np.ndarray
+    impulses: Impulses
     substeps: int = 1
     dt_s: float = 0.0
     opening_rate: float = 0.0
@@ -133,7 +136,13 @@ class FreeBody:
         mean = 0.5 * (before + self._v)
         self._x += dt * mean[:, :3]
         self._work += dt * float(np.sum(self._load * mean))
-        return FakeAdvance(self._v.copy())
+        nothing = np.zeros((1, 9))
+        impulses = Impulses(nothing, nothing, dt * (self._x - 0.5 * dt * mean[:, :3]), dt, np.zeros(3))
+        return FakeAdvance(self._v.copy(), impulses)
+
+    def momentum(self, about):
+        p = self.mass[:, None] * self._v[:, :3]
+        return np.concatenate([p.sum(axis=0), np.cross(self._x - about, p).sum(axis=0)])
 
     def energies(self):
         height = float(self.mass @ self._x[:, 2])

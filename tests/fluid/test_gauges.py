@@ -2,9 +2,12 @@
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from fluid import gauges
 from fluid.bodies import ConvexBodies
+from fluid.clip import clipped, volumes
 from tests.fluid.scenes import advance, column, load, tank
 
 
@@ -67,3 +70,59 @@ def test_pressure_read_is_the_pressure_that_acts():
         np.testing.assert_allclose(acted, load(problem, x), rtol=1e-9, atol=1e-9)
         largest = max(largest, np.abs(water.end_pressure - water.pressure).max())
     assert largest > 100.0, "the scene has no impact in which the two could be confused"
+
+
+def streaming(velocity, level=0.437):
+    """A pool that moves as one, as its state has it."""
+    water = tank([1, 1, 1], 0.125, lambda x: x[:, 2] - level)
+    water.velocity[:] = velocity
+    return water
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.tuples(*[st.floats(-2, 2)] * 3), st.floats(0.05, 0.9))
+def test_uniform_flow_through_a_plane(velocity, level):
+    """u·n times the wet area, wherever the surface crosses the patch; velocity at a point is the velocity."""
+    water = streaming(velocity, level)
+    across = gauges.flux(water, [0.4, 0.5, 0.5], [[0, 0.6, 0], [0, 0, 0.9]])
+    wet = min(max(level - 0.05, 0.0), 0.9) * 0.6
+    assert across == pytest.approx(velocity[0] * wet, abs=1e-9)
+    np.testing.assert_allclose(gauges.velocity(water, [0.3, 0.3, 0.04]), velocity, atol=1e-12)
+
+
+def test_flux_through_a_slanted_plane_counts_its_projection():
+    water = streaming((1.0, 0.0, 0.0), 0.9)
+    slanted = gauges.flux(water, [0.5, 0.5, 0.4], [[0.3, 0.4, 0.0], [0, 0, 0.5]])
+    assert slanted == pytest.approx(0.4 * 0.5, rel=1e-12)
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.lists(st.floats(0.0, 0.97), min_size=3, max_size=3), st.floats(0.02, 0.6), st.floats(0.1, 0.9))
+def test_volume_in_any_box_under_a_flat_surface(lower, edge, level):
+    water = tank([1, 1, 1], 0.25, lambda x: x[:, 2] - level)
+    level = gauges.level(water, (0.5, 0.5))  # not to the last digit where the surface runs through nodes
+    upper = np.minimum(np.add(lower, edge), 1.0)
+    deep = max(min(upper[2], level) - lower[2], 0.0)
+    exact = (upper[0] - lower[0]) * (upper[1] - lower[1]) * deep
+    assert gauges.volume_in_box(water, np.array(lower), upper) == pytest.approx(exact, abs=1e-7)
+
+
+def test_boxes_that_share_a_border_share_the_water():
+    """A tilted surface and a box in the tank: the parts add up to what the tank holds, whatever cuts what."""
+    box = ConvexBodies.boxes(np.array([[0.52, 0.5, 0.25]]), np.array([[0.3, 0.4, 0.5]]))
+    water = tank([1, 1, 1], 0.125, lambda x: x[:, 2] - 0.4 - 0.3 * x[:, 0], box)
+    cut = 0.531
+    left = gauges.volume_in_box(water, [0, 0, 0], [cut, 1, 1])
+    right = gauges.volume_in_box(water, [cut, 0, 0], [1, 1, 1])
+    assert left + right == pytest.approx(water.volume(), rel=1e-9)
+
+
+def test_parts_of_a_clipped_cell_fill_it():
+    """Volumes of both sides of a random plane, and the mean of a value that is carried along."""
+    rng = np.random.default_rng(3)
+    tets = rng.normal(size=(50, 4, 4))
+    v = tets[:, :, :3] @ rng.normal(size=3) - 0.2
+    one, other = clipped(tets, v), clipped(tets, -v)
+    assert volumes(one).sum() + volumes(other).sum() == pytest.approx(volumes(tets).sum(), rel=1e-12)
+    whole, parts = (float(volumes(t) @ t[:, :, 3].mean(axis=1)) for t in (tets, np.concatenate([one, other])))
+    assert parts == pytest.approx(whole, rel=1e-9)
