@@ -20,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-from coupler.errors import ExitCode
+from coupler.errors import BadCase, ExitCode
 from coupler.fingerprint import differences, program
 from coupler.history import read_history
 from coupler.run_directory import read_summary, write_json
@@ -198,6 +198,9 @@ def _measured(
     setting: Setting, number: int, place: Path, cost: Cost, compiling: float, program: dict
 ) -> Measured:
     summary = read_summary(place) if (place / "run.json").exists() else {}
+    changed = differences(summary.get("case", setting.case), setting.case)
+    if changed:
+        raise BadCase([f"{place}: the case was changed while the study ran ({changed[0]}); start it again"])
     figures = summary.get("figures", {})
     split = figures.get("cpu_seconds", {})
     inside, set_up = sum(split.values()), split.get("set-up", 0.0)

@@ -1,5 +1,6 @@
 """Texts beside points of a figure, each where it covers neither a point nor another text."""
 
+from matplotlib.patheffects import withStroke
 from matplotlib.text import Text
 
 PLACES = [(x, y) for far in (4, 11, 19) for x, y in ((far, far), (far, -far), (-far, far), (-far, -far), (0, 1.5 * far),
@@ -7,6 +8,8 @@ PLACES = [(x, y) for far in (4, 11, 19) for x, y in ((far, far), (far, -far), (-
 """Offsets [points] of a text from its point, in the order in which they are tried."""
 NEAR = 6
 """Offset [points] up to which a text stands beside its point; a thin line leads from one farther away."""
+HALO = (withStroke(linewidth=1.5, foreground="white", alpha=0.8),)
+"""A white rim, so that a text can be read across a line."""
 ROOM = 1.0
 """Free space around a text [pixels]."""
 
@@ -39,6 +42,7 @@ def _written(axis, x, y, text, colour, size):
         color=colour,
         zorder=4,
         arrowprops=line,
+        path_effects=HALO,
     )
 
 

@@ -21,6 +21,8 @@ LEVELS = (0.01, 0.05, 0.10)
 """Errors for which the cheapest setting is told: thin lines."""
 LOWEST = 1e-6
 """Errors below this are drawn here: they are round-off."""
+SHORT = 24
+"""Letters in a name of which three stand side by side."""
 NOTE_WIDTH = 105
 """Letters in a line below a figure."""
 
@@ -84,7 +86,7 @@ def figure(stem, q, curves, failed, along):
         axis.set_xlabel(along)
         axis.set_ylabel(ylabel(q))
         if len(shown) > 1 or q["against"] == "measured":
-            drawing.legend(loc="outside upper center", ncols=min(3, len(shown) + 1))
+            drawing.legend(loc="outside upper center", ncols=columns(shown))
         if notes:
             drawing.supxlabel("\n".join(notes), x=0.01, ha="left", fontsize=6, color=INK)
         crosses(axis, failed)
@@ -93,6 +95,12 @@ def figure(stem, q, curves, failed, along):
             drawing.savefig(stem.with_name(f"{stem.name}.{ending}"), metadata=_undated(ending))
         plt.close(drawing)
     return stem.with_name(f"{stem.name}.png")
+
+
+def columns(curves):
+    """Columns of the legend: three of short names, else two."""
+    longest = max(len(legend) for legend, _ in curves)
+    return min(len(curves) + 1, 3 if longest <= SHORT else 2)
 
 
 def ylabel(q):
@@ -140,6 +148,7 @@ def limits(axis, curves, failed):
     y = [max(p[1], LOWEST) for _, points in curves for p in points]
     axis.set_xlim(0.7 * min(x), 1.9 * max(x))
     low, high = 10.0 ** math.floor(math.log10(0.95 * min(y))), 10.0 ** math.ceil(math.log10(1.2 * max(y)))
+    low = max(low, 0.5 * LOWEST)
     axis.set_ylim(low, high)
     for level in LEVELS:
         if low < level < high:
