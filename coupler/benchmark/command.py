@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from coupler import provenance
-from coupler.benchmark import cutting, scenes
+from coupler.benchmark import cutting, debris, scenes
 from coupler.benchmark.part import LAW
 from coupler.errors import ExitCode, SurgebreakError
 from yade_scripts.faces import touching_faces
@@ -56,7 +56,7 @@ def benchmark(quick: bool, as_json: bool) -> ExitCode:
     lines: list[Line] = []
     if not as_json:
         print(_heading(), flush=True)
-    for measured in (_engine, _scenes, _dead, _cutting, _stock):
+    for measured in (_engine, _scenes, _dead, _cutting, _debris, _stock):
         for line in measured(sizes):
             lines.append(line)
             if not as_json:
@@ -142,6 +142,16 @@ def _cutting(sizes):
     """The water's side: cells that blocks cut."""
     for what, bodies, us, target in cutting.figures(_part("cutting")):
         yield Line(what, bodies, 0, us, "a cut cell", target)
+
+
+def _debris(sizes):
+    """What blocks cost a coupled step, part by part, and the pressure solve beside one without them."""
+    found, n = debris.costs(), debris.BLOCKS
+    for name, what in debris.PARTS.items():
+        yield Line(f"coupled step, {what}", n, 0, 1e3 * found.full[name], "a step")
+    bare = 1e3 * found.bare["pressure"]
+    yield Line("  the pressure without blocks, same mesh", 0, 0, bare, "a step")
+    yield Line("  a solve with blocks over one without, times 1", n, 0, found.share, "", debris.MOST)
 
 
 def _stock(sizes):
