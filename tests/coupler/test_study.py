@@ -282,3 +282,11 @@ def test_a_real_study_of_a_falling_block(tmp_path):
         assert run["peak_memory"] > 50e6
         assert run["cpu_seconds"] > 0.0
         assert run["start_seconds"] > 0.1
+
+
+def test_a_case_that_changes_while_the_study_runs_is_refused(fake, case, monkeypatch):
+    """Its runs would be kept under the name of the case as it was."""
+    wrong = {"case": {"title": "edited"}}
+    monkeypatch.setattr(runner, "read_summary", lambda place: {"figures": {}, "case": wrong})
+    with pytest.raises(BadCase, match="changed while the study ran"):
+        made(case)
