@@ -3,9 +3,10 @@
 import json
 import time
 
+import numpy as np
 import pytest
 
-from coupler.benchmark import command, cutting, part, scenes
+from coupler.benchmark import command, cutting, debris, part, scenes
 from coupler.benchmark.command import Line
 from coupler.errors import ExitCode
 from yade_scripts.faces import touching_faces
@@ -72,3 +73,22 @@ def test_json_is_one_object_and_a_missed_target_is_the_exit_code(monkeypatch, ca
     told = json.loads(capsys.readouterr().out)
     assert told["lines"][0]["kept"] is False
     assert {"machine", "versions"} <= told.keys()
+
+
+def test_debris_is_apart_and_as_many_as_asked_for():
+    """Blocks that overlapped at the start would be thrown about: spheres around them have their own cubes."""
+    blocks = debris.debris(30)
+    places = np.array([b.centre for b in blocks])
+    apart = np.linalg.norm(places[:, None] - places[None], axis=2) + 10.0 * np.eye(30)
+    assert len(blocks) == 30
+    assert apart.min() >= 2.0 > 2.0 * max(b.radius for b in blocks)
+
+
+def test_the_costs_of_debris_are_told_part_by_part():
+    """The share is that of one solve, structure included."""
+    bare = dict.fromkeys(debris.PARTS, 1.0) | {"unknowns": 10, "iterations": 5.0, "passes": 1.0}
+    full = dict.fromkeys(debris.PARTS, 3.0) | {"unknowns": 10, "iterations": 5.0, "passes": 2.0}
+    found = debris.Costs(bare, full)
+    assert found.share == pytest.approx(3.0)
+    shown = debris.told(found, 30)
+    assert all(what in shown for what in debris.PARTS.values())

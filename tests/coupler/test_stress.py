@@ -5,7 +5,7 @@ import json
 import pytest
 
 from coupler.errors import BadCase, ExitCode
-from coupler.stress import report, runner
+from coupler.stress import page, report, runner
 from coupler.stress.one import outcome
 from coupler.stress.registry import GROUPS, Measure, Scene, scenes
 from yade_scripts.contact import ContactLaw
@@ -73,3 +73,22 @@ def test_a_failed_scene_fails_the_command(monkeypatch, capsys):
     monkeypatch.setattr(report, "run", outcome)
     assert report.stress([], quick=False, as_json=False, only_list=False) == ExitCode.DIVERGED
     assert "not kept" in capsys.readouterr().out
+
+
+def test_the_page_shows_groups_verdicts_and_what_was_missed():
+    """A failed scene names the figure and its limit, a refused one its message; passed ones only their row."""
+    rows = [outcome(made(run, refusal)).as_row() for run, refusal in ((good, "never"), (bad, "never"))]
+    rows.append(outcome(made(refuses, "must")).as_row())
+    shown = page.tables(rows)
+    assert shown.startswith("### structure\n1 passed, 1 refused, 1 failed")
+    assert "| X1 | made up | **failed** |" in shown
+    assert "gain nan, limit 1" in shown
+    assert "“contact.stiffness = -1.0" in shown
+
+
+def test_scenes_of_all_groups_are_short_and_run_by_their_group():
+    """Scenes with water are all of the short kind: a group must not take longer than a coffee."""
+    for group in ("water", "coupling"):
+        found = runner.chosen([group], quick=False)
+        assert len(found) >= 14
+        assert {s.cost for s in found} == {"S"}
