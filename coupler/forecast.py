@@ -14,6 +14,7 @@ import numpy as np
 from coupler.case import Case
 from coupler.observe import joint_counts
 from coupler.place_checks import BYTES_PER_CELL, mesh_size
+from coupler.schedule import checkpoint_interval
 from coupler.terminal import Row
 
 LONGEST_REST_STEP = 0.3
@@ -23,6 +24,10 @@ PROGRAM_BYTES = {"water": 250e6, "structure": 250e6}
 DISK_BYTES_PER_NODE = 12
 """Compressed level set, velocity and pressure of one written state."""
 DISK_BYTES_PER_BLOCK = 150
+CHECKPOINT_BYTES_PER_CELL = 36
+"""Of one checkpoint, compressed; blocks take less than a tenth of it."""
+HISTORY_BYTES_PER_STEP = 4000
+"""Rows of all histories without gauges."""
 
 
 @dataclass(frozen=True)
@@ -52,10 +57,20 @@ def forecast(case: Case, exact: bool = False) -> Forecast:
         n = _structure_rows(case, rows, exact)
         memory += PROGRAM_BYTES["structure"] + BYTES_PER_BLOCK * n
         disk += DISK_BYTES_PER_BLOCK * n * (outputs + 1)
+    disk += HISTORY_BYTES_PER_STEP * steps + _checkpoint_bytes(case)
     rows.append(Row("written states", outputs + 1, "", ""))
     rows.append(Row("memory", memory / 1e6, "MB", "about"))
     rows.append(Row("disk", disk / 1e6, "MB", "about"))
     return Forecast(rows)
+
+
+def _checkpoint_bytes(case: Case) -> float:
+    """Those that stay [B]; none where the case wants none."""
+    if checkpoint_interval(case) == 0.0 or case.water is None:
+        return 0.0
+    from coupler.checkpoint import KEPT
+
+    return float(KEPT * CHECKPOINT_BYTES_PER_CELL * mesh_size(case.tank)[0])
 
 
 def _water_rows(case: Case, rows: list[Row]) -> float:

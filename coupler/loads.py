@@ -77,6 +77,7 @@ class GroupLoads:
         self.rows, self.point = np.asarray(rows), np.asarray(point, float)
         self.names = [*parts, "total"]
         self.windows = {name: Windows(impulse or WHOLE_RUN, mean_over) for name in self.names}
+        self._columns = [name for name, *_ in self.columns()]
 
     def columns(self) -> list[tuple[str, str, str]]:
         """Name, unit, meaning of what `read` gives, time first."""
@@ -95,7 +96,7 @@ class GroupLoads:
         values = [record.time]
         for name in self.names:
             values += [*sums[name], *self.windows[name].add(record.time, record.dt, sums[name][:3])]
-        return [{name: float(v) for (name, *_), v in zip(self.columns(), values)}]
+        return [{name: float(v) for name, v in zip(self._columns, values)}]
 
     def save(self) -> dict[str, Array]:
         """What has been accumulated."""

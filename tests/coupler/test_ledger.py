@@ -35,3 +35,15 @@ def test_work_that_does_not_arrive_is_an_error():
     found = ledger.balance((50.0, 20.0), NOTHING | {"kinetic": 25.0, "load_work": 25.0})
     assert found.interface_residual == pytest.approx(5.0)
     assert found.energy_error == pytest.approx(0.05)
+
+
+def test_shear_and_outflow_are_not_numerical_dissipation():
+    """What viscosity took and what fell out through open sides are known: only the rest is the numerics', and a gain
+    that they would hide shows."""
+    ledger = started()
+    ledger.shear, ledger.left = 6.0, 10.0
+    found = ledger.balance((50.0, 30.0), NOTHING)
+    assert (found.shear_dissipation, found.left) == (6.0, 10.0)
+    assert found.numerical_dissipation == pytest.approx(4.0)
+    ledger.left = 20.0
+    assert ledger.balance((50.0, 30.0), NOTHING).energy_error == pytest.approx(0.06)
