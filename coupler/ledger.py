@@ -24,6 +24,10 @@ STORED = ("kinetic", "gravity", "joint_stored", "contact_stored")
 DISSIPATED = ("joint_dissipated", "joint_damping", "dashpot", "friction")
 
 
+ROUND_OFF = 1e-9
+"""Share of the energy of the water at the start below which nothing counts as put in."""
+
+
 @dataclass(frozen=True)
 class Balance:
     """One line of the ledger, all in joules but the last, a share of the input energy."""
@@ -67,7 +71,8 @@ class Ledger:
         self._water_start = water
         self._structure_start = None if structure is None else _structure_total(structure)
         self._gravity_start = None if structure is None else structure["gravity"]
-        self._input = self.available
+        # a scene at perfect rest puts nothing in: then the round-off of what it holds is the scale
+        self._input = max(self.available, ROUND_OFF * abs(sum(water or (0.0,))))
 
     def save(self) -> dict[str, np.ndarray]:
         """Everything that it holds, by name."""

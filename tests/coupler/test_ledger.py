@@ -47,3 +47,10 @@ def test_shear_and_outflow_are_not_numerical_dissipation():
     assert found.numerical_dissipation == pytest.approx(4.0)
     ledger.left = 20.0
     assert ledger.balance((50.0, 30.0), NOTHING).energy_error == pytest.approx(0.06)
+
+
+def test_water_at_perfect_rest_is_not_out_of_balance_by_its_round_off():
+    """Nothing is put in, and the last digit of a large potential energy comes and goes: no share of nothing."""
+    ledger = Ledger(available=0.0)
+    ledger.start((0.0, -3421.0), None)
+    assert ledger.balance((1e-20, -3421.0 + 5e-13), None).energy_error < 1e-6
