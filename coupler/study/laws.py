@@ -13,6 +13,7 @@ from pathlib import Path
 
 from coupler.case_study import Ladder, Quantity
 from coupler.errors import SurgebreakError
+from coupler.run_directory import write_json
 from coupler.study import runner
 from coupler.study.plan import Plan, fingerprint
 from coupler.study.reference import Reading, against_number, fixed_reference
@@ -67,10 +68,11 @@ def _comparison(plan: Plan, ladder: Ladder, runs: Runs) -> Path:
     overrides = (*plan.study.set, *ladder.set)
     id = fingerprint({"case": plan.settings[plan.base].case, "ladder": ladder.model_dump(mode="json")})
     place = runs.folder / f"laws-{ladder.name}-{id}"
-    if (place / "comparison.json").exists():
-        return place / "comparison.json"
+    found, made_by = place / "comparison.json", place.with_suffix(".json")
+    if found.exists() and made_by.exists() and (runs.any_version or _program(made_by) == runs.program):
+        return found
     if place.exists():
-        shutil.rmtree(place)  # of a study that was stopped
+        shutil.rmtree(place)  # of a study that was stopped, or of another version
     log = place.with_suffix(".log")
     sets = [word for override in overrides for word in ("--set", override)]
     substeps = ",".join(str(multiple) for multiple in ladder.substeps)
@@ -86,4 +88,9 @@ def _comparison(plan: Plan, ladder: Ladder, runs: Runs) -> Path:
             f"ladder {ladder.name}: surgebreak compare ended with {cost.exit_code}: {last}"
         )
     runs.tell(f"ladder {ladder.name}: {len(ladder.laws)} laws compared, {cost.cpu_seconds:.3g} CPU s in all")
-    return place / "comparison.json"
+    write_json(made_by, runs.program)
+    return found
+
+
+def _program(path: Path) -> dict:
+    return json.loads(path.read_text(encoding="utf-8"))
