@@ -29,8 +29,9 @@ class Windows:
         """What is added to the columns of a gauge `name`; axes: endings of its components, ("",) of a number."""
         found = []
         if self.impulse:
-            window = "{:g} to {:g} s".format(*self.impulse)
-            found += [(f"{name}_impulse{a}", f"{unit} s", f"impulse so far, within {window}") for a in axes]
+            window = ", within {:g} to {:g} s".format(*self.impulse) if np.isfinite(self.impulse[1]) else ""
+            by_time = unit.removesuffix("/s") if unit.endswith("/s") else f"{unit} s"
+            found += [(f"{name}_impulse{a}", by_time, f"value times step so far{window}") for a in axes]
         if self.mean_over:
             found += [(f"{name}_mean{a}", unit, f"mean over the last {self.mean_over:g} s") for a in axes]
             found.append((f"{name}_peak", unit, f"largest mean over {self.mean_over:g} s so far"))

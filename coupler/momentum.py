@@ -192,7 +192,7 @@ def momentum_ledger(water, structure) -> MomentumLedger:
     if water is not None:
         about, reach = water.reference, 0.5 * np.linalg.norm(np.ptp(water.mesh.bounds, axis=0))
     else:
-        about = structure.centre().mean(axis=0)
+        about = structure.centre().mean(axis=0).round(6)
         away = np.linalg.norm(structure.centre() - about, axis=1)
         reach = (away + [np.linalg.norm(v, axis=1).max() for v in structure.shape_vertices]).max()
     ledger = MomentumLedger(about, reach)

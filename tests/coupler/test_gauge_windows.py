@@ -64,3 +64,9 @@ def test_points_of_a_parallelogram_are_its_middle_on_the_mean():
     points = parallelogram([1, 2, 3], [[0.2, 0, 0], [0.1, 0, 0.3]])
     np.testing.assert_allclose(points.mean(axis=0), [1, 2, 3])
     np.testing.assert_allclose(np.ptp(points[:, 2]), 0.25)
+
+
+def test_units_of_sums_over_time():
+    """A force gives newton seconds, a flux the volume that has passed."""
+    units = [Windows((0.0, 1.0), None).columns("g", unit, ("",))[0][1] for unit in ("N", "Pa", "m3/s")]
+    assert units == ["N s", "Pa s", "m3"]
