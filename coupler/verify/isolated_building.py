@@ -19,7 +19,7 @@ RESERVOIR, AHEAD = 0.40, 0.02
 """Water behind the gate and in the channel [m]."""
 GATE = -0.8
 """Its near side [m]: the water stands up to there, between two blocks that leave 1 m."""
-CELL, LAYER = 0.1, 0.05
+CELL, LAYER = 0.15, 0.05
 """Cells along the channel and across it, and their height [m]."""
 GAUGES = {
     "G1": (2.65, 1.15), "G2": (2.65, -0.60), "G3": (4.00, 1.15),
@@ -49,7 +49,7 @@ def isolated_building():
         )
         curves = (
             Curve("measured", "measured", t[shown], 100 * table[name][shown]),
-            Curve("computed, cells 10 cm x 10 cm x 5 cm", "computed", run["t"], 100 * run[name]),
+            Curve("computed, cells 15 cm x 15 cm x 5 cm", "computed", run["t"], 100 * run[name]),
         )
         panels.append(Panel("time [s]", f"depth at {name} [cm]", curves, (0.0, UNTIL)))
     yield from losses.findings()

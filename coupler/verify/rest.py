@@ -14,7 +14,7 @@ WEIGHT = DENSITY * G
 STEPS, STEP = 1000, 0.01
 LARGEST = 1e-7
 """Speed [m/s] that counts as rest."""
-SEEDS = (1, 2, 3)
+SEEDS = (1, 2)
 
 
 @check("P30", "water at rest in a tank with fixed cut blocks", "Archimedes; p = rho g (h - z)")
@@ -24,7 +24,7 @@ def at_rest():
         ("straight", np.eye(3)),
         ("turned", Rotation.from_rotvec([0.2, 0.4, 0.5]).as_matrix()),
     ):
-        c, record = _rest([box((0.5, 0.45, 0.4), size, turn)], level, "single")
+        c, record = _rest([box((0.5, 0.45, 0.4), size, turn)], level, "single", cells=8)
         buoyancy = WEIGHT * size.prod()
         yield Finding(f"{name}: lift / buoyancy", record.load[0, 2] / buoyancy, 1.0, 1e-6)
         sideways = np.abs(record.load[0, [0, 1, 3, 4, 5]]).max() / buoyancy
@@ -35,9 +35,9 @@ def at_rest():
             yield from _anywhere(kind, covers)
 
 
-def _rest(solids, level: float, covers: str):
-    """A tank of 1 m, eight cells an edge, after STEPS steps; and the record of the last one."""
-    c = tank((1, 1, 1), (8, 8, 8), level_at(level), solids=solids, covers=covers)
+def _rest(solids, level: float, covers: str, cells: int = 6):
+    """A tank of 1 m, `cells` along each edge, after STEPS steps; and the record of the last one."""
+    c = tank((1, 1, 1), (cells,) * 3, level_at(level), solids=solids, covers=covers)
     for _ in range(STEPS):
         record = c.step(STEP)
     return c, record
@@ -89,13 +89,13 @@ def _through_the_surface(random):
 
 
 def _thin_plate(random):
-    """A plate of 0.1 to 0.8 cells with all its edges in the water."""
+    """A plate of 0.08 to 0.6 cells with all its edges in the water."""
     size = (0.5, 0.4, random.uniform(0.0125, 0.1))
     return [box([*random.uniform(0.4, 0.6, 2), 0.4], size, _turn(random))]
 
 
 def _thin_wall(random):
-    """A wall of 0.1 to 0.8 cells, tilted, that reaches from deep water into the air; its sides end in the water."""
+    """A wall of 0.08 to 0.6 cells, tilted, that reaches from deep water into the air; its sides end in the water."""
     size = (random.uniform(0.0125, 0.1), 0.5, 0.7)
     return [box([*random.uniform(0.4, 0.6, 2), 0.55], size, _turn(random, 0.6))]
 
