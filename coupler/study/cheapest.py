@@ -13,9 +13,11 @@ LEVELS = (0.01, 0.05, 0.10)
 
 @dataclass(frozen=True)
 class Cheapest:
-    """The cheapest setting of a quantity with an error of at most `level`; rung None: no run comes that near."""
+    """The cheapest setting of a quantity with an error of at most `level`, among the ladders run across `curve` (empty:
+    the others); rung None: no run comes that near."""
 
     quantity: str
+    curve: str
     level: float
     rung: Rung | None
     error: float
@@ -23,18 +25,24 @@ class Cheapest:
 
 
 def cheapest(plan: Plan, found: dict[str, Outcome]) -> list[Cheapest]:
-    """For every quantity and level. A rung counts when all finer ones of its curve are as near: a coarse run may hit
-    the answer by chance."""
-    return [_cheapest(plan, found, q.name, level) for q in plan.study.quantity for level in LEVELS]
+    """For every quantity, curve and level. A rung counts when all finer ones of its curve are as near: a coarse run may
+    hit the answer by chance."""
+    curves = list(dict.fromkeys(rung.curve for rung in plan.rungs))
+    return [
+        _cheapest(plan, found, q.name, curve, level)
+        for q in plan.study.quantity
+        for curve in curves
+        for level in LEVELS
+    ]
 
 
-def _cheapest(plan: Plan, found: dict[str, Outcome], name: str, level: float) -> Cheapest:
-    near = [rung for rung in plan.rungs if _stays(plan, found, name, level, rung)]
+def _cheapest(plan: Plan, found: dict[str, Outcome], name: str, curve: str, level: float) -> Cheapest:
+    near = [r for r in plan.rungs if r.curve == curve and _stays(plan, found, name, level, r)]
     if not near:
-        return Cheapest(name, level, None, float("nan"), float("nan"))
+        return Cheapest(name, curve, level, None, float("nan"), float("nan"))
     best = min(near, key=lambda rung: found[rung.setting].run.cpu_seconds)
     outcome = found[best.setting]
-    return Cheapest(name, level, best, outcome.readings[name].error, outcome.run.cpu_seconds)
+    return Cheapest(name, curve, level, best, outcome.readings[name].error, outcome.run.cpu_seconds)
 
 
 def _stays(plan: Plan, found: dict[str, Outcome], name: str, level: float, rung: Rung) -> bool:

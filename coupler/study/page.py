@@ -21,7 +21,7 @@ def page(told: dict, level: int = 1, pictures: str = "") -> str:
         f"{mark} {told['title']}",
         _where(told),
         *(_quantity(told, q, mark, pictures) for q in told["quantities"]),
-        f"{mark}# Runs\n\n{_runs(told)}",
+        f"{mark}# Runs\n\n{_ladders(told)}\n\n{_runs(told)}",
         f"{mark}# Cheapest setting for an error\n\n{_cheapest(told)}",
     ]
     if told["orders"]:
@@ -79,8 +79,7 @@ def table(head: list[str], rows: list[list[str]]) -> str:
 
 def point_name(point: dict) -> str:
     """Ladder and setting of a point or rung."""
-    curve = f" ({point['curve']})" if point["curve"] else ""
-    return f"{point['ladder']} {point['label']}{curve}"
+    return f"{point['ladder']} {point['label']}{curve_of(point)}"
 
 
 def percent(value) -> str:
@@ -90,6 +89,12 @@ def percent(value) -> str:
 
 def _number(value) -> bool:
     return isinstance(value, int | float) and math.isfinite(value)
+
+
+def _ladders(told: dict) -> str:
+    """What is varied, so that the short names in the tables can be read."""
+    run = {point["ladder"] for point in told["points"]}
+    return "; ".join(f"`{la['name']}`: {la['what']}" for la in told["ladders"] if la["name"] in run) + "."
 
 
 def _runs(told: dict) -> str:
@@ -130,15 +135,24 @@ def _run_row(told: dict, point: dict, quantities: list[dict]) -> list[str]:
 
 def _cheapest(told: dict) -> str:
     what = {q["name"]: q["what"] for q in told["quantities"]}
-    rows = []
-    for entry in told["cheapest"]:
-        rung = entry["rung"]
-        setting = "none of these" if rung is None else point_name(rung)
-        cost = "–" if rung is None else f"{entry['cpu_seconds']:.3g}"
-        rows.append(
-            [f"{what[entry['quantity']]}, {100 * entry['level']:g} %", setting, percent(entry["error"]), cost]
-        )
+    rows = [
+        [f"{what[e['quantity']]}{curve_of(e)}, {100 * e['level']:g} %", *cheapest_cells(e)]
+        for e in told["cheapest"]
+    ]
     return table(["quantity and error", "setting", "its error", "CPU s"], rows)
+
+
+def curve_of(entry: dict) -> str:
+    """The value of the ladder across which an entry was found, in brackets."""
+    return f" ({entry['curve']})" if entry["curve"] else ""
+
+
+def cheapest_cells(entry: dict) -> list[str]:
+    """Setting, its error and its cost."""
+    if entry["rung"] is None:
+        return ["none of these", "–", "–"]
+    setting = f"{entry['rung']['ladder']} {entry['rung']['label']}"
+    return [setting, percent(entry["error"]), f"{entry['cpu_seconds']:.3g}"]
 
 
 def _orders(told: dict) -> str:
@@ -146,7 +160,7 @@ def _orders(told: dict) -> str:
         return f"{value + 0.0:.2f}".replace("-0.00", "0.00") if _number(value) else "–"
 
     rows = [
-        [f"{o['quantity']}, {o['ladder']}" + (f" ({o['curve']})" if o["curve"] else ""), shown(o["overall"]),
+        [f"{o['quantity']}, {o['ladder']}{curve_of(o)}", shown(o["overall"]),
          shown(o["finest"]), o["how"]]
         for o in told["orders"]
     ]  # fmt: skip

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 from coupler.provenance import ROOT
-from coupler.study.page import AGAINST, page, percent, point_name, table
+from coupler.study.page import AGAINST, cheapest_cells, curve_of, page, table
 
 OPENING = """\
 # Error against run time
@@ -38,17 +38,14 @@ def summary(studies: list[dict]) -> str:
     """The settings for 5 % of all studies."""
     rows = []
     for told in studies:
-        what = {q["name"]: (q["what"], AGAINST[q["against"]]) for q in told["quantities"]}
-        for entry in told["cheapest"]:
-            if entry["level"] == 0.05:
-                rung = entry["rung"]
-                setting = "none of these" if rung is None else point_name(rung)
-                cost = "–" if rung is None else f"{entry['cpu_seconds']:.3g}"
-                name, against = what[entry["quantity"]]
-                rows.append([told["title"], f"{name}, {against}", setting, percent(entry["error"]), cost])
-    return "## Settings for an error of 5 %\n\n" + table(
-        ["case", "quantity", "setting", "its error", "CPU s"], rows
-    )
+        what = {q["name"]: f"{q['what']}, {AGAINST[q['against']]}" for q in told["quantities"]}
+        rows += [
+            [told["title"] + curve_of(entry), what[entry["quantity"]], *cheapest_cells(entry)]
+            for entry in told["cheapest"]
+            if entry["level"] == 0.05
+        ]
+    head = ["case", "quantity", "setting", "its error", "CPU s"]
+    return "## Settings for an error of 5 %\n\n" + table(head, rows)
 
 
 def main() -> None:

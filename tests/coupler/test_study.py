@@ -85,7 +85,7 @@ def test_a_run_that_had_to_compile_is_made_again(fake, case):
 def test_the_cheapest_setting_is_found_and_what_a_part_costs(fake, case):
     """Errors 16, 4 and 1 %: 5 % needs h = 0.2; friction costs a quarter of a second of 10.25."""
     _, told = made(case)
-    found = {(c["quantity"], c["level"]): c["rung"] for c in told["cheapest"]}
+    found = {(c["quantity"], c["level"]): c["rung"] for c in told["cheapest"] if not c["curve"]}
     assert found["exact", 0.05]["label"] == "0.2"
     assert found["exact", 0.10]["label"] == "0.2"
     (part,) = told["parts"]
