@@ -11,13 +11,16 @@ def water_of(case: Case, structure, solids):
     """(Water, Immersion) of a case with a structure or None and fixed solids [(vertices, faces)]."""
     from coupler.exchange import Immersion
     from coupler.fill import start_level
+    from fluid.covers import WIDE_OPENINGS
     from fluid.mesh import box_mesh
     from fluid.parameters import WaterParameters
     from fluid.water import Water
 
     w = case.water
     mesh = box_mesh(case.tank.lower, case.tank.upper, case.tank.cell)
-    immersion = Immersion(mesh, structure, solids, w.covers, _narrow_cracks(w.cracks, structure, mesh))
+    cracks = _narrow_cracks(w.cracks, structure, mesh)
+    connection = WIDE_OPENINGS if w.openings == "wide" else None
+    immersion = Immersion(mesh, structure, solids, w.covers, cracks, connection)
     parameters = WaterParameters(
         density=w.density,
         gravity=case.case.gravity,

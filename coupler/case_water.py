@@ -119,6 +119,11 @@ class Water(Section):
         "single",
         description="one set of unknowns per node, or one per part of the water that a thin wall separates",
     )
+    openings: Literal["all", "wide"] = Field(
+        "all",
+        description="with multiple covers, what counts as an opening of a thin wall: any, which acts as one cell wide "
+        "at least, or only those about a cell wide and more, which makes free edges and added mass of thin plates right",
+    )
     cracks: Literal["open", "closed", "slit"] = Field(
         "open",
         description="broken joints of walls thinner than two cells, while narrower than a quarter of a cell: openings "

@@ -30,11 +30,12 @@ class Immersion:
     """The solids in the water: n blocks of the structure, then m fixed solids; keeps the domain they leave.
 
     mesh: Background · structure: Structure or None · solids: list of (vertices (k, 3), faces) fixed in space ·
-    cracks: `NarrowCracks` of the structure, or None: broken joints are open.
+    cracks: `NarrowCracks` of the structure, or None: broken joints are open · connection: thresholds of the covers.
     """
 
-    def __init__(self, mesh, structure, solids, covers: str, cracks=None):
+    def __init__(self, mesh, structure, solids, covers: str, cracks=None, connection=None):
         self.mesh, self.structure, self.covers, self.cracks = mesh, structure, covers, cracks
+        self.connection = connection
         self.n_blocks = 0 if structure is None else structure.n
         self.n_solids = len(solids)
         self._solid_centre = np.array([v.mean(axis=0) for v, _ in solids]).reshape(-1, 3)
@@ -54,7 +55,7 @@ class Immersion:
         self._centre, self._rotation = self._pose()
         self._growth = self._new_growth(np.zeros(len(self._body_of_plane)))
         self.bodies = self._placed()
-        self.domain = cut_domain(mesh, self.bodies, covers)
+        self.domain = cut_domain(mesh, self.bodies, covers, connection=connection)
         self.cut_again = 0
         """Bodies whose cells the last update cut again."""
 
@@ -74,7 +75,7 @@ class Immersion:
         self._centre[moved], self._rotation[moved] = centre[moved], rotation[moved]
         self._growth = growth
         self.bodies = self._placed()
-        self.domain = cut_domain(self.mesh, self.bodies, self.covers, previous=self.domain)
+        self.domain = cut_domain(self.mesh, self.bodies, self.covers, self.domain, connection=self.connection)
         return True
 
     def save(self) -> dict[str, Array]:
@@ -90,7 +91,7 @@ class Immersion:
         self._centre, self._rotation = saved["centre"].copy(), saved["rotation"].copy()
         self._growth = saved["growth"].copy()
         self.bodies = self._placed()
-        self.domain = cut_domain(self.mesh, self.bodies, self.covers)
+        self.domain = cut_domain(self.mesh, self.bodies, self.covers, connection=self.connection)
         self.cut_again = 0
 
     def _pose(self) -> tuple[Array, Array]:

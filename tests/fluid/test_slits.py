@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fluid.bodies import ConvexBodies
-from fluid.covers import Connection
+from fluid.covers import WIDE_OPENINGS
 from fluid.domain import cut_domain
 from fluid.mesh import Background, box_mesh
 from fluid.parameters import WaterParameters
@@ -138,9 +138,9 @@ def edge_error(n, connection):
 
 
 def test_free_edges_of_thin_walls():
-    """A free edge acts as if the wall were too short; thresholds of 0.35 take 80 % of that off, loads 0.10 to 0.15."""
+    """A free edge acts as if the wall were too short; thresholds take 80 % of that off, loads 0.10 to 0.15."""
     assert -0.035 < edge_error(8, None) < -0.02
-    assert abs(edge_error(8, Connection(inner=0.35, face=0.35))) < 0.006
+    assert abs(edge_error(8, WIDE_OPENINGS)) < 0.006
 
 
 def test_slit_between_equal_levels_stays_at_rest():
