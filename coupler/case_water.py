@@ -122,7 +122,7 @@ class Water(Section):
     openings: Literal["all", "wide"] = Field(
         "all",
         description="with multiple covers, what counts as an opening of a thin wall: any, which acts as one cell wide "
-        "at least, or only those about a cell wide and more, which makes free edges and added mass of thin plates right",
+        "at least, or only those about a cell wide and more, for right edges and added mass of thin plates",
     )
     cracks: Literal["open", "closed", "slit"] = Field(
         "open",
