@@ -59,16 +59,16 @@ def test_free_fall_has_its_weight_alone():
 
 
 def wall_case(**gauge):
-    """A held wall across the tank with still water of 0.4 m on one side, a cell and a half thick."""
+    """A held wall across the tank with still water of 0.37 m on one side, a cell and a half thick."""
     return Case.model_validate(
         {
             "case": {"title": "t"},
             "time": {"end": 0.05},
             "tank": {"lower": [0, 0, 0], "upper": [1, 0.3, 0.6], "cell": 0.1},
-            "water": {"fill": [{"lower": [0, 0, 0], "upper": [0.53, 0.3, 0.4]}]},
+            "water": {"fill": [{"lower": [0, 0, 0], "upper": [0.53, 0.3, 0.37]}], "covers": "multiple"},
             "structure": {
                 "block": [
-                    {"name": "wall", "centre": [0.605, 0.15, 0.3], "size": [0.15, 0.32, 0.64], "fixed": True},
+                    {"name": "wall", "centre": [0.605, 0.15, 0.3], "size": [0.15, 0.3, 0.6], "fixed": True},
                 ]
             },
             "contact": {"stiffness": 1e6},
@@ -79,7 +79,7 @@ def wall_case(**gauge):
 
 def test_still_water_on_a_wall():
     """ρ g d² b/2 at a third of the depth, and its weight; nothing else acts on it."""
-    case, depth, width = wall_case(), 0.4, 0.3
+    case, depth, width = wall_case(), 0.37, 0.3
     assert problems(case) == []
     made = build(case, no_clock)
     try:
@@ -93,7 +93,7 @@ def test_still_water_on_a_wall():
     assert row["pressure_force_x"] == pytest.approx(force, rel=1e-5)
     assert row["pressure_moment_y"] == pytest.approx(force * depth / 3, rel=1e-4)
     assert row["total_force_x"] == pytest.approx(force, rel=1e-5)
-    assert row["weight_force_z"] == pytest.approx(-2400 * 0.15 * 0.32 * 0.64 * G, rel=1e-9)
+    assert row["weight_force_z"] == pytest.approx(-2400 * 0.15 * 0.3 * 0.6 * G, rel=1e-9)
     assert row["pressure_impulse_x"] == pytest.approx(0.01 * force, rel=1e-5)
     assert row["contact_force_z"] == row["friction_force_x"] == 0.0
 
