@@ -76,22 +76,24 @@ class ImpulseSums:
 
 @njit(cache=True)
 def _add(dt, x, joint, before, whole, joint_sum, contact_sum, place):
-    force = np.empty(6)
     for r in range(len(x)):
         for k in range(3):
             place[r, k] += dt * x[r, k]
-        _take(dt, x[r], joint[r], joint_sum[r])
-        for k in range(6):
-            force[k] = whole[r, k] - before[r, k]
-        _take(dt, x[r], force, contact_sum[r])
+        f0, f1, f2 = joint[r, 0], joint[r, 1], joint[r, 2]
+        _take(dt, x, r, f0, f1, f2, joint[r, 3], joint[r, 4], joint[r, 5], joint_sum)
+        f0, f1, f2 = whole[r, 0] - before[r, 0], whole[r, 1] - before[r, 1], whole[r, 2] - before[r, 2]
+        m0, m1, m2 = whole[r, 3] - before[r, 3], whole[r, 4] - before[r, 4], whole[r, 5] - before[r, 5]
+        _take(dt, x, r, f0, f1, f2, m0, m1, m2, contact_sum)
 
 
 @njit(cache=True)
-def _take(dt, x, F, out):
-    if F[0] == 0.0 and F[1] == 0.0 and F[2] == 0.0 and F[3] == 0.0 and F[4] == 0.0 and F[5] == 0.0:
-        return
-    for k in range(6):
-        out[k] += dt * F[k]
-    out[6] += dt * (x[1] * F[2] - x[2] * F[1] + F[3])
-    out[7] += dt * (x[2] * F[0] - x[0] * F[2] + F[4])
-    out[8] += dt * (x[0] * F[1] - x[1] * F[0] + F[5])
+def _take(dt, x, r, f0, f1, f2, m0, m1, m2, out):
+    out[r, 0] += dt * f0
+    out[r, 1] += dt * f1
+    out[r, 2] += dt * f2
+    out[r, 3] += dt * m0
+    out[r, 4] += dt * m1
+    out[r, 5] += dt * m2
+    out[r, 6] += dt * (x[r, 1] * f2 - x[r, 2] * f1 + m0)
+    out[r, 7] += dt * (x[r, 2] * f0 - x[r, 0] * f2 + m1)
+    out[r, 8] += dt * (x[r, 0] * f1 - x[r, 1] * f0 + m2)
