@@ -101,7 +101,7 @@ def _projected(t, kept, gradient, share):
 def _remainders(water, kept, gradient, mean, dt):
     """u' (M, 3) [m/s] after this step and its rate -(∇x - Π∇x)/(θ ρ) (M, 3) [m/s²] for the next kick."""
     t = water.topology
-    remainder, rate = np.zeros_like(water.remainder), np.zeros_like(water.remainder)
+    remainder, rate = np.zeros(water.remainder.shape), np.zeros(water.remainder.shape)
     if water.parameters.subscale_memory:
         whole = _all_below(kept.wet_cells, kept.level_set, -MEMORY_DEPTH * water.mesh.spacing, t.cells)
         cells = kept.wet_cells[whole]
@@ -155,11 +155,20 @@ def _limit_speed(water, u, a) -> int:
     p = water.parameters
     low, high = water.mesh.bounds
     limit = p.speed_limit * np.sqrt(p.gravity * (high - low)[2])
-    speed = np.linalg.norm(u, axis=1)
-    fast = speed > limit
-    u[fast] *= (limit / speed[fast])[:, None]
-    a[fast] = p.weight
-    return int(fast.sum())
+    return _clip(u, a, limit, p.weight)
+
+
+@njit(cache=True)
+def _clip(u, a, limit, weight):
+    count = 0
+    for i in range(u.shape[0]):
+        speed = np.sqrt(u[i, 0] * u[i, 0] + u[i, 1] * u[i, 1] + u[i, 2] * u[i, 2])
+        if speed > limit:
+            count += 1
+            for k in range(3):
+                u[i, k] *= limit / speed
+                a[i, k] = weight[k]
+    return count
 
 
 def _continue(water, kept, listed, start, u, a) -> None:
@@ -176,7 +185,7 @@ def _flux(water, kept, listed, start, u, u_cell):
     near = np.zeros(len(u), bool)
     near[reached] = True
     around = cells_touching(near, t.cells)
-    cell_field = np.zeros_like(water.cell_velocity)
+    cell_field = np.zeros(water.cell_velocity.shape)
     cell_field[around] = cell_velocity(around, u, np.zeros((0, 3)), t.cells, t.share)
     cell_field[kept.wet_cells] = u_cell
     # with implicit Euler the velocity at the end of the step is the stable choice
@@ -188,12 +197,12 @@ def _flux(water, kept, listed, start, u, u_cell):
 
 @njit(cache=True)
 def to_middle(cell_list, now, before):
-    """1.5 u - 0.5 u_before (M, 3): the velocity half a step ahead; u where there was none before."""
-    out = now.copy()
+    """1.5 u - 0.5 u_before (M, 3) in the listed cells: the velocity half a step ahead; u where none was before."""
+    out = np.empty(now.shape)
     for e in cell_list:
-        if before[e, 0] != 0.0 or before[e, 1] != 0.0 or before[e, 2] != 0.0:
-            for k in range(3):
-                out[e, k] = 1.5 * now[e, k] - 0.5 * before[e, k]
+        known = before[e, 0] != 0.0 or before[e, 1] != 0.0 or before[e, 2] != 0.0
+        for k in range(3):
+            out[e, k] = 1.5 * now[e, k] - 0.5 * before[e, k] if known else now[e, k]
     return out
 
 

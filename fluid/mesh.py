@@ -73,7 +73,7 @@ class Background:
             points, x, y, z, self.bin_start, self.bin_cells, self.nodes, self.cells, self.gradients
         )
 
-    @property
+    @cached_property
     def bounds(self) -> np.ndarray:
         """(2, 3) [m] lowest and highest coordinates."""
         return np.array([self.nodes.min(axis=0), self.nodes.max(axis=0)])
@@ -102,7 +102,9 @@ def box_mesh(lower, upper, cell_size=None, axes=None) -> Background:
     if axes is None:
         axes = _axes_of_box(np.asarray(lower, float), np.asarray(upper, float), cell_size)
     mesh = MeshTet.init_tensor(*axes)
-    return Background.from_arrays(mesh.p.T, mesh.t.T.astype(np.int64), axes)
+    # the six cells of a brick one after the other: what is near in space is near in memory
+    cells = mesh.t.T.reshape(6, -1, 4).swapaxes(0, 1).reshape(-1, 4)
+    return Background.from_arrays(mesh.p.T, cells.astype(np.int64), axes)
 
 
 def gradients(nodes, cells) -> tuple[np.ndarray, np.ndarray]:

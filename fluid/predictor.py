@@ -101,8 +101,16 @@ def _sheared(water, dt, theta, kick, surface, u_adv):
 
 def kick_factor(acceleration, parameters):
     """f = min(1, limit g / |a|) (N,): spray must not be thrown on by the acceleration of an impact."""
-    size = np.linalg.norm(acceleration, axis=1)
-    return np.minimum(1.0, parameters.kick_limit * parameters.gravity / np.maximum(size, 1e-300))
+    return _factor(acceleration, parameters.kick_limit * parameters.gravity)
+
+
+@njit(cache=True)
+def _factor(a, limit):
+    out = np.empty(a.shape[0])
+    for i in range(a.shape[0]):
+        size = np.sqrt(a[i, 0] * a[i, 0] + a[i, 1] * a[i, 1] + a[i, 2] * a[i, 2])
+        out[i] = min(1.0, limit / max(size, 1e-300))
+    return out
 
 
 def _transported(water, dt, theta, kick):
@@ -228,15 +236,16 @@ def _carried_remainder(water, dt, theta, cells):
     if not water.parameters.subscale_memory:
         return np.zeros_like(water.remainder)
     rate = (1.0 - theta) * dt
-    return carry_remainder(
-        cells, water.remainder, water.kick_remainder, rate, water.velocity, dt, t.cells, t.size
+    out = np.zeros(water.remainder.shape)  # pages that nobody writes to are never touched
+    carry_remainder(
+        cells, water.remainder, water.kick_remainder, rate, water.velocity, dt, t.cells, t.size, out
     )
+    return out
 
 
 @njit(cache=True)
-def carry_remainder(cell_list, remainder, kick, kick_time, u, dt, cells, size):
-    """β (u' + kick_time r) (M, 3) in the listed cells, zero elsewhere."""
-    out = np.zeros_like(remainder)
+def carry_remainder(cell_list, remainder, kick, kick_time, u, dt, cells, size, out):
+    """β (u' + kick_time r) (M, 3) in the listed cells of `out`."""
     for e in cell_list:
         square = 0.0
         for k in range(3):
@@ -245,7 +254,6 @@ def carry_remainder(cell_list, remainder, kick, kick_time, u, dt, cells, size):
         beta = 1.0 / (1.0 + 2.0 * np.sqrt(square) * dt / size[e])
         for k in range(3):
             out[e, k] = beta * (remainder[e, k] + kick_time * kick[e, k])
-    return out
 
 
 def _sealed(water, matrix, anchored, dofs, dt, pressure):

@@ -153,7 +153,7 @@ class Water:
     def fastest(self) -> float:
         """Largest component of the velocity of the water [m/s], films beside solids left out."""
         counted = (self.level_set < 0.0) & (self.topology.node_volume > LEAST_COUNTED * self.mesh.spacing**3)
-        return float(np.abs(self.velocity[counted]).max()) if counted.any() else 0.0
+        return _largest_component(self.velocity, counted)
 
     def predict(self, dt: float) -> PressureProblem:
         """Advection, volume and gravity over dt [s], and the system for the pressure."""
@@ -357,6 +357,17 @@ def _viscosity(parameters: WaterParameters):
 def kinetic_energy(density: float, nodal_water, velocity) -> float:
     """½ ρ Σ W_i |u_i|² [J]; nodal_water (N,) [m³], velocity (N, 3) [m/s]."""
     return float(0.5 * density * (nodal_water @ np.einsum("ij,ij->i", velocity, velocity)))
+
+
+@njit(cache=True)
+def _largest_component(u, counted):
+    """max |u_ik| over the counted rows of u (N, 3), 0 without any."""
+    largest = 0.0
+    for i in range(u.shape[0]):
+        if counted[i]:
+            for k in range(3):
+                largest = max(largest, abs(u[i, k]))
+    return largest
 
 
 @njit(cache=True)
