@@ -15,6 +15,8 @@ from coupler.view.plots import STYLE, _undated, plt
 
 SIZE = (6.9, 3.6)
 """[inch] two columns of a journal."""
+BEFORE = 0.1
+"""[s] shown before the wave arrives."""
 ARRIVES = 0.02
 """Share of the largest force from which the wave has arrived."""
 
@@ -46,15 +48,17 @@ def draw(curves, path):
     with plt.rc_context(STYLE):
         drawing, (upper, lower) = plt.subplots(2, 1, figsize=SIZE, sharex=True)
         for colour, (name, curve) in zip(LINES, curves.items()):
-            upper.plot(curve.time, 1e-6 * curve.force, color=colour, label=name)
-            lower.plot(curve.time, 1e-6 * curve.impulse, color=colour)
+            upper.plot(curve.time, 1e-6 * curve.force, color=colour)
+            lower.plot(curve.time, 1e-6 * curve.impulse, color=colour, label=name)
             for axes in (upper, lower):
                 if np.isfinite(curve.broken):
                     axes.axvline(curve.broken, color=colour, linewidth=0.6, linestyle=":")
         upper.set_ylabel("force [MN]")
         lower.set_ylabel("impulse [MN·s]")
         lower.set_xlabel("time [s]")
-        upper.legend(loc="upper left")
+        arrival = min(curve.arrival for curve in curves.values())
+        upper.set_xlim(max(0.0, arrival - BEFORE), max(curve.time[-1] for curve in curves.values()))
+        lower.legend(loc="upper left")
         drawing.savefig(path, metadata=_undated(Path(path).suffix[1:]))
         plt.close(drawing)
 
