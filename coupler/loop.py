@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
@@ -138,9 +139,11 @@ class Coupling:
 
     def _shear_limit(self) -> float:
         """Longest step [s] for the lightest block that the water sticks to."""
+        if self.water.viscous is None:
+            return math.inf
         p, s = self.water.parameters, self.structure
         free = np.flatnonzero(~s.fixed)
-        if self.water.viscous is None or p.walls != "no-slip" or len(free) == 0:
+        if p.walls != "no-slip" or len(free) == 0:
             return math.inf
         least = min(s.mass[b] / surface_area(s.shape_vertices[b], s.shape_faces[b]) for b in free)
         return SHEAR * least * self.water.mesh.spacing / p.viscosity
@@ -167,7 +170,9 @@ class Coupling:
 
     def _coupled_step(self, dt: float, record: StepRecord) -> None:
         with self.clock("cut"):
-            if self.immersion.update():
+            changed = self.immersion.update()
+        with self.clock("carry over"):
+            if changed:
                 self.water.move_solids(self.immersion.domain)
             if self.water.slits is not None:
                 self.water.set_cracks(self.immersion.cracks.cracks())
@@ -233,10 +238,12 @@ class Coupling:
 
         `_before` keeps the structure as it stood; None where no block is wetted, then nothing is to be corrected."""
         from coupler.scheme import corrected_free_velocity, defect, solve_coupled
+        from coupler.wetting import Wetting
 
-        structure = self.structure
+        structure, solve = self.structure, partial(self._solve, kept=[])
         with self.clock("structure in pressure"):
             mass, response, v_free = self._response(problem)
+            wetting = Wetting.of(problem.coupling)
         wetted = problem.coupling.nnz > 0
         with self.clock("structure"):
             self._before = structure.save() if wetted else None
@@ -244,7 +251,7 @@ class Coupling:
         for record.passes in range(1, (self.passes if wetted else 1) + 1):
             with self.clock("pressure"):
                 guess = None if found is None else found.x
-                found = solve_coupled(problem, response, v_free, self._solve, self.rtol, guess)
+                found = solve_coupled(problem, response, v_free, solve, self.rtol, guess, wetting)
             with self.clock("structure"):
                 if record.passes > 1:
                     structure.restore(self._before)

@@ -31,6 +31,8 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
+from coupler.wetting import Wetting
+
 Array = np.ndarray
 
 
@@ -129,23 +131,24 @@ def solve_coupled(
     solve: Callable,
     rtol: float,
     guess: Array | None = None,
+    wetting: Wetting | None = None,
 ) -> CoupledSolution:
-    """Solve (3). `problem` is the water's PressureProblem, `solve` its linear solver, v_free (6 n_bodies,)."""
-    G = problem.coupling
-    feels_water = len(response.free) > 0 and G.nnz > 0
-    Gt = sp.csr_array(G.T)
+    """Solve (3). `problem` is the water's PressureProblem, `solve` its linear solver, v_free (6 n_bodies,);
+    guess (n_dofs,) [Pa] and wetting: those of the problem unless given."""
+    wets = Wetting.of(problem.coupling) if wetting is None else wetting
+    feels_water = len(response.free) > 0 and problem.coupling.nnz > 0
 
     def added_inertia(p: Array) -> Array:
-        return G @ response.compliance(Gt @ p)
+        return wets.on_water(response.compliance(wets.on_bodies(p)))
 
     result = solve(
         problem.matrix,
-        problem.rhs + G @ v_free,
+        problem.rhs + wets.on_water(v_free),
         problem.guess if guess is None else guess,
         rtol,
         extra=added_inertia if feels_water else None,
     )
-    velocity = v_free - response.compliance(Gt @ result.x)
+    velocity = v_free - response.compliance(wets.on_bodies(result.x))
     return CoupledSolution(
         result.x, velocity.reshape(-1, 6), water_load(problem, result.x), result.iterations
     )

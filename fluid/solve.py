@@ -36,15 +36,27 @@ class SolveResult:
     residual: float
 
 
-def solve(A, b, x0, rtol: float, extra: Callable | None = None, most: int = MOST_ITERATIONS) -> SolveResult:
+def solve(
+    A,
+    b,
+    x0,
+    rtol: float,
+    extra: Callable | None = None,
+    most: int = MOST_ITERATIONS,
+    kept: list | None = None,
+) -> SolveResult:
     """x with ‖b - (A + extra) x‖ ≤ rtol ‖b‖ by preconditioned conjugate gradients from x0.
 
     A: csr (n, n), symmetric positive definite · b, x0 (n,) · extra: v ↦ S v, S symmetric positive semidefinite.
+    kept: an empty list takes the preconditioner; hand it in again with the same A.
     Raises NotConverged after `most` iterations or when A turns out not to be positive definite."""
     scale = np.linalg.norm(b)
     if scale == 0.0:
         return SolveResult(np.zeros_like(b), 0, 0.0)
-    precondition = _preconditioner(A, MULTIGRID_FROM if extra is None else MULTIGRID_FROM_WITH_EXTRA)
+    kept = [] if kept is None else kept
+    if not kept:
+        kept.append(_preconditioner(A, MULTIGRID_FROM if extra is None else MULTIGRID_FROM_WITH_EXTRA))
+    precondition = kept[0]
     apply = (lambda v: A @ v) if extra is None else (lambda v: A @ v + extra(v))
     x = np.array(x0, float)
     r = b - apply(x)

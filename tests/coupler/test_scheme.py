@@ -13,6 +13,7 @@ from coupler.scheme import (
     mass_matrix,
     solve_coupled,
 )
+from coupler.wetting import Wetting
 from tests.fakes import direct_solve, piston_column
 
 WATER = 1000.0  # mass of the water in the pipe [kg]
@@ -147,3 +148,15 @@ def test_a_structure_that_hardly_moves_has_no_defect_to_speak_of():
     found = np.array([[1e-6, 0, 0, 0, 0, 0]])
     assert defect(M, 0.0 * found, found) == 1.0
     assert defect(M, 0.0 * found, found, floor=1.0) < 1e-4
+
+
+@given(st.integers(0, 2**31), st.integers(0, 6), st.integers(0, 4))
+@settings(max_examples=30, deadline=None)
+def test_short_rows_give_both_products_of_the_coupling(seed, dofs, bodies):
+    """G V and Gᵀ p of any sparse G, empty ones too."""
+    random = np.random.default_rng(seed)
+    dense = random.normal(size=(dofs, 6 * bodies)) * (random.random((dofs, 6 * bodies)) < 0.3)
+    wets = Wetting.of(sp.csr_array(dense))
+    p, V = random.normal(size=dofs), random.normal(size=6 * bodies)
+    assert wets.on_bodies(p) == pytest.approx(dense.T @ p, abs=1e-12)
+    assert wets.on_water(V) == pytest.approx(dense @ V, abs=1e-12)
