@@ -35,7 +35,8 @@ def run(case: Case, directory, reporter, checkpoint=None) -> ExitCode:
             if checkpoint:
                 _restore(scene, checkpoint, clock)
             _describe(scene, reporter)
-            directory.record(size=size(scene.coupling))
+            if checkpoint is None:  # the size at the start
+                directory.record(size=size(scene.coupling))
             if scene.coupling.structure is not None:
                 directory.record(laws=laws_of(scene.coupling.structure))
             _steps(case, scene, directory, reporter, clock, figures, checkpoint)
