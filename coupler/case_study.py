@@ -197,6 +197,7 @@ class Variant(Section):
 class Study(Section):
     """What `surgebreak study` runs. A run of the case takes no notice of it."""
 
+    note: str = Field("", description="what its figures show, for its page")
     set: tuple[Override, ...] = Field(
         (), description="changes of all runs of the study, KEY=VALUE", examples=[["time.end=1 s"]]
     )

@@ -19,6 +19,7 @@ def page(told: dict, level: int = 1, pictures: str = "") -> str:
     mark = "#" * level
     parts = [
         f"{mark} {told['title']}",
+        *([told["note"]] if told["note"] else []),
         _where(told),
         *(_quantity(told, q, mark, pictures) for q in told["quantities"]),
         f"{mark}# Runs\n\n{_ladders(told)}\n\n{_runs(told)}",

@@ -31,6 +31,7 @@ def content(plan: Plan, runs: Runs, found: dict[str, Outcome], laws: list[LawPoi
         "program": "surgebreak",
         "case": str(plan.file.path),
         "title": plan.file.case.case.title,
+        "note": " ".join(plan.study.note.split()),
         "command": ["surgebreak", *sys.argv[1:]],
         "ended": now_text(),
         "machine": provenance.machine(),

@@ -155,8 +155,8 @@ def limits(axis, curves, failed):
             axis.axhline(level, color=INK, lw=0.5, ls=":", zorder=2)
     axis.xaxis.set_major_formatter(plt.FuncFormatter(lambda value, _: f"{value:g}"))
     axis.yaxis.set_major_formatter(plt.FuncFormatter(lambda value, _: share(value)))
-    axis.xaxis.set_minor_formatter(plt.FuncFormatter(minor(max(x) / min(x) < 30.0, "{:g}")))
-    axis.yaxis.set_minor_formatter(plt.FuncFormatter(minor(high / low < 30.0, "{:g} %", 100.0)))
+    axis.xaxis.set_minor_formatter(plt.FuncFormatter(minor(max(x) / min(x), "{:g}")))
+    axis.yaxis.set_minor_formatter(plt.FuncFormatter(minor(high / low, "{:g} %", 100.0)))
 
 
 def share(value):
@@ -164,13 +164,13 @@ def share(value):
     return f"{100 * value:g} %"
 
 
-def minor(short, form, scale=1.0):
-    """Names of the ticks between decades: 2 and 5 on an axis that is short, else none."""
+def minor(extent, form, scale=1.0):
+    """Names of the ticks between decades, the more the shorter the axis; extent: its end over its beginning."""
+    named = (1.5, 2, 3, 4, 5, 6, 8) if extent < 4.0 else (2, 5) if extent < 30.0 else ()
 
     def ticks(value, _):
         first = value / 10.0 ** math.floor(math.log10(value))
-        shown = short and min(abs(first - k) for k in (2.0, 5.0)) < 1e-6
-        return form.format(scale * value) if shown else ""
+        return form.format(scale * value) if any(abs(first - k) < 1e-6 for k in named) else ""
 
     return ticks
 
