@@ -293,14 +293,17 @@ def study(
 
 @app.command()
 def benchmark(
-    quick: Annotated[bool, typer.Option("--quick", help="1000 joints only")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="small sizes only")] = False,
     json: Annotated[bool, typer.Option("--json", help="one JSON object")] = False,
+    only: Annotated[
+        str | None, typer.Option(help="joints, scenes, dead, cutting, debris, water, solver or stock")
+    ] = None,
 ) -> None:
-    """Measure what a substep costs: joints, whole scenes, and YADE's own laws; leaves with 3 if a target is missed."""
+    """Measure what substeps, cuts, steps of the water and solvers cost; leaves with 3 if a target is missed."""
     one_thread()
     from coupler.benchmark.command import benchmark as measure
 
-    raise typer.Exit(int(measure(quick, json)))
+    raise typer.Exit(int(measure(quick, json, only)))
 
 
 @app.command(context_settings=PASS_ON)

@@ -1,7 +1,7 @@
 """Symmetric positive definite systems: conjugate gradients behind one function.
 
-Preconditioner: the diagonal for small systems, else a multigrid cycle (`multigrid.py`). `surgebreak benchmark --solver`
-compares it with others on pressure systems.
+Preconditioner: the diagonal for small systems, else a multigrid cycle (`multigrid.py`); `surgebreak benchmark --only
+solver` compares it with others on pressure systems.
 """
 
 from __future__ import annotations

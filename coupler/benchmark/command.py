@@ -25,6 +25,10 @@ POINTS = (1, 3)
 VISITS = 2_000_000
 """Bonds times substeps of a stock measurement, in RECORDS parts of which the cheapest counts."""
 RECORDS = 5
+WATER_NODES, WATER_QUICK = (30_000, 100_000), (10_000,)
+SOLVER_UNKNOWNS, SOLVER_QUICK = (10_000, 100_000, 300_000), (10_000,)
+MOST_PER_100K_CELLS = 30_000.0
+"""Target [us]: a step of the water at 100 000 nodes, a fifth of the tank wet."""
 MOST_PER_JOINT, MOST_PER_BUILDING = 1.0, 1000.0
 """Targets [us]: the joint engine a joint and substep at AT joints, an intact building of 500 blocks a substep."""
 
@@ -40,7 +44,9 @@ class Line:
 
     what: str
     blocks: int
+    """Of the water alone: nodes of its mesh."""
     joints: int
+    """Of the water alone, and of solvers: unknowns of the pressure."""
     us: float
     of: str
     target: float | None = None
@@ -50,14 +56,16 @@ class Line:
         return self.target is None or self.us <= self.target
 
 
-def benchmark(quick: bool, as_json: bool) -> ExitCode:
-    """Measure and tell; leaves with DIVERGED where a target is missed."""
+def benchmark(quick: bool, as_json: bool, only: str | None = None) -> ExitCode:
+    """Measure and tell; leaves with DIVERGED where a target is missed. only: one of GROUPS, None: all."""
+    if only is not None and only not in GROUPS:
+        raise PartFailed(f"benchmark --only {only}: choose one of {', '.join(GROUPS)}")
     sizes = QUICK_SIZES if quick else SIZES
     lines: list[Line] = []
     if not as_json:
         print(_heading(), flush=True)
-    for measured in (_engine, _scenes, _dead, _cutting, _debris, _stock):
-        for line in measured(sizes):
+    for name in GROUPS if only is None else (only,):
+        for line in GROUPS[name](sizes):
             lines.append(line)
             if not as_json:
                 print(_told(line), flush=True)
@@ -78,7 +86,8 @@ def _heading() -> str:
 
 def _told(line: Line) -> str:
     target = "" if line.target is None else f"  target {line.target:g}: {'kept' if line.kept else 'MISSED'}"
-    return f"{line.what:58}{line.blocks:8}{line.joints:8}{line.us:10.3g} {line.of}{target}"
+    us = f"{line.us:.0f}" if line.us >= 1000.0 else f"{line.us:.3g}"
+    return f"{line.what:58}{line.blocks:8}{line.joints:8}{us:>10} {line.of}{target}"
 
 
 def _part(kind: str, size: int = 0) -> dict:
@@ -149,9 +158,11 @@ def _debris(sizes):
     found, n = debris.costs(), debris.BLOCKS
     for name, what in debris.PARTS.items():
         yield Line(f"coupled step, {what}", n, 0, 1e3 * found.full[name], "a step")
-    bare = 1e3 * found.bare["pressure"]
-    yield Line("  the pressure without blocks, same mesh", 0, 0, bare, "a step")
-    yield Line("  a solve with blocks over one without, times 1", n, 0, found.share, "", debris.MOST)
+    for what, table in (("without blocks", found.bare), ("with the blocks held", found.held)):
+        yield Line(f"  the pressure {what}, same mesh", 0, 0, 1e3 * table["pressure"], "a step")
+    none, held = found.shares
+    yield Line("  a solve with blocks over one without them", n, 0, none, "times", debris.MOST)
+    yield Line("  the same over one with the blocks held", n, 0, held, "times")
 
 
 def _stock(sizes):
@@ -174,3 +185,16 @@ def _stock_line(name: str, scene: dict, blocks: int, joints: int, points: int) -
         figures = run_script(law, made, Path(folder)).figures
     what = f"{law.title}, {points**2} bond{'s' if points > 1 else ''} a joint"
     return Line(what, blocks, joints, 1e6 * figures["cheapest_substep"] / joints, "a joint, whole substep")
+
+
+GROUPS = {
+    "joints": _engine,
+    "scenes": _scenes,
+    "dead": _dead,
+    "cutting": _cutting,
+    "debris": _debris,
+    "water": _water,
+    "solver": _solver,
+    "stock": _stock,
+}
+"""Measurements by the name that --only takes."""

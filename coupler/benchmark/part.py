@@ -109,7 +109,29 @@ def _take_away(structure: Structure, rows: np.ndarray) -> None:
         structure.displace(rows, shift, np.tile(np.eye(3), (len(rows), 1, 1)))
 
 
-KINDS = {"joints": joints, "building": building, "pile": pile, "dead": dead, "cutting": cutting}
+def water(size: int) -> dict:
+    """A step of the water by stage, also in a tank twice as high."""
+    from coupler.benchmark.water import taller_tank
+
+    return taller_tank(size)
+
+
+def solver(size: int) -> dict:
+    """Solvers for the pressure, without and with blocks in it."""
+    from coupler.benchmark.solver import solver as measured
+
+    return {"alone": measured(size), "wall": measured(size, wall=True)}
+
+
+KINDS = {
+    "joints": joints,
+    "building": building,
+    "pile": pile,
+    "dead": dead,
+    "cutting": cutting,
+    "water": water,
+    "solver": solver,
+}
 
 
 def main() -> None:

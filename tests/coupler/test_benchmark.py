@@ -6,7 +6,7 @@ import time
 import numpy as np
 import pytest
 
-from coupler.benchmark import command, cutting, debris, part, scenes
+from coupler.benchmark import command, cutting, debris, part, scenes, solver, water
 from coupler.benchmark.command import Line
 from coupler.errors import ExitCode
 from yade_scripts.faces import touching_faces
@@ -66,9 +66,7 @@ def test_cutting_is_measured_per_cell_that_lost_something(monkeypatch):
 
 
 def test_json_is_one_object_and_a_missed_target_is_the_exit_code(monkeypatch, capsys):
-    monkeypatch.setattr(command, "_engine", lambda sizes: [Line("a", 1, 1, 5.0, "a joint", 1.0)])
-    for name in ("_scenes", "_dead", "_cutting", "_stock"):
-        monkeypatch.setattr(command, name, lambda sizes: [])
+    monkeypatch.setattr(command, "GROUPS", {"joints": lambda sizes: [Line("a", 1, 1, 5.0, "a joint", 1.0)]})
     assert command.benchmark(quick=True, as_json=True) == ExitCode.DIVERGED
     told = json.loads(capsys.readouterr().out)
     assert told["lines"][0]["kept"] is False
@@ -88,7 +86,31 @@ def test_the_costs_of_debris_are_told_part_by_part():
     """The share is that of one solve, structure included."""
     bare = dict.fromkeys(debris.PARTS, 1.0) | {"unknowns": 10, "iterations": 5.0, "passes": 1.0}
     full = dict.fromkeys(debris.PARTS, 3.0) | {"unknowns": 10, "iterations": 5.0, "passes": 2.0}
-    found = debris.Costs(bare, full)
-    assert found.share == pytest.approx(3.0)
+    found = debris.Costs(bare, bare | {"pressure": 2.0}, full)
+    assert found.shares == pytest.approx((3.0, 1.5))
     shown = debris.told(found, 30)
     assert all(what in shown for what in debris.PARTS.values())
+
+
+def test_one_group_may_be_chosen_and_an_unknown_one_is_refused(monkeypatch, capsys):
+    groups = {name: lambda sizes, name=name: [Line(name, 1, 1, 1.0, "")] for name in ("joints", "water")}
+    monkeypatch.setattr(command, "GROUPS", groups)
+    assert command.benchmark(quick=True, as_json=True, only="water") == ExitCode.DONE
+    assert [line["what"] for line in json.loads(capsys.readouterr().out)["lines"]] == ["water"]
+    with pytest.raises(command.PartFailed, match="choose one of joints, water"):
+        command.benchmark(quick=True, as_json=True, only="wat")
+
+
+def test_stages_are_those_of_a_step_and_add_up_to_no_more_than_it(monkeypatch):
+    """Every stage is found in the code and takes time; a stage inside another counts once."""
+    monkeypatch.setattr(water, "BEFORE", 0.05)
+    found = water.water(8000)
+    assert all(seconds > 0.0 for seconds in found["stages"].values())
+    assert 0.0 <= found["rest"] < 0.5 * found["step"]
+
+
+def test_all_solvers_solve_the_systems_alone_and_with_a_wall():
+    for wall in (False, True):
+        found = solver.solver(1500, wall)["solvers"]
+        assert set(found) == set(solver.PRECONDITIONERS)
+        assert found["multigrid"]["iterations"][0] < 0.5 * found["diagonal"]["iterations"][0]
