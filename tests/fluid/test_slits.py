@@ -117,14 +117,16 @@ def test_an_open_slit_of_a_thin_wall_acts_as_wide_as_a_cell():
         assert (abs(CLOSED - truth) < abs(open_ - truth)) == closed_is_better
 
 
-@pytest.mark.parametrize("opening", [0.012, 0.12, 0.48, 2.4])
-def test_channels_through_thick_walls_are_integrated(opening):
-    """In a wall of three cells the channel itself is cut exactly: 1 to 5 % of the load however narrow it is, so such
-    cracks stay open."""
+@pytest.mark.parametrize(
+    ("opening", "limit"), [(0.012, 0.01), (0.12, 0.04), (0.48, 0.05), (1.2, 0.09), (2.4, 0.06)]
+)
+def test_channels_through_thick_walls_are_integrated(opening, limit):
+    """In a wall of three cells the channel itself is cut exactly: the load is off by 9 % where it is as wide as a cell
+    and by less the narrower it is, so such cracks stay open."""
     h = 1 / 12
     pieces = [(-1, 0.27 - opening * h / 2), (0.27 + opening * h / 2, 2)]
     truth = reference(3 * h, opening * h)[0]
-    assert opened(12, 3 * h, pieces, None) == pytest.approx(truth, rel=0.06)
+    assert opened(12, 3 * h, pieces, None) == pytest.approx(truth, rel=limit)
 
 
 def edge_error(n, connection):
