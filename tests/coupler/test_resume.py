@@ -67,6 +67,13 @@ name = "wall"
 on = "wall"
 mean_over = "50 ms"
 impulse = ["0.1 s", "0.4 s"]
+[[gauge]]
+kind = "loads"
+name = "split"
+on = "wall"
+each_block = true
+every = "70 ms"
+mean_over = "50 ms"
 """
 
 STREAM = """\
