@@ -165,6 +165,34 @@ def _debris(sizes):
     yield Line("  the same over one with the blocks held", n, 0, held, "times")
 
 
+def _water(sizes):
+    """A step of the water by stage, CPU time for 100 000 cells of the mesh, and in a tank twice as high."""
+    for nodes in WATER_QUICK if sizes == QUICK_SIZES else WATER_NODES:
+        found = _part("water", nodes)
+        low, high = found["low"], found["high"]
+        share = 1e6 * 1e5 / low["cells"]
+        n, u = low["nodes"], low["unknowns"]
+        target = MOST_PER_100K_CELLS if nodes == WATER_NODES[-1] else None
+        yield Line(
+            "step of the water, 20 % of the tank wet", n, u, share * low["step"], "a 100k cells", target
+        )
+        for stage, seconds in (*low["stages"].items(), ("rest", low["rest"])):
+            yield Line(f"  {stage}", n, u, share * seconds, "a 100k cells")
+        yield Line("  whole step", n, u, 1e6 * low["step"], "a step")
+        yield Line("  the same water, tank twice as high", high["nodes"], u, 1e6 * high["step"], "a step")
+
+
+def _solver(sizes):
+    """Solvers for the pressure to 1e-8: set-up, and iterations from a guess that is 2 % off."""
+    for unknowns in SOLVER_QUICK if sizes == QUICK_SIZES else SOLVER_UNKNOWNS:
+        for where, found in _part("solver", unknowns).items():
+            for name, m in found["solvers"].items():
+                blocks = 25 if where == "wall" else 0
+                us, iterations = 1e6 * (m["setup"] + m["warm"]), m["iterations"][1]
+                what = f"{name}, {iterations} its, set-up {1e3 * m['setup']:.3g} ms"
+                yield Line(what, blocks, found["unknowns"], us, "a solve")
+
+
 def _stock(sizes):
     """YADE's own laws on the same walls."""
     for size in sizes:
