@@ -137,7 +137,7 @@ def _run_row(told: dict, point: dict, quantities: list[dict]) -> list[str]:
 def _cheapest(told: dict) -> str:
     what = {q["name"]: q["what"] for q in told["quantities"]}
     rows = [
-        [f"{what[e['quantity']]}{curve_of(e)}, {100 * e['level']:g} %", *cheapest_cells(e)]
+        [f"{what[e['quantity']]}{curve_of(e)}, {100 * e['level']:g} %", *cheapest_cells(told, e)]
         for e in told["cheapest"]
     ]
     return table(["quantity and error", "setting", "its error", "CPU s"], rows)
@@ -148,12 +148,13 @@ def curve_of(entry: dict) -> str:
     return f" ({entry['curve']})" if entry["curve"] else ""
 
 
-def cheapest_cells(entry: dict) -> list[str]:
-    """Setting, its error and its cost."""
-    if entry["rung"] is None:
+def cheapest_cells(told: dict, entry: dict) -> list[str]:
+    """Setting with what its ladder holds fixed, its error and its cost."""
+    rung = entry["rung"]
+    if rung is None:
         return ["none of these", "–", "–"]
-    setting = f"{entry['rung']['ladder']} {entry['rung']['label']}"
-    return [setting, percent(entry["error"]), f"{entry['cpu_seconds']:.3g}"]
+    what = next(ladder["what"] for ladder in told["ladders"] if ladder["name"] == rung["ladder"])
+    return [f"{what}: {rung['label']}", percent(entry["error"]), f"{entry['cpu_seconds']:.3g}"]
 
 
 def _orders(told: dict) -> str:
