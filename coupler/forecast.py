@@ -20,7 +20,8 @@ from coupler.terminal import Row
 LONGEST_REST_STEP = 0.3
 BYTES_PER_BLOCK = 60_000
 """Resident memory per block, its contact nodes included."""
-PROGRAM_BYTES = {"water": 250e6, "structure": 250e6}
+PROGRAM_BYTES = {"water": 130e6, "structure": 330e6}
+"""Resident memory of the code and libraries of each side, kernels included."""
 DISK_BYTES_PER_NODE = 12
 """Compressed level set, velocity and pressure of one written state."""
 DISK_BYTES_PER_BLOCK = 150
