@@ -42,7 +42,10 @@ LINES = (
     ("surface", "scheme: pressure in cells that the surface cuts"),
     ("damping", "scheme: damping of divergence"),
     ("limit", "scheme: limit of the speed"),
-    ("slip", "scheme: velocity into the sides of the tank taken off after the pressure"),
+    (
+        "slip",
+        "scheme: velocity into the sides of the tank taken off, that of inflows given, after the pressure",
+    ),
     ("shear_solve", "scheme: residual of the viscous solve"),
     ("recut", "scheme: fields handed to newly cut cells"),
     ("lag", "scheme: loads held on blocks that move on (moments only)"),

@@ -125,8 +125,10 @@ class Recorder:
         self._coupling = self._table("coupling", COUPLING)
         about = "({:g}, {:g}, {:g})".format(*coupling.momentum.about)
         of = f"angular momentum about {about}"
-        self._momentum = self._table("momentum", momentum_columns("N s", "momentum"))
-        self._angular = self._table("angular_momentum", momentum_columns("N m s", of))
+        self._momentum = self._table("momentum", momentum_columns("N s", "momentum"), MOMENTUM_TITLE)
+        self._angular = self._table(
+            "angular_momentum", momentum_columns("N m s", of), f"angular {MOMENTUM_TITLE}"
+        )
         self._water = self._table("water", WATER) if water else None
         self._structure = self._table("structure", STRUCTURE) if structure else None
         self._gauges = self._table("gauges", self._gauge_columns()) if self._together() else None
@@ -144,9 +146,9 @@ class Recorder:
         elif solids or tank:
             write_solids(directory / "solids.vtkhdf", [v for v, _ in solids], [f for _, f in solids], tank)
 
-    def _table(self, name: str, columns) -> HistoryTable:
+    def _table(self, name: str, columns, title: str | None = None) -> HistoryTable:
         keep = None if self._kept is None else self._kept[f"table_{name}"].tolist()
-        self._tables[name] = HistoryTable(self.history / f"{name}.csv", columns, keep=keep)
+        self._tables[name] = HistoryTable(self.history / f"{name}.csv", columns, title, keep)
         return self._tables[name]
 
     def _restore_sums(self, kept) -> None:
