@@ -18,8 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from fluid.cut import root as find
 from fluid.jit import inner
+from fluid.parts_of_cell import root as find
 
 # Areas of contact below this share of h^2 are round-off.
 NO_AREA = 1e-12

@@ -14,12 +14,13 @@ vertices made by splitting only round-off is snapped (see `pieces.py`).
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numba import njit
 
+from fluid.claims import wetted
+from fluid.cut_arrays import Cuts, Output, doubled, output, trimmed
 from fluid.jit import inner
+from fluid.parts_of_cell import label_parts
 from fluid.pieces import (
     BROKEN_CAP,
     DONE,
@@ -28,14 +29,12 @@ from fluid.pieces import (
     WORKSPACE_FULL,
     classify,
     copy_piece,
-    interpolated,
     merge_moments,
     piece_moments,
     split,
     start_piece,
     workspace,
 )
-from fluid.polygons import copy_polygon, load_face, polygon_rule, shared_area, split_polygon
 
 # A piece too thin for its cross-section to close goes to one side whole; thicker ones are an error.
 THIN = 1e-6
@@ -45,38 +44,6 @@ NO_AREA = 1e-15
 
 class CutFailed(RuntimeError):
     """The cross-section of a piece could not be closed although the piece is not thin."""
-
-
-class Output(NamedTuple):
-    """What the kernel fills; rows beyond the returned counts are unused."""
-
-    part_cell: np.ndarray  # (parts,) background cell
-    part_whole: np.ndarray  # (parts,) True where nothing was removed from the cell
-    part_moments: np.ndarray  # (parts, 10) V, c, S
-    wet_part: np.ndarray  # (wetted polygons,) row of the part it bounds
-    wet_body: np.ndarray  # (wetted polygons,)
-    wet: np.ndarray  # (wetted triangles, 25) area, centroid, normal, three quadrature points, corners
-    open_part: np.ndarray  # (open polygons,)  pieces' faces on faces of the cell
-    open_face: np.ndarray  # (open polygons,)  0..3
-    open_start: np.ndarray  # (open polygons + 1,)
-    open_x: np.ndarray  # (corners, 3)
-
-
-def output(parts: int, polygons: int, with_openings: bool) -> Output:
-    """Room for that many parts and polygons."""
-    openings = polygons * 4 if with_openings else 64
-    return Output(
-        np.zeros(parts, dtype=np.int64),
-        np.zeros(parts, dtype=np.bool_),
-        np.zeros((parts, 10)),
-        np.zeros(polygons, dtype=np.int64),
-        np.zeros(polygons, dtype=np.int64),
-        np.zeros((polygons, 25)),
-        np.zeros(openings, dtype=np.int64),
-        np.zeros(openings, dtype=np.int64),
-        np.zeros(openings + 1, dtype=np.int64),
-        np.zeros((openings * 5, 3)),
-    )
 
 
 @inner
@@ -199,186 +166,6 @@ def _fluid_pieces(w, n_near, round_off, thin):
 
 
 @inner
-def _lies_in(w, piece, f, r, normals, round_off):
-    """Does a face lie in near plane r, with the piece on the outer side of it?"""
-    g = w.near_plane[r]
-    if w.tag[piece, f] == 2 * g:
-        return True
-    corners = w.size[piece, f]
-    for k in range(corners):
-        if abs(interpolated(w.x[w.loop[piece, f, k]], w.near_distance[r])) > round_off:
-            return False
-    o = w.loop[piece, f, 0]
-    facing = 0.0
-    for k in range(1, corners - 1):
-        a, b = w.loop[piece, f, k], w.loop[piece, f, k + 1]
-        ax, ay, az = w.x[a, 4] - w.x[o, 4], w.x[a, 5] - w.x[o, 5], w.x[a, 6] - w.x[o, 6]
-        bx, by, bz = w.x[b, 4] - w.x[o, 4], w.x[b, 5] - w.x[o, 5], w.x[b, 6] - w.x[o, 6]
-        facing += normals[g, 0] * (ay * bz - az * by)
-        facing += normals[g, 1] * (az * bx - ax * bz) + normals[g, 2] * (ax * by - ay * bx)
-    return facing < 0.0
-
-
-@inner
-def _claim(w, polygon, at, plane, round_off, top):
-    """Clip a polygon in near plane `plane` by the other planes of body number `at` -> (claimed, new top).
-
-    What is left replaces the polygon, the remainders go on top of the stack; if nothing is left the polygon
-    stays as it was."""
-    work, inner = len(w.corners) - 1, len(w.corners) - 2
-    copy_polygon(w, polygon, work)
-    new_top = top
-    for r in range(w.near_start[at], w.near_start[at + 1]):
-        if r == plane:
-            continue
-        for k in range(w.corners[work]):
-            w.height[k] = interpolated(w.polygon[work, k], w.near_distance[r])
-        outside, inside = split_polygon(w, work, new_top + 1, inner, round_off)
-        if not inside:
-            return False, top
-        if outside:
-            copy_polygon(w, inner, work)
-            new_top += 1
-    copy_polygon(w, work, polygon)
-    return True, new_top
-
-
-@inner
-def _claim_face(w, at, r, origin, normals, round_off, least, top, part, out, n_wet):
-    """Let one body claim its share of the polygons 0..top of a face -> (state, new top, polygons written)."""
-    planes = w.near_start[at + 1] - w.near_start[at]
-    g = w.near_plane[r]
-    for polygon in range(top, -1, -1):
-        if top + planes + 4 > len(w.corners) or w.corners[polygon] + planes + 2 > w.polygon.shape[1]:
-            return WORKSPACE_FULL, top, n_wet
-        claimed, top = _claim(w, polygon, at, r, round_off, top)
-        if not claimed:
-            continue
-        state, n_wet = _append(w, polygon, at, g, origin, normals, least, part, out, n_wet)
-        if state != DONE:
-            return state, top, n_wet
-        if polygon != top:
-            copy_polygon(w, top, polygon)
-        top -= 1
-    return DONE, top, n_wet
-
-
-@inner
-def _append(w, polygon, at, g, origin, normals, least, part, out, n_wet):
-    """Write a polygon in plane g of body number `at` as triangles -> (state, triangles written).
-
-    Triangles, because the water surface may clip them later."""
-    triangle = len(w.corners) - 1
-    w.corners[triangle] = 3
-    for second in range(1, w.corners[polygon] - 1):
-        if n_wet >= len(out.wet_part):
-            return OUTPUT_FULL, n_wet
-        row = out.wet[n_wet]
-        for k in range(3):
-            corner = 0 if k == 0 else second + k - 1
-            for c in range(7):
-                w.polygon[triangle, k, c] = w.polygon[polygon, corner, c]
-            for c in range(3):
-                row[16 + 3 * k + c] = w.polygon[polygon, corner, 4 + c]
-        polygon_rule(w, triangle, normals[g, 0], normals[g, 1], normals[g, 2], least, row)
-        if row[0] > 0.0:
-            for c in range(3):
-                for q in (1, 7, 10, 13, 16, 19, 22):
-                    row[q + c] += origin[c]
-            out.wet_part[n_wet] = part
-            out.wet_body[n_wet] = w.near_body[at]
-            n_wet += 1
-    return DONE, n_wet
-
-
-@inner
-def _wetted(w, piece, origin, n_near, normals, round_off, least, part, out, n_wet):
-    """Append the wetted polygons of a piece -> (state, number of polygons).
-
-    Polygons 0..top of the stack are the part of a face that no body has claimed yet; only bodies that
-    overlap and share a plane compete for the same part."""
-    for f in range(w.faces[piece]):
-        top, loaded = 0, False
-        for at in range(n_near):
-            for r in range(w.near_start[at], w.near_start[at + 1]):
-                if top < 0 or not _lies_in(w, piece, f, r, normals, round_off):
-                    continue
-                if not loaded:
-                    load_face(w, piece, f, 0)
-                    loaded = True
-                state, top, n_wet = _claim_face(
-                    w, at, r, origin, normals, round_off, least, top, part, out, n_wet
-                )
-                if state != DONE:
-                    return state, n_wet
-    return DONE, n_wet
-
-
-@inner
-def root(label, i):
-    """Representative of item i in a union-find forest, with path halving."""
-    while label[i] != i:
-        label[i] = label[label[i]]
-        i = label[i]
-    return i
-
-
-@inner
-def _linked_area(w, one, two, normals, round_off):
-    """Area over which two pieces touch: caps of one plane, one from each side."""
-    area = 0.0
-    for f in range(w.faces[one]):
-        tag = w.tag[one, f]
-        if tag < 0:
-            continue
-        for k in range(w.faces[two]):
-            if w.tag[two, k] == (tag ^ 1):
-                g = tag // 2
-                load_face(w, one, f, 0)
-                load_face(w, two, k, 1)
-                area += shared_area(w, 0, 1, normals[g, 0], normals[g, 1], normals[g, 2], round_off)
-    return area
-
-
-@inner
-def _reaches_faces(w, piece):
-    """Does a piece have a face on a face of the cell?"""
-    reaches = False
-    for f in range(w.faces[piece]):
-        reaches = reaches or w.tag[piece, f] < 0
-    return reaches
-
-
-@inner
-def _label_parts(w, count, normals, round_off, link_area):
-    """Number the connected parts of the fluid in w.label -> how many. link_area < 0: one part."""
-    for piece in range(count):
-        w.label[piece] = 0 if link_area < 0.0 else piece
-    if link_area < 0.0:
-        return 1
-    for one in range(count):
-        for two in range(one + 1, count):
-            a, b = root(w.label, one), root(w.label, two)
-            if a == b:
-                continue
-            # A piece away from the faces of the cell must belong to one that is not.
-            limit = link_area if _reaches_faces(w, one) and _reaches_faces(w, two) else 0.0
-            if _linked_area(w, one, two, normals, round_off) > limit:
-                w.label[max(a, b)] = min(a, b)
-    for piece in range(count):
-        w.label[piece] = root(w.label, piece)
-    parts = 0
-    for piece in range(count):
-        if w.label[piece] == piece:
-            w.label[piece] = parts
-            parts += 1
-        else:
-            # Roots come before their members, so theirs is already the final number.
-            w.label[piece] = w.label[w.label[piece]]
-    return parts
-
-
-@inner
 def _openings(w, piece, origin, part, out, n_open):
     """Append the faces of a piece that lie on faces of the cell -> (state, number of openings)."""
     for f in range(w.faces[piece]):
@@ -403,7 +190,7 @@ def _emit(
     w, cell, origin, count, n_near, whole, normals, round_off, least, link_area, out, n_part, n_wet, n_open
 ):
     """Write the parts of one cell, their moments and wetted polygons (and openings if link_area >= 0)."""
-    parts = _label_parts(w, count, normals, round_off, link_area)
+    parts = label_parts(w, count, normals, round_off, link_area)
     if n_part + parts > len(out.part_cell):
         return OUTPUT_FULL, n_part, n_wet, n_open
     for part in range(n_part, n_part + parts):
@@ -415,7 +202,7 @@ def _emit(
         part = n_part + w.label[piece]
         piece_moments(w, piece, w.moments)
         merge_moments(out.part_moments[part], w.moments)
-        state, n_wet = _wetted(w, piece, origin, n_near, normals, round_off, least, part, out, n_wet)
+        state, n_wet = wetted(w, piece, origin, n_near, normals, round_off, least, part, out, n_wet)
         if state == DONE and link_area >= 0.0:
             state, n_open = _openings(w, piece, origin, part, out, n_open)
         if state != DONE:
@@ -458,45 +245,6 @@ def _cut_cells(
     return DONE
 
 
-class Cuts(NamedTuple):
-    """Fluid parts of the cells that were cut, in the order of the cells.
-
-    part_cell (K,) · part_whole (K,) nothing removed · moments (K, 10) V [m3], c [m], S [m5]
-    wet_part (S,) row of the part · wet_body (S,) · wet (S, 25) triangles: area [m2], centroid, normal, 3 points,
-    3 corners
-    open_part (O,), open_face (O,) 0..3 (opposite to node k), open_start (O+1,), open_x [m]: the faces of
-    the parts on the faces of their cells (only with connected parts)."""
-
-    part_cell: np.ndarray
-    part_whole: np.ndarray
-    moments: np.ndarray
-    wet_part: np.ndarray
-    wet_body: np.ndarray
-    wet: np.ndarray
-    open_part: np.ndarray
-    open_face: np.ndarray
-    open_start: np.ndarray
-    open_x: np.ndarray
-
-    def kept(self, keep) -> Cuts:
-        """Only the parts keep (K,) bool, with their polygons."""
-        row = np.cumsum(keep) - 1
-        wet, openings = keep[self.wet_part], keep[self.open_part]
-        length = np.diff(self.open_start)
-        return Cuts(
-            self.part_cell[keep],
-            self.part_whole[keep],
-            self.moments[keep],
-            row[self.wet_part[wet]],
-            self.wet_body[wet],
-            self.wet[wet],
-            row[self.open_part[openings]],
-            self.open_face[openings],
-            np.concatenate([[0], np.cumsum(length[openings])]).astype(np.int64),
-            self.open_x[np.repeat(openings, length)],
-        )
-
-
 def cut_cells(nodes, cells, chosen, body_start, bodies, solids, tolerance, spacing, link_area=-1.0) -> Cuts:
     """Cut chosen cells by the bodies near each.
 
@@ -518,14 +266,14 @@ def cut_cells(nodes, cells, chosen, body_start, bodies, solids, tolerance, spaci
             tolerance, spacing, link_area, w, out, at,
         )  # fmt: skip
         if state == DONE:
-            return _with_volume(_trimmed(out, at))
+            return _with_volume(trimmed(out, at))
         if state == BROKEN_CAP:
             raise CutFailed(_failure(cells, nodes, chosen, body_start, bodies, int(at[0])))
         if state == WORKSPACE_FULL:
             scale *= 2
             w = workspace(scale, most_bodies, most_bodies * most_planes)
         else:
-            out = Output(*(_doubled(a) for a in out))
+            out = Output(*(doubled(a) for a in out))
 
 
 def _with_volume(cuts):
@@ -542,25 +290,4 @@ def _failure(cells, nodes, chosen, body_start, bodies, row):
     return (
         f"cell {chosen[row]} at {np.round(centre, 6).tolist()} m could not be cut by bodies {near}: "
         "check that the polyhedra are convex and no smaller than a millionth of the cell"
-    )
-
-
-def _doubled(a):
-    return np.concatenate([a, np.zeros_like(a)])
-
-
-def _trimmed(out, at):
-    parts, wet, openings = int(at[1]), int(at[2]), int(at[3])
-    start = out.open_start[: openings + 1].copy()
-    return Cuts(
-        out.part_cell[:parts].copy(),
-        out.part_whole[:parts].copy(),
-        out.part_moments[:parts].copy(),
-        out.wet_part[:wet].copy(),
-        out.wet_body[:wet].copy(),
-        out.wet[:wet].copy(),
-        out.open_part[:openings].copy(),
-        out.open_face[:openings].copy(),
-        start,
-        out.open_x[: start[-1]].copy(),
     )

@@ -21,7 +21,8 @@ from numba import njit
 from fluid.bodies import ConvexBodies
 from fluid.contacts import Contacts, find_contacts
 from fluid.covers import Connection, virtual_cells, without_pockets
-from fluid.cut import Cuts, cut_cells
+from fluid.cut import cut_cells
+from fluid.cut_arrays import Cuts
 from fluid.heirs import pick_old_nodes
 from fluid.joined import joined
 from fluid.mesh import Background, gradients

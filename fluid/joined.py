@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from fluid.cut import Cuts
+from fluid.cut_arrays import Cuts
 
 
 def joined(old: Cuts, again, new: Cuts) -> Cuts:

@@ -1,0 +1,101 @@
+"""Arrays that the cut fills, and what is handed on of them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Output(NamedTuple):
+    """What the kernel fills; rows beyond the returned counts are unused."""
+
+    part_cell: np.ndarray  # (parts,) background cell
+    part_whole: np.ndarray  # (parts,) True where nothing was removed from the cell
+    part_moments: np.ndarray  # (parts, 10) V, c, S
+    wet_part: np.ndarray  # (wetted polygons,) row of the part it bounds
+    wet_body: np.ndarray  # (wetted polygons,)
+    wet: np.ndarray  # (wetted triangles, 25) area, centroid, normal, three quadrature points, corners
+    open_part: np.ndarray  # (open polygons,)  pieces' faces on faces of the cell
+    open_face: np.ndarray  # (open polygons,)  0..3
+    open_start: np.ndarray  # (open polygons + 1,)
+    open_x: np.ndarray  # (corners, 3)
+
+
+def output(parts: int, polygons: int, with_openings: bool) -> Output:
+    """Room for that many parts and polygons."""
+    openings = polygons * 4 if with_openings else 64
+    return Output(
+        np.zeros(parts, dtype=np.int64),
+        np.zeros(parts, dtype=np.bool_),
+        np.zeros((parts, 10)),
+        np.zeros(polygons, dtype=np.int64),
+        np.zeros(polygons, dtype=np.int64),
+        np.zeros((polygons, 25)),
+        np.zeros(openings, dtype=np.int64),
+        np.zeros(openings, dtype=np.int64),
+        np.zeros(openings + 1, dtype=np.int64),
+        np.zeros((openings * 5, 3)),
+    )
+
+
+class Cuts(NamedTuple):
+    """Fluid parts of the cells that were cut, in the order of the cells.
+
+    part_cell (K,) · part_whole (K,) nothing removed · moments (K, 10) V [m3], c [m], S [m5]
+    wet_part (S,) row of the part · wet_body (S,) · wet (S, 25) triangles: area [m2], centroid, normal, 3 points,
+    3 corners
+    open_part (O,), open_face (O,) 0..3 (opposite to node k), open_start (O+1,), open_x [m]: the faces of
+    the parts on the faces of their cells (only with connected parts)."""
+
+    part_cell: np.ndarray
+    part_whole: np.ndarray
+    moments: np.ndarray
+    wet_part: np.ndarray
+    wet_body: np.ndarray
+    wet: np.ndarray
+    open_part: np.ndarray
+    open_face: np.ndarray
+    open_start: np.ndarray
+    open_x: np.ndarray
+
+    def kept(self, keep) -> Cuts:
+        """Only the parts keep (K,) bool, with their polygons."""
+        row = np.cumsum(keep) - 1
+        wet, openings = keep[self.wet_part], keep[self.open_part]
+        length = np.diff(self.open_start)
+        return Cuts(
+            self.part_cell[keep],
+            self.part_whole[keep],
+            self.moments[keep],
+            row[self.wet_part[wet]],
+            self.wet_body[wet],
+            self.wet[wet],
+            row[self.open_part[openings]],
+            self.open_face[openings],
+            np.concatenate([[0], np.cumsum(length[openings])]).astype(np.int64),
+            self.open_x[np.repeat(openings, length)],
+        )
+
+
+def doubled(a):
+    """An array of twice the length, its second half zero."""
+    return np.concatenate([a, np.zeros_like(a)])
+
+
+def trimmed(out, at) -> Cuts:
+    """The rows that were filled; at (4,): cells, parts, wetted polygons, openings."""
+    parts, wet, openings = int(at[1]), int(at[2]), int(at[3])
+    start = out.open_start[: openings + 1].copy()
+    return Cuts(
+        out.part_cell[:parts].copy(),
+        out.part_whole[:parts].copy(),
+        out.part_moments[:parts].copy(),
+        out.wet_part[:wet].copy(),
+        out.wet_body[:wet].copy(),
+        out.wet[:wet].copy(),
+        out.open_part[:openings].copy(),
+        out.open_face[:openings].copy(),
+        start,
+        out.open_x[: start[-1]].copy(),
+    )
