@@ -105,10 +105,11 @@ def _extrema(t, z):
 )
 def falling_sphere():
     """Box of 10 x 10 x 16 cm, no-slip sides; the gap below the sphere is eight diameters at the start."""
-    for name, density, viscosity in (("11p6", 962.0, 0.113), ("1p5", 970.0, 0.373)):
+    cases = (("11p6", 962.0, 0.113, 4), ("11p6", 962.0, 0.113, 6), ("1p5", 970.0, 0.373, 4))
+    for name, density, viscosity, cells in cases:
         speed, height = columns(f"tencate_Re{name}_velocity"), columns(f"tencate_Re{name}_height")
-        t, v, gap = _fall(density, viscosity, cells=4)
-        what = f"Re {name.replace('p', '.')}, D/h = 4"
+        t, v, gap = _fall(density, viscosity, cells)
+        what = f"Re {name.replace('p', '.')}, D/h = {cells}"
         fastest = np.abs(speed["uz_mps"]).max()
         yield Finding(f"{what}: largest speed [m/s]", np.abs(v).max(), fastest, 0.05)
         exact = _first_below(height["t_s"], height["gap_over_d"], 4.0)
