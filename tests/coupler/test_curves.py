@@ -65,7 +65,7 @@ def test_peak_mean_and_impulse_of_a_known_pulse():
     """A rectangle of 10 Pa over 0.2 s within the window, on steps of any length: peak and mean 10, impulse 2."""
     t = np.array([0.0, 0.4, 0.4001, 0.6, 0.6001, 1.2])
     p = np.array([0.0, 0.0, 10.0, 10.0, 0.0, 0.0])
-    assert peak_mean_impulse(t, p) == pytest.approx((10.0, 10.0, 2.0), rel=1e-2)
+    assert peak_mean_impulse(t, p, 0.1, 1.0) == pytest.approx((10.0, 10.0, 2.0), rel=1e-2)
 
 
 def case_with_run(folder, expected):
