@@ -9,8 +9,9 @@ Water:      Δ(kinetic + potential) + W_given + D_shear + D = E_sides − E_left
             E_left: energy of the water that fell out through open sides
 
 A scheme that gains energy shows D < 0; dissipation D > 0 is damping of the water by the numerics and is
-reported, not counted as an error. The energy error is (|r_s| + |r_i| + max(0, −D)) / E_in, E_in the energy that the
-scene puts in: the potential energy of the water above its level state, the potential energy the blocks give up,
+reported, not counted as an error. The energy error is (|r_s| + |r_i| + max(0, −D − E_left)) / E_in: the head of water
+at an open side is not that of the water which the volume correction then takes off, within five cells of the side, so a
+gain is told from an outflow only beyond it. E_in is the energy that the scene puts in: the potential energy of the water above its level state, the potential energy the blocks give up,
 kinetic energy, or work of imposed motions, whichever is the largest so far.
 """
 
@@ -108,7 +109,7 @@ class Ledger:
             released = self._gravity_start - structure["gravity"]
             self._input = max(self._input, abs(released), structure["kinetic"], abs(driven))
         self._input = max(self._input, kinetic, abs(self.work_given), abs(self.entered))
-        error = abs(residual) + max(0.0, -dissipation)
+        error = abs(residual) + max(0.0, -dissipation - self.left)
         if water is not None and structure is not None:
             error += abs(self.work_given - received)
         share = error / self._input if self._input > 0.0 else 0.0

@@ -38,14 +38,14 @@ def test_work_that_does_not_arrive_is_an_error():
 
 
 def test_shear_and_outflow_are_not_numerical_dissipation():
-    """What viscosity took and what fell out through open sides are known: only the rest is the numerics', and a gain
-    that they would hide shows."""
+    """What viscosity took and what fell out through open sides are lines of their own: only the rest is the numerics',
+    and a gain that friction would hide shows."""
     ledger = started()
     ledger.shear, ledger.left = 6.0, 10.0
     found = ledger.balance((50.0, 30.0), NOTHING)
     assert (found.shear_dissipation, found.left) == (6.0, 10.0)
     assert found.numerical_dissipation == pytest.approx(4.0)
-    ledger.left = 20.0
+    ledger.shear, ledger.left = 26.0, 0.0
     assert ledger.balance((50.0, 30.0), NOTHING).energy_error == pytest.approx(0.06)
 
 
