@@ -8,11 +8,12 @@ Water:      Δ(kinetic + potential) + W_given + D_shear + D = E_sides − E_left
             E_sides: energy of the water that came in through inflows and seas, with the work of its pressure;
             E_left: energy of the water that fell out through open sides
 
-A scheme that gains energy shows D < 0; dissipation D > 0 is damping of the water by the numerics and is
-reported, not counted as an error. The energy error is (|r_s| + |r_i| + max(0, −D − E_left)) / E_in: the head of water
-at an open side is not that of the water which the volume correction then takes off, within five cells of the side, so a
-gain is told from an outflow only beyond it. E_in is the energy that the scene puts in: the potential energy of the water above its level state, the potential energy the blocks give up,
-kinetic energy, or work of imposed motions, whichever is the largest so far.
+A scheme that gains energy shows D < 0; dissipation D > 0 is damping of the water by the numerics and is reported, not
+counted as an error. The energy error is (|r_s| + |r_i| + max(0, −D − E_left)) / E_in: the head of water at an open
+side is not that of the water which the volume correction then takes off, within five cells of the side, so a gain is
+told from an outflow only beyond it. E_in is the energy that the scene puts in: the potential energy of the water
+above its level state, the potential energy the blocks give up, kinetic energy, or work of imposed motions, whichever
+is the largest so far.
 """
 
 from __future__ import annotations
