@@ -12,7 +12,6 @@ from fluid.domain import cut_domain, gradients, wetted_coupling
 from fluid.mesh import box_mesh
 
 MESH = box_mesh((0, 0, 0), (1, 1, 1), 0.25)
-CUBE = manifold3d.Manifold.cube((1.0, 1.0, 1.0))
 
 
 def solid_box(centre, size, rotation):
@@ -20,11 +19,15 @@ def solid_box(centre, size, rotation):
     return manifold3d.Manifold.cube(tuple(size), True).transform(move)
 
 
+def cube():
+    return manifold3d.Manifold.cube((1.0, 1.0, 1.0))
+
+
 def reference(centre, size, rotation):
     """Volume of the unit cube without the boxes, and area of the boxes' surface in it (solid modeller)."""
     boxes = [solid_box(c, s, r) for c, s, r in zip(centre, size, rotation)]
     union = manifold3d.Manifold.batch_boolean(boxes, manifold3d.OpType.Add)
-    water, inside = CUBE - union, union ^ CUBE
+    water, inside = cube() - union, union ^ cube()
     return water.volume(), (water.surface_area() + inside.surface_area() - 6) / 2
 
 
@@ -125,7 +128,7 @@ def test_random_convex_polyhedra():
         domain = cut_domain(MESH, ConvexBodies.from_polyhedra([(h, None) for h in hulls]))
         solids = [manifold3d.Manifold.hull_points(h) for h in hulls]
         union = manifold3d.Manifold.batch_boolean(solids, manifold3d.OpType.Add)
-        water, inside = CUBE - union, union ^ CUBE
+        water, inside = cube() - union, union ^ cube()
         assert domain.volume.sum() == pytest.approx(water.volume(), abs=1e-12)
         area = (water.surface_area() + inside.surface_area() - 6) / 2
         assert domain.face_area.sum() == pytest.approx(area, abs=1e-10)

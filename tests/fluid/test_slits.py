@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from fluid import state
 from fluid.bodies import ConvexBodies
 from fluid.covers import WIDE_OPENINGS
 from fluid.domain import cut_domain
@@ -212,18 +213,20 @@ def test_conductance_of_a_wide_opening_is_its_channel():
     assert conductance(np.array(0.5), np.array(1.0), np.array(0.2), 0.1) == pytest.approx(2.5)
 
 
+def crack_of_tank(opening):
+    x = 0.52 + np.array([-0.02, -0.02, 0.02, 0.02])
+    corners = np.column_stack([x, [0, 0.25, 0.25, 0], np.full(4, 0.27)])
+    return Cracks(corners, np.array([0, 4]), np.array([opening]), np.array([[0, 1]]), np.array([3]))
+
+
 def tank_with_slit(opening):
-    """Two basins of the slice mesh, 0.87 m and 0.43 m deep, parted by a wall with a slit at 0.27 m."""
+    """Two basins 0.87 m and 0.43 m deep, parted by a wall with a slit at 0.27 m: Water, nodes (N,) on the right."""
     mesh = box_mesh((0, 0, 0), (1, 0.25, 1), 1 / 8)
     domain = cut_domain(mesh, wall(0.52, 0.04, [(-1, 0.27), (0.27, 2)]), "multiple")
     right = np.zeros(len(domain.nodes), dtype=bool)
     right[domain.cells[domain.centroid[:, 0] > 0.52]] = True
     water = Water(mesh, domain, domain.nodes[:, 2] - np.where(right, 0.43, 0.87), WaterParameters())
-    x = 0.52 + np.array([-0.02, -0.02, 0.02, 0.02])
-    corners = np.column_stack([x, [0, 0.25, 0.25, 0], np.full(4, 0.27)])
-    water.set_cracks(
-        Cracks(corners, np.array([0, 4]), np.array([opening]), np.array([[0, 1]]), np.array([3]))
-    )
+    water.set_cracks(crack_of_tank(opening))
     return water, right
 
 
@@ -242,3 +245,18 @@ def test_water_flows_through_a_slit_into_the_other_basin():
     assert lost - gained == pytest.approx(0, abs=1e-6 * sum(before))
     steady = DISCHARGE * 0.005 * 0.25 * np.sqrt(2 * GRAVITY * drop)
     assert abs(water.slits.flow.sum()) == pytest.approx(steady, rel=0.03)
+
+
+def test_saved_flow_goes_on_bit_for_bit():
+    """The flow of a slit has inertia, so it is part of the state."""
+    water, _ = tank_with_slit(0.005)
+    for _ in range(4):
+        advance(water, dt=0.01)
+    again, _ = tank_with_slit(0.005)
+    state.restore(again, water.domain, state.save(water))
+    for one in (water, again):
+        one.set_cracks(crack_of_tank(0.006))
+        advance(one, dt=0.01)
+    assert np.abs(water.slits.flow).min() > 0
+    np.testing.assert_array_equal(water.slits.flow, again.slits.flow)
+    np.testing.assert_array_equal(water.velocity, again.velocity)
