@@ -31,15 +31,16 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
+from numba import njit
 from scipy.sparse.linalg import LinearOperator, gmres
 from skfem import asm
 
 from fluid import forms
 from fluid.solve import NotConverged
 
-GHOST_PENALTY = 0.05
+GHOST_PENALTY = 1e-4
 """Weight γ of the jumps across the faces of cut cells."""
-ANCHOR = 1e-6
+ANCHOR = 1e-9
 """Mass that keeps a node where it was, as a share of that of its whole cells."""
 SMALLEST_WEIGHT = 1e-9
 """Of a cell in the mean at a node, in h³."""
@@ -75,18 +76,37 @@ class Band:
 
 
 def midpoint_velocity(topology, band: Band, u_m, dt: float):
-    """c (n, 3) [m/s] at the nodes of the band from u_m (n, 3): the derivative along u_m, a mean over the cells around
-    each node by their water."""
+    """c (n, 3) [m/s] at the nodes of the band from u_m (n, 3) [m/s]."""
     t, rows = topology, band.rows
-    mean = np.einsum("ma,mak->mk", t.share[rows], u_m[band.cells])
-    along = np.einsum("mj,maj->ma", mean, t.gradients[t.parent[rows]])
-    rate = np.einsum("ma,mak->mk", along, u_m[band.cells])
     weight = np.maximum(band.volume, SMALLEST_WEIGHT * t.size[rows] ** 3)
-    total = np.zeros_like(u_m)
-    for corner in band.cells.T:
-        np.add.at(total, corner, weight[:, None] * rate)
-    at_nodes = np.bincount(band.cells.ravel(), np.repeat(weight, 4), minlength=len(u_m))
-    return u_m - 0.5 * dt * total / at_nodes[:, None]
+    return u_m - 0.5 * dt * _rate_along(band.cells, t.share[rows], t.parent[rows], t.gradients, weight, u_m)
+
+
+@njit(cache=True)
+def _rate_along(cells, share, parent, g, weight, u):
+    """(u·∇)u (n, 3) at the nodes: mean over the cells around each by weight (m,), u (n, 3) at their centroids."""
+    total, at_node = np.zeros_like(u), np.zeros(u.shape[0])
+    mean, rate = np.empty(3), np.empty(3)
+    for e in range(cells.shape[0]):
+        mean[:] = 0.0
+        for a in range(4):
+            for k in range(3):
+                mean[k] += share[e, a] * u[cells[e, a], k]
+        rate[:] = 0.0
+        for a in range(4):
+            along = 0.0
+            for k in range(3):
+                along += mean[k] * g[parent[e], a, k]
+            for k in range(3):
+                rate[k] += along * u[cells[e, a], k]
+        for a in range(4):
+            at_node[cells[e, a]] += weight[e]
+            for k in range(3):
+                total[cells[e, a], k] += weight[e] * rate[k]
+    for i in range(u.shape[0]):
+        for k in range(3):
+            total[i, k] /= at_node[i]
+    return total
 
 
 def stabilisation_time(c, gradients, dt: float):
@@ -184,18 +204,25 @@ def carried_velocity(water, dt: float, u_m, u_hat):
     new = old + Transport.of(t, band, c[members], dt).change(old, free)
     reach = int(np.ceil(np.abs(c[members]).max() * dt / water.mesh.spacing))
     moved = u_hat.copy()
-    moved[members] = np.clip(new, *range_around(band, old, max(reach, 1)))
+    moved[members] = np.clip(new, *range_around(band.cells, old, max(reach, 1)))
     return moved[water.listed]
 
 
-def range_around(band: Band, f, layers: int):
-    """Least and largest value (n, m), (n, m) of f (n, m) among the nodes up to so many cells away."""
+@njit(cache=True)
+def range_around(cells, f, layers):
+    """Least and largest value (n, m), (n, m) of f (n, m) among the nodes up to so many cells (m, 4) away."""
     low, high = f.copy(), f.copy()
     for _ in range(layers):
-        least, largest = low[band.cells].min(axis=1), high[band.cells].max(axis=1)
-        for corner in band.cells.T:
-            np.minimum.at(low, corner, least)
-            np.maximum.at(high, corner, largest)
+        below, above = low.copy(), high.copy()
+        for e in range(cells.shape[0]):
+            for k in range(f.shape[1]):
+                least, largest = np.inf, -np.inf
+                for a in range(4):
+                    least = min(least, below[cells[e, a], k])
+                    largest = max(largest, above[cells[e, a], k])
+                for a in range(4):
+                    low[cells[e, a], k] = min(low[cells[e, a], k], least)
+                    high[cells[e, a], k] = max(high[cells[e, a], k], largest)
     return low, high
 
 

@@ -1,0 +1,222 @@
+"""The kernels of the step equal the scikit-fem forms to round-off: on whole cells, and on cells that any number of
+bodies cuts, with one set of unknowns a node or one per part of the water."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+from skfem import asm
+
+from fluid import forms
+from fluid.bodies import ConvexBodies
+from fluid.domain import cut_domain, wetted_coupling
+from fluid.mesh import box_mesh
+from fluid.moments import nodal_water
+from fluid.projection import (
+    cell_gradient,
+    cell_velocity,
+    damp_divergence,
+    inflow,
+    nodal_mean,
+    pressure_matrix,
+)
+from fluid.quadrature import surface_basis
+from fluid.solve import solve
+from fluid.topology import Graph, Topology
+from fluid.viscous_kernels import cell_stress, wall_stress
+from tests.fluid.scenes import tank
+
+MESH = box_mesh((0, 0, 0), (1, 1, 1), 1 / 6)
+EXAMPLES = settings(max_examples=12, deadline=None)  # the first call compiles
+
+
+CUTS = given(
+    n=st.integers(0, 3), seed=st.integers(0, 2**32 - 1), covers=st.sampled_from(["single", "multiple"])
+)
+
+
+def cut(n, seed, covers):
+    """The unit cube less n boxes at any place and turn: plates and rods of a thousandth of a cell to three of them."""
+    random = np.random.default_rng(seed)
+    centre = random.uniform(0.1, 0.9, (n, 3))
+    size = np.exp(random.uniform(np.log(2e-4), np.log(0.5), (n, 3)))
+    turn = Rotation.random(n, random).as_matrix() if n else None
+    bodies = ConvexBodies.boxes(centre, size, turn) if n else ConvexBodies.empty()
+    return cut_domain(MESH, bodies, covers)
+
+
+def laid_out(domain):
+    """(Topology, all its cells, random node values (N, 3))."""
+    t = Topology.of(MESH, domain)
+    return t, np.arange(len(t.cells)), np.random.default_rng(0).normal(size=(len(t.nodes), 3))
+
+
+def same(found, expected, tolerance=1e-13):
+    """To round-off of the largest entry."""
+    np.testing.assert_allclose(found, expected, rtol=0, atol=tolerance * np.abs(expected).max())
+
+
+@EXAMPLES
+@CUTS
+def test_pressure_matrix_is_the_stiffness_form(n, seed, covers):
+    domain = cut(n, seed, covers)
+    t, _, _ = laid_out(domain)
+    dofs = np.flatnonzero(t.active)
+    graph, nowhere = Graph.of(t, dofs), np.zeros(len(t.nodes), bool)
+    found, anchored = pressure_matrix(graph, -np.ones(len(t.nodes)), dofs, nowhere, 0.02)
+    expected = 0.02 * asm(forms.stiffness, forms.basis_of(domain)).tocsr()[dofs][:, dofs]
+    difference = abs(found - expected)
+    assert difference.max() <= 1e-13 * abs(expected).max()
+    assert not anchored.any()
+
+
+@EXAMPLES
+@CUTS
+def test_right_hand_side_of_the_pressure(n, seed, covers):
+    domain = cut(n, seed, covers)
+    t, cells, u = laid_out(domain)
+    basis = forms.basis_of(domain)
+    mean = cell_velocity(cells, u, np.zeros((0, 3)), t.cells, t.share)
+    found = inflow(cells, mean, t.cells, t.parent, t.gradients, t.volume, len(u))
+    same(found, asm(forms.inflow, basis, u=forms.at_points(basis, u)))
+
+
+@EXAMPLES
+@CUTS
+def test_nodal_volume_and_what_the_pressure_takes_off_the_momentum(n, seed, covers):
+    """Σ_e w_e ∇p / Σ_e w_e times the volume of the node is ∫ ∇p N_i dV.  Shares below 1e-9 count as that in the kernel,
+    so that no node is without a gradient."""
+    domain = cut(n, seed, covers)
+    t, cells, f = laid_out(domain)
+    basis, vector = forms.basis_of(domain), forms.vector_basis_of(domain)
+    volume = asm(forms.lumped, basis)
+    n = len(t.nodes)
+    same(nodal_water(cells, 0.0, -np.ones(n), t.cells, t.volume, t.share, n), volume)
+    same(t.node_volume, volume)
+    expected = asm(forms.pressure_gradient, vector, p=basis.interpolate(f[:, 0])).reshape(-1, 3)
+    gradient = cell_gradient(cells, np.ascontiguousarray(f[:, 0]), t.cells, t.parent, t.gradients)
+    mean = nodal_mean(cells, gradient, np.ones(len(cells)), t.cells, t.share, t.volume, n)
+    same(mean * volume[:, None], expected, 1e-8)
+
+
+@EXAMPLES
+@CUTS
+def test_divergence_damping(n, seed, covers):
+    """Lumped mass times the change of u is -c ∫ l² (div u)(div v) dV, where no cell is left out."""
+    domain = cut(n, seed, covers)
+    t, cells, u = laid_out(domain)
+    vector = forms.vector_basis_of(domain)
+    size = forms.per_cell(vector, t.size)
+    expected = -0.05 * asm(forms.grad_div, vector, u=vector.interpolate(forms.by_component(u)), l=size)
+    damped, everywhere = u.copy(), np.ones(len(cells))
+    damp_divergence(
+        cells, 0.05, -np.ones(len(u)), t.beside_solid, -np.inf, damped, t.cells, t.parent, t.gradients, t.volume,
+        t.size, everywhere,
+    )  # fmt: skip
+    mass = np.bincount(t.cells.ravel(), np.repeat(0.25 * t.volume, 4), minlength=len(u))
+    # the change of a node next to a sliver is huge, its mass tiny: compare what they make together
+    scale = np.abs(expected).max() + np.abs(mass[:, None] * u).max()
+    np.testing.assert_allclose(
+        (damped - u) * mass[:, None], expected.reshape(-1, 3), rtol=0, atol=1e-13 * scale
+    )
+
+
+@EXAMPLES
+@CUTS
+def test_viscous_stress(n, seed, covers):
+    domain = cut(n, seed, covers)
+    t, cells, u = laid_out(domain)
+    rate = np.zeros_like(u)
+    cell_stress(cells, 2.0 * 0.7 * t.volume, u, t.cells, t.parent, t.gradients, rate)
+    vector = forms.vector_basis_of(domain)
+    stiffness = asm(forms.viscous, vector, mu=0.7)
+    same(-rate, (stiffness @ forms.by_component(u)).reshape(-1, 3))
+
+
+@EXAMPLES
+@CUTS
+def test_stress_on_wetted_faces(n, seed, covers):
+    """Symmetric Nitsche terms at bodies at rest, with a penalty that differs from face to face."""
+    domain = cut(n, seed, covers)
+    if len(domain.face_cell) == 0:
+        return
+    t, _, u = laid_out(domain)
+    basis, normal = forms.vector_surface_basis_of(domain)
+    penalty = np.random.default_rng(1).uniform(1.0, 50.0, len(domain.face_cell))
+    hat = np.ascontiguousarray(np.moveaxis(_hats(domain), 0, 2))
+    arm = domain.face_points - domain.body_centre[domain.face_body][:, None]
+    area = np.repeat(domain.face_area[:, None] / 3.0, 3, axis=1)
+    normals, drag = np.ascontiguousarray(domain.face_normal), np.zeros(len(penalty))
+    walls = (
+        domain.face_cell.astype(np.int64),
+        domain.face_body.astype(np.int64),
+        normals,
+        hat,
+        arm,
+        area,
+        penalty,
+        drag,
+    )
+    rate, load = np.zeros_like(u), np.zeros((domain.n_bodies, 6))
+    still = np.zeros((domain.n_bodies, 6))
+    wall_stress(walls, 0.7, u, still, t.cells, t.parent, t.gradients, rate, load)
+    form = asm(forms.nitsche, basis, mu=0.7, n=normal, penalty=forms.per_cell(basis, penalty))
+    reached = form.shape[0] // 3  # scikit-fem numbers nodes up to the highest one of its cells
+    same(-rate[:reached], (form @ forms.by_component(u[:reached])).reshape(-1, 3))
+    assert not rate[reached:].any()
+
+
+def _hats(domain):
+    """Hat functions (4, S, 3) at the points of the wetted polygons, from scikit-fem."""
+    basis, _ = surface_basis(domain)
+    return np.array([np.asarray(field[0]) for field in basis.basis])
+
+
+@EXAMPLES
+@CUTS
+def test_coupling_of_every_body(n, seed, covers):
+    """All six columns of G of each body: its motion along and about each axis, on its own faces."""
+    domain = cut(n, seed, covers)
+    if len(domain.face_cell) == 0:
+        return
+    basis, normal = surface_basis(domain)
+    G = wetted_coupling(domain).toarray()[: basis.N]
+    scale = np.abs(G).max()
+    for body in range(domain.n_bodies):
+        own = normal * (domain.face_body == body)[None, :, None]
+        centre = tuple(domain.body_centre[body])
+        for axis, along in enumerate(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))):
+            pushed = asm(forms.push, basis, n=own, m=along)
+            turned = asm(forms.twist, basis, n=own, m=along, centre=centre)
+            found = G[:, 6 * body + axis], G[:, 6 * body + 3 + axis]
+            np.testing.assert_allclose(found, (pushed, turned), rtol=0, atol=1e-12 * scale)
+
+
+@pytest.mark.parametrize("covers", ["single", "multiple"])
+def test_projection_is_stabilised_by_the_pressure(covers):
+    """The nodal velocity after a step balances mass with PSPG: ∫ u·∇q dV - ∫ τ R·∇q dV = 0 with τ = dt and the part
+    R = (∇x - Π∇x)/ρ of the pressure gradient that nodes cannot hold."""
+    plate = ConvexBodies.boxes(
+        [[0.52, 0.5, 0.5]], [[0.03, 0.6, 0.7]], [Rotation.from_rotvec([0.1, 0.2, 0]).as_matrix()]
+    )
+    water = tank([1, 1, 1], 1 / 6, lambda x: x[:, 2] - 10.0, plate, covers=covers)
+    t, dt = water.topology, 0.01
+    water.velocity[:] = np.random.default_rng(3).normal(size=water.velocity.shape)
+    problem = water.predict(dt)
+    x = np.zeros(len(t.nodes))
+    x[problem.dofs] = solve(problem.matrix, problem.rhs, problem.guess, 1e-12).x
+    cells, star = problem.predicted.wet_cells, problem.predicted.u_star
+    gradient = cell_gradient(cells, x, t.cells, t.parent, t.gradients) / problem.density
+    mean = nodal_mean(cells, gradient, np.ones(len(cells)), t.cells, t.share, t.volume, len(x))
+    basis = forms.basis_of(water.domain)
+    left = np.repeat(gradient.T[:, :, None], 4, axis=2)
+    tau = forms.per_cell(basis, np.full(len(t.cells), dt))
+    stabilised = asm(forms.pspg, basis, tau=tau, R=left - forms.at_points(basis, mean))
+    unbalanced = asm(forms.inflow, basis, u=forms.at_points(basis, star - dt * mean))
+    # what is left is the compliance of the closed tank, 1e-8 of the pressure matrix
+    np.testing.assert_allclose(unbalanced + stabilised, 0.0, atol=1e-6 * np.abs(unbalanced).max())
+    assert (
+        np.abs(stabilised).max()
+        > 0.01 * np.abs(asm(forms.inflow, basis, u=forms.at_points(basis, star))).max()
+    )

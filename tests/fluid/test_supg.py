@@ -1,0 +1,248 @@
+"""Transport by stabilised elements: exact where it must be, bounded on slivers, second order, and in the loop as good
+as the transport along paths that it is the reference for."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+from skfem import asm
+
+from fluid import forms, supg
+from fluid.bodies import ConvexBodies
+from fluid.domain import cut_domain
+from fluid.mesh import box_mesh
+from fluid.solve import NotConverged
+from fluid.supg import Band, Transport, ghost_penalty, midpoint_velocity, stabilisation_time
+from fluid.topology import Topology
+from tests.fluid.scenes import advance, column, rotation, tank
+
+H = 1 / 3
+MESH = box_mesh((0, 0, 0), (1, 1, 1), H)
+EXAMPLES = settings(max_examples=8, deadline=None)  # the first call compiles
+VECTOR = st.tuples(*[st.floats(-2, 2)] * 3).filter(lambda v: np.linalg.norm(v) > 0.1)
+
+
+def scene(bodies, covers="single", mesh=MESH):
+    """(Topology, Band of all nodes) of the mesh less the bodies."""
+    domain = cut_domain(mesh, bodies, covers)
+    t = Topology.of(mesh, domain)
+    return t, Band.of(domain, np.flatnonzero(t.active))
+
+
+def random_boxes(seed, n):
+    """n boxes at any place and turn, from plates of a thousandth of a cell to three cells."""
+    random = np.random.default_rng(seed)
+    size = np.exp(random.uniform(np.log(2e-4), np.log(0.6), (n, 3)))
+    return ConvexBodies.boxes(random.uniform(0.1, 0.9, (n, 3)), size, Rotation.random(n, random).as_matrix())
+
+
+def terms(t, band, c, dt):
+    """Basis, and the fields that the forms of the transport need, of a uniform velocity c (3,)."""
+    basis = forms.basis_of(band)
+    velocity = np.tile(np.asarray(c, float), (len(band.nodes), 1))
+    tau = stabilisation_time(velocity[band.cells].mean(axis=1), t.gradients[t.parent[band.rows]], dt)
+    return basis, {"c": forms.at_points(basis, velocity), "tau": forms.per_cell(basis, tau)}
+
+
+@EXAMPLES
+@given(st.integers(0, 2**32 - 1), VECTOR, VECTOR, st.sampled_from(["single", "multiple"]))
+def test_forms_are_exact_for_constant_and_linear_fields(seed, c, slope, covers):
+    """On any cut, with volume V and f = slope·x:  Σ_i ∫ N_i c·∇f = V c·slope;  the SUPG weights of all hats sum to
+    nothing;  streamline diffusion of f against f is ∫ τ (c·slope)²;  linear fields have no jump of the gradient."""
+    t, band = scene(random_boxes(seed, 2), covers)
+    basis, fields = terms(t, band, c, 0.05)
+    one, f, volume = np.ones(len(band.nodes)), band.nodes @ slope, band.volume.sum()
+    crossing = float(np.dot(c, slope))
+    close = {"rtol": 1e-11, "atol": 1e-12}
+    np.testing.assert_allclose(one @ asm(forms.mass, basis) @ one, volume, **close)
+    galerkin = asm(forms.advection, basis, **fields)
+    np.testing.assert_allclose(galerkin @ one, 0.0, atol=1e-14)
+    np.testing.assert_allclose(one @ (galerkin @ f), volume * crossing, **close)
+    rate, along = (asm(form, basis, **fields) for form in (forms.streamline_rate, forms.streamline_diffusion))
+    np.testing.assert_allclose(one @ rate, 0.0, atol=1e-14)
+    np.testing.assert_allclose(one @ along, 0.0, atol=1e-14)
+    tau = fields["tau"][:, 0]
+    np.testing.assert_allclose(f @ (along @ f), (tau * band.volume).sum() * crossing**2, **close)
+    np.testing.assert_allclose(ghost_penalty(t, band) @ f, 0.0, atol=1e-12)
+
+
+@EXAMPLES
+@given(
+    st.integers(0, 2**32 - 1), VECTOR, VECTOR, st.sampled_from(["single", "multiple"]), st.floats(0.1, 3.0)
+)
+def test_a_linear_field_in_uniform_flow_moves_exactly(seed, c, slope, covers, courant):
+    """δ = -dt c·∇f at every node, to the tolerance of the solver; the anchor is felt at nodes with next to no water."""
+    t, band = scene(random_boxes(seed, 2), covers)
+    velocity = np.tile(c, (len(band.nodes), 1))
+    dt = courant * H / np.abs(c).max()
+    np.testing.assert_allclose(midpoint_velocity(t, band, velocity, dt), velocity, rtol=1e-12)
+    f = (band.nodes @ slope)[:, None]
+    moved = Transport.of(t, band, velocity, dt).change(f, np.ones(f.shape, bool))
+    expected, scale = -dt * np.dot(c, slope), dt * np.linalg.norm(c) * np.linalg.norm(slope)
+    np.testing.assert_allclose(moved, expected, rtol=1e-3, atol=1e-5 * scale)
+
+
+def wall_beside_node(exponent, turn):
+    """A half space whose plane passes 10^exponent of a cell from a node of the lattice."""
+    R = rotation([1.0, 0.7, -0.4], turn)
+    centre = np.full(3, H) + R @ np.array([2.0 + 10.0**exponent * H, 0.0, 0.0])
+    return ConvexBodies.boxes([centre], [[4.0, 6.0, 6.0]], [R])
+
+
+@EXAMPLES
+@given(st.floats(-14, -1), st.floats(-1, 1), VECTOR, st.floats(0.05, 4.0))
+def test_matrices_stay_bounded_on_slivers(exponent, turn, c, courant):
+    """Whatever is left of the cells: no entry beyond that of whole cells; scaled to a unit diagonal, no direction of
+    the matrix is lost; and the change of a field of order one is of order one."""
+    t, band = scene(wall_beside_node(exponent, turn))
+    dt = courant * H / np.abs(c).max()
+    step = Transport.of(t, band, np.tile(c, (len(band.nodes), 1)), dt)
+    A, whole = step.matrix.toarray(), 4.0 * H**3  # twenty-four cells around a node
+    assert np.abs(A).max() < (1.0 + courant) ** 2 * whole
+    assert dt * np.abs(step.advection.toarray()).max() < (1.0 + courant) ** 2 * whole
+    root = np.sqrt(np.diag(A))
+    scaled = A / np.outer(root, root)
+    assert np.linalg.svd(scaled, compute_uv=False)[-1] > 1e-4
+    f = np.random.default_rng(0).uniform(-1, 1, len(root))
+    assert np.abs(np.linalg.solve(scaled, -dt * (step.advection @ f) / root) / root).max() < 100.0
+
+
+def test_a_vanishing_sliver_changes_nothing():
+    """Nodes that keep water move as if the last 1e-6 of a cell were not there, but for the ghost penalty that now holds
+    the change smooth across the cut cells."""
+    found = []
+    for left in (0.0, 1e-6):
+        t, band = scene(ConvexBodies.boxes([[2.0 + H + left * H, 0.5, 0.5]], [[4.0, 4.0, 4.0]]))
+        x = band.nodes
+        velocity = np.column_stack([np.sin(np.pi * x[:, 0]), np.cos(3 * x[:, 1]), x[:, 2] ** 2])
+        change = Transport.of(t, band, velocity, 0.1).change(velocity, np.ones(x.shape, bool))
+        found.append(change[x[:, 0] < H + 1e-3])
+    np.testing.assert_allclose(found[1], found[0], atol=0.01 * np.abs(found[0]).max())
+
+
+def test_time_of_stabilisation_has_its_limits():
+    """τ = dt/2 in slow water, and half the time to cross the cell, h/(2|c|), in fast water."""
+    g = MESH.gradients[:1]
+    slow, fast = (stabilisation_time(np.array([[speed, 0.0, 0.0]]), g, 0.1)[0] for speed in (1e-9, 1e9))
+    assert slow == pytest.approx(0.05)
+    assert fast == pytest.approx(H / 2e9)
+
+
+def test_a_bump_is_carried_with_second_order():
+    """A Gaussian a tenth of the slab wide moves by four of its widths, Courant number 0.32; nothing comes in."""
+    errors = [_translation_error(n) for n in (20, 40)]
+    assert errors[1] < 0.06
+    assert np.log2(errors[0] / errors[1]) > 1.7
+
+
+def _translation_error(n):
+    mesh = box_mesh(np.zeros(3), [1, 1 / n, 1], 1 / n)
+    t, band = scene(ConvexBodies.empty(), mesh=mesh)
+    bump = lambda x0, z0: np.exp(-((band.nodes[:, 0] - x0) ** 2 + (band.nodes[:, 2] - z0) ** 2) / 0.02)  # noqa: E731
+    velocity = np.tile([0.4, 0.0, 0.3], (len(band.nodes), 1))
+    steps, x = n, band.nodes
+    step = Transport.of(t, band, velocity, 0.8 / steps)
+    free = ~np.isclose(x[:, [0, 2]], 0.0).any(axis=1)[:, None]
+    f, exact = bump(0.4, 0.4)[:, None], bump(0.72, 0.64)[:, None]
+    for _ in range(steps):
+        f = f + step.change(f, free)
+    return np.linalg.norm(f - exact) / np.linalg.norm(exact)
+
+
+def full(x):
+    """Fill: everything is water."""
+    return x[:, 2] - 100.0
+
+
+def vortex(n, advection, steps, end, speed=1.0, **parameters):
+    """Water with the velocity of one vortex in a closed square box after a time, and the velocity at its start."""
+    water = tank([1, 1 / n, 1], 1 / n, full, advection=advection, **parameters)
+    x = np.pi * water.topology.nodes
+    water.velocity[:, 0] = speed * np.sin(x[:, 0]) * np.cos(x[:, 2])
+    water.velocity[:, 2] = -speed * np.cos(x[:, 0]) * np.sin(x[:, 2])
+    water.cell_velocity[:] = water.velocity[water.topology.cells].mean(axis=1)
+    start = water.velocity.copy()
+    for _ in range(steps):
+        advance(water, end / steps, rtol=1e-8)
+    return water, start
+
+
+def test_both_ways_of_transport_keep_the_same_energy_in_a_steady_vortex():
+    """Steady in the equations of Euler; what is lost after two seconds at Courant number 1 is lost by the splitting,
+    so that both agree to 2 %."""
+    kept = []
+    for advection in ("semi-lagrangian", "supg"):
+        water, start = vortex(12, advection, 24, 2.0)
+        kept.append(water.kinetic_energy() / (0.5e3 * water.nodal_water @ (start**2).sum(axis=1)))
+    assert kept[1] == pytest.approx(kept[0], abs=0.02)
+    assert min(kept) > 0.7
+
+
+def test_vortices_of_taylor_and_green_decay_with_second_order():
+    """Velocities fall as exp(-2 ν k² t)."""
+    nu, errors = 0.05, []
+    end = 0.25 / (nu * np.pi**2)
+    for n, steps in ((8, 3), (16, 6)):
+        water, start = vortex(n, "supg", steps, end, 0.2, viscosity=1000.0 * nu)
+        exact = start * np.exp(-2 * nu * np.pi**2 * end)
+        errors.append(np.linalg.norm(water.velocity - exact) / np.linalg.norm(exact))
+    assert errors[1] < 0.01
+    assert np.log2(errors[0] / errors[1]) > 1.7
+
+
+@pytest.mark.parametrize("covers", ["single", "multiple"])
+def test_water_at_rest_stays_at_rest(covers):
+    """Beside a tilted body whose faces cut the cells below the surface."""
+    box = ConvexBodies.boxes([[0.5, 0.45, 0.3]], [[0.3, 0.25, 0.2]], [rotation([1, 2, 3], 0.7)])
+    water = tank([1, 1, 1], 0.125, lambda x: x[:, 2] - 0.63, box, covers=covers, advection="supg")
+    for _ in range(30):
+        advance(water, 0.01)
+    assert np.abs(water.velocity).max() < 1e-9
+
+
+def test_a_dam_break_runs_as_it_does_along_paths():
+    """Ten cells over the width of the column, to T = t sqrt(2g/a) = 3: front within a cell, energy within 1 %, volume
+    kept."""
+    found = []
+    for advection in ("semi-lagrangian", "supg"):
+        a = 0.25
+        water = tank([5 * a, a / 5, 2.5 * a], a / 10, column(a, 2 * a), advection=advection)
+        energy = water.available_energy()
+        while water.time * np.sqrt(2 * 9.81 / a) < 3.0:
+            advance(water, rtol=1e-6)
+        x = water.topology.nodes
+        low = (water.level_set < 0) & (x[:, 2] < 0.04)
+        found.append([x[low, 0].max() / a, water.available_energy() / energy])
+        assert abs(water.volume_error()) < 1e-4
+    front, energy = np.abs(np.subtract(*found))
+    assert front < 0.1001
+    assert energy < 0.01
+
+
+def test_a_solver_that_does_not_converge_says_so(monkeypatch):
+    monkeypatch.setattr(supg, "RESTART", 1)
+    monkeypatch.setattr(supg, "MOST_RESTARTS", 1)
+    water = tank([1, 0.25, 1], 0.125, column(0.5, 0.5), advection="supg")
+    advance(water)
+    with pytest.raises(
+        NotConverged, match=r"stabilised elements stopped after 1 iterations.*reduce time\.cfl"
+    ):
+        advance(water)
+
+
+def test_paths_alone_load_nothing_of_it():
+    """Absent means absent: neither the forms nor this module are imported by a step that does not ask for them."""
+    code = (
+        "import sys\n"
+        "from tests.fluid.scenes import advance, column, tank\n"
+        "advance(tank([1, 0.5, 1], 0.25, column(0.5, 0.5)))\n"
+        "print('fluid.supg' in sys.modules, 'fluid.forms' in sys.modules)\n"
+        "advance(tank([1, 0.5, 1], 0.25, column(0.5, 0.5), advection='supg'))\n"
+        "print('fluid.supg' in sys.modules, 'fluid.forms' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["False", "False", "True", "True"]
