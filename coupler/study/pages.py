@@ -17,7 +17,7 @@ OPENING = """\
 `surgebreak study CASE` runs the ladders of the case's [`[study]`](case_file.md#study): mesh, step, law, scheme. A
 study that was stopped goes on when the command is given again; `--larger` adds the larger rungs; `surgebreak study
 compare A B` leaves with 3 if errors or CPU times got worse. Results: `study.json`, `study.csv`, `study.md`, and a
-figure a quantity.
+figure a quantity. The tables below are those of the default ladders, each run once; the larger rungs are left out.
 
 Every quantity has errors of one kind: against an exact answer, a measurement, or the finest run. CPU s are user and
 system time of the steps and of writing results, one thread; set-up of the scene (and loading YADE), start of the
