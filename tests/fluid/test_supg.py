@@ -11,14 +11,17 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 from skfem import asm
 
-from fluid import forms, supg
+from fluid import forms, supg, waves
 from fluid.bodies import ConvexBodies
 from fluid.domain import cut_domain
+from fluid.inflow import Side, Sides
 from fluid.mesh import box_mesh
+from fluid.parameters import WaterParameters
 from fluid.solve import NotConverged
 from fluid.supg import Band, Transport, ghost_penalty, midpoint_velocity, stabilisation_time
 from fluid.topology import Topology
-from tests.fluid.scenes import advance, column, rotation, tank
+from fluid.water import Water
+from tests.fluid.scenes import advance, column, load, rotation, tank
 
 H = 1 / 3
 MESH = box_mesh((0, 0, 0), (1, 1, 1), H)
@@ -221,6 +224,54 @@ def test_a_dam_break_runs_as_it_does_along_paths():
     front, energy = np.abs(np.subtract(*found))
     assert front < 0.1001
     assert energy < 0.01
+
+
+def test_a_body_driven_through_the_surface_feels_the_same():
+    """The domain changes at every step; the impulse on the body is that of the water carried along paths to 1 %."""
+    impulses = []
+    for advection in ("semi-lagrangian", "supg"):
+        mesh, impulse, z = box_mesh(np.zeros(3), [1, 1, 1], 0.125), 0.0, 0.7
+        domain = cut_domain(mesh, _tilted(z))
+        water = Water(mesh, domain, lambda x: x[:, 2] - 0.5, WaterParameters(advection=advection))
+        for _ in range(20):
+            z -= 0.5 * 0.01
+            domain = cut_domain(mesh, _tilted(z), previous=domain)
+            water.move_solids(domain)
+            problem, x = advance(water, 0.01, np.array([0, 0, -0.5, 0, 0, 0]), rtol=1e-8)
+            impulse += load(problem, x)[0, 2] * problem.dt
+        impulses.append(impulse)
+    assert impulses[1] == pytest.approx(impulses[0], rel=0.01)
+    assert impulses[0] > 0.1
+
+
+def _tilted(z):
+    return ConvexBodies.boxes([[0.5, 0.5, z]], [[0.3, 0.3, 0.3]], [rotation([1, 2, 3], 0.3)])
+
+
+def test_a_stream_through_the_tank_is_that_along_paths():
+    """From an inflow, where velocities are given, to a sea, where some comes back: after the first second the two
+    differ by less than 1 % of the stream in the mean and 5 % at the worst node."""
+    alone, paths = (_stream(advection) for advection in ("supg", "semi-lagrangian"))
+    wet = (alone.level_set < 0.0) & (paths.level_set < 0.0)
+    assert wet.sum() > 200
+    difference = np.linalg.norm(alone.velocity[wet] - paths.velocity[wet], axis=1) / 0.5
+    assert np.sqrt(np.mean(difference**2)) < 0.01
+    assert difference.max() < 0.05
+    assert abs(alone.volume_error()) < 1e-5
+
+
+def _stream(advection):
+    side = lambda sign: lambda normal, _: sign * normal[:, 0] > 0.5  # noqa: E731
+    mesh = box_mesh(np.zeros(3), [2, 0.1, 1], 0.1)
+    inflow = Side.of(mesh, side(-1), waves.steady([1, 0, 0], 0.5, 0.5))
+    sides = Sides([inflow, Side.of(mesh, side(1), level=lambda time: 0.5)])
+    domain, parameters = cut_domain(mesh, ConvexBodies.empty()), WaterParameters(advection=advection)
+    water = Water(mesh, domain, lambda x: x[:, 2] - 0.5, parameters, sides=sides)
+    water.velocity[:, 0] = 0.5 * (water.level_set < 0.3)
+    water.cell_velocity[:, 0] = 0.5
+    while water.time < 1.0:
+        advance(water, rtol=1e-7)
+    return water
 
 
 def test_a_solver_that_does_not_converge_says_so(monkeypatch):
