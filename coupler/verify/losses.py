@@ -47,6 +47,6 @@ class Losses:
         t, moved, clipped = np.array(self.history).T
         volume = Curve(label, "computed", t, 100 * moved)
         return (
-            Panel("time [s]", "re-inserted volume so far [% of the water]", (volume,)),
+            Panel("time [s]", "re-inserted so far [% of the water]", (volume,)),
             Panel("time [s]", "node-steps at the speed limit", (Curve(label, "computed", t, clipped),)),
         )
