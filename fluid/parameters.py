@@ -45,6 +45,10 @@ class WaterParameters:
     pocket_compliance: float = 1e-8
     """Compressibility of pockets without free surface, where the pressure level floats, in dt/(ρ h²)."""
 
+    def __post_init__(self):
+        if self.advection not in ("semi-lagrangian", "supg"):
+            raise ValueError(f"advection = {self.advection!r} is unknown; choose 'semi-lagrangian' or 'supg'")
+
     @property
     def shear(self) -> bool:
         """Whether anything but pressure acts along walls or within the water."""
