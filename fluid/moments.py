@@ -134,3 +134,15 @@ def cells_touching(marked, cells):
             found[n] = e
             n += 1
     return found[:n].copy()
+
+
+@njit(cache=True)
+def touching_among(cell_list, marked, cells):
+    """Those of the listed cells (k,) with at least one marked corner, in their order; marked (N,) bool."""
+    found = np.empty(cell_list.shape[0], np.int64)
+    n = 0
+    for e in cell_list:
+        if marked[cells[e, 0]] or marked[cells[e, 1]] or marked[cells[e, 2]] or marked[cells[e, 3]]:
+            found[n] = e
+            n += 1
+    return found[:n].copy()

@@ -22,7 +22,7 @@ import scipy.sparse as sp
 from numba import njit
 
 from fluid.level_set import without_films
-from fluid.moments import cells_touching, nodal_water
+from fluid.moments import cells_touching, nodal_water, touching_among
 from fluid.topology import Graph
 
 BAND_WIDTH = 3.0
@@ -208,7 +208,10 @@ def correct_volume(topology, graph, listed, phi, carried, target: float, kappa: 
 
     kappa in cell sizes · listed (n,) nodes of the graph to look at, all with water and |φ| small among them."""
     n = len(phi)
-    near = cells_touching(phi < 2 * _PROBE * spacing, topology.cells)
+    seen = np.zeros(n, bool)
+    seen[listed] = True
+    around = cells_touching(seen, topology.cells)
+    near = touching_among(around, phi < 2 * _PROBE * spacing, topology.cells)
     own = nodal_water(near, 0.0, phi, *_of_cells(topology))
     slope = _volume_slope(topology, near, phi, spacing)
     band = listed[np.abs(phi[listed]) < BAND_WIDTH * spacing]
@@ -229,8 +232,8 @@ def correct_volume(topology, graph, listed, phi, carried, target: float, kappa: 
     )
     phi = phi.copy()
     phi[band] -= np.clip(shift, -LARGEST_SHIFT * spacing, LARGEST_SHIFT * spacing)
-    phi, reinserted = _meet_total(topology, phi, band, slope.sum(), target, spacing)
-    return VolumeCorrection(phi, nodal_volume(topology, phi), own, reinserted)
+    phi, reinserted = _meet_total(topology, around, phi, band, slope.sum(), target, spacing)
+    return VolumeCorrection(phi, nodal_volume(topology, phi, around), own, reinserted)
 
 
 def _volume_slope(t, near, phi, spacing):
@@ -258,12 +261,12 @@ def _within_reach(cell_list, phi, cells, step):
     return found[:n].copy()
 
 
-def _meet_total(t, phi, band, area, target, spacing):
+def _meet_total(t, around, phi, band, area, target, spacing):
     """φ after a uniform shift of the band that meets the total volume, and the volume [m³] that it moved.
 
     Secant steps on the shift, from the slope `area`; the shift stays within LARGEST_UNIFORM_SHIFT."""
     limit, shift = LARGEST_UNIFORM_SHIFT * spacing, 0.0
-    start = volume = water_volume(t, phi)
+    start = volume = float(nodal_volume(t, phi, around).sum())
     shifted = phi
     for _ in range(MOST_SECANTS):
         if abs(target - volume) <= VOLUME_TOLERANCE * abs(target) or area <= 0.0:
@@ -273,7 +276,7 @@ def _meet_total(t, phi, band, area, target, spacing):
             break
         shifted = phi.copy()
         shifted[band] -= trial
-        before, volume = volume, water_volume(t, shifted)
+        before, volume = volume, float(nodal_volume(t, shifted, around).sum())
         area, shift = (volume - before) / (trial - shift), trial
     return without_films(shifted, spacing), volume - start
 
@@ -283,9 +286,11 @@ def water_volume(topology, phi) -> float:
     return float(nodal_volume(topology, phi).sum())
 
 
-def nodal_volume(topology, phi):
-    """∫_{φ<0} N_i dV (N,) [m³]."""
-    return nodal_water(cells_touching(phi < 0.0, topology.cells), 0.0, phi, *_of_cells(topology))
+def nodal_volume(topology, phi, around=None):
+    """∫_{φ<0} N_i dV (N,) [m³]; around (k,): cells that hold all water, ascending, None for all."""
+    wet, cells = phi < 0.0, topology.cells
+    near = cells_touching(wet, cells) if around is None else touching_among(around, wet, cells)
+    return nodal_water(near, 0.0, phi, *_of_cells(topology))
 
 
 def _of_cells(topology):
