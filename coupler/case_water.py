@@ -110,7 +110,7 @@ class Water(Section):
     advection: Literal["semi-lagrangian", "supg"] = Field(
         "semi-lagrangian",
         description="how the flow carries velocity and surface: along paths, or by stabilised finite elements, the "
-        "reference, which costs some four times as much a step",
+        "reference, which costs four to seven times as much a step",
     )
     theta: quantity("", ge=0.5, le=1) = Field(
         0.6, description="weight of the new pressure in the projection; 0.5 damps least, 1 most"
