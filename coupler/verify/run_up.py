@@ -27,7 +27,7 @@ FLAT, ABOVE = 2.0, 0.2
 """Flat bed before the toe of the beach and tank above the still water, in depths."""
 AHEAD = 18.4
 """Way of the crest to the inflow in depths, arccosh(sqrt 20)/sqrt(3H/4d): at the start 5 % of its height is there."""
-CELLS, STRETCH = 20, 2
+CELLS, STRETCH = 24, 2
 """Cells over the depth, and length of a cell over its height."""
 FILM = 0.1
 """Height over the beach at which it counts as wet, in cells: the experiment saw the tip of the water."""
