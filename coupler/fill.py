@@ -5,7 +5,7 @@ the wall and the water there without pressure; and beside a thin wall the copies
 count as wet. So a side of a box counts at a node only where water and air can meet in the cells around it:
 
     s = distance to the side, negative inside;  [s_low, s_high] over the fluid part of the cells around the node
-    solid cuts these cells short on the outer side, s_high < t   →  s ← min(s, -2 c)      wet up to the solid
+    solid cuts these cells short on the outer side, s_high < t   →  s ← -far          wet up to the solid: no side
     solid cuts these cells short on the inner side, s_low > -t   →  s ← max(s, +2 c)      dry from the solid on
 
 c: cell edge, t = TOUCHES c. Elsewhere s stays, so that a level surface stays a plane up to the wall.
@@ -70,7 +70,7 @@ def _side(s, s_low, s_high, cut_inner, cut_outer, edge: float) -> Array:
     sliver = wet & dry  # counts to the side on which it mostly lies
     wet &= ~sliver | (-s_low >= s_high)
     dry &= ~wet
-    return np.where(wet, np.minimum(s, -2.0 * edge), np.where(dry, np.maximum(s, 2.0 * edge), s))
+    return np.where(wet, -np.inf, np.where(dry, np.maximum(s, 2.0 * edge), s))
 
 
 def _cell_edge(mesh) -> float:

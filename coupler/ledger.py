@@ -26,8 +26,8 @@ STORED = ("kinetic", "gravity", "joint_stored", "contact_stored")
 DISSIPATED = ("joint_dissipated", "joint_damping", "dashpot", "friction")
 
 
-ROUND_OFF = 1e-9
-"""Share of the energy of the water at the start below which nothing counts as put in."""
+NEGLIGIBLE = 1e-6
+"""Share of the energy that water and blocks hold at the start below which nothing counts as put in."""
 
 
 @dataclass(frozen=True)
@@ -73,8 +73,9 @@ class Ledger:
         self._water_start = water
         self._structure_start = None if structure is None else _structure_total(structure)
         self._gravity_start = None if structure is None else structure["gravity"]
-        # a scene at perfect rest puts nothing in: then the round-off of what it holds is the scale
-        self._input = max(self.available, ROUND_OFF * abs(sum(water or (0.0,))))
+        # a scene at perfect rest puts nothing in: then a small part of what it holds is the scale
+        held = abs(sum(water or (0.0,))) + abs(self._gravity_start or 0.0)
+        self._input = max(self.available, NEGLIGIBLE * held)
 
     def save(self) -> dict[str, np.ndarray]:
         """Everything that it holds, by name."""

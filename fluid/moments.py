@@ -93,21 +93,24 @@ def wet_moments(phi, out, corner):
 def nodal_water(cell_list, shift, phi, cells, fluid_volume, share, n_nodes):
     """∫_{φ+shift<0} N_i dV (N,) [m³] over the listed cells; fluid_volume (M,) [m³], share (M, 4) of Topology.
 
-    Exact in whole cells and in cut cells that are all water; a cell with both solid and surface in it takes
-    the wet share of the whole cell times its fluid volume."""
+    Exact in whole cells and in cut cells that are all water.  A cell with both solid and surface in it takes the wet
+    share of the whole cell times its fluid volume, shared out so that it goes over into the exact values as the cell
+    fills: a jump there stirs still water whose surface passes through nodes (0.02 m/s beside a slope of 1:20)."""
     total = np.zeros(n_nodes)
     local, out, corner = np.empty(4), np.empty(4), np.empty((6, 4))
     for s in range(cell_list.shape[0]):
         e = cell_list[s]
         for a in range(4):
             local[a] = phi[cells[e, a]] + shift
-        if local[0] < 0.0 and local[1] < 0.0 and local[2] < 0.0 and local[3] < 0.0:
-            for a in range(4):
-                total[cells[e, a]] += fluid_volume[e] * share[e, a]
-            continue
         wet_moments(local, out, corner)
+        wet, weight = 0.0, 0.0
         for a in range(4):
-            total[cells[e, a]] += fluid_volume[e] * out[a]
+            wet += out[a]
+            weight += out[a] * share[e, a]
+        if weight <= 0.0:
+            continue
+        for a in range(4):
+            total[cells[e, a]] += fluid_volume[e] * wet * out[a] * share[e, a] / weight
     return total
 
 

@@ -14,9 +14,10 @@ linear functions are integrated exactly.  So
 to round-off, whatever the pressure is: `pressure_closure` is what is missing.  b_i is summed over the cells around
 nodes of the sides, so that (1) is a check of the cutting and not an identity.
 
-What the nodes make of it differs from (1) where the surface cuts cells, and where the part of the last pressure that is
-carried over acts on other nodes than it came from.  These differences, and what transport, volume correction, damping,
-limit and slip do, are lines of their own: the semi-Lagrangian transport does not conserve momentum.
+What the nodes make of it differs from (1) where the surface cuts cells or leaves them void, and where the part of the
+last pressure that is carried over acts on other nodes than it came from. These differences, and what transport,
+volume correction, damping, limit and slip do, are lines of their own: the semi-Lagrangian transport does not conserve
+momentum.
 """
 
 from __future__ import annotations
@@ -107,7 +108,7 @@ def momentum_change(water, problem, unknown, pressure, stages: Stages) -> Moment
     kept, dt = problem.predicted, problem.dt
     x, p = np.where(kept.wet, unknown, 0.0), np.where(kept.wet, pressure, 0.0)
     at = _momenta(water, kept, dt, stages)
-    cells, tank, held = _reactions(water, kept.wet_cells, x, p, dt)
+    cells, tank, held = _reactions(water, kept, x, p, dt)
     told, shear_told, tank_shear = _loads(water, problem, p)
     through, side_pressure = _through(water, kept), -dt * _pressure_on_sides(water, p)
     weight = dt * at["weight"]
@@ -162,9 +163,10 @@ def _momenta(water, kept, dt, stages: Stages) -> dict[str, np.ndarray]:
     return at
 
 
-def _reactions(water, cells, x, p, dt):
+def _reactions(water, kept, x, p, dt):
     """Impulses on the water: by the cells, of x and of p - x; by the sides of the tank and by the bodies, of p."""
     t, at_side = water.topology, water.on_sides
+    cells = np.concatenate([kept.wet_cells, kept.void])
     mesh = (t.nodes, t.cells, t.parent, t.gradients, t.volume, t.share)
     of_x, of_p, of_sides = hat_forces(cells, x, p, at_side, water.reference, *mesh)
     of_sides += _on_bodies(water, np.where(at_side, p, 0.0))

@@ -15,9 +15,7 @@ import numpy as np
 from numba import njit
 
 from fluid.advection import transport
-from fluid.extension import continue_into_solids
 from fluid.level_set import redistance
-from fluid.moments import cells_touching
 from fluid.projection import (
     PressureProblem,
     cell_velocity,
@@ -28,6 +26,8 @@ from fluid.projection import (
 )
 from fluid.volume import correct_volume
 from fluid.waterline import waterline_load
+from fluid.wet_part import WetPart
+from fluid.wetted import wetted_coupling
 
 TRANSPORT_WIDTH = 5.0
 """|φ| in cell sizes within which the level set moves; beyond, only its sign matters."""
@@ -37,12 +37,11 @@ RESCALE_EVERY = 5
 @dataclass(frozen=True)
 class Predicted:
     """Between predict and correct: level_set (N,), nodal_water (N,) [m³], advected (N, 3) and u_star (N, 3) [m/s],
-    wet (N,) bool, wet_cells (n,), cell_star (n, 3) [m/s] velocity of the wet cells, remainder (M, 3) [m/s],
-    theta, conserved_volume and reinserted [m³], uncorrected_water (N,) [m³] before the volume correction,
-    shear: ViscousChange by viscosity and friction, None without; end [s]: time at the end of the step; left (N,) [m³]
-    that leaves through open sides, None if none;
-    through (N,) [m³] that comes in through sides, None without any; held (N,) [Pa]: unknown part of the pressure on
-    the nodes of seas, None without any side."""
+    wet (N,) bool, wet_cells (n,), wet_share (n,) and void (k,) of WetPart, cell_star (n, 3) [m/s] velocity of the wet
+    cells, remainder (M, 3) [m/s], theta, conserved_volume and reinserted [m³], uncorrected_water (N,) [m³] before the
+    volume correction, shear: ViscousChange by viscosity and friction, None without; end [s]: time at the end of the
+    step; left (N,) [m³] that leaves through open sides, None if none; through (N,) [m³] that comes in through sides,
+    None without any; held (N,) [Pa]: unknown part of the pressure on the nodes of seas, None without any side."""
 
     level_set: np.ndarray
     nodal_water: np.ndarray
@@ -50,6 +49,8 @@ class Predicted:
     u_star: np.ndarray
     wet: np.ndarray
     wet_cells: np.ndarray
+    wet_share: np.ndarray
+    void: np.ndarray
     cell_star: np.ndarray
     remainder: np.ndarray
     theta: float
@@ -148,8 +149,6 @@ def _outflow(water, dt, carried):
 def _new_surface(water, phi, carried, conserved):
     """φ redistanced and corrected: VolumeCorrection."""
     t, h = water.topology, water.mesh.spacing
-    continue_into_solids(t, phi, water.listed)
-    keep_dry(t, phi, carried)
     phi = redistance(t, phi, h, rescale=(water.steps % RESCALE_EVERY == RESCALE_EVERY - 1))
     return correct_volume(
         t,
@@ -163,39 +162,26 @@ def _new_surface(water, phi, carried, conserved):
     )
 
 
-def keep_dry(topology, phi, carried) -> None:
-    """No water where none was carried, in place: φ (N,) of covered nodes that neither hold nor touch water is kept
-    positive.  A level surface continued around the edge of a wall would put water on its dry side."""
-    t = topology
-    doubtful = t.covered & (phi < 0.0)
-    if not doubtful.any():
-        return
-    near_water = np.zeros(len(phi), bool)
-    near_water[t.cells[cells_touching(carried > 0.0, t.cells)]] = True
-    doubtful &= ~near_water
-    phi[doubtful] = -phi[doubtful]
-
-
 def _problem(water, dt, theta, kick, surface, conserved, u_adv, u_star, shear, left, through, inflow_rate):
     t, density = water.topology, water.parameters.density
     phi = surface.level_set
-    wet = (phi < 0.0) & t.active
-    cells = cells_touching(wet, t.cells)
+    part = WetPart.of(t, water.domain, phi, water.mesh.spacing)
+    wet, cells = part.nodes, part.cells
+    graph = water.graph_for(water.listed).without(t, part.void)
     remainder = _carried_remainder(water, dt, theta, cells)
     star = cell_velocity(cells, u_star, remainder, t.cells, t.share)
     rhs = inflow(cells, star, t.cells, t.parent, t.gradients, t.volume, len(phi))
     dofs = np.flatnonzero(wet & ~water._walls.open_node)
-    matrix, anchored = pressure_matrix(
-        water.graph_for(water.listed), phi, dofs, water._walls.open_node, dt / density
-    )
+    matrix, anchored = pressure_matrix(graph, phi, dofs, water._walls.open_node, dt / density)
     held = None
     if water.sides is not None:
         rhs += inflow_rate
         gravity = water.parameters.gravity
         held = theta * water.sides.pressure(density, gravity, water.velocity, water.time + dt)
-        rhs[dofs] += pull_of_held(water.graph_for(water.listed), dofs, held, dt / density)
+        rhs[dofs] += pull_of_held(graph, dofs, held, dt / density)
     known = (1.0 - theta) * kick[dofs] * water.end_pressure[dofs]
     guess = theta * water.end_pressure[dofs]
+    coupling, faces = _coupling(water, part.void)
     matrix, extra = _sealed(water, matrix, anchored, dofs, dt, guess)
     if water.slits is not None:
         lumped, drive = water.slits.pressure_terms(dofs, known, water.parameters.weight, dt, density)
@@ -207,6 +193,8 @@ def _problem(water, dt, theta, kick, surface, conserved, u_adv, u_star, shear, l
         u_star,
         wet,
         cells,
+        part.share,
+        part.void,
         star,
         remainder,
         theta,
@@ -221,11 +209,21 @@ def _problem(water, dt, theta, kick, surface, conserved, u_adv, u_star, shear, l
     )
     # before the first step there is no pressure to go by: still water
     acted = water.pressure if water.steps else -density * water.parameters.gravity * phi
-    other = waterline_load(water.domain, phi, wet, acted, water._walls.open_node)
+    other = waterline_load(water.domain, faces, phi, wet, acted, water._walls.open_node)
     if shear is not None:
         other += shear.load
-    coupling = water.coupling[dofs]
-    return PressureProblem(matrix, rhs[dofs] + extra, coupling, known, guess, dofs, dt, density, other, kept)
+    return PressureProblem(
+        matrix, rhs[dofs] + extra, coupling[dofs], known, guess, dofs, dt, density, other, kept
+    )
+
+
+def _coupling(water, void):
+    """G (N, 6 n_bodies) without the polygons of void cells, and the rows of the polygons that count."""
+    cell = water.domain.face_cell
+    if len(void) == 0:
+        return water.coupling, np.arange(len(cell))
+    left_out = np.isin(cell, void)
+    return water.coupling - wetted_coupling(water.domain, left_out), np.flatnonzero(~left_out)
 
 
 def _carried_remainder(water, dt, theta, cells):

@@ -81,7 +81,7 @@ def _wet_matrix(dofs, column, graph_row, start, neighbour, stiffness, phi, open_
             elif open_node[j]:
                 diagonal += k
                 anchored[r] = True
-            else:
+            elif phi[j] >= 0.0:  # a node under water without an unknown shares void cells only
                 cut = max(phi[i] / (phi[i] - phi[j]), 1e-7)
                 diagonal += k / cut
                 positive += abs(k) / cut
@@ -255,3 +255,38 @@ def damp_divergence(cell_list, weight, phi, beside_solid, deep, u, cells, parent
         if phi[i] < 0.0 and mass[i] > 0.0:
             for k in range(3):
                 u[i, k] -= push[i, k] / mass[i]
+
+
+@njit(cache=True)
+def damp_waterline(cell_list, weight, phi, wet, beside_solid, deep, u, cells, volume, wet_share):
+    """u_i += c Σ_e w_e (mean of u over the wet corners of e - u_i) / m_i, in place on wet nodes, over the cells beside
+    solids that reach up to φ > deep; w_e their water, m_i all water around i.
+
+    Where a surface meets a solid slantwise, velocity of one cell's wave length and the surface feed each other (growth
+    of 0.02 a step on still water against 1:20).  The sum is symmetric and positive: it only takes energy, and nothing
+    from a uniform velocity."""
+    mass, push, mean = np.zeros(u.shape[0]), np.zeros((u.shape[0], 3)), np.empty(3)
+    for s in range(cell_list.shape[0]):
+        e = cell_list[s]
+        w = volume[e] * max(wet_share[s], SMALLEST_WET_SHARE)
+        count, beside, highest = 0, False, -np.inf
+        mean[:] = 0.0
+        for a in range(4):
+            i = cells[e, a]
+            beside = beside or beside_solid[i]
+            highest = max(highest, phi[i])
+            if wet[i]:
+                count += 1
+                mass[i] += w
+                for k in range(3):
+                    mean[k] += u[i, k]
+        if beside and highest > deep:
+            for a in range(4):
+                i = cells[e, a]
+                if wet[i]:
+                    for k in range(3):
+                        push[i, k] += w * (mean[k] / count - u[i, k])
+    for i in range(u.shape[0]):
+        if mass[i] > 0.0:
+            for k in range(3):
+                u[i, k] += weight * push[i, k] / mass[i]

@@ -6,7 +6,7 @@ corners), so that nothing geometric is recomputed when solids move.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -275,9 +275,40 @@ class Graph:
         )
         return cls(nodes, row, start, neighbour, stiffness)
 
+    def without(self, topology: Topology, cell_list) -> Graph:
+        """The same edges with the stiffness of the listed cells (k,) taken out."""
+        if len(cell_list) == 0:
+            return self
+        t, stiffness = topology, self.stiffness.copy()
+        _take_out(
+            cell_list,
+            t.cells,
+            t.parent,
+            t.products,
+            t.volume,
+            self.row,
+            self.start,
+            self.neighbour,
+            stiffness,
+        )
+        return replace(self, stiffness=stiffness)
+
 
 _PAIR = np.array([[-1, 0, 1, 2], [0, -1, 3, 4], [1, 3, -1, 5], [2, 4, 5, -1]])
 """Column of Background.products that holds the corners a, b."""
+
+
+@njit(cache=True)
+def _take_out(cell_list, cells, parent, products, volume, row, start, neighbour, stiffness):
+    for e in cell_list:
+        for a in range(4):
+            r = row[cells[e, a]]
+            if r < 0:
+                continue
+            for s in range(start[r], start[r + 1]):
+                for b in range(4):
+                    if b != a and neighbour[s] == cells[e, b]:
+                        stiffness[s] -= volume[e] * products[parent[e], _PAIR[a, b]]
 
 
 @njit(cache=True)

@@ -17,12 +17,13 @@ from numba import njit
 
 from fluid.corrector import Corrected, corrected
 from fluid.domain import carry, wetted_coupling
-from fluid.extension import BAND, continue_into_solids, fill_missing
-from fluid.level_set import FAR, redistance, without_films
+from fluid.extension import BAND, fill_missing
+from fluid.first_surface import first_surface
+from fluid.level_set import FAR
 from fluid.mesh import Background
 from fluid.momentum import MomentumChange
 from fluid.parameters import WaterParameters
-from fluid.predictor import keep_dry, predicted
+from fluid.predictor import predicted
 from fluid.projection import PressureProblem
 from fluid.topology import Graph, Topology, layers_around
 from fluid.volume import carry_volume, edge_flux, nodal_volume, renumbering
@@ -103,7 +104,9 @@ class Water:
         level = fill(self.topology.nodes) if callable(fill) else np.asarray(fill, float)
         if sides is not None:
             sides.surface(level, 0.0)
-        self.level_set = self._first_surface(self._dry_if_inactive(level))
+        level = self._dry_if_inactive(level)
+        around = self.layers((level < 0.0) & self.topology.active)[0]
+        self.level_set = first_surface(self.topology, level, around, mesh.spacing)
         self.velocity, self.acceleration = np.zeros((n, 3)), np.zeros((n, 3))
         self.pressure = self._pressure_at_rest()
         self.end_pressure = self.pressure.copy()
@@ -120,17 +123,6 @@ class Water:
         self.flux = edge_flux(
             self.topology, self.graph_for(self.listed), self.listed, self.cell_velocity, self.nodal_water
         )
-
-    def _first_surface(self, level):
-        """φ (N,) as the steps make it, so that the first one finds nothing to correct beside solids."""
-        t, h = self.topology, self.mesh.spacing
-        level = redistance(t, level, h, rescale=False)
-        for _ in range(2):  # the first continuation still sees a surface bent inside the solids
-            held = nodal_volume(t, level)
-            continue_into_solids(t, level, self.layers((level < 0.0) & t.active)[0])
-            keep_dry(t, level, held)
-            level = redistance(t, level, h, rescale=False)
-        return without_films(level, h)
 
     # ---- the step
 

@@ -26,17 +26,18 @@ from fluid.moments import cells_touching
 from fluid.projection import with_ghosts
 
 
-def waterline_load(domain, phi, wet, pressure, open_node) -> np.ndarray:
+def waterline_load(domain, faces, phi, wet, pressure, open_node) -> np.ndarray:
     """R of (2): force and moment on every body (n_bodies, 6) [N, N m].
 
-    phi (N,) [m] · wet (N,) bool · pressure (N,) [Pa], read on wet nodes · open_node (N,) bool: p = 0."""
+    faces (k,) rows of the polygons to look at · phi (N,) [m] · wet (N,) bool · pressure (N,) [Pa], read on wet nodes ·
+    open_node (N,) bool: p = 0."""
     load = np.zeros((domain.n_bodies, 6))
-    corners = domain.cells[domain.face_cell]
+    corners = domain.cells[domain.face_cell[faces]]
     count = wet[corners].sum(axis=1)
-    at = np.flatnonzero((count > 0) & (count < 4))
-    if len(at) == 0:
+    mixed = (count > 0) & (count < 4)
+    if not mixed.any():
         return load
-    corners = corners[at]
+    at, corners = faces[mixed], corners[mixed]
     p = np.where(wet & ~open_node, pressure, 0.0)
     beside = cells_touching(np.isin(np.arange(len(phi)), corners), domain.cells)
     ghosts = with_ghosts(p, wet, open_node, phi, beside, domain.cells)

@@ -7,23 +7,24 @@ import scipy.sparse as sp
 from numba import njit
 
 
-def wetted_coupling(domain) -> sp.csr_matrix:
+def wetted_coupling(domain, polygons=slice(None)) -> sp.csr_matrix:
     """G (N, 6 n_bodies): G[i, 6b:6b+3] = ∫ N_i n dA [m2], G[i, 6b+3:6b+6] = ∫ N_i (x - x_b) x n dA [m3].
 
     n points out of body b, so a pressure field p loads it by force and torque -G^T p, and G V is the flux
     that the body's motion V = (v, omega) pushes into the test functions. Exact: the integrands are of
-    degree 2. domain: PhysicalDomain."""
+    degree 2. domain: PhysicalDomain; polygons: rows of its wetted polygons to sum over."""
     shape = (len(domain.nodes), 6 * domain.n_bodies)
-    if len(domain.face_cell) == 0:
+    cell, body = domain.face_cell[polygons], domain.face_body[polygons]
+    if len(cell) == 0:
         return sp.csr_matrix(shape)
-    cell = domain.face_cell
+    area, normal, points = (f[polygons] for f in (domain.face_area, domain.face_normal, domain.face_points))
     block = _blocks(
-        cell, domain.face_body, domain.face_area, domain.face_normal, domain.face_points, domain.body_centre,
+        cell, body, area, normal, points, domain.body_centre,
         domain.nodes, domain.cells, domain.parent_cell, domain.memory.mesh.gradients,
     )  # fmt: skip
     start, members = polygons_of_nodes(cell, domain.cells, shape[0])
-    row = _distinct(start, members, domain.face_body)
-    values, columns = _summed(start, members, domain.face_body, block, row)
+    row = _distinct(start, members, body)
+    values, columns = _summed(start, members, body, block, row)
     return sp.csr_matrix((values.ravel(), columns.ravel(), 6 * row), shape=shape)
 
 

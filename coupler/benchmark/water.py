@@ -15,11 +15,7 @@ BEFORE = 0.35
 """Seconds of the dam break before the steps that are measured."""
 STAGES = {
     "transport": (("predictor", "transport"),),
-    "distance": (
-        ("predictor", "redistance"),
-        ("predictor", "continue_into_solids"),
-        ("predictor", "keep_dry"),
-    ),
+    "distance": (("predictor", "redistance"),),
     "volume": (("water", "carry_volume"), ("predictor", "correct_volume"), ("corrector", "edge_flux")),
     "pressure matrix": (("predictor", "_problem"),),
     "solver, set-up": (("solve", "Multigrid"),),

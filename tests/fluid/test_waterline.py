@@ -71,4 +71,6 @@ def test_solids_wholly_under_water_need_no_correction():
     domain = cut_domain(mesh, boxes([0.5, 0.5, 0.3]))
     phi = domain.nodes[:, 2] - 0.9
     no_side = np.zeros(len(phi), bool)
-    assert not waterline_load(domain, phi, phi < 0.0, -WEIGHT * phi, no_side).any()
+    assert not waterline_load(
+        domain, np.arange(len(domain.face_cell)), phi, phi < 0.0, -WEIGHT * phi, no_side
+    ).any()
