@@ -13,6 +13,8 @@ c: cell edge, t = TOUCHES c. Elsewhere s stays, so that a level surface stays a 
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 
 from fluid.quadrature import part_points
@@ -23,6 +25,8 @@ TOUCHES = 0.1
 """Share of a cell edge within which the side of a box counts as the face of the solid."""
 MISSING = 0.05
 """Share of a cell edge that a solid must take off the cells around a node to count."""
+SEAM = 1e-6
+"""Share of a cell edge within which two boxes touch."""
 
 
 def start_level(boxes, tank, mesh, domain) -> Array:
@@ -36,7 +40,27 @@ def start_level(boxes, tank, mesh, domain) -> Array:
     cut_low = low - whole_low[domain.parent_node] > MISSING * edge
     cut_high = whole_high[domain.parent_node] - high > MISSING * edge
     stars = (domain.nodes, low, high, cut_low, cut_high)
-    return np.min([_box_level(box, tank, stars, edge) for box in boxes], axis=0)
+    level = np.min([_box_level(box, tank, stars, edge) for box in boxes], axis=0)
+    return _without_seams(level, boxes, tank, domain.nodes, edge)
+
+
+def _without_seams(level, boxes, tank, nodes, edge: float) -> Array:
+    """The level (N,) with water where boxes touch: the distance to both is zero on the face that they share."""
+    at = np.flatnonzero(np.abs(level) < SEAM * edge)
+    around = np.array(list(product((-1.0, 1.0), repeat=3))) * SEAM * edge
+    inside = np.ones(len(at), bool)
+    for offset in around:
+        inside &= np.any([_in_box(box, tank, nodes[at] + offset) for box in boxes], axis=0)
+    level[at[inside]] = -edge
+    return level
+
+
+def _in_box(box, tank, points) -> Array:
+    """(n,) bool: inside the box, which goes on beyond the walls of the tank that it reaches."""
+    (box_low, box_high), (tank_low, tank_high) = np.array(box), np.array(tank)
+    low = np.where(box_low > tank_low, box_low, -np.inf)
+    high = np.where(box_high < tank_high, box_high, np.inf)
+    return np.all((points > low) & (points < high), axis=1)
 
 
 def _box_level(box, tank, stars, edge: float) -> Array:

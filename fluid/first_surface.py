@@ -24,7 +24,9 @@ def first_surface(topology, phi, listed, spacing: float):
     fill = phi
     for _ in range(3):  # the first continuation still sees a surface bent inside the solids
         # below a surface a fill may count from its other sides; above it, a distance would bend at the surface's end
-        phi = np.where((phi < 0.0) | topology.covered, redistance(topology, phi, spacing, rescale=False), fill)
+        phi = np.where(
+            (phi < 0.0) | topology.covered, redistance(topology, phi, spacing, rescale=False), fill
+        )
         held = nodal_volume(topology, phi)
         _continue_into_solids(topology, phi, listed)
         _keep_dry(topology, phi, held)
