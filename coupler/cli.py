@@ -162,6 +162,19 @@ def render(context: typer.Context) -> None:
 
 
 @app.command()
+def report(
+    place: Annotated[Path, typer.Argument(metavar="RUN|STUDY", help="the directory of a run or of a study")],
+    pictures: Annotated[
+        bool, typer.Option("--pictures/--no-pictures", help="with stills and figures of a run")
+    ] = True,
+) -> None:
+    """Write report.html into the directory: one file with pictures, figures and tables, for screen and paper."""
+    from coupler.report.command import report as write
+
+    print(f"report: {write(place, pictures)}")
+
+
+@app.command()
 def doctor() -> None:
     """Check that Python, YADE, threads, files and pictures work here."""
     one_thread()
@@ -173,10 +186,19 @@ def doctor() -> None:
 @app.command()
 def explain(
     key: Annotated[
-        str | None, typer.Argument(help="a name of the case file, for instance joints.strength")
+        str | None,
+        typer.Argument(
+            metavar="[KEY | RUN]",
+            help="a name of the case file, for instance joints.strength, or a run directory",
+        ),
     ] = None,
 ) -> None:
-    """Say what a name of the case file means, with unit, limits and default."""
+    """Say what a name of the case file means, or what a run left out and what that would have cost."""
+    if key and (Path(key) / "run.json").is_file():
+        from coupler.explain_run import explanation_of_run
+
+        print(explanation_of_run(Path(key)))
+        return
     from coupler.case_docs import explanation
 
     print(explanation(key))

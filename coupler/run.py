@@ -8,6 +8,7 @@ from coupler.build import Scene, build
 from coupler.case import Case, effective
 from coupler.clock import Clock
 from coupler.errors import ExitCode
+from coupler.left_out import imports, note_work
 from coupler.limits import LimitReached, Limits, check_balance, check_defect, check_momentum
 from coupler.observe import joint_counts, size
 from coupler.recorder import Recorder
@@ -44,7 +45,7 @@ def run(case: Case, directory, reporter, checkpoint=None) -> ExitCode:
             if scene.coupling.structure is not None:
                 scene.coupling.structure.close()
     finally:
-        directory.record(**figures, cpu_seconds=clock.split())
+        directory.record(**figures, cpu_seconds=clock.split(), imports=imports())
     _tell_fast_openings(figures, reporter)
     _tell_split(clock, reporter)
     return ExitCode.DONE
@@ -180,11 +181,13 @@ def _note(coupling, record, figures: dict) -> None:
         figures["volume_error"] = coupling.water.volume_error()
         largest("volume_error", abs(figures["volume_error"]))
         largest("water_force", np.linalg.norm(record.load[:, :3].sum(axis=0)))
+    joints = None
     if coupling.structure is not None:
         joints = joint_counts(coupling.structure)
         figures["joints"], figures["joints_broken"] = joints.intact + joints.broken, joints.broken
         largest("defect", record.defect)
         largest("opening_rate", record.opening_rate)
+    note_work(figures.setdefault("work", {}), coupling, record, joints, figures["steps"])
 
 
 def _told(coupling, record) -> dict[str, str]:

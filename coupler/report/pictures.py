@@ -1,0 +1,48 @@
+"""Pictures for a report, made from files in processes of their own: VTK and YADE do not live in one."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Sequence
+from importlib.util import find_spec
+from pathlib import Path
+
+STILL = "800x450"
+"""Of a film of that camera; a still has twice the pixels each way."""
+NEEDED = ("pyvista", "matplotlib", "imageio_ffmpeg")
+
+
+def missing() -> str:
+    """Why no pictures can be made here; empty where they can."""
+    absent = [name for name in NEEDED if find_spec(name) is None]
+    return f"not installed: {', '.join(absent)} (the extra `view`)" if absent else ""
+
+
+def stills(run: Path, folder: Path, times: Sequence[float]) -> str:
+    """A still of each time [s] into folder; the reason if one could not be made, else empty."""
+    for time in times:
+        reason = _view("coupler.view", run, "--still", "--time", repr(time), "--size", STILL, "--to", folder)
+        if reason:
+            return reason
+    return ""
+
+
+def plots(run: Path, folder: Path) -> str:
+    """Figures of the histories and curves over data into folder; the reason if they could not be made."""
+    return _view("coupler.view", run, "--plots", "--to", folder)
+
+
+def study_figures(study: Path) -> str:
+    """Error against run time beside study.json; the reason if they could not be drawn."""
+    return _view("coupler.view.study", study)
+
+
+def _view(module: str, *words: object) -> str:
+    done = subprocess.run(
+        [sys.executable, "-m", module, *map(str, words)], capture_output=True, text=True, check=False
+    )
+    if done.returncode == 0:
+        return ""
+    told = done.stderr.strip().splitlines()
+    return told[-1] if told else f"{module} ended with {done.returncode}"

@@ -1,0 +1,204 @@
+"""The report of a run: what was run, what came out, how far it is to be trusted, what was left out."""
+
+from __future__ import annotations
+
+import shlex
+from html import escape
+from pathlib import Path
+
+from coupler.explain_run import not_loaded, seconds_of, shares, skipped
+from coupler.report import tables
+from coupler.report.html import (
+    document,
+    facts,
+    figure,
+    film,
+    note,
+    paragraph,
+    percent,
+    preformatted,
+    quantity,
+    section,
+    table,
+)
+
+CAPTIONS = {
+    "gauges": "Gauges",
+    "energy": "Energy: change since the first step",
+    "structure": "Structure: joints, momentum of the blocks, impulse of the water on them, fastest point",
+    "water": "Water: volume, what the numerics moved, momentum",
+    "momentum": "Momentum: what each line has added since the start",
+    "angular_momentum": "Angular momentum: what each line has added since the start",
+    "coupling": "Steps: length, passes, iterations, defect",
+}
+"""Of the figures of the histories, in the order in which they are shown; other tables come behind the gauges."""
+FIGURES = {
+    "time": ("time that was reached", "s"),
+    "steps": ("steps", "1"),
+    "substeps": ("substeps of the blocks", "1"),
+    "largest_water_force": ("largest force of the water on all bodies", "N"),
+    "joints": ("joints at the start", "1"),
+    "joints_broken": ("joints broken", "1"),
+    "largest_opening_rate": ("largest opening in a substep, of the opening at failure", "1"),
+    "numerical_dissipation": ("energy that the numerics took, of the input", "1"),
+    "numerical_impulse": ("impulse of the lines of the scheme, of all impulses", "1"),
+}
+"""Figures of run.json that the page tells."""
+
+
+def run_page(run: Path, summary: dict, pictures: Path, remarks: list[str]) -> str:
+    """The whole page. pictures: folder of stills and figures; remarks: why some are missing."""
+    title = summary["case"]["case"]["title"]
+    return document(
+        title,
+        [
+            f"<h1>{escape(title)}</h1>",
+            paragraph(summary["case"]["case"].get("description", "")),
+            _verdict(summary),
+            section("What was run", _what(run, summary)),
+            section("Pictures", _stills(run, pictures), *map(note, remarks)),
+            section("Results", _figures(summary), _promises(summary)),
+            section("Computed over data", *(figure(p, _words(p.stem)) for p in over_data(run, pictures))),
+            section("Histories", *(figure(p, _caption(p.stem)) for p in plots(run, pictures))),
+            section("Ledger", tables.energy(run), tables.volume(run), tables.momentum(run, "momentum")),
+            section("Cracks", tables.cracks(run)),
+            section("Limits", tables.limits(summary)),
+            section("Processor time, and what was left out", _time(summary), _left_out(summary)),
+            section("The case as it was written", _case(run)),
+        ],
+    )
+
+
+def _verdict(summary: dict) -> str:
+    bad = summary["exit_code"] not in (0, None)
+    told = summary["status"]
+    if summary["exit_reason"]:
+        told += f" (exit code {summary['exit_code']}): {summary['exit_reason']}"
+    elif summary["status"] == "running":
+        told += ": the run goes on, or it was killed; this is what it has written so far"
+    return f'<p class="verdict{" bad" if bad else ""}">{escape(told)}</p>'
+
+
+def _what(run: Path, summary: dict) -> str:
+    on = [name for name, on in summary["modules"].items() if on]
+    off = [name for name, on in summary["modules"].items() if not on]
+    machine, git = summary["machine"], summary.get("git")
+    rows = [
+        ("case", summary["case_file"]),
+        ("changed keys", ", ".join(summary["overrides"]) or "none"),
+        ("command", shlex.join(summary["command"])),
+        ("results in", str(run.resolve())),
+        ("began, ended", f"{summary['started']}, {summary['ended'] or '–'}"),
+        ("resumed", ", ".join(f"{again['at']}" for again in summary.get("resumed", []))),
+        ("wall time", quantity(summary.get("wall_seconds"), "s")),
+        ("processor time", quantity(summary.get("cpu_seconds"), "s")),
+        ("on", ", ".join(on)),
+        ("off", ", ".join(off)),
+        *((what, law) for what, law in summary["figures"].get("laws", {}).items()),
+        ("size at the start", _size(summary["figures"].get("size", {}))),
+        (
+            "machine",
+            f"{machine['processor']}, {machine['cores']} cores, OMP_NUM_THREADS {machine['threads']}; "
+            f"{machine['system']}",
+        ),
+        ("versions", ", ".join(f"{name} {number}" for name, number in summary["versions"].items())),
+        ("commit", f"{git['commit']}{' with changes' if git['changed'] else ''}" if git else "not from git"),
+    ]
+    return facts(rows)
+
+
+def _size(size: dict) -> str:
+    return ", ".join(f"{count} {_words(name)}" for name, count in size.items())
+
+
+def _stills(run: Path, pictures: Path) -> str:
+    found = sorted(pictures.glob("still_*s.png"), key=_time_of)
+    told = [figure(p, f"t = {quantity(_time_of(p), 's')}") for p in found]
+    made = run / "pictures" / "film.mp4"
+    if made.exists():
+        told.append(film(made, "pictures/film.mp4"))
+    return "\n".join(told)
+
+
+def _time_of(still: Path) -> float:
+    return float(still.stem.removeprefix("still_").removesuffix("s"))
+
+
+def _figures(summary: dict) -> str:
+    figures = summary["figures"]
+    rows = [
+        [what, quantity(figures[name], unit) if unit != "1" else _number(figures[name])]
+        for name, (what, unit) in FIGURES.items()
+        if name in figures
+    ]
+    return table(["figure", "value"], rows)
+
+
+def _number(value: float) -> str:
+    return f"{value}" if isinstance(value, int) else f"{value:.4g}"
+
+
+def _promises(summary: dict) -> str:
+    kept = summary["figures"].get("expected", {})
+    rows = [[what, "kept" if is_kept else "NOT KEPT"] for what, is_kept in kept.items()]
+    return table(["what expected.toml promises", "in this run"], rows, (0, 1))
+
+
+def plots(run: Path, pictures: Path) -> list[Path]:
+    """Figures of the histories in the order of CAPTIONS, other tables behind the gauges."""
+    order = list(CAPTIONS)
+    stems = sorted(p.stem for p in (run / "history").glob("*.csv"))
+    ranked = sorted(stems, key=lambda stem: order.index(stem) if stem in order else 0.5)
+    return [pictures / f"{stem}.png" for stem in ranked if (pictures / f"{stem}.png").exists()]
+
+
+def over_data(run: Path, pictures: Path) -> list[Path]:
+    """Figures that the case asks for: neither stills nor histories."""
+    histories = plots(run, pictures)
+    return [
+        p for p in sorted(pictures.glob("*.png")) if p not in histories and not p.name.startswith("still_")
+    ]
+
+
+def _caption(stem: str) -> str:
+    return f"{CAPTIONS.get(stem, _words(stem))} (history/{stem}.csv)"
+
+
+def _time(summary: dict) -> str:
+    rows = [[name, quantity(seconds, "s"), percent(share)] for name, seconds, share in shares(summary)]
+    return table(["part", "processor time", "share"], rows)
+
+
+def _left_out(summary: dict) -> str:
+    rows = [
+        [row.what, f"{row.done:.4g}", f"{row.skipped:.4g}", _cost(row.seconds),
+         quantity(seconds_of(summary, row.parts), "s"),         ", ".join(row.parts)]
+        for row in skipped(summary)
+    ]  # fmt: skip
+    head = ["skipped in the steps", "done", "skipped", "would have cost", "paid", "for"]
+    told = [f"{part} ({', '.join(names)})" for part, names in not_loaded(summary).items()]
+    return "\n".join(
+        [
+            table(head, rows, (0, 5)),
+            note(
+                "Numbers a step, means over the steps. The cost is an estimate: what one took in this run, times those "
+                "that were skipped; a dash where the run holds no measure of one."
+                if rows
+                else "This run has counted nothing of what it skipped."
+            ),
+            paragraph(f"Not loaded at all: {', '.join(told)}." if told else ""),
+        ]
+    )
+
+
+def _cost(seconds: float | None) -> str:
+    return "–" if seconds is None else f"about {quantity(float(f'{seconds:.2g}'), 's')}"
+
+
+def _case(run: Path) -> str:
+    path = run / "case.toml"
+    return preformatted(path.read_text(encoding="utf-8")) if path.exists() else ""
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")
