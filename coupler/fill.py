@@ -46,20 +46,36 @@ def start_level(boxes, tank, mesh, domain) -> Array:
 
 def _without_seams(level, boxes, tank, nodes, edge: float) -> Array:
     """The level (N,) with water where boxes touch: the distance to both is zero on the face that they share."""
-    at = np.flatnonzero(np.abs(level) < SEAM * edge)
-    around = np.array(list(product((-1.0, 1.0), repeat=3))) * SEAM * edge
+    step = SEAM * edge
+    at = np.flatnonzero(np.abs(level) < step)
     inside = np.ones(len(at), bool)
-    for offset in around:
+    for offset in product((-step, step), repeat=3):
         inside &= np.any([_in_box(box, tank, nodes[at] + offset) for box in boxes], axis=0)
-    level[at[inside]] = -edge
+    at = at[inside]
+    if len(at) > 0:
+        ways = [_reach_of(boxes, tank, nodes[at], k, sign, step) for k in range(3) for sign in (-1, 1)]
+        level[at] = -np.min(ways, axis=0)
     return level
 
 
-def _in_box(box, tank, points) -> Array:
+def _reach_of(boxes, tank, points, axis: int, sign: int, step: float) -> Array:
+    """How far (n,) [m] the union of the boxes reaches from points (n, 3) in it along an axis."""
+    way, whole = np.zeros(len(points)), np.ptp(np.array(tank))
+    for box in list(boxes) * len(boxes):  # from box to box, at most through all of them
+        ahead = points.copy()
+        ahead[:, axis] += sign * (way + step)
+        end = box[0 if sign < 0 else 1][axis]
+        goes_on = end <= tank[0][axis] if sign < 0 else end >= tank[1][axis]
+        far = whole if goes_on else sign * (end - points[:, axis])
+        way = np.where(_in_box(box, tank, ahead, 0.5 * step), np.maximum(way, far), way)
+    return way
+
+
+def _in_box(box, tank, points, slack: float = 0.0) -> Array:
     """(n,) bool: inside the box, which goes on beyond the walls of the tank that it reaches."""
     (box_low, box_high), (tank_low, tank_high) = np.array(box), np.array(tank)
-    low = np.where(box_low > tank_low, box_low, -np.inf)
-    high = np.where(box_high < tank_high, box_high, np.inf)
+    low = np.where(box_low > tank_low, box_low - slack, -np.inf)
+    high = np.where(box_high < tank_high, box_high + slack, np.inf)
     return np.all((points > low) & (points < high), axis=1)
 
 
