@@ -38,6 +38,11 @@ class Skipped:
         whole = self.done + self.skipped
         return self.done / whole if whole > 0.0 else 1.0
 
+    @property
+    def how_sure(self) -> str:
+        """Joints are charged with all that the substeps cost, also with what does not grow with their number."""
+        return "at most" if self.unit == "joint" else "about"
+
 
 def skipped(summary: dict) -> list[Skipped]:
     """What a run of this summary (run.json) did not compute; empty for runs without figures.work."""
@@ -159,7 +164,7 @@ def in_words(row: Skipped, paid: float) -> str:
     if row.seconds is None:
         return told + "; no estimate, the run holds no measure of one"
     names = " and ".join(row.parts)
-    return told + f"; about {row.seconds:.2g} s more, beside {paid:.2g} s that {names} took"
+    return told + f"; {row.how_sure} {row.seconds:.2g} s more, beside {paid:.2g} s that {names} took"
 
 
 def _count(value: float) -> str:

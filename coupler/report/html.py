@@ -100,8 +100,14 @@ def quantity(value: float | None, unit: str) -> str:
     if value is None or value != value:
         return "–"
     power = _power(abs(value)) if unit in PREFIXED else 0
-    told = f"{value / 1000.0**power:.4g}"
+    power = min(power, 0) if unit == "s" else power
+    told = f"{_digits(value / 1000.0**power)}"
     return f"{told} {PREFIXES[power]}{UNIT_TEXT.get(unit, unit)}".strip()
+
+
+def _digits(value: float) -> str:
+    """Four digits, whole ones without a power of ten."""
+    return f"{value:.0f}" if 1e4 <= abs(value) < 1e9 else f"{value:.4g}"
 
 
 def _power(size: float) -> int:

@@ -9,6 +9,8 @@ from pathlib import Path
 from coupler.report.html import figure, table
 
 IMAGE = re.compile(r"!\[(.*)\]\((.*)\)")
+UNITS = {"set-up": "s", "start": "s", "compile": "s"}
+"""Of the columns of a study that are CPU seconds beside a column that says so."""
 MARKS = (
     (re.compile(r"`([^`]+)`"), r"<code>\1</code>"),
     (re.compile(r"\*\*(.+?)\*\*"), r"<strong>\1</strong>"),
@@ -36,7 +38,7 @@ def _block(block: str, folder: Path) -> str:
 
 def _table(lines: list[str]) -> str:
     rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
-    return table(rows[0], rows[2:])
+    return table([f"{name} {UNITS[name]}" if name in UNITS else name for name in rows[0]], rows[2:])
 
 
 def _figure(path: Path, caption: str) -> str:

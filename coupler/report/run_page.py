@@ -6,7 +6,7 @@ import shlex
 from html import escape
 from pathlib import Path
 
-from coupler.explain_run import not_loaded, seconds_of, shares, skipped
+from coupler.explain_run import Skipped, not_loaded, seconds_of, shares, skipped
 from coupler.report import tables
 from coupler.report.html import (
     document,
@@ -32,6 +32,8 @@ CAPTIONS = {
     "coupling": "Steps: length, passes, iterations, defect",
 }
 """Of the figures of the histories, in the order in which they are shown; other tables come behind the gauges."""
+OF_SCHEME = ("momentum", "angular_momentum", "coupling")
+"""Histories that tell of the scheme rather than of the scene: towards the end of the page."""
 FIGURES = {
     "time": ("time that was reached", "s"),
     "steps": ("steps", "1"),
@@ -44,6 +46,14 @@ FIGURES = {
     "numerical_impulse": ("impulse of the lines of the scheme, of all impulses", "1"),
 }
 """Figures of run.json that the page tells."""
+NEEDS = {
+    "substeps": ("structure",),
+    "largest_water_force": ("structure", "fixed solids"),
+    "joints": ("joints",),
+    "joints_broken": ("joints",),
+    "largest_opening_rate": ("joints",),
+}
+"""Figures that say something only where one of these modules is on."""
 
 
 def run_page(run: Path, summary: dict, pictures: Path, remarks: list[str]) -> str:
@@ -59,11 +69,12 @@ def run_page(run: Path, summary: dict, pictures: Path, remarks: list[str]) -> st
             section("Pictures", _stills(run, pictures), *map(note, remarks)),
             section("Results", _figures(summary), _promises(summary)),
             section("Computed over data", *(figure(p, _words(p.stem)) for p in over_data(run, pictures))),
-            section("Histories", *(figure(p, _caption(p.stem)) for p in plots(run, pictures))),
+            section("Histories", *_histories(run, pictures, of_scheme=False)),
             section("Ledger", tables.energy(run), tables.volume(run), tables.momentum(run, "momentum")),
             section("Cracks", tables.cracks(run)),
             section("Limits", tables.limits(summary)),
             section("Processor time, and what was left out", _time(summary), _left_out(summary)),
+            section("Histories of the scheme", *_histories(run, pictures, of_scheme=True)),
             section("The case as it was written", _case(run)),
         ],
     )
@@ -113,7 +124,8 @@ def _size(size: dict) -> str:
 
 def _stills(run: Path, pictures: Path) -> str:
     found = sorted(pictures.glob("still_*s.png"), key=_time_of)
-    told = [figure(p, f"t = {quantity(_time_of(p), 's')}") for p in found]
+    told = [figure(p, f"t = {_time_of(p):.4g} s") for p in found]
+    told = [f'<div class="stills">{"".join(told)}</div>'] if told else []
     made = run / "pictures" / "film.mp4"
     if made.exists():
         told.append(film(made, "pictures/film.mp4"))
@@ -129,9 +141,13 @@ def _figures(summary: dict) -> str:
     rows = [
         [what, quantity(figures[name], unit) if unit != "1" else _number(figures[name])]
         for name, (what, unit) in FIGURES.items()
-        if name in figures
+        if name in figures and _says_something(name, summary["modules"])
     ]
     return table(["figure", "value"], rows)
+
+
+def _says_something(figure_name: str, modules: dict) -> bool:
+    return figure_name not in NEEDS or any(modules.get(module, True) for module in NEEDS[figure_name])
 
 
 def _number(value: float) -> str:
@@ -160,6 +176,11 @@ def over_data(run: Path, pictures: Path) -> list[Path]:
     ]
 
 
+def _histories(run: Path, pictures: Path, of_scheme: bool) -> list[str]:
+    found = plots(run, pictures)
+    return [figure(p, _caption(p.stem)) for p in found if (p.stem in OF_SCHEME) == of_scheme]
+
+
 def _caption(stem: str) -> str:
     return f"{CAPTIONS.get(stem, _words(stem))} (history/{stem}.csv)"
 
@@ -171,9 +192,10 @@ def _time(summary: dict) -> str:
 
 def _left_out(summary: dict) -> str:
     rows = [
-        [row.what, f"{row.done:.4g}", f"{row.skipped:.4g}", _cost(row.seconds),
+        [row.what, _count(row.done), _count(row.skipped), _cost(row),
          quantity(seconds_of(summary, row.parts), "s"),         ", ".join(row.parts)]
         for row in skipped(summary)
+        if row.done + row.skipped > 0.0
     ]  # fmt: skip
     head = ["skipped in the steps", "done", "skipped", "would have cost", "paid", "for"]
     told = [f"{part} ({', '.join(names)})" for part, names in not_loaded(summary).items()]
@@ -191,8 +213,14 @@ def _left_out(summary: dict) -> str:
     )
 
 
-def _cost(seconds: float | None) -> str:
-    return "–" if seconds is None else f"about {quantity(float(f'{seconds:.2g}'), 's')}"
+def _count(value: float) -> str:
+    return f"{value:.0f}" if value >= 100.0 else f"{value:.3g}"
+
+
+def _cost(row: Skipped) -> str:
+    if row.seconds is None:
+        return "–"
+    return f"{row.how_sure} {quantity(float(f'{row.seconds:.2g}'), 's')}"
 
 
 def _case(run: Path) -> str:

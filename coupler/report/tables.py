@@ -179,7 +179,7 @@ def _share(value: float) -> str:
 
 
 def _reached(value: float, limit: float) -> str:
-    return f"{100.0 * value / limit:.2g} %" + (" – passed" if value > limit else "")
+    return f"{100.0 * value / limit:.3g} %" + (" – passed" if value > limit else "")
 
 
 def _words(name: str) -> str:

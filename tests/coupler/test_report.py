@@ -1,0 +1,164 @@
+"""A report is one file that needs no other, says what happened, and gives every number its unit."""
+
+import json
+import re
+import subprocess
+import sys
+from html.parser import HTMLParser
+
+import pytest
+
+from coupler.errors import NoRun
+from coupler.history import CRACK_COLUMNS, HistoryTable, write_cracks
+from coupler.recorder import ENERGY, WATER
+from coupler.report import pictures
+from coupler.report.command import report
+from coupler.report.html import figure, quantity, table
+from coupler.report.markdown import to_html
+
+PIXEL = bytes.fromhex(
+    "89504e470d0a1a0a0000000d49484452000000010000000108060000001f15c4890000000d49444154789c6360000002000001e221bc33"
+    "0000000049454e44ae426082"
+)
+SUMMARY = {
+    "status": "diverged", "exit_code": 3, "exit_reason": "the water volume is off by <5 %",
+    "started": "2026-01-01T00:00:00+00:00", "ended": "2026-01-01T00:01:00+00:00", "process": 1,
+    "command": ["surgebreak", "run", "case"], "case_file": "/nowhere/case.toml", "overrides": ["time.end=2 s"],
+    "modules": {"water": True, "structure": True, "coupling": True, "joints": True, "viscosity": False},
+    "versions": {"surgebreak": "0.1.0"}, "git": None, "wall_seconds": 4000.0, "cpu_seconds": 50.0,
+    "machine": {"system": "Linux", "processor": "a processor", "cores": 2, "threads": "1"},
+    "figures": {
+        "steps": 2, "time": 0.2, "largest_volume_error": 0.03, "largest_water_force": 12500.0,
+        "cpu_seconds": {"water": 3.0, "pressure": 1.0},
+        "work": {"mesh_cells": 90, "cells": 80, "wet_cells": 20, "bodies": 0, "bodies_cut": 0, "passes": 1},
+        "imports": {"fluid": True, "yade": True}, "expected": {"the water keeps its volume": False},
+    },
+    "case": {"case": {"title": "Water & a <wall>"}, "limits": {"volume_error": 0.02}},
+}  # fmt: skip
+
+
+@pytest.fixture
+def run(tmp_path):
+    """A run directory as one that diverged leaves it, without fields: two steps of histories and two joints."""
+    (tmp_path / "history").mkdir()
+    (tmp_path / "run.json").write_text(json.dumps(SUMMARY), encoding="utf-8")
+    (tmp_path / "case.toml").write_text('[case]\ntitle = "<b>"\n', encoding="utf-8")
+    for name, columns in (("energy", ENERGY), ("water", WATER)):
+        with HistoryTable(tmp_path / "history" / f"{name}.csv", columns) as history:
+            for step in (1, 2):
+                history.append(**{c[0]: 1500.0 * step if c[1] == "J" else 0.1 * step for c in columns})
+    one = {c.name: [1.0, 0.0] for c in CRACK_COLUMNS if c.unit != "J"} | {"dissipated": [2500.0, 0.0]}
+    vectors = {name: [[0.5, 0.0, 1.0]] * 2 for name in ("centre", "normal")}
+    write_cracks(tmp_path / "cracks.csv", one | vectors | {"intact": [0, 1], "time": [0.15, float("nan")]})
+    return tmp_path
+
+
+class Outside(HTMLParser):
+    """Collects what a page would load from elsewhere, and checks that tags close in order."""
+
+    def __init__(self):
+        super().__init__()
+        self.found, self.open = [], []
+
+    def handle_starttag(self, tag, attributes):
+        self.found += [v for k, v in attributes if k in ("src", "href") and not v.startswith("data:")]
+        if tag not in ("meta", "img", "br"):
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+
+def read(path):
+    text = path.read_text(encoding="utf-8")
+    page = Outside()
+    page.feed(text)
+    assert page.open == []
+    assert page.found == []
+    return text
+
+
+def test_the_page_of_a_run_is_whole_and_alone(run):
+    told = read(report(run, with_pictures=False))
+    assert "diverged (exit code 3): the water volume is off by &lt;5 %" in told
+    assert "Water &amp; a &lt;wall&gt;" in told
+    assert "&lt;b&gt;" in told
+    for title in ("What was run", "Ledger", "Cracks", "Limits", "Processor time, and what was left out"):
+        assert f"<h2>{title}</h2>" in told
+    assert "NOT KEPT" in told
+    assert "time.end=2 s" in told
+
+
+def test_numbers_have_their_units(run):
+    told = read(report(run, with_pictures=False))
+    assert "12.5 kN" in told
+    assert "4000 s" in told
+    assert re.search(r"1\.5 kJ.*3 kJ.*1\.5 kJ", told)
+    assert "1 of 2 joints broke" in told
+    assert "dissipated 2.5 kJ" in told
+
+
+def test_a_limit_that_was_passed_is_marked(run):
+    assert "150 % – passed" in read(report(run, with_pictures=False))
+
+
+def test_what_could_not_be_drawn_is_said(run, monkeypatch):
+    """A run that was stopped before its first output has no pictures; nor has a machine without the extra."""
+    assert "the run has stored no fields" in read(report(run))
+    monkeypatch.setattr(pictures, "NEEDED", ("a_package_that_is_nowhere",))
+    assert "not installed: a_package_that_is_nowhere" in read(report(run))
+
+
+def test_a_directory_of_something_else_is_refused(tmp_path):
+    with pytest.raises(NoRun, match="neither a run"):
+        report(tmp_path)
+
+
+def test_the_report_leaves_yade_and_pictures_alone(run):
+    """It reads files; VTK and matplotlib are loaded by the processes that draw."""
+    code = (
+        "import sys; from pathlib import Path; from coupler.report.command import report\n"
+        f"report(Path({str(run)!r}), False)\n"
+        "print(*sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    loaded = {name.split(".")[0] for name in done.stdout.split()}
+    assert loaded & {"yade", "yade_scripts", "fluid", "matplotlib", "pyvista", "vtkmodules"} == set()
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "told"),
+    [
+        (1234.5, "J", "1.234 kJ"), (0.0, "N", "0 N"), (-2.5e-5, "m", "-25 µm"), (3600.0, "s", "3600 s"),
+        (0.02, "s", "20 ms"), (12.0, "m3", "12 m³"), (0.25, "1", "0.25"), (None, "J", "–"), (float("nan"), "J", "–"),
+    ],
+)  # fmt: skip
+def test_quantities_are_short_and_have_units(value, unit, told):
+    assert quantity(value, unit) == told
+
+
+def test_a_figure_is_in_the_page(tmp_path):
+    """Of the same figure as SVG and PNG the smaller is taken."""
+    (tmp_path / "a.png").write_bytes(PIXEL)
+    assert "data:image/png;base64," in figure(tmp_path / "a.png", "a")
+    (tmp_path / "a.svg").write_text("<svg/>", encoding="utf-8")
+    assert "data:image/svg+xml;base64," in figure(tmp_path / "a.png", "a")
+
+
+def test_a_table_without_rows_is_not_there():
+    assert table(["a", "b"], []) == ""
+
+
+def test_markdown_of_a_study(tmp_path):
+    (tmp_path / "q.png").write_bytes(PIXEL)
+    told = to_html(
+        "# T & U\n\n**bold** and `a < b`\n\n![what](q.png)\n\n![gone](r.png)\n\n"
+        "| run | set-up |\n|---|--:|\n| a | 1 |\n\n- one\n- two\n",
+        tmp_path,
+    )
+    assert "<h1>T &amp; U</h1>" in told
+    assert "<strong>bold</strong> and <code>a &lt; b</code>" in told
+    assert told.count("<img") == 1
+    assert "r.png was not drawn" in told
+    assert "set-up s" in told
+    assert "<li>one</li><li>two</li>" in told
