@@ -33,8 +33,9 @@ MEMORY_DEPTH = 2.0
 """Cells nearer to the surface than this (in cell sizes) keep no remainder: there it feeds surface noise."""
 WATERLINE_DAMPING, WATERLINE_DEPTH = 0.5, 1.0
 """Share of the difference to its neighbours that velocity beside a water line on a solid loses in a step, and how far
-below the surface (in cell sizes).  On a slope of 1:20 noise grows by 0.01 a step with 0.1, and with 0.3 still where the
-surface passes through nodes."""
+below the surface (in cell sizes). On a slope of 1:20 noise grows by 0.01 a step with 0.1, and with 0.3 still where
+the surface passes through nodes. Less in faster water, none where it crosses a cell in a step: there it would take
+what is real."""
 
 
 @dataclass(frozen=True)
@@ -157,7 +158,7 @@ def _limit_and_damp(water, kept, u, a):
     )
     damp_waterline(
         kept.wet_cells,
-        WATERLINE_DAMPING,
+        WATERLINE_DAMPING * water.calm(kept.end - water.time),
         kept.level_set,
         kept.wet,
         t.beside_solid,

@@ -133,8 +133,11 @@ class Water:
         p = self.parameters
         if self.steps < 2 or p.theta == 1.0:
             return 1.0
-        crossed = min(1.0, self.fastest() * dt / self.mesh.spacing)
-        return min(p.theta, p.calm_theta + (p.theta - p.calm_theta) * crossed)
+        return min(p.theta, p.theta - (p.theta - p.calm_theta) * self.calm(dt))
+
+    def calm(self, dt: float) -> float:
+        """1 for water at rest, 0 where the fastest crosses a cell in a step dt [s]."""
+        return 1.0 - min(1.0, self.fastest() * dt / self.mesh.spacing)
 
     def stable_step(self) -> float:
         """dt [s]: Courant number of the fastest water, and LONGEST_STEP sqrt(h/g)."""
