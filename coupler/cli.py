@@ -194,7 +194,7 @@ def explain(
     ] = None,
 ) -> None:
     """Say what a name of the case file means, or what a run left out and what that would have cost."""
-    if key and (Path(key) / "run.json").is_file():
+    if key and (os.sep in key or (Path(key) / "run.json").is_file()):
         from coupler.explain_run import explanation_of_run
 
         print(explanation_of_run(Path(key)))

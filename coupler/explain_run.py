@@ -148,6 +148,8 @@ def _opening(place: Path, summary: dict) -> list[str]:
 
 def _work(summary: dict) -> list[str]:
     rows = [in_words(row, seconds_of(summary, row.parts)) for row in skipped(summary) if row.skipped > 0.0]
+    if "work" not in summary["figures"]:
+        return ["skipped in the steps: not known, the run has no counts (figures.work of run.json)"]
     if not rows:
         return ["skipped in the steps: nothing that was counted"]
     note = (

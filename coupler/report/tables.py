@@ -36,7 +36,7 @@ def energy(run: Path) -> str:
         for c in lines
         if np.abs(found[c.name]).max() > NEGLIGIBLE * largest
     ]
-    error = percent(float(found["energy_error"][-1]))
+    error = _share(float(found["energy_error"][-1]))
     return table(
         ["energy", "after the first step", "at the end", "change", "what it is"], rows, (0, 4)
     ) + note(f"What the lines miss at the end, over the energy that the scene has put in: {error}.")
@@ -56,7 +56,7 @@ def volume(run: Path) -> str:
         for c in found.columns
         if c.unit == "m3"
     ]
-    error = percent(float(found["volume_error"][-1]))
+    error = _share(float(found["volume_error"][-1]))
     return table(
         ["volume", "after the first step", "at the end", "change", "what it is"], rows, (0, 4)
     ) + note(f"Volume that the books miss at the end: {error}.")

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from coupler.errors import NoRun
 from coupler.explain_run import explanation_of_run, not_loaded, shares, skipped
 from coupler.left_out import note_work
 from coupler.observe import JointCounts
@@ -71,6 +72,11 @@ def test_the_words_say_what_is_an_estimate(tmp_path):
     assert "costs are estimates" in told
     assert "cells without water: 75 of 100 a step; about 6 s more" in told
     assert "off in this case: viscosity" in told
+
+
+def test_a_directory_without_a_run_is_refused(tmp_path):
+    with pytest.raises(NoRun):
+        explanation_of_run(tmp_path)
 
 
 def test_counts_are_means_over_the_steps():

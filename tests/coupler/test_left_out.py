@@ -10,6 +10,7 @@ import time
 import pytest
 
 from coupler.history import read_history
+from coupler.left_out import HEAVY
 from coupler.provenance import ROOT
 
 from .test_case_file import WATER, write
@@ -35,16 +36,32 @@ def loaded(*arguments):
     return {name.split(".")[0] for name in done.stderr.split()}
 
 
+def figures(run):
+    return json.loads((run / "run.json").read_text(encoding="utf-8"))["figures"]
+
+
 def test_a_dry_case_loads_neither_the_water_nor_pictures(tmp_path):
+    """Nor does it book time to the water, count its cells or write its tables; run.json says so."""
     packages = loaded(DRY, "--end", "2 ms", "--output", tmp_path / "run")
     assert "yade" in packages
     assert packages & {"skfem", "fluid", "pyamg", "vtkmodules", "pyvista", "matplotlib"} == set()
+    told = figures(tmp_path / "run")
+    assert {name for name, is_loaded in told["imports"].items() if is_loaded} == packages & set(HEAVY)
+    assert told["cpu_seconds"].keys() == {"set-up", "structure", "output", "other"}
+    assert told["work"].keys() == {"blocks", "loose_blocks", "joints", "live_joints", "contacts"}
+    assert told["work"]["joints"] == told["joints"]
+    assert not (tmp_path / "run" / "history" / "water.csv").exists()
 
 
 def test_a_case_of_water_alone_never_loads_yade_or_pictures(tmp_path):
     packages = loaded(write(tmp_path, WATER), "--end", "20 ms", "--output", tmp_path / "run")
     assert "fluid" in packages
     assert packages & {"yade", "yade_scripts", "vtkmodules", "pyvista", "matplotlib"} == set()
+    told = figures(tmp_path / "run")
+    assert told["cpu_seconds"].keys() == {"set-up", "water", "pressure", "output", "other"}
+    assert told["work"].keys() == {"mesh_cells", "cells", "wet_cells", "bodies", "bodies_cut", "passes"}
+    assert 0 < told["work"]["wet_cells"] < told["work"]["cells"] == told["work"]["mesh_cells"]
+    assert not (tmp_path / "run" / "history" / "structure.csv").exists()
 
 
 def ask_by_file(child, directory):

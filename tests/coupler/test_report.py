@@ -15,6 +15,9 @@ from coupler.report import pictures
 from coupler.report.command import report
 from coupler.report.html import figure, quantity, table
 from coupler.report.markdown import to_html
+from coupler.study import command, runner
+
+from .fake_runs import CASE, FakeProcesses
 
 PIXEL = bytes.fromhex(
     "89504e470d0a1a0a0000000d49484452000000010000000108060000001f15c4890000000d49444154789c6360000002000001e221bc33"
@@ -162,3 +165,17 @@ def test_markdown_of_a_study(tmp_path):
     assert "r.png was not drawn" in told
     assert "set-up s" in told
     assert "<li>one</li><li>two</li>" in told
+
+
+def test_the_page_of_a_study_holds_its_tables_and_figures(tmp_path, monkeypatch):
+    """The figures are drawn where the study has none yet; a failed run stands in the page with its reason."""
+    (tmp_path / "case.toml").write_text(CASE, encoding="utf-8")
+    processes = FakeProcesses()
+    processes.broken = {0.4: "the water volume is off"}
+    monkeypatch.setattr(runner, "measure", processes)
+    monkeypatch.setattr(command, "_draw", lambda folder: None)
+    command.study(tmp_path, [], None, tmp_path / "out", False, False)
+    told = read(report(tmp_path / "out"))
+    assert told.count("<img") == 3
+    assert "Cheapest setting for an error" in told
+    assert "the water volume is off" in told
