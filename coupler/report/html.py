@@ -12,6 +12,8 @@ HERE = Path(__file__).parent
 KIND = {".png": "image/png", ".svg": "image/svg+xml", ".mp4": "video/mp4"}
 LARGEST_FILM = 8_000_000
 """[bytes] of a film that is put into the page; a larger one is linked."""
+MOST_COLUMNS = 9
+"""Of a table in letters of the usual size; one of more has smaller ones."""
 PREFIXES = {-3: "n", -2: "µ", -1: "m", 0: "", 1: "k", 2: "M", 3: "G", 4: "T"}
 PREFIXED = ("J", "N", "N s", "N m s", "Pa", "W", "s", "m", "m/s", "B")
 UNIT_TEXT = {"1": "", "m2": "m²", "m3": "m³", "m/s2": "m/s²", "kg/m3": "kg/m³"}
@@ -54,7 +56,8 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]], texts: Iterable[in
         return f"<tr>{''.join(found)}</tr>"
 
     body = "\n".join(cells("td", row) for row in rows)
-    return f"<table>\n<thead>{cells('th', head)}</thead>\n<tbody>\n{body}\n</tbody>\n</table>"
+    size = " class=wide" if len(head) > MOST_COLUMNS else ""
+    return f"<table{size}>\n<thead>{cells('th', head)}</thead>\n<tbody>\n{body}\n</tbody>\n</table>"
 
 
 def facts(rows: Iterable[tuple[str, str]]) -> str:
