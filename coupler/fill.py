@@ -39,9 +39,21 @@ def start_level(boxes, tank, mesh, domain) -> Array:
     whole_low, whole_high = _reach(mesh.nodes, mesh.cells, *_extent(mesh.nodes[mesh.cells]))
     cut_low = low - whole_low[domain.parent_node] > MISSING * edge
     cut_high = whole_high[domain.parent_node] - high > MISSING * edge
-    stars = (domain.nodes, low, high, cut_low, cut_high)
+    faced_low, faced_high = _facing(domain)
+    stars = (domain.nodes, low, high, cut_low & faced_low, cut_high & faced_high)
     level = np.min([_box_level(box, tank, stars, edge) for box in boxes], axis=0)
     return _without_seams(level, boxes, tank, domain.nodes, edge)
+
+
+def _facing(domain) -> tuple[Array, Array]:
+    """(N, 3) bool each: nodes with a solid around them whose face looks up, or down, each axis: a side of a box can
+    only end at such a one, not where a wall across it cuts the cells short."""
+    up, down = np.zeros(domain.nodes.shape, bool), np.zeros(domain.nodes.shape, bool)
+    for a in range(4):
+        corner = domain.cells[domain.face_cell, a]
+        np.logical_or.at(up, corner, domain.face_normal > 0.5)
+        np.logical_or.at(down, corner, domain.face_normal < -0.5)
+    return up, down
 
 
 def _without_seams(level, boxes, tank, nodes, edge: float) -> Array:
@@ -105,7 +117,8 @@ def _box_level(box, tank, stars, edge: float) -> Array:
 def _side(s, s_low, s_high, cut_inner, cut_outer, edge: float) -> Array:
     """Distance to one side (N,), pushed away from the solids that stand there."""
     touch = TOUCHES * edge
-    wet = cut_outer & (s_high < touch)
+    # a star below the surface, cut short by a slanting solid, keeps its distance
+    wet = cut_outer & (s_high < touch) & ((s >= 0.0) | (s_high > -touch))
     dry = cut_inner & (s_low > -touch)
     sliver = wet & dry  # counts to the side on which it mostly lies
     wet &= ~sliver | (-s_low >= s_high)
@@ -124,13 +137,24 @@ def _extent(points) -> tuple[Array, Array]:
 
 
 def _fluid_extent(domain) -> tuple[Array, Array]:
-    """Bounds (M, 3) each of the fluid part of every cell, by the points of its quadrature."""
-    corners = domain.nodes[domain.cells]
+    """Bounds (M, 3) each of the fluid part of every cell: its corners are those of its wetted polygons and the corners
+    of the cell in front of all of these; the points of its quadrature besides, for parts that are not convex."""
+    d = domain
+    corners = d.nodes[d.cells]
     low, high = _extent(corners)
-    cut = np.flatnonzero(domain.is_cut)
-    points = part_points(corners[cut], domain.volume[cut], domain.centroid[cut], domain.second[cut])
-    part_low, part_high = _extent(points)
-    low[cut], high[cut] = np.maximum(low[cut], part_low), np.minimum(high[cut], part_high)
+    behind = np.zeros(d.cells.shape, bool)
+    to_corner = corners[d.face_cell] - d.face_centroid[:, None]
+    np.logical_or.at(behind, d.face_cell, np.einsum("sak,sk->sa", to_corner, d.face_normal) < 0.0)
+    cut = np.flatnonzero(d.is_cut)
+    points = part_points(corners[cut], d.volume[cut], d.centroid[cut], d.second[cut])
+    part_low, part_high = np.full(low.shape, np.inf), np.full(low.shape, -np.inf)
+    part_low[cut], part_high[cut] = _extent(points)
+    np.minimum.at(part_low, d.face_cell, d.face_corners.min(axis=1))
+    np.maximum.at(part_high, d.face_cell, d.face_corners.max(axis=1))
+    shown = ~behind[cut, :, None]
+    part_low[cut] = np.minimum(part_low[cut], np.where(shown, corners[cut], np.inf).min(axis=1))
+    part_high[cut] = np.maximum(part_high[cut], np.where(shown, corners[cut], -np.inf).max(axis=1))
+    low[cut], high[cut] = np.maximum(low[cut], part_low[cut]), np.minimum(high[cut], part_high[cut])
     return low, high
 
 

@@ -196,7 +196,9 @@ def _clip(u, a, limit, weight):
 
 def _continue(water, kept, listed, start, u, a) -> None:
     """Velocity and acceleration outside the water, in place; limited again, slipping again."""
-    extend_velocity(water.topology, listed, start, kept.wet, kept.wet_cells, u, a)
+    extend_velocity(
+        water.topology, listed, start, kept.wet, kept.wet_cells, u, a, water.calm(kept.end - water.time)
+    )
     _limit_speed(water, u, a)
     water.hold(u, kept.end)
 

@@ -18,8 +18,7 @@ from numba import njit
 from fluid.corrector import Corrected, corrected
 from fluid.domain import carry, wetted_coupling
 from fluid.extension import BAND, fill_missing
-from fluid.first_surface import first_surface
-from fluid.level_set import FAR
+from fluid.level_set import FAR, redistance, without_films
 from fluid.mesh import Background
 from fluid.momentum import MomentumChange
 from fluid.parameters import WaterParameters
@@ -105,8 +104,9 @@ class Water:
         if sides is not None:
             sides.surface(level, 0.0)
         level = self._dry_if_inactive(level)
-        around = self.layers((level < 0.0) & self.topology.active)[0]
-        self.level_set = first_surface(self.topology, level, around, mesh.spacing)
+        self.level_set = without_films(
+            redistance(self.topology, level, mesh.spacing, rescale=False), mesh.spacing
+        )
         self.velocity, self.acceleration = np.zeros((n, 3)), np.zeros((n, 3))
         self.pressure = self._pressure_at_rest()
         self.end_pressure = self.pressure.copy()

@@ -97,8 +97,9 @@ def test_lines_tell_the_balance_of_things_at_rest():
     case = scene(**changes)
     _, record = run(case, 0.1, lambda *_: None)
     lines = record.momentum.lines
-    volume = 1.2 * 0.5 * 0.23 - 0.1 * 0.1 * 0.23  # the pier stands in it
-    np.testing.assert_allclose(lines["water_weight"][2], -0.1 * 1000 * G * volume, rtol=1e-6)
+    # the pier stands in it; a cell with solid and surface takes the wet share of the whole cell
+    volume = 1.2 * 0.5 * 0.23 - 0.1 * 0.1 * 0.23
+    np.testing.assert_allclose(lines["water_weight"][2], -0.1 * 1000 * G * volume, rtol=2e-4)
     np.testing.assert_allclose(lines["tank"][2], -lines["water_weight"][2], rtol=1e-5)
     assert record.momentum.scheme < 1e-6
 
