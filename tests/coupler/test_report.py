@@ -19,6 +19,8 @@ from coupler.study import command, runner
 
 from .fake_runs import CASE, FakeProcesses
 
+pytestmark = pytest.mark.before_yade
+
 PIXEL = bytes.fromhex(
     "89504e470d0a1a0a0000000d49484452000000010000000108060000001f15c4890000000d49444154789c6360000002000001e221bc33"
     "0000000049454e44ae426082"
