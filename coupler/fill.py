@@ -5,8 +5,9 @@ the wall and the water there without pressure; and beside a thin wall the copies
 count as wet. So a side of a box counts at a node only where water and air can meet in the cells around it:
 
     s = distance to the side, negative inside;  [s_low, s_high] over the fluid part of the cells around the node
-    solid cuts these cells short on the outer side, s_high < t   →  s ← -far          wet up to the solid: no side
-    solid cuts these cells short on the inner side, s_low > -t   →  s ← max(s, +2 c)      dry from the solid on
+    a solid that faces the side cuts these cells short on the outer side, |s_high| < t, or s ≥ 0 and s_high < t
+                                                            →  s ← -far             wet up to the solid: no side
+    one cuts them short on the inner side, s_low > -t       →  s ← max(s, +2 c)     dry from the solid on
 
 c: cell edge, t = TOUCHES c. Elsewhere s stays, so that a level surface stays a plane up to the wall.
 """

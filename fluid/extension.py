@@ -14,7 +14,7 @@ from fluid.topology import layers_around
 
 LINEAR_LAYERS = 2
 SWEEPS = 3
-"""Averages of the slope that the velocity is continued with."""
+"""Averages of the slope that the velocity is continued with, in calm water."""
 BAND = 5
 """Layers of nodes outside the water that carry a velocity."""
 
