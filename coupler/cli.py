@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import os
-import subprocess
-import sys
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from coupler.errors import ExitCode
+from coupler.extras import need
 from coupler.failures import Failures
+from coupler.process import run_module
 
 app = typer.Typer(
     name="surgebreak",
@@ -157,8 +156,7 @@ def describe(file, tell) -> None:
 @app.command(context_settings=PASS_ON | {"help_option_names": []})
 def render(context: typer.Context) -> None:
     """Make stills, a film and plots of a run, in a process of its own."""
-    need("pyvista", "view", "render")
-    raise typer.Exit(_python("-m", "coupler.view", *context.args))
+    raise typer.Exit(run_module("coupler.view", *context.args).returncode)
 
 
 @app.command()
@@ -228,7 +226,7 @@ def verify(
     """Run cases against exact solutions and measured records; leaves with 3 if one misses its tolerance."""
     one_thread()
     if plots is not None:
-        need("matplotlib", "view", "render")
+        need("view")
     from coupler.verify.report import verify as run_cases
 
     raise typer.Exit(int(run_cases(ids or [], quick=quick, as_json=json, only_list=list_, plots=plots)))
@@ -331,11 +329,11 @@ def benchmark(
 @app.command(context_settings=PASS_ON)
 def test(context: typer.Context) -> None:
     """Run the tests; further words go to pytest."""
-    need("pytest", "test", "test")
+    need("test")
     one_thread()
     from coupler.provenance import ROOT
 
-    raise typer.Exit(_python("-m", "pytest", *context.args, cwd=ROOT))
+    raise typer.Exit(run_module("pytest", *context.args, cwd=ROOT).returncode)
 
 
 def one_thread() -> None:
@@ -345,21 +343,6 @@ def one_thread() -> None:
     from coupler.kernel_cache import use_kernel_cache
 
     use_kernel_cache()
-
-
-def need(package: str, extra: str, command: str) -> None:
-    """Refuse, with the way out, when an optional package is absent."""
-    if find_spec(package) is None:
-        from coupler.errors import SurgebreakError
-
-        raise SurgebreakError(
-            f"the package {package} is not installed; `./surgebreak {command}` of the checkout installs it, "
-            f"or: pip install -c constraints.txt -e '.[{extra}]'"
-        )
-
-
-def _python(*arguments: str, cwd: Path | None = None) -> int:
-    return subprocess.run([sys.executable, *arguments], cwd=cwd, check=False).returncode
 
 
 if __name__ == "__main__":

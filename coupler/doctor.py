@@ -52,7 +52,7 @@ def _python() -> Finding:
 
 def _packages() -> Finding:
     import_names = {"scikit-fem": "skfem"}
-    names = ("numpy", "scipy", "scikit-fem", "meshio", "h5py", "numba", "pyamg", "pydantic", "pint", "rich")
+    names = ("numpy", "scipy", "scikit-fem", "meshio", "h5py", "numba", "pydantic", "pint", "rich")
     absent = [name for name in names if find_spec(import_names.get(name, name)) is None]
     held = ", ".join(f"{name} {number}" for name, number in versions().items() if name in names)
     return Finding(

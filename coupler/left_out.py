@@ -11,7 +11,7 @@ import sys
 import numpy as np
 
 HEAVY = (
-    "fluid", "yade_scripts", "yade", "scipy", "numba", "h5py", "pyamg", "skfem", "pint", "matplotlib", "pyvista",
+    "fluid", "yade_scripts", "yade", "scipy", "numba", "h5py", "skfem", "pint", "matplotlib", "pyvista",
     "vtkmodules",
 )  # fmt: skip
 """Rooms of this program and packages that take time or memory to load."""

@@ -9,7 +9,7 @@ from importlib import metadata
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-PACKAGES = ("numpy", "scipy", "scikit-fem", "meshio", "h5py", "numba", "pyamg", "pydantic")
+PACKAGES = ("numpy", "scipy", "scikit-fem", "meshio", "h5py", "numba", "pydantic")
 
 
 def version() -> str:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 import tempfile
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -13,6 +11,8 @@ from coupler import provenance
 from coupler.benchmark import cutting, debris, scenes
 from coupler.benchmark.part import LAW
 from coupler.errors import ExitCode, SurgebreakError
+from coupler.extras import need
+from coupler.process import run_module
 from yade_scripts.faces import touching_faces
 from yade_scripts.stock.scene import described, timed
 from yade_scripts.stock.script import LAWS, run_script, stock_law
@@ -60,11 +60,14 @@ def benchmark(quick: bool, as_json: bool, only: str | None = None) -> ExitCode:
     """Measure and tell; leaves with DIVERGED where a target is missed. only: one of GROUPS, None: all."""
     if only is not None and only not in GROUPS:
         raise PartFailed(f"benchmark --only {only}: choose one of {', '.join(GROUPS)}")
+    chosen = GROUPS if only is None else (only,)
+    if "solver" in chosen:
+        need("benchmark")  # now, not after the measurements before it
     sizes = QUICK_SIZES if quick else SIZES
     lines: list[Line] = []
     if not as_json:
         print(_heading(), flush=True)
-    for name in GROUPS if only is None else (only,):
+    for name in chosen:
         for line in GROUPS[name](sizes):
             lines.append(line)
             if not as_json:
@@ -91,8 +94,7 @@ def _told(line: Line) -> str:
 
 
 def _part(kind: str, size: int = 0) -> dict:
-    command = [sys.executable, "-m", "coupler.benchmark.part", kind, str(size)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    done = run_module("coupler.benchmark.part", kind, size, capture_output=True, text=True)
     if done.returncode != 0:
         last = " | ".join(done.stderr.strip().splitlines()[-3:])
         raise PartFailed(f"benchmark {kind} {size}: its process ended with {done.returncode}: {last}")

@@ -7,7 +7,6 @@ last two is the price of the covers. CPU milliseconds a step, the median of STEP
 from __future__ import annotations
 
 import json
-import subprocess
 import sys
 from dataclasses import dataclass
 
@@ -17,6 +16,7 @@ from scipy.spatial.transform import Rotation
 from coupler.clock import Clock
 from coupler.exchange import Immersion
 from coupler.loop import Coupling
+from coupler.process import run_module
 from fluid.mesh import box_mesh
 from fluid.parameters import WaterParameters
 from fluid.water import Water
@@ -133,8 +133,8 @@ CASES = (("single", "none"), ("single", "held"), ("single", "free"), ("multiple"
 
 
 def _in_process(count: int, covers: str, blocks: str) -> dict:
-    command = [sys.executable, "-m", "coupler.benchmark.debris", str(count), covers, blocks]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    words = (count, covers, blocks)
+    done = run_module("coupler.benchmark.debris", *words, capture_output=True, text=True, check=True)
     return json.loads(done.stdout.splitlines()[-1])
 
 

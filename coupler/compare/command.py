@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from collections.abc import Iterable
 from datetime import UTC, datetime
-from importlib.util import find_spec
 from pathlib import Path
 
 from coupler.compare.outcome import exact_answers
@@ -14,6 +11,8 @@ from coupler.compare.plan import make_plan
 from coupler.compare.report import table, write
 from coupler.compare.run import run_plan
 from coupler.errors import BadCase, ExitCode
+from coupler.extras import missing
+from coupler.process import run_module
 from coupler.run_directory import RunDirectory
 from yade_scripts import laws as own_laws
 from yade_scripts.stock.script import stock_law, stock_names
@@ -66,7 +65,8 @@ def _multiples(text: str) -> list[int]:
 
 def _draw(folder: Path) -> None:
     """The figure, in a process of its own; told where matplotlib is absent."""
-    if find_spec("matplotlib") is None:
-        print("no figure: matplotlib is not installed (pip install -c constraints.txt -e '.[view]')")
+    absent = missing("view")
+    if absent:
+        print(f"no figure: {absent}")
         return
-    subprocess.run([sys.executable, "-m", "coupler.view.comparison", str(folder)], check=True)
+    run_module("coupler.view.comparison", folder, check=True)

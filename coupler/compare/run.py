@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -12,6 +10,7 @@ from coupler.compare.outcome import Outcome
 from coupler.compare.own import Request
 from coupler.compare.plan import OwnLaw, Plan
 from coupler.errors import SurgebreakError
+from coupler.process import run_module
 from yade_scripts.stock.scene import timed
 from yade_scripts.stock.script import StockLaw, read_table, run_script
 
@@ -46,12 +45,7 @@ def _run_own(law: OwnLaw, plan: Plan, multiple: int, place: Path, scene: Path | 
     Request(
         str(plan.file.path), law.overrides, multiple, plan.records, str(place), law.stem, str(scene or "")
     ).write(request)
-    done = subprocess.run(
-        [sys.executable, "-m", "coupler.compare.own", str(request)],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = run_module("coupler.compare.own", request, capture_output=True, text=True)
     if done.returncode != 0:
         last = " | ".join(done.stderr.strip().splitlines()[-3:])
         raise LawFailed(f"{law.name}: its process ended with {done.returncode}: {last}")

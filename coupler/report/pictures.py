@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from collections.abc import Sequence
-from importlib.util import find_spec
 from pathlib import Path
+
+from coupler import extras
+from coupler.process import run_module
 
 STILL = "800x450"
 """Of a film of that camera; a still has twice the pixels each way."""
-NEEDED = ("pyvista", "matplotlib", "imageio_ffmpeg")
 
 
 def missing() -> str:
     """Why no pictures can be made here; empty where they can."""
-    absent = [name for name in NEEDED if find_spec(name) is None]
-    return f"not installed: {', '.join(absent)} (the extra `view`)" if absent else ""
+    return extras.missing("view")
 
 
 def stills(run: Path, folder: Path, times: Sequence[float]) -> str:
@@ -39,9 +37,7 @@ def study_figures(study: Path) -> str:
 
 
 def _view(module: str, *words: object) -> str:
-    done = subprocess.run(
-        [sys.executable, "-m", module, *map(str, words)], capture_output=True, text=True, check=False
-    )
+    done = run_module(module, *words, capture_output=True, text=True)
     if done.returncode == 0:
         return ""
     told = done.stderr.strip().splitlines()

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 import subprocess
-import sys
 import tempfile
 import time
 from pathlib import Path
 
 from coupler.errors import BadCase, did_you_mean
+from coupler.process import run_module
 from coupler.stress.registry import Measure, Outcome, Scene, scenes
 
 TIME_LIMIT = {"S": 600, "M": 3600}
@@ -52,11 +52,9 @@ def run(scene: Scene) -> Outcome:
 
 def _trouble(scene: Scene, path: Path) -> str:
     """Run the process; how it ended, when not well."""
-    command = [sys.executable, "-m", "coupler.stress.one", scene.id, str(path)]
+    limit = TIME_LIMIT[scene.cost]
     try:
-        done = subprocess.run(
-            command, capture_output=True, text=True, check=False, timeout=TIME_LIMIT[scene.cost]
-        )
+        done = run_module("coupler.stress.one", scene.id, path, capture_output=True, text=True, timeout=limit)
     except subprocess.TimeoutExpired as error:
         return f"not done after {error.timeout} s"
     last = " | ".join(done.stderr.strip().splitlines()[-LAST_LINES:])

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from collections.abc import Iterable
-from importlib.util import find_spec
 from pathlib import Path
 
 from coupler.errors import ExitCode
+from coupler.extras import missing
+from coupler.process import run_module
 from coupler.study.laws import law_points
 from coupler.study.page import page
 from coupler.study.plan import make_plan
@@ -43,7 +42,8 @@ def study(
 
 def _draw(folder: Path) -> None:
     """The figures, in a process of their own; told where matplotlib is absent."""
-    if find_spec("matplotlib") is None:
-        print("no figures: matplotlib is not installed (pip install -c constraints.txt -e '.[view]')")
+    absent = missing("view")
+    if absent:
+        print(f"no figures: {absent}")
         return
-    subprocess.run([sys.executable, "-m", "coupler.view.study", str(folder)], check=True)
+    run_module("coupler.view.study", folder, check=True)

@@ -23,6 +23,7 @@ import numpy as np
 from coupler.errors import BadCase, ExitCode
 from coupler.fingerprint import differences, program
 from coupler.history import read_history
+from coupler.process import environment
 from coupler.run_directory import read_summary, write_json
 from coupler.study.plan import Plan, Setting
 
@@ -182,7 +183,7 @@ def measure(command: list[str], log: Path) -> Cost:
     """Run a process to its end, what it tells into a file."""
     began = time.perf_counter()
     with log.open("w", encoding="utf-8") as stream:
-        child = subprocess.Popen(command, stdout=stream, stderr=subprocess.STDOUT)
+        child = subprocess.Popen(command, stdout=stream, stderr=subprocess.STDOUT, env=environment())
         try:
             _, status, used = os.wait4(child.pid, 0)
         except BaseException:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
-import subprocess
 import sys
 from dataclasses import asdict
 from pathlib import Path
 
 from coupler.errors import ExitCode
+from coupler.process import run_module
 from coupler.verify.registry import NOT_COVERED, Check, Result
 from coupler.verify.runner import chosen, run
 
@@ -46,8 +46,7 @@ def draw(plots: Path, ids: list[str]) -> None:
     """Draw the figures that the cases left, in a process of its own, and tell the pictures on stderr."""
     there = [str(path) for id in ids if (path := plots / f"{id}.json").exists() and path.stat().st_size]
     if there:
-        command = [sys.executable, "-m", "coupler.view.curves", str(plots), *there]
-        subprocess.run(command, check=True, stdout=sys.stderr)
+        run_module("coupler.view.curves", plots, *there, check=True, stdout=sys.stderr)
 
 
 def head() -> str:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 import subprocess
-import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
 from coupler.errors import BadCase, did_you_mean
+from coupler.process import run_module
 from coupler.verify.registry import NOT_COVERED, Check, Result, checks
 
 TIME_LIMIT = {"S": 300, "M": 3600, "L": 6 * 3600}
@@ -40,11 +40,9 @@ def run(case: Check, plots: Path | None = None) -> Iterator[Result]:
     figures = [] if plots is None else [str(plots / f"{case.id}.json")]
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "results"
-        command = [sys.executable, "-m", "coupler.verify.one", case.id, str(path), *figures]
+        quietly = {"capture_output": True, "text": True, "timeout": TIME_LIMIT[case.cost]}
         try:
-            done = subprocess.run(
-                command, capture_output=True, text=True, check=False, timeout=TIME_LIMIT[case.cost]
-            )
+            done = run_module("coupler.verify.one", case.id, path, *figures, **quietly)
             trouble = "" if done.returncode == 0 else _told(done)
         except subprocess.TimeoutExpired as error:
             trouble = f"not done after {error.timeout} s"

@@ -2,18 +2,16 @@
 
 import argparse
 import ctypes
-import importlib.util
 import sys
 import time
 from pathlib import Path
 
 from coupler.errors import FULL, ExitCode, SurgebreakError
+from coupler.extras import need
 
-NEEDED = {"pyvista": "pictures", "imageio_ffmpeg": "films", "matplotlib": "figures"}
 
-
-class ViewNotInstalled(SurgebreakError):
-    """The packages that make pictures are an extra."""
+class CannotDraw(SurgebreakError):
+    """The system has nothing to draw with."""
 
 
 def arguments(given):
@@ -81,29 +79,19 @@ def within(text, low, high, unit):
     return value
 
 
-def check_installed():
-    """Raise ViewNotInstalled with the command that helps."""
-    missing = [name for name in NEEDED if importlib.util.find_spec(name) is None]
-    if missing:
-        what = ", ".join(f"{NEEDED[name]} ({name})" for name in missing)
-        raise ViewNotInstalled(
-            f"{what} cannot be made: run `{sys.executable} -m pip install 'surgebreak[view]'`"
-        )
-
-
 def check_drawing():
-    """Raise ViewNotInstalled if the system cannot draw: without a display that takes EGL and a software renderer."""
+    """Raise CannotDraw if the system cannot draw: without a display that takes EGL and a software renderer."""
     try:
         ctypes.CDLL("libEGL.so.1")
     except OSError:
-        raise ViewNotInstalled(
+        raise CannotDraw(
             "no EGL found: run `apt install libegl1 libgl1-mesa-dri` (YADE brings it along)"
         ) from None
 
 
 def make(options):
     """Make what the options ask for and say what was made."""
-    check_installed()
+    need("view")
     check_drawing()
     from coupler.view.run_files import open_run, was_killed
 

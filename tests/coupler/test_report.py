@@ -8,10 +8,10 @@ from html.parser import HTMLParser
 
 import pytest
 
+from coupler import extras
 from coupler.errors import NoRun
 from coupler.history import CRACK_COLUMNS, HistoryTable, write_cracks
 from coupler.recorder import ENERGY, WATER
-from coupler.report import pictures
 from coupler.report.command import report
 from coupler.report.html import figure, quantity, table
 from coupler.report.markdown import to_html
@@ -110,8 +110,8 @@ def test_a_limit_that_was_passed_is_marked(run):
 def test_what_could_not_be_drawn_is_said(run, monkeypatch):
     """A run that was stopped before its first output has no pictures; nor has a machine without the extra."""
     assert "the run has stored no fields" in read(report(run))
-    monkeypatch.setattr(pictures, "NEEDED", ("a_package_that_is_nowhere",))
-    assert "not installed: a_package_that_is_nowhere" in read(report(run))
+    monkeypatch.setitem(extras.EXTRAS, "view", ("a_package_that_is_nowhere",))
+    assert "a_package_that_is_nowhere is not installed" in read(report(run))
 
 
 def test_a_directory_of_something_else_is_refused(tmp_path):

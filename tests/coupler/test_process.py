@@ -1,0 +1,64 @@
+"""What a command starts must be the program that was called, or figures would be told of another version."""
+
+import os
+import shutil
+import subprocess
+import sys
+
+import pytest
+
+from coupler import extras, process
+from coupler.benchmark import command
+from coupler.provenance import ROOT
+
+HERE = "print(__file__)\n"
+
+
+def checkout(folder):
+    """The least of a checkout that starts a child, with a module that tells where it stands."""
+    (folder / "coupler").mkdir(parents=True)
+    for name in ("__init__.py", "process.py", "provenance.py"):
+        shutil.copy(ROOT / "coupler" / name, folder / "coupler" / name)
+    shutil.copy(ROOT / "pyproject.toml", folder)
+    (folder / "coupler" / "here.py").write_text(HERE, encoding="utf-8")
+    return folder
+
+
+def test_children_are_of_the_checkout_of_their_parent(tmp_path):
+    """Called from within another checkout, in an environment where a third one is installed."""
+    mine, other = checkout(tmp_path / "mine"), checkout(tmp_path / "other")
+    code = "from coupler.process import run_module; run_module('coupler.here')"
+    parent = os.environ | {"PYTHONPATH": str(mine), "PYTHONSAFEPATH": "1"}
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=other, env=parent, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == str(mine / "coupler" / "here.py")
+
+
+def test_the_path_that_the_user_gave_stays_behind_ours(monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", f"/somewhere{os.pathsep}{ROOT}")
+    assert process.environment()["PYTHONPATH"] == f"{ROOT}{os.pathsep}/somewhere"
+
+
+def test_an_installed_program_needs_no_path(monkeypatch, tmp_path):
+    """Its folder is that of all packages; ahead of the standard library it could hide parts of that."""
+    monkeypatch.delenv("PYTHONPATH", raising=False)
+    monkeypatch.setattr(process, "ROOT", tmp_path)
+    assert "PYTHONPATH" not in process.environment()
+
+
+def test_all_extras_are_here_and_are_those_of_pyproject():
+    import tomllib
+
+    declared = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert set(extras.EXTRAS) == set(extras.COMMANDS) == set(declared["optional-dependencies"])
+    assert not any(extras.missing(extra) for extra in extras.EXTRAS)
+
+
+def test_a_benchmark_without_its_solvers_is_refused_before_it_measures(monkeypatch):
+    """With the command that brings them; the other measurements do without."""
+    monkeypatch.setitem(extras.EXTRAS, "benchmark", ("a_package_that_is_nowhere",))
+    monkeypatch.setattr(command, "GROUPS", {"joints": lambda sizes: [], "solver": lambda sizes: []})
+    with pytest.raises(extras.NotInstalled, match=r"nowhere is not installed.*\./surgebreak benchmark"):
+        command.benchmark(quick=True, as_json=True)
+    assert command.benchmark(quick=True, as_json=True, only="joints") == 0
