@@ -32,6 +32,10 @@ class Failure:
             return cls(
                 ExitCode.STOPPED, "stopped at once by Ctrl-C; the last written state and checkpoint are sound"
             )
+        if isinstance(error, BrokenPipeError):
+            return cls(
+                ExitCode.STOPPED, "nobody reads the output any more (a pipe to `head`, for instance); stopped"
+            )
         if isinstance(error, OSError) and error.errno in FULL:
             return cls(ExitCode.STOPPED, _full(error))
         code = getattr(error, "exit_code", None)

@@ -45,11 +45,11 @@ def size(coupling) -> dict[str, int]:
 
 
 def block_damage(structure) -> Array:
-    """(n,) area-weighted mean damage of the joints that each block had at the start; 0 for blocks without."""
+    """(n,) area-weighted mean damage of the joints that each block had at the start; 0 for blocks without.
+
+    structure: with joints."""
     table = structure.joint_table()
     damage, area = np.zeros(structure.n), np.zeros(structure.n)
-    if table is None:
-        return damage
     weighted = np.where(table.alive, table.mean_damage, 1.0) * table.area
     for side in (table.a, table.b):
         inner = side >= 0

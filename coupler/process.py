@@ -1,4 +1,5 @@
-"""Python processes that this one starts run the program that this one is, wherever they are started.
+"""Processes: those that a command starts run the program that it is itself, wherever it is called from; and whether the
+one of a run is still there.
 
 A child would otherwise find the installed package, or one in the folder in which the user happens to stand: another
 checkout would then be checked, measured or drawn with than the one that was called.
@@ -7,6 +8,7 @@ checkout would then be checked, measured or drawn with than the one that was cal
 from __future__ import annotations
 
 import os
+import platform
 import subprocess
 import sys
 
@@ -26,3 +28,20 @@ def environment() -> dict[str, str]:
         others = [place for place in found.get("PYTHONPATH", "").split(os.pathsep) if place]
         found["PYTHONPATH"] = os.pathsep.join([str(ROOT), *(p for p in others if p != str(ROOT))])
     return found
+
+
+def was_killed(summary: dict) -> bool:
+    """Whether run.json (its content) says "running" although its process is gone: nothing could tell how the run ended.
+
+    Of a run on another machine that cannot be known.
+    """
+    here = summary.get("machine", {}).get("host", platform.node()) == platform.node()
+    if summary.get("status") != "running" or not here:
+        return False
+    try:
+        os.kill(summary["process"], 0)
+    except ProcessLookupError:
+        return True
+    except PermissionError:  # somebody else's process: it lives
+        return False
+    return False

@@ -291,7 +291,8 @@ class Recorder:
                 time,
                 s.centre(),
                 s.rotation(),
-                {"damage": block_damage(s), "speed": np.linalg.norm(s.velocity()[:, :3], axis=1)},
+                {"speed": np.linalg.norm(s.velocity()[:, :3], axis=1)}
+                | ({} if s.joints is None else {"damage": block_damage(s)}),
             )
         self._write_cracks()
         self._written += 1

@@ -15,8 +15,8 @@ from coupler.report.run_page import run_page
 from coupler.run_directory import read_summary
 
 NAME = "report.html"
-STILLS = 3
-"""Pictures of a run: its first stored step, its last, and one between."""
+STILLS = 4
+"""Pictures of a run, two beside each other: its first stored step, its last, and those between."""
 
 
 def report(place: Path, with_pictures: bool = True) -> Path:

@@ -10,6 +10,8 @@ from coupler.process import run_module
 
 STILL = "800x450"
 """Of a film of that camera; a still has twice the pixels each way."""
+LETTERS = "1.7"
+"""Times the usual size: two stills stand side by side on a page of paper."""
 
 
 def missing() -> str:
@@ -20,7 +22,8 @@ def missing() -> str:
 def stills(run: Path, folder: Path, times: Sequence[float]) -> str:
     """A still of each time [s] into folder; the reason if one could not be made, else empty."""
     for time in times:
-        reason = _view("coupler.view", run, "--still", "--time", repr(time), "--size", STILL, "--to", folder)
+        words = ("--still", "--time", repr(time), "--size", STILL, "--letters", LETTERS, "--to", folder)
+        reason = _view("coupler.view", run, *words)
         if reason:
             return reason
     return ""

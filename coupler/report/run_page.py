@@ -7,6 +7,7 @@ from html import escape
 from pathlib import Path
 
 from coupler.explain_run import Skipped, not_loaded, seconds_of, shares, skipped
+from coupler.process import was_killed
 from coupler.report import tables
 from coupler.report.html import (
     document,
@@ -41,9 +42,9 @@ FIGURES = {
     "largest_water_force": ("largest force of the water on all bodies", "N"),
     "joints": ("joints at the start", "1"),
     "joints_broken": ("joints broken", "1"),
-    "largest_opening_rate": ("largest opening in a substep, of the opening at failure", "1"),
-    "numerical_dissipation": ("energy that the numerics took, of the input", "1"),
-    "numerical_impulse": ("impulse of the lines of the scheme, of all impulses", "1"),
+    "largest_opening_rate": ("largest opening in a substep, of the opening at failure", "%"),
+    "numerical_dissipation": ("energy that the numerics took, of the input", "%"),
+    "numerical_impulse": ("impulse of the lines of the scheme, of all impulses", "%"),
 }
 """Figures of run.json that the page tells."""
 NEEDS = {
@@ -81,12 +82,15 @@ def run_page(run: Path, summary: dict, pictures: Path, remarks: list[str]) -> st
 
 
 def _verdict(summary: dict) -> str:
-    bad = summary["exit_code"] not in (0, None)
+    killed = was_killed(summary)
+    bad = killed or summary["exit_code"] not in (0, None)
     told = summary["status"]
     if summary["exit_reason"]:
         told += f" (exit code {summary['exit_code']}): {summary['exit_reason']}"
+    elif killed:
+        told = "killed: its process is gone and could not say why; this is what it has written"
     elif summary["status"] == "running":
-        told += ": the run goes on, or it was killed; this is what it has written so far"
+        told += ": this is what the run has written so far"
     return f'<p class="verdict{" bad" if bad else ""}">{escape(told)}</p>'
 
 
@@ -99,10 +103,10 @@ def _what(run: Path, summary: dict) -> str:
         ("changed keys", ", ".join(summary["overrides"]) or "none"),
         ("command", shlex.join(summary["command"])),
         ("results in", str(run.resolve())),
-        ("began, ended", f"{summary['started']}, {summary['ended'] or '–'}"),
-        ("resumed", ", ".join(f"{again['at']}" for again in summary.get("resumed", []))),
-        ("wall time", quantity(summary.get("wall_seconds"), "s")),
-        ("processor time", quantity(summary.get("cpu_seconds"), "s")),
+        ("began", _moment(summary["started"])),
+        *(("resumed", _again(again)) for again in summary.get("resumed", [])),
+        ("ended", _moment(summary["ended"]) if summary["ended"] else ""),
+        *_times(summary),
         ("on", ", ".join(on)),
         ("off", ", ".join(off)),
         *((what, law) for what, law in summary["figures"].get("laws", {}).items()),
@@ -118,8 +122,27 @@ def _what(run: Path, summary: dict) -> str:
     return facts(rows)
 
 
+def _moment(text: str) -> str:
+    """2026-01-31 12:00:00 UTC of 2026-01-31T12:00:00+00:00."""
+    return text.replace("T", " ").replace("+00:00", " UTC")
+
+
+def _again(again: dict) -> str:
+    """When and from where a run went on, and what was changed."""
+    changed = f"; {', '.join(again['changed'])}" if again.get("changed") else ""
+    return f"{_moment(again['at'])}, from the checkpoint at t = {quantity(again['time'], 's')}{changed}"
+
+
+def _times(summary: dict) -> list[tuple[str, str]]:
+    """What a run took, all its parts together; of one that has not ended only its files know until when."""
+    if summary["ended"] is None:
+        return []
+    times = (("wall time", "wall_seconds"), ("processor time", "cpu_seconds"))
+    return [(what, quantity(summary.get(name), "s")) for what, name in times]
+
+
 def _size(size: dict) -> str:
-    return ", ".join(f"{count} {_words(name)}" for name, count in size.items())
+    return ", ".join(f"{_words(name)} {count}" for name, count in size.items() if count)
 
 
 def _stills(run: Path, pictures: Path) -> str:
@@ -139,7 +162,7 @@ def _time_of(still: Path) -> float:
 def _figures(summary: dict) -> str:
     figures = summary["figures"]
     rows = [
-        [what, quantity(figures[name], unit) if unit != "1" else _number(figures[name])]
+        [what, percent(figures[name]) if unit == "%" else quantity(figures[name], unit)]
         for name, (what, unit) in FIGURES.items()
         if name in figures and _says_something(name, summary["modules"])
     ]
@@ -148,10 +171,6 @@ def _figures(summary: dict) -> str:
 
 def _says_something(figure_name: str, modules: dict) -> bool:
     return figure_name not in NEEDS or any(modules.get(module, True) for module in NEEDS[figure_name])
-
-
-def _number(value: float) -> str:
-    return f"{value}" if isinstance(value, int) else f"{value:.4g}"
 
 
 def _promises(summary: dict) -> str:

@@ -32,7 +32,7 @@ def energy(run: Path) -> str:
     lines = [c for c in found.columns if c.unit == "J"]
     largest = max(np.abs(found[c.name]).max() for c in lines)
     rows = [
-        [_words(c.name), *(quantity(v, "J") for v in _ends(found[c.name])), c.meaning]
+        [_words(c.name), *(quantity(v, "J") for v in _ends(found[c.name], largest)), c.meaning]
         for c in lines
         if np.abs(found[c.name]).max() > NEGLIGIBLE * largest
     ]
@@ -42,8 +42,10 @@ def energy(run: Path) -> str:
     ) + note(f"What the lines miss at the end, over the energy that the scene has put in: {error}.")
 
 
-def _ends(values: np.ndarray) -> tuple[float, float, float]:
-    return float(values[0]), float(values[-1]), float(values[-1] - values[0])
+def _ends(values: np.ndarray, largest: float) -> list[float]:
+    """First, last and change; 0 for what is round-off beside the largest of the book."""
+    ends = (values[0], values[-1], values[-1] - values[0])
+    return [float(v) if abs(v) > NEGLIGIBLE * largest else 0.0 for v in ends]
 
 
 def volume(run: Path) -> str:
@@ -51,10 +53,12 @@ def volume(run: Path) -> str:
     found = history(run, "water")
     if found is None:
         return ""
+    lines = [c for c in found.columns if c.unit == "m3"]
+    largest = max(np.abs(found[c.name]).max() for c in lines)
     rows = [
-        [_words(c.name), *(quantity(v, c.unit) for v in _ends(found[c.name])), c.meaning]
-        for c in found.columns
-        if c.unit == "m3"
+        [_words(c.name), *(quantity(v, c.unit) for v in _ends(found[c.name], largest)), c.meaning]
+        for c in lines
+        if np.abs(found[c.name]).max() > NEGLIGIBLE * largest
     ]
     error = _share(float(found["volume_error"][-1]))
     return table(

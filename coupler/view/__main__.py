@@ -2,12 +2,15 @@
 
 import argparse
 import ctypes
+import json
+import os
 import sys
 import time
 from pathlib import Path
 
 from coupler.errors import FULL, ExitCode, SurgebreakError
 from coupler.extras import need
+from coupler.process import was_killed
 
 
 class CannotDraw(SurgebreakError):
@@ -40,6 +43,9 @@ def arguments(given):
     parser.add_argument(
         "--elevation", type=angle, default=22.0, help="of the camera above the ground, degrees"
     )
+    parser.add_argument(
+        "--letters", type=letters, default=1.0, metavar="TIMES", help="the usual size, for a small picture"
+    )
     parser.add_argument("--to", type=Path, metavar="FOLDER", help="where to write; default RUN/pictures")
     options = parser.parse_args(given)
     if not (options.still or options.film or options.plots):
@@ -68,6 +74,11 @@ def angle(text):
     return within(text, -5.0, 85.0, "degrees")
 
 
+def letters(text):
+    """Size of the letters as multiples of the usual one."""
+    return within(text, 0.5, 3.0, "times the usual size")
+
+
 def within(text, low, high, unit):
     """A number in [low, high]."""
     try:
@@ -93,14 +104,14 @@ def make(options):
     """Make what the options ask for and say what was made."""
     need("view")
     check_drawing()
-    from coupler.view.run_files import open_run, was_killed
+    from coupler.view.run_files import open_run
 
     run = open_run(options.run)
-    if was_killed(options.run):
+    if was_killed(summary(options.run)):
         print(f"note: the run was killed; shown is what it wrote, until t = {run.times[-1]:g} s", flush=True)
     folder = options.to or options.run / "pictures"
     folder.mkdir(parents=True, exist_ok=True)
-    camera = {"azimuth": options.azimuth, "elevation": options.elevation}
+    camera = {"azimuth": options.azimuth, "elevation": options.elevation, "letters": options.letters}
     if options.still:
         from coupler.view.pictures import still
 
@@ -116,6 +127,12 @@ def make(options):
         from coupler.view.pictures import film
 
         report(film, run, folder, options.size, options.fps, tell=tell, **camera)
+
+
+def summary(run):
+    """What run.json says; nothing where there is none."""
+    path = run / "run.json"
+    return json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
 
 
 def report(action, *given, **options):
@@ -141,6 +158,9 @@ def main(given=None):
     except SurgebreakError as error:
         print(f"surgebreak render: {error}", file=sys.stderr)
         return int(error.exit_code)
+    except BrokenPipeError:  # `| head` has read enough: end as quietly as other commands do
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return int(ExitCode.STOPPED)
     except OSError as error:
         remedy = "; free some space, or write elsewhere with --to" if error.errno in FULL else ""
         print(f"surgebreak render: {options.run}: {error}{remedy}", file=sys.stderr)

@@ -14,9 +14,13 @@ WIDTH = 6.9  # [inch] two columns of a journal
 PANEL, LOW_PANEL = 1.75, 1.05  # [inch] height of a panel, and of one with a pure number
 LINES_PER_PANEL = len(LINES)
 NEGLIGIBLE = 1e-9  # of the largest change in a table and unit: round-off, not shown
+FLAT = (
+    1 / 30
+)  # of the largest line of a panel: what is smaller would lie on the axis and goes to a panel of its own
+LEVEL = 0.01
 FORMATS = ("pdf", "svg", "png")
-UNIT_TEXT = {"1": "–", "m3": "m³", "m2": "m²", "N s": "N·s"}
-PREFIXED = ("J", "N", "N s", "Pa", "W", "m", "m/s", "s")
+UNIT_TEXT = {"1": "–", "m3": "m³", "m2": "m²", "N s": "N·s", "N m s": "N·m·s"}
+PREFIXED = ("J", "N", "N s", "N m s", "Pa", "W", "m", "m/s", "s")
 PREFIXES = {-2: "µ", -1: "m", 0: "", 1: "k", 2: "M", 3: "G", 4: "T"}
 SINCE_START = (
     "energy",
@@ -42,28 +46,53 @@ def plots(directory, folder):
 
 
 def grouped(history):
-    """Panels [(unit, [column names])] of the numbers that are more than round-off, by unit, none too full.
+    """Panels [(unit, [column names])] of the numbers that are more than round-off, by unit and size, none too full.
 
-    Pure numbers get a panel each: a count and a share have no scale in common.
+    Components of a vector stay together. Pure numbers get a panel each: a count and a share have no scale in common.
     """
     sizes = {}
     for column in history.columns:
         if column.name != "time" and column.unit:
             size = np.nanmax(np.abs(changed(history, column.name)), initial=0.0)
             sizes.setdefault(column.unit, {})[column.name] = size
-    shown = {unit: _not_negligible(named, unit) for unit, named in sizes.items()}
-    return [
-        (unit, names[i : i + most])
-        for unit, names in shown.items()
-        for most in [1 if unit == "1" else LINES_PER_PANEL]
-        for i in range(0, len(names), most)
-    ]
+    return [(unit, names) for unit, named in sizes.items() for names in _panels(named, unit)]
 
 
-def _not_negligible(sizes, unit):
-    """Names of the columns whose largest number counts beside that of the others in the unit; pure numbers all do."""
+def _panels(sizes, unit):
+    """Lists of the columns whose largest number counts beside that of the others in the unit; pure numbers all do."""
     least = 0.0 if unit == "1" else NEGLIGIBLE * max(sizes.values())
-    return [name for name, size in sizes.items() if size > least]
+    shown = {name: size for name, size in sizes.items() if size > least}
+    if unit == "1":
+        return [[name] for name in shown]
+    return [panel for alike in _alike(_vectors(shown)) for panel in _not_too_full(alike)]
+
+
+def _vectors(sizes):
+    """Columns with their sizes as {what they are components of: {name: size}}; a number alone is its own."""
+    found = {}
+    for name, size in sizes.items():
+        found.setdefault(name[:-2] if name[-2:] in ("_x", "_y", "_z") else name, {})[name] = size
+    return found
+
+
+def _alike(vectors):
+    """Lists of vectors of like size, the largest first: [[{name: size}]]."""
+    left, found = list(vectors.values()), []
+    while left:
+        least = FLAT * max(max(vector.values()) for vector in left)
+        found.append([vector for vector in left if max(vector.values()) >= least])
+        left = [vector for vector in left if max(vector.values()) < least]
+    return found
+
+
+def _not_too_full(vectors):
+    """Lists of names, each of whole vectors, as many as one panel can show."""
+    found = [[]]
+    for vector in vectors:
+        if found[-1] and len(found[-1]) + len(vector) > LINES_PER_PANEL:
+            found.append([])
+        found[-1] += vector
+    return found
 
 
 def changed(history, name):
@@ -100,8 +129,18 @@ def panel(axis, history, unit, names):
     what = names[0].replace("_", " ") if len(names) == 1 else since
     axis.set_ylabel(f"{what} [{text}]".strip())
     axis.margins(x=0)
+    _keep_flat(axis)
     if len(names) > 1:
         axis.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0)
+
+
+def _keep_flat(axis):
+    """A line that stays within LEVEL of its value is shown level: its last digits would look like a swing."""
+    values = np.concatenate([line.get_ydata() for line in axis.lines])
+    low, high = np.nanmin(values), np.nanmax(values)
+    room = LEVEL * max(abs(low), abs(high))
+    if high - low < room:
+        axis.set_ylim((low + high) / 2 - room, (low + high) / 2 + room)
 
 
 def prefixed(unit, largest):

@@ -3,8 +3,6 @@
 HDF5 reads them, not VTK: VTK's reader may crash on a file that grows under its hands.
 """
 
-import json
-import os
 import time as clock
 from dataclasses import dataclass
 from pathlib import Path
@@ -125,23 +123,6 @@ def open_run(directory):
         )
     solids, tank = _solids(directory / "solids.vtkhdf")
     return RunFiles(directory, water, blocks, solids, tank, (water or blocks).times)
-
-
-def was_killed(directory):
-    """True if run.json says "running" but its process is gone: nothing could tell how the run ended."""
-    summary = directory / "run.json"
-    if not summary.exists():
-        return False
-    told = json.loads(summary.read_text(encoding="utf-8"))
-    if told.get("status") != "running":
-        return False
-    try:
-        os.kill(told["process"], 0)
-    except ProcessLookupError:
-        return True
-    except PermissionError:  # somebody else's process: it lives
-        return False
-    return False
 
 
 def _series(kind, path):

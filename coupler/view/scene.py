@@ -21,16 +21,18 @@ FILL = np.array([1.0, -0.2, 0.25])
 LETTERS = Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"
 VTK_FONT_FILE = 4  # vtkTextProperty: use the font file
 SAMPLED_STEPS = 25
+BAR = 0.075  # height of a colour bar with its text, as a share of that of the picture
 
 
 class Scene:
     """Draws the steps of a run into one window with one camera and fixed colour scales, so that pictures compare."""
 
-    def __init__(self, run, size=(1280, 720), azimuth=-62.0, elevation=22.0, soft=True):
+    def __init__(self, run, size=(1280, 720), azimuth=-62.0, elevation=22.0, soft=True, letters=1.0):
         """run: RunFiles · size: (width, height) in pixels · azimuth, elevation of the camera in degrees ·
-        soft: darken corners where little light comes (costs three times as much as all the rest)."""
+        soft: darken corners where little light comes (costs three times as much as all the rest) ·
+        letters: times the usual size, for a picture that is shown small."""
         self.run = run
-        self.size = size
+        self.size, self.letters = size, letters
         self.lower, self.upper = bounds(run)
         self.fastest = nice_ceiling(fastest_water(run)) if run.water else 0.0
         self.light, self.fill = turned(SUN, azimuth + 90.0), turned(FILL, azimuth + 90.0)
@@ -64,7 +66,7 @@ class Scene:
 
     def _points(self, size):
         """A font size that keeps its share of the picture's height."""
-        return max(6, round(size * self.size[1] / 720))
+        return max(6, round(self.letters * size * self.size[1] / 720))
 
     def _draw_time(self, time):
         stamp = f"t = {time:.{decimals(self.run.times)}f} s"
@@ -91,7 +93,7 @@ class Scene:
             self.size[0] / self.size[1],
             azimuth,
             elevation,
-            margin=(0.04, 0.04, 0.17, 0.05),
+            margin=(0.04, 0.04, 0.095 + BAR * self.letters, 0.05),
         )
         camera = self.plotter.camera
         camera.position, camera.focal_point, camera.up = view.position, view.focus, view.up
@@ -168,7 +170,7 @@ class Scene:
             return
         bar = self.plotter.add_scalar_bar(
             title=title, mapper=self.plotter.actors[actor].mapper, n_labels=2, fmt="%.3g", vertical=False,
-            width=0.26, height=0.075, position_x=left, position_y=0.03, color=palette.INK, render=False,
+            width=0.26, height=BAR * self.letters, position_x=left, position_y=0.03, color=palette.INK, render=False,
             title_font_size=self._points(17), label_font_size=self._points(15), unconstrained_font_size=True,
         )  # fmt: skip
         lettered(bar.GetTitleTextProperty())

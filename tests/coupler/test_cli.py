@@ -1,5 +1,6 @@
 """The command: exit codes, messages and files, seen from outside."""
 
+import json
 import os
 import subprocess
 import sys
@@ -169,3 +170,26 @@ def test_a_case_with_blocks_tells_its_modules(tmp_path):
 
 def test_the_first_case_is_commented():
     assert FIRST_CASE.count("#") > 5
+
+
+@pytest.mark.parametrize("words", [("explain",), ("verify", "--list"), ("check", "cases/joint_pulled")])
+def test_a_reader_who_has_enough_ends_a_command_quietly(words):
+    """`| head` closes the pipe while the command still writes: no traceback, no word."""
+    with subprocess.Popen(
+        [COMMAND, *words], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as command:
+        command.stdout.close()
+        assert command.stderr.read() == ""
+    assert command.returncode != 0
+
+
+def test_a_run_that_nobody_reads_says_so_in_its_files(tmp_path):
+    """It is stopped like any command in a broken pipe; its log holds the reason, not a traceback."""
+    words = [COMMAND, "run", "cases/joint_pulled", "--output", tmp_path / "run"]
+    with subprocess.Popen(words, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as run:
+        run.stdout.close()
+        told = run.stderr.read()
+    log = (tmp_path / "run" / "log.txt").read_text(encoding="utf-8")
+    assert "nobody reads the output any more" in log
+    assert "Traceback" not in log + told
+    assert json.loads((tmp_path / "run" / "run.json").read_text(encoding="utf-8"))["exit_code"] == 4

@@ -1,6 +1,7 @@
 """A report is one file that needs no other, says what happened, and gives every number its unit."""
 
 import json
+import os
 import re
 import subprocess
 import sys
@@ -12,6 +13,7 @@ from coupler import extras
 from coupler.errors import NoRun
 from coupler.history import CRACK_COLUMNS, HistoryTable, write_cracks
 from coupler.recorder import ENERGY, WATER
+from coupler.report import html
 from coupler.report.command import report
 from coupler.report.html import figure, quantity, table
 from coupler.report.markdown import to_html
@@ -181,3 +183,48 @@ def test_the_page_of_a_study_holds_its_tables_and_figures(tmp_path, monkeypatch)
     assert told.count("<img") == 3
     assert "Cheapest setting for an error" in told
     assert "the water volume is off" in told
+
+
+def test_a_small_film_is_in_the_page_and_a_large_one_linked(run, monkeypatch):
+    """Paper shows neither; a page of a hundred megabytes could not be sent."""
+    (run / "pictures").mkdir()
+    (run / "pictures" / "film.mp4").write_bytes(b"0" * 3000)
+    assert "<video controls" in read(report(run, with_pictures=False))
+    monkeypatch.setattr(html, "LARGEST_FILM", 2000)
+    told = report(run, with_pictures=False).read_text(encoding="utf-8")
+    assert '<a href="pictures/film.mp4">' in told
+    assert "(3 kB)" in told
+
+
+def test_a_killed_run_is_told_from_one_that_goes_on(run):
+    """Both left the same run.json; one has no process any more. What it took is not known, so no times."""
+    with subprocess.Popen([sys.executable, "-c", ""]) as ended:
+        ended.wait()
+    for process, told in ((ended.pid, "killed: its process is gone"), (os.getpid(), "running: this is what")):
+        going = SUMMARY | {"status": "running", "exit_code": None, "exit_reason": None, "ended": None}
+        (run / "run.json").write_text(json.dumps(going | {"process": process}), encoding="utf-8")
+        page = read(report(run, with_pictures=False))
+        assert told in page
+        assert "wall time" not in page
+
+
+def test_a_resumed_run_tells_from_where(run):
+    again = {
+        "at": "2026-01-01T00:00:30+00:00",
+        "command": [],
+        "from": "1.h5",
+        "time": 0.1,
+        "changed": ["a=1"],
+    }
+    (run / "run.json").write_text(json.dumps(SUMMARY | {"resumed": [again]}), encoding="utf-8")
+    told = read(report(run, with_pictures=False))
+    assert "2026-01-01 00:00:30 UTC, from the checkpoint at t = 100 ms; a=1" in told
+
+
+def test_round_off_in_a_book_is_zero(run):
+    """1e-14 J beside kilojoules is not an energy."""
+    (run / "history" / "energy.csv").unlink()
+    with HistoryTable(run / "history" / "energy.csv", ENERGY) as history:
+        for size in (1e-14, 1500.0):
+            history.append(**{c[0]: size if c[1] == "J" else 0.1 for c in ENERGY})
+    assert "0 J</td><td class=n>1.5 kJ" in read(report(run, with_pictures=False))

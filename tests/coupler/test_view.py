@@ -168,3 +168,25 @@ def test_bad_options_are_refused(read, text):
 
     with pytest.raises(argparse.ArgumentTypeError, match=text):
         read(text)
+
+
+def test_a_reader_who_has_enough_ends_the_pictures_quietly(tmp_path):
+    """`surgebreak render RUN | head -1` leaves no message about a broken pipe."""
+    run = write_run(tmp_path / "run", [0.0], cell=4.0)
+    words = [sys.executable, "-m", "coupler.view", str(run), "--still", "--size", "160x90"]
+    with subprocess.Popen(words, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as view:
+        view.stdout.close()
+        assert view.stderr.read() == ""
+    assert view.returncode == 4
+
+
+def test_panels_hold_whole_vectors_of_like_size(tmp_path):
+    """Lines that would lie flat on the axis beside larger ones get a panel of their own; x, y, z stay together."""
+    names = ["pull_x", "pull_y", "pull_z", "small_x", "small_y", "small_z", "push_x", "push_y", "push_z"]
+    table = HistoryTable(tmp_path / "gauges.csv", [("time", "s", ""), *((n, "N", n) for n in names)])
+    for k in range(3):
+        table.append(time=k, **{n: k * (0.1 if n.startswith("small") else 50.0) for n in names})
+    table.close()
+    units, panels = zip(*grouped(read_history(tmp_path / "gauges.csv")))
+    assert units == ("N", "N")
+    assert panels == (names[:3] + names[6:], names[3:6])
