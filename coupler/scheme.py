@@ -29,6 +29,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
+from numba import njit
 from scipy.sparse.linalg import splu
 
 from coupler.wetting import Wetting
@@ -57,15 +58,18 @@ class StructureResponse:
         self.mass = mass
         self.imposed = np.where(driven[:, None], driven_velocity, 0.0).ravel()
         self.free = np.flatnonzero(np.repeat(~driven, 6))
-        self.matrix = sp.csc_array(mass / dt + damping + dt * stiffness)
-        tied = _tied(self.matrix) & ~driven
-        alone = np.flatnonzero(~driven & ~tied)
-        self._alone = (6 * alone[:, None] + np.arange(6)).ravel()
-        self._inverse = np.linalg.inv(_own_blocks(self.matrix)[alone])
+        self.matrix = sp.csr_array(mass / dt)
+        for part in (damping, dt * stiffness):
+            if part.nnz:
+                self.matrix = self.matrix + part
+        own, tied = _own_blocks(self.matrix.indptr, self.matrix.indices, self.matrix.data, len(driven))
+        tied &= ~driven
+        self._alone = np.flatnonzero(~driven & ~tied)
+        self._inverse = np.linalg.inv(own[self._alone])
         self._tied = np.flatnonzero(np.repeat(tied, 6))
         self._factor = None
         if len(self._tied):
-            block = self.matrix[:, self._tied][self._tied, :]
+            block = self.matrix[self._tied][:, self._tied]
             self._factor = splu(
                 sp.csc_matrix(block), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}
             )
@@ -75,7 +79,7 @@ class StructureResponse:
 
         Bodies that nothing ties to others are solved each by itself."""
         velocity = np.zeros_like(force)
-        velocity[self._alone] = (self._inverse @ force[self._alone].reshape(-1, 6, 1)).ravel()
+        _answer(self._alone, self._inverse, force, velocity)
         if self._factor is not None:
             velocity[self._tied] = self._factor.solve(np.ascontiguousarray(force[self._tied]))
         return velocity
@@ -89,24 +93,30 @@ class StructureResponse:
         return self.velocity(self.mass @ velocity.ravel() / self.dt + force.ravel())
 
 
-def _tied(matrix) -> Array:
-    """(n,) bool: bodies with entries in the rows of others. matrix (6n, 6n) sparse."""
-    entries = sp.coo_array(matrix)
-    row, column = entries.row // 6, entries.col // 6
-    between = (row != column) & (entries.data != 0.0)
-    tied = np.zeros(matrix.shape[0] // 6, bool)
-    tied[row[between]] = tied[column[between]] = True
-    return tied
+@njit(cache=True)
+def _own_blocks(indptr, indices, data, n):
+    """Diagonal blocks (n, 6, 6) of a csr matrix (6n, 6n), and (n,) bool: bodies with entries in the rows of others."""
+    blocks, tied = np.zeros((n, 6, 6)), np.zeros(n, np.bool_)
+    for row in range(6 * n):
+        for s in range(indptr[row], indptr[row + 1]):
+            column = indices[s]
+            if column // 6 == row // 6:
+                blocks[row // 6, row % 6, column % 6] += data[s]
+            elif data[s] != 0.0:
+                tied[row // 6] = tied[column // 6] = True
+    return blocks, tied
 
 
-def _own_blocks(matrix) -> Array:
-    """Diagonal blocks (n, 6, 6) of a sparse (6n, 6n) matrix."""
-    entries = sp.coo_array(matrix)
-    own = entries.row // 6 == entries.col // 6
-    row, column = entries.row[own], entries.col[own]
-    blocks = np.zeros((matrix.shape[0] // 6, 6, 6))
-    np.add.at(blocks, (row // 6, row % 6, column % 6), entries.data[own])
-    return blocks
+@njit(cache=True)
+def _answer(bodies, inverse, force, velocity):
+    """Rows of `bodies` (k,) of velocity (6n,) from force (6n,) and inverse (k, 6, 6), in place."""
+    for k in range(len(bodies)):
+        first = 6 * bodies[k]
+        for i in range(6):
+            total = 0.0
+            for j in range(6):
+                total += inverse[k, i, j] * force[first + j]
+            velocity[first + i] = total
 
 
 @dataclass(frozen=True)

@@ -16,40 +16,84 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class Wetting:
-    """dof, body (k,) of each pair · rows (k, 6) [m², m³], entries of G · size: (n_dofs, n_bodies)."""
+    """dof, body (k,) of each pair · rows (k, 6) [m², m³], entries of G · n_dofs · start (n_bodies + 1,): pairs of each
+    body in own_dof (k,) and own_rows (k, 6), the same ordered by bodies: read in order, both products are faster."""
 
     dof: Array
     body: Array
     rows: Array
-    size: tuple[int, int]
+    n_dofs: int
+    start: Array
+    own_dof: Array
+    own_rows: Array
 
     @classmethod
     def of(cls, coupling) -> Wetting:
         """From csr (n_dofs, 6 n_bodies)."""
-        row = np.repeat(np.arange(coupling.shape[0]), np.diff(coupling.indptr))
-        body, component = coupling.indices // 6, coupling.indices % 6
-        n_bodies = coupling.shape[1] // 6
-        key, pair = np.unique(row * n_bodies + body, return_inverse=True)
-        rows = np.zeros((len(key), 6))
-        rows[pair, component] = coupling.data
-        return cls(key // max(1, n_bodies), key % max(1, n_bodies), rows, (coupling.shape[0], n_bodies))
+        dof, body, rows = _pairs(coupling.indptr, coupling.indices, coupling.data)
+        by_body = _by_body(dof, body, rows, coupling.shape[1] // 6)
+        return cls(dof, body, rows, coupling.shape[0], *by_body)
 
     def on_bodies(self, p: Array) -> Array:
         """Gᵀ p (6 n_bodies,) of p (n_dofs,)."""
-        return _gather(self.dof, self.body, self.rows, p, self.size[1]).ravel()
+        return _gather(self.start, self.own_dof, self.own_rows, p).ravel()
 
     def on_water(self, velocity: Array) -> Array:
         """G V (n_dofs,) of V (6 n_bodies,)."""
-        return _scatter(self.dof, self.body, self.rows, velocity.reshape(-1, 6), self.size[0])
+        return _scatter(self.dof, self.body, self.rows, velocity.reshape(-1, 6), self.n_dofs)
 
 
 @njit(cache=True)
-def _gather(dof, body, rows, p, n_bodies):
-    out = np.zeros((n_bodies, 6))
+def _pairs(indptr, indices, data):
+    """dof, body (k,) and rows (k, 6) of the entries; a row holds few bodies, so each is sought among those before it."""
+    dof, body = np.empty(len(indices), np.int64), np.empty(len(indices), np.int64)
+    rows = np.zeros((len(indices), 6))
+    count = 0
+    for i in range(len(indptr) - 1):
+        first = count
+        for s in range(indptr[i], indptr[i + 1]):
+            b = indices[s] // 6
+            k = count - 1
+            while k >= first and body[k] != b:
+                k -= 1
+            if k < first:
+                k = count
+                dof[k], body[k] = i, b
+                count += 1
+            rows[k, indices[s] % 6] += data[s]
+    return dof[:count].copy(), body[:count].copy(), rows[:count].copy()
+
+
+@njit(cache=True)
+def _by_body(dof, body, rows, n_bodies):
+    """start (n_bodies + 1,), dof (k,) and rows (k, 6) of the pairs, body by body."""
+    start = np.zeros(n_bodies + 1, np.int64)
+    for b in body:
+        start[b + 1] += 1
+    start = np.cumsum(start)
+    place = start[:-1].copy()
+    own_dof, own_rows = np.empty_like(dof), np.empty_like(rows)
     for k in range(len(dof)):
-        value = p[dof[k]]
-        for c in range(6):
-            out[body[k], c] += rows[k, c] * value
+        at = place[body[k]]
+        own_dof[at], own_rows[at] = dof[k], rows[k]
+        place[body[k]] += 1
+    return start, own_dof, own_rows
+
+
+@njit(cache=True)
+def _gather(start, dof, rows, p):
+    out = np.zeros((len(start) - 1, 6))
+    for b in range(len(start) - 1):
+        f0 = f1 = f2 = f3 = f4 = f5 = 0.0  # six sums in registers: an array costs twice as much
+        for k in range(start[b], start[b + 1]):
+            value = p[dof[k]]
+            f0 += rows[k, 0] * value
+            f1 += rows[k, 1] * value
+            f2 += rows[k, 2] * value
+            f3 += rows[k, 3] * value
+            f4 += rows[k, 4] * value
+            f5 += rows[k, 5] * value
+        out[b] = f0, f1, f2, f3, f4, f5
     return out
 
 
