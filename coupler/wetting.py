@@ -45,7 +45,7 @@ class Wetting:
 
 @njit(cache=True)
 def _pairs(indptr, indices, data):
-    """dof, body (k,) and rows (k, 6) of the entries; a row holds few bodies, so each is sought among those before it."""
+    """dof, body (k,), rows (k, 6) of the entries. Each body is sought among the few that its row had before."""
     dof, body = np.empty(len(indices), np.int64), np.empty(len(indices), np.int64)
     rows = np.zeros((len(indices), 6))
     count = 0
