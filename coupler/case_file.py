@@ -23,6 +23,7 @@ from coupler.case_checks import problems
 from coupler.case_messages import explain_error
 from coupler.case_schema import find, keys
 from coupler.errors import BadCase, did_you_mean
+from coupler.records import find_record
 from coupler.toml_lines import key_lines, line_of, shown
 
 KeyPath = tuple[str | int, ...]
@@ -66,10 +67,15 @@ def _place_files(table: dict, directory: Path) -> None:
     """Paths in the case are meant from its directory; what is no path is refused later."""
     for above, name in (("structure", "file"), ("water", "inflow"), ("study", "quantity"), (None, "solid")):
         section = table if above is None else table.get(above)
+        find = find_record if name == "quantity" else _from
         entries = section.get(name) if isinstance(section, dict) else None
         for entry in entries if isinstance(entries, list) else ():
             if isinstance(entry, dict) and isinstance(entry.get("path"), str) and entry["path"]:
-                entry["path"] = str((directory / Path(entry["path"]).expanduser()).resolve())
+                entry["path"] = str(find(entry["path"], directory))
+
+
+def _from(path: str, directory: Path) -> Path:
+    return (directory / Path(path).expanduser()).resolve()
 
 
 class _Places:

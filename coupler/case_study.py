@@ -56,7 +56,8 @@ class Quantity(Section):
     )
     path: str | None = Field(
         None,
-        description="the reference: a CSV file, from the directory of the case; take is applied to it as well",
+        description="the reference: a CSV file, from the directory of the case or one of "
+        "coupler/verify/reference by its name; take is applied to it as well",
     )
     columns: tuple[str, str] | None = Field(None, description="time and value in that file")
     band: Number | None = Field(None, description="half the width of the scatter of the measurement")

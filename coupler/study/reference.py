@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 
 from coupler.case_study import Quantity
-from coupler.errors import BadCase, did_you_mean
+from coupler.errors import BadCase
+from coupler.records import column as table_column
+from coupler.records import read_record
 from coupler.study.formula import evaluate
 from coupler.study.reading import Curve, taken
 
@@ -76,25 +76,6 @@ def half_band(q: Quantity) -> float:
 
 
 def file_curve(q: Quantity, column: str | None = None) -> Curve:
-    """Columns of the reference file: time and value, or time and another one. Raises BadCase."""
-    table = _table(Path(q.path))
-    found = []
-    for name in (q.columns[0], column or q.columns[1]):
-        if name not in table:
-            raise BadCase(
-                [f"{q.path}: no column '{name}'{did_you_mean(name, table)}; there are {', '.join(table)}"]
-            )
-        found.append(table[name])
-    return Curve(*found)
-
-
-@lru_cache(maxsize=32)
-def _table(path: Path) -> dict[str, np.ndarray]:
-    """Columns of a CSV by their heading; lines that begin with # are skipped. Raises BadCase."""
-    try:
-        text = path.read_text(encoding="utf-8")
-        rows = list(csv.reader(line for line in text.splitlines() if line and not line.startswith("#")))
-        values = np.array([[float(entry) for entry in row] for row in rows[1:]], float)
-        return {name.strip(): values[:, k] for k, name in enumerate(rows[0])}
-    except (OSError, ValueError, IndexError) as error:
-        raise BadCase([f"{path}: no table of numbers under a line of names: {error}"]) from error
+    """Columns of the reference file: time and value, or time and another one. Raises NoSuchData."""
+    table = read_record(Path(q.path))
+    return Curve(*(table_column(table, name, q.path) for name in (q.columns[0], column or q.columns[1])))

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 
-FOLDER = Path(__file__).parent / "reference"
+from coupler.records import SHIPPED, read_record
 
 
 def columns(name: str) -> dict[str, np.ndarray]:
     """Columns of reference/<name>.csv by their heading; every entry a number."""
-    head, *rows = _lines(name)
-    table = np.array([[float(entry) for entry in row.split(",")] for row in rows])
-    return dict(zip(head.split(","), table.T))
+    return read_record(SHIPPED / f"{name}.csv")
 
 
 def named_values(name: str) -> dict[str, float]:
@@ -23,5 +19,5 @@ def named_values(name: str) -> dict[str, float]:
 
 
 def _lines(name: str) -> list[str]:
-    lines = (FOLDER / f"{name}.csv").read_text(encoding="utf-8").splitlines()
+    lines = (SHIPPED / f"{name}.csv").read_text(encoding="utf-8").splitlines()
     return [line for line in lines if not line.startswith("#")]

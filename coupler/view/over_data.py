@@ -7,8 +7,9 @@ columns, places, above                  instead of column: the times at which th
                                         their places - the way of a front
 x_label, x_scale, y_scale               "time [s]", 1, 1: what time and value are multiplied with
 x_range, y_range                        what is shown; absent: all
-references = [{file = "reference/a.csv", x = "t", y = "H1", label = "measured"}]
-                                        low and high instead of y: a band; the file from the directory of the case
+references = [{file = "record.csv", x = "t", y = "H1", label = "measured"}]
+                                        low and high instead of y: a band; the file from the directory of the case,
+                                        or one of coupler/verify/reference by its name
 """
 
 import json
@@ -17,15 +18,9 @@ from pathlib import Path
 
 import numpy as np
 
-from coupler.errors import ExitCode, SurgebreakError, did_you_mean
 from coupler.history import read_history
+from coupler.records import column, find_record, read_record
 from coupler.view.curves import draw
-
-
-class NoSuchData(SurgebreakError):
-    """A curve of expected.toml names a file or a column that is not there."""
-
-    exit_code = ExitCode.BAD_CASE
 
 
 def over_data(run, folder):
@@ -72,10 +67,10 @@ def computed(entry, run):
     history = read_history(run / entry["table"]).values
     time = history["time"] * entry.get("x_scale", 1.0)
     if "columns" in entry:
-        values = np.array([_named(history, name, entry["table"]) for name in entry["columns"]])
+        values = np.array([column(history, name, entry["table"]) for name in entry["columns"]])
         x, y = arrivals(time, values, entry["above"]), np.array(entry["places"], float)
     else:
-        x, y = time, _named(history, entry["column"], entry["table"])
+        x, y = time, column(history, entry["column"], entry["table"])
     y = y * entry.get("y_scale", 1.0)
     return {"label": entry.get("label", "computed"), "kind": "computed", "x": x.tolist(), "y": y.tolist()}
 
@@ -88,27 +83,12 @@ def arrivals(time, values, above):
 
 def reference(entry, place):
     """A measured curve or band from a CSV file whose comments begin with #."""
-    table = read_table(place / entry["file"])
-    x = _named(table, entry["x"], entry["file"])
+    table = read_record(find_record(entry["file"], place))
+    x = column(table, entry["x"], entry["file"])
     curve = {"label": entry["label"], "x": (x * entry.get("x_scale", 1.0)).tolist()}
     scale = entry.get("y_scale", 1.0)
     if "low" in entry:
-        low, high = (scale * _named(table, entry[k], entry["file"]) for k in ("low", "high"))
+        low, high = (scale * column(table, entry[k], entry["file"]) for k in ("low", "high"))
         return curve | {"kind": "band", "y": low.tolist(), "upper": high.tolist()}
-    y = scale * _named(table, entry["y"], entry["file"])
+    y = scale * column(table, entry["y"], entry["file"])
     return curve | {"kind": "measured", "y": y.tolist()}
-
-
-def read_table(path):
-    """Columns (n,) by name. Raises NoSuchData."""
-    if not path.exists():
-        raise NoSuchData(f"{path}: no such file; expected.toml names it for a curve")
-    lines = [line for line in path.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
-    rows = np.array([[float(entry) for entry in line.split(",")] for line in lines[1:]])
-    return dict(zip(lines[0].split(","), rows.T))
-
-
-def _named(table, name, file):
-    if name not in table:
-        raise NoSuchData(f"{file}: no column '{name}'{did_you_mean(name, table)}")
-    return np.asarray(table[name], float)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from coupler.history import HistoryTable
+from coupler.records import SHIPPED, NoSuchData, find_record, read_record
 from coupler.verify import one
 from coupler.verify.courant import figures as peak_mean_impulse
 from coupler.verify.curves import Curve, Figure, Panel, as_json
@@ -105,7 +106,7 @@ def test_a_run_is_drawn_over_the_data_of_its_case(tmp_path):
 )
 def test_data_that_are_not_there_are_named(tmp_path, was, now, said):
     run = case_with_run(tmp_path, CURVE.replace(was, now))
-    with pytest.raises(view.NoSuchData, match=said):
+    with pytest.raises(NoSuchData, match=said):
         view.over_data(run, tmp_path)
 
 
@@ -114,3 +115,19 @@ def test_a_run_whose_case_is_gone_has_no_data(tmp_path):
     assert view.directory_of_case(tmp_path) is None
     (tmp_path / "run.json").write_text(json.dumps({"case_file": "/no/such/case.toml"}), encoding="utf-8")
     assert view.over_data(tmp_path, tmp_path) == []
+
+
+def test_records_of_the_program_are_found_by_name_behind_those_of_the_case(tmp_path):
+    """A copied case still finds them; a file of the case with the same name goes before."""
+    name = "sloshing_linear.csv"
+    assert find_record(name, tmp_path) == SHIPPED / name
+    (tmp_path / name).write_text("# ours\na,b\n1,2\n", encoding="utf-8")
+    assert read_record(find_record(name, tmp_path))["b"] == [2.0]
+    assert find_record("nowhere.csv", tmp_path) == tmp_path / "nowhere.csv"
+
+
+@pytest.mark.parametrize("path", sorted(SHIPPED.glob("*.csv")), ids=lambda path: path.stem)
+def test_every_record_of_the_program_names_its_source(path):
+    first = path.read_text(encoding="utf-8").splitlines()[0]
+    assert first.startswith("#")
+    assert len(first) > 30

@@ -1,13 +1,10 @@
 """Water in motion: free fall, sloshing, a dam break, symmetry, and the volume through all of it."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
+from coupler.verify.figures import columns
 from tests.fluid.scenes import advance, column, tank
-
-REFERENCE = Path(__file__).parents[1] / "reference"
 
 
 def test_blob_falls_freely():
@@ -25,8 +22,7 @@ def test_blob_falls_freely():
 
 def test_sloshing_has_the_linear_frequency_and_little_damping():
     """ω² = g k tanh(k d), first mode of a 1 m tank (sloshing_linear.csv): a coarse run over two periods."""
-    table = np.loadtxt(REFERENCE / "sloshing_linear.csv", delimiter=",", comments="#", skiprows=2)
-    omega = table[0, 3]
+    omega = columns("sloshing_linear")["omega"][0]
     n, amplitude = 16, 0.01
     water = tank(
         [1, 2 / n, 10.5 / n],

@@ -1,24 +1,19 @@
 """The pressure: exact at the release of a dam, symmetric positive definite, in balance with bodies."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
+from coupler.verify.figures import columns
 from fluid.bodies import ConvexBodies
 from fluid.moments import cells_touching
 from fluid.projection import cell_gradient
 from tests.fluid.scenes import advance, column, rotation, tank
 
-REFERENCE = Path(__file__).parents[1] / "reference"
-
 
 @pytest.mark.parametrize("width", [0.5, 1.0])
 def test_first_pressure_after_a_dam_vanishes(width):
     """Series solution of Laplace p = 0 in the released column (header of the CSV); error falls with h."""
-    table = np.loadtxt(
-        REFERENCE / "dam_release_initial_pressure.csv", delimiter=",", comments="#", skiprows=3
-    )
+    table = np.column_stack(list(columns("dam_release_initial_pressure").values()))
     table = table[table[:, 0] == width]
     errors = []
     for cell in (0.1, 0.05):

@@ -1,7 +1,7 @@
 """Bodies lighter and heavier than water, released in a full, closed tank: the added mass is in the pressure solve.
 
 Stepping water and body in turn diverges below a density ratio of about the added mass coefficient; here the first
-acceleration must be g (1 - s)/(s + ca) at any ratio s. Reference: potential flow, tests/reference/
+acceleration must be g (1 - s)/(s + ca) at any ratio s. Reference: potential flow, coupler/verify/reference/
 added_mass_closed_tank.csv (cube of side a in a cubic tank of side 3a: ca = 0.7177).
 """
 

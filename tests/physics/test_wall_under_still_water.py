@@ -1,5 +1,5 @@
 """A bonded wall under still water: the load is hydrostatic, block by block, and stays so; the wall stands and falls
-where the strength of its base joint says (closed forms; joint strength: tests/reference/coh_joint_Mmax_vs_N.csv)."""
+where the strength of its base joint says (closed forms; joint strength: coh_joint_Mmax_vs_N.csv)."""
 
 import numpy as np
 import pytest

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tests.yade_scripts.reference import columns
+from coupler.verify.figures import columns
 from yade_scripts.blocks import Block
 from yade_scripts.contact import (
     ContactError,

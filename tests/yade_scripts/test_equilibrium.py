@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.yade_scripts.reference import columns
+from coupler.verify.figures import columns
 from yade_scripts.blocks import Block
 from yade_scripts.cohesion import JointParameters
 from yade_scripts.contact import ContactLaw

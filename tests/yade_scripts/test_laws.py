@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from tests.yade_scripts.reference import columns
+from coupler.verify.figures import columns
 from yade_scripts import laws
 from yade_scripts.cohesion import JointParameterError, JointParameters
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
-from tests.yade_scripts.reference import columns
+from coupler.verify.figures import columns
 from yade_scripts.blocks import Block
 from yade_scripts.cohesion import JointParameters
 from yade_scripts.contact import ContactLaw
