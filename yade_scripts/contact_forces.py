@@ -6,10 +6,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from yade_scripts import contact_kernel as kernel
 from yade_scripts.blocks import Block
 from yade_scripts.contact import ContactLaw
+from yade_scripts.contact_arrays import Bodies, Law, Pairs, Slots, empty_rows
+from yade_scripts.contact_kernel import carry_slots, contact_forces
 from yade_scripts.contact_nodes import contact_shapes
+from yade_scripts.contact_springs import contact_work
 from yade_scripts.contact_state import Contacts, contacts_of_rows
 from yade_scripts.faces import FixedPlane
 from yade_scripts.motion import Motion
@@ -46,7 +48,7 @@ class ContactForces:
         materials = sorted(set(names))
         rows = np.array([materials.index(name) for name in names], np.int64)
         self._bodies = _bodies(blocks, len(planes), face_stiffness, free, rows)
-        self._law = kernel.Law(
+        self._law = Law(
             law.shear_ratio, law.damping_ratio, law.tangential_damping_ratio, law.friction_table(materials)
         )
         self._free = np.concatenate([free, np.zeros(len(planes), bool)])
@@ -104,27 +106,25 @@ class ContactForces:
         size = self._nodes[a] + self._nodes[b] + 1
         start = np.concatenate([[0], np.cumsum(size)]).astype(np.int64)
         total = int(start[-1])
-        slots = kernel.Slots(
-            np.full(total, -1, np.int64), np.zeros(total), np.zeros(total), np.zeros((total, 3))
-        )
+        slots = Slots(np.full(total, -1, np.int64), np.zeros(total), np.zeros(total), np.zeros((total, 3)))
         fresh, known, touching = (np.zeros(len(a), bool) for _ in range(3))
         if hasattr(self, "_pairs") and len(self._pairs.a):
             known = self._carry(a, b, start, fresh, touching, slots)
         if as_deep or parted is not None:
             fresh |= ~known & (as_deep or np.isin(self._key(a, b), parted))
-        self._pairs = kernel.Pairs(a, b, start, fresh, touching, np.zeros(len(a)))
+        self._pairs = Pairs(a, b, start, fresh, touching, np.zeros(len(a)))
         self._slots = slots
         if not hasattr(self, "_rows") or len(self._rows.a) < total:
-            self._rows = kernel.empty_rows(total + total // 4)
+            self._rows = empty_rows(total + total // 4)
 
-    def _carry(self, a, b, start, fresh: Array, touching: Array, slots: kernel.Slots) -> Array:
+    def _carry(self, a, b, start, fresh: Array, touching: Array, slots: Slots) -> Array:
         """Copy the slots of pairs that were known before; (p,) bool."""
         old = self._pairs
         old_keys, keys = self._key(old.a, old.b), self._key(a, b)
         spot = np.minimum(np.searchsorted(old_keys, keys), len(old_keys) - 1)
         known = old_keys[spot] == keys
         fresh[known], touching[known] = old.fresh[spot[known]], old.touching[spot[known]]
-        self.friction += kernel.carry_slots(
+        self.friction += carry_slots(
             old, self._slots, np.flatnonzero(known), spot[known], start, slots, self._law.shear
         )
         return known
@@ -134,7 +134,7 @@ class ContactForces:
     def add_forces(self, dt: float, F: Array) -> None:
         """Add the contact forces at the present places to F (n, 6) for a substep of dt [s]."""
         m = self._motion
-        self._count, lost = kernel.contact_forces(
+        self._count, lost = contact_forces(
             self._shapes, self._bodies, self._law, self._pairs, self._slots, m.all_x, m.all_v, m.all_R, dt, m.dt,
             self._rows, F,
         )  # fmt: skip
@@ -143,7 +143,7 @@ class ContactForces:
 
     def settle(self, dt: float) -> None:
         """Book the work of the contacts over the substep that has just ended."""
-        dashpot, driving = kernel.contact_work(self._rows, self._count, self._motion.all_v, ~self._free, dt)
+        dashpot, driving = contact_work(self._rows, self._count, self._motion.all_v, ~self._free, dt)
         self.dashpot += dashpot
         self.driving += driving
 
@@ -198,11 +198,11 @@ def _in_order(pairs: Array) -> Array:
     return np.unique(np.sort(pairs, axis=1), axis=0)
 
 
-def _bodies(blocks, planes: int, face_stiffness: Array, free: Array, material: Array) -> kernel.Bodies:
+def _bodies(blocks, planes: int, face_stiffness: Array, free: Array, material: Array) -> Bodies:
     inverse_mass = np.array([1.0 / b.mass if f else 0.0 for b, f in zip(blocks, free)] + [0.0] * planes)
     inverse_inertia = np.zeros((len(blocks) + planes, 3, 3))
     for row, block in enumerate(blocks):
         if free[row]:
             inverse_inertia[row] = np.linalg.inv(block.inertia)
     stiffness = np.concatenate([face_stiffness, np.full(planes, np.inf)])
-    return kernel.Bodies(inverse_mass, inverse_inertia, stiffness, material)
+    return Bodies(inverse_mass, inverse_inertia, stiffness, material)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from yade_scripts.contact_kernel import Rows, empty_rows
+from yade_scripts.contact_arrays import Rows, empty_rows
 from yade_scripts.tangent import Springs
 
 Array = np.ndarray

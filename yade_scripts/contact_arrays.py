@@ -1,0 +1,93 @@
+"""What the loops over contact nodes work on: blocks, pairs, the memory of nodes, and the contacts of an evaluation."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+Array = np.ndarray
+
+
+class Bodies(NamedTuple):
+    """Blocks and planes: inverse_mass (n,) [1/kg], inverse_inertia (n, 3, 3) body frame, zero where motion is given.
+
+    stiffness (n,) K of a face [N/m], inf for planes · material (n,) rows of `Law.friction`.
+    """
+
+    inverse_mass: Array
+    inverse_inertia: Array
+    stiffness: Array
+    material: Array
+
+
+class Law(NamedTuple):
+    """shear: k_t/k_n · zeta, zeta_t: damping ratios (zeta_t < 0: c_t = sqrt(shear) c_n) · friction (m, m) μ."""
+
+    shear: float
+    zeta: float
+    zeta_t: float
+    friction: Array
+
+
+class Pairs(NamedTuple):
+    """a < b (p,) bodies; b may be a plane · start (p+1,) first slot: the nodes of a, those of b, then
+    one for edges that cross
+
+    fresh (p,) bool: contact takes over from a joint, with the depth there is · touching (p,) bool: had contacts last
+    time · calm (p,) [m]: way that the two must move before they can touch.
+    """
+
+    a: Array
+    b: Array
+    start: Array
+    fresh: Array
+    touching: Array
+    calm: Array
+
+
+class Slots(NamedTuple):
+    """What a node remembers of its contact with the other body of the pair: face (s,) or -1 (of edges: the number of
+    their pair), k (s,) [N/m],
+
+    rest (s,) [m]: depth at which it began · shear (s, 3) [N] on the node's block, in the frame of the face's.
+    """
+
+    face: Array
+    k: Array
+    rest: Array
+    shear: Array
+
+
+class Rows(NamedTuple):
+    """The contacts of one evaluation, one row each: a block of the node, b of the face; slot.
+
+    point, normal (out of b) (c, 3) · depth [m] · kn, kt, cn, ct · mu · force, viscous, shear (c, 3) on a
+    arm_a, arm_b (c, 3) [m] · slip (c, 3): velocity of a against b before the substep.
+    """
+
+    a: Array
+    b: Array
+    slot: Array
+    point: Array
+    normal: Array
+    depth: Array
+    kn: Array
+    kt: Array
+    cn: Array
+    ct: Array
+    mu: Array
+    force: Array
+    viscous: Array
+    shear: Array
+    arm_a: Array
+    arm_b: Array
+    velocity: Array
+
+
+def empty_rows(size: int) -> Rows:
+    """Room for `size` contacts."""
+    whole, one, three = (np.zeros(size, np.int64) for _ in range(3)), (size,), (size, 3)
+    scalars = [np.zeros(one) for _ in range(6)]
+    vectors = [np.zeros(three) for _ in range(8)]
+    return Rows(*whole, vectors[0], vectors[1], *scalars, *vectors[2:])
