@@ -19,6 +19,7 @@ from numba import njit
 
 from fluid.claims import wetted
 from fluid.cut_arrays import Cuts, Output, doubled, output, trimmed
+from fluid.fans import fan
 from fluid.jit import inner
 from fluid.parts_of_cell import label_parts
 from fluid.pieces import (
@@ -187,12 +188,13 @@ def _openings(w, piece, origin, part, out, n_open):
 
 @inner
 def _emit(
-    w, cell, origin, count, n_near, whole, normals, round_off, least, link_area, out, n_part, n_wet, n_open
+    w, cell, origin, count, n_near, whole, normals, round_off, least, link_area, out, at
 ):
-    """Write the parts of one cell, their moments and wetted polygons (and openings if link_area >= 0)."""
+    """Write the parts of one cell, their moments, wetted polygons and tetrahedra (and openings if link_area >= 0)."""
+    n_part, n_wet, n_open, n_tet = at[1], at[2], at[3], at[4]
     parts = label_parts(w, count, normals, round_off, link_area)
     if n_part + parts > len(out.part_cell):
-        return OUTPUT_FULL, n_part, n_wet, n_open
+        return OUTPUT_FULL
     for part in range(n_part, n_part + parts):
         out.part_cell[part] = cell
         out.part_whole[part] = whole
@@ -205,12 +207,15 @@ def _emit(
         state, n_wet = wetted(w, piece, origin, n_near, normals, round_off, least, part, out, n_wet)
         if state == DONE and link_area >= 0.0:
             state, n_open = _openings(w, piece, origin, part, out, n_open)
+        if state == DONE and not whole:
+            state, n_tet = fan(w, piece, part, out, n_tet)
         if state != DONE:
-            return state, n_part, n_wet, n_open
+            return state
     for part in range(n_part, n_part + parts):
         for c in range(3):
             out.part_moments[part, 1 + c] += origin[c]
-    return DONE, n_part + parts, n_wet, n_open
+    at[1], at[2], at[3], at[4] = n_part + parts, n_wet, n_open, n_tet
+    return DONE
 
 
 @njit(cache=True)
@@ -218,7 +223,7 @@ def _cut_cells(
     nodes, cells, chosen, body_start, bodies, normals, offsets, plane_start, tolerance, spacing, link_area,
     w, out, at,
 ):  # fmt: skip
-    """Cut the cells `chosen` from at[0] on; at (4,) <- cells, parts, wetted polygons, openings done."""
+    """Cut the cells `chosen` from at[0] on; at (5,) <- cells, parts, wetted polygons, openings, tetrahedra done."""
     x = np.empty((4, 3))
     round_off, thin, least = ROUND_OFF * spacing, THIN * spacing, NO_AREA * spacing * spacing
     for row in range(at[0], len(chosen)):
@@ -234,13 +239,11 @@ def _cut_cells(
             if state != DONE:
                 return state
             if count > 0:
-                state, n_part, n_wet, n_open = _emit(
-                    w, chosen[row], x[0], count, near, whole, normals, round_off, least, link_area, out,
-                    at[1], at[2], at[3],
-                )  # fmt: skip
+                state = _emit(
+                    w, chosen[row], x[0], count, near, whole, normals, round_off, least, link_area, out, at
+                )
                 if state != DONE:
                     return state
-                at[1], at[2], at[3] = n_part, n_wet, n_open
         at[0] = row + 1
     return DONE
 
@@ -253,7 +256,7 @@ def cut_cells(nodes, cells, chosen, body_start, bodies, solids, tolerance, spaci
     link_area [m2]: pieces of a cell are one part where they touch over more than this; < 0: all pieces of
     a cell are one part and no openings are listed.
     Raises CutFailed where the cross-section of a piece that is not thin cannot be closed."""
-    at = np.zeros(4, dtype=np.int64)
+    at = np.zeros(5, dtype=np.int64)
     scale = 1
     most_bodies = int(np.diff(body_start).max()) if len(chosen) else 0
     most_planes = int(np.diff(solids.plane_start).max()) if len(solids) else 0

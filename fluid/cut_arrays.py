@@ -20,6 +20,8 @@ class Output(NamedTuple):
     open_face: np.ndarray  # (open polygons,)  0..3
     open_start: np.ndarray  # (open polygons + 1,)
     open_x: np.ndarray  # (corners, 3)
+    tet_part: np.ndarray  # (tetrahedra,) row of the part that they fill
+    tet: np.ndarray  # (tetrahedra, 17) volume, barycentric coordinates of the four corners
 
 
 def output(parts: int, polygons: int, with_openings: bool) -> Output:
@@ -36,6 +38,8 @@ def output(parts: int, polygons: int, with_openings: bool) -> Output:
         np.zeros(openings, dtype=np.int64),
         np.zeros(openings + 1, dtype=np.int64),
         np.zeros((openings * 5, 3)),
+        np.zeros(polygons, dtype=np.int64),
+        np.zeros((polygons, 17)),
     )
 
 
@@ -46,7 +50,9 @@ class Cuts(NamedTuple):
     wet_part (S,) row of the part · wet_body (S,) · wet (S, 25) triangles: area [m2], centroid, normal, 3 points,
     3 corners
     open_part (O,), open_face (O,) 0..3 (opposite to node k), open_start (O+1,), open_x [m]: the faces of
-    the parts on the faces of their cells (only with connected parts)."""
+    the parts on the faces of their cells (only with connected parts).
+    tet_part (T,) row of the part · tet (T, 17) tetrahedra that fill it: volume [m3], barycentric coordinates of the
+    four corners in the cell (only of parts that are not whole cells)"""
 
     part_cell: np.ndarray
     part_whole: np.ndarray
@@ -58,11 +64,13 @@ class Cuts(NamedTuple):
     open_face: np.ndarray
     open_start: np.ndarray
     open_x: np.ndarray
+    tet_part: np.ndarray
+    tet: np.ndarray
 
     def kept(self, keep) -> Cuts:
         """Only the parts keep (K,) bool, with their polygons."""
         row = np.cumsum(keep) - 1
-        wet, openings = keep[self.wet_part], keep[self.open_part]
+        wet, openings, filled = keep[self.wet_part], keep[self.open_part], keep[self.tet_part]
         length = np.diff(self.open_start)
         return Cuts(
             self.part_cell[keep],
@@ -75,6 +83,8 @@ class Cuts(NamedTuple):
             self.open_face[openings],
             np.concatenate([[0], np.cumsum(length[openings])]).astype(np.int64),
             self.open_x[np.repeat(openings, length)],
+            row[self.tet_part[filled]],
+            self.tet[filled],
         )
 
 
@@ -84,8 +94,8 @@ def doubled(a):
 
 
 def trimmed(out, at) -> Cuts:
-    """The rows that were filled; at (4,): cells, parts, wetted polygons, openings."""
-    parts, wet, openings = int(at[1]), int(at[2]), int(at[3])
+    """The rows that were filled; at (5,): cells, parts, wetted polygons, openings, tetrahedra."""
+    parts, wet, openings, tets = int(at[1]), int(at[2]), int(at[3]), int(at[4])
     start = out.open_start[: openings + 1].copy()
     return Cuts(
         out.part_cell[:parts].copy(),
@@ -98,4 +108,6 @@ def trimmed(out, at) -> Cuts:
         out.open_face[:openings].copy(),
         start,
         out.open_x[: start[-1]].copy(),
+        out.tet_part[:tets].copy(),
+        out.tet[:tets].copy(),
     )

@@ -23,6 +23,7 @@ from fluid.contacts import Contacts, find_contacts
 from fluid.covers import Connection, virtual_cells, without_pockets
 from fluid.cut import cut_cells
 from fluid.cut_arrays import Cuts
+from fluid.fans import Fans, fans
 from fluid.heirs import pick_old_nodes
 from fluid.joined import joined
 from fluid.mesh import Background, gradients
@@ -81,7 +82,7 @@ class PhysicalDomain:
 
     nodes (N, 3) [m] · cells (M, 4) · parent_node (N,), parent_cell (M,) in the background
     volume (M,) [m3], centroid (M, 3) [m], second (M, 6) [m5] (xx, yy, zz, xy, xz, yz): of the fluid part
-    is_cut (M,): something was removed from the cell
+    is_cut (M,): something was removed from the cell · fans: tetrahedra that fill the fluid part of cut cells
     face_cell (S,) row of `cells` · face_body (S,) · face_area (S,) [m2] · face_centroid (S, 3) [m]
     face_normal (S, 3) out of the body · face_points (S, 3, 3) [m] three points, weight area / 3, degree 2
     face_corners (S, 3, 3) [m] (the polygons are triangles)
@@ -96,6 +97,7 @@ class PhysicalDomain:
     centroid: np.ndarray
     second: np.ndarray
     is_cut: np.ndarray
+    fans: Fans
     face_cell: np.ndarray
     face_body: np.ndarray
     face_area: np.ndarray
@@ -237,7 +239,8 @@ def _assembled(memory: Memory, elements: Elements, covers: str) -> PhysicalDomai
             mesh, elements.parent, elements.part, elements.start, memory.contacts, memory.connection
         )
     volume = _volume(memory, elements)
-    face_cell, wet, wet_body = elements.of_part[cuts.wet_part], cuts.wet, cuts.wet_body
+    of_part = elements.of_part
+    face_cell, wet, wet_body = of_part[cuts.wet_part], cuts.wet, cuts.wet_body
     parent, part = elements.parent, elements.part
     keep = np.ones(len(parent), bool)
     if covers == "multiple":
@@ -248,6 +251,7 @@ def _assembled(memory: Memory, elements: Elements, covers: str) -> PhysicalDomai
         parent_node = parent_node[used]
         left = keep[face_cell]
         face_cell, wet, wet_body = renumbered[face_cell[left]], wet[left], wet_body[left]
+        of_part = np.where(keep[of_part], renumbered[of_part], -1)
         parent, part, volume = parent[keep], part[keep], volume[keep]
     centroid, second = _moments(parent, part, memory.whole.centroid, memory.whole.second, cuts.moments)
     return PhysicalDomain(
@@ -259,6 +263,7 @@ def _assembled(memory: Memory, elements: Elements, covers: str) -> PhysicalDomai
         centroid=centroid,
         second=second,
         is_cut=part >= 0,
+        fans=fans(cuts.tet_part, cuts.tet, of_part, len(parent)),
         face_cell=face_cell,
         face_body=wet_body,
         face_area=wet[:, 0],

@@ -85,7 +85,7 @@ def volume_in_box(water, lower, upper) -> float:
     inside = ((x >= lower) & (x <= upper)).all(axis=(1, 2))
     beyond = ((x <= lower).all(axis=1) | (x >= upper).all(axis=1)).any(axis=1)
     whole, border = wet[inside], wet[~inside & ~beyond]
-    total = float(wet_fraction(whole, water.level_set, t.cells) @ t.volume[whole])
+    total = float(wet_fraction(whole, water.level_set, t.parts) @ t.volume[whole])
     return total + float(_in_box(water, border, lower, upper) @ t.fraction[border])
 
 

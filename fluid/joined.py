@@ -13,6 +13,7 @@ def joined(old: Cuts, again, new: Cuts) -> Cuts:
     take, kept, fresh = _merged(old.part_cell, new.part_cell, again)
     wet = _of_parts(kept, fresh, old.wet_part, new.wet_part)
     opened = _of_parts(kept, fresh, old.open_part, new.open_part)
+    tets = _of_parts(kept, fresh, old.tet_part, new.tet_part)
     start, corner = _ragged(opened, old.open_start, new.open_start)
     return Cuts(
         _rows(take, old.part_cell, new.part_cell),
@@ -25,6 +26,8 @@ def joined(old: Cuts, again, new: Cuts) -> Cuts:
         _rows(opened, old.open_face, new.open_face),
         start,
         _rows(corner, old.open_x, new.open_x),
+        _rows(tets, kept[old.tet_part], fresh[new.tet_part]),
+        _rows(tets, old.tet, new.tet),
     )
 
 

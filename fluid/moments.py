@@ -7,8 +7,12 @@ N_k at its four corners.  With two corners on each side the water is a prism, sp
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
+
+from fluid.jit import inner
 
 
 @njit(cache=True)
@@ -89,41 +93,76 @@ def wet_moments(phi, out, corner):
                 out[k] = 0.25 - out[k]
 
 
-@njit(cache=True)
-def nodal_water(cell_list, shift, phi, cells, fluid_volume, share, n_nodes):
-    """∫_{φ+shift<0} N_i dV (N,) [m³] over the listed cells; fluid_volume (M,) [m³], share (M, 4) of Topology.
+class FluidParts(NamedTuple):
+    """Where water can be: cells (M, 4) · volume (M,) [m³] of their fluid part · share (M, 4), mean of N_a over it ·
+    fans of the cut cells (`fans.Fans`): start (M + 1,), fan_volume (T,) [m³], corners (T, 4, 4)."""
 
-    Exact in whole cells and in cut cells that are all water.  A cell with both solid and surface in it takes the wet
-    share of the whole cell times its fluid volume, shared out so that it goes over into the exact values as the cell
-    fills: a jump there stirs still water whose surface passes through nodes (0.02 m/s beside a slope of 1:20)."""
-    total = np.zeros(n_nodes)
-    local, out, corner = np.empty(4), np.empty(4), np.empty((6, 4))
+    cells: np.ndarray
+    volume: np.ndarray
+    share: np.ndarray
+    start: np.ndarray
+    fan_volume: np.ndarray
+    corners: np.ndarray
+
+
+@inner
+def part_moments(e, phi, parts, total, local, out, corner):
+    """total (4,) <- ∫_{φ<0} N_a dV [m³] over the fluid part of cell e; phi (4,) at its corners; rest: work space.
+
+    Exact: a whole cell by its corners, a cut one by the tetrahedra that fill it."""
+    n_wet = 0
+    for a in range(4):
+        n_wet += phi[a] < 0.0
+        total[a] = 0.0
+    if n_wet == 0:
+        return
+    if n_wet == 4:
+        for a in range(4):
+            total[a] = parts.volume[e] * parts.share[e, a]
+        return
+    if parts.start[e] == parts.start[e + 1]:
+        wet_moments(phi, out, corner)
+        for a in range(4):
+            total[a] = parts.volume[e] * out[a]
+        return
+    for t in range(parts.start[e], parts.start[e + 1]):
+        for q in range(4):
+            local[q] = 0.0
+            for a in range(4):
+                local[q] += parts.corners[t, q, a] * phi[a]
+        wet_moments(local, out, corner)
+        for q in range(4):
+            weight = parts.fan_volume[t] * out[q]
+            for a in range(4):
+                total[a] += weight * parts.corners[t, q, a]
+
+
+@njit(cache=True)
+def nodal_water(cell_list, shift, phi, parts, n_nodes):
+    """∫_{φ+shift<0} N_i dV (N,) [m³] over the listed cells of the FluidParts; phi (N,) [m]."""
+    water = np.zeros(n_nodes)
+    at, total, local, out, corner = np.empty(4), np.empty(4), np.empty(4), np.empty(4), np.empty((6, 4))
     for s in range(cell_list.shape[0]):
         e = cell_list[s]
         for a in range(4):
-            local[a] = phi[cells[e, a]] + shift
-        wet_moments(local, out, corner)
-        wet, weight = 0.0, 0.0
+            at[a] = phi[parts.cells[e, a]] + shift
+        part_moments(e, at, parts, total, local, out, corner)
         for a in range(4):
-            wet += out[a]
-            weight += out[a] * share[e, a]
-        if weight <= 0.0:
-            continue
-        for a in range(4):
-            total[cells[e, a]] += fluid_volume[e] * wet * out[a] * share[e, a] / weight
-    return total
+            water[parts.cells[e, a]] += total[a]
+    return water
 
 
 @njit(cache=True)
-def wet_fraction(cell_list, phi, cells):
-    """Share of each listed cell with φ < 0, (n,)."""
+def wet_fraction(cell_list, phi, parts):
+    """Share of the fluid part of each listed cell with φ < 0, (n,)."""
     share = np.empty(cell_list.shape[0])
-    local, out, corner = np.empty(4), np.empty(4), np.empty((6, 4))
+    at, total, local, out, corner = np.empty(4), np.empty(4), np.empty(4), np.empty(4), np.empty((6, 4))
     for s in range(cell_list.shape[0]):
+        e = cell_list[s]
         for a in range(4):
-            local[a] = phi[cells[cell_list[s], a]]
-        wet_moments(local, out, corner)
-        share[s] = out[0] + out[1] + out[2] + out[3]
+            at[a] = phi[parts.cells[e, a]]
+        part_moments(e, at, parts, total, local, out, corner)
+        share[s] = min((total[0] + total[1] + total[2] + total[3]) / parts.volume[e], 1.0)
     return share
 
 

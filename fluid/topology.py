@@ -13,6 +13,7 @@ import numpy as np
 from numba import njit
 
 from fluid.mesh import Background
+from fluid.moments import FluidParts
 from fluid.wetted import polygons_of_nodes
 
 
@@ -23,7 +24,7 @@ class Topology:
     share (M, 4) mean of N_a over the fluid part (∫ N_a = volume · share_a) · size (M,) [m] (6 |e|)^(1/3) ·
     node_start (N+1,), node_cells (4M,) cells around each node · neighbours (M, 4) across faces, -1 none ·
     node_volume (N,) [m³] ∫ N_i · covered (N,) bool: nodes inside a solid · beside_solid (N,) bool: nodes of
-    cut cells."""
+    cut cells · parts: what of the cells water can fill."""
 
     nodes: np.ndarray
     cells: np.ndarray
@@ -40,6 +41,7 @@ class Topology:
     node_volume: np.ndarray
     covered: np.ndarray
     beside_solid: np.ndarray
+    parts: FluidParts
 
     @classmethod
     def of(cls, mesh: Background, domain) -> Topology:
@@ -67,6 +69,7 @@ class Topology:
             node_volume=node_volume,
             covered=covered_nodes(domain),
             beside_solid=beside_solid,
+            parts=FluidParts(cells, domain.volume, share, *domain.fans),
         )
 
     @cached_property

@@ -121,7 +121,7 @@ class Viscosity:
             self._walls = WettedWalls(water.domain, water.mesh.spacing)
         wet = (phi < 0.0) & t.active
         cells = np.flatnonzero(wet[t.cells].any(axis=1))
-        share = wet_fraction(cells, phi, t.cells)
+        share = wet_fraction(cells, phi, t.parts)
         cells, share = cells[share > 0.0], share[share > 0.0]
         idle = mass <= 0.0
         drag = np.zeros(len(phi)) if self.friction is None else self.friction.of_nodes(water, phi, w)

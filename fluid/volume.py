@@ -212,7 +212,7 @@ def correct_volume(topology, graph, listed, phi, carried, target: float, kappa: 
     seen[listed] = True
     around = cells_touching(seen, topology.cells)
     near = touching_among(around, phi < 2 * _PROBE * spacing, topology.cells)
-    own = nodal_water(near, 0.0, phi, *_of_cells(topology))
+    own = nodal_water(near, 0.0, phi, topology.parts, len(topology.nodes))
     slope = _volume_slope(topology, near, phi, spacing)
     band = listed[np.abs(phi[listed]) < BAND_WIDTH * spacing]
     place = np.full(n, -1, np.int64)
@@ -240,8 +240,8 @@ def _volume_slope(t, near, phi, spacing):
     """c (N,) [m²] by a central difference over the cells that the surface can reach."""
     step = _PROBE * spacing
     cut = _within_reach(near, phi, t.cells, step)
-    wider = nodal_water(cut, -step, phi, *_of_cells(t))
-    slope = (wider - nodal_water(cut, step, phi, *_of_cells(t))) / (2 * step)
+    wider = nodal_water(cut, -step, phi, t.parts, len(t.nodes))
+    slope = (wider - nodal_water(cut, step, phi, t.parts, len(t.nodes))) / (2 * step)
     # in slivers beside solids the last corner to get wet moves water between nodes: no slope may be negative
     return np.maximum(slope, 0.0)
 
@@ -290,12 +290,7 @@ def nodal_volume(topology, phi, around=None):
     """∫_{φ<0} N_i dV (N,) [m³]; around (k,): cells that hold all water, ascending, None for all."""
     wet, cells = phi < 0.0, topology.cells
     near = cells_touching(wet, cells) if around is None else touching_among(around, wet, cells)
-    return nodal_water(near, 0.0, phi, *_of_cells(topology))
-
-
-def _of_cells(topology):
-    t = topology
-    return t.cells, t.volume, t.share, len(t.nodes)
+    return nodal_water(near, 0.0, phi, topology.parts, len(topology.nodes))
 
 
 def renumbering(source, old_parent, new_parent, new_volume) -> sp.csr_array:

@@ -90,7 +90,7 @@ def column_depth(water, phi, cells):
     wet = cells_touching(phi < 0.0, t.cells)
     area = np.outer(np.diff(x), np.diff(y)).ravel()
     volume = np.bincount(
-        _column(water, wet), t.volume[wet] * wet_fraction(wet, phi, t.cells), minlength=len(area)
+        _column(water, wet), t.volume[wet] * wet_fraction(wet, phi, t.parts), minlength=len(area)
     )
     return (volume / area)[_column(water, cells)]
 

@@ -42,7 +42,7 @@ class WetPart:
             reached = np.zeros(len(phi), bool)
             reached[t.cells[cells]] = True
             below &= reached
-        return cls(below, cells, wet_fraction(cells, phi, t.cells), void)
+        return cls(below, cells, wet_fraction(cells, phi, t.parts), void)
 
 
 def _holding(d, t, phi, dry):
