@@ -187,9 +187,7 @@ def _openings(w, piece, origin, part, out, n_open):
 
 
 @inner
-def _emit(
-    w, cell, origin, count, n_near, whole, normals, round_off, least, link_area, out, at
-):
+def _emit(w, cell, origin, count, n_near, whole, normals, round_off, least, link_area, out, at):
     """Write the parts of one cell, their moments, wetted polygons and tetrahedra (and openings if link_area >= 0)."""
     n_part, n_wet, n_open, n_tet = at[1], at[2], at[3], at[4]
     parts = label_parts(w, count, normals, round_off, link_area)

@@ -23,7 +23,7 @@ from fluid.contacts import Contacts, find_contacts
 from fluid.covers import Connection, virtual_cells, without_pockets
 from fluid.cut import cut_cells
 from fluid.cut_arrays import Cuts
-from fluid.fans import Fans, fans
+from fluid.fans import fans
 from fluid.heirs import pick_old_nodes
 from fluid.joined import joined
 from fluid.mesh import Background, gradients
@@ -82,7 +82,8 @@ class PhysicalDomain:
 
     nodes (N, 3) [m] · cells (M, 4) · parent_node (N,), parent_cell (M,) in the background
     volume (M,) [m3], centroid (M, 3) [m], second (M, 6) [m5] (xx, yy, zz, xy, xz, yz): of the fluid part
-    is_cut (M,): something was removed from the cell · fans: tetrahedra that fill the fluid part of cut cells
+    is_cut (M,): something was removed from the cell
+    fan_start (M + 1,), fan_volume (T,) [m3], fan_corners (T, 4, 4): tetrahedra that fill the cut cells (`fans.py`)
     face_cell (S,) row of `cells` · face_body (S,) · face_area (S,) [m2] · face_centroid (S, 3) [m]
     face_normal (S, 3) out of the body · face_points (S, 3, 3) [m] three points, weight area / 3, degree 2
     face_corners (S, 3, 3) [m] (the polygons are triangles)
@@ -97,7 +98,9 @@ class PhysicalDomain:
     centroid: np.ndarray
     second: np.ndarray
     is_cut: np.ndarray
-    fans: Fans
+    fan_start: np.ndarray
+    fan_volume: np.ndarray
+    fan_corners: np.ndarray
     face_cell: np.ndarray
     face_body: np.ndarray
     face_area: np.ndarray
@@ -253,6 +256,7 @@ def _assembled(memory: Memory, elements: Elements, covers: str) -> PhysicalDomai
         face_cell, wet, wet_body = renumbered[face_cell[left]], wet[left], wet_body[left]
         of_part = np.where(keep[of_part], renumbered[of_part], -1)
         parent, part, volume = parent[keep], part[keep], volume[keep]
+    fan_start, fan_volume, fan_corners = fans(cuts.tet_part, cuts.tet, of_part, len(parent))
     centroid, second = _moments(parent, part, memory.whole.centroid, memory.whole.second, cuts.moments)
     return PhysicalDomain(
         nodes=mesh.nodes if covers == "single" else mesh.nodes[parent_node],
@@ -263,7 +267,9 @@ def _assembled(memory: Memory, elements: Elements, covers: str) -> PhysicalDomai
         centroid=centroid,
         second=second,
         is_cut=part >= 0,
-        fans=fans(cuts.tet_part, cuts.tet, of_part, len(parent)),
+        fan_start=fan_start,
+        fan_volume=fan_volume,
+        fan_corners=fan_corners,
         face_cell=face_cell,
         face_body=wet_body,
         face_area=wet[:, 0],

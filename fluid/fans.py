@@ -1,27 +1,16 @@
 """The fluid part of a cut cell as tetrahedra, so that a surface linear in the cell can clip it exactly.
 
-Every convex piece is a fan of tetrahedra from one of its vertices.  Their corners are kept as barycentric coordinates in
-the cell: a field linear in the cell is known there without any geometry.
+Every convex piece is a fan of tetrahedra from one of its vertices.  Their corners are kept as barycentric coordinates
+in the cell: a field linear in the cell is known there without any geometry.
 """
 
 from __future__ import annotations
-
-from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 from fluid.jit import inner
 from fluid.pieces import DONE, OUTPUT_FULL
-
-
-class Fans(NamedTuple):
-    """Tetrahedra of the fluid part of M elements: start (M + 1,), none in whole cells · volume (T,) [m³] ·
-    corners (T, 4, 4), barycentric coordinates of the four corners in their cell."""
-
-    start: np.ndarray
-    volume: np.ndarray
-    corners: np.ndarray
 
 
 @inner
@@ -59,11 +48,14 @@ def fan(w, piece, part, out, n):
     return DONE, n
 
 
-def fans(tet_part, tet, element_of_part, n_elements: int) -> Fans:
-    """The tetrahedra (T, 17) of cut parts tet_part (T,) in the order of their elements element_of_part (K,), -1 gone."""
+def fans(tet_part, tet, element_of_part, n_elements: int):
+    """The tetrahedra (T, 17) of cut parts tet_part (T,) in the order of their elements element_of_part (K,), -1 gone.
+
+    -> start (n_elements + 1,), none in whole cells · volume (T,) [m³] · corners (T, 4, 4), the barycentric coordinates
+    of the four corners in their cell."""
     start, order = _sorted(element_of_part[tet_part], n_elements)
     rows = tet[order]
-    return Fans(start, np.ascontiguousarray(rows[:, 0]), np.ascontiguousarray(rows[:, 1:]).reshape(-1, 4, 4))
+    return start, np.ascontiguousarray(rows[:, 0]), np.ascontiguousarray(rows[:, 1:]).reshape(-1, 4, 4)
 
 
 @njit(cache=True)

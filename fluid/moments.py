@@ -95,7 +95,7 @@ def wet_moments(phi, out, corner):
 
 class FluidParts(NamedTuple):
     """Where water can be: cells (M, 4) · volume (M,) [m³] of their fluid part · share (M, 4), mean of N_a over it ·
-    fans of the cut cells (`fans.Fans`): start (M + 1,), fan_volume (T,) [m³], corners (T, 4, 4)."""
+    start (M + 1,), fan_volume (T,) [m³], corners (T, 4, 4): fans of the cut cells (`fans.py`)."""
 
     cells: np.ndarray
     volume: np.ndarray

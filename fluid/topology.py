@@ -69,7 +69,9 @@ class Topology:
             node_volume=node_volume,
             covered=covered_nodes(domain),
             beside_solid=beside_solid,
-            parts=FluidParts(cells, domain.volume, share, *domain.fans),
+            parts=FluidParts(
+                cells, domain.volume, share, domain.fan_start, domain.fan_volume, domain.fan_corners
+            ),
         )
 
     @cached_property
