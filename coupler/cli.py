@@ -8,7 +8,6 @@ from typing import Annotated
 
 import typer
 
-from coupler.errors import ExitCode
 from coupler.extras import need
 from coupler.failures import Failures
 from coupler.process import run_module
@@ -62,11 +61,12 @@ def run(
 ) -> None:
     """Run a case. Ctrl-C or a file named `stop` in the run directory ends it cleanly."""
     one_thread()
+    from coupler.carry_out import carry_out
     from coupler.case_file import load
     from coupler.run_directory import RunDirectory
 
     file = load(case, [*(set or []), *([f"time.end={end}"] if end else [])])
-    carry_out(file, RunDirectory.create(file, output))
+    raise typer.Exit(int(carry_out(file, RunDirectory.create(file, output))))
 
 
 @app.command()
@@ -85,39 +85,11 @@ def resume(
 ) -> None:
     """Go on with a run from its newest checkpoint, as if it had never stopped."""
     one_thread()
+    from coupler.carry_out import carry_out
     from coupler.resume import prepare
 
     found = prepare(run, [*(set or []), *([f"time.end={end}"] if end else [])], any_version)
-    carry_out(found.file, found.directory, found.checkpoint)
-
-
-def carry_out(file, directory, checkpoint=None) -> None:
-    """Run a case in its directory to the end, and leave with the code of how it ended."""
-    from coupler.progress import reporter
-    from coupler.run import run as run_case
-    from coupler.stop import StopRequest
-
-    with directory, StopRequest(directory.path) as stop:
-        with reporter(file.case.time.end, directory.log, stop.requested) as tell:
-            describe(file, tell.message)
-            code = ExitCode(run_case(file.case, directory, tell, checkpoint))
-            compare(file, directory, tell.message)
-        directory.finish(code, "reached the end" if code == ExitCode.DONE else "see log.txt")
-    print(f"results in {directory.path}")
-    raise typer.Exit(int(code))
-
-
-def compare(file, directory, tell) -> None:
-    """Tell whether a run of the case as it is written kept what its expected.toml promises; no file, no promise."""
-    promises = file.directory / "expected.toml"
-    if file.overrides or not promises.exists():
-        return
-    from coupler.expected import verdicts
-
-    found = verdicts(directory.path, promises)
-    for verdict in found:
-        tell(f"{'as expected' if verdict.kept else 'UNEXPECTED'}: {verdict}")
-    directory.record(expected={verdict.what: verdict.kept for verdict in found})
+    raise typer.Exit(int(carry_out(found.file, found.directory, found.checkpoint)))
 
 
 @app.command()
@@ -131,6 +103,7 @@ def check(
     """Check a case without running it, and forecast steps, memory and disk."""
     one_thread()
     from coupler import terminal
+    from coupler.carry_out import describe
     from coupler.case_file import load
 
     file = load(case, set or [])
@@ -138,19 +111,6 @@ def check(
     from coupler.forecast import forecast
 
     terminal.table("forecast", forecast(file.case, exact).rows)
-
-
-def describe(file, tell) -> None:
-    """Tell which parts are on and off, and what is worth knowing before the run."""
-    from coupler.case import modules
-    from coupler.case_checks import remarks
-
-    parts = modules(file.case)
-    tell(f"{file.path}: {file.case.case.title}")
-    tell("on:  " + (", ".join(name for name, on in parts.items() if on) or "nothing"))
-    tell("off: " + (", ".join(name for name, on in parts.items() if not on) or "nothing"))
-    for remark in remarks(file.case):
-        tell(f"note: {remark}")
 
 
 @app.command(context_settings=PASS_ON | {"help_option_names": []})

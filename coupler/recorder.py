@@ -12,95 +12,17 @@ import numpy as np
 
 from coupler.crack_surfaces import write_crack_surfaces
 from coupler.history import HistoryTable, write_cracks
-from coupler.momentum import LINES
+from coupler.history_columns import (
+    COUPLING,
+    ENERGY,
+    MOMENTUM_TITLE,
+    STRUCTURE,
+    STRUCTURE_LINES,
+    WATER,
+    momentum_columns,
+)  # fmt: skip
 from coupler.observe import block_damage, crack_columns, fastest_point, joint_counts
 from coupler.output import BlockWriter, WaterWriter, write_solids
-
-ENERGY = (
-    ("time", "s", "time"),
-    ("water_kinetic", "J", "kinetic energy of the water"),
-    ("water_potential", "J", "potential energy of the water above z = 0"),
-    ("numerical_dissipation", "J", "energy the numerics took out of the water so far; negative: put in"),
-    ("shear_dissipation", "J", "energy that viscosity and friction of walls took out of the water so far"),
-    ("entered", "J", "energy that came with water through inflows and seas so far, less what left there"),
-    ("left", "J", "energy of the water that fell out through open sides so far"),
-    ("work_given", "J", "work of the water on the blocks so far, with the velocities of the pressure solve"),
-    ("work_received", "J", "the same loads over the motion that the blocks made"),
-    ("blocks_kinetic", "J", "kinetic energy of the blocks"),
-    ("blocks_gravity", "J", "potential energy of the blocks"),
-    ("joint_stored", "J", "elastic energy in the joints"),
-    ("joint_dissipated", "J", "energy used to open joints so far"),
-    ("joint_damping", "J", "energy taken by the damping of the joints so far"),
-    ("contact_stored", "J", "elastic energy in contacts"),
-    ("dashpot", "J", "energy taken by contact dashpots so far"),
-    (
-        "friction",
-        "J",
-        "energy taken by friction so far, with the springs of contacts that ended",
-    ),
-    ("driving_work", "J", "work of prescribed motions on the structure so far"),
-    ("structure_residual", "J", "what the structure's own ledger misses"),
-    ("interface_residual", "J", "work given less work received"),
-    ("input_energy", "J", "energy the scene has put in so far, the scale of the error"),
-    ("energy_error", "1", "unbalanced share of the input energy"),
-)
-COUPLING = (
-    ("time", "s", "time at the end of the step"),
-    ("dt", "s", "length of the step"),
-    ("passes", "1", "pressure solves in the step"),
-    ("iterations", "1", "iterations of the linear solver"),
-    ("unknowns", "1", "pressure unknowns (wet nodes)"),
-    ("bodies_cut", "1", "bodies whose cells were cut again"),
-    ("retries", "1", "times that the step was halved and taken again"),
-    ("substeps", "1", "YADE substeps"),
-    ("substep", "s", "length of a substep"),
-    ("defect", "1", "share by which the blocks' mean motion missed what the water was told"),
-    ("opening_rate", "1", "largest opening in a substep over the opening at failure"),
-)
-WATER = (
-    ("time", "s", "time"),
-    ("volume", "m3", "volume of the water"),
-    ("entered", "m3", "volume that came in through inflows and seas so far"),
-    ("left", "m3", "volume that left through open sides, inflows and seas so far"),
-    (
-        "volume_error",
-        "1",
-        "volume + left - entered - volume at the start, over the volume at the start and what entered",
-    ),
-    ("reinserted", "m3", "volume that the uniform correction moved so far, a sum of absolute values"),
-    ("reinserted_net", "m3", "the same with its sign: positive where the transport had lost water"),
-    ("clipped", "1", "nodes whose speed was capped so far (spray)"),
-    ("momentum_x", "N s", "momentum of the water"),
-    ("momentum_y", "N s", "momentum of the water"),
-    ("momentum_z", "N s", "momentum of the water"),
-)
-STRUCTURE = (
-    ("time", "s", "time"),
-    ("joints_intact", "1", "joints that still carry traction"),
-    ("joints_broken", "1", "joints that have failed"),
-    ("largest_damage", "1", "largest damage of a live joint"),
-    ("momentum_x", "N s", "momentum of the blocks"),
-    ("momentum_y", "N s", "momentum of the blocks"),
-    ("momentum_z", "N s", "momentum of the blocks"),
-    ("impulse_x", "N s", "impulse of the water on the blocks so far"),
-    ("impulse_y", "N s", "impulse of the water on the blocks so far"),
-    ("impulse_z", "N s", "impulse of the water on the blocks so far"),
-    ("fastest", "m/s", "speed of the fastest point of a block"),
-)
-
-
-MOMENTUM_TITLE = "momentum: each line is what it has added to water and free blocks since the start"
-
-
-def momentum_columns(unit: str, of: str) -> tuple[tuple[str, str, str], ...]:
-    """Columns of the books of momentum; of: what a vector is, behind the name of its line."""
-    sums = (
-        ("water", f"{of} of the water"),
-        ("blocks", f"{of} of the blocks that move freely"),
-        ("residual", "what the lines miss so far: round-off"),
-    )
-    told = (*sums[:2], *LINES, sums[2])
-    return (("time", "s", "time"), *((f"{n}_{a}", unit, m) for n, m in told for a in "xyz"))
 
 
 class Recorder:
@@ -211,7 +133,7 @@ class Recorder:
             work_received=b.work_received,
             blocks_kinetic=e.get("kinetic", 0.0),
             blocks_gravity=e.get("gravity", 0.0),
-            **{name: e.get(name, 0.0) for name in _STRUCTURE_LINES},
+            **{name: e.get(name, 0.0) for name in STRUCTURE_LINES},
             driving_work=e.get("driving_work", 0.0),
             structure_residual=b.structure_residual,
             interface_residual=b.interface_residual if c.coupled else 0.0,
@@ -307,16 +229,6 @@ class Recorder:
     def close(self) -> None:
         for table in self._tables.values():
             table.close()
-
-
-_STRUCTURE_LINES = (
-    "joint_stored",
-    "joint_dissipated",
-    "joint_damping",
-    "contact_stored",
-    "dashpot",
-    "friction",
-)
 
 
 def fluid_fraction(domain) -> np.ndarray:

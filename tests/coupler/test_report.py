@@ -12,7 +12,7 @@ import pytest
 from coupler import extras
 from coupler.errors import NoRun
 from coupler.history import CRACK_COLUMNS, HistoryTable, write_cracks
-from coupler.recorder import ENERGY, WATER
+from coupler.history_columns import ENERGY, WATER
 from coupler.report import html
 from coupler.report.command import report
 from coupler.report.html import figure, quantity, table
