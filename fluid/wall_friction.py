@@ -1,8 +1,11 @@
 """Friction of rough walls: shear stress τ = ρ C_f |u_t| u_t against the tangential velocity beside the wall.
 
-Log law of a wall with sand roughness k_s (Nikuradse), velocity taken at half a cell, y = h/2:
+Log law of a wall with sand roughness k_s (Nikuradse):
 
     C_f = [κ / ln(1 + y/z₀)]²,   κ = 0.41,   z₀ = k_s/30                                           (1)
+
+The velocity beside the wall is no point of the profile: the value of a node on a wall stands for the water of its hat.
+The mean of u = u*/κ ln(y/z₀) over it, 2/h ∫ (1 - y/h) u dy = u*/κ [ln(h/z₀) - 3/2], is the profile at y = e^(-3/2) h.
 
 Manning, for beds under water of depth d (the stress of uniform flow, τ = ρ g n² |u| u / d^(1/3)):
 
@@ -21,6 +24,8 @@ import numpy as np
 from fluid.moments import cells_touching, wet_fraction
 
 KARMAN = 0.41
+OFF_WALL = np.exp(-1.5)
+"""Where the profile has its mean over the hat of a node on the wall, in cells."""
 LOOKS_UP = 0.5
 
 
@@ -50,7 +55,7 @@ class WallFriction:
         across = np.einsum("sk,sk->s", slip, walls.normal)
         speed = np.linalg.norm(slip - across[:, None] * walls.normal, axis=1)
         if self.manning is None:
-            return self.density * log_law(0.5 * t.size[walls.cell], self.roughness) * speed
+            return self.density * log_law(OFF_WALL * t.size[walls.cell], self.roughness) * speed
         depth = column_depth(water, phi, walls.cell)
         bed = walls.normal[:, 2] > LOOKS_UP
         return np.where(bed, self.density * self._bed(depth, water.mesh.spacing) * speed, 0.0)
@@ -65,7 +70,7 @@ class WallFriction:
             faces, size, cell, unit = faces[floor], size[floor], cell[floor], unit[floor]
             factor = self._bed(column_depth(water, phi, cell), water.mesh.spacing)
         else:
-            factor = log_law(0.5 * t.size[cell], self.roughness)
+            factor = log_law(OFF_WALL * t.size[cell], self.roughness)
         size = size * t.fraction[cell]  # what solids stand on does not slide
         drag = np.zeros(len(phi))
         for corner in range(3):

@@ -185,6 +185,27 @@ def test_log_law_between_known_walls():
     assert 1 / np.sqrt(log_law(0.5, 3e-3)) == pytest.approx(np.log(5001) / 0.41)
 
 
+@pytest.mark.parametrize("cell", [0.125, 0.0625])
+def test_rough_bed_takes_the_stress_of_the_profile_on_any_cells(cell):
+    """A stream with the profile u*/0.41 ln(z/z0), nodes holding its mean over their hats: the bed takes ρ u*² from it.
+
+    With the velocity taken for that at half a cell the stress is a quarter low."""
+    depth, friction_speed, roughness, dt = 0.5, 0.05, 3e-3, 1e-4
+    ends = lambda normal, _: np.abs(normal[:, 0]) > 0.5  # noqa: E731
+    smooth = lambda normal, _: np.abs(normal[:, 1]) > 0.5  # noqa: E731
+    mesh = box_mesh(np.zeros(3), [1, 0.25, 1], cell)
+    settings = WaterParameters(walls="friction", roughness=roughness)
+    fill = lambda x: x[:, 2] - depth - 1e-6  # noqa: E731
+    water = Water(mesh, cut_domain(mesh, ConvexBodies.empty()), fill, settings, ends, smooth)
+    z, z0 = water.topology.nodes[:, 2], roughness / 30
+    of_bed = np.log(cell / z0) - 1.5
+    profile = np.where(z > 0.5 * cell, np.log(np.maximum(z, cell) / z0), of_bed) * friction_speed / 0.41
+    water.velocity[:, 0] = np.where(water.level_set < 0.2, profile, 0.0)
+    change = water.viscous.change(water, water.level_set, water.nodal_water, water.velocity.copy(), dt)
+    taken = (water.nodal_water @ change.change)[0] / dt  # per density; over a bed of 0.25 m²
+    assert taken == pytest.approx(-(friction_speed**2) * 0.25, rel=0.01)
+
+
 def test_friction_needs_one_law():
     for roughness, manning in ((None, None), (1e-3, 0.02)):
         with pytest.raises(ValueError, match="roughness or manning"):
