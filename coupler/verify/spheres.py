@@ -105,7 +105,7 @@ def _extrema(t, z):
 )
 def falling_sphere():
     """Box of 10 x 10 x 16 cm, no-slip sides; the gap below the sphere is eight diameters at the start."""
-    cases = (("11p6", 962.0, 0.113, 4), ("11p6", 962.0, 0.113, 6), ("1p5", 970.0, 0.373, 4))
+    cases = (("11p6", 962.0, 0.113, 4), ("11p6", 962.0, 0.113, 8), ("1p5", 970.0, 0.373, 4))
     for name, density, viscosity, cells in cases:
         speed, height = columns(f"tencate_Re{name}_velocity"), columns(f"tencate_Re{name}_height")
         t, v, gap = _fall(density, viscosity, cells)
