@@ -46,7 +46,9 @@ class Time(Section):
         1.0, description="cells that the fastest water may cross in one step; sets the step up to step_max"
     )
     output_every: PositiveTime | None = Field(
-        None, description="time between two written states; absent: a hundredth of the end time"
+        None,
+        description="time between two written states; a step ends at each of them, so none is longer than this; "
+        "absent: a hundredth of the end time",
     )
     checkpoint_every: quantity("s", ge=0) | None = Field(
         None,

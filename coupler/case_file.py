@@ -110,7 +110,9 @@ def _find(place: Path) -> Path:
     if path.is_file():
         return path
     if place.is_dir():
-        raise BadCase([f"{place}: no case.toml in this directory; `surgebreak init {place}` writes one"])
+        cases = sorted(child.parent.name for child in place.glob("*/case.toml"))
+        hint = f"below it are {', '.join(cases)}" if cases else f"`surgebreak init {place}` writes one"
+        raise BadCase([f"{place}: no case.toml in this directory; {hint}"])
     around = place.parent if place.parent.is_dir() else Path(".")
     near = difflib.get_close_matches(place.name, [child.name for child in around.iterdir()], n=1)
     hint = f"; did you mean '{around / near[0]}'?" if near else "; give a case directory or a case.toml"

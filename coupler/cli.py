@@ -83,7 +83,10 @@ def resume(
         bool, typer.Option("--any-version", help="go on although the program has changed since")
     ] = False,
 ) -> None:
-    """Go on with a run from its newest checkpoint, as if it had never stopped."""
+    """Go on with a run that was stopped or killed.
+
+    From its newest checkpoint, to the last digit as if it had never stopped.
+    """
     one_thread()
     from coupler.carry_out import carry_out
     from coupler.resume import prepare
@@ -100,7 +103,10 @@ def check(
         bool, typer.Option("--exact", help="solve for the exact frequency of the joints as well")
     ] = False,
 ) -> None:
-    """Check a case without running it, and forecast steps, memory and disk."""
+    """Check a case, and forecast steps, memory and disk.
+
+    Nothing is run; with a structure YADE is asked for the substep.
+    """
     one_thread()
     from coupler import terminal
     from coupler.carry_out import describe
@@ -115,7 +121,7 @@ def check(
 
 @app.command(context_settings=PASS_ON | {"help_option_names": []})
 def render(context: typer.Context) -> None:
-    """Make stills, a film and plots of a run, in a process of its own."""
+    """Make stills, a film and plots of a run."""
     raise typer.Exit(run_module("coupler.view", *context.args).returncode)
 
 
@@ -126,7 +132,10 @@ def report(
         bool, typer.Option("--pictures/--no-pictures", help="with stills and figures of a run")
     ] = True,
 ) -> None:
-    """Write report.html into the directory: one file with pictures, figures and tables, for screen and paper."""
+    """Write one HTML page about a run or a study.
+
+    report.html in the directory: pictures, figures and tables in one file, for screen and paper.
+    """
     from coupler.report.command import report as write
 
     print(f"report: {write(place, pictures)}")
@@ -134,7 +143,7 @@ def report(
 
 @app.command()
 def doctor() -> None:
-    """Check that Python, YADE, threads, files and pictures work here."""
+    """Check that YADE and the rest work here."""
     one_thread()
     from coupler.doctor import examine
 
@@ -151,7 +160,10 @@ def explain(
         ),
     ] = None,
 ) -> None:
-    """Say what a name of the case file means, or what a run left out and what that would have cost."""
+    """Explain a name of the case file, or what a run left out.
+
+    Without a name: all sections. Of a run: what it skipped, and what that would have cost.
+    """
     if key and (os.sep in key or (Path(key) / "run.json").is_file()):
         from coupler.explain_run import explanation_of_run
 
@@ -183,7 +195,10 @@ def verify(
         Path | None, typer.Option(help="a folder for figures: computed curves over measured ones")
     ] = None,
 ) -> None:
-    """Run cases against exact solutions and measured records; leaves with 3 if one misses its tolerance."""
+    """Compare with exact solutions and measured records.
+
+    Leaves with 3 if one misses its tolerance.
+    """
     one_thread()
     if plots is not None:
         need("view")
@@ -201,7 +216,10 @@ def stress(
     json: Annotated[bool, typer.Option("--json", help="one JSON object a scene, one a line")] = False,
     list_: Annotated[bool, typer.Option("--list", help="list the scenes")] = False,
 ) -> None:
-    """Run stiff and extreme scenes: passed, refused with a message, or failed; leaves with 3 if one failed."""
+    """Run stiff and extreme scenes.
+
+    Each is passed, refused with a message, or failed; leaves with 3 if one failed.
+    """
     one_thread()
     from coupler.stress.report import stress as run_scenes
 
@@ -230,7 +248,10 @@ def compare_laws(
         bool, typer.Option("--list", help="list the laws and what the stock ones do not match")
     ] = False,
 ) -> None:
-    """Run a dry case under our laws and YADE's own, matched; table, figure, CSV, JSON, and the scripts for yade."""
+    """Run a dry case under our laws and YADE's own.
+
+    Matched as far as they can be; table, figure, CSV, JSON, and the scripts for yade.
+    """
     one_thread()
     from coupler.compare.command import compare, show_laws
 
@@ -257,7 +278,10 @@ def study(
     error: Annotated[float, typer.Option(min=1.0, help="compare: largest ratio of errors, B over A")] = 1.1,
     cpu: Annotated[float, typer.Option(min=1.0, help="compare: largest ratio of CPU seconds")] = 1.2,
 ) -> None:
-    """Error against run time over ladders of a case; goes on where it stopped. `compare A B`: 3 if B is worse."""
+    """Error against run time over ladders of a case.
+
+    Goes on where it stopped. `study compare A B` leaves with 3 if B is worse than A.
+    """
     one_thread()
     if len(words) == 3 and str(words[0]) == "compare":
         from coupler.study.against import compare as compare_studies
@@ -279,7 +303,10 @@ def benchmark(
         str | None, typer.Option(help="joints, scenes, dead, cutting, debris, water, solver or stock")
     ] = None,
 ) -> None:
-    """Measure what substeps, cuts, steps of the water and solvers cost; leaves with 3 if a target is missed."""
+    """Measure what substeps, cuts and solvers cost.
+
+    Leaves with 3 if a target is missed.
+    """
     one_thread()
     from coupler.benchmark.command import benchmark as measure
 

@@ -14,7 +14,7 @@ import numpy as np
 from coupler.case import Case
 from coupler.observe import joint_counts
 from coupler.place_checks import BYTES_PER_CELL, mesh_size
-from coupler.schedule import checkpoint_interval
+from coupler.schedule import Schedule, checkpoint_interval
 from coupler.terminal import Row
 
 LONGEST_REST_STEP = 0.3
@@ -45,10 +45,11 @@ def forecast(case: Case, exact: bool = False) -> Forecast:
     rows: list[Row] = []
     memory = 80e6
     disk = 0.0
-    outputs = max(1, round(case.time.end / (case.time.output_every or case.time.end / 100)))
-    step = case.time.step_max
+    interval = Schedule.of(case).interval
+    outputs = max(1, round(case.time.end / interval))
+    step = min(case.time.step_max, interval)
     if case.water:
-        step = _water_rows(case, rows)
+        step = _water_rows(case, interval, rows)
         cells, nodes = mesh_size(case.tank)
         memory += PROGRAM_BYTES["water"] + BYTES_PER_CELL * cells
         disk += DISK_BYTES_PER_NODE * nodes * (outputs + 1)
@@ -74,7 +75,7 @@ def _checkpoint_bytes(case: Case) -> float:
     return float(KEPT * CHECKPOINT_BYTES_PER_CELL * mesh_size(case.tank)[0])
 
 
-def _water_rows(case: Case, rows: list[Row]) -> float:
+def _water_rows(case: Case, interval: float, rows: list[Row]) -> float:
     """Rows of the water; the step [s] that its greatest speed allows."""
     cells, nodes = mesh_size(case.tank)
     volume = sum(float(np.prod(np.subtract(f.upper, f.lower))) for f in case.water.fill)
@@ -83,6 +84,7 @@ def _water_rows(case: Case, rows: list[Row]) -> float:
     fastest = math.sqrt(2.0 * g * height)
     limits = {
         "time.step_max": case.time.step_max,
+        "time.output_every": interval,
         "time.cfl at the speed of a free fall": case.time.cfl * h / fastest if fastest > 0.0 else math.inf,
         "the cell size at rest": LONGEST_REST_STEP * math.sqrt(h / g) if g > 0.0 else math.inf,
     }

@@ -218,6 +218,10 @@ def read_summary(path: Path) -> dict:
     """What run.json in a run directory says.  Raises NoRun."""
     try:
         return json.loads((path / "run.json").read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise NoRun(
+            f"{path}: not the directory of a run, there is no run.json; runs are in runs/<time>-<hash> beside the case"
+        ) from error
     except (OSError, ValueError) as error:
         raise NoRun(f"{path}: not the directory of a run (run.json: {error})") from error
 

@@ -32,13 +32,18 @@ class Schedule:
         divides = every is not None and abs(every * count - end) < ROUNDING * every
         return cls(every, 1, end) if divides else cls(end, count, end)
 
+    @property
+    def interval(self) -> float:
+        """Time between two outputs [s]: a step ends at each, so none is longer."""
+        return self.span / self.count
+
     def until(self, end: float) -> Schedule:
         """The same outputs with another end [s]."""
         return replace(self, end=end)
 
     def next_output(self, time: float) -> float:
         """The first output after a time [s]."""
-        k = _intervals(time, self.span / self.count) + 1
+        k = _intervals(time, self.interval) + 1
         target = self.span * k / self.count
         return target if target < self.end * (1.0 - ROUNDING) else self.end
 

@@ -16,7 +16,7 @@ from coupler.case import effective
 from coupler.case_file import CaseFile, load
 from coupler.case_schema import find
 from coupler.case_study import Ladder, Study
-from coupler.errors import BadCase, UnitError, did_you_mean
+from coupler.errors import BadCase, UnitError
 from coupler.study.names import without_places
 from coupler.units import to_si
 
@@ -79,7 +79,9 @@ def make_plan(place: Path, chosen: Iterable[str] = (), larger: bool = False) -> 
     ladders = {ladder.name: ladder for ladder in study.ladder}
     chosen = list(chosen)
     wanted = chosen or list(ladders)
-    wrong = [f"--ladder {n}: no such ladder{did_you_mean(n, ladders)}" for n in wanted if n not in ladders]
+    wrong = [
+        f"--ladder {n}: no such ladder; there are {', '.join(ladders)}" for n in wanted if n not in ladders
+    ]
     if wrong:
         raise BadCase(wrong)
     made = _Settings(file, study)
