@@ -18,11 +18,12 @@ NOTES = {
     "P39": "H3 lies behind the box, where the jet comes down: it differs from run to run by some centimetres.",
     "P41": "Measured between 5 and 11 depths from the gate; 0.018 m is two cells, and a run that differed by round-off "
     "gave 1.16 m/s there.",
-    "P55": "With D/h = 4 the sphere falls a tenth too slowly at both Reynolds numbers; at Re 11.6 10.5, 6.3 and "
-    "4.5 % with 4, 6 and 8: cells over the diameter set its drag (held and spun at D/h = 4, its moment is 1.4 times that of Stokes). At D/h = 4 the "
-    "number of its facets, cells far from it, half the step, its place in a cell and holding the tangential velocity "
-    "only change the speed by 1 % at most, a smaller penalty of the wall (2.5 for 4 μ A/V) by 1.7 %. D/h = 8 at Re 1.5 "
-    "takes seven times the steps, since light blocks bound them (docs/theory.md, 3).",
+    "P55": "With D/h = 4 the sphere falls a tenth too slowly at both Reynolds numbers; at Re 11.6 it is 10.5, 6.3 and "
+    "4.5 % with 4, 6 and 8: cells over the diameter set its drag (held and spun at D/h = 4, its moment is 1.4 times "
+    "that of Stokes). At D/h = 4 the number of its facets, cells far from it, half the step, its place in a cell and "
+    "holding the tangential velocity only change the speed by 1 % at most, a smaller penalty of the wall (2.5 for "
+    "4 μ A/V) by 1.7 %. D/h = 8 at Re 1.5 takes seven times the steps, since light blocks bound them "
+    "(docs/theory.md, 3).",
     "P56": "The sheet of water that reaches the cubes is 3 to 5 cm deep, less than a cell of edge/3. Its momentum flux "
     "over the width of a cube, 44 N from 0.8 to 1.0 s, is right there, but a held column of that width gets 15, 21 and "
     "28 N with edge/3, 6 and 10 (sealed or wetted from below: the same): semi-Lagrangian transport loses what the "
