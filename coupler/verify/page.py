@@ -26,8 +26,8 @@ NOTES = {
     "(docs/theory.md, 3).",
     "P56": "The sheet of water that reaches the cubes is 3 to 5 cm deep, less than a cell of edge/3. Its momentum flux "
     "over the width of a cube, 44 N from 0.8 to 1.0 s, is right there, but a held column of that width gets 15, 21 and "
-    "28 N with edge/3, 6 and 10 (sealed or wetted from below: the same): semi-Lagrangian transport loses what the "
-    "pressure should stop. The stack slides from 28 N on; its lowest cube leaves it from 52 N on.",
+    "28 N with edge/3, 6 and 10: too few nodes under the surface to turn the sheet aside. Cubes sealed or wetted from "
+    "below move alike. The stack slides from 28 N on; its lowest cube leaves it from 52 N on.",
     "P52": "The period is measured over few swings and moves by 1 to 2 % with the substep and the number of passes.",
 }
 """What is known about cases that miss a tolerance."""
