@@ -1,0 +1,166 @@
+"""What others read of a structure between its steps: places, forces, stiffness, joints, contacts, energies.
+
+World coordinates and SI units; one row a block; motions and forces are six numbers a block about its centre,
+[velocity, angular velocity] and [force, moment], world axes.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+
+from yade_scripts import tangent
+from yade_scripts.accounts import Accounts, Masses
+from yade_scripts.contact_forces import ContactForces
+from yade_scripts.contact_state import Contacts, no_contacts, sum_on_blocks
+from yade_scripts.joints import Joints, JointTable
+from yade_scripts.motion import Motion
+from yade_scripts.onset import ContactOnset
+from yade_scripts.scene import Scene
+from yade_scripts.spin import SpinCorrection
+from yade_scripts.substep import Substepper
+
+Array = np.ndarray
+
+
+class StructureReadings:
+    """The half of `Structure` that changes nothing; that one sets the parts up and moves them on."""
+
+    n: int
+    mass: Array
+    fixed: Array
+    gravity: Array
+    joints: Joints | None
+    _origin: Array
+    _masses: Masses
+    _scene: Scene
+    _motion: Motion
+    _spin: SpinCorrection
+    _contacts: ContactForces | None
+    _onset: ContactOnset
+    _accounts: Accounts
+    _substepper: Substepper
+
+    def centre(self) -> Array:
+        """(n, 3) [m]"""
+        return self._motion.x + self._origin
+
+    def rotation(self) -> Array:
+        """(n, 3, 3): body frame → world."""
+        return self._motion.R.copy()
+
+    def velocity(self) -> Array:
+        """(n, 6) [m/s, rad/s]"""
+        return self._motion.v.copy()
+
+    def momentum(self, about: Array) -> Array:
+        """Momentum, and angular momentum about a point (3,), of the blocks that move freely (6,) [N s, N m s].
+
+        Of the velocities, half a substep before the places; with these it changes by the impulses to round-off."""
+        free = self._accounts.free
+        p = self.mass[free, None] * self._motion.v[free, :3]
+        orbital = np.cross(self._motion.x[free] + (self._origin - np.asarray(about)), p)
+        spin = self._scene.angular_momentum(free) - self._spin.save()[free]
+        return np.concatenate([p.sum(axis=0), (orbital + spin).sum(axis=0)])
+
+    def inertia(self) -> Array:
+        """(n, 3, 3) [kg m²] about the centres, world axes."""
+        return self._masses.inertia(self._motion.R)
+
+    def loose(self) -> Array:
+        """(n,) bool: blocks that lost a joint, never had one, or left their place: they meet others by contact."""
+        return self._onset.loose.copy()
+
+    def contacts(self) -> Contacts:
+        """Contacts at the present positions."""
+        return no_contacts() if self._contacts is None else self._contacts.now()
+
+    def gravity_force(self) -> Array:
+        """(n, 6) [N, N m]"""
+        force = np.zeros((self.n, 6))
+        force[:, :3] = self.mass[:, None] * self.gravity
+        return force
+
+    def internal_force(self, viscous: bool = False) -> Array:
+        """Forces of joints and contacts on the blocks at the present state, (n, 6).
+
+        Elastic parts only by default: the dashpots act through the damping matrix of `tangent`.
+        """
+        m, contacts = self._motion, self.contacts()
+        force = contacts.forces(m.v, m.x) if viscous else contacts.elastic_forces()
+        F = sum_on_blocks(contacts, force, m.x)
+        if self.joints is not None:
+            self.joints.forces(m.x, m.v, m.R, F, eta=None if viscous else 0.0)
+        return F
+
+    def reaction(self) -> Array:
+        """(n, 6): what holds the blocks of prescribed motion, minus every force on them; zero for the others."""
+        total = self.internal_force(viscous=True) + self.gravity_force() + self._substepper.load
+        return np.where(self.fixed[:, None], -total, 0.0)
+
+    def tangent(self) -> tuple[sp.csr_array, sp.csr_array]:
+        """(K, C), each (6n, 6n): secant stiffness and damping of live joints and of contacts."""
+        springs = self.contacts().springs(self._motion.x)
+        if self.joints is not None:
+            springs = springs.and_(tangent.joint_springs(self.joints, self._motion.x, self._motion.R))
+        return tangent.assemble(springs, self.n)
+
+    def opening_tangent(self) -> sp.csr_array:
+        """(6n, 6n): as K of `tangent`, with the joints as they answer while they open further: softening counts."""
+        contacts = tangent.assemble(self.contacts().springs(self._motion.x), self.n)[0]
+        if self.joints is None:
+            return contacts
+        return contacts + tangent.joint_tangent(self.joints, self._motion.x, self._motion.R, self.n)
+
+    def joint_table(self) -> JointTable | None:
+        """State of every joint, None without joints."""
+        if self.joints is None:
+            return None
+        table = self.joints.table(self._motion.x, self._motion.R)
+        table.centre[:] += self._origin
+        return table
+
+    def joint_polygons(self) -> tuple[Array, Array]:
+        """Joined faces as polygons where block a of each is: corners (c, 3) [m], first corner of each (J + 1,)."""
+        if self.joints is None:
+            return np.zeros((0, 3)), np.zeros(1, np.int64)
+        m = self._motion
+        return self.joints.corners(m.x, m.R) + self._origin, self.joints.corner_start
+
+    def overlaps(self) -> tuple[Array, Array, Array]:
+        """Contacts seen from each block in them: block (m,), direction to the other body (m, 3), depth (m,) [m]."""
+        c = self.contacts()
+        other = c.b >= 0
+        rows = np.concatenate([c.a, c.b[other]])
+        return rows, np.concatenate([c.normal, -c.normal[other]]), np.concatenate([c.depth, c.depth[other]])
+
+    def joined_planes(self) -> tuple[Array, Array, Array]:
+        """Faces sealed by a live joint: block (m,), face (m,), half of the largest opening (m,) [m]."""
+        if self.joints is None:
+            return np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0)
+        return self.joints.sealed_faces(self._motion.x, self._motion.R)
+
+    def broken_joints(self) -> tuple[Array, Array, Array, Array]:
+        """Joints that carry nothing any more: number (m,), blocks and their faces (m, 2), -1 a fixed plane, and now
+        their mean normal opening, mean sliding and largest normal opening (m, 3) [m]."""
+        if self.joints is None:
+            none = np.zeros((0, 2), np.int64)
+            return np.zeros(0, np.int64), none, none, np.zeros((0, 3))
+        j, m = self.joints, self._motion
+        dead = np.flatnonzero(~j.alive)
+        blocks, faces = np.column_stack([j.a, j.b])[dead], np.column_stack([j.face_a, j.face_b])[dead]
+        return dead, blocks, faces, j.openings(dead, m.x, m.R)
+
+    def energies(self) -> dict[str, float]:
+        """Ledger [J]: kinetic + gravity + joint_stored + joint_dissipated + joint_damping + contact_stored + dashpot
+        + friction changes by load_work + driving_work.
+
+        Kinetic energy lives at half substeps (leapfrog), so the potentials are taken there too. joint_dissipated,
+        dashpot and friction are sums over substeps of force times velocity; friction holds the springs of contacts
+        that ended as well.
+        """
+        return self._accounts.energies()
+
+    def law_dissipation(self) -> float:
+        """Energy that the damage stands for by the law, Σ A D(λ) [J]: to compare with joint_dissipated."""
+        return self._accounts.law_dissipation()
