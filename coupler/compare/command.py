@@ -11,8 +11,7 @@ from coupler.compare.plan import make_plan
 from coupler.compare.report import table, write
 from coupler.compare.run import run_plan
 from coupler.errors import BadCase, ExitCode
-from coupler.extras import missing
-from coupler.process import run_module
+from coupler.report.pictures import draw
 from coupler.run_directory import RunDirectory
 from yade_scripts import laws as own_laws
 from yade_scripts.stock.script import stock_law, stock_names
@@ -31,7 +30,7 @@ def compare(
         exact = exact_answers(plan.file.directory)
         rows = write(plan, outcomes, exact, directory.path)
         print(table(plan, outcomes, rows, exact))
-        _draw(directory.path)
+        draw("coupler.view.comparison", directory.path)
     print(f"results in {directory.path}; each script in laws/ runs alone: yade -x -n SCRIPT")
     return ExitCode.DONE
 
@@ -61,12 +60,3 @@ def _multiples(text: str) -> list[int]:
     if wrong or not found:
         raise BadCase([f"--substeps {text}: write whole numbers from 1 to 100, for instance 1,2,4,8"])
     return [int(word) for word in found]
-
-
-def _draw(folder: Path) -> None:
-    """The figure, in a process of its own; told where matplotlib is absent."""
-    absent = missing("view")
-    if absent:
-        print(f"no figure: {absent}")
-        return
-    run_module("coupler.view.comparison", folder, check=True)

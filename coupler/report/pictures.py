@@ -39,6 +39,15 @@ def study_figures(study: Path) -> str:
     return _view("coupler.view.study", study)
 
 
+def draw(module: str, folder: Path) -> None:
+    """Figures of a comparison or a study beside its tables; where the extra is absent, that is told instead."""
+    absent = missing()
+    if absent:
+        print(f"no figures: {absent}")
+        return
+    run_module(module, folder, check=True)
+
+
 def _view(module: str, *words: object) -> str:
     done = run_module(module, *words, capture_output=True, text=True)
     if done.returncode == 0:

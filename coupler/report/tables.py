@@ -25,27 +25,13 @@ def history(run: Path, name: str) -> History | None:
 
 
 def energy(run: Path) -> str:
-    """Energy at the first step and the last, line by line [J]; lines that are zero throughout are left out."""
+    """Energy at the first step and the last, line by line [J]."""
     found = history(run, "energy")
     if found is None:
         return ""
-    lines = [c for c in found.columns if c.unit == "J"]
-    largest = max(np.abs(found[c.name]).max() for c in lines)
-    rows = [
-        [_words(c.name), *(quantity(v, "J") for v in _ends(found[c.name], largest)), c.meaning]
-        for c in lines
-        if np.abs(found[c.name]).max() > NEGLIGIBLE * largest
-    ]
     error = _share(float(found["energy_error"][-1]))
-    return table(
-        ["energy", "after the first step", "at the end", "change", "what it is"], rows, (0, 4)
-    ) + note(f"What the lines miss at the end, over the energy that the scene has put in: {error}.")
-
-
-def _ends(values: np.ndarray, largest: float) -> list[float]:
-    """First, last and change; 0 for what is round-off beside the largest of the book."""
-    ends = (values[0], values[-1], values[-1] - values[0])
-    return [float(v) if abs(v) > NEGLIGIBLE * largest else 0.0 for v in ends]
+    told = f"What the lines miss at the end, over the energy that the scene has put in: {error}."
+    return _book("energy", found, "J") + note(told)
 
 
 def volume(run: Path) -> str:
@@ -53,17 +39,26 @@ def volume(run: Path) -> str:
     found = history(run, "water")
     if found is None:
         return ""
-    lines = [c for c in found.columns if c.unit == "m3"]
+    error = _share(float(found["volume_error"][-1]))
+    return _book("volume", found, "m3") + note(f"Volume that the books miss at the end: {error}.")
+
+
+def _book(title: str, found: History, unit: str) -> str:
+    """Columns of one unit as lines with their first and last value; those that are zero throughout are left out."""
+    lines = [c for c in found.columns if c.unit == unit]
     largest = max(np.abs(found[c.name]).max() for c in lines)
     rows = [
-        [_words(c.name), *(quantity(v, c.unit) for v in _ends(found[c.name], largest)), c.meaning]
+        [_words(c.name), *(quantity(v, unit) for v in _ends(found[c.name], largest)), c.meaning]
         for c in lines
         if np.abs(found[c.name]).max() > NEGLIGIBLE * largest
     ]
-    error = _share(float(found["volume_error"][-1]))
-    return table(
-        ["volume", "after the first step", "at the end", "change", "what it is"], rows, (0, 4)
-    ) + note(f"Volume that the books miss at the end: {error}.")
+    return table([title, "after the first step", "at the end", "change", "what it is"], rows, (0, 4))
+
+
+def _ends(values: np.ndarray, largest: float) -> list[float]:
+    """First, last and change; 0 for what is round-off beside the largest of the book."""
+    ends = (values[0], values[-1], values[-1] - values[0])
+    return [float(v) if abs(v) > NEGLIGIBLE * largest else 0.0 for v in ends]
 
 
 def momentum(run: Path, name: str) -> str:

@@ -6,8 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from coupler.errors import ExitCode
-from coupler.extras import missing
-from coupler.process import run_module
+from coupler.report.pictures import draw
 from coupler.study.laws import law_points
 from coupler.study.page import page
 from coupler.study.plan import make_plan
@@ -35,15 +34,6 @@ def study(
     told = content(plan, runs, found, law_points(plan, runs))
     write(folder, told)
     print(page(told))
-    _draw(folder)
+    draw("coupler.view.study", folder)
     print(f"results in {folder}")
     return ExitCode.DIVERGED if any(outcome.run.failed for outcome in found.values()) else ExitCode.DONE
-
-
-def _draw(folder: Path) -> None:
-    """The figures, in a process of their own; told where matplotlib is absent."""
-    absent = missing("view")
-    if absent:
-        print(f"no figures: {absent}")
-        return
-    run_module("coupler.view.study", folder, check=True)

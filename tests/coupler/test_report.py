@@ -177,7 +177,7 @@ def test_the_page_of_a_study_holds_its_tables_and_figures(tmp_path, monkeypatch)
     processes = FakeProcesses()
     processes.broken = {0.4: "the water volume is off"}
     monkeypatch.setattr(runner, "measure", processes)
-    monkeypatch.setattr(command, "_draw", lambda folder: None)
+    monkeypatch.setattr(command, "draw", lambda module, folder: None)
     command.study(tmp_path, [], None, tmp_path / "out", False, False)
     told = read(report(tmp_path / "out"))
     assert told.count("<img") == 3

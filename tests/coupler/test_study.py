@@ -17,7 +17,7 @@ def fake(monkeypatch, request):
     processes = FakeProcesses()
     monkeypatch.setattr(runner, "measure", processes)
     if "with_figures" not in request.fixturenames:
-        monkeypatch.setattr(command, "_draw", lambda folder: None)
+        monkeypatch.setattr(command, "draw", lambda module, folder: None)
     return processes
 
 
@@ -215,8 +215,8 @@ def test_a_wrong_name_ends_the_study_at_the_first_run(fake, case, old, new, says
     assert len(fake.calls) == 1
 
 
-def test_unknown_ladders_are_refused_with_the_nearest(case):
-    with pytest.raises(BadCase, match="did you mean 'rule'"):
+def test_unknown_ladders_are_refused_with_those_there_are(case):
+    with pytest.raises(BadCase, match="no such ladder; there are dt, rule"):
         make_plan(case, ["rul"])
 
 
