@@ -14,11 +14,20 @@ import sys
 
 from coupler.provenance import ROOT
 
+LAST_LINES = 3
+"""Of what a process told, in a message about how it ended."""
+
 
 def run_module(module: str, *words: object, **options) -> subprocess.CompletedProcess:
     """`python -m module words...` of this very program; options of subprocess.run, of which check is False."""
     command = [sys.executable, "-m", module, *map(str, words)]
     return subprocess.run(command, **{"check": False, "env": environment(), **options})
+
+
+def trouble(exit_code: int, told: str) -> str:
+    """How a process ended that did not end well, with the last lines of what it told."""
+    last = " | ".join(told.strip().splitlines()[-LAST_LINES:])
+    return f"its process ended with {exit_code}: {last}"
 
 
 def environment() -> dict[str, str]:

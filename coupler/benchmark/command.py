@@ -12,7 +12,7 @@ from coupler.benchmark import cutting, debris, scenes
 from coupler.benchmark.part import LAW
 from coupler.errors import ExitCode, SurgebreakError
 from coupler.extras import need
-from coupler.process import run_module
+from coupler.process import run_module, trouble
 from yade_scripts.faces import touching_faces
 from yade_scripts.stock.scene import described, timed
 from yade_scripts.stock.script import LAWS, run_script, stock_law
@@ -96,8 +96,7 @@ def _told(line: Line) -> str:
 def _part(kind: str, size: int = 0) -> dict:
     done = run_module("coupler.benchmark.part", kind, size, capture_output=True, text=True)
     if done.returncode != 0:
-        last = " | ".join(done.stderr.strip().splitlines()[-3:])
-        raise PartFailed(f"benchmark {kind} {size}: its process ended with {done.returncode}: {last}")
+        raise PartFailed(f"benchmark {kind} {size}: {trouble(done.returncode, done.stderr)}")
     return json.loads(done.stdout.splitlines()[-1])
 
 

@@ -10,7 +10,7 @@ from coupler.compare.outcome import Outcome
 from coupler.compare.own import Request
 from coupler.compare.plan import OwnLaw, Plan
 from coupler.errors import SurgebreakError
-from coupler.process import run_module
+from coupler.process import run_module, trouble
 from yade_scripts.stock.scene import timed
 from yade_scripts.stock.script import StockLaw, read_table, run_script
 
@@ -47,8 +47,7 @@ def _run_own(law: OwnLaw, plan: Plan, multiple: int, place: Path, scene: Path | 
     ).write(request)
     done = run_module("coupler.compare.own", request, capture_output=True, text=True)
     if done.returncode != 0:
-        last = " | ".join(done.stderr.strip().splitlines()[-3:])
-        raise LawFailed(f"{law.name}: its process ended with {done.returncode}: {last}")
+        raise LawFailed(f"{law.name}: {trouble(done.returncode, done.stderr)}")
     figures = json.loads((place / f"{law.stem}.json").read_text(encoding="utf-8"))
     return Outcome(law, multiple, read_table(place / f"{law.stem}.csv"), figures)
 

@@ -9,12 +9,11 @@ import time
 from pathlib import Path
 
 from coupler.errors import BadCase, did_you_mean
-from coupler.process import run_module
+from coupler.process import run_module, trouble
 from coupler.stress.registry import Measure, Outcome, Scene, scenes
 
 TIME_LIMIT = {"S": 600, "M": 3600}
 """Wall seconds after which a scene counts as failed: far more than its cost."""
-LAST_LINES = 3
 
 
 def chosen(ids: list[str], quick: bool) -> list[Scene]:
@@ -57,5 +56,4 @@ def _trouble(scene: Scene, path: Path) -> str:
         done = run_module("coupler.stress.one", scene.id, path, capture_output=True, text=True, timeout=limit)
     except subprocess.TimeoutExpired as error:
         return f"not done after {error.timeout} s"
-    last = " | ".join(done.stderr.strip().splitlines()[-LAST_LINES:])
-    return "" if done.returncode == 0 else f"its process ended with {done.returncode}: {last}"
+    return "" if done.returncode == 0 else trouble(done.returncode, done.stderr)

@@ -13,11 +13,12 @@ from pathlib import Path
 
 from coupler.case_study import Ladder, Quantity
 from coupler.errors import SurgebreakError
+from coupler.process import trouble
 from coupler.run_directory import write_json
 from coupler.study import runner
 from coupler.study.plan import Plan, fingerprint
 from coupler.study.reference import Reading, against_number, fixed_reference
-from coupler.study.runner import LAST_LINES, Runs
+from coupler.study.runner import Runs
 
 
 @dataclass(frozen=True)
@@ -81,12 +82,8 @@ def _comparison(plan: Plan, ladder: Ladder, runs: Runs) -> Path:
         [sys.executable, "-m", "coupler.cli", "compare", str(plan.file.path), *options, *sets], log
     )
     if cost.exit_code:
-        last = " | ".join(
-            log.read_text(encoding="utf-8", errors="replace").strip().splitlines()[-LAST_LINES:]
-        )
-        raise ComparisonFailed(
-            f"ladder {ladder.name}: surgebreak compare ended with {cost.exit_code}: {last}"
-        )
+        told = log.read_text(encoding="utf-8", errors="replace")
+        raise ComparisonFailed(f"ladder {ladder.name}: surgebreak compare: {trouble(cost.exit_code, told)}")
     runs.tell(f"ladder {ladder.name}: {len(ladder.laws)} laws compared, {cost.cpu_seconds:.3g} CPU s in all")
     write_json(made_by, runs.program)
     return found

@@ -23,11 +23,10 @@ import numpy as np
 from coupler.errors import BadCase, ExitCode
 from coupler.fingerprint import differences, program
 from coupler.history import read_history
-from coupler.process import environment
+from coupler.process import environment, trouble
 from coupler.run_directory import read_summary, write_json
 from coupler.study.plan import Plan, Setting
 
-LAST_LINES = 3
 COMPILED = 0.05
 """Share of the time of the steps from which a run that had to compile is made again: it compiled what the first step
 does not need, and finds it the second time."""
@@ -231,8 +230,7 @@ def _reason(summary: dict, cost: Cost, log: Path) -> str:
         return ""
     if summary.get("exit_reason"):
         return summary["exit_reason"]
-    last = log.read_text(encoding="utf-8", errors="replace").strip().splitlines()[-LAST_LINES:]
-    return f"its process ended with {cost.exit_code}: {' | '.join(last)}"
+    return trouble(cost.exit_code, log.read_text(encoding="utf-8", errors="replace"))
 
 
 def _passes(place: Path) -> float:

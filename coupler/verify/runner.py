@@ -9,12 +9,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from coupler.errors import BadCase, did_you_mean
-from coupler.process import run_module
+from coupler.process import run_module, trouble
 from coupler.verify.registry import NOT_COVERED, Check, Result, checks
 
 TIME_LIMIT = {"S": 1800, "M": 2 * 3600, "L": 6 * 3600}
 """Wall seconds after which a case counts as failed: far more than its cost, also on a machine with much else to do."""
-LAST_LINES = 3
 
 
 def chosen(ids: list[str], quick: bool) -> list[Check]:
@@ -43,16 +42,11 @@ def run(case: Check, plots: Path | None = None) -> Iterator[Result]:
         quietly = {"capture_output": True, "text": True, "timeout": TIME_LIMIT[case.cost]}
         try:
             done = run_module("coupler.verify.one", case.id, path, *figures, **quietly)
-            trouble = "" if done.returncode == 0 else _told(done)
+            wrong = "" if done.returncode == 0 else trouble(done.returncode, done.stderr)
         except subprocess.TimeoutExpired as error:
-            trouble = f"not done after {error.timeout} s"
+            wrong = f"not done after {error.timeout} s"
         lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
     found = [Result(**json.loads(line)) for line in lines]
     yield from found
-    if trouble or not found:
-        yield Result.failed(case.id, trouble or "the case gave no result", 0.0)
-
-
-def _told(done: subprocess.CompletedProcess) -> str:
-    last = " | ".join(done.stderr.strip().splitlines()[-LAST_LINES:])
-    return f"its process ended with {done.returncode}: {last}"
+    if wrong or not found:
+        yield Result.failed(case.id, wrong or "the case gave no result", 0.0)

@@ -124,10 +124,3 @@ def test_records_of_the_program_are_found_by_name_behind_those_of_the_case(tmp_p
     (tmp_path / name).write_text("# ours\na,b\n1,2\n", encoding="utf-8")
     assert read_record(find_record(name, tmp_path))["b"] == [2.0]
     assert find_record("nowhere.csv", tmp_path) == tmp_path / "nowhere.csv"
-
-
-@pytest.mark.parametrize("path", sorted(SHIPPED.glob("*.csv")), ids=lambda path: path.stem)
-def test_every_record_of_the_program_names_its_source(path):
-    first = path.read_text(encoding="utf-8").splitlines()[0]
-    assert first.startswith("#")
-    assert len(first) > 30

@@ -6,6 +6,7 @@ import math
 import pytest
 
 from coupler.errors import BadCase, ExitCode
+from coupler.records import SHIPPED
 from coupler.verify import registry, report, runner
 from coupler.verify.figures import columns, named_values
 from coupler.verify.registry import Check, Finding, Result
@@ -33,16 +34,10 @@ def test_every_reference_case_is_checked_or_its_absence_explained():
 
 def test_references_name_their_source():
     """Each table starts with lines that say where it comes from, and its numbers can be read."""
-    for path in registry_files():
+    for path in sorted(SHIPPED.glob("*.csv")):
         assert path.read_text(encoding="utf-8").startswith("# ")
     assert columns("coh_mode1_law")["T_over_Tmax"].max() == pytest.approx(1.0, abs=1e-3)
     assert named_values("dem_simple_closed_forms")["drop 0.5 m: impact speed"] == pytest.approx(3.132092)
-
-
-def registry_files():
-    from coupler.verify.figures import FOLDER
-
-    return sorted(FOLDER.glob("*.csv"))
 
 
 def test_unknown_and_absent_cases_are_told_apart(monkeypatch):
