@@ -165,6 +165,7 @@ def test_extras_come_with_the_command_that_needs_them(machine):
     assert pip_installs(machine("run")[2]) == [""]
     assert pip_installs(machine("--quiet", "render", "r")[2]) == ["[view]"]
     assert pip_installs(machine("render", "r")[2]) == []
+    assert pip_installs(machine("report", "r")[2]) == []
     assert pip_installs(machine("test")[2]) == ["[test]"]
     assert pip_installs(machine("benchmark")[2]) == ["[benchmark]"]
     assert pip_installs(machine("test", "render")[2]) == []
