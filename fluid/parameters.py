@@ -13,7 +13,7 @@ class WaterParameters:
 
     theta: weight of the new pressure in the reflected projection (1: implicit Euler, 0.5: trapezoidal) in water that
         crosses a cell in a step; calm_theta: in water that hardly moves, where it is what damps waves.
-    courant: cells crossed per step by the fastest water; 1 for loads, 2 to 4 for drafts.
+    courant: cells crossed per step by the fastest water, spray apart (`pace.py`); 1 for loads, 2 to 4 for drafts.
     divergence_damping: weight c_L of the element grad-div term.
     correction_length: κ/h, length over which the volume correction is spread.
     kick_limit: largest acceleration carried over to the next step, in g (spray).

@@ -21,6 +21,7 @@ from fluid.extension import BAND, fill_missing
 from fluid.level_set import FAR, redistance, without_films
 from fluid.mesh import Background
 from fluid.momentum import MomentumChange
+from fluid.pace import LEAST_COUNTED, largest_component, pace
 from fluid.parameters import WaterParameters
 from fluid.predictor import predicted
 from fluid.projection import PressureProblem
@@ -30,9 +31,6 @@ from fluid.walls import Walls
 
 LONGEST_STEP = 0.3
 """dt ≤ LONGEST_STEP sqrt(h/g): a step at rest."""
-LEAST_COUNTED = 0.05
-"""Nodes with less fluid volume around them (in h³) do not set the step: films beside solids, which paths of any
-length cross safely."""
 
 
 @dataclass(frozen=True)
@@ -140,15 +138,18 @@ class Water:
         return 1.0 - min(1.0, self.fastest() * dt / self.mesh.spacing)
 
     def stable_step(self) -> float:
-        """dt [s]: Courant number of the fastest water, and LONGEST_STEP sqrt(h/g)."""
+        """dt [s]: Courant number of all but the spray (`pace.py`), and LONGEST_STEP sqrt(h/g)."""
         h = self.mesh.spacing
         at_rest = LONGEST_STEP * np.sqrt(h / self.parameters.gravity)
-        return float(min(at_rest, self.parameters.courant * h / max(self.fastest(), 1e-12)))
+        speed = pace(self.velocity, self.nodal_water, self._counted())
+        return float(min(at_rest, self.parameters.courant * h / max(speed, 1e-12)))
 
     def fastest(self) -> float:
         """Largest component of the velocity of the water [m/s], films beside solids left out."""
-        counted = (self.level_set < 0.0) & (self.topology.node_volume > LEAST_COUNTED * self.mesh.spacing**3)
-        return _largest_component(self.velocity, counted)
+        return largest_component(self.velocity, self._counted())
+
+    def _counted(self):
+        return (self.level_set < 0.0) & (self.topology.node_volume > LEAST_COUNTED * self.mesh.spacing**3)
 
     def predict(self, dt: float) -> PressureProblem:
         """Advection, volume and gravity over dt [s], and the system for the pressure."""
@@ -352,17 +353,6 @@ def _viscosity(parameters: WaterParameters):
 def kinetic_energy(density: float, nodal_water, velocity) -> float:
     """½ ρ Σ W_i |u_i|² [J]; nodal_water (N,) [m³], velocity (N, 3) [m/s]."""
     return float(0.5 * density * (nodal_water @ np.einsum("ij,ij->i", velocity, velocity)))
-
-
-@njit(cache=True)
-def _largest_component(u, counted):
-    """max |u_ik| over the counted rows of u (N, 3), 0 without any."""
-    largest = 0.0
-    for i in range(u.shape[0]):
-        if counted[i]:
-            for k in range(3):
-                largest = max(largest, abs(u[i, k]))
-    return largest
 
 
 @njit(cache=True)
