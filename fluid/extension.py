@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from fluid.moments import touching_among
 from fluid.topology import layers_around
 
 LINEAR_LAYERS = 2
@@ -99,28 +100,33 @@ def mean_gradients(cell_list, marked, f, cells, parent, g, volume, n_nodes):
                     gradient[cells[e, a], k, d] += volume[e] * local[k, d]
     for i in range(n_nodes):
         if weight[i] > 0.0:
-            gradient[i] /= weight[i]
+            for k in range(m):
+                for d in range(3):
+                    gradient[i, k, d] /= weight[i]
     return gradient
 
 
-def smoothed(cell_list, marked, field, cells, calm: float):
-    """The field (N, m, 3) averaged over the corners of the listed cells, each cell counts: at the nodes beside cells
-    that are not all marked, from which values are continued (elsewhere it is not to be read).  Once in fast water,
-    calm = 0; SWEEPS times at rest, calm = 1; between, in between.
+def smoothed_slope(topology, cell_list, marked, u, calm: float):
+    """∇u (N, m, 3) of `mean_gradients`, averaged over the corners of the listed cells, each cell counts: at the nodes
+    beside cells that are not all marked, from which values are continued (elsewhere it is not to be read).  Once in
+    fast water, calm = 0; SWEEPS times at rest, calm = 1; between, in between.
 
     Only nodes of cells whose corners are all marked have a field, the averages run over these.  Waves of a few cells,
     whose slope the continuation carries to the surface many times too large, grow without it: by 0.01 to 0.02 a step
     where the surface lies just below a layer of nodes, by 0.005 after one sweep.  More than one slows a bore into two
     cells of water by 15 %."""
-    has, beside = _with_field(cell_list, marked, cells)
+    t = topology
+    has, beside = _with_field(cell_list, marked, t.cells)
     reach = [beside]
-    for _ in range(SWEEPS - 1 if calm > 0.0 else 0):
+    for _ in range(SWEEPS if calm > 0.0 else 1):
         # each sweep reads one layer of nodes farther in than it is to be right on
-        reach.append(_one_layer_more(cell_list, reach[-1], cells))
-    once = field = _averaged(cell_list, reach.pop(), has, field, cells)
+        reach.append(_one_layer_more(cell_list, reach[-1], t.cells))
+    near = touching_among(cell_list, reach.pop(), t.cells)
+    slope = mean_gradients(near, marked, u, t.cells, t.parent, t.gradients, t.volume, len(u))
+    once = slope = _averaged(near, reach.pop(), has, slope, t.cells)
     while reach:
-        field = _averaged(cell_list, reach.pop(), has, field, cells)
-    return once + calm * (field - once) if field is not once else once
+        slope = _averaged(near, reach.pop(), has, slope, t.cells)
+    return once + calm * (slope - once) if slope is not once else once
 
 
 @njit(cache=True)
@@ -157,17 +163,24 @@ def _averaged(cell_list, reach, has, field, cells):
             continue
         total[:] = 0.0
         known = 0
+        # written out entry by entry: sums of array slices take four times as long
         for a in range(4):
             if has[cells[e, a]]:
                 known += 1
-                total += field[cells[e, a]]
+                for k in range(field.shape[1]):
+                    for d in range(field.shape[2]):
+                        total[k, d] += field[cells[e, a], k, d]
         for a in range(4):
             if has[cells[e, a]]:
-                mean[cells[e, a]] += total
                 count[cells[e, a]] += known
+                for k in range(field.shape[1]):
+                    for d in range(field.shape[2]):
+                        mean[cells[e, a], k, d] += total[k, d]
     for i in range(field.shape[0]):
         if count[i] > 0.0:
-            mean[i] /= count[i]
+            for k in range(field.shape[1]):
+                for d in range(field.shape[2]):
+                    mean[i, k, d] /= count[i]
     return mean
 
 
@@ -193,12 +206,11 @@ def _fill(t, order, start, linear, f, gradient, done):
 
 def extend_velocity(topology, order, start, wet, wet_cells, u, a, calm: float):
     """Continue u (linear, then constant) and a (constant), each (N, 3), over the layers of `order`, in place; calm as
-    in `smoothed`.
+    in `smoothed_slope`.
 
     Nodes outside the layers are set to zero."""
     t = topology
-    gradient = mean_gradients(wet_cells, wet, u, t.cells, t.parent, t.gradients, t.volume, len(u))
-    gradient = smoothed(wet_cells, wet, gradient, t.cells, calm)
+    gradient = smoothed_slope(t, wet_cells, wet, u, calm)
     outside = np.ones(len(u), bool)
     outside[order] = False
     u[outside], a[outside] = 0.0, 0.0

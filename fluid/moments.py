@@ -142,13 +142,20 @@ def nodal_water(cell_list, shift, phi, parts, n_nodes):
     """∫_{φ+shift<0} N_i dV (N,) [m³] over the listed cells of the FluidParts; phi (N,) [m]."""
     water = np.zeros(n_nodes)
     at, total, local, out, corner = np.empty(4), np.empty(4), np.empty(4), np.empty(4), np.empty((6, 4))
+    cells, volume, share = parts.cells, parts.volume, parts.share
     for s in range(cell_list.shape[0]):
         e = cell_list[s]
+        n_wet = 0
         for a in range(4):
-            at[a] = phi[parts.cells[e, a]] + shift
-        part_moments(e, at, parts, total, local, out, corner)
-        for a in range(4):
-            water[parts.cells[e, a]] += total[a]
+            at[a] = phi[cells[e, a]] + shift
+            n_wet += at[a] < 0.0
+        if n_wet == 4:  # most cells: not worth a call
+            for a in range(4):
+                water[cells[e, a]] += volume[e] * share[e, a]
+        elif n_wet > 0:
+            part_moments(e, at, parts, total, local, out, corner)
+            for a in range(4):
+                water[cells[e, a]] += total[a]
     return water
 
 
@@ -157,10 +164,16 @@ def wet_fraction(cell_list, phi, parts):
     """Share of the fluid part of each listed cell with φ < 0, (n,)."""
     share = np.empty(cell_list.shape[0])
     at, total, local, out, corner = np.empty(4), np.empty(4), np.empty(4), np.empty(4), np.empty((6, 4))
+    cells, start = parts.cells, parts.start
     for s in range(cell_list.shape[0]):
         e = cell_list[s]
+        n_wet = 0
         for a in range(4):
-            at[a] = phi[parts.cells[e, a]]
+            at[a] = phi[cells[e, a]]
+            n_wet += at[a] < 0.0
+        if n_wet == 4 and start[e] == start[e + 1]:
+            share[s] = 1.0  # most cells: not worth a call
+            continue
         part_moments(e, at, parts, total, local, out, corner)
         share[s] = min((total[0] + total[1] + total[2] + total[3]) / parts.volume[e], 1.0)
     return share

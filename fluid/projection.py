@@ -131,12 +131,33 @@ def seal_pockets(matrix, anchored, volume, compliance: float, pressure):
     Adds V_i · compliance [1/(Pa s)] to the diagonal of the components without an anchored row and the same times
     `pressure` (n,) [Pa] to the right hand side, so that a state at rest is unchanged.  volume (n,) [m³].
     Returns (matrix, addition to the right hand side (n,))."""
-    count, label = sp.csgraph.connected_components(matrix, directed=False)
-    floating = np.bincount(label, anchored, minlength=count) == 0
+    floating = ~_reached(matrix.indptr, matrix.indices, anchored)
     if not floating.any():
         return matrix, np.zeros(len(anchored))
-    added = np.where(floating[label], volume * compliance, 0.0)
+    added = np.where(floating, volume * compliance, 0.0)
     return sp.csr_array(matrix + sp.diags_array(added)), added * pressure
+
+
+@njit(cache=True)
+def _reached(indptr, indices, seed):
+    """Rows (n,) bool that the entries of a symmetric matrix connect to a row of the seed (n,) bool."""
+    reached = seed.copy()
+    waiting = np.empty(seed.shape[0], np.int64)
+    count = 0
+    for i in range(seed.shape[0]):
+        if seed[i]:
+            waiting[count] = i
+            count += 1
+    while count > 0:
+        count -= 1
+        i = waiting[count]
+        for s in range(indptr[i], indptr[i + 1]):
+            j = indices[s]
+            if not reached[j]:
+                reached[j] = True
+                waiting[count] = j
+                count += 1
+    return reached
 
 
 @njit(cache=True)

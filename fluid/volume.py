@@ -22,7 +22,7 @@ import scipy.sparse as sp
 from numba import njit
 
 from fluid.level_set import without_films
-from fluid.moments import cells_touching, nodal_water, touching_among
+from fluid.moments import cells_touching, nodal_water
 from fluid.topology import Graph
 
 BAND_WIDTH = 3.0
@@ -210,9 +210,10 @@ def correct_volume(topology, graph, listed, phi, carried, target: float, kappa: 
     n = len(phi)
     seen = np.zeros(n, bool)
     seen[listed] = True
-    around = cells_touching(seen, topology.cells)
-    near = touching_among(around, phi < 2 * _PROBE * spacing, topology.cells)
-    own = nodal_water(near, 0.0, phi, topology.parts, len(topology.nodes))
+    reach = (LARGEST_SHIFT + LARGEST_UNIFORM_SHIFT) * spacing
+    whole, near = _split(cells_touching(seen, topology.cells), phi, topology.cells, reach)
+    inner = nodal_water(whole, 0.0, phi, topology.parts, n)
+    own = inner + nodal_water(near, 0.0, phi, topology.parts, n)
     slope = _volume_slope(topology, near, phi, spacing)
     band = listed[np.abs(phi[listed]) < BAND_WIDTH * spacing]
     place = np.full(n, -1, np.int64)
@@ -232,51 +233,58 @@ def correct_volume(topology, graph, listed, phi, carried, target: float, kappa: 
     )
     phi = phi.copy()
     phi[band] -= np.clip(shift, -LARGEST_SHIFT * spacing, LARGEST_SHIFT * spacing)
-    phi, reinserted = _meet_total(topology, around, phi, band, slope.sum(), target, spacing)
-    return VolumeCorrection(phi, nodal_volume(topology, phi, around), own, reinserted)
+    left = target - float(inner.sum())
+    phi, reinserted = _meet_total(
+        topology, near, phi, band, slope.sum(), left, VOLUME_TOLERANCE * abs(target), spacing
+    )
+    return VolumeCorrection(phi, inner + nodal_water(near, 0.0, phi, topology.parts, n), own, reinserted)
+
+
+@njit(cache=True)
+def _split(cell_list, phi, cells, reach):
+    """The listed cells that are all water whatever shift within ±reach φ takes, and those that a surface can reach."""
+    whole, near = np.empty(cell_list.shape[0], np.int64), np.empty(cell_list.shape[0], np.int64)
+    n_whole, n_near = 0, 0
+    for e in cell_list:
+        low, high = np.inf, -np.inf
+        for a in range(4):
+            low, high = min(low, phi[cells[e, a]]), max(high, phi[cells[e, a]])
+        if high < -reach:
+            whole[n_whole] = e
+            n_whole += 1
+        elif low < reach:
+            near[n_near] = e
+            n_near += 1
+    return whole[:n_whole].copy(), near[:n_near].copy()
 
 
 def _volume_slope(t, near, phi, spacing):
     """c (N,) [m²] by a central difference over the cells that the surface can reach."""
     step = _PROBE * spacing
-    cut = _within_reach(near, phi, t.cells, step)
+    cut = _split(near, phi, t.cells, step)[1]
     wider = nodal_water(cut, -step, phi, t.parts, len(t.nodes))
     slope = (wider - nodal_water(cut, step, phi, t.parts, len(t.nodes))) / (2 * step)
     # in slivers beside solids the last corner to get wet moves water between nodes: no slope may be negative
     return np.maximum(slope, 0.0)
 
 
-@njit(cache=True)
-def _within_reach(cell_list, phi, cells, step):
-    """The listed cells whose surface exists for some shift of φ within ±step."""
-    found = np.empty(cell_list.shape[0], np.int64)
-    n = 0
-    for e in cell_list:
-        low, high = np.inf, -np.inf
-        for a in range(4):
-            low, high = min(low, phi[cells[e, a]]), max(high, phi[cells[e, a]])
-        if low < step and high > -step:
-            found[n] = e
-            n += 1
-    return found[:n].copy()
-
-
-def _meet_total(t, around, phi, band, area, target, spacing):
-    """φ after a uniform shift of the band that meets the total volume, and the volume [m³] that it moved.
+def _meet_total(t, near, phi, band, area, target, tolerance, spacing):
+    """φ after a uniform shift of the band that brings the water in the cells `near` to a target [m³] within a
+    tolerance [m³], and the volume [m³] that it moved.
 
     Secant steps on the shift, from the slope `area`; the shift stays within LARGEST_UNIFORM_SHIFT."""
     limit, shift = LARGEST_UNIFORM_SHIFT * spacing, 0.0
-    start = volume = float(nodal_volume(t, phi, around).sum())
+    start = volume = float(nodal_water(near, 0.0, phi, t.parts, len(phi)).sum())
     shifted = phi
     for _ in range(MOST_SECANTS):
-        if abs(target - volume) <= VOLUME_TOLERANCE * abs(target) or area <= 0.0:
+        if abs(target - volume) <= tolerance or area <= 0.0:
             break
         trial = np.clip(shift + (target - volume) / area, -limit, limit)
         if trial == shift:
             break
         shifted = phi.copy()
         shifted[band] -= trial
-        before, volume = volume, float(nodal_volume(t, shifted, around).sum())
+        before, volume = volume, float(nodal_water(near, 0.0, shifted, t.parts, len(phi)).sum())
         area, shift = (volume - before) / (trial - shift), trial
     return without_films(shifted, spacing), volume - start
 
@@ -286,11 +294,11 @@ def water_volume(topology, phi) -> float:
     return float(nodal_volume(topology, phi).sum())
 
 
-def nodal_volume(topology, phi, around=None):
-    """∫_{φ<0} N_i dV (N,) [m³]; around (k,): cells that hold all water, ascending, None for all."""
-    wet, cells = phi < 0.0, topology.cells
-    near = cells_touching(wet, cells) if around is None else touching_among(around, wet, cells)
-    return nodal_water(near, 0.0, phi, topology.parts, len(topology.nodes))
+def nodal_volume(topology, phi):
+    """∫_{φ<0} N_i dV (N,) [m³]."""
+    return nodal_water(
+        cells_touching(phi < 0.0, topology.cells), 0.0, phi, topology.parts, len(topology.nodes)
+    )
 
 
 def renumbering(source, old_parent, new_parent, new_volume) -> sp.csr_array:

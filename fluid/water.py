@@ -350,9 +350,15 @@ def _viscosity(parameters: WaterParameters):
     return Viscosity(parameters)
 
 
-def kinetic_energy(density: float, nodal_water, velocity) -> float:
+@njit(cache=True)
+def kinetic_energy(density, nodal_water, velocity):
     """½ ρ Σ W_i |u_i|² [J]; nodal_water (N,) [m³], velocity (N, 3) [m/s]."""
-    return float(0.5 * density * (nodal_water @ np.einsum("ij,ij->i", velocity, velocity)))
+    total = 0.0
+    for i in range(nodal_water.shape[0]):
+        if nodal_water[i] != 0.0:  # most of a tank is dry: its velocities are not even read
+            u = velocity[i]
+            total += nodal_water[i] * (u[0] * u[0] + u[1] * u[1] + u[2] * u[2])
+    return 0.5 * density * total
 
 
 @njit(cache=True)
