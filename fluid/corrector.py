@@ -115,11 +115,24 @@ def _remainders(water, kept, gradient, mean, dt):
     remainder, rate = np.zeros(water.remainder.shape), np.zeros(water.remainder.shape)
     if water.parameters.subscale_memory:
         whole = _all_below(kept.wet_cells, kept.level_set, -MEMORY_DEPTH * water.mesh.spacing, t.cells)
-        cells = kept.wet_cells[whole]
-        left = cell_velocity(cells, mean, np.zeros((0, 3)), t.cells, t.share) - gradient[whole]
-        remainder[cells] = kept.remainder[cells] + left
-        rate[cells] = left / (kept.theta * dt)
+        time = kept.theta * dt
+        _leave(whole, kept.wet_cells, mean, gradient, kept.remainder, time, t.cells, t.share, remainder, rate)
     return remainder, rate
+
+
+@njit(cache=True)
+def _leave(places, cell_list, mean, gradient, before, time, cells, share, remainder, rate):
+    """What the nodes do not hold of the gradient, Π∇x - ∇x [m/s], in the cells at these places of the list: added to
+    the remainder before, and over a time [s] as its rate."""
+    for s in places:
+        e = cell_list[s]
+        for k in range(3):
+            left = 0.0
+            for a in range(4):
+                left += share[e, a] * mean[cells[e, a], k]
+            left -= gradient[s, k]
+            remainder[e, k] = before[e, k] + left
+            rate[e, k] = left / time
 
 
 @njit(cache=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
 _SAME_DIRECTION = 0.3
 """Normals of one node that span less than this (singular value over the largest) count as one direction."""
@@ -99,7 +100,17 @@ class Walls:
 
     def slip(self, u) -> None:
         """Take the part into the closed sides off u (N, 3), in place."""
-        u[self.nodes] = np.einsum("nij,nj->ni", self.projector, u[self.nodes])
+        _project(self.nodes, self.projector, u)
+
+
+@njit(cache=True)
+def _project(nodes, projector, u):
+    """u_i <- P_i u_i of the listed nodes, in place."""
+    for s in range(nodes.shape[0]):
+        i = nodes[s]
+        x, y, z = u[i, 0], u[i, 1], u[i, 2]
+        for k in range(3):
+            u[i, k] = projector[s, k, 0] * x + projector[s, k, 1] * y + projector[s, k, 2] * z
 
 
 def _chosen(sides, mesh, x, of_sea: bool):
