@@ -209,9 +209,8 @@ def _clip(u, a, limit, weight):
 
 def _continue(water, kept, listed, start, u, a) -> None:
     """Velocity and acceleration outside the water, in place; limited again, slipping again."""
-    extend_velocity(
-        water.topology, listed, start, kept.wet, kept.wet_cells, u, a, water.calm(kept.end - water.time)
-    )
+    calm = water.calm(kept.end - water.time)
+    extend_velocity(water.topology, listed, start, kept.wet, kept.wet_cells, u, a, calm, water.rubbed_nodes())
     _limit_speed(water, u, a)
     water.hold(u, kept.end)
 

@@ -204,12 +204,17 @@ def _fill(t, order, start, linear, f, gradient, done):
     continue_outward(order, start, linear, f, gradient, t.nodes, t.cells, t.node_start, t.node_cells, done)
 
 
-def extend_velocity(topology, order, start, wet, wet_cells, u, a, calm: float):
+def extend_velocity(topology, order, start, wet, wet_cells, u, a, calm: float, rubbed=None):
     """Continue u (linear, then constant) and a (constant), each (N, 3), over the layers of `order`, in place; calm as
-    in `smoothed_slope`.
+    in `smoothed_slope`. rubbed (N,) bool: nodes on walls that rub or hold the water, None: there are none.
+
+    No slope is taken from cells beside such walls: the shear of the layer along a bed, carried on through the surface
+    of a film, made the air above it 1.6 times as fast as the water and drew its tip ahead of one without friction.
 
     Nodes outside the layers are set to zero."""
     t = topology
+    if rubbed is not None:
+        wet_cells = wet_cells[~rubbed[t.cells[wet_cells]].any(axis=1)]
     gradient = smoothed_slope(t, wet_cells, wet, u, calm)
     outside = np.ones(len(u), bool)
     outside[order] = False

@@ -291,6 +291,14 @@ class Water:
         """Nodes (n,) on the sides of the tank and projectors (n, 3, 3) onto what friction and viscosity may change."""
         return self._walls.restriction()
 
+    def rubbed_nodes(self):
+        """Nodes (N,) bool on sides of the tank and beside solids that rub or hold the water; None if all are smooth."""
+        if self.parameters.walls == "slip":
+            return None
+        rubbed = self.topology.beside_solid.copy()
+        rubbed[self._walls.rough_faces] = True
+        return rubbed
+
     def rough_faces(self):
         """Faces of the closed sides that rub the water: (nodes (C, 3), outward area (C, 3) [m²], cell (C,))."""
         w = self._walls

@@ -9,6 +9,7 @@ import pytest
 from fluid import gauges
 from fluid.bodies import ConvexBodies
 from fluid.domain import cut_domain
+from fluid.extension import extend_velocity
 from fluid.mesh import box_mesh
 from fluid.parameters import WaterParameters
 from fluid.viscosity import Viscosity
@@ -204,6 +205,29 @@ def test_rough_bed_takes_the_stress_of_the_profile_on_any_cells(cell):
     change = water.viscous.change(water, water.level_set, water.nodal_water, water.velocity.copy(), dt)
     taken = (water.nodal_water @ change.change)[0] / dt  # per density; over a bed of 0.25 m²
     assert taken == pytest.approx(-(friction_speed**2) * 0.25, rel=0.01)
+
+
+def test_shear_along_a_bed_is_not_carried_on_into_the_air():
+    """A film of two layers of nodes, slow on the bed: the air above must not run faster than the water, or the tip of
+    the film takes that speed over (1.8 times the water's, with slopes taken from the cells on the bed)."""
+    cell = 0.125
+    smooth = lambda normal, _: np.abs(normal[:, 1]) > 0.5  # noqa: E731
+    mesh = box_mesh(np.zeros(3), [2, 0.25, 1], cell)
+    settings = WaterParameters(walls="friction", roughness=3e-3)
+    fill = lambda x: np.maximum(x[:, 2] - 1.5 * cell, x[:, 0] - 1.3)  # noqa: E731
+    water = Water(mesh, cut_domain(mesh, ConvexBodies.empty()), fill, settings, None, smooth)
+    wet = water.level_set < 0.0
+    cells = np.flatnonzero(wet[water.topology.cells].any(axis=1))
+    speed = np.where(water.topology.nodes[:, 2] < 0.5 * cell, 0.6, 1.0)
+
+    def fastest(rubbed):
+        u = np.where(wet[:, None], speed[:, None] * [1.0, 0.0, 0.0], 0.0)
+        order = water.listed, water.layer_start
+        extend_velocity(water.topology, *order, wet, cells, u, np.zeros_like(u), 0.0, rubbed)
+        return u[:, 0].max()
+
+    assert fastest(water.rubbed_nodes()) == pytest.approx(1.0, abs=1e-12)
+    assert fastest(None) > 1.5
 
 
 def test_friction_needs_one_law():
