@@ -61,9 +61,9 @@ def _scene(axes, level, body, parameters: WaterParameters, smooth=None) -> Coupl
     "P53", "heave of a half-submerged sphere dies away", "linear potential flow (case of Kramer 2021)", "M"
 )
 def heave_decay():
-    """Dropped 0.2 R, in a tank 3.6 m wide for the open water of the theory. Waves of its period come back from the walls
-    after the fourth extremum; longer ones are faster, and the sphere raises the mean level: in 2.4 m both lift the
-    third extremum by 0.02."""
+    """Dropped 0.2 R, in a tank 3.6 m wide for the open water of the theory. Waves of its period come back from the
+    walls after the fourth extremum; longer ones are faster, and the sphere raises the mean level: in 2.4 m both lift
+    the third extremum by 0.02."""
     exact = columns("sphere_heave_decay_linear")
     rows = argrelextrema(np.abs(exact["z_over_H0"]), np.greater)[0][:4]
     t, z = _heave(0.15, 5.0, 1.62)
