@@ -73,7 +73,7 @@ def corrected(water, problem, x) -> Corrected:
     clipped, limited, damped = _limit_and_damp(water, kept, u, a)
     slipping = u.copy()
     listed, start = water.layers(kept.wet)
-    _continue(water, kept, listed, start, u, a)
+    _continue(water, kept, listed, start, u, a, kept.u_star - mean)
     cell_field, flux = _flux(water, kept, listed, start, u, u_cell)
     momentum = momentum_change(
         water, problem, unknown, pressure, Stages(projected, limited, damped, slipping, u)
@@ -207,10 +207,13 @@ def _clip(u, a, limit, weight):
     return count
 
 
-def _continue(water, kept, listed, start, u, a) -> None:
-    """Velocity and acceleration outside the water, in place; limited again, slipping again."""
+def _continue(water, kept, listed, start, u, a, forced) -> None:
+    """Velocity and acceleration outside the water, in place; limited again, slipping again.
+
+    forced: see `extend_velocity`."""
     calm = water.calm(kept.end - water.time)
-    extend_velocity(water.topology, listed, start, kept.wet, kept.wet_cells, u, a, calm, water.rubbed_nodes())
+    rubbed = water.rubbed_nodes()
+    extend_velocity(water.topology, listed, start, kept.wet, kept.wet_cells, u, a, calm, forced, rubbed)
     _limit_speed(water, u, a)
     water.hold(u, kept.end)
 
@@ -273,6 +276,7 @@ def _report(water, problem, x, projected, u, clipped, momentum):
         change["transport and gravity"] -= kept.shear.energy
         change["viscosity and friction"] = kept.shear.energy
     volume = float(kept.nodal_water.sum())
+    left = kept.left
     moved_by_bodies = problem.matrix @ x - problem.rhs
     return StepReport(
         problem.dt,
@@ -284,14 +288,6 @@ def _report(water, problem, x, projected, u, clipped, momentum):
         -problem.dt * float((x + problem.known) @ moved_by_bodies),
         change,
         momentum,
-        *_outflow(water, kept),
+        0.0 if left is None else float(left.volume.sum()),
+        0.0 if left is None else left.energy,
     )
-
-
-def _outflow(water, kept) -> tuple[float, float]:
-    """What left through open sides in the step: volume [m³], and energy [J] with the velocity that it had."""
-    if kept.left is None:
-        return 0.0, 0.0
-    p = water.parameters
-    head = 0.5 * np.einsum("ij,ij->i", water.velocity, water.velocity) - water.topology.nodes @ p.weight
-    return float(kept.left.sum()), p.density * float(kept.left @ head)

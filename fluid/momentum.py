@@ -194,7 +194,7 @@ def _through(water, kept):
     arm = water.topology.nodes - water.reference
     density = water.parameters.density
     if kept.left is not None:
-        total -= momentum_of(density * kept.left, water.velocity, arm)
+        total -= momentum_of(density * kept.left.volume, water.velocity, arm)
     if kept.through is not None:
         u = water.velocity.copy()
         water.hold(u, kept.end)

@@ -16,6 +16,7 @@ from numba import njit
 
 from fluid.advection import transport
 from fluid.level_set import redistance
+from fluid.outflow import Outflow
 from fluid.projection import (
     PressureProblem,
     cell_velocity,
@@ -40,7 +41,7 @@ class Predicted:
     wet (N,) bool, wet_cells (n,), wet_share (n,) and void (k,) of WetPart, cell_star (n, 3) [m/s] velocity of the wet
     cells, remainder (M, 3) [m/s], theta, conserved_volume and reinserted [m³], uncorrected_water (N,) [m³] before the
     volume correction, shear: ViscousChange by viscosity and friction, None without; end [s]: time at the end of the
-    step; left (N,) [m³] that leaves through open sides, None if none; through (N,) [m³] that comes in through sides,
+    step; left: what leaves through open sides, None if nothing; through (N,) [m³] that comes in through sides,
     None without any; held (N,) [Pa]: unknown part of the pressure on the nodes of seas, None without any side."""
 
     level_set: np.ndarray
@@ -59,7 +60,7 @@ class Predicted:
     uncorrected_water: np.ndarray
     shear: object | None
     end: float
-    left: np.ndarray | None
+    left: Outflow | None
     through: np.ndarray | None
     held: np.ndarray | None
 
@@ -70,9 +71,10 @@ def predicted(water, dt: float) -> PressureProblem:
     kick = kick_factor(water.acceleration, parameters)
     u_adv, phi = _transported(water, dt, theta, kick)
     carried = water.carried_volume(dt)
-    left = _outflow(water, dt, carried)
-    carried -= left
-    conserved = water.conserved_volume - float(left.sum())
+    conserved, left = water.conserved_volume, Outflow.of(water, dt, carried)
+    if left is not None:
+        carried -= left.volume
+        conserved -= float(left.volume.sum())
     through = inflow_rate = None
     if water.sides is not None:
         water.sides.surface(phi, water.time + dt)
@@ -135,17 +137,6 @@ def _transported(water, dt, theta, kick):
     return u_adv, phi
 
 
-def _outflow(water, dt, carried):
-    """Volume (N,) [m³] that leaves through open sides: ∮ N_i (u·n)⁺ dA dt, at most what the node holds."""
-    sides = water._walls
-    left = np.zeros(len(carried))
-    if len(sides.open_faces) == 0:
-        return left
-    speed = np.einsum("fak,fk->fa", water.velocity[sides.open_faces], sides.open_area) / 3.0
-    np.add.at(left, sides.open_faces, dt * np.maximum(speed, 0.0))
-    return np.minimum(left, np.maximum(carried, 0.0))
-
-
 def _new_surface(water, phi, carried, conserved):
     """φ redistanced and corrected: VolumeCorrection."""
     t, h = water.topology, water.mesh.spacing
@@ -203,7 +194,7 @@ def _problem(water, dt, theta, kick, surface, conserved, u_adv, u_star, shear, l
         surface.uncorrected_water,
         shear,
         water.time + dt,
-        left if left.any() else None,
+        left,
         through,
         held,
     )

@@ -6,7 +6,7 @@ is carried by the fluxes of the projected velocity u_e, which balance exactly at
 
     q_ij = Σ_e |e|/4 (∇N_j - ∇N_i)·u_e,      Σ_j q_ij = -Σ_e |e| ∇N_i·u_e = (G V)_i,                       (1)
 
-upwind, and never more out of a node than it holds.  Then φ takes the shift ψ that brings its own volume there,
+along the edges (`volume_transport.py`).  Then φ takes the shift ψ that brings its own volume there,
 
     (c + κ K) ψ = W - ∫_{φ<0} N dV,        c_i = d/dψ ∫_{φ<ψ} N_i dV,                                       (2)
 
@@ -27,7 +27,7 @@ from fluid.topology import Graph
 
 BAND_WIDTH = 3.0
 LARGEST_SHIFT = 0.3
-LARGEST_UNIFORM_SHIFT = 0.02
+LARGEST_UNIFORM_SHIFT = 0.1
 ANCHOR = 1e-3
 MOST_SECANTS = 4
 VOLUME_TOLERANCE = 1e-6
@@ -85,65 +85,6 @@ def edge_flux(topology, graph, listed, u_cell, water) -> Flux:
     mesh = (t.cells, t.parent, t.gradients, t.volume, t.node_start, t.node_cells)
     rate = _edge_rates(listed, g.row, g.start, g.neighbour, u_cell, *mesh)
     return Flux(listed, g, rate, water, t.node_volume)
-
-
-@njit(cache=True)
-def _carry(nodes, graph_row, start, neighbour, rate, water, capacity, dt, n_sub):
-    """n_sub upwind steps in place."""
-    h = dt / n_sub
-    change = np.zeros(water.shape[0])
-    for _ in range(n_sub):
-        for i in nodes:
-            r = graph_row[i]
-            if water[i] <= 0.0:
-                continue
-            out = 0.0
-            for s in range(start[r], start[r + 1]):
-                out += max(rate[s], 0.0)
-            if out <= 0.0:
-                continue
-            # the donor's concentration, at most what is in it
-            share = min(water[i] / capacity[i], 1.0)
-            share = min(share, water[i] / (h * out))
-            for s in range(start[r], start[r + 1]):
-                if rate[s] > 0.0:
-                    moved = h * share * rate[s]
-                    change[i] -= moved
-                    change[neighbour[s]] += moved
-        for i in nodes:
-            r = graph_row[i]
-            water[i] += change[i]
-            change[i] = 0.0
-            for s in range(start[r], start[r + 1]):
-                j = neighbour[s]
-                water[j] += change[j]
-                change[j] = 0.0
-
-
-@njit(cache=True)
-def _largest_turnover(nodes, graph_row, start, rate, capacity, least):
-    """max_i Σ out / V_i [1/s] over nodes of some size."""
-    largest = 0.0
-    for i in nodes:
-        r = graph_row[i]
-        if capacity[i] > least:
-            out = 0.0
-            for s in range(start[r], start[r + 1]):
-                out += max(rate[s], 0.0)
-            largest = max(largest, out / capacity[i])
-    return largest
-
-
-def carry_volume(flux: Flux, dt: float):
-    """W (N,) [m³] after dt [s] by the flux; Σ W is kept to round-off."""
-    water = flux.water.copy()
-    capacity = np.maximum(flux.capacity, 1e-300)
-    least = 0.3 * np.median(capacity[flux.nodes]) if len(flux.nodes) else 0.0
-    g = flux.graph
-    turnover = _largest_turnover(flux.nodes, g.row, g.start, flux.rate, capacity, least)
-    n_sub = int(np.ceil(dt * turnover / 0.8)) or 1
-    _carry(flux.nodes, g.row, g.start, g.neighbour, flux.rate, water, capacity, dt, n_sub)
-    return water
 
 
 @njit(cache=True)

@@ -26,7 +26,8 @@ from fluid.parameters import WaterParameters
 from fluid.predictor import predicted
 from fluid.projection import PressureProblem
 from fluid.topology import Graph, Topology, layers_around
-from fluid.volume import carry_volume, edge_flux, nodal_volume, renumbering
+from fluid.volume import edge_flux, nodal_volume, renumbering
+from fluid.volume_transport import carry_volume
 from fluid.walls import Walls
 
 LONGEST_STEP = 0.3

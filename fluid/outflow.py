@@ -1,0 +1,58 @@
+"""What leaves through the open sides of the tank in a step: they are at the pressure of the air and nothing comes back.
+
+    W_i^left = dt ∮ N_i s (u·n)⁺ dA,        E_left = ρ dt ∮ s (½ u² - g·x) (u·n)⁺ dA                          (1)
+
+over the open faces, with the velocity at the beginning of the step and the share s of water around the nodes, both
+linear on a face; no node gives more than it holds.  The rule is exact to degree 4.  Taken at the nodes alone, the flux
+of energy, a cubic of u, is up to 20 % too large at the foot of an outlet, where u doubles within a cell; and nodes that
+are partly full, the high ones, would empty as fast as full ones.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+_NEAR, _FAR = 0.445948490915965, 0.091576213509771
+_POINTS = np.array(
+    [
+        [1 - 2 * _NEAR, _NEAR, _NEAR],
+        [_NEAR, 1 - 2 * _NEAR, _NEAR],
+        [_NEAR, _NEAR, 1 - 2 * _NEAR],
+        [1 - 2 * _FAR, _FAR, _FAR],
+        [_FAR, 1 - 2 * _FAR, _FAR],
+        [_FAR, _FAR, 1 - 2 * _FAR],
+    ]
+)
+_WEIGHTS = np.array([0.223381589678011] * 3 + [0.109951743655322] * 3)
+"""Rule of degree 4 on a triangle (Dunavant, Int. J. Numer. Meth. Eng. 21 (1985) 1129)."""
+
+
+@dataclass(frozen=True)
+class Outflow:
+    """volume (N,) [m³] off each node · energy [J], kinetic and potential."""
+
+    volume: np.ndarray
+    energy: float
+
+    @classmethod
+    def of(cls, water, dt: float, carried) -> Outflow | None:
+        """Equation (1) over dt [s] from nodes that hold `carried` (N,) [m³]; None where nothing leaves."""
+        faces, area = water._walls.open_faces, water._walls.open_area
+        if len(faces) == 0:
+            return None
+        p, t = water.parameters, water.topology
+        share = np.clip(water.nodal_water[faces] / np.maximum(t.node_volume[faces], 1e-300), 0.0, 1.0)
+        u = np.einsum("qa,fak->fqk", _POINTS, water.velocity[faces])
+        x = np.einsum("qa,fak->fqk", _POINTS, t.nodes[faces])
+        speed = np.maximum(np.einsum("fqk,fk->fq", u, area), 0.0)
+        rate = dt * _WEIGHTS * speed * np.einsum("qa,fa->fq", _POINTS, share)
+        head = p.density * (0.5 * np.einsum("fqk,fqk->fq", u, u) - x @ p.weight)
+        volume, energy = np.zeros(len(carried)), np.zeros(len(carried))
+        np.add.at(volume, faces, np.einsum("fq,qa->fa", rate, _POINTS))
+        np.add.at(energy, faces, np.einsum("fq,qa->fa", rate * head, _POINTS))
+        if not volume.any():
+            return None
+        kept = np.minimum(volume, np.maximum(carried, 0.0))
+        return cls(kept, float(np.sum(energy * kept / np.maximum(volume, 1e-300))))
