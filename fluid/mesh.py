@@ -89,6 +89,11 @@ class Background:
         return _products(self.gradients)
 
     @cached_property
+    def is_obtuse(self) -> bool:
+        """Some dihedral angle is more than a right one, ∇N_a·∇N_b > 0: never in `box_mesh`."""
+        return bool((self.products.max(axis=1) * self.cell_size**2 > 1e-9).any())
+
+    @cached_property
     def skfem(self) -> MeshTet:
         """The same mesh for scikit-fem (node and cell numbers unchanged)."""
         return MeshTet(self.nodes.T.copy(), self.cells.T.copy(), sort_t=False, validate=False)

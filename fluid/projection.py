@@ -278,15 +278,22 @@ def damp_divergence(cell_list, weight, phi, beside_solid, deep, u, cells, parent
                 u[i, k] -= push[i, k] / mass[i]
 
 
-@njit(cache=True)
 def damp_waterline(cell_list, weight, phi, wet, beside_solid, deep, u, cells, volume, wet_share):
-    """u_i += c Σ_e w_e (mean of u over the wet corners of e - u_i) / m_i, in place on wet nodes, over the cells beside
-    solids that reach up to φ > deep; w_e their water, m_i all water around i.
+    """u ← u - c (M⁻¹L)² u in place on wet nodes, over the cells beside solids that reach up to φ > deep:
+    (L u)_i = Σ_e w_e (u_i - mean of u over the wet corners of e), w_e the water of the cell, M all water around a node.
 
     Where a surface meets a solid slantwise, velocity of one cell's wave length and the surface feed each other (growth
-    of 0.02 a step on still water against 1:20).  The sum is symmetric and positive: it only takes energy, and nothing
-    from a uniform velocity."""
-    mass, push, mean = np.zeros(u.shape[0]), np.zeros((u.shape[0], 3)), np.empty(3)
+    of 0.03 a step on still water against 1:20).  L is symmetric and positive and annihilates a uniform velocity, so its
+    square only takes energy and no momentum; squared, because L alone is a viscosity that holds a thin tongue of
+    run-up back."""
+    one = _unlike_neighbours(cell_list, phi, wet, beside_solid, deep, u, cells, volume, wet_share)
+    u -= weight * _unlike_neighbours(cell_list, phi, wet, beside_solid, deep, one, cells, volume, wet_share)
+
+
+@njit(cache=True)
+def _unlike_neighbours(cell_list, phi, wet, beside_solid, deep, u, cells, volume, wet_share):
+    """M⁻¹L u (N, 3), zero on dry nodes."""
+    mass, out, mean = np.zeros(u.shape[0]), np.zeros((u.shape[0], 3)), np.empty(3)
     for s in range(cell_list.shape[0]):
         e = cell_list[s]
         w = volume[e] * max(wet_share[s], SMALLEST_WET_SHARE)
@@ -306,8 +313,9 @@ def damp_waterline(cell_list, weight, phi, wet, beside_solid, deep, u, cells, vo
                 i = cells[e, a]
                 if wet[i]:
                     for k in range(3):
-                        push[i, k] += w * (mean[k] / count - u[i, k])
+                        out[i, k] += w * (u[i, k] - mean[k] / count)
     for i in range(u.shape[0]):
         if mass[i] > 0.0:
             for k in range(3):
-                u[i, k] += weight * push[i, k] / mass[i]
+                out[i, k] /= mass[i]
+    return out

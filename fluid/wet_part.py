@@ -14,6 +14,7 @@ import numpy as np
 from numba import njit
 
 from fluid.moments import cells_touching, wet_fraction
+from fluid.obtuse import without_indefinite
 
 DRY = 1e-9
 """A fluid part that lies above φ = -DRY h holds no water."""
@@ -22,7 +23,7 @@ DRY = 1e-9
 @dataclass(frozen=True)
 class WetPart:
     """nodes (N,) bool with an unknown · cells (n,), share (n,) of each with φ < 0, 1 in wholly wet ones ·
-    void (k,) cells left out."""
+    void (k,) cells left out: without water, or those that `obtuse.py` drops."""
 
     nodes: np.ndarray
     cells: np.ndarray
@@ -36,6 +37,8 @@ class WetPart:
         below = (phi < 0.0) & t.active
         cells = cells_touching(below, t.cells)
         holds = ~domain.is_cut[cells] | _holding(domain, t, phi, -DRY * spacing)[cells]
+        if t.is_obtuse:
+            holds[holds] = without_indefinite(t, domain.is_cut, cells[holds], below, phi)
         void = cells[~holds]
         if len(void) > 0:
             cells = cells[holds]

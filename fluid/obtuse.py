@@ -1,0 +1,107 @@
+"""Cells with obtuse angles at the surface that would turn the pressure matrix indefinite.
+
+The zero of the pressure at the crossings of wet-dry edges (`projection.py`, equation (2)) gives the wet corners i of a
+cell the matrix
+
+    A_ij = |e| ∇N_i·∇N_j,      A_ii = |e| [Σ_{j wet} k_ij + Σ_{j dry} k_ij / ϑ_ij],      k_ij = -∇N_i·∇N_j,
+
+indefinite where a dry corner lies behind an obtuse angle.  In the open its neighbours outweigh such a cell; beside a
+solid, where cells have little fluid, they may not: the row of a node then has no pressure that the surface could hold,
+and any positive number in its place stirs water at rest.  Left out of matrix and right hand side alike are
+- cut cells whose own matrix is not positive,
+- cells that take from the diagonal of a row until the sum is no longer clearly positive.
+Water at rest balances in every cell by itself, so it stays at rest.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+LEAST = 0.05
+"""Least share of a row's positive and negative entries on the diagonal that is to be left."""
+SMALLEST_CUT = 1e-7
+ROUND_OFF = 1e-12
+
+
+def without_indefinite(topology, is_cut, cells, wet, phi):
+    """Which of the listed cells (n,) stay, (n,) bool; is_cut (M,) bool, wet (N,) bool and phi (N,) [m]: the surface."""
+    t = topology
+    return _kept(cells, is_cut, wet, phi, t.cells, t.parent, t.products, t.volume)
+
+
+@njit(cache=True)
+def _kept(cell_list, is_cut, wet, phi, cells, parent, products, volume):
+    kept = np.ones(len(cell_list), np.bool_)
+    part, total, size = np.zeros((len(cell_list), 4)), np.zeros(len(phi)), np.zeros(len(phi))
+    matrix = np.empty((4, 4))
+    for s in range(len(cell_list)):
+        e = cell_list[s]
+        n_wet = _cell_matrix(cells[e], products[parent[e]], wet, phi, matrix)
+        for a in range(4):
+            part[s, a] = volume[e] * matrix[a, a]
+        if n_wet < 4 and is_cut[e] and not _is_positive(matrix):
+            kept[s] = False
+            continue
+        for a in range(4):
+            total[cells[e, a]] += part[s, a]
+            size[cells[e, a]] += abs(part[s, a])
+    dropped = True
+    while dropped:
+        dropped = False
+        for s in range(len(cell_list)):
+            e = cell_list[s]
+            against = False
+            for a in range(4):
+                i = cells[e, a]
+                against = against or (part[s, a] < 0.0 and total[i] < LEAST * size[i])
+            if kept[s] and against:
+                kept[s], dropped = False, True
+                for a in range(4):
+                    total[cells[e, a]] -= part[s, a]
+                    size[cells[e, a]] -= abs(part[s, a])
+    return kept
+
+
+@njit(cache=True)
+def _cell_matrix(corners, products, wet, phi, matrix):
+    """A / |e| in `matrix` (4, 4), rows and columns of dry corners zero; the number of wet corners."""
+    matrix[:] = 0.0
+    column, n_wet = 0, 0
+    for a in range(4):
+        n_wet += wet[corners[a]]
+        for b in range(a + 1, 4):
+            k = -products[column]
+            column += 1
+            i, j = corners[a], corners[b]
+            if wet[i] and wet[j]:
+                matrix[a, b] = matrix[b, a] = -k
+                matrix[a, a] += k
+                matrix[b, b] += k
+            elif wet[i]:
+                matrix[a, a] += k / _crossing(phi[i], phi[j])
+            elif wet[j]:
+                matrix[b, b] += k / _crossing(phi[j], phi[i])
+    return n_wet
+
+
+@njit(cache=True)
+def _crossing(inside, outside):
+    """ϑ of the edge from a wet node to one that is not."""
+    return max(inside / (inside - outside), SMALLEST_CUT) if outside >= 0.0 else 1.0
+
+
+@njit(cache=True)
+def _is_positive(matrix):
+    """Whether elimination (in place) meets no pivot below zero; empty rows are none."""
+    largest = max(max(matrix[0, 0], matrix[1, 1]), max(matrix[2, 2], matrix[3, 3]))
+    for a in range(4):
+        if matrix[a, a] < -ROUND_OFF * largest or largest <= 0.0:
+            return False
+        if matrix[a, a] <= ROUND_OFF * largest:
+            continue
+        for b in range(a + 1, 4):
+            factor = matrix[b, a] / matrix[a, a]
+            for c in range(a, 4):
+                matrix[b, c] -= factor * matrix[a, c]
+    return True
