@@ -8,7 +8,7 @@ cell the matrix
 indefinite where a dry corner lies behind an obtuse angle.  In the open its neighbours outweigh such a cell; beside a
 solid, where cells have little fluid, they may not: the row of a node then has no pressure that the surface could hold,
 and any positive number in its place stirs water at rest.  Left out of matrix and right hand side alike are
-- cut cells whose own matrix is not positive,
+- cells with less than SMALL of their volume in the fluid whose own matrix is not positive,
 - cells that take from the diagonal of a row until the sum is no longer clearly positive.
 Water at rest balances in every cell by itself, so it stays at rest.
 """
@@ -20,18 +20,20 @@ from numba import njit
 
 LEAST = 0.05
 """Least share of a row's positive and negative entries on the diagonal that is to be left."""
+SMALL = 0.98
+"""Fuller cells have neighbours like themselves: without them the surface loses what holds it (growth of 0.1 a step)."""
 SMALLEST_CUT = 1e-7
 ROUND_OFF = 1e-12
 
 
-def without_indefinite(topology, is_cut, cells, wet, phi):
-    """Which of the listed cells (n,) stay, (n,) bool; is_cut (M,) bool, wet (N,) bool and phi (N,) [m]: the surface."""
+def without_indefinite(topology, cells, wet, phi):
+    """Which of the listed cells (n,) stay, (n,) bool; wet (N,) bool and phi (N,) [m]: the surface."""
     t = topology
-    return _kept(cells, is_cut, wet, phi, t.cells, t.parent, t.products, t.volume)
+    return _kept(cells, t.fraction, wet, phi, t.cells, t.parent, t.products, t.volume)
 
 
 @njit(cache=True)
-def _kept(cell_list, is_cut, wet, phi, cells, parent, products, volume):
+def _kept(cell_list, fraction, wet, phi, cells, parent, products, volume):
     kept = np.ones(len(cell_list), np.bool_)
     part, total, size = np.zeros((len(cell_list), 4)), np.zeros(len(phi)), np.zeros(len(phi))
     matrix = np.empty((4, 4))
@@ -40,7 +42,7 @@ def _kept(cell_list, is_cut, wet, phi, cells, parent, products, volume):
         n_wet = _cell_matrix(cells[e], products[parent[e]], wet, phi, matrix)
         for a in range(4):
             part[s, a] = volume[e] * matrix[a, a]
-        if n_wet < 4 and is_cut[e] and not _is_positive(matrix):
+        if n_wet < 4 and fraction[e] < SMALL and not _is_positive(matrix):
             kept[s] = False
             continue
         for a in range(4):

@@ -38,7 +38,7 @@ class WetPart:
         cells = cells_touching(below, t.cells)
         holds = ~domain.is_cut[cells] | _holding(domain, t, phi, -DRY * spacing)[cells]
         if t.is_obtuse:
-            holds[holds] = without_indefinite(t, domain.is_cut, cells[holds], below, phi)
+            holds[holds] = without_indefinite(t, cells[holds], below, phi)
         void = cells[~holds]
         if len(void) > 0:
             cells = cells[holds]
