@@ -8,6 +8,7 @@ import numpy as np
 
 from coupler.clock import Clock
 from coupler.exchange import Immersion
+from coupler.fill import start_level
 from coupler.loop import Coupling
 from fluid.mesh import box_mesh
 from fluid.parameters import WaterParameters
@@ -31,7 +32,7 @@ def box(centre, size, rotation=None) -> tuple[np.ndarray, tuple]:
 def tank(
     size,
     cells,
-    fill: Callable,
+    fill: Callable | list,
     structure=None,
     solids=(),
     rtol: float = 1e-9,
@@ -40,10 +41,14 @@ def tank(
     covers: str = "single",
     **parameters,
 ) -> Coupling:
-    """Water in [0, size] on cells (nx, ny, nz) with blocks and fixed solids; fill, is_open, is_smooth: see `Water`."""
+    """Water in [0, size] on cells (nx, ny, nz) with blocks and fixed solids; is_open, is_smooth: see `Water`.
+
+    fill: as in `Water`, or boxes (lower (3,), upper (3,)) filled like those of a case, which end at the faces of walls."""
     mesh = box_mesh(np.zeros(3), size, np.asarray(size, float) / np.asarray(cells))
     immersion = Immersion(mesh, structure, list(solids), covers)
     parameters = WaterParameters(**({"density": DENSITY, "gravity": G} | parameters))
+    if not callable(fill):
+        fill = start_level(fill, (np.zeros(3), np.asarray(size, float)), mesh, immersion.domain)
     water = Water(mesh, immersion.domain, fill, parameters, is_open, is_smooth)
     return Coupling(water, structure, immersion, rtol=rtol, step_max=1.0, clock=Clock())
 

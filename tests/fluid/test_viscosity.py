@@ -223,7 +223,9 @@ def test_shear_along_a_bed_is_not_carried_on_into_the_air():
     def fastest(rubbed):
         u = np.where(wet[:, None], speed[:, None] * [1.0, 0.0, 0.0], 0.0)
         order = water.listed, water.layer_start
-        extend_velocity(water.topology, *order, wet, cells, u, np.zeros_like(u), 0.0, np.full_like(u, np.inf), rubbed)
+        extend_velocity(
+            water.topology, *order, wet, cells, u, np.zeros_like(u), 0.0, np.full_like(u, np.inf), rubbed
+        )
         return u[:, 0].max()
 
     assert fastest(water.rubbed_nodes()) == pytest.approx(1.0, abs=1e-12)
