@@ -43,7 +43,7 @@ def tank(
 ) -> Coupling:
     """Water in [0, size] on cells (nx, ny, nz) with blocks and fixed solids; is_open, is_smooth: see `Water`.
 
-    fill: as in `Water`, or boxes (lower (3,), upper (3,)) filled like those of a case, which end at the faces of walls."""
+    fill: as in `Water`, or boxes (lower (3,), upper (3,)) filled like those of a case, which end at walls."""
     mesh = box_mesh(np.zeros(3), size, np.asarray(size, float) / np.asarray(cells))
     immersion = Immersion(mesh, structure, list(solids), covers)
     parameters = WaterParameters(**({"density": DENSITY, "gravity": G} | parameters))
