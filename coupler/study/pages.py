@@ -29,7 +29,7 @@ chance. The order of convergence is the slope of the errors where there is an ex
 differences of the three finest runs, and there is none where these do not shrink.
 
 What a part of the program costs is the difference of two runs, the case with and without it; what is within the scatter
-of CPU times, some 5 to 10 % on a busy machine, is noise. Wall seconds are those of a machine that did ten other things.
+of CPU times, some 5 to 10 % on a busy machine, is noise. Wall seconds are those of a machine that did other work too.
 """
 
 COLOURS = 96

@@ -13,11 +13,11 @@ NOTES = {
     "P38": "Without friction the pressure is that of published frictionless δ-SPH to 0.03. Friction of smooth walls "
     "brings it down to the measured one, but by an amount that depends on the cells, as nothing mixes the boundary "
     "layer: docs/water.md.",
-    "P39": "H3 lies behind the box: some centimetres of water close the wake from one side too early, because all cells "
+    "P39": "H3 lies behind the box: water closes the wake from one side too early, because all cells "
     "are split along the same diagonal (docs/water.md, Weak); when the jet comes down differs from run to run.",
     "P41": "Measured between 5 and 11 depths from the gate; 0.018 m is two cells, and a run that differed by round-off "
     "gave 1.16 m/s there.",
-    "P42": "The wave is less than half a cell high and its run-up one to two cells of water; where the tongue tears off "
+    "P42": "The wave is less than half a cell high, its run-up one to two cells of water; where the tongue tears off "
     "a film decides: 0.064 to 0.099 d on 24 and 48 cells over the depth, with variants of damping and transport.",
     "P55": "With D/h = 4 the sphere falls a tenth too slowly at both Reynolds numbers; at Re 11.6 it is 10.5, 6.3 and "
     "4.5 % with 4, 6 and 8: cells over the diameter set its drag (held and spun at D/h = 4, its moment is 1.4 times "
