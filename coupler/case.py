@@ -188,7 +188,7 @@ class RunLimits(Section):
     defect: quantity("", gt=0) = Field(
         0.5,
         description="share by which the blocks may miss the motion that the water was told, on the mean of the last "
-        "twenty steps; a single step that misses by more is halved and taken again",
+        "twenty steps; a single step that misses by more than 0.6 of it is halved and taken again",
     )
     cpu_seconds: PositiveTime | None = Field(
         None, description="processor time that the run may take; a resumed run has as much again"
