@@ -25,8 +25,8 @@ class Output(NamedTuple):
 
 
 def output(parts: int, polygons: int, with_openings: bool) -> Output:
-    """Room for that many parts and polygons."""
-    openings = polygons * 4 if with_openings else 64
+    """Room for that many parts and polygons; for tetrahedra ample, as pages that nobody writes to cost nothing."""
+    openings, tetrahedra = polygons * 4 if with_openings else 64, polygons * 4
     return Output(
         np.zeros(parts, dtype=np.int64),
         np.zeros(parts, dtype=np.bool_),
@@ -38,8 +38,8 @@ def output(parts: int, polygons: int, with_openings: bool) -> Output:
         np.zeros(openings, dtype=np.int64),
         np.zeros(openings + 1, dtype=np.int64),
         np.zeros((openings * 5, 3)),
-        np.zeros(polygons, dtype=np.int64),
-        np.zeros((polygons, 17)),
+        np.zeros(tetrahedra, dtype=np.int64),
+        np.zeros((tetrahedra, 17)),
     )
 
 
