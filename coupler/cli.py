@@ -188,7 +188,9 @@ def verify(
     ids: Annotated[
         list[str] | None, typer.Argument(metavar="[ID]...", help="cases, P01...; else all")
     ] = None,
-    quick: Annotated[bool, typer.Option("--quick", help="only cases that take less than a minute")] = False,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="only the cheap cases, three minutes of processor time in all")
+    ] = False,
     json: Annotated[bool, typer.Option("--json", help="one JSON object a quantity, one a line")] = False,
     list_: Annotated[bool, typer.Option("--list", help="list the cases, and those not covered")] = False,
     plots: Annotated[

@@ -63,7 +63,9 @@ def _hinge_curve(law: JointParameters, stops) -> tuple[np.ndarray, np.ndarray, f
     return np.asarray(stops), np.array(moment), work
 
 
-@check("P23", "moment that a joint carries under axial load", "400- to 800-point integration of the face")
+@check(
+    "P23", "moment that a joint carries under axial load", "400- to 800-point integration of the face", "M"
+)
 def joint_under_axial_load():
     table = columns("coh_joint_Mmax_vs_N")
     for ratio in (1, 10, 100, 10000):

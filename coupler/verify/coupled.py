@@ -118,7 +118,7 @@ def _period(t, z, guess: float) -> float:
     return float(curve_fit(model, t, z, [z[0], guess, 0.1, 0.0, 0.0])[0][1])
 
 
-@check("P54", "attitude in which a square prism floats", "stable heel of a homogeneous prism")
+@check("P54", "attitude in which a square prism floats", "stable heel of a homogeneous prism", "M")
 def attitude():
     table = columns("floating_square_attitude")
     for s in (0.15, 0.24, 0.4):

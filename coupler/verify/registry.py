@@ -41,7 +41,9 @@ class Finding:
 
 @dataclass(frozen=True)
 class Check:
-    """One reference case. cost on two cores: S below a minute, M below 15 minutes, L longer."""
+    """One reference case.
+
+    cost on two cores: S for the quick set, three minutes of processor time in all; M below 15 minutes, L longer."""
 
     id: str
     group: str

@@ -81,7 +81,10 @@ def growth(scene: Scene, steps: int = STEPS) -> float:
 
 
 @check(
-    "P58", "a bonded wall swings in still water: one pass and two", "no growth without damping (own check)"
+    "P58",
+    "a bonded wall swings in still water: one pass and two",
+    "no growth without damping (own check)",
+    "M",
 )
 def passes():
     for density, damping, number in ((2400.0, 0.02, 1), (2400.0, 0.0, 2), (500.0, 0.0, 2)):
