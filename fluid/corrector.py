@@ -32,10 +32,9 @@ FLUX_LAYERS = 3
 MEMORY_DEPTH = 2.0
 """Cells nearer to the surface than this (in cell sizes) keep no remainder: there it feeds surface noise."""
 WATERLINE_DAMPING, WATERLINE_DEPTH = 0.5, 1.0
-"""Share of the difference to its neighbours that velocity beside a water line on a solid loses in a step, and how far
-below the surface (in cell sizes). On a slope of 1:20 noise grows by 0.01 a step with 0.1, and with 0.3 still where
-the surface passes through nodes. Less in faster water, none where it crosses a cell in a step: there it would take
-what is real."""
+"""c of `damp_waterline` in calm water, and how far below the surface it acts (in cell sizes). Noise on a slope of 1:20
+grows by 0.03 a step without, and not with 0.5. Less in faster water, none where it crosses a cell in a step: there it
+would take what is real."""
 
 
 @dataclass(frozen=True)

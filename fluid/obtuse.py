@@ -18,11 +18,12 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from fluid.projection import SMALLEST_CUT
+
 LEAST = 0.05
 """Least share of a row's positive and negative entries on the diagonal that is to be left."""
 SMALL = 0.98
 """Fuller cells have neighbours like themselves: without them the surface loses what holds it (growth of 0.1 a step)."""
-SMALLEST_CUT = 1e-7
 ROUND_OFF = 1e-12
 
 

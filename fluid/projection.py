@@ -82,7 +82,7 @@ def _wet_matrix(dofs, column, graph_row, start, neighbour, stiffness, phi, open_
                 diagonal += k
                 anchored[r] = True
             elif phi[j] >= 0.0:  # a node under water without an unknown shares void cells only
-                cut = max(phi[i] / (phi[i] - phi[j]), 1e-7)
+                cut = max(phi[i] / (phi[i] - phi[j]), SMALLEST_CUT)
                 diagonal += k / cut
                 positive += abs(k) / cut
                 anchored[r] = True
