@@ -11,6 +11,8 @@ AGAINST = {
     "finest": "the finest run",
 }
 
+ROUND_OFF = 1e-6
+"""Errors below this say nothing; figures draw them here."""
 TIMES = ("cpu_seconds", "set_up_seconds", "start_seconds", "compile_seconds", "wall_seconds")
 
 
@@ -84,8 +86,10 @@ def point_name(point: dict) -> str:
 
 
 def percent(value) -> str:
-    """A share for people; a dash for none."""
-    return "–" if not _number(value) else f"{100 * value:.3g} %"
+    """A share for people; a dash for none, and no digits of what is round-off."""
+    if not _number(value):
+        return "–"
+    return f"< {100 * ROUND_OFF:g} %" if 0.0 < abs(value) < ROUND_OFF else f"{100 * value:.3g} %"
 
 
 def _number(value) -> bool:
@@ -135,12 +139,16 @@ def _run_row(told: dict, point: dict, quantities: list[dict]) -> list[str]:
 
 
 def _cheapest(told: dict) -> str:
+    """A row a quantity (and value across its ladders), a column a level: setting, its error, its CPU seconds."""
     what = {q["name"]: q["what"] for q in told["quantities"]}
-    rows = [
-        [f"{what[e['quantity']]}{curve_of(e)}, {100 * e['level']:g} %", *cheapest_cells(told, e)]
-        for e in told["cheapest"]
-    ]
-    return table(["quantity and error", "setting", "its error", "CPU s"], rows)
+    rows: dict[str, dict[float, str]] = {}
+    for e in told["cheapest"]:
+        setting, error, cpu = cheapest_cells(told, e)
+        cell = f"{setting} ({error}, {cpu} s)" if e["rung"] else setting
+        rows.setdefault(f"{what[e['quantity']]}{curve_of(e)}", {})[e["level"]] = cell
+    levels = sorted({e["level"] for e in told["cheapest"]})
+    cells = [[name, *(found[level] for level in levels)] for name, found in rows.items()]
+    return table(["quantity", *(f"error of {100 * level:g} %" for level in levels)], cells)
 
 
 def curve_of(entry: dict) -> str:

@@ -22,7 +22,8 @@ figure a quantity. The tables below are those of the default ladders, each run o
 Every quantity has errors of one kind: against an exact answer, a measurement, or the finest run. CPU s are user and
 system time of the steps and of writing results, one thread; set-up of the scene (and loading YADE), start of the
 program and compilation stand apart. A run that had to compile is made again. In the figures dotted lines are 1, 5 and
-10 %, crosses on the upper edge are failed runs; errors below 0.0001 % are drawn there.
+10 %, crosses on the upper edge are failed runs; errors below 0.0001 % are drawn there. A run that belongs to several
+ladders carries its settings in all of them ("50 mm / 10 ms / 2").
 
 The cheapest setting counts only if every finer run of its ladder is as near, since a coarse run may hit the answer by
 chance. The order of convergence is the slope of the errors where there is an exact answer; else it comes from the
@@ -38,7 +39,7 @@ COLOURS = 96
 
 def summary(studies: list[dict]) -> str:
     """The settings for 5 % of all studies."""
-    rows = []
+    rows: list[list[str]] = []
     for told in studies:
         what = {q["name"]: f"{q['what']}, {AGAINST[q['against']]}" for q in told["quantities"]}
         rows += [
@@ -47,6 +48,9 @@ def summary(studies: list[dict]) -> str:
             if entry["level"] == 0.05
         ]
     head = ["case", "quantity", "setting", "its error", "CPU s"]
+    cases = [row[0] for row in rows]
+    for row, before in zip(rows[1:], cases):
+        row[0] = "" if row[0] == before else row[0]
     return "## Settings for an error of 5 %\n\n" + table(head, rows)
 
 
@@ -67,6 +71,11 @@ def main() -> None:
     for folder in folders:
         told = json.loads((folder / "study.json").read_text(encoding="utf-8"))
         case = Path(told["case"]).parent.name
+        told["command"] = [
+            "surgebreak",
+            "study",
+            f"cases/{case}",
+        ]  # as from the checkout, wherever it was made
         for figure in sorted(folder.glob("*.png")):
             _copy(figure, pictures / f"{case}_{figure.name}")
         studies.append(told)

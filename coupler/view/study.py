@@ -10,13 +10,19 @@ import sys
 import textwrap
 from pathlib import Path
 
+from matplotlib.colors import to_rgb
+
 from coupler.view.labels import place_labels
 from coupler.view.palette import INK, LINES, SOLID
 from coupler.view.plots import FORMATS, STYLE, _undated, plt
 
-SIZE = (5.2, 3.7)
+SIZE = (5.2, 3.5)
 """[inch] one and a half columns of a journal."""
 MARKS = "osD^vP*X"
+DASHES = ("-", (0, (5, 1.2)), (0, (1.2, 1)), "-.", (0, (3, 1, 1, 1, 1, 1)))
+"""Of the curves in their order, so that they are told apart in grey print."""
+DARKER = 0.75
+"""Of a curve's colour, for the texts at its points: thin letters look paler than lines."""
 LEVELS = (0.01, 0.05, 0.10)
 """Errors for which the cheapest setting is told: thin lines."""
 LOWEST = 1e-6
@@ -90,7 +96,7 @@ def figure(stem, q, curves, failed, along):
         if notes:
             drawing.supxlabel("\n".join(notes), x=0.01, ha="left", fontsize=6, color=INK)
         crosses(axis, failed)
-        place_labels(drawing, axis, labels(shown), 6)
+        place_labels(drawing, axis, labels(shown), 6.5)
         for ending in FORMATS:
             drawing.savefig(stem.with_name(f"{stem.name}.{ending}"), metadata=_undated(ending))
         plt.close(drawing)
@@ -113,7 +119,8 @@ def line(axis, number, legend, points):
     """A ladder: its points joined in their order."""
     x, y = [p[0] for p in points], [max(p[1], LOWEST) for p in points]
     mark = MARKS[number % len(MARKS)]
-    axis.plot(x, y, marker=mark, markersize=4, color=colour(number), label=legend, zorder=3)
+    dashes = DASHES[number % len(DASHES)]
+    axis.plot(x, y, marker=mark, ls=dashes, markersize=4, color=colour(number), label=legend, zorder=3)
 
 
 def colour(number):
@@ -122,13 +129,25 @@ def colour(number):
 
 
 def labels(curves):
-    """(CPU s, error, setting, colour) of every point; the same place is told once."""
+    """(CPU s, error, setting, colour) of every point; a run that is in several ladders has its settings in all."""
     found = {}
     for number, (_, points) in enumerate(curves):
         for cpu, error, label, _ in points:
-            text = label if error >= LOWEST else f"{label} (below {share(LOWEST)})"
-            found.setdefault((cpu, max(error, LOWEST)), (text, colour(number)))
-    return [(*place, *text) for place, text in found.items()]
+            texts, _ = found.setdefault((cpu, max(error, LOWEST)), ([], text_colour(number)))
+            texts.append(label)
+    return [
+        (*place, _settings(place[1], texts), text_colour) for place, (texts, text_colour) in found.items()
+    ]
+
+
+def _settings(error, texts):
+    told = " / ".join(dict.fromkeys(filter(None, texts)))
+    return told if error > LOWEST else f"{told} (< {share(LOWEST)})".strip()
+
+
+def text_colour(number):
+    """Of the texts at the points of a curve."""
+    return tuple(DARKER * part for part in to_rgb(colour(number)))
 
 
 def band(axis, curves):
@@ -146,7 +165,7 @@ def limits(axis, curves, failed):
         p["cpu_seconds"] for p in failed if p["cpu_seconds"] > 0
     ]
     y = [max(p[1], LOWEST) for _, points in curves for p in points]
-    axis.set_xlim(0.7 * min(x), 1.9 * max(x))
+    axis.set_xlim(0.75 * min(x), 1.5 * max(x))
     low, high = 10.0 ** math.floor(math.log10(0.95 * min(y))), 10.0 ** math.ceil(math.log10(1.2 * max(y)))
     low = max(low, 0.5 * LOWEST)
     axis.set_ylim(low, high)
@@ -166,7 +185,7 @@ def share(value):
 
 def minor(extent, form, scale=1.0):
     """Names of the ticks between decades, the more the shorter the axis; extent: its end over its beginning."""
-    named = (1.5, 2, 3, 4, 5, 6, 8) if extent < 4.0 else (2, 5) if extent < 30.0 else ()
+    named = (1.5, 2, 3, 4, 5, 6, 8) if extent < 4.0 else (2, 5) if extent < 100.0 else ()
 
     def ticks(value, _):
         first = value / 10.0 ** math.floor(math.log10(value))
