@@ -44,7 +44,8 @@ def _study(case: Case) -> Iterator[Problem]:
 
 def remarks(case: Case) -> list[str]:
     """What is allowed but worth knowing before the run."""
-    return [*_thin_remarks(case), *water_remarks(case), *_joint_remarks(case), *_loose_remarks(case)]
+    found = [*_thin_remarks(case), *water_remarks(case), *_joint_remarks(case), *_loose_remarks(case)]
+    return [*found, *_solid_remarks(case)]
 
 
 def _thin_remarks(case: Case) -> Iterator[str]:
@@ -94,6 +95,15 @@ def _loose_remarks(case: Case) -> Iterator[str]:
         return
     for part in (*case.structure.wall, *case.structure.building):
         yield f"the blocks of '{part.name}' lie loose on one another; a section [joints] glues them"
+
+
+def _solid_remarks(case: Case) -> Iterator[str]:
+    """Fixed solids do not stop blocks."""
+    if case.solid and any(not (b.fixed or b.driven) for part in parts_of(case) for b in part.blocks):
+        yield (
+            f"only the water feels the fixed solid '{case.solid[0].name}', blocks pass through it; where they may "
+            "reach a body that stands fast, make that a [[structure.block]] with fixed = true"
+        )
 
 
 # ---------------------------------------------------------------- sections

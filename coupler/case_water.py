@@ -138,7 +138,8 @@ class Water(Section):
 
 class Solid(Section):
     """A fixed body in the water, for instance an obstacle: a box (centre, size), the hull of points (vertices), or the
-    convex bodies of a file (path). It carries forces but never moves."""
+    convex bodies of a file (path). It takes the forces of the water and never moves. Blocks pass through it: what is to
+    hold blocks is a [[structure.block]] with fixed = true."""
 
     name: Name = Field("solid", description="for gauges and results")
     centre: Point | None = Field(None, description="centre of a box")

@@ -116,6 +116,31 @@ def test_overlapping_blocks_are_named_both_with_the_overlap():
     assert found == ["structure.block.1: 'b1' overlaps 'b0' by 0.2 m; move one of them by that much"]
 
 
+def test_a_block_that_would_fall_through_the_solid_under_it_is_refused():
+    """Solids bound the water only; beside one, or above it with a gap, a block may be, and the user is told."""
+    solid = [{"name": "bed", "centre": [7, 5, 1], "size": [2, 2, 2]}]
+    (found,) = told(case(solid=solid, **structure({"centre": [7, 5, 2.5]})))
+    assert (
+        found.startswith("structure.block.0: 'b0' rests on the fixed solid 'bed'") and "fixed = true" in found
+    )
+    held = case(solid=solid, **structure({"centre": [7, 5, 2.5], "fixed": True}))
+    assert told(held) == [] and remarks(held) == []
+    for centre in ([8.5, 5, 0.5], [7, 5, 3]):
+        beside = case(solid=solid, **structure({"centre": centre}))
+        assert told(beside) == [] and "blocks pass through it" in remarks(beside)[0]
+
+
+def test_a_block_on_a_slope_rests_on_it():
+    slope = [
+        {"name": "slope", "vertices": [[6, 4, 0], [9, 4, 0], [9, 4, 1], [6, 6, 0], [9, 6, 0], [9, 6, 1]]}
+    ]
+    turn = {"axis": [0, -1, 0], "angle": float(np.arctan2(1, 3))}
+    up = rotation_matrix(turn["axis"], turn["angle"]) @ [0, 0, 0.5]
+    block = {"centre": list(np.array([7.5, 5, 0.5]) + up), "rotation": turn}
+    (found,) = told(case(solid=slope, **structure(block)))
+    assert "rests on the fixed solid 'slope'" in found
+
+
 def test_touching_blocks_do_not_overlap():
     """Decimal fractions are not exact in binary: 0.1 + 0.2 against 0.3 must count as touching."""
     a, b = {"centre": [7, 5, 0.15], "size": [1, 1, 0.3]}, {"centre": [7, 5, 0.1 + 0.2 + 0.5]}
