@@ -55,9 +55,11 @@ def run(
     set: Overrides = None,
     output: Annotated[
         Path | None,
-        typer.Option(help="a new directory for the results; else runs/<time>-<hash> beside the case"),
+        typer.Option(
+            metavar="DIR", help="a new directory for the results; else runs/<time>-<hash> beside the case"
+        ),
     ] = None,
-    end: Annotated[str | None, typer.Option(help="short for --set time.end=...")] = None,
+    end: Annotated[str | None, typer.Option(metavar="TIME", help="short for --set time.end=...")] = None,
 ) -> None:
     """Run a case. Ctrl-C or a file named `stop` in the run directory ends it cleanly."""
     one_thread()
@@ -72,7 +74,9 @@ def run(
 @app.command()
 def resume(
     run: Annotated[Path, typer.Argument(metavar="RUN", help="the directory of a run that stopped")],
-    end: Annotated[str | None, typer.Option(help="another end; short for --set time.end=...")] = None,
+    end: Annotated[
+        str | None, typer.Option(metavar="TIME", help="another end; short for --set time.end=...")
+    ] = None,
     set: Annotated[
         list[str] | None,
         typer.Option(
@@ -155,7 +159,7 @@ def explain(
     key: Annotated[
         str | None,
         typer.Argument(
-            metavar="[KEY | RUN]",
+            metavar="KEY|RUN",
             help="a name of the case file, for instance joints.strength, or a run directory",
         ),
     ] = None,
@@ -175,7 +179,7 @@ def explain(
 
 
 @app.command()
-def init(directory: Annotated[Path, typer.Argument(help="the new case directory")]) -> None:
+def init(directory: Annotated[Path, typer.Argument(metavar="DIR", help="the new case directory")]) -> None:
     """Write a small commented case that runs."""
     from coupler.case_docs import write_first_case
 
@@ -185,16 +189,15 @@ def init(directory: Annotated[Path, typer.Argument(help="the new case directory"
 
 @app.command()
 def verify(
-    ids: Annotated[
-        list[str] | None, typer.Argument(metavar="[ID]...", help="cases, P01...; else all")
-    ] = None,
+    ids: Annotated[list[str] | None, typer.Argument(metavar="ID", help="cases (P01 ...); else all")] = None,
     quick: Annotated[
         bool, typer.Option("--quick", help="only the cheap cases, three minutes of processor time in all")
     ] = False,
     json: Annotated[bool, typer.Option("--json", help="one JSON object a quantity, one a line")] = False,
     list_: Annotated[bool, typer.Option("--list", help="list the cases, and those not covered")] = False,
     plots: Annotated[
-        Path | None, typer.Option(help="a folder for figures: computed curves over measured ones")
+        Path | None,
+        typer.Option(metavar="DIR", help="a folder for figures: computed curves over measured ones"),
     ] = None,
 ) -> None:
     """Compare with exact solutions and measured records.
@@ -212,7 +215,8 @@ def verify(
 @app.command()
 def stress(
     scenes: Annotated[
-        list[str] | None, typer.Argument(metavar="[ID]...", help="scenes, S01..., or groups; else all")
+        list[str] | None,
+        typer.Argument(metavar="ID", help="scenes (S01 ...) or groups: structure, water, coupling; else all"),
     ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="only scenes that take less than a minute")] = False,
     json: Annotated[bool, typer.Option("--json", help="one JSON object a scene, one a line")] = False,
@@ -234,18 +238,24 @@ def compare_laws(
     laws: Annotated[
         str,
         typer.Option(
-            help="comma-separated; else all of ours, cohfrict, jcfpm, mortar and cpm; `--list` names them"
+            metavar="A,B,...",
+            help="comma-separated; else all of ours, cohfrict, jcfpm, mortar and cpm; `--list` names them",
         ),
     ] = "",
     set: Overrides = None,
     output: Annotated[
         Path | None,
-        typer.Option(help="a new directory for the results; else runs/compare-<time> beside the case"),
+        typer.Option(
+            metavar="DIR", help="a new directory for the results; else runs/compare-<time> beside the case"
+        ),
     ] = None,
     substeps: Annotated[
-        str, typer.Option(help="multiples of the case's own substep, for error against run time")
+        str,
+        typer.Option(
+            metavar="N,N,...", help="multiples of the case's own substep, for error against run time"
+        ),
     ] = "1,2,4,8",
-    records: Annotated[int, typer.Option(min=10, help="rows of the tables")] = 1000,
+    records: Annotated[int, typer.Option(min=10, metavar="N", help="rows of the tables")] = 1000,
     list_: Annotated[
         bool, typer.Option("--list", help="list the laws and what the stock ones do not match")
     ] = False,
@@ -264,21 +274,29 @@ def compare_laws(
 def study(
     words: Annotated[
         list[Path],
-        typer.Argument(metavar="CASE | compare A B", help="a case with a section [study], or two studies"),
+        typer.Argument(metavar="CASE|compare A B", help="a case with a section [study], or two studies"),
     ],
-    ladder: Annotated[str, typer.Option(help="comma-separated names of ladders; else all of the case")] = "",
+    ladder: Annotated[
+        str, typer.Option(metavar="A,B,...", help="comma-separated names of ladders; else all of the case")
+    ] = "",
     repeat: Annotated[
-        int | None, typer.Option(min=1, help="times that each run is made; else study.repeat of the case")
+        int | None,
+        typer.Option(min=1, metavar="N", help="times that each run is made; else study.repeat of the case"),
     ] = None,
     output: Annotated[
-        Path | None, typer.Option(help="directory of the study; else runs/study beside the case")
+        Path | None,
+        typer.Option(metavar="DIR", help="directory of the study; else runs/study beside the case"),
     ] = None,
     larger: Annotated[bool, typer.Option("--larger", help="with the larger rungs of the ladders")] = False,
     any_version: Annotated[
         bool, typer.Option("--any-version", help="keep runs that another version of the program made")
     ] = False,
-    error: Annotated[float, typer.Option(min=1.0, help="compare: largest ratio of errors, B over A")] = 1.1,
-    cpu: Annotated[float, typer.Option(min=1.0, help="compare: largest ratio of CPU seconds")] = 1.2,
+    error: Annotated[
+        float, typer.Option(min=1.0, metavar="RATIO", help="compare: largest ratio of errors, B over A")
+    ] = 1.1,
+    cpu: Annotated[
+        float, typer.Option(min=1.0, metavar="RATIO", help="compare: largest ratio of CPU seconds")
+    ] = 1.2,
 ) -> None:
     """Error against run time over ladders of a case.
 
@@ -302,7 +320,8 @@ def benchmark(
     quick: Annotated[bool, typer.Option("--quick", help="small sizes only")] = False,
     json: Annotated[bool, typer.Option("--json", help="one JSON object")] = False,
     only: Annotated[
-        str | None, typer.Option(help="joints, scenes, dead, cutting, debris, water, solver or stock")
+        str | None,
+        typer.Option(metavar="PART", help="joints, scenes, dead, cutting, debris, water, solver or stock"),
     ] = None,
 ) -> None:
     """Measure what substeps, cuts and solvers cost.

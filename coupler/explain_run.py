@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from coupler.process import was_killed
 from coupler.run_directory import read_summary
 
 NEEDS = {
@@ -140,8 +141,10 @@ def explanation_of_run(place: Path) -> str:
 def _opening(place: Path, summary: dict) -> list[str]:
     figures = summary["figures"]
     time = ", ".join(f"{name} {s:.3g} s ({share:.0%})" for name, s, share in shares(summary))
+    status = "killed (its process is gone)" if was_killed(summary) else summary["status"]
+    steps = f"{figures['steps']} steps" if "steps" in figures else "steps not counted"
     return [
-        f"{place}: {summary['case']['case']['title']}: {summary['status']}, {figures.get('steps', 0)} steps",
+        f"{place}: {summary['case']['case']['title']}: {status}, {steps}",
         f"processor time: {time or 'not booked'}",
     ]
 

@@ -12,6 +12,8 @@ HERE = Path(__file__).parent
 KIND = {".png": "image/png", ".svg": "image/svg+xml", ".mp4": "video/mp4"}
 LARGEST_FILM = 8_000_000
 """[bytes] of a film that is put into the page; a larger one is linked."""
+SHORT = 16
+"""Rows of a table that paper does not break."""
 MOST_COLUMNS = 9
 """Of a table in letters of the usual size; one of more has smaller ones."""
 PREFIXES = {-3: "n", -2: "µ", -1: "m", 0: "", 1: "k", 2: "M", 3: "G", 4: "T"}
@@ -56,7 +58,8 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]], texts: Iterable[in
         return f"<tr>{''.join(found)}</tr>"
 
     body = "\n".join(cells("td", row) for row in rows)
-    size = " class=wide" if len(head) > MOST_COLUMNS else ""
+    kinds = [*(["wide"] if len(head) > MOST_COLUMNS else []), *(["short"] if len(rows) <= SHORT else [])]
+    size = f' class="{" ".join(kinds)}"' if kinds else ""
     return f"<table{size}>\n<thead>{cells('th', head)}</thead>\n<tbody>\n{body}\n</tbody>\n</table>"
 
 
@@ -77,10 +80,8 @@ def figure(path: Path, caption: str, wide: bool = True) -> str:
     if path.suffix == ".png" and svg.exists() and svg.stat().st_size < path.stat().st_size:
         path = svg
     kind = "" if wide else " class=narrow"
-    return (
-        f'<figure{kind}><img src="{as_data(path)}" alt="{escape(caption)}">'
-        f"<figcaption>{escape(caption)}</figcaption></figure>"
-    )
+    below = "" if path.name.startswith("still_") else f"<figcaption>{escape(caption)}</figcaption>"
+    return f'<figure{kind}><img src="{as_data(path)}" alt="{escape(caption)}">{below}</figure>'
 
 
 def film(path: Path, link: str) -> str:
@@ -102,10 +103,25 @@ def quantity(value: float | None, unit: str) -> str:
     """A number with its unit and a prefix that keeps it short: 1.23 kN; a dash for none."""
     if value is None or value != value:
         return "–"
-    power = _power(abs(value)) if unit in PREFIXED else 0
-    power = min(power, 0) if unit == "s" else power
+    power = power_of(value, unit)
     told = f"{_digits(value / 1000.0**power)}"
-    return f"{told} {PREFIXES[power]}{UNIT_TEXT.get(unit, unit)}".strip()
+    return f"{told} {unit_text(unit, power)}".strip()
+
+
+def in_one_unit(value: float, power: int) -> str:
+    """A number of a book whose lines all have the unit with this power of 1000, so that they can be compared."""
+    return _digits(value / 1000.0**power)
+
+
+def unit_text(unit: str, power: int) -> str:
+    """The unit with the prefix of a power of 1000."""
+    return f"{PREFIXES[power]}{UNIT_TEXT.get(unit, unit)}"
+
+
+def power_of(value: float, unit: str) -> int:
+    """Power of 1000 that keeps a number of this unit short."""
+    power = _power(abs(value)) if unit in PREFIXED else 0
+    return min(power, 0) if unit == "s" else power
 
 
 def _digits(value: float) -> str:

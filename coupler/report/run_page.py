@@ -65,10 +65,10 @@ def run_page(run: Path, summary: dict, pictures: Path, remarks: list[str]) -> st
         [
             f"<h1>{escape(title)}</h1>",
             paragraph(summary["case"]["case"].get("description", "")),
-            _verdict(summary),
+            _verdict(run, summary),
             section("What was run", _what(run, summary)),
-            section("Pictures", _stills(run, pictures), *map(note, remarks)),
             section("Results", _figures(summary), _promises(summary)),
+            section("Pictures", _stills(run, pictures), *map(note, remarks)),
             section("Computed over data", *(figure(p, _words(p.stem)) for p in over_data(run, pictures))),
             section("Histories", *_histories(run, pictures, of_scheme=False)),
             section("Ledger", tables.energy(run), tables.volume(run), tables.momentum(run, "momentum")),
@@ -81,17 +81,23 @@ def run_page(run: Path, summary: dict, pictures: Path, remarks: list[str]) -> st
     )
 
 
-def _verdict(summary: dict) -> str:
+def _verdict(run: Path, summary: dict) -> str:
     killed = was_killed(summary)
     bad = killed or summary["exit_code"] not in (0, None)
     told = summary["status"]
     if summary["exit_reason"]:
         told += f" (exit code {summary['exit_code']}): {summary['exit_reason']}"
     elif killed:
-        told = "killed: its process is gone and could not say why; this is what it has written"
+        told = f"killed: its process is gone and could not say why; this is what it has written{_until(run)}"
     elif summary["status"] == "running":
-        told += ": this is what the run has written so far"
+        told += f": this is what the run has written so far{_until(run)}"
     return f'<p class="verdict{" bad" if bad else ""}">{escape(told)}</p>'
+
+
+def _until(run: Path) -> str:
+    """How far the histories of a run go that could not say it itself."""
+    found = tables.history(run, "energy")
+    return "" if found is None else f", to t = {quantity(float(found['time'][-1]), 's')}"
 
 
 def _what(run: Path, summary: dict) -> str:
@@ -184,7 +190,13 @@ def plots(run: Path, pictures: Path) -> list[Path]:
     order = list(CAPTIONS)
     stems = sorted(p.stem for p in (run / "history").glob("*.csv"))
     ranked = sorted(stems, key=lambda stem: order.index(stem) if stem in order else 0.5)
-    return [pictures / f"{stem}.png" for stem in ranked if (pictures / f"{stem}.png").exists()]
+    return [path for stem in ranked for path in _leaves(pictures, stem)]
+
+
+def _leaves(pictures: Path, stem: str) -> list[Path]:
+    """The figure of a table, and those on which it goes on: gauges.png, gauges_2.png."""
+    more = sorted(p for p in pictures.glob(f"{stem}_*.png") if p.stem.removeprefix(f"{stem}_").isdigit())
+    return [p for p in (pictures / f"{stem}.png", *more) if p.exists()]
 
 
 def over_data(run: Path, pictures: Path) -> list[Path]:
@@ -196,12 +208,13 @@ def over_data(run: Path, pictures: Path) -> list[Path]:
 
 
 def _histories(run: Path, pictures: Path, of_scheme: bool) -> list[str]:
-    found = plots(run, pictures)
-    return [figure(p, _caption(p.stem)) for p in found if (p.stem in OF_SCHEME) == of_scheme]
+    found = [(p, p.stem.rstrip("0123456789").rstrip("_")) for p in plots(run, pictures)]
+    return [figure(p, _caption(stem, p.stem)) for p, stem in found if (stem in OF_SCHEME) == of_scheme]
 
 
-def _caption(stem: str) -> str:
-    return f"{CAPTIONS.get(stem, _words(stem))} (history/{stem}.csv)"
+def _caption(stem: str, leaf: str) -> str:
+    again = "" if leaf == stem else ", continued"
+    return f"{CAPTIONS.get(stem, _words(stem))}{again} (history/{stem}.csv)"
 
 
 def _time(summary: dict) -> str:

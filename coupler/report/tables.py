@@ -7,7 +7,16 @@ from pathlib import Path
 import numpy as np
 
 from coupler.history import History, read_history
-from coupler.report.html import note, paragraph, percent, quantity, table
+from coupler.report.html import (
+    in_one_unit,
+    note,
+    paragraph,
+    percent,
+    power_of,
+    quantity,
+    table,
+    unit_text,
+)
 
 MOST_CRACKS = 25
 """Broken joints that are listed one by one."""
@@ -47,18 +56,29 @@ def _book(title: str, found: History, unit: str) -> str:
     """Columns of one unit as lines with their first and last value; those that are zero throughout are left out."""
     lines = [c for c in found.columns if c.unit == unit]
     largest = max(np.abs(found[c.name]).max() for c in lines)
+    power = power_of(largest, unit)
     rows = [
-        [_words(c.name), *(quantity(v, unit) for v in _ends(found[c.name], largest)), c.meaning]
+        [_words(c.name), *(in_one_unit(v, power) for v in _ends(found[c.name], largest)), c.meaning]
         for c in lines
         if np.abs(found[c.name]).max() > NEGLIGIBLE * largest
     ]
-    return table([title, "after the first step", "at the end", "change", "what it is"], rows, (0, 4))
+    head = [
+        f"{title} [{unit_text(unit, power)}]",
+        "after the first step",
+        "at the end",
+        "change",
+        "what it is",
+    ]
+    return table(head, rows, (0, 4))
 
 
 def _ends(values: np.ndarray, largest: float) -> list[float]:
     """First, last and change; 0 for what is round-off beside the largest of the book."""
-    ends = (values[0], values[-1], values[-1] - values[0])
-    return [float(v) if abs(v) > NEGLIGIBLE * largest else 0.0 for v in ends]
+    return [_no_noise(v, largest) for v in (values[0], values[-1], values[-1] - values[0])]
+
+
+def _no_noise(value: float, largest: float) -> float:
+    return float(value) if abs(value) > NEGLIGIBLE * largest else 0.0
 
 
 def momentum(run: Path, name: str) -> str:
@@ -72,12 +92,18 @@ def momentum(run: Path, name: str) -> str:
     if largest == 0.0:
         return ""
     column = {c.name: c for c in found.columns}
+    unit = column[f"{ends[0]}_x"].unit
+    power = power_of(largest, unit)
     rows = [
-        [_words(end), *(quantity(v, column[f"{end}_x"].unit) for v in vector), column[f"{end}_x"].meaning]
+        [
+            _words(end),
+            *(in_one_unit(_no_noise(v, largest), power) for v in vector),
+            column[f"{end}_x"].meaning,
+        ]
         for end, vector in vectors.items()
         if end == "residual" or max(map(abs, vector)) > NEGLIGIBLE * largest
     ]
-    return table([_words(name), "x", "y", "z", "what it is"], rows, (0, 4))
+    return table([f"{_words(name)} [{unit_text(unit, power)}]", "x", "y", "z", "what it is"], rows, (0, 4))
 
 
 def cracks(run: Path) -> str:
@@ -97,7 +123,9 @@ def cracks(run: Path) -> str:
         f"dissipated {quantity(found['dissipated'][broken].sum(), 'J')}; all joints together "
         f"{quantity(found['dissipated'].sum(), 'J')}."
     )
-    rows = [_crack(found, i) for i in order[:MOST_CRACKS]]
+    extent = max(np.abs(found[f"centre_{axis}"]).max() for axis in "xyz")
+    digits = max(0, 3 - int(np.ceil(np.log10(extent)))) if extent > 0.0 else 0
+    rows = [_crack(found, i, digits) for i in order[:MOST_CRACKS]]
     head = [
         "joint",
         "blocks",
@@ -113,9 +141,11 @@ def cracks(run: Path) -> str:
     return paragraph(told) + table(head, rows) + note(f"and {left} more in cracks.csv" if left else "")
 
 
-def _crack(found: History, i: int) -> list[str]:
+def _crack(found: History, i: int, digits: int) -> list[str]:
+    """A joint; digits: decimals of its place [m], as many as tell one block from the next."""
     other = "ground" if found["b"][i] < 0 else f"{found['b'][i]:.0f}"
-    place = ", ".join(f"{found[f'centre_{axis}'][i]:.3g}" for axis in "xyz")
+    where = (round(float(found[f"centre_{axis}"][i]), digits) + 0.0 for axis in "xyz")
+    place = ", ".join(f"{x:.{digits}f}" for x in where)
     return [
         f"{found['joint'][i]:.0f}",
         f"{found['a'][i]:.0f} – {other}",
@@ -131,6 +161,8 @@ def _largest(values: np.ndarray) -> str:
     return f"{values.max():.3g}" if len(values) else "none"
 
 
+LITTLE = 1e-4
+"""Share of a limit below which its digits say nothing."""
 LIMITS = (
     ("volume_error", "largest_volume_error", "volume of water that the books miss"),
     ("energy_error", "largest_energy_error", "energy that the books miss, of the input"),
@@ -174,10 +206,12 @@ def limits(summary: dict) -> str:
 
 
 def _share(value: float) -> str:
-    return f"{value:.2e}" if 0.0 < abs(value) < 1e-5 else percent(value)
+    return f"{100.0 * value:.1e} %" if 0.0 < abs(value) < 1e-5 else percent(value)
 
 
 def _reached(value: float, limit: float) -> str:
+    if 0.0 < value < LITTLE * limit:
+        return f"< {100.0 * LITTLE:g} %"
     return f"{100.0 * value / limit:.3g} %" + (" – passed" if value > limit else "")
 
 

@@ -18,6 +18,8 @@ FLAT = (
     1 / 30
 )  # of the largest line of a panel: what is smaller would lie on the axis and goes to a panel of its own
 LEVEL = 0.01
+TALLEST = 8.4  # [inch] of the panels of one figure: with its caption it fits on a page of A4
+ROUND_OFF = 1e-12  # pure numbers below this all the time are not shown
 FORMATS = ("pdf", "svg", "png")
 UNIT_TEXT = {"1": "–", "m3": "m³", "m2": "m²", "N s": "N·s", "N m s": "N·m·s"}
 PREFIXED = ("J", "N", "N s", "N m s", "Pa", "W", "m", "m/s", "s")
@@ -41,8 +43,24 @@ def plots(directory, folder):
         history = read_history(table)
         panels = grouped(history)
         if panels and len(history["time"]) > 1:
-            written.append(figure(history, panels, folder / table.stem))
+            written += [
+                figure(history, some, folder / (table.stem if leaf == 1 else f"{table.stem}_{leaf}"))
+                for leaf, some in enumerate(leaves(panels), start=1)
+            ]
     return written
+
+
+def leaves(panels):
+    """Panels in lists that a page can hold each."""
+    found, room = [[]], TALLEST
+    for unit, names in panels:
+        height = LOW_PANEL if unit == "1" else PANEL
+        if found[-1] and height > room:
+            found.append([])
+            room = TALLEST
+        found[-1].append((unit, names))
+        room -= height
+    return found
 
 
 def grouped(history):
@@ -60,7 +78,7 @@ def grouped(history):
 
 def _panels(sizes, unit):
     """Lists of the columns whose largest number counts beside that of the others in the unit; pure numbers all do."""
-    least = 0.0 if unit == "1" else NEGLIGIBLE * max(sizes.values())
+    least = ROUND_OFF if unit == "1" else NEGLIGIBLE * max(sizes.values())
     shown = {name: size for name, size in sizes.items() if size > least}
     if unit == "1":
         return [[name] for name in shown]

@@ -100,7 +100,8 @@ def test_numbers_have_their_units(run):
     told = read(report(run, with_pictures=False))
     assert "12.5 kN" in told
     assert "4000 s" in told
-    assert re.search(r"1\.5 kJ.*3 kJ.*1\.5 kJ", told)
+    assert "energy [kJ]" in told
+    assert re.search(r"1\.5<.*>3<.*>1\.5<", told)
     assert "1 of 2 joints broke" in told
     assert "dissipated 2.5 kJ" in told
 
@@ -227,4 +228,4 @@ def test_round_off_in_a_book_is_zero(run):
     with HistoryTable(run / "history" / "energy.csv", ENERGY) as history:
         for size in (1e-14, 1500.0):
             history.append(**{c[0]: size if c[1] == "J" else 0.1 for c in ENERGY})
-    assert "0 J</td><td class=n>1.5 kJ" in read(report(run, with_pictures=False))
+    assert "<td class=n>0</td><td class=n>1.5</td>" in read(report(run, with_pictures=False))

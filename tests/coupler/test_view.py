@@ -190,3 +190,15 @@ def test_panels_hold_whole_vectors_of_like_size(tmp_path):
     units, panels = zip(*grouped(read_history(tmp_path / "gauges.csv")))
     assert units == ("N", "N")
     assert panels == (names[:3] + names[6:], names[3:6])
+
+
+def test_a_figure_of_many_panels_goes_on_where_a_page_of_paper_ends():
+    """A figure taller than A4 would be shrunk until its letters cannot be read."""
+    from coupler.view.plots import LOW_PANEL, PANEL, TALLEST, leaves
+
+    panels = [("N", ["a"])] * 5 + [("1", ["b"])] * 4
+    found = leaves(panels)
+    assert [panel for leaf in found for panel in leaf] == panels
+    heights = [sum(LOW_PANEL if unit == "1" else PANEL for unit, _ in leaf) for leaf in found]
+    assert max(heights) <= TALLEST
+    assert len(found) == 2
