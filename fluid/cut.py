@@ -18,7 +18,7 @@ import numpy as np
 from numba import njit
 
 from fluid.claims import wetted
-from fluid.cut_arrays import Cuts, Output, doubled, output, trimmed
+from fluid.cut_arrays import Cuts, doubled, output, trimmed
 from fluid.fans import fan
 from fluid.jit import inner
 from fluid.parts_of_cell import label_parts
@@ -259,7 +259,7 @@ def cut_cells(nodes, cells, chosen, body_start, bodies, solids, tolerance, spaci
     most_bodies = int(np.diff(body_start).max()) if len(chosen) else 0
     most_planes = int(np.diff(solids.plane_start).max()) if len(solids) else 0
     w = workspace(scale, most_bodies, most_bodies * most_planes)
-    out = output(len(chosen) * 2 + 64, len(chosen) * 8 + 256, link_area >= 0)
+    out = output(len(chosen) * 4 + 64, len(chosen) * 32 + 256, link_area >= 0)
     offsets = solids.cut_offsets()
     while True:
         state = _cut_cells(
@@ -274,7 +274,7 @@ def cut_cells(nodes, cells, chosen, body_start, bodies, solids, tolerance, spaci
             scale *= 2
             w = workspace(scale, most_bodies, most_bodies * most_planes)
         else:
-            out = Output(*(doubled(a) for a in out))
+            out = doubled(out, at)
 
 
 def _with_volume(cuts):

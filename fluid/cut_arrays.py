@@ -25,7 +25,7 @@ class Output(NamedTuple):
 
 
 def output(parts: int, polygons: int, with_openings: bool) -> Output:
-    """Room for that many parts and polygons; for tetrahedra ample, as pages that nobody writes to cost nothing."""
+    """Room for that many parts and polygons, ample everywhere: pages that nobody writes to cost nothing."""
     openings, tetrahedra = polygons * 4 if with_openings else 64, polygons * 4
     return Output(
         np.zeros(parts, dtype=np.int64),
@@ -88,26 +88,22 @@ class Cuts(NamedTuple):
         )
 
 
-def doubled(a):
-    """An array of twice the length, its second half zero."""
-    return np.concatenate([a, np.zeros_like(a)])
+def doubled(out, at) -> Output:
+    """Arrays of twice the length with the rows that were filled; at (5,) as in `trimmed`."""
+    filled = _filled(out, at)
+    grown = Output(*(np.zeros((2 * len(a), *a.shape[1:]), a.dtype) for a in out))
+    for new, old, count in zip(grown, out, filled):
+        new[:count] = old[:count]
+    return grown
+
+
+def _filled(out, at) -> tuple[int, ...]:
+    """Rows of each array of the output that were filled."""
+    parts, wet, openings, tets = (int(n) for n in at[1:])
+    corners = int(out.open_start[openings])
+    return (*(parts,) * 3, *(wet,) * 3, *(openings,) * 2, openings + 1, corners, *(tets,) * 2)
 
 
 def trimmed(out, at) -> Cuts:
-    """The rows that were filled; at (5,): cells, parts, wetted polygons, openings, tetrahedra."""
-    parts, wet, openings, tets = int(at[1]), int(at[2]), int(at[3]), int(at[4])
-    start = out.open_start[: openings + 1].copy()
-    return Cuts(
-        out.part_cell[:parts].copy(),
-        out.part_whole[:parts].copy(),
-        out.part_moments[:parts].copy(),
-        out.wet_part[:wet].copy(),
-        out.wet_body[:wet].copy(),
-        out.wet[:wet].copy(),
-        out.open_part[:openings].copy(),
-        out.open_face[:openings].copy(),
-        start,
-        out.open_x[: start[-1]].copy(),
-        out.tet_part[:tets].copy(),
-        out.tet[:tets].copy(),
-    )
+    """Views of the rows that were filled; at (5,): cells, parts, wetted polygons, openings, tetrahedra."""
+    return Cuts(*(array[:count] for array, count in zip(out, _filled(out, at))))

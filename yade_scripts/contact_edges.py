@@ -14,54 +14,80 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from yade_scripts.jit import inner
+
 PARALLEL = 0.05
 """Sine of the angle below which two edges do not cross."""
 SUPPORT = 1e-6
 """Share of the radius by which an edge may be off the outermost point of its block."""
+SCRATCH = 8
+"""Rows of the work space of a pair before those for the vertices of both blocks."""
 
 
 @njit(cache=True)
-def find_crossing(shapes, a, b, x, R, deepest):
-    """Edges of a and b with the smallest overlap, if that is less than `deepest` [m].
+def pair_scratch(shapes):
+    """Work space (.., 3) of a pair of blocks."""
+    most = 0
+    for a in range(len(shapes.vertex_end)):
+        most = max(most, shapes.vertex_end[a] - shapes.node_start[a])
+    return np.empty((SCRATCH + 2 * most, 3))
+
+
+@inner
+def find_crossing(shapes, a, b, x, R, deepest, scratch):
+    """Edges of a and b with the smallest overlap, if that is less than `deepest` [m]; scratch: of `pair_scratch`.
 
     → (number of the pair of edges or -1, distance that parts the blocks or -1 [m])
     """
-    A, B = _vertices(shapes, a, np.zeros(3), R), _vertices(shapes, b, x[b] - x[a], R)
-    d = x[a] - x[b]
+    count = shapes.vertex_end[a] - shapes.node_start[a]
+    A, B = scratch[SCRATCH : SCRATCH + count], scratch[SCRATCH + count :]
+    n, d, da, db = scratch[0], scratch[1], scratch[2], scratch[3]
+    for k in range(3):
+        d[k], n[k] = 0.0, x[b, k] - x[a, k]
+    _vertices(shapes, a, d, R, A)
+    _vertices(shapes, b, n, R, B)
+    A, B = A[:count], B[: shapes.vertex_end[b] - shapes.node_start[b]]
+    for k in range(3):
+        d[k] = x[a, k] - x[b, k]
     off = SUPPORT * (shapes.radius[a] + shapes.radius[b])
-    found, n = -1, np.empty(3)
+    found = -1
     first_a, first_b = shapes.edge_start[a], shapes.edge_start[b]
     count_a, count_b = shapes.edge_start[a + 1] - first_a, shapes.edge_start[b + 1] - first_b
     for i in range(count_a):
         a0, a1 = shapes.edge[first_a + i, 0], shapes.edge[first_a + i, 1]
+        for k in range(3):
+            da[k] = A[a1, k] - A[a0, k]
         for j in range(count_b):
             b0, b1 = shapes.edge[first_b + j, 0], shapes.edge[first_b + j, 1]
-            if not _normal(A[a1] - A[a0], B[b1] - B[b0], n):
+            for k in range(3):
+                db[k] = B[b1, k] - B[b0, k]
+            if not _normal(da, db, n):
                 continue
             if n[0] * d[0] + n[1] * d[1] + n[2] * d[2] < 0.0:
-                n *= -1.0
+                for k in range(3):
+                    n[k] *= -1.0
             low, high = _least(A, n, 1.0), -_least(B, n, -1.0)
             if low > high:
                 return -1, low - high
             at_a = n[0] * A[a0, 0] + n[1] * A[a0, 1] + n[2] * A[a0, 2]
             at_b = n[0] * B[b0, 0] + n[1] * B[b0, 1] + n[2] * B[b0, 2]
             if high - low < deepest and at_a - low < off and high - at_b < off:
-                s, t = _nearest(A[a0], A[a1] - A[a0], B[b0], B[b1] - B[b0])
+                s, t = _nearest(A[a0], da, B[b0], db)
                 if 0.0 <= s <= 1.0 and 0.0 <= t <= 1.0:
                     found, deepest = i * count_b + j, high - low
     return found, -1.0
 
 
-@njit(cache=True)
-def crossing(shapes, a, b, number, x, R, plane, point):
+@inner
+def crossing(shapes, a, b, number, x, R, plane, point, scratch):
     """Depth of a pair of edges [m]; 0 where they carry no more.
 
-    plane (4,), point (3,): set to the normal out of b and to the point of a, both in the frame of a."""
+    plane, point (3,): set to the normal out of b and to the point of a, both in the frame of a; scratch (5, 3)."""
     count_b = shapes.edge_start[b + 1] - shapes.edge_start[b]
     ea, eb = shapes.edge_start[a] + number // count_b, shapes.edge_start[b] + number % count_b
-    pa, da = _line(shapes, a, ea, R)
-    pb, db = _line(shapes, b, eb, R)
-    n, outward = np.empty(3), 0.0
+    pa, da, pb, db, n, outward = scratch[0], scratch[1], scratch[2], scratch[3], scratch[4], 0.0
+    _line(shapes, a, ea, R, pa, da)
+    _line(shapes, b, eb, R, pb, db)
     for k in range(3):
         pb[k] += x[b, k] - x[a, k]
     if not _normal(da, db, n):
@@ -83,33 +109,30 @@ def crossing(shapes, a, b, number, x, R, plane, point):
     return depth
 
 
-@njit(cache=True)
-def _line(shapes, a, edge, R):
-    """Start and direction of an edge, seen from the centre of its block, world axes."""
+@inner
+def _line(shapes, a, edge, R, p, d):
+    """Start p and direction d (3,) of an edge, seen from the centre of its block, world axes."""
     begin = shapes.node_start[a]
     first, second = begin + shapes.edge[edge, 0], begin + shapes.edge[edge, 1]
-    p, d = np.zeros(3), np.zeros(3)
     for k in range(3):
+        p[k] = d[k] = 0.0
         for j in range(3):
             p[k] += R[a, k, j] * shapes.node[first, j]
             d[k] += R[a, k, j] * (shapes.node[second, j] - shapes.node[first, j])
-    return p, d
 
 
-@njit(cache=True)
-def _vertices(shapes, a, shift, R):
-    """Vertices of a block (k, 3), turned and moved."""
+@inner
+def _vertices(shapes, a, shift, R, out):
+    """Vertices of a block, turned and moved, in out (k, 3)."""
     begin, end = shapes.node_start[a], shapes.vertex_end[a]
-    out = np.empty((end - begin, 3))
     for i in range(end - begin):
         for k in range(3):
             out[i, k] = shift[k]
             for j in range(3):
                 out[i, k] += R[a, k, j] * shapes.node[begin + i, j]
-    return out
 
 
-@njit(cache=True)
+@inner
 def _normal(da, db, n):
     """Unit normal of two directions in n; False where they are nearly parallel."""
     n[0] = da[1] * db[2] - da[2] * db[1]
@@ -123,12 +146,12 @@ def _normal(da, db, n):
     return True
 
 
-@njit(cache=True)
+@inner
 def _dot(u, w):
     return u[0] * w[0] + u[1] * w[1] + u[2] * w[2]
 
 
-@njit(cache=True)
+@inner
 def _least(points, n, sign):
     """Smallest sign n·p over the points."""
     least = np.inf
@@ -137,7 +160,7 @@ def _least(points, n, sign):
     return least
 
 
-@njit(cache=True)
+@inner
 def _nearest(pa, da, pb, db):
     """Where the lines pa + s da and pb + t db are nearest: (s, t)."""
     aa, bb, ab = _dot(da, da), _dot(db, db), _dot(da, db)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from yade_scripts.contact_edges import pair_scratch
 from yade_scripts.contact_search import closing_bound, cross, planes_seen_from, scan, separation
 from yade_scripts.contact_springs import apply, let_go, set_dashpots
 
@@ -25,7 +26,7 @@ def contact_forces(shapes, bodies, law, pairs, slots, x, v, R, dt, last_dt, rows
     → (contacts, work of friction and of springs that were let go [J])
     """
     count, lost = 0, 0.0
-    planes = np.empty((np.diff(shapes.face_start).max(), 4))
+    planes, scratch = np.empty((np.diff(shapes.face_start).max(), 4)), pair_scratch(shapes)
     for p in range(len(pairs.a)):
         a, b = pairs.a[p], pairs.b[p]
         if pairs.calm[p] > 0.0:
@@ -47,7 +48,7 @@ def contact_forces(shapes, bodies, law, pairs, slots, x, v, R, dt, last_dt, rows
                 slot = pairs.start[p] if node_body == a else pairs.start[p + 1] - 1 - (end - begin)
                 count, lost = scan(
                     shapes, bodies, law.shear, slots, slot, pairs.fresh[p], node_body, face_body, planes, faces,
-                    nearest, margin, x, v, R, last_dt, rows, count, lost,
+                    nearest, margin, x, v, R, last_dt, rows, count, lost, scratch,
                 )  # fmt: skip
         last = pairs.start[p + 1] - 1
         if slots.face[last] >= 0 or (
@@ -56,13 +57,13 @@ def contact_forces(shapes, bodies, law, pairs, slots, x, v, R, dt, last_dt, rows
             deepest = -apart if count == first else -CROSSING * apart
             count, lost, parted = cross(
                 shapes, bodies, law.shear, slots, last, pairs.fresh[p], a, b, deepest, x, v, R, last_dt, rows, count,
-                lost,
+                lost, scratch,
             )  # fmt: skip
             apart = max(apart, parted)
         pairs.fresh[p], pairs.touching[p] = False, count > first
         if count > first:
-            set_dashpots(bodies, law, a, b, R, rows, first, count)
-            lost += apply(slots, x, v, R, dt, rows, first, count, F)
+            set_dashpots(bodies, law, a, b, R, rows, first, count, scratch)
+            lost += apply(slots, x, v, R, dt, rows, first, count, F, scratch)
         pairs.calm[p] = apart if count == first else 0.0
     return count, lost
 

@@ -7,10 +7,10 @@ depth counts from there on, so that no contact begins with a force: contacts add
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from yade_scripts.contact_edges import crossing, find_crossing
 from yade_scripts.contact_springs import let_go, slip, stiffness_together
+from yade_scripts.jit import inner
 
 ALIGNED = 0.02
 """Least cosine between a face and the opposite of one that holds the node: others cannot be what it ran into."""
@@ -20,7 +20,7 @@ ARRIVED = 1.5
 """Depth in paths of one substep up to which a node counts as having come through the face."""
 
 
-@njit(cache=True)
+@inner
 def closing_bound(v, a, b, radius_a, radius_b):
     """Upper bound of the speed at which points of two bodies approach [m/s]; planes (radius inf) stand still."""
     linear = turn_a = turn_b = 0.0
@@ -32,7 +32,7 @@ def closing_bound(v, a, b, radius_a, radius_b):
     return speed + np.sqrt(turn_b) * radius_b if turn_b > 0.0 else speed
 
 
-@njit(cache=True)
+@inner
 def planes_seen_from(face_start, normal, offset, a, b, x, R, planes):
     """Face planes of b in the frame of a: depth of a point ξ of a behind face g is d - m·ξ, planes (g, 4) = (m, d).
 
@@ -51,7 +51,7 @@ def planes_seen_from(face_start, normal, offset, a, b, x, R, planes):
     return count
 
 
-@njit(cache=True)
+@inner
 def separation(node, begin, end, planes, faces):
     """Largest distance of all nodes begin .. end before one plane [m], and that plane: two bodies are at least that far
     apart. The vertices are enough."""
@@ -66,7 +66,7 @@ def separation(node, begin, end, planes, faces):
     return best, witness
 
 
-@njit(cache=True)
+@inner
 def scan(
     shapes,
     bodies,
@@ -87,6 +87,7 @@ def scan(
     rows,
     count,
     lost,
+    scratch,
 ):
     """Contacts of the nodes of a with the faces of b; contacts that ended leave their springs' energy in `lost`.
 
@@ -118,7 +119,7 @@ def scan(
             slots.face[s] = base + g
             slots.k[s] = stiffness_together(bodies.stiffness[a], bodies.stiffness[b]) / shapes.face_nodes[own]
             slots.shear[s, 0] = slots.shear[s, 1] = slots.shear[s, 2] = 0.0
-            closing = 0.0 if fresh else _closing_speed(v, R, x, a, b, xi0, xi1, xi2, planes[g])
+            closing = 0.0 if fresh else _closing_speed(v, R, x, a, b, xi0, xi1, xi2, planes[g], scratch)
             slots.rest[s] = 0.0 if fresh else max(0.0, depth - ARRIVED * last_dt * max(closing, 0.0))
         slots.rest[s] = min(slots.rest[s], depth)
         _write_row(rows, count, a, b, s, planes[g], depth, xi0, xi1, xi2, x, R)
@@ -127,16 +128,18 @@ def scan(
     return count, lost
 
 
-@njit(cache=True)
-def cross(shapes, bodies, shear, slots, s, fresh, a, b, deepest, x, v, R, last_dt, rows, count, lost):
+@inner
+def cross(
+    shapes, bodies, shear, slots, s, fresh, a, b, deepest, x, v, R, last_dt, rows, count, lost, scratch
+):  # fmt: skip
     """Contact of an edge of a with one of b, known or new; the third result parts the blocks if it is positive [m]."""
-    plane, xi = np.empty(4), np.empty(3)
+    plane, xi = scratch[5], scratch[6]
     known = slots.face[s] >= 0
     if not known:
-        slots.face[s], parted = find_crossing(shapes, a, b, x, R, deepest)
+        slots.face[s], parted = find_crossing(shapes, a, b, x, R, deepest, scratch)
         if slots.face[s] < 0:
             return count, lost, parted
-    depth = crossing(shapes, a, b, slots.face[s], x, R, plane, xi)
+    depth = crossing(shapes, a, b, slots.face[s], x, R, plane, xi, scratch)
     if depth <= 0.0:
         if known:
             lost += let_go(slots.face, slots.k, slots.rest, slots.shear, s, depth, shear)
@@ -145,7 +148,7 @@ def cross(shapes, bodies, shear, slots, s, fresh, a, b, deepest, x, v, R, last_d
     if not known:
         slots.k[s] = stiffness_together(bodies.stiffness[a], bodies.stiffness[b])
         slots.shear[s, 0] = slots.shear[s, 1] = slots.shear[s, 2] = 0.0
-        closing = 0.0 if fresh else _closing_speed(v, R, x, a, b, xi[0], xi[1], xi[2], plane)
+        closing = 0.0 if fresh else _closing_speed(v, R, x, a, b, xi[0], xi[1], xi[2], plane, scratch)
         slots.rest[s] = 0.0 if fresh else max(0.0, depth - ARRIVED * last_dt * max(closing, 0.0))
     slots.rest[s] = min(slots.rest[s], depth)
     _write_row(rows, count, a, b, s, plane, depth, xi[0], xi[1], xi[2], x, R)
@@ -153,13 +156,13 @@ def cross(shapes, bodies, shear, slots, s, fresh, a, b, deepest, x, v, R, last_d
     return count + 1, lost, -1.0
 
 
-@njit(cache=True)
+@inner
 def _behind(planes, g, xi0, xi1, xi2):
     """Depth of the point ξ behind a plane [m]."""
     return planes[g, 3] - planes[g, 0] * xi0 - planes[g, 1] * xi1 - planes[g, 2] * xi2
 
 
-@njit(cache=True)
+@inner
 def _entered(of_start, of, normal, i, xi0, xi1, xi2, planes, faces, smallest, margin):
     """Face g of b that node i of a is behind, and the face of a opposite; -1 if it is outside.
 
@@ -180,10 +183,10 @@ def _entered(of_start, of, normal, i, xi0, xi1, xi2, planes, faces, smallest, ma
     return face, own
 
 
-@njit(cache=True)
-def _closing_speed(v, R, x, a, b, xi0, xi1, xi2, plane):
-    """Speed of the point ξ of a into a face of b, whose normal in the frame of a is plane[:3] [m/s]."""
-    arm, point, speed = np.empty(3), np.empty(3), 0.0
+@inner
+def _closing_speed(v, R, x, a, b, xi0, xi1, xi2, plane, scratch):
+    """Speed of the point ξ of a into a face of b, whose normal in the frame of a is plane[:3] [m/s]; scratch (2, 3)."""
+    arm, point, speed = scratch[0], scratch[1], 0.0
     for k in range(3):
         arm[k] = R[a, k, 0] * xi0 + R[a, k, 1] * xi1 + R[a, k, 2] * xi2
         point[k] = x[a, k] + arm[k] - x[b, k]
@@ -193,7 +196,7 @@ def _closing_speed(v, R, x, a, b, xi0, xi1, xi2, plane):
     return speed
 
 
-@njit(cache=True)
+@inner
 def _write_row(rows, c, a, b, s, plane, depth, xi0, xi1, xi2, x, R):
     """Geometry of a contact: half way between the node ξ and the face."""
     rows.a[c], rows.b[c], rows.slot[c] = a, b, s

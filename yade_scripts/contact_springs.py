@@ -12,16 +12,20 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from yade_scripts.jit import inner
+
 SHARP = 1e-3
 """Sum of the normals of a pair below which they have no mean direction."""
 
 
-@njit(cache=True)
-def set_dashpots(bodies, law, a, b, R, rows, first, count):
+@inner
+def set_dashpots(bodies, law, a, b, R, rows, first, count, scratch):
     """Dashpots of all contacts of a pair, c = 2 ζ sqrt(m K) k/K with K = Σ k and the effective mass m at their middle.
 
-    So a face, an edge and a corner that land all return e."""
-    K, middle_a, middle_b, n = 0.0, np.zeros(3), np.zeros(3), np.zeros(3)
+    So a face, an edge and a corner that land all return e. scratch (5, 3): work space."""
+    K, middle_a, middle_b, n, u, axis = 0.0, scratch[0], scratch[1], scratch[2], scratch[3], scratch[4]
+    for i in range(3):
+        middle_a[i] = middle_b[i] = n[i] = 0.0
     for c in range(first, count):
         k, same = rows.kn[c], rows.a[c] == a
         K += k
@@ -34,16 +38,17 @@ def set_dashpots(bodies, law, a, b, R, rows, first, count):
         for i in range(3):
             n[i] /= K * length
     else:
-        n[:] = rows.normal[first]
+        for i in range(3):
+            n[i] = rows.normal[first, i]
     for i in range(3):
         middle_a[i] /= K
         middle_b[i] /= K
     across = bodies.inverse_mass[a] + bodies.inverse_mass[b]
-    normal = across + _turning(bodies, a, R, middle_a, n) + _turning(bodies, b, R, middle_b, n)
+    normal = across + _turning(bodies, a, R, middle_a, n, u) + _turning(bodies, b, R, middle_b, n, u)
     cn = 2.0 * law.zeta / np.sqrt(normal * K)
     ct = np.sqrt(law.shear) * cn
     if law.zeta_t >= 0.0:
-        trace = _all_turning(bodies, a, R, middle_a) + _all_turning(bodies, b, R, middle_b)
+        trace = _all_turning(bodies, a, R, middle_a, axis, u) + _all_turning(bodies, b, R, middle_b, axis, u)
         tangential = across + 0.5 * (trace - (normal - across))
         ct = 2.0 * law.zeta_t * np.sqrt(law.shear) / np.sqrt(tangential * K)
     for c in range(first, count):
@@ -52,11 +57,11 @@ def set_dashpots(bodies, law, a, b, R, rows, first, count):
         rows.mu[c] = law.friction[bodies.material[rows.a[c]], bodies.material[rows.b[c]]]
 
 
-@njit(cache=True)
-def _turning(bodies, a, R, arm, n):
-    """(r x n)·I⁻¹(r x n) [1/kg]: how much a body yields by turning under a force along n at the arm r."""
+@inner
+def _turning(bodies, a, R, arm, n, u):
+    """(r x n)·I⁻¹(r x n) [1/kg]: how much a body yields by turning under a force along n at the arm r; u (3,): work
+    space."""
     t0, t1, t2 = arm[1] * n[2] - arm[2] * n[1], arm[2] * n[0] - arm[0] * n[2], arm[0] * n[1] - arm[1] * n[0]
-    u = np.empty(3)
     for k in range(3):
         u[k] = R[a, 0, k] * t0 + R[a, 1, k] * t1 + R[a, 2, k] * t2
     total = 0.0
@@ -66,25 +71,26 @@ def _turning(bodies, a, R, arm, n):
     return total
 
 
-@njit(cache=True)
-def _all_turning(bodies, a, R, arm):
-    """Sum of `_turning` over three axes."""
-    total, axis = 0.0, np.zeros(3)
+@inner
+def _all_turning(bodies, a, R, arm, axis, u):
+    """Sum of `_turning` over three axes; axis, u (3,): work space."""
+    total = 0.0
     for k in range(3):
-        axis[:] = 0.0
-        axis[k] = 1.0
-        total += _turning(bodies, a, R, arm, axis)
+        for i in range(3):
+            axis[i] = 1.0 if i == k else 0.0
+        total += _turning(bodies, a, R, arm, axis, u)
     return total
 
 
-@njit(cache=True)
-def apply(slots, x, v, R, dt, rows, first, count, F):
-    """Forces of the contacts first .. count of a pair on F; → work of friction [J]."""
-    lost, w, S, n, local = 0.0, np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+@inner
+def apply(slots, x, v, R, dt, rows, first, count, F, scratch):
+    """Forces of the contacts first .. count of a pair on F; → work of friction [J]. scratch (5, 3): work space."""
+    lost, w, S, n = 0.0, scratch[0], scratch[1], scratch[2]
     for c in range(first, count):
         a, b, s = rows.a[c], rows.b[c], rows.slot[c]
         w[0], w[1], w[2] = slip(v, a, b, rows.arm_a[c], rows.arm_b[c])
-        n[:] = rows.normal[c]
+        for k in range(3):
+            n[k] = rows.normal[c, k]
         wn = w[0] * n[0] + w[1] * n[1] + w[2] * n[2]
         spring = rows.kn[c] * rows.depth[c]
         N = max(0.0, spring - rows.cn[c] * wn)
@@ -113,14 +119,13 @@ def apply(slots, x, v, R, dt, rows, first, count, F):
             rows.ct[c] = 0.0
         if dt > 0.0:
             for k in range(3):
-                local[k] = R[b, 0, k] * S[0] + R[b, 1, k] * S[1] + R[b, 2, k] * S[2]
-            slots.shear[s] = local
+                slots.shear[s, k] = R[b, 0, k] * S[0] + R[b, 1, k] * S[1] + R[b, 2, k] * S[2]
         _add(F, a, 1.0, rows.force[c], rows.arm_a[c])
         _add(F, b, -1.0, rows.force[c], rows.arm_b[c])
     return lost if dt > 0.0 else 0.0
 
 
-@njit(cache=True)
+@inner
 def _add(F, row, sign, force, arm):
     """Force and its moment about the centre; F has rows for blocks only."""
     if row >= len(F):
@@ -154,7 +159,7 @@ def contact_work(rows, count, v, given, dt):
     return dashpot, driving
 
 
-@njit(cache=True)
+@inner
 def _power(force, arm, v):
     """Power of a force at a point of a body that moves with v (6,) [W]."""
     u0 = v[0] + v[4] * arm[2] - v[5] * arm[1]
@@ -163,7 +168,7 @@ def _power(force, arm, v):
     return force[0] * u0 + force[1] * u1 + force[2] * u2
 
 
-@njit(cache=True)
+@inner
 def slip(v, a, b, arm_a, arm_b):
     """Velocity of a against b at a point, given from both centres, as three floats."""
     w0 = v[a, 0] + v[a, 4] * arm_a[2] - v[a, 5] * arm_a[1]
@@ -175,7 +180,7 @@ def slip(v, a, b, arm_a, arm_b):
     return w0, w1, w2
 
 
-@njit(cache=True)
+@inner
 def stiffness_together(K_a, K_b):
     """Stiffness of a face of a against b [N/m].
 
@@ -183,7 +188,7 @@ def stiffness_together(K_a, K_b):
     return K_a * K_b / (K_a + K_b) if K_b < np.inf else K_a
 
 
-@njit(cache=True)
+@inner
 def let_go(face, k, rest, spring, s, depth, shear):
     """End a contact; what its springs still held is lost [J]."""
     face[s] = -1
