@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 
 from coupler.case import Case
+from coupler.errors import did_you_mean
 
 
 def water_of(case: Case, structure, solids):
@@ -103,29 +106,57 @@ class RecordError(ValueError):
     """The table of an inflow cannot be used; the message says why."""
 
 
+COLUMNS = ("time", "level", "velocity")
+
+
 def record_columns(path: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Columns time [s], level [m], velocity [m/s] of a CSV file. Raises RecordError."""
-    names = ("time", "level", "velocity")
-    try:
-        with open(path, encoding="utf-8") as file:
-            lines = [line for line in file if line.strip() and not line.startswith("#")]
-    except (OSError, UnicodeDecodeError) as error:
-        raise RecordError(f"{path}: cannot be read ({error})") from error
-    head = [name.strip() for name in lines[0].split(",")] if lines else []
-    missing = [name for name in names if name not in head]
+    numbered = _written_lines(path)
+    head = [name.strip() for name in numbered[0][1].split(",")] if numbered else []
+    missing = [name for name in COLUMNS if name not in head]
     if missing:
         raise RecordError(
-            f"{path}: no column {', '.join(missing)}; its first line must name {', '.join(names)}"
+            f"{path}: no column {', '.join(missing)}; its first line must name "
+            f"{', '.join(COLUMNS)}, with commas between"
         )
-    try:
-        table = np.array([[float(entry) for entry in line.split(",")] for line in lines[1:]])
-    except ValueError as error:
-        raise RecordError(f"{path}: {error}") from error
-    if table.ndim != 2 or table.shape[1] != len(head) or not np.isfinite(table).all():
-        raise RecordError(f"{path}: every line needs {len(head)} finite numbers, one a column")
-    time, level, velocity = (table[:, head.index(name)] for name in names)
-    if np.any(np.diff(time) <= 0.0):
-        raise RecordError(
-            f"{path}: times must increase; they do not at {time[np.argmax(np.diff(time) <= 0)]:g} s"
-        )
+    table = np.array([_numbers(path, n, line, len(head)) for n, line in numbered[1:]]).reshape(-1, len(head))
+    if not len(table):
+        raise RecordError(f"{path}: no line of numbers below the names of the columns")
+    time, level, velocity = (table[:, head.index(name)] for name in COLUMNS)
+    back = np.flatnonzero(np.diff(time) <= 0.0)
+    if len(back):
+        n, later = numbered[back[0] + 2][0], time[back[0] + 1]
+        raise RecordError(f"{path}:{n}: times must increase; {later:g} s comes after {time[back[0]]:g} s")
     return time, level, velocity
+
+
+def _written_lines(path: str) -> list[tuple[int, str]]:
+    """Lines with their numbers, without comments and empty ones; a byte-order mark of a spreadsheet is skipped."""
+    try:
+        with open(path, encoding="utf-8-sig") as file:
+            return [(n, line) for n, line in enumerate(file, 1) if line.strip() and not line.startswith("#")]
+    except UnicodeDecodeError as error:
+        raise RecordError(f"{path}: not a text in UTF-8; save it as UTF-8") from error
+    except OSError as error:
+        raise RecordError(f"{path}: cannot be read: {error.strerror}{_near_file(path)}") from error
+
+
+def _near_file(path: str) -> str:
+    beside = Path(path).parent
+    return did_you_mean(Path(path).name, [p.name for p in beside.iterdir()]) if beside.is_dir() else ""
+
+
+def _numbers(path: str, n: int, line: str, count: int) -> list[float]:
+    """The numbers of line n, finite and one a column. Raises RecordError."""
+    entries = line.strip().split(",")
+    if len(entries) != count:
+        raise RecordError(f"{path}:{n}: {len(entries)} values; every line needs {count}, one a column")
+    found = []
+    for entry in entries:
+        try:
+            found.append(float(entry))
+        except ValueError:
+            raise RecordError(f"{path}:{n}: '{entry.strip()}' is not a number") from None
+    if not np.isfinite(found).all():
+        raise RecordError(f"{path}:{n}: '{line.strip()}' is not finite")
+    return found

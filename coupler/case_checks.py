@@ -21,6 +21,11 @@ from coupler.water_checks import water_problems, water_remarks
 KeyPath = tuple[str | int, ...]
 Problem = tuple[KeyPath, str]
 
+LIGHTEST, HEAVIEST = 5.0, 25e3
+"""Densities [kg/m3] between which solids lie: foam and platinum."""
+WEAKEST = 1.0
+"""Strength [Pa] below which a joint holds nothing: a millimetre of stone weighs more."""
+
 
 def problems(case: Case) -> list[Problem]:
     """Everything that is wrong with a case whose sections are valid one by one."""
@@ -45,7 +50,7 @@ def _study(case: Case) -> Iterator[Problem]:
 def remarks(case: Case) -> list[str]:
     """What is allowed but worth knowing before the run."""
     found = [*_thin_remarks(case), *water_remarks(case), *_joint_remarks(case), *_loose_remarks(case)]
-    return [*found, *_solid_remarks(case)]
+    return [*found, *_solid_remarks(case), *_unit_remarks(case), *_window_remarks(case)]
 
 
 def _thin_remarks(case: Case) -> Iterator[str]:
@@ -104,6 +109,35 @@ def _solid_remarks(case: Case) -> Iterator[str]:
             f"only the water feels the fixed solid '{case.solid[0].name}', blocks pass through it; where they may "
             "reach a body that stands fast, make that a [[structure.block]] with fixed = true"
         )
+
+
+def _unit_remarks(case: Case) -> Iterator[str]:
+    """Values that nobody builds with: most likely another unit was meant."""
+    blocks = [block for part in parts_of(case) for block in part.blocks]
+    for block in blocks:
+        if not LIGHTEST <= block.density <= HEAVIEST:
+            yield f"the density of '{block.name}' is {block.density:g} kg/m3; other units are text, \"2.4 g/cm3\""
+            break
+    j = case.joints
+    if j is not None and j.strength < WEAKEST:
+        yield f'joints.strength is {j.strength:g} Pa, next to nothing; "1 MPa" is a million, "1 mPa" a thousandth'
+    if j is not None and blocks:
+        from coupler.bodies import Body
+
+        thinnest = min(Body.of_block(block).thickness() for block in blocks)
+        if j.opening_at_failure > 0.5 * thinnest:
+            yield (
+                f"joints.opening_at_failure is {j.opening_at_failure:g} m, more than half the thinnest block "
+                f'({thinnest:g} m); millimetres are text, "1 mm"'
+            )
+
+
+def _window_remarks(case: Case) -> Iterator[str]:
+    """Sums that never begin."""
+    for gauge in case.gauge:
+        window = getattr(gauge, "impulse", None)
+        if window is not None and window[0] >= case.time.end:
+            yield f"gauge '{gauge.name}' begins to add up at {window[0]:g} s, after the end ({case.time.end:g} s)"
 
 
 # ---------------------------------------------------------------- sections

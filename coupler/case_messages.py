@@ -10,6 +10,7 @@ KeyPath = tuple[str | int, ...]
 GAUGE_KINDS = (
     "level", "pressure", "patch", "velocity", "flux", "volume", "force", "loads", "reaction", "motion",
 )  # fmt: skip
+INFLOW_KINDS = ("steady", "record", "bore", "solitary")
 
 
 def explain_error(error: dict) -> tuple[KeyPath, str]:
@@ -32,7 +33,7 @@ def explain_error(error: dict) -> tuple[KeyPath, str]:
             value, context["expected"]
         )
     if kind in ("union_tag_invalid", "union_tag_not_found"):
-        return _gauge_kind(path, kind, context)
+        return _kind(path, kind, context)
     if kind == "value_error":
         return path, str(context["error"])
     return path, _shape(kind, value, context, key, error["msg"])
@@ -47,9 +48,11 @@ _COMPARE = {
 
 
 def _path(place: tuple) -> KeyPath:
-    """The place without the gauge's kind, which pydantic puts between the list place and the key."""
-    if len(place) > 2 and place[0] == "gauge" and place[2] in GAUGE_KINDS:
-        return place[:2] + place[3:]
+    """The place without the kind of a gauge or an inflow, which pydantic puts between the list place and the key."""
+    for above, kinds in ((("gauge",), GAUGE_KINDS), (("water", "inflow"), INFLOW_KINDS)):
+        n = len(above) + 1
+        if len(place) > n and place[: n - 1] == above and place[n] in kinds:
+            return place[:n] + place[n + 1 :]
     return place
 
 
@@ -80,13 +83,15 @@ def _near(value: object, expected: str) -> str:
     return did_you_mean(str(value), [word.strip("' ") for word in expected.replace(" or ", ",").split(",")])
 
 
-def _gauge_kind(path: KeyPath, kind: str, context: dict) -> tuple[KeyPath, str]:
-    if kind == "union_tag_not_found":
-        return (*path, "kind"), f"missing; what the gauge measures, one of {', '.join(GAUGE_KINDS)}"
-    tag = str(context["tag"])
-    return (*path, "kind"), f"{tag!r} is not known; one of {', '.join(GAUGE_KINDS)}" + did_you_mean(
-        tag, GAUGE_KINDS
+def _kind(path: KeyPath, kind: str, context: dict) -> tuple[KeyPath, str]:
+    """A gauge or an inflow of no kind, or of one that there is not."""
+    what, kinds = (
+        ("what comes in", INFLOW_KINDS) if path[0] == "water" else ("what the gauge measures", GAUGE_KINDS)
     )
+    if kind == "union_tag_not_found":
+        return (*path, "kind"), f"missing; {what}, one of {', '.join(kinds)}"
+    tag = str(context["tag"])
+    return (*path, "kind"), f"{tag!r} is not known; one of {', '.join(kinds)}" + did_you_mean(tag, kinds)
 
 
 def _shape(kind: str, value: object, context: dict, key: Key | None, message: str) -> str:
@@ -95,6 +100,8 @@ def _shape(kind: str, value: object, context: dict, key: Key | None, message: st
         return f"{value!r} is no name; use letters, digits, - and _, beginning with a letter"
     if kind in ("tuple_type", "list_type") and key is not None and key.several:
         return f"write [[{key.path}]] with double brackets: there may be several"
+    if kind in ("tuple_type", "list_type") and isinstance(value, str):
+        return f'"{value}" is not a list; write ["{value}"]'
     if kind in ("tuple_type", "list_type"):
         return f"{value!r} is not a list of numbers; {_is(key)}"
     if kind in ("model_type", "model_attributes_type", "dict_type"):

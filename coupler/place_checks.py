@@ -60,7 +60,8 @@ def place_problems(case: Case, parts: list[Part]) -> Iterator[Problem]:
     yield from _resting(case, solids, parts)
     yield from _outside(case, solids, blocks)
     yield from _submerged_fills(case, [*solids, *blocks])
-    yield from _gauges(case, solids)
+    held = [(part.path, b.name, Body.of_block(b)) for part in parts for b in part.blocks if b.fixed]
+    yield from _gauges(case, [*solids, *held])
 
 
 def _corners_in_order(path: KeyPath, box) -> Iterator[Problem]:
@@ -252,7 +253,7 @@ def _hollow(path: KeyPath, building: Building) -> Iterator[Problem]:
         )
 
 
-def _gauges(case: Case, solids: list[Placed]) -> Iterator[Problem]:
+def _gauges(case: Case, held: list[Placed]) -> Iterator[Problem]:
     for i, gauge in enumerate(case.gauge):
         path = ("gauge", i)
         window = getattr(gauge, "impulse", None)
@@ -268,7 +269,7 @@ def _gauges(case: Case, solids: list[Placed]) -> Iterator[Problem]:
         elif gauge.kind == "volume":
             yield from _corners_in_order(path, gauge)
         elif gauge.kind in ("level", "pressure", "patch", "velocity", "flux") and case.tank is not None:
-            yield from _gauge_place(case, path, gauge, solids)
+            yield from _gauge_place(case, path, gauge, held)
             yield from _patch(path, gauge)
 
 
@@ -283,7 +284,7 @@ def _patch(path: KeyPath, gauge) -> Iterator[Problem]:
         yield (*path, "edges"), f"the edges of '{gauge.name}' are parallel: the patch has no area"
 
 
-def _gauge_place(case: Case, path: KeyPath, gauge, solids: list[Placed]) -> Iterator[Problem]:
+def _gauge_place(case: Case, path: KeyPath, gauge, held: list[Placed]) -> Iterator[Problem]:
     for axis, value in enumerate(gauge.at):
         low, high = case.tank.lower[axis], case.tank.upper[axis]
         if not low <= value <= high:
@@ -292,10 +293,10 @@ def _gauge_place(case: Case, path: KeyPath, gauge, solids: list[Placed]) -> Iter
                 f"'{gauge.name}' is outside the tank: {'xyz'[axis]} = {value:g} m, not in {low:g} to {high:g} m",
             )
     if len(gauge.at) == 3 and gauge.kind != "flux":
-        for _, name, body in solids:
+        for _, name, body in held:
             (depth,) = body.depth(np.array([gauge.at]))
             if depth > TOUCH * body.thickness():
                 yield (
                     (*path, "at"),
-                    f"'{gauge.name}' lies {depth:.3g} m inside the solid '{name}'; put it on the face",
+                    f"'{gauge.name}' lies {depth:.3g} m inside '{name}'; put it on the face",
                 )

@@ -3,7 +3,7 @@
     to_si("24 kN/m3", "N/m3") = 24000.0        to_si(24000, "N/m3") = 24000.0
 
 Units are read by pint, which is imported only when a value is text. A digit behind a letter is a power
-(`kg/m3`, `m/s2`, `s-1`), which pint itself does not read.
+(`kg/m3`, `m/s2`, `s-1`), which pint itself does not read; `kg/m³` is the same.
 """
 
 from __future__ import annotations
@@ -41,6 +41,12 @@ DIMENSIONS = {
 _QUANTITY = re.compile(r"\s*([-+]?(?:\d[\d_]*\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
 _FACTOR = r"[^\W\d_%°]*[A-Za-z%°](?:(?:\^|\*\*)?-?\d+)?"
 _UNIT_TEXT = re.compile(rf"(?:(?:1\s*/\s*)?{_FACTOR}(?:(?:\s*[*/·]\s*|\s+){_FACTOR})*)?")
+_CAPITALS = (
+    "m", "mm", "cm", "km", "s", "ms", "g", "kg", "t", "N", "kN", "MN", "Pa", "kPa", "MPa", "GPa", "J", "kJ", "Hz",
+    "rad", "deg", "kg/m3", "t/m3", "g/cm3", "kN/m3", "N/m", "kN/m", "MN/m", "GN/m", "N/mm", "m/s", "mm/s", "m/s2",
+)  # fmt: skip
+"""Units that people write with wrong capitals."""
+_RAISED = str.maketrans("⁻¹²³⁴", "-1234")
 _POWER = re.compile(r"(?<=[A-Za-z])(-?\d+)")
 
 
@@ -68,7 +74,7 @@ def to_si(value: object, unit: str) -> float:
     match = _QUANTITY.fullmatch(value)
     if match is None:
         raise UnitError(f"{value!r} is not a number with a unit{_example(unit)}")
-    number, given = float(match[1]), match[2]
+    number, given = float(match[1]), match[2].translate(_RAISED)
     if not given and unit:
         raise UnitError(f"{value!r} has no unit{_example(unit)}")
     return number * _factor(given, unit, value)
@@ -84,12 +90,18 @@ def _factor(given: str, unit: str, value: str) -> float:
             raise ValueError(given)
         source = 1.0 * registry.parse_units(_POWER.sub(r"^\1", given.replace("·", "*")))
     except (pint.PintError, ValueError, AttributeError) as error:
-        raise UnitError(f"{value!r}: unknown unit '{given}'{_example(unit)}") from error
+        raise UnitError(f"{value!r}: unknown unit '{given}'{_near(given)}{_example(unit)}") from error
     target = _si(unit)
     of_other_kind = source.dimensionality != target.dimensionality
     if of_other_kind or _is_angle(source) != _is_angle(target):
         raise UnitError(f"{value!r} is {_kind(source)}, needs {DIMENSIONS[unit]}{_in(unit)}")
     return float(source.to(target.units).magnitude)
+
+
+def _near(given: str) -> str:
+    """The same with other capitals, if that is a unit: kpa, MM."""
+    right = {name.lower(): name for name in _CAPITALS}.get(given.lower())
+    return f"; did you mean '{right}'?" if right and right != given else ""
 
 
 def _is_angle(source) -> bool:

@@ -92,7 +92,7 @@ def _sides(case: Case) -> Iterator[Problem]:
 def _levels(case: Case, path: KeyPath, spec) -> Iterator[Problem]:
     bed, top = case.tank.lower[2], case.tank.upper[2]
     if _kind(spec) == "record":
-        yield from _record(path, spec, bed)
+        yield from _record(path, spec, bed, top)
         return
     if not bed < spec.level <= top:
         yield (
@@ -112,7 +112,7 @@ def _levels(case: Case, path: KeyPath, spec) -> Iterator[Problem]:
         )
 
 
-def _record(path: KeyPath, spec, bed: float) -> Iterator[Problem]:
+def _record(path: KeyPath, spec, bed: float, top: float) -> Iterator[Problem]:
     try:
         _, level, _ = record_columns(spec.path)
     except RecordError as error:
@@ -122,6 +122,11 @@ def _record(path: KeyPath, spec, bed: float) -> Iterator[Problem]:
         yield (
             (*path, "path"),
             f"its level falls to z = {level.min():g} m, below the floor of the tank ({bed:g} m)",
+        )
+    if level.max() > top:
+        yield (
+            (*path, "path"),
+            f"its level rises to z = {level.max():g} m, above the top of the tank ({top:g} m)",
         )
 
 

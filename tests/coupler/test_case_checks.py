@@ -120,14 +120,21 @@ def test_a_block_that_would_fall_through_the_solid_under_it_is_refused():
     """Solids bound the water only; beside one, or above it with a gap, a block may be, and the user is told."""
     solid = [{"name": "bed", "centre": [7, 5, 1], "size": [2, 2, 2]}]
     (found,) = told(case(solid=solid, **structure({"centre": [7, 5, 2.5]})))
-    assert (
-        found.startswith("structure.block.0: 'b0' rests on the fixed solid 'bed'") and "fixed = true" in found
-    )
+    assert found.startswith("structure.block.0: 'b0' rests on the fixed solid 'bed'")
+    assert "fixed = true" in found
     held = case(solid=solid, **structure({"centre": [7, 5, 2.5], "fixed": True}))
-    assert told(held) == [] and remarks(held) == []
+    assert told(held) == []
+    assert remarks(held) == []
     for centre in ([8.5, 5, 0.5], [7, 5, 3]):
         beside = case(solid=solid, **structure({"centre": centre}))
-        assert told(beside) == [] and "blocks pass through it" in remarks(beside)[0]
+        assert told(beside) == []
+        assert "blocks pass through it" in remarks(beside)[0]
+
+
+def test_a_pressure_gauge_inside_a_block_that_stands_fast_is_refused():
+    gauge = [{"kind": "pressure", "name": "g", "at": [7, 5, 0.5]}]
+    (found,) = told(case(gauge=gauge, **structure({"centre": [7, 5, 0.5], "fixed": True})))
+    assert found == "gauge.0.at: 'g' lies 0.5 m inside 'b0'; put it on the face"
 
 
 def test_a_block_on_a_slope_rests_on_it():
@@ -232,7 +239,7 @@ def test_a_block_in_a_room_is_free_and_one_in_the_wall_is_not():
     ("gauge", "says"),
     [
         ({"kind": "level", "at": [11, 5]}, "'g' is outside the tank: x = 11 m, not in 0 to 10 m"),
-        ({"kind": "pressure", "at": [7, 5, 1]}, "'g' lies 1 m inside the solid 'pier'; put it on the face"),
+        ({"kind": "pressure", "at": [7, 5, 1]}, "'g' lies 1 m inside 'pier'; put it on the face"),
         ({"kind": "force", "on": "peer"}, "there is no body 'peer'; did you mean 'pier'?"),
         ({"kind": "motion", "of": "b1"}, "there is no block 'b1'; there are b0"),
         ({"kind": "reaction", "on": "pier"}, "there is no block or group 'pier'; there are b0"),
@@ -313,3 +320,30 @@ def test_a_law_that_does_not_exist_or_has_no_potential_is_refused():
     wrong = joints | {"law": "bilinear", "mixed_mode": "needleman"}
     ((place, _),) = problems(case(joints=wrong, **block))
     assert place == ("joints", "mixed_mode")
+
+
+@pytest.mark.parametrize(
+    ("sections", "says"),
+    [
+        (structure({"centre": [7, 5, 0.5]}, density=2.4), "density of 'b0' is 2.4 kg/m3"),
+        (
+            {
+                **structure({"centre": [7, 5, 0.5]}),
+                "joints": {"strength": "2 mPa", "opening_at_failure": 1e-3},
+            },
+            "joints.strength is 0.002 Pa",
+        ),
+        (
+            {**structure({"centre": [7, 5, 0.5]}), "joints": {"strength": 1e6, "opening_at_failure": 1}},
+            "joints.opening_at_failure is 1 m",
+        ),
+        (
+            {"gauge": [{"kind": "pressure", "name": "g", "at": [1, 1, 1], "impulse": [2, 3]}]},
+            "gauge 'g' begins to add up at 2 s",
+        ),
+    ],
+)
+def test_values_that_look_like_a_wrong_unit_are_told(sections, says):
+    """Allowed, since somebody may mean it: g/cm3 as a plain number, mPa for MPa, m for mm, a window after the end."""
+    assert any(says in remark for remark in remarks(case(**sections)))
+    assert told(case(**sections)) == []

@@ -85,9 +85,13 @@ def test_modules_tell_what_is_on():
     ("text", "says"),
     [
         ("time,level\n0,1\n", "no column velocity"),
-        ("time,level,velocity\n0,1\n", "every line needs 3"),
-        ("time,level,velocity\n1,1,0\n0,1,0\n", "times must increase"),
-        ("time,level,velocity\n0,a,0\n", "could not convert"),
+        ("time,level,velocity\n0,1\n", "r.csv:2: 2 values; every line needs 3"),
+        ("time,level,velocity\n1,1,0\n0,1,0\n", "r.csv:3: times must increase; 0 s comes after 1 s"),
+        ("# a\n\ntime,level,velocity\n0,a,0\n", "r.csv:4: 'a' is not a number"),
+        ("time,level,velocity\n0,,0\n", "r.csv:2: '' is not a number"),
+        ("time,level,velocity\n0,nan,0\n", "r.csv:2: '0,nan,0' is not finite"),
+        ("time,level,velocity\n", "no line of numbers"),
+        ("time;level;velocity\n0;1;0\n", "no column time, level, velocity"),
         ("", "no column"),
     ],
 )
@@ -96,6 +100,25 @@ def test_records_that_cannot_be_read_say_why(tmp_path, text, says):
     path.write_text(text, encoding="utf-8")
     with pytest.raises(RecordError, match=says):
         record_columns(str(path))
+
+
+def test_a_record_that_is_not_there_names_the_nearest_file(tmp_path):
+    (tmp_path / "bore.csv").write_text("time,level,velocity\n0,1,0\n", encoding="utf-8")
+    with pytest.raises(RecordError, match=r"No such file or directory; did you mean 'bore.csv'"):
+        record_columns(str(tmp_path / "Bore.csv"))
+
+
+def test_a_record_saved_by_a_spreadsheet_may_begin_with_a_byte_order_mark(tmp_path):
+    path = tmp_path / "r.csv"
+    path.write_bytes("time,level,velocity\r\n0,1,0\r\n1,2,0\r\n".encode("utf-8-sig"))
+    assert list(record_columns(str(path))[1]) == [1, 2]
+
+
+def test_a_record_that_rises_above_the_tank_is_refused(tmp_path):
+    path = tmp_path / "r.csv"
+    path.write_text("time,level,velocity\n0,0.1,0\n1,50,0\n", encoding="utf-8")
+    inflow = {"kind": "record", "side": "x-", "path": str(path)}
+    assert any("above the top of the tank" in line for line in told({"inflow": [inflow]}))
 
 
 def test_columns_of_a_record_may_stand_in_any_order(tmp_path):
