@@ -7,12 +7,26 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from typer.core import TyperGroup
 
 from coupler.extras import need
 from coupler.failures import Failures
 from coupler.process import run_module
 
+
+class Commands(TyperGroup):
+    """All commands; Ctrl-C ends each with a word and the code of a stop, where typer would say nothing."""
+
+    def invoke(self, ctx):
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt:
+            with Failures():
+                raise
+
+
 app = typer.Typer(
+    cls=Commands,
     name="surgebreak",
     help="How a structure breaks when water hits it, and how its debris then changes the flow.",
     no_args_is_help=True,

@@ -25,13 +25,19 @@ def study(
 ) -> ExitCode:
     """Make the study of a case in its directory and tell its tables; leaves with DIVERGED if a run failed.
 
-    Runs that are done stay: a study that was stopped goes on, larger rungs are added to it. Raises BadCase.
+    Runs that are done stay: a study that was stopped (STOPPED) goes on, larger rungs are added to it. Raises BadCase.
     """
     plan = make_plan(case, ladders, larger)
     folder = output or plan.file.directory / "runs" / "study"
     runs = Runs(plan, folder, any_version, lambda text: print(text, flush=True))
-    found = collect(plan, runs, repeat or plan.study.repeat)
-    told = content(plan, runs, found, law_points(plan, runs))
+    try:
+        found = collect(plan, runs, repeat or plan.study.repeat)
+        told = content(plan, runs, found, law_points(plan, runs))
+    except KeyboardInterrupt:
+        print(
+            f"stopped by Ctrl-C; the runs that were done are kept in {folder}, and the same command goes on"
+        )
+        return ExitCode.STOPPED
     write(folder, told)
     print(page(told))
     draw("coupler.view.study", folder)

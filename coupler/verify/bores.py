@@ -29,8 +29,8 @@ def bore():
         yield Finding(f"speed of the bore [m/s], {UPPER} m into {lower} m", speed, exact, 0.05)
         yield from losses.findings(f"into {lower} m: ")
         x = (places - GATE) / UPPER
-        curves.append(Curve(f"computed, into {1e3 * lower:.0f} mm", "computed", arrival, x))
-        curves.append(Curve("Stoker", "exact", x * UPPER / exact, x))
+        curves.append(Curve(f"computed, into {1e3 * lower:.0f} mm", "computed", arrival, x, points=True))
+        curves.append(Curve(f"Stoker, into {1e3 * lower:.0f} mm", "exact", x * UPPER / exact, x))
     axes = ("time [s]", "way of the bore from the gate, $x/h_0$ [–]")
     yield Figure("P41_bore", (Panel(*axes, tuple(curves)),))
 

@@ -46,6 +46,6 @@ def figure(name: str, runs: dict[float, tuple], window: float, end: float, axes,
     )
     panels = (
         Panel(*axes, lines, x_range),
-        Panel("Courant number", f"value over that of CFL {numbers[0]:g}", shares, None, (0.0, 1.2)),
+        Panel("Courant number", f"value over that of CFL {numbers[0]:g}", shares, None, (0.0, 1.2), log="x"),
     )
     return Figure(name, panels, columns=2)

@@ -18,24 +18,27 @@ Kind = Literal["computed", "other", "measured", "band", "exact"]
 @dataclass(frozen=True)
 class Curve:
     """A line or points: x, y (n,) in the units of its panel; a band reaches from y to upper (n,). No label: not in the
-    legend."""
+    legend. points: single results, which no line may join."""
 
     label: str
     kind: Kind
     x: np.ndarray
     y: np.ndarray
     upper: np.ndarray | None = None
+    points: bool = False
 
 
 @dataclass(frozen=True)
 class Panel:
-    """Curves over one pair of axes; their names carry the units. x_range, y_range: what is shown, None: all."""
+    """Curves over one pair of axes; their names carry the units. x_range, y_range: what is shown, None: all.
+    log: the logarithmic axes, "", "x", "y" or "xy"."""
 
     x_label: str
     y_label: str
     curves: tuple[Curve, ...]
     x_range: tuple[float, float] | None = None
     y_range: tuple[float, float] | None = None
+    log: str = ""
 
 
 @dataclass(frozen=True)

@@ -59,9 +59,9 @@ def run_up():
     heights = np.geomspace(0.005, 0.05, 40)
     law = 2.831 * np.sqrt(SLOPE) * heights**1.25
     against = (
-        Curve("laboratory, Synolakis 1987", "measured", lab["H_over_d"], lab["R_over_d"]),
+        Curve("laboratory, Synolakis 1987", "measured", lab["H_over_d"], lab["R_over_d"], points=True),
         Curve("law of waves that do not break", "exact", heights, law),
-        Curve("computed", "computed", np.array([HEIGHT, HEIGHT]), np.array([0.0, run.R.max()])),
+        Curve("computed", "computed", np.array([HEIGHT]), run.R.max(keepdims=True), points=True),
     )
     line = (
         Curve("largest of the law", "exact", run.t[[0, -1]], np.full(2, exact)),

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from coupler import cli
 from coupler.case_docs import FIRST_CASE
 from coupler.provenance import ROOT, version
 
@@ -29,6 +30,19 @@ def surgebreak(*arguments, **environment):
 
 def test_version():
     assert surgebreak("--version").stdout == f"surgebreak {version()}\n"
+
+
+def test_ctrl_c_ends_any_command_with_a_word(monkeypatch, capsys):
+    """The library under it would leave with 130 and say nothing; a study or a set of checks takes minutes."""
+
+    def interrupted(key):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("coupler.case_docs.explanation", interrupted)
+    with pytest.raises(SystemExit) as left:
+        cli.app(["explain"])
+    assert left.value.code == 4
+    assert "Ctrl-C" in capsys.readouterr().err
 
 
 def test_help_names_every_command_quickly():

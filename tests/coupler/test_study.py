@@ -100,10 +100,10 @@ def test_the_same_setting_is_run_once(fake, case):
     assert len(fake.calls) == 5  # h = 0.4, 0.2, the case itself, rule = paper, no friction
 
 
-def test_a_study_that_was_stopped_goes_on(fake, case):
+def test_a_study_that_was_stopped_says_so_and_goes_on(fake, case, capsys):
     fake.stop_after = 2
-    with pytest.raises(KeyboardInterrupt):
-        made(case)
+    assert command.study(case, [], None, case / "out", False, False) == ExitCode.STOPPED
+    assert "the same command goes on" in capsys.readouterr().out
     assert len(fake.calls) == 2
     fake.stop_after = None
     _, told = made(case)
