@@ -112,8 +112,14 @@ class ContactLaw:
 
 
 def _within(name, value, low, high, unit, closed_above=False) -> None:
-    if not (low < value < high or (closed_above and value == high)):
-        raise ContactError(f"contact.{name} = {value} {unit}; it must lie between {max(low, 0.0)} and {high}")
+    if low < value < high or (closed_above and value == high):
+        return
+    least = "at least 0" if low < 0.0 else f"above {low:g}"
+    most = "" if high == np.inf else f", {'at most' if closed_above else 'below'} {high:g}"
+    remedy = f"take a finite number {least}{most}"
+    if np.isnan(value):
+        remedy += "; look for a division by zero or a missing value where it comes from"
+    raise ContactError(f"contact.{name} = {value:g} {unit}".rstrip() + f"; {remedy}")
 
 
 def paper_damping_ratio(e: float) -> float:

@@ -1,0 +1,78 @@
+"""What the pages say can be typed in is known to the program: names of the case file, commands, their options."""
+
+import re
+import tomllib
+
+import pytest
+from typer.main import get_command
+
+from coupler.case_schema import keys, names_in
+from coupler.cli import app
+from coupler.provenance import ROOT
+
+PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md"), *(ROOT / "cases").glob("*/README.md")])
+KNOWN = {key.path for key in keys()}
+SECTIONS = {path.split(".")[0] for path in KNOWN}
+FILES = ("py", "toml", "md", "json", "csv")
+COMMANDS = get_command(app).commands
+each_page = pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+
+
+def blocks(text, language):
+    return re.findall(rf"^```{language}\n(.*?)^```", text, flags=re.DOTALL | re.MULTILINE)
+
+
+def typed(text):
+    """What stands between backticks and in blocks of the shell: `text` that a reader may copy."""
+    plain = re.sub(r"^```.*?^```", "", text, flags=re.DOTALL | re.MULTILINE)
+    return re.findall(r"`([^`\n]+)`", plain) + "".join(blocks(text, "sh") + blocks(text, "")).splitlines()
+
+
+def paths(table, above=()):
+    """Dotted names of all entries of a TOML table; those of a list of tables without their number."""
+    for name, value in table.items():
+        path = (*above, name)
+        yield ".".join(path)
+        for entry in value if isinstance(value, list) else [value]:
+            if isinstance(entry, dict) and path[-1] not in ("set",):
+                yield from paths(entry, path)
+
+
+@each_page
+def test_names_of_the_case_file_exist(page):
+    text = page.read_text(encoding="utf-8")
+    dotted = re.compile(r"(?<![\w./-])([a-z_]+(?:\.[a-z_]+)+)(?![\w/(*])")
+    found = [name for words in typed(text) for name in dotted.findall(words)]
+    lost = {
+        name
+        for name in found
+        if name.split(".")[0] in SECTIONS and name not in KNOWN and name.split(".")[-1] not in FILES
+    }
+    assert lost == set()
+
+
+@each_page
+def test_toml_that_is_shown_is_valid(page):
+    for block in blocks(page.read_text(encoding="utf-8"), "toml"):
+        told = tomllib.loads(block)
+        assert {path for path in paths(told) if path not in KNOWN} == set()
+
+
+@each_page
+def test_commands_and_their_options_exist(page):
+    """`surgebreak run CASE --end '2 s'`: the command is there, and so is every option."""
+    lost = []
+    for words in typed(page.read_text(encoding="utf-8")):
+        for command, rest in re.findall(r"surgebreak ([a-z]+)\b([^|;]*)", words):
+            if command not in COMMANDS:
+                lost.append(f"surgebreak {command}")
+            elif command not in ("render", "test"):  # these hand their words on
+                there = {o for p in COMMANDS[command].params for o in (*p.opts, *p.secondary_opts)}
+                lost += [o for o in re.findall(r"(?<!\S)--[a-z-]+", rest) if o not in there]
+    assert lost == []
+
+
+def test_sections_have_names():
+    """The test above would pass over everything if the schema gave nothing."""
+    assert {"tank", "water", "joints", "study"} <= SECTIONS
+    assert names_in(("joints",))
