@@ -25,6 +25,7 @@ from fluid.domain import hat_values
 from fluid.moments import wet_fraction
 from fluid.momentum import momentum_of
 from fluid.solve import NotConverged
+from fluid.strain import edges_of
 from fluid.viscous_kernels import implicit_change, momentum_rate, unheld_rate
 
 GAMMA = 1.0 - np.sqrt(0.5)
@@ -127,9 +128,10 @@ class Viscosity:
         cells, share = cells[share > 0.0], share[share > 0.0]
         idle = mass <= 0.0
         drag = np.zeros(len(phi)) if self.friction is None else self.friction.of_nodes(water, phi, w)
+        weight = 2.0 * p.viscosity * share * t.volume[cells]
         return (
             cells,
-            2.0 * p.viscosity * share * t.volume[cells],
+            weight,
             self._wall_terms(water, phi, w, cells, share),
             p.viscosity,
             drag,
@@ -138,6 +140,7 @@ class Viscosity:
             t.cells,
             t.parent,
             t.gradients,
+            *edges_of(cells, weight, t.cells, len(phi)),
         )
 
     def _wall_terms(self, water, phi, w, wet_cells, share):
@@ -150,10 +153,12 @@ class Viscosity:
         nothing = np.zeros(len(k.cell))
         nitsche = 4.0 * p.viscosity * k.per_volume / water_share[k.cell] if p.walls == "no-slip" else nothing
         drag = nothing if self.friction is None else self.friction.of_faces(water, k, phi, w)
+        row = np.full(len(cells), -1, np.int64)
+        row[wet_cells] = np.arange(len(wet_cells))
         use = (area > 0.0).any(axis=1) & ((nitsche > 0.0) | (drag > 0.0))
         return tuple(
             np.ascontiguousarray(a[use])
-            for a in (k.cell, k.body, k.normal, k.hat, k.arm, area, nitsche, drag)
+            for a in (k.cell, row[k.cell], k.body, k.normal, k.hat, k.arm, area, nitsche, drag)
         )
 
 

@@ -4,10 +4,10 @@ r = f - K u: the rate of momentum [N] that stresses give to the nodes,
 
     r_i = - ∫ 2μ ε(u) ∇N_i dV  +  ∫_Γ N_i (t - λ (u - u_Γ)) dA  +  ∫_Γ (u - u_Γ)·t(N_i) dA  -  ∫_Γ N_i C (u - u_Γ)_t dA
 
-ε(u) = (∇u + ∇uᵀ)/2, t(v) = -2μ ε(v) n, n out of the body into the water, u_Γ the velocity of the body there.  The
-second and third terms hold u = u_Γ weakly (symmetric Nitsche), the last is wall friction.  With λ = 4 μ A/V, A wetted
-area and V water of the cell, the form is positive definite on every cut, since ε is constant in a cell (trace
-inequality ∫_Γ |ε n|² ≤ A/V ∫ |ε|²; De Prenter, Lehrenfeld, Massing, Comput. Math. Appl. 75 (2018) 4322).
+ε: strain rate, smoothed over edges (`strain`), t(v) = -2μ ε(v) n, n out of the body into the water, u_Γ the velocity
+of the body there.  The second and third terms hold u = u_Γ weakly (symmetric Nitsche), the last is wall friction.  With
+λ = 4 μ A/V, A wetted area and V water of the cell, the form is positive definite on every cut, since ε is constant in a
+cell (trace inequality ∫_Γ |ε n|² ≤ A/V ∫ |ε|²; De Prenter, Lehrenfeld, Massing, Comput. Math. Appl. 75 (2018) 4322).
 The body gets what the hats sum up to, -∫ (t - λ (u - u_Γ) - C (u - u_Γ)_t) dA: momentum is exchanged to round-off.
 """
 
@@ -16,44 +16,29 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-
-@njit(cache=True)
-def cell_stress(cell_list, weight, u, cells, parent, g, out):
-    """out (N, 3) -= Σ_e w_e ε(u) ∇N_i over the listed cells, weight (n,) = 2μ times their water [N s/m]."""
-    G = np.empty((3, 3))
-    for s in range(cell_list.shape[0]):
-        e = cell_list[s]
-        p = parent[e]
-        G[:] = 0.0
-        for a in range(4):
-            i = cells[e, a]
-            for k in range(3):
-                for m in range(3):
-                    G[k, m] += u[i, k] * g[p, a, m]
-        for a in range(4):
-            i = cells[e, a]
-            for k in range(3):
-                total = 0.0
-                for m in range(3):
-                    total += (G[k, m] + G[m, k]) * g[p, a, m]
-                out[i, k] -= 0.5 * weight[s] * total
+from fluid.strain import COLUMN, ROW, add_to_edges, edge_strain, mean_strain, spread_stress
 
 
 @njit(cache=True)
-def wall_stress(walls, mu, u, body_velocity, cells, parent, g, out, load):
-    """The terms on Γ added to out (N, 3), and what the bodies get to load (n_bodies, 6).
+def wall_stress(walls, mu, u, body_velocity, edge, edge_weight, strain, flux, cells, out, load):
+    """The terms on Γ: those with hats added to out (N, 3), what the bodies get to load (n_bodies, 6), and those with
+    t(N_i) to the strains flux (n_edges, 6), for `spread_stress`.
 
-    walls: (cell (S,), body (S,), normal (S, 3), hat (S, 3, 4), arm (S, 3, 3) [m], area (S, 3) [m²] of each point,
-    nitsche (S,) λ [kg/(m² s)], drag (S,) C [kg/(m² s)]) · body_velocity (n_bodies, 6)."""
-    cell, body, normal, hat, arm, area, nitsche, drag = walls
-    t, v, f = np.empty(3), np.empty(3), np.empty(3)
+    walls: (cell (S,), row (S,) of the cell in the list of wet cells, -1 if it is not there, body (S,), normal (S, 3),
+    hat (S, 3, 4), arm (S, 3, 3) [m], area (S, 3) [m²] of each point, nitsche (S,) λ [kg/(m² s)], drag (S,) C
+    [kg/(m² s)]) · body_velocity (n_bodies, 6) · strain (n_edges, 6) of u."""
+    cell, row, body, normal, hat, arm, area, nitsche, drag = walls
+    mean = np.empty((3, 3))
+    t, v, f, pull, x = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(6)
     for s in range(cell.shape[0]):
         e, b = cell[s], body[s]
-        p = parent[e]
-        held = nitsche[s] > 0.0
-        t[:] = 0.0
+        held = nitsche[s] > 0.0 and row[s] >= 0
+        t[:], pull[:] = 0.0, 0.0
         if held:
-            _traction(e, mu, u, normal[s], cells, g[p], t)
+            mean_strain(strain, edge[row[s]], mean)
+            for k in range(3):
+                for m in range(3):
+                    t[k] -= 2.0 * mu * mean[k, m] * normal[s, m]
         for q in range(3):
             w = area[s, q]
             if w == 0.0:
@@ -62,33 +47,19 @@ def wall_stress(walls, mu, u, body_velocity, cells, parent, g, out, load):
             into = v[0] * normal[s, 0] + v[1] * normal[s, 1] + v[2] * normal[s, 2]
             for k in range(3):
                 f[k] = w * (t[k] - nitsche[s] * v[k] - drag[s] * (v[k] - into * normal[s, k]))
+                pull[k] += 2.0 * mu * w * v[k]
             for a in range(4):
-                i = cells[e, a]
-                across, along = 0.0, 0.0
-                if held:
-                    for k in range(3):
-                        across += g[p, a, k] * normal[s, k]
-                        along += g[p, a, k] * v[k]
                 for k in range(3):
-                    out[i, k] += hat[s, q, a] * f[k] - w * mu * (v[k] * across + normal[s, k] * along)
+                    out[cells[e, a], k] += hat[s, q, a] * f[k]
             for k in range(3):
                 load[b, k] -= f[k]
             load[b, 3] -= arm[s, q, 1] * f[2] - arm[s, q, 2] * f[1]
             load[b, 4] -= arm[s, q, 2] * f[0] - arm[s, q, 0] * f[2]
             load[b, 5] -= arm[s, q, 0] * f[1] - arm[s, q, 1] * f[0]
-
-
-@njit(cache=True)
-def _traction(e, mu, u, n, cells, g, t):
-    """t = -2μ ε(u) n of the cell e, in place; g (4, 3) its gradients."""
-    for k in range(3):
-        t[k] = 0.0
-    for a in range(4):
-        i = cells[e, a]
-        across = g[a, 0] * n[0] + g[a, 1] * n[1] + g[a, 2] * n[2]
-        along = u[i, 0] * n[0] + u[i, 1] * n[1] + u[i, 2] * n[2]
-        for k in range(3):
-            t[k] -= mu * (u[i, k] * across + g[a, k] * along)
+        if held:
+            for c in range(6):
+                x[c] = 0.5 * (pull[ROW[c]] * normal[s, COLUMN[c]] + pull[COLUMN[c]] * normal[s, ROW[c]])
+            add_to_edges(flux, edge[row[s]], edge_weight, x)
 
 
 @njit(cache=True)
@@ -118,11 +89,13 @@ def momentum_rate(terms, u, body_velocity):
 @njit(cache=True)
 def unheld_rate(terms, u, body_velocity):
     """The same without the sides of the tank: without drag on their nodes, and as if they held nothing."""
-    cell_list, weight, walls, mu, _drag, _node, _projector, _idle, cells, parent, g = terms
+    cell_list, weight, walls, mu, _drag, _node, _projector, _idle, cells, parent, g, edge, edge_weight = terms
     r = np.zeros_like(u)
     load = np.zeros_like(body_velocity)
-    cell_stress(cell_list, weight, u, cells, parent, g, r)
-    wall_stress(walls, mu, u, body_velocity, cells, parent, g, r, load)
+    strain = edge_strain(cell_list, weight, edge, edge_weight, u, cells, parent, g)
+    flux = strain.copy()
+    wall_stress(walls, mu, u, body_velocity, edge, edge_weight, strain, flux, cells, r, load)
+    spread_stress(cell_list, weight, edge, flux, cells, parent, g, r)
     return r, load
 
 
@@ -145,8 +118,8 @@ def _restrict(r, node, projector, idle):
 @njit(cache=True)
 def preconditioner(terms, mass, tau):
     """1 / diagonal (N,) of M + τ K, the flux terms left out; 0 on idle nodes."""
-    cell_list, weight, walls, _mu, node_drag, _node, _projector, idle, cells, parent, g = terms
-    cell, _body, _normal, hat, _arm, area, nitsche, drag = walls
+    cell_list, weight, walls, _mu, node_drag, _node, _projector, idle, cells, parent, g, _edge, _total = terms
+    cell, _row, _body, _normal, hat, _arm, area, nitsche, drag = walls
     diagonal = mass + tau * node_drag
     for s in range(cell_list.shape[0]):
         e = cell_list[s]
@@ -172,7 +145,8 @@ def implicit_change(terms, mass, tau, right, n_bodies, tolerance, most):
 
     terms: (cells in the water (n,), 2μ times their water (n,), walls of `wall_stress`, μ, drag of the nodes on sides
     (N,) [kg/s], nodes on sides (n,), their projectors (n, 3, 3), idle (N,) bool: nodes that keep their velocity, cells,
-    parent, gradients) · mass (N,) [kg] · tau [s] · right (N, 3) [N s]."""
+    parent, gradients, edges of the cells in the water (n, 6) and their weight (n_edges,)) · mass (N,) [kg] · tau [s] ·
+    right (N, 3) [N s]."""
     still = np.zeros((n_bodies, 6))
     inverse = preconditioner(terms, mass, tau)
     d, r = np.zeros_like(right), right.copy()

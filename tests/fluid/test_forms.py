@@ -23,8 +23,9 @@ from fluid.projection import (
 )
 from fluid.quadrature import surface_basis
 from fluid.solve import solve
+from fluid.strain import edge_strain, spread_stress
 from fluid.topology import Graph, Topology
-from fluid.viscous_kernels import cell_stress, wall_stress
+from fluid.viscous_kernels import wall_stress
 from tests.fluid.scenes import tank
 
 MESH = box_mesh((0, 0, 0), (1, 1, 1), 1 / 6)
@@ -127,11 +128,18 @@ def test_divergence_damping(n, seed, covers):
 def test_viscous_stress(n, seed, covers):
     domain = cut(n, seed, covers)
     t, cells, u = laid_out(domain)
-    rate = np.zeros_like(u)
-    cell_stress(cells, 2.0 * 0.7 * t.volume, u, t.cells, t.parent, t.gradients, rate)
+    rate, weight = np.zeros_like(u), 2.0 * 0.7 * t.volume
+    edge = _unshared_edges(len(cells))
+    strain = edge_strain(cells, weight, edge, weight, u, t.cells, t.parent, t.gradients)
+    spread_stress(cells, weight, edge, strain, t.cells, t.parent, t.gradients, rate)
     vector = forms.vector_basis_of(domain)
     stiffness = asm(forms.viscous, vector, mu=0.7)
     same(-rate, (stiffness @ forms.by_component(u)).reshape(-1, 3))
+
+
+def _unshared_edges(n):
+    """Edges (n, 6) that each cell has for itself: nothing is smoothed, as in the forms."""
+    return np.repeat(np.arange(n)[:, None], 6, axis=1)
 
 
 @EXAMPLES
@@ -141,7 +149,7 @@ def test_stress_on_wetted_faces(n, seed, covers):
     domain = cut(n, seed, covers)
     if len(domain.face_cell) == 0:
         return
-    t, _, u = laid_out(domain)
+    t, cells, u = laid_out(domain)
     basis, normal = forms.vector_surface_basis_of(domain)
     penalty = np.random.default_rng(1).uniform(1.0, 50.0, len(domain.face_cell))
     hat = np.ascontiguousarray(np.moveaxis(_hats(domain), 0, 2))
@@ -150,6 +158,7 @@ def test_stress_on_wetted_faces(n, seed, covers):
     normals, drag = np.ascontiguousarray(domain.face_normal), np.zeros(len(penalty))
     walls = (
         domain.face_cell.astype(np.int64),
+        domain.face_cell.astype(np.int64),  # every cell is listed
         domain.face_body.astype(np.int64),
         normals,
         hat,
@@ -160,7 +169,11 @@ def test_stress_on_wetted_faces(n, seed, covers):
     )
     rate, load = np.zeros_like(u), np.zeros((domain.n_bodies, 6))
     still = np.zeros((domain.n_bodies, 6))
-    wall_stress(walls, 0.7, u, still, t.cells, t.parent, t.gradients, rate, load)
+    edge, weight = _unshared_edges(len(cells)), 2.0 * 0.7 * t.volume
+    strain = edge_strain(cells, weight, edge, weight, u, t.cells, t.parent, t.gradients)
+    flux = np.zeros_like(strain)
+    wall_stress(walls, 0.7, u, still, edge, weight, strain, flux, t.cells, rate, load)
+    spread_stress(cells, weight, edge, flux, t.cells, t.parent, t.gradients, rate)
     form = asm(forms.nitsche, basis, mu=0.7, n=normal, penalty=forms.per_cell(basis, penalty))
     reached = form.shape[0] // 3  # scikit-fem numbers nodes up to the highest one of its cells
     same(-rate[:reached], (form @ forms.by_component(u[:reached])).reshape(-1, 3))

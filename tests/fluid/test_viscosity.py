@@ -66,7 +66,8 @@ def test_a_steady_flow_does_not_depend_on_the_step():
         for _ in range(round(10 / dt)):
             advance(water, dt)
         found.append(water.velocity[:, 0].max())
-    np.testing.assert_allclose(found, 1.25, rtol=1e-3)
+    np.testing.assert_allclose(found[0], found[1], rtol=1e-3)
+    np.testing.assert_allclose(found, 1.25, rtol=2e-2)  # eight cells
 
 
 def test_vortices_decay_at_the_exact_rate_with_second_order():
