@@ -27,6 +27,8 @@ LEVELS = (0.01, 0.05, 0.10)
 """Errors for which the cheapest setting is told: thin lines."""
 LOWEST = 1e-6
 """Errors below this are drawn here: they are round-off."""
+SHORTEST = 1e-5
+"""[s] CPU times below this, also 0 where all was spent in the compiler, are drawn here."""
 SHORT = 24
 """Letters in a name of which three stand side by side."""
 NOTE_WIDTH = 105
@@ -59,7 +61,8 @@ def ladder_curves(told, name):
         points = curves.setdefault(legend, [])
         reading = point["readings"].get(name)
         if reading and reading["error"] is not None and not point["reason"]:
-            points.append((point["cpu_seconds"], reading["error"], point["label"], reading["band"]))
+            cpu = max(point["cpu_seconds"], SHORTEST)
+            points.append((cpu, reading["error"], point["label"], reading["band"]))
     return list(curves.items())
 
 
@@ -72,7 +75,7 @@ def law_curves(told, name):
             legend = f"{row['law']} (YADE)" if row["stock"] else row["law"]
             label = "" if row["multiple"] == 1 else f"×{row['multiple']}"
             curves.setdefault(legend, []).append(
-                (row["cpu_seconds"], reading["error"], label, reading["band"])
+                (max(row["cpu_seconds"], SHORTEST), reading["error"], label, reading["band"])
             )
     return list(curves.items())
 

@@ -83,7 +83,7 @@ def test_the_page_shows_groups_verdicts_and_what_was_missed():
     assert shown.startswith("### structure\n1 passed, 1 refused, 1 failed")
     assert "| X1 | made up | **failed** |" in shown
     assert "gain nan, limit 1" in shown
-    assert "“contact.stiffness = -1.0" in shown
+    assert "“contact.stiffness = -1 N/m; take" in shown
 
 
 def test_scenes_of_all_groups_are_short_and_run_by_their_group():

@@ -4,7 +4,7 @@ import itertools
 
 from coupler.view.labels import _extent, place_labels
 from coupler.view.plots import plt
-from coupler.view.study import crosses, footnotes, labels, ladder_curves, limits, line, ylabel
+from coupler.view.study import crosses, figure, footnotes, labels, ladder_curves, limits, line, ylabel
 
 
 def point(ladder, label, cpu, error, reason=""):
@@ -37,6 +37,13 @@ def test_a_curve_is_a_ladder_without_its_failed_runs():
     curves = dict(ladder_curves(TOLD, "force"))
     assert [p[2] for p in curves["cells"]] == ["10 cm", "5 cm"]
     assert len(curves["step"]) == 4
+
+
+def test_a_run_that_took_no_time_that_counts_is_drawn_all_the_same(tmp_path):
+    """All of it was spent in the compiler: zero seconds have no place on a logarithmic axis."""
+    q = {"name": "force", "what": "force", "against": "exact"}
+    told = TOLD | {"points": [point("h", "10 cm", 0.0, 0.2), point("h", "5 cm", 0.5, 0.1)]}
+    assert figure(tmp_path / "force", q, ladder_curves(told, "force"), [], "CPU time [s]").exists()
 
 
 def test_failed_runs_are_told_below_with_their_reason():
