@@ -73,9 +73,9 @@ def _drawn(told: dict, q: dict) -> bool:
     return any(reading.get("error") for reading in readings)
 
 
-def table(head: list[str], rows: list[list[str]]) -> str:
-    """A Markdown table; the first column is text, the others are numbers."""
-    rule = "|---|" + "--:|" * (len(head) - 1)
+def table(head: list[str], rows: list[list[str]], words: bool = False) -> str:
+    """A Markdown table; the first column is text, the others are numbers unless all are `words`."""
+    rule = "|---|" + ("---|" if words else "--:|") * (len(head) - 1)
     lines = ["| " + " | ".join(row) + " |" for row in [head, *rows]]
     return "\n".join([lines[0], rule, *lines[1:]])
 
@@ -118,7 +118,9 @@ def _runs(told: dict) -> str:
         "steps",
         "passes",
     ]
-    return table(head, [_run_row(told, point, quantities) for point in told["points"]])
+    rows = [_run_row(told, point, quantities) for point in told["points"]]
+    said = [k for k in range(len(head)) if any(row[k] != "–" for row in rows)]
+    return table([head[k] for k in said], [[row[k] for k in said] for row in rows])
 
 
 def _run_row(told: dict, point: dict, quantities: list[dict]) -> list[str]:
@@ -148,7 +150,7 @@ def _cheapest(told: dict) -> str:
         rows.setdefault(f"{what[e['quantity']]}{curve_of(e)}", {})[e["level"]] = cell
     levels = sorted({e["level"] for e in told["cheapest"]})
     cells = [[name, *(found[level] for level in levels)] for name, found in rows.items()]
-    return table(["quantity", *(f"error of {100 * level:g} %" for level in levels)], cells)
+    return table(["quantity", *(f"error of {100 * level:g} %" for level in levels)], cells, words=True)
 
 
 def curve_of(entry: dict) -> str:
@@ -192,7 +194,7 @@ def _laws(told: dict, pictures: str) -> str:
 def _parts(told: dict) -> str:
     rows = [
         [part["name"], part["reason"] or f"{part['cpu_seconds']:.3g}", _cost(part["share"]),
-         f"{part['memory'] / 1e6:.0f}"]
+         f"{round(part['memory'] / 1e6)}"]
         for part in told["parts"]
     ]  # fmt: skip
     whole = told["runs"][told["base"]]["cpu_seconds"]

@@ -51,7 +51,7 @@ def summary(studies: list[dict]) -> str:
     cases = [row[0] for row in rows]
     for row, before in zip(rows[1:], cases):
         row[0] = "" if row[0] == before else row[0]
-    return "## Settings for an error of 5 %\n\n" + table(head, rows)
+    return "## Settings for an error of 5 %\n\n" + table(head, rows, words=True)
 
 
 def _copy(figure: Path, place: Path) -> None:
