@@ -25,6 +25,8 @@ GAP = 1e-5
 leaves a tenth of that."""
 SLIVER = 1e-6
 """Smallest overlap, as a share of the smaller face, that counts."""
+SQUARE = 1e-5
+"""Share of its size by which a face may miss a parallelogram and count as one."""
 DOUBLE = 1e-12
 """Corners of an overlap closer than this share of a face's extent are one."""
 
@@ -281,12 +283,18 @@ def gauss_points(polygon: Array, rule: Rule | int) -> tuple[Array, Array]:
     direction; any other polygon a fan of triangles with the same rule collapsed on each.
     """
     rule = gauss(rule) if isinstance(rule, int) else rule
-    if len(polygon) == 4 and np.allclose(polygon[0] + polygon[2], polygon[1] + polygon[3]):
+    if len(polygon) == 4 and _is_parallelogram(polygon):
         return _mapped_rule(polygon, rule)
     centre = polygon.mean(axis=0)
     ring = zip(polygon, np.roll(polygon, -1, axis=0))
     rules = [_mapped_rule(np.array([centre, p, q, centre]), rule) for p, q in ring]
     return np.concatenate([r[0] for r in rules]), np.concatenate([r[1] for r in rules])
+
+
+def _is_parallelogram(corners: Array) -> bool:
+    """Whether opposite sides of four corners (4, 3) are equal, by their own size wherever they lie."""
+    left_over = np.abs(corners[0] - corners[1] + corners[2] - corners[3]).max()
+    return bool(left_over <= SQUARE * np.ptp(corners, axis=0).max())
 
 
 def _mapped_rule(corners: Array, rule: Rule) -> tuple[Array, Array]:

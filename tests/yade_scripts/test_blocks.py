@@ -91,6 +91,14 @@ def test_gauss_rule_on_any_convex_polygon_integrates_quadratics():
     assert w @ x[:, 0] ** 2 == pytest.approx(5 * np.sqrt(3) / 16, rel=1e-12)
 
 
+@pytest.mark.parametrize(("taper", "points"), [(0.0, 9), (1e-3, 36)])
+def test_the_rule_of_a_face_does_not_depend_on_where_it_lies(taper, points):
+    """A face of 2 m that narrows by 2 mm is no parallelogram, at the origin and a kilometre away."""
+    face = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [2.0 - taper, 0.0, 1.0], [taper, 0.0, 1.0]])
+    for place in (np.zeros(3), np.array([900.0, -700.0, 30.0])):
+        assert len(gauss_points(face + place, 3)[1]) == points
+
+
 def test_building_has_the_volume_of_its_walls_slabs_and_openings():
     """Walls as the difference of two prisms, three slabs, minus one door of whole blocks."""
     solid = Building((0, 0), (20, 10), 12.0, 0.5, 1.9, storeys=3)
