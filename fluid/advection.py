@@ -4,7 +4,9 @@ Foot of the path that ends at node x:           x_d = x - dt u_m(x_d),  u_m = u 
 Transported value:                              f1(x) = f(x_d)
 Error of one interpolation, seen on the way back, taken off half (Selle, Fedkiw, Kim, Liu, Rossignac,
 J. Sci. Comput. 35 (2008) 350):                 f2(x) = f1(x) + [f(x) - f1(x + dt u_m)] / 2
-and f2 is refused where it leaves the range of f in the cell of the foot.
+and f2 is refused where it leaves the range of f in the cell of the foot, and on open sides: the way on from there ends
+at the side, f1 there is no way back, and the water would lose only half of its change on the way (a pool that
+drained left with a quarter more energy than it had).
 
 Paths walk from cell to cell through open faces, starting at the node's own cells: on any mesh, and never
 through a wall, however thin, because a wall has no neighbour on its other side.
@@ -108,8 +110,8 @@ def interpolate(cell, weight, cells, f):
 
 
 @njit(cache=True)
-def _limited(listed, back_cell, back_weight, f, f1, f1_ahead, cells):
-    """f2 where it stays within the range of f over the cell of the foot, f1 elsewhere, (n, m).
+def _limited(listed, on_open_side, back_cell, back_weight, f, f1, f1_ahead, cells):
+    """f2 where it stays within the range of f over the cell of the foot, f1 elsewhere and on open sides, (n, m).
 
     Only corners with weight count: a foot on a face must not depend on the side it was found from."""
     out = np.empty_like(f1)
@@ -121,12 +123,14 @@ def _limited(listed, back_cell, back_weight, f, f1, f1_ahead, cells):
                 if back_weight[s, a] > 1e-9:
                     low, high = min(low, f[cells[e, a], k]), max(high, f[cells[e, a], k])
             f2 = f1[s, k] + 0.5 * (f[listed[s], k] - f1_ahead[s, k])
-            out[s, k] = f2 if low <= f2 <= high else f1[s, k]
+            out[s, k] = f2 if low <= f2 <= high and not on_open_side[listed[s]] else f1[s, k]
     return out
 
 
-def transport(topology, listed, dt: float, u_m, f):
-    """Values of f (N, m) after dt [s] at the listed nodes (n,), carried by u_m (N, 3) [m/s] → (n, m)."""
+def transport(topology, listed, dt: float, u_m, f, on_open_side):
+    """Values of f (N, m) after dt [s] at the listed nodes (n,), carried by u_m (N, 3) [m/s] → (n, m).
+
+    on_open_side (N,) bool: nodes where water may leave."""
     t = topology
     mesh = (t.nodes, t.cells, t.parent, t.gradients, t.neighbours, t.node_start, t.node_cells)
     cell, weight = feet(listed, -1.0, dt, 3, u_m, *mesh)
@@ -135,4 +139,4 @@ def transport(topology, listed, dt: float, u_m, f):
     moved[listed] = f1
     ahead, ahead_weight = feet(listed, 1.0, dt, 0, u_m, *mesh)
     f1_ahead = interpolate(ahead, ahead_weight, t.cells, moved)
-    return _limited(listed, cell, weight, f, f1, f1_ahead, t.cells)
+    return _limited(listed, on_open_side, cell, weight, f, f1, f1_ahead, t.cells)

@@ -124,7 +124,7 @@ def _transported(water, dt, theta, kick):
     for u in (u_hat, u_m):
         water.hold(u, water.time + dt)
     fields = np.column_stack([u_hat, water.level_set])
-    moved = transport(water.topology, water.listed, dt, u_m, fields)
+    moved = transport(water.topology, water.listed, dt, u_m, fields, water._walls.open_node)
     if water.parameters.advection == "supg":
         from fluid.supg import carried_velocity
 

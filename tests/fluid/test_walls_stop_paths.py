@@ -36,7 +36,7 @@ def check_sides(t, side, seed, courant):
     fields = np.column_stack([side == 1, np.where(side == 1, 3.0, -7.0), side == 0]).astype(float)
     start = fields.copy()
     for _ in range(3):
-        fields[listed] = transport(t, listed, 1.0, u, fields)
+        fields[listed] = transport(t, listed, 1.0, u, fields, np.zeros(len(u), bool))
     np.testing.assert_allclose(fields[listed], start[listed], rtol=1e-13, atol=0)
     mesh = (t.nodes, t.cells, t.parent, t.gradients, t.neighbours, t.node_start, t.node_cells)
     cell, _ = feet(listed, -1.0, 1.0, 3, u, *mesh)
