@@ -27,6 +27,8 @@ OWN = LINES
 """Computed curves, in their order."""
 DASHES = ("-", (0, (6, 1.2)), (0, (1.5, 0.9)), (0, (6, 1.2, 1.5, 1.2)))
 """Of the computed curves, so that they are told apart in grey print."""
+EXACT = ("--", (0, (1, 1.5)), "-.")
+"""Of the exact curves."""
 LEGEND_ROW = 0.16
 """[inch] of a row of the legend above the panels."""
 
@@ -77,7 +79,7 @@ def draw_panel(axis, panel, legend_columns):
     if "y" in panel.get("log", ""):
         axis.set_yscale("log")
     _plain_numbers(axis, panel.get("log", ""))
-    seen = {"computed": 0, "measured": 0}
+    seen = dict.fromkeys(("computed", "measured", "exact"), 0)
     for curve in panel["curves"]:
         style = look(curve, seen)
         x, y = np.array(curve["x"], float), np.array(curve["y"], float)
@@ -87,13 +89,13 @@ def draw_panel(axis, panel, legend_columns):
             axis.plot(x, y, **style)
     axis.set_xlabel(panel["x_label"])
     axis.set_ylabel(panel["y_label"])
-    axis.margins(x=0)
+    axis.margins(x=0.06 if "x" in panel.get("log", "") else 0)
     if panel.get("x_range"):
         axis.set_xlim(panel["x_range"])
     if panel.get("y_range"):
         axis.set_ylim(panel["y_range"])
     elif all(np.ptp(curve["y"]) == 0.0 for curve in panel["curves"]):
-        axis.set_ylim(0.0, 1.0)
+        axis.set_ylim(-0.05, 1.0)
     if not legend_columns:
         return
     axis.legend(
@@ -120,7 +122,9 @@ def look(curve, seen):
     if kind == "band":
         return style | {"color": BAND, "linewidth": 0, "zorder": 1}
     if kind == "exact":
-        return style | {"color": INK, "linestyle": "--", "linewidth": 0.9, "zorder": 2.5}
+        dashes = EXACT[seen["exact"] % len(EXACT)]
+        seen["exact"] += 1
+        return style | {"color": INK, "linestyle": dashes, "linewidth": 0.9, "zorder": 2.5}
     if kind == "measured":
         return style | measured(len(curve["x"]), seen, curve.get("points", False))
     number = seen["computed"]
