@@ -5,6 +5,7 @@ What is compared ends when a joint of the first run breaks: from there on the ru
 """
 
 import sys
+from itertools import cycle
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ import numpy as np
 from coupler.history import read_history
 from coupler.view.palette import LINES
 from coupler.view.plots import STYLE, _undated, plt
+from coupler.view.study import DASHES
 
 SIZE = (6.9, 3.6)
 """[inch] two columns of a journal."""
@@ -47,18 +49,20 @@ def draw(curves, path):
     """Force and impulse over time, the first break of each run marked."""
     with plt.rc_context(STYLE):
         drawing, (upper, lower) = plt.subplots(2, 1, figsize=SIZE, sharex=True)
-        for colour, (name, curve) in zip(LINES, curves.items()):
-            upper.plot(curve.time, 1e-6 * curve.force, color=colour)
-            lower.plot(curve.time, 1e-6 * curve.impulse, color=colour, label=name)
-            for axes in (upper, lower):
-                if np.isfinite(curve.broken):
-                    axes.axvline(curve.broken, color=colour, linewidth=0.6, linestyle=":")
+        for colour, dashes, (name, curve) in zip(LINES, cycle(DASHES), curves.items()):
+            upper.plot(curve.time, 1e-6 * curve.force, color=colour, linestyle=dashes)
+            lower.plot(curve.time, 1e-6 * curve.impulse, color=colour, linestyle=dashes, label=name)
+            if np.isfinite(curve.broken):
+                for axes in (upper, lower):
+                    axes.axvline(curve.broken, color=colour, linewidth=0.8, linestyle=":")
+                upper.annotate("first joint breaks", (curve.broken, 0.03), xycoords=("data", "axes fraction"),
+                               xytext=(4, 0), textcoords="offset points", fontsize=7, color=colour)  # fmt: skip
         upper.set_ylabel("force [MN]")
         lower.set_ylabel("impulse [MN·s]")
         lower.set_xlabel("time [s]")
         arrival = min(curve.arrival for curve in curves.values())
         upper.set_xlim(max(0.0, arrival - BEFORE), max(curve.time[-1] for curve in curves.values()))
-        lower.legend(loc="upper left")
+        lower.legend(loc="lower right")
         drawing.savefig(path, metadata=_undated(Path(path).suffix[1:]))
         plt.close(drawing)
 
