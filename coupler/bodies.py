@@ -75,6 +75,11 @@ def rotation_matrix(axis, angle: float) -> np.ndarray:
     return np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
 
 
+def turned(rotation) -> np.ndarray:
+    """(3, 3) of a turn as cases give it, with axis and angle [rad]; None: along the axes."""
+    return np.eye(3) if rotation is None else rotation_matrix(rotation.axis, rotation.angle)
+
+
 def overlap_depth(a: Body, b: Body, enough: float = 0.0) -> float:
     """How far one body must move for the two to part [m]; ≤ 0: they do not overlap.
 

@@ -15,14 +15,14 @@ from coupler.case import Case
 from coupler.gauges import Bodies, Gauge, make_gauges
 from coupler.loop import Coupling
 from coupler.parts import Part, parts_of
-from coupler.solids import solids_of
+from coupler.solids import obstacle_blocks, solids_of
 
 PRESSURE_RTOL = 1e-8
 
 
 @dataclass(frozen=True)
 class Scene:
-    """What a run works on: both sides, the gauges and what never moves."""
+    """What a run works on: both sides, the gauges and what never moves (with a structure its last blocks too)."""
 
     coupling: Coupling
     gauges: list[Gauge]
@@ -39,7 +39,8 @@ def build(case: Case, clock, from_start: bool = True) -> Scene:
         structure = build_structure(case) if case.structure else None
         if structure is not None:
             on_failure.callback(structure.close)
-        coupling = _coupling(case, structure, solids, clock, from_start)
+        only_in_water = [] if structure else solids
+        coupling = _coupling(case, structure, only_in_water, clock, from_start)
         on_failure.pop_all()
     tank = (case.tank.lower, case.tank.upper) if case.tank else None
     return Scene(coupling, _gauges(case), solids, tank)
@@ -120,7 +121,7 @@ def build_structure(case: Case):
         )
     gravity = (0.0, 0.0, -case.case.gravity)
     planes = [*_ground(case), *_tank_planes(case)]
-    blocks = [block for part in parts_of(case) for block in part.blocks]
+    blocks = [block for part in parts_of(case) for block in part.blocks] + obstacle_blocks(case)
     return Structure(blocks, contact, joints, None, planes, gravity, substep=case.structure.substep)
 
 

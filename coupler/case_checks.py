@@ -50,7 +50,7 @@ def _study(case: Case) -> Iterator[Problem]:
 def remarks(case: Case) -> list[str]:
     """What is allowed but worth knowing before the run."""
     found = [*_thin_remarks(case), *water_remarks(case), *_joint_remarks(case), *_loose_remarks(case)]
-    return [*found, *_solid_remarks(case), *_unit_remarks(case), *_window_remarks(case)]
+    return [*found, *_unit_remarks(case), *_window_remarks(case)]
 
 
 def _thin_remarks(case: Case) -> Iterator[str]:
@@ -100,15 +100,6 @@ def _loose_remarks(case: Case) -> Iterator[str]:
         return
     for part in (*case.structure.wall, *case.structure.building):
         yield f"the blocks of '{part.name}' lie loose on one another; a section [joints] glues them"
-
-
-def _solid_remarks(case: Case) -> Iterator[str]:
-    """Fixed solids do not stop blocks."""
-    if case.solid and any(not (b.fixed or b.driven) for part in parts_of(case) for b in part.blocks):
-        yield (
-            f"only the water feels the fixed solid '{case.solid[0].name}', blocks pass through it; where they may "
-            "reach a body that stands fast, make that a [[structure.block]] with fixed = true"
-        )
 
 
 def _unit_remarks(case: Case) -> Iterator[str]:
@@ -280,8 +271,8 @@ def _known_names(case: Case, parts: list[Part]) -> Iterator[Problem]:
     for i, gauge in enumerate(case.gauge):
         if gauge.kind in ("force", "loads") and absent(gauge.on, moving + solids):
             yield ("gauge", i, "on"), _no_such("body", gauge.on, moving + solids)
-        if gauge.kind == "reaction" and absent(gauge.on, moving):
-            yield ("gauge", i, "on"), _no_such("block or group", gauge.on, moving)
+        if gauge.kind == "reaction" and absent(gauge.on, moving + solids):
+            yield ("gauge", i, "on"), _no_such("block, group or solid", gauge.on, moving + solids)
         if gauge.kind == "motion" and absent(gauge.of, blocks):
             yield ("gauge", i, "of"), _no_such("block", gauge.of, blocks)
 
@@ -303,10 +294,10 @@ def _pairs(case: Case) -> Iterator[Problem]:
 
 
 def _materials(case: Case) -> dict[str, None]:
-    """Materials of blocks, ground and tank, each once."""
+    """Materials of blocks, solids, ground and tank, each once."""
     structure = case.structure
     tables = [spec for kind in PARTS for spec in getattr(structure, kind)]
-    found = [spec.material for spec in tables]
+    found = [spec.material for spec in (*tables, *case.solid)]
     if structure.ground is not None:
         found.append(structure.ground.material)
     if case.tank is not None:

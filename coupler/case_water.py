@@ -138,8 +138,8 @@ class Water(Section):
 
 class Solid(Section):
     """A fixed body in the water, for instance an obstacle: a box (centre, size), the hull of points (vertices), or the
-    convex bodies of a file (path). It takes the forces of the water and never moves. Blocks pass through it: what is to
-    hold blocks is a [[structure.block]] with fixed = true."""
+    convex bodies of a file (path). It takes forces and never moves. In a case with a structure it is one of its blocks,
+    held in place: blocks hit it, rest on it and, with joints, are glued to it where their faces touch."""
 
     name: Name = Field("solid", description="for gauges and results")
     centre: Point | None = Field(None, description="centre of a box")
@@ -159,4 +159,8 @@ class Solid(Section):
     offset: Point = Field((0.0, 0.0, 0.0), description="added to all places of the file, after the scale")
     weld: PositiveLength | None = Field(
         None, description="corners of the file closer than this are one; absent: found from its edges"
+    )
+    material: Name = Field("solid", description="a name that contact.pair may go by")
+    density: Density | None = Field(
+        None, description="mass per volume, for its weight among the loads; absent: structure.density"
     )

@@ -3,7 +3,7 @@
 Part        force on a block, mean over the step                          absent without
 pressure    -∫ p n dA over its wetted faces                               [water]
 friction    viscous stress and friction of the water along its faces      [water]
-contact     of other blocks, held ones too, of ground and tank            [contact]
+contact     of other blocks, held ones and solids too, of ground and tank [contact]
 joint       joints with other blocks and the ground                       [joints]
 weight      m g                                                           [structure]
 
@@ -24,7 +24,7 @@ Array = np.ndarray
 PARTS = {
     "pressure": "pressure of the water",
     "friction": "viscosity and friction of the water along the faces",
-    "contact": "contact with other blocks, ground and tank",
+    "contact": "contact with other blocks, solids, ground and tank",
     "joint": "joints with other blocks and the ground",
     "weight": "weight",
 }

@@ -9,7 +9,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from coupler.bodies import rotation_matrix
+from coupler.bodies import turned
 from coupler.case import Case
 
 KeyPath = tuple[str | int, ...]
@@ -79,9 +79,8 @@ def _made_from(case: Case, spec, make, driven: dict) -> list:
 def _single(spec, common: dict) -> list:
     from yade_scripts.blocks import Block
 
-    turn = np.eye(3) if spec.rotation is None else rotation_matrix(spec.rotation.axis, spec.rotation.angle)
     more = common | {
-        "rotation": turn,
+        "rotation": turned(spec.rotation),
         "group": spec.group or spec.name,
         "fixed": spec.fixed,
         "velocity": np.array(spec.velocity),

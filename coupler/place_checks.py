@@ -19,8 +19,6 @@ Placed = tuple[KeyPath, str, Body]
 
 TOUCH = 1e-5
 """Overlap below this share of the smallest width is contact, not overlap (rounding of decimals and of files)."""
-LOWERED = 10.0 * TOUCH
-"""Share of its smallest width by which a block is lowered to see what it rests on."""
 BYTES_PER_CELL = 1200
 """Resident memory that a cell of the mesh takes in a run: topology, moments and fields of the water."""
 
@@ -57,7 +55,6 @@ def place_problems(case: Case, parts: list[Part]) -> Iterator[Problem]:
     yield from _tank(case)
     yield from _fills(case)
     yield from _overlaps(solids, blocks, [b.name for part in parts for b in part.blocks])
-    yield from _resting(case, solids, parts)
     yield from _outside(case, solids, blocks)
     yield from _submerged_fills(case, [*solids, *blocks])
     held = [(part.path, b.name, Body.of_block(b)) for part in parts for b in part.blocks if b.fixed]
@@ -188,26 +185,6 @@ def _may_overlap(path: KeyPath, other: KeyPath) -> bool:
     if path == other:
         return path[:2] == ("structure", "file")
     return not path[0] == other[0] == "solid"
-
-
-def _resting(case: Case, solids: list[Placed], parts: list[Part]) -> Iterator[Problem]:
-    """Blocks that stand on a fixed solid: only the water feels it, so they would fall through; each part told once."""
-    for part in parts if case.case.gravity > 0.0 else ():
-        free = [Body.of_block(b) for b in part.blocks if not (b.fixed or b.driven)]
-        under = next((name for _, name, solid in solids if any(_rests_on(b, solid) for b in free)), None)
-        if under is not None:
-            yield (
-                part.path,
-                f"'{part.name}' rests on the fixed solid '{under}', which only the water feels: it would fall through; "
-                f"make '{under}' a [[structure.block]] with fixed = true",
-            )
-
-
-def _rests_on(block: Body, solid: Body) -> bool:
-    """The two touch, and overlap as soon as the block is lowered."""
-    low = LOWERED * min(block.thickness(), solid.thickness())
-    down = Body(block.vertices - [0.0, 0.0, low], block.normals, block.edges)
-    return overlap_depth(solid, down) > 0.5 * low and overlap_depth(solid, block) < 0.1 * low * (1 + 1e-9)
 
 
 def _submerged_fills(case: Case, bodies: list[Placed]) -> Iterator[Problem]:

@@ -28,7 +28,8 @@ from coupler.output import BlockWriter, WaterWriter, write_solids
 class Recorder:
     """Writes a run as it goes; absent sides leave no files.
 
-    directory: of the run · coupling: Coupling · gauges: list of Gauge · solids: [(vertices, faces)]
+    directory: of the run · coupling: Coupling · gauges: list of Gauge
+    solids: [(vertices, faces)] that never move, with a structure its last blocks ·
     tank: (lower, upper) or None · kept: what `save` gave, to continue the files from there. Raises CannotContinue.
     """
 
@@ -61,8 +62,10 @@ class Recorder:
         self._blocks = None
         if structure:
             s = structure
+            self._n_blocks = s.n - len(solids)
             shapes = (s.shape_vertices, s.shape_faces, s.names, s.groups)
-            self._blocks = BlockWriter(directory / "blocks.vtkhdf", *shapes, keep=keep)
+            own = (values[: self._n_blocks] for values in shapes)
+            self._blocks = BlockWriter(directory / "blocks.vtkhdf", *own, keep=keep)
         if kept is not None:
             self._restore_sums(kept)
         elif solids or tank:
@@ -209,13 +212,10 @@ class Recorder:
             )
         if self._blocks:
             s = c.structure
-            self._blocks.append(
-                time,
-                s.centre(),
-                s.rotation(),
-                {"speed": np.linalg.norm(s.velocity()[:, :3], axis=1)}
-                | ({} if s.joints is None else {"damage": block_damage(s)}),
-            )
+            data = {"speed": np.linalg.norm(s.velocity()[:, :3], axis=1)}
+            data |= {} if s.joints is None else {"damage": block_damage(s)}
+            data = {name: values[: self._n_blocks] for name, values in data.items()}
+            self._blocks.append(time, s.centre()[: self._n_blocks], s.rotation()[: self._n_blocks], data)
         self._write_cracks()
         self._written += 1
 

@@ -83,8 +83,9 @@ def _describe(scene: Scene, reporter) -> None:
     if c.structure is not None:
         limit, substep = c.structure.substep_limit(), c.structure.substep()
         joints = joint_counts(c.structure).intact
+        held = f" ({int(c.structure.fixed.sum())} held or driven)" if c.structure.fixed.any() else ""
         reporter.message(
-            f"structure: {c.structure.n} blocks, {joints} joints, substep {substep:.3g} s ({limit.what})"
+            f"structure: {c.structure.n} blocks{held}, {joints} joints, substep {substep:.3g} s ({limit.what})"
         )
         if limit.remark(substep):
             reporter.message(f"note: {limit.remark(substep)}")

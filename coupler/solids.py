@@ -1,4 +1,7 @@
-"""The fixed solids of a case as convex bodies in space: boxes, hulls of points, bodies of files."""
+"""The fixed solids of a case as convex bodies in space: boxes, hulls of points, bodies of files.
+
+To the water they are bodies that never move; in a case with a structure they are held blocks of it, behind the others.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from coupler.bodies import Body, rotation_matrix
+from coupler.bodies import Body, turned
 from coupler.case import Case
 
 KeyPath = tuple[str | int, ...]
@@ -36,6 +39,17 @@ def solids_of(case: Case) -> tuple[FixedSolid, ...]:
 
     Raises BlockError or BlockFileError where a table makes none. Kept for the next call unless a file changed."""
     return _made(case.solid, tuple(_stamp(s.path) for s in case.solid if s.path))
+
+
+def obstacle_blocks(case: Case) -> list:
+    """The fixed solids as held blocks, in the order of `solids_of`: what blocks meet and joints glue to."""
+    return [block for i, spec in enumerate(case.solid) for block in _held(case, spec)]
+
+
+def _held(case: Case, spec) -> list:
+    """Blocks of one table; those of a file are numbered, and all are a group of its name."""
+    density = spec.density or case.structure.density
+    return _blocks(spec, density=density, material=spec.material, group=spec.name, fixed=True)
 
 
 def refused_solids(case: Case) -> Iterator[tuple[KeyPath, str]]:
@@ -73,9 +87,7 @@ def _stamp(path: str) -> tuple[int, int]:
 
 def _bodies(path: KeyPath, spec) -> Iterator[FixedSolid]:
     if spec.size is not None:
-        turn = (
-            np.eye(3) if spec.rotation is None else rotation_matrix(spec.rotation.axis, spec.rotation.angle)
-        )
+        turn = turned(spec.rotation)
         corners = np.array(spec.centre) + (0.5 * np.array(spec.size) * BOX_CORNERS) @ turn.T
         yield FixedSolid(path, spec.name, corners, BOX_FACES, Body.box(spec.centre, spec.size, turn))
         return
@@ -83,10 +95,13 @@ def _bodies(path: KeyPath, spec) -> Iterator[FixedSolid]:
         yield FixedSolid(path, spec.name, block.world_vertices(), block.faces, Body.of_block(block))
 
 
-def _blocks(spec) -> list:
+def _blocks(spec, **common) -> list:
     from coupler.block_files import blocks_from_file
     from yade_scripts.blocks import Block
 
     if spec.path:
-        return blocks_from_file(spec)
-    return [Block.standing(spec.name, np.array(spec.vertices))]
+        return blocks_from_file(spec, **common)
+    if spec.size is not None:
+        size, turn = np.array(spec.size), turned(spec.rotation)
+        return [Block(spec.name, np.array(spec.centre), size=size, rotation=turn, **common)]
+    return [Block.standing(spec.name, np.array(spec.vertices), **common)]
