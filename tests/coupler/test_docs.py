@@ -1,5 +1,6 @@
 """What the pages say can be typed in is known to the program: names of the case file, commands, their options."""
 
+import json
 import re
 import tomllib
 
@@ -9,6 +10,9 @@ from typer.main import get_command
 from coupler.case_schema import keys, names_in
 from coupler.cli import app
 from coupler.provenance import ROOT
+from coupler.stress.registry import Measure, Outcome
+from coupler.verify.registry import Result
+from coupler.verify.report import json_line
 
 PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md"), *(ROOT / "cases").glob("*/README.md")])
 KNOWN = {key.path for key in keys()}
@@ -70,6 +74,22 @@ def test_commands_and_their_options_exist(page):
                 there = {o for p in COMMANDS[command].params for o in (*p.opts, *p.secondary_opts)}
                 lost += [o for o in re.findall(r"(?<!\S)--[a-z-]+", rest) if o not in there]
     assert lost == []
+
+
+def documented(title):
+    """Names in the first column of the table with this head in docs/results.md."""
+    text = (ROOT / "docs" / "results.md").read_text(encoding="utf-8")
+    table = text.split(f"| `{title}` | |\n|---|---|\n")[1].split("\n\n")[0]
+    return {name for row in table.splitlines() for name in re.findall(r"`(\w+)`", row.split("|")[1])}
+
+
+def test_what_programs_read_is_documented():
+    """Scripts of users hang on these names: who changes one changes the page, and tells it."""
+    checked = json.loads(json_line(Result.failed("P01", "why", 1.0)))
+    assert documented("verify --json") == set(checked)
+    outcome = Outcome("S01", "structure", "what", "passed", measures=[Measure("gain", 1.0, 2.0, "J")])
+    assert documented("stress --json") == set(outcome.as_row())
+    assert set(outcome.as_row()["measures"][0]) == {"quantity", "value", "limit", "unit", "kept"}
 
 
 def test_sections_have_names():
