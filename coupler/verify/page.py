@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import json
+import math
+import re
 import sys
 from collections.abc import Iterable
 
 from coupler.provenance import machine, versions
-from coupler.verify.registry import NOT_COVERED, Result, checks
+from coupler.verify.registry import NOT_COVERED, TOLD, Result, checks
 
 NOTES = {
     "P38": "Without friction the pressure is that of published frictionless δ-SPH to 0.03. Friction of smooth walls "
     "brings it down to the measured one, but by an amount that depends on the cells, as nothing mixes the boundary "
-    "layer: docs/water.md.",
+    "layer: [water](water.md).",
     "P39": "H3 lies behind the box: water closes the wake from one side too early, because all cells "
-    "are split along the same diagonal (docs/water.md, Weak); when the jet comes down differs from run to run.",
+    "are split along the same diagonal ([water](water.md#weak)); when the jet comes down differs from run to run.",
     "P41": "Into 0.018 m, two cells, the bore is a tenth too slow, in other places and with other steps by 6 to 13 %: "
     "the sheet that it runs over is thinner than what a cell resolves.",
     "P42": "The wave is less than half a cell high, its run-up one to two cells of water; where the tongue tears off "
@@ -24,7 +26,7 @@ NOTES = {
     "that of Stokes). At D/h = 4 the number of its facets, cells far from it, half the step, its place in a cell and "
     "holding the tangential velocity only change the speed by 1 % at most, a smaller penalty of the wall (2.5 for "
     "4 μ A/V) by 1.7 %. D/h = 8 at Re 1.5 takes seven times the steps, since light blocks bound them "
-    "(docs/theory.md, 3).",
+    "([theory](theory.md#3-coupling)).",
     "P56": "The sheet of water that reaches the cubes is 3 to 5 cm deep, less than a cell of edge/3. Its momentum flux "
     "over the width of a cube, 44 N from 0.8 to 1.0 s, is right there, but a held column of that width gets 15, 21 and "
     "28 N with edge/3, 6 and 10: too few nodes under the surface to turn the sheet aside. Cubes sealed or wetted from "
@@ -37,6 +39,7 @@ NOTES = {
 def page(results: list[Result]) -> str:
     """The whole page."""
     failed = [r.id for r in results if not r.passed]
+    judged = [r for r in results if r.judged]
     cases = list(dict.fromkeys(r.id for r in results))
     passed = len(cases) - len(set(failed))
     parts = [
@@ -44,13 +47,40 @@ def page(results: list[Result]) -> str:
         "Made from `surgebreak verify --json | python -m coupler.verify.page`. Errors are shown with the processor "
         "time that the case took; the figures of a case come from one run, booked to the first of them.",
         f"{_machine()}",
-        f"{passed} of {len(cases)} cases pass, {len(results) - len(failed)} of {len(results)} figures; "
-        f"{sum(r.cpu_s for r in results):.0f} CPU s.",
+        f"{passed} of {len(cases)} cases pass, {len(judged) - len(failed)} of {len(judged)} figures, "
+        f"{len(results) - len(judged)} more are told and not judged; "
+        f"{sum(r.cpu_s for r in results):.0f} CPU s. A case passes if all of its figures do.",
+        _overview(results, cases),
         *(_case(id, [r for r in results if r.id == id]) for id in cases),
     ]
     if NOT_COVERED:
         parts += ["## Not covered", "\n".join(f"- {id}: {why}" for id, why in NOT_COVERED.items())]
     return "\n\n".join(parts) + "\n"
+
+
+def _overview(results: list[Result], cases: list[str]) -> str:
+    """A row a case: how many of its figures keep their limit, the one nearest to it or farthest beyond, its time."""
+    rows = []
+    for id in cases:
+        everything = [r for r in results if r.id == id]
+        own = [r for r in everything if r.judged]
+        kept, title = sum(r.passed for r in own), checks()[id].title
+        count = f"{kept} of {len(own)}" if kept == len(own) else f"**{kept} of {len(own)}**"
+        nearest = max(map(_of_limit, own))
+        worst = f"{100 * nearest:.0f} %" if math.isfinite(nearest) else "–"
+        anchor = re.sub(r"[^\w\- ]", "", f"{id}: {title}".lower()).replace(" ", "-")
+        rows.append(
+            f"| [{id}](#{anchor}) | {title} | {count} | {worst} | {sum(r.cpu_s for r in everything):.0f} |"
+        )
+    head = "| case | what | figures kept | largest error, of its limit | CPU s |\n|---|---|--:|--:|--:|"
+    return "\n".join([head, *rows])
+
+
+def _of_limit(r: Result) -> float:
+    """Error over its limit; 0 where only equality passes and it does; infinite without a figure."""
+    if r.error is None or r.tolerance is None:
+        return math.inf
+    return r.error / r.tolerance if r.tolerance > 0.0 else 0.0 if r.passed else math.inf
 
 
 def _machine() -> str:
@@ -74,6 +104,8 @@ def _row(r: Result) -> str:
         return f"| {r.reason} | | | | | **no** | {r.cpu_s:.1f} |"
     error, limit = (f"{100 * v:.3g} %" if r.relative else f"{v:.3g}" for v in (r.error, r.tolerance))
     verdict = "yes" if r.passed else "**no**"
+    if not r.judged:
+        quantity, limit, verdict = quantity.replace(f" {TOLD}", ""), "–", "told"
     return (
         f"| {quantity} | {r.value:.6g} | {r.expected:.6g} | {error} | {limit} | {verdict} | {r.cpu_s:.1f} |"
     )

@@ -53,6 +53,10 @@ class Check:
     run: Callable[[], Iterator[Finding]]
 
 
+TOLD = "(told, not judged)"
+"""In the name of a quantity that is reported beside those that are judged."""
+
+
 @dataclass(frozen=True)
 class Result:
     """One quantity of a case, or why the case gave none (`reason`; then value and error are None)."""
@@ -67,6 +71,11 @@ class Result:
     passed: bool
     cpu_s: float
     reason: str = ""
+
+    @property
+    def judged(self) -> bool:
+        """Whether it counts: what is only told neither passes nor fails."""
+        return TOLD not in self.quantity
 
     @classmethod
     def of(cls, id: str, found: Finding, cpu_s: float) -> Result:

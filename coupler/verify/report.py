@@ -56,7 +56,7 @@ def head() -> str:
 
 def line(result: Result) -> str:
     """One row; a case that broke off says why instead of its figures."""
-    verdict = "ok" if result.passed else "FAIL"
+    verdict = "told" if not result.judged else "ok" if result.passed else "FAIL"
     if result.value is None:
         return f"{result.id:5} {verdict}: {result.reason}"
     error, limit = (_share(v) if result.relative else f"{v:.3g}" for v in (result.error, result.tolerance))
@@ -75,7 +75,8 @@ def totals(results: list[Result]) -> str:
     """How many passed, which did not, and the processor time."""
     failed = sorted({r.id for r in results if not r.passed})
     cases = len({r.id for r in results})
-    told = f"{cases - len(failed)} of {cases} cases pass, {sum(r.passed for r in results)} of {len(results)} figures"
+    judged = [r for r in results if r.judged]
+    told = f"{cases - len(failed)} of {cases} cases pass, {sum(r.passed for r in judged)} of {len(judged)} figures"
     if failed:
         told += f"; not: {', '.join(failed)}"
     return f"{told}; {sum(r.cpu_s for r in results):.1f} CPU s"

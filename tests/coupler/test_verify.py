@@ -7,7 +7,7 @@ import pytest
 
 from coupler.errors import BadCase, ExitCode
 from coupler.records import SHIPPED
-from coupler.verify import registry, report, runner
+from coupler.verify import page, registry, report, runner
 from coupler.verify.figures import columns, named_values
 from coupler.verify.registry import Check, Finding, Result
 
@@ -69,6 +69,15 @@ def test_a_case_of_the_law_runs_in_its_own_process(capsys):
     assert len(rows) == 14
     assert {"id", "quantity", "value", "expected", "error", "tolerance", "pass", "cpu_s"} <= set(rows[0])
     assert all(row["pass"] for row in rows)
+
+
+def test_what_is_only_told_is_not_counted_as_kept():
+    """A case that promises nothing would else raise the share of figures that pass."""
+    told = Result("P43", "rms of G1 (told, not judged)", 0.04, 0.0, 0.04, 0.1, False, True, 1.0)
+    kept = Result("P43", "volume", 0.0, 0.0, 0.0, 0.1, False, True, 1.0)
+    assert "1 of 1 figures" in report.totals([told, kept])
+    assert " told " in report.line(told)
+    assert "1 of 1 |" in page.page([told, kept])
 
 
 def test_a_failure_is_counted_and_named():
