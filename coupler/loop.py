@@ -16,7 +16,7 @@ import numpy as np
 from coupler.ledger import Balance, Ledger
 from coupler.limits import Diverged, check_finite, check_misses, check_pressure
 from coupler.momentum import MomentumBalance, book_step, momentum_ledger
-from coupler.observe import fastest_point, surface_area
+from coupler.observe import fastest_point
 
 Array = np.ndarray
 
@@ -26,9 +26,6 @@ STANDS_STILL = 1e-3
 """Share of the energy of the scene below which the motion of the structure is no measure of the defect."""
 DEFECT_STEPS = 20
 """Steps over which the defect is averaged: a breaking joint may spoil one of them."""
-SHEAR = 0.05
-"""dt ≤ SHEAR (m/A) h/μ for blocks of mass m and surface A in water that sticks to them: the shear of a step goes by
-the velocity that they had at its start, and a longer step turns their spin round (measured on a sphere)."""
 RETRIES = 3
 """Times that a step which failed is halved and taken again."""
 RETRY_AT = 0.6
@@ -101,6 +98,11 @@ class Coupling:
         if structure is not None:
             self.radius = np.array([np.linalg.norm(v, axis=1).max() for v in structure.shape_vertices])
         self.time = 0.0
+        self.sheared = None
+        if self.coupled and water.viscous is not None and water.parameters.walls == "no-slip":
+            from coupler.shear import ShearedBlocks
+
+            self.sheared = ShearedBlocks(structure, immersion.n_solids)
         self.ledger = Ledger()
         if water is not None:
             self.ledger.available = water.available_energy()
@@ -110,6 +112,8 @@ class Coupling:
     def save(self) -> dict[str, Array]:
         """What the coupling itself remembers between two steps; both sides and the ledger save theirs."""
         found = {"time": np.array(self.time), "defects": np.array(self._defects, float)}
+        if self.sheared is not None:
+            found["sheared"] = self.sheared.accelerations.copy()
         return found if math.isinf(self.longest) else found | {"longest": np.array(self.longest)}
 
     def restore(self, saved: dict[str, Array]) -> None:
@@ -117,6 +121,8 @@ class Coupling:
         self.time = float(saved["time"])
         self._defects = deque(saved["defects"].tolist(), maxlen=DEFECT_STEPS)
         self.longest = float(saved.get("longest", math.inf))
+        if self.sheared is not None:
+            self.sheared.accelerations = saved["sheared"].copy()
 
     @property
     def coupled(self) -> bool:
@@ -137,19 +143,7 @@ class Coupling:
             speed = fastest_point(self.structure.velocity(), self.radius)
             if speed > 0.0:
                 dt = min(dt, BLOCK_COURANT * self.water.mesh.spacing / speed)
-            dt = min(dt, self._shear_limit())
         return remaining / max(1, math.ceil(remaining / dt * (1.0 - 1e-9)))
-
-    def _shear_limit(self) -> float:
-        """Longest step [s] for the lightest block that the water sticks to."""
-        if self.water.viscous is None:
-            return math.inf
-        p, s = self.water.parameters, self.structure
-        free = np.flatnonzero(~s.fixed)
-        if p.walls != "no-slip" or len(free) == 0:
-            return math.inf
-        least = min(s.mass[b] / surface_area(s.shape_vertices[b], s.shape_faces[b]) for b in free)
-        return SHEAR * least * self.water.mesh.spacing / p.viscosity
 
     def step(self, dt: float) -> StepRecord:
         """Advance both sides by dt [s], or by the half of it, its half, ... where a whole one fails: `record.dt`.
@@ -180,12 +174,16 @@ class Coupling:
             if self.water.slits is not None:
                 self.water.set_cracks(self.immersion.cracks.cracks())
             record.bodies_cut = self.immersion.cut_again
+        n, before = self.structure.n, self.structure.velocity()
         if self.water.viscous is not None:
-            self.water.body_velocity = self._padded(self.structure.velocity())
+            self.water.body_velocity = self._padded(before)
+        if self.sheared is not None:
+            self.water.free_bodies = self.sheared.now()
         problem, found = self._attempts(dt, record)
         with self.clock("water"):
             self.water.correct(problem, found.x)
-        n = self.structure.n
+        if self.sheared is not None:
+            self.sheared.note(before, problem.predicted.shear.load[:n], record.dt)
         record.load, record.unknowns = found.load, len(found.x)
         self.ledger.give(record.dt * float(np.sum(found.load[:n] * found.velocity[:n])))
         self._note_loads(problem, record, found.velocity)

@@ -10,6 +10,9 @@ method of order two that damps stiff parts fully (Alexander, SIAM J. Numer. Anal
     u₁ = uⁿ + γ (w - uⁿ) + γ dt M⁻¹ r(u₁)
     u = w + dt M⁻¹ [(1-γ) r(u₁) + γ r(u)],        impulse on bodies  dt [(1-γ) F(u₁) + γ F(u)].
 
+Bodies that move freely are part of the stage, with their own mass and the motion that the other forces of the last
+step would give them (`FreeBodies`): what a light body and the water that sticks to it exchange does not depend on dt.
+
 M: the water at each node, ∫_{φ<0} ρ N_i dV; cells count with their water.  No traction on the free surface (natural).
 Sides of the tank: no-slip holds u = 0 on their nodes; friction acts on their nodes.  On open sides only the normal
 velocity changes: the tangential one leaves as it came, or the missing ∇uᵀ n would bend a parallel stream.
@@ -47,6 +50,22 @@ class ViscousChange:
     energy: float
     iterations: int
     tank: np.ndarray
+
+
+@dataclass(frozen=True)
+class FreeBodies:
+    """How bodies answer to shear within a step: mass (n_bodies, 6, 6) [kg, kg m²] about their centres, world axes ·
+    moves (n_bodies,) bool: the others keep their velocity · acceleration (n_bodies, 6) [m/s², rad/s²] by all but
+    shear."""
+
+    mass: np.ndarray
+    moves: np.ndarray
+    acceleration: np.ndarray
+
+    @classmethod
+    def none(cls, n: int) -> FreeBodies:
+        """n bodies that keep their velocity."""
+        return cls(np.zeros((n, 6, 6)), np.zeros(n, bool), np.zeros((n, 6)))
 
 
 class WettedWalls:
@@ -94,29 +113,34 @@ class Viscosity:
         Raises NotConverged."""
         mass = self.parameters.density * nodal_water
         terms = self._terms(water, phi, mass, w)
-        V = water.body_velocity
-        half_way = water.velocity + GAMMA * (w - water.velocity)
-        first, n1 = self._stage(terms, mass, dt, half_way, V)
-        load1, tank1, power1 = _acting(water, terms, half_way + first)
-        second, n2 = self._stage(terms, mass, dt, w + (1.0 - GAMMA) / GAMMA * first, V)
-        u = w + (1.0 - GAMMA) / GAMMA * first + second
-        load2, tank2, power2 = _acting(water, terms, u)
+        V, bodies = water.body_velocity, water.free_bodies or FreeBodies.none(len(water.body_velocity))
+        change, lead = dt * bodies.acceleration, (1.0 - GAMMA) / GAMMA
+        half_way, V_half_way = water.velocity + GAMMA * (w - water.velocity), V + GAMMA * change
+        first, first_V, n1 = self._stage(terms, mass, bodies, dt, half_way, V_half_way)
+        load1, tank1, power1 = _acting(water, terms, half_way + first, V_half_way + first_V)
+        start, V_start = w + lead * first, V + change + lead * first_V
+        second, second_V, n2 = self._stage(terms, mass, bodies, dt, start, V_start)
+        u = start + second
+        load2, tank2, power2 = _acting(water, terms, u, V_start + second_V)
         both = ((load1, load2), (tank1, tank2), (power1, power2))
         load, tank, power = ((1.0 - GAMMA) * one + GAMMA * two for one, two in both)
         return ViscousChange(u - w, load, dt * power, n1 + n2, tank)
 
-    def _stage(self, terms, mass, dt, start, V):
-        """d with (M + γ dt K) d = γ dt r(start)."""
+    def _stage(self, terms, mass, bodies, dt, start, V):
+        """Changes (d, D) of the velocity of the water and of the bodies: (M + γ dt K) (d, D) = γ dt r(start, V)."""
         tau = GAMMA * dt
-        rate, _ = momentum_rate(terms, start, V)
-        d, count, left = implicit_change(terms, mass, tau, tau * rate, len(V), TOLERANCE, MOST_ITERATIONS)
+        rate, load = momentum_rate(terms, start, V)
+        load[~bodies.moves] = 0.0
+        d, D, count, left = implicit_change(
+            terms, mass, tau, tau * rate, (bodies.mass, bodies.moves), tau * load, TOLERANCE, MOST_ITERATIONS
+        )
         if not left <= TOLERANCE:
             raise NotConverged(
                 f"the viscous step stopped after {count} iterations at a residual of {left:.3g}, "
                 f"wanted {TOLERANCE:.3g}; reduce time.step_max or time.cfl",
                 np.array([left]),
             )
-        return d, count
+        return d, D, count
 
     def _terms(self, water, phi, mass, w):
         t, p = water.topology, self.parameters
@@ -162,10 +186,10 @@ class Viscosity:
         )
 
 
-def _acting(water, terms, u):
-    """Loads (n_bodies, 6) of the velocity u (N, 3) on the bodies, (6,) of the sides of the tank on the water, and the
-    power [W] that all stresses give the water."""
-    held, load = momentum_rate(terms, u, water.body_velocity)
-    free, _ = unheld_rate(terms, u, water.body_velocity)
+def _acting(water, terms, u, V):
+    """Loads (n_bodies, 6) of the velocity u (N, 3) on bodies with the velocity V, (6,) of the sides of the tank on the
+    water, and the power [W] that all stresses give the water."""
+    held, load = momentum_rate(terms, u, V)
+    free, _ = unheld_rate(terms, u, V)
     arm = water.topology.nodes - water.reference
     return load, momentum_of(np.ones(len(u)), held - free, arm), float(np.sum(held * u))

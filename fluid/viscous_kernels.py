@@ -140,35 +140,93 @@ def preconditioner(terms, mass, tau):
 
 
 @njit(cache=True)
-def implicit_change(terms, mass, tau, right, n_bodies, tolerance, most):
-    """d (N, 3) with (M + τ K) d = right by conjugate gradients: (d, iterations, residual reached over the first).
+def body_preconditioner(terms, body_mass, moves, tau):
+    """Inverse (n_bodies, 6, 6) of the diagonal blocks of the bodies without the flux terms; 0 where they are driven."""
+    _cell, _row, body, normal, _hat, arm, area, nitsche, drag = terms[2]
+    block, c = body_mass.copy(), np.zeros((3, 6))
+    for s in range(body.shape[0]):
+        b = body[s]
+        if not moves[b]:
+            continue
+        for q in range(3):
+            _slip_of_body(s, q, arm, c)
+            for i in range(6):
+                for j in range(6):
+                    across_i, across_j, together = 0.0, 0.0, 0.0
+                    for k in range(3):
+                        across_i += normal[s, k] * c[k, i]
+                        across_j += normal[s, k] * c[k, j]
+                        together += c[k, i] * c[k, j]
+                    along = together - across_i * across_j
+                    block[b, i, j] += tau * area[s, q] * (nitsche[s] * together + drag[s] * along)
+    inverse = np.zeros_like(block)
+    for b in range(block.shape[0]):
+        if moves[b]:
+            inverse[b] = np.linalg.inv(block[b])
+    return inverse
+
+
+@njit(cache=True)
+def _slip_of_body(s, q, arm, c):
+    """c (3, 6): velocity of a point of a polygon by the six velocities of its body, in place."""
+    x, y, z = arm[s, q, 0], arm[s, q, 1], arm[s, q, 2]
+    c[:] = 0.0
+    for k in range(3):
+        c[k, k] = 1.0
+    c[0, 4], c[0, 5] = z, -y
+    c[1, 3], c[1, 5] = -z, x
+    c[2, 3], c[2, 4] = y, -x
+
+
+@njit(cache=True)
+def implicit_change(terms, mass, tau, right, bodies, body_right, tolerance, most):
+    """d (N, 3) and D (n_bodies, 6) with (M + τ K) (d, D) = (right, body_right) by conjugate gradients: (d, D,
+    iterations, residual reached over the first).
 
     terms: (cells in the water (n,), 2μ times their water (n,), walls of `wall_stress`, μ, drag of the nodes on sides
     (N,) [kg/s], nodes on sides (n,), their projectors (n, 3, 3), idle (N,) bool: nodes that keep their velocity, cells,
     parent, gradients, edges of the cells in the water (n, 6) and their weight (n_edges,)) · mass (N,) [kg] · tau [s] ·
-    right (N, 3) [N s]."""
-    still = np.zeros((n_bodies, 6))
+    right (N, 3) [N s] · bodies: (mass (n_bodies, 6, 6) [kg, kg m²], moves (n_bodies,) bool: the others keep their
+    velocity) · body_right (n_bodies, 6) [N s, N m s]."""
+    body_mass, moves = bodies
     inverse = preconditioner(terms, mass, tau)
+    body_inverse = body_preconditioner(terms, body_mass, moves, tau)
     d, r = np.zeros_like(right), right.copy()
-    z = _scaled(inverse, r)
-    p = z.copy()
-    rz = np.sum(r * z)
+    D, R = np.zeros_like(body_right), body_right.copy()
+    z, Z = _scaled(inverse, r), _answers(body_inverse, R)
+    p, P = z.copy(), Z.copy()
+    rz = np.sum(r * z) + np.sum(R * Z)
     first = rz
     count = 0
     while rz > tolerance * tolerance * first and count < most:
-        change, _ = momentum_rate(terms, p, still)
-        Ap = np.empty_like(p)
+        change, load = momentum_rate(terms, p, P)
+        Ap, AP = np.empty_like(p), np.zeros_like(P)
         for i in range(p.shape[0]):
             for k in range(3):
                 Ap[i, k] = mass[i] * p[i, k] - tau * change[i, k]
-        alpha = rz / np.sum(p * Ap)
+        for b in range(len(moves)):
+            if moves[b]:
+                AP[b] = body_mass[b] @ P[b] - tau * load[b]
+        alpha = rz / (np.sum(p * Ap) + np.sum(P * AP))
         d += alpha * p
+        D += alpha * P
         r -= alpha * Ap
-        z = _scaled(inverse, r)
-        before, rz = rz, np.sum(r * z)
+        R -= alpha * AP
+        z, Z = _scaled(inverse, r), _answers(body_inverse, R)
+        before, rz = rz, np.sum(r * z) + np.sum(R * Z)
         p = z + (rz / before) * p
+        P = Z + (rz / before) * P
         count += 1
-    return d, count, np.sqrt(rz / first) if first > 0.0 else 0.0
+    return d, D, count, np.sqrt(rz / first) if first > 0.0 else 0.0
+
+
+@njit(cache=True)
+def _answers(inverse, R):
+    """inverse (n, 6, 6) times R (n, 6), body by body."""
+    out = np.zeros_like(R)
+    for b in range(R.shape[0]):
+        out[b] = inverse[b] @ R[b]
+    return out
 
 
 @njit(cache=True)

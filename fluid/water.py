@@ -97,6 +97,8 @@ class Water:
         self._on_sides[mesh.boundary_faces] = True
         self.viscous = _viscosity(self.parameters)
         self.body_velocity = np.zeros((domain.n_bodies, 6))
+        self.free_bodies = None
+        """`viscosity.FreeBodies` that answer to shear within the step; None: all keep their velocity."""
         self._set_domain(domain)
         n = len(self.topology.nodes)
         level = fill(self.topology.nodes) if callable(fill) else np.asarray(fill, float)

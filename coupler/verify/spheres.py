@@ -11,7 +11,7 @@ from scipy.spatial import ConvexHull
 
 from coupler.clock import Clock
 from coupler.exchange import Immersion
-from coupler.loop import SHEAR, Coupling
+from coupler.loop import Coupling
 from coupler.verify.figures import columns
 from coupler.verify.registry import Finding, check
 from coupler.verify.scenes import level_at, top
@@ -135,9 +135,8 @@ def _fall(density: float, viscosity: float, cells: int):
     with Structure([block]) as body:
         c = _scene((across, across, up), level_at(1.0), body, settings, top)
         t, v, gap = [0.0], [0.0], [8.0]
-        dt = SHEAR * block.density * D / 6.0 * h / viscosity
         while gap[-1] > 3.9:
-            c.step(dt * min(1.0, 0.1 + c.time / 0.02))
+            c.step(c.step_size(1.0) * min(1.0, 0.1 + c.time / 0.02))
             t.append(c.time)
             v.append(body.velocity()[0, 2])
             gap.append(body.centre()[0, 2] / D - 0.5)

@@ -114,6 +114,34 @@ at = [0.9, 0.5, 0.1]
 mean_over = "0.1 s"
 """
 
+STUCK = """\
+[case]
+title = "a light block in a thick liquid"
+[time]
+end = "0.1 s"
+step_max = "10 ms"
+output_every = "50 ms"
+checkpoint_every = "50 ms"
+[tank]
+lower = [0, 0, 0]
+upper = [0.6, 0.6, 0.6]
+cell = 0.1
+[water]
+viscosity = "50 Pa s"
+walls = "no-slip"
+[[water.fill]]
+lower = [0, 0, 0]
+upper = [0.6, 0.6, 0.5]
+[structure]
+[[structure.block]]
+name = "light"
+centre = [0.3, 0.3, 0.25]
+size = [0.2, 0.2, 0.2]
+density = 600
+[contact]
+stiffness = "1 MN/m"
+"""
+
 DRY = """\
 [case]
 title = "a shot breaks a column"
@@ -248,6 +276,17 @@ def test_water_alone_goes_on_bit_for_bit(tmp_path):
     part = shutil.copytree(whole, tmp_path / "part")
     listed(part / FOLDER)[0].unlink()
     assert float(go_on(part).checkpoint.part("water")["entered"]) > 0.0
+    check_same(whole, part)
+
+
+def test_a_block_that_water_sticks_to_goes_on_bit_for_bit(tmp_path):
+    """What moved it apart from shear, in the last two steps, belongs to the state."""
+    whole = begin(tmp_path / "case", STUCK, tmp_path / "whole")
+    part = shutil.copytree(whole, tmp_path / "part")
+    listed(part / FOLDER)[0].unlink()
+    (checkpoint,) = listed(part / FOLDER)
+    assert np.abs(Checkpoint.read(checkpoint).part("coupling")["sheared"]).max() > 0.1
+    assert command("resume", part, "--any-version").returncode == 0
     check_same(whole, part)
 
 
