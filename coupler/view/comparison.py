@@ -10,10 +10,13 @@ from pathlib import Path
 
 from coupler.view.palette import LINES
 from coupler.view.plots import FORMATS, STYLE, _undated, plt, prefixed
+from coupler.view.study import MARKS, share
 
 SIZE = (6.9, 7.2)
 """[inch] two columns of a journal."""
-OURS, STOCK = "-", "--"
+OURS = ("-", (0, (7, 1)), (0, (5, 1, 1, 1)))
+DASH = 3.0
+"""Length of a dash of a law of YADE [line widths]: those that coincide fill each other's gaps, so that all are seen."""
 
 
 def draw(folder):
@@ -21,7 +24,7 @@ def draw(folder):
     about = json.loads((folder / "comparison.json").read_text(encoding="utf-8"))
     first = min(row["multiple"] for row in about["laws"])
     laws = [row for row in about["laws"] if row["multiple"] == first]
-    look = {row["law"]: _look(number, row) for number, row in enumerate(laws)}
+    look = looks(laws)
     tables = {row["law"]: read(folder / f"{row['files']}.csv") for row in laws}
     with plt.rc_context(STYLE):
         drawing, axes = plt.subplots(3, 2, figsize=SIZE)
@@ -39,9 +42,16 @@ def draw(folder):
     return folder / "comparison.png"
 
 
-def _look(number, row):
-    """Colour and line of a law: ours in full lines, those of YADE dashed."""
-    return {"color": LINES[number % len(LINES)], "linestyle": STOCK if row["stock"] else OURS}
+def looks(laws):
+    """Colour and line of each law: ours nearly full, those of YADE in short dashes one behind the other."""
+    ours, stock = ([row["law"] for row in laws if row["stock"] is kind] for kind in (False, True))
+    lines = {law: OURS[k % len(OURS)] for k, law in enumerate(ours)}
+    gap = DASH * max(len(stock) - 1, 1)
+    lines |= {law: (DASH * k, (DASH, gap)) for k, law in enumerate(stock)}
+    return {
+        row["law"]: {"color": LINES[k % len(LINES)], "linestyle": lines[row["law"]]}
+        for k, row in enumerate(laws)
+    }
 
 
 def read(path):
@@ -103,10 +113,13 @@ def accuracy(axis, about, look):
         runs = sorted((r for r in about["laws"] if r["law"] == name), key=lambda r: r["cpu_seconds"])
         points = [(r["cpu_seconds"], r["largest_error"]) for r in runs if r["largest_error"]]
         if points:
-            axis.plot(*zip(*points), marker="o", markersize=3, **style)
+            axis.plot(
+                *zip(*points), marker=MARKS[list(look).index(name) % len(MARKS)], markersize=3.5, **style
+            )
     axis.set_xscale("log")
     axis.set_yscale("log")
     axis.set_xlabel("CPU time of the run [s]")
+    axis.yaxis.set_major_formatter(plt.FuncFormatter(lambda value, _: share(value)))
     axis.set_ylabel("error against " + ("the exact answer" if about["exact"] else about["reference"]))
 
 
