@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from shlex import quote
 from typing import Annotated
 
 import typer
@@ -197,8 +198,8 @@ def init(directory: Annotated[Path, typer.Argument(metavar="DIR", help="the new 
     """Write a small commented case that runs."""
     from coupler.case_docs import write_first_case
 
-    path = write_first_case(directory)
-    print(f"wrote {path}; next: surgebreak check {directory}, surgebreak run {directory}")
+    path, word = write_first_case(directory), quote(str(directory))
+    print(f"wrote {path}; next: surgebreak check {word}, surgebreak run {word}")
 
 
 @app.command()

@@ -7,7 +7,7 @@ from coupler.momentum import LINES
 ENERGY = (
     ("time", "s", "time"),
     ("water_kinetic", "J", "kinetic energy of the water"),
-    ("water_potential", "J", "potential energy of the water above z = 0"),
+    ("water_potential", "J", "potential energy of the water above the floor of the tank"),
     ("numerical_dissipation", "J", "energy the numerics took out of the water so far; negative: put in"),
     ("shear_dissipation", "J", "energy that viscosity and friction of walls took out of the water so far"),
     ("entered", "J", "energy that came with water through inflows and seas so far, less what left there"),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from shlex import quote
+
 import numpy as np
 
 from coupler.build import Scene, build
@@ -135,7 +137,11 @@ def _steps(
             if checkpoints is not None and (wish or at_end or checkpoints.due()):
                 _save(checkpoints, directory, figures, clock)
             if wish:
-                way_on = f"; `surgebreak resume {directory.path}` goes on" if checkpoints is not None else ""
+                way_on = (
+                    f"; `surgebreak resume {quote(str(directory.path))}` goes on"
+                    if checkpoints is not None
+                    else ""
+                )
                 raise LimitReached(wish + way_on)
     finally:
         recorder.close()

@@ -51,7 +51,7 @@ class RunDirectory:
         content = effective(file.case)
         path = _make(output, file.directory / "runs", content)
         run = cls(path, _summary(file, content))
-        (path / "history").mkdir()
+        _claim(path)
         (path / ".reserve").write_bytes(bytes(RESERVE))
         shutil.copyfile(file.path, path / "case.toml")
         write_json(path / "effective.json", content)
@@ -177,6 +177,16 @@ def _make_named(output: Path) -> Path:
         )
     output.mkdir(parents=True, exist_ok=True)
     return output
+
+
+def _claim(path: Path) -> None:
+    """Only one of two runs that begin in one directory at the same moment can make the folder of the histories."""
+    try:
+        (path / "history").mkdir()
+    except FileExistsError as error:
+        raise RunDirectoryExists(
+            f"{path}: another run has just begun there; name another with --output"
+        ) from error
 
 
 def _make_stamped(runs: Path, content: dict) -> Path:

@@ -257,7 +257,7 @@ def _report(water, problem, x, projected, u, clipped, momentum):
     from fluid.water import StepReport, kinetic_energy
 
     kept, p = problem.predicted, water.parameters
-    g_x = water.topology.nodes @ p.weight
+    g_x = water.below_floor(water.topology.nodes)
 
     def energy(volume, velocity):
         return kinetic_energy(p.density, volume, velocity) - p.density * float(volume @ g_x)

@@ -3,9 +3,9 @@
     W_i^left = dt ∮ N_i s (u·n)⁺ dA,        E_left = ρ dt ∮ s (½ u² - g·x) (u·n)⁺ dA                          (1)
 
 over the open faces, with the velocity at the beginning of the step and the share s of water around the nodes, both
-linear on a face; no node gives more than it holds.  The rule is exact to degree 4.  Taken at the nodes alone, the flux
-of energy, a cubic of u, is up to 20 % too large at the foot of an outlet, where u doubles within a cell; and nodes that
-are partly full, the high ones, would empty as fast as full ones.
+linear on a face, g·x zero at the floor of the tank; no node gives more than it holds.  The rule is exact to degree 4.
+Taken at the nodes alone, the flux of energy, a cubic of u, is up to 20 % too large at the foot of an outlet, where u
+doubles within a cell; and nodes that are partly full, the high ones, would empty as fast as full ones.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class Outflow:
         x = np.einsum("qa,fak->fqk", _POINTS, t.nodes[faces])
         speed = np.maximum(np.einsum("fqk,fk->fq", u, area), 0.0)
         rate = dt * _WEIGHTS * speed * np.einsum("qa,fa->fq", _POINTS, share)
-        head = p.density * (0.5 * np.einsum("fqk,fqk->fq", u, u) - x @ p.weight)
+        head = p.density * (0.5 * np.einsum("fqk,fqk->fq", u, u) - water.below_floor(x))
         volume, energy = np.zeros(len(carried)), np.zeros(len(carried))
         np.add.at(volume, faces, np.einsum("fq,qa->fa", rate, _POINTS))
         np.add.at(energy, faces, np.einsum("fq,qa->fa", rate * head, _POINTS))

@@ -91,6 +91,8 @@ class Water:
         self.slits = None
         self.reference = mesh.bounds.mean(axis=0)
         """Point (3,) [m] that angular momentum is taken about."""
+        self._lowest = float((mesh.bounds * self.parameters.weight).max(axis=0).sum())
+        """g·x at the floor [m²/s²]."""
         no_slip = self.parameters.walls == "no-slip"
         self._sides = Walls.of(mesh, is_open, is_smooth, no_slip, sides)
         self._on_sides = np.zeros(len(mesh.nodes), bool)
@@ -328,27 +330,32 @@ class Water:
         return kinetic_energy(self.parameters.density, self.nodal_water, self.velocity)
 
     def potential_energy(self) -> float:
-        """-∫ ρ g·x dV [J] at the time of the velocity.
+        """-∫ ρ g·x dV [J] above the floor of the tank, at the time of the velocity.
 
         The surface lags: it moves at the start of the next step.  The rate -∫ ρ g·u dV brings it up: by half a step
         on its own (centred transport), by a whole one where bodies have already moved with this step's velocity;
         or the work on a heaving body would seem to come and go."""
         p = self.parameters
-        at_surface = -p.density * float(self.nodal_water @ (self.topology.nodes @ p.weight))
+        at_surface = -p.density * float(self.nodal_water @ self.below_floor(self.topology.nodes))
         return at_surface - self._surface_lag * float(self.momentum() @ p.weight)
 
     def head(self) -> np.ndarray:
         """½ ρ u² - ρ g·x + p (N,) [J/m³] at the nodes."""
         p = self.parameters
         kinetic = 0.5 * p.density * np.einsum("ij,ij->i", self.velocity, self.velocity)
-        return kinetic - p.density * (self.topology.nodes @ p.weight) + self.pressure
+        return kinetic - p.density * self.below_floor(self.topology.nodes) + self.pressure
+
+    def below_floor(self, x) -> np.ndarray:
+        """g·x (...) [m²/s²] of places x (..., 3) [m], zero at the floor of the tank and negative above it: what leaves
+        the tank takes energy with it, wherever the tank lies."""
+        return x @ self.parameters.weight - self._lowest
 
     def available_energy(self) -> float:
         """Kinetic energy, and the potential energy above that of the same water spread over the whole floor [J]."""
         low, high = self.mesh.bounds
         area = (high - low)[0] * (high - low)[1]
         p, volume = self.parameters, self.volume()
-        spread = p.density * p.gravity * volume * (low[2] + 0.5 * volume / area)
+        spread = 0.5 * p.density * p.gravity * volume**2 / area
         return self.kinetic_energy() + max(self.potential_energy() - spread, 0.0)
 
 

@@ -53,6 +53,17 @@ def test_two_runs_in_one_second_have_two_directories(file):
     assert RunDirectory.create(file).path != RunDirectory.create(file).path
 
 
+def test_of_two_runs_that_begin_in_one_directory_at_once_the_second_is_refused(file, tmp_path, monkeypatch):
+    """Both found it empty; the first to make the folder of the histories has it."""
+    place = tmp_path / "results"
+    RunDirectory.create(file, place)
+    monkeypatch.setattr("coupler.run_directory._make", lambda *_: place)
+    with pytest.raises(
+        RunDirectoryExists, match="another run has just begun there; name another with --output"
+    ):
+        RunDirectory.create(file, place)
+
+
 def test_an_existing_directory_is_never_touched(file, tmp_path):
     place = tmp_path / "results"
     place.mkdir()

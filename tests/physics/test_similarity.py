@@ -10,7 +10,7 @@ import pytest
 
 from coupler.build import build
 from tests.fakes import no_clock
-from tests.physics.scenes import case
+from tests.physics.scenes import case, run
 
 INFLOWS = {
     "bore": {"ahead": (0.3, "m"), "level": (0.45, "m")},
@@ -216,3 +216,29 @@ def test_an_arch_breaks_the_same_elsewhere_and_with_its_blocks_in_another_order(
     )
     for name in expected:
         np.testing.assert_allclose(found[name], expected[name], rtol=0, atol=1e-5)
+
+
+@pytest.mark.parametrize("lowest", [-20.0, 20.0])
+def test_energy_of_water_that_leaves_does_not_depend_on_where_the_tank_lies(lowest):
+    """A column drains through an open side of a tank at sea level, below it and above it. Counted from z = 0, water
+    that falls out below it would seem to bring 57 times the energy of the scene."""
+
+    def balance(z):
+        scene = build(
+            case(
+                time={"end": 0.6, "step_max": 0.02},
+                tank={"lower": [0, 0, z], "upper": [1, 0.25, 0.75 + z], "cell": 0.125, "open": ["z+", "x+"]},
+                water={"fill": [{"lower": [0, 0, z], "upper": [0.5, 0.25, 0.5 + z]}]},
+            ),
+            no_clock,
+        )
+        records = []
+        run(scene.coupling, 0.6, records.append)
+        return records[-1].balance
+
+    found, expected = balance(lowest), balance(0.0)
+    assert expected.left > 0.2 * expected.input_energy
+    for name in ("water_potential", "left", "numerical_dissipation", "energy_error"):
+        assert getattr(found, name) == pytest.approx(
+            getattr(expected, name), abs=0.01 * expected.input_energy
+        )
