@@ -46,7 +46,7 @@ def differences(one, two, at="water", found=None):
     if isinstance(one, np.ndarray):
         if (
             one.dtype != two.dtype
-            or one.strides != two.strides
+            or (one.size > 0 and one.strides != two.strides)
             or not np.array_equal(one, two, equal_nan=True)
         ):
             found.append(at)
