@@ -68,9 +68,22 @@ def test_debris_in_a_dam_break_closes_every_step(covers):
     coupling, _ = run(scene(water=water), 0.4, each)
     assert max(errors) < 1e-13
     assert not coupling.structure.joints.alive.all(), "no joint broke"
-    acting = ["tank", "tank_shear", "solids", "held_blocks", "ground", "ground_joints", "lag", "transport"]
+    acting = ["tank", "tank_shear", "held_blocks", "ground", "ground_joints", "lag", "transport"]
     for name in acting + ["recut"] * (covers == "multiple"):
         assert told[name] > 1e-6, f"nothing happened in {name}: the scene does not show that it closes"
+
+
+def test_a_pier_that_water_alone_strikes_has_a_line_of_its_own():
+    """Without a structure fixed solids are none of its held blocks."""
+    errors, solids = [], []
+
+    def each(coupling, record):
+        errors.append(record.momentum.error)
+        solids.append(np.abs(record.momentum.lines["solids"]).max())
+
+    run(scene(structure=None, contact=None, joints=None), 0.3, each)
+    assert max(errors) < 1e-13
+    assert max(solids) > 0.1
 
 
 def test_water_gives_what_blocks_receive():
