@@ -218,29 +218,31 @@ def _coupling(water, void):
 
 
 def _carried_remainder(water, dt, theta, cells):
-    """u'_e = β (u'_e - (1-θ) dt r_e) (M, 3) with β = 1/(1 + 2 |u_e| dt / l_e): the remainder that lives on.
+    """u'_e = β (u'_e - (1-θ) dt r_e) (M, 3) with β = 1/(1 + (4 ν/l_e² + 2 |u_e|/l_e) dt): the remainder that lives on.
 
-    It is swept out of the cell in the time that the water takes to cross it (dynamic subscales)."""
-    t = water.topology
-    if not water.parameters.subscale_memory:
+    It is swept out of the cell in the time that the water takes to cross it, and viscosity stops it (dynamic subscales;
+    Codina, Principe, Guasch, Badia, Comput. Methods Appl. Mech. Eng. 196 (2007) 2413)."""
+    t, p = water.topology, water.parameters
+    if not p.subscale_memory:
         return np.zeros_like(water.remainder)
     rate = (1.0 - theta) * dt
     out = np.zeros(water.remainder.shape)  # pages that nobody writes to are never touched
+    nu = p.viscosity / p.density
     carry_remainder(
-        cells, water.remainder, water.kick_remainder, rate, water.velocity, dt, t.cells, t.size, out
+        cells, water.remainder, water.kick_remainder, rate, water.velocity, dt, nu, t.cells, t.size, out
     )
     return out
 
 
 @njit(cache=True)
-def carry_remainder(cell_list, remainder, kick, kick_time, u, dt, cells, size, out):
-    """β (u' + kick_time r) (M, 3) in the listed cells of `out`."""
+def carry_remainder(cell_list, remainder, kick, kick_time, u, dt, nu, cells, size, out):
+    """β (u' + kick_time r) (M, 3) in the listed cells of `out`; nu: kinematic viscosity [m²/s]."""
     for e in cell_list:
         square = 0.0
         for k in range(3):
             mean = 0.25 * (u[cells[e, 0], k] + u[cells[e, 1], k] + u[cells[e, 2], k] + u[cells[e, 3], k])
             square += mean * mean
-        beta = 1.0 / (1.0 + 2.0 * np.sqrt(square) * dt / size[e])
+        beta = 1.0 / (1.0 + (4.0 * nu / size[e] + 2.0 * np.sqrt(square)) * dt / size[e])
         for k in range(3):
             out[e, k] = beta * (remainder[e, k] + kick_time * kick[e, k])
 
