@@ -17,10 +17,12 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from fluid.jit import inner
+
 _LONGEST_WALK = 100
 
 
-@njit(cache=True)
+@inner
 def walk(x, e, nodes, cells, parent, g, neighbours, lam):
     """Cell that holds x (3,), walking from cell e; its barycentric coordinates in lam (4,).
 
@@ -55,7 +57,7 @@ def walk(x, e, nodes, cells, parent, g, neighbours, lam):
     return e
 
 
-@njit(cache=True)
+@inner
 def _to_face(x, lam, g):
     """Move x (3,) straight back to the face of the cell that it is farthest beyond, in place; False if it is inside."""
     face, lowest = -1, -1e-9
@@ -76,16 +78,26 @@ def feet(listed, sense, dt, sweeps, u_m, nodes, cells, parent, g, neighbours, no
 
     u_m (N, 3) [m/s].  sweeps: fixed-point sweeps with u_m at the foot; 0 takes u_m at the node."""
     n = listed.shape[0]
-    cell = np.empty(n, np.int64)
-    weight = np.empty((n, 4))
-    x, lam, u = np.empty(3), np.empty(4), np.empty(3)
-    for s in range(n):
+    cell, weight = np.empty(n, np.int64), np.empty((n, 4))
+    mesh = (nodes, cells, parent, g, neighbours)
+    _trace(listed, sense * dt, sweeps, u_m, *mesh, node_start, node_cells, np.empty((3, 4)), cell, weight)
+    return cell, weight
+
+
+@inner
+def _trace(
+    listed, dt, sweeps, u_m, nodes, cells, parent, g, neighbours, node_start, node_cells, scratch, cell, weight
+):  # fmt: skip
+    """The loop of `feet`; scratch (3, 4): work space."""
+    x, lam, u = scratch[0], scratch[1], scratch[2]
+    for s in range(listed.shape[0]):
         i = listed[s]
-        u[:] = u_m[i]
+        for k in range(3):
+            u[k] = u_m[i, k]
         e = node_cells[node_start[i]]
         for sweep in range(sweeps + 1):
             for k in range(3):
-                x[k] = nodes[i, k] + sense * dt * u[k]
+                x[k] = nodes[i, k] + dt * u[k]
             e = walk(x, e, nodes, cells, parent, g, neighbours, lam)
             if sweep < sweeps:
                 for k in range(3):
@@ -93,8 +105,8 @@ def feet(listed, sense, dt, sweeps, u_m, nodes, cells, parent, g, neighbours, no
                     for a in range(4):
                         u[k] += lam[a] * u_m[cells[e, a], k]
         cell[s] = e
-        weight[s] = lam
-    return cell, weight
+        for a in range(4):
+            weight[s, a] = lam[a]
 
 
 @njit(cache=True)

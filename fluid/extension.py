@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from fluid.jit import inner
 from fluid.moments import touching_among
 from fluid.topology import layers_around
 
@@ -32,14 +33,22 @@ def continue_outward(
 
     done (N,) bool: nodes whose f is known; extended in place, layer by layer.  least (N,): no filled |f| is larger
     than the largest of its known neighbours and its own `least`; of length 0: no limit."""
-    n_layers = layer_start.shape[0] - 1
+    mesh = (nodes, cells, node_start, node_cells)
+    _continue(order, layer_start, linear_layers, f, gradient, *mesh, done, least, np.empty(f.shape[1]))
+
+
+@inner
+def _continue(
+    order, layer_start, linear_layers, f, gradient, nodes, cells, node_start, node_cells, done, least, total
+):  # fmt: skip
+    """The loop of `continue_outward`; total (m,): work space."""
     m = f.shape[1]
-    total = np.empty(m)
-    for layer in range(1, n_layers):
+    for layer in range(1, layer_start.shape[0] - 1):
         for s in range(layer_start[layer], layer_start[layer + 1]):
             i = order[s]
             weight, most = 0.0, 0.0
-            total[:] = 0.0
+            for k in range(m):
+                total[k] = 0.0
             for t in range(node_start[i], node_start[i + 1]):
                 for a in range(4):
                     j = cells[node_cells[t], a]
@@ -62,27 +71,31 @@ def continue_outward(
                 f[i, k] = total[k] / weight if weight > 0.0 else 0.0
             if least.shape[0] > 0:
                 most = max(most, least[i] * least[i])
-                f[i] *= np.sqrt(min(1.0, most / max(_square(f[i]), 1e-300)))
+                factor = np.sqrt(min(1.0, most / max(_square(f[i]), 1e-300)))
+                for k in range(m):
+                    f[i, k] *= factor
             if layer <= linear_layers:
                 _pass_gradient(i, m, gradient, cells, node_start, node_cells, done)
         for s in range(layer_start[layer], layer_start[layer + 1]):
             done[order[s]] = True
 
 
-@njit(cache=True)
+@inner
 def _square(v):
     """|v|²."""
     total = 0.0
-    for x in v:
-        total += x * x
+    for k in range(v.shape[0]):
+        total += v[k] * v[k]
     return total
 
 
-@njit(cache=True)
+@inner
 def _pass_gradient(i, m, gradient, cells, node_start, node_cells, done):
     """The gradient of a filled node: the mean of the known ones around it."""
-    gradient[i] = 0.0
     count = 0
+    for k in range(m):
+        for d in range(3):
+            gradient[i, k, d] = 0.0
     for t in range(node_start[i], node_start[i + 1]):
         for a in range(4):
             j = cells[node_cells[t], a]
@@ -91,7 +104,9 @@ def _pass_gradient(i, m, gradient, cells, node_start, node_cells, done):
                 for k in range(m):
                     for d in range(3):
                         gradient[i, k, d] += gradient[j, k, d]
-    gradient[i] /= max(count, 1)
+    for k in range(m):
+        for d in range(3):
+            gradient[i, k, d] /= max(count, 1)
 
 
 @njit(cache=True)

@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from fluid.jit import inner, plain
 from fluid.topology import layers_around
 
 LAYERS = 6
@@ -76,7 +77,7 @@ def surface_triangles(cut, phi, nodes, cells):
     return triangles[:n].copy(), owner[:n].copy()
 
 
-@njit(cache=True)
+@plain
 def squared_distance(p, t):
     """Squared distance [m²] from the point p (3,) to the triangle t (3, 3) (Ericson, Real-Time Collision
     Detection (2005), 5.1.5).  Scalars only: this is called millions of times a second."""
@@ -110,7 +111,7 @@ def squared_distance(p, t):
     return x * x + y * y + z * z
 
 
-@njit(cache=True)
+@plain
 def _ratio(part, whole):
     """part / whole; 0 for an edge or a triangle without extent."""
     return part / whole if whole > 0.0 else 0.0
@@ -120,9 +121,19 @@ def _ratio(part, whole):
 def _closest_in_layers(order, layer_start, triangles, owner, nodes, cells, start, around):
     """Distance (N,) [m] of the nodes of `order` to the triangles, handed outward; two sweeps a layer."""
     n = nodes.shape[0]
-    closest = np.full(n, -1, np.int64)
-    best = np.full(n, np.inf)
+    closest, best = np.full(n, -1, np.int64), np.full(n, np.inf)
     tried = np.full(triangles.shape[0], -1, np.int64)
+    _hand_outward(
+        order, layer_start, triangles, owner, nodes, cells, start, around, closest, best, tried
+    )
+    return np.sqrt(best)
+
+
+@inner
+def _hand_outward(
+    order, layer_start, triangles, owner, nodes, cells, start, around, closest, best, tried
+):  # fmt: skip
+    """Squared distance `best` (N,) and number of the `closest` triangle (N,); tried (T,): the last node that asked."""
     for t in range(triangles.shape[0]):
         for a in range(4):
             i = cells[owner[t], a]
@@ -141,7 +152,6 @@ def _closest_in_layers(order, layer_start, triangles, owner, nodes, cells, start
                     d = squared_distance(nodes[i], triangles[c])
                     if d < best[i]:
                         best[i], closest[i] = d, c
-    return np.sqrt(best)
 
 
 @njit(cache=True)

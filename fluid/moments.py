@@ -12,10 +12,10 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from fluid.jit import inner
+from fluid.jit import inner, plain
 
 
-@njit(cache=True)
+@plain
 def corner_moments(phi, a, out):
     """∫ N_k / |e| over the part of the cell on the side of corner a, the only one there. phi (4,), out (4,)."""
     v = 1.0
@@ -30,10 +30,12 @@ def corner_moments(phi, a, out):
             out[a] += 0.25 * v * (1.0 - t)
 
 
-@njit(cache=True)
+@plain
 def _prism_moments(phi, a, b, c, d, out, corner):
     """∫ N_k / |e| over the wet side when a, b are wet and c, d dry. corner (6, 4): work space."""
-    corner[:] = 0.0
+    for q in range(6):
+        for k in range(4):
+            corner[q, k] = 0.0
     corner[0, a] = 1.0
     corner[3, b] = 1.0
     for side in range(2):
@@ -43,7 +45,8 @@ def _prism_moments(phi, a, b, c, d, out, corner):
             t = phi[wet] / (phi[wet] - phi[dry])
             corner[3 * side + 1 + k, wet] = 1.0 - t
             corner[3 * side + 1 + k, dry] = t
-    out[:] = 0.0
+    for k in range(4):
+        out[k] = 0.0
     for piece in range(3):
         v = abs(_volume4(corner, piece))
         for k in range(4):
@@ -56,7 +59,7 @@ def _prism_moments(phi, a, b, c, d, out, corner):
 _PRISM = np.array([[0, 1, 2, 5], [0, 1, 4, 5], [0, 3, 4, 5]])
 
 
-@njit(cache=True)
+@plain
 def _volume4(corner, piece):
     """Relative volume of the tetrahedron of four barycentric points, one piece of the prism."""
     p0, p1, p2, p3 = _PRISM[piece, 0], _PRISM[piece, 1], _PRISM[piece, 2], _PRISM[piece, 3]
@@ -66,7 +69,7 @@ def _volume4(corner, piece):
     return ax * (by * cz - bz * cy) - ay * (bx * cz - bz * cx) + az * (bx * cy - by * cx)
 
 
-@njit(cache=True)
+@plain
 def wet_moments(phi, out, corner):
     """∫_{φ<0} N_k / |e| (4,) of a cell with corner values phi (4,). corner (6, 4): work space."""
     n_wet = 0
@@ -74,7 +77,8 @@ def wet_moments(phi, out, corner):
         if phi[k] < 0.0:
             n_wet += 1
     if n_wet == 0 or n_wet == 4:
-        out[:] = 0.0 if n_wet == 0 else 0.25
+        for k in range(4):
+            out[k] = 0.0 if n_wet == 0 else 0.25
     elif n_wet == 2:
         a, b, c, d = -1, -1, -1, -1
         for k in range(4):
