@@ -75,14 +75,18 @@ def run(
         ),
     ] = None,
     end: Annotated[str | None, typer.Option(metavar="TIME", help="short for --set time.end=...")] = None,
+    dry: Annotated[bool, typer.Option("--dry", help="only read the case; nothing is run")] = False,
 ) -> None:
     """Run a case. Ctrl-C or a file named `stop` in the run directory ends it cleanly."""
     one_thread()
-    from coupler.carry_out import carry_out
     from coupler.case_file import load
-    from coupler.run_directory import RunDirectory
 
     file = load(case, [*(set or []), *([f"time.end={end}"] if end else [])])
+    if dry:
+        return
+    from coupler.carry_out import carry_out
+    from coupler.run_directory import RunDirectory
+
     raise typer.Exit(int(carry_out(file, RunDirectory.create(file, output))))
 
 

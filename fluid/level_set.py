@@ -123,9 +123,7 @@ def _closest_in_layers(order, layer_start, triangles, owner, nodes, cells, start
     n = nodes.shape[0]
     closest, best = np.full(n, -1, np.int64), np.full(n, np.inf)
     tried = np.full(triangles.shape[0], -1, np.int64)
-    _hand_outward(
-        order, layer_start, triangles, owner, nodes, cells, start, around, closest, best, tried
-    )
+    _hand_outward(order, layer_start, triangles, owner, nodes, cells, start, around, closest, best, tried)
     return np.sqrt(best)
 
 

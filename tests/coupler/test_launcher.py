@@ -116,13 +116,14 @@ def pip_installs(calls):
 
 def test_the_first_call_on_a_fresh_machine_sets_everything_up(machine):
     """apt for YADE and venv, a .venv, the pinned packages, then the command itself."""
-    code, told, calls = machine("run", "cases/x", "--end", "1 s")
+    case = str(machine.root)
+    code, told, calls = machine("run", case, "--end", "1 s")
     assert code == 0
     assert "apt-get install -q -y --no-install-recommends -o Dpkg::Use-Pty=0 yade python3-venv" in calls
     assert any(call.startswith("system-python -m venv") for call in calls)
     assert pip_installs(calls) == [""]
     assert any("-c " + str(machine.root / "constraints.txt") in call for call in calls)
-    assert calls[-1] == "surgebreak run cases/x --end 1 s"
+    assert calls[-1] == f"surgebreak run {case} --end 1 s"
     assert "installing yade python3-venv from apt" in told
     assert "set up in " in told
 
@@ -174,14 +175,32 @@ def test_extras_come_with_the_command_that_needs_them(machine):
 def test_the_kernels_are_compiled_once_before_the_first_run(machine):
     """A failure there is no reason to refuse the run, which compiles what it needs itself."""
     machine.ready()
-    assert "python -m coupler.warm_up" not in machine("check", "x")[2]
+    assert "python -m coupler.warm_up" not in machine("check", str(machine.root))[2]
     (machine.root / ".venv/bin/python").write_text(
         '#!/bin/sh\necho "python $*" >>"$CALLS"\nexit 1\n', encoding="utf-8"
     )
     code, told, calls = machine("run", "x")
-    assert (code, calls) == (0, ["python -m coupler.warm_up", "surgebreak run x"])
+    assert (code, calls) == (0, ["surgebreak run x --dry", "python -m coupler.warm_up", "surgebreak run x"])
     assert "left to the first run" in told
     assert machine("run", "x")[2] == ["surgebreak run x"]
+
+
+@pytest.mark.parametrize("options", [(), ("--set", "time.end=1 s", "--output", "there")])
+def test_nothing_is_set_up_for_a_case_that_does_not_exist(machine, options):
+    """A slip of the pen should not cost an installation."""
+    code, told, calls = machine("run", *options, "nowhere/x")
+    assert (code, calls) == (2, [])
+    assert "nowhere/x: no such case" in told
+
+
+def test_no_kernels_are_compiled_for_a_case_with_mistakes(machine):
+    """The program reads the case first, and says what is wrong with it; the next call does the same."""
+    machine.ready()("--version")
+    program = machine.root / ".venv/bin/surgebreak"
+    program.write_text('#!/bin/sh\necho "surgebreak $*" >>"$CALLS"\nexit 2\n', encoding="utf-8")
+    for _ in range(2):
+        code, _, calls = machine("run", "x")
+        assert (code, calls) == (2, ["surgebreak run x --dry"])
 
 
 def test_changed_pins_are_installed_again(machine):
