@@ -6,10 +6,15 @@ paths of transport may cross any number of cells, and the volume is carried in s
 
     v = min(v_1, max(SPRAY_SPEED v_s, v_1 / SPRAY_COURANT))                                                (1)
 
-with v_1 the largest |u_ik| of all nodes, and v_s the least speed that at most the share SPRAY of the volume of water
-exceeds.  Where no water is far faster than the rest, v = v_1: fronts and first impacts keep the step of their fastest
-node, and with it their loads.  The last limit binds where so little water may be all that matters: a thin front at the
-end of a long tank.
+with v_1 the largest |u_ik| of all nodes that count, and v_s the least speed that at most the share SPRAY of the volume
+of their water exceeds.  Where no water is far faster than the rest, v = v_1: fronts and first impacts keep the step of
+their fastest node, and with it their loads.  The last limit binds where so little water may be all that matters: a thin
+front at the end of a long tank.
+
+Nodes do not count where the water is drops and trickles of far less than a cell: where it fills less than the share
+LEAST_GATHERED of what there is room for at a node and at those beside it.  Such water flies and runs down walls as
+fast as the limit of the speed allows, long after everything else is calm; its paths may be as long as they like, and
+its volume is carried and kept like that of all water.
 """
 
 from __future__ import annotations
@@ -26,6 +31,9 @@ SPRAY_COURANT = 2.0
 LEAST_COUNTED = 0.05
 """Nodes with less fluid volume around them (in h³) do not set the step: films beside solids, which paths of any
 length cross safely."""
+LEAST_GATHERED = 1.0 / 15.0
+"""Share of the room at a node and its neighbours below which their water does not set the step: on a lattice a node has
+14 neighbours, so that is less than the water of one of them."""
 
 
 def pace(u, water, counted) -> float:
@@ -41,6 +49,23 @@ def _bulk(least, u, water, counted) -> float:
     order = np.argsort(speed)[::-1]
     rest = np.searchsorted(np.cumsum(volume[order]), SPRAY * total, side="right")
     return float(speed[order[rest]]) if rest < len(order) else least
+
+
+@njit(cache=True)
+def gathered(counted, water, room, start, around):
+    """The counted nodes (N,) bool with enough water around them; all of them where none has.
+
+    water, room (N,) [m³] at the nodes: what they hold and could hold · start (N + 1,), around: `Topology.around`."""
+    found, n = np.zeros(counted.shape[0], np.bool_), 0
+    for i in range(counted.shape[0]):
+        if counted[i]:
+            held, most = water[i], room[i]
+            for t in range(start[i], start[i + 1]):
+                held += water[around[t]]
+                most += room[around[t]]
+            found[i] = held >= LEAST_GATHERED * most
+            n += found[i]
+    return found if n > 0 else counted
 
 
 @njit(cache=True)

@@ -21,7 +21,7 @@ from fluid.extension import BAND, fill_missing
 from fluid.level_set import FAR, redistance, without_films
 from fluid.mesh import Background
 from fluid.momentum import MomentumChange
-from fluid.pace import LEAST_COUNTED, largest_component, pace
+from fluid.pace import LEAST_COUNTED, gathered, largest_component, pace
 from fluid.parameters import WaterParameters
 from fluid.predictor import predicted
 from fluid.projection import PressureProblem
@@ -143,10 +143,12 @@ class Water:
         return 1.0 - min(1.0, self.fastest() * dt / self.mesh.spacing)
 
     def stable_step(self) -> float:
-        """dt [s]: Courant number of all but the spray (`pace.py`), and LONGEST_STEP sqrt(h/g)."""
+        """dt [s]: Courant number of all but spray and trickles (`pace.py`), and LONGEST_STEP sqrt(h/g)."""
         h = self.mesh.spacing
         at_rest = LONGEST_STEP * np.sqrt(h / self.parameters.gravity)
-        speed = pace(self.velocity, self.nodal_water, self._counted())
+        t = self.topology
+        counted = gathered(self._counted(), self.nodal_water, t.node_volume, *t.around)
+        speed = pace(self.velocity, self.nodal_water, counted)
         return float(min(at_rest, self.parameters.courant * h / max(speed, 1e-12)))
 
     def fastest(self) -> float:

@@ -43,6 +43,25 @@ def test_no_drop_crosses_more_than_twice_the_cells():
     assert water.stable_step() == pytest.approx(SPRAY_COURANT * 0.1 / 90.0, rel=1e-12)
 
 
+def test_a_drop_in_the_air_does_not_set_the_step_however_fast():
+    """Less than the water of one node, with air around it: its path may cross any number of cells. The same drop inside
+    the water still counts (above), and alone in the tank it sets the step itself."""
+    drop = np.array([0.5, 0.5, 0.8])
+
+    def ball(x):
+        return np.linalg.norm(x - drop, axis=1) - 0.06
+
+    water = tank((1.0, 1.0, 1.0), 0.1, lambda x: np.minimum(x[:, 2] - 0.45, ball(x)))
+    water.velocity[water.level_set < 0.0, 0] = 10.0
+    flying = (water.level_set < 0.0) & (water.topology.nodes[:, 2] > 0.6)
+    assert 0.0 < water.nodal_water[flying].sum() < 0.1**3
+    water.velocity[flying] = [0.0, 0.0, -90.0]
+    assert water.stable_step() == 0.1 / 10.0
+    alone = tank((1.0, 1.0, 1.0), 0.1, ball)
+    alone.velocity[alone.level_set < 0.0, 2] = -90.0
+    assert alone.stable_step() == 0.1 / 90.0
+
+
 def test_water_without_outliers_keeps_the_step_of_its_fastest_node():
     """A smooth field, here the speeds of a rotation: the step is the one of the largest component, bit for bit."""
     water = half_full()
