@@ -11,10 +11,10 @@ of their water exceeds.  Where no water is far faster than the rest, v = v_1: fr
 their fastest node, and with it their loads.  The last limit binds where so little water may be all that matters: a thin
 front at the end of a long tank.
 
-Nodes do not count where the water is drops and trickles of far less than a cell: where it fills less than the share
-LEAST_GATHERED of what there is room for at a node and at those beside it.  Such water flies and runs down walls as
-fast as the limit of the speed allows, long after everything else is calm; its paths may be as long as they like, and
-its volume is carried and kept like that of all water.
+Nodes do not count where the water is drops and trickles of less than a cell: where a node and those beside it hold less
+than LEAST_GATHERED h³ of it together.  Such water flies and runs down walls as fast as the limit of the speed allows,
+long after everything else is calm; its paths may be as long as they like, and its volume is carried and kept like that
+of all water.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ SPRAY_COURANT = 2.0
 LEAST_COUNTED = 0.05
 """Nodes with less fluid volume around them (in h³) do not set the step: films beside solids, which paths of any
 length cross safely."""
-LEAST_GATHERED = 1.0 / 15.0
-"""Share of the room at a node and its neighbours below which their water does not set the step: on a lattice a node has
-14 neighbours, so that is less than the water of one of them."""
+LEAST_GATHERED = 1.0
+"""Water at a node and its neighbours (in h³) below which they do not set the step. On a lattice they have room for 15,
+and a sheet counts if it is thicker than an eighth of a cell."""
 
 
 def pace(u, water, counted) -> float:
@@ -52,18 +52,18 @@ def _bulk(least, u, water, counted) -> float:
 
 
 @njit(cache=True)
-def gathered(counted, water, room, start, around):
-    """The counted nodes (N,) bool with enough water around them; all of them where none has.
+def gathered(counted, water, least, start, around):
+    """The counted nodes (N,) bool that hold at least so much water together with their neighbours; all of them where
+    none does.
 
-    water, room (N,) [m³] at the nodes: what they hold and could hold · start (N + 1,), around: `Topology.around`."""
+    water (N,) [m³] at the nodes · least [m³] · start (N + 1,), around: `Topology.around`."""
     found, n = np.zeros(counted.shape[0], np.bool_), 0
     for i in range(counted.shape[0]):
         if counted[i]:
-            held, most = water[i], room[i]
+            held = water[i]
             for t in range(start[i], start[i + 1]):
                 held += water[around[t]]
-                most += room[around[t]]
-            found[i] = held >= LEAST_GATHERED * most
+            found[i] = held >= least
             n += found[i]
     return found if n > 0 else counted
 

@@ -21,7 +21,7 @@ from fluid.extension import BAND, fill_missing
 from fluid.level_set import FAR, redistance, without_films
 from fluid.mesh import Background
 from fluid.momentum import MomentumChange
-from fluid.pace import LEAST_COUNTED, gathered, largest_component, pace
+from fluid.pace import LEAST_COUNTED, LEAST_GATHERED, gathered, largest_component, pace
 from fluid.parameters import WaterParameters
 from fluid.predictor import predicted
 from fluid.projection import PressureProblem
@@ -146,8 +146,8 @@ class Water:
         """dt [s]: Courant number of all but spray and trickles (`pace.py`), and LONGEST_STEP sqrt(h/g)."""
         h = self.mesh.spacing
         at_rest = LONGEST_STEP * np.sqrt(h / self.parameters.gravity)
-        t = self.topology
-        counted = gathered(self._counted(), self.nodal_water, t.node_volume, *t.around)
+        least = LEAST_GATHERED * h**3
+        counted = gathered(self._counted(), self.nodal_water, least, *self.topology.around)
         speed = pace(self.velocity, self.nodal_water, counted)
         return float(min(at_rest, self.parameters.courant * h / max(speed, 1e-12)))
 
