@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numba import njit
@@ -97,6 +98,26 @@ class Walls:
         projector = np.concatenate([projector, self.open_projector[~both]])
         projector[np.isin(nodes, self.flowing)] = 0.0
         return nodes, projector
+
+    @cached_property
+    def outward(self):
+        """Nodes (k,) of the open faces and their unit normals (k, 3) out of the tank."""
+        nodes, place = np.unique(self.open_faces, return_inverse=True)
+        total = np.zeros((len(nodes), 3))
+        for corner in place.reshape(-1, 3).T:
+            np.add.at(total, corner, self.open_area)
+        return nodes, total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-300)
+
+    def let_air_in(self, phi, u, dt: float) -> None:
+        """Air lies beyond the open sides: where u (N, 3) [m/s] points into the tank, the surface was at the side at most
+        and lies |u·n| dt inside after dt [s]; φ (N,) [m] is raised to that, in place.
+
+        Paths that come from outside end at the side and would find there the water that has just left it: a drop that
+        falls back from an open top then never ends, and runs down the wall faster and faster."""
+        nodes, normal = self.outward
+        inward = -dt * np.einsum("ij,ij->i", u[nodes], normal)
+        coming = inward > 0.0
+        phi[nodes[coming]] = np.maximum(phi[nodes[coming]], inward[coming])
 
     def slip(self, u) -> None:
         """Take the part into the closed sides off u (N, 3), in place."""

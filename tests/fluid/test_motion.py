@@ -105,6 +105,24 @@ def test_open_side_lets_the_water_out():
     assert abs(water.volume_error()) < 5e-3
 
 
+def test_water_that_falls_from_an_open_top_leaves_it():
+    """Air comes after it through the top. Before, the top stayed wet and fed a trickle whose speed grew by g t up to the
+    limit, long after all else had reached the floor (at 0.4 s) and spread there."""
+    water = tank(
+        [0.4, 0.4, 0.8],
+        0.05,
+        lambda x: np.maximum(np.maximum(x[:, 0] - 0.12, x[:, 1] - 0.12), 0.7 - x[:, 2]),
+        is_open=lambda normal, centre: normal[:, 2] > 0.5,
+    )
+    top = water.topology.nodes[:, 2] > 0.79
+    assert (water.level_set[top] < 0.0).any()
+    while water.time < 0.55:
+        advance(water)
+    assert not (water.level_set[top] < 0.0).any()
+    assert water.fastest() < 0.7 * 9.81 * 0.55
+    assert abs(water.volume_error()) < 1e-6
+
+
 @pytest.mark.parametrize("theta", [0.5, 0.6, 1.0])
 def test_predict_changes_nothing(theta):
     """A caller may ask again with another dt: the state is taken over by `correct` alone."""
