@@ -106,5 +106,4 @@ def _filled(out, at) -> tuple[int, ...]:
 
 def trimmed(out, at) -> Cuts:
     """Views of the rows that were filled; at (5,): cells, parts, wetted polygons, openings, tetrahedra."""
-    views = (array[:count] for array, count in zip(out, _filled(out, at)))
-    return Cuts(*(view if len(view) else view.copy() for view in views))
+    return Cuts(*(array[:count] for array, count in zip(out, _filled(out, at))))

@@ -109,8 +109,8 @@ class Walls:
         return nodes, total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-300)
 
     def let_air_in(self, phi, u, dt: float) -> None:
-        """Air lies beyond the open sides: where u (N, 3) [m/s] points into the tank, the surface was at the side at most
-        and lies |u·n| dt inside after dt [s]; φ (N,) [m] is raised to that, in place.
+        """Air lies beyond the open sides: where u (N, 3) [m/s] points into the tank, the surface was at the side at
+        most and lies |u·n| dt inside after dt [s]; φ (N,) [m] is raised to that, in place.
 
         Paths that come from outside end at the side and would find there the water that has just left it: a drop that
         falls back from an open top then never ends, and runs down the wall faster and faster."""

@@ -106,8 +106,8 @@ def test_open_side_lets_the_water_out():
 
 
 def test_water_that_falls_from_an_open_top_leaves_it():
-    """Air comes after it through the top. Before, the top stayed wet and fed a trickle whose speed grew by g t up to the
-    limit, long after all else had reached the floor (at 0.4 s) and spread there."""
+    """Air comes after it through the top. Before, the top stayed wet and fed a trickle whose speed grew by g t up to
+    the limit, long after all else had reached the floor (at 0.4 s) and spread there."""
     water = tank(
         [0.4, 0.4, 0.8],
         0.05,
