@@ -193,7 +193,7 @@ def _laws(told: dict, pictures: str) -> str:
 
 def _parts(told: dict) -> str:
     rows = [
-        [part["name"], part["reason"] or f"{part['cpu_seconds']:.3g}", _cost(part["share"]),
+        [part["name"], part["reason"] or f"{part['cpu_seconds']:.3g}", percent(part["share"]),
          f"{round(part['memory'] / 1e6)}"]
         for part in told["parts"]
     ]  # fmt: skip
@@ -202,11 +202,6 @@ def _parts(told: dict) -> str:
         ["the whole case", f"{whole:.3g}", "100 %", f"{told['runs'][told['base']]['peak_memory'] / 1e6:.0f}"]
     )
     return table(["part", "CPU s", "share", "MB"], rows)
-
-
-def _cost(share) -> str:
-    """Of the whole; a part cannot cost less than nothing."""
-    return "scatter" if _number(share) and share < 0.0 else percent(share)
 
 
 def _failed(told: dict) -> str:

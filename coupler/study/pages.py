@@ -29,8 +29,10 @@ The cheapest setting counts only if every finer run of its ladder is as near, si
 chance. The order of convergence is the slope of the errors where there is an exact answer; else it comes from the
 differences of the three finest runs, and there is none where these do not shrink.
 
-What a part of the program costs is the difference of two runs, the case with and without it; what is within the scatter
-of CPU times, some 5 to 10 % on a busy machine, is noise. Wall seconds are those of a machine that did other work too.
+What a part of the program costs is the difference of two runs, the case with and without it; what is within the
+scatter of CPU times, some 10 % on a busy machine and 0.3 s of short runs, is noise. Less than nothing beyond that
+means that the scene does more without the part: blocks that no joints hold have contacts instead. Wall seconds are
+those of a machine that did other work too.
 """
 
 COLOURS = 96
