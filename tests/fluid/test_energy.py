@@ -32,6 +32,18 @@ def test_outflow_takes_volume_and_energy_of_a_sheared_stream_exactly():
     assert left.energy == pytest.approx(1000.0 * dt * (0.5 / 4 + 9.81 / 3), rel=1e-12)
 
 
+def test_half_full_nodes_let_out_half_and_none_more_than_it_holds():
+    """A uniform stream of 1 m/s through 1 m²; its middle is half a metre above the floor."""
+    water = tank([1, 1, 1], 0.25, lambda x: np.full(len(x), -5.0), is_open=right)
+    water.velocity[:, 0] = 1.0
+    water.nodal_water *= 0.5
+    left = Outflow.of(water, 1e-3, water.nodal_water)
+    assert left.volume.sum() == pytest.approx(0.5e-3, rel=1e-12)
+    assert left.energy == pytest.approx(0.5e-3 * 1000.0 * (0.5 + 9.81 / 2), rel=1e-12)
+    scarce = 1e-9 * np.ones(len(water.nodal_water))
+    assert Outflow.of(water, 1e-3, scarce).volume.max() == 1e-9
+
+
 def test_water_carried_through_the_tank_keeps_its_sum_and_its_range():
     """Second order on edges: no node below nothing or above what it holds, and the sum to round-off."""
     water = tank([2, 0.25, 0.75], 0.125, column(0.6, 0.5))
