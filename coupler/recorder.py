@@ -208,7 +208,7 @@ class Recorder:
                 w.domain.nodes,
                 w.domain.cells,
                 {"level_set": w.level_set, "velocity": w.velocity, "pressure": w.pressure},
-                {"fluid_fraction": fluid_fraction(w.domain)},
+                {"fluid_fraction": w.topology.fraction},
             )
         if self._blocks:
             s = c.structure
@@ -229,13 +229,6 @@ class Recorder:
     def close(self) -> None:
         for table in self._tables.values():
             table.close()
-
-
-def fluid_fraction(domain) -> np.ndarray:
-    """(M,) share of each cell that no solid takes."""
-    x = domain.nodes[domain.cells]
-    whole = np.abs(np.linalg.det(x[:, 1:] - x[:, :1])) / 6.0
-    return domain.volume / whole
 
 
 def _xyz(name: str, vector) -> dict[str, float]:
