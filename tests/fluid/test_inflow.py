@@ -49,6 +49,19 @@ def test_still_water_beside_a_sea_of_its_level_stays(level):
     assert water.volume() == pytest.approx(start, abs=1e-9)
 
 
+def test_a_sea_gives_water_that_comes_in_its_speed():
+    """What comes in was at rest: Bernoulli takes half ρ u² off the weight of the water above, and it comes in straight;
+    what goes out meets the weight alone."""
+    water = tank([1, 0.2, 1], 0.1, lambda x: x[:, 2] - 0.6, sea=0.6)
+    (side,) = water.sides.now
+    z = side.place[:, 2]
+    for speed, taken in ((-2.0, 0.5 * 1000.0 * 2.0**2), (2.0, 0.0)):
+        u = np.tile([speed, 0.5, 0.0], (len(water.velocity), 1))
+        assert side.pressure(1000.0, 9.81, u, 0.0) == pytest.approx(9810.0 * (0.6 - z) - taken)
+        side.hold(u, 0.0)
+        assert (u[side.nodes] == [speed, 0.0 if taken else 0.5, 0.0]).all()
+
+
 def test_tank_fills_to_the_level_of_the_sea():
     """From a third, in swings about that level that must not grow (with the static pressure on the side they end above
     the top of the tank); what came in is what is there."""
