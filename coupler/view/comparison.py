@@ -8,6 +8,8 @@ import json
 import sys
 from pathlib import Path
 
+from matplotlib.ticker import LogLocator, NullFormatter
+
 from coupler.view.palette import LINES
 from coupler.view.plots import FORMATS, STYLE, _undated, plt, prefixed
 from coupler.view.study import MARKS, share
@@ -119,6 +121,9 @@ def accuracy(axis, about, look):
     axis.set_xscale("log")
     axis.set_yscale("log")
     axis.set_xlabel("CPU time of the run [s]")
+    axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
+    axis.xaxis.set_major_formatter(plt.FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.xaxis.set_minor_formatter(NullFormatter())
     axis.yaxis.set_major_formatter(plt.FuncFormatter(lambda value, _: share(value)))
     axis.set_ylabel("error against " + ("the exact answer" if about["exact"] else about["reference"]))
 
