@@ -188,6 +188,8 @@ writer, rng = WaterWriter(sys.argv[1]), np.random.default_rng(0)
 for k in range(100000):
     part = cells[: 600 + 97 * (k % 7)] if sys.argv[2] == "changing" else cells
     writer.append(k, nodes, part, {"level_set": k + rng.random(len(nodes))}, {"fluid_fraction": rng.random(len(part))})
+    if k == 0:
+        print("one step", flush=True)
 """
 
 
@@ -196,12 +198,11 @@ for k in range(100000):
 def test_a_killed_writer_leaves_all_its_complete_steps(tmp_path, mesh, moment):
     """SIGKILL in a loop that does nothing but write: every step that the file counts must be whole."""
     path = tmp_path / "fields.vtkhdf"
-    writer = subprocess.Popen([sys.executable, "-c", KILLED, str(path), mesh], cwd=HERE.parents[1])
-    while not path.exists() or path.stat().st_size < 50_000:
-        time.sleep(0.01)
-    time.sleep(moment)
-    writer.send_signal(signal.SIGKILL)
-    writer.wait()
+    command = [sys.executable, "-c", KILLED, str(path), mesh]
+    with subprocess.Popen(command, cwd=HERE.parents[1], stdout=subprocess.PIPE) as writer:
+        writer.stdout.readline()
+        time.sleep(moment)
+        writer.send_signal(signal.SIGKILL)
     found = read_with_vtk(path)
     assert int(found["steps"]) >= 1
     for k in range(int(found["steps"])):
