@@ -6,6 +6,7 @@ import pytest
 from coupler.verify.figures import columns
 from fluid.bodies import ConvexBodies
 from fluid.moments import cells_touching
+from fluid.predictor import carry_remainder
 from fluid.projection import cell_gradient
 from tests.fluid.scenes import advance, column, rotation, tank
 
@@ -80,3 +81,15 @@ def test_bodies_take_from_the_water_what_they_give(cut):
     on_whole_walls = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]) / 2 * p[faces].mean(axis=1)[:, None]
     # the second body sticks out through the wall x = 1: compare the directions its opening does not face
     np.testing.assert_allclose((on_bodies + on_whole_walls.sum(axis=0))[1:], over_water[1:], atol=1e-10)
+
+
+@pytest.mark.parametrize(("viscosity", "left"), [(0.0, 1 / 3), (1.25, 1 / 5)])
+def test_the_remainder_of_a_cell_is_swept_out_as_fast_as_water_crosses_it(viscosity, left):
+    """β = 1/(1 + (4 ν/l + 2 |u|) dt/l) of what is left and kicked; |u| = 5 m/s of the mean, dt = 0.1 s, l = 0.5 m."""
+    u = np.array([[3.0, 4.0, 0.0]] * 4)
+    u[0] += [1.0, -2.0, 6.0]
+    u[1] -= [1.0, -2.0, 6.0]
+    remainder, kick = np.array([[0.3, 0.0, -0.6]]), np.array([[3.0, 6.0, 0.0]])
+    cells, size, out = np.array([[0, 1, 2, 3]]), np.array([0.5]), np.zeros((1, 3))
+    carry_remainder(np.array([0]), remainder, kick, 0.02, u, 0.1, viscosity, cells, size, out)
+    np.testing.assert_allclose(out, [[0.36 * left, 0.12 * left, -0.6 * left]], rtol=1e-12)
