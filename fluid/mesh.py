@@ -89,9 +89,14 @@ class Background:
         return _products(self.gradients)
 
     @cached_property
+    def obtuse(self) -> np.ndarray:
+        """(M,) bool: some dihedral angle of the cell is more than a right one, ∇N_a·∇N_b > 0: never in `box_mesh`."""
+        return self.products.max(axis=1) * self.cell_size**2 > 1e-9
+
+    @cached_property
     def is_obtuse(self) -> bool:
-        """Some dihedral angle is more than a right one, ∇N_a·∇N_b > 0: never in `box_mesh`."""
-        return bool((self.products.max(axis=1) * self.cell_size**2 > 1e-9).any())
+        """Some cell is obtuse."""
+        return bool(self.obtuse.any())
 
     @cached_property
     def skfem(self) -> MeshTet:

@@ -4,9 +4,15 @@ A level set alone loses thin sheets (a dam break lost its own volume once over).
 Farthing and Bazilevs, J. Comput. Phys. 230 (2011) 4536, lumped):  the volume W_i = ∫_{φ<0} N_i dV of the step before
 is carried by the fluxes of the projected velocity u_e, which balance exactly at wholly wet nodes,
 
-    q_ij = Σ_e |e|/4 (∇N_j - ∇N_i)·u_e,      Σ_j q_ij = -Σ_e |e| ∇N_i·u_e = (G V)_i,                       (1)
+    q_ij = -Σ_e |e| (∇N_i·∇N_j) (x_j - x_i)·u_e,      Σ_j q_ij = -Σ_e |e| ∇N_i·u_e = (G V)_i,              (1)
 
-along the edges (`volume_transport.py`).  Then φ takes the shift ψ that brings its own volume there,
+along the edges (`volume_transport.py`): what goes through the cell borders that stand upright on the edge, half way; in
+split bricks along the sides of the bricks only.  A cell with an obtuse dihedral angle, where this may run against the
+water, gives |e|/4 (∇N_j - ∇N_i)·u_e, through the planes of its medians.  In split bricks that sends a third of the flow
+across, along diagonals and back along sides, and where the surface slopes less comes back than goes: a dam break in a
+tank 0.5 m wide ran 7 cm farther along one side than along the other, on any cells.
+
+Then φ takes the shift ψ that brings its own volume there,
 
     (c + κ K) ψ = W - ∫_{φ<0} N dV,        c_i = d/dψ ∫_{φ<ψ} N_i dV,                                       (2)
 
@@ -50,31 +56,34 @@ class Flux:
 
 
 @njit(cache=True)
-def _edge_rates(nodes, graph_row, start, neighbour, u_cell, cells, parent, g, volume, node_start, node_cells):
+def _edge_rates(listed, graph_row, start, neighbour, u_cell, nodes, cells, parent, g, obtuse, volume, around):
     rate = np.zeros(neighbour.shape[0])
-    slot = np.empty(node_start.shape[0] - 1, np.int64)
-    flow, there = np.empty(cells.shape), np.zeros(cells.shape[0], np.bool_)
-    for i in nodes:
+    slot = np.empty(nodes.shape[0], np.int64)
+    node_start, node_cells = around
+    for i in listed:
         r = graph_row[i]
         for s in range(start[r], start[r + 1]):
             slot[neighbour[s]] = s
         for t in range(node_start[i], node_start[i + 1]):
             e = node_cells[t]
-            if not there[e]:
-                there[e] = True
-                p = parent[e]
-                for a in range(4):
-                    flow[e, a] = (
-                        0.25
-                        * volume[e]
-                        * (g[p, a, 0] * u_cell[e, 0] + g[p, a, 1] * u_cell[e, 1] + g[p, a, 2] * u_cell[e, 2])
-                    )
-            own = 0
+            p, own = parent[e], 0
+            x, y, z = volume[e] * u_cell[e, 0], volume[e] * u_cell[e, 1], volume[e] * u_cell[e, 2]
             while cells[e, own] != i:
                 own += 1
+            gx, gy, gz = g[p, own, 0], g[p, own, 1], g[p, own, 2]
             for a in range(4):
-                if a != own:
-                    rate[slot[cells[e, a]]] += flow[e, a] - flow[e, own]
+                j = cells[e, a]
+                if a != own and obtuse[p]:
+                    rate[slot[j]] += 0.25 * (
+                        (g[p, a, 0] - gx) * x + (g[p, a, 1] - gy) * y + (g[p, a, 2] - gz) * z
+                    )
+                elif a != own:
+                    slopes = gx * g[p, a, 0] + gy * g[p, a, 1] + gz * g[p, a, 2]
+                    rate[slot[j]] -= slopes * (
+                        (nodes[j, 0] - nodes[i, 0]) * x
+                        + (nodes[j, 1] - nodes[i, 1]) * y
+                        + (nodes[j, 2] - nodes[i, 2]) * z
+                    )
     return rate
 
 
@@ -82,7 +91,7 @@ def edge_flux(topology, graph, listed, u_cell, water) -> Flux:
     """Equation (1) on the edges of the listed nodes (n,); u_cell (M, 3) [m/s] projected velocity of the cells,
     water (N,) [m³] volume at the nodes."""
     t, g = topology, graph
-    mesh = (t.cells, t.parent, t.gradients, t.volume, t.node_start, t.node_cells)
+    mesh = (t.nodes, t.cells, t.parent, t.gradients, t.obtuse, t.volume, (t.node_start, t.node_cells))
     rate = _edge_rates(listed, g.row, g.start, g.neighbour, u_cell, *mesh)
     return Flux(listed, g, rate, water, t.node_volume)
 
