@@ -21,10 +21,10 @@ NOTES = {
     "the sheet that it runs over is thinner than what a cell resolves.",
     "P42": "The wave is less than half a cell high, its run-up one to two cells of water; where the tongue tears off "
     "a film decides: 0.064 to 0.099 d on 24 and 48 cells over the depth, with variants of damping and transport.",
-    "P55": "With four cells over the diameter the speed is 5 to 6 % low: linear velocities are too coarse there (spun, the "
-    "sphere feels 1.04 of the moment of Stokes; 1.003 with eight cells). At Re 1.5 the digitised records do not agree: "
-    "the speeds add up to a gap of 4 D at 1.82 s, the record of the gap says 1.94 s, and the largest speed, 0.0370, is a "
-    "single point above a plateau of 0.0366 m/s.",
+    "P55": "With four cells over the diameter the speed is 5 to 6 % low: linear velocities are too coarse there (spun, "
+    "the sphere feels 1.04 of the moment of Stokes; 1.003 with eight cells). At Re 1.5 the digitised records do not "
+    "agree: the speeds add up to a gap of 4 D at 1.82 s, the record of the gap says 1.94 s, and the largest speed, "
+    "0.0370, is a single point above a plateau of 0.0366 m/s.",
     "P56": "The sheet of water that reaches the cubes is 3 to 5 cm deep, less than a cell of edge/3. Its momentum flux "
     "over the width of a cube, 44 N from 0.8 to 1.0 s, is right there, but a held column of that width gets 15, 21 and "
     "28 N with edge/3, 6 and 10: too few nodes under the surface to turn the sheet aside. Cubes sealed or wetted from "
