@@ -133,7 +133,7 @@ def _transported(water, dt, theta, kick):
     u_adv[water.listed] = moved[:, :3]
     near = np.abs(phi[water.listed]) < TRANSPORT_WIDTH * water.mesh.spacing
     phi[water.listed[near]] = moved[near, 3]
-    water._walls.let_air_in(phi, u_m, dt)
+    water._walls.let_air_in(phi, u_m, dt, water.mesh.spacing)
     water.hold(u_adv, water.time + dt)
     return u_adv, phi
 
