@@ -129,16 +129,10 @@ def test_the_first_call_on_a_fresh_machine_sets_everything_up(machine):
 
 
 def test_later_calls_start_at_once(machine):
-    """No apt, no pip, no word; and the launcher itself costs less than 50 ms (best of five, machines are busy)."""
+    """No apt, no pip, no word: one process, the command itself."""
     machine("run")
     code, told, calls = machine("run", "x")
     assert (code, told, calls) == (0, "", ["surgebreak run x"])
-    costs = []
-    for _ in range(5):
-        began = time.perf_counter()
-        machine("run")
-        costs.append(time.perf_counter() - began)
-    assert min(costs) < 0.05
 
 
 def test_an_existing_yade_is_honoured(machine):
