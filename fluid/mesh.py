@@ -18,6 +18,8 @@ from numba import njit
 from skfem import MeshTet
 
 CORNERS_OF_FACE = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])  # outward for a positive cell
+MOST_SLENDER = 2.5
+"""Longest over shortest edge of a cell, 1.73 in a split cube, up to which its volume goes through upright borders."""
 
 
 class MeshError(ValueError):
@@ -97,6 +99,12 @@ class Background:
     def is_obtuse(self) -> bool:
         """Some cell is obtuse."""
         return bool(self.obtuse.any())
+
+    @cached_property
+    def upright(self) -> np.ndarray:
+        """(M,) bool: cells in which the borders upright on the edges serve the volume (`volume.py`): neither obtuse nor
+        slender."""
+        return ~self.obtuse & (_slenderness(self.nodes, self.cells) <= MOST_SLENDER)
 
     @cached_property
     def skfem(self) -> MeshTet:
@@ -230,6 +238,22 @@ def _products(g):
             for b in range(a + 1, 4):
                 out[e, n] = g[e, a, 0] * g[e, b, 0] + g[e, a, 1] * g[e, b, 1] + g[e, a, 2] * g[e, b, 2]
                 n += 1
+    return out
+
+
+@njit(cache=True)
+def _slenderness(x, cells):
+    """Longest over shortest edge (M,) of the cells."""
+    out = np.empty(cells.shape[0])
+    for e in range(cells.shape[0]):
+        shortest, longest = np.inf, 0.0
+        for a in range(4):
+            for b in range(a + 1, 4):
+                length = 0.0
+                for k in range(3):
+                    length += (x[cells[e, b], k] - x[cells[e, a], k]) ** 2
+                shortest, longest = min(shortest, length), max(longest, length)
+        out[e] = np.sqrt(longest / shortest)
     return out
 
 

@@ -25,7 +25,7 @@ class Topology:
     node_start (N+1,), node_cells (4M,) cells around each node · neighbours (M, 4) across faces, -1 none ·
     node_volume (N,) [m³] ∫ N_i · covered (N,) bool: nodes inside a solid · beside_solid (N,) bool: nodes of
     cut cells · parts: what of the cells water can fill · is_obtuse: the mesh has obtuse dihedral angles ·
-    obtuse (rows of `gradients`,) bool: the cell has one."""
+    upright (rows of `gradients`,) bool: `Background.upright`."""
 
     nodes: np.ndarray
     cells: np.ndarray
@@ -44,7 +44,7 @@ class Topology:
     beside_solid: np.ndarray
     parts: FluidParts
     is_obtuse: bool
-    obtuse: np.ndarray
+    upright: np.ndarray
 
     @classmethod
     def of(cls, mesh: Background, domain) -> Topology:
@@ -76,7 +76,7 @@ class Topology:
                 cells, domain.volume, share, domain.fan_start, domain.fan_volume, domain.fan_corners
             ),
             is_obtuse=mesh.is_obtuse,
-            obtuse=mesh.obtuse,
+            upright=mesh.upright,
         )
 
     @cached_property

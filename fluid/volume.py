@@ -6,11 +6,13 @@ is carried by the fluxes of the projected velocity u_e, which balance exactly at
 
     q_ij = -Σ_e |e| (∇N_i·∇N_j) (x_j - x_i)·u_e,      Σ_j q_ij = -Σ_e |e| ∇N_i·u_e = (G V)_i,              (1)
 
-along the edges (`volume_transport.py`): what goes through the cell borders that stand upright on the edge, half way; in
-split bricks along the sides of the bricks only.  A cell with an obtuse dihedral angle, where this may run against the
-water, gives |e|/4 (∇N_j - ∇N_i)·u_e, through the planes of its medians.  In split bricks that sends a third of the flow
-across, along diagonals and back along sides, and where the surface slopes less comes back than goes: a dam break in a
-tank 0.5 m wide ran 7 cm farther along one side than along the other, on any cells.
+along the edges (`volume_transport.py`): what goes through the cell borders that stand upright on the edge, half way;
+in split bricks along the sides of the bricks only.  A cell with an obtuse dihedral angle, where this may run against the
+water, or with edges that differ by more than 2.5 times gives |e|/4 (∇N_j - ∇N_i)·u_e, through the planes of its
+medians: in cells three times as high as wide a dam break gains 1.1 % of its energy with it, 3.5 % with (1).  In split
+cubes that sends a third of the flow across, along diagonals and back along sides, and where the surface slopes less
+comes back than goes: a dam break in a tank 0.5 m wide ran 7 cm farther along one side than along the other, on any
+cells.
 
 Then φ takes the shift ψ that brings its own volume there,
 
@@ -56,7 +58,9 @@ class Flux:
 
 
 @njit(cache=True)
-def _edge_rates(listed, graph_row, start, neighbour, u_cell, nodes, cells, parent, g, obtuse, volume, around):
+def _edge_rates(
+    listed, graph_row, start, neighbour, u_cell, nodes, cells, parent, g, upright, volume, around
+):
     rate = np.zeros(neighbour.shape[0])
     slot = np.empty(nodes.shape[0], np.int64)
     node_start, node_cells = around
@@ -73,7 +77,7 @@ def _edge_rates(listed, graph_row, start, neighbour, u_cell, nodes, cells, paren
             gx, gy, gz = g[p, own, 0], g[p, own, 1], g[p, own, 2]
             for a in range(4):
                 j = cells[e, a]
-                if a != own and obtuse[p]:
+                if a != own and not upright[p]:
                     rate[slot[j]] += 0.25 * (
                         (g[p, a, 0] - gx) * x + (g[p, a, 1] - gy) * y + (g[p, a, 2] - gz) * z
                     )
@@ -91,7 +95,7 @@ def edge_flux(topology, graph, listed, u_cell, water) -> Flux:
     """Equation (1) on the edges of the listed nodes (n,); u_cell (M, 3) [m/s] projected velocity of the cells,
     water (N,) [m³] volume at the nodes."""
     t, g = topology, graph
-    mesh = (t.nodes, t.cells, t.parent, t.gradients, t.obtuse, t.volume, (t.node_start, t.node_cells))
+    mesh = (t.nodes, t.cells, t.parent, t.gradients, t.upright, t.volume, (t.node_start, t.node_cells))
     rate = _edge_rates(listed, g.row, g.start, g.neighbour, u_cell, *mesh)
     return Flux(listed, g, rate, water, t.node_volume)
 

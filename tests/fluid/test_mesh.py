@@ -33,6 +33,14 @@ def test_cells_fill_the_box_and_gradients_are_exact(name, request):
     np.testing.assert_allclose(gradient, np.broadcast_to([1.0, -2.0, 0.5], gradient.shape), atol=1e-11)
 
 
+def test_cells_that_are_neither_obtuse_nor_slender_are_upright():
+    """Split cubes are; bricks three times as high as wide, and cells moved at random with obtuse angles, are not."""
+    cubes, bricks = box_mesh([0, 0, 0], [1, 1, 1], 0.25), box_mesh([0, 0, 0], [1, 1, 3], [0.25, 0.25, 0.75])
+    assert cubes.upright.all()
+    assert not bricks.upright.any()
+    assert not bricks.is_obtuse
+
+
 @pytest.mark.parametrize("name", ["graded", "jittered"])
 def test_boundary_is_closed_and_outward(name, request):
     """Σ area n = 0 and Σ area n·x = 3 V: the divergence theorem on the faces of the mesh."""
