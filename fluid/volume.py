@@ -7,7 +7,7 @@ is carried by the fluxes of the projected velocity u_e, which balance exactly at
     q_ij = -Σ_e |e| (∇N_i·∇N_j) (x_j - x_i)·u_e,      Σ_j q_ij = -Σ_e |e| ∇N_i·u_e = (G V)_i,              (1)
 
 along the edges (`volume_transport.py`): what goes through the cell borders that stand upright on the edge, half way;
-in split bricks along the sides of the bricks only.  A cell with an obtuse dihedral angle, where this may run against the
+in split bricks along the sides of the bricks only. A cell with an obtuse dihedral angle, where this may run against the
 water, or with edges that differ by more than 2.5 times gives |e|/4 (∇N_j - ∇N_i)·u_e, through the planes of its
 medians: in cells three times as high as wide a dam break gains 1.1 % of its energy with it, 3.5 % with (1).  In split
 cubes that sends a third of the flow across, along diagonals and back along sides, and where the surface slopes less
