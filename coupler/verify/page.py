@@ -17,9 +17,9 @@ NOTES = {
     "layer: [water](water.md).",
     "P39": "H3 lies behind the box: water closes the wake from one side too early, because all cells "
     "are split along the same diagonal ([water](water.md#weak)); when the jet comes down differs from run to run.",
-    "P41": "Into two and into four cells of water the bore is 11 to 14 % too slow, with other steps by 6 to 16 %. A node "
-    "at rest ahead of it is the foot of its own path, so that it stays at rest while the bore pours water into it: of the "
-    "momentum that transport loses there, the volume brings back four fifths.",
+    "P41": "Into two and into four cells of water the bore is 11 to 14 % too slow, with other steps by 6 to 16 %. "
+    "A node at rest ahead of it is the foot of its own path, so that it stays at rest while the bore pours water into "
+    "it: of the momentum that transport loses there, the volume brings back four fifths.",
     "P42": "The wave is less than half a cell high, its run-up one to two cells of water; where the tongue tears off "
     "a film decides: 0.064 to 0.099 d on 24 and 48 cells over the depth, with variants of damping and transport.",
     "P55": "With four cells over the diameter the speed is 5 to 6 % low: linear velocities are too coarse there (spun, "
