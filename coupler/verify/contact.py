@@ -151,7 +151,7 @@ def _slide_until_rolling() -> tuple[float, float]:
         return float(s.velocity()[0, 0]), time
 
 
-@check("P05", "tilting table: topples, slides", "atan(b/h), atan(mu)")
+@check("P05", "tilting table: topples, slides", "atan(b/h), atan(mu)", "M")
 def tilting_table():
     exact = np.degrees(np.arctan(0.5))
     topples = _critical_angle((1.0, 1.0, 2.0), 0.8, lambda s: s.rotation()[0, 0, 2] > 0.1)

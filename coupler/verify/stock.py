@@ -65,7 +65,9 @@ TENSION, COHESION, FRICTION, COMPRESSION, ASPECT = 1e6, 1.5e6, 0.7, 6e6, 1.2
 """f_t, c, tan φ, f_c, A of the envelope that is probed [Pa]."""
 
 
-@check("P28", "Lourenço's envelope of YADE's mortar law", "tension cut-off, Coulomb line, compression cap")
+@check(
+    "P28", "Lourenço's envelope of YADE's mortar law", "tension cut-off, Coulomb line, compression cap", "M"
+)
 def lourenco_envelope():
     angles = np.radians([0, 20, 40, 60, 75, 90, 105, 120, 135, 145, 155, 165, 175, 180])
     joints = JointParameters(TENSION, 1e-5, shear_ratio=COHESION / TENSION)

@@ -37,7 +37,7 @@ def step(water: Water, dt: float, rtol: float = 1e-8):
     return problem.other_load - (problem.coupling.T @ (x + problem.known)).reshape(-1, 6)
 
 
-@check("P31", "decay of Taylor-Green vortices", "exp(-4 nu k² t), exact")
+@check("P31", "decay of Taylor-Green vortices", "exp(-4 nu k² t), exact", "M")
 def vortices():
     nu, k = 0.05, np.pi
     errors, curves = {}, []
