@@ -154,7 +154,7 @@ def _end_load(P: float, n: int, left: bool = False) -> np.ndarray:
     return F
 
 
-@check("P24", "cantilever of six blocks", "statically determinate chain; joints with closing stiffness")
+@check("P24", "cantilever of six blocks", "statically determinate chain; joints with closing stiffness", "M")
 def cantilever():
     for ratio, m in CHAINS:
         law = JointParameters(STRENGTH, FAILURE, closing_ratio=ratio)

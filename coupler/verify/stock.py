@@ -45,7 +45,7 @@ def ran(name: str, blocks, end: float, substep: float, records: int, joints=LAW,
         return run_script(law, timed(scene, law.variant, end, substep, records), Path(folder))
 
 
-@check("P27", "stock brittle laws at the same strength and stiffness", "linear bond: T_max²/(2 K_0)")
+@check("P27", "stock brittle laws at the same strength and stiffness", "linear bond: T_max²/(2 K_0)", "M")
 def brittle_laws():
     speed = 0.01
     speeds = np.linspace(0.95, 1.05, 101)
