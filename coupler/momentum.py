@@ -7,7 +7,7 @@ A line is what it has added since the start, so weight is negative in z and the 
     water_weight, blocks_weight      weight
     tank, tank_shear                 sides of the tank on the water: pressure; viscosity and friction
     sides                            water that came in through open sides, inflows and seas, with the pressure there
-    solids                           fixed solids on the water
+    solids                           fixed solids on the water (with a structure they are held blocks)
     held_blocks                      blocks of prescribed motion on the water and on free blocks
     ground, ground_joints            ground and tank on free blocks: by contact, and through joints
     transport ... shear_solve        what the scheme of the water adds (`fluid.momentum`)

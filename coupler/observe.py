@@ -66,15 +66,6 @@ def fastest_point(velocity: Array, radius: Array) -> float:
     return float((np.linalg.norm(velocity[:, :3], axis=1) + spin * radius).max())
 
 
-def surface_area(vertices: Array, faces) -> float:
-    """Surface [m²] of a polyhedron: vertices (k, 3) [m], faces as rows of vertices."""
-    total = 0.0
-    for face in faces:
-        arm = vertices[list(face)] - vertices[face[0]]
-        total += 0.5 * float(np.linalg.norm(np.cross(arm[1:-1], arm[2:]).sum(axis=0)))
-    return total
-
-
 def crack_columns(structure) -> dict[str, Array]:
     """Columns of the crack table; empty without joints."""
     t = structure.joint_table()

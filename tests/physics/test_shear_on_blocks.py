@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from coupler.observe import surface_area
 from coupler.verify.scenes import level_at, tank
 from coupler.verify.spheres import sphere
 from fluid.bodies import ConvexBodies
@@ -13,7 +12,7 @@ from fluid.parameters import WaterParameters
 from fluid.viscosity import Viscosity
 from fluid.viscous_kernels import implicit_change, momentum_rate
 from fluid.water import Water
-from yade_scripts.blocks import BOX_CORNERS, BOX_FACES, Block
+from yade_scripts.blocks import Block
 from yade_scripts.structure import Structure
 
 THICK = 200.0
@@ -23,12 +22,6 @@ THICK = 200.0
 def spinning_cube(structure):
     """Full, closed tank of half a metre with a cube of four cells."""
     return tank((0.5, 0.5, 0.5), (8, 8, 8), level_at(9.0), structure, viscosity=THICK, walls="no-slip")
-
-
-def test_the_surface_of_a_box_is_that_of_its_six_faces():
-    size = np.array([0.3, 0.4, 0.5])
-    exact = 2.0 * (size[0] * size[1] + size[1] * size[2] + size[2] * size[0])
-    assert surface_area(0.5 * size * BOX_CORNERS, BOX_FACES) == pytest.approx(exact)
 
 
 @pytest.mark.parametrize(("density", "dt"), [(8000.0, 5e-3), (1000.0, 2e-3), (1000.0, 1e-2), (100.0, 2e-3)])
