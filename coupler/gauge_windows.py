@@ -6,7 +6,8 @@ Values v_n hold over the step that ends at t_n:
     mean      m(t) = 1/T ∫_{t-T}^{t} v dt,  T the time since the start if that is shorter
     peak      max over the time so far of |m|
 
-A peak is only as sharp as its mean is short; those of different runs compare at the same `mean_over` only.
+A peak is only as sharp as its mean is short; those of different runs compare at the same `mean_over` only. Steps
+without a value (NaN: the place is inside a block) add nothing to I, and m goes over the others; without any it is NaN.
 """
 
 from __future__ import annotations
@@ -43,11 +44,11 @@ class Windows:
         found: list[float] = []
         if self.impulse:
             within = min(time, self.impulse[1]) - max(time - dt, self.impulse[0])
-            self.total = self.total + max(within, 0.0) * value
+            self.total = self.total + max(within, 0.0) * np.nan_to_num(value)
             found += list(self.total)
         if self.mean_over:
             mean = self._mean(time, dt, value)
-            self.peak = max(self.peak, float(np.linalg.norm(mean)))
+            self.peak = float(np.fmax(self.peak, np.linalg.norm(mean)))
             found += [*mean, self.peak]
         return found
 
@@ -62,9 +63,12 @@ class Windows:
         self._steps = deque((float(row[0]), float(row[1]), row[2:].copy()) for row in saved["steps"])
 
     def _mean(self, time: float, dt: float, value) -> np.ndarray:
-        self._steps.append((time - dt, time, value))
+        if np.isfinite(value).all():
+            self._steps.append((time - dt, time, value))
         start = time - self.mean_over
-        while self._steps[0][1] <= start:
+        while self._steps and self._steps[0][1] <= start:
             self._steps.popleft()
         spans = [(end - max(begin, start), v) for begin, end, v in self._steps]
+        if not spans:
+            return np.full_like(value, np.nan)
         return sum(span * v for span, v in spans) / sum(span for span, _ in spans)

@@ -1,4 +1,8 @@
-"""Gauges of a case: what is read every step, as columns of `history/gauges.csv` or in a table of its own."""
+"""Gauges of a case: what is read every step, as columns of `history/gauges.csv` or in a table of its own.
+
+A place inside a block or solid has no water to measure: its cell of the table stays empty, it adds nothing to impulses,
+and running means and peaks go over the time in which it was free.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coupler.errors import SurgebreakError
 from coupler.gauge_windows import Windows
 from coupler.loads import BlockLoads, GroupLoads
 
@@ -82,6 +85,11 @@ def _named(columns, values) -> dict[str, float]:
     return {name: float(v) for (name, *_), v in zip(columns, values)}
 
 
+def _measured(columns, values) -> dict[str, float | None]:
+    """The same, None where there was nothing to measure (NaN)."""
+    return {name: None if np.isnan(v) else v for name, v in _named(columns, values).items()}
+
+
 def _level(spec, rows_of) -> Gauge:
     at = np.array(spec.at)
 
@@ -106,26 +114,31 @@ def _pressure(spec, rows_of) -> Gauge:
 
 def _patch(spec, rows_of) -> Gauge:
     points = parallelogram(spec.at, spec.edges) if spec.edges else disc(spec.at, spec.radius, spec.normal)
+    windows = Windows(spec.impulse, spec.mean_over)
+    columns = (
+        (f"{spec.name}_pressure", "Pa", f"mean pressure over the free part of the patch at {spec.at}"),
+        (
+            f"{spec.name}_covered",
+            "1",
+            "share of the patch inside blocks or solids; at 1 there is no pressure",
+        ),
+        *windows.columns(spec.name, "Pa", ("",)),
+    )
 
-    def value(coupling):
+    def read(coupling, record):
         from fluid.gauges import pressure
 
-        return _mean_outside_solids(spec.name, pressure(coupling.water, points))
+        mean, covered = free_mean(pressure(coupling.water, points))
+        return _measured(columns, [mean, covered, *windows.add(record.time, record.dt, mean)])
 
-    return _in_time(spec, "pressure", "Pa", f"mean pressure over the patch at {spec.at}", value)
-
-
-class Covered(SurgebreakError):
-    """A patch lies wholly inside a solid."""
+    return Gauge(columns, read, windows)
 
 
-def _mean_outside_solids(name: str, values) -> float:
-    there = np.isfinite(values)
-    if not there.any():
-        raise Covered(
-            f"the patch of gauge '{name}' lies inside a solid or block; move it to the face, outside"
-        )
-    return float(values[there].mean())
+def free_mean(values) -> tuple[float, float]:
+    """Mean of values (m,) at places of equal area, NaN inside bodies, over those outside, and the share inside; the
+    mean is NaN where all are inside."""
+    free = np.isfinite(values)
+    return float(values[free].mean()) if free.any() else np.nan, float(1.0 - free.mean())
 
 
 def _in_time(spec, what: str, unit: str, meaning: str, value: Callable) -> Gauge:
@@ -136,7 +149,7 @@ def _in_time(spec, what: str, unit: str, meaning: str, value: Callable) -> Gauge
 
     def read(coupling, record):
         now = value(coupling)
-        return _named(columns, [now, *windows.add(record.time, record.dt, now)])
+        return _measured(columns, [now, *windows.add(record.time, record.dt, now)])
 
     return Gauge(columns, read, windows)
 
@@ -184,7 +197,7 @@ def _velocity(spec, rows_of) -> Gauge:
         from fluid.gauges import velocity
 
         now = velocity(coupling.water, np.array(spec.at))
-        return _named(columns, [*now, *windows.add(record.time, record.dt, now)])
+        return _measured(columns, [*now, *windows.add(record.time, record.dt, now)])
 
     return Gauge(columns, read, windows)
 

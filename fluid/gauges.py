@@ -7,11 +7,7 @@ import numpy as np
 from fluid.clip import clipped, volumes
 from fluid.inflow import wet_shares
 from fluid.moments import cells_touching, wet_fraction
-
-
-class Outside(ValueError):
-    """A gauge lies outside the tank."""
-
+from fluid.places import Places
 
 SAMPLES_PER_CELL = 4
 
@@ -36,42 +32,44 @@ def level(water, xy) -> float:
 
 def pressure(water, points):
     """Pressure [Pa] at points (m, 3) or (3,) [m] → (m,) or a number; 0 in the air, NaN inside a solid."""
-    p = _interpolated(water, points, water.pressure[:, None])[:, 0]
-    p = np.where(level_set_at(water, points) >= 0.0, 0.0, p)
+    places = Places.of(water, points)
+    p = np.where(places.read(water.level_set) >= 0.0, 0.0, places.read(water.pressure))
     return p if np.ndim(points) == 2 else float(p[0])
 
 
 def velocity(water, points):
     """Velocity [m/s] at points (m, 3) or (3,) [m] → the same shape; 0 in the air, NaN inside a solid."""
-    u = _interpolated(water, points, water.velocity)
-    u = np.where(level_set_at(water, points)[:, None] >= 0.0, 0.0, u)
+    places = Places.of(water, points)
+    u = np.where(places.read(water.level_set)[:, None] >= 0.0, 0.0, places.read(water.velocity))
     return u if np.ndim(points) == 2 else u[0]
 
 
 def level_set_at(water, points) -> np.ndarray:
-    """φ [m] at points (m, 3) [m] → (m,), negative in the water."""
-    return _interpolated(water, points, water.level_set[:, None])[:, 0]
+    """φ [m] at points (m, 3) [m] → (m,), negative in the water, NaN inside a solid."""
+    return Places.of(water, points).read(water.level_set)
 
 
 def flux(water, at, edges) -> float:
     """Water [m³/s] through the parallelogram with the centre `at` (3,) and edges (2, 3) [m], positive along the cross
     product of the edges: ∫_{φ<0} u·n dA.
 
-    φ and u are read on a lattice of triangles no longer than half a cell and taken as linear in each; a triangle with a
-    corner inside a solid counts as dry."""
+    φ and u are read on a lattice of triangles no longer than half a cell and taken as linear in each; a triangle whose
+    middle is inside a solid counts as dry."""
     edges = np.asarray(edges, float)
     m, n = (int(np.ceil(2.0 * np.linalg.norm(e) / water.mesh.spacing)) for e in edges)
     i, j = np.meshgrid(np.arange(m + 1), np.arange(n + 1), indexing="ij")
     place = np.column_stack([i.ravel() / m - 0.5, j.ravel() / n - 0.5])
     points = np.asarray(at, float) + place @ edges
-    phi = level_set_at(water, points)
-    through = _interpolated(water, points, water.velocity) @ np.cross(*edges) / (2.0 * m * n)
+    places = Places.of(water, points)
+    phi = places.read(water.level_set, inside=True)
+    through = places.read(water.velocity, inside=True) @ np.cross(*edges) / (2.0 * m * n)
     corner = np.arange((m + 1) * (n + 1)).reshape(m + 1, n + 1)
     low, right, up, top = (
         c.ravel() for c in (corner[:-1, :-1], corner[1:, :-1], corner[:-1, 1:], corner[1:, 1:])
     )
     triangles = np.concatenate([np.column_stack([low, right, top]), np.column_stack([low, top, up])])
-    triangles = triangles[np.isfinite(phi[triangles]).all(axis=1)]
+    free = ~Places.of(water, points[triangles].mean(axis=1)).inside & np.isfinite(phi[triangles]).all(axis=1)
+    triangles = triangles[free]
     return float((wet_shares(phi[triangles]) * through[triangles]).sum())
 
 
@@ -102,24 +100,3 @@ def _in_box(water, cells, lower, upper):
     parts = clipped(parts, parts[:, :, 3])
     of_cell = np.rint(parts[:, 0, 4]).astype(np.int64)
     return np.bincount(of_cell, volumes(parts), minlength=len(cells))
-
-
-def _interpolated(water, points, field):
-    """P1 value (m, k) of field (N, k) at points (m, 3) or (3,); NaN inside solids. Raises Outside.
-
-    A point on the face of a solid may be found in the cell behind it: then the cell beside that one answers."""
-    points = np.atleast_2d(np.asarray(points, float))
-    parent = water.mesh.locate(points)
-    if np.any(parent < 0):
-        low, high = water.mesh.bounds
-        place = points[np.flatnonzero(parent < 0)[0]]
-        raise Outside(f"gauge at {place} lies outside the tank {low} to {high}; move it inside")
-    row = water.topology.row_of_parent
-    beside = row[np.append(parent[:, None], water.mesh.neighbours[parent], axis=1)]
-    cell = beside[np.arange(len(points)), np.argmax(beside >= 0, axis=1)]
-    corners = water.topology.cells[cell]
-    g = water.mesh.gradients[water.topology.parent[cell]]
-    weight = np.einsum("mak,mk->ma", g, points - water.topology.nodes[corners[:, 0]])
-    weight[:, 0] += 1.0
-    value = np.einsum("ma,mak->mk", weight, field[corners])
-    return np.where(cell[:, None] >= 0, value, np.nan)

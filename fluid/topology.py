@@ -87,6 +87,14 @@ class Topology:
         return row
 
     @cached_property
+    def rows_of_parent(self) -> tuple[np.ndarray, np.ndarray]:
+        """First row and number of the cells of each background cell: none inside solids, several where a thin wall
+        parts it."""
+        background = np.arange(self.gradients.shape[0])
+        first = np.searchsorted(self.parent, background)
+        return first, np.searchsorted(self.parent, background, side="right") - first
+
+    @cached_property
     def around(self) -> tuple[np.ndarray, np.ndarray]:
         """start (N+1,), neighbours: the nodes that share a cell with each node."""
         return _nodes_around(self.cells, self.node_start, self.node_cells)

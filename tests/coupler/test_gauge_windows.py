@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from coupler.gauge_windows import Windows
-from coupler.gauges import disc, parallelogram
+from coupler.gauges import disc, free_mean, parallelogram
 
 STEPS = st.lists(st.tuples(st.floats(1e-3, 0.5), st.floats(-10, 10)), min_size=1, max_size=30)
 
@@ -70,3 +70,22 @@ def test_units_of_sums_over_time():
     """A force gives newton seconds, a flux the volume that has passed."""
     units = [Windows((0.0, 1.0), None).columns("g", unit, ("",))[0][1] for unit in ("N", "Pa", "m3/s")]
     assert units == ["N s", "Pa s", "m3"]
+
+
+def test_steps_without_a_value_leave_sums_means_and_peaks_alone():
+    """A block lies over the place from 0.2 to 0.6 s: the mean of the last 0.2 s goes over what was measured in it, is
+    NaN where that is nothing, and impulse and peak go on from what they were."""
+    windows = Windows((0.0, 1.0), 0.2)
+    values = [1.0, 3.0, np.nan, np.nan, np.nan, np.nan, 2.0]
+    told = np.array([windows.add(0.1 * (k + 1), 0.1, v) for k, v in enumerate(values)])
+    np.testing.assert_allclose(told[:, 0], [0.1, 0.4, 0.4, 0.4, 0.4, 0.4, 0.6])
+    np.testing.assert_allclose(told[:, 1], [1.0, 2.0, 3.0, np.nan, np.nan, np.nan, 2.0])
+    np.testing.assert_allclose(told[:, 2], [1.0, 2.0, 3.0, 3.0, 3.0, 3.0, 3.0])
+    assert np.isfinite(windows.save()["steps"]).all()  # checkpoints hold numbers only
+
+
+def test_a_patch_reads_its_free_part_and_says_how_much_is_covered():
+    assert free_mean(np.array([4.0, np.nan, 8.0, np.nan])) == (6.0, 0.5)
+    mean, covered = free_mean(np.full(3, np.nan))
+    assert np.isnan(mean)
+    assert covered == 1.0

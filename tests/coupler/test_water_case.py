@@ -186,3 +186,38 @@ def test_wave_onto_a_beach_keeps_its_books():
     # the crest brings c H in a second over the width, give or take the coarse cells
     assert max(row["q_flux"] for row in rows) == pytest.approx(2.33 * 0.05 * 0.2, rel=0.25)
     assert max(row["p_peak"] for row in rows) == pytest.approx(9810 * 0.45, rel=0.05)
+
+
+def test_a_stone_that_covers_gauges_leaves_their_cells_empty():
+    """It sinks past them: before and behind it they read the water, inside it there is none, and the run goes on."""
+    stone = {"name": "stone", "size": [0.12] * 3, "centre": [0.51, 0.1, 0.62], "velocity": [0, 0, -3.0]}
+    windows = {"mean_over": 0.01, "impulse": [0, 1]}
+    at = [0.51, 0.1, 0.4]
+    found = Case.model_validate(
+        {
+            "case": {"title": "t"},
+            "time": {"end": 1.0, "step_max": 0.01},
+            "tank": TANK,
+            "water": {"fill": FILL},
+            "structure": {"density": 5000, "block": [stone]},
+            "contact": {"stiffness": 1e6},
+            "gauge": [
+                {"kind": "pressure", "name": "point", "at": at, **windows},
+                {"kind": "patch", "name": "disc", "at": at, "radius": 0.02, "normal": [1, 0, 0], **windows},
+                {"kind": "velocity", "name": "u", "at": at, "mean_over": 0.01},
+            ],
+        }
+    )
+    coupling, _, rows = run(found, 0.16)
+    coupling.structure.close()  # one scene of YADE a process
+    empty, disc = ([row[f"{name}_pressure"] is None for row in rows] for name in ("point", "disc"))
+    assert not empty[0]
+    assert any(disc)
+    assert not empty[-1]
+    assert empty == [row["u_velocity_x"] is None for row in rows]
+    assert disc == [row["disc_covered"] == 1.0 for row in rows]
+    assert not any(whole and not middle for whole, middle in zip(disc, empty))
+    assert any(0.0 < row["disc_covered"] < 1.0 for row in rows)
+    impulse = np.array([row["point_impulse"] for row in rows])
+    assert (np.diff(impulse)[empty[1:]] == 0.0).all()
+    assert impulse[-1] > impulse[0] > 0.0

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from fluid import gauges
 from fluid.bodies import ConvexBodies
 from fluid.clip import clipped, volumes
+from fluid.places import Outside
 from tests.fluid.scenes import advance, column, load, tank
 
 
@@ -44,7 +45,7 @@ def test_volume_of_all_and_of_a_half(pool):
 
 
 def test_gauge_outside_the_tank_is_refused(pool):
-    with pytest.raises(gauges.Outside, match="lies outside the tank"):
+    with pytest.raises(Outside, match="lies outside the tank"):
         gauges.pressure(pool, [[2.0, 0.5, 0.5]])
 
 
@@ -56,6 +57,45 @@ def test_pressure_on_the_face_of_a_solid():
     for x in (0.25, 0.75):
         np.testing.assert_allclose(gauges.pressure(water, [x, 0.5, 0.3]), 9810 * 0.5, rtol=1e-6)
     assert np.isnan(gauges.pressure(water, [0.5, 0.5, 0.25]))
+
+
+@pytest.mark.parametrize("thickness", [0.01, 0.05])
+@pytest.mark.parametrize("place", [0.5, 0.53, 0.5625])
+def test_gauges_read_their_own_side_of_a_wall_thinner_than_a_cell(place, thickness):
+    """Two pools, 0.65 m and 0.35 m deep. The cells that the wall cuts in two hold both; a sensor on its face, one close
+    to it, a level gauge and a flow meter read the pool that they are in, and in the middle of the wall is nothing."""
+    low, high = place - 0.5 * thickness, place + 0.5 * thickness
+    wall = ConvexBodies.boxes(np.array([[place, 0.5, 0.5]]), np.array([[thickness, 2.0, 2.0]]))
+    water = tank([1, 1, 1], 0.125, lambda x: x[:, 2] - 0.35, wall, covers="multiple")
+    left = np.zeros(len(water.level_set), bool)
+    left[water.domain.cells[water.domain.centroid[:, 0] < place]] = True
+    depth = np.where(left, 0.65, 0.35)
+    water.level_set[:] = water.topology.nodes[:, 2] - depth
+    water.pressure[:] = np.maximum(-9810 * water.level_set, 0.0)
+    water.velocity[:] = np.where(left, 2.0, -1.0)[:, None]
+    for x, deep, u in (
+        (low, 0.65, 2.0),
+        (low - 0.03, 0.65, 2.0),
+        (high, 0.35, -1.0),
+        (high + 0.03, 0.35, -1.0),
+    ):
+        for y in (0.5, 0.3, 0.41):  # on mesh planes and off them
+            assert gauges.pressure(water, [x, y, 0.25]) == pytest.approx(9810 * (deep - 0.25))
+        assert gauges.level(water, (x, 0.41)) == pytest.approx(deep, abs=1e-9)
+        across = gauges.flux(water, [x, 0.5, 0.1], [[0, 0.3, 0], [0, 0, 0.1]])
+        assert across == pytest.approx(0.03 * u)
+    if thickness > 0.02:  # else its middle counts as on its face
+        assert np.isnan(gauges.pressure(water, [place, 0.3, 0.25]))
+
+
+def test_a_gauge_inside_a_block_smaller_than_a_cell_reads_nothing():
+    """No cell lies wholly inside it; its own faces say where it is."""
+    block = ConvexBodies.boxes(np.array([[0.5, 0.5, 0.3]]), np.array([[0.1, 0.1, 0.1]]))
+    water = tank([1, 1, 1], 0.125, lambda x: x[:, 2] - 0.8, block)
+    assert np.isnan(gauges.pressure(water, [0.5, 0.5, 0.3]))
+    assert np.isnan(gauges.velocity(water, [0.5, 0.5, 0.26])).all()
+    assert gauges.level(water, (0.5, 0.5)) == pytest.approx(0.7, abs=0.05)  # sampled four times a cell
+    assert gauges.level(water, (0.6, 0.5)) == pytest.approx(0.8)
 
 
 def test_pressure_read_is_the_pressure_that_acts():
