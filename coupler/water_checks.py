@@ -34,11 +34,6 @@ def water_problems(case: Case) -> Iterator[Problem]:
             ("water",),
             "no water: write at least one [[water.fill]] with lower and upper, or an inflow or a sea",
         )
-    if case.case.gravity == 0.0:
-        yield (
-            ("case", "gravity"),
-            "water without weight has neither a step nor a speed to measure by; give it a little, such as 1e-6 m/s2",
-        )
     yield from _walls(w)
     if case.tank is not None:
         yield from _sides(case)
