@@ -64,7 +64,17 @@ def _coupling(case: Case, structure, solids, clock, from_start: bool) -> Couplin
         passes=case.coupling.passes,
         tolerance=case.coupling.tolerance,
         most_defect=case.limits.defect,
+        expected=_side_energy(case),
     )
+
+
+def _side_energy(case: Case) -> float:
+    """What inflows and seas can bring [J]; without any their code is not loaded."""
+    if case.water is None or not (case.water.inflow or case.water.sea):
+        return 0.0
+    from coupler.side_energy import side_energy
+
+    return side_energy(case)
 
 
 def _settled(structure, water) -> bool:

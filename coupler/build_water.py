@@ -9,6 +9,9 @@ import numpy as np
 from coupler.case import Case
 from coupler.errors import did_you_mean
 
+SLACK = 1e-6
+"""Share of a cell within which a box of water reaches a side of the tank."""
+
 
 def water_of(case: Case, structure, solids):
     """(Water, Immersion) of a case with a structure or None and fixed solids [(vertices, faces)]."""
@@ -36,14 +39,47 @@ def water_of(case: Case, structure, solids):
         manning=w.manning,
     )
     level = np.full(len(immersion.domain.nodes), np.ptp(mesh.bounds, axis=0).max())
-    if w.fill:
-        boxes = [(fill.lower, fill.upper) for fill in w.fill]
+    boxes = [(fill.lower, fill.upper) for fill in w.fill] + _strips(case)
+    if boxes:
         level = start_level(boxes, (case.tank.lower, case.tank.upper), mesh, immersion.domain)
     opened, smooth = sides_named(case.tank.open), sides_named(case.tank.smooth)
     water = Water(mesh, immersion.domain, level, parameters, opened, smooth, _flows(case, mesh))
     if immersion.cracks is not None and immersion.cracks.lumped:
         water.set_cracks(immersion.cracks.cracks())
     return water, immersion
+
+
+def _strips(case: Case) -> list[tuple]:
+    """Boxes (lower, upper) of water, one cell wide, beside inflows and seas that no fill reaches: without any water
+    beside it a side would begin with a film, in which neither pressure nor volume mean anything."""
+    found = []
+    for spec in (*case.water.inflow, *case.water.sea):
+        top = level_at_start(spec)
+        if top > case.tank.lower[2] and not fills_beside(case, spec.side):
+            lower, upper = [*case.tank.lower], [*case.tank.upper]
+            axis, end = "xyz".index(spec.side[0]), spec.side[1]
+            if end == "-":
+                upper[axis] = lower[axis] + case.tank.cell
+            else:
+                lower[axis] = upper[axis] - case.tank.cell
+            found.append((lower, [*upper[:2], top]))
+    return found
+
+
+def level_at_start(spec) -> float:
+    """Height z [m] of the surface that an inflow or a sea has at the start, ahead of any wave."""
+    if getattr(spec, "kind", "sea") == "record":
+        return float(record_columns(spec.path)[1][0])
+    return spec.ahead if getattr(spec, "kind", "sea") == "bore" else spec.level
+
+
+def fills_beside(case: Case, side: str) -> list:
+    """The boxes of water at the start that reach a side of the tank."""
+    axis, end = "xyz".index(side[0]), "upper" if side[1] == "+" else "lower"
+    wall = getattr(case.tank, end)[axis]
+    return [
+        fill for fill in case.water.fill if abs(getattr(fill, end)[axis] - wall) <= SLACK * case.tank.cell
+    ]
 
 
 def _narrow_cracks(kind: str, structure, mesh):

@@ -130,7 +130,9 @@ class Water(Section):
         "as the mesh sees them (one cell wide at least), closed, or closed with the flow through them lumped",
     )
     fill: tuple[Fill, ...] = Field(
-        (), description="where the water stands at the start; at least one box, or an inflow or a sea"
+        (),
+        description="where the water stands at the start; at least one box, or an inflow or a sea, "
+        "which then begin with a strip of water one cell wide",
     )
     inflow: tuple[Inflow, ...] = Field((), description="sides through which water comes in")
     sea: tuple[Sea, ...] = Field((), description="sides with a still sea beyond")

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from coupler.build_water import record_columns
 from coupler.case import Case
 from coupler.observe import joint_counts
 from coupler.place_checks import BYTES_PER_CELL, mesh_size
@@ -79,7 +80,7 @@ def _water_rows(case: Case, interval: float, rows: list[Row]) -> float:
     """Rows of the water; the step [s] that its greatest speed allows."""
     cells, nodes = mesh_size(case.tank)
     volume = sum(float(np.prod(np.subtract(f.upper, f.lower))) for f in case.water.fill)
-    height = max(f.upper[2] for f in case.water.fill) - case.tank.lower[2]
+    height = _highest(case) - case.tank.lower[2]
     g, h = case.case.gravity, case.tank.cell
     fastest = math.sqrt(2.0 * g * height)
     limits = {
@@ -93,6 +94,17 @@ def _water_rows(case: Case, interval: float, rows: list[Row]) -> float:
     rows.append(Row("water", volume, "m3", "in the fill boxes, solids not taken off"))
     rows.append(Row("step", 1e3 * limits[reason], "ms", f"set by {reason}"))
     return limits[reason]
+
+
+def _highest(case: Case) -> float:
+    """Height z [m] of the highest water: in the boxes at the start, of a sea, or that comes in."""
+    found = [box.upper[2] for box in case.water.fill] + [sea.level for sea in case.water.sea]
+    for spec in case.water.inflow:
+        if spec.kind == "record":
+            found.append(float(record_columns(spec.path)[1].max()))
+        else:
+            found.append(spec.level + (spec.height if spec.kind == "solitary" else 0.0))
+    return max(found)
 
 
 def _structure_rows(case: Case, rows: list[Row], exact: bool) -> int:

@@ -12,8 +12,8 @@ A scheme that gains energy shows D < 0; dissipation D > 0 is damping of the wate
 counted as an error. The energy error is (|r_s| + |r_i| + max(0, −D − E_left)) / E_in: the head of water at an open
 side is not that of the water which the volume correction then takes off, within five cells of the side, so a gain is
 told from an outflow only beyond it. E_in is the energy that the scene puts in: the potential energy of the water
-above its level state, the potential energy the blocks give up, kinetic energy, or work of imposed motions, whichever
-is the largest so far.
+above its level state and what inflows and seas can bring, the potential energy the blocks give up, kinetic energy, or
+work of imposed motions, whichever is the largest so far.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class Ledger:
     """Accumulates the balances of a run. Either side may be absent (None)."""
 
     available: float = 0.0
-    """Potential energy of the water above its level state at the start [J]."""
+    """Potential energy of the water above its level state at the start, and what inflows and seas can bring [J]."""
     work_given: float = 0.0
     entered: float = 0.0
     """Energy that came with water through inflows and seas so far, less what left there [J]."""

@@ -72,6 +72,7 @@ class Coupling:
     passes: most pressure solves in a step; beyond the first, the structure goes back and takes the step again, as long
     as the defect is above `tolerance`.
     most_defect: above RETRY_AT of it, or where no pressure is found, both sides go back and take half of the step.
+    expected: energy that inflows and seas can bring [J], a scale for errors.
     """
 
     def __init__(
@@ -86,6 +87,7 @@ class Coupling:
         passes: int = 1,
         tolerance: float = 0.02,
         most_defect: float = 0.5,
+        expected: float = 0.0,
     ):
         self.passes, self.tolerance, self.most_defect = passes, tolerance, most_defect
         self.longest = math.inf
@@ -105,7 +107,7 @@ class Coupling:
             self.sheared = ShearedBlocks(structure, immersion.n_solids)
         self.ledger = Ledger()
         if water is not None:
-            self.ledger.available = water.available_energy()
+            self.ledger.available = water.available_energy() + expected
         self.ledger.start(self._water_energy(), self._structure_energies())
         self.momentum = momentum_ledger(water, structure)
 

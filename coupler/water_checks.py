@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from coupler.build_water import RecordError, record_columns
+from coupler.build_water import RecordError, fills_beside, level_at_start, record_columns
 from coupler.case import Case
 
 KeyPath = tuple[str | int, ...]
@@ -16,6 +16,9 @@ HIGHEST_WAVE = 0.78
 
 EARLY = 0.05
 """Share of its height that a solitary wave may have at the start without a remark."""
+
+STILL = 0.1
+"""Share of a cell by which the still water may miss the level that a wave is made for, without a remark."""
 
 
 def water_problems(case: Case) -> Iterator[Problem]:
@@ -40,8 +43,10 @@ def water_problems(case: Case) -> Iterator[Problem]:
 
 
 def water_remarks(case: Case) -> Iterator[str]:
-    """Waves that are under way at the start."""
+    """Waves that are under way at the start, and waves without the still water that they run into."""
     for spec in case.water.inflow if case.water and case.tank else ():
+        if spec.kind in ("bore", "solitary"):
+            yield from _still_water(case, spec)
         if spec.kind == "solitary":
             share = _share_at_start(spec, spec.level - case.tank.lower[2], case.case.gravity)
             if share > EARLY:
@@ -49,6 +54,16 @@ def water_remarks(case: Case) -> Iterator[str]:
                     f"the solitary wave at {spec.side} starts at {100 * share:.0f} % of its height: a jump that "
                     f"strikes; let its crest come later than {spec.crest:g} s"
                 )
+
+
+def _still_water(case: Case, spec) -> Iterator[str]:
+    wanted = level_at_start(spec)
+    there = max([fill.upper[2] for fill in fills_beside(case, spec.side)], default=case.tank.lower[2])
+    if abs(there - wanted) > STILL * case.tank.cell:
+        yield (
+            f"the {'bore' if spec.kind == 'bore' else 'solitary wave'} at {spec.side} runs into still water up to "
+            f"z = {wanted:g} m, but [[water.fill]] reaches z = {there:g} m beside it: that difference falls at once"
+        )
 
 
 def _share_at_start(spec, depth: float, gravity: float) -> float:

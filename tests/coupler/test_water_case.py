@@ -7,6 +7,8 @@ from coupler.build import build
 from coupler.build_water import RecordError, record_columns
 from coupler.case import Case, modules
 from coupler.case_checks import problems, remarks
+from coupler.forecast import forecast
+from coupler.side_energy import side_energy
 from tests.fakes import no_clock
 
 TANK = {"lower": [0, 0, 0], "upper": [2, 0.2, 1], "cell": 0.1, "smooth": ["y-", "y+"]}
@@ -74,6 +76,43 @@ def test_a_dry_start_is_allowed_where_water_comes_in():
     assert (
         told({"fill": [], "inflow": [{"kind": "steady", "side": "x-", "level": 0.3, "velocity": 1.0}]}) == []
     )
+
+
+@pytest.mark.parametrize(
+    "side",
+    [
+        {"inflow": [{"kind": "steady", "side": "x-", "level": 0.3, "velocity": 1.0}]},
+        {"sea": [{"side": "x+", "level": 0.4}]},
+    ],
+)
+def test_a_dry_start_keeps_its_books_from_the_first_step(side):
+    """A film of water beside the side, as it was, lost half of its volume and could not balance its energy; errors of
+    energy are shares of what the side can bring, not of what came in so far."""
+    found = case({"fill": [], **side})
+    assert "water" in [row.name for row in forecast(found).rows]
+    coupling = build(found, no_clock).coupling
+    strip = 0.1 * 0.2 * (0.3 if "inflow" in side else 0.4)
+    assert coupling.water.volume() == pytest.approx(strip, rel=0.15)  # cells cut off its upper edge
+    for _ in range(8):
+        record = coupling.step(0.01)
+        assert record.balance.energy_error < 0.02
+        assert abs(coupling.water.volume_error()) < 1e-5
+    assert coupling.water.sides.entered > 0.0
+
+
+def test_energy_that_a_side_can_bring():
+    """A sea 0.2 m above the water: ½ ρ g Δz² over its depth; a stream on a dry bed has its speed too."""
+    sea = side_energy(case({"sea": [{"side": "x+", "level": 0.7}]}))
+    assert sea == pytest.approx(0.5 * 1000 * 0.2 * 0.7 * 9.81 * 0.2**2)
+    stream = {"kind": "steady", "side": "x-", "level": 0.3, "velocity": 1.0}
+    both = side_energy(case({"fill": [], "inflow": [stream]}))
+    assert both == pytest.approx(0.5 * 1000 * 0.2 * 0.3 * (9.81 * 0.3**2 + 0.3))
+
+
+def test_a_wave_without_its_still_water_is_remarked():
+    bore = {"kind": "bore", "side": "x-", "ahead": 0.4, "level": 0.8}
+    assert "bore at x- runs into still water up to z = 0.4 m" in remarks(case({"inflow": [bore]}))[0]
+    assert remarks(case({"inflow": [bore | {"ahead": 0.5}]})) == []
 
 
 def test_modules_tell_what_is_on():
