@@ -14,6 +14,7 @@ from coupler.case import Case
 from coupler.errors import did_you_mean
 from coupler.parts import PARTS, Part, parts_of, recipes
 from coupler.place_checks import frame_problems, opening_problems, place_problems, solid_bodies
+from coupler.schedule import MOST_OUTPUTS
 from coupler.solids import refused_solids
 from coupler.toml_lines import shown
 from coupler.water_checks import water_problems, water_remarks
@@ -141,12 +142,24 @@ def _sections(case: Case) -> Iterator[Problem]:
         yield ("water",), "the water needs a section [tank] that says where it may be"
     if case.tank is not None and case.water is None and case.structure is None:
         yield ("tank",), "a tank without water; write a section [water] with [[water.fill]]"
+    yield from _outputs(case)
     yield from water_problems(case)
     if case.structure is not None:
         yield from _structure_sections(case)
     elif case.joints is not None or case.contact is not None or case.motion:
         absent = [name for name in ("contact", "joints", "motion") if getattr(case, name)]
         yield (absent[0],), f"[{absent[0]}] is for blocks; write a section [structure] or leave this one out"
+
+
+def _outputs(case: Case) -> Iterator[Problem]:
+    """A step ends at each output, so that too many of them make a run endless and fill the disk."""
+    end, every = case.time.end, case.time.output_every
+    if every is not None and end > MOST_OUTPUTS * every:
+        yield (
+            ("time", "output_every"),
+            f"{every:g} s makes {end / every:.3g} written states until {end:g} s, at most {MOST_OUTPUTS}; write "
+            f"{end / MOST_OUTPUTS:.2g} s or more (histories have a row every step anyway)",
+        )
 
 
 def _structure_sections(case: Case) -> Iterator[Problem]:

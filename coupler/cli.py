@@ -139,7 +139,7 @@ def check(
     describe(file, print)
     from coupler.forecast import forecast
 
-    terminal.table("forecast", forecast(file.case, exact).rows)
+    terminal.table("forecast", forecast(file.case, exact, file.directory).rows)
 
 
 @app.command(context_settings=PASS_ON | {"help_option_names": []})

@@ -7,7 +7,9 @@ Memory and disk per cell were read off runs; they are forecasts, not bounds.
 from __future__ import annotations
 
 import math
+import shutil
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -39,10 +41,11 @@ class Forecast:
     rows: list[Row]
 
 
-def forecast(case: Case, exact: bool = False) -> Forecast:
+def forecast(case: Case, exact: bool = False, place: Path = Path()) -> Forecast:
     """The forecast of a case; starts YADE when the case has a structure, to ask it for the substep.
 
-    exact: with the exact frequency of the joints beside the bound that sets the substep (an eigenvalue problem)."""
+    exact: with the exact frequency of the joints beside the bound that sets the substep (an eigenvalue problem) ·
+    place: a directory on the disk that the results go to."""
     rows: list[Row] = []
     memory = 80e6
     disk = 0.0
@@ -63,8 +66,15 @@ def forecast(case: Case, exact: bool = False) -> Forecast:
     disk += HISTORY_BYTES_PER_STEP * steps + _checkpoint_bytes(case)
     rows.append(Row("written states", outputs + 1, "", ""))
     rows.append(Row("memory", memory / 1e6, "MB", "about"))
-    rows.append(Row("disk", disk / 1e6, "MB", "about"))
+    rows.append(Row("disk", disk / 1e6, "MB", _disk_remark(disk, shutil.disk_usage(place).free)))
     return Forecast(rows)
+
+
+def _disk_remark(wanted: float, free: float) -> str:
+    """Whether the disk has room for the results [B]."""
+    if wanted < free:
+        return "about"
+    return f"more than the {free / 1e6:.4g} MB that are free: raise time.output_every, or give --output another disk"
 
 
 def _checkpoint_bytes(case: Case) -> float:

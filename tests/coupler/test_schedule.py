@@ -4,6 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from coupler.case_checks import problems
+from coupler.forecast import _disk_remark
 from coupler.schedule import Schedule, checkpoint_interval, next_multiple
 from tests.physics.scenes import case
 
@@ -37,6 +39,19 @@ def test_the_interval_divides_the_first_end():
     assert Schedule.of(timed(end=1.0, output_every=5.0)) == Schedule(1.0, 1, 1.0)
     short, long = (Schedule.of(timed(end=end, output_every=0.01)) for end in (0.06, 0.1))
     assert [short.next_output(0.01 * k) for k in range(5)] == [long.next_output(0.01 * k) for k in range(5)]
+
+
+def test_more_outputs_than_anybody_can_read_are_refused():
+    """A step ends at each: a nanosecond for a millisecond would never come to an end, and fill the disk."""
+    ((path, text),) = (p for p in problems(timed(end=1.0, output_every=1e-9)) if p[0][:1] == ("time",))
+    assert path == ("time", "output_every")
+    assert "1e+09 written states until 1 s, at most 100000; write 1e-05 s or more" in text
+    assert not any(p[0][:1] == ("time",) for p in problems(timed(end=1.0, output_every=1e-5)))
+
+
+def test_the_forecast_says_where_the_disk_is_too_small():
+    assert _disk_remark(1e6, 2e6) == "about"
+    assert "more than the 2 MB that are free: raise time.output_every" in _disk_remark(1e9, 2e6)
 
 
 def test_how_often_checkpoints_are_written():
