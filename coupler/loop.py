@@ -7,14 +7,14 @@ A scene may lack either side: without water the structure runs alone, without a 
 from __future__ import annotations
 
 import math
-from collections import deque
 from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
 
+from coupler.defects import RETRIES, Defects
 from coupler.ledger import Balance, Ledger
-from coupler.limits import Diverged, check_finite, check_misses, check_pressure
+from coupler.limits import Diverged, check_finite, check_pressure
 from coupler.momentum import MomentumBalance, book_step, momentum_ledger
 from coupler.observe import fastest_point
 
@@ -24,17 +24,6 @@ BLOCK_COURANT = 0.5
 """Share of a cell that the fastest block may cross in one step: its cells are cut once a step."""
 STANDS_STILL = 1e-3
 """Share of the energy of the scene below which the motion of the structure is no measure of the defect."""
-DEFECT_STEPS = 20
-"""Steps over which the defect is averaged: a breaking joint may spoil one of them."""
-RETRIES = 3
-"""Times that a step which failed is halved and taken again."""
-RETRY_AT = 0.6
-"""Share of `most_defect` above which a step is halved: blocks that hit each other under water within one step miss by
-0.2 to 0.5, and left 2 % of the energy out of balance where only half of them were taken again."""
-MISSES = 3
-"""Steps in a row that may miss by more than `most_defect` at their shortest before the run stops."""
-REGROWTH = 1.5
-"""By which the longest step grows again with every step that needs no retry."""
 
 
 @dataclass
@@ -71,7 +60,8 @@ class Coupling:
     water, structure, immersion: either side may be None (immersion only with water).
     passes: most pressure solves in a step; beyond the first, the structure goes back and takes the step again, as long
     as the defect is above `tolerance`.
-    most_defect: above RETRY_AT of it, or where no pressure is found, both sides go back and take half of the step.
+    most_defect: above a share of it (`Defects`), or where no pressure is found, both sides go back and take half of the
+    step.
     expected: energy that inflows and seas can bring [J], a scale for errors.
     """
 
@@ -89,11 +79,9 @@ class Coupling:
         most_defect: float = 0.5,
         expected: float = 0.0,
     ):
-        self.passes, self.tolerance, self.most_defect = passes, tolerance, most_defect
-        self.longest = math.inf
-        """Longest step [s] after one that had to be halved."""
+        self.passes, self.tolerance = passes, tolerance
+        self.defects = Defects(most_defect, step_max)
         self._before = None
-        self._defects: deque[float] = deque(maxlen=DEFECT_STEPS)
         self.water, self.structure, self.immersion = water, structure, immersion
         self.rtol, self.step_max, self.clock = rtol, step_max, clock
         self.radius = np.zeros(0)
@@ -113,16 +101,15 @@ class Coupling:
 
     def save(self) -> dict[str, Array]:
         """What the coupling itself remembers between two steps; both sides and the ledger save theirs."""
-        found = {"time": np.array(self.time), "defects": np.array(self._defects, float)}
+        found = {"time": np.array(self.time), **self.defects.save()}
         if self.sheared is not None:
             found["sheared"] = self.sheared.accelerations.copy()
-        return found if math.isinf(self.longest) else found | {"longest": np.array(self.longest)}
+        return found
 
     def restore(self, saved: dict[str, Array]) -> None:
         """Back to what was saved."""
         self.time = float(saved["time"])
-        self._defects = deque(saved["defects"].tolist(), maxlen=DEFECT_STEPS)
-        self.longest = float(saved.get("longest", math.inf))
+        self.defects.restore(saved)
         if self.sheared is not None:
             self.sheared.accelerations = saved["sheared"].copy()
 
@@ -130,15 +117,9 @@ class Coupling:
     def coupled(self) -> bool:
         return self.water is not None and self.structure is not None
 
-    @property
-    def mean_defect(self) -> float:
-        """Mean defect of the last DEFECT_STEPS steps; 0 before there are as many."""
-        full = len(self._defects) == DEFECT_STEPS
-        return sum(self._defects) / DEFECT_STEPS if full else 0.0
-
     def step_size(self, remaining: float) -> float:
         """The largest step [s] that water, blocks and the case allow, dividing `remaining` evenly."""
-        dt = min(self.step_max, self.longest)
+        dt = min(self.step_max, self.defects.longest)
         if self.water is not None:
             dt = min(dt, self.water.stable_step())
         if self.coupled:
@@ -219,22 +200,12 @@ class Coupling:
                         f"t = {self.time:.4g} s: {error} Steps down to {record.dt:.3g} s did not help."
                     ) from error
             else:
-                if last or self._before is None or record.defect <= RETRY_AT * self.most_defect:
+                if last or self._before is None or not self.defects.too_large(record.defect):
                     break
             if self._before is not None:
                 self.structure.restore(self._before)
-        self._note_defect(record)
+        self.defects.note(self.time, record.dt, record.defect, record.retries)
         return problem, found
-
-    def _note_defect(self, record: StepRecord) -> None:
-        """Keep the next steps short after a retry, and stop where the shortest ones keep missing."""
-        self._defects.append(record.defect)
-        if record.retries > 0:
-            self.longest = record.dt
-        else:
-            self.longest = self.longest * REGROWTH if self.longest < self.step_max else math.inf
-        if record.retries == RETRIES:
-            check_misses(self.time, list(self._defects)[-MISSES:], MISSES, self.most_defect, record.dt)
 
     def _exchange(self, problem, record: StepRecord):
         """Pressure with the structure inside, then the structure under it, as often as the passes allow.

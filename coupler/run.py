@@ -128,7 +128,7 @@ def _steps(
             reporter.step(coupling.time, _told(coupling, record))
             check_balance(coupling.time, _volume_error(coupling), record.balance.energy_error, limits)
             check_momentum(coupling.time, record.momentum.error, limits.momentum_error)
-            check_defect(coupling.time, coupling.mean_defect, case.limits.defect)
+            check_defect(coupling.time, coupling.defects.mean, case.limits.defect)
             if _reached(coupling.time, target):
                 with clock("output"):
                     recorder.fields(coupling.time)

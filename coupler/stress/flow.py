@@ -56,7 +56,7 @@ class Flow:
         self.lost = balance.numerical_dissipation / max(balance.input_energy, 1e-300)
         if self.limited:
             check_balance(record.time, water.volume_error(), balance.energy_error, STOPS)
-            check_defect(record.time, self.coupling.mean_defect, DEFECT)
+            check_defect(record.time, self.coupling.defects.mean, DEFECT)
         return record
 
     def measures(self, what: str = "", energy: float | None = ENERGY) -> Iterator[Measure]:

@@ -66,7 +66,7 @@ def growth(scene: Scene, steps: int = STEPS) -> float:
     the run to the last; infinite if a joint breaks."""
     coupling = swinging_wall(scene)
     coupling.tolerance = 1e-6  # every step takes all its passes
-    coupling.most_defect = np.inf
+    coupling.defects.most = np.inf
     structure, speed = coupling.structure, []
     try:
         for _ in range(steps):
