@@ -1,0 +1,105 @@
+"""What does not fit a run is refused before anything of it is touched, and the difference is told."""
+
+import json
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from coupler.array_file import write_arrays
+from coupler.checkpoint import FOLDER, UNSET, Checkpoint, OtherScene, listed
+from coupler.errors import BadCase, ExitCode, NoRun
+from coupler.resume import CannotResume, prepare
+from tests.coupler.resumed import command, go_on
+
+
+def test_what_is_no_run_is_told(tmp_path):
+    with pytest.raises(NoRun, match="not the directory of a run"):
+        prepare(tmp_path)
+
+
+def test_another_case_is_refused_with_the_difference(stopped):
+    case = stopped / "case.toml"
+    text = case.read_text(encoding="utf-8").replace('"2 mm"', '"3 mm"').replace("[12, 0, 0]", "[12, 0, 1]")
+    case.write_text(text, encoding="utf-8")
+    with pytest.raises(
+        CannotResume,
+        match=r"block\[0\]\.velocity\[2\]: was 0\.0, is 1\.0; joints\.opening_at_failure: was 0\.002, is 0\.003",
+    ):
+        prepare(stopped, any_version=True)
+
+
+def test_only_what_leaves_the_scene_alone_may_be_set(stopped):
+    with pytest.raises(
+        CannotResume, match=r"--set contact.friction=0.1: .*only time.end, .*limits.\* may change"
+    ):
+        prepare(stopped, ["contact.friction=0.1"])
+    with pytest.raises(BadCase, match=r"limits\.defect: -1 is out of range"):
+        prepare(stopped, ["limits.defect=-1"])
+    assert go_on(stopped, "limits.energy_error=0.5").file.case.limits.energy_error == 0.5
+
+
+def rewritten(path, **about):
+    """The same checkpoint with something else in what it belongs to."""
+    found = Checkpoint.read(path)
+    write_arrays(path, found.arrays, json.dumps(found.about | about), UNSET)
+    return found.about
+
+
+def test_another_program_is_refused_with_the_difference(stopped):
+    """Unless the user says that it does not matter."""
+    (path,) = listed(stopped / FOLDER)
+    program = Checkpoint.read(path).about["program"]
+    rewritten(path, program=program | {"surgebreak": "0.0.1", "commit": "abc"})
+    with pytest.raises(CannotResume, match=r"surgebreak: was 0\.0\.1, is .*commit: was abc.*--any-version"):
+        prepare(stopped)
+    told = []
+    go_on(stopped, told=told, any_version=True)
+    assert any("written by another program: surgebreak: was 0.0.1" in line for line in told)
+
+
+def test_another_layout_is_refused(stopped):
+    rewritten(listed(stopped / FOLDER)[0], layout=99)
+    with pytest.raises(CannotResume, match="written in layout 99, this program reads 2"):
+        prepare(stopped)
+
+
+def test_another_scene_is_refused_before_any_file_is_touched(stopped):
+    """A file of blocks may have changed although the case that names it has not."""
+    (path,) = listed(stopped / FOLDER)
+    scene = Checkpoint.read(path).about["scene"]
+    rewritten(path, scene=scene | {"blocks": "5 blocks (01234567)"})
+    table = (stopped / "history" / "energy.csv").read_bytes()
+    with pytest.raises(OtherScene, match=r"blocks: was 5 blocks \(01234567\), is 4 blocks"):
+        go_on(stopped)
+    assert (stopped / "history" / "energy.csv").read_bytes() == table
+
+
+def test_a_run_that_still_runs_is_left_alone(stopped):
+    """Its process is there and is ours; a number that went to another program since does not count."""
+    for words, refused in (("surgebreak", True), ("something else", False)):
+        other = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)", words])
+        try:
+            summary = json.loads((stopped / "run.json").read_text(encoding="utf-8"))
+            summary |= {"status": "running", "process": other.pid}
+            (stopped / "run.json").write_text(json.dumps(summary), encoding="utf-8")
+            until = time.monotonic() + 10
+            while words.encode() not in Path(f"/proc/{other.pid}/cmdline").read_bytes():
+                assert time.monotonic() < until
+            if refused:
+                with pytest.raises(CannotResume, match=f"still running \\(process {other.pid}\\)"):
+                    prepare(stopped)
+            else:
+                prepare(stopped, any_version=True, tell=[].append)
+        finally:
+            other.kill()
+            other.wait()
+
+
+def test_the_command_tells_what_is_wrong_and_leaves_with_two(dry):
+    done = command("resume", dry, check=False)
+    assert done.returncode == ExitCode.BAD_CASE
+    assert "give a later one with --end to go on" in done.stderr or "another program" in done.stderr
+    assert "Traceback" not in done.stderr
