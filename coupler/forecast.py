@@ -23,8 +23,12 @@ from coupler.terminal import Row
 LONGEST_REST_STEP = 0.3
 BYTES_PER_BLOCK = 60_000
 """Resident memory per block, its contact nodes included."""
-PROGRAM_BYTES = {"water": 130e6, "structure": 330e6}
-"""Resident memory of the code and libraries of each side, kernels included."""
+BYTES_PER_WET_BLOCK = 300_000
+"""The same with the cells that it cuts."""
+BYTES_PER_COUPLED_CELL = 1500
+"""Resident memory per cell where blocks move: now and then two domains are there at once."""
+PROGRAM_BYTES = {"base": 105e6, "water": 155e6, "structure": 330e6, "both": 375e6}
+"""Resident memory of code and libraries: of every run, and what each side adds, kernels included."""
 DISK_BYTES_PER_NODE = 12
 """Compressed level set, velocity and pressure of one written state."""
 DISK_BYTES_PER_BLOCK = 150
@@ -47,7 +51,7 @@ def forecast(case: Case, exact: bool = False, place: Path = Path()) -> Forecast:
     exact: with the exact frequency of the joints beside the bound that sets the substep (an eigenvalue problem) ·
     place: a directory on the disk that the results go to."""
     rows: list[Row] = []
-    memory = 80e6
+    cells = blocks = 0
     disk = 0.0
     interval = Schedule.of(case).interval
     outputs = max(1, round(case.time.end / interval))
@@ -55,19 +59,27 @@ def forecast(case: Case, exact: bool = False, place: Path = Path()) -> Forecast:
     if case.water:
         step = _water_rows(case, interval, rows)
         cells, nodes = mesh_size(case.tank)
-        memory += PROGRAM_BYTES["water"] + BYTES_PER_CELL * cells
         disk += DISK_BYTES_PER_NODE * nodes * (outputs + 1)
     steps = math.ceil(case.time.end / step)
     rows.append(Row("steps", steps, "", "at least, while the water is fast" if case.water else ""))
     if case.structure:
-        n = _structure_rows(case, rows, exact)
-        memory += PROGRAM_BYTES["structure"] + BYTES_PER_BLOCK * n
-        disk += DISK_BYTES_PER_BLOCK * n * (outputs + 1)
+        blocks = _structure_rows(case, rows, exact)
+        disk += DISK_BYTES_PER_BLOCK * blocks * (outputs + 1)
     disk += HISTORY_BYTES_PER_STEP * steps + _checkpoint_bytes(case)
     rows.append(Row("written states", outputs + 1, "", ""))
-    rows.append(Row("memory", memory / 1e6, "MB", "about"))
+    rows.append(Row("memory", memory(case, cells, blocks) / 1e6, "MB", "about"))
     rows.append(Row("disk", disk / 1e6, "MB", _disk_remark(disk, shutil.disk_usage(place).free)))
     return Forecast(rows)
+
+
+def memory(case: Case, cells: int, blocks: int) -> float:
+    """Largest resident memory [B] of a run with so many cells and blocks."""
+    if case.water is None:
+        return PROGRAM_BYTES["base"] + PROGRAM_BYTES["structure"] + BYTES_PER_BLOCK * blocks
+    if case.structure is None:
+        return PROGRAM_BYTES["base"] + PROGRAM_BYTES["water"] + BYTES_PER_CELL * cells
+    both = PROGRAM_BYTES["base"] + PROGRAM_BYTES["both"]
+    return both + BYTES_PER_COUPLED_CELL * cells + BYTES_PER_WET_BLOCK * blocks
 
 
 def _disk_remark(wanted: float, free: float) -> str:

@@ -19,8 +19,8 @@ Placed = tuple[KeyPath, str, Body]
 
 TOUCH = 1e-5
 """Overlap below this share of the smallest width is contact, not overlap (rounding of decimals and of files)."""
-BYTES_PER_CELL = 1200
-"""Resident memory that a cell of the mesh takes in a run: topology, moments and fields of the water."""
+BYTES_PER_CELL = 1100
+"""Resident memory that a cell of the mesh takes in a run of water alone: topology, moments and fields."""
 
 
 def mesh_size(tank) -> tuple[int, int]:
