@@ -38,7 +38,7 @@ def parts_of(case: Case) -> tuple[Part, ...]:
 
     Kept for the next call: a case is checked, forecast and built from the same blocks, unless a file changed.
     """
-    stamps = tuple(_stamp(spec.path) for spec in case.structure.file) if case.structure else ()
+    stamps = tuple(stamp(spec.path) for spec in case.structure.file) if case.structure else ()
     return _made(case, stamps)
 
 
@@ -47,7 +47,8 @@ def _made(case: Case, stamps: tuple) -> tuple[Part, ...]:
     return tuple(Part(r.path, r.name, tuple(r.make())) for r in recipes(case))
 
 
-def _stamp(path: str) -> tuple[int, int]:
+def stamp(path: str) -> tuple[int, int]:
+    """Time of the last change [ns] and size [B] of a file: by these it is read again or not."""
     there = os.stat(path)
     return there.st_mtime_ns, there.st_size
 

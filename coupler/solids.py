@@ -5,7 +5,6 @@ To the water they are bodies that never move; in a case with a structure they ar
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
@@ -14,6 +13,7 @@ import numpy as np
 
 from coupler.bodies import Body, turned
 from coupler.case import Case
+from coupler.parts import stamp
 
 KeyPath = tuple[str | int, ...]
 BOX_CORNERS = np.array(
@@ -38,7 +38,7 @@ def solids_of(case: Case) -> tuple[FixedSolid, ...]:
     """All fixed bodies in the order of their rows; a file may hold several.
 
     Raises BlockError or BlockFileError where a table makes none. Kept for the next call unless a file changed."""
-    return _made(case.solid, tuple(_stamp(s.path) for s in case.solid if s.path))
+    return _made(case.solid, tuple(stamp(s.path) for s in case.solid if s.path))
 
 
 def obstacle_blocks(case: Case) -> list:
@@ -78,11 +78,6 @@ def _refused(path: KeyPath, spec) -> Iterator[tuple[KeyPath, str]]:
 @lru_cache(maxsize=1)
 def _made(specs, stamps) -> tuple[FixedSolid, ...]:
     return tuple(solid for i, spec in enumerate(specs) for solid in _bodies(("solid", i), spec))
-
-
-def _stamp(path: str) -> tuple[int, int]:
-    there = os.stat(path)
-    return there.st_mtime_ns, there.st_size
 
 
 def _bodies(path: KeyPath, spec) -> Iterator[FixedSolid]:

@@ -15,8 +15,6 @@ from yade_scripts.stock.script import StockLaw, stock_law, stock_names
 
 USUAL_STOCK = ("cohfrict", "jcfpm", "mortar", "cpm")
 """Stock laws compared unless others are named."""
-USUAL_SUBSTEPS = (1, 2, 4, 8)
-"""Multiples of the case's own substep, a tenth of the stability limit."""
 
 
 @dataclass(frozen=True)
