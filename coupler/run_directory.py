@@ -237,6 +237,7 @@ def read_summary(path: Path) -> dict:
 
 
 def now_text() -> str:
+    """The time now in UTC, ISO 8601 to the second."""
     return _now().isoformat(timespec="seconds")
 
 

@@ -64,12 +64,14 @@ def effective_pace(dn, ss, wn, sw, beta):
 
 @njit
 def effective_response(ks, dn, ss, largest, k0, df, beta, kc):
+    """Normal traction [Pa], and stiffnesses [Pa/m] normal and in sliding, with the secant ks of the measure."""
     kn = ks if dn > 0.0 else kc
     return kn * dn, kn, beta**2 * ks
 
 
 @njit
 def effective_stored(ks, dn, en, slide, largest, k0, df, beta, kc):
+    """Elastic energy [J/m²] between the openings dn and en [m]; slide [m²]: scalar product of their slidings."""
     kn = ks if dn + en > 0.0 else kc
     return 0.5 * (kn * dn * en + beta**2 * ks * slide)
 
@@ -88,6 +90,7 @@ def needleman_pace(dn, ss, wn, sw, beta):
 
 @njit
 def needleman_response(ks, dn, ss, largest, k0, df, beta, kc):
+    """As `effective_response`: the potential takes β² k_0 s²/δ_f (1 - L) off the normal traction."""
     whole = max(1.0 - largest / df, 0.0)
     kn = ks if dn > 0.0 else kc
     return kn * dn - beta**2 * k0 * ss / df * whole, kn, _needleman_shear(dn, largest, k0, df, beta)
@@ -102,6 +105,7 @@ def _needleman_shear(dn, largest, k0, df, beta):
 
 @njit
 def needleman_stored(ks, dn, en, slide, largest, k0, df, beta, kc):
+    """As `effective_stored`."""
     kn = ks if dn + en > 0.0 else kc
     return 0.5 * (kn * dn * en + _needleman_shear(0.5 * (dn + en), largest, k0, df, beta) * slide)
 

@@ -84,14 +84,17 @@ def curves(axis, tables, look, column, unit):
 
 
 def load(axis, tables, look):
+    """Force over time, a curve a run; tables: columns by name of each run, look: line of each."""
     axis.set_ylabel(f"force [{curves(axis, tables, look, 'force', 'N')}]")
 
 
 def energy(axis, tables, look, column, what):
+    """An energy [J] over time, with the prefix that suits it."""
     axis.set_ylabel(f"energy {what} [{curves(axis, tables, look, column, 'J')}]")
 
 
 def broken(axis, tables, look):
+    """Joints broken so far over time."""
     for name, table in tables.items():
         axis.step(table["time"], table["joints_broken"], where="post", **look[name])
     axis.set_xlabel("time [s]")

@@ -68,6 +68,9 @@ def test_locate_returns_the_cell_that_holds_the_point(name, request):
 
 
 def test_neighbours_are_mutual_and_share_three_nodes(graded):
+    """Every face that is not on the boundary has two cells, so none is left out."""
+    within = np.count_nonzero(graded.neighbours >= 0)
+    assert within == 4 * len(graded.cells) - len(graded.boundary_faces)
     for e in range(0, len(graded.cells), 7):
         for a, other in enumerate(graded.neighbours[e]):
             if other >= 0:
