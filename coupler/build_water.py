@@ -23,7 +23,7 @@ def water_of(case: Case, structure, solids):
     from fluid.water import Water
 
     w = case.water
-    mesh = box_mesh(case.tank.lower, case.tank.upper, case.tank.cell)
+    mesh = box_mesh(case.tank.lower, case.tank.upper, case.tank.cell, split=case.tank.split)
     cracks = _narrow_cracks(w.cracks, structure, mesh)
     connection = WIDE_OPENINGS if w.openings == "wide" else None
     immersion = Immersion(mesh, structure, solids, w.covers, cracks, connection)

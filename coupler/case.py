@@ -68,6 +68,11 @@ class Tank(Section):
         description="wanted edge of the mesh cells; changed so that a whole number fits each side",
         examples=["1 m"],
     )
+    split: Literal["kuhn", "mirrored"] = Field(
+        "kuhn",
+        description="how bricks become cells: all along the same diagonal, or each as the mirror image of those beside "
+        "it, so that what parts at an obstacle parts alike on both sides",
+    )
     open: tuple[Side, ...] = Field(
         ("z+",), description="sides through which air and water may leave; the others are walls"
     )

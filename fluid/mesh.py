@@ -17,6 +17,8 @@ import numpy as np
 from numba import njit
 from skfem import MeshTet
 
+from fluid.bricks import SPLITS, split_bricks
+
 CORNERS_OF_FACE = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])  # outward for a positive cell
 MOST_SLENDER = 2.5
 """Longest over shortest edge of a cell, 1.73 in a split cube, up to which its volume goes through upright borders."""
@@ -112,17 +114,17 @@ class Background:
         return MeshTet(self.nodes.T.copy(), self.cells.T.copy(), sort_t=False, validate=False)
 
 
-def box_mesh(lower, upper, cell_size=None, axes=None) -> Background:
+def box_mesh(lower, upper, cell_size=None, axes=None, split: str = "kuhn") -> Background:
     """Box [lower, upper] (3,) [m] in bricks of about cell_size ((3,) or one number [m]), six cells each.
 
-    Kuhn's split as made by scikit-fem's MeshTet.init_tensor.  axes: three increasing coordinate arrays
-    instead (graded meshes); lower, upper and cell_size are then ignored."""
+    axes: three increasing coordinate arrays instead (graded meshes); lower, upper and cell_size are then ignored.
+    split: "kuhn" or "mirrored", see `bricks.py`.  Raises MeshError for extents that are not positive and for
+    any other split."""
+    if split not in SPLITS:
+        raise MeshError(f"split {split!r} of the bricks: must be one of {', '.join(SPLITS)}")
     if axes is None:
         axes = _axes_of_box(np.asarray(lower, float), np.asarray(upper, float), cell_size)
-    mesh = MeshTet.init_tensor(*axes)
-    # the six cells of a brick one after the other: what is near in space is near in memory
-    cells = mesh.t.T.reshape(6, -1, 4).swapaxes(0, 1).reshape(-1, 4)
-    return Background.from_arrays(mesh.p.T, cells.astype(np.int64), axes)
+    return Background.from_arrays(*split_bricks(axes, split), axes)
 
 
 def gradients(nodes, cells) -> tuple[np.ndarray, np.ndarray]:

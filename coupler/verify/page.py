@@ -16,7 +16,10 @@ NOTES = {
     "brings it down to the measured one, but by an amount that depends on the cells, as nothing mixes the boundary "
     "layer: [water](water.md).",
     "P39": "H3 lies behind the box: water closes the wake from one side too early, because all cells "
-    "are split along the same diagonal ([water](water.md#weak)); when the jet comes down differs from run to run.",
+    "are split along the same diagonal; mirrored cells (tank.split) cure it "
+    "([water](water.md#which-way-the-cells-are-split)). When the jet comes down differs from run to run.",
+    "P40": "P3 is 1.2 cells below the edge of the box and reads 0.30 to 0.80 of the measured impulse on cells of "
+    "4.2 to 6.3 cm, whichever way they are split ([water](water.md#weak)).",
     "P41": "Into two and into four cells of water the bore is 11 to 14 % too slow, with other steps by 6 to 16 %. "
     "A node at rest ahead of it is the foot of its own path, so that it stays at rest while the bore pours water into "
     "it: of the momentum that transport loses there, the volume brings back four fifths.",

@@ -39,12 +39,14 @@ def tank(
     is_open=None,
     is_smooth=None,
     covers: str = "single",
+    split: str = "kuhn",
     **parameters,
 ) -> Coupling:
-    """Water in [0, size] on cells (nx, ny, nz) with blocks and fixed solids; is_open, is_smooth: see `Water`.
+    """Water in [0, size] on cells (nx, ny, nz) with blocks and fixed solids; is_open, is_smooth: see `Water`;
+    split: see `box_mesh`.
 
     fill: as in `Water`, or boxes (lower (3,), upper (3,)) filled like those of a case, which end at walls."""
-    mesh = box_mesh(np.zeros(3), size, np.asarray(size, float) / np.asarray(cells))
+    mesh = box_mesh(np.zeros(3), size, np.asarray(size, float) / np.asarray(cells), split=split)
     immersion = Immersion(mesh, structure, list(solids), covers)
     parameters = WaterParameters(**({"density": DENSITY, "gravity": G} | parameters))
     if not callable(fill):
