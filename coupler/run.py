@@ -15,6 +15,7 @@ from coupler.limits import LimitReached, Limits, check_balance, check_defect, ch
 from coupler.observe import joint_counts, size
 from coupler.recorder import Recorder
 from coupler.schedule import Schedule, checkpoint_interval
+from coupler.terminal import newtons
 
 FAST_OPENING = 0.25
 """Growth of λ/δ_f in a substep from which tearing counts as averaged over it."""
@@ -203,7 +204,8 @@ def _told(coupling, record) -> dict[str, str]:
         joints = joint_counts(coupling.structure)
         told["broken"] = f"{joints.broken}/{joints.intact + joints.broken}"
     if coupling.water is not None:
-        told["force"] = f"{np.linalg.norm(record.load[:, :3].sum(axis=0)) / 1e3:.4g} kN"
+        if len(record.load):
+            told["force"] = newtons(float(np.linalg.norm(record.load[:, :3].sum(axis=0))))
         told["volume"] = f"{_volume_error(coupling):+.2%}"
     if coupling.coupled:
         told["defect"] = f"{record.defect:.1e}"

@@ -60,6 +60,14 @@ def number(value: str | float | int) -> str:
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
+def newtons(force: float) -> str:
+    """A force [N] in N, kN or MN, to the tenth of a newton."""
+    for unit, size in (("MN", 1e6), ("kN", 1e3)):
+        if force >= size:
+            return f"{force / size:.4g} {unit}"
+    return f"{force:.1f} N"
+
+
 def duration(seconds: float) -> str:
     """42 s, 3 min 05 s, 2 h 10 min."""
     seconds = round(seconds)

@@ -9,7 +9,7 @@ import pytest
 
 from coupler.progress import BarReporter, LineReporter, reporter
 from coupler.stop import StopRequest
-from coupler.terminal import Row, duration, table
+from coupler.terminal import Row, duration, newtons, table
 
 FIGURES = {"dt": "10 ms", "joints broken": "3/90"}
 
@@ -99,3 +99,12 @@ def test_tables_without_a_terminal_are_aligned_lines(capsys):
         "  steps    120",
         "  substep  0.0001235 s  limited by blocks a and b",
     ]
+
+
+@pytest.mark.parametrize(
+    ("force", "text"),
+    [(0.0, "0.0 N"), (0.0118, "0.0 N"), (4.84, "4.8 N"), (12345.0, "12.35 kN"), (2.5e6, "2.5 MN")],
+)
+def test_forces_have_the_unit_that_suits_them(force, text):
+    """A small flume has newtons, a quay meganewtons; what is below a tenth of a newton is round-off."""
+    assert newtons(force) == text
