@@ -7,6 +7,7 @@ run left unfinished is not read.
 
 import csv
 import io
+import math
 import os
 from dataclasses import dataclass
 from pathlib import Path
@@ -71,6 +72,8 @@ class HistoryTable:
     def __init__(self, path, columns, title=None, keep=None):
         self.path = Path(path)
         self.columns = tuple(c if isinstance(c, Column) else Column(*c) for c in columns)
+        self._names = [c.name for c in self.columns]
+        self._known = set(self._names)
         self._title = title or self.path.stem
         self._rows = 0
         mode = "x" if keep is None else "r+"
@@ -103,8 +106,8 @@ class HistoryTable:
 
         Raises NotFinite, WrongShape (missing or unknown names), DiskFull.
         """
-        names = [c.name for c in self.columns]
-        if set(row) != set(names):
+        names = self._names
+        if row.keys() != self._known:
             missing, unknown = sorted(set(names) - set(row)), sorted(set(row) - set(names))
             raise WrongShape(
                 f"{self.path}, row {self._rows}: missing columns {missing}, unknown columns {unknown}"
@@ -115,7 +118,7 @@ class HistoryTable:
     def _cell(self, name, value):
         if value is None or isinstance(value, str):
             return value or ""
-        if not np.isfinite(value):
+        if not math.isfinite(value):
             raise NotFinite(f"{self.path}: {name} is {value} in row {self._rows}; None leaves a cell empty")
         return number(value)
 

@@ -1,8 +1,8 @@
 """Values continued from the water into the nodes around it, layer by layer.
 
-u_i = Σ_j [u_j + ∇u_j·(x_i - x_j)] / d_ij² / Σ_j 1/d_ij²  over the neighbours j in earlier layers.  The first
-two layers use the gradient (a constant continuation costs 1.4 % of the sloshing frequency at 32 cells a length),
-farther ones do not.
+u_i = Σ_j n_ij [u_j + ∇u_j·(x_i - x_j)] / d_ij² / Σ_j n_ij / d_ij²  over the neighbours j in earlier layers, n_ij: how
+many cells they share.  The first two layers use the gradient (a constant continuation costs 1.4 % of the sloshing
+frequency at 32 cells a length), farther ones do not.
 """
 
 from __future__ import annotations
@@ -26,20 +26,20 @@ _NO_LIMIT = np.zeros(0)
 
 
 @njit(cache=True)
-def continue_outward(
-    order, layer_start, linear_layers, f, gradient, nodes, cells, node_start, node_cells, done, least
-):
+def continue_outward(order, layer_start, linear_layers, f, gradient, nodes, around, done, least):
     """Fill f (N, m) in place on layers 1.. of `order` from layer 0; gradient (N, m, 3) read where linear.
 
-    done (N,) bool: nodes whose f is known; extended in place, layer by layer.  least (N,): no filled |f| is larger
-    than the largest of its known neighbours and its own `least`; of length 0: no limit."""
-    mesh = (nodes, cells, node_start, node_cells)
-    _continue(order, layer_start, linear_layers, f, gradient, *mesh, done, least, np.empty(f.shape[1]))
+    around: `Topology.around_by_cells` · done (N,) bool: nodes whose f is known; extended in place, layer by layer.
+    least (N,): no filled |f| is larger than the largest of its known neighbours and its own `least`; of length 0: no
+    limit."""
+    _continue(
+        order, layer_start, linear_layers, f, gradient, nodes, *around, done, least, np.empty(f.shape[1])
+    )
 
 
 @inner
 def _continue(
-    order, layer_start, linear_layers, f, gradient, nodes, cells, node_start, node_cells, done, least, total
+    order, layer_start, linear_layers, f, gradient, nodes, start, around, shared, done, least, total
 ):  # fmt: skip
     """The loop of `continue_outward`; total (m,): work space."""
     m = f.shape[1]
@@ -49,23 +49,22 @@ def _continue(
             weight, most = 0.0, 0.0
             for k in range(m):
                 total[k] = 0.0
-            for t in range(node_start[i], node_start[i + 1]):
-                for a in range(4):
-                    j = cells[node_cells[t], a]
-                    if not done[j]:
-                        continue
-                    if least.shape[0] > 0:
-                        most = max(most, _square(f[j]))
-                    dx = nodes[i, 0] - nodes[j, 0]
-                    dy = nodes[i, 1] - nodes[j, 1]
-                    dz = nodes[i, 2] - nodes[j, 2]
-                    w = 1.0 / (dx * dx + dy * dy + dz * dz)
-                    weight += w
-                    for k in range(m):
-                        value = f[j, k]
-                        if layer <= linear_layers:
-                            value += gradient[j, k, 0] * dx + gradient[j, k, 1] * dy + gradient[j, k, 2] * dz
-                        total[k] += w * value
+            for t in range(start[i], start[i + 1]):
+                j = around[t]
+                if not done[j]:
+                    continue
+                if least.shape[0] > 0:
+                    most = max(most, _square(f[j]))
+                dx = nodes[i, 0] - nodes[j, 0]
+                dy = nodes[i, 1] - nodes[j, 1]
+                dz = nodes[i, 2] - nodes[j, 2]
+                w = shared[t] / (dx * dx + dy * dy + dz * dz)
+                weight += w
+                for k in range(m):
+                    value = f[j, k]
+                    if layer <= linear_layers:
+                        value += gradient[j, k, 0] * dx + gradient[j, k, 1] * dy + gradient[j, k, 2] * dz
+                    total[k] += w * value
             for k in range(m):
                 # nothing known around: a side where water is yet to come in
                 f[i, k] = total[k] / weight if weight > 0.0 else 0.0
@@ -75,7 +74,7 @@ def _continue(
                 for k in range(m):
                     f[i, k] *= factor
             if layer <= linear_layers:
-                _pass_gradient(i, m, gradient, cells, node_start, node_cells, done)
+                _pass_gradient(i, m, gradient, start, around, shared, done)
         for s in range(layer_start[layer], layer_start[layer + 1]):
             done[order[s]] = True
 
@@ -90,20 +89,19 @@ def _square(v):
 
 
 @inner
-def _pass_gradient(i, m, gradient, cells, node_start, node_cells, done):
-    """The gradient of a filled node: the mean of the known ones around it."""
+def _pass_gradient(i, m, gradient, start, around, shared, done):
+    """The gradient of a filled node: the mean of the known ones around it, each as often as they share cells."""
     count = 0
     for k in range(m):
         for d in range(3):
             gradient[i, k, d] = 0.0
-    for t in range(node_start[i], node_start[i + 1]):
-        for a in range(4):
-            j = cells[node_cells[t], a]
-            if done[j]:
-                count += 1
-                for k in range(m):
-                    for d in range(3):
-                        gradient[i, k, d] += gradient[j, k, d]
+    for t in range(start[i], start[i + 1]):
+        j = around[t]
+        if done[j]:
+            count += shared[t]
+            for k in range(m):
+                for d in range(3):
+                    gradient[i, k, d] += shared[t] * gradient[j, k, d]
     for k in range(m):
         for d in range(3):
             gradient[i, k, d] /= max(count, 1)
@@ -218,6 +216,27 @@ def _averaged(cell_list, reach, has, field, cells):
     return mean
 
 
+@njit(cache=True)
+def _own_speed(order, first, factor, forced):
+    """factor |forced| (N,) at the nodes order[first:], zero elsewhere."""
+    out = np.zeros(forced.shape[0])
+    for i in order[first:]:
+        out[i] = factor * np.sqrt(_square(forced[i]))
+    return out
+
+
+@njit(cache=True)
+def _clear_outside(order, u, a):
+    """u, a (N, 3) ← 0 at the nodes that are not in the list, in place."""
+    listed = np.zeros(u.shape[0], np.bool_)
+    for i in order:
+        listed[i] = True
+    for i in range(u.shape[0]):
+        if not listed[i]:
+            for k in range(3):
+                u[i, k], a[i, k] = 0.0, 0.0
+
+
 def fill_missing(topology, known, *fields):
     """Continue each field (N, m) into the active nodes that are not `known`, layer after layer, in place."""
     missing = topology.active & ~known
@@ -235,8 +254,7 @@ def fill_missing(topology, known, *fields):
 
 
 def _fill(t, order, start, linear, f, gradient, done, least):
-    mesh = (t.nodes, t.cells, t.node_start, t.node_cells)
-    continue_outward(order, start, linear, f, gradient, *mesh, done, least)
+    continue_outward(order, start, linear, f, gradient, t.nodes, t.around_by_cells, done, least)
 
 
 def extend_velocity(topology, order, start, wet, wet_cells, u, a, calm: float, forced, rubbed=None):
@@ -255,9 +273,7 @@ def extend_velocity(topology, order, start, wet, wet_cells, u, a, calm: float, f
     if rubbed is not None:
         wet_cells = wet_cells[~rubbed[t.cells[wet_cells]].any(axis=1)]
     gradient = smoothed_slope(t, wet_cells, wet, u, calm)
-    outside = np.ones(len(u), bool)
-    outside[order] = False
-    u[outside], a[outside] = 0.0, 0.0
-    least = (1.0 + WAVE_SLACK * calm) * np.sqrt(np.einsum("ij,ij->i", forced, forced))
+    least = _own_speed(order, start[1], 1.0 + WAVE_SLACK * calm, forced)
+    _clear_outside(order, u, a)
     _fill(t, order, start, LINEAR_LAYERS, u, gradient, wet.copy(), least)
     _fill(t, order, start, 0, a, np.zeros((1, 3, 3)), wet.copy(), _NO_LIMIT)

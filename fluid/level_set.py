@@ -123,33 +123,45 @@ def _closest_in_layers(order, layer_start, triangles, owner, nodes, cells, start
     n = nodes.shape[0]
     closest, best = np.full(n, -1, np.int64), np.full(n, np.inf)
     tried = np.full(triangles.shape[0], -1, np.int64)
-    _hand_outward(order, layer_start, triangles, owner, nodes, cells, start, around, closest, best, tried)
+    asked, found = np.zeros(n, np.int32), np.zeros(n, np.int32)
+    _hand_outward(
+        order, layer_start, triangles, owner, nodes, cells, start, around, closest, best, tried, asked, found
+    )
     return np.sqrt(best)
 
 
 @inner
 def _hand_outward(
-    order, layer_start, triangles, owner, nodes, cells, start, around, closest, best, tried
+    order, layer_start, triangles, owner, nodes, cells, start, around, closest, best, tried, asked, found
 ):  # fmt: skip
-    """Squared distance `best` (N,) and number of the `closest` triangle (N,); tried (T,): the last node that asked."""
+    """Squared distance `best` (N,) and number of the `closest` triangle (N,); tried (T,): the last node that asked.
+
+    asked, found (N,): when a node asked last and when it found its triangle. In the second sweep only neighbours that
+    have found another one since are worth a question."""
+    now = 1
     for t in range(triangles.shape[0]):
         for a in range(4):
             i = cells[owner[t], a]
             d = squared_distance(nodes[i], triangles[t])
             if d < best[i]:
-                best[i], closest[i] = d, t
+                best[i], closest[i], found[i] = d, t, now
     for layer in range(1, layer_start.shape[0] - 1):
         for _ in range(2):
             for s in range(layer_start[layer], layer_start[layer + 1]):
                 i = order[s]
+                now += 1
                 for t in range(start[i], start[i + 1]):
-                    c = closest[around[t]]
-                    if c < 0 or tried[c] == i:
+                    j = around[t]
+                    if found[j] <= asked[i]:
+                        continue
+                    c = closest[j]
+                    if tried[c] == i:
                         continue
                     tried[c] = i
                     d = squared_distance(nodes[i], triangles[c])
                     if d < best[i]:
-                        best[i], closest[i] = d, c
+                        best[i], closest[i], found[i] = d, c, now
+                asked[i] = now
 
 
 @njit(cache=True)

@@ -18,6 +18,7 @@ from numba import njit
 from skfem import MeshTet
 
 from fluid.bricks import SPLITS, split_bricks
+from fluid.shapes import Shapes
 
 CORNERS_OF_FACE = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])  # outward for a positive cell
 MOST_SLENDER = 2.5
@@ -107,6 +108,11 @@ class Background:
         """(M,) bool: cells in which the borders upright on the edges serve the volume (`volume.py`): neither obtuse nor
         slender."""
         return ~self.obtuse & (_slenderness(self.nodes, self.cells) <= MOST_SLENDER)
+
+    @cached_property
+    def shapes(self) -> Shapes:
+        """The different cells of the mesh."""
+        return Shapes.of(self)
 
     @cached_property
     def skfem(self) -> MeshTet:

@@ -191,6 +191,8 @@ def _loads(water, problem, p):
 def _through(water, kept):
     """Momentum (6,) that came in with the water through sides, less what left."""
     total = np.zeros(6)
+    if kept.left is None and kept.through is None:
+        return total
     arm = water.topology.nodes - water.reference
     density = water.parameters.density
     if kept.left is not None:
@@ -221,23 +223,28 @@ def hat_forces(cell_list, x, p, at_side, reference, nodes, cells, parent, g, vol
 
     c_e: centroid of the fluid part; exact for linear f."""
     out = np.zeros((3, 6))
-    force = np.empty((3, 3))
-    arm = np.empty(3)
+    arm, beside = np.empty(3), np.empty(4, np.bool_)
     for e in cell_list:
         q = parent[e]
-        force[:] = 0.0
         for k in range(3):
             arm[k] = -reference[k]
+        at_any = False
         for a in range(4):
             i = cells[e, a]
+            beside[a] = at_side[i]
+            at_any = at_any or beside[a]
             for k in range(3):
                 arm[k] += share[e, a] * nodes[i, k]
-                force[0, k] += x[i] * g[q, a, k]
-                force[1, k] += p[i] * g[q, a, k]
-                if at_side[i]:
-                    force[2, k] += p[i] * g[q, a, k]
-        for m in range(3):
-            f0, f1, f2 = volume[e] * force[m, 0], volume[e] * force[m, 1], volume[e] * force[m, 2]
+        for m in range(3 if at_any else 2):
+            f0, f1, f2 = 0.0, 0.0, 0.0
+            for a in range(4):
+                if m == 2 and not beside[a]:
+                    continue
+                value = x[cells[e, a]] if m == 0 else p[cells[e, a]]
+                f0 += value * g[q, a, 0]
+                f1 += value * g[q, a, 1]
+                f2 += value * g[q, a, 2]
+            f0, f1, f2 = volume[e] * f0, volume[e] * f1, volume[e] * f2
             out[m, 0] += f0
             out[m, 1] += f1
             out[m, 2] += f2

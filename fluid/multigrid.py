@@ -34,7 +34,7 @@ class Level:
     """Rows of A: start[i]:middle[i] of (column, entry) lie left of the diagonal, middle[i]:start[i+1] right of it.
 
     diagonal (n,) and its inverse · aggregate (n,) unknown of the coarser level, -1 none (an unknown without
-    neighbours, which one sweep solves)."""
+    neighbours, which one sweep solves) · start, middle, column: unsigned, see `topology.py`."""
 
     start: np.ndarray
     middle: np.ndarray
@@ -50,7 +50,7 @@ class Multigrid:
 
     def __init__(self, A):
         self.levels: list[Level] = []
-        parts = _split(A.indptr, A.indices, A.data)
+        parts = _split(A.indptr.view(np.uint32), A.indices.view(np.uint32), A.data)
         while len(parts[-1]) > COARSEST:
             aggregate, count = _aggregates(parts)
             if count > LEAST_GAIN * len(aggregate):
@@ -99,8 +99,8 @@ def _dense_inverse(level: Level):
 def _split(indptr, indices, data):
     """start, middle, column, entry, diagonal of Level from the rows of a csr matrix."""
     n = len(indptr) - 1
-    start, middle = np.zeros(n + 1, np.int32), np.empty(n, np.int32)
-    column, entry = np.empty(len(indices), np.int32), np.empty(len(indices))
+    start, middle = np.zeros(n + 1, np.uint32), np.empty(n, np.uint32)
+    column, entry = np.empty(len(indices), np.uint32), np.empty(len(indices))
     diagonal = np.zeros(n)
     k = 0
     for i in range(n):
@@ -167,19 +167,19 @@ def _chained(first, second):
 @njit(cache=True)
 def _galerkin(start, middle, column, entry, diagonal, aggregate, n, scale):
     """scale Pᵀ A P as csr (indptr, indices, data), the diagonal first in every row."""
-    first = np.zeros(n + 1, np.int64)
+    first = np.zeros(n + 1, np.uint32)
     for i in range(len(aggregate)):
         if aggregate[i] >= 0:
             first[aggregate[i] + 1] += 1
     for k in range(n):
         first[k + 1] += first[k]
-    filled, member = first[:-1].copy(), np.empty(first[-1], np.int64)
+    filled, member = first[:-1].copy(), np.empty(first[-1], np.uint32)
     for i in range(len(aggregate)):
         if aggregate[i] >= 0:
             member[filled[aggregate[i]]] = i
             filled[aggregate[i]] += 1
-    slot, indptr = np.full(n, -1, np.int64), np.zeros(n + 1, np.int64)
-    indices, data = np.empty(len(column) + n, np.int32), np.empty(len(column) + n)
+    slot, indptr = np.full(n, -1, np.int64), np.zeros(n + 1, np.uint32)
+    indices, data = np.empty(len(column) + n, np.uint32), np.empty(len(column) + n)
     k = 0
     for row in range(n):
         begin = k

@@ -40,6 +40,8 @@ class Outflow:
     def of(cls, water, dt: float, carried) -> Outflow | None:
         """Equation (1) over dt [s] from nodes that hold `carried` (N,) [m³]; None where nothing leaves."""
         faces, area = water._walls.open_faces, water._walls.open_area
+        holds = (water.nodal_water[faces] > 0.0).any(axis=1)
+        faces, area = faces[holds], area[holds]
         if len(faces) == 0:
             return None
         p, t = water.parameters, water.topology

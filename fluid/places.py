@@ -50,7 +50,7 @@ class Places:
             raise Outside(f"gauge at {place} lies outside the tank {low} to {high}; move it inside")
         t = water.topology
         deep = _depth(water.domain.memory, parent, points) > SKIN * water.mesh.spacing
-        first, count = t.rows_of_parent
+        first, count = t.rows_of_background
         neighbours, near = water.mesh.neighbours, NEAR * water.mesh.spacing
         cell = _answering(points, parent, deep, neighbours, first, count, t.parts, t.nodes, near)
         corners = t.cells[cell]

@@ -286,8 +286,31 @@ def damp_waterline(cell_list, weight, phi, wet, beside_solid, deep, u, cells, vo
     of 0.03 a step on still water against 1:20).  L is symmetric and positive and annihilates a uniform velocity, so its
     square only takes energy and no momentum; squared, because L alone is a viscosity that holds a thin tongue of
     run-up back."""
+    near = _around_waterline(cell_list, phi, beside_solid, deep, cells)
+    cell_list, wet_share = cell_list[near], wet_share[near]
     one = _unlike_neighbours(cell_list, phi, wet, beside_solid, deep, u, cells, volume, wet_share)
     u -= weight * _unlike_neighbours(cell_list, phi, wet, beside_solid, deep, one, cells, volume, wet_share)
+
+
+@njit(cache=True)
+def _around_waterline(cell_list, phi, beside_solid, deep, cells):
+    """Places in the list of the cells beside solids that reach up to φ > deep, and of all that touch them."""
+    reached = np.zeros(phi.shape[0], np.bool_)
+    for e in cell_list:
+        beside, highest = False, -np.inf
+        for a in range(4):
+            beside = beside or beside_solid[cells[e, a]]
+            highest = max(highest, phi[cells[e, a]])
+        if beside and highest > deep:
+            for a in range(4):
+                reached[cells[e, a]] = True
+    found, n = np.empty(cell_list.shape[0], np.int64), 0
+    for s in range(cell_list.shape[0]):
+        e = cell_list[s]
+        if reached[cells[e, 0]] or reached[cells[e, 1]] or reached[cells[e, 2]] or reached[cells[e, 3]]:
+            found[n] = s
+            n += 1
+    return found[:n].copy()
 
 
 @njit(cache=True)

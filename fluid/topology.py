@@ -1,7 +1,10 @@
 """Who touches whom in the physical domain, laid out for the kernels of the step.
 
-The gradients of a cell are those of its parent in the background mesh (a cover is a copy with the same
-corners), so that nothing geometric is recomputed when solids move.
+The gradients of a cell are those of its cell in the background mesh (a cover is a copy with the same
+corners), so that nothing geometric is recomputed when solids move.  Every loop over cells reads them: cells of one
+shape share a row (`shapes.py`), which stays in the cache of the processor.  Numbers of
+nodes and cells are unsigned: a loop that gathers by them need not ask whether one counts from the end, as negative
+numbers do in Python, and takes half of the time.
 """
 
 from __future__ import annotations
@@ -19,7 +22,8 @@ from fluid.wetted import polygons_of_nodes
 
 @dataclass(frozen=True)
 class Topology:
-    """nodes (N, 3) [m] · cells (M, 4) · parent (M,) row of `gradients` (.., 4, 3) [1/m] and of their `products` ·
+    """nodes (N, 3) [m] · cells (M, 4) · background (M,) cell of the background mesh, of n_background ·
+    parent (M,) row of `gradients` (.., 4, 3) [1/m] and of their `products` ·
     volume (M,) [m³] of the fluid part · fraction (M,) fluid share of the cell ·
     share (M, 4) mean of N_a over the fluid part (∫ N_a = volume · share_a) · size (M,) [m] (6 |e|)^(1/3) ·
     node_start (N+1,), node_cells (4M,) cells around each node · neighbours (M, 4) across faces, -1 none ·
@@ -29,6 +33,8 @@ class Topology:
 
     nodes: np.ndarray
     cells: np.ndarray
+    background: np.ndarray
+    n_background: int
     parent: np.ndarray
     gradients: np.ndarray
     products: np.ndarray
@@ -49,26 +55,29 @@ class Topology:
     @classmethod
     def of(cls, mesh: Background, domain) -> Topology:
         """Lay out a PhysicalDomain of the background mesh."""
-        cells, parent = np.ascontiguousarray(domain.cells), np.ascontiguousarray(domain.parent_cell)
+        cells, background = domain.cells.astype(np.uint32), np.ascontiguousarray(domain.parent_cell)
         nodes = np.ascontiguousarray(domain.nodes)
         start, members = _cells_of_nodes(cells, len(nodes))
+        shapes = mesh.shapes
         share, fraction, size, node_volume, beside_solid = _measures(
-            nodes, cells, parent, mesh.gradients, mesh.cell_volume, mesh.cell_size, domain.volume, domain.centroid,
+            nodes, cells, background, mesh.gradients, mesh.cell_volume, mesh.cell_size, domain.volume, domain.centroid,
             domain.is_cut,
         )  # fmt: skip
         return cls(
             nodes=nodes,
             cells=cells,
-            parent=parent,
-            gradients=mesh.gradients,
-            products=mesh.products,
+            background=background,
+            n_background=len(mesh.cells),
+            parent=shapes.row[background],
+            gradients=shapes.gradients,
+            products=shapes.products,
             volume=domain.volume,
             fraction=fraction,
             share=share,
             size=size,
             node_start=start,
             node_cells=members,
-            neighbours=_neighbours_in(mesh, nodes, cells, parent),
+            neighbours=_neighbours_in(mesh, nodes, cells, background),
             node_volume=node_volume,
             covered=covered_nodes(domain),
             beside_solid=beside_solid,
@@ -76,27 +85,32 @@ class Topology:
                 cells, domain.volume, share, domain.fan_start, domain.fan_volume, domain.fan_corners
             ),
             is_obtuse=mesh.is_obtuse,
-            upright=mesh.upright,
+            upright=shapes.upright,
         )
 
     @cached_property
-    def row_of_parent(self) -> np.ndarray:
+    def row_of_background(self) -> np.ndarray:
         """Row of the (first) cell of each background cell, -1 inside solids; a last -1 for "no cell"."""
-        row = np.full(self.gradients.shape[0] + 1, -1, np.int64)
-        row[self.parent[::-1]] = np.arange(len(self.parent))[::-1]
+        row = np.full(self.n_background + 1, -1, np.int64)
+        row[self.background[::-1]] = np.arange(len(self.background))[::-1]
         return row
 
     @cached_property
-    def rows_of_parent(self) -> tuple[np.ndarray, np.ndarray]:
+    def rows_of_background(self) -> tuple[np.ndarray, np.ndarray]:
         """First row and number of the cells of each background cell: none inside solids, several where a thin wall
         parts it."""
-        background = np.arange(self.gradients.shape[0])
-        first = np.searchsorted(self.parent, background)
-        return first, np.searchsorted(self.parent, background, side="right") - first
+        cells = np.arange(self.n_background)
+        first = np.searchsorted(self.background, cells)
+        return first, np.searchsorted(self.background, cells, side="right") - first
 
-    @cached_property
+    @property
     def around(self) -> tuple[np.ndarray, np.ndarray]:
         """start (N+1,), neighbours: the nodes that share a cell with each node."""
+        return self.around_by_cells[:2]
+
+    @cached_property
+    def around_by_cells(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """`around`, and how many cells each of these neighbours shares with the node."""
         return _nodes_around(self.cells, self.node_start, self.node_cells)
 
     @property
@@ -163,14 +177,14 @@ def _measures(nodes, cells, parent, g, full, full_size, volume, centroid, is_cut
 
 @njit(cache=True)
 def _cells_of_nodes(cells, n):
-    start = np.zeros(n + 1, np.int64)
+    start = np.zeros(n + 1, np.uint32)
     for e in range(cells.shape[0]):
         for a in range(4):
             start[cells[e, a] + 1] += 1
     for i in range(n):
         start[i + 1] += start[i]
     filled = start[:-1].copy()
-    members = np.empty(4 * cells.shape[0], np.int64)
+    members = np.empty(4 * cells.shape[0], np.uint32)
     for e in range(cells.shape[0]):
         for a in range(4):
             i = cells[e, a]
@@ -183,7 +197,7 @@ def _neighbours_in(mesh, nodes, cells, parent):
     """neighbours (M, 4); where every node is its background node, those of the parents, renumbered."""
     if len(nodes) > len(mesh.nodes):
         return _neighbours(mesh.neighbours, cells, parent, len(mesh.cells))
-    row = np.full(len(mesh.cells) + 1, -1, np.int64)  # the last entry answers for "no neighbour", -1
+    row = np.full(len(mesh.cells) + 1, -1, np.int32)  # the last entry answers for "no neighbour", -1
     row[parent] = np.arange(len(parent))
     return row[mesh.neighbours[parent]]
 
@@ -196,7 +210,7 @@ def _neighbours(parent_neighbours, cells, parent, n_parents):
         start[parent[e] + 1] += 1
     for k in range(n_parents):
         start[k + 1] += start[k]
-    found = np.full(cells.shape, -1, np.int64)
+    found = np.full(cells.shape, -1, np.int32)
     for e in range(cells.shape[0]):
         for a in range(4):
             p = parent_neighbours[parent[e], a]
@@ -216,26 +230,29 @@ def _neighbours(parent_neighbours, cells, parent, n_parents):
 
 @njit(cache=True)
 def _nodes_around(cells, node_start, node_cells):
-    """start (N + 1,), neighbours: nodes that share a cell with each node, in the order of its cells."""
+    """start (N + 1,), neighbours: nodes that share a cell with each node, in the order of its cells; how many cells."""
     n = node_start.shape[0] - 1
-    start = np.zeros(n + 1, np.int64)
-    seen = np.full(n, -1, np.int64)
-    around = np.empty(16 * n + 64, np.int32)
+    start = np.zeros(n + 1, np.uint32)
+    slot = np.full(n, -1, np.int64)
+    around, shared = np.empty(16 * n + 64, np.uint32), np.empty(16 * n + 64, np.uint8)
     count = 0
     for i in range(n):
-        most = 3 * (node_start[i + 1] - node_start[i])
+        most = 3 * int(node_start[i + 1] - node_start[i])
         if count + most > around.shape[0]:
-            around = np.concatenate((around, np.empty(around.shape[0] + most, np.int32)))
-        seen[i] = i
+            around = np.concatenate((around, np.empty(around.shape[0] + most, np.uint32)))
+            shared = np.concatenate((shared, np.empty(shared.shape[0] + most, np.uint8)))
         for t in range(node_start[i], node_start[i + 1]):
             for a in range(4):
                 j = cells[node_cells[t], a]
-                if seen[j] != i:
-                    seen[j] = i
-                    around[count] = j
+                if j == i:
+                    continue
+                if slot[j] < start[i]:
+                    slot[j] = count
+                    around[count], shared[count] = j, 0
                     count += 1
+                shared[slot[j]] += 1
         start[i + 1] = count
-    return start, around[:count].copy()
+    return start, around[:count].copy(), shared[:count].copy()
 
 
 @njit(cache=True)
@@ -332,17 +349,17 @@ def _take_out(cell_list, cells, parent, products, volume, row, start, neighbour,
 @njit(cache=True)
 def _edges(rows, cells, parent, products, volume, node_start, node_cells):
     slot = np.full(node_start.shape[0] - 1, -1, np.int64)
-    start = np.zeros(rows.shape[0] + 1, np.int64)
+    start = np.zeros(rows.shape[0] + 1, np.uint32)
     capacity = 16 * rows.shape[0] + 64
-    neighbour = np.empty(capacity, np.int64)
+    neighbour = np.empty(capacity, np.uint32)
     stiffness = np.empty(capacity)
     count = 0
     for r in range(rows.shape[0]):
         i = rows[r]
-        most = 3 * (node_start[i + 1] - node_start[i])
+        most = 3 * int(node_start[i + 1] - node_start[i])
         if count + most > capacity:
             capacity = 2 * capacity + most
-            neighbour = np.concatenate((neighbour[:count], np.empty(capacity - count, np.int64)))
+            neighbour = np.concatenate((neighbour[:count], np.empty(capacity - count, np.uint32)))
             stiffness = np.concatenate((stiffness[:count], np.empty(capacity - count)))
         for t in range(node_start[i], node_start[i + 1]):
             e = node_cells[t]

@@ -83,11 +83,12 @@ def _edge_rates(
                     )
                 elif a != own:
                     slopes = gx * g[p, a, 0] + gy * g[p, a, 1] + gz * g[p, a, 2]
-                    rate[slot[j]] -= slopes * (
-                        (nodes[j, 0] - nodes[i, 0]) * x
-                        + (nodes[j, 1] - nodes[i, 1]) * y
-                        + (nodes[j, 2] - nodes[i, 2]) * z
-                    )
+                    if slopes != 0.0:  # it is zero along half of the edges of a split brick
+                        rate[slot[j]] -= slopes * (
+                            (nodes[j, 0] - nodes[i, 0]) * x
+                            + (nodes[j, 1] - nodes[i, 1]) * y
+                            + (nodes[j, 2] - nodes[i, 2]) * z
+                        )
     return rate
 
 

@@ -226,9 +226,9 @@ class Water:
 
     def _carry_cells(self, old: Topology):
         """Cell fields go to the cell of the same parent (of several covers: the first)."""
-        if np.array_equal(old.parent, self.topology.parent):
+        if np.array_equal(old.background, self.topology.background):
             return
-        source = same_cells(old.parent, self.topology.parent, len(self.mesh.cells))
+        source = same_cells(old.background, self.topology.background, len(self.mesh.cells))
         for name in ("cell_velocity", "remainder", "kick_remainder"):
             setattr(self, name, carried_rows(source, getattr(self, name)))
         fresh = np.flatnonzero(source < 0)
@@ -309,7 +309,7 @@ class Water:
     def rough_faces(self):
         """Faces of the closed sides that rub the water: (nodes (C, 3), outward area (C, 3) [m²], cell (C,))."""
         w = self._walls
-        cell = self.topology.row_of_parent[w.rough_cell]
+        cell = self.topology.row_of_background[w.rough_cell]
         there = cell >= 0
         return w.rough_faces[there], w.rough_area[there], cell[there]
 

@@ -1,0 +1,65 @@
+"""Cells of one shape and place in the lattice share their gradients.
+
+A box of bricks has six different cells, whatever its size.  The loops of a step read gradients cell by cell: six rows
+of them stay in the first cache of the processor, where one row a cell would be three quarters of all that is read.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+MOST_SHAPES = 64
+"""Shapes that are kept apart, 6 kB of gradients; a mesh with more has a row for every cell."""
+SAME = 1e-12
+"""Difference of gradients over the largest of them up to which cells count as equal: round-off of their nodes."""
+
+
+@dataclass(frozen=True)
+class Shapes:
+    """row (M,): shape of each cell of a mesh · gradients (S, 4, 3) [1/m], products (S, 6) [1/m²] and upright (S,) bool
+    of the shapes, those of their first cells; names as in `mesh.Background`."""
+
+    row: np.ndarray
+    gradients: np.ndarray
+    products: np.ndarray
+    upright: np.ndarray
+
+    @classmethod
+    def of(cls, mesh) -> Shapes:
+        """The shapes of a `mesh.Background`."""
+        row, first = _shapes(mesh.gradients, MOST_SHAPES, SAME)
+        if len(first) == 0:
+            return cls(
+                np.arange(len(mesh.gradients), dtype=np.uint32), mesh.gradients, mesh.products, mesh.upright
+            )
+        return cls(row, mesh.gradients[first], mesh.products[first], mesh.upright[first])
+
+
+@njit(cache=True)
+def _shapes(g, most, same):
+    """Shape (M,) of each cell and first cell (S,) of each shape; without any shape if there are more than `most`."""
+    row, first, n = np.empty(g.shape[0], np.uint32), np.empty(most, np.int64), 0
+    for e in range(g.shape[0]):
+        size = np.abs(g[e]).max()
+        s = 0
+        while s < n and not _alike(g[e], g[first[s]], same * size):
+            s += 1
+        if s == most:
+            return row, first[:0].copy()
+        if s == n:
+            first[n] = e
+            n += 1
+        row[e] = s
+    return row, first[:n].copy()
+
+
+@njit(cache=True)
+def _alike(g, other, tolerance):
+    for a in range(4):
+        for k in range(3):
+            if abs(g[a, k] - other[a, k]) > tolerance:
+                return False
+    return True
