@@ -15,7 +15,6 @@ import numpy as np
 from numba import njit
 
 from fluid.extension import extend_velocity
-from fluid.moments import cells_touching
 from fluid.momentum import Stages, momentum_change
 from fluid.projection import (
     cell_gradient,
@@ -223,7 +222,7 @@ def _flux(water, kept, listed, start, u, u_cell):
     reached = listed[: start[FLUX_LAYERS + 1]]
     near = np.zeros(len(u), bool)
     near[reached] = True
-    around = cells_touching(near, t.cells)
+    around = t.cells_around(near)
     cell_field = np.zeros(water.cell_velocity.shape)
     put(around, cell_velocity(around, u, np.zeros((0, 3)), t.cells, t.share), cell_field)
     put(kept.wet_cells, u_cell, cell_field)

@@ -6,7 +6,7 @@ import numpy as np
 
 from fluid.clip import clipped, volumes
 from fluid.inflow import wet_shares
-from fluid.moments import cells_touching, wet_fraction
+from fluid.moments import wet_fraction
 from fluid.places import Places
 
 SAMPLES_PER_CELL = 4
@@ -78,7 +78,7 @@ def volume_in_box(water, lower, upper) -> float:
 
     A cell that the border of the box and a solid cut at once counts with its share outside the solid."""
     t = water.topology
-    wet = cells_touching(water.level_set < 0.0, t.cells)
+    wet = t.cells_around(water.level_set < 0.0)
     x = t.nodes[t.cells[wet]]
     inside = ((x >= lower) & (x <= upper)).all(axis=(1, 2))
     beyond = ((x <= lower).all(axis=1) | (x >= upper).all(axis=1)).any(axis=1)

@@ -25,11 +25,11 @@ def without_films(phi, spacing: float):
 
 
 @njit(cache=True)
-def surface_cells(phi, cells):
-    """Numbers of the cells with water on one corner and air on another."""
-    found = np.empty(cells.shape[0], np.int64)
+def surface_cells(phi, cell_list, cells):
+    """Those of the listed cells with water on one corner and air on another."""
+    found = np.empty(cell_list.shape[0], np.int64)
     n = 0
-    for e in range(cells.shape[0]):
+    for e in cell_list:
         wet = 0
         for a in range(4):
             wet += phi[cells[e, a]] < 0.0
@@ -187,7 +187,7 @@ def redistance(topology, phi, spacing: float, rescale: bool):
 
     rescale: also divide by the mean slope at the nodes of cut cells where it left [0.9, 1.1]."""
     t = topology
-    cut = surface_cells(phi, t.cells)
+    cut = surface_cells(phi, t.cells_around(phi < 0.0), t.cells)
     far = np.copysign(FAR * spacing, phi)
     if len(cut) == 0:
         return far

@@ -31,47 +31,22 @@ def corner_moments(phi, a, out):
 
 
 @plain
-def _prism_moments(phi, a, b, c, d, out, corner):
-    """∫ N_k / |e| over the wet side when a, b are wet and c, d dry. corner (6, 4): work space."""
-    for q in range(6):
-        for k in range(4):
-            corner[q, k] = 0.0
-    corner[0, a] = 1.0
-    corner[3, b] = 1.0
-    for side in range(2):
-        wet = a if side == 0 else b
-        for k in range(2):
-            dry = c if k == 0 else d
-            t = phi[wet] / (phi[wet] - phi[dry])
-            corner[3 * side + 1 + k, wet] = 1.0 - t
-            corner[3 * side + 1 + k, dry] = t
-    for k in range(4):
-        out[k] = 0.0
-    for piece in range(3):
-        v = abs(_volume4(corner, piece))
-        for k in range(4):
-            total = 0.0
-            for q in range(4):
-                total += corner[_PRISM[piece, q], k]
-            out[k] += 0.25 * v * total
+def _prism_moments(phi, a, b, c, d, out):
+    """∫ N_k / |e| over the wet side when a, b are wet and c, d dry.
 
-
-_PRISM = np.array([[0, 1, 2, 5], [0, 1, 4, 5], [0, 3, 4, 5]])
+    The crossings ac, ad, bc, bd part the prism into the tetrahedra a ac ad bd, a ac bc bd and a b bc bd."""
+    ac, ad = phi[a] / (phi[a] - phi[c]), phi[a] / (phi[a] - phi[d])
+    bc, bd = phi[b] / (phi[b] - phi[c]), phi[b] / (phi[b] - phi[d])
+    first, second, third = 0.25 * ac * ad * (1.0 - bd), 0.25 * ac * (1.0 - bc) * bd, 0.25 * bc * bd
+    out[a] = first * (3.0 - ac - ad) + second * (2.0 - ac) + third
+    out[b] = first * (1.0 - bd) + second * (2.0 - bc - bd) + third * (3.0 - bc - bd)
+    out[c] = first * ac + second * (ac + bc) + third * bc
+    out[d] = first * (ad + bd) + second * bd + third * bd
 
 
 @plain
-def _volume4(corner, piece):
-    """Relative volume of the tetrahedron of four barycentric points, one piece of the prism."""
-    p0, p1, p2, p3 = _PRISM[piece, 0], _PRISM[piece, 1], _PRISM[piece, 2], _PRISM[piece, 3]
-    ax, ay, az = corner[p1, 1] - corner[p0, 1], corner[p1, 2] - corner[p0, 2], corner[p1, 3] - corner[p0, 3]
-    bx, by, bz = corner[p2, 1] - corner[p0, 1], corner[p2, 2] - corner[p0, 2], corner[p2, 3] - corner[p0, 3]
-    cx, cy, cz = corner[p3, 1] - corner[p0, 1], corner[p3, 2] - corner[p0, 2], corner[p3, 3] - corner[p0, 3]
-    return ax * (by * cz - bz * cy) - ay * (bx * cz - bz * cx) + az * (bx * cy - by * cx)
-
-
-@plain
-def wet_moments(phi, out, corner):
-    """∫_{φ<0} N_k / |e| (4,) of a cell with corner values phi (4,). corner (6, 4): work space."""
+def wet_moments(phi, out):
+    """∫_{φ<0} N_k / |e| (4,) of a cell with corner values phi (4,)."""
     n_wet = 0
     for k in range(4):
         if phi[k] < 0.0:
@@ -86,7 +61,7 @@ def wet_moments(phi, out, corner):
                 a, b = (k, b) if a < 0 else (a, k)
             else:
                 c, d = (k, d) if c < 0 else (c, k)
-        _prism_moments(phi, a, b, c, d, out, corner)
+        _prism_moments(phi, a, b, c, d, out)
     else:
         single = 0
         while (phi[single] < 0.0) != (n_wet == 1):
@@ -110,7 +85,7 @@ class FluidParts(NamedTuple):
 
 
 @inner
-def part_moments(e, phi, parts, total, local, out, corner):
+def part_moments(e, phi, parts, total, local, out):
     """total (4,) <- ∫_{φ<0} N_a dV [m³] over the fluid part of cell e; phi (4,) at its corners; rest: work space.
 
     Exact: a whole cell by its corners, a cut one by the tetrahedra that fill it."""
@@ -125,7 +100,7 @@ def part_moments(e, phi, parts, total, local, out, corner):
             total[a] = parts.volume[e] * parts.share[e, a]
         return
     if parts.start[e] == parts.start[e + 1]:
-        wet_moments(phi, out, corner)
+        wet_moments(phi, out)
         for a in range(4):
             total[a] = parts.volume[e] * out[a]
         return
@@ -134,7 +109,7 @@ def part_moments(e, phi, parts, total, local, out, corner):
             local[q] = 0.0
             for a in range(4):
                 local[q] += parts.corners[t, q, a] * phi[a]
-        wet_moments(local, out, corner)
+        wet_moments(local, out)
         for q in range(4):
             weight = parts.fan_volume[t] * out[q]
             for a in range(4):
@@ -145,7 +120,7 @@ def part_moments(e, phi, parts, total, local, out, corner):
 def nodal_water(cell_list, shift, phi, parts, n_nodes):
     """∫_{φ+shift<0} N_i dV (N,) [m³] over the listed cells of the FluidParts; phi (N,) [m]."""
     water = np.zeros(n_nodes)
-    at, total, local, out, corner = np.empty(4), np.empty(4), np.empty(4), np.empty(4), np.empty((6, 4))
+    at, total, local, out = np.empty(4), np.empty(4), np.empty(4), np.empty(4)
     cells, volume, share = parts.cells, parts.volume, parts.share
     for s in range(cell_list.shape[0]):
         e = cell_list[s]
@@ -157,7 +132,7 @@ def nodal_water(cell_list, shift, phi, parts, n_nodes):
             for a in range(4):
                 water[cells[e, a]] += volume[e] * share[e, a]
         elif n_wet > 0:
-            part_moments(e, at, parts, total, local, out, corner)
+            part_moments(e, at, parts, total, local, out)
             for a in range(4):
                 water[cells[e, a]] += total[a]
     return water
@@ -167,7 +142,7 @@ def nodal_water(cell_list, shift, phi, parts, n_nodes):
 def wet_fraction(cell_list, phi, parts):
     """Share of the fluid part of each listed cell with φ < 0, (n,)."""
     share = np.empty(cell_list.shape[0])
-    at, total, local, out, corner = np.empty(4), np.empty(4), np.empty(4), np.empty(4), np.empty((6, 4))
+    at, total, local, out = np.empty(4), np.empty(4), np.empty(4), np.empty(4)
     cells, start = parts.cells, parts.start
     for s in range(cell_list.shape[0]):
         e = cell_list[s]
@@ -178,7 +153,7 @@ def wet_fraction(cell_list, phi, parts):
         if n_wet == 4 and start[e] == start[e + 1]:
             share[s] = 1.0  # most cells: not worth a call
             continue
-        part_moments(e, at, parts, total, local, out, corner)
+        part_moments(e, at, parts, total, local, out)
         share[s] = min((total[0] + total[1] + total[2] + total[3]) / parts.volume[e], 1.0)
     return share
 

@@ -113,6 +113,11 @@ class Topology:
         """`around`, and how many cells each of these neighbours shares with the node."""
         return _nodes_around(self.cells, self.node_start, self.node_cells)
 
+    def cells_around(self, nodes) -> np.ndarray:
+        """Numbers of the cells with at least one of these nodes (N,) bool, in order; cost grows with their number only,
+        but for a byte a cell."""
+        return np.flatnonzero(_touched(nodes, self.node_start, self.node_cells, len(self.cells)))
+
     @property
     def active(self) -> np.ndarray:
         """(N,) bool: nodes that belong to a cell with fluid volume."""
@@ -253,6 +258,17 @@ def _nodes_around(cells, node_start, node_cells):
                 shared[slot[j]] += 1
         start[i + 1] = count
     return start, around[:count].copy(), shared[:count].copy()
+
+
+@njit(cache=True)
+def _touched(nodes, node_start, node_cells, n_cells):
+    """(n_cells,) bool: cells around these nodes (N,) bool."""
+    touched = np.zeros(n_cells, np.bool_)
+    for i in range(nodes.shape[0]):
+        if nodes[i]:
+            for t in range(node_start[i], node_start[i + 1]):
+                touched[node_cells[t]] = True
+    return touched
 
 
 @njit(cache=True)

@@ -30,7 +30,7 @@ import scipy.sparse as sp
 from numba import njit
 
 from fluid.level_set import without_films
-from fluid.moments import cells_touching, nodal_water
+from fluid.moments import nodal_water
 from fluid.topology import Graph
 
 BAND_WIDTH = 3.0
@@ -106,7 +106,7 @@ def _diffused_shift(band, place, graph_row, start, neighbour, stiffness, c, resi
     """Equation (2) on the band nodes by conjugate gradients with the diagonal as preconditioner, (n,)."""
     n = band.shape[0]
     diagonal = c.copy()
-    first, column, entry = np.zeros(n + 1, np.int64), np.empty(40 * n, np.int64), np.empty(40 * n)
+    first, column, entry = np.zeros(n + 1, np.uint32), np.empty(40 * n, np.uint32), np.empty(40 * n)
     count = 0
     for r in range(n):
         row = graph_row[band[r]]
@@ -166,7 +166,7 @@ def correct_volume(topology, graph, listed, phi, carried, target: float, kappa: 
     seen = np.zeros(n, bool)
     seen[listed] = True
     reach = (LARGEST_SHIFT + LARGEST_UNIFORM_SHIFT) * spacing
-    whole, near = _split(cells_touching(seen, topology.cells), phi, topology.cells, reach)
+    whole, near = _split(topology.cells_around(seen), phi, topology.cells, reach)
     inner = nodal_water(whole, 0.0, phi, topology.parts, n)
     own = inner + nodal_water(near, 0.0, phi, topology.parts, n)
     slope = _volume_slope(topology, near, phi, spacing)
@@ -251,9 +251,7 @@ def water_volume(topology, phi) -> float:
 
 def nodal_volume(topology, phi):
     """∫_{φ<0} N_i dV (N,) [m³]."""
-    return nodal_water(
-        cells_touching(phi < 0.0, topology.cells), 0.0, phi, topology.parts, len(topology.nodes)
-    )
+    return nodal_water(topology.cells_around(phi < 0.0), 0.0, phi, topology.parts, len(topology.nodes))
 
 
 def renumbering(source, old_parent, new_parent, new_volume) -> sp.csr_array:

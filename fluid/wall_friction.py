@@ -21,7 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fluid.moments import cells_touching, wet_fraction
+from fluid.moments import wet_fraction
 
 KARMAN = 0.41
 OFF_WALL = np.exp(-1.5)
@@ -92,7 +92,7 @@ def log_law(distance, roughness: float):
 def column_depth(water, phi, cells):
     """Depth of water (n,) [m] in the columns of bins over the cells (n,): their water over the area of the bin."""
     t, (x, y, _) = water.topology, water.mesh.axes
-    wet = cells_touching(phi < 0.0, t.cells)
+    wet = t.cells_around(phi < 0.0)
     area = np.outer(np.diff(x), np.diff(y)).ravel()
     volume = np.bincount(
         _column(water, wet), t.volume[wet] * wet_fraction(wet, phi, t.parts), minlength=len(area)

@@ -39,7 +39,9 @@ def waterline_load(domain, faces, phi, wet, pressure, open_node) -> np.ndarray:
         return load
     at, corners = faces[mixed], corners[mixed]
     p = np.where(wet & ~open_node, pressure, 0.0)
-    beside = cells_touching(np.isin(np.arange(len(phi)), corners), domain.cells)
+    reached = np.zeros(len(phi), bool)
+    reached[corners] = True
+    beside = cells_touching(reached, domain.cells)
     ghosts = with_ghosts(p, wet, open_node, phi, beside, domain.cells)
     hats = hat_values(domain.nodes[corners], domain.face_corners[at])
     height, full, acting = (np.einsum("kqa,ka->kq", hats, f[corners]) for f in (phi, ghosts, p))

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from fluid.moments import cells_touching, wet_fraction
+from fluid.moments import wet_fraction
 from fluid.obtuse import without_indefinite
 
 DRY = 1e-9
@@ -35,7 +35,7 @@ class WetPart:
         """The wet part below the level set φ (N,) [m]; spacing [m] of the mesh."""
         t = topology
         below = (phi < 0.0) & t.active
-        cells = cells_touching(below, t.cells)
+        cells = t.cells_around(below)
         holds = ~domain.is_cut[cells] | _holding(domain, t, phi, -DRY * spacing)[cells]
         if t.is_obtuse:
             holds[holds] = without_indefinite(t, cells[holds], below, phi)
