@@ -1,7 +1,8 @@
 """Cells of one shape and place in the lattice share their gradients.
 
-A box of bricks has six different cells, whatever its size.  The loops of a step read gradients cell by cell: six rows
-of them stay in the first cache of the processor, where one row a cell would be three quarters of all that is read.
+A box of equal bricks has six different cells, 48 if they are mirrored, whatever its size.  The loops of a step read
+gradients cell by cell: these rows stay in the first cache of the processor.  With a row for every cell they would be
+three quarters of all that is read.
 """
 
 from __future__ import annotations
