@@ -1,7 +1,7 @@
 """What is carried on one side of a thin wall never reaches the other, whatever the velocity."""
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
@@ -71,8 +71,12 @@ def test_bonded_walls(angle, courant, seed):
 
 @settings(max_examples=10, deadline=None)
 @given(seed=st.integers(0, 10**6), courant=st.floats(0.5, 10))
+@example(seed=759, courant=1.0)
 def test_closed_boxes(seed, courant):
-    """The water within six plates, turned any way, and the water round them."""
+    """The water within six plates, turned any way, and the water round them: two waters of the exact volumes.
+
+    The centroid of a cell does not tell on which side it lies: with seed 759 two cells outside reach round an edge of
+    the box, and the middle of their water falls within it."""
     turn = Rotation.random(rng=np.random.default_rng(seed)).as_matrix()
     thickness, inner, centre, size = 0.2 * H, 3.0 * H, [], []
     for axis in range(3):
@@ -83,7 +87,9 @@ def test_closed_boxes(seed, courant):
             size.append(d)
     domain = cut_domain(MESH, ConvexBodies.boxes(centre, size, np.repeat(turn[None], 6, axis=0)), "multiple")
     t = Topology.of(MESH, domain)
-    inside = (np.abs((domain.centroid - 0.5) @ turn) < inner / 2).all(axis=1)
+    water = components(domain.cells, len(domain.nodes))
+    volume = sorted(np.bincount(water, domain.volume))
+    np.testing.assert_allclose(volume, [inner**3, 1 - (inner + 2 * thickness) ** 3], rtol=1e-9)
     side = np.full(len(t.nodes), -1)
-    side[t.cells] = inside[:, None]
+    side[t.cells] = water[:, None]
     check_sides(t, side, seed, courant)
