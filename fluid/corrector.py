@@ -34,6 +34,10 @@ WATERLINE_DAMPING, WATERLINE_DEPTH = 0.5, 1.0
 """c of `damp_waterline` in calm water, and how far below the surface it acts (in cell sizes). Noise on a slope of 1:20
 grows by 0.03 a step without, and not with 0.5. Less in faster water, none where it crosses a cell in a step: there it
 would take what is real."""
+OBTUSE_DEPTH = 2.0
+"""The same depth on meshes with obtuse cells, where it acts along the whole surface: velocity of single nodes along the
+surface grows there by 0.005 to 0.015 a step, with and without solids, as the pressure of a wave and the way in which
+velocity lifts the surface are not each other's transpose. Cells of the surface reach 1.6 cell sizes down."""
 
 
 @dataclass(frozen=True)
@@ -167,21 +171,28 @@ def _limit_and_damp(water, kept, u, a):
         t.size,
         kept.wet_share,
     )
+    _damp_surface(water, kept, u)
+    damped = u.copy()
+    water.hold(u, kept.end)
+    return clipped, limited, damped
+
+
+def _damp_surface(water, kept, u) -> None:
+    """`damp_waterline` beside solids, on meshes with obtuse cells everywhere along the surface; in place."""
+    t = water.topology
+    depth = OBTUSE_DEPTH if t.is_obtuse else WATERLINE_DEPTH
     damp_waterline(
         kept.wet_cells,
         WATERLINE_DAMPING * water.calm(kept.end - water.time),
         kept.level_set,
         kept.wet,
-        t.beside_solid,
-        -WATERLINE_DEPTH * water.mesh.spacing,
+        np.ones_like(t.beside_solid) if t.is_obtuse else t.beside_solid,
+        -depth * water.mesh.spacing,
         u,
         t.cells,
         t.volume,
         kept.wet_share,
     )
-    damped = u.copy()
-    water.hold(u, kept.end)
-    return clipped, limited, damped
 
 
 def _limit_speed(water, u, a) -> int:

@@ -4,6 +4,12 @@ Nodes of cells that the surface passes through keep φ: their zero is the surfac
 closest point pulls the surface off the walls (0.2 m/s in a tilted tank at rest).  Only where the mean |∇φ| around
 such a node has left [0.9, 1.1] is φ divided by it.  All other nodes take the distance to the closest polygon of
 the surface, handed from layer to layer; beyond the layers φ = ±FAR h.
+
+What is handed on is the closest polygon of a neighbour.  Where the cells are obtuse that may be some polygons away from
+the node's own, φ too large by 0.02 h to 0.15 h there, and its slope in the cells above and below the surface so far
+from upright that velocity along still water lifts it (growth of 0.005 a step).  There the nodes of the first layers
+look for their own among the polygons around the one in hand until none is closer: on a surface that is nearly flat
+over a cell, the closest of all.
 """
 
 from __future__ import annotations
@@ -15,6 +21,8 @@ from fluid.jit import inner, plain
 from fluid.topology import layers_around
 
 LAYERS = 6
+EXACT_LAYERS = 2
+"""Layers that look for their own closest polygon on meshes with obtuse cells: those of the cells next to the surface."""
 FAR = 7.0
 FILM = 1e-7
 
@@ -118,16 +126,56 @@ def _ratio(part, whole):
 
 
 @njit(cache=True)
-def _closest_in_layers(order, layer_start, triangles, owner, nodes, cells, start, around):
-    """Distance (N,) [m] of the nodes of `order` to the triangles, handed outward; two sweeps a layer."""
+def _closest_in_layers(
+    order, layer_start, triangles, owner, nodes, cells, start, around, exact, node_start, node_cells
+):
+    """Distance (N,) [m] of the nodes of `order` to the triangles, handed outward; two sweeps a layer.
+
+    exact: first layers whose nodes go on to the closest of all (`_descend`)."""
     n = nodes.shape[0]
     closest, best = np.full(n, -1, np.int64), np.full(n, np.inf)
     tried = np.full(triangles.shape[0], -1, np.int64)
+    first = _first_triangles(owner, cells.shape[0] if exact > 0 else 0)
     asked, found = np.zeros(n, np.int32), np.zeros(n, np.int32)
     _hand_outward(
         order, layer_start, triangles, owner, nodes, cells, start, around, closest, best, tried, asked, found
     )
+    for s in range(layer_start[1], layer_start[exact + 1]):
+        i = order[s]
+        if closest[i] >= 0:
+            best[i] = _descend(
+                nodes[i], closest[i], best[i], triangles, owner, first, cells, node_start, node_cells
+            )
     return np.sqrt(best)
+
+
+@njit(cache=True)
+def _first_triangles(owner, n_cells):
+    """First triangle of each cell (n_cells,), -1 none; those of a cell follow each other."""
+    first = np.full(n_cells, -1, np.int64)
+    if n_cells > 0:
+        for t in range(owner.shape[0] - 1, -1, -1):
+            first[owner[t]] = t
+    return first
+
+
+@njit(cache=True)
+def _descend(x, closest, best, triangles, owner, first, cells, node_start, node_cells):
+    """Squared distance [m²] of x (3,) to the closest triangle that can be reached from `closest`, at the squared
+    distance `best`, through cells with a common node, always coming closer."""
+    before = -1
+    while closest != before:
+        before = closest
+        for a in range(4):
+            i = cells[owner[before], a]
+            for s in range(node_start[i], node_start[i + 1]):
+                t = first[node_cells[s]]
+                while 0 <= t < owner.shape[0] and owner[t] == node_cells[s]:
+                    d = squared_distance(x, triangles[t])
+                    if d < best:
+                        best, closest = d, t
+                    t += 1
+    return best
 
 
 @inner
@@ -195,7 +243,10 @@ def redistance(topology, phi, spacing: float, rescale: bool):
     front[t.cells[cut]] = True
     order, start = layers_around(front, LAYERS, *t.around)
     triangles, owner = surface_triangles(cut, phi, t.nodes, t.cells)
-    distance = _closest_in_layers(order, start, triangles, owner, t.nodes, t.cells, *t.around)
+    exact = EXACT_LAYERS if t.is_obtuse else 0
+    distance = _closest_in_layers(
+        order, start, triangles, owner, t.nodes, t.cells, *t.around, exact, t.node_start, t.node_cells
+    )
     listed = order[start[1] :]
     far[listed] = np.copysign(np.minimum(distance[listed], FAR * spacing), phi[listed])
     far[front] = phi[front]

@@ -17,6 +17,7 @@ from numba import njit
 from fluid.advection import transport
 from fluid.level_set import redistance
 from fluid.outflow import Outflow
+from fluid.paths_in_solids import levels_in_solids
 from fluid.projection import (
     PressureProblem,
     cell_velocity,
@@ -131,6 +132,9 @@ def _transported(water, dt, theta, kick):
         moved[:, :3] = carried_velocity(water, dt, u_m, u_hat)
     u_adv, phi = u_hat, water.level_set.copy()
     u_adv[water.listed] = moved[:, :3]
+    if water.topology.is_obtuse:
+        places, levels = levels_in_solids(water.topology, water.listed, dt, u_m, phi, water.mesh.spacing)
+        moved[places, 3] = levels
     near = np.abs(phi[water.listed]) < TRANSPORT_WIDTH * water.mesh.spacing
     phi[water.listed[near]] = moved[near, 3]
     water._walls.let_air_in(phi, u_m, dt, water.mesh.spacing)
