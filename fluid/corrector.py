@@ -15,6 +15,7 @@ import numpy as np
 from numba import njit
 
 from fluid.extension import extend_velocity
+from fluid.kinks import damp_kinks
 from fluid.momentum import Stages, momentum_change
 from fluid.projection import (
     cell_gradient,
@@ -34,10 +35,9 @@ WATERLINE_DAMPING, WATERLINE_DEPTH = 0.5, 1.0
 """c of `damp_waterline` in calm water, and how far below the surface it acts (in cell sizes). Noise on a slope of 1:20
 grows by 0.03 a step without, and not with 0.5. Less in faster water, none where it crosses a cell in a step: there it
 would take what is real."""
-OBTUSE_DEPTH = 2.0
-"""The same depth on meshes with obtuse cells, where it acts along the whole surface: velocity of single nodes along the
-surface grows there by 0.005 to 0.015 a step, with and without solids, as the pressure of a wave and the way in which
-velocity lifts the surface are not each other's transpose. Cells of the surface reach 1.6 cell sizes down."""
+KINK_DAMPING, KINK_DEPTH, SURFACE_DAMPING = 1.0 / 8.0, 2.0, 0.025
+"""On meshes with obtuse cells, in calm water: c of `damp_kinks` and how far below the surface it acts (cells of the
+surface reach 1.6 cell sizes down), and c of `damp_waterline` along the whole surface, for cells not wholly wet."""
 
 
 @dataclass(frozen=True)
@@ -178,21 +178,20 @@ def _limit_and_damp(water, kept, u, a):
 
 
 def _damp_surface(water, kept, u) -> None:
-    """`damp_waterline` beside solids, on meshes with obtuse cells everywhere along the surface; in place."""
-    t = water.topology
-    depth = OBTUSE_DEPTH if t.is_obtuse else WATERLINE_DEPTH
-    damp_waterline(
-        kept.wet_cells,
-        WATERLINE_DAMPING * water.calm(kept.end - water.time),
-        kept.level_set,
-        kept.wet,
-        np.ones_like(t.beside_solid) if t.is_obtuse else t.beside_solid,
-        -depth * water.mesh.spacing,
-        u,
-        t.cells,
-        t.volume,
-        kept.wet_share,
-    )
+    """`damp_waterline`, and `damp_kinks` on meshes with obtuse cells, in calm water, in place."""
+    t, h, calm = water.topology, water.mesh.spacing, water.calm(kept.end - water.time)
+    wet = (kept.wet_cells, kept.level_set, kept.wet)
+
+    def even_out(weight, where):
+        list_, *level = wet
+        deep = -WATERLINE_DEPTH * h
+        damp_waterline(list_, weight * calm, *level, where, deep, u, t.cells, t.volume, kept.wet_share)
+
+    even_out(WATERLINE_DAMPING, t.beside_solid)
+    if t.is_obtuse:
+        mesh = (t.cells, t.parent, t.gradients, t.volume, t.neighbours)
+        damp_kinks(*wet, KINK_DAMPING * calm, -KINK_DEPTH * h, u, *mesh)
+        even_out(SURFACE_DAMPING, np.ones_like(t.beside_solid))
 
 
 def _limit_speed(water, u, a) -> int:

@@ -22,7 +22,7 @@ from fluid.topology import layers_around
 
 LAYERS = 6
 EXACT_LAYERS = 2
-"""Layers that look for their own closest polygon on meshes with obtuse cells: those of the cells next to the surface."""
+"""Layers that look for their own closest polygon on meshes with obtuse cells: those next to the surface."""
 FAR = 7.0
 FILM = 1e-7
 

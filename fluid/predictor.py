@@ -177,7 +177,7 @@ def _problem(water, dt, theta, kick, surface, conserved, u_adv, u_star, shear, l
         rhs[dofs] += pull_of_held(graph, dofs, held, dt / density)
     known = (1.0 - theta) * kick[dofs] * water.end_pressure[dofs]
     guess = theta * water.end_pressure[dofs]
-    coupling, faces = _coupling(water, part.void)
+    coupling, faces, left_out = _coupling(water, part.void)
     matrix, extra = _sealed(water, matrix, anchored, dofs, dt, guess)
     if water.slits is not None:
         lumped, drive = water.slits.pressure_terms(dofs, known, water.parameters.weight, dt, density)
@@ -205,7 +205,7 @@ def _problem(water, dt, theta, kick, surface, conserved, u_adv, u_star, shear, l
     )
     # before the first step there is no pressure to go by: still water
     acted = water.pressure if water.steps else -density * water.parameters.gravity * phi
-    other = waterline_load(water.domain, faces, phi, wet, acted, water._walls.open_node)
+    other = waterline_load(water.domain, faces, left_out, phi, wet, acted, water._walls.open_node)
     if shear is not None:
         other += shear.load
     return PressureProblem(
@@ -214,12 +214,14 @@ def _problem(water, dt, theta, kick, surface, conserved, u_adv, u_star, shear, l
 
 
 def _coupling(water, void):
-    """G (N, 6 n_bodies) without the polygons of void cells, and the rows of the polygons that count."""
-    cell = water.domain.face_cell
+    """G (N, 6 n_bodies) without the polygons of void cells, the rows of the polygons that count, and those of others where
+    their cells may hold water (`obtuse.py`)."""
+    cell, none = water.domain.face_cell, np.zeros(0, np.int64)
     if len(void) == 0:
-        return water.coupling, np.arange(len(cell))
+        return water.coupling, np.arange(len(cell)), none
     left_out = np.isin(cell, void)
-    return water.coupling - wetted_coupling(water.domain, left_out), np.flatnonzero(~left_out)
+    coupling = water.coupling - wetted_coupling(water.domain, left_out)
+    return coupling, np.flatnonzero(~left_out), np.flatnonzero(left_out) if water.topology.is_obtuse else none
 
 
 def _carried_remainder(water, dt, theta, cells):

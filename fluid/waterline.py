@@ -26,18 +26,18 @@ from fluid.moments import cells_touching
 from fluid.projection import with_ghosts
 
 
-def waterline_load(domain, faces, phi, wet, pressure, open_node) -> np.ndarray:
+def waterline_load(domain, faces, left_out, phi, wet, pressure, open_node) -> np.ndarray:
     """R of (2): force and moment on every body (n_bodies, 6) [N, N m].
 
-    faces (k,) rows of the polygons to look at · phi (N,) [m] · wet (N,) bool · pressure (N,) [Pa], read on wet nodes ·
-    open_node (N,) bool: p = 0."""
+    faces (k,) rows of the polygons of G · left_out (l,) rows of those that are not in G though their cells hold water ·
+    phi (N,) [m] · wet (N,) bool · pressure (N,) [Pa], read on wet nodes · open_node (N,) bool: p = 0."""
     load = np.zeros((domain.n_bodies, 6))
-    corners = domain.cells[domain.face_cell[faces]]
-    count = wet[corners].sum(axis=1)
-    mixed = (count > 0) & (count < 4)
-    if not mixed.any():
+    count = wet[domain.cells[domain.face_cell[faces]]].sum(axis=1)
+    mixed = faces[(count > 0) & (count < 4)]
+    at = np.concatenate([mixed, left_out])
+    if len(at) == 0:
         return load
-    at, corners = faces[mixed], corners[mixed]
+    corners = domain.cells[domain.face_cell[at]]
     p = np.where(wet & ~open_node, pressure, 0.0)
     reached = np.zeros(len(phi), bool)
     reached[corners] = True
@@ -45,6 +45,7 @@ def waterline_load(domain, faces, phi, wet, pressure, open_node) -> np.ndarray:
     ghosts = with_ghosts(p, wet, open_node, phi, beside, domain.cells)
     hats = hat_values(domain.nodes[corners], domain.face_corners[at])
     height, full, acting = (np.einsum("kqa,ka->kq", hats, f[corners]) for f in (phi, ghosts, p))
+    acting[len(mixed) :] = 0.0
     body = domain.face_body[at]
     arm = domain.face_corners[at] - domain.body_centre[body][:, None]
     force, first = _differences(height, full, acting, arm, domain.face_area[at])

@@ -70,7 +70,5 @@ def test_solids_wholly_under_water_need_no_correction():
     mesh = box_mesh([0, 0, 0], [1, 1, 1], 0.125)
     domain = cut_domain(mesh, boxes([0.5, 0.5, 0.3]))
     phi = domain.nodes[:, 2] - 0.9
-    no_side = np.zeros(len(phi), bool)
-    assert not waterline_load(
-        domain, np.arange(len(domain.face_cell)), phi, phi < 0.0, -WEIGHT * phi, no_side
-    ).any()
+    faces, none, no_side = np.arange(len(domain.face_cell)), np.zeros(0, int), np.zeros(len(phi), bool)
+    assert not waterline_load(domain, faces, none, phi, phi < 0.0, -WEIGHT * phi, no_side).any()
