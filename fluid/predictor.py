@@ -214,8 +214,8 @@ def _problem(water, dt, theta, kick, surface, conserved, u_adv, u_star, shear, l
 
 
 def _coupling(water, void):
-    """G (N, 6 n_bodies) without the polygons of void cells, the rows of the polygons that count, and those of others where
-    their cells may hold water (`obtuse.py`)."""
+    """G (N, 6 n_bodies) without the polygons of void cells, the rows of the polygons that count, and of those others
+    whose cells may hold water (`obtuse.py`)."""
     cell, none = water.domain.face_cell, np.zeros(0, np.int64)
     if len(void) == 0:
         return water.coupling, np.arange(len(cell)), none
