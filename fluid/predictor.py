@@ -1,7 +1,7 @@
 """First half of the step: what the water does before its pressure is known.
 
 û = uⁿ + (1-θ) dt âⁿ,   âⁿ = aⁿ f,  f = min(1, 3g/|aⁿ|)           part of the last acceleration, limited
-φ̃, u_adv = transport of φ, û by uⁿ + dt/2 âⁿ                      semi-Lagrangian, MacCormack
+φ̃, u_adv = transport of φ, û by uⁿ + dt/2 âⁿ     semi-Lagrangian, MacCormack; `surface_momentum.py`
 φ = redistanced φ̃, corrected towards the conservative volume
 u* = u_adv + θ dt g
 (dt/ρ) K x = ∫ (u* + u')·∇N dV + G V
@@ -71,7 +71,8 @@ def predicted(water, dt: float) -> PressureProblem:
     theta, parameters = water.theta(dt), water.parameters
     kick = kick_factor(water.acceleration, parameters)
     u_adv, phi = _transported(water, dt, theta, kick)
-    carried = water.carried_volume(dt)
+    found = water.carried(dt, theta)
+    carried = found.water
     conserved, left = water.conserved_volume, Outflow.of(water, dt, carried)
     if left is not None:
         carried -= left.volume
@@ -85,6 +86,10 @@ def predicted(water, dt: float) -> PressureProblem:
         carried += through
         conserved += float(through.sum())
     surface = _new_surface(water, phi, carried, conserved)
+    if parameters.advection == "semi-lagrangian":
+        graph = water.graph_for(water.listed)
+        found.into(u_adv, water.listed, phi, water.mesh.spacing, graph, surface.shift)
+        water.hold(u_adv, water.time + dt)
     shear = None
     if water.viscous is not None:
         shear = _sheared(water, dt, theta, kick, surface, u_adv)

@@ -56,7 +56,7 @@ def restore(water, domain, arrays) -> None:
     for name, kind in NUMBERS.items():
         setattr(water, name, kind(arrays[name]))
     water._graph = Graph.of(water.topology, np.array(arrays["graph_nodes"]))
-    water._renumbered, water.report = None, None
+    water._renumbered, water._left_behind, water.report = None, None, None
     water.flux = Flux(
         np.array(arrays["flux_nodes"]),
         water._graph,

@@ -148,14 +148,24 @@ def _diffused_shift(band, place, graph_row, start, neighbour, stiffness, c, resi
 
 
 @dataclass(frozen=True)
+class Shift:
+    """ψ of (2): value (n,) [m] at the nodes of the band (n,), with its κ [m]."""
+
+    band: np.ndarray
+    value: np.ndarray
+    kappa: float
+
+
+@dataclass(frozen=True)
 class VolumeCorrection:
     """level_set (N,) · nodal_water (N,) [m³] of it, and `uncorrected_water` before · reinserted [m³] moved by the
-    uniform shift."""
+    uniform shift · shift: ψ of (2)."""
 
     level_set: np.ndarray
     nodal_water: np.ndarray
     uncorrected_water: np.ndarray
     reinserted: float
+    shift: Shift
 
 
 def correct_volume(topology, graph, listed, phi, carried, target: float, kappa: float, spacing: float):
@@ -192,7 +202,13 @@ def correct_volume(topology, graph, listed, phi, carried, target: float, kappa: 
     phi, reinserted = _meet_total(
         topology, near, phi, band, slope.sum(), left, VOLUME_TOLERANCE * abs(target), spacing
     )
-    return VolumeCorrection(phi, inner + nodal_water(near, 0.0, phi, topology.parts, n), own, reinserted)
+    return VolumeCorrection(
+        phi,
+        inner + nodal_water(near, 0.0, phi, topology.parts, n),
+        own,
+        reinserted,
+        Shift(band, shift, kappa * spacing),
+    )
 
 
 @njit(cache=True)

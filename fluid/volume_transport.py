@@ -16,6 +16,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from fluid.velocity_transport import carry_velocity
 from fluid.volume import Flux
 
 LARGEST_COURANT = 0.8
@@ -23,16 +24,22 @@ LEAST_COUNTED = 0.3
 """Courant number of a substep, and nodes that set it: those of at least this share of the median volume."""
 
 
-def carry_volume(flux: Flux, dt: float):
-    """W (N,) [m³] after dt [s] by the flux; Σ W is kept to round-off."""
+def carry_volume(flux: Flux, dt: float, u=None):
+    """W (N,) [m³] after dt [s] by the flux; Σ W is kept to round-off.
+
+    u (N, 3) [m/s], if given, goes along (`velocity_transport.py`), in place; nodes without water keep theirs."""
     water = flux.water.copy()
     capacity = np.maximum(flux.capacity, 1e-300)
     least = LEAST_COUNTED * np.median(capacity[flux.nodes]) if len(flux.nodes) else 0.0
     g = flux.graph
     turnover = _largest_turnover(flux.nodes, g.row, g.start, flux.rate, capacity, least)
     n_sub = int(np.ceil(dt * turnover / LARGEST_COURANT)) or 1
+    along = (flux.nodes, g.row, g.start, g.neighbour)
     for _ in range(n_sub):
-        _substep(flux.nodes, g.row, g.start, g.neighbour, flux.rate, water, capacity, dt / n_sub)
+        moved = _moved(*along, flux.rate, water, capacity, dt / n_sub)
+        if u is not None:
+            carry_velocity(*along, moved, water, u)
+        _hand_over(*along, moved, water)
     return water
 
 
@@ -56,10 +63,9 @@ def _out(r, start, rate):
 
 
 @njit(cache=True)
-def _substep(nodes, graph_row, start, neighbour, rate, water, capacity, h):
-    """Equation (1) over h [s], in place."""
-    n = water.shape[0]
-    share, change = np.zeros(n), np.zeros(n)
+def _moved(nodes, graph_row, start, neighbour, rate, water, capacity, h):
+    """w_ij (edges,) [m³]: what leaves the listed nodes within h [s] by (1); no node gives more than it holds."""
+    share, moved = np.zeros(water.shape[0]), np.zeros(rate.shape[0])
     for i in nodes:
         share[i] = min(max(water[i], 0.0) / capacity[i], 1.0)
     for i in nodes:
@@ -72,14 +78,23 @@ def _substep(nodes, graph_row, start, neighbour, rate, water, capacity, h):
         total = 0.0
         for s in range(start[r], start[r + 1]):
             if rate[s] > 0.0:
-                total += h * rate[s] * _leaving(share[i], behind, share[neighbour[s]], second)
-        scale = min(1.0, water[i] / total) if total > 0.0 else 0.0
+                moved[s] = h * rate[s] * _leaving(share[i], behind, share[neighbour[s]], second)
+                total += moved[s]
+        if total > water[i]:
+            for s in range(start[r], start[r + 1]):
+                moved[s] *= water[i] / total
+    return moved
+
+
+@njit(cache=True)
+def _hand_over(nodes, graph_row, start, neighbour, moved, water):
+    """The volumes moved (edges,) [m³] off the one node and on to the other, in place."""
+    change = np.zeros(water.shape[0])
+    for i in nodes:
+        r = graph_row[i]
         for s in range(start[r], start[r + 1]):
-            if rate[s] > 0.0:
-                j = neighbour[s]
-                moved = scale * h * rate[s] * _leaving(share[i], behind, share[j], second)
-                change[i] -= moved
-                change[j] += moved
+            change[i] -= moved[s]
+            change[neighbour[s]] += moved[s]
     water += change
 
 

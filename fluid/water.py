@@ -10,7 +10,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numba import njit
@@ -23,11 +23,11 @@ from fluid.mesh import Background
 from fluid.momentum import MomentumChange
 from fluid.pace import LEAST_COUNTED, LEAST_GATHERED, gathered, largest_component, pace
 from fluid.parameters import WaterParameters
-from fluid.predictor import predicted
+from fluid.predictor import kick_factor, predicted
 from fluid.projection import PressureProblem
+from fluid.surface_momentum import Carried
 from fluid.topology import Graph, Topology, layers_around
 from fluid.volume import edge_flux, nodal_volume, renumbering
-from fluid.volume_transport import carry_volume
 from fluid.walls import Walls
 
 LONGEST_STEP = 0.3
@@ -122,7 +122,7 @@ class Water:
         self.conserved_volume = float(self.nodal_water.sum())
         self.initial_volume = self.conserved_volume
         self._find_band()
-        self._renumbered = None
+        self._renumbered, self._left_behind = None, None
         self.flux = edge_flux(
             self.topology, self.graph_for(self.listed), self.listed, self.cell_velocity, self.nodal_water
         )
@@ -182,7 +182,7 @@ class Water:
         self.time += problem.dt
         self._surface_lag = problem.dt if self._solids_move else 0.5 * problem.dt
         self.steps += 1
-        self._domain_is_new, self._renumbered = False, None
+        self._domain_is_new, self._renumbered, self._left_behind = False, None, None
 
     # ---- moving solids
 
@@ -194,6 +194,8 @@ class Water:
         source = carry(old, domain)
         self._set_domain(domain)
         known = (source >= 0) & old_topology.active[source]
+        if self._left_behind is None:
+            self._left_behind = (self.velocity, self.acceleration)
         self._carry_nodes(source, known)
         self._carry_cells(old_topology)
         self._find_band()
@@ -208,11 +210,16 @@ class Water:
 
         self.slits = Slits.of(self.domain, cracks, self.mesh.spacing, self.slits)
 
-    def carried_volume(self, dt: float) -> np.ndarray:
-        """Conservative volume (N,) [m³] of the nodes after dt [s], carried on the domain of the last projection."""
-        carried = carry_volume(self.flux, dt)
-        carried = carried if self._renumbered is None else self._renumbered @ carried
-        return carried if self.slits is None else carried + self.slits.carried(dt)
+    def carried(self, dt: float, theta: float) -> Carried:
+        """What the fluxes make of volume and momentum in dt [s], carried on the domain of the last projection."""
+        u, a = (self.velocity, self.acceleration) if self._left_behind is None else self._left_behind
+        kick = (1.0 - theta) * dt * kick_factor(a, self.parameters)
+        u_hat = u + kick[:, None] * a
+        carried = Carried.by(self.flux, dt, u_hat, a, self.parameters.gravity, self.mesh.spacing)
+        carried = carried if self._renumbered is None else carried.handed_on(self._renumbered)
+        if self.slits is None:
+            return carried
+        return replace(carried, water=carried.water + self.slits.carried(dt))
 
     def _carry_nodes(self, source, known):
         scalars = np.column_stack([self.level_set, self.pressure, self.end_pressure])

@@ -1,0 +1,37 @@
+"""Momentum that goes with the volume, and where it counts."""
+
+import numpy as np
+import pytest
+
+from fluid.volume_transport import carry_volume
+from tests.fluid.scenes import advance, column, tank
+
+
+def test_velocity_carried_with_the_volume_keeps_momentum_and_range():
+    """Fast water on slow: Σ W u to round-off, and no component beyond the range of what was there."""
+    water = tank([2, 0.25, 0.75], 0.125, column(0.6, 0.5))
+    while water.time < 0.25:
+        advance(water)
+    before = water.velocity.copy()
+    before[:, 0] += np.sin(9.0 * water.topology.nodes[:, 0])
+    u = before.copy()
+    volume = carry_volume(water.flux, water.stable_step(), u)
+    assert volume @ u == pytest.approx(water.nodal_water @ before, rel=1e-10, abs=1e-12)
+    wet = volume > 0.0
+    assert np.all(u[wet] <= before.max(axis=0) + 1e-12)
+    assert np.all(u[wet] >= before.min(axis=0) - 1e-12)
+
+
+def test_momentum_counts_at_jumps_only():
+    """A low wave and a front on a dry bed go along the paths alone, a dam break into two cells of water does not."""
+    wave = tank([2, 0.125, 1.0], 0.125, lambda x: x[:, 2] - 0.55 - 0.005 * np.cos(np.pi * x[:, 0]))
+    dam = column(0.8, 0.8)
+    dry = tank([2, 0.125, 1.0], 0.125, dam)
+    bore = tank([2, 0.125, 1.0], 0.125, lambda x: np.minimum(dam(x), x[:, 2] - 0.25))
+    for water in (wave, dry, bore):
+        while water.time < 0.25:
+            advance(water)
+    dt = wave.stable_step()
+    assert wave.carried(dt, 0.6).weight is None
+    assert dry.carried(dt, 0.6).weight is None
+    assert bore.carried(dt, 0.6).weight.max() > 0.5
