@@ -88,7 +88,7 @@ def predicted(water, dt: float) -> PressureProblem:
     surface = _new_surface(water, phi, carried, conserved)
     if parameters.advection == "semi-lagrangian":
         graph = water.graph_for(water.listed)
-        found.into(u_adv, water.listed, phi, water.mesh.spacing, graph, surface.shift)
+        found.into(u_adv, water.listed, phi, water.mesh.spacing, graph, surface.shift, water.topology)
         water.hold(u_adv, water.time + dt)
     shear = None
     if water.viscous is not None:

@@ -32,7 +32,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from fluid.topology import Graph
+from fluid.topology import Graph, Topology
 from fluid.velocity_transport import carry_velocity
 from fluid.volume import Flux, Shift
 from fluid.volume_transport import carry_volume
@@ -78,15 +78,24 @@ class Carried:
         fields = (heirs @ (held * fields)) / np.maximum(heirs @ held, 1e-300)
         return Carried(water, fields[:, :3].copy(), fields[:, 3].copy())
 
-    def into(self, u, nodes, phi, spacing: float, graph: Graph, shift: Shift) -> None:
+    def into(self, u, nodes, phi, spacing: float, graph: Graph, shift: Shift, t: Topology) -> None:
         """Equations (1) and (2) for u (N, 3) [m/s] at the listed nodes (n,) that hold water, in place; φ (N,) [m]."""
         if self.velocity is None:
             return
         carried = self.velocity.copy()
         _pass_on(graph, shift, self.water, carried)
         weight = self.weight[nodes] * np.clip((phi[nodes] / spacing + DEEP) / (DEEP - SHALLOW), 0.0, 1.0)
-        weight[self.water[nodes] <= 0.0] = 0.0
+        weight[(self.water[nodes] <= 0.0) | _around_solids(t)[nodes]] = 0.0
         u[nodes] += weight[:, None] * (carried[nodes] - u[nodes])
+
+
+def _around_solids(t: Topology):
+    """Nodes (N,) bool of cut cells and two layers around them: what stops there is stopped by pressure."""
+    found = t.beside_solid.copy()
+    if found.any():
+        for _ in range(2):
+            found[t.cells[found[t.cells].any(axis=1)]] = True
+    return found
 
 
 def _pass_on(graph: Graph, shift: Shift, water, u) -> None:
