@@ -20,11 +20,9 @@ NOTES = {
     "([water](water.md#which-way-the-cells-are-split)). When the jet comes down differs from run to run.",
     "P40": "P3 is 1.2 cells below the edge of the box and reads 0.30 to 0.80 of the measured impulse on cells of "
     "4.2 to 6.3 cm, whichever way they are split ([water](water.md#weak)).",
-    "P41": "Into two and into four cells of water the bore is 11 to 14 % too slow, with other steps by 6 to 16 %. "
-    "A node at rest ahead of it is the foot of its own path, so that it stays at rest while the bore pours water into "
-    "it: of the momentum that transport loses there, the volume brings back four fifths.",
     "P42": "The wave is less than half a cell high, its run-up one to two cells of water; where the tongue tears off "
-    "a film decides: 0.064 to 0.099 d on 24 and 48 cells over the depth, with variants of damping and transport.",
+    "a film decides: 0.064 to 0.099 d on 24 and 48 cells over the depth, with variants of damping and transport; "
+    "round-off alone moves it by 0.004 d.",
     "P55": "With four cells over the diameter the speed is 5 to 6 % low: linear velocities are too coarse there (spun, "
     "the sphere feels 1.04 of the moment of Stokes; 1.003 with eight cells). At Re 1.5 the digitised records do not "
     "agree: the speeds add up to a gap of 4 D at 1.82 s, the record of the gap says 1.94 s, and the largest speed, "
