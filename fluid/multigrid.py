@@ -45,12 +45,17 @@ class Level:
     aggregate: np.ndarray
 
 
+def unsigned(A) -> tuple[np.ndarray, np.ndarray]:
+    """indptr and indices of A: csr as uint32, see `topology.py`; scipy keeps them in 32 bits or, after sums, in 64."""
+    return tuple(k.view(np.uint32) if k.itemsize == 4 else k.astype(np.uint32) for k in (A.indptr, A.indices))
+
+
 class Multigrid:
     """Preconditioner of A: csr (n, n), symmetric positive definite."""
 
     def __init__(self, A):
         self.levels: list[Level] = []
-        parts = _split(A.indptr.view(np.uint32), A.indices.view(np.uint32), A.data)
+        parts = _split(*unsigned(A), A.data)
         while len(parts[-1]) > COARSEST:
             aggregate, count = _aggregates(parts)
             if count > LEAST_GAIN * len(aggregate):

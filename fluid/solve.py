@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from fluid.multigrid import Multigrid
+from fluid.multigrid import Multigrid, unsigned
 
 MULTIGRID_FROM = 1_000
 MULTIGRID_FROM_WITH_EXTRA = 300
@@ -58,7 +58,7 @@ def solve(
     if not kept:
         kept.append(_preconditioner(A, MULTIGRID_FROM if extra is None else MULTIGRID_FROM_WITH_EXTRA))
     precondition = kept[0]
-    rows = (A.indptr.view(np.uint32), A.indices.view(np.uint32), A.data)
+    rows = (*unsigned(A), A.data)
     apply = (lambda v: _product(*rows, v)) if extra is None else (lambda v: _product(*rows, v) + extra(v))
     x = np.array(x0, float)
     r = b - apply(x)

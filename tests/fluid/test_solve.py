@@ -35,6 +35,18 @@ def test_added_operator_is_part_of_the_system():
     np.testing.assert_allclose(result.x, exact, atol=1e-8)
 
 
+@pytest.mark.parametrize("multigrid_from", [0, 10**9])
+def test_indices_of_64_bits_are_the_same_matrix(multigrid_from, monkeypatch):
+    """Sums of scipy's matrices may have them; read as 32 bits they name other rows."""
+    monkeypatch.setattr(solver, "MULTIGRID_FROM", multigrid_from)
+    A = laplace(12)
+    long = A.copy()
+    long.indptr, long.indices = A.indptr.astype(np.int64), A.indices.astype(np.int64)
+    b = np.sin(np.arange(A.shape[0], dtype=float))
+    found = [solve(matrix, b, np.zeros_like(b), 1e-9).x for matrix in (A, long)]
+    assert np.array_equal(*found)
+
+
 def test_warm_start_at_the_solution_needs_no_iteration():
     A, x = laplace(5), np.arange(125.0)
     assert solve(A, A @ x, x, 1e-8).iterations == 0
