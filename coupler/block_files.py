@@ -7,10 +7,6 @@ is no convex block is refused with the number of the cell or surface and its pla
 
 from __future__ import annotations
 
-import contextlib
-import io
-import struct
-import warnings
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +15,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from coupler.closed_surfaces import SurfaceError, closed_surfaces, convex_corners
-from coupler.errors import ExitCode, SurgebreakError, did_you_mean
+from coupler.mesh_files import MeshFileError, read_mesh
 from yade_scripts.blocks import Block
 from yade_scripts.polyhedra import BlockError, fans, shown
 
@@ -40,28 +36,10 @@ STL_DIGITS = 2.0**-23
 """Relative resolution of a coordinate of an STL file (single precision)."""
 COARSEST = 1e-3
 """Largest share of the usual edge that the coordinates of a file may leave open."""
-UNREADABLE = (
-    SystemExit,
-    OSError,
-    ValueError,
-    KeyError,
-    IndexError,
-    TypeError,
-    struct.error,
-    SyntaxError,
-    AssertionError,
-)
-"""What meshio's readers raise on a file that is not what its name says; one of them leaves the program."""
-
-
-class BlockFileError(SurgebreakError):
-    """A file that gives no blocks; the message names it, the place, and the remedy."""
-
-    exit_code = ExitCode.BAD_CASE
 
 
 def blocks_from_file(spec, **common) -> list:
-    """Blocks NAME-0 .. of a `[[structure.file]]`; common: for every Block. Raises BlockFileError."""
+    """Blocks NAME-0 .. of a `[[structure.file]]`; common: for every Block. Raises MeshFileError."""
     path = Path(spec.path)
     points, cells, single = read_mesh(path)
     points = points * spec.scale + np.array(spec.offset)
@@ -73,59 +51,22 @@ def blocks_from_file(spec, **common) -> list:
             found.append(Block.standing(f"{spec.name}-{k}", vertices, faces, tolerance=weld, **common))
         except BlockError as error:
             place = shown(vertices.mean(axis=0))
-            raise BlockFileError(f"{path.name}: {kind} at {place}: {error}") from error
+            raise MeshFileError(f"{path.name}: {kind} at {place}: {error}") from error
     return found
-
-
-def read_mesh(path: Path) -> tuple[Array, dict[str, Array], bool]:
-    """Points (n, 3), cells by kind (m, k), and whether the file holds single precision. Raises BlockFileError."""
-    import meshio
-
-    if not path.is_file():
-        near = (
-            did_you_mean(path.name, [p.name for p in path.parent.iterdir()]) if path.parent.is_dir() else ""
-        )
-        raise BlockFileError(f"{path}: no such file{near}")
-    told = io.StringIO()
-    try:
-        with contextlib.redirect_stdout(told), contextlib.redirect_stderr(told), warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            mesh = meshio.read(path)
-    except (*UNREADABLE, meshio.ReadError) as error:
-        known = ", ".join(sorted(meshio.extension_to_filetypes))
-        raise BlockFileError(
-            f"{path.name}: meshio cannot read it ({_first_line(error, told)}); it reads {known}"
-        ) from error
-    if mesh.points.ndim != 2 or mesh.points.shape[1] != 3 or not np.isfinite(mesh.points).all():
-        raise BlockFileError(f"{path.name}: its points are not rows of three finite coordinates")
-    cells: dict[str, list] = {}
-    for block in mesh.cells:
-        rows = np.asarray(block.data)
-        if rows.size and not 0 <= rows.min() <= rows.max() < len(mesh.points):
-            raise BlockFileError(f"{path.name}: a cell names point {rows.max()} of {len(mesh.points)} points")
-        kind = f"polygon{rows.shape[1]}" if block.type == "polygon" else block.type
-        cells.setdefault(kind, []).append(rows)
-    single = mesh.points.dtype == np.float32 or path.suffix.lower() == ".stl"
-    return mesh.points.astype(float), {kind: np.concatenate(rows) for kind, rows in cells.items()}, single
-
-
-def _first_line(error: BaseException, told: io.StringIO) -> str:
-    text = " ".join((told.getvalue() or str(error) or type(error).__name__).split())
-    return text[:120]
 
 
 def _weld(path: Path, points: Array, cells: dict, single: bool, spec) -> float:
     """Distance [m] within which corners are one; refuses coordinates that are too coarse for the blocks."""
     rings = [points[rows] for kind, rows in cells.items() if kind not in IGNORED and len(rows)]
     if not rings:
-        raise BlockFileError(
+        raise MeshFileError(
             f"{path.name}: holds no cells; write a mesh of volume cells or of closed surfaces"
         )
     lengths = np.concatenate([np.linalg.norm(r - np.roll(r, 1, axis=1), axis=2).ravel() for r in rings])
     usual = float(np.median(lengths))
     digits = STL_DIGITS * float(np.abs(points - np.array(spec.offset)).max()) if single else 0.0
     if spec.weld is None and digits > COARSEST * usual:
-        raise BlockFileError(
+        raise MeshFileError(
             f"{path.name}: its coordinates are single precision and resolve {digits:.2g} m only, too coarse for edges "
             f"of {usual:.3g} m; move the drawing to its own origin before writing it and give the shift as offset"
         )
@@ -150,7 +91,7 @@ def _bodies(path: Path, points: Array, cells: dict[str, Array], weld: float):
     surfaces = {k: rows for k, rows in surfaces.items() if k not in IGNORED}
     other = [kind for kind in cells if kind not in (*VOLUME_FACES, *surfaces, *IGNORED)]
     if other:
-        raise BlockFileError(
+        raise MeshFileError(
             f"{path.name}: cells of kind '{other[0]}' cannot be rigid blocks with plane faces; write linear "
             f"{', '.join(VOLUME_FACES)}, or closed surfaces of triangles or quads"
         )
@@ -187,11 +128,11 @@ def _surfaces(path: Path, points: Array, surfaces: dict[str, Array], weld: float
     try:
         parts = closed_surfaces(points, loops)
     except SurfaceError as error:
-        raise BlockFileError(
+        raise MeshFileError(
             f"{path.name}: {error} (corners within {weld:.2g} m are one; structure.file.weld sets that)"
         ) from error
     for k, part in enumerate(parts):
         try:
             yield f"surface {k}", convex_corners(part, weld), None
         except SurfaceError as error:
-            raise BlockFileError(f"{path.name}: surface {k} {error}") from error
+            raise MeshFileError(f"{path.name}: surface {k} {error}") from error

@@ -8,8 +8,9 @@ import numpy as np
 
 from coupler.case import Case
 from coupler.errors import did_you_mean
+from coupler.tank_mesh import mesh_of, on_side
 
-SLACK = 1e-6
+SLACK = 1e-3
 """Share of a cell within which a box of water reaches a side of the tank."""
 
 
@@ -18,12 +19,11 @@ def water_of(case: Case, structure, solids):
     from coupler.exchange import Immersion
     from coupler.fill import start_level
     from fluid.covers import WIDE_OPENINGS
-    from fluid.mesh import box_mesh
     from fluid.parameters import WaterParameters
     from fluid.water import Water
 
     w = case.water
-    mesh = box_mesh(case.tank.lower, case.tank.upper, case.tank.cell, split=case.tank.split)
+    mesh = mesh_of(case.tank)
     cracks = _narrow_cracks(w.cracks, structure, mesh)
     connection = WIDE_OPENINGS if w.openings == "wide" else None
     immersion = Immersion(mesh, structure, solids, w.covers, cracks, connection)
@@ -39,14 +39,23 @@ def water_of(case: Case, structure, solids):
         manning=w.manning,
     )
     level = np.full(len(immersion.domain.nodes), np.ptp(mesh.bounds, axis=0).max())
-    boxes = [(fill.lower, fill.upper) for fill in w.fill] + _strips(case)
+    boxes = [_reaching(case.tank, fill) for fill in w.fill] + _strips(case)
     if boxes:
         level = start_level(boxes, (case.tank.lower, case.tank.upper), mesh, immersion.domain)
-    opened, smooth = sides_named(case.tank.open), sides_named(case.tank.smooth)
+    opened, smooth = sides_named(case.tank.open, mesh), sides_named(case.tank.smooth, mesh)
     water = Water(mesh, immersion.domain, level, parameters, opened, smooth, _flows(case, mesh))
     if immersion.cracks is not None and immersion.cracks.lumped:
         water.set_cracks(immersion.cracks.cracks())
     return water, immersion
+
+
+def _reaching(tank, fill) -> tuple:
+    """A box of water (lower, upper); ends that miss a side of the tank by the rounding of a file are moved to it."""
+    pairs = ((fill.lower, tank.lower), (fill.upper, tank.upper))
+    return tuple(
+        tuple(side if abs(end - side) <= SLACK * tank.cell else end for end, side in zip(ends, sides))
+        for ends, sides in pairs
+    )
 
 
 def _strips(case: Case) -> list[tuple]:
@@ -76,10 +85,8 @@ def level_at_start(spec) -> float:
 def fills_beside(case: Case, side: str) -> list:
     """The boxes of water at the start that reach a side of the tank."""
     axis, end = "xyz".index(side[0]), "upper" if side[1] == "+" else "lower"
-    wall = getattr(case.tank, end)[axis]
-    return [
-        fill for fill in case.water.fill if abs(getattr(fill, end)[axis] - wall) <= SLACK * case.tank.cell
-    ]
+    wall, slack = getattr(case.tank, end)[axis], SLACK * case.tank.cell
+    return [f for f in case.water.fill if f.lower[axis] - slack <= wall <= f.upper[axis] + slack]
 
 
 def _narrow_cracks(kind: str, structure, mesh):
@@ -91,14 +98,13 @@ def _narrow_cracks(kind: str, structure, mesh):
     return NarrowCracks(structure, mesh.spacing, lumped=kind == "slit")
 
 
-def sides_named(names):
+def sides_named(names, mesh):
     """Face normals (B, 3), centres (B, 3) → (B,) bool: those on the sides of these names; None without any."""
     if not names:
         return None
-    outward = np.array([_outward(name) for name in names])
 
     def chosen(normals, centres):
-        return (normals @ outward.T > 0.5).any(axis=1)
+        return np.any([on_side(mesh, name, normals, centres) for name in names], axis=0)
 
     return chosen
 
@@ -115,9 +121,9 @@ def _flows(case: Case, mesh):
         return None
     from fluid.inflow import Side, Sides
 
-    sides = [Side.of(mesh, sides_named([i.side]), flow_of(case, i)) for i in case.water.inflow]
+    sides = [Side.of(mesh, sides_named([i.side], mesh), flow_of(case, i)) for i in case.water.inflow]
     for sea in case.water.sea:
-        sides.append(Side.of(mesh, sides_named([sea.side]), level=lambda time, level=sea.level: level))
+        sides.append(Side.of(mesh, sides_named([sea.side], mesh), level=lambda time, level=sea.level: level))
     return Sides(sides)
 
 

@@ -60,12 +60,18 @@ class Time(Section):
 
 
 class Tank(Section):
-    """The box in which water may be: a fixed mesh of tetrahedra. Closed sides are walls for blocks too."""
+    """Where water may be: a fixed mesh of tetrahedra, of a box (lower, upper, cell) or from a file (mesh). Closed sides
+    are walls for blocks too."""
 
-    lower: Point = Field(description="corner with the smallest coordinates", examples=[[0, 0, 0]])
-    upper: Point = Field(description="corner with the largest coordinates", examples=[[60, 24, 16]])
-    cell: PositiveLength = Field(
-        description="wanted edge of the mesh cells; changed so that a whole number fits each side",
+    lower: Point | None = Field(
+        None, description="corner with the smallest coordinates; needed without mesh", examples=[[0, 0, 0]]
+    )
+    upper: Point | None = Field(
+        None, description="corner with the largest coordinates; needed without mesh", examples=[[60, 24, 16]]
+    )
+    cell: PositiveLength | None = Field(
+        None,
+        description="wanted edge of the mesh cells, needed without mesh; changed so that a whole number fits each side",
         examples=["1 m"],
     )
     split: Literal["kuhn", "mirrored"] = Field(
@@ -73,6 +79,16 @@ class Tank(Section):
         description="how bricks become cells: all along the same diagonal, or each as the mirror image of those beside "
         "it, so that what parts at an obstacle parts alike on both sides",
     )
+    mesh: Annotated[str, Field(min_length=1)] | None = Field(
+        None,
+        description="a file of tetrahedra in any format that meshio reads (MSH, VTU, VTK, ...), from the directory of "
+        "the case, instead of lower, upper, cell and split; its whole boundary is wall but for the flat ends along the "
+        "axes that open, smooth, an inflow or a sea name. Water alone may have a basin of any shape; with blocks the "
+        "mesh must fill a box",
+        examples=["basin.msh"],
+    )
+    scale: PositiveLength = Field(1.0, description="length of one unit of mesh", examples=["1 mm"])
+    offset: Point = Field((0.0, 0.0, 0.0), description="added to all places of mesh, after the scale")
     open: tuple[Side, ...] = Field(
         ("z+",), description="sides through which air and water may leave; the others are walls"
     )
@@ -205,7 +221,7 @@ class Case(Section):
 
     case: About = Field(description="what the case is")
     time: Time = Field(description="how long and how often")
-    tank: Tank | None = Field(None, description="the box for the water")
+    tank: Tank | None = Field(None, description="where water may be: a box, or a mesh from a file")
     water: Water | None = Field(None, description="the water")
     solid: tuple[Solid, ...] = Field((), description="fixed bodies in the water")
     structure: Structure | None = Field(None, description="rigid blocks")

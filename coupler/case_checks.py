@@ -16,6 +16,7 @@ from coupler.parts import PARTS, Part, parts_of, recipes
 from coupler.place_checks import frame_problems, opening_problems, place_problems, solid_bodies
 from coupler.schedule import MOST_OUTPUTS
 from coupler.solids import refused_solids
+from coupler.tank_mesh import is_measured, mesh_remarks
 from coupler.toml_lines import shown
 from coupler.water_checks import water_problems, water_remarks
 
@@ -32,7 +33,7 @@ def problems(case: Case) -> list[Problem]:
     """Everything that is wrong with a case whose sections are valid one by one."""
     wrong_frames = [*frame_problems(case), *refused_solids(case)]
     found = [*_sections(case), *_study(case), *wrong_frames]
-    if wrong_frames:
+    if wrong_frames or (case.tank is not None and not is_measured(case.tank)):
         return found  # without a direction or a tank the rest would report nonsense
     shapes = [*_shapes(case), *opening_problems(case)]
     parts, refused = _made(case, {path[:3] for path, _ in shapes})
@@ -51,6 +52,7 @@ def _study(case: Case) -> Iterator[Problem]:
 def remarks(case: Case) -> list[str]:
     """What is allowed but worth knowing before the run."""
     found = [*_thin_remarks(case), *water_remarks(case), *_joint_remarks(case), *_loose_remarks(case)]
+    found += mesh_remarks(case.tank) if case.tank is not None else []
     return [*found, *_unit_remarks(case), *_window_remarks(case)]
 
 
@@ -222,11 +224,11 @@ def _made(case: Case, skipped: set[KeyPath]) -> tuple[list[Part], list[Problem]]
     """The parts that can be made, and why the others cannot; those in `skipped` are known to be wrong."""
     if case.structure is None:
         return [], []
-    from coupler.block_files import BlockFileError
+    from coupler.mesh_files import MeshFileError
     from yade_scripts.polyhedra import BlockError
 
     if not skipped:
-        with suppress(BlockError, BlockFileError, OSError):
+        with suppress(BlockError, MeshFileError, OSError):
             return list(parts_of(case)), []
     made, refused = [], []
     for recipe in recipes(case):
@@ -236,7 +238,7 @@ def _made(case: Case, skipped: set[KeyPath]) -> tuple[list[Part], list[Problem]]
             made.append(Part(recipe.path, recipe.name, tuple(recipe.make())))
         except BlockError as error:
             refused.append((recipe.path, str(error)))
-        except BlockFileError as error:
+        except MeshFileError as error:
             refused.append(((*recipe.path, "path"), str(error)))
     return made, refused
 

@@ -24,6 +24,7 @@ from coupler.case_messages import explain_error
 from coupler.case_schema import find, keys
 from coupler.errors import BadCase, did_you_mean
 from coupler.records import find_record
+from coupler.tank_mesh import measured
 from coupler.toml_lines import key_lines, line_of, shown
 
 KeyPath = tuple[str | int, ...]
@@ -65,6 +66,9 @@ def load(place: Path | str, overrides: Iterable[str] = (), files: Path | None = 
 
 def _place_files(table: dict, directory: Path) -> None:
     """Paths in the case are meant from its directory; what is no path is refused later."""
+    tank = table.get("tank")
+    if isinstance(tank, dict) and isinstance(tank.get("mesh"), str) and tank["mesh"]:
+        tank["mesh"] = str(_from(tank["mesh"], directory))
     for above, name in (("structure", "file"), ("water", "inflow"), ("study", "quantity"), (None, "solid")):
         section = table if above is None else table.get(above)
         find = find_record if name == "quantity" else _from
@@ -229,7 +233,8 @@ def _validate(table: dict, places: _Places) -> tuple[Case | None, list[str]]:
         case = _without_unknown(table, found)
     mistakes = [explain_error(item) for item in found]
     if case is not None:
-        mistakes += problems(case)
+        case, refused = measured(case)
+        mistakes += [*refused, *problems(case)]
     mistakes.sort(key=lambda mistake: places.line(mistake[0]))
     lines = [_line(path, text, places) for path, text in mistakes]
     return (case if not found else None), list(dict.fromkeys(lines))

@@ -56,8 +56,16 @@ def differences(then: object, now: object, name: str = "") -> list[str]:
 
 def case_differences(then: dict, now: dict) -> list[str]:
     """Those between two effective cases that change the scene or its results so far."""
-    found = differences(then, now)
+    found = differences(_as_written(then), _as_written(now))
     return [line for line in found if not any(is_free(line.partition(":")[0], name) for name in FREE)]
+
+
+def _as_written(case: dict) -> dict:
+    """Without what a tank has from its mesh file: a change of that is told with the mesh itself."""
+    tank = case.get("tank") or {}
+    if "mesh" not in tank:
+        return case
+    return case | {"tank": {key: tank[key] for key in tank if key not in ("lower", "upper", "cell")}}
 
 
 def is_free(key: str, name: str) -> bool:

@@ -18,6 +18,7 @@ from coupler.case import Case
 from coupler.observe import joint_counts
 from coupler.place_checks import BYTES_PER_CELL, mesh_size
 from coupler.schedule import Schedule, checkpoint_interval
+from coupler.tank_mesh import water_in
 from coupler.terminal import Row
 
 LONGEST_REST_STEP = 0.3
@@ -102,6 +103,8 @@ def _water_rows(case: Case, interval: float, rows: list[Row]) -> float:
     """Rows of the water; the step [s] that its greatest speed allows."""
     cells, nodes = mesh_size(case.tank)
     volume = sum(float(np.prod(np.subtract(f.upper, f.lower))) for f in case.water.fill)
+    if case.tank.mesh is not None:
+        volume = water_in(case.tank, case.water.fill)
     height = _highest(case) - case.tank.lower[2]
     g, h = case.case.gravity, case.tank.cell
     fastest = math.sqrt(2.0 * g * height)
@@ -126,7 +129,7 @@ def _highest(case: Case) -> float:
             found.append(float(record_columns(spec.path)[1].max()))
         else:
             found.append(spec.level + (spec.height if spec.kind == "solitary" else 0.0))
-    return max(found)
+    return min(max(found), case.tank.upper[2])
 
 
 def _structure_rows(case: Case, rows: list[Row], exact: bool) -> int:

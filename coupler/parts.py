@@ -26,7 +26,7 @@ class Part:
 
 @dataclass(frozen=True)
 class Recipe:
-    """A part that is still to be made; make() raises BlockError or BlockFileError where it cannot be."""
+    """A part that is still to be made; make() raises BlockError or MeshFileError where it cannot be."""
 
     path: KeyPath
     name: str

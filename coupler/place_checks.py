@@ -12,6 +12,7 @@ from coupler.case import Case
 from coupler.case_structure import Building
 from coupler.parts import Part
 from coupler.solids import solids_of
+from coupler.tank_mesh import beside_mesh, is_measured, mesh_of, tank_places
 
 KeyPath = tuple[str | int, ...]
 Problem = tuple[KeyPath, str]
@@ -24,7 +25,10 @@ BYTES_PER_CELL = 1100
 
 
 def mesh_size(tank) -> tuple[int, int]:
-    """Cells and nodes of the mesh of a tank: six tetrahedra a box of about the wanted edge."""
+    """Cells and nodes of the mesh of a tank: those of its file, or six tetrahedra a box of about the wanted edge."""
+    if tank.mesh is not None:
+        mesh = mesh_of(tank)
+        return len(mesh.cells), len(mesh.nodes)
     edges = np.subtract(tank.upper, tank.lower)
     parts = np.maximum(1, np.rint(edges / tank.cell).astype(int))
     return 6 * int(np.prod(parts)), int(np.prod(parts + 1))
@@ -44,7 +48,7 @@ def frame_problems(case: Case) -> Iterator[Problem]:
     for path, body in turned:
         if body.rotation is not None and not np.any(body.rotation.axis):
             yield (*path, "rotation", "axis"), "[0, 0, 0] is no direction; write for instance [0, 0, 1]"
-    if case.tank is not None:
+    if case.tank is not None and is_measured(case.tank):
         yield from _corners_in_order(("tank",), case.tank)
 
 
@@ -53,6 +57,7 @@ def place_problems(case: Case, parts: list[Part]) -> Iterator[Problem]:
     solids = solid_bodies(case)
     blocks = [(part.path, part.name, Body.of_block(b)) for part in parts for b in part.blocks]
     yield from _tank(case)
+    yield from tank_places(case)
     yield from _fills(case)
     yield from _overlaps(solids, blocks, [b.name for part in parts for b in part.blocks])
     yield from _outside(case, solids, blocks)
@@ -71,7 +76,7 @@ def _tank(case: Case) -> Iterator[Problem]:
     if case.tank is None:
         return
     smallest = min(np.subtract(case.tank.upper, case.tank.lower))
-    if 0 < smallest < case.tank.cell:
+    if case.tank.mesh is None and 0 < smallest < case.tank.cell:
         yield (
             ("tank", "cell"),
             f"{case.tank.cell:g} m is larger than the smallest side of the tank ({smallest:g} m)",
@@ -84,7 +89,12 @@ def _memory(case: Case) -> Iterator[Problem]:
     """A mesh that this machine cannot hold: the system would kill the run without a word."""
     cells, _ = mesh_size(case.tank)
     needed, there = BYTES_PER_CELL * cells, os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    if needed > there:
+    if needed > there and case.tank.mesh is not None:
+        yield (
+            ("tank", "mesh"),
+            f"{cells:.3g} cells need about {needed / 1e9:.0f} GB, this machine has {there / 1e9:.0f} GB; mesh coarser",
+        )
+    elif needed > there:
         fits = case.tank.cell * (needed / there) ** (1.0 / 3.0)
         yield (
             ("tank", "cell"),
@@ -97,7 +107,7 @@ def _fills(case: Case) -> Iterator[Problem]:
     for i, fill in enumerate(case.water.fill if case.water else ()):
         path = ("water", "fill", i)
         yield from _corners_in_order(path, fill)
-        if case.tank is not None:
+        if case.tank is not None and case.tank.mesh is None:  # a basin of any shape cuts its boxes of water
             yield from _beyond_tank(case, path, f"water fill {i}", np.array([fill.lower, fill.upper]))
 
 
@@ -269,6 +279,9 @@ def _gauge_place(case: Case, path: KeyPath, gauge, held: list[Placed]) -> Iterat
                 (*path, "at"),
                 f"'{gauge.name}' is outside the tank: {'xyz'[axis]} = {value:g} m, not in {low:g} to {high:g} m",
             )
+            return
+    if case.tank.mesh is not None and gauge.kind != "flux" and beside_mesh(case.tank, gauge.at):
+        yield (*path, "at"), f"'{gauge.name}' is outside tank.mesh: no cell is there; move it inside"
     if len(gauge.at) == 3 and gauge.kind != "flux":
         for _, name, body in held:
             (depth,) = body.depth(np.array([gauge.at]))

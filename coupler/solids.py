@@ -37,7 +37,7 @@ class FixedSolid:
 def solids_of(case: Case) -> tuple[FixedSolid, ...]:
     """All fixed bodies in the order of their rows; a file may hold several.
 
-    Raises BlockError or BlockFileError where a table makes none. Kept for the next call unless a file changed."""
+    Raises BlockError or MeshFileError where a table makes none. Kept for the next call unless a file changed."""
     return _made(case.solid, tuple(stamp(s.path) for s in case.solid if s.path))
 
 
@@ -66,12 +66,12 @@ def refused_solids(case: Case) -> Iterator[tuple[KeyPath, str]]:
 
 
 def _refused(path: KeyPath, spec) -> Iterator[tuple[KeyPath, str]]:
-    from coupler.block_files import BlockFileError
+    from coupler.mesh_files import MeshFileError
     from yade_scripts.polyhedra import BlockError
 
     try:
         list(_bodies(path, spec))
-    except (BlockError, BlockFileError) as error:
+    except (BlockError, MeshFileError) as error:
         yield path, str(error)
 
 

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 from coupler.build_water import RecordError, fills_beside, level_at_start, record_columns
 from coupler.case import Case
+from coupler.tank_mesh import is_measured
 
 KeyPath = tuple[str | int, ...]
 Problem = tuple[KeyPath, str]
@@ -38,7 +39,7 @@ def water_problems(case: Case) -> Iterator[Problem]:
             "no water: write at least one [[water.fill]] with lower and upper, or an inflow or a sea",
         )
     yield from _walls(w)
-    if case.tank is not None:
+    if case.tank is not None and is_measured(case.tank):
         yield from _sides(case)
 
 

@@ -21,8 +21,9 @@ def level(water, xy) -> float:
     low, high = water.mesh.bounds[:, 2]
     count = int(np.ceil(SAMPLES_PER_CELL * (high - low) / water.mesh.spacing)) + 1
     z = np.linspace(low, high, count)
-    phi = level_set_at(water, np.column_stack([np.full(count, xy[0]), np.full(count, xy[1]), z]))
-    wet = np.fmax(-phi, 0.0)  # NaN inside solids
+    line = np.column_stack([np.full(count, xy[0]), np.full(count, xy[1]), z])
+    phi = Places.of(water, line, beyond=True).read(water.level_set)
+    wet = np.fmax(-phi, 0.0)  # NaN inside solids and outside a mesh of another shape than a box
     length = np.abs(phi[1:] - phi[:-1])
     share = np.divide(np.abs(wet[1:] - wet[:-1]), length, out=(wet[1:] > 0.0) * 1.0, where=length > 0.0)
     both = (phi[1:] < 0.0) & (phi[:-1] < 0.0)
@@ -60,7 +61,7 @@ def flux(water, at, edges) -> float:
     i, j = np.meshgrid(np.arange(m + 1), np.arange(n + 1), indexing="ij")
     place = np.column_stack([i.ravel() / m - 0.5, j.ravel() / n - 0.5])
     points = np.asarray(at, float) + place @ edges
-    places = Places.of(water, points)
+    places = Places.of(water, points, beyond=True)
     phi = places.read(water.level_set, inside=True)
     through = places.read(water.velocity, inside=True) @ np.cross(*edges) / (2.0 * m * n)
     corner = np.arange((m + 1) * (n + 1)).reshape(m + 1, n + 1)
@@ -68,7 +69,9 @@ def flux(water, at, edges) -> float:
         c.ravel() for c in (corner[:-1, :-1], corner[1:, :-1], corner[:-1, 1:], corner[1:, 1:])
     )
     triangles = np.concatenate([np.column_stack([low, right, top]), np.column_stack([low, top, up])])
-    free = ~Places.of(water, points[triangles].mean(axis=1)).inside & np.isfinite(phi[triangles]).all(axis=1)
+    free = ~Places.of(water, points[triangles].mean(axis=1), beyond=True).inside & np.isfinite(
+        phi[triangles]
+    ).all(axis=1)
     triangles = triangles[free]
     return float((wet_shares(phi[triangles]) * through[triangles]).sum())
 

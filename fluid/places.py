@@ -38,18 +38,20 @@ class Places:
     inside: np.ndarray
 
     @classmethod
-    def of(cls, water, points) -> Places:
-        """Look points (m, 3) or (3,) [m] up.  Raises Outside.
+    def of(cls, water, points, beyond: bool = False) -> Places:
+        """Look points (m, 3) or (3,) [m] up.  Raises Outside for those outside the mesh; beyond: only if all are, the
+        rest count as inside a body.
 
         A point on a face of the mesh may be found in the background cell behind it: then a neighbour answers."""
         points = np.atleast_2d(np.asarray(points, float))
         parent = water.mesh.locate(points)
-        if np.any(parent < 0):
+        outside = parent < 0
+        if outside.all() if beyond else outside.any():
             low, high = water.mesh.bounds
-            place = points[np.flatnonzero(parent < 0)[0]]
+            place = points[np.flatnonzero(outside)[0]]
             raise Outside(f"gauge at {place} lies outside the tank {low} to {high}; move it inside")
         t = water.topology
-        deep = _depth(water.domain.memory, parent, points) > SKIN * water.mesh.spacing
+        deep = outside | (_depth(water.domain.memory, parent, points) > SKIN * water.mesh.spacing)
         first, count = t.rows_of_background
         neighbours, near = water.mesh.neighbours, NEAR * water.mesh.spacing
         cell = _answering(points, parent, deep, neighbours, first, count, t.parts, t.nodes, near)

@@ -8,8 +8,9 @@ from hypothesis import strategies as st
 from scipy.spatial import Delaunay
 from scipy.spatial.transform import Rotation
 
-from coupler.block_files import VOLUME_FACES, BlockFileError, blocks_from_file
+from coupler.block_files import VOLUME_FACES, blocks_from_file
 from coupler.case_structure import BlockFile
+from coupler.mesh_files import MeshFileError
 from yade_scripts.blocks import BOX_CORNERS, BOX_FACES
 from yade_scripts.faces import touching_faces
 
@@ -41,7 +42,7 @@ def read(path, **options):
 
 
 def refused(path, **options):
-    with pytest.raises(BlockFileError) as refusal:
+    with pytest.raises(MeshFileError) as refusal:
         read(path, **options)
     return str(refusal.value)
 
