@@ -200,8 +200,9 @@ class BlockWriter:
         return (centre - self.origin)[owner] + np.einsum("vij,vj->vi", rotation[owner], self._vertices)
 
 
-def write_solids(path, vertices, faces, tank=None, origin=(0.0, 0.0, 0.0)):
-    """Write what does not move: fixed solids (per solid (k, 3) [m] world and faces) and the tank (lower, upper) [m]."""
+def write_solids(path, vertices, faces, tank=None, origin=(0.0, 0.0, 0.0), basin=None):
+    """Write what does not move: fixed solids (per solid (k, 3) [m] world and faces), the tank (lower, upper) [m] and,
+    of one that is no box, the ends (n, 2, 3) [m] of its edges."""
     origin = np.asarray(origin, dtype=float)
     vtkhdf.create(path, "PolyData", origin)
     points = (
@@ -216,6 +217,8 @@ def write_solids(path, vertices, faces, tank=None, origin=(0.0, 0.0, 0.0)):
         vtkhdf.extend(vtkhdf.growing(root["CellData"], "solid", solid), solid)
         if tank is not None:
             file["scene"].attrs["tank"] = np.asarray(tank, dtype=float)
+        if basin is not None:
+            file["scene"]["basin"] = np.asarray(basin, dtype=float)
 
 
 def joined_faces(vertices, faces):

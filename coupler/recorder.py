@@ -23,6 +23,7 @@ from coupler.history_columns import (
 )  # fmt: skip
 from coupler.observe import block_damage, crack_columns, fastest_point, joint_counts
 from coupler.output import BlockWriter, WaterWriter, write_solids
+from coupler.tank_mesh import basin_edges
 
 
 class Recorder:
@@ -69,7 +70,9 @@ class Recorder:
         if kept is not None:
             self._restore_sums(kept)
         elif solids or tank:
-            write_solids(directory / "solids.vtkhdf", [v for v, _ in solids], [f for _, f in solids], tank)
+            basin = basin_edges(water.mesh) if water else None
+            bodies = ([v for v, _ in solids], [f for _, f in solids])
+            write_solids(directory / "solids.vtkhdf", *bodies, tank, basin=basin)
 
     def _table(self, name: str, columns, title: str | None = None) -> HistoryTable:
         keep = None if self._kept is None else self._kept[f"table_{name}"].tolist()

@@ -26,6 +26,8 @@ OF_BOX = {
     "cell": "wanted edge of the mesh cells [m]",
 }
 OF_FILE = ("scale", "offset")
+SHARP = 30.0
+"""Least angle [degrees] between two faces of the boundary whose common edge is drawn."""
 FULL = 1e-4
 """Share of the box around a mesh that may be missing in one that fills it."""
 THIN = 5.0
@@ -89,8 +91,8 @@ def tank_places(case: Case) -> Iterator[Problem]:
                 ("water", "fill", i),
                 "no node of tank.mesh lies in this box, so there is no water; enlarge it",
             )
-    share = mesh.cell_volume.sum() / np.prod(np.ptp(mesh.bounds, axis=0))
-    if case.structure is not None and abs(share - 1.0) > FULL:
+    if case.structure is not None and not _fills_its_box(mesh):
+        share = mesh.cell_volume.sum() / np.prod(np.ptp(mesh.bounds, axis=0))
         low, high = (shown(corner) for corner in mesh.bounds)
         yield (
             ("tank", "mesh"),
@@ -131,6 +133,25 @@ def water_in(tank: Tank, boxes) -> float:
     middle = mesh.nodes[mesh.cells].mean(axis=1)
     inside = np.any([_within(middle, box) for box in boxes], axis=0) if boxes else np.zeros(len(middle), bool)
     return float(mesh.cell_volume[inside].sum())
+
+
+def basin_edges(mesh) -> Array | None:
+    """Ends (k, 2, 3) [m] of the sharp edges of the boundary, for pictures; None for a box, whose edges are known."""
+    if _fills_its_box(mesh):
+        return None
+    faces = np.sort(mesh.boundary_faces, axis=1)
+    edges = np.concatenate([faces[:, [0, 1]], faces[:, [0, 2]], faces[:, [1, 2]]])
+    face = np.tile(np.arange(len(faces)), 3)
+    order = np.lexsort(edges.T)
+    edges, normal = edges[order], mesh.boundary_normal[face[order]]
+    same = (edges[1:] == edges[:-1]).all(axis=1)
+    sharp = np.einsum("ek,ek->e", normal[1:], normal[:-1]) < np.cos(np.radians(SHARP))
+    return mesh.nodes[edges[1:][same & sharp]]
+
+
+def _fills_its_box(mesh) -> bool:
+    share = mesh.cell_volume.sum() / np.prod(np.ptp(mesh.bounds, axis=0))
+    return bool(abs(share - 1.0) <= FULL)
 
 
 def beside_mesh(tank: Tank, place) -> bool:

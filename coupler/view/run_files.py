@@ -93,7 +93,8 @@ def faces_for_vtk(connectivity, ends):
 
 @dataclass(frozen=True)
 class RunFiles:
-    """What a run has to show; absent parts are None. tank (2, 3) [m] relative to the origin."""
+    """What a run has to show; absent parts are None. tank (2, 3) and the edges of one that is no box, basin (k, 2, 3),
+    [m] relative to the origin."""
 
     directory: Path
     water: WaterSeries | None
@@ -101,6 +102,7 @@ class RunFiles:
     solids: object
     tank: np.ndarray | None
     times: np.ndarray
+    basin: np.ndarray | None = None
 
     def nearest(self, time):
         """The stored time nearest to `time`; the last one for None."""
@@ -121,8 +123,8 @@ def open_run(directory):
             f"{directory}: neither fields.vtkhdf nor blocks.vtkhdf holds a step; the run has not reached its first "
             "output yet, or it was stopped before"
         )
-    solids, tank = _solids(directory / "solids.vtkhdf")
-    return RunFiles(directory, water, blocks, solids, tank, (water or blocks).times)
+    solids, tank, basin = _solids(directory / "solids.vtkhdf")
+    return RunFiles(directory, water, blocks, solids, tank, (water or blocks).times, basin)
 
 
 def _series(kind, path):
@@ -133,11 +135,13 @@ def _series(kind, path):
 
 
 def _solids(path):
-    """Fixed solids (None without any) and tank corners relative to the origin (None without a tank)."""
+    """Fixed solids (None without any), tank corners (None without a tank) and its edges where it is no box, relative
+    to the origin."""
     if not path.exists():
-        return None, None
+        return None, None, None
     with h5py.File(path, "r", locking=False) as file:
         scene, points = file["scene"].attrs, file["VTKHDF/Points"][:]
         tank = scene["tank"] - scene["origin"] if "tank" in scene else None
+        basin = file["scene/basin"][:] - scene["origin"] if "basin" in file["scene"] else None
     faces = faces_for_vtk(*vtkhdf.read_polygons(path))
-    return (pv.PolyData(points, faces) if len(points) else None), tank
+    return (pv.PolyData(points, faces) if len(points) else None), tank, basin

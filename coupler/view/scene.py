@@ -118,7 +118,10 @@ class Scene:
             )
             self._draw_shadow(self.run.solids, "solid_shadow")
         if self.run.tank is not None:
-            tank = pv.Box(np.ravel(self.run.tank, order="F")).extract_all_edges()
+            if self.run.basin is None:
+                tank = pv.Box(np.ravel(self.run.tank, order="F")).extract_all_edges()
+            else:
+                tank = pv.line_segments_from_points(self.run.basin.reshape(-1, 3))
             self.plotter.add_mesh(tank, color=palette.TANK, line_width=self._line(0.9))
         self._draw_scale_bar(azimuth)
 

@@ -16,7 +16,7 @@ from coupler.errors import BadCase
 from coupler.expected import verdicts
 from coupler.forecast import forecast
 from coupler.provenance import ROOT
-from coupler.tank_mesh import mesh_of, on_side
+from coupler.tank_mesh import basin_edges, mesh_of, on_side
 from fluid.gauges import level
 from fluid.mesh import box_mesh
 from tests.coupler.basins import cylinder, write
@@ -138,6 +138,14 @@ def test_the_mesh_of_the_round_tank_is_the_one_that_is_made_here():
     nodes, _ = cylinder(0.5, 0.75, 8, 12)
     np.testing.assert_allclose(mesh.nodes, nodes, atol=1e-12)
     assert (ROUND / "cylinder.vtu").stat().st_size < 300e3
+
+
+def test_pictures_show_the_rims_of_a_round_tank_and_the_box_of_a_box():
+    """Twice 48 edges around floor and top; the edges between the facets of the wall are blunt."""
+    edges = basin_edges(mesh_of(load(ROUND).case.tank))
+    assert len(edges) == 2 * 48
+    np.testing.assert_allclose(np.linalg.norm(edges[:, :, :2], axis=2), 0.5, rtol=1e-12)
+    assert basin_edges(box_mesh(LOWER, UPPER, CELL)) is None
 
 
 # ---------------------------------------------------------------- going on
