@@ -16,7 +16,13 @@ BEFORE = 0.35
 STAGES = {
     "transport": (("predictor", "transport"),),
     "distance": (("predictor", "redistance"),),
-    "volume": (("water", "carry_volume"), ("predictor", "correct_volume"), ("corrector", "edge_flux")),
+    "volume": (
+        ("surface_momentum", "carry_volume"),
+        ("surface_momentum", "_jumps"),
+        ("surface_momentum", "_pass_on"),
+        ("predictor", "correct_volume"),
+        ("corrector", "edge_flux"),
+    ),
     "pressure matrix": (("predictor", "_problem"),),
     "solver, set-up": (("solve", "Multigrid"),),
     "solver, iterations": (("solve", "solve"),),

@@ -76,7 +76,17 @@ def ask_by_signal(child, directory):
 def test_a_wish_to_stop_ends_a_run_cleanly(tmp_path, ask):
     """Exit code 4, the reason in run.json, and a history of whole steps up to there."""
     place = tmp_path / "run"
-    command = [sys.executable, "-m", "coupler.cli", "run", str(DRY), "--end", "1 h", "--output", str(place)]
+    command = [
+        sys.executable,
+        "-m",
+        "coupler.cli",
+        "run",
+        str(DRY),
+        "--end",
+        "10 min",
+        "--output",
+        str(place),
+    ]
     child = subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=ENVIRONMENT
     )
