@@ -13,8 +13,8 @@ of that correction (`volume.py`, 2), c ψ + κ K ψ = r, the volumes
 
 go from node to node, and momentum goes with them as with the fluxes.
 
-w is 0 deeper than 3 h and in full between the surface and 2 h, h the size of the cells, within RINGS nodes around a
-jump: a node with water s V, less fast than the water that flows into it, u_up with acceleration a_up,
+w is 0 deeper than 3 h and within two layers around cut cells, where pressure is what stops water, and in full between the
+surface and 2 h, h the size of the cells, within RINGS nodes around a jump: a node with water s V, less fast than the water that flows into it, u_up with acceleration a_up,
 
     R(d/√(g h); 0.1, 0.3) R(η; 0.5, 0.9) R(s; 0.25, 0.75),    d = |u_up| - |u|,
     η = 1 + (h (a + a_up)·u_up/|u_up| - |u|²) / |u_up|²                                                     (3)
@@ -85,17 +85,8 @@ class Carried:
         carried = self.velocity.copy()
         _pass_on(graph, shift, self.water, carried)
         weight = self.weight[nodes] * np.clip((phi[nodes] / spacing + DEEP) / (DEEP - SHALLOW), 0.0, 1.0)
-        weight[(self.water[nodes] <= 0.0) | _around_solids(t)[nodes]] = 0.0
+        weight[(self.water[nodes] <= 0.0) | t.near_solids[nodes]] = 0.0
         u[nodes] += weight[:, None] * (carried[nodes] - u[nodes])
-
-
-def _around_solids(t: Topology):
-    """Nodes (N,) bool of cut cells and two layers around them: what stops there is stopped by pressure."""
-    found = t.beside_solid.copy()
-    if found.any():
-        for _ in range(2):
-            found[t.cells[found[t.cells].any(axis=1)]] = True
-    return found
 
 
 def _pass_on(graph: Graph, shift: Shift, water, u) -> None:

@@ -113,6 +113,13 @@ class Topology:
         """`around`, and how many cells each of these neighbours shares with the node."""
         return _nodes_around(self.cells, self.node_start, self.node_cells)
 
+    @cached_property
+    def near_solids(self) -> np.ndarray:
+        """(N,) bool: nodes of cut cells and two layers around them."""
+        near = self.beside_solid.copy()
+        near[layers_around(near, 2, *self.around)[0]] = True
+        return near
+
     def cells_around(self, nodes) -> np.ndarray:
         """Numbers of the cells with at least one of these nodes (N,) bool, in order; cost grows with their number only,
         but for a byte a cell."""
