@@ -12,9 +12,9 @@ from coupler.provenance import machine, versions
 from coupler.verify.registry import NOT_COVERED, TOLD, Result, checks
 
 NOTES = {
-    "P38": "Without friction the pressure is that of published frictionless δ-SPH to 0.03. Friction of smooth walls "
-    "brings it down to the measured one, but by an amount that depends on the cells, as nothing mixes the boundary "
-    "layer: [water](water.md).",
+    "P38": "Without friction the mean pressure is that of published frictionless δ-SPH to 0.03. Friction of smooth "
+    "walls brings it down to the measured one, but by an amount that depends on the cells, as nothing mixes the "
+    "boundary layer: [water](water.md).",
     "P39": "H3 lies behind the box: water closes the wake from one side too early, because all cells "
     "are split along the same diagonal; mirrored cells (tank.split) cure it "
     "([water](water.md#which-way-the-cells-are-split)). When the jet comes down differs from run to run.",
