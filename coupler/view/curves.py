@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullFormatter
 
 from coupler.view.palette import INK, LINES
 from coupler.view.plots import FORMATS, STYLE, WIDTH, _undated, plt
@@ -79,6 +79,8 @@ def draw_panel(axis, panel, legend_columns):
     if "y" in panel.get("log", ""):
         axis.set_yscale("log")
     _plain_numbers(axis, panel.get("log", ""))
+    if "x" in panel.get("log", ""):
+        _ticks_of_a_ladder(axis, panel["curves"])
     seen = dict.fromkeys(("computed", "measured", "exact"), 0)
     for curve in panel["curves"]:
         style = look(curve, seen)
@@ -114,6 +116,13 @@ def _plain_numbers(axis, log):
         along.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         along.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         along.set_minor_formatter(NullFormatter())
+
+
+def _ticks_of_a_ladder(axis, curves):
+    """Few places on the axis, such as Courant numbers 0.5 to 4: each has its number."""
+    places = sorted({place for curve in curves for place in curve["x"]})
+    if len(places) <= FEW:
+        axis.xaxis.set_major_locator(FixedLocator(places))
 
 
 def look(curve, seen):
