@@ -131,6 +131,6 @@ def test_still_water_rests_for_a_thousand_steps(mesh, seed, level):
 @pytest.mark.nightly
 @pytest.mark.parametrize(("seed", "level"), [(0, 0.5), (1, 0.53), (2, 0.53)])
 def test_growing_motion_of_still_water_stays_small(mesh, seed, level):
-    """A weakness (docs/water.md): pressure and surface are not each other's transpose, and by 1 to 3 % a step motion
-    grows from round-off until it is damped as water that is not calm, at 2 mm/s."""
+    """A weakness (docs/water.md): pressure and surface are not each other's transpose, and motion grows from round-off
+    by 1 to 3 % a step, to 2 mm/s after a thousand."""
     assert fastest_of_a_thousand_steps(mesh, seed, level) < 5e-3
