@@ -214,12 +214,13 @@ def _bins(nodes, cells, axes, lattice):
     """Cells of each bin as CSR: of the centroid in a lattice, otherwise all that the box of a cell meets."""
     x = nodes[cells]
     corners = (x.mean(axis=1), x.mean(axis=1)) if lattice else (x.min(axis=1), x.max(axis=1))
-    low, high = (np.stack([_bin_of(axes[k], c[:, k]) for k in range(3)], axis=1) for c in corners)
+    low, high = (np.stack([bin_of(axes[k], c[:, k]) for k in range(3)], axis=1) for c in corners)
     shape = [len(a) - 1 for a in axes]
     return _fill_bins(low, high, *shape)
 
 
-def _bin_of(axis, x):
+def bin_of(axis, x) -> np.ndarray:
+    """Number of the bin along one of the axes that holds each coordinate x (m,) [m]; beyond the ends, the nearest."""
     return np.clip(np.searchsorted(axis, x, side="right") - 1, 0, len(axis) - 2)
 
 

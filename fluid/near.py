@@ -10,6 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from fluid.mesh import bin_of
+
 
 def near_pairs(mesh, solids, chosen, margin) -> tuple[np.ndarray, np.ndarray]:
     """mesh: Background · solids: ConvexBodies · chosen (c,) bodies to search for · margin [m]
@@ -18,8 +20,8 @@ def near_pairs(mesh, solids, chosen, margin) -> tuple[np.ndarray, np.ndarray]:
     if len(chosen) == 0:
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
     bounds = solids.bounds()[chosen]
-    low = np.stack([_bin(a, bounds[:, 0, k] - margin) for k, a in enumerate(mesh.axes)], axis=1)
-    high = np.stack([_bin(a, bounds[:, 1, k] + margin) for k, a in enumerate(mesh.axes)], axis=1)
+    low = np.stack([bin_of(a, bounds[:, 0, k] - margin) for k, a in enumerate(mesh.axes)], axis=1)
+    high = np.stack([bin_of(a, bounds[:, 1, k] + margin) for k, a in enumerate(mesh.axes)], axis=1)
     capacity = 64 * len(chosen) + 1024
     while True:
         cell, body = np.empty(capacity, dtype=np.int64), np.empty(capacity, dtype=np.int64)
@@ -33,10 +35,6 @@ def near_pairs(mesh, solids, chosen, margin) -> tuple[np.ndarray, np.ndarray]:
         capacity = n
     key = np.unique(cell[:n] * len(solids) + body[:n])
     return key // len(solids), key % len(solids)
-
-
-def _bin(axis, x):
-    return np.clip(np.searchsorted(axis, x, side="right") - 1, 0, len(axis) - 2)
 
 
 @njit(cache=True)

@@ -86,7 +86,7 @@ def predicted(water, dt: float) -> PressureProblem:
         carried += through
         conserved += float(through.sum())
     surface = _new_surface(water, phi, carried, conserved)
-    if parameters.advection == "semi-lagrangian":
+    if found.velocity is not None:
         graph = water.graph_for(water.listed)
         found.into(u_adv, water.listed, phi, water.mesh.spacing, graph, surface.shift, water.topology)
         water.hold(u_adv, water.time + dt)

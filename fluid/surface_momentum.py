@@ -14,8 +14,8 @@ of that correction (`volume.py`, 2), c ψ + κ K ψ = r, the volumes
 go from node to node, and momentum goes with them as with the fluxes.
 
 w is 0 deeper than 3 h and within two layers around cut cells, where pressure is what stops water, and in full between
-the surface and 2 h, h the size of the cells, within RINGS nodes around a jump: a node with water s V, less fast than the
-water that flows into it, u_up with acceleration a_up,
+the surface and 2 h, h the size of the cells, within RINGS nodes around a jump: a node with water s V, less fast than
+the water that flows into it, u_up with acceleration a_up,
 
     R(d/√(g h); 0.1, 0.3) R(η; 0.5, 0.9) R(s; 0.25, 0.75),    d = |u_up| - |u|,
     η = 1 + (h (a + a_up)·u_up/|u_up| - |u|²) / |u_up|²                                                     (3)
@@ -80,9 +80,8 @@ class Carried:
         return Carried(water, fields[:, :3].copy(), fields[:, 3].copy())
 
     def into(self, u, nodes, phi, spacing: float, graph: Graph, shift: Shift, t: Topology) -> None:
-        """Equations (1) and (2) for u (N, 3) [m/s] at the listed nodes (n,) that hold water, in place; φ (N,) [m]."""
-        if self.velocity is None:
-            return
+        """Equations (1) and (2) for u (N, 3) [m/s] at the listed nodes (n,) that hold water, in place; φ (N,) [m].
+        Only where there is a jump."""
         carried = self.velocity.copy()
         _pass_on(graph, shift, self.water, carried)
         weight = self.weight[nodes] * np.clip((phi[nodes] / spacing + DEEP) / (DEEP - SHALLOW), 0.0, 1.0)

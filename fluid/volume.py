@@ -260,11 +260,6 @@ def _meet_total(t, near, phi, band, area, target, tolerance, spacing):
     return without_films(shifted, spacing), volume - start
 
 
-def water_volume(topology, phi) -> float:
-    """∫_{φ<0} dV [m³] over the physical domain."""
-    return float(nodal_volume(topology, phi).sum())
-
-
 def nodal_volume(topology, phi):
     """∫_{φ<0} N_i dV (N,) [m³]."""
     return nodal_water(topology.cells_around(phi < 0.0), 0.0, phi, topology.parts, len(topology.nodes))

@@ -28,6 +28,7 @@ from fluid.projection import PressureProblem
 from fluid.surface_momentum import Carried
 from fluid.topology import Graph, Topology, layers_around
 from fluid.volume import edge_flux, nodal_volume, renumbering
+from fluid.volume_transport import carry_volume
 from fluid.walls import Walls
 
 LONGEST_STEP = 0.3
@@ -211,15 +212,21 @@ class Water:
         self.slits = Slits.of(self.domain, cracks, self.mesh.spacing, self.slits)
 
     def carried(self, dt: float, theta: float) -> Carried:
-        """What the fluxes make of volume and momentum in dt [s], carried on the domain of the last projection."""
-        u, a = (self.velocity, self.acceleration) if self._left_behind is None else self._left_behind
-        kick = (1.0 - theta) * dt * kick_factor(a, self.parameters)
-        u_hat = u + kick[:, None] * a
-        carried = Carried.by(self.flux, dt, u_hat, a, self.parameters.gravity, self.mesh.spacing)
+        """What the fluxes make of volume and momentum in dt [s], carried on the domain of the last projection; of the
+        volume alone with `advection = "supg"`, where velocity does not go along paths."""
+        carried = self._carried(dt, theta)
         carried = carried if self._renumbered is None else carried.handed_on(self._renumbered)
         if self.slits is None:
             return carried
         return replace(carried, water=carried.water + self.slits.carried(dt))
+
+    def _carried(self, dt: float, theta: float) -> Carried:
+        if self.parameters.advection == "supg":
+            return Carried(carry_volume(self.flux, dt))
+        u, a = (self.velocity, self.acceleration) if self._left_behind is None else self._left_behind
+        kick = (1.0 - theta) * dt * kick_factor(a, self.parameters)
+        u_hat = u + kick[:, None] * a
+        return Carried.by(self.flux, dt, u_hat, a, self.parameters.gravity, self.mesh.spacing)
 
     def _carry_nodes(self, source, known):
         scalars = np.column_stack([self.level_set, self.pressure, self.end_pressure])
