@@ -18,6 +18,7 @@ from numba import njit
 from skfem import MeshTet
 
 from fluid.bricks import SPLITS, split_bricks
+from fluid.cube_root import cube_root
 from fluid.shapes import Shapes
 
 CORNERS_OF_FACE = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])  # outward for a positive cell
@@ -63,7 +64,7 @@ class Background:
         g, volume = gradients(nodes, cells)
         neighbours = cell_neighbours(cells, len(nodes))
         faces, owner = _boundary(cells, neighbours)
-        spacing = float(np.cbrt(6.0 * volume.mean()))
+        spacing = float(cube_root(6.0 * volume.mean()))
         lattice = axes is not None
         axes = tuple(np.asarray(a, float) for a in axes) if lattice else _uniform_axes(nodes, spacing)
         start, members = _bins(nodes, cells, axes, lattice)
@@ -86,7 +87,7 @@ class Background:
     @cached_property
     def cell_size(self) -> np.ndarray:
         """(M,) [m] edge of the brick that holds six such cells, (6 |e|)^(1/3)."""
-        return np.cbrt(6.0 * self.cell_volume)
+        return cube_root(6.0 * self.cell_volume)
 
     @cached_property
     def products(self) -> np.ndarray:

@@ -21,6 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fluid.cube_root import cube_root
 from fluid.moments import wet_fraction
 
 KARMAN = 0.41
@@ -81,7 +82,7 @@ class WallFriction:
         return drag
 
     def _bed(self, depth, least):
-        return self.gravity * self.manning**2 / np.cbrt(np.maximum(depth, least))
+        return self.gravity * self.manning**2 / cube_root(np.maximum(depth, least))
 
 
 def log_law(distance, roughness: float):
