@@ -54,3 +54,21 @@ def test_water_at_perfect_rest_is_not_out_of_balance_by_its_round_off():
     ledger = Ledger(available=0.0)
     ledger.start((0.0, -3421.0), None)
     assert ledger.balance((1e-20, -3421.0 + 5e-13), None).energy_error < 1e-6
+
+
+def test_what_falling_blocks_release_is_the_scale_of_a_structure_alone():
+    """60 J fallen, 30 J of them moving: 3 J that are missing are 5 %."""
+    ledger = Ledger()
+    ledger.start(None, NOTHING | {"gravity": 100.0})
+    found = ledger.balance(None, NOTHING | {"gravity": 40.0, "kinetic": 30.0, "dashpot": 27.0})
+    assert found.input_energy == 60.0
+    assert found.energy_error == pytest.approx(0.05)
+
+
+def test_a_gain_of_water_counts_only_beyond_what_fell_out():
+    """10 J left through open sides: water that holds 6 J more than it should is within them, 16 J more are 6 J of an
+    error."""
+    ledger = started()
+    ledger.left = 10.0
+    assert ledger.balance((50.0, 46.0), NOTHING).energy_error == 0.0
+    assert ledger.balance((50.0, 56.0), NOTHING).energy_error == pytest.approx(0.06)

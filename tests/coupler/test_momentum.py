@@ -139,3 +139,21 @@ def test_books_go_on_from_what_was_saved():
     again.restore(ledger.save())
     for name, value in ledger.save().items():
         np.testing.assert_array_equal(again.save()[name], value)
+
+
+def test_a_block_that_strikes_a_held_one_is_stopped_by_it():
+    """Dry: the held block gives what gravity and the fall had brought, and the books close in every step."""
+    blocks = [
+        {"name": "held", "centre": [0.6, 0.25, 0.15], "size": [0.1, 0.1, 0.1], "fixed": True},
+        {"name": "falls", "centre": [0.6, 0.25, 0.26], "size": [0.1, 0.1, 0.1], "density": 1000},
+    ]
+    alone = {"block": blocks, "ground": {}}
+    errors = []
+    case = scene(
+        structure=alone, water=None, tank=None, solid=[], joints=None, time={"end": 0.3, "step_max": 0.01}
+    )
+    _, record = run(case, 0.3, lambda _, record: errors.append(record.momentum.error))
+    lines = record.momentum.lines
+    assert max(errors) < 1e-12
+    np.testing.assert_allclose(lines["held_blocks"][2], 0.3 * G * 1000 * 0.1**3, rtol=1e-2)
+    assert np.abs(lines["ground"]).max() < 1e-12

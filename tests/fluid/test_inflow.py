@@ -132,6 +132,15 @@ def test_solitary_wave_carries_its_volume(order, allowed):
     assert wave.elevation(0.0) == pytest.approx(0.2)
 
 
+def test_the_tail_of_a_solitary_wave_falls_off_at_the_rate_of_its_celerity():
+    """Far from the crest η ~ exp(-k x) is a wave of potential theory, c² = g tan(k d)/k (Stokes), with k twice the rate
+    in sech². Rate and celerity of third order hold it to the fourth."""
+    for e in (0.01, 0.02):
+        wave = waves.SolitaryWave(2.0, 2.0 * e, G, 0.0)
+        k = 2.0 * wave.rate
+        assert wave.speed**2 / (G * 2.0) == pytest.approx(np.tan(2.0 * k) / (2.0 * k), abs=0.03 * e**3)
+
+
 def test_solitary_wave_keeps_height_and_speed():
     """Sent in through a side, H/d = 0.2: after 5 depths still its height and its celerity, to the coarse cells d/10."""
     depth, height = 1.0, 0.2

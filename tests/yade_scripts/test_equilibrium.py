@@ -7,7 +7,7 @@ from coupler.verify.figures import columns
 from yade_scripts.blocks import Block
 from yade_scripts.cohesion import JointParameters
 from yade_scripts.contact import ContactLaw
-from yade_scripts.equilibrium import CannotStand, settle
+from yade_scripts.equilibrium import SLACK, CannotStand, Search, settle
 from yade_scripts.generators.building import Building, Opening, building_blocks
 from yade_scripts.generators.wall import wall_of_blocks
 from yade_scripts.structure import Structure
@@ -161,3 +161,17 @@ def test_needleman_settles_where_sliding_pushes_the_faces_apart():
         settle(s)
         residual = s.internal_force() + s.gravity_force()
         assert np.abs(residual).max() < 1e-6 * s.mass.sum() * G
+
+
+def test_a_step_that_is_far_too_long_is_cut_until_it_overshoots_by_little():
+    """A block lifted off its joint by 0.1 mm and sent 1 m down into it, where closing is ten thousand times as stiff:
+    of the whole way only a share is left, downwards, and what the joint gives back there is within SLACK."""
+    law = JointParameters(1e6, 1e-3, closing_ratio=1e4)
+    with Structure([Block("b", (0, 0, 0.5), size=1.0)], None, law, ground=0.0) as s:
+        s.displace(np.array([0]), np.array([[0.0, 0.0, 1e-4]]), np.eye(3)[None])
+        search = Search(s, np.array([0]), s.gravity_force())
+        residual, way = search.residual(), np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
+        search.along(way, residual)
+        gone = 0.5 + 1e-4 - s.centre()[0, 2]
+        assert 0.0 < gone < 2e-4
+        assert search.residual() @ way > -SLACK * (residual @ way)

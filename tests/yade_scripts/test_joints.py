@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from yade_scripts.blocks import Block
 from yade_scripts.cohesion import JointParameters
@@ -220,6 +221,19 @@ def test_needleman_does_not_soften_in_pure_shear():
     assert len(pair.joints.broken_now()) == 0
 
 
+def test_needleman_unloads_along_the_tangent_of_his_potential():
+    """Opened to L and back to u: shear 27/4 T_max α [(1 - L)² + 2 (1 - L)(L - u)] v, normal traction
+    27/4 T_max [(1 - L)² u - α v² (1 - L)]."""
+    C, alpha, v = 27.0 / 4.0 * 1e6, 0.64, 0.3
+    for L in (0.1, 0.4, 0.8):
+        pair = Pair(POTENTIAL)
+        pair.force(np.array([0.0, 0.0, L * 1e-3]), advance=True)
+        for u in (0.9 * L, 0.5 * L, 0.1 * L):
+            T = pair.force(np.array([v * 1e-3, 0.0, u * 1e-3]), advance=True)
+            assert T[0] == pytest.approx(C * alpha * ((1 - L) ** 2 + 2 * (1 - L) * (L - u)) * v, rel=1e-9)
+            assert T[2] == pytest.approx(C * ((1 - L) ** 2 * u - alpha * v * v * (1 - L)), rel=1e-9)
+
+
 # ---- faces and points -------------------------------------------------------------------------------------------
 
 
@@ -365,3 +379,16 @@ def test_history_brings_everything_back():
     pair.joints.restore(saved)
     again = [pair.force(np.array([0, 0, z]), 1e-6, advance=True) for z in (0.4e-3, 0.7e-3, 0.9e-3)]
     np.testing.assert_array_equal(first, again)
+
+
+def test_sealed_faces_tell_half_of_the_largest_opening():
+    """Two cubes, the upper one lifted by 0.2 mm and turned so that the joint gapes by more at one edge."""
+    pair = Pair(JointParameters(1e6, 1e-3))
+    x = pair.x + np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 2e-4]])
+    R = pair.R.copy()
+    R[1] = Rotation.from_rotvec([2e-4, 0.0, 0.0]).as_matrix()
+    block, face, half = pair.joints.sealed_faces(x, R)
+    farthest = np.abs(pair.joints.xi_a[:, 1]).max()
+    assert block.tolist() == [0, 1]
+    assert [pair.blocks[b].planes[0][f][2] for b, f in zip(block, face)] == [1.0, -1.0]
+    np.testing.assert_allclose(half, 0.5 * (2e-4 + 2e-4 * farthest), rtol=1e-3)

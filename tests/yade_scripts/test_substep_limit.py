@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from yade_scripts.blocks import Block
@@ -58,3 +59,37 @@ def test_the_explicit_limit_is_where_energy_starts_to_grow(share):
             assert grown < 1e-4
         else:
             assert grown > 0.1
+
+
+def test_dashpots_shorten_the_limit():
+    """√(1 + ζ²) - ζ of the limit without: 0.618 for the joints' ζ = 1/2, and that of the restitution for contacts."""
+    for contact, joints, damping in [
+        (None, JOINT, 0.5),
+        (ContactLaw(1e8, restitution=0.1), None, ContactLaw(1e8, restitution=0.1).damping_ratio),
+    ]:
+        damped_joints = joints and replace(joints, damping=damping)
+        undamped_contact = contact and replace(contact, restitution=1.0)
+        with Structure(two_cubes(), contact, damped_joints, gravity=STILL) as s:
+            damped = s.substep_limit()
+        with Structure(two_cubes(), undamped_contact, joints, gravity=STILL) as s:
+            undamped = s.substep_limit()
+        share = np.sqrt(1.0 + damping**2) - damping
+        assert share < 0.75
+        assert damped.stable / undamped.stable == pytest.approx(share, rel=1e-9)
+        assert damped.dt / undamped.dt == pytest.approx(share, rel=1e-9)
+
+
+@pytest.mark.parametrize("share", [0.9, 1.1])
+def test_the_limit_with_dashpots_is_where_energy_starts_to_grow(share):
+    """As above, with ζ = 1/2 of the joint's first frequency: (√1.25 - 1/2) 2/ω instead of 2/ω."""
+    damped = replace(JOINT, damping=0.5)
+    with Structure(two_cubes(velocity=(1e-7, 0.0, 0.0)), None, damped, gravity=STILL) as s:
+        dt = share * s.substep_limit().stable * s.substep_limit().omega
+        dt /= exact_joint_frequency(s.blocks, s.joints)
+        s._limit = replace(s.substep_limit(), stable=2.0 * dt)
+        s.advance(200 * dt, substep=dt)
+        grown = s.joint_table().damage.max()
+        if share < 1.0:
+            assert grown < 1e-4
+        else:
+            assert grown > 0.01

@@ -1,0 +1,29 @@
+"""Blocks as the water sees them: faces that joints seal reach over the gap between the blocks."""
+
+import numpy as np
+import pytest
+
+from coupler.exchange import STILL, Immersion
+from fluid.mesh import box_mesh
+from yade_scripts.blocks import Block
+from yade_scripts.cohesion import JointParameters
+from yade_scripts.structure import Structure
+
+CELL = 0.25
+
+
+@pytest.mark.parametrize("gap", [0.0, 0.5, 0.95, 2.9])
+def test_sealed_faces_reach_beyond_a_block_that_has_moved_since_it_was_cut(gap):
+    """A joint opens by `gap` times the distance within which a block counts as not moved: each face still overlaps the
+    place of the other one, and that by the whole distance."""
+    still = STILL * CELL
+    blocks = [Block(name, (0.5, 0.5, z), size=0.3) for name, z in (("low", 0.35), ("high", 0.65))]
+    with Structure(blocks, None, JointParameters(1e6, 0.1), gravity=(0, 0, 0)) as s:
+        immersion = Immersion(box_mesh((0, 0, 0), (1, 1, 1), CELL), s, [], "single")
+        s.displace(np.array([1]), np.array([[0.0, 0.0, gap * still]]), np.eye(3)[None])
+        immersion.update()
+        bodies, (block, face, _) = immersion.bodies, s.joined_planes()
+        plane = bodies.plane_start[block] + face
+        reaches = (bodies.offsets + bodies.growth)[plane] * bodies.normals[plane, 2]
+        assert reaches[0] >= 0.5 + gap * still + still * (1 - 1e-9)
+        assert reaches[1] <= 0.5 + still * 1e-9 - still + (gap * still if gap > 1.0 else 0.0)
