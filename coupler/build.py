@@ -13,6 +13,7 @@ import numpy as np
 from coupler.build_water import water_of
 from coupler.case import Case
 from coupler.gauges import Bodies, Gauge, make_gauges
+from coupler.limits import Limits
 from coupler.loop import Coupling
 from coupler.parts import Part, parts_of
 from coupler.solids import obstacle_blocks, solids_of
@@ -64,8 +65,15 @@ def _coupling(case: Case, structure, solids, clock, from_start: bool) -> Couplin
         passes=case.coupling.passes,
         tolerance=case.coupling.tolerance,
         most_defect=case.limits.defect,
+        limits=limits_of(case),
         expected=_side_energy(case),
     )
+
+
+def limits_of(case: Case) -> Limits:
+    """The limits of a case."""
+    wanted = case.limits
+    return Limits(wanted.volume_error, wanted.energy_error, wanted.cpu_seconds, wanted.momentum_error)
 
 
 def _side_energy(case: Case) -> float:

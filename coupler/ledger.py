@@ -45,6 +45,8 @@ class Balance:
     structure_residual: float = 0.0
     input_energy: float = 0.0
     energy_error: float = 0.0
+    step_error: float = 0.0
+    """What the last step alone put out of balance, over the input energy."""
 
     @property
     def interface_residual(self) -> float:
@@ -67,6 +69,8 @@ class Ledger:
     _water_start: tuple[float, float] | None = None
     _structure_start: float | None = None
     _input: float = field(default=0.0)
+    _before: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Residuals of structure and interface, and what the water lost beyond the outflow, at the last balance [J]."""
 
     def start(self, water: tuple[float, float] | None, structure: dict[str, float] | None) -> None:
         """Fix the reference state: water (kinetic, potential) [J], structure energies by name [J]."""
@@ -111,10 +115,10 @@ class Ledger:
             released = self._gravity_start - structure["gravity"]
             self._input = max(self._input, abs(released), structure["kinetic"], abs(driven))
         self._input = max(self._input, kinetic, abs(self.work_given), abs(self.entered))
-        error = abs(residual) + max(0.0, -dissipation - self.left)
-        if water is not None and structure is not None:
-            error += abs(self.work_given - received)
-        share = error / self._input if self._input > 0.0 else 0.0
+        interface = self.work_given - received if water is not None and structure is not None else 0.0
+        now = (residual, interface, dissipation + self.left)
+        share, step = (self._share(*rows) for rows in (now, np.subtract(now, self._before).tolist()))
+        self._before = now
         return Balance(
             kinetic,
             potential,
@@ -127,7 +131,13 @@ class Ledger:
             residual,
             self._input,
             share,
+            step,
         )
+
+    def _share(self, structure: float, interface: float, lost: float) -> float:
+        """Residuals of structure and interface and what the water lost [J] → the error over the input energy."""
+        error = abs(structure) + max(0.0, -lost) + abs(interface)
+        return error / self._input if self._input > 0.0 else 0.0
 
 
 def _structure_total(energies: dict[str, float]) -> float:

@@ -32,9 +32,12 @@ class Limits:
     momentum_error: float = 1e-8
 
 
-def check_balance(time: float, volume_error: float, energy_error: float, limits: Limits) -> None:
+def check_balance(
+    time: float, volume_error: float, energy_error: float, limits: Limits, where: str = ""
+) -> None:
     """Stop a run whose water volume or energy no longer balances.
 
+    where: what to look at, a clause without a full stop.
     Raises Diverged with the quantity, its value, its limit and the remedy.
     """
     if not math.isfinite(volume_error) or abs(volume_error) > limits.volume_error:
@@ -43,9 +46,10 @@ def check_balance(time: float, volume_error: float, energy_error: float, limits:
             f"{limits.volume_error:.2%} (limits.volume_error). Reduce time.cfl or tank.cell."
         )
     if not math.isfinite(energy_error) or energy_error > limits.energy_error:
+        place = f" {where[0].upper()}{where[1:]}." if where else ""
         raise Diverged(
             f"the energy balance is off by {energy_error:.2%} of the input energy at t = {time:.4g} s; limit "
-            f"{limits.energy_error:.2%} (limits.energy_error). Reduce time.step_max, raise joints.damping, "
+            f"{limits.energy_error:.2%} (limits.energy_error).{place} Reduce time.step_max, raise joints.damping, "
             "or see history/energy.csv for the line that grows."
         )
 

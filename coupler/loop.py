@@ -14,9 +14,11 @@ import numpy as np
 
 from coupler.defects import RETRIES, Defects
 from coupler.ledger import Balance, Ledger
-from coupler.limits import Diverged, check_finite, check_pressure
+from coupler.limits import Diverged, Limits, check_finite, check_pressure
 from coupler.momentum import MomentumBalance, book_step, momentum_ledger
 from coupler.observe import fastest_point
+from coupler.step_limits import check_step, one_step_too_far
+from coupler.step_start import StepStart
 
 Array = np.ndarray
 
@@ -42,12 +44,16 @@ class StepRecord:
     unknowns: int = 0
     bodies_cut: int = 0
     retries: int = 0
-    """Times that the step was halved, and dt with it, because it failed or its defect was too large."""
+    """Times that the step was halved, and dt with it, because it failed or broke a limit."""
+    wetted: bool = False
+    """Whether water touched a body in this step."""
     load: Array = field(default_factory=lambda: np.zeros((0, 6)))
     shear_load: Array = field(default_factory=lambda: np.zeros((0, 6)))
     """The part of `load` that walls of bodies take by viscosity and friction."""
     surface_load: Array = field(default_factory=lambda: np.zeros((0, 6)))
     """The part of `load` that corrects the pressure where the surface passes through the cells of a body."""
+    missed_work: Array = field(default_factory=lambda: np.zeros(0))
+    """Work of the load on each block (n,) [J] that the blocks got less than the water gave."""
     impulses: object = None
     """What contacts and joints gave to the blocks; None without a structure."""
     balance: Balance = field(default_factory=Balance)
@@ -60,8 +66,8 @@ class Coupling:
     water, structure, immersion: either side may be None (immersion only with water).
     passes: most pressure solves in a step; beyond the first, the structure goes back and takes the step again, as long
     as the defect is above `tolerance`.
-    most_defect: above a share of it (`Defects`), or where no pressure is found, both sides go back and take half of the
-    step.
+    most_defect, limits: above a share of the one (`Defects`), beyond the others (`step_limits.py`), or where no
+    pressure is found, both sides go back and take half of the step; without limits only what is not finite counts.
     expected: energy that inflows and seas can bring [J], a scale for errors.
     """
 
@@ -77,11 +83,12 @@ class Coupling:
         passes: int = 1,
         tolerance: float = 0.02,
         most_defect: float = 0.5,
+        limits: Limits | None = None,
         expected: float = 0.0,
     ):
         self.passes, self.tolerance = passes, tolerance
         self.defects = Defects(most_defect, step_max)
-        self._before = None
+        self.limits = limits
         self.water, self.structure, self.immersion = water, structure, immersion
         self.rtol, self.step_max, self.clock = rtol, step_max, clock
         self.radius = np.zeros(0)
@@ -133,22 +140,82 @@ class Coupling:
 
         Raises Diverged, or what the pressure solver says, when that does not help either."""
         record = StepRecord(self.time + dt, dt)
+        if self.water is None:
+            self._take(record, None)
+            return record
         if self.coupled:
-            self._coupled_step(dt, record)
+            self._cut(record)
+            before = self.structure.velocity()
+        self._take_until_good(dt, record)
+        if self.sheared is not None:
+            self.sheared.note(before, record.shear_load[: self.structure.n], record.dt)
+        self.defects.note(self.time, record.dt, record.defect, record.retries)
+        return record
+
+    def _take_until_good(self, dt: float, record: StepRecord) -> None:
+        """A step of dt [s]; its half, and so on, where that has no solution or breaks a limit. The shortest one stays
+        also where it breaks one: whether the run stops there is for its caller to say.
+
+        Raises Diverged where the shortest one has no solution."""
+        start = self._start()
+        for record.retries in range(RETRIES + 1):
+            record.dt = dt / 2**record.retries
+            try:
+                self._take(record, start)
+                good = self._is_good(record)
+            except self._failures() as error:
+                if record.retries == RETRIES:
+                    raise _no_way_on(self.time, error, record.dt) from error
+                good = False
+            if good or record.retries == RETRIES:
+                return
+            start.restore(self)
+
+    def _start(self) -> StepStart:
+        with self.clock("water" if self.structure is None else "structure"):
+            return StepStart.of(self)
+
+    def _failures(self) -> tuple:
+        """What a step raises that a shorter one may cure."""
+        from fluid.solve import NotConverged
+
+        if self.structure is None:
+            return Diverged, NotConverged
+        from yade_scripts.structure import NotFinite
+
+        return Diverged, NotConverged, NotFinite
+
+    def _is_good(self, record: StepRecord) -> bool:
+        """Whether the step that was just taken may stay."""
+        if record.wetted and self.defects.too_large(record.defect):
+            return False
+        if self.limits is None:
+            return True
+        try:
+            check_step(self, record, self.limits)
+        except Diverged:
+            return False
+        return not one_step_too_far(record, self.limits)
+
+    def _take(self, record: StepRecord, start: StepStart | None) -> None:
+        """One step of record.dt on both sides and in the books. Raises what the solvers say, and Diverged."""
+        dt = record.dt
+        if self.coupled:
+            self._coupled_step(dt, record, start)
         elif self.water is not None:
             self._water_step(dt, record)
         else:
             self._structure_step(dt, record)
-        self.time += record.dt
+        self.time += dt
         record.time = self.time
         self._check_finite()
         if self.water is not None and self.water.sides is not None:
             self.ledger.entered = self.water.sides.energy
         record.balance = self.ledger.balance(self._water_energy(), self._structure_energies())
         record.momentum = book_step(self, record)
-        return record
 
-    def _coupled_step(self, dt: float, record: StepRecord) -> None:
+    def _cut(self, record: StepRecord) -> None:
+        """The domain that the bodies leave now, and what they do to the water besides."""
         with self.clock("cut"):
             changed = self.immersion.update()
         with self.clock("carry over"):
@@ -157,18 +224,22 @@ class Coupling:
             if self.water.slits is not None:
                 self.water.set_cracks(self.immersion.cracks.cracks())
             record.bodies_cut = self.immersion.cut_again
-        n, before = self.structure.n, self.structure.velocity()
         if self.water.viscous is not None:
-            self.water.body_velocity = self._padded(before)
+            self.water.body_velocity = self._padded(self.structure.velocity())
         if self.sheared is not None:
             self.water.free_bodies = self.sheared.now()
-        problem, found = self._attempts(dt, record)
+
+    def _coupled_step(self, dt: float, record: StepRecord, start: StepStart) -> None:
+        n = self.structure.n
+        with self.clock("water"):
+            problem = self.water.predict(dt)
+        found, moved = self._exchange(problem, record, start)
         with self.clock("water"):
             self.water.correct(problem, found.x)
-        if self.sheared is not None:
-            self.sheared.note(before, problem.predicted.shear.load[:n], record.dt)
         record.load, record.unknowns = found.load, len(found.x)
-        self.ledger.give(record.dt * float(np.sum(found.load[:n] * found.velocity[:n])))
+        given = found.load[:n] * found.velocity[:n]
+        self.ledger.give(dt * float(np.sum(given)))
+        record.missed_work = dt * np.sum(given - found.load[:n] * moved, axis=1)
         self._note_loads(problem, record, found.velocity)
 
     def _note_loads(self, problem, record: StepRecord, velocity: Array) -> None:
@@ -180,37 +251,9 @@ class Coupling:
             self.ledger.shear -= shear.energy + record.dt * float(np.sum(shear.load * velocity))
         self.ledger.left += self.water.report.left_energy
 
-    def _attempts(self, dt: float, record: StepRecord):
-        """Problem and solution of a step of dt; of its half, and so on, where that has none or the blocks miss by too
-        much. `predict` changes nothing in the water, and the structure goes back to where it stood."""
-        from fluid.solve import NotConverged
-        from yade_scripts.structure import NotFinite
-
-        self._before = None
-        for record.retries in range(RETRIES + 1):
-            last = record.retries == RETRIES
-            record.dt = dt / 2**record.retries
-            try:
-                with self.clock("water"):
-                    problem = self.water.predict(record.dt)
-                found = self._exchange(problem, record)
-            except (NotConverged, NotFinite) as error:
-                if last or (self._before is None and isinstance(error, NotFinite)):
-                    raise Diverged(
-                        f"t = {self.time:.4g} s: {error} Steps down to {record.dt:.3g} s did not help."
-                    ) from error
-            else:
-                if last or self._before is None or not self.defects.too_large(record.defect):
-                    break
-            if self._before is not None:
-                self.structure.restore(self._before)
-        self.defects.note(self.time, record.dt, record.defect, record.retries)
-        return problem, found
-
-    def _exchange(self, problem, record: StepRecord):
-        """Pressure with the structure inside, then the structure under it, as often as the passes allow.
-
-        `_before` keeps the structure as it stood; None where no block is wetted, then nothing is to be corrected."""
+    def _exchange(self, problem, record: StepRecord, start: StepStart):
+        """Pressure with the structure inside, then the structure under it, as often as the passes allow: the solution,
+        and the mean velocity (n, 6) with which the blocks moved. One pass where no block is wetted."""
         from coupler.scheme import corrected_free_velocity, defect, solve_coupled
         from coupler.wetting import Wetting
 
@@ -218,17 +261,15 @@ class Coupling:
         with self.clock("structure in pressure"):
             mass, response, v_free = self._response(problem)
             wetting = Wetting.of(problem.coupling)
-        wetted = problem.coupling.nnz > 0
-        with self.clock("structure"):
-            self._before = structure.save() if wetted else None
-        found = None
-        for record.passes in range(1, (self.passes if wetted else 1) + 1):
+        record.wetted = problem.coupling.nnz > 0
+        found, most = None, self.passes if record.wetted else 1
+        for record.passes in range(1, most + 1):
             with self.clock("pressure"):
                 guess = None if found is None else found.x
                 found = solve_coupled(problem, response, v_free, solve, self.rtol, guess, wetting)
             with self.clock("structure"):
                 if record.passes > 1:
-                    structure.restore(self._before)
+                    structure.restore(start.structure)
                 structure.set_load(found.load[: structure.n])
                 report = structure.advance(problem.dt)
             record.iterations += found.iterations
@@ -241,7 +282,7 @@ class Coupling:
             v_free = corrected_free_velocity(response, mean, found.x, problem.coupling)
         record.substep, record.opening_rate = report.dt_s, report.opening_rate
         record.impulses = report.impulses
-        return found
+        return found, report.mean_velocity
 
     def _response(self, problem):
         """Mass of the blocks, the answer of all bodies to forces, and V_free of the first pass."""
@@ -311,3 +352,8 @@ class Coupling:
             check_pressure(self.time, self.water.pressure, self.water.topology.nodes)
         if self.structure is not None:
             check_finite(self.time, "the velocity of the structure", self.structure.velocity(), "block")
+
+
+def _no_way_on(time: float, error: Exception, dt: float) -> Diverged:
+    at = "" if isinstance(error, Diverged) else f"t = {time:.4g} s: "
+    return Diverged(f"{at}{error} Steps down to {dt:.3g} s did not help.")

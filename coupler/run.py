@@ -6,15 +6,16 @@ from shlex import quote
 
 import numpy as np
 
-from coupler.build import Scene, build
+from coupler.build import Scene, build, limits_of
 from coupler.case import Case, effective
 from coupler.clock import Clock
 from coupler.errors import ExitCode
 from coupler.left_out import imports, note_work
-from coupler.limits import LimitReached, Limits, check_balance, check_defect, check_momentum
+from coupler.limits import LimitReached, Limits, check_defect
 from coupler.observe import joint_counts, size
 from coupler.recorder import Recorder
 from coupler.schedule import Schedule, checkpoint_interval
+from coupler.step_limits import check_step
 from coupler.terminal import newtons
 
 FAST_OPENING = 0.25
@@ -110,8 +111,7 @@ def _steps(
     case: Case, scene: Scene, directory, reporter, clock: Clock, figures: dict, checkpoint=None
 ) -> None:
     coupling = scene.coupling
-    wanted = case.limits
-    limits = Limits(wanted.volume_error, wanted.energy_error, wanted.cpu_seconds, wanted.momentum_error)
+    limits = limits_of(case)
     schedule = checkpoint.schedule(case.time.end) if checkpoint else Schedule.of(case)
     kept = checkpoint.part("recorder") if checkpoint else None
     recorder = Recorder(directory.path, coupling, scene.gauges, scene.solids, scene.tank, kept)
@@ -127,8 +127,7 @@ def _steps(
                 recorder.step(record)
             _note(coupling, record, figures)
             reporter.step(coupling.time, _told(coupling, record))
-            check_balance(coupling.time, _volume_error(coupling), record.balance.energy_error, limits)
-            check_momentum(coupling.time, record.momentum.error, limits.momentum_error)
+            check_step(coupling, record, limits)
             check_defect(coupling.time, coupling.defects.mean, case.limits.defect)
             if _reached(coupling.time, target):
                 with clock("output"):

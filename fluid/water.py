@@ -156,6 +156,15 @@ class Water:
         """Largest component of the velocity of the water [m/s], films beside solids left out."""
         return largest_component(self.velocity, self._counted())
 
+    def fastest_place(self) -> tuple[float, np.ndarray]:
+        """Speed [m/s] and place (3,) [m] of the fastest water, films beside solids left out; zeros without water."""
+        counted = np.flatnonzero(self._counted())
+        if len(counted) == 0:
+            return 0.0, np.zeros(3)
+        speed = np.linalg.norm(self.velocity[counted], axis=1)
+        worst = int(speed.argmax())
+        return float(speed[worst]), self.topology.nodes[counted[worst]]
+
     def _counted(self):
         return (self.level_set < 0.0) & (self.topology.node_volume > LEAST_COUNTED * self.mesh.spacing**3)
 
@@ -184,6 +193,18 @@ class Water:
         self._surface_lag = problem.dt if self._solids_move else 0.5 * problem.dt
         self.steps += 1
         self._domain_is_new, self._renumbered, self._left_behind = False, None, None
+
+    def remember(self) -> dict:
+        """The state now, for `go_back`: a step replaces what it changes, so these are references."""
+        return vars(self) | {"sides": None if self.sides is None else dict(vars(self.sides))}
+
+    def go_back(self, remembered: dict) -> None:
+        """Back to what `remember` gave, bit for bit."""
+        sides = self.sides
+        vars(self).update(remembered)
+        self.sides = sides
+        if sides is not None:
+            vars(sides).update(remembered["sides"])
 
     # ---- moving solids
 

@@ -9,11 +9,15 @@ import numpy as np
 import pytest
 
 from coupler import loop
+from coupler.build import build
 from coupler.defects import MISSES, RETRIES
-from coupler.limits import Diverged
+from coupler.limits import Diverged, Limits
 from coupler.loop import Coupling
+from coupler.momentum import book_step, momentum_ledger
+from coupler.step_limits import check_step
 from fluid.solve import NotConverged
 from tests.fakes import FreeBody, no_clock, piston_column
+from tests.physics.scenes import case
 
 
 class Pipe:
@@ -24,9 +28,13 @@ class Pipe:
     topology = SimpleNamespace(nodes=np.zeros((1, 3)))
     mesh = SimpleNamespace(spacing=1.0)
     report = SimpleNamespace(left_energy=0.0)
+    volume_off = 0.0
+    body_velocity = np.zeros((1, 6))
 
-    def __init__(self, fails_above=np.inf):
-        self.fails_above, self.taken = fails_above, []
+    def __init__(self, fails_above=np.inf, gains_above=np.inf, gains=0.0):
+        """gains [J] in every step longer than gains_above."""
+        self.fails_above, self.gains_above, self.gains = fails_above, gains_above, gains
+        self.energy, self.taken = 0.0, []
 
     def stable_step(self):
         return 1.0
@@ -39,15 +47,28 @@ class Pipe:
 
     def correct(self, problem, x):
         self.taken.append(problem.dt)
+        self.energy += self.gains * (problem.dt > self.gains_above)
+
+    def remember(self):
+        return {"energy": self.energy, "taken": list(self.taken)}
+
+    def go_back(self, remembered):
+        self.energy, self.taken = remembered["energy"], list(remembered["taken"])
 
     def available_energy(self):
-        return 0.0
+        return 1.0
 
     def kinetic_energy(self):
-        return 0.0
+        return self.energy
 
     def potential_energy(self):
         return 0.0
+
+    def volume_error(self):
+        return self.volume_off
+
+    def fastest_place(self):
+        return 3.0, np.array([0.1, 0.2, 0.3])
 
 
 class Piston(FreeBody):
@@ -107,6 +128,100 @@ def test_blocks_that_never_follow_stop_the_run_and_say_which_limit():
         assert c.step(0.1).retries == RETRIES
     with pytest.raises(Diverged, match=r"3 steps in a row.*limits\.defect.*coupling\.passes"):
         c.step(0.1)
+
+
+def alone(pipe):
+    """Water without blocks."""
+    return Coupling(pipe, None, None, rtol=1e-10, step_max=1.0, clock=no_clock, limits=LIMITS)
+
+
+LIMITS = Limits(volume_error=0.02, energy_error=0.05, cpu_seconds=None)
+
+
+@pytest.mark.parametrize("gains", [0.013, 0.1])
+def test_a_step_that_gains_energy_is_taken_again(gains):
+    """Of 1 J put in a quarter of what the run may miss is too much. The books forget a step taken back."""
+    c = alone(Pipe(gains_above=0.03, gains=gains))
+    record = c.step(0.1)
+    assert (record.retries, record.dt, c.water.taken) == (2, 0.025, [0.025])
+    assert c.water.energy == 0.0
+    assert record.balance.step_error < 0.001
+    assert c.step_size(1.0) == 0.025
+
+
+def test_a_step_that_gains_little_stays():
+    c = alone(Pipe(gains_above=0.03, gains=0.011))
+    assert c.step(0.1).retries == 0
+
+
+def test_a_limit_that_shorter_steps_do_not_keep_is_reported_with_the_place():
+    c = alone(Pipe(gains_above=0.0, gains=0.1))
+    record = c.step(0.1)
+    assert record.retries == RETRIES
+    with pytest.raises(Diverged, match=r"energy balance.*fastest, 3 m/s, at \(0\.1, 0\.2, 0\.3\) m\. Reduce"):
+        check_step(c, record, LIMITS)
+
+
+def test_water_that_lost_its_volume_is_stepped_again():
+    pipe = Pipe()
+    pipe.volume_off = 0.03
+    c = alone(pipe)
+    record = c.step(0.1)
+    assert record.retries == RETRIES
+    with pytest.raises(Diverged, match="water volume"):
+        check_step(c, record, LIMITS)
+
+
+def splash(**sections):
+    """Water that falls to one side of a small tank, with a sea beside it, and a block in its way."""
+    return build(
+        case(
+            time={"end": 1.0, "step_max": 0.02},
+            tank={"lower": [0, 0, 0], "upper": [1, 0.4, 0.6], "cell": 0.1},
+            water={
+                "fill": [{"lower": [0, 0, 0], "upper": [0.4, 0.4, 0.4]}],
+                "sea": [{"side": "x+", "level": 0.15}],
+            },
+            **sections,
+        ),
+        no_clock,
+    ).coupling
+
+
+BLOCK = {
+    "structure": {
+        "density": 600.0,
+        "block": [{"name": "b", "centre": [0.6, 0.2, 0.12], "size": [0.2, 0.2, 0.2]}],
+    },
+    "contact": {"stiffness": 1e5},
+}
+
+
+@pytest.mark.parametrize("sections", [{}, BLOCK])
+def test_a_step_taken_again_is_the_short_step_bit_for_bit(sections, monkeypatch):
+    """Nothing of the step that was taken back is left in water, sea, structure and books, with and without blocks."""
+    monkeypatch.setattr(loop, "momentum_ledger", momentum_ledger)
+    monkeypatch.setattr(loop, "book_step", book_step)
+    again, straight = (after_steps(splash(**sections), good) for good in ([False, True], [True]))
+    assert all(np.array_equal(a, b) for a, b in zip(again, straight))
+
+
+def after_steps(c, good):
+    """What three steps leave, one that is as `good` says and two that are, the first one 5 ms long in the end."""
+    for _ in range(3):
+        c.step(0.01)
+    verdicts = iter(good)
+    c._is_good = lambda record: next(verdicts, True)
+    dt = 0.005 * 2 ** (len(good) - 1)
+    assert c.step(dt).retries == len(good) - 1
+    c.step(0.005)
+    record = c.step(0.005)
+    state = [c.water.velocity, c.water.level_set, c.water.pressure, record.load, c.momentum.residual]
+    state += [np.array([vars(record.balance)[name] for name in sorted(vars(record.balance))])]
+    if c.structure is not None:
+        state += [c.structure.centre(), c.structure.velocity()]
+        c.structure.close()
+    return state
 
 
 def test_what_a_retry_leaves_behind_is_saved_and_restored():

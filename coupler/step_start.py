@@ -1,0 +1,39 @@
+"""Both sides and their books as they stood before a step, so that a step can be taken again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class StepStart:
+    """What `of` found; `restore` goes back to it, bit for bit, as often as wanted."""
+
+    time: float
+    water: dict | None
+    structure: object | None
+    ledger: dict
+    momentum: dict | None
+
+    @classmethod
+    def of(cls, coupling) -> StepStart:
+        """Before a step. References, not copies, where a step replaces what it changes."""
+        water, structure, momentum = coupling.water, coupling.structure, coupling.momentum
+        return cls(
+            coupling.time,
+            None if water is None else water.remember(),
+            None if structure is None else structure.save(),
+            dict(vars(coupling.ledger)),
+            None if momentum is None else vars(momentum) | {"lines": dict(momentum.lines)},
+        )
+
+    def restore(self, coupling) -> None:
+        """Back to the start of the step."""
+        coupling.time = self.time
+        if self.water is not None:
+            coupling.water.go_back(self.water)
+        if self.structure is not None:
+            coupling.structure.restore(self.structure)
+        vars(coupling.ledger).update(self.ledger)
+        if self.momentum is not None:
+            vars(coupling.momentum).update(self.momentum | {"lines": dict(self.momentum["lines"])})
