@@ -235,20 +235,45 @@ def verify(
 def stress(
     scenes: Annotated[
         list[str] | None,
-        typer.Argument(metavar="ID", help="scenes (S01 ...) or groups: structure, water, coupling; else all"),
+        typer.Argument(
+            metavar="ID", help="scenes (S01 ..., R1-12 ...) or groups: structure, water, coupling; else all"
+        ),
     ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="only scenes that take less than a minute")] = False,
     json: Annotated[bool, typer.Option("--json", help="one JSON object a scene, one a line")] = False,
     list_: Annotated[bool, typer.Option("--list", help="list the scenes")] = False,
+    random: Annotated[
+        int | None, typer.Option(min=1, metavar="N", help="N scenes drawn over the whole case format instead")
+    ] = None,
+    seed: Annotated[
+        int, typer.Option(min=0, help="of the random scenes; the same seed, the same scenes")
+    ] = 1,
+    first: Annotated[int, typer.Option("--from", min=0, metavar="K", help="number of the first one")] = 0,
+    group: Annotated[
+        list[str] | None, typer.Option(metavar="GROUP", help="only of this group; may be given again")
+    ] = None,
+    keep: Annotated[
+        Path,
+        typer.Option(metavar="DIR", help="where random scenes that fail are kept, as cases and made small"),
+    ] = Path("stress-failures"),
+    shrink: Annotated[
+        float, typer.Option(min=0.0, metavar="SECONDS", help="processor time to make each of them small")
+    ] = 60.0,
 ) -> None:
-    """Run stiff and extreme scenes.
+    """Run stiff and extreme scenes, or random ones.
 
     Each is passed, refused with a message, or failed; leaves with 3 if one failed.
     """
     one_thread()
+    from coupler.stress.drawn.command import is_drawn, named, numbered, stress_drawn
+
+    words = [*(scenes or []), *(group or [])]
+    if random is not None or (words and all(map(is_drawn, words))):
+        asked = named(words) if random is None else numbered(seed, random, first, words)
+        raise typer.Exit(int(stress_drawn(asked, keep, shrink, as_json=json, only_list=list_)))
     from coupler.stress.report import stress as run_scenes
 
-    raise typer.Exit(int(run_scenes(scenes or [], quick=quick, as_json=json, only_list=list_)))
+    raise typer.Exit(int(run_scenes(words, quick=quick, as_json=json, only_list=list_)))
 
 
 @app.command(name="compare")

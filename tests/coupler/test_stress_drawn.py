@@ -1,0 +1,279 @@
+"""Scenes drawn at random: the same ones again, all of them cases, judged from outside, and failures made small.
+
+Twenty of them are run here, the beginning of each; `surgebreak stress --random` runs whole ones."""
+
+import copy
+import tomllib
+
+import numpy as np
+import pytest
+
+from coupler.carry_out import carry_out
+from coupler.case import Case, effective
+from coupler.case_file import load
+from coupler.errors import BadCase, ExitCode
+from coupler.history import HistoryTable, read_history
+from coupler.output import BlockWriter
+from coupler.run_directory import RunDirectory, write_json
+from coupler.stress.drawn import command
+from coupler.stress.drawn.case import toml, write
+from coupler.stress.drawn.judge import measures
+from coupler.stress.drawn.scene import draw
+from coupler.stress.drawn.shrink import shrunk
+from coupler.stress.drawn.trial import Trial
+from coupler.stress.registry import Measure
+
+SEED = 2
+NUMBERS = (*range(3), *range(4, 21))
+"""Scene 3 has wide openings only: its momentum does not close at thin walls."""
+SHORT = 0.4
+"""[CPU s] that a scene is sized for here."""
+
+
+def made(directory, number, seconds=SHORT):
+    """The case of a scene, and whether its water has no reason to move."""
+    drawn = draw(SEED, number, seconds)
+    return load(write(drawn.table, drawn.files, directory / drawn.id)), drawn.still
+
+
+def test_a_scene_is_the_same_whenever_it_is_drawn():
+    assert [toml(draw(3, n).table) for n in range(20)] == [toml(draw(3, n).table) for n in range(20)]
+    assert len({toml(draw(seed, n).table) for seed in (3, 4) for n in range(20)}) == 40
+
+
+def test_files_say_what_was_drawn(tmp_path):
+    for number in range(20):
+        drawn = draw(SEED, number)
+        place = write(drawn.table, drawn.files, tmp_path / drawn.id)
+        assert tomllib.loads((place / "case.toml").read_text()) == tomllib.loads(toml(drawn.table))
+        assert {path.name for path in place.iterdir()} == {"case.toml", *drawn.files}
+
+
+def test_every_drawn_scene_is_a_case(tmp_path):
+    """A scene that is refused is one that nobody meant: the makers keep bodies apart and inside of the tank."""
+    refused = []
+    for number in range(100, 140):
+        try:
+            made(tmp_path, number)
+        except BadCase as error:
+            refused.append((number, str(error)))
+    assert refused == []
+
+
+def test_scenes_cover_the_case_format():
+    """Every section, kind of body, side, wall and law turns up."""
+    text = "\n".join(toml(draw(SEED, number).table) for number in range(300))
+    wanted = [
+        "[[solid]]",
+        "[joints]",
+        "[coupling]",
+        "[[motion]]",
+        "[structure.ground]",
+        "[[water.sea]]",
+        "mesh = ",
+    ]
+    wanted += [
+        f"[[structure.{kind}]]" for kind in ("block", "wall", "building", "column", "arch", "rubble", "file")
+    ]
+    wanted += [f'kind = "{kind}"' for kind in ("bore", "solitary", "steady", "record")]
+    wanted += [f'kind = "{kind}"' for kind in ("level", "volume", "flux", "motion", "force", "loads")]
+    wanted += [
+        'walls = "no-slip"',
+        'walls = "friction"',
+        "viscosity",
+        'covers = "multiple"',
+        'openings = "wide"',
+    ]
+    wanted += [
+        'cracks = "slit"',
+        'cracks = "closed"',
+        'split = "mirrored"',
+        'law = "bilinear"',
+        "smooth",
+        "open",
+    ]
+    wanted += ["rotation", "vertices", "velocity", "spin", "fixed", "gravity", "advection", "pair"]
+    assert [name for name in wanted if name not in text] == []
+
+
+@pytest.mark.parametrize("number", NUMBERS)
+def test_a_short_scene_keeps_what_it_must(tmp_path, number):
+    file, still = made(tmp_path, number)
+    code = carry_out(file, RunDirectory.create(file, tmp_path / "out"))
+    assert code in (ExitCode.DONE, ExitCode.STOPPED)
+    assert [m for m in measures(tmp_path / "out", still) if not m.kept] == []
+
+
+# ---------------------------------------------------------------- judged from outside
+
+BLOCKS = {
+    "case": {"title": "two blocks"},
+    "time": {"end": 1.0},
+    "tank": {"lower": [0, 0, 0], "upper": [4, 4, 4], "cell": 1.0},
+    "structure": {"block": [{"name": "a", "centre": [1, 1, 0.5], "size": [1, 1, 1]}]},
+    "contact": {"stiffness": 1e6},
+}
+CUBE = 0.5 * np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
+FACES = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+ENERGY = (
+    "water_kinetic",
+    "water_potential",
+    "blocks_kinetic",
+    "blocks_gravity",
+    "joint_stored",
+    "contact_stored",
+)
+ENERGY += ("entered", "driving_work", "energy_error")
+
+
+def written(directory, kinetic=(1.0, 1.0), places=((1.0, 1.0, 0.5), (2.5, 1.0, 0.5)), lines=None):
+    """The files of a run of two unit cubes: kinetic energy [J] in its rows (None: no number), centres (n, 3) [m] at
+    its end."""
+    (directory / "history").mkdir(parents=True)
+    write_json(directory / "run.json", {"case": effective(Case.model_validate(BLOCKS)), "figures": {}})
+    energy = HistoryTable(
+        directory / "history" / "energy.csv", [(name, "J", "") for name in (*ENERGY, "input_energy")]
+    )
+    for value in kinetic:
+        energy.append(**dict.fromkeys(ENERGY, 0.0) | {"blocks_kinetic": value, "input_energy": 1.0})
+    energy.close()
+    names = [f"{name}_{axis}" for name in ("blocks", "contact", "residual") for axis in "xyz"]
+    momentum = HistoryTable(directory / "history" / "momentum.csv", [(name, "N s", "") for name in names])
+    momentum.append(**{name: 0.0 if name.startswith("residual") else 1.0 for name in names} | (lines or {}))
+    momentum.close()
+    blocks = BlockWriter(directory / "blocks.vtkhdf", [CUBE] * 2, [FACES] * 2, ["a", "b"], ["a", "b"])
+    turns = np.tile(np.eye(3), (2, 1, 1))
+    blocks.append(0.0, np.array([[1.0, 1.0, 0.5], [2.5, 1.0, 0.5]]), turns, {"speed": np.zeros(2)})
+    blocks.append(1.0, np.array(places), turns, {"speed": np.zeros(2)})
+    return [m.quantity for m in measures(directory, still=False) if not m.kept]
+
+
+def test_files_of_a_sound_run_keep_everything(tmp_path):
+    assert written(tmp_path / "run", places=((1.0, 1.0, 0.48), (1.95, 1.0, 0.5))) == []
+
+
+@pytest.mark.parametrize(
+    ("what", "wrong"),
+    [
+        ({"kinetic": (1.0, 1.06)}, "energy above what was put in"),
+        ({"kinetic": (1.0, None)}, "numbers that are not finite"),
+        ({"lines": {"residual_y": 1e-5}}, "momentum missed along y"),
+        ({"places": ((1.0, 1.0, 0.5), (1.85, 1.0, 0.5))}, "overlap over the thinner body (a and b, t = 1 s)"),
+        (
+            {"places": ((1.0, 1.0, 0.35), (2.5, 1.0, 0.5))},
+            "reach through a wall over the thickness (a at z-, t = 1 s)",
+        ),
+        (
+            {"places": ((1.0, 1.0, 0.5), (3.7, 1.0, 0.5))},
+            "reach through a wall over the thickness (b at x+, t = 1 s)",
+        ),
+    ],
+)
+def test_a_fault_is_seen_in_the_files(tmp_path, what, wrong):
+    assert wrong in written(tmp_path / "run", **what)
+
+
+def test_a_block_that_left_through_an_open_side_is_not_looked_for(tmp_path):
+    assert written(tmp_path / "run", places=((1.0, 1.0, 0.5), (9.0, 1.0, 7.0))) == []
+
+
+def test_still_water_that_moves_is_seen(tmp_path):
+    """A scene whose water stands still, and the same file with a kinetic energy that it should not have."""
+    still = next(n for n in range(200) if draw(SEED, n).still)
+    file, _ = made(tmp_path, still, 0.05)
+    carry_out(file, RunDirectory.create(file, tmp_path / "out"))
+    speed = [m for m in measures(tmp_path / "out", still=True) if m.quantity == "speed of still water"]
+    assert [m.kept for m in speed] == [True]
+    path = tmp_path / "out" / "history" / "energy.csv"
+    head = [line for line in path.read_text().splitlines() if line.startswith("#")]
+    found = read_history(path)
+    found.values["water_kinetic"][-1] = found["water_potential"][-1]
+    rows = [
+        ",".join(found.values),
+        *(",".join(map(repr, map(float, row))) for row in zip(*found.values.values())),
+    ]
+    path.write_text("\n".join([*head, *rows]) + "\n")
+    assert "speed of still water" in [
+        m.quantity for m in measures(tmp_path / "out", still=True) if not m.kept
+    ]
+
+
+# ---------------------------------------------------------------- failures made small
+
+
+def test_a_failure_is_made_small():
+    """A fault that takes two solids and viscosity, at 0.3 s: all else goes, and the run ends just after it."""
+    table = {
+        "case": {"title": "x"},
+        "time": {"end": 2.0, "output_every": 0.1},
+        "tank": {"cell": 1.0},
+        "water": {"viscosity": 1.0, "walls": "slip", "fill": [{"a": 1}, {"a": 2}]},
+        "solid": [{"name": "one", "size": 1}, {"name": "two"}, {"name": "three"}],
+        "gauge": [{"kind": "level"}],
+        "limits": {"cpu_seconds": 10},
+    }
+    before = copy.deepcopy(table)
+
+    def fails_at(t):
+        fault = len(t.get("solid", ())) >= 2 and "viscosity" in t.get("water", {}) and "tank" in t
+        return 0.3 if fault and t["time"]["end"] > 0.3 else None
+
+    small = shrunk(table, fails_at, 0.3)
+    assert small["time"]["end"] == pytest.approx(0.306)
+    assert small["water"] == {"viscosity": 1.0}
+    assert small["tank"] == {}
+    assert len(small["solid"]) == 2
+    assert "gauge" not in small
+    assert table == before
+
+
+def test_a_failure_that_does_not_come_again_stays_as_it_was():
+    table = {"case": {}, "time": {"end": 2.0}, "water": {"viscosity": 1.0}}
+    assert shrunk(table, lambda t: None, 1.0) == table
+
+
+def told(text):
+    return Trial("failed", text, [], 1.0, 1.0, 0.5)
+
+
+def test_failures_are_the_same_whatever_their_numbers():
+    first = told("the water volume is off by -20.94% at t = 0.5772 s; limit 2.00% (limits.volume_error).")
+    second = told("the water volume is off by +3.1% at t = 1e-05 s; limit 2.00% (limits.volume_error).")
+    assert first.kind == second.kind == "the water volume is off by at t"
+    assert first.kind != told("the energy balance is off by 19.80% of the input energy").kind
+
+
+def test_a_failure_is_kept_as_a_case_with_its_story(tmp_path, monkeypatch):
+    """A run that fails as long as its scene has joints."""
+
+    def run(case, output, still):
+        joints = "joints" in tomllib.loads((case / "case.toml").read_text())
+        found = [Measure("error of the volume", 0.5 if joints else 0.0, 0.02)]
+        return Trial("failed" if joints else "passed", "", found, 1.0, 1.0, 1e-9)
+
+    monkeypatch.setattr(command, "trial", run)
+    drawn = next(d for d in (draw(SEED, n) for n in range(100)) if "joints" in d.table)
+    found = command.outcome(drawn, tmp_path, seconds=100.0)
+    small = tomllib.loads((tmp_path / drawn.id / "small" / "case.toml").read_text())
+    assert found.verdict == "failed"
+    assert str(tmp_path / drawn.id) in found.told
+    assert (small["joints"], "contact" in small, "structure" in small) == ({}, False, False)
+    assert "error of the volume 0.5, at most 0.02" in (tmp_path / drawn.id / "found.txt").read_text()
+    (row,) = command.named([drawn.id])
+    assert toml(draw(*row).table) == toml(drawn.table)
+
+
+def test_scenes_of_a_group_keep_their_numbers():
+    water = list(command.numbered(SEED, 3, 0, ["water"]))
+    assert [draw(*row).group for row in water] == ["water"] * 3
+    assert water == [row for row in command.numbered(SEED, 30, 0, []) if draw(*row).group == "water"][:3]
+    with pytest.raises(BadCase, match="unknown group"):
+        list(command.numbered(SEED, 1, 0, ["wind"]))
+    with pytest.raises(BadCase, match="R<seed>-<number>"):
+        list(command.named(["S01"]))
+
+
+def test_the_list_names_scenes_without_running_them(tmp_path, capsys):
+    asked = command.numbered(SEED, 2, 5, [])
+    assert command.stress_drawn(asked, tmp_path, 0.0, as_json=False, only_list=True) == ExitCode.DONE
+    assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == [f"R{SEED}-5", f"R{SEED}-6"]
