@@ -17,6 +17,7 @@ from scipy.spatial import cKDTree
 from coupler.closed_surfaces import SurfaceError, closed_surfaces, convex_corners
 from coupler.mesh_files import MeshFileError, read_mesh
 from yade_scripts.blocks import Block
+from yade_scripts.generators.cuts import check_count
 from yade_scripts.polyhedra import BlockError, fans, shown
 
 Array = np.ndarray
@@ -96,9 +97,17 @@ def _bodies(path: Path, points: Array, cells: dict[str, Array], weld: float):
             f"{', '.join(VOLUME_FACES)}, or closed surfaces of triangles or quads"
         )
     if volumes:
+        _check_count(path, sum(len(rows) for rows in volumes.values()))
         yield from _cells(points, volumes)
     else:
         yield from _surfaces(path, points, surfaces, weld)
+
+
+def _check_count(path: Path, count: int) -> None:
+    try:
+        check_count(path.name, count)
+    except BlockError as error:
+        raise MeshFileError(str(error)) from error
 
 
 def _cells(points: Array, volumes: dict[str, Array]):
@@ -129,8 +138,9 @@ def _surfaces(path: Path, points: Array, surfaces: dict[str, Array], weld: float
         parts = closed_surfaces(points, loops)
     except SurfaceError as error:
         raise MeshFileError(
-            f"{path.name}: {error} (corners within {weld:.2g} m are one; structure.file.weld sets that)"
+            f"{path.name}: {error} (corners within {weld:.2g} m are one; weld of this table sets that)"
         ) from error
+    _check_count(path, len(parts))
     for k, part in enumerate(parts):
         try:
             yield f"surface {k}", convex_corners(part, weld), None

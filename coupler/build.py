@@ -138,9 +138,14 @@ def build_structure(case: Case):
             mixed_mode=j.mixed_mode,
         )
     gravity = (0.0, 0.0, -case.case.gravity)
-    planes = [*_ground(case), *_tank_planes(case)]
+    planes = planes_of(case)
     blocks = [block for part in parts_of(case) for block in part.blocks] + obstacle_blocks(case)
     return Structure(blocks, contact, joints, None, planes, gravity, substep=case.structure.substep)
+
+
+def planes_of(case: Case) -> list:
+    """What bounds the room of the blocks: the ground and the closed sides of the tank."""
+    return [*_ground(case), *_tank_planes(case)]
 
 
 def _ground(case: Case) -> list:

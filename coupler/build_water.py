@@ -7,7 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from coupler.case import Case
-from coupler.errors import did_you_mean
+from coupler.errors import briefly
+from coupler.paths import BadPath, read_text
+from coupler.records import repeated
 from coupler.tank_mesh import mesh_of, on_side
 
 SLACK = 1e-3
@@ -155,6 +157,9 @@ def record_columns(path: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Columns time [s], level [m], velocity [m/s] of a CSV file. Raises RecordError."""
     numbered = _written_lines(path)
     head = [name.strip() for name in numbered[0][1].split(",")] if numbered else []
+    twice = repeated(head)
+    if twice:
+        raise RecordError(f"{path}: the column '{twice}' is there twice; rename or remove one")
     missing = [name for name in COLUMNS if name not in head]
     if missing:
         raise RecordError(
@@ -175,17 +180,12 @@ def record_columns(path: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def _written_lines(path: str) -> list[tuple[int, str]]:
     """Lines with their numbers, without comments and empty ones; a byte-order mark of a spreadsheet is skipped."""
     try:
-        with open(path, encoding="utf-8-sig") as file:
-            return [(n, line) for n, line in enumerate(file, 1) if line.strip() and not line.startswith("#")]
-    except UnicodeDecodeError as error:
-        raise RecordError(f"{path}: not a text in UTF-8; save it as UTF-8") from error
-    except OSError as error:
-        raise RecordError(f"{path}: cannot be read: {error.strerror}{_near_file(path)}") from error
-
-
-def _near_file(path: str) -> str:
-    beside = Path(path).parent
-    return did_you_mean(Path(path).name, [p.name for p in beside.iterdir()]) if beside.is_dir() else ""
+        text = read_text(Path(path), encoding="utf-8-sig")
+    except BadPath as error:
+        raise RecordError(f"{path}: {error}") from error
+    return [
+        (n, line) for n, line in enumerate(text.split("\n"), 1) if line.strip() and not line.startswith("#")
+    ]
 
 
 def _numbers(path: str, n: int, line: str, count: int) -> list[float]:
@@ -198,7 +198,7 @@ def _numbers(path: str, n: int, line: str, count: int) -> list[float]:
         try:
             found.append(float(entry))
         except ValueError:
-            raise RecordError(f"{path}:{n}: '{entry.strip()}' is not a number") from None
+            raise RecordError(f"{path}:{n}: {briefly(entry.strip())} is not a number") from None
     if not np.isfinite(found).all():
-        raise RecordError(f"{path}:{n}: '{line.strip()}' is not finite")
+        raise RecordError(f"{path}:{n}: {briefly(line.strip())} is not finite")
     return found

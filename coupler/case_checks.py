@@ -12,10 +12,13 @@ import numpy as np
 
 from coupler.case import Case
 from coupler.errors import did_you_mean
+from coupler.joint_checks import joint_problems
+from coupler.motion_checks import motion_problems
 from coupler.parts import PARTS, Part, parts_of, recipes
 from coupler.place_checks import frame_problems, opening_problems, place_problems, solid_bodies
 from coupler.schedule import MOST_OUTPUTS
 from coupler.solids import refused_solids
+from coupler.table_checks import table_problems
 from coupler.tank_mesh import is_measured, mesh_remarks
 from coupler.toml_lines import shown
 from coupler.water_checks import water_problems, water_remarks
@@ -38,7 +41,10 @@ def problems(case: Case) -> list[Problem]:
     shapes = [*_shapes(case), *opening_problems(case)]
     parts, refused = _made(case, {path[:3] for path, _ in shapes})
     found += [*shapes, *refused, *_unique_names(case, parts), *_known_names(case, parts), *_pairs(case)]
-    return [*found, *_law(case), *place_problems(case, parts)]
+    found += [*_law(case), *place_problems(case, parts), *table_problems(case)]
+    if case.structure is not None:
+        found += motion_problems(case, parts)
+    return found if found else list(joint_problems(case, parts))
 
 
 def _study(case: Case) -> Iterator[Problem]:
@@ -51,7 +57,13 @@ def _study(case: Case) -> Iterator[Problem]:
 
 def remarks(case: Case) -> list[str]:
     """What is allowed but worth knowing before the run."""
-    found = [*_thin_remarks(case), *water_remarks(case), *_joint_remarks(case), *_loose_remarks(case)]
+    found = [
+        *_thin_remarks(case),
+        *_contact_remarks(case),
+        *water_remarks(case),
+        *_joint_remarks(case),
+        *_loose_remarks(case),
+    ]
     found += mesh_remarks(case.tank) if case.tank is not None else []
     return [*found, *_unit_remarks(case), *_window_remarks(case)]
 
@@ -103,6 +115,14 @@ def _loose_remarks(case: Case) -> Iterator[str]:
         return
     for part in (*case.structure.wall, *case.structure.building):
         yield f"the blocks of '{part.name}' lie loose on one another; a section [joints] glues them"
+
+
+def _contact_remarks(case: Case) -> Iterator[str]:
+    if case.structure is not None and case.contact is None:
+        yield (
+            "there is no section [contact]: blocks whose joints break pass through one another, the ground and the "
+            "sides of the tank; with [joints] an empty section [contact] will do"
+        )
 
 
 def _unit_remarks(case: Case) -> Iterator[str]:
@@ -171,9 +191,9 @@ def _structure_sections(case: Case) -> Iterator[Problem]:
             "no block: write [[structure.block]], .wall, .building, .column, .arch, .rubble or .file in double "
             "brackets",
         )
-    if case.contact is None:
+    if case.contact is None and case.joints is None:
         yield ("structure",), "blocks need a section [contact] with stiffness, restitution and friction"
-    elif case.contact.stiffness is None and case.joints is None:
+    elif case.contact is not None and case.contact.stiffness is None and case.joints is None:
         yield ("contact",), "stiffness: missing; without [joints] there is nothing to take it from"
 
 

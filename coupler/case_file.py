@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import copy
 import difflib
+import os
 import re
 import sys
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -22,12 +23,21 @@ from coupler.case import Case
 from coupler.case_checks import problems
 from coupler.case_messages import explain_error
 from coupler.case_schema import find, keys
-from coupler.errors import BadCase, did_you_mean
+from coupler.errors import BadCase, briefly, did_you_mean
+from coupler.paths import BadPath, place_of, read_text
+from coupler.promises import mistakes_in
 from coupler.records import find_record
 from coupler.tank_mesh import measured
 from coupler.toml_lines import key_lines, line_of, shown
 
 KeyPath = tuple[str | int, ...]
+DEEPEST = 20
+"""Tables and lists inside of one another; the schema has six."""
+MOST_BITS = 10_000
+"""Of a whole number; longer ones cannot be written in decimals."""
+LONGEST_SHOWN = 200
+"""Characters of an override in a message."""
+_TOO_DEEP = f"more than {DEEPEST} lists or sections inside of one another; no case is so deep"
 ABSENT = "absent"
 """Value of an override that leaves the name out, as if it had not been written."""
 
@@ -57,29 +67,39 @@ def load(place: Path | str, overrides: Iterable[str] = (), files: Path | None = 
     places = _Places(_shown(path), key_lines(text))
     for override in overrides:
         places.override(_apply(table, override), override)
-    _place_files(table, files or path.parent)
-    case, lines = _validate(table, places)
+    nowhere = _place_files(table, files or path.parent)
+    case, lines = _validate(table, places, nowhere)
+    lines += mistakes_in(files or path.parent)
     if lines or case is None:
         raise BadCase(lines)
     return CaseFile(case, path, overrides)
 
 
-def _place_files(table: dict, directory: Path) -> None:
-    """Paths in the case are meant from its directory; what is no path is refused later."""
-    tank = table.get("tank")
-    if isinstance(tank, dict) and isinstance(tank.get("mesh"), str) and tank["mesh"]:
-        tank["mesh"] = str(_from(tank["mesh"], directory))
+def _place_files(table: dict, directory: Path) -> list[tuple[KeyPath, str]]:
+    """Paths in the case are meant from its directory: those that lead nowhere, and why; what is no path is refused
+    later."""
+    found = [((*path, "path"), entry, "path") for path, entry in _named_files(table)]
+    if isinstance(table.get("tank"), dict):
+        found.append((("tank", "mesh"), table["tank"], "mesh"))
+    nowhere = []
+    for path, entry, key in found:
+        if isinstance(entry.get(key), str) and entry[key]:
+            find = find_record if path[1] == "quantity" else place_of
+            try:
+                entry[key] = str(find(entry[key], directory))
+            except BadPath as error:
+                nowhere.append((path, str(error)))
+    return nowhere
+
+
+def _named_files(table: dict) -> Iterator[tuple[KeyPath, dict]]:
+    """The tables of a case that may name a file under `path`, with their places."""
     for above, name in (("structure", "file"), ("water", "inflow"), ("study", "quantity"), (None, "solid")):
         section = table if above is None else table.get(above)
-        find = find_record if name == "quantity" else _from
         entries = section.get(name) if isinstance(section, dict) else None
-        for entry in entries if isinstance(entries, list) else ():
-            if isinstance(entry, dict) and isinstance(entry.get("path"), str) and entry["path"]:
-                entry["path"] = str(find(entry["path"], directory))
-
-
-def _from(path: str, directory: Path) -> Path:
-    return (directory / Path(path).expanduser()).resolve()
+        for i, entry in enumerate(entries if isinstance(entries, list) else ()):
+            if isinstance(entry, dict):
+                yield (name, i) if above is None else (above, name, i), entry
 
 
 class _Places:
@@ -104,23 +124,37 @@ class _Places:
     def __call__(self, path: KeyPath) -> str:
         override = self._override(path)
         if override:
-            return f"--set {override}"
+            return f"--set {_cut(override)}"
         line = self.line(path)
         return f"{self.name}:{line}" if line else self.name
 
 
 def _find(place: Path) -> Path:
-    path = place / "case.toml" if place.is_dir() else place
-    if path.is_file():
-        return path
+    if not _is_utf_8(str(place)):
+        raise BadCase([f"{os.fsencode(place)!r}: no path in UTF-8, as results hold it; rename it"])
+    try:
+        path = place / "case.toml" if place.is_dir() else place
+        if path.is_file():
+            return path
+    except (OSError, ValueError) as error:
+        raise BadCase(
+            [f"{briefly(str(place))}: no such case: {getattr(error, 'strerror', error)}"]
+        ) from error
     if place.is_dir():
         cases = sorted(child.parent.name for child in place.glob("*/case.toml"))
         hint = f"below it are {', '.join(cases)}" if cases else f"`surgebreak init {place}` writes one"
         raise BadCase([f"{place}: no case.toml in this directory; {hint}"])
+    if place.exists():
+        raise BadCase([f"{place}: no ordinary file; give a case directory or a case.toml"])
     around = place.parent if place.parent.is_dir() else Path(".")
     near = difflib.get_close_matches(place.name, [child.name for child in around.iterdir()], n=1)
     hint = f"; did you mean '{around / near[0]}'?" if near else "; give a case directory or a case.toml"
     raise BadCase([f"{place}: no such case{hint}"])
+
+
+def _is_utf_8(text: str) -> bool:
+    """Whether a word of the command line was one in UTF-8; Python marks the bytes that were not."""
+    return not any("\ud800" <= letter <= "\udfff" for letter in text)
 
 
 def _shown(path: Path) -> str:
@@ -131,20 +165,37 @@ def _shown(path: Path) -> str:
 
 def _read(path: Path) -> tuple[str, dict]:
     try:
-        text = path.read_text(encoding="utf-8")
-        return text, tomllib.loads(text)
-    except UnicodeDecodeError as error:
-        raise BadCase(
-            [f"{_shown(path)}: not a text in UTF-8 (byte {error.start}); save it as UTF-8"]
-        ) from error
-    except OSError as error:
-        raise BadCase([f"{_shown(path)}: cannot be read: {error.strerror}"]) from error
+        text = read_text(path)
+    except BadPath as error:
+        raise BadCase([f"{_shown(path)}: {error}"]) from error
+    try:
+        table = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         what, line = str(error), ""
         at = re.search(r" \(at line (\d+), column \d+\)", what)
         if at:
             what, line = what.replace(at[0], ""), f":{at[1]}"
         raise BadCase([f"{_shown(path)}{line}: not valid TOML: {what}"]) from error
+    except ValueError as error:  # a whole number of thousands of digits
+        raise BadCase([f"{_shown(path)}: not valid TOML: {error}"]) from error
+    except RecursionError as error:
+        raise BadCase([f"{_shown(path)}: {_TOO_DEEP}"]) from error
+    _check_readable(table, _shown(path))
+    return text, table
+
+
+def _check_readable(table: object, place: str) -> None:
+    """Refuse what no message could show: tables deeper in one another than any case, numbers of thousands of digits."""
+    level = [table]
+    for _ in range(DEEPEST):
+        inner = [item.values() if isinstance(item, dict) else item for item in level]
+        values = [value for items in inner for value in items]
+        if any(isinstance(value, int) and value.bit_length() > MOST_BITS for value in values):
+            raise BadCase([f"{place}: a whole number of thousands of digits; no value of a case is so large"])
+        level = [value for value in values if isinstance(value, dict | list)]
+        if not level:
+            return
+    raise BadCase([f"{place}: {_TOO_DEEP}"])
 
 
 # ---------------------------------------------------------------- overrides
@@ -155,11 +206,13 @@ def _apply(table: dict, override: str) -> KeyPath:
 
     `value` is TOML; what is no TOML is taken as text, so that units need no quotes. `a.b=absent` leaves a.b out.
     """
+    if not _is_utf_8(override):
+        raise BadCase([f"--set {os.fsencode(override)!r}: no text in UTF-8"])
     name, sign, value = override.partition("=")
     path = _parse_path(name.strip())
     if not sign or not path:
         raise BadCase(
-            [f"--set {override}: write KEY=VALUE, for instance time.end=2 or joints.strength='1 MPa'"]
+            [f"--set {_cut(override)}: write KEY=VALUE, for instance time.end=2 or joints.strength='1 MPa'"]
         )
     if value.strip() == ABSENT:
         _leave_out(table, path, override)
@@ -168,7 +221,8 @@ def _apply(table: dict, override: str) -> KeyPath:
     for part, following in pairwise(path):
         holder = _step_into(holder, part, [] if isinstance(following, int) else {}, override)
     _step_into(holder, path[-1], None, override)
-    holder[path[-1]] = _value(value.strip())
+    holder[path[-1]] = _value(value.strip(), override)
+    _check_readable(table, f"--set {_cut(override)}")
     return path
 
 
@@ -177,7 +231,9 @@ def _leave_out(table: dict, path: KeyPath, override: str) -> None:
     if find(path) is None:
         name = shown(path)
         raise BadCase(
-            [f"--set {override}: {name}: unknown name{did_you_mean(name, [key.path for key in keys()])}"]
+            [
+                f"--set {_cut(override)}: {name}: unknown name{did_you_mean(name, [key.path for key in keys()])}"
+            ]
         )
     holder = table
     for part in path[:-1]:
@@ -202,42 +258,50 @@ def _step_into(holder: dict | list, part: str | int, new: dict | list | None, ov
         if not isinstance(holder, list) or part >= len(holder):
             size = len(holder) if isinstance(holder, list) else 0
             raise BadCase(
-                [f"--set {override}: there is no item [{part}]; the list has {size}, counted from [0]"]
+                [f"--set {_cut(override)}: there is no item [{part}]; the list has {size}, counted from [0]"]
             )
         return holder[part]
     if isinstance(holder, list):
         raise BadCase(
-            [f"--set {override}: '{part}' is inside a list; say which item, for instance [0].{part}"]
+            [f"--set {_cut(override)}: '{part}' is inside a list; say which item, for instance [0].{part}"]
         )
     if not isinstance(holder, dict):
-        raise BadCase([f"--set {override}: '{part}' is below a value, not below a section"])
+        raise BadCase([f"--set {_cut(override)}: '{part}' is below a value, not below a section"])
     return holder.setdefault(part, new) if new is not None else holder.get(part)
 
 
-def _value(text: str) -> object:
+def _cut(override: str) -> str:
+    """An override as messages name it."""
+    return override if len(override) <= LONGEST_SHOWN else f"{override[:LONGEST_SHOWN]}..."
+
+
+def _value(text: str, override: str) -> object:
     try:
         return tomllib.loads(f"x = {text}")["x"]
-    except tomllib.TOMLDecodeError:
+    except ValueError:  # no TOML, or a whole number of thousands of digits
         return text
+    except RecursionError as error:
+        raise BadCase([f"--set {_cut(override)}: {_TOO_DEEP}"]) from error
 
 
 # ---------------------------------------------------------------- checks
 
 
-def _validate(table: dict, places: _Places) -> tuple[Case | None, list[str]]:
-    """The case and the messages. Unknown names do not hide what is wrong with the geometry."""
+def _validate(table: dict, places: _Places, nowhere: list) -> tuple[Case | None, list[str]]:
+    """The case and the messages, those of paths that lead nowhere with them. Unknown names do not hide what is wrong
+    with the geometry."""
     try:
         case, found = Case.model_validate(table), []
     except ValidationError as error:
         found = error.errors()
         case = _without_unknown(table, found)
-    mistakes = [explain_error(item) for item in found]
-    if case is not None:
+    mistakes = [*nowhere, *(explain_error(item) for item in found)]
+    if case is not None and not nowhere:
         case, refused = measured(case)
         mistakes += [*refused, *problems(case)]
     mistakes.sort(key=lambda mistake: places.line(mistake[0]))
     lines = [_line(path, text, places) for path, text in mistakes]
-    return (case if not found else None), list(dict.fromkeys(lines))
+    return (case if not mistakes else None), list(dict.fromkeys(lines))
 
 
 def _without_unknown(table: dict, found: list) -> Case | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from coupler.case_schema import Key, find, keys, names_in
-from coupler.errors import did_you_mean
+from coupler.errors import briefly, did_you_mean
 
 KeyPath = tuple[str | int, ...]
 
@@ -27,9 +27,9 @@ def explain_error(error: dict) -> tuple[KeyPath, str]:
     if kind in _COMPARE:
         word, name = _COMPARE[kind]
         unit = f" {key.unit}" if key and key.unit else ""
-        return path, f"{value!r} is out of range; must be {word} {context[name]:g}{unit}"
+        return path, f"{briefly(value)} is out of range; must be {word} {context[name]:g}{unit}"
     if kind == "literal_error":
-        return path, f"{value!r} is not known; one of {context['expected']}" + _near(
+        return path, f"{briefly(value)} is not known; one of {context['expected']}" + _near(
             value, context["expected"]
         )
     if kind in ("union_tag_invalid", "union_tag_not_found"):
@@ -91,33 +91,35 @@ def _kind(path: KeyPath, kind: str, context: dict) -> tuple[KeyPath, str]:
     if kind == "union_tag_not_found":
         return (*path, "kind"), f"missing; {what}, one of {', '.join(kinds)}"
     tag = str(context["tag"])
-    return (*path, "kind"), f"{tag!r} is not known; one of {', '.join(kinds)}" + did_you_mean(tag, kinds)
+    return (*path, "kind"), f"{briefly(tag)} is not known; one of {', '.join(kinds)}" + did_you_mean(
+        tag, kinds
+    )
 
 
 def _shape(kind: str, value: object, context: dict, key: Key | None, message: str) -> str:
     """Wrong kinds of values: a list where a number belongs, a text where a switch belongs, and so on."""
     if kind == "string_pattern_mismatch":
-        return f"{value!r} is no name; use letters, digits, - and _, beginning with a letter"
+        return f"{briefly(value)} is no name; use letters, digits, - and _, beginning with a letter"
     if kind in ("tuple_type", "list_type") and key is not None and key.several:
         return f"write [[{key.path}]] with double brackets: there may be several"
     if kind in ("tuple_type", "list_type") and isinstance(value, str):
-        return f'"{value}" is not a list; write ["{value}"]'
+        return f"{briefly(value)} is not a list; write [{briefly(value)}]"
     if kind in ("tuple_type", "list_type"):
-        return f"{value!r} is not a list of numbers; {_is(key)}"
+        return f"{briefly(value)} is not a list of numbers; {_is(key)}"
     if kind in ("model_type", "model_attributes_type", "dict_type"):
-        return f"{value!r} is not a section; {_is(key)}"
+        return f"{briefly(value)} is not a section; {_is(key)}"
     if kind == "too_long":
         return f"{len(value)} values where {context['max_length']} belong; {_is(key)}"
     if kind == "too_short":
         return f"{len(value)} values where at least {context['min_length']} belong; {_is(key)}"
     if kind == "string_too_short":
-        return f"{value!r} is empty; {_is(key)}"
+        return f"{briefly(value)} is empty; {_is(key)}"
     if kind == "bool_type":
-        return f"{value!r} is neither true nor false"
+        return f"{briefly(value)} is neither true nor false"
     if kind == "finite_number":
-        return f"{value!r} is not a finite number"
+        return f"{briefly(value)} is not a finite number"
     if kind == "int_type":
-        return f"{value!r} is not a whole number"
+        return f"{briefly(value)} is not a whole number"
     if kind == "string_type":
-        return f"{value!r} is not a text; put it in quotes"
+        return f"{briefly(value)} is not a text; put it in quotes"
     return f"{message[:1].lower()}{message[1:]}"

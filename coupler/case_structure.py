@@ -157,7 +157,7 @@ class Rubble(Section):
     size: Size = Field(
         description="edges of the box; a third of it can be filled with spheres around the blocks"
     )
-    count: Annotated[int, Field(strict=True, ge=1, le=100_000)] = Field(description="number of blocks")
+    count: Annotated[int, Field(strict=True, ge=1, le=20_000)] = Field(description="number of blocks")
     diameter: tuple[PositiveLength, PositiveLength] = Field(
         description="smallest and largest of the spheres around the blocks", examples=[["20 cm", "40 cm"]]
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import errno
+import reprlib
 from collections.abc import Iterable
 from enum import IntEnum
 
@@ -63,6 +64,24 @@ class CannotWrite(SurgebreakError):
     """The directory for the results cannot be made."""
 
     exit_code = ExitCode.BAD_CASE
+
+
+class _Briefly(reprlib.Repr):
+    """Values as they were written, cut where they are long: a message is for reading."""
+
+    def __init__(self):
+        super().__init__()
+        self.maxstring = self.maxother = 80
+        self.maxlist = self.maxtuple = self.maxdict = 8
+        self.maxlevel = 4
+
+    def repr_int(self, value: int, level: int) -> str:
+        digits = int(value.bit_length() * 0.30103) + 1
+        return repr(value) if digits <= 60 else f"a whole number of about {digits} digits"
+
+
+briefly = _Briefly().repr
+"""How a value was written, cut where it is long: a message is for reading."""
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:

@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import contextlib
+import importlib.util
 import io
+import signal
 import struct
+import threading
 import warnings
+import zlib
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
-from coupler.errors import ExitCode, SurgebreakError, did_you_mean
+from coupler.errors import ExitCode, SurgebreakError
+from coupler.paths import BadPath, check_file
 
 Array = np.ndarray
 
@@ -18,14 +24,25 @@ UNREADABLE = (
     SystemExit,
     OSError,
     ValueError,
-    KeyError,
-    IndexError,
+    LookupError,
     TypeError,
+    ArithmeticError,
+    AttributeError,
+    RuntimeError,
+    NameError,
+    ImportError,
+    MemoryError,
+    EOFError,
     struct.error,
+    zlib.error,
     SyntaxError,
     AssertionError,
 )
 """What meshio's readers raise on a file that is not what its name says; one of them leaves the program."""
+NEEDS_PACKAGE = {"exodus": "netCDF4", "cgns": "h5py", "h5m": "h5py", "hmf": "h5py", "med": "h5py"}
+"""Formats whose reader needs a package that may be absent."""
+PATIENCE, PER_MEGABYTE = 3.0, 10.0
+"""Processor time [s] that reading may take, and more for each megabyte: torn files send some readers in circles."""
 
 
 class MeshFileError(SurgebreakError):
@@ -38,20 +55,23 @@ def read_mesh(path: Path) -> tuple[Array, dict[str, Array], bool]:
     """Points (n, 3), cells by kind (m, k), and whether the file holds single precision. Raises MeshFileError."""
     import meshio
 
-    if not path.is_file():
-        near = (
-            did_you_mean(path.name, [p.name for p in path.parent.iterdir()]) if path.parent.is_dir() else ""
-        )
-        raise MeshFileError(f"{path}: no such file{near}")
+    try:
+        check_file(path)
+    except BadPath as error:
+        raise MeshFileError(f"{path}: {error}") from error
     told = io.StringIO()
     try:
-        with contextlib.redirect_stdout(told), contextlib.redirect_stderr(told), warnings.catch_warnings():
+        with (
+            contextlib.redirect_stdout(told),
+            contextlib.redirect_stderr(told),
+            warnings.catch_warnings(),
+            _patience(PATIENCE + PER_MEGABYTE * 1e-6 * path.stat().st_size),
+        ):
             warnings.simplefilter("ignore")
             mesh = meshio.read(path)
     except (*UNREADABLE, meshio.ReadError) as error:
-        known = ", ".join(sorted(meshio.extension_to_filetypes))
         raise MeshFileError(
-            f"{path.name}: meshio cannot read it ({_first_line(error, told)}); it reads {known}"
+            f"{path.name}: meshio cannot read it ({_first_line(error, told)}); it reads {', '.join(readable())}"
         ) from error
     if mesh.points.ndim != 2 or mesh.points.shape[1] != 3 or not np.isfinite(mesh.points).all():
         raise MeshFileError(f"{path.name}: its points are not rows of three finite coordinates")
@@ -64,6 +84,35 @@ def read_mesh(path: Path) -> tuple[Array, dict[str, Array], bool]:
         cells.setdefault(kind, []).append(rows)
     single = mesh.points.dtype == np.float32 or path.suffix.lower() == ".stl"
     return mesh.points.astype(float), {kind: np.concatenate(rows) for kind, rows in cells.items()}, single
+
+
+def readable() -> list[str]:
+    """Endings of the files that can be read here."""
+    import meshio
+    from meshio._helpers import reader_map
+
+    absent = {kind for kind, name in NEEDS_PACKAGE.items() if importlib.util.find_spec(name) is None}
+    kinds = set(reader_map) - absent
+    return sorted(end for end, types in meshio.extension_to_filetypes.items() if kinds & set(types))
+
+
+@contextlib.contextmanager
+def _patience(seconds: float) -> Iterator[None]:
+    """End what takes more processor time [s] with a ValueError; in the main thread, which alone gets signals."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def enough(number: int, frame: object) -> None:
+        raise ValueError(f"the reader came to no end in {seconds:.0f} s of processor time")
+
+    before = signal.signal(signal.SIGPROF, enough)
+    signal.setitimer(signal.ITIMER_PROF, seconds, 1.0)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        signal.signal(signal.SIGPROF, before)
 
 
 def _first_line(error: BaseException, told: io.StringIO) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterator
 
@@ -30,8 +31,8 @@ def mesh_size(tank) -> tuple[int, int]:
         mesh = mesh_of(tank)
         return len(mesh.cells), len(mesh.nodes)
     edges = np.subtract(tank.upper, tank.lower)
-    parts = np.maximum(1, np.rint(edges / tank.cell).astype(int))
-    return 6 * int(np.prod(parts)), int(np.prod(parts + 1))
+    parts = [int(n) for n in np.maximum(1.0, np.rint(edges / tank.cell))]  # of any length: cells may be tiny
+    return 6 * math.prod(parts), math.prod(n + 1 for n in parts)
 
 
 def solid_bodies(case: Case) -> list[Placed]:
@@ -92,13 +93,13 @@ def _memory(case: Case) -> Iterator[Problem]:
     if needed > there and case.tank.mesh is not None:
         yield (
             ("tank", "mesh"),
-            f"{cells:.3g} cells need about {needed / 1e9:.0f} GB, this machine has {there / 1e9:.0f} GB; mesh coarser",
+            f"{cells:.3g} cells need about {needed / 1e9:.3g} GB, this machine has {there / 1e9:.0f} GB; mesh coarser",
         )
     elif needed > there:
         fits = case.tank.cell * (needed / there) ** (1.0 / 3.0)
         yield (
             ("tank", "cell"),
-            f"{cells:.3g} cells of {case.tank.cell:g} m need about {needed / 1e9:.0f} GB, this machine has "
+            f"{cells:.3g} cells of {case.tank.cell:g} m need about {needed / 1e9:.3g} GB, this machine has "
             f"{there / 1e9:.0f} GB; use cells of {1.1 * fits:.2g} m or more",
         )
 

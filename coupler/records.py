@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from coupler.errors import BadCase, did_you_mean
+from coupler.paths import BadPath, place_of, read_text
 
 SHIPPED = Path(__file__).parent / "verify" / "reference"
 """The records that come with the program, each once."""
@@ -22,8 +23,10 @@ class NoSuchData(BadCase):
 
 
 def find_record(file: str | Path, directory: Path) -> Path:
-    """The file, from the directory of the case; if there is none there, the one of that name among SHIPPED."""
-    place = (directory / Path(file).expanduser()).resolve()
+    """The file, from the directory of the case; if there is none there, the one of that name among SHIPPED.
+
+    Raises BadPath."""
+    place = place_of(file, directory)
     shipped = SHIPPED / file
     return shipped if not place.exists() and shipped.is_file() else place
 
@@ -31,15 +34,27 @@ def find_record(file: str | Path, directory: Path) -> Path:
 @lru_cache(maxsize=32)
 def read_record(path: Path) -> dict[str, np.ndarray]:
     """Columns (n,) by their heading.  Raises NoSuchData for what is no such table."""
-    if not path.exists():
-        raise NoSuchData([f"{path}: no such file; those that come with the program are in {SHIPPED}"])
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_text(path)
         rows = list(csv.reader(line for line in text.splitlines() if line and not line.startswith("#")))
+        names = [name.strip() for name in rows[0]]
         values = np.array([[float(entry) for entry in row] for row in rows[1:]], float)
-        return {name.strip(): values[:, k] for k, name in enumerate(rows[0])}
-    except (OSError, ValueError, IndexError) as error:
+        columns = {name: values[:, k] for k, name in enumerate(names)}
+    except BadPath as error:
+        raise NoSuchData([f"{path}: {error}; those that come with the program are in {SHIPPED}"]) from error
+    except (ValueError, IndexError, csv.Error) as error:
         raise NoSuchData([f"{path}: no table of numbers under a line of names: {error}"]) from error
+    twice = repeated(names)
+    if twice:
+        raise NoSuchData([f"{path}: the column '{twice}' is there twice; rename or remove one"])
+    if not np.isfinite(values).all():
+        raise NoSuchData([f"{path}: not all of its numbers are finite"])
+    return columns
+
+
+def repeated(names: list[str]) -> str | None:
+    """The first name that is there twice."""
+    return next((name for k, name in enumerate(names) if name in names[:k]), None)
 
 
 def column(table: dict[str, np.ndarray], name: str, file: str | Path) -> np.ndarray:

@@ -8,6 +8,7 @@ Units are read by pint, which is imported only when a value is text. A digit beh
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
 from functools import lru_cache, partial
@@ -15,7 +16,7 @@ from typing import Annotated
 
 from pydantic import BeforeValidator, Field
 
-from coupler.errors import UnitError
+from coupler.errors import UnitError, briefly
 
 DIMENSIONS = {
     "": "a plain number",
@@ -37,6 +38,11 @@ DIMENSIONS = {
     "rad/s": "an angular velocity",
 }
 """What a quantity of each unit of the case file is called."""
+
+LEAST, MOST = 1e-30, 1e30
+"""Sizes of numbers, zero aside, with whose products and powers the program can still count."""
+LONGEST = 100
+"""Characters of the text of a quantity."""
 
 _QUANTITY = re.compile(r"\s*([-+]?(?:\d[\d_]*\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
 _FACTOR = r"[^\W\d_%°]*[A-Za-z%°](?:(?:\^|\*\*)?-?\d+)?"
@@ -68,16 +74,33 @@ def to_si(value: object, unit: str) -> float:
     Raises UnitError, naming the value, when the text is no quantity or one of another kind.
     """
     if isinstance(value, bool) or not isinstance(value, int | float | str):
-        raise UnitError(f"{value!r} is not a number{_example(unit)}")
-    if isinstance(value, int | float):
-        return float(value)
-    match = _QUANTITY.fullmatch(value)
+        raise UnitError(f"{briefly(value)} is not a number{_example(unit)}")
+    if isinstance(value, str) and len(value) > LONGEST:
+        raise UnitError(
+            f"{briefly(value)} has {len(value)} characters, a quantity at most {LONGEST}{_example(unit)}"
+        )
+    number = _from_text(value, unit) if isinstance(value, str) else value
+    if _is_finite(number) and number != 0 and not LEAST <= abs(number) <= MOST:
+        raise UnitError(
+            f"{briefly(value)} is beyond all that is computed with: write 0, or a number of a size "
+            f"between {LEAST:g} and {MOST:g}{_in(unit)}"
+        )
+    return float(number)
+
+
+def _is_finite(number: int | float) -> bool:
+    """Infinities and NaN are refused by the schema, as of any number; whole numbers may have any length."""
+    return isinstance(number, int) or math.isfinite(number)
+
+
+def _from_text(text: str, unit: str) -> float:
+    match = _QUANTITY.fullmatch(text)
     if match is None:
-        raise UnitError(f"{value!r} is not a number with a unit{_example(unit)}")
+        raise UnitError(f"{text!r} is not a number with a unit{_example(unit)}")
     number, given = float(match[1]), match[2].translate(_RAISED)
     if not given and unit:
-        raise UnitError(f"{value!r} has no unit{_example(unit)}")
-    return number * _factor(given, unit, value)
+        raise UnitError(f"{text!r} has no unit{_example(unit)}")
+    return number * _factor(given, unit, text)
 
 
 @lru_cache(maxsize=256)
@@ -89,7 +112,7 @@ def _factor(given: str, unit: str, value: str) -> float:
         if not _UNIT_TEXT.fullmatch(given):
             raise ValueError(given)
         source = 1.0 * registry.parse_units(_POWER.sub(r"^\1", given.replace("·", "*")))
-    except (pint.PintError, ValueError, AttributeError) as error:
+    except (pint.PintError, ValueError, AttributeError, ArithmeticError) as error:
         raise UnitError(f"{value!r}: unknown unit '{given}'{_near(given)}{_example(unit)}") from error
     target = _si(unit)
     of_other_kind = source.dimensionality != target.dimensionality

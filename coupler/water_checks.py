@@ -103,7 +103,7 @@ def _sides(case: Case) -> Iterator[Problem]:
 def _levels(case: Case, path: KeyPath, spec) -> Iterator[Problem]:
     bed, top = case.tank.lower[2], case.tank.upper[2]
     if _kind(spec) == "record":
-        yield from _record(path, spec, bed, top)
+        yield from _record(path, spec, bed, top, case.time.end)
         return
     if not bed < spec.level <= top:
         yield (
@@ -123,12 +123,18 @@ def _levels(case: Case, path: KeyPath, spec) -> Iterator[Problem]:
         )
 
 
-def _record(path: KeyPath, spec, bed: float, top: float) -> Iterator[Problem]:
+def _record(path: KeyPath, spec, bed: float, top: float, end: float) -> Iterator[Problem]:
     try:
-        _, level, _ = record_columns(spec.path)
+        time, level, _ = record_columns(spec.path)
     except RecordError as error:
         yield (*path, "path"), str(error)
         return
+    if time[0] >= end or time[-1] < 0.0:
+        yield (
+            (*path, "path"),
+            f"its times go from {time[0]:g} to {time[-1]:g} s, all {'after' if time[0] >= end else 'before'} the run "
+            f"(0 to {end:g} s); shift them",
+        )
     if level.min() < bed:
         yield (
             (*path, "path"),

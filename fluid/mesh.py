@@ -24,6 +24,8 @@ from fluid.shapes import Shapes
 CORNERS_OF_FACE = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])  # outward for a positive cell
 MOST_SLENDER = 2.5
 """Longest over shortest edge of a cell, 1.73 in a split cube, up to which its volume goes through upright borders."""
+MOST_BRICKS = 3e8
+"""Of a box: the numbers of the tetrahedra of more, six a brick, pass 32 bits."""
 
 
 class MeshError(ValueError):
@@ -201,8 +203,10 @@ def _axes_of_box(lower, upper, cell_size):
         raise MeshError(
             f"box {lower} to {upper} with cell size {cell_size}: all three extents must be positive"
         )
-    count = np.maximum(1, np.rint((upper - lower) / cell_size).astype(int))
-    return [np.linspace(lower[k], upper[k], count[k] + 1) for k in range(3)]
+    count = np.maximum(1.0, np.rint((upper - lower) / cell_size))
+    if not np.prod(count) < MOST_BRICKS:
+        raise MeshError(f"box {lower} to {upper} with cell size {cell_size}: {np.prod(count):.3g} bricks")
+    return [np.linspace(lower[k], upper[k], int(count[k]) + 1) for k in range(3)]
 
 
 def _uniform_axes(nodes, spacing):

@@ -10,7 +10,7 @@ import ast
 import math
 import operator
 
-from coupler.errors import ExitCode, SurgebreakError, did_you_mean
+from coupler.errors import ExitCode, SurgebreakError, briefly, did_you_mean
 
 
 class BadFormula(SurgebreakError):
@@ -19,6 +19,8 @@ class BadFormula(SurgebreakError):
     exit_code = ExitCode.BAD_CASE
 
 
+LONGEST = 1000
+"""Characters of a formula."""
 _OPERATIONS = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
@@ -35,6 +37,10 @@ def evaluate(formula: str | float, case: dict) -> float:
     """The number that a formula has in an effective case; numbers are themselves. Raises BadFormula."""
     if not isinstance(formula, str):
         return float(formula)
+    if len(formula) > LONGEST:
+        raise BadFormula(
+            f"{briefly(formula)}: a formula of {len(formula)} characters; at most {LONGEST} are read"
+        )
     try:
         found = _value(ast.parse(formula, mode="eval").body, case, formula)
         return float(found)
@@ -42,11 +48,13 @@ def evaluate(formula: str | float, case: dict) -> float:
         raise BadFormula(f"'{formula}': not a formula: {error.msg}") from error
     except (ArithmeticError, ValueError, TypeError) as error:
         raise BadFormula(f"'{formula}': {error}") from error
+    except (RecursionError, MemoryError) as error:
+        raise BadFormula(f"'{formula}': too many brackets or signs inside of one another") from error
 
 
 def _value(node: ast.expr, case: dict, formula: str):
     if isinstance(node, ast.Constant) and isinstance(node.value, int | float):
-        return node.value
+        return float(node.value)  # powers of whole numbers could grow without end
     if isinstance(node, ast.BinOp) and type(node.op) in _OPERATIONS:
         return _OPERATIONS[type(node.op)](_value(node.left, case, formula), _value(node.right, case, formula))
     if isinstance(node, ast.UnaryOp) and type(node.op) in _OPERATIONS:

@@ -3,8 +3,12 @@
 import numpy as np
 import pytest
 
-from coupler.expected import TAKE, BadExpectation, verdicts
+from coupler.case_file import load
+from coupler.errors import BadCase
+from coupler.expected import TAKE, verdicts
 from coupler.history import HistoryTable
+from coupler.promises import mistakes_in
+from tests.coupler.test_case_file import WATER
 
 TIME = np.linspace(0.0, 4.0, 401)
 ENTRY = {"time": 1.234, "from": 1.0, "to": 2.5, "above": 6.0}
@@ -53,6 +57,55 @@ def test_verdicts(tmp_path, bound, kept):
     assert (verdict.found, verdict.kept) == (4.0, kept)
 
 
-def test_a_wrong_column_is_told_with_the_nearest(tmp_path):
-    with pytest.raises(BadExpectation, match=r"no column 'tim'; did you mean 'time'\?"):
-        write_run(tmp_path, ONE.replace('column = "x"', 'column = "tim"') + "at_least = 0")
+@pytest.mark.parametrize(
+    ("right", "wrong", "told"),
+    [
+        ('column = "x"', 'column = "tim"', "history/a.csv has no column 'tim'; did you mean 'time'?"),
+        ("a.csv", "b.csv", "the run has no table history/b.csv"),
+    ],
+)
+def test_a_promise_about_what_the_run_has_not_is_not_kept(tmp_path, right, wrong, told):
+    """The run is done by then: its results must not be lost for a slip in the promise."""
+    (verdict,) = write_run(tmp_path, ONE.replace(right, wrong) + "at_least = 0")
+    assert not verdict.kept
+    assert str(verdict) == f"x: {told}, expected 0 to inf"
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        (ONE, "expected.toml:1: expect[0]: give value and tolerance, or at_least, at_most or both of these"),
+        (ONE + "value = 1", "give value and tolerance"),
+        (ONE + "at_most = nan", "expected.toml:6: expect[0].at_most: nan: input should be a finite number"),
+        (ONE.replace('"largest"', '"at"') + "at_most = 1", "take = 'at' needs time"),
+        (ONE.replace('"largest"', '"integral"') + "at_most = 1\nfrom = 2\nto = 1", "must be less than to"),
+        (
+            ONE.replace('"largest"', '"biggest"') + "at_most = 1",
+            "expected.toml:5: expect[0].take: 'biggest': inp",
+        ),
+        (ONE + "at_most = 1\nfoo = 1", "expected.toml:7: expect[0].foo: unknown name"),
+        ("[[expect]]\nat_most = 1", "expected.toml:1: expect[0].what: missing"),
+        ("expect = 1", "expected.toml:1: expect: 1: input should be a valid tuple"),
+        ("expect = [", "expected.toml: not valid TOML"),
+        (
+            '[[curve]]\nfigure = "a"\npanel = "b"\ntable = "c"',
+            "give column, or columns with places and above",
+        ),
+        (
+            '[[curve]]\nfigure = "../a"\npanel = "b"\ntable = "c"\ncolumn = "d"',
+            "curve[0].figure: '../a': string",
+        ),
+    ],
+)
+def test_a_wrong_file_is_told_before_the_run(tmp_path, text, told):
+    (tmp_path / "expected.toml").write_text(text, encoding="utf-8")
+    (line,) = [line for line in mistakes_in(tmp_path) if told in line]
+    assert line.startswith(str(tmp_path))
+
+
+def test_a_wrong_file_beside_the_case_refuses_it(tmp_path):
+    (tmp_path / "case.toml").write_text(WATER, encoding="utf-8")
+    assert load(tmp_path)
+    (tmp_path / "expected.toml").write_bytes(b"\xff")
+    with pytest.raises(BadCase, match=r"expected.toml: not a text in UTF-8 \(byte 0\)"):
+        load(tmp_path)

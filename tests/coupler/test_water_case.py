@@ -57,7 +57,7 @@ def run(found, end):
             {"inflow": [{"kind": "solitary", "side": "x-", "level": 0.2, "height": 0.2, "crest": 1.0}]},
             "breaks at once on a depth of 0.2 m",
         ),
-        ({"inflow": [{"kind": "record", "side": "x-", "path": "/nowhere.csv"}]}, "cannot be read"),
+        ({"inflow": [{"kind": "record", "side": "x-", "path": "/nowhere.csv"}]}, "no such file"),
     ],
 )
 def test_what_cannot_be_is_refused_with_its_place(water, message):
@@ -155,7 +155,7 @@ def test_records_that_cannot_be_read_say_why(tmp_path, text, says):
 
 def test_a_record_that_is_not_there_names_the_nearest_file(tmp_path):
     (tmp_path / "bore.csv").write_text("time,level,velocity\n0,1,0\n", encoding="utf-8")
-    with pytest.raises(RecordError, match=r"No such file or directory; did you mean 'bore.csv'"):
+    with pytest.raises(RecordError, match=r"no such file; did you mean 'bore.csv'"):
         record_columns(str(tmp_path / "Bore.csv"))
 
 

@@ -6,13 +6,14 @@ openings where there are any.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
 
 from yade_scripts.blocks import Block
-from yade_scripts.generators.cuts import equal_cuts
+from yade_scripts.generators.cuts import check_count, equal_cuts, pieces
 from yade_scripts.polyhedra import BlockError
 
 Array = np.ndarray
@@ -124,6 +125,7 @@ def building_blocks(b: Building) -> list[Block]:
                 f"building '{b.name}': the opening {np.asarray(opening.lower)} .. {np.asarray(opening.upper)} m meets "
                 "no wall and no slab; check its wall, its place and its size"
             )
+    check_count(b.name, sum(_wanted_blocks(part) for part in parts))
     return [block for part in parts for block in _part_blocks(part, b)]
 
 
@@ -151,6 +153,11 @@ def _storey_parts(b: Building, storey: int) -> list[_Part]:
         low, high = np.array([x0, y0, head]), np.array([x1, y1, head + b.slab])
         parts.append(_Part(f"{b.name}-{kind}{storey}", kind, low, high, (b.block, b.block, np.inf), wished))
     return parts
+
+
+def _wanted_blocks(part: _Part) -> float:
+    """Blocks of a wall or slab without openings, about."""
+    return math.prod(pieces(h - l, edge) for l, h, edge in zip(part.low, part.high, part.edges))
 
 
 def _part_blocks(part: _Part, b: Building) -> list[Block]:

@@ -6,19 +6,21 @@ turn freely where it lies. Spheres fill a third of a box at most this way; let t
 
 from __future__ import annotations
 
+import itertools
 from typing import Literal
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from yade_scripts.blocks import Block
+from yade_scripts.generators.cuts import check_count
 from yade_scripts.polyhedra import BlockError
 
 Array = np.ndarray
 Shape = Literal["polyhedra", "boxes", "mixed"]
 
-TRIES = 5000
-"""Places tried for one block before the region counts as full."""
+TRIES, TRIES_IN_ALL = 5000, 400_000
+"""Places tried for one block, and for all of them, before the region counts as full."""
 FLATTEST = 0.6
 """Smallest ratio of the axes of a stone, and of the edges of a box."""
 CANDIDATES = 8
@@ -44,6 +46,7 @@ def rubble_blocks(
     """
     lower, size = np.asarray(lower, float), np.asarray(size, float)
     _check(name, size, count, diameter, shape, corners)
+    check_count(name, count)
     random = np.random.default_rng(seed)
     diameters = np.sort(random.uniform(*diameter, size=count))[::-1]
     centres = _places(name, lower, size, 0.5 * diameters, random)
@@ -57,20 +60,43 @@ def rubble_blocks(
 
 
 def _places(name: str, lower: Array, size: Array, radius: Array, random) -> Array:
-    """Centres (n, 3) [m] of spheres that lie in the box and apart from each other."""
-    centres = np.empty((len(radius), 3))
+    """Centres (n, 3) [m] of spheres that lie in the box and apart from each other; the largest come first."""
+    spheres = _Spheres(lower, radius)
+    tried = 0
     for k, r in enumerate(radius):
-        for _ in range(TRIES):
+        for _ in range(min(TRIES, TRIES_IN_ALL - tried)):
+            tried += 1
             place = lower + r + random.random(3) * (size - 2.0 * r)
-            if (np.linalg.norm(centres[:k] - place, axis=1) > radius[:k] + r).all():
-                centres[k] = place
+            if spheres.put(k, place):
                 break
         else:
             raise BlockError(
                 f"rubble '{name}': only {k} of {len(radius)} blocks found room in {size} m; enlarge it, or take fewer "
                 "or smaller blocks"
             )
-    return centres
+    return spheres.centres
+
+
+class _Spheres:
+    """Spheres that lie apart. Bins are as wide as the largest one, so only those of the same and the next bins can be
+    in the way of another."""
+
+    def __init__(self, lower: Array, radius: Array):
+        self.lower, self.radius, self.width = lower, radius, 2.0 * radius.max()
+        self.centres = np.empty((len(radius), 3))
+        self._bins: dict[tuple[int, ...], list[int]] = {}
+
+    def put(self, k: int, place: Array) -> bool:
+        """Put sphere k to a place (3,) [m] if it is free."""
+        own = tuple(((place - self.lower) / self.width).astype(int).tolist())
+        around = itertools.product(*((i - 1, i, i + 1) for i in own))
+        near = [n for key in around for n in self._bins.get(key, ())]
+        apart = np.linalg.norm(self.centres[near] - place, axis=1)
+        if (apart <= self.radius[near] + self.radius[k]).any():
+            return False
+        self.centres[k] = place
+        self._bins.setdefault(own, []).append(k)
+        return True
 
 
 def _box(random, diameter: float) -> dict:

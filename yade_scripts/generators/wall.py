@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import Literal
 
 import numpy as np
 
 from yade_scripts.blocks import Block
-from yade_scripts.generators.cuts import equal_cuts, shifted_cuts
+from yade_scripts.generators.cuts import check_count, equal_cuts, pieces, shifted_cuts
 from yade_scripts.polyhedra import BlockError
 
 Bond = Literal["stack", "running"]
@@ -24,6 +25,7 @@ def wall_of_blocks(
     """
     lower, size, block = (np.broadcast_to(np.asarray(v, float), (3,)) for v in (lower, size, block))
     _check(name, size, block, bond, along)
+    check_count(name, math.prod(pieces(s, edge) for s, edge in zip(size, block)))
     axis = int(size[1] > size[0]) if along is None else "xy".index(along)
     cuts = [equal_cuts(a, a + s, edge) for a, s, edge in zip(lower, size, block)]
     shifted = list(cuts)
