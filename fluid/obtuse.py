@@ -11,6 +11,16 @@ and any positive number in its place stirs water at rest.  Left out of matrix an
 - cells with less than SMALL of their volume in the fluid whose own matrix is not positive,
 - cells that take from the diagonal of a row until the sum is no longer clearly positive.
 Water at rest balances in every cell by itself, so it stays at rest.
+
+What is left may still be indefinite where the surface passes close to a node behind an obtuse angle, 1/ϑ being large.
+With K_UU, rows and columns of the unknowns in the stiffness of all cells, the matrix is
+
+    A = K_UU + diag(d),      d_i = Σ_{j dry} k_ij (1/ϑ_ij - 1),
+
+and K_UU ⪰ diag(r) with r_i = Σ_e t_e K_e,ii, t_e the least eigenvalue of the cell's K_e,UU scaled to a diagonal of ones
+(above 0 where a corner of the cell is no unknown).  So A is positive definite wherever d > -r; rows that miss that get
+|d_i| instead of d_i, and the difference times what the pressure of the node is about goes to the right hand side: the
+surface still holds the pressure near 0 there, and water at rest still balances (`reserve`, `about`).
 """
 
 from __future__ import annotations
@@ -31,6 +41,80 @@ def without_indefinite(topology, cells, wet, phi):
     """Which of the listed cells (n,) stay, (n,) bool; wet (N,) bool and phi (N,) [m]: the surface."""
     t = topology
     return _kept(cells, t.fraction, wet, phi, t.cells, t.parent, t.products, t.volume)
+
+
+def reserve(topology, cells, unknown):
+    """r (N,) [m]: what the diagonal of each row may lose, from the listed cells (n,); unknown (N,) bool."""
+    t = topology
+    return _reserve(cells, unknown, t.cells, t.parent, t.products, t.volume)
+
+
+@njit(cache=True)
+def _reserve(cell_list, unknown, cells, parent, products, volume):
+    out = np.zeros(len(unknown))
+    own, scaled = np.empty(4), np.empty(3)
+    for e in cell_list:
+        count = 0
+        for a in range(4):
+            count += unknown[cells[e, a]]
+        if count == 0 or count == 4:
+            continue
+        column, pair = 0, 0
+        own[:], scaled[:] = 0.0, 0.0
+        for a in range(4):
+            for b in range(a + 1, 4):
+                k = -products[parent[e], column]
+                column += 1
+                own[a] += k
+                own[b] += k
+        column = 0
+        for a in range(4):
+            for b in range(a + 1, 4):
+                if unknown[cells[e, a]] and unknown[cells[e, b]]:
+                    scaled[pair] = products[parent[e], column] / np.sqrt(own[a] * own[b])
+                    pair += 1
+                column += 1
+        share = 1.0 + _least_root(scaled)
+        for a in range(4):
+            if unknown[cells[e, a]]:
+                out[cells[e, a]] += volume[e] * share * own[a]
+    return out
+
+
+@njit(cache=True)
+def _least_root(off):
+    """Least eigenvalue of the symmetric 3 x 3 matrix with zeros on its diagonal and these entries (3,) beside it, from
+    below: λ³ - p λ - q = 0 by Newton's method, which comes up from -2 sqrt(p/3) without passing the root."""
+    p = off[0] * off[0] + off[1] * off[1] + off[2] * off[2]
+    q = 2.0 * off[0] * off[1] * off[2]
+    root = -2.0 * np.sqrt(p / 3.0)
+    for _ in range(6):
+        slope = 3.0 * root * root - p
+        if slope <= 0.0:
+            break
+        root -= ((root * root - p) * root - q) / slope
+    return root
+
+
+def about(graph, rows, beside, phi, pressure):
+    """What the pressure of nodes rows (k,) is about [Pa]: φ times the mean slope p/φ of the nodes around, beside (N,)
+    bool the surface, where φ is exact, the deep ones first; pressure (N,) [Pa] a step ago."""
+    return _about(rows, graph.row, graph.start, graph.neighbour, beside, phi, pressure)
+
+
+@njit(cache=True)
+def _about(rows, graph_row, start, neighbour, beside, phi, pressure):
+    out = np.zeros(len(rows))
+    for r in range(len(rows)):
+        i = rows[r]
+        up, down = pressure[i] * phi[i], phi[i] * phi[i]
+        for s in range(start[graph_row[i]], start[graph_row[i] + 1]):
+            j = neighbour[s]
+            if beside[j]:
+                up += pressure[j] * phi[j]
+                down += phi[j] * phi[j]
+        out[r] = phi[i] * up / down if down > 0.0 else 0.0
+    return out
 
 
 @njit(cache=True)

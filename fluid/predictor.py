@@ -16,6 +16,7 @@ from numba import njit
 
 from fluid.advection import transport
 from fluid.level_set import redistance
+from fluid.obtuse import about, reserve
 from fluid.outflow import Outflow
 from fluid.paths_in_solids import levels_in_solids
 from fluid.projection import (
@@ -173,7 +174,8 @@ def _problem(water, dt, theta, kick, surface, conserved, u_adv, u_star, shear, l
     star = cell_velocity(cells, u_star, remainder, t.cells, t.share)
     rhs = inflow(cells, star, t.cells, t.parent, t.gradients, t.volume, len(phi))
     dofs = np.flatnonzero(wet & ~water._walls.open_node)
-    matrix, anchored = pressure_matrix(graph, phi, dofs, water._walls.open_node, dt / density)
+    matrix, anchored, held_back = _definite(water, graph, phi, cells, dofs, dt / density, theta)
+    rhs[dofs] += held_back
     held = None
     if water.sides is not None:
         rhs += inflow_rate
@@ -208,14 +210,36 @@ def _problem(water, dt, theta, kick, surface, conserved, u_adv, u_star, shear, l
         through,
         held,
     )
-    # before the first step there is no pressure to go by: still water
-    acted = water.pressure if water.steps else -density * water.parameters.gravity * phi
+    acted = _known_pressure(water, water.pressure, phi)
     other = waterline_load(water.domain, faces, left_out, phi, wet, acted, water._walls.open_node)
     if shear is not None:
         other += shear.load
     return PressureProblem(
         matrix, rhs[dofs] + extra, coupling[dofs], known, guess, dofs, dt, density, other, kept
     )
+
+
+def _known_pressure(water, pressure, phi):
+    """A pressure (N,) [Pa] of the last step; before the first there is none to go by: that of still water."""
+    return pressure if water.steps else -water.parameters.density * water.parameters.gravity * phi
+
+
+def _definite(water, graph, phi, cells, dofs, scale, theta):
+    """The matrix, rows beside p = 0, and what rows behind obtuse angles at the surface add to the right hand side."""
+    open_node = water._walls.open_node
+    if not water.topology.is_obtuse:
+        matrix, anchored, _ = pressure_matrix(graph, phi, dofs, open_node, scale, np.zeros(len(phi)))
+        return matrix, anchored, 0.0
+    unknown = np.zeros(len(phi), bool)
+    unknown[dofs] = True
+    spare = reserve(water.topology, cells, unknown)
+    matrix, anchored, turned = pressure_matrix(graph, phi, dofs, open_node, scale, spare)
+    rows, held_back, beside = np.flatnonzero(turned), np.zeros(len(dofs)), np.zeros(len(phi), bool)
+    beside[dofs[anchored]] = True
+    held_back[rows] = turned[rows] * about(
+        graph, dofs[rows], beside, phi, theta * _known_pressure(water, water.end_pressure, phi)
+    )
+    return matrix, anchored, held_back
 
 
 def _coupling(water, void):

@@ -27,6 +27,8 @@ from numba import njit
 
 SMALLEST_CUT = 1e-7
 SMALLEST_WET_SHARE = 1e-6
+LEAST_RESERVE = 0.05
+"""Share of what the diagonal of a row may lose behind obtuse angles that is to be left."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +55,7 @@ class PressureProblem:
 
 
 @njit(cache=True)
-def _wet_matrix(dofs, column, graph_row, start, neighbour, stiffness, phi, open_node, scale):
+def _wet_matrix(dofs, column, graph_row, start, neighbour, stiffness, phi, open_node, scale, reserve):
     n = dofs.shape[0]
     indptr = np.zeros(n + 1, np.int32)
     for r in range(n):
@@ -64,12 +66,12 @@ def _wet_matrix(dofs, column, graph_row, start, neighbour, stiffness, phi, open_
         indptr[r + 1] = indptr[r] + count
     indices = np.empty(indptr[n], np.int32)
     entries = np.empty(indptr[n])
-    anchored = np.zeros(n, np.bool_)
+    anchored, turned = np.zeros(n, np.bool_), np.zeros(n)
     for r in range(n):
         i = dofs[r]
         row = graph_row[i]
         at = indptr[r]
-        diagonal, positive = 0.0, 0.0
+        diagonal, beyond = 0.0, 0.0
         for s in range(start[row], start[row + 1]):
             j = neighbour[s]
             k = -scale * stiffness[s]
@@ -84,28 +86,30 @@ def _wet_matrix(dofs, column, graph_row, start, neighbour, stiffness, phi, open_
             elif phi[j] >= 0.0:  # a node under water without an unknown shares void cells only
                 cut = max(phi[i] / (phi[i] - phi[j]), SMALLEST_CUT)
                 diagonal += k / cut
-                positive += abs(k) / cut
+                beyond += k / cut - k
                 anchored[r] = True
-        if diagonal <= 0.0:
-            # only on very obtuse cells; a positive diagonal keeps the matrix definite there
-            diagonal += 2.0 * positive
+        if beyond < 0.0 and -beyond > (1.0 - LEAST_RESERVE) * scale * reserve[i]:
+            turned[r] = -2.0 * beyond
+            diagonal += turned[r]
         indices[indptr[r]] = r
         entries[indptr[r]] = diagonal
-    return indptr, indices, entries, anchored
+    return indptr, indices, entries, anchored, turned
 
 
-def pressure_matrix(graph, phi, dofs, open_node, scale: float):
-    """Equation (2) times scale = dt/ρ for the wet nodes dofs (n,): csr (n, n), and (n,) bool next to p = 0.
+def pressure_matrix(graph, phi, dofs, open_node, scale: float, reserve):
+    """Equation (2) times scale = dt/ρ for the wet nodes dofs (n,): csr (n, n), (n,) bool next to p = 0, and (n,) what
+    was added to the diagonal to keep it definite; that times the pressure belongs on the right hand side (`obtuse.py`).
 
-    open_node (N,) bool: nodes on open sides, p = 0."""
+    open_node (N,) bool: nodes on open sides, p = 0 · reserve (N,) [m] of `obtuse.reserve`, zeros without obtuse cells.
+    """
     column = np.full(len(phi), -1, np.int64)
     column[dofs] = np.arange(len(dofs))
     g = graph
-    indptr, indices, entries, anchored = _wet_matrix(
-        dofs, column, g.row, g.start, g.neighbour, g.stiffness, phi, open_node, scale
+    indptr, indices, entries, anchored, turned = _wet_matrix(
+        dofs, column, g.row, g.start, g.neighbour, g.stiffness, phi, open_node, scale, reserve
     )
     matrix = sp.csr_array((entries, indices, indptr), shape=(len(dofs),) * 2)
-    return matrix, anchored
+    return matrix, anchored, turned
 
 
 def pull_of_held(graph, dofs, held, scale: float):

@@ -65,7 +65,9 @@ def test_pressure_matrix_is_the_stiffness_form(n, seed, covers):
     t, _, _ = laid_out(domain)
     dofs = np.flatnonzero(t.active)
     graph, nowhere = Graph.of(t, dofs), np.zeros(len(t.nodes), bool)
-    found, anchored = pressure_matrix(graph, -np.ones(len(t.nodes)), dofs, nowhere, 0.02)
+    found, anchored, _ = pressure_matrix(
+        graph, -np.ones(len(t.nodes)), dofs, nowhere, 0.02, np.zeros(len(t.nodes))
+    )
     expected = 0.02 * asm(forms.stiffness, forms.basis_of(domain)).tocsr()[dofs][:, dofs]
     difference = abs(found - expected)
     assert difference.max() <= 1e-13 * abs(expected).max()

@@ -7,8 +7,12 @@ from scipy.spatial.transform import Rotation
 from fluid.bodies import ConvexBodies
 from fluid.domain import cut_domain
 from fluid.mesh import Background, box_mesh
+from fluid.obtuse import about, reserve
 from fluid.parameters import WaterParameters
+from fluid.projection import pressure_matrix
+from fluid.topology import Graph, Topology
 from fluid.water import Water
+from fluid.wet_part import WetPart
 from tests.fluid.scenes import advance
 
 N = 8
@@ -47,3 +51,46 @@ def test_water_on_both_sides_of_a_thin_wall_stays_at_rest(share, level, seed):
     for _ in range(50):
         advance(water)
     assert water.fastest() < 1e-7
+
+
+def surfaces(nodes, count):
+    """Level sets (N,) [m] of tilted and wavy surfaces that pass close to a node."""
+    random = np.random.default_rng(1)
+    for _ in range(count):
+        slope, wave = random.uniform(-1.5, 1.5, 2), random.uniform(0, 0.1)
+        phi = nodes[:, 2] - nodes[:, :2] @ slope - wave * np.sin(9 * nodes[:, 0])
+        phi -= phi[random.integers(len(nodes))] + random.choice([1e-3, 1e-2, 3e-4])
+        if (phi < 0).any():
+            yield phi
+
+
+def test_the_matrix_is_definite_wherever_the_surface_lies():
+    """Some of these matrices are not without what is added behind obtuse angles; where nothing is, nothing changes."""
+    mesh = jittered(0.4)
+    domain = cut_domain(mesh, ConvexBodies.empty(), "single")
+    t = Topology.of(mesh, domain)
+    nowhere, graph = np.zeros(len(t.nodes), bool), Graph.of(t, np.arange(len(t.nodes)))
+    indefinite = 0
+    for phi in surfaces(t.nodes, 40):
+        part = WetPart.of(t, domain, phi, mesh.spacing)
+        dofs, kept = np.flatnonzero(part.nodes), graph.without(t, part.void)
+        spare = reserve(t, part.cells, part.nodes)
+        matrix, _, turned = pressure_matrix(kept, phi, dofs, nowhere, 1.0, spare)
+        plain = pressure_matrix(kept, phi, dofs, nowhere, 1.0, np.full(len(phi), np.inf))[0]
+        assert np.linalg.eigvalsh(matrix.toarray())[0] > 0
+        assert abs(matrix - matrix.T).max() <= 1e-12 * matrix.diagonal().max()
+        np.testing.assert_allclose((matrix - plain).diagonal(), turned, atol=1e-9 * matrix.diagonal().max())
+        indefinite += np.linalg.eigvalsh(plain.toarray())[0] <= 0
+    assert indefinite > 0
+
+
+def test_rows_held_back_know_the_pressure_of_water_at_rest():
+    """φ times the slope of the nodes beside the surface; the node itself counts for little."""
+    t = Topology.of(BOX, cut_domain(BOX, ConvexBodies.empty(), "single"))
+    graph, phi = Graph.of(t, np.arange(len(t.nodes))), t.nodes[:, 2] - 0.501
+    beside = (phi < 0) & (phi > -0.2)
+    row = np.flatnonzero(beside & (t.nodes[:, 2] == 0.5))[:1]
+    at_rest = -1e4 * phi
+    np.testing.assert_allclose(about(graph, row, beside, phi, at_rest), at_rest[row], rtol=1e-12)
+    disturbed = np.where(np.arange(len(phi)) == row, 1e3, at_rest)
+    np.testing.assert_allclose(about(graph, row, beside, phi, disturbed), at_rest[row], rtol=1e-2)
