@@ -120,14 +120,14 @@ class Accounts:
         return float(self._joints.stored_between(m.x, m.R, *m.before()).sum())
 
     def contact_stored(self) -> float:
-        """Springs of the contacts half a substep ago: 1/2 k u(t) u(t - dt) in the normals [J]."""
+        """Springs of the contacts half a substep ago: 1/2 k u(t) u(t - dt) [J]."""
         if self._contacts is None:
             return 0.0
         c, m = self._contacts.now(), self._motion
         closing = np.einsum("ci,ci->c", c.closing_velocity(m.v, m.x), c.normal)
         depth = np.maximum(c.depth, 0.0)
         normal = 0.5 * c.kn * depth * np.maximum(depth - m.dt * closing, 0.0)
-        return float(np.sum(normal + 0.5 * (c.shear_force**2).sum(axis=1) / c.ks))
+        return float(np.sum(normal + c.shear_energy))
 
     def sums(self) -> dict[str, float]:
         """What `restore` needs."""

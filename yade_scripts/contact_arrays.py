@@ -8,6 +8,9 @@ import numpy as np
 
 Array = np.ndarray
 
+BEGINS = -1.0
+"""In place of the last normal force of a contact that has not pushed yet."""
+
 
 class Bodies(NamedTuple):
     """Blocks and planes: inverse_mass (n,) [1/kg], inverse_inertia (n, 3, 3) body frame, zero where motion is given.
@@ -50,20 +53,30 @@ class Slots(NamedTuple):
     """What a node remembers of its contact with the other body of the pair: face (s,) or -1 (of edges: the number of
     their pair), k (s,) [N/m],
 
-    rest (s,) [m]: depth at which it began · shear (s, 3) [N] on the node's block, in the frame of the face's.
+    rest (s,) [m]: depth at which it began · shear (s, 3) [N] on the node's block, in the frame of the face's
+    push (s,) [N]: normal force of the substep before, `BEGINS` in none · speed (s,) [m/s] at which it closed then.
     """
 
     face: Array
     k: Array
     rest: Array
     shear: Array
+    push: Array
+    speed: Array
+
+    @classmethod
+    def empty(cls, size: int) -> Slots:
+        """Nodes without a contact."""
+        rest, k, push, speed = (np.zeros(size) for _ in range(4))
+        return cls(np.full(size, -1, np.int64), k, rest, np.zeros((size, 3)), push, speed)
 
 
 class Rows(NamedTuple):
     """The contacts of one evaluation, one row each: a block of the node, b of the face; slot.
 
     point, normal (out of b) (c, 3) · depth [m] · kn, kt, cn, ct · mu · force, viscous, shear (c, 3) on a
-    arm_a, arm_b (c, 3) [m] · slip (c, 3): velocity of a against b before the substep.
+    arm_a, arm_b (c, 3) [m] · velocity (c, 3): of a against b before the substep · held (c,) [J]: energy of the shear
+    spring at the time of that velocity.
     """
 
     a: Array
@@ -83,11 +96,12 @@ class Rows(NamedTuple):
     arm_a: Array
     arm_b: Array
     velocity: Array
+    held: Array
 
 
 def empty_rows(size: int) -> Rows:
     """Room for `size` contacts."""
     whole, one, three = (np.zeros(size, np.int64) for _ in range(3)), (size,), (size, 3)
-    scalars = [np.zeros(one) for _ in range(6)]
+    scalars = [np.zeros(one) for _ in range(7)]
     vectors = [np.zeros(three) for _ in range(8)]
-    return Rows(*whole, vectors[0], vectors[1], *scalars, *vectors[2:])
+    return Rows(*whole, vectors[0], vectors[1], *scalars[:6], *vectors[2:], scalars[6])

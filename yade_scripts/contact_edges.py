@@ -80,25 +80,24 @@ def find_crossing(shapes, a, b, x, R, deepest, scratch):
 
 @inner
 def crossing(shapes, a, b, number, x, R, plane, point, scratch):
-    """Depth of a pair of edges [m]; 0 where they carry no more.
+    """Depth of a pair of edges [m], and whether they still meet between their ends.
 
-    plane, point (3,): set to the normal out of b and to the point of a, both in the frame of a; scratch (5, 3)."""
+    plane, point (3,): set to the normal out of b and to the point of a, both in the frame of a; scratch (8, 3), of
+    which rows 4 and 5 are not used."""
     count_b = shapes.edge_start[b + 1] - shapes.edge_start[b]
     ea, eb = shapes.edge_start[a] + number // count_b, shapes.edge_start[b] + number % count_b
-    pa, da, pb, db, n, outward = scratch[0], scratch[1], scratch[2], scratch[3], scratch[4], 0.0
+    pa, da, pb, db, n, outward = scratch[0], scratch[1], scratch[2], scratch[3], scratch[6], 0.0
     _line(shapes, a, ea, R, pa, da)
     _line(shapes, b, eb, R, pb, db)
     for k in range(3):
         pb[k] += x[b, k] - x[a, k]
     if not _normal(da, db, n):
-        return 0.0
+        return 0.0, False
     for k in range(3):
         for j in range(3):
             outward += n[k] * (R[b, k, j] * shapes.edge_out[eb, j] - R[a, k, j] * shapes.edge_out[ea, j])
     sign = 1.0 if outward > 0.0 else -1.0
     s, t = _nearest(pa, da, pb, db)
-    if s < 0.0 or s > 1.0 or t < 0.0 or t > 1.0:
-        return 0.0
     depth = 0.0
     for k in range(3):
         plane[k] = sign * (R[a, 0, k] * n[0] + R[a, 1, k] * n[1] + R[a, 2, k] * n[2])
@@ -106,7 +105,7 @@ def crossing(shapes, a, b, number, x, R, plane, point, scratch):
         point[k] = 0.0
         for j in range(3):
             point[k] += R[a, j, k] * (pa[j] + s * da[j])
-    return depth
+    return depth, 0.0 <= s <= 1.0 and 0.0 <= t <= 1.0
 
 
 @inner

@@ -106,7 +106,7 @@ class ContactForces:
         size = self._nodes[a] + self._nodes[b] + 1
         start = np.concatenate([[0], np.cumsum(size)]).astype(np.int64)
         total = int(start[-1])
-        slots = Slots(np.full(total, -1, np.int64), np.zeros(total), np.zeros(total), np.zeros((total, 3)))
+        slots = Slots.empty(total)
         fresh, known, touching = (np.zeros(len(a), bool) for _ in range(3))
         if hasattr(self, "_pairs") and len(self._pairs.a):
             known = self._carry(a, b, start, fresh, touching, slots)
@@ -175,6 +175,8 @@ class ContactForces:
             "k": self._slots.k[index],
             "rest": self._slots.rest[index],
             "shear": self._slots.shear[index],
+            "push": self._slots.push[index],
+            "speed": self._slots.speed[index],
             "sums": np.array([self.dashpot, self.friction, self.driving]),
         }
 
@@ -187,7 +189,7 @@ class ContactForces:
         pair = np.searchsorted(self._key(self._pairs.a, self._pairs.b), self._key(saved["a"], saved["b"]))
         slot = self._pairs.start[pair] + saved["node"]
         self._pairs.touching[pair] = True
-        for name in ("face", "k", "rest", "shear"):
+        for name in Slots._fields:
             getattr(self._slots, name)[slot] = saved[name]
         self.dashpot, self.friction, self.driving = saved["sums"].tolist()
         self._read = None

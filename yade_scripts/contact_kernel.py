@@ -12,7 +12,7 @@ from numba import njit
 
 from yade_scripts.contact_edges import pair_scratch
 from yade_scripts.contact_search import closing_bound, cross, planes_seen_from, scan, separation
-from yade_scripts.contact_springs import apply, let_go, set_dashpots
+from yade_scripts.contact_springs import Mode, apply, set_dashpots
 
 CROSSING = 0.5
 """Overlap of crossing edges over that of faces below which nodes that touch leave the contact to the edges as well."""
@@ -62,8 +62,9 @@ def contact_forces(shapes, bodies, law, pairs, slots, x, v, R, dt, last_dt, rows
             apart = max(apart, parted)
         pairs.fresh[p], pairs.touching[p] = False, count > first
         if count > first:
-            set_dashpots(bodies, law, a, b, R, rows, first, count, scratch)
-            lost += apply(slots, x, v, R, dt, rows, first, count, F, scratch)
+            yields, K = set_dashpots(bodies, law, a, b, R, rows, first, count, scratch)
+            mode = Mode(law.zeta, np.sqrt(yields * K))
+            lost += apply(slots, v, R, dt, last_dt, mode, rows, first, count, F, scratch)
         pairs.calm[p] = apart if count == first else 0.0
     return count, lost
 
@@ -81,10 +82,13 @@ def carry_slots(old_pairs, old, new_index, old_index, start, new, shear):
             new.k[to] = old.k[source]
             new.rest[to] = old.rest[source]
             new.shear[to] = old.shear[source]
+            new.push[to] = old.push[source]
+            new.speed[to] = old.speed[source]
     lost = 0.0
     for q in range(len(kept)):
         if not kept[q]:
             for s in range(old_pairs.start[q], old_pairs.start[q + 1]):
                 if old.face[s] >= 0:
-                    lost += let_go(old.face, old.k, old.rest, old.shear, s, old.rest[s], shear)
+                    held = old.shear[s, 0] ** 2 + old.shear[s, 1] ** 2 + old.shear[s, 2] ** 2
+                    lost += 0.5 * held / (shear * old.k[s])
     return lost

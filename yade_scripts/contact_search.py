@@ -8,16 +8,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from yade_scripts.contact_arrays import BEGINS
 from yade_scripts.contact_edges import crossing, find_crossing
-from yade_scripts.contact_springs import let_go, slip, stiffness_together
+from yade_scripts.contact_springs import ARRIVED, let_go, stiffness_together, way_of
 from yade_scripts.jit import inner
 
 ALIGNED = 0.02
 """Least cosine between a face and the opposite of one that holds the node: others cannot be what it ran into."""
 SHALLOW = 2.0
 """Depth in margins up to which a node beside a face counts as on it."""
-ARRIVED = 1.5
-"""Depth in paths of one substep up to which a node counts as having come through the face."""
 
 
 @inner
@@ -92,7 +91,7 @@ def scan(
     """Contacts of the nodes of a with the faces of b; contacts that ended leave their springs' energy in `lost`.
 
     Most nodes are outside the plane `nearest`, so it is asked first."""
-    begin, base = shapes.node_start[a], shapes.face_start[b]
+    begin, base, way = shapes.node_start[a], shapes.face_start[b], scratch[6:8]
     for i in range(begin, shapes.node_start[a + 1]):
         s = slot + i - begin
         xi0, xi1, xi2 = shapes.node[i, 0], shapes.node[i, 1], shapes.node[i, 2]
@@ -105,7 +104,8 @@ def scan(
         if g >= 0:
             depth = _behind(planes, g, xi0, xi1, xi2)
             if depth <= 0.0 or smallest < -margin:
-                lost += let_go(slots.face, slots.k, slots.rest, slots.shear, s, depth, shear)
+                way_of(v, R, x, a, b, xi0, xi1, xi2, planes[g], last_dt, scratch, way)
+                lost += let_go(slots, s, shear, depth, way, R, b)
                 continue
         elif smallest < -margin:
             continue
@@ -119,8 +119,9 @@ def scan(
             slots.face[s] = base + g
             slots.k[s] = stiffness_together(bodies.stiffness[a], bodies.stiffness[b]) / shapes.face_nodes[own]
             slots.shear[s, 0] = slots.shear[s, 1] = slots.shear[s, 2] = 0.0
-            closing = 0.0 if fresh else _closing_speed(v, R, x, a, b, xi0, xi1, xi2, planes[g], scratch)
-            slots.rest[s] = 0.0 if fresh else max(0.0, depth - ARRIVED * last_dt * max(closing, 0.0))
+            slots.push[s] = BEGINS
+            way_of(v, R, x, a, b, xi0, xi1, xi2, planes[g], last_dt, scratch, way)
+            slots.rest[s] = 0.0 if fresh else max(0.0, depth - ARRIVED * max(way[1, 0], 0.0))
         slots.rest[s] = min(slots.rest[s], depth)
         _write_row(rows, count, a, b, s, planes[g], depth, xi0, xi1, xi2, x, R)
         rows.depth[count], rows.kn[count] = depth - slots.rest[s], slots.k[s]
@@ -133,23 +134,25 @@ def cross(
     shapes, bodies, shear, slots, s, fresh, a, b, deepest, x, v, R, last_dt, rows, count, lost, scratch
 ):  # fmt: skip
     """Contact of an edge of a with one of b, known or new; the third result parts the blocks if it is positive [m]."""
-    plane, xi = scratch[5], scratch[6]
+    plane, xi, way = scratch[4], scratch[5], scratch[6:8]
     known = slots.face[s] >= 0
     if not known:
         slots.face[s], parted = find_crossing(shapes, a, b, x, R, deepest, scratch)
         if slots.face[s] < 0:
             return count, lost, parted
-    depth = crossing(shapes, a, b, slots.face[s], x, R, plane, xi, scratch)
-    if depth <= 0.0:
+    depth, meet = crossing(shapes, a, b, slots.face[s], x, R, plane, xi, scratch)
+    if not meet or depth <= 0.0:
         if known:
-            lost += let_go(slots.face, slots.k, slots.rest, slots.shear, s, depth, shear)
+            way_of(v, R, x, a, b, xi[0], xi[1], xi[2], plane, last_dt, scratch, way)
+            lost += let_go(slots, s, shear, depth, way, R, b)
         slots.face[s] = -1
         return count, lost, -1.0
     if not known:
         slots.k[s] = stiffness_together(bodies.stiffness[a], bodies.stiffness[b])
         slots.shear[s, 0] = slots.shear[s, 1] = slots.shear[s, 2] = 0.0
-        closing = 0.0 if fresh else _closing_speed(v, R, x, a, b, xi[0], xi[1], xi[2], plane, scratch)
-        slots.rest[s] = 0.0 if fresh else max(0.0, depth - ARRIVED * last_dt * max(closing, 0.0))
+        slots.push[s] = BEGINS
+        way_of(v, R, x, a, b, xi[0], xi[1], xi[2], plane, last_dt, scratch, way)
+        slots.rest[s] = 0.0 if fresh else max(0.0, depth - ARRIVED * max(way[1, 0], 0.0))
     slots.rest[s] = min(slots.rest[s], depth)
     _write_row(rows, count, a, b, s, plane, depth, xi[0], xi[1], xi[2], x, R)
     rows.depth[count], rows.kn[count] = depth - slots.rest[s], slots.k[s]
@@ -181,19 +184,6 @@ def _entered(of_start, of, normal, i, xi0, xi1, xi2, planes, faces, smallest, ma
     if best <= 0.0 or (smallest < 0.0 and best > SHALLOW * margin):
         return -1, -1
     return face, own
-
-
-@inner
-def _closing_speed(v, R, x, a, b, xi0, xi1, xi2, plane, scratch):
-    """Speed of the point ξ of a into a face of b, whose normal in the frame of a is plane[:3] [m/s]; scratch (2, 3)."""
-    arm, point, speed = scratch[0], scratch[1], 0.0
-    for k in range(3):
-        arm[k] = R[a, k, 0] * xi0 + R[a, k, 1] * xi1 + R[a, k, 2] * xi2
-        point[k] = x[a, k] + arm[k] - x[b, k]
-    w = slip(v, a, b, arm, point)
-    for k in range(3):
-        speed -= w[k] * (R[a, k, 0] * plane[0] + R[a, k, 1] * plane[1] + R[a, k, 2] * plane[2])
-    return speed
 
 
 @inner

@@ -20,7 +20,8 @@ class Contacts:
     """c node contacts. a, b (c,) rows · point (c, 3) [m] · normal (c, 3) from a to b
 
     depth (c,) [m] · kn, ks [N/m] · cn, cs [N s/m], cs zero while it slides · mu · normal_force (with dashpot),
-    shear_force (without) (c, 3) [N] on b. a is the block of the node, b that of the face or -1 for a fixed plane.
+    shear_force (without) (c, 3) [N] on b · shear_energy (c,) [J], half a substep ago. a is the block of the node, b
+    that of the face or -1 for a fixed plane.
     """
 
     a: Array
@@ -35,6 +36,7 @@ class Contacts:
     mu: Array
     normal_force: Array
     shear_force: Array
+    shear_energy: Array
 
     def __len__(self) -> int:
         return len(self.a)
@@ -94,7 +96,7 @@ def contacts_of_rows(rows: Rows, count: int, n: int) -> Contacts:
     normal_force = np.einsum("ci,ci->c", r.force, r.normal)
     return Contacts(
         r.a, np.where(on_face, r.b, -1), r.point, -r.normal, r.depth, r.kn, r.kt, r.cn, r.ct, r.mu,
-        -normal_force[:, None] * r.normal, -r.shear,
+        -normal_force[:, None] * r.normal, -r.shear, r.held,
     )  # fmt: skip
 
 

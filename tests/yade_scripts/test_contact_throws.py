@@ -1,7 +1,8 @@
 """Random blocks thrown at each other: contacts conserve momentum and never give energy; edges that cross are held."""
 
 import numpy as np
-from hypothesis import given, settings
+import pytest
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
@@ -40,12 +41,14 @@ def angular_momentum(s):
 
 
 @settings(max_examples=6, deadline=None)
+@example(61, 1.0, 0.0)  # edges that cross for one substep, then a node that leaves past an edge
+@example(116, 1.0, 0.5)  # sliding until the contact ends
 @given(st.integers(0, 10_000), st.sampled_from([1.0, 0.8, 0.3]), st.sampled_from([0.0, 0.5, 1.5]))
 def test_blocks_thrown_at_each_other(seed, e, friction):
-    """Momentum to round-off. Energy in the frame of the centre of mass never rises: by 1e-3 of its start, and by the
-    (Δt ω)²/4 = 1 % that begin and end of a contact within a substep may be off where e = 1 takes none. Angular
+    """Momentum to round-off. Energy in the frame of the centre of mass never rises: by 1e-3 of its start, and by 0.5 %
+    where e = 1 takes none. What springs, dashpots and friction account for closes within 0.5 % at every time. Angular
     momentum to the second order of the free rotation in the substep."""
-    gain = 0.01 if e == 1.0 else 1e-3
+    gain = 5e-3 if e == 1.0 else 1e-3
     random = np.random.default_rng(seed)
     blocks = [random_block("a", random, -1.0), random_block("b", random, 1.0)]
     with Structure(blocks, ContactLaw(K, e, friction), gravity=STILL) as s:
@@ -57,6 +60,9 @@ def test_blocks_thrown_at_each_other(seed, e, friction):
         for _ in range(40):
             s.advance(3.0 / closing / 40)
             energies = s.energies()
-            assert energies["kinetic"] + energies["contact_stored"] - common < (1.0 + gain) * start
+            held = energies["kinetic"] + energies["contact_stored"] - common
+            assert held < (1.0 + gain) * start
+            assert held + energies["dashpot"] + energies["friction"] == pytest.approx(start, rel=5e-3)
+            assert energies["friction"] > -5e-3 * start
         assert np.abs(s.mass @ s.velocity()[:, :3] - P).max() < 1e-12 * size
         assert np.abs(angular_momentum(s) - L).max() < 1e-3 * size
