@@ -4,7 +4,8 @@ Inflow: u and the level are given.  On its nodes u = u_in (all components) and �
 
     q_i = -∮_wet N_i u·n dA,                                                                    (1)
 
-n outward, joins the mass balance of the pressure, the conservative volume and the ledger.
+n outward, joins the mass balance of the pressure, the conservative volume and the ledger.  Where a solid stands in the
+side, the integral is over what it leaves open: the faces that its cell's tetrahedra (`fans.py`) have there.
 Sea: φ = z - level on its nodes and there
 
     p = ρ g (level - z) - ½ ρ min(u·n, 0)²                                                     (2)
@@ -22,6 +23,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numba import njit
 
+ON_FACE = 1e-9
+"""Hat value below which a corner of a tetrahedron lies on the face of its cell."""
+
 
 @dataclass(frozen=True)
 class Flow:
@@ -36,12 +40,17 @@ class Side:
     """A part of the boundary with its nodes on a domain.
 
     chosen: face normals (B, 3), centres (B, 3) [m] → (B,) bool · flow: Flow, or None for a sea · level(time) [m] ·
-    faces (F, 3), area (F, 3) [m²] outward · nodes (n,), place (n, 3) [m], normal (n, 3) outward."""
+    cell (F,) of each face, corner (F,) of the cell opposite to it, faces (F, 3) its nodes; on a domain a face that a
+    solid cuts is there as its open triangles: hats (F, 3, 3), values at each corner (row) of the hats of the nodes, and
+    area (F, 3) [m²] outward · nodes (n,), place (n, 3) [m], normal (n, 3) outward."""
 
     chosen: Callable
     flow: Flow | None
     level: Callable
+    cell: np.ndarray
+    corner: np.ndarray
     faces: np.ndarray
+    hats: np.ndarray
     area: np.ndarray
     nodes: np.ndarray
     place: np.ndarray
@@ -58,24 +67,42 @@ class Side:
         normal = np.zeros((len(nodes), 3))
         np.add.at(normal, row.reshape(faces.shape), area[there][:, None])
         normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        cell = mesh.boundary_cell[there]
+        beside = (mesh.cells[cell][:, :, None] == faces[:, None, :]).any(axis=2)
         return cls(
-            chosen, flow, flow.level if flow else level, faces, area[there], nodes, mesh.nodes[nodes], normal
+            chosen,
+            flow,
+            flow.level if flow else level,
+            cell,
+            np.argmin(beside, axis=1),
+            mesh.cells[cell][beside].reshape(-1, 3),
+            np.broadcast_to(np.eye(3), (len(cell), 3, 3)),
+            area[there],
+            nodes,
+            mesh.nodes[nodes],
+            normal,
         )
 
-    def on_copies(self, first, active) -> Side:
-        """The same side where first (N_mesh,) is the first copy of each background node, -1 none, and active (N,)."""
-        faces = first[self.faces]
-        kept = (faces >= 0).all(axis=1)
-        kept[kept] = active[faces[kept]].all(axis=1)
-        nodes = first[self.nodes]
-        there = nodes >= 0
+    def on_domain(self, domain, active) -> Side:
+        """The same side on a domain: its own copies of the nodes, and what is open of the faces; active (N,) bool."""
+        row = np.full(max(domain.parent_node.max(initial=-1), self.nodes.max(initial=-1)) + 1, -1)
+        row[self.nodes] = np.arange(len(self.nodes))
+        row = row[domain.parent_node]
+        nodes = np.flatnonzero(row >= 0)
+        face, element, hats, share = _open_triangles(domain, self.cell, self.corner)
+        corners = beside_corner(self.corner[face])
+        faces = np.take_along_axis(domain.cells[element], corners, axis=1)
+        kept = active[faces].all(axis=1)
         return replace(
             self,
+            cell=self.cell[face[kept]],
+            corner=self.corner[face[kept]],
             faces=faces[kept],
-            area=self.area[kept],
-            nodes=nodes[there],
-            place=self.place[there],
-            normal=self.normal[there],
+            hats=hats[kept],
+            area=self.area[face[kept]] * share[kept, None],
+            nodes=nodes,
+            place=self.place[row[nodes]],
+            normal=self.normal[row[nodes]],
         )
 
     @property
@@ -103,10 +130,52 @@ class Side:
     def rate(self, phi, u):
         """q (N,) [m³/s] of equation (1): what enters at each node; phi (N,), u (N, 3) [m/s]."""
         q = np.zeros(len(phi))
-        share = wet_shares(phi[self.faces])
+        wet = wet_shares(np.einsum("fca,fa->fc", self.hats, phi[self.faces]))
+        share = np.einsum("fca,fc->fa", self.hats, wet)
         inward = -np.einsum("fak,fk->fa", u[self.faces], self.area)
         np.add.at(q, self.faces, share * inward)
         return q
+
+
+def beside_corner(corner):
+    """The three corners (F, 3) of a cell beside corner (F,), in order."""
+    every = np.broadcast_to(np.arange(4), (len(corner), 4))
+    return every[every != corner[:, None]].reshape(-1, 3)
+
+
+def _open_triangles(domain, cell, corner):
+    """Faces opposite to corner (F,) of background cells (F,) as triangles in the fluid: number (n,) of the face,
+    element (n,) of the domain, hats (n, 3, 3), share (n,) of the area of the face; a whole face is one triangle."""
+    low = np.searchsorted(domain.parent_cell, cell, "left")
+    count = np.searchsorted(domain.parent_cell, cell, "right") - low
+    face = np.repeat(np.arange(len(cell)), count)
+    element = np.repeat(low - np.concatenate([[0], np.cumsum(count)[:-1]]), count) + np.arange(len(face))
+    cut = domain.is_cut[element]
+    whole = (face[~cut], element[~cut], np.broadcast_to(np.eye(3), (int((~cut).sum()), 3, 3)))
+    parts = [(*whole, np.ones(len(whole[0])))]
+    if cut.any():
+        parts.append(_on_faces(domain, face[cut], element[cut], corner[face[cut]]))
+    joined = [np.concatenate(arrays) for arrays in zip(*parts)]
+    order = np.argsort(joined[0], kind="stable")
+    return tuple(array[order] for array in joined)
+
+
+def _on_faces(domain, face, element, corner):
+    """The same of cut elements: the faces of their tetrahedra on which the hat of the corner is zero."""
+    count = domain.fan_start[element + 1] - domain.fan_start[element]
+    which = np.repeat(np.arange(len(element)), count)
+    first = np.repeat(domain.fan_start[element] - np.concatenate([[0], np.cumsum(count)[:-1]]), count)
+    corners = domain.fan_corners[
+        first + np.arange(len(which))
+    ]  # (T, corner of the tetrahedron, hat of the cell)
+    off = np.abs(np.take_along_axis(corners, corner[which][:, None, None], axis=2)[:, :, 0]) > ON_FACE
+    there = off.sum(axis=1) == 1
+    which, corners = which[there], corners[there]
+    of_tet, of_cell = beside_corner(np.argmax(off[there], axis=1)), beside_corner(corner[which])
+    hats = np.take_along_axis(
+        np.take_along_axis(corners, of_tet[:, :, None], axis=1), of_cell[:, None, :], axis=2
+    )
+    return face[which], element[which], hats, np.abs(np.linalg.det(hats))
 
 
 @njit(cache=True)
@@ -145,11 +214,9 @@ class Sides:
         self.now = self.every
         self.entered = self.left = self.energy = 0.0
 
-    def place(self, parent_node, n_background: int, active) -> None:
-        """Follow the nodes of a domain: parent_node (N,), active (N,) bool."""
-        first = np.full(n_background, -1)
-        first[parent_node[::-1]] = np.arange(len(parent_node))[::-1]
-        self.now = tuple(side.on_copies(first, active) for side in self.every)
+    def place(self, domain, active) -> None:
+        """Follow a domain; active (N,) bool: its nodes with fluid around."""
+        self.now = tuple(side.on_domain(domain, active) for side in self.every)
 
     def hold(self, u, time: float) -> None:
         """Velocities of the inflows, in place."""

@@ -205,11 +205,11 @@ def _through(water, kept):
 
 
 def _pressure_on_sides(water, p):
-    """∮ p [n; r × n] dA (6,) over inflows and seas, n outward; whole faces also where a solid cuts them."""
+    """∮ p [n; r × n] dA (6,) over what is open of inflows and seas, n outward."""
     total = np.zeros(6)
     for side in water.sides.now if water.sides is not None else ():
-        place = water.topology.nodes[side.faces] - water.reference
-        value = p[side.faces]
+        place = np.einsum("fca,fak->fck", side.hats, water.topology.nodes[side.faces]) - water.reference
+        value = np.einsum("fca,fa->fc", side.hats, p[side.faces])
         mean, middle = value.sum(axis=1) / 12.0, place.sum(axis=1)
         first = np.einsum("fa,fak->fk", value, place) / 12.0 + mean[:, None] * middle
         total[:3] += (value.mean(axis=1)[:, None] * side.area).sum(axis=0)

@@ -279,7 +279,7 @@ class Water:
         self.on_sides = self._on_sides[domain.parent_node]
         """(N,) bool: nodes on the sides of the tank."""
         if self.sides is not None:
-            self.sides.place(domain.parent_node, len(self.mesh.nodes), self.topology.active)
+            self.sides.place(domain, self.topology.active)
         self._domain_is_new = True
         self._graph = None
 

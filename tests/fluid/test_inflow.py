@@ -49,6 +49,27 @@ def test_still_water_beside_a_sea_of_its_level_stays(level):
     assert water.volume() == pytest.approx(start, abs=1e-9)
 
 
+@pytest.mark.parametrize("covers", ["single", "multiple"])
+@pytest.mark.parametrize(("foot", "width"), [(0.0, 2.0), (-0.03, 2.0), (-0.2, 0.15), (-0.2, 2.0)])
+def test_what_comes_in_comes_through_what_solids_leave_open(covers, foot, width):
+    """A sill of 0.37 m that stands in the side, also in part of its width or with its foot in cells: water of 0.6 m
+    enters above and beside it only. Through its faces it went into cells without room, at 1e21 Pa."""
+    sill = ConvexBodies.boxes(
+        np.array([[0.0, 0.0, foot + (0.37 - foot) / 2]]), np.array([[0.5, width, 0.37 - foot]])
+    )
+    mesh = box_mesh(np.zeros(3), [1, 0.2, 1], 0.1)
+    side = Side.of(mesh, left, waves.steady([1, 0, 0], 0.6, 0.5))
+    domain = cut_domain(mesh, sill, covers)
+    water = Water(mesh, domain, lambda x: x[:, 2] - 0.6, WaterParameters(), sides=Sides([side]))
+    (side,) = water.sides.now
+    covered = min(0.2, width / 2) * 0.37
+    u = np.tile([0.5, 0.0, 0.0], (len(water.velocity), 1))
+    rate = side.rate(water.topology.nodes[:, 2] - 0.6, u)
+    assert rate.sum() == pytest.approx(0.5 * (0.2 * 0.6 - covered), rel=1e-9)
+    assert np.abs(rate[water.topology.node_volume == 0.0]).max(initial=0.0) == 0.0
+    assert np.linalg.norm(side.area.sum(axis=0)) == pytest.approx(0.2 - covered, rel=1e-9)
+
+
 def test_a_sea_gives_water_that_comes_in_its_speed():
     """What comes in was at rest: Bernoulli takes half ρ u² off the weight of the water above, and it comes in straight;
     what goes out meets the weight alone."""
