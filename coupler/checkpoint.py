@@ -13,8 +13,9 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+from pydantic import BaseModel
 
-from coupler.array_file import read_arrays, write_arrays
+from coupler.array_file import Damaged, read_arrays, write_arrays
 from coupler.errors import ExitCode, SurgebreakError
 from coupler.fingerprint import differences, program, scene_parts
 from coupler.schedule import Schedule, next_multiple
@@ -44,7 +45,15 @@ class Checkpoint:
     def read(cls, path: Path) -> Checkpoint:
         """Raises Damaged."""
         arrays, text = read_arrays(path)
-        return cls(path, arrays, json.loads(text))
+        try:
+            about = json.loads(text)
+            _About.model_validate(about)
+            missing = [name for name in ALWAYS if name not in arrays]
+            if missing:
+                raise ValueError(f"no {missing[0]}")
+        except (ValueError, RecursionError) as error:
+            raise Damaged(f"{path} does not hold what a run writes: {str(error).splitlines()[0]}") from error
+        return cls(path, arrays, about)
 
     def part(self, name: str) -> dict[str, np.ndarray]:
         """Arrays of one part: coupling, ledger, water, immersion, structure, recorder."""
@@ -59,6 +68,27 @@ class Checkpoint:
     def schedule(self, end: float) -> Schedule:
         """Outputs of the run, up to another end [s]."""
         return Schedule(*self.about["outputs"], end=end)
+
+
+ALWAYS = ("coupling/time", "recorder/outputs")
+"""Arrays that every checkpoint holds."""
+
+
+class _Figures(BaseModel):
+    steps: int
+    substeps: int
+
+
+class _About(BaseModel):
+    """What the text of a checkpoint says; a file that was edited may have a digest that fits."""
+
+    layout: int
+    case: dict
+    program: dict[str, str]
+    scene: dict[str, str]
+    outputs: tuple[float, int]
+    figures: _Figures
+    cpu_seconds: dict[str, float]
 
 
 class Checkpoints:
@@ -122,6 +152,16 @@ def restore(coupling, checkpoint: Checkpoint) -> None:
         raise OtherScene(
             f"{checkpoint.path} belongs to another scene: {'; '.join(wrong)}. Has a file that the case names changed?"
         )
+    try:
+        _restore_sides(coupling, checkpoint)
+        coupling.restore(checkpoint.part("coupling"))
+        coupling.ledger.restore(checkpoint.part("ledger"))
+        coupling.momentum.restore(checkpoint.part("momentum"))
+    except (LookupError, ValueError, TypeError) as error:
+        raise OtherScene(f"{checkpoint.path} does not hold a state of this scene: {error!r}") from error
+
+
+def _restore_sides(coupling, checkpoint: Checkpoint) -> None:
     if coupling.structure is not None:
         from yade_scripts.structure_state import StructureState
 
@@ -131,14 +171,11 @@ def restore(coupling, checkpoint: Checkpoint) -> None:
 
         coupling.immersion.restore(checkpoint.part("immersion"))
         state.restore(coupling.water, coupling.immersion.domain, checkpoint.part("water"))
-    coupling.restore(checkpoint.part("coupling"))
-    coupling.ledger.restore(checkpoint.part("ledger"))
-    coupling.momentum.restore(checkpoint.part("momentum"))
 
 
 def listed(folder: Path) -> list[Path]:
     """Files of checkpoints, the newest first."""
-    return sorted(folder.glob("[0-9]*.h5"), reverse=True)
+    return sorted((path for path in folder.glob("[0-9]*.h5") if path.is_file()), reverse=True)
 
 
 def _plain(value: object) -> object:

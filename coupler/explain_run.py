@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from coupler.process import was_killed
-from coupler.run_directory import read_summary
+from coupler.run_summary import read_summary
 
 NEEDS = {
     "water": ("fluid",),

@@ -6,6 +6,8 @@ happens is a mistake in the program: its traceback belongs to the log (or to sta
 
 from __future__ import annotations
 
+import errno
+import resource
 import sys
 import traceback
 from dataclasses import dataclass
@@ -15,6 +17,8 @@ from coupler import terminal
 from coupler.errors import FULL, BadCase, ExitCode
 
 OURS = ("coupler", "fluid", "yade_scripts")
+NO_MEMORY = ("cannot allocate memory", "failed to map segment", "not enough memory")
+"""What the loader of libraries says when there is no room for one, in small letters."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +42,8 @@ class Failure:
             )
         if isinstance(error, OSError) and error.errno in FULL:
             return cls(ExitCode.STOPPED, _full(error))
+        if out_of_memory(error):
+            return cls(ExitCode.STOPPED, _memory(error))
         code = getattr(error, "exit_code", None)
         if code is None and type(error).__module__.split(".")[0] in OURS:
             code = ExitCode.DIVERGED if isinstance(error, ArithmeticError) else ExitCode.CRASHED
@@ -54,6 +60,32 @@ def _full(error: OSError) -> str:
     return (
         f"{place}no room for the results ({error.strerror or error}); what was written before is readable; "
         "free some space, give --output a larger disk, or raise time.output_every"
+    )
+
+
+def out_of_memory(error: BaseException | None) -> bool:
+    """Whether an error, or what it came from, is a lack of memory: libraries have words of their own for it."""
+    if error is None:
+        return False
+    if isinstance(error, MemoryError) or getattr(error, "errno", None) == errno.ENOMEM:
+        return True
+    if isinstance(error, ImportError | OSError):
+        library = any(words in str(error).lower() for words in NO_MEMORY)
+        return library or out_of_memory(error.__cause__ or error.__context__)
+    return out_of_memory(error.__cause__)
+
+
+def _memory(error: BaseException) -> str:
+    most, _ = resource.getrlimit(resource.RLIMIT_AS)
+    limit = (
+        "" if most == resource.RLIM_INFINITY else f"; this process may take {most / 1e6:.0f} MB (ulimit -v)"
+    )
+    while (inner := error.__cause__ or error.__context__) and not isinstance(error, MemoryError):
+        error = inner
+    return (
+        f"there is not enough memory ({str(error) or type(error).__name__}){limit}. What was written before is "
+        "readable; `surgebreak check CASE` tells what a case needs: use a larger tank.cell, fewer blocks, or another "
+        "machine"
     )
 
 

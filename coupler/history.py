@@ -14,7 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
-from coupler.errors import FULL, SurgebreakError
+from coupler.errors import FULL, ExitCode, SurgebreakError
+from coupler.paths import BadPath, read_text
 from coupler.storage import DiskFull, NotFinite, WrongShape
 
 
@@ -27,6 +28,16 @@ class Column:
     meaning: str
 
 
+class BadTable(SurgebreakError):
+    """A file that is no table of a run, or was changed since; the message names it."""
+
+    exit_code = ExitCode.BAD_CASE
+
+
+MOST_BYTES = 4_000_000_000
+"""Size of a table that is read: millions of steps."""
+
+
 @dataclass(frozen=True)
 class History:
     """A table read back: columns as declared, values by name (float (rows,), NaN where empty; text as it stands)."""
@@ -36,6 +47,9 @@ class History:
     values: dict
 
     def __getitem__(self, name):
+        """The values of a column. Raises BadTable where there is none of that name."""
+        if name not in self.values:
+            raise BadTable(f"the table '{self.title}' has no column '{name}'")
         return self.values[name]
 
 
@@ -176,13 +190,32 @@ def number(value):
 
 
 def read_history(path):
-    """Read a table written by HistoryTable or write_cracks, also while it grows; an unfinished last row is left out."""
-    whole = Path(path).read_text(encoding="utf-8").rpartition("\n")[0].splitlines()
-    about = [text[2:] for text in whole if text.startswith("# ")]
-    records = list(csv.reader(text for text in whole if not text.startswith("#")))
-    columns = tuple(_declared(text) for text in about[1:])
-    cells = list(zip(*records[1:])) or [()] * len(columns)
-    return History(about[0], columns, {c.name: _values(c, values) for c, values in zip(columns, cells)})
+    """Read a table written by HistoryTable or write_cracks, also while it grows; an unfinished last row is left out.
+
+    Raises BadTable for what is no such table."""
+    try:
+        whole = read_text(Path(path), most=MOST_BYTES).rpartition("\n")[0].splitlines()
+        about = [text[2:] for text in whole if text.startswith("# ")]
+        records = list(csv.reader(text for text in whole if not text.startswith("#")))
+        columns = tuple(_declared(text) for text in about[1:])
+        _check_whole(columns, records)
+        cells = list(zip(*records[1:])) or [()] * len(columns)
+        values = {c.name: _values(c, given) for c, given in zip(columns, cells)}
+    except BadPath as error:
+        raise BadTable(f"{path}: {error}") from error
+    except (ValueError, csv.Error) as error:
+        raise BadTable(f"{path}: not a table as a run writes it: {error}") from error
+    return History(about[0], columns, values)
+
+
+def _check_whole(columns, records):
+    """The line of names says what the head declares, each once, and every row has a value for each."""
+    names = [c.name for c in columns]
+    if not records or records[0] != names or len(set(names)) < len(names):
+        raise ValueError("its columns are not those that its head declares")
+    bad = next((k for k, row in enumerate(records[1:]) if len(row) != len(names)), None)
+    if bad is not None:
+        raise ValueError(f"row {bad} has {len(records[bad + 1])} values, there are {len(names)} columns")
 
 
 def _declared(text):

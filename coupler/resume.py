@@ -19,7 +19,9 @@ from coupler.case_file import CaseFile, load
 from coupler.checkpoint import FOLDER, LAYOUT, Checkpoint, listed
 from coupler.errors import ExitCode, SurgebreakError
 from coupler.fingerprint import FREE, case_differences, differences, is_free, program
-from coupler.run_directory import RunDirectory, read_summary
+from coupler.run_directory import RunDirectory
+from coupler.run_lock import RunLock
+from coupler.run_summary import read_summary
 from coupler.stop import FILE_NAME
 
 
@@ -44,12 +46,14 @@ def prepare(
     """Find where the run in the directory `path` can go on, and open the directory again.
 
     overrides: KEY=VALUE, of names in `FREE` only · any_version: go on with another version of the program too.
-    Raises NoRun, CannotResume, BadCase; nothing was changed then.
+    Raises NoRun, Busy, CannotResume, BadCase; nothing was changed then.
     """
     summary = read_summary(path)
     _check_idle(path, summary)
     overrides = tuple(overrides)
     _check_free(overrides)
+    lock = _locked(path)
+    summary = read_summary(path)  # of the process that held it until now
     checkpoint, unusable = _newest(path)
     for line in unusable:
         tell(f"note: {line}")
@@ -65,7 +69,17 @@ def prepare(
     tell(
         f"going on from {checkpoint.path}, t = {checkpoint.time:.6g} s, step {checkpoint.about['figures']['steps']}"
     )
-    return Resumption(file, RunDirectory.reopen(path, file, again), checkpoint)
+    return Resumption(file, RunDirectory.reopen(path, file, again, lock), checkpoint)
+
+
+def _locked(path: Path) -> RunLock:
+    """The lock of the directory. Raises Busy, and CannotResume where nothing may be written."""
+    try:
+        return RunLock(path)
+    except OSError as error:
+        raise CannotResume(
+            f"{path}: a run goes on in its own directory, and here nothing can be written ({error.strerror})"
+        ) from error
 
 
 def _clear(path: Path, checkpoint: Checkpoint) -> None:
@@ -80,7 +94,7 @@ def _clear(path: Path, checkpoint: Checkpoint) -> None:
 
 def _check_idle(path: Path, summary: dict) -> None:
     process = summary["process"]
-    here = summary["machine"]["host"] == platform.node()
+    here = summary["machine"].get("host") == platform.node()
     if summary["status"] == "running" and here and process != os.getpid() and _is_ours(process):
         raise CannotResume(
             f"{path} is still running (process {process}); end it with Ctrl-C or `touch {path / FILE_NAME}` first"
@@ -137,7 +151,7 @@ def _wrong_with(path: Path, checkpoint: Checkpoint) -> str:
     for name, place in kept.items():
         if name.startswith("table_"):
             table = path / "history" / f"{name.removeprefix('table_')}.csv"
-            if not table.exists() or table.stat().st_size < place[1]:
+            if not table.is_file() or table.stat().st_size < place[1]:
                 return f"{table} ends before it"
     for part, name in (("water", "fields.vtkhdf"), ("structure", "blocks.vtkhdf")):
         if checkpoint.part(part):
@@ -150,7 +164,7 @@ def _wrong_with(path: Path, checkpoint: Checkpoint) -> str:
 def _steps_in(path: Path) -> int:
     try:
         return len(vtkhdf.read_times(path))
-    except (OSError, KeyError):
+    except vtkhdf.UNREADABLE:
         return 0
 
 

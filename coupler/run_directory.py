@@ -24,8 +24,10 @@ from types import TracebackType
 from coupler import provenance
 from coupler.case import effective, modules
 from coupler.case_file import CaseFile
-from coupler.errors import FULL, CannotWrite, ExitCode, NoRun, RunDirectoryExists
+from coupler.errors import FULL, CannotWrite, ExitCode, RunDirectoryExists
 from coupler.failures import Failure
+from coupler.run_lock import RunLock
+from coupler.run_summary import read_summary
 
 RESERVE = 256 * 1024
 """Bytes kept aside so that the reason can still be written when the disk is full."""
@@ -34,8 +36,8 @@ RESERVE = 256 * 1024
 class RunDirectory:
     """A context: leaving it writes how the run ended, whatever the reason."""
 
-    def __init__(self, path: Path, summary: dict):
-        self.path, self.summary = path, summary
+    def __init__(self, path: Path, summary: dict, lock: RunLock):
+        self.path, self.summary, self.lock = path, summary, lock
         self.finished = False
         self._clock = (time.monotonic(), time.process_time())
         self._before = (0.0, 0.0)
@@ -50,30 +52,39 @@ class RunDirectory:
         """
         content = effective(file.case)
         path = _make(output, file.directory / "runs", content)
-        run = cls(path, _summary(file, content))
         _claim(path)
+        run = cls(path, _summary(file, content), RunLock(path))
         (path / ".reserve").write_bytes(bytes(RESERVE))
         shutil.copyfile(file.path, path / "case.toml")
         write_json(path / "effective.json", content)
-        run.log(f"surgebreak {provenance.version()}: {' '.join(sys.argv)}")
-        run.save()
+        run.begin()
         return run
 
     @classmethod
-    def reopen(cls, path: Path, file: CaseFile, again: dict) -> RunDirectory:
-        """The directory of a run that goes on: it is running again, and `again` says from where and how."""
+    def reopen(cls, path: Path, file: CaseFile, again: dict, lock: RunLock) -> RunDirectory:
+        """The directory of a run that goes on: it is running again, and `again` says from where and how.
+
+        lock: of that directory, taken before anything in it was read or changed."""
         before = read_summary(path)
         content = effective(file.case)
         now = _summary(file, content)
         now |= {name: before[name] for name in ("started", "case_file", "figures")}
         now["resumed"] = [*before.get("resumed", []), {"at": now_text(), "command": sys.argv, **again}]
-        run = cls(path, now)
+        run = cls(path, now, lock)
         run._before = (before.get("wall_seconds", 0.0), before.get("cpu_seconds", 0.0))
         (path / ".reserve").write_bytes(bytes(RESERVE))
         write_json(path / "effective.json", content)
-        run.log(f"surgebreak {provenance.version()}: {' '.join(sys.argv)}")
-        run.save()
+        run.begin()
         return run
+
+    def begin(self) -> None:
+        """Write the first lines of this process: what was called, and the summary of a run that runs."""
+        self.log(f"surgebreak {provenance.version()}: {' '.join(sys.argv)}")
+        if not self.lock.known:
+            self.log(
+                "note: this file system has no locks; nothing keeps a second process out of the directory"
+            )
+        self.save()
 
     @property
     def log_path(self) -> Path:
@@ -87,7 +98,7 @@ class RunDirectory:
     def log(self, text: str) -> None:
         """Append a line with its time to log.txt."""
         stamp = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
-        with self.log_path.open("a", encoding="utf-8") as stream:
+        with self.log_path.open("a", encoding="utf-8", errors="backslashreplace") as stream:
             stream.write(f"{stamp}  {text}\n")
 
     def record(self, **figures: object) -> None:
@@ -116,6 +127,7 @@ class RunDirectory:
         }
         self.save()
         self.log(f"{code.name.lower().replace('_', ' ')}: {reason}")
+        self.lock.release()
 
     def __enter__(self) -> RunDirectory:
         return self
@@ -133,12 +145,14 @@ class RunDirectory:
         except OSError as second:
             if second.errno not in FULL:
                 raise
+        finally:
+            self.lock.release()
 
 
 def write_json(path: Path, content: object) -> None:
     """Write to a neighbour first and rename it, which either happens as a whole or not at all."""
     part = path.with_name(f".{path.name}.part")
-    with part.open("w", encoding="utf-8") as stream:
+    with part.open("w", encoding="utf-8", errors="backslashreplace") as stream:
         json.dump(_plain(content), stream, indent=1, ensure_ascii=False, allow_nan=False)
         stream.write("\n")
         stream.flush()
@@ -222,18 +236,6 @@ def _summary(file: CaseFile, content: dict) -> dict:
         "figures": {},
         "case": content,
     }
-
-
-def read_summary(path: Path) -> dict:
-    """What run.json in a run directory says.  Raises NoRun."""
-    try:
-        return json.loads((path / "run.json").read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        raise NoRun(
-            f"{path}: not the directory of a run, there is no run.json; runs are in runs/<time>-<hash> beside the case"
-        ) from error
-    except (OSError, ValueError) as error:
-        raise NoRun(f"{path}: not the directory of a run (run.json: {error})") from error
 
 
 def now_text() -> str:

@@ -1,30 +1,42 @@
-"""The user's wish to stop: Ctrl-C, or a file named `stop` in the run directory.
+"""The user's wish to stop: Ctrl-C, the end of the session, or a file named `stop` in the run directory.
 
-The loop asks once a step; the step under way ends properly and is written. A second Ctrl-C stops at once.
+The loop asks once a step; the step under way ends properly and is written. A second Ctrl-C stops at once. When the
+terminal closes (SIGHUP) there is nobody to tell any more: what is printed goes nowhere from then on.
 """
 
 from __future__ import annotations
 
+import contextlib
+import os
 import signal
 import threading
 from pathlib import Path
 
 FILE_NAME = "stop"
+WHO = {
+    signal.SIGINT: "Ctrl-C",
+    signal.SIGTERM: "the system (SIGTERM)",
+    signal.SIGHUP: "the end of its terminal (SIGHUP)",
+}
 
 
 class StopRequest:
-    """A context in which Ctrl-C and SIGTERM ask for an end instead of killing the run."""
+    """A context in which Ctrl-C, SIGTERM and SIGHUP ask for an end instead of killing the run."""
 
-    SIGNALS = (signal.SIGINT, signal.SIGTERM)
+    SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
     def __init__(self, directory: Path):
         self.file = Path(directory) / FILE_NAME
         self._reason: str | None = None
         self._before: dict[int, object] = {}
+        self._terminals: list[int] = []
 
     def __enter__(self) -> StopRequest:
         if threading.current_thread() is threading.main_thread():
             self._before = {number: signal.getsignal(number) for number in self.SIGNALS}
+            if self._before[signal.SIGHUP] == signal.SIG_IGN:  # nohup
+                del self._before[signal.SIGHUP]
+            self._terminals = [handle for handle in (1, 2) if os.isatty(handle)]
             self._arm()
         return self
 
@@ -41,11 +53,20 @@ class StopRequest:
         return self._reason
 
     def _arm(self) -> None:
-        for number in self.SIGNALS:
+        for number in self._before:
             signal.signal(number, self._on_signal)
 
     def _on_signal(self, number: int, frame) -> None:
-        if self._reason is not None:
+        if number == signal.SIGHUP:  # often comes twice, from the terminal and from the shell
+            self._leave_the_terminal()
+        elif self._reason is not None:
             raise KeyboardInterrupt
-        who = "Ctrl-C" if number == signal.SIGINT else "the system (SIGTERM)"
-        self._reason = f"stopped by {who}; all steps until then are written"
+        self._reason = self._reason or f"stopped by {WHO[number]}; all steps until then are written"
+
+    def _leave_the_terminal(self) -> None:
+        """A terminal that is gone refuses what is printed, which would end the run instead of its step."""
+        with contextlib.suppress(OSError):
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            for handle in self._terminals:
+                os.dup2(nowhere, handle)
+            os.close(nowhere)

@@ -163,6 +163,10 @@ def single(array):
     return np.ascontiguousarray(array, dtype=np.float32 if array.dtype.kind == "f" else array.dtype)
 
 
+UNREADABLE = (OSError, KeyError, RuntimeError, AttributeError, TypeError, ValueError, IndexError)
+"""What reading raises of a file that is not what a run writes: torn, another kind of file, a folder."""
+
+
 def read_times(path):
     """Times (steps,) [s] of the complete steps of a file, also while it is being written."""
     with opened(path, "r") as file:

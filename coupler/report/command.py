@@ -8,11 +8,12 @@ from pathlib import Path
 
 from coupler import vtkhdf
 from coupler.errors import NoRun
+from coupler.paths import BadPath, read_text
 from coupler.report import pictures
 from coupler.report.html import document
 from coupler.report.markdown import to_html
 from coupler.report.run_page import run_page
-from coupler.run_directory import read_summary
+from coupler.run_summary import read_summary
 
 NAME = "report.html"
 STILLS = 4
@@ -58,7 +59,10 @@ def stored_times(run: Path) -> list[float]:
     """Times [s] of the stills: STILLS of the stored steps, spread evenly; fewer where fewer are stored."""
     for name in ("fields.vtkhdf", "blocks.vtkhdf"):
         if (run / name).exists():
-            times = vtkhdf.read_times(run / name)
+            try:
+                times = vtkhdf.read_times(run / name)
+            except vtkhdf.UNREADABLE as error:
+                raise NoRun(f"{run / name}: not what a run writes: {error}") from error
             if len(times):
                 last = len(times) - 1
                 return [
@@ -71,7 +75,13 @@ def study_report(study: Path) -> str:
     """The page of a study: what its study.md says, with the figures inside."""
     from coupler.study.page import page
 
-    told = json.loads((study / "study.json").read_text(encoding="utf-8"))
+    try:
+        told = json.loads(read_text(study / "study.json"))
+        title, text = told["title"], page(told)
+    except BadPath as error:
+        raise NoRun(f"{study / 'study.json'}: {error}") from error
+    except (LookupError, ValueError, TypeError, AttributeError, RecursionError) as error:
+        raise NoRun(f"{study / 'study.json'}: not what a study writes: {error!r}") from error
     if not any(study.glob("*.png")) and not pictures.missing():
         pictures.study_figures(study)
-    return document(told["title"], [to_html(page(told), study)])
+    return document(title, [to_html(text, study)])

@@ -11,7 +11,7 @@ from coupler.case_study import Quantity
 from coupler.errors import BadCase, did_you_mean
 from coupler.expected import TAKE
 from coupler.history import read_history
-from coupler.run_directory import read_summary
+from coupler.run_summary import read_summary
 
 Array = np.ndarray
 

@@ -24,7 +24,8 @@ from coupler.errors import BadCase, ExitCode
 from coupler.fingerprint import differences, program
 from coupler.history import read_history
 from coupler.process import environment, trouble
-from coupler.run_directory import read_summary, write_json
+from coupler.run_directory import write_json
+from coupler.run_summary import read_summary
 from coupler.study.plan import Plan, Setting
 
 COMPILED = 0.05

@@ -78,9 +78,9 @@ def patiently(read, *given):
     for left in reversed(range(TRIES)):
         try:
             return read(*given)
-        except (OSError, KeyError, RuntimeError):
+        except vtkhdf.UNREADABLE as error:
             if left == 0:
-                raise
+                raise NothingToShow(f"{given[0]}: not what a run writes: {error}") from error
             clock.sleep(PAUSE)
     raise AssertionError("the last try returns or raises")
 

@@ -6,6 +6,7 @@ A run with time.step_max = h gives the value 2 (1 + h²) at a cost of 1 s/h; wha
 import json
 from pathlib import Path
 
+from coupler.case import Case, effective
 from coupler.case_file import load
 from coupler.errors import ExitCode
 from coupler.history import HistoryTable
@@ -61,6 +62,21 @@ set = ["contact.friction=0"]
 """
 
 
+SUMMARY = {
+    "exit_code": 0,
+    "started": "2026-01-31T12:00:00+00:00",
+    "ended": "2026-01-31T12:01:00+00:00",
+    "process": 1,
+    "command": ["surgebreak"],
+    "case_file": "case.toml",
+    "overrides": [],
+    "modules": {},
+    "versions": {},
+    "machine": {"system": "", "processor": "", "cores": 1, "threads": "1"},
+}
+"""What run.json of any run holds, but for how it ended, its figures and its case."""
+
+
 class FakeProcesses:
     """Stands in for `measure`. calls: settings that were run · broken: steps whose runs fail, with the reason ·
     stop_after: calls after which Ctrl-C is pressed · compiling: CPU seconds that compilation takes in the next run."""
@@ -81,7 +97,7 @@ class FakeProcesses:
         sets = [command[i + 1] for i, word in enumerate(command) if word == "--set"]
         case = load(command[command.index("run") + 1], sets).case
         reason = self.broken.get(case.time.step_max, "")
-        write_run(place, case.time.step_max, case.contact.friction, reason)
+        write_run(place, case, reason)
         compiled = json.dumps({"compile_seconds": self.compiling})
         Path(command[command.index("run") - 1]).write_text(compiled, encoding="utf-8")
         self.compiling = 0.0
@@ -109,8 +125,9 @@ def write_comparison(place: Path) -> None:
     (place / "comparison.json").write_text(json.dumps({"laws": rows}), encoding="utf-8")
 
 
-def write_run(place: Path, h: float, friction: float, reason: str) -> None:
+def write_run(place: Path, case: Case, reason: str) -> None:
     """The files of a run that a study reads."""
+    h, friction = case.time.step_max, case.contact.friction
     (place / "history").mkdir(parents=True)
     with HistoryTable(
         place / "history" / "gauges.csv", [("time", "s", "time"), ("value", "1", "v")]
@@ -128,5 +145,7 @@ def write_run(place: Path, h: float, friction: float, reason: str) -> None:
         "cpu_seconds": {"structure": cost - 0.5, "set-up": 0.75, "other": 0.5},
         "size": {"blocks": 1},
     }
-    summary = {"status": "diverged" if reason else "done", "exit_reason": reason or "reached the end"}
-    (place / "run.json").write_text(json.dumps(summary | {"figures": figures}), encoding="utf-8")
+    ended = {"status": "diverged" if reason else "done", "exit_reason": reason or "reached the end"}
+    (place / "run.json").write_text(
+        json.dumps(SUMMARY | ended | {"figures": figures, "case": effective(case)}), encoding="utf-8"
+    )

@@ -10,12 +10,14 @@ from coupler.errors import NoRun
 from coupler.explain_run import explanation_of_run, not_loaded, shares, skipped
 from coupler.left_out import note_work
 from coupler.observe import JointCounts
+from tests.coupler.fake_runs import SUMMARY
 
 
 def summary(**work):
     """A run of 10 steps in which everything cost 2 s, with the counts a step given."""
-    return {
+    return SUMMARY | {
         "status": "done",
+        "exit_reason": "reached the end",
         "modules": {"water": True, "structure": True, "coupling": True, "viscosity": False},
         "case": {"case": {"title": "made up"}, "coupling": {"passes": 3}},
         "figures": {
