@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from coupler import arithmetic
 from coupler.case import modules
 from coupler.case_checks import remarks
 from coupler.case_file import CaseFile
@@ -35,7 +36,7 @@ def describe(file: CaseFile, tell: Callable[[str], object]) -> None:
     tell(f"{file.path}: {file.case.case.title}")
     tell("on:  " + (", ".join(name for name, on in parts.items() if on) or "nothing"))
     tell("off: " + (", ".join(name for name, on in parts.items() if not on) or "nothing"))
-    for remark in remarks(file.case):
+    for remark in [*remarks(file.case), *filter(None, [arithmetic.remark()])]:
         tell(f"note: {remark}")
 
 

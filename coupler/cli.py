@@ -389,11 +389,11 @@ def test(context: typer.Context) -> None:
 
 
 def one_thread() -> None:
-    """One thread unless the user asks: reproducible, and several spinning pools are far slower."""
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
-        os.environ.setdefault(name, "1")
+    """One thread unless the user asks, one instruction set, and the kernels of the present sources."""
+    from coupler.arithmetic import fix_arithmetic
     from coupler.kernel_cache import use_kernel_cache
 
+    fix_arithmetic()
     use_kernel_cache()
 
 

@@ -8,6 +8,8 @@ import subprocess
 from importlib import metadata
 from pathlib import Path
 
+from coupler.arithmetic import missing
+
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = ("numpy", "scipy", "scikit-fem", "meshio", "h5py", "numba", "pydantic")
 
@@ -36,6 +38,7 @@ def machine() -> dict[str, str | int]:
     return {
         "system": platform.platform(),
         "processor": _processor(),
+        "instructions": "its own" if missing() else os.environ.get("NUMBA_CPU_NAME", "its own"),
         "cores": os.cpu_count() or 1,
         "threads": os.environ.get("OMP_NUM_THREADS", "not set"),
         "host": platform.node(),

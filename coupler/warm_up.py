@@ -9,8 +9,6 @@ from __future__ import annotations
 import tempfile
 from pathlib import Path
 
-from coupler.case_file import load
-
 CASE = """\
 [case]
 title = "warm-up"
@@ -70,6 +68,7 @@ class Silent:
 
 def warm_up() -> None:
     """Run the small case in a temporary directory."""
+    from coupler.case_file import load
     from coupler.run import run
     from coupler.run_directory import RunDirectory
 

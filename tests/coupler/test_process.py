@@ -17,7 +17,7 @@ HERE = "print(__file__)\n"
 def checkout(folder):
     """The least of a checkout that starts a child, with a module that tells where it stands."""
     (folder / "coupler").mkdir(parents=True)
-    for name in ("__init__.py", "process.py", "provenance.py"):
+    for name in ("__init__.py", "arithmetic.py", "process.py", "provenance.py"):
         shutil.copy(ROOT / "coupler" / name, folder / "coupler" / name)
     shutil.copy(ROOT / "pyproject.toml", folder)
     (folder / "coupler" / "here.py").write_text(HERE, encoding="utf-8")

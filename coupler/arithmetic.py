@@ -1,0 +1,60 @@
+"""The same last digits on every processor: one thread, and the instructions of one baseline, x86-64-v3.
+
+NumPy, OpenBLAS and Numba choose their code by the processor they find: with AVX-512 products of matrices, hyperbolic
+functions and sorting of equal numbers come out otherwise than with AVX2, first in the last digit, then in where drops
+and debris go. Here all are told to take what processors since 2013 (Intel) and 2015 (AMD) have. The C library chooses
+between code with and without fused multiply-add, the same on all of these. On an older processor each part takes what
+it finds, and `missing` says what is not there. Only the variables of the process are set, and only those which the
+user has not, so it must happen before numpy or numba is imported; processes that are started later take them over.
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+from collections.abc import MutableMapping
+from pathlib import Path
+
+BASELINE = "x86-64-v3"
+NEEDED = ("avx", "avx2", "bmi1", "bmi2", "f16c", "fma", "abm", "movbe")
+"""The baseline beyond x86-64-v2, in the words of /proc/cpuinfo (abm: lzcnt)."""
+
+ONE_THREAD = dict.fromkeys(
+    ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
+)
+"""Sums in one order, and several spinning pools are far slower."""
+ONE_INSTRUCTION_SET = {
+    "NPY_DISABLE_CPU_FEATURES": "X86_V4 AVX512_ICL AVX512_SPR",
+    "OPENBLAS_CORETYPE": "Haswell",
+    "NUMBA_CPU_NAME": BASELINE,
+    "NUMBA_CPU_FEATURES": "",
+}
+
+
+def fix_arithmetic(environment: MutableMapping[str, str] = os.environ) -> None:
+    """Set the variables above that are not set; the instruction set where the processor has it."""
+    settings = ONE_THREAD if missing() else ONE_THREAD | ONE_INSTRUCTION_SET
+    for name, value in settings.items():
+        environment.setdefault(name, value)
+
+
+def missing(cpuinfo: Path = Path("/proc/cpuinfo")) -> list[str]:
+    """What this processor lacks of the baseline, in the words of NEEDED; all of it on other families of processors."""
+    if platform.machine() != "x86_64":
+        return list(NEEDED)
+    for line in cpuinfo.read_text(encoding="utf-8").splitlines():
+        if line.startswith("flags"):
+            found = line.partition(":")[2].split()
+            return [name for name in NEEDED if name not in found]
+    return list(NEEDED)
+
+
+def remark() -> str:
+    """What a user of an older processor should know; empty on others."""
+    absent = missing()
+    if not absent:
+        return ""
+    return (
+        f"this processor has no {', '.join(absent)} ({BASELINE}): the last digits, and what grows from them, differ "
+        "from those on processors since 2013"
+    )
