@@ -11,6 +11,7 @@ import time
 
 import pytest
 
+from coupler.cli import app
 from coupler.provenance import ROOT
 
 TOOLS = (
@@ -130,34 +131,34 @@ def test_the_first_call_on_a_fresh_machine_sets_everything_up(machine):
 
 def test_later_calls_start_at_once(machine):
     """No apt, no pip, no word: one process, the command itself."""
-    machine("run")
+    machine("run", str(machine.root))
     code, told, calls = machine("run", "x")
     assert (code, told, calls) == (0, "", ["surgebreak run x"])
 
 
 def test_an_existing_yade_is_honoured(machine):
-    _, _, calls = machine.ready()("run")
+    _, _, calls = machine.ready()("doctor")
     assert not any(call.startswith("apt-get") for call in calls)
 
 
 def test_a_yade_known_to_the_package_system_is_honoured_wherever_it_is(machine):
     machine.stub("dpkg-query", "#!/bin/sh\necho installed\n")
     (machine.state / "venv-module").touch()
-    _, _, calls = machine("run")
+    _, _, calls = machine("doctor")
     assert not any(call.startswith("apt-get") for call in calls)
 
 
 def test_a_yade_that_an_interrupted_apt_left_half_done_is_finished(machine):
     """Its folder is there already, but its packages are not set up."""
     machine.ready().stub("dpkg-query", "#!/bin/sh\necho half-configured\n")
-    _, _, calls = machine("run")
+    _, _, calls = machine("doctor")
     assert "dpkg --configure -a" in calls
     assert "apt-get install -q -y --no-install-recommends -o Dpkg::Use-Pty=0 yade" in calls
 
 
 def test_extras_come_with_the_command_that_needs_them(machine):
     machine.ready()
-    assert pip_installs(machine("run")[2]) == [""]
+    assert pip_installs(machine("doctor")[2]) == [""]
     assert pip_installs(machine("--quiet", "render", "r")[2]) == ["[view]"]
     assert pip_installs(machine("render", "r")[2]) == []
     assert pip_installs(machine("report", "r")[2]) == []
@@ -179,6 +180,39 @@ def test_the_kernels_are_compiled_once_before_the_first_run(machine):
     assert machine("run", "x")[2] == ["surgebreak run x"]
 
 
+@pytest.mark.parametrize(
+    "words", [("run",), ("run", "--set"), ("run", "--set", "a=1"), ("check", "--end", "1 s")]
+)
+def test_nothing_is_set_up_without_a_case(machine, words):
+    code, told, calls = machine(*words)
+    assert (code, calls) == (2, [])
+    assert f"{words[0]}: which case? Write surgebreak {words[0]} CASE" in told
+
+
+@pytest.mark.parametrize(
+    "words", [("--help",), ("render", "--help"), ("benchmark", "-h"), ("run", "-h"), ("test", "--help")]
+)
+def test_help_installs_nothing(machine, words):
+    """Before the set-up the launcher says what there is; after it the program does, without the extras."""
+    code, told, calls = machine(*words)
+    assert (code, told, calls) == (0, "", [])
+    machine.ready()("doctor")
+    assert machine(*words)[::2] == (0, ["surgebreak " + " ".join(words)])
+
+
+def test_help_names_the_commands_of_the_program(machine):
+    told = subprocess.run(
+        [machine.root / "surgebreak", "-h"],
+        capture_output=True,
+        text=True,
+        check=True,
+        env=machine.environment,
+    ).stdout
+    names = [command.name or command.callback.__name__ for command in app.registered_commands]
+    (line,) = [line for line in told.splitlines() if line.startswith("Commands: ")]
+    assert sorted(line.removeprefix("Commands: ").split(", ")) == sorted(names)
+
+
 @pytest.mark.parametrize("options", [(), ("--set", "time.end=1 s", "--output", "there")])
 def test_nothing_is_set_up_for_a_case_that_does_not_exist(machine, options):
     """A slip of the pen should not cost an installation."""
@@ -198,14 +232,14 @@ def test_no_kernels_are_compiled_for_a_case_with_mistakes(machine):
 
 
 def test_changed_pins_are_installed_again(machine):
-    machine.ready()("run")
+    machine.ready()("doctor")
     with (machine.root / "constraints.txt").open("a", encoding="utf-8") as stream:
         stream.write("# changed\n")
-    assert pip_installs(machine("run")[2]) == [""]
+    assert pip_installs(machine("doctor")[2]) == [""]
 
 
 def test_through_a_link_and_from_another_directory(machine, tmp_path):
-    machine.ready()("run")
+    machine.ready()("doctor")
     (tmp_path / "elsewhere").mkdir()
     (tmp_path / "link").symlink_to("checkout/surgebreak")
     (tmp_path / "elsewhere" / "again").symlink_to("../link")
@@ -215,7 +249,7 @@ def test_through_a_link_and_from_another_directory(machine, tmp_path):
 
 
 def test_arguments_arrive_as_they_were_given(machine):
-    machine.ready()("run")
+    machine.ready()("run", str(machine.root))
     machine.stub("show", "")
     (machine.root / ".venv/bin/surgebreak").write_text(
         '#!/bin/sh\nprintf "<%s>" "$@" >>"$CALLS"\n', encoding="utf-8"
@@ -224,9 +258,9 @@ def test_arguments_arrive_as_they_were_given(machine):
 
 
 def test_the_exit_code_of_the_command_is_returned(machine):
-    machine.ready()("run")
+    machine.ready()("doctor")
     (machine.root / ".venv/bin/surgebreak").write_text("#!/bin/sh\nexit 3\n", encoding="utf-8")
-    assert machine("run")[0] == 3
+    assert machine("doctor")[0] == 3
 
 
 # ---------------------------------------------------------------- where it cannot work
@@ -234,9 +268,9 @@ def test_the_exit_code_of_the_command_is_returned(machine):
 
 def test_sudo_is_used_by_ordinary_users(machine):
     machine.stub("sudo", '#!/bin/sh\necho "sudo $*" >>"$CALLS"\n[ "$1" = -v ] || exec "$@"\n')
-    code, _, calls = machine("run", USER_NUMBER="1000")
+    code, _, calls = machine("doctor", USER_NUMBER="1000")
     assert code == 0
-    assert calls[-1] == "surgebreak run"
+    assert calls[-1] == "surgebreak doctor"
     assert any(call.startswith("sudo env DEBIAN_FRONTEND=noninteractive apt-get install") for call in calls)
     assert not any("pip" in call for call in calls if call.startswith("sudo"))
 
@@ -245,7 +279,7 @@ def test_sudo_is_used_by_ordinary_users(machine):
 def test_neither_root_nor_sudo_says_what_to_ask_for(machine, sudo):
     if sudo:
         machine.stub("sudo", sudo)
-    code, told, calls = machine("run", USER_NUMBER="1000")
+    code, told, calls = machine("doctor", USER_NUMBER="1000")
     assert code == 1
     assert "    apt-get install --no-install-recommends yade python3-venv" in told
     assert "sudo is absent or refused" in told
@@ -254,7 +288,7 @@ def test_neither_root_nor_sudo_says_what_to_ask_for(machine, sudo):
 
 def test_without_apt(machine):
     (machine.stubs / "apt-get").unlink()
-    code, told, _ = machine("run")
+    code, told, _ = machine("doctor")
     assert code == 1
     assert (
         "Debian GNU/Linux 12 (bookworm) has no apt-get; surgebreak takes the engine YADE from the packages"
@@ -264,51 +298,51 @@ def test_without_apt(machine):
 
 def test_another_system(machine):
     machine.stub("uname", "#!/bin/sh\necho Darwin\n")
-    code, told, _ = machine("run")
+    code, told, _ = machine("doctor")
     assert code == 1
     assert "this system is Darwin; surgebreak needs Debian 12 or a derivative" in told
 
 
 def test_a_derivative_without_the_package(machine):
-    code, told, _ = machine("run", NO_PACKAGE="1")
+    code, told, _ = machine("doctor", NO_PACKAGE="1")
     assert code == 1
     assert "offers no package 'yade'" in told
 
 
 def test_a_python_that_is_too_old(machine):
-    code, told, _ = machine.ready()("run", OLD_PYTHON="1")
+    code, told, _ = machine.ready()("doctor", OLD_PYTHON="1")
     assert code == 1
     assert "needs the system's Python 3.11 or later" in told
 
 
 def test_a_failing_apt_is_told_and_repeated(machine):
-    code, told, calls = machine("run", APT_FAILS="1")
+    code, told, calls = machine("doctor", APT_FAILS="1")
     assert code == 1
     assert "apt-get could not install yade python3-venv" in told
     assert not any("venv" in call for call in calls if call.startswith("system-python -m"))
-    assert machine("run")[0] == 0
+    assert machine("doctor")[0] == 0
 
 
 def test_a_failing_pip_is_told_and_repeated_without_starting_over(machine):
     """Without network nothing has been written yet: the next call goes on where this one stopped."""
     machine.ready()
-    code, told, calls = machine("run", PIP_FAILS="1")
+    code, told, calls = machine("doctor", PIP_FAILS="1")
     assert code == 1
     assert "pip could not install the packages" in told
     assert not any(call.startswith("surgebreak") for call in calls)
-    code, told, calls = machine("run")
-    assert (code, calls[-1]) == (0, "surgebreak run")
+    code, told, calls = machine("doctor")
+    assert (code, calls[-1]) == (0, "surgebreak doctor")
     assert not any(call.startswith("system-python -m venv") for call in calls)
 
 
 def test_packages_half_written_by_an_interrupted_set_up_are_thrown_away(machine):
     """A wheel of which half is on disk looks installed to pip; so the folder is made again."""
-    machine.ready()("run")
+    machine.ready()("doctor")
     stamps = machine.root / ".venv" / ".set-up"
     (stamps / "unfinished").write_text("view\n", encoding="utf-8")
     (stamps / "view.log").write_text("Installing collected packages: numpy\n", encoding="utf-8")
     (machine.root / ".venv" / "half").touch()
-    code, told, calls = machine("run")
+    code, told, calls = machine("doctor")
     assert code == 0
     assert "an earlier set-up was interrupted; starting it again" in told
     assert not (machine.root / ".venv" / "half").exists()
@@ -321,7 +355,7 @@ def test_ctrl_c_during_the_set_up_leaves_a_state_that_the_next_call_mends(machin
     machine.stub("make-venv", VENV.replace('[ -z "$PIP_FAILS" ]', 'sh "$STUBS/slow"'))
     (machine.root.parent / "calls").touch()
     child = subprocess.Popen(
-        [machine.root / "surgebreak", "run"], env=machine.environment, stderr=subprocess.PIPE, text=True,
+        [machine.root / "surgebreak", "doctor"], env=machine.environment, stderr=subprocess.PIPE, text=True,
         start_new_session=True, preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )  # fmt: skip
     log = machine.root / ".venv" / ".set-up" / "core.log"
@@ -334,13 +368,88 @@ def test_ctrl_c_during_the_set_up_leaves_a_state_that_the_next_call_mends(machin
     assert child.returncode == 130
     assert "interrupted; the next call starts this part again" in told
     machine.stub("slow", "#!/bin/sh\n")
-    code, _, calls = machine("run")
-    assert (code, calls[-1]) == (0, "surgebreak run")
+    code, _, calls = machine("doctor")
+    assert (code, calls[-1]) == (0, "surgebreak doctor")
+
+
+def test_a_checkout_whose_path_has_a_blank_and_an_umlaut(tmp_path):
+    """pip takes PIP_CONSTRAINT for a list with blanks between: the name in it must hold none."""
+    (tmp_path / "my schöner folder").mkdir()
+    machine = Machine(tmp_path / "my schöner folder")
+    machine.stub(
+        "make-venv",
+        VENV.replace('echo "python $*"', 'echo "python $* [$PIP_CONSTRAINT] in $(pwd)"'),
+    )
+    code, _, calls = machine.ready()("doctor")
+    (pip,) = [call for call in calls if " pip install " in call]
+    assert code == 0
+    assert pip.endswith(
+        f"-c {machine.root}/constraints.txt -e {machine.root} [constraints.txt] in {machine.root}"
+    )
+
+
+@pytest.mark.parametrize(
+    ("log", "told"),
+    [
+        ("OSError: [Errno 28] No space left on device", "The disk is full"),
+        ("Connection to pypi.org timed out", "look at network and proxy"),
+        ("ERROR: Invalid requirement: 'schöner'", "The last lines say why"),
+    ],
+)
+def test_pip_fails_for_the_reason_that_its_log_tells(machine, log, told):
+    machine.stub("make-venv", VENV.replace('[ -z "$PIP_FAILS" ]', f'echo "{log}"; exit 1'))
+    code, said, _ = machine.ready()("doctor")
+    assert code == 1
+    assert f"{told}" in said.splitlines()[-1]
+
+
+def as_a_user_who_may_only_read(machine, *words, **environment):
+    """Root may write everywhere; so another user calls, who may write into the lists of the test alone."""
+    for place in (machine.root, *machine.root.parents[:3]):
+        place.chmod(0o755)
+    (machine.root.parent / "calls").touch()
+    (machine.root.parent / "calls").chmod(0o666)
+    user = {"user": 65534, "group": 65534} if os.getuid() == 0 else {}
+    if not user:
+        machine.root.chmod(0o555)
+    done = subprocess.run(
+        [machine.root / "surgebreak", *words], capture_output=True, text=True, check=False, **user,
+        env=machine.environment | environment,
+    )  # fmt: skip
+    machine.root.chmod(0o755)
+    return (
+        done.returncode,
+        done.stderr,
+        (machine.root.parent / "calls").read_text(encoding="utf-8").splitlines(),
+    )
+
+
+def test_a_checkout_that_one_may_only_read(machine):
+    """Either another place for the packages, or a word about it; never half an installation."""
+    code, told, calls = as_a_user_who_may_only_read(machine.ready(), "doctor")
+    assert (code, calls) == (1, [])
+    assert f"cannot write to {machine.root}/.venv, where the packages go" in told
+    assert "SURGEBREAK_VENV=$HOME/surgebreak-venv" in told
+
+
+def test_the_packages_may_go_elsewhere(machine):
+    elsewhere = machine.state / "my venv"
+    code, _, calls = machine.ready()("doctor", SURGEBREAK_VENV=str(elsewhere))
+    assert (code, calls[-1]) == (0, "surgebreak doctor")
+    assert (elsewhere / "bin" / "surgebreak").exists()
+    assert not (machine.root / ".venv").exists()
+
+
+def test_the_installation_of_somebody_else_is_used_as_it_is(machine):
+    """Its kernels are compiled into a cache of each user's own."""
+    machine.ready()("doctor")
+    code, told, calls = as_a_user_who_may_only_read(machine, "run", "x")
+    assert (code, told, calls[-1]) == (0, "", "surgebreak run x")
 
 
 def test_a_folder_that_cannot_be_written(machine):
     (machine.root / ".venv").write_text("", encoding="utf-8")
-    code, told, _ = machine.ready()("run")
+    code, told, _ = machine.ready()("doctor")
     assert code == 1
     assert "cannot write to " in told
 
