@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from coupler.build_water import RecordError, fills_beside, level_at_start, record_columns
+import numpy as np
+
+from coupler.build_water import SLACK, RecordError, fills_beside, level_at_start, record_columns
 from coupler.case import Case
 from coupler.tank_mesh import is_measured
 
@@ -17,6 +19,12 @@ HIGHEST_WAVE = 0.78
 
 EARLY = 0.05
 """Share of its height that a solitary wave may have at the start without a remark."""
+
+WHOLE_DEPTH = 0.9
+"""Share of the depth of still water from which an inflow pushes all of it."""
+
+LEAST_CELLS = 2
+"""Cells of the thinnest water without a remark. A falling drop of one gains 14 % of its energy in a step."""
 
 STILL = 0.1
 """Share of a cell by which the still water may miss the level that a wave is made for, without a remark."""
@@ -40,11 +48,18 @@ def water_problems(case: Case) -> Iterator[Problem]:
         )
     yield from _walls(w)
     if case.tank is not None and is_measured(case.tank):
-        yield from _sides(case)
+        wrong = list(_sides(case))
+        yield from wrong
+        if not wrong:
+            yield from _filled_up(case)
+            yield from _struck(case)
 
 
 def water_remarks(case: Case) -> Iterator[str]:
-    """Waves that are under way at the start, and waves without the still water that they run into."""
+    """Water that the mesh does not resolve, waves that are under way at the start, and waves without the still water
+    that they run into."""
+    if case.water and case.tank:
+        yield from _thin_water(case)
     for spec in case.water.inflow if case.water and case.tank else ():
         if spec.kind in ("bore", "solitary"):
             yield from _still_water(case, spec)
@@ -55,6 +70,43 @@ def water_remarks(case: Case) -> Iterator[str]:
                     f"the solitary wave at {spec.side} starts at {100 * share:.0f} % of its height: a jump that "
                     f"strikes; let its crest come later than {spec.crest:g} s"
                 )
+
+
+def _thin_water(case: Case) -> Iterator[str]:
+    """Boxes of water, inflows and seas that are thinner than a few cells; walls and other water lengthen a box."""
+    tank, cell = case.tank, case.tank.cell
+    found = []
+    if tank.mesh is None:
+        for i, fill in enumerate(case.water.fill):
+            found += [(f"water.fill[{i}]", edge) for edge in _free_edges(case, fill)]
+    for kind in ("inflow", "sea"):
+        for i, spec in enumerate(getattr(case.water, kind)):
+            found.append((f"the water at water.{kind}[{i}]", level_at_start(spec) - tank.lower[2]))
+    for name, edge in found:
+        if 0.0 < edge < LEAST_CELLS * cell * (1.0 - SLACK):
+            yield (
+                f"{name} is {edge:.3g} m thin, {edge / cell:.2g} cells: under {LEAST_CELLS} cells water is not "
+                f"resolved, volume and energy may be off by more than a run allows; take tank.cell = {edge / 4:.2g} m"
+            )
+
+
+def _free_edges(case: Case, fill) -> Iterator[float]:
+    """Edges [m] of a box of water between two ends of which one at least is free: neither at a wall nor in other water.
+    From wall to wall it is a slice, whatever its width; on the floor it is a layer."""
+    slack = SLACK * case.tank.cell
+    for axis in range(3):
+        ends = fill.lower[axis], fill.upper[axis]
+        at_wall = ends[0] <= case.tank.lower[axis] + slack, ends[1] >= case.tank.upper[axis] - slack
+        others = [f for f in case.water.fill if f is not fill and _meet(f, fill, slack)]
+        if not all(at_wall) and not others:
+            yield ends[1] - ends[0]
+
+
+def _meet(other, fill, slack: float) -> bool:
+    """Whether two boxes of water touch or overlap, so that their water is one."""
+    return all(
+        other.lower[k] <= fill.upper[k] + slack and fill.lower[k] <= other.upper[k] + slack for k in range(3)
+    )
 
 
 def _still_water(case: Case, spec) -> Iterator[str]:
@@ -84,6 +136,67 @@ def _walls(w) -> Iterator[Problem]:
         )
     if w.walls != "friction" and laws:
         yield ("water", laws[0]), f'is for walls = "friction"; they are "{w.walls}"'
+
+
+def _filled_up(case: Case) -> Iterator[Problem]:
+    """Inflows into a tank without a way out, which they fill before the end."""
+    if case.tank.open or case.water.sea or case.tank.mesh is not None:
+        return
+    size = [high - low for low, high in zip(case.tank.lower, case.tank.upper)]
+    boxes = [[high - low for low, high in zip(fill.lower, fill.upper)] for fill in case.water.fill]
+    room = math.prod(size) - max((math.prod(box) for box in boxes), default=0.0)
+    for i, spec in enumerate(case.water.inflow):
+        brought = size[1 if spec.side[0] == "x" else 0] * _brought(case, spec)
+        if brought > room:
+            yield (
+                ("water", "inflow", i),
+                f"brings {brought:.3g} m3 until the end of the run ({case.time.end:g} s) into a tank without a way out "
+                f"that has room for {room:.3g} m3: name open sides (tank.open), or end before it is full",
+            )
+
+
+def _struck(case: Case) -> Iterator[Problem]:
+    """Streams that set still water beside them in motion at once and have no room for the bore that this makes."""
+    bed, top = case.tank.lower[2], case.tank.upper[2]
+    for i, spec in enumerate(case.water.inflow):
+        still = max([fill.upper[2] for fill in fills_beside(case, spec.side)], default=bed) - bed
+        if spec.kind != "steady" or still <= 0.0 or spec.level - bed < WHOLE_DEPTH * still:
+            continue
+        behind = _depth_behind(still, spec.velocity, case.case.gravity)
+        if bed + behind > top:
+            yield (
+                ("water", "inflow", i, "velocity"),
+                f"{spec.velocity:g} m/s strike still water {still:g} m deep: as a bore it would rise to "
+                f"z = {bed + behind:.3g} m at once, above the top of the tank ({top:g} m); take a lower velocity, less "
+                'still water, a higher tank, or a velocity that grows with time (kind = "record")',
+            )
+
+
+def _depth_behind(ahead: float, speed: float, gravity: float) -> float:
+    """Depth [m] behind the bore that a piston of this speed [m/s] pushes into still water of depth `ahead` [m]:
+    u = (h₂ - h₁) sqrt(g (h₁ + h₂) / (2 h₁ h₂))    (Stoker 1957, 10.6)."""
+    low, high = ahead, ahead + max(speed, 0.0) * math.sqrt(2.0 * ahead / gravity)
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        reached = (middle - ahead) * math.sqrt(gravity * (ahead + middle) / (2.0 * ahead * middle))
+        low, high = (middle, high) if reached < speed else (low, middle)
+    return high
+
+
+def _brought(case: Case, spec) -> float:
+    """Volume a metre of width [m2] that an inflow brings until the end of the run, what it takes back not counted."""
+    bed, end = case.tank.lower[2], case.time.end
+    if spec.kind == "solitary":
+        return 0.0
+    if spec.kind == "record":
+        time, level, velocity = record_columns(spec.path)
+        return float(np.trapezoid(np.maximum((level - bed) * velocity, 0.0)[time <= end], time[time <= end]))
+    depth = spec.level - bed
+    if spec.kind == "steady":
+        return max(spec.velocity, 0.0) * depth * end
+    from fluid.waves import bore_speed
+
+    return bore_speed(spec.ahead - bed, depth, case.case.gravity)[1] * depth * end
 
 
 def _sides(case: Case) -> Iterator[Problem]:

@@ -58,10 +58,58 @@ def run(found, end):
             "breaks at once on a depth of 0.2 m",
         ),
         ({"inflow": [{"kind": "record", "side": "x-", "path": "/nowhere.csv"}]}, "no such file"),
+        (
+            {"inflow": [{"kind": "steady", "side": "x-", "level": 0.5, "velocity": 3.0}]},
+            "water.inflow.0.velocity: 3 m/s strike still water 0.5 m deep: as a bore it would rise to z = 1.32 m",
+        ),
     ],
 )
 def test_what_cannot_be_is_refused_with_its_place(water, message):
     assert any(message in line for line in told(water)), told(water)
+
+
+def test_a_tank_that_its_inflow_fills_is_refused():
+    """0.2 m x 0.5 m x 1 m/s bring 0.1 m3 in a second, there is room for 0.2 m3. Any way out is enough."""
+    stream = {"kind": "steady", "side": "x-", "level": 0.5, "velocity": 1.0}
+    closed = TANK | {"open": []}
+
+    def filled(end, tank, **more):
+        found = problems(case({"inflow": [stream], **more}, tank=tank, time={"end": end}))
+        return [text for path, text in found if path == ("water", "inflow", 0)]
+
+    assert filled(1.9, closed) == []
+    assert "brings 0.21 m3 until the end of the run (2.1 s)" in filled(2.1, closed)[0]
+    assert filled(2.1, TANK) == []
+    assert filled(2.1, closed, sea=[{"side": "x+", "level": 0.5}]) == []
+
+
+@pytest.mark.parametrize(
+    ("fill", "thin"),
+    [
+        ([[0, 0, 0], [2, 0.2, 0.19]], "water.fill[0] is 0.19 m thin, 1.9 cells"),
+        ([[0, 0, 0], [0.15, 0.2, 0.6]], "water.fill[0] is 0.15 m thin, 1.5 cells"),
+        ([[0.5, 0, 0.5], [1.0, 0.2, 0.61]], "water.fill[0] is 0.11 m thin, 1.1 cells"),
+        ([[0, 0, 0], [2, 0.2, 0.2]], None),
+        ([[0, 0, 0], [0.5, 0.2, 0.5]], None),
+    ],
+)
+def test_water_that_the_mesh_does_not_resolve_is_remarked(fill, thin):
+    """From wall to wall any width is a slice, here of two cells and of one."""
+    low, high = fill
+    for width in (0.2, 0.1):
+        found = remarks(
+            case(
+                {"fill": [{"lower": low, "upper": [high[0], width, high[2]]}]},
+                tank=TANK | {"upper": [2, width, 1]},
+            )
+        )
+        assert [thin is not None and text.startswith(thin) for text in found] == [True] * (thin is not None)
+
+
+def test_a_layer_on_other_water_is_not_thin():
+    boxes = [{"lower": [0, 0, 0], "upper": [2, 0.2, 0.3]}, {"lower": [0, 0, 0.3], "upper": [0.5, 0.2, 0.4]}]
+    assert remarks(case({"fill": boxes})) == []
+    assert "water at water.sea[0] is 0.1 m thin" in remarks(case({"sea": [{"side": "x+", "level": 0.1}]}))[0]
 
 
 def test_the_split_of_a_case_is_that_of_its_mesh():
