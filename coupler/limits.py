@@ -95,19 +95,32 @@ HIGHEST_PRESSURE = 1e8
 """[Pa] beyond any impact: water hammer at 70 m/s."""
 
 
-def check_pressure(time: float, pressure, nodes) -> None:
+def no_room(place, blocks: bool, sides: bool) -> str:
+    """Where water finds no pressure, place (3,) [m], and what of a scene may be the cause: blocks that move, sides that
+    water comes through, or neither."""
+    causes = ["a block closes or makes smaller"] * blocks + ["an inflow or a sea fills"] * sides
+    at = ", ".join(f"{x:.3g}" for x in place)
+    if causes:
+        remedy = f"look for a full chamber that {' or '.join(causes)}, and leave it an opening or some air"
+    else:
+        remedy = (
+            "nothing moves or flows in, so look at the mesh and for slivers of water between solids there, and move "
+            "them or change tank.cell a little"
+        )
+    return f"Water has no room to go at ({at}) m: {remedy}."
+
+
+def check_pressure(time: float, pressure, nodes, blocks: bool, sides: bool) -> None:
     """Stop where water has no room: a chamber without a free surface that something driven makes smaller.
 
-    pressure (N,) [Pa] at nodes (N, 3) [m]. Raises Diverged.
+    pressure (N,) [Pa] at nodes (N, 3) [m]; blocks, sides as in `no_room`. Raises Diverged.
     """
     worst = int(np.argmax(np.abs(pressure))) if len(pressure) else 0
     if len(pressure) == 0 or abs(pressure[worst]) <= HIGHEST_PRESSURE:
         return
-    place = ", ".join(f"{x:.3g}" for x in nodes[worst])
     raise Diverged(
-        f"the pressure is {pressure[worst]:.3g} Pa at ({place}) m, t = {time:.4g} s; limit {HIGHEST_PRESSURE:.0e} Pa. "
-        "Water has no room to go there: look for a full chamber that a driven block or an inflow makes smaller, and "
-        "leave it an opening or some air."
+        f"the pressure is {pressure[worst]:.3g} Pa at t = {time:.4g} s; limit {HIGHEST_PRESSURE:.0e} Pa. "
+        f"{no_room(nodes[worst], blocks, sides)}"
     )
 
 

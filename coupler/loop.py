@@ -7,6 +7,7 @@ A scene may lack either side: without water the structure runs alone, without a 
 from __future__ import annotations
 
 import math
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -14,7 +15,7 @@ import numpy as np
 
 from coupler.defects import RETRIES, Defects
 from coupler.ledger import Balance, Ledger
-from coupler.limits import Diverged, Limits, check_finite, check_pressure
+from coupler.limits import Diverged, Limits, check_finite, check_pressure, no_room
 from coupler.momentum import MomentumBalance, book_step, momentum_ledger
 from coupler.observe import fastest_point
 from coupler.step_limits import check_step, one_step_too_far
@@ -233,7 +234,8 @@ class Coupling:
         n = self.structure.n
         with self.clock("water"):
             problem = self.water.predict(dt)
-        found, moved = self._exchange(problem, record, start)
+        with self._placed(problem):
+            found, moved = self._exchange(problem, record, start)
         with self.clock("water"):
             self.water.correct(problem, found.x)
         record.load, record.unknowns = found.load, len(found.x)
@@ -304,7 +306,7 @@ class Coupling:
 
         with self.clock("water"):
             problem = self.water.predict(dt)
-        with self.clock("pressure"):
+        with self.clock("pressure"), self._placed(problem):
             result = self._solve(problem.matrix, problem.rhs, problem.guess, self.rtol)
         with self.clock("water"):
             self.water.correct(problem, result.x)
@@ -346,10 +348,28 @@ class Coupling:
     def _structure_energies(self) -> dict[str, float] | None:
         return None if self.structure is None else self.structure.energies()
 
+    def _driven_by(self) -> tuple[bool, bool]:
+        """Whether blocks may move, and whether water comes in through sides."""
+        return self.structure is not None and not self.structure.fixed.all(), self.water.sides is not None
+
+    @contextmanager
+    def _placed(self, problem):
+        """A pressure of the problem that is not found is told with its place and what may be the cause."""
+        from fluid.solve import NotConverged
+
+        try:
+            yield
+        except NotConverged as error:
+            if error.unknown is None:
+                raise
+            place = self.water.topology.nodes[problem.dofs[error.unknown]]
+            text = f"{error} {no_room(place, *self._driven_by())}"
+            raise NotConverged(text, error.history, error.unknown) from error
+
     def _check_finite(self) -> None:
         if self.water is not None:
             check_finite(self.time, "the velocity of the water", self.water.velocity, "node")
-            check_pressure(self.time, self.water.pressure, self.water.topology.nodes)
+            check_pressure(self.time, self.water.pressure, self.water.topology.nodes, *self._driven_by())
         if self.structure is not None:
             check_finite(self.time, "the velocity of the structure", self.structure.velocity(), "block")
 

@@ -21,11 +21,12 @@ MOST_ITERATIONS = 2000
 
 
 class NotConverged(RuntimeError):
-    """The linear solver stopped above its tolerance; `history` holds the residual norms of every iteration."""
+    """The linear solver stopped above its tolerance; `history` holds the residual norms of every iteration, `unknown`
+    the row where it is worst, None where that has no meaning."""
 
-    def __init__(self, message: str, history: np.ndarray):
+    def __init__(self, message: str, history: np.ndarray, unknown: int | None = None):
         super().__init__(message)
-        self.history = history
+        self.history, self.unknown = history, unknown
 
 
 @dataclass(frozen=True)
@@ -66,14 +67,14 @@ def solve(
     p = rz = None
     while not history[-1] <= rtol:
         if len(history) > most or not np.isfinite(history[-1]):
-            raise _failure("did not converge", history, rtol, len(b))
+            raise _failure("did not converge", history, rtol, r)
         z = precondition(r)
         rz, rz_before = r @ z, rz
         p = z if p is None else z + (rz / rz_before) * p
         Ap = apply(p)
         curvature = p @ Ap
         if curvature <= 0.0:
-            raise _failure(f"met a direction of curvature {curvature:.3g} ≤ 0", history, rtol, len(b))
+            raise _failure(f"met a direction of curvature {curvature:.3g} ≤ 0", history, rtol, p)
         x += (rz / curvature) * p
         r -= (rz / curvature) * Ap
         history.append(np.linalg.norm(r) / scale)
@@ -99,10 +100,10 @@ def _preconditioner(A, multigrid_from: int) -> Callable:
     return Multigrid(A)
 
 
-def _failure(what: str, history, rtol: float, n: int) -> NotConverged:
+def _failure(what: str, history, rtol: float, vector) -> NotConverged:
+    """vector (n,): the residual, or the direction of no use; its largest entry is where to look."""
     text = (
         f"pressure solver {what} after {len(history) - 1} iterations: residual {history[-1]:.3g}, wanted {rtol:.3g}, "
-        f"{n} unknowns, last residuals {', '.join(f'{r:.2g}' for r in history[-5:])}. "
-        "Reduce time.cfl, or look for a pocket of water that moving solids close."
+        f"{len(vector)} unknowns, last residuals {', '.join(f'{r:.2g}' for r in history[-5:])}."
     )
-    return NotConverged(text, np.array(history))
+    return NotConverged(text, np.array(history), int(np.argmax(np.abs(vector))))

@@ -8,7 +8,9 @@ from coupler.build_water import RecordError, record_columns
 from coupler.case import Case, modules
 from coupler.case_checks import problems, remarks
 from coupler.forecast import forecast
+from coupler.limits import Diverged, check_pressure
 from coupler.side_energy import side_energy
+from fluid.solve import NotConverged
 from tests.fakes import no_clock
 
 TANK = {"lower": [0, 0, 0], "upper": [2, 0.2, 1], "cell": 0.1, "smooth": ["y-", "y+"]}
@@ -320,3 +322,38 @@ def test_a_stone_that_covers_gauges_leaves_their_cells_empty():
     impulse = np.array([row["point_impulse"] for row in rows])
     assert (np.diff(impulse)[empty[1:]] == 0.0).all()
     assert impulse[-1] > impulse[0] > 0.0
+
+
+@pytest.mark.parametrize(
+    ("water", "cause"),
+    [
+        ({}, "nothing moves or flows in, so look at the mesh"),
+        ({"sea": [{"side": "x+", "level": 0.5}]}, "a full chamber that an inflow or a sea fills"),
+    ],
+)
+def test_a_pressure_that_is_not_found_is_told_with_its_place_and_cause(monkeypatch, water, cause):
+    """Words of moving solids were told where there are none."""
+    coupling = build(case(water), no_clock).coupling
+
+    def fails(A, b, x0, rtol):
+        assert np.isfinite(b).all()
+        raise NotConverged("no way", np.ones(1), unknown=7)
+
+    monkeypatch.setattr(type(coupling), "_solve", property(lambda self: fails))
+    dofs = coupling.water.predict(1e-3).dofs
+    place = ", ".join(f"{x:.3g}" for x in coupling.water.topology.nodes[dofs[7]])
+    with pytest.raises(Diverged) as error:
+        coupling.step(1e-3)
+    assert f"no way Water has no room to go at ({place}) m" in str(error.value)
+    assert cause in str(error.value)
+
+
+def test_a_pressure_beyond_all_bounds_is_told_with_its_place_and_cause():
+    pressure, nodes = np.array([0.0, -2e9]), np.array([[0.0, 0, 0], [1.0, 2, 3.5]])
+    check_pressure(1.0, pressure[:1], nodes, blocks=True, sides=True)
+    with pytest.raises(
+        Diverged, match=r"-2e\+09 Pa .* at \(1, 2, 3.5\) m: .* a block closes or makes smaller or an inflow"
+    ):
+        check_pressure(1.0, pressure, nodes, blocks=True, sides=True)
+    with pytest.raises(Diverged, match="slivers of water"):
+        check_pressure(1.0, pressure, nodes, blocks=False, sides=False)
