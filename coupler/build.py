@@ -107,7 +107,6 @@ def _load_at_rest(structure, water) -> np.ndarray:
 
 def build_structure(case: Case):
     """The structure of a case, in a new YADE scene."""
-    from yade_scripts.cohesion import JointParameters
     from yade_scripts.contact import ContactLaw, PairFriction
     from yade_scripts.structure import Structure
 
@@ -125,22 +124,38 @@ def build_structure(case: Case):
             pairs=tuple(PairFriction(*pair.materials, pair.friction) for pair in c.pair),
         )
     if j:
-        joints = JointParameters(
-            strength=j.strength,
-            opening_at_failure=j.opening_at_failure,
-            shear_ratio=j.shear_ratio,
-            closing_ratio=j.closing_ratio,
-            damping=j.damping,
-            points=j.points,
-            ground=j.ground,
-            law=j.law,
-            peak=j.peak,
-            mixed_mode=j.mixed_mode,
-        )
+        joints = joint_parameters(j)
     gravity = (0.0, 0.0, -case.case.gravity)
     planes = planes_of(case)
     blocks = [block for part in parts_of(case) for block in part.blocks] + obstacle_blocks(case)
-    return Structure(blocks, contact, joints, None, planes, gravity, substep=case.structure.substep)
+    return Structure(
+        blocks,
+        contact,
+        joints,
+        None,
+        planes,
+        gravity,
+        substep=case.structure.substep,
+        impermeable=bool(c and c.impermeable),
+    )
+
+
+def joint_parameters(joints):
+    """The law of a section [joints]."""
+    from yade_scripts.cohesion import JointParameters
+
+    return JointParameters(
+        strength=joints.strength,
+        opening_at_failure=joints.opening_at_failure,
+        shear_ratio=joints.shear_ratio,
+        closing_ratio=joints.closing_ratio,
+        damping=joints.damping,
+        points=joints.points,
+        ground=joints.ground,
+        law=joints.law,
+        peak=joints.peak,
+        mixed_mode=joints.mixed_mode,
+    )
 
 
 def planes_of(case: Case) -> list:

@@ -135,6 +135,11 @@ class Contact(Section):
     nodes_per_edge: Annotated[int, Field(strict=True, ge=3, le=33)] = Field(
         3, description="contact nodes along an edge of a block; crossing edges hold each other whatever it is"
     )
+    impermeable: Switch = Field(
+        False,
+        description="true: faces that touch at the start without a joint keep the water out for as long as they lie "
+        "on one another, on the ground or on the floor of the tank; false: water reaches between them",
+    )
     pair: tuple[ContactPair, ...] = Field((), description="pairs of materials with a friction of their own")
 
 
@@ -210,6 +215,11 @@ class RunLimits(Section):
         0.5,
         description="share by which the blocks may miss the motion that the water was told, on the mean of the last "
         "twenty steps; a single step that misses by more than 0.6 of it is halved and taken again",
+    )
+    overlap: quantity("", gt=0) = Field(
+        0.1,
+        description="depth to which a block may be in another, the ground or a side of the tank, over the thickness "
+        "of the thinner one: twice the distance of its nearest face from its centre of mass",
     )
     cpu_seconds: PositiveTime | None = Field(
         None, description="processor time that the run may take; a resumed run has as much again"

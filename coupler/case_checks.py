@@ -17,6 +17,7 @@ from coupler.motion_checks import motion_problems
 from coupler.parts import PARTS, Part, parts_of, recipes
 from coupler.place_checks import frame_problems, opening_problems, place_problems, solid_bodies
 from coupler.schedule import MOST_OUTPUTS
+from coupler.softness import softness_remarks
 from coupler.solids import refused_solids
 from coupler.table_checks import table_problems
 from coupler.tank_mesh import is_measured, mesh_remarks
@@ -60,6 +61,7 @@ def remarks(case: Case) -> list[str]:
     found = [
         *_thin_remarks(case),
         *_contact_remarks(case),
+        *softness_remarks(case),
         *water_remarks(case),
         *_joint_remarks(case),
         *_loose_remarks(case),

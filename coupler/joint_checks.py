@@ -37,8 +37,9 @@ def joined_blocks(case: Case, parts: list[Part]) -> tuple[list, set[int]]:
     """All blocks with the fixed solids behind them, and the rows of those with a face that joints glue to another."""
     from coupler.build import planes_of
     from coupler.solids import obstacle_blocks
-    from yade_scripts.faces import touching_faces
+    from yade_scripts.faces import both_held, touching_faces
 
     blocks = [block for part in parts for block in part.blocks] + obstacle_blocks(case)
     faces = touching_faces(blocks, planes_of(case) if case.joints.ground else ())
-    return blocks, {row for face in faces for row in (face.a, face.b) if row >= 0}
+    glued = [face for face in faces if not both_held(blocks, face)]
+    return blocks, {row for face in glued for row in (face.a, face.b) if row >= 0}

@@ -91,6 +91,22 @@ def check_misses(time: float, defects: list[float], most: int, limit: float, dt:
     )
 
 
+def check_overlap(time: float, found, limit: float) -> None:
+    """Stop where blocks are in one another, or in the ground, deeper than contact between solids can be.
+
+    found: Overlap (`coupler.overlaps`) or None. Raises Diverged.
+    """
+    if found is None:
+        return
+    stiffer = max(2.0, (found.share / limit) ** 2)
+    raise Diverged(
+        f"'{found.block}' is {found.depth:.3g} m deep in {found.other} at t = {time:.4g} s, {found.share:.2g} of the "
+        f"thickness of the thinner one ({found.depth / found.share:.3g} m); limit {limit:g} (limits.overlap). What "
+        "holds them apart is too soft for the weight or the speed of the blocks: try a contact.stiffness (absent: by "
+        f"joints.closing_ratio) about {stiffer:.2g} times as high, or thicker or slower blocks."
+    )
+
+
 HIGHEST_PRESSURE = 1e8
 """[Pa] beyond any impact: water hammer at 70 m/s."""
 

@@ -11,8 +11,9 @@ from coupler.case import Case, effective
 from coupler.clock import Clock
 from coupler.errors import ExitCode
 from coupler.left_out import imports, note_work
-from coupler.limits import LimitReached, Limits, check_defect
+from coupler.limits import LimitReached, Limits, check_defect, check_overlap
 from coupler.observe import joint_counts, size
+from coupler.overlaps import deepest_overlap
 from coupler.recorder import Recorder
 from coupler.schedule import Schedule, checkpoint_interval
 from coupler.step_limits import check_step
@@ -129,6 +130,9 @@ def _steps(
             reporter.step(coupling.time, _told(coupling, record))
             check_step(coupling, record, limits)
             check_defect(coupling.time, coupling.defects.mean, case.limits.defect)
+            if coupling.structure is not None:
+                depth = case.limits.overlap
+                check_overlap(coupling.time, deepest_overlap(coupling.structure, depth), depth)
             if _reached(coupling.time, target):
                 with clock("output"):
                     recorder.fields(coupling.time)

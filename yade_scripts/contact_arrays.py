@@ -38,7 +38,8 @@ class Pairs(NamedTuple):
     one for edges that cross
 
     fresh (p,) bool: contact takes over from a joint, with the depth there is · touching (p,) bool: had contacts last
-    time · calm (p,) [m]: way that the two must move before they can touch.
+    time · calm (p,) [m]: way that the two must move before they can touch · overlap (p,) [m]: way that parts them,
+    zero if they are apart.
     """
 
     a: Array
@@ -47,6 +48,7 @@ class Pairs(NamedTuple):
     fresh: Array
     touching: Array
     calm: Array
+    overlap: Array
 
 
 class Slots(NamedTuple):
@@ -54,29 +56,31 @@ class Slots(NamedTuple):
     their pair), k (s,) [N/m],
 
     rest (s,) [m]: depth at which it began · shear (s, 3) [N] on the node's block, in the frame of the face's
-    push (s,) [N]: normal force of the substep before, `BEGINS` in none · speed (s,) [m/s] at which it closed then.
+    spread (s,): how much nearer to the middle of the contacts of its pair it rubs · push (s,) [N]: normal force of
+    the substep before, `BEGINS` in none · speed (s,) [m/s] at which it closed then.
     """
 
     face: Array
     k: Array
     rest: Array
     shear: Array
+    spread: Array
     push: Array
     speed: Array
 
     @classmethod
     def empty(cls, size: int) -> Slots:
         """Nodes without a contact."""
-        rest, k, push, speed = (np.zeros(size) for _ in range(4))
-        return cls(np.full(size, -1, np.int64), k, rest, np.zeros((size, 3)), push, speed)
+        rest, k, spread, push, speed = (np.zeros(size) for _ in range(5))
+        return cls(np.full(size, -1, np.int64), k, rest, np.zeros((size, 3)), spread, push, speed)
 
 
 class Rows(NamedTuple):
     """The contacts of one evaluation, one row each: a block of the node, b of the face; slot.
 
     point, normal (out of b) (c, 3) · depth [m] · kn, kt, cn, ct · mu · force, viscous, shear (c, 3) on a
-    arm_a, arm_b (c, 3) [m] · velocity (c, 3): of a against b before the substep · held (c,) [J]: energy of the shear
-    spring at the time of that velocity.
+    arm_a, arm_b (c, 3) [m] · shift (c, 3) [m]: from there to where it rubs · velocity (c, 3): of a against b before
+    the substep · held (c,) [J]: energy of the shear spring at the time of that velocity.
     """
 
     a: Array
@@ -95,6 +99,7 @@ class Rows(NamedTuple):
     shear: Array
     arm_a: Array
     arm_b: Array
+    shift: Array
     velocity: Array
     held: Array
 
@@ -103,5 +108,5 @@ def empty_rows(size: int) -> Rows:
     """Room for `size` contacts."""
     whole, one, three = (np.zeros(size, np.int64) for _ in range(3)), (size,), (size, 3)
     scalars = [np.zeros(one) for _ in range(7)]
-    vectors = [np.zeros(three) for _ in range(8)]
+    vectors = [np.zeros(three) for _ in range(9)]
     return Rows(*whole, vectors[0], vectors[1], *scalars[:6], *vectors[2:], scalars[6])

@@ -112,7 +112,7 @@ class ContactForces:
             known = self._carry(a, b, start, fresh, touching, slots)
         if as_deep or parted is not None:
             fresh |= ~known & (as_deep or np.isin(self._key(a, b), parted))
-        self._pairs = Pairs(a, b, start, fresh, touching, np.zeros(len(a)))
+        self._pairs = Pairs(a, b, start, fresh, touching, np.zeros(len(a)), np.zeros(len(a)))
         self._slots = slots
         if not hasattr(self, "_rows") or len(self._rows.a) < total:
             self._rows = empty_rows(total + total // 4)
@@ -154,6 +154,15 @@ class ContactForces:
             self._read = contacts_of_rows(self._rows, self._count, self._n)
         return self._read
 
+    def deepest(self) -> tuple[Array, Array, Array]:
+        """Pairs that overlap: blocks a (p,) and b (p,), -1 - number for a fixed plane, and the way that parts them
+        (p,) [m]."""
+        self.now()
+        pairs = self._pairs
+        on = np.flatnonzero(pairs.overlap > 0.0)
+        b = pairs.b[on]
+        return pairs.a[on], np.where(b < self._n, b, self._n - 1 - b), pairs.overlap[on]
+
     def moved(self) -> None:
         """Places have changed since the last evaluation."""
         self._read = None
@@ -175,6 +184,7 @@ class ContactForces:
             "k": self._slots.k[index],
             "rest": self._slots.rest[index],
             "shear": self._slots.shear[index],
+            "spread": self._slots.spread[index],
             "push": self._slots.push[index],
             "speed": self._slots.speed[index],
             "sums": np.array([self.dashpot, self.friction, self.driving]),

@@ -60,11 +60,14 @@ def contact_forces(shapes, bodies, law, pairs, slots, x, v, R, dt, last_dt, rows
                 lost, scratch,
             )  # fmt: skip
             apart = max(apart, parted)
+        pairs.overlap[p] = max(0.0, -apart)
+        if slots.face[last] >= 0:
+            pairs.overlap[p] = min(pairs.overlap[p], rows.depth[count - 1] + slots.rest[last])
         pairs.fresh[p], pairs.touching[p] = False, count > first
         if count > first:
             yields, K = set_dashpots(bodies, law, a, b, R, rows, first, count, scratch)
             mode = Mode(law.zeta, np.sqrt(yields * K))
-            lost += apply(slots, v, R, dt, last_dt, mode, rows, first, count, F, scratch)
+            lost += apply(slots, v, R, dt, last_dt, mode, a, rows, first, count, F, scratch)
         pairs.calm[p] = apart if count == first else 0.0
     return count, lost
 
@@ -82,6 +85,7 @@ def carry_slots(old_pairs, old, new_index, old_index, start, new, shear):
             new.k[to] = old.k[source]
             new.rest[to] = old.rest[source]
             new.shear[to] = old.shear[source]
+            new.spread[to] = old.spread[source]
             new.push[to] = old.push[source]
             new.speed[to] = old.speed[source]
     lost = 0.0

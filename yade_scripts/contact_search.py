@@ -118,6 +118,7 @@ def scan(
             depth = _behind(planes, g, xi0, xi1, xi2)
             slots.face[s] = base + g
             slots.k[s] = stiffness_together(bodies.stiffness[a], bodies.stiffness[b]) / shapes.face_nodes[own]
+            slots.spread[s] = shapes.face_spread[own]
             slots.shear[s, 0] = slots.shear[s, 1] = slots.shear[s, 2] = 0.0
             slots.push[s] = BEGINS
             way_of(v, R, x, a, b, xi0, xi1, xi2, planes[g], last_dt, scratch, way)
@@ -148,7 +149,7 @@ def cross(
         slots.face[s] = -1
         return count, lost, -1.0
     if not known:
-        slots.k[s] = stiffness_together(bodies.stiffness[a], bodies.stiffness[b])
+        slots.k[s], slots.spread[s] = stiffness_together(bodies.stiffness[a], bodies.stiffness[b]), 1.0
         slots.shear[s, 0] = slots.shear[s, 1] = slots.shear[s, 2] = 0.0
         slots.push[s] = BEGINS
         way_of(v, R, x, a, b, xi[0], xi[1], xi[2], plane, last_dt, scratch, way)

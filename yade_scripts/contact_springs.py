@@ -45,7 +45,8 @@ class Mode(NamedTuple):
 def set_dashpots(bodies, law, a, b, R, rows, first, count, scratch):
     """Dashpots of all contacts of a pair, c = 2 ζ sqrt(m K) k/K with K = Σ k and the effective mass m at their middle.
 
-    So a face, an edge and a corner that land all return e. scratch (5, 3): work space   →   (1/m [1/kg], K [N/m])"""
+    So a face, an edge and a corner that land all return e. scratch (5, 3): work space, its first two rows are
+    set to the middle of the contacts seen from a and from b   →   (1/m [1/kg], K [N/m])"""
     K, middle_a, middle_b, n, u, axis = 0.0, scratch[0], scratch[1], scratch[2], scratch[3], scratch[4]
     for i in range(3):
         middle_a[i] = middle_b[i] = n[i] = 0.0
@@ -107,21 +108,28 @@ def _all_turning(bodies, a, R, arm, axis, u):
 
 
 @inner
-def apply(slots, v, R, dt, last_dt, mode, rows, first, count, F, scratch):
-    """Forces of the contacts first .. count of a pair on F; → work of friction [J]. scratch (5, 3): work space.
+def apply(slots, v, R, dt, last_dt, mode, pair_a, rows, first, count, F, scratch):
+    """Forces of the contacts first .. count of a pair on F; → work of friction [J]. scratch (6, 3): work space,
+    its first two rows the middles of the contacts seen from both blocks; pair_a: the first of these.
 
     Work of friction: the way slipped times the mean of the forces before and after it, which is what the leapfrog
     takes.
     A spring that began within the last substep is stretched for the time since it touched only, and pulls for half of
     that and half a substep.
     dt [s]: substep to come, 0: only look, nothing is remembered · last_dt [s]: substep that led here."""
-    lost, w, S, n, old = 0.0, scratch[0], scratch[1], scratch[2], scratch[3]
+    lost, w, S, n, old = 0.0, scratch[2], scratch[3], scratch[4], scratch[5]
     for c in range(first, count):
         a, b, s = rows.a[c], rows.b[c], rows.slot[c]
         w[0], w[1], w[2] = slip(v, a, b, rows.arm_a[c], rows.arm_b[c])
         for k in range(3):
             n[k] = rows.normal[c, k]
         wn = w[0] * n[0] + w[1] * n[1] + w[2] * n[2]
+        if count - first > 1 and slots.spread[s] < 1.0:
+            middle = scratch[0] if a == pair_a else scratch[1]
+            set_shift(rows, c, middle, slots.spread[s] - 1.0)
+            turn_slip(v, a, b, rows.shift[c], n, w)
+        else:
+            rows.shift[c, 0] = rows.shift[c, 1] = rows.shift[c, 2] = 0.0
         touched = dt
         if dt == 0.0:
             N = max(0.0, rows.kn[c] * rows.depth[c] - rows.cn[c] * wn)
@@ -161,9 +169,35 @@ def apply(slots, v, R, dt, last_dt, mode, rows, first, count, F, scratch):
         if dt > 0.0:
             for k in range(3):
                 slots.shear[s, k] = R[b, 0, k] * S[0] + R[b, 1, k] * S[1] + R[b, 2, k] * S[2]
-        _add(F, a, 1.0, rows.force[c], rows.arm_a[c])
-        _add(F, b, -1.0, rows.force[c], rows.arm_b[c])
+        for k in range(3):
+            S[k] = rows.force[c, k] - N * n[k]
+        _add(F, a, 1.0, rows.force[c], rows.arm_a[c], S, rows.shift[c])
+        _add(F, b, -1.0, rows.force[c], rows.arm_b[c], S, rows.shift[c])
     return lost if dt > 0.0 else 0.0
+
+
+@inner
+def set_shift(rows, c, middle, share):
+    """Set the way from a contact to where it rubs: along the face, `share` of its arm from the middle (3,) of all
+    contacts of the pair, seen from the block of the node."""
+    across = 0.0
+    for k in range(3):
+        rows.shift[c, k] = share * (rows.arm_a[c, k] - middle[k])
+        across += rows.shift[c, k] * rows.normal[c, k]
+    for k in range(3):
+        rows.shift[c, k] -= across * rows.normal[c, k]
+
+
+@inner
+def turn_slip(v, a, b, shift, n, w):
+    """Take the velocity w (3,) of a against b to a place `shift` further along the face; its part along n stays."""
+    w0 = (v[a, 4] - v[b, 4]) * shift[2] - (v[a, 5] - v[b, 5]) * shift[1]
+    w1 = (v[a, 5] - v[b, 5]) * shift[0] - (v[a, 3] - v[b, 3]) * shift[2]
+    w2 = (v[a, 3] - v[b, 3]) * shift[1] - (v[a, 4] - v[b, 4]) * shift[0]
+    along = w0 * n[0] + w1 * n[1] + w2 * n[2]
+    w[0] += w0 - along * n[0]
+    w[1] += w1 - along * n[1]
+    w[2] += w2 - along * n[2]
 
 
 @inner
@@ -217,17 +251,19 @@ def since_touch(zeta, phase):
 
 
 @inner
-def _add(F, row, sign, force, arm):
-    """Force and its moment about the centre; F has rows for blocks only."""
+def _add(F, row, sign, force, arm, shear, shift):
+    """Force and its moment about the centre, of which the part `shear` acts `shift` further on; F has rows for blocks
+    only."""
     if row >= len(F):
         return
     f0, f1, f2 = sign * force[0], sign * force[1], sign * force[2]
     F[row, 0] += f0
     F[row, 1] += f1
     F[row, 2] += f2
-    F[row, 3] += arm[1] * f2 - arm[2] * f1
-    F[row, 4] += arm[2] * f0 - arm[0] * f2
-    F[row, 5] += arm[0] * f1 - arm[1] * f0
+    s0, s1, s2 = sign * shear[0], sign * shear[1], sign * shear[2]
+    F[row, 3] += arm[1] * f2 - arm[2] * f1 + shift[1] * s2 - shift[2] * s1
+    F[row, 4] += arm[2] * f0 - arm[0] * f2 + shift[2] * s0 - shift[0] * s2
+    F[row, 5] += arm[0] * f1 - arm[1] * f0 + shift[0] * s1 - shift[1] * s0
 
 
 @njit(cache=True)
@@ -241,9 +277,11 @@ def contact_work(rows, count, v, given, dt):
     → (taken by dashpots, put in by what moves the driven bodies) [J]
     """
     dashpot = driving = 0.0
+    w = np.empty(3)
     for c in range(count):
         a, b = rows.a[c], rows.b[c]
-        w = slip(v, a, b, rows.arm_a[c], rows.arm_b[c])
+        w[0], w[1], w[2] = slip(v, a, b, rows.arm_a[c], rows.arm_b[c])
+        turn_slip(v, a, b, rows.shift[c], rows.normal[c], w)
         came = goes = 0.0
         for k in range(3):
             dashpot -= 0.5 * rows.viscous[c, k] * (rows.velocity[c, k] + w[k]) * dt
@@ -252,19 +290,24 @@ def contact_work(rows, count, v, given, dt):
         depth = rows.depth[c]
         dashpot += 0.5 * rows.kn[c] * depth * (min(depth + goes, 0.0) - min(depth - came, 0.0))
         if given[a]:
-            driving -= _power(rows.force[c], rows.arm_a[c], v[a]) * dt
+            driving -= _power(rows, c, rows.arm_a[c], v[a]) * dt
         if given[b]:
-            driving += _power(rows.force[c], rows.arm_b[c], v[b]) * dt
+            driving += _power(rows, c, rows.arm_b[c], v[b]) * dt
     return dashpot, driving
 
 
 @inner
-def _power(force, arm, v):
-    """Power of a force at a point of a body that moves with v (6,) [W]."""
+def _power(rows, c, arm, v):
+    """Power of the force on a of a contact at its place on a body that moves with v (6,) [W]."""
+    f, n, shift = rows.force[c], rows.normal[c], rows.shift[c]
+    N = f[0] * n[0] + f[1] * n[1] + f[2] * n[2]
     u0 = v[0] + v[4] * arm[2] - v[5] * arm[1]
     u1 = v[1] + v[5] * arm[0] - v[3] * arm[2]
     u2 = v[2] + v[3] * arm[1] - v[4] * arm[0]
-    return force[0] * u0 + force[1] * u1 + force[2] * u2
+    s0 = (f[0] - N * n[0]) * (v[4] * shift[2] - v[5] * shift[1])
+    s1 = (f[1] - N * n[1]) * (v[5] * shift[0] - v[3] * shift[2])
+    s2 = (f[2] - N * n[2]) * (v[3] * shift[1] - v[4] * shift[0])
+    return f[0] * u0 + f[1] * u1 + f[2] * u2 + s0 + s1 + s2
 
 
 @inner

@@ -17,7 +17,8 @@ SLIPS = 1.0 - 1e-9
 
 @dataclass(frozen=True)
 class Contacts:
-    """c node contacts. a, b (c,) rows · point (c, 3) [m] · normal (c, 3) from a to b
+    """c node contacts. a, b (c,) rows · point, shear_point (c, 3) [m]: where they push and rub · normal (c, 3) from a
+    to b
 
     depth (c,) [m] · kn, ks [N/m] · cn, cs [N s/m], cs zero while it slides · mu · normal_force (with dashpot),
     shear_force (without) (c, 3) [N] on b · shear_energy (c,) [J], half a substep ago. a is the block of the node, b
@@ -27,6 +28,7 @@ class Contacts:
     a: Array
     b: Array
     point: Array
+    shear_point: Array
     normal: Array
     depth: Array
     kn: Array
@@ -53,7 +55,9 @@ class Contacts:
 
     def forces(self, v: Array, x: Array) -> Array:
         """Whole force on b (c, 3) [N] at block velocities v (n, 6): with the dashpots, as the law applies it."""
-        w = self.closing_velocity(v, x)
+        w = point_velocities(self.a, self.shear_point, v, x) - point_velocities(
+            self.b, self.shear_point, v, x
+        )
         ws = w - np.einsum("ci,ci->c", w, self.normal)[:, None] * self.normal
         viscous = np.where(self.slides, 0.0, self.cs)[:, None] * ws
         return self.normal_force + self.shear_force + viscous
@@ -65,11 +69,15 @@ class Contacts:
     def springs(self, x: Array) -> Springs:
         """Secant springs and dashpots; a sliding contact has no tangential ones."""
         sticks = ~self.slides
-        arm_a, arm_b = self.point - x[self.a], self.point - x[self.b]
-        # `assemble` reads -1 as the fixed world; its arm is not used there.
-        return Springs(
-            self.a, self.b, arm_a, arm_b, self.normal, self.kn, self.ks * sticks, self.cn, self.cs * sticks
+        none = np.zeros(len(self))
+        across = self._springs_at(self.point, x, self.kn, none, self.cn, none)
+        return across.and_(
+            self._springs_at(self.shear_point, x, none, self.ks * sticks, none, self.cs * sticks)
         )
+
+    def _springs_at(self, point, x, kn, kt, cn, ct) -> Springs:
+        """`assemble` reads -1 as the fixed world; its arm is not used there."""
+        return Springs(self.a, self.b, point - x[self.a], point - x[self.b], self.normal, kn, kt, cn, ct)
 
 
 def point_velocities(row: Array, point: Array, v: Array, x: Array) -> Array:
@@ -81,11 +89,13 @@ def point_velocities(row: Array, point: Array, v: Array, x: Array) -> Array:
 
 def sum_on_blocks(contacts: Contacts, force: Array, x: Array) -> Array:
     """Force and moment (n, 6) on the blocks from contact forces on b (c, 3)."""
-    total = np.zeros((len(x), 6))
-    for row, sign in ((contacts.a, -1.0), (contacts.b, 1.0)):
-        on = row >= 0
-        f = sign * force[on]
-        np.add.at(total, row[on], np.concatenate([f, np.cross(contacts.point[on] - x[row[on]], f)], axis=1))
+    total, n = np.zeros((len(x), 6)), contacts.normal
+    normal = np.einsum("ci,ci->c", force, n)[:, None] * n
+    for point, part in ((contacts.point, normal), (contacts.shear_point, force - normal)):
+        for row, sign in ((contacts.a, -1.0), (contacts.b, 1.0)):
+            on = row >= 0
+            f = sign * part[on]
+            np.add.at(total, row[on], np.concatenate([f, np.cross(point[on] - x[row[on]], f)], axis=1))
     return total
 
 
@@ -95,7 +105,7 @@ def contacts_of_rows(rows: Rows, count: int, n: int) -> Contacts:
     on_face = r.b < n
     normal_force = np.einsum("ci,ci->c", r.force, r.normal)
     return Contacts(
-        r.a, np.where(on_face, r.b, -1), r.point, -r.normal, r.depth, r.kn, r.kt, r.cn, r.ct, r.mu,
+        r.a, np.where(on_face, r.b, -1), r.point, r.point + r.shift, -r.normal, r.depth, r.kn, r.kt, r.cn, r.ct, r.mu,
         -normal_force[:, None] * r.normal, -r.shear, r.held,
     )  # fmt: skip
 

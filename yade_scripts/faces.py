@@ -69,6 +69,11 @@ class TouchingFaces:
         return float(np.linalg.norm(polygon_area_vector(self.polygon)))
 
 
+def both_held(blocks: list[Block], face: TouchingFaces) -> bool:
+    """Whether both sides stand still for good: nothing between them can break. (Driven blocks may part.)"""
+    return all(blocks[row].fixed for row in (face.a, face.b) if row >= 0)
+
+
 @dataclass(frozen=True)
 class _WorldFaces:
     """All faces of all blocks, block after block. block_start (n+1,): faces of each block · corner_start (f+1,)
@@ -305,3 +310,11 @@ def _mapped_rule(corners: Array, rule: Rule) -> tuple[Array, Array]:
     du = np.stack([-(1 - v), 1 - v, v, -v], axis=1) @ corners
     dv = np.stack([-(1 - u), -u, u, 1 - u], axis=1) @ corners
     return shape @ corners, np.outer(w, w).ravel() * np.linalg.norm(np.cross(du, dv), axis=1)
+
+
+def to_body(points: Array, row: Array, centre: Array, R: Array) -> Array:
+    """World points (P, 3) → frame of their body; row < 0 stays in the world."""
+    local = points.copy()
+    on = row >= 0
+    local[on] = np.einsum("pji,pj->pi", R[row[on]], points[on] - centre[row[on]])
+    return local

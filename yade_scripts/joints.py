@@ -9,7 +9,7 @@ import numpy as np
 from yade_scripts import joint_kernel as kernel
 from yade_scripts.blocks import Block
 from yade_scripts.cohesion import JointParameters
-from yade_scripts.faces import TouchingFaces, gauss_points
+from yade_scripts.faces import TouchingFaces, gauss_points, to_body
 from yade_scripts.joint_forces import NOT_GROWING, PULL, kernels_of
 
 Array = np.ndarray
@@ -74,9 +74,9 @@ class Joints:
         corners = np.concatenate([f.polygon for f in faces]) if n else np.zeros((0, 3))
         self.corner_start = np.concatenate([[0], np.cumsum([len(f.polygon) for f in faces])]).astype(np.int64)
         self._corner_of = np.repeat(np.arange(n), np.diff(self.corner_start))
-        self._corner = _to_body(corners, self.a[self._corner_of], centre, R)
-        self.xi_a = _to_body(place, self.a[self.joint_of], centre, R)
-        self.xi_b = _to_body(place, self.b[self.joint_of], centre, R)
+        self._corner = to_body(corners, self.a[self._corner_of], centre, R)
+        self.xi_a = to_body(place, self.a[self.joint_of], centre, R)
+        self.xi_b = to_body(place, self.b[self.joint_of], centre, R)
         normal = np.array([f.normal for f in faces]).reshape(-1, 3)
         self.normal = np.einsum("nji,nj->ni", R[self.a], normal) if n else np.zeros((0, 3))
         self.k0 = np.full(n, parameters.stiffness)
@@ -233,11 +233,3 @@ class Joints:
         """Back to a `history`."""
         for name, value in history.items():
             setattr(self, name, value.copy())
-
-
-def _to_body(points: Array, row: Array, centre: Array, R: Array) -> Array:
-    """World points (P, 3) → frame of their body; row < 0 stays in the world."""
-    local = points.copy()
-    on = row >= 0
-    local[on] = np.einsum("pji,pj->pi", R[row[on]], points[on] - centre[row[on]])
-    return local

@@ -25,7 +25,12 @@ NONE = np.zeros(0, np.int64)
 def loose_at_start(blocks: list[Block], joints: Joints | None) -> Array:
     """(n,) bool: blocks without joints, and blocks that move."""
     loose = np.ones(len(blocks), bool) if joints is None else joints.damaged_blocks(len(blocks))
-    return loose | np.array([bool(b.velocity.any() or b.spin.any()) for b in blocks], bool)
+    return loose | np.array([moves(b) for b in blocks], bool)
+
+
+def moves(block: Block) -> bool:
+    """Whether it moves at the start."""
+    return bool(block.velocity.any() or block.spin.any())
 
 
 class ContactOnset:

@@ -17,12 +17,13 @@ from yade_scripts.contact import ContactLaw
 from yade_scripts.contact_forces import ContactForces
 from yade_scripts.description import check_names, local_origin, matched_stiffness, moved_block
 from yade_scripts.engine import load_yade
-from yade_scripts.faces import FixedPlane, touching_faces
+from yade_scripts.faces import FixedPlane, TouchingFaces, both_held, touching_faces
 from yade_scripts.impulses import Impulses, ImpulseSums
 from yade_scripts.joints import Joints
 from yade_scripts.motion import Motion
-from yade_scripts.onset import ContactOnset, loose_at_start
+from yade_scripts.onset import ContactOnset, loose_at_start, moves
 from yade_scripts.scene import Scene
+from yade_scripts.seals import Seals
 from yade_scripts.spin import SpinCorrection
 from yade_scripts.structure_readings import StructureReadings
 from yade_scripts.structure_state import StructureState, check_belongs
@@ -61,6 +62,10 @@ class Structure(StructureReadings):
     blocks: list of Block, unique names · ground: level of a horizontal floor [m] or None
     planes: further fixed planes (tank walls) · gravity (3,) [m/s²]
     substep: used in place of the one that `substep_limit` finds accurate, None: that one
+    impermeable: faces that touch at the start without a joint count as sealed while they do (`joined_planes`)
+
+    Fixed blocks are not joined to one another or to planes, since nothing could break there; their faces are sealed
+    as those of a joint. Driven blocks are joined: they may part.
 
     One structure in a process at a time (YADE has one scene): use it as a context manager or call close().
     """
@@ -75,6 +80,7 @@ class Structure(StructureReadings):
         gravity=GRAVITY,
         threads: int = 1,
         substep: float | None = None,
+        impermeable: bool = False,
     ):
         self._describe(blocks, gravity)
         self.contact = contact
@@ -82,7 +88,9 @@ class Structure(StructureReadings):
         origin = self._origin = local_origin(blocks)
         local = [moved_block(b, -origin) for b in blocks]
         local_planes = [replace(p, point=p.point - origin) for p in self.planes]
-        self.joints = _make_joints(local, local_planes, joints)
+        faces = _Faces.of(local, local_planes, joints, impermeable)
+        self.joints = Joints(local, faces.joined, joints) if faces.joined else None
+        self._seals = Seals(local, faces.sealed) if faces.sealed else None
         self.face_stiffness = self._face_stiffness()
         self._set_damping()
         self._substep = substep
@@ -93,6 +101,7 @@ class Structure(StructureReadings):
         self._motion.read()
         self._contacts = self._contact_forces(local, local_planes)
         loose = loose_at_start(blocks, self.joints)
+        loose[[row for row in faces.held_rows if not moves(blocks[row])]] = False
         self._onset = ContactOnset(
             self._scene, self._motion, self.joints, self._contacts, self._radius, loose
         )
@@ -335,8 +344,27 @@ def _with_ground(ground: float | None, planes) -> list[FixedPlane]:
     return [*floor, *planes]
 
 
-def _make_joints(blocks, planes, parameters: JointParameters | None) -> Joints | None:
-    if parameters is None:
-        return None
-    joints = Joints(blocks, touching_faces(blocks, planes if parameters.ground else ()), parameters)
-    return joints if len(joints) else None
+@dataclass(frozen=True)
+class _Faces:
+    """Touching faces: those that get a joint, those that only keep water out, and blocks held at others that are
+    held."""
+
+    joined: list[TouchingFaces]
+    sealed: list[TouchingFaces]
+    held_rows: list[int]
+
+    @classmethod
+    def of(cls, blocks, planes, parameters: JointParameters | None, impermeable: bool) -> _Faces:
+        if parameters is None and not impermeable:
+            return cls([], [], [])
+        joined, sealed, held_rows = [], [], set()
+        for face in touching_faces(blocks, planes):
+            ends = [row for row in (face.a, face.b) if row >= 0]
+            held = both_held(blocks, face)
+            glued = parameters is not None and (face.b >= 0 or parameters.ground)
+            if glued and not held:
+                joined.append(face)
+            elif glued or impermeable:
+                sealed.append(face)
+            held_rows.update(ends if glued and held else ())
+        return cls(joined, sealed, sorted(held_rows))

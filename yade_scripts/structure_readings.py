@@ -17,6 +17,7 @@ from yade_scripts.joints import Joints, JointTable
 from yade_scripts.motion import Motion
 from yade_scripts.onset import ContactOnset
 from yade_scripts.scene import Scene
+from yade_scripts.seals import Seals
 from yade_scripts.spin import SpinCorrection
 from yade_scripts.substep import Substepper
 
@@ -38,6 +39,7 @@ class StructureReadings:
     _spin: SpinCorrection
     _contacts: ContactForces | None
     _onset: ContactOnset
+    _seals: Seals | None
     _accounts: Accounts
     _substepper: Substepper
 
@@ -134,11 +136,32 @@ class StructureReadings:
         rows = np.concatenate([c.a, c.b[other]])
         return rows, np.concatenate([c.normal, -c.normal[other]]), np.concatenate([c.depth, c.depth[other]])
 
+    def deepest(self) -> tuple[Array, Array, Array, Array]:
+        """Pairs that are in one another: blocks a (p,) and b (p,), -1 - number for a fixed plane, depth (p,) [m] and
+        depth over the
+        thickness of the thinner block (p,). Of contacts: the way that parts the two, at most (faces are tried, and
+        edges that cross where these carry); of live joints: the mean closing."""
+        thickness = 2.0 * np.array([b.planes[1].min() for b in self.blocks])
+        a, b, depth = (np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0))
+        if self._contacts is not None:
+            a, b, depth = self._contacts.deepest()
+        if self.joints is not None:
+            live = self.joints.live
+            closing = -self.joints.openings(live, self._motion.x, self._motion.R)[:, 0]
+            other = np.where(self.joints.b < 0, -1 - self.joints.plane, self.joints.b)
+            a, b = np.concatenate([a, self.joints.a[live]]), np.concatenate([b, other[live]])
+            depth = np.concatenate([depth, np.maximum(closing, 0.0)])
+        thinner = np.minimum(thickness[a], np.where(b >= 0, thickness[b], np.inf))
+        return a, b, depth, depth / thinner
+
     def joined_planes(self) -> tuple[Array, Array, Array]:
-        """Faces sealed by a live joint: block (m,), face (m,), half of the largest opening (m,) [m]."""
-        if self.joints is None:
-            return np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0)
-        return self.joints.sealed_faces(self._motion.x, self._motion.R)
+        """Faces sealed by a live joint, or by lying on one another where that is impermeable: block (m,), face (m,),
+        half of the largest opening (m,) [m]."""
+        m = self._motion
+        none = np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0)
+        glued = none if self.joints is None else self.joints.sealed_faces(m.x, m.R)
+        lying = none if self._seals is None else self._seals.closed_faces(m.x, m.R)
+        return tuple(np.concatenate(two) for two in zip(glued, lying))
 
     def broken_joints(self) -> tuple[Array, Array, Array, Array]:
         """Joints that carry nothing any more: number (m,), blocks and their faces (m, 2), -1 a fixed plane, and now

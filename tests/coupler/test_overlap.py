@@ -1,0 +1,81 @@
+"""Contacts too soft for their blocks: a remark before the run, and an end with the names during it."""
+
+import subprocess
+import sys
+
+import pytest
+
+from coupler.case_checks import remarks
+from coupler.case_file import load
+from coupler.errors import ExitCode
+from coupler.limits import Diverged, check_overlap
+from coupler.overlaps import deepest_overlap
+from yade_scripts.blocks import Block
+from yade_scripts.contact import ContactLaw
+from yade_scripts.structure import Structure
+
+from .test_case_file import write
+
+SOFT = """
+[case]
+title = "plate that falls"
+[time]
+end = 0.5
+output_every = 0.1
+[structure]
+density = 2000.0
+[structure.ground]
+[[structure.block]]
+name = "plate"
+centre = [0, 0, 0.25]
+size = [1.0, 1.0, 0.1]
+[contact]
+stiffness = {stiffness}
+"""
+
+
+@pytest.mark.parametrize(("stiffness", "soft"), [("1e5", True), ("1e8", False)])
+def test_a_soft_contact_is_remarked_and_ends_the_run(tmp_path, stiffness, soft):
+    """200 kg from 0.2 m: v sqrt(m/K) is 0.9 of the plate, or 0.03 of it."""
+    path = write(tmp_path, SOFT.format(stiffness=stiffness))
+    told = [text for text in remarks(load(path).case) if "too soft" in text]
+    assert [("'plate', 0.1 m thick" in text) for text in told] == ([True] if soft else [])
+    program = "import sys; sys.argv[0] = 'surgebreak'; from coupler.cli import main; main()"
+    command = [sys.executable, "-c", program, "run", str(path), "--output", str(tmp_path / "out")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == (ExitCode.DIVERGED if soft else 0), done.stderr
+    if soft:
+        assert "'plate' is" in done.stderr
+        assert "deep in the ground" in done.stderr
+        assert "limits.overlap" in done.stderr
+
+
+def test_crossed_edges_are_measured_by_the_way_that_parts_them():
+    """A ridge that sinks 0.02 m into a ridge lies far behind its faces; the way out is short."""
+    from scipy.spatial.transform import Rotation
+
+    low, high = (Rotation.from_euler(axis, 45, degrees=True).as_matrix() for axis in "xy")
+    blocks = [
+        Block("low", (0, 0, 0), size=1.0, rotation=low, fixed=True),
+        Block("high", (0, 0, 2**0.5 + 1e-4), size=1.0, rotation=high, velocity=(0, 0, -1.0)),
+    ]
+    with Structure(blocks, ContactLaw(1e9, 0.3, 0.0), gravity=(0, 0, 0)) as s:
+        s.advance(1.1e-3)
+        found = deepest_overlap(s, 1e-5)
+        depth = 2**0.5 - s.centre()[1, 2]
+    assert (found.block, found.other) == ("low", "'high'")
+    assert found.depth == pytest.approx(depth, rel=1e-5)
+    assert found.share == pytest.approx(found.depth, rel=1e-9)
+    with pytest.raises(Diverged, match=r"'low' is .* deep in 'high'"):
+        check_overlap(1.0, found, 1e-4)
+
+
+def test_a_joint_that_closes_too_far_counts():
+    from yade_scripts.cohesion import JointParameters
+
+    blocks = [Block("low", (0, 0, 0.5), size=1.0), Block("high", (0, 0, 1.5), size=1.0, density=2000.0)]
+    with Structure(blocks, ContactLaw(), JointParameters(1e3, 0.1), ground=0.0) as s:
+        s.advance(1.0)
+        found = deepest_overlap(s, 0.1)
+    assert found.other in ("'high'", "the ground")
+    assert found.share > 0.1

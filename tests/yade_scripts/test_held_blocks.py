@@ -1,0 +1,61 @@
+"""Fixed blocks have no joints among themselves; faces that lie on one another may keep water out."""
+
+import numpy as np
+import pytest
+
+from yade_scripts.blocks import Block
+from yade_scripts.cohesion import JointParameters
+from yade_scripts.contact import ContactLaw
+from yade_scripts.structure import Structure
+
+GLUE = JointParameters(1e6, 1e-3)
+
+
+def row_of(count, **more):
+    """Cubes of 1 m in a row on the ground, one of them free."""
+    return [Block(f"b{i}", (float(i), 0, 0.5), size=1.0, **({} if i == 2 else more)) for i in range(count)]
+
+
+def test_fixed_blocks_are_joined_to_free_ones_alone():
+    """Of four in a row and the ground, the free one has its two neighbours and the ground; what is held has nothing
+    else."""
+    with Structure(row_of(4, fixed=True), ContactLaw(), GLUE, ground=0.0) as s:
+        table = s.joint_table()
+        assert sorted(zip(table.a.tolist(), table.b.tolist())) == [(1, 2), (2, -1), (2, 3)]
+        block, face, _ = s.joined_planes()
+        assert len(block) == 2 + 1 + 2 + 2 + 3  # two faces b1-b2, b2-b3, b0-b1; ground under four: once each
+        assert len(set(zip(block.tolist(), face.tolist()))) == len(block)
+        assert not s.loose()[[0, 1, 3]].any()
+
+
+def test_a_driven_block_is_joined_to_a_fixed_one_since_they_may_part():
+    blocks = [
+        Block("low", (0, 0, 0.5), size=1.0, fixed=True),
+        Block("high", (0, 0, 1.5), size=1.0, driven=True),
+    ]
+    with Structure(blocks, ContactLaw(1e8), GLUE, ground=0.0) as s:
+        assert s.joint_table().b.tolist() == [1]
+
+
+def test_a_driven_block_that_leaves_opens_what_it_sealed():
+    blocks = [
+        Block("low", (0, 0, 0.5), size=1.0, fixed=True),
+        Block("high", (0, 0, 1.5), size=1.0, driven=True, velocity=(0, 0, 0.1)),
+    ]
+    with Structure(blocks, ContactLaw(1e8), gravity=(0, 0, 0), impermeable=True) as s:
+        assert len(s.joined_planes()[0]) == 2
+        s.advance(0.05)
+        assert len(s.joined_planes()[0]) == 2
+        s.advance(0.1)
+        assert len(s.joined_planes()[0]) == 0
+
+
+@pytest.mark.parametrize(("impermeable", "closed"), [(False, 0), (True, 3)])
+def test_loose_blocks_seal_where_that_is_asked_for(impermeable, closed):
+    """A cube on another on the ground: both faces between them and the one below, until the upper one is pushed off."""
+    blocks = [Block("low", (0, 0, 0.5), size=1.0), Block("high", (0, 0, 1.5), size=1.0)]
+    with Structure(blocks, ContactLaw(1e8), ground=0.0, impermeable=impermeable) as s:
+        s.advance(0.1)
+        assert len(s.joined_planes()[0]) == closed
+        s.displace(np.array([1]), np.array([[0.6, 0.0, 0.0]]), np.eye(3)[None])
+        assert len(s.joined_planes()[0]) == closed // 3
