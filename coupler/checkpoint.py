@@ -7,7 +7,7 @@ result files go, figures and processor time; with it the case and the program th
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import cached_property
 from pathlib import Path
@@ -91,6 +91,16 @@ class _About(BaseModel):
     cpu_seconds: dict[str, float]
 
 
+@dataclass(frozen=True)
+class State:
+    """What a checkpoint holds, before it is written. time [s] · name of the file · arrays by name · about, as text"""
+
+    time: float
+    name: str
+    arrays: dict[str, np.ndarray]
+    about: str
+
+
 class Checkpoints:
     """Writes those of a run: the newest KEPT stay.
 
@@ -116,20 +126,33 @@ class Checkpoints:
 
     def write(self, figures: dict, cpu_seconds: dict[str, float]) -> None:
         """One now, unless the last one is of this very step.  Raises NotFinite, DiskFull."""
-        coupling = self.scene.coupling
-        if coupling.time == self._last:
+        if self.scene.coupling.time != self._last:
+            self.put(self._state(figures, cpu_seconds))
+
+    def hold(self, figures: dict, cpu_seconds: dict[str, float]) -> State:
+        """What stands now, copied, for `put` if the step that follows is left."""
+        state = self._state(figures, cpu_seconds)
+        return replace(state, arrays={name: array.copy() for name, array in state.arrays.items()})
+
+    def put(self, state: State) -> None:
+        """Write a state, unless the last one is of its step.  Raises NotFinite, DiskFull."""
+        if state.time == self._last:
             return
+        write_arrays(self.folder / state.name, state.arrays, state.about, UNSET)
+        self._last = state.time
+        self._next = next_multiple(state.time, self.every)
+        for old in listed(self.folder)[KEPT:]:
+            old.unlink()
+
+    def _state(self, figures: dict, cpu_seconds: dict[str, float]) -> State:
         about = self._about | {
             "figures": figures,
             "cpu_seconds": cpu_seconds,
             "written": datetime.now(UTC).isoformat(timespec="seconds"),
         }
-        path = self.folder / f"{figures['steps']:08d}.h5"
-        write_arrays(path, _arrays(coupling, self.recorder), json.dumps(about, default=_plain), UNSET)
-        self._last = coupling.time
-        self._next = next_multiple(coupling.time, self.every)
-        for old in listed(self.folder)[KEPT:]:
-            old.unlink()
+        arrays = _arrays(self.scene.coupling, self.recorder)
+        name = f"{figures['steps']:08d}.h5"
+        return State(self.scene.coupling.time, name, arrays, json.dumps(about, default=_plain))
 
 
 def _arrays(coupling, recorder) -> dict[str, np.ndarray]:

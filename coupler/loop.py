@@ -7,6 +7,7 @@ A scene may lack either side: without water the structure runs alone, without a 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
@@ -88,6 +89,8 @@ class Coupling:
         expected: float = 0.0,
     ):
         self.passes, self.tolerance = passes, tolerance
+        self.pause: Callable[[], None] | None = None
+        """Called between the parts of a step, where the run may be ended by an exception."""
         self.defects = Defects(most_defect, step_max)
         self.limits = limits
         self.water, self.structure, self.immersion = water, structure, immersion
@@ -266,6 +269,7 @@ class Coupling:
         record.wetted = problem.coupling.nnz > 0
         found, most = None, self.passes if record.wetted else 1
         for record.passes in range(1, most + 1):
+            self._pause()
             with self.clock("pressure"):
                 guess = None if found is None else found.x
                 found = solve_coupled(problem, response, v_free, solve, self.rtol, guess, wetting)
@@ -285,6 +289,10 @@ class Coupling:
         record.substep, record.opening_rate = report.dt_s, report.opening_rate
         record.impulses = report.impulses
         return found, report.mean_velocity
+
+    def _pause(self) -> None:
+        if self.pause is not None:
+            self.pause()
 
     def _response(self, problem):
         """Mass of the blocks, the answer of all bodies to forces, and V_free of the first pass."""
@@ -306,6 +314,7 @@ class Coupling:
 
         with self.clock("water"):
             problem = self.water.predict(dt)
+        self._pause()
         with self.clock("pressure"), self._placed(problem):
             result = self._solve(problem.matrix, problem.rhs, problem.guess, self.rtol)
         with self.clock("water"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from shlex import quote
 
 import numpy as np
@@ -18,6 +19,7 @@ from coupler.recorder import Recorder
 from coupler.schedule import Schedule, checkpoint_interval
 from coupler.step_limits import check_step
 from coupler.terminal import newtons
+from coupler.within_step import LongSteps, StepLeft
 
 FAST_OPENING = 0.25
 """Growth of λ/δ_f in a substep from which tearing counts as averaged over it."""
@@ -117,13 +119,16 @@ def _steps(
     kept = checkpoint.part("recorder") if checkpoint else None
     recorder = Recorder(directory.path, coupling, scene.gauges, scene.solids, scene.tank, kept)
     checkpoints = _checkpoints(case, scene, directory, recorder, schedule)
+    way_on = f"; `surgebreak resume {quote(str(directory.path))}` goes on" if checkpoints is not None else ""
+    long = _long_steps(coupling, limits, reporter, clock, figures, checkpoints)
     try:
         if checkpoint is None:
             with clock("output"):
                 recorder.fields(0.0)
         while not _reached(coupling.time, schedule.end):
             target = schedule.next_output(coupling.time)
-            record = coupling.step(coupling.step_size(target - coupling.time))
+            dt = coupling.step_size(target - coupling.time)
+            record = long.around(partial(coupling.step, dt))
             with clock("output"):
                 recorder.step(record)
             _note(coupling, record, figures)
@@ -141,14 +146,27 @@ def _steps(
             if checkpoints is not None and (wish or at_end or checkpoints.due()):
                 _save(checkpoints, directory, figures, clock)
             if wish:
-                way_on = (
-                    f"; `surgebreak resume {quote(str(directory.path))}` goes on"
-                    if checkpoints is not None
-                    else ""
-                )
                 raise LimitReached(wish + way_on)
+    except StepLeft as left:
+        if checkpoints is not None:
+            with clock("output"):
+                checkpoints.put(long.held)
+        raise LimitReached(str(left) + way_on) from None
     finally:
         recorder.close()
+
+
+def _long_steps(coupling, limits: Limits, reporter, clock: Clock, figures: dict, checkpoints) -> LongSteps:
+    """What leaves a long step where the run is to end, asked by both sides."""
+
+    def hold():
+        return None if checkpoints is None else checkpoints.hold(figures, clock.split())
+
+    long = LongSteps(lambda: _wish_to_stop(clock, limits, reporter), hold)
+    coupling.pause = long
+    if coupling.structure is not None:
+        coupling.structure.pause = long
+    return long
 
 
 def _reached(time: float, target: float) -> bool:

@@ -1,6 +1,6 @@
 """The user's wish to stop: Ctrl-C, the end of the session, or a file named `stop` in the run directory.
 
-The loop asks once a step; the step under way ends properly and is written. A second Ctrl-C stops at once. When the
+The loop asks once a step, and within one that lasts long (`within_step.py`). A second Ctrl-C stops at once. When the
 terminal closes (SIGHUP) there is nobody to tell any more: what is printed goes nowhere from then on.
 """
 

@@ -6,6 +6,7 @@ World coordinates and SI units outside; one row a block; motions and forces are 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -113,6 +114,8 @@ class Structure(StructureReadings):
         check_names(blocks)
         self.blocks = list(blocks)
         self.n = len(self.blocks)
+        self.pause: Callable[[], None] | None = None
+        """Called after every substep, where the run may be ended by an exception."""
         self.names = [b.name for b in blocks]
         self.groups = [b.group for b in blocks]
         self.mass = np.array([b.mass for b in blocks])
@@ -251,6 +254,8 @@ class Structure(StructureReadings):
         broken = self.joints.broken_now() if self.joints is not None else np.zeros(0, np.int64)
         if len(broken):
             self._retire(broken)
+        if self.pause is not None:
+            self.pause()
         return broken
 
     def _retire(self, broken: Array) -> None:
