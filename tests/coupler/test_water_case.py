@@ -88,10 +88,10 @@ def test_a_tank_that_its_inflow_fills_is_refused():
 @pytest.mark.parametrize(
     ("fill", "thin"),
     [
-        ([[0, 0, 0], [2, 0.2, 0.19]], "water.fill[0] is 0.19 m thin, 1.9 cells"),
+        ([[0, 0, 0], [2, 0.2, 0.29]], "water.fill[0] is 0.29 m thin, 2.9 cells"),
         ([[0, 0, 0], [0.15, 0.2, 0.6]], "water.fill[0] is 0.15 m thin, 1.5 cells"),
         ([[0.5, 0, 0.5], [1.0, 0.2, 0.61]], "water.fill[0] is 0.11 m thin, 1.1 cells"),
-        ([[0, 0, 0], [2, 0.2, 0.2]], None),
+        ([[0, 0, 0], [2, 0.2, 0.3]], None),
         ([[0, 0, 0], [0.5, 0.2, 0.5]], None),
     ],
 )

@@ -20,6 +20,8 @@ BRICK_STEP = 4e-6
 """[CPU s] that a brick (six cells) of water takes a step, about; with blocks half as much again."""
 SUBSTEP = 4e-6
 """[CPU s] that a block with its contacts and joints takes a substep, about."""
+TOUCHING = ("wall", "building", "column", "arch")
+"""Kinds of parts in which faces touch for sure: from their joints [contact] can take its stiffness."""
 WANTED = 4.0
 """[CPU s] that a scene is sized for."""
 
@@ -180,7 +182,7 @@ def _structure(dice: Dice, place: Basin, flow: Stream | None, found: Bodies, gra
         tables["joints"] = _joints(dice, place, found, density, gravity)
         if flow is not None and dice.chance(0.3):
             tables["water"]["cracks"] = dice.one(["closed", "slit"])
-    if not glued or dice.chance(0.5):
+    if not glued or dice.chance(0.5) or not any(kind in found.tables for kind in TOUCHING):
         contact["stiffness"] = rounded(stiffness)
     tables["contact"] = contact
     return math.sqrt(stiffness / (density * found.smallest**3))

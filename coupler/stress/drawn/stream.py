@@ -10,7 +10,7 @@ import numpy as np
 from coupler.stress.drawn.basin import SIDES, Basin
 from coupler.stress.drawn.dice import Dice, rounded
 
-SHALLOWEST = 2.0
+SHALLOWEST = 3.0
 """Cells of the shallowest water that is drawn: below, `check` says that the mesh does not resolve it."""
 
 
