@@ -29,6 +29,17 @@ def test_pressure_at_depth_and_in_the_air(pool):
     np.testing.assert_allclose(p, [9810 * 0.337, 0.0], rtol=1e-6)
 
 
+def test_air_has_neither_pressure_nor_velocity():
+    """Also within the cells that the surface cuts, whose lower nodes have both."""
+    water = tank([1, 1, 1], 0.125, lambda x: x[:, 2] - 0.437)
+    advance(water, 0.01)
+    water.velocity[:] = [1.0, 0.0, 0.0]
+    points = np.array([[0.3, 0.4, 0.43], [0.3, 0.4, 0.44], [0.3, 0.4, 0.49]])
+    assert gauges.pressure(water, points)[0] > 0.0
+    np.testing.assert_array_equal(gauges.pressure(water, points)[1:], 0.0)
+    np.testing.assert_allclose(gauges.velocity(water, points)[:, 0], [1.0, 0.0, 0.0], rtol=1e-12)
+
+
 def test_velocity_at_rest(pool):
     assert np.abs(gauges.velocity(pool, [[0.3, 0.4, 0.1]])).max() < 1e-9
 

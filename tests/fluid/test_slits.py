@@ -184,6 +184,17 @@ def test_steady_flow_of_a_slit_is_torricellis():
         assert brought[right].sum() == pytest.approx(0.1 * steady * np.sign(high - low), rel=1e-6)
 
 
+def test_a_dry_mouth_gives_nothing():
+    """The flow goes on into a dry mouth, and ends where it would come out of one."""
+    mesh = slice_mesh(8)
+    domain = cut_domain(mesh, wall(0.52, 0.04, [(-1, 0.3), (0.3, 2)]), "multiple")
+    slit = slit_at(domain, 0.52, 0.04, 0.3, 0.01, mesh.spacing)
+    first = np.flatnonzero((slit.difference > 0.0).sum(axis=1))
+    push = RHO_G * np.ones(len(first))
+    assert (slit.advanced(first, push, WEIGHT, 0.01, DENSITY).flow > 0.0).all()
+    assert (slit.advanced(first, -push, WEIGHT, 0.01, DENSITY).flow == 0.0).all()
+
+
 def test_flows_are_taken_over_by_name():
     mesh = slice_mesh(8)
     domain = cut_domain(mesh, wall(0.52, 0.04, [(-1, 0.3), (0.3, 2)]), "multiple")

@@ -182,6 +182,17 @@ def test_bed_of_manning_slows_a_uniform_stream_as_its_law_says():
     np.testing.assert_allclose(column_depth(water, water.level_set, every), depth, rtol=1e-4)
 
 
+def test_mannings_law_is_that_of_the_bed_alone():
+    """Sides that stand upright have no depth over them: drag on the nodes of the floor, none on the others."""
+    water = tank([1, 0.25, 1], 0.125, lambda x: x[:, 2] - 0.5)
+    friction = WallFriction.of(WaterParameters(walls="friction", manning=0.03))
+    u = np.tile([1.0, 0.0, 1.0], (len(water.topology.nodes), 1))
+    drag = friction.of_nodes(water, water.level_set, u)
+    floor = water.topology.nodes[:, 2] < 1e-9
+    assert drag[floor].min() > 0.0
+    assert np.abs(drag[~floor]).max() == 0.0
+
+
 def test_log_law_between_known_walls():
     """Half a metre off a wall of 3 mm sand: u/u* = ln(1 + 0.5/1e-4)/0.41 = 20.8."""
     assert 1 / np.sqrt(log_law(0.5, 3e-3)) == pytest.approx(np.log(5001) / 0.41)
