@@ -124,7 +124,7 @@ def build_structure(case: Case):
             pairs=tuple(PairFriction(*pair.materials, pair.friction) for pair in c.pair),
         )
     if j:
-        joints = joint_parameters(j)
+        joints = joint_rules(j)
     gravity = (0.0, 0.0, -case.case.gravity)
     planes = planes_of(case)
     blocks = [block for part in parts_of(case) for block in part.blocks] + obstacle_blocks(case)
@@ -137,7 +137,30 @@ def build_structure(case: Case):
         gravity,
         substep=case.structure.substep,
         impermeable=bool(c and c.impermeable),
+        ramp=case.structure.ramp or 0.0,
     )
+
+
+def joint_rules(joints):
+    """What a section [joints] says of all joints, of pairs and of the scatter of strengths."""
+    from yade_scripts.joint_rules import JointRules, PairJoints, Scatter
+
+    pairs = tuple(
+        PairJoints(*pair.between, joint_parameters(of_pair(joints, pair)) if pair.joined else None)
+        for pair in joints.pair
+    )
+    scatter = joints.distribution and Scatter(joints.distribution, joints.variation, joints.seed)
+    return JointRules(joint_parameters(joints), pairs, scatter)
+
+
+def of_pair(joints, pair):
+    """The section [joints] as it is for a pair."""
+    own = {name for name in pair.model_fields_set if getattr(pair, name) is not None}
+    own -= {"between", "joined"}
+    change = {name: getattr(pair, name) for name in own}
+    if pair.law is not None and pair.law != joints.law and pair.peak is None:
+        change["peak"] = None
+    return joints.model_copy(update=change)
 
 
 def joint_parameters(joints):

@@ -143,6 +143,33 @@ class Contact(Section):
     pair: tuple[ContactPair, ...] = Field((), description="pairs of materials with a friction of their own")
 
 
+class JointPair(Section):
+    """Joints between chosen blocks that differ from the rest, or none; of several that fit, the last counts."""
+
+    between: tuple[Name, Name] = Field(
+        description="two names: of blocks, groups or materials, ground (the ground) or tank (its floor)",
+        examples=[["wall", "ground"]],
+    )
+    joined: Switch = Field(True, description="false: no joint, whatever else is said")
+    strength: quantity("Pa", gt=0) | None = Field(
+        None, description="absent, like all below: that of [joints]"
+    )
+    opening_at_failure: PositiveLength | None = Field(
+        None, description="opening at which nothing holds any more"
+    )
+    law: Name | None = Field(
+        None, description="as in [joints]; with a law of its own, its peak is that law's"
+    )
+    peak: quantity("", gt=0, lt=1) | None = Field(
+        None, description="opening at T_max over opening_at_failure"
+    )
+    mixed_mode: Literal["effective", "needleman"] | None = Field(None, description="as in [joints]")
+    shear_ratio: quantity("", gt=0) | None = Field(None, description="beta")
+    closing_ratio: quantity("", gt=0) | None = Field(
+        None, description="stiffness in compression over the first in tension"
+    )
+
+
 class Joints(Section):
     """Cohesion between touching faces, by default T = 27/4 T_max d (1 - d)^2, d = opening/opening_at_failure."""
 
@@ -180,7 +207,22 @@ class Joints(Section):
         description="Gauss points along each direction of a joined face; auto: for a peak moment to 2 %, from 3 up "
         "with closing_ratio and the law",
     )
-    ground: Switch = Field(True, description="blocks that stand on the ground are glued to it")
+    ground: Switch = Field(
+        True,
+        description="blocks that stand on the ground are glued to it; a pair with the ground counts in any case",
+    )
+    distribution: Literal["weibull", "lognormal"] | None = Field(
+        None,
+        description="strengths are random, joint by joint, with strength as their mean; opening_at_failure stays, so "
+        "stiffness and work of separation go along; absent: all alike",
+    )
+    variation: quantity("", ge=0.001, le=1) | None = Field(
+        None, description="standard deviation of the strengths over their mean, needed with distribution"
+    )
+    seed: Annotated[int, Field(strict=True, ge=0)] = Field(
+        1, description="of the random strengths; the same seed gives the same strengths"
+    )
+    pair: tuple[JointPair, ...] = Field((), description="joints between chosen blocks")
 
 
 class Motion(Section):

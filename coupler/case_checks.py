@@ -12,7 +12,7 @@ import numpy as np
 
 from coupler.case import Case
 from coupler.errors import did_you_mean
-from coupler.joint_checks import joint_problems
+from coupler.joint_checks import joint_problems, pair_problems
 from coupler.motion_checks import motion_problems
 from coupler.parts import PARTS, Part, parts_of, recipes
 from coupler.place_checks import frame_problems, opening_problems, place_problems, solid_bodies
@@ -43,6 +43,7 @@ def problems(case: Case) -> list[Problem]:
     parts, refused = _made(case, {path[:3] for path, _ in shapes})
     found += [*shapes, *refused, *_unique_names(case, parts), *_known_names(case, parts), *_pairs(case)]
     found += [*_law(case), *place_problems(case, parts), *table_problems(case)]
+    found += pair_problems(case, parts)
     if case.structure is not None:
         found += motion_problems(case, parts)
     return found if found else list(joint_problems(case, parts))
@@ -192,6 +193,14 @@ def _structure_sections(case: Case) -> Iterator[Problem]:
             ("structure",),
             "no block: write [[structure.block]], .wall, .building, .column, .arch, .rubble or .file in double "
             "brackets",
+        )
+    start, ramp = case.structure.start, case.structure.ramp
+    if (start == "ramp") != (ramp is not None):
+        yield (
+            ("structure", "ramp"),
+            "missing; start = 'ramp' needs the time over which the weight comes on, for instance \"2 s\""
+            if ramp is None
+            else f"is for start = 'ramp', not '{start}'; leave one of them out",
         )
     if case.contact is None and case.joints is None:
         yield ("structure",), "blocks need a section [contact] with stiffness, restitution and friction"

@@ -211,10 +211,17 @@ class Structure(Section):
     rubble: tuple[Rubble, ...] = Field((), description="loose random blocks")
     file: tuple[BlockFile, ...] = Field((), description="blocks from files")
     ground: Ground | None = Field(None, description="flat ground under the blocks")
-    start: Literal["settled", "sudden"] = Field(
+    start: Literal["settled", "sudden", "ramp"] = Field(
         "settled",
         description="settled: joined blocks that reach the ground start in equilibrium with their weight and the "
-        "water around them; sudden: the weight comes on at once",
+        "water around them; sudden: the weight comes on at once; ramp: the weight comes on gradually over the time "
+        "`ramp`, while water acts in full from the start",
+    )
+    ramp: PositiveTime | None = Field(
+        None,
+        description="with start = 'ramp', the time over which the weight of the blocks grows to its whole, as "
+        "tau^2 (3 - 2 tau); several periods of the structure leave it nearly at rest",
+        examples=["2 s"],
     )
     substep: PositiveTime | None = Field(
         None,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from coupler.case import Case
+from coupler.errors import did_you_mean
 from coupler.parts import Part
 
 KeyPath = tuple[str | int, ...]
@@ -33,13 +34,66 @@ def joint_problems(case: Case, parts: list[Part]) -> Iterator[Problem]:
             )
 
 
+def pair_problems(case: Case, parts: list[Part]) -> Iterator[Problem]:
+    """Pairs of joints: names that something has, laws that can be; scatter with its measure."""
+    j = case.joints
+    if j is None or case.structure is None:
+        return
+    if (j.distribution is None) != (j.variation is None):
+        absent, given = (
+            ("variation", "distribution") if j.variation is None else ("distribution", "variation")
+        )
+        yield (
+            ("joints", absent),
+            f"missing; it belongs to joints.{given}, for instance "
+            + ("0.2" if absent == "variation" else "'weibull'"),
+        )
+    known = _names(case, parts)
+    for i, pair in enumerate(j.pair):
+        for name in dict.fromkeys(pair.between):
+            if name not in known:
+                hint = did_you_mean(name, known) or f"; there are {', '.join(known[:8])}"
+                yield ("joints", "pair", i, "between"), f"nothing is called '{name}'{hint}"
+        yield from _pair_law(case, i, pair)
+
+
+def _pair_law(case: Case, i: int, pair) -> Iterator[Problem]:
+    from coupler.build import joint_parameters, of_pair
+    from yade_scripts import laws
+    from yade_scripts.cohesion import JointParameterError
+
+    if pair.law is not None and pair.law not in laws.names():
+        known = laws.names()
+        hint = did_you_mean(pair.law, known) or f"; there are {', '.join(known)}"
+        yield ("joints", "pair", i, "law"), f"there is no law '{pair.law}'{hint}"
+    elif case.joints.law in laws.names():
+        try:
+            joint_parameters(of_pair(case.joints, pair))
+        except JointParameterError as error:
+            yield ("joints", "pair", i), str(error)
+
+
+def _names(case: Case, parts: list[Part]) -> list[str]:
+    """Names, groups and materials of blocks and solids, and of the planes that joints may be to."""
+    from coupler.build import planes_of
+    from coupler.solids import obstacle_blocks
+
+    blocks = [block for part in parts for block in part.blocks] + obstacle_blocks(case)
+    found = [name for b in blocks for name in (b.group, b.name, b.material) if name]
+    return list(
+        dict.fromkeys([*found, *(n for p in planes_of(case) if p.bonds for n in (p.name, p.material))])
+    )
+
+
 def joined_blocks(case: Case, parts: list[Part]) -> tuple[list, set[int]]:
     """All blocks with the fixed solids behind them, and the rows of those with a face that joints glue to another."""
-    from coupler.build import planes_of
+    from coupler.build import joint_rules, planes_of
     from coupler.solids import obstacle_blocks
     from yade_scripts.faces import both_held, touching_faces
 
     blocks = [block for part in parts for block in part.blocks] + obstacle_blocks(case)
-    faces = touching_faces(blocks, planes_of(case) if case.joints.ground else ())
-    glued = [face for face in faces if not both_held(blocks, face)]
+    planes = planes_of(case)
+    faces = touching_faces(blocks, planes)
+    laws = joint_rules(case.joints).of_faces(faces, blocks, planes)
+    glued = [face for face, law in zip(faces, laws) if law is not None and not both_held(blocks, face)]
     return blocks, {row for face in glued for row in (face.a, face.b) if row >= 0}

@@ -42,7 +42,7 @@ def loads(coupling, record, rows: Array, point: Array) -> dict[str, Array]:
             found[name][rows < n] = record.impulses.of_held(load[:n], point)[blocks] / record.dt
     if len(blocks):
         J, s = record.impulses, coupling.structure
-        acting = (J.about(point, J.contact), J.about(point, J.joint), J.of_held(s.gravity_force(), point))
+        acting = (J.about(point, J.contact), J.about(point, J.joint), J.of_weight(s.gravity_force(), point))
         for name, impulse in zip(("contact", "joint", "weight"), acting):
             found[name][rows < n] = impulse[blocks] / record.dt
     return found

@@ -306,7 +306,7 @@ class Coupling:
             *self._with_solids(mass, *structure.tangent()), problem.dt, driven, velocity
         )
         known = water_load(problem, 0.0)
-        force = structure.gravity_force() + structure.internal_force()
+        force = structure.weight_now() + structure.internal_force()
         return mass, response, response.free_velocity(velocity, self._padded(force) + known)
 
     def _water_step(self, dt: float, record: StepRecord) -> None:

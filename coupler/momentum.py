@@ -177,7 +177,7 @@ class BlocksStep:
         """After a step under the load (n, 6) with its Impulses."""
         free = ~structure.fixed
         contact, joint = (impulses.about(about, which) for which in (impulses.contact, impulses.joint))
-        weight = impulses.of_held(structure.gravity_force(), about)[free]
+        weight = impulses.of_weight(structure.gravity_force(), about)[free]
         received = impulses.of_held(load, about)[free]
         lines = {
             "blocks_weight": weight.sum(axis=0),

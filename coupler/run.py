@@ -106,7 +106,7 @@ def laws_of(structure) -> dict[str, str]:
     if structure.contact is not None:
         found["contact"] = structure.contact.described(structure.face_stiffness)
     if structure.joints is not None:
-        found["joints"] = structure.joints.parameters.described()
+        found["joints"] = structure.joint_rules.described(structure.joints.laws)
     return found
 
 

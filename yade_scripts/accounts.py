@@ -39,7 +39,8 @@ class Masses:
 
 class Accounts:
     """Running sums [J]: load_work · joint_work: what the joints did to the blocks · driving_work: done by what moves
-    the driven blocks, against joints · handed_over: energy of compressed joints that went over to contacts.
+    the driven blocks, against joints, and by what holds up weight that has not come on yet · handed_over: energy of
+    compressed joints that went over to contacts.
 
     contacts: they keep the account of their own work; None in a scene without contact.
     """
@@ -53,6 +54,9 @@ class Accounts:
     ):
         self._masses, self._motion, self._joints, self._contacts = masses, motion, joints, contacts
         self.load_work = self.joint_work = self.driving_work = self.handed_over = 0.0
+        self.weight = np.zeros((len(masses.mass), 6))
+        """Of the blocks whose motion is not prescribed, (n, 6) [N, N m]."""
+        self.weight[masses.free, :3] = masses.mass[masses.free, None] * masses.gravity
 
     @property
     def free(self) -> Array:
@@ -68,6 +72,10 @@ class Accounts:
         self.joint_work += joint_kernel.work_of(F[rows], before[rows], self._motion.v[rows], dt)
         held = rows[~self._masses.free[rows]]
         self.driving_work -= joint_kernel.work_of(F[held], before[held], self._motion.v[held], dt)
+
+    def take_lift(self, F: Array, before: Array, dt: float) -> None:
+        """Work in a substep dt, begun with velocities `before` (n, 6), of the forces F (n, 6) that hold blocks up."""
+        self.driving_work += joint_kernel.work_of(F, before, self._motion.v, dt)
 
     def take_load(
         self, load: Array, before: Array, half_before: Array, turn: Array, spin_before: Array

@@ -40,16 +40,18 @@ def moved_block(block: Block, shift: Array) -> Block:
 
 
 def matched_stiffness(blocks: list[Block], joints: Joints | None) -> Array:
-    """K (n,) [N/m] of faces in contact that continues the closing stiffness of the joints: k_c times the mean area of
-    the joined faces of a block; a block without joints takes the mean of the others."""
+    """K (n,) [N/m] of faces in contact that continues the closing stiffness of the joints: the mean k_c times the mean
+    area of the joined faces of a block; a block without joints takes the mean of the others."""
     if joints is None:
         raise ContactError(
             "contact.stiffness is not given and there are no joints to take it from; give contact.stiffness in N/m"
         )
     faces: dict[tuple[int, int], float] = {}
+    closing: dict[int, list[float]] = {}
     for ends, side in ((joints.a, joints.face_a), (joints.b, joints.face_b)):
-        for row, face in zip(ends.tolist(), side.tolist()):
+        for row, face, k in zip(ends.tolist(), side.tolist(), joints.kc.tolist()):
             if row >= 0:
+                closing.setdefault(row, []).append(k)
                 faces[row, face] = float(
                     np.linalg.norm(polygon_area_vector(blocks[row].vertices[list(blocks[row].faces[face])]))
                 )
@@ -57,5 +59,5 @@ def matched_stiffness(blocks: list[Block], joints: Joints | None) -> Array:
     for row in range(len(blocks)):
         areas = [area for (r, _), area in faces.items() if r == row]
         if areas:
-            K[row] = joints.parameters.closing_stiffness * np.mean(areas)
+            K[row] = np.mean(closing[row]) * np.mean(areas)
     return np.where(np.isnan(K), np.nanmean(K), K)

@@ -24,7 +24,8 @@ class Impulses:
     moment about the zero of the coordinates [N m s].
 
     contact, joint (n, 9) · place (n, 3) [m s]: dt times the place of the centre, about the same zero · dt [s] · zero
-    (3,) [m]: that zero in the world.
+    (3,) [m]: that zero in the world · lifted (n, 3) [m s], lifted_dt [s]: place and dt of the part of the weight
+    that was not there yet.
     """
 
     contact: Array
@@ -32,11 +33,13 @@ class Impulses:
     place: Array
     dt: float
     zero: Array
+    lifted: Array
+    lifted_dt: float = 0.0
 
     @classmethod
     def none(cls, n: int, zero: Array) -> Impulses:
         """Before the first substep."""
-        return cls(np.zeros((n, 9)), np.zeros((n, 9)), np.zeros((n, 3)), 0.0, zero)
+        return cls(np.zeros((n, 9)), np.zeros((n, 9)), np.zeros((n, 3)), 0.0, zero, np.zeros((n, 3)))
 
     def about(self, point: Array, which: Array) -> Array:
         """Impulse and its moment about a point of the world, (n, 6), of `contact` or `joint`."""
@@ -49,6 +52,12 @@ class Impulses:
         moment = np.cross(arm, load[:, :3]) + self.dt * load[:, 3:]
         return np.concatenate([self.dt * load[:, :3], moment], axis=1)
 
+    def of_weight(self, weight: Array, point: Array) -> Array:
+        """The same (n, 6) of the whole weight (n, 6), of which a part was not there yet."""
+        arm = self.lifted + self.lifted_dt * (self.zero - np.asarray(point))
+        lifted = np.concatenate([self.lifted_dt * weight[:, :3], np.cross(arm, weight[:, :3])], axis=1)
+        return self.of_held(weight, point) - lifted
+
 
 class ImpulseSums:
     """The sums while they grow; `taken` gives them and starts anew."""
@@ -60,7 +69,12 @@ class ImpulseSums:
     def start(self) -> None:
         """From here on."""
         self._sums = Impulses.none(self._n, self._zero)
-        self._dt = 0.0
+        self._dt = self._lifted_dt = 0.0
+
+    def lift(self, dt: float, x: Array, share: float) -> None:
+        """A substep at the places x (n, 3) without `share` of the weight."""
+        self._sums.lifted[:] += dt * share * x
+        self._lifted_dt += dt * share
 
     def add(self, dt: float, x: Array, joint: Array, before: Array, whole: Array) -> None:
         """A substep at the places x (n, 3): joint forces (n, 6), and all forces before and with those of contacts."""
@@ -71,7 +85,7 @@ class ImpulseSums:
     def taken(self) -> Impulses:
         """Those since `start`."""
         s = self._sums
-        return Impulses(s.contact, s.joint, s.place, self._dt, s.zero)
+        return Impulses(s.contact, s.joint, s.place, self._dt, s.zero, s.lifted, self._lifted_dt)
 
 
 @njit(cache=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,7 @@ from yade_scripts import joint_kernel as kernel
 from yade_scripts.blocks import Block
 from yade_scripts.cohesion import JointParameters
 from yade_scripts.faces import TouchingFaces, gauss_points, to_body
-from yade_scripts.joint_forces import NOT_GROWING, PULL, kernels_of
+from yade_scripts.joint_forces import NOT_GROWING, PULL, JointKernels, kernels_of
 
 Array = np.ndarray
 
@@ -50,20 +51,29 @@ class JointTable:
 class Joints:
     """Geometry (constant), history λ of every point, and which joints are alive.
 
-    faces: from `touching_faces` (coordinates of the scene) · parameters: one law for all joints
+    faces: from `touching_faces` (coordinates of the scene) · parameters: the law of most joints · laws: that of each,
+    None: the same for all.
     """
 
-    def __init__(self, blocks: list[Block], faces: list[TouchingFaces], parameters: JointParameters):
+    def __init__(
+        self,
+        blocks: list[Block],
+        faces: list[TouchingFaces],
+        parameters: JointParameters,
+        laws: list[JointParameters] | None = None,
+    ):
         self.parameters = parameters
-        self.kernels = kernels_of(parameters.law, parameters.mixed_mode)
         n = len(faces)
+        laws = [parameters] * n if laws is None else laws
+        self.laws = laws
+        self.families, self.family = _families(laws)
         self.a = np.array([f.a for f in faces], np.int64)
         self.b = np.array([max(f.b, -1) for f in faces], np.int64)
         self.plane = np.array([-1 - f.b for f in faces], np.int64)
         """Number of the fixed plane where b = -1."""
         self.face_a = np.array([f.face_a for f in faces], np.int64)
         self.face_b = np.array([f.face_b for f in faces], np.int64)
-        rules = [gauss_points(f.polygon, parameters.rule) for f in faces]
+        rules = [gauss_points(f.polygon, law.rule) for f, law in zip(faces, laws)]
         self.start = np.concatenate([[0], np.cumsum([len(w) for _, w in rules])]).astype(np.int64)
         self.weight = np.concatenate([w for _, w in rules]) if n else np.zeros(0)
         place = np.concatenate([p for p, _ in rules]) if n else np.zeros((0, 3))
@@ -79,11 +89,9 @@ class Joints:
         self.xi_b = to_body(place, self.b[self.joint_of], centre, R)
         normal = np.array([f.normal for f in faces]).reshape(-1, 3)
         self.normal = np.einsum("nji,nj->ni", R[self.a], normal) if n else np.zeros((0, 3))
-        self.k0 = np.full(n, parameters.stiffness)
-        self.df = np.full(n, parameters.opening_at_failure)
-        self.beta = np.full(n, parameters.shear_ratio)
-        self.kc = np.full(n, parameters.closing_stiffness)
-        unit = np.full(n, parameters.strength / parameters.opening_at_failure)
+        known = {law: _numbers(law) for law in dict.fromkeys(laws)}
+        numbers = np.array([known[law] for law in laws]).reshape(-1, 5)
+        unit, self.df, self.beta, self.kc, self.k0 = (column.copy() for column in numbers.T)
         self.law = np.stack([unit, self.df, self.beta, self.kc, self.k0], axis=1)
         """Columns as in `joint_forces`."""
         self.eta = 0.0
@@ -105,35 +113,53 @@ class Joints:
 
     def forces(self, x, v, R, F, dt: float = 0.0, advance: bool = False, eta: float | None = None) -> float:
         """Add the joint forces on the blocks to F (n, 6); see `joint_forces.joint_forces`."""
-        return self.kernels.joint_forces(
-            *self._arrays(), self.paid, self.eta if eta is None else eta, x, v, R, dt, advance, F, self.damped
-        )
+        eta, fastest = self.eta if eta is None else eta, 0.0
+        for kernels, arrays in self._live_families():
+            growth = kernels.joint_forces(*arrays, self.paid, eta, x, v, R, dt, advance, F, self.damped)
+            fastest = max(fastest, growth)
+        return fastest
 
-    def _arrays(self) -> tuple:
-        """What the kernels of the law read of the live joints, in their order."""
-        return (
-            self.live, self.a, self.b, self.start, self.xi_a, self.xi_b, self.weight, self.normal, self.law,
-            self.parameters.peak_share, self.largest,
-        )  # fmt: skip
+    def _live_families(self) -> Iterator[tuple[JointKernels, tuple]]:
+        """Kernels of each law with live joints, and what they read of these, in their order."""
+        for number, (kernels, peak) in enumerate(self.families):
+            live = self.live if len(self.families) == 1 else self.live[self.family[self.live] == number]
+            yield (
+                kernels,
+                (
+                    live, self.a, self.b, self.start, self.xi_a, self.xi_b, self.weight, self.normal, self.law,
+                    peak, self.largest,
+                ),
+            )  # fmt: skip
 
     def stored_between(self, x: Array, R: Array, x0: Array, R0: Array) -> Array:
         """Elastic energy of each joint between two places of the blocks, (J,) [J]."""
         out = np.zeros(len(self))
-        self.kernels.stored_between(*self._arrays(), x, R, x0, R0, out)
+        for kernels, arrays in self._live_families():
+            kernels.stored_between(*arrays, x, R, x0, R0, out)
         return out
 
     def lost(self) -> Array:
         """Energy that the damage of each joint stands for by its law, G_c A once it has failed, (J,) [J]."""
-        out = np.empty(len(self))
-        self.kernels.lost(self.start, self.weight, self.law, self.parameters.peak_share, self.largest, out)
+        out, own = np.empty(len(self)), np.empty(len(self))
+        for number, (kernels, peak) in enumerate(self.families):
+            kernels.lost(self.start, self.weight, self.law, peak, self.largest, own)
+            of_law = self.family == number
+            out[of_law] = own[of_law]
         return out
 
-    def of_points(self, index: Array) -> tuple:
-        """What the kernels of single points read of the points `index`, in their order."""
-        return (
-            index, self.joint_of, self.a, self.b, self.xi_a, self.xi_b, self.normal, self.law,
-            self.parameters.peak_share, self.largest,
-        )  # fmt: skip
+    def of_points(self, index: Array) -> Iterator[tuple[JointKernels, Array, tuple]]:
+        """For each law: its kernels, which of the points `index` are its own (bool), and what the kernels of single
+        points read of these, in their order."""
+        for number, (kernels, peak) in enumerate(self.families):
+            own = self.family[self.joint_of[index]] == number
+            yield (
+                kernels,
+                own,
+                (
+                    index[own], self.joint_of, self.a, self.b, self.xi_a, self.xi_b, self.normal, self.law,
+                    peak, self.largest,
+                ),
+            )  # fmt: skip
 
     def broken_now(self) -> Array:
         """Live joints that have failed since the last call of `retire`."""
@@ -233,3 +259,18 @@ class Joints:
         """Back to a `history`."""
         for name, value in history.items():
             setattr(self, name, value.copy())
+
+
+def _numbers(law: JointParameters) -> tuple[float, ...]:
+    """T_max/δ_f [Pa/m], δ_f [m], β, k_c [Pa/m], k_0 [Pa/m] of a law."""
+    unit = law.strength / law.opening_at_failure
+    return unit, law.opening_at_failure, law.shear_ratio, law.closing_stiffness, law.stiffness
+
+
+def _families(laws: list[JointParameters]) -> tuple[list[tuple[JointKernels, float]], Array]:
+    """Kernels and place of the peak of each law that is used, and the number (J,) of that of each joint."""
+    keys = [(law.law, law.mixed_mode, law.peak_share) for law in laws]
+    used = list(dict.fromkeys(keys))
+    numbers = {key: number for number, key in enumerate(used)}
+    families = [(kernels_of(law, mode), peak) for law, mode, peak in used]
+    return families, np.array([numbers[key] for key in keys], np.int64)

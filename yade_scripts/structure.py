@@ -20,6 +20,7 @@ from yade_scripts.description import check_names, local_origin, matched_stiffnes
 from yade_scripts.engine import load_yade
 from yade_scripts.faces import FixedPlane, TouchingFaces, both_held, touching_faces
 from yade_scripts.impulses import Impulses, ImpulseSums
+from yade_scripts.joint_rules import JointRules
 from yade_scripts.joints import Joints
 from yade_scripts.motion import Motion
 from yade_scripts.onset import ContactOnset, loose_at_start, moves
@@ -62,7 +63,9 @@ class Structure(StructureReadings):
 
     blocks: list of Block, unique names · ground: level of a horizontal floor [m] or None
     planes: further fixed planes (tank walls) · gravity (3,) [m/s²]
+    joints: one law for all touching faces, or rules by pairs and scatter
     substep: used in place of the one that `substep_limit` finds accurate, None: that one
+    ramp [s]: time over which the weight of the blocks comes on
     impermeable: faces that touch at the start without a joint count as sealed while they do (`joined_planes`)
 
     Fixed blocks are not joined to one another or to planes, since nothing could break there; their faces are sealed
@@ -75,13 +78,14 @@ class Structure(StructureReadings):
         self,
         blocks: list[Block],
         contact: ContactLaw | None = None,
-        joints: JointParameters | None = None,
+        joints: JointParameters | JointRules | None = None,
         ground: float | None = None,
         planes: list[FixedPlane] | tuple = (),
         gravity=GRAVITY,
         threads: int = 1,
         substep: float | None = None,
         impermeable: bool = False,
+        ramp: float = 0.0,
     ):
         self._describe(blocks, gravity)
         self.contact = contact
@@ -89,8 +93,9 @@ class Structure(StructureReadings):
         origin = self._origin = local_origin(blocks)
         local = [moved_block(b, -origin) for b in blocks]
         local_planes = [replace(p, point=p.point - origin) for p in self.planes]
-        faces = _Faces.of(local, local_planes, joints, impermeable)
-        self.joints = Joints(local, faces.joined, joints) if faces.joined else None
+        self.joint_rules = JointRules(joints) if isinstance(joints, JointParameters) else joints
+        faces = _Faces.of(local, local_planes, self.joint_rules, impermeable)
+        self.joints = faces.joints(local, self.joint_rules)
         self._seals = Seals(local, faces.sealed) if faces.sealed else None
         self.face_stiffness = self._face_stiffness()
         self._set_damping()
@@ -106,7 +111,7 @@ class Structure(StructureReadings):
         self._onset = ContactOnset(
             self._scene, self._motion, self.joints, self._contacts, self._radius, loose
         )
-        self._start_accounts()
+        self._start_accounts(ramp)
 
     # ---- setting up -----------------------------------------------------------------------------------------
 
@@ -160,7 +165,7 @@ class Structure(StructureReadings):
             omega = self.substep_limit().omega
             self.joints.eta = 2.0 * self.joints.parameters.damping / omega if omega > 0.0 else 0.0
 
-    def _start_accounts(self) -> None:
+    def _start_accounts(self, ramp: float) -> None:
         self.time = 0.0
         self._accounts = Accounts(self._masses, self._motion, self.joints, self._contacts)
         self._impulses = ImpulseSums(self.n, self._origin)
@@ -172,6 +177,7 @@ class Structure(StructureReadings):
             self._spin,
             self._accounts,
             self._impulses,
+            ramp,
         )
         self._substepper.list_bodies(self._onset.loose)
 
@@ -249,7 +255,7 @@ class Structure(StructureReadings):
 
     def _one_substep(self, dt: float) -> Array:
         """Joints that failed, rows of the table."""
-        self._substepper.step(dt)
+        self._substepper.step(dt, self.time)
         self.time += dt
         broken = self.joints.broken_now() if self.joints is not None else np.zeros(0, np.int64)
         if len(broken):
@@ -355,21 +361,28 @@ class _Faces:
     held."""
 
     joined: list[TouchingFaces]
+    laws: list[JointParameters]
     sealed: list[TouchingFaces]
     held_rows: list[int]
 
     @classmethod
-    def of(cls, blocks, planes, parameters: JointParameters | None, impermeable: bool) -> _Faces:
-        if parameters is None and not impermeable:
-            return cls([], [], [])
+    def of(cls, blocks, planes, rules: JointRules | None, impermeable: bool) -> _Faces:
+        if rules is None and not impermeable:
+            return cls([], [], [], [])
+        faces = touching_faces(blocks, planes)
+        laws = [None] * len(faces) if rules is None else rules.of_faces(faces, blocks, planes)
         joined, sealed, held_rows = [], [], set()
-        for face in touching_faces(blocks, planes):
-            ends = [row for row in (face.a, face.b) if row >= 0]
+        for face, law in zip(faces, laws):
             held = both_held(blocks, face)
-            glued = parameters is not None and (face.b >= 0 or parameters.ground)
-            if glued and not held:
-                joined.append(face)
-            elif glued or impermeable:
+            if law is not None and not held:
+                joined.append((face, law))
+            elif law is not None or impermeable:
                 sealed.append(face)
-            held_rows.update(ends if glued and held else ())
-        return cls(joined, sealed, sorted(held_rows))
+            held_rows.update(row for row in (face.a, face.b) if row >= 0 and law is not None and held)
+        return cls([face for face, _ in joined], [law for _, law in joined], sealed, sorted(held_rows))
+
+    def joints(self, blocks, rules: JointRules | None) -> Joints | None:
+        """None where no faces are joined."""
+        if not self.joined:
+            return None
+        return Joints(blocks, self.joined, rules.everywhere, rules.scattered(self.laws))

@@ -28,6 +28,7 @@ class StructureReadings:
     """The half of `Structure` that changes nothing; that one sets the parts up and moves them on."""
 
     n: int
+    time: float
     mass: Array
     fixed: Array
     gravity: Array
@@ -82,6 +83,10 @@ class StructureReadings:
         force = np.zeros((self.n, 6))
         force[:, :3] = self.mass[:, None] * self.gravity
         return force
+
+    def weight_now(self) -> Array:
+        """(n, 6) [N, N m]: as `gravity_force`, less what has not come on yet."""
+        return self.gravity_force() - self._substepper.missing_weight(self.time) * self._accounts.weight
 
     def internal_force(self, viscous: bool = False) -> Array:
         """Forces of joints and contacts on the blocks at the present state, (n, 6).

@@ -24,6 +24,8 @@ Array = np.ndarray
 class Substepper:
     """Moves the scene by one substep at a time. load (n, 6) [N, N m] acts in every substep.
 
+    ramp [s]: the weight comes on over this time from the start, as τ² (3 - 2 τ); 0: it is there at once.
+
     fastest: largest growth of λ/δ_f in a substep since it was set to zero.
     """
 
@@ -36,6 +38,7 @@ class Substepper:
         spin: SpinCorrection,
         accounts: Accounts,
         impulses: ImpulseSums,
+        ramp: float = 0.0,
     ):
         self._scene, self._motion, self._joints, self._contacts = scene, motion, joints, contacts
         self._spin, self._accounts, self._impulses = spin, accounts, impulses
@@ -44,6 +47,8 @@ class Substepper:
         self._F = np.zeros_like(self.load)
         self._joint_F = np.zeros_like(self.load)
         self._without_contact = np.zeros_like(self.load)
+        self.ramp = ramp
+        self._lift = np.zeros_like(self.load)
         self.list_bodies(np.ones(len(scene.ids), bool))
 
     def list_bodies(self, loose: Array) -> None:
@@ -59,11 +64,23 @@ class Substepper:
         self._pushed = np.union1d(watched, np.flatnonzero(self.load.any(axis=1)))
         self._pushed_ids = [self._scene.ids[r] for r in self._pushed]
 
-    def step(self, dt: float) -> None:
-        """From the present places to those at dt [s] later."""
+    def missing_weight(self, time: float) -> float:
+        """Share of the weight that is not there yet."""
+        if time >= self.ramp:
+            return 0.0
+        part = time / self.ramp
+        return 1.0 - part**2 * (3.0 - 2.0 * part)
+
+    def step(self, dt: float, time: float) -> None:
+        """From the present places, at `time` [s], to those dt [s] later."""
         m = self._motion
         before = m.v.copy()
         self._F[:] = self.load
+        missing = self.missing_weight(time)
+        if missing > 0.0:
+            self._lift[:] = -missing * self._accounts.weight
+            self._F += self._lift
+            self._impulses.lift(dt, m.x, missing)
         self._joint_F[:] = 0.0
         if len(self._joined):
             growth = self._joints.forces(m.x, m.v, m.R, self._joint_F, dt, advance=True)
@@ -78,6 +95,8 @@ class Substepper:
         self._scene.step(dt, self._pushed_ids, self._F[self._pushed])
         m.dt = dt
         m.read_watched()
+        if missing > 0.0:
+            self._accounts.take_lift(self._lift, before, dt)
         if len(self._joined):
             self._accounts.take_joints(self._joint_F, before, self._joined, dt)
         if self._contacts is not None:

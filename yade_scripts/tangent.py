@@ -107,7 +107,10 @@ def joint_springs(joints, x: Array, R: Array) -> Springs:
     """Springs of the live joints at places x (n, 3), R (n, 3, 3): secant k_s where open, k_c where closed."""
     index = np.flatnonzero(joints.alive[joints.joint_of])
     arm, normal, k = np.zeros((2, len(index), 3)), np.zeros((len(index), 3)), np.zeros((2, len(index)))
-    joints.kernels.point_springs(*joints.of_points(index), x, R, arm, normal, k)
+    for kernels, own, arrays in joints.of_points(index):
+        arms, normals, stiffness = arm[:, own], normal[own], k[:, own]  # copies
+        kernels.point_springs(*arrays, x, R, arms, normals, stiffness)
+        arm[:, own], normal[own], k[:, own] = arms, normals, stiffness
     j = joints.joint_of[index]
     kn, kt = k * joints.weight[index]
     return Springs(joints.a[j], joints.b[j], *arm, normal, kn, kt, joints.eta * kn, joints.eta * kt)
@@ -120,6 +123,9 @@ def joint_tangent(joints, x: Array, R: Array, n: int) -> sp.csr_array:
     springs = joint_springs(joints, x, R)
     index = np.flatnonzero(joints.alive[joints.joint_of])
     D = np.zeros((len(index), 3, 3))
-    joints.kernels.point_tangents(*joints.of_points(index), x, R, D)
+    for kernels, own, arrays in joints.of_points(index):
+        found = D[own]  # a copy
+        kernels.point_tangents(*arrays, x, R, found)
+        D[own] = found
     D = 0.5 * (D + D.transpose(0, 2, 1)) * joints.weight[index][:, None, None]
     return _assembled(springs, D, n)

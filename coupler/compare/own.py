@@ -18,6 +18,7 @@ import numpy as np
 from coupler.build import build
 from coupler.case_file import load
 from coupler.clock import Clock
+from yade_scripts.cohesion import JointParameterError
 from yade_scripts.description import local_origin, moved_block
 from yade_scripts.faces import touching_faces
 from yade_scripts.stock.scene import described
@@ -89,6 +90,10 @@ def cost(structure, end: float, substep: float) -> tuple[float, int]:
 def write_stock_scene(structure, path: Path) -> None:
     """Blocks and joints as they were built, described for the stock laws (`timed` adds law and times)."""
     parameters = structure.joints.parameters
+    if not structure.joint_rules.plain:
+        raise JointParameterError(
+            "joints.pair and joints.distribution are not known to the stock laws; leave them out"
+        )
     origin = local_origin(structure.blocks)
     blocks = [moved_block(b, -origin) for b in structure.blocks]
     planes = [replace(p, point=p.point - origin) for p in structure.planes if parameters.ground]

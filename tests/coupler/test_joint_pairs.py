@@ -1,0 +1,102 @@
+"""Joints by pairs, random strengths and a gradual start, as a case asks for them."""
+
+import numpy as np
+import pytest
+
+from coupler.build import build_structure
+from coupler.case_file import load
+
+from .test_case_file import mistakes, write
+
+TOWER = """
+[case]
+title = "tower"
+[time]
+end = 0.1
+[structure]
+{structure}
+[structure.ground]
+[[structure.block]]
+name = "low"
+centre = [0, 0, 0.5]
+size = [1, 1, 1]
+[[structure.block]]
+name = "high"
+centre = [0, 0, 1.5]
+size = [1, 1, 1]
+material = "brick"
+[contact]
+stiffness = 1e9
+[joints]
+strength = "1 MPa"
+opening_at_failure = "1 mm"
+{joints}
+"""
+RANDOM = 'distribution = "weibull"\nvariation = 0.3\nseed = {seed}'
+
+
+def case_text(joints="", structure=""):
+    return TOWER.format(joints=joints, structure=structure)
+
+
+def laws(folder, joints):
+    structure = build_structure(load(write(folder, case_text(joints))).case)
+    with structure as s:
+        return {
+            s.names[a] + "-" + ("ground" if b < 0 else s.names[b]): law
+            for a, b, law in zip(s.joints.a, s.joints.b, s.joints.laws)
+        }
+
+
+def test_a_pair_changes_what_it_says_and_nothing_else(tmp_path):
+    found = laws(
+        tmp_path,
+        'law = "bilinear"\npeak = 0.2\n'
+        '[[joints.pair]]\nbetween = ["brick", "low"]\nstrength = "2 kPa"\nlaw = "exponential"',
+    )
+    pair, rest = found["low-high"], found["low-ground"]
+    assert (pair.strength, pair.opening_at_failure, pair.law, pair.peak_share) == (
+        2e3,
+        1e-3,
+        "exponential",
+        0.1,
+    )
+    assert (rest.strength, rest.law, rest.peak_share) == (1e6, "bilinear", 0.2)
+    assert list(laws(tmp_path, '[[joints.pair]]\nbetween = ["ground", "low"]\njoined = false')) == [
+        "low-high"
+    ]
+
+
+def test_random_strengths_are_those_of_the_seed(tmp_path):
+    one, again, other = (
+        [law.strength for law in laws(tmp_path, RANDOM.format(seed=seed)).values()] for seed in (1, 1, 2)
+    )
+    assert one == again != other
+    assert np.ptp(one) > 0.0
+
+
+@pytest.mark.parametrize(
+    ("joints", "structure", "says"),
+    [
+        ('[[joints.pair]]\nbetween = ["hihg", "low"]', "", "nothing is called 'hihg'; did you mean 'high'?"),
+        (
+            '[[joints.pair]]\nbetween = ["high", "low"]\nlaw = "bilinaer"',
+            "",
+            "no law 'bilinaer'; did you mean 'bilinear'?",
+        ),
+        ('[[joints.pair]]\nbetween = ["high", "low"]\npeak = 0.5', "", "joints.peak = 0.5"),
+        ('distribution = "weibull"', "", "joints.distribution"),
+        ("variation = 0.2", "", "joints.variation"),
+        ('distribution = "weibull"\nvariation = "2 m"', "", "variation"),
+        ("", 'start = "ramp"', "needs the time over which the weight comes on"),
+        ("", "ramp = 1.0", "is for start = 'ramp', not 'settled'"),
+    ],
+)
+def test_what_does_not_fit_is_refused_with_its_key(tmp_path, joints, structure, says):
+    assert any(says in line for line in mistakes(tmp_path, case_text(joints, structure)))
+
+
+def test_a_ramp_reaches_the_structure(tmp_path):
+    text = case_text(structure='start = "ramp"\nramp = "2 s"')
+    with build_structure(load(write(tmp_path, text)).case) as s:
+        assert np.abs(s.weight_now()).max() == 0.0
