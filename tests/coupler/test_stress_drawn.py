@@ -13,14 +13,16 @@ from coupler.case import Case, effective
 from coupler.case_file import load
 from coupler.errors import BadCase, ExitCode
 from coupler.history import HistoryTable, read_history
+from coupler.limits import Diverged, check_overlap
 from coupler.output import BlockWriter
+from coupler.overlaps import Overlap
 from coupler.run_directory import RunDirectory, write_json
 from coupler.stress.drawn import command
 from coupler.stress.drawn.case import toml, write
 from coupler.stress.drawn.judge import measures
 from coupler.stress.drawn.scene import draw
 from coupler.stress.drawn.shrink import shrunk
-from coupler.stress.drawn.trial import Trial
+from coupler.stress.drawn.trial import Trial, asked_too_much
 from coupler.stress.registry import Measure
 
 SEED = 2
@@ -241,6 +243,15 @@ def test_failures_are_the_same_whatever_their_numbers():
     second = told("the water volume is off by +3.1% at t = 1e-05 s; limit 2.00% (limits.volume_error).")
     assert first.kind == second.kind == "the water volume is off by at t"
     assert first.kind != told("the energy balance is off by 19.80% of the input energy").kind
+
+
+def test_a_scene_may_ask_too_much_of_its_joints_but_not_of_its_contact():
+    with pytest.raises(Diverged) as error:
+        check_overlap(1.0, Overlap("a", "'b'", 0.1, 0.2), 0.1)
+    told = str(error.value)
+    assert asked_too_much(told, {"contact": {"friction": 0.5}})
+    assert not asked_too_much(told, {"contact": {"stiffness": 1e6}})
+    assert not asked_too_much("the energy balance is off by 6 %", {})
 
 
 def test_a_failure_is_kept_as_a_case_with_its_story(tmp_path, monkeypatch):
