@@ -37,6 +37,7 @@ def start_level(boxes, tank, mesh, domain) -> Array:
     """
     low, high = _reach(domain.nodes, domain.cells, *_fluid_extent(domain))
     edge = _cell_edge(mesh)
+    boxes = merged(boxes, SEAM * edge)
     whole_low, whole_high = _reach(mesh.nodes, mesh.cells, *_extent(mesh.nodes[mesh.cells]))
     cut_low = low - whole_low[domain.parent_node] > MISSING * edge
     cut_high = whole_high[domain.parent_node] - high > MISSING * edge
@@ -44,6 +45,35 @@ def start_level(boxes, tank, mesh, domain) -> Array:
     stars = (domain.nodes, low, high, cut_low & faced_low, cut_high & faced_high)
     level = np.min([_box_level(box, tank, stars, edge) for box in boxes], axis=0)
     return _without_seams(level, boxes, tank, domain.nodes, edge)
+
+
+def merged(boxes, slack: float) -> list:
+    """The boxes, those side by side that make one together as that one: it has no side where they touch, and between
+    nodes the distance to such a side would take water away. slack [m]: within which ends are the same."""
+    found, before = [np.array(box, float) for box in boxes], len(boxes) + 1
+    while len(found) < before:
+        before = len(found)
+        for axis in range(3):
+            found = _joined_along(axis, found, slack)
+    return [(tuple(low), tuple(high)) for low, high in np.array(found).tolist()]
+
+
+def _joined_along(axis: int, boxes: list[Array], slack: float) -> list[Array]:
+    """Boxes (2, 3) with the same ends across an axis that meet along it are one."""
+    rows: dict[tuple, list[Array]] = {}
+    for box in boxes:
+        across = np.delete(box, axis, axis=1)
+        rows.setdefault(tuple(np.round(across / slack).ravel()), []).append(box)
+    joined: list[Array] = []
+    for row in rows.values():
+        row.sort(key=lambda box: box[0, axis])
+        joined.append(row[0].copy())
+        for box in row[1:]:
+            if box[0, axis] <= joined[-1][1, axis] + slack:
+                joined[-1][1, axis] = max(joined[-1][1, axis], box[1, axis])
+            else:
+                joined.append(box.copy())
+    return joined
 
 
 def _facing(domain) -> tuple[Array, Array]:

@@ -17,6 +17,7 @@ import numpy as np
 
 from coupler.errors import ExitCode, SurgebreakError
 from coupler.paths import BadPath, check_file
+from coupler.units import MOST
 
 Array = np.ndarray
 
@@ -73,8 +74,13 @@ def read_mesh(path: Path) -> tuple[Array, dict[str, Array], bool]:
         raise MeshFileError(
             f"{path.name}: meshio cannot read it ({_first_line(error, told)}); it reads {', '.join(readable())}"
         ) from error
-    if mesh.points.ndim != 2 or mesh.points.shape[1] != 3 or not np.isfinite(mesh.points).all():
+    points = mesh.points
+    if points.ndim != 2 or points.shape[1] != 3 or not len(points) or not np.isfinite(points).all():
         raise MeshFileError(f"{path.name}: its points are not rows of three finite coordinates")
+    if np.abs(points).max() > MOST:
+        raise MeshFileError(
+            f"{path.name}: a coordinate of {np.abs(points).max():g}; at most {MOST:g} is read"
+        )
     cells: dict[str, list] = {}
     for block in mesh.cells:
         rows = np.asarray(block.data)

@@ -30,7 +30,7 @@ def _passed(case: Case, path: KeyPath, motion, body: Body, walls) -> Iterator[Pr
     for what, axis, sign, place in walls:
         speed = sign * motion.velocity[axis]
         room = sign * (place - (high if sign > 0.0 else low)[axis])
-        if speed * case.time.end > room + THROUGH * body.thickness():
+        if speed > 0.0 and speed * case.time.end > room + THROUGH * body.thickness():
             yield (
                 path,
                 f"'{motion.block}' reaches {what} ({'xyz'[axis]} = {place:g} m) at t = {max(0.0, room) / speed:.4g} s "

@@ -17,7 +17,7 @@ from coupler.array_file import Damaged
 from coupler.case import effective
 from coupler.case_file import CaseFile, load
 from coupler.checkpoint import FOLDER, LAYOUT, Checkpoint, listed
-from coupler.errors import ExitCode, SurgebreakError
+from coupler.errors import FULL, ExitCode, SurgebreakError
 from coupler.fingerprint import FREE, case_differences, differences, is_free, program
 from coupler.run_directory import RunDirectory
 from coupler.run_lock import RunLock
@@ -69,7 +69,12 @@ def prepare(
     tell(
         f"going on from {checkpoint.path}, t = {checkpoint.time:.6g} s, step {checkpoint.about['figures']['steps']}"
     )
-    return Resumption(file, RunDirectory.reopen(path, file, again, lock), checkpoint)
+    try:
+        return Resumption(file, RunDirectory.reopen(path, file, again, lock), checkpoint)
+    except OSError as error:
+        if error.errno in FULL:
+            raise
+        raise CannotResume(f"{path}: a file of the run cannot be written: {error}") from error
 
 
 def _locked(path: Path) -> RunLock:

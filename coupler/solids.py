@@ -99,4 +99,14 @@ def _blocks(spec, **common) -> list:
     if spec.size is not None:
         size, turn = np.array(spec.size), turned(spec.rotation)
         return [Block(spec.name, np.array(spec.centre), size=size, rotation=turn, **common)]
-    return [Block.standing(spec.name, np.array(spec.vertices), **common)]
+    return [Block.standing(spec.name, hull_corners(np.array(spec.vertices)), **common)]
+
+
+def hull_corners(points: np.ndarray) -> np.ndarray:
+    """The points (n, 3) that are corners of their convex hull, in their order; all of them where they span none."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        return points[np.sort(ConvexHull(points - points.mean(axis=0)).vertices)]
+    except (QhullError, ValueError):
+        return points  # refused with its reason when the body is made

@@ -207,6 +207,10 @@ def check_convex(name: str, vertices: Array, faces, tolerance: float, origin=(0.
     """Raise BlockError where faces do not close, have no area, or a vertex lies more than tolerance [m] outside one.
 
     origin (3,) [m] is added to the places that messages name."""
+    if not faces:
+        raise BlockError(
+            f"block '{name}': its corners span no volume at {shown(origin + vertices.mean(axis=0))}"
+        )
     _check_closed(name, vertices, faces, origin)
     areas = face_areas(vertices, faces)
     size = np.linalg.norm(areas, axis=1)

@@ -7,6 +7,7 @@ from html import escape
 from pathlib import Path
 
 from coupler.explain_run import Skipped, not_loaded, seconds_of, shares, skipped
+from coupler.paths import BadPath, read_text
 from coupler.process import was_killed
 from coupler.report import tables
 from coupler.report.html import (
@@ -257,7 +258,12 @@ def _cost(row: Skipped) -> str:
 
 def _case(run: Path) -> str:
     path = run / "case.toml"
-    return preformatted(path.read_text(encoding="utf-8")) if path.exists() else ""
+    if not path.exists():
+        return ""
+    try:
+        return preformatted(read_text(path))
+    except BadPath as error:
+        return note(f"case.toml {error}")
 
 
 def _words(name: str) -> str:

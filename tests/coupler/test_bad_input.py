@@ -11,6 +11,7 @@ from coupler.errors import BadCase, briefly
 from coupler.mesh_files import MeshFileError, read_mesh, readable
 from coupler.paths import BadPath, read_text
 from coupler.records import NoSuchData, read_record
+from coupler.solids import solids_of
 from coupler.study.formula import BadFormula, evaluate
 from coupler.table_checks import column_names
 from fluid.mesh import MeshError, box_mesh
@@ -335,3 +336,22 @@ def test_a_driven_block_stops_at_the_ground(tmp_path):
     (line,) = mistakes(tmp_path, driven("[0, 0, -0.1]", "[structure.ground]\n"))
     assert "'a' reaches the ground (z = 0 m)" in line
     assert math.isfinite(load(write(tmp_path, driven("[0, 0, 0]", "[structure.ground]\n"))).case.time.end)
+
+
+def test_a_solid_is_the_hull_of_its_points(tmp_path):
+    """Points inside and on its faces change nothing, as the page of the case says."""
+    corners = [[2, 0, 0], [3, 0, 0], [2, 1, 0], [2, 0, 1]]
+    more = [*corners, [2.2, 0.2, 0.2], [2.5, 0, 0], [2.2, 0.2, 0]]
+    bodies = [
+        solids_of(load(write(tmp_path, WATER + f"[[solid]]\nvertices = {points}\n")).case)[0]
+        for points in (corners, more)
+    ]
+    assert bodies[0].vertices.tolist() == bodies[1].vertices.tolist()
+    flat = [[2, 0, 0], [3, 0, 0], [2, 1, 0], [3, 1, 0]]
+    assert "span no volume" in mistakes(tmp_path, WATER + f"[[solid]]\nvertices = {flat}\n")[0]
+
+
+def test_a_block_that_was_driven_out_already_is_told_once(tmp_path):
+    """Its velocity along an axis may be zero."""
+    lines = mistakes(tmp_path, driven("[0, 0, 0]").replace("centre = [2, 1, 0.5]", "centre = [20, 1, 0.5]"))
+    assert ["reaches 16.5 m beyond the side x+" in line for line in lines] == [True]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from coupler.fill import start_level
+from coupler.fill import merged, start_level
 from fluid.bodies import ConvexBodies
 from fluid.domain import cut_domain
 from fluid.mesh import box_mesh
@@ -36,3 +36,24 @@ def test_boxes_on_top_of_each_other_keep_their_own_surfaces():
     """A step of two boxes: water to 0.25 m over one half, to 0.375 m over the other; only the seam goes."""
     low, high = ((0.0, 0.0, 0.0), (1.0, 0.5, 0.25)), ((0.0, 0.0, 0.25), (0.5, 0.5, 0.375))
     assert water_in([low, high]).volume() == pytest.approx(0.125 + 0.03125, rel=0.03)
+
+
+@pytest.mark.parametrize("seam", [0.3, 1.0 / 3.0, 0.3125, 0.1 + 0.2, 0.5])
+def test_where_boxes_touch_makes_no_difference_to_the_water(seam):
+    """Between nodes too: the level beside the seam is that of one box."""
+    parts = [((0.0, 0.0, 0.0), (seam, 0.4, 0.2)), ((seam, 0.0, 0.0), (0.75, 0.4, 0.2))]
+    whole = water_in([((0.0, 0.0, 0.0), (0.75, 0.4, 0.2))])
+    np.testing.assert_array_equal(water_in(parts).level_set, whole.level_set)
+
+
+def test_boxes_become_one_where_they_fill_one():
+    box = ((0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
+    eight = [
+        ((x, y, z), (x + 0.5, y + 0.5, z + 0.5)) for x in (0.0, 0.5) for y in (0.0, 0.5) for z in (0.0, 0.5)
+    ]
+    assert merged(eight, 1e-9) == [box]
+    assert merged([box, box, ((0.2, 0.0, 0.0), (1.5, 1.0, 1.0))], 1e-9) == [
+        ((0.0, 0.0, 0.0), (1.5, 1.0, 1.0))
+    ]
+    apart = [box, ((1.1, 0.0, 0.0), (2.0, 1.0, 1.0)), ((1.0, 0.0, 0.0), (1.1, 1.0, 0.5))]
+    assert len(merged(apart, 1e-9)) == 3
