@@ -80,12 +80,12 @@ def _energy(energy: dict) -> Iterator[Measure]:
 
 
 def _momentum(momentum: dict) -> Iterator[Measure]:
-    """Water and free blocks against the sum of all lines."""
+    """Water and free blocks against the sum of all lines, over the largest of these along any axis."""
+    lines = [v for name, v in momentum.items() if name != "time" and not name.startswith("residual")]
+    scale = max(max(_largest(np.abs(v)) for v in lines), 1e-300)
     for axis in "xyz":
-        lines = {name: v for name, v in momentum.items() if name.endswith(f"_{axis}")}
-        missed = np.abs(lines.pop(f"residual_{axis}"))
-        scale = max(max(_largest(np.abs(v)) for v in lines.values()), 1e-300)
-        yield Measure(f"momentum missed along {axis}", _largest(missed) / scale, MOMENTUM)
+        missed = _largest(np.abs(momentum[f"residual_{axis}"]))
+        yield Measure(f"momentum missed along {axis}", missed / scale, MOMENTUM)
 
 
 def _water(water: dict, case: Case) -> Iterator[Measure]:
