@@ -157,7 +157,7 @@ class ReactionGauge(Section):
 
 
 class MotionGauge(Section):
-    """Centre, velocity and rotation vector of one block."""
+    """Centre, velocity, rotation vector and angular velocity of one block."""
 
     kind: Literal["motion"] = Field(description="what it measures: motion of a block")
     name: Name = Field(description="columns of the history")

@@ -217,12 +217,14 @@ def _motion(spec, rows_of) -> Gauge:
         *_vector(f"{spec.name}_centre", "m", f"centre of block '{spec.of}'"),
         *_vector(f"{spec.name}_velocity", "m/s", f"velocity of block '{spec.of}'"),
         *_vector(f"{spec.name}_tilt", "rad", f"rotation vector of block '{spec.of}' since the start"),
+        *_vector(f"{spec.name}_spin", "rad/s", f"angular velocity of block '{spec.of}', world axes"),
     )
 
     def read(coupling, record):
         s = coupling.structure
         tilt = _rotation_vector(s.rotation()[row] @ s.blocks[row].rotation.T)
-        return _named(columns, np.concatenate([s.centre()[row], s.velocity()[row, :3], tilt]))
+        velocity = s.velocity()[row]
+        return _named(columns, np.concatenate([s.centre()[row], velocity[:3], tilt, velocity[3:]]))
 
     return Gauge(columns, read)
 

@@ -61,7 +61,7 @@ def place_problems(case: Case, parts: list[Part]) -> Iterator[Problem]:
     yield from tank_places(case)
     yield from _fills(case)
     yield from _overlaps(solids, blocks, [b.name for part in parts for b in part.blocks])
-    yield from _outside(case, solids, blocks)
+    yield from _outside(case, solids, blocks, [b.name for part in parts for b in part.blocks])
     yield from _submerged_fills(case, [*solids, *blocks])
     held = [(part.path, b.name, Body.of_block(b)) for part in parts for b in part.blocks if b.fixed]
     yield from _gauges(case, [*solids, *held])
@@ -130,13 +130,14 @@ def _beyond_tank(case: Case, path: KeyPath, name: str, bounds: np.ndarray) -> It
                 )
 
 
-def _outside(case: Case, solids: list[Placed], blocks: list[Placed]) -> Iterator[Problem]:
+def _outside(case: Case, solids: list[Placed], blocks: list[Placed], names: list[str]) -> Iterator[Problem]:
     """Blocks must lie inside the tank; fixed solids may stick out of it, but not be wholly outside."""
     outlines = _outlines(blocks)
     if case.tank is not None:
         tank = Body.between(case.tank.lower, case.tank.upper)
         for path, name, bounds in outlines:
-            yield from _beyond_tank(case, path, f"'{name}'", bounds)
+            for place, text in _beyond_tank(case, path, f"'{name}'", bounds):
+                yield place, text + _which_blocks(case, path, name, blocks, names)
         for path, name, body in solids:
             if overlap_depth(tank, body) <= 0:
                 yield (
@@ -148,6 +149,19 @@ def _outside(case: Case, solids: list[Placed], blocks: list[Placed]) -> Iterator
         depth = ground.level - bounds[0, 2]
         if depth > TOUCH * np.ptp(bounds, axis=0).min():
             yield path, f"'{name}' reaches {depth:.4g} m below the ground (z = {ground.level:g} m); raise it"
+
+
+def _which_blocks(case: Case, path: KeyPath, name: str, blocks: list[Placed], names: list[str]) -> str:
+    """Which blocks of a part reach out of the tank, where it has several: of a file they are found by number alone."""
+    of_part = [
+        (own, np.array(body.bounds()))
+        for (at, part, body), own in zip(blocks, names)
+        if (at, part) == (path, name)
+    ]
+    out = [own for own, bounds in of_part if any(True for _ in _beyond_tank(case, path, own, bounds))]
+    if len(of_part) < 2 or not out:
+        return ""
+    return f" ({len(out)} of its {len(of_part)} blocks: {', '.join(out[:3])}{' ...' if len(out) > 3 else ''})"
 
 
 def _outlines(bodies: list[Placed]) -> list[tuple[KeyPath, str, np.ndarray]]:

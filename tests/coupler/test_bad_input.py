@@ -4,6 +4,8 @@ import math
 import os
 import time
 
+import meshio
+import numpy as np
 import pytest
 
 from coupler.case_file import load
@@ -355,3 +357,31 @@ def test_a_block_that_was_driven_out_already_is_told_once(tmp_path):
     """Its velocity along an axis may be zero."""
     lines = mistakes(tmp_path, driven("[0, 0, 0]").replace("centre = [2, 1, 0.5]", "centre = [20, 1, 0.5]"))
     assert ["reaches 16.5 m beyond the side x+" in line for line in lines] == [True]
+
+
+def test_of_many_blocks_those_that_reach_out_of_the_tank_are_named(tmp_path):
+    """A file of a thousand wedges says which one is wrong only by its number."""
+    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
+    cells = [[0, 1, 2, 3], [4, 5, 6, 7]]
+    meshio.Mesh(np.concatenate([points, np.add(points, [3.5, 0, 0])]), [("tetra", cells)]).write(
+        tmp_path / "two.vtu"
+    )
+    text = (
+        WATER
+        + DRY.partition("[contact]")[1]
+        + "\nstiffness = 1e6\n"
+        + '[[structure.file]]\npath = "two.vtu"\n'
+    )
+    (line,) = mistakes(tmp_path, text)
+    assert "'file' reaches 0.5 m beyond the side x+ of the tank" in line
+    assert line.endswith("(1 of its 2 blocks: file-1)")
+
+
+def test_an_open_surface_names_the_key_of_its_own_table(tmp_path):
+    """A solid has a weld too, not only a file of blocks."""
+    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
+    meshio.Mesh(points, [("triangle", [[0, 2, 1], [0, 1, 3], [1, 2, 3]])]).write(tmp_path / "open.stl")
+    (line,) = mistakes(tmp_path, WATER + '[[solid]]\npath = "open.stl"\n')
+    assert "case.toml:14: solid[0]: open.stl: open surface" in line
+    assert "weld of this table sets that" in line
+    assert "structure.file" not in line

@@ -1,4 +1,4 @@
-"""The gauge of the motion of a block: centre, velocity, and the turn since the start, whatever way it stood then."""
+"""The gauge of the motion of a block: centre, velocity, turn since the start, whatever way it stood then, and spin."""
 
 import numpy as np
 import pytest
@@ -38,3 +38,4 @@ def test_the_turn_of_a_block_that_stands_askew_is_counted_from_its_start():
     moved = np.array([read[f"b_centre_{a}"] for a in "xyz"]) - [0, 0, 1]
     assert moved == pytest.approx(np.multiply(velocity, end), abs=1e-9)
     assert [read[f"b_tilt_{a}"] for a in "xyz"] == pytest.approx(np.multiply(spin, end), abs=1e-4)
+    assert [read[f"b_spin_{a}"] for a in "xyz"] == pytest.approx(spin, abs=1e-4)
