@@ -152,7 +152,7 @@ for _ in range(2001):
     force.append(F[0, 2])
     x[1, 2] += 0.5e-6
 print(max(force) / 1e6, sum(force) * 0.5e-6 / 1e3, len(joints.broken_now()))
-stats = joints.kernels.joint_forces.stats
+stats = joints.families[0][0].joint_forces.stats
 print(sum(stats.cache_misses.values()))
 print(stats.cache_path)
 """
