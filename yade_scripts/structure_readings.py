@@ -143,9 +143,8 @@ class StructureReadings:
 
     def deepest(self) -> tuple[Array, Array, Array, Array]:
         """Pairs that are in one another: blocks a (p,) and b (p,), -1 - number for a fixed plane, depth (p,) [m] and
-        depth over the
-        thickness of the thinner block (p,). Of contacts: the way that parts the two, at most (faces are tried, and
-        edges that cross where these carry); of live joints: the mean closing."""
+        depth over the thickness of the thinner block (p,). Of contacts: the way that parts the two, at most (faces are
+        tried, and edges that cross where these carry); of live joints: the mean closing."""
         thickness = 2.0 * np.array([b.planes[1].min() for b in self.blocks])
         a, b, depth = (np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0))
         if self._contacts is not None:
@@ -156,7 +155,7 @@ class StructureReadings:
             other = np.where(self.joints.b < 0, -1 - self.joints.plane, self.joints.b)
             a, b = np.concatenate([a, self.joints.a[live]]), np.concatenate([b, other[live]])
             depth = np.concatenate([depth, np.maximum(closing, 0.0)])
-        thinner = np.minimum(thickness[a], np.where(b >= 0, thickness[b], np.inf))
+        thinner = np.minimum(thickness[a], np.where(b >= 0, thickness[np.maximum(b, 0)], np.inf))
         return a, b, depth, depth / thinner
 
     def joined_planes(self) -> tuple[Array, Array, Array]:

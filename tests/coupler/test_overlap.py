@@ -5,11 +5,13 @@ import sys
 
 import pytest
 
+from coupler.build import build
 from coupler.case_checks import remarks
 from coupler.case_file import load
 from coupler.errors import ExitCode
 from coupler.limits import Diverged, check_overlap
 from coupler.overlaps import deepest_overlap
+from tests.fakes import no_clock
 from yade_scripts.blocks import Block
 from yade_scripts.contact import ContactLaw
 from yade_scripts.structure import Structure
@@ -79,3 +81,21 @@ def test_a_joint_that_closes_too_far_counts():
         found = deepest_overlap(s, 0.1)
     assert found.other in ("'high'", "the ground")
     assert found.share > 0.1
+
+
+def test_one_block_between_the_sides_of_a_tank(tmp_path):
+    """More planes than blocks: the floor, the last of five, was looked for among the blocks."""
+    tank = 'tank = { lower = [-1, -1, 0], upper = [1, 1, 2], cell = 0.5, open = ["z+"] }\n'
+    text = tank + SOFT.format(stiffness="1e8").replace("0.25]", "0.05]\nvelocity = [0, 0, -1]").replace(
+        "[structure.ground]\n", ""
+    )
+    structure = build(load(write(tmp_path, text)).case, no_clock).coupling.structure
+    try:
+        structure.advance(1e-4)
+        a, b, depth, share = structure.deepest()
+        assert a.tolist() == [0] * len(a)
+        assert (b < 0).all()
+        assert share == pytest.approx(depth / 0.1)
+        assert share.max() == pytest.approx(1e-3, rel=0.2)
+    finally:
+        structure.close()
