@@ -96,13 +96,12 @@ def _settled(structure, water) -> bool:
 def _load_at_rest(structure, water) -> np.ndarray:
     """Force and moment (n, 6) of the water on the blocks while these are held."""
     from coupler.scheme import water_load
-    from fluid.solve import solve
+    from fluid.bounded import solve_pressure
 
     problem = water.predict(water.stable_step())
     if problem.coupling.nnz == 0:
         return np.zeros((structure.n, 6))
-    x = solve(problem.matrix, problem.rhs, problem.guess, PRESSURE_RTOL).x
-    return water_load(problem, x)[: structure.n]
+    return water_load(problem, solve_pressure(problem, PRESSURE_RTOL).x)[: structure.n]
 
 
 def build_structure(case: Case):

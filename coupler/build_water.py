@@ -19,7 +19,7 @@ SLACK = 1e-3
 def water_of(case: Case, structure, solids):
     """(Water, Immersion) of a case with a structure or None and fixed solids [(vertices, faces)]."""
     from coupler.exchange import Immersion
-    from coupler.fill import start_level
+    from coupler.fill import start_level, start_velocity
     from fluid.covers import WIDE_OPENINGS
     from fluid.parameters import WaterParameters
     from fluid.water import Water
@@ -39,13 +39,19 @@ def water_of(case: Case, structure, solids):
         walls=w.walls,
         roughness=w.roughness,
         manning=w.manning,
+        suction=w.suction,
+        vapour_pressure=w.vapour_pressure,
     )
     level = np.full(len(immersion.domain.nodes), np.ptp(mesh.bounds, axis=0).max())
     boxes = [_reaching(case.tank, fill) for fill in w.fill] + _strips(case)
+    velocity = None
     if boxes:
         level = start_level(boxes, (case.tank.lower, case.tank.upper), mesh, immersion.domain)
+        velocity = start_velocity(boxes, [fill.velocity for fill in w.fill], immersion.domain.nodes)
     opened, smooth = sides_named(case.tank.open, mesh), sides_named(case.tank.smooth, mesh)
-    water = Water(mesh, immersion.domain, level, parameters, opened, smooth, _flows(case, mesh))
+    water = Water(
+        mesh, immersion.domain, level, parameters, opened, smooth, _flows(case, mesh), velocity=velocity
+    )
     if immersion.cracks is not None and immersion.cracks.lumped:
         water.set_cracks(immersion.cracks.cracks())
     return water, immersion

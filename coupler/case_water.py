@@ -29,6 +29,9 @@ class Fill(Section):
 
     lower: Point = Field(description="corner with the smallest coordinates", examples=[[0, 0, 0]])
     upper: Point = Field(description="corner with the largest coordinates", examples=[[20, 24, 10]])
+    velocity: tuple[Velocity, Velocity, Velocity] = Field(
+        (0.0, 0.0, 0.0), description="velocity of its water at the start", examples=[[3, 0, 0]]
+    )
 
 
 class SteadyInflow(Section):
@@ -114,6 +117,14 @@ class Water(Section):
     )
     theta: quantity("", ge=0.5, le=1) = Field(
         0.6, description="weight of the new pressure in the projection; 0.5 damps least, 1 most"
+    )
+    suction: Literal["bounded", "unlimited"] = Field(
+        "bounded",
+        description="how far the pressure may fall: to that of the air where air can reach the water, and to "
+        "vapour_pressure elsewhere, where the water parts; or without any bound, for comparison",
+    )
+    vapour_pressure: quantity("Pa", lt=0) = Field(
+        -98e3, description="pressure of the vapour of the water, relative to the air", examples=["-98 kPa"]
     )
     covers: Literal["single", "multiple"] = Field(
         "single",

@@ -76,6 +76,18 @@ def _joined_along(axis: int, boxes: list[Array], slack: float) -> list[Array]:
     return joined
 
 
+def start_velocity(boxes, velocities, nodes) -> Array | None:
+    """Velocity (N, 3) [m/s] at nodes (N, 3): that of the box in which a node lies deepest, or else of the nearest one.
+
+    boxes: as in `start_level` · velocities: of the first of them, the others are at rest; None if all are."""
+    if not np.any(velocities):
+        return None
+    moving = np.zeros((len(boxes), 3))
+    moving[: len(velocities)] = velocities
+    outside = [np.maximum(np.array(low) - nodes, nodes - np.array(high)).max(axis=1) for low, high in boxes]
+    return moving[np.argmin(outside, axis=0)]
+
+
 def _facing(domain) -> tuple[Array, Array]:
     """(N, 3) bool each: nodes with a solid around them whose face looks up, or down, each axis: a side of a box can
     only end at such a one, not where a wall across it cuts the cells short."""

@@ -3,7 +3,8 @@
 Structure:  Δ(kinetic + gravity + joints stored + contacts stored) + dissipated = W_received        residual r_s
 Interface:  W_given − W_received = r_i,  W_given = Σ dt F·V with the velocities V of the pressure solve,
             W_received = work of the same loads over the motion that the discrete elements made
-Water:      Δ(kinetic + potential) + W_given + D_shear + D = E_sides − E_left
+Water:      Δ(kinetic + potential) + W_given + D_shear + D_vapour + D = E_sides − E_left
+            D_vapour: spent on parting water from its vapour, whose pressure lies below that of the air;
             D_shear: taken by viscosity and by friction of walls; D: what is missing, the dissipation of the numerics;
             E_sides: energy of the water that came in through inflows and seas, with the work of its pressure;
             E_left: energy of the water that fell out through open sides
@@ -38,6 +39,7 @@ class Balance:
     water_potential: float = 0.0
     numerical_dissipation: float = 0.0
     shear_dissipation: float = 0.0
+    parting_work: float = 0.0
     entered: float = 0.0
     left: float = 0.0
     work_given: float = 0.0
@@ -66,6 +68,8 @@ class Ledger:
     """Energy of the water that fell out through open sides so far [J]."""
     shear: float = 0.0
     """Energy that viscosity and friction of walls took out of the water so far [J]."""
+    parting: float = 0.0
+    """Energy spent so far on parting water from its vapour [J]."""
     _water_start: tuple[float, float] | None = None
     _structure_start: float | None = None
     _input: float = field(default=0.0)
@@ -106,7 +110,8 @@ class Ledger:
         dissipation = 0.0
         if water is not None:
             change = kinetic + potential - sum(self._water_start)
-            dissipation = self.entered - self.left - change - self.work_given - self.shear
+            taken = self.work_given + self.shear + self.parting
+            dissipation = self.entered - self.left - change - taken
         received = residual = 0.0
         if structure is not None:
             received = structure["load_work"]
@@ -124,6 +129,7 @@ class Ledger:
             potential,
             dissipation,
             self.shear,
+            self.parting,
             self.entered,
             self.left,
             self.work_given,

@@ -240,7 +240,7 @@ class Coupling:
         with self._placed(problem):
             found, moved = self._exchange(problem, record, start)
         with self.clock("water"):
-            self.water.correct(problem, found.x)
+            self.water.correct(problem, found.x, found.parting)
         record.load, record.unknowns = found.load, len(found.x)
         given = found.load[:n] * found.velocity[:n]
         self.ledger.give(dt * float(np.sum(given)))
@@ -255,14 +255,16 @@ class Coupling:
         if shear is not None:
             self.ledger.shear -= shear.energy + record.dt * float(np.sum(shear.load * velocity))
         self.ledger.left += self.water.report.left_energy
+        self.ledger.parting += self.water.report.bound.work
 
     def _exchange(self, problem, record: StepRecord, start: StepStart):
         """Pressure with the structure inside, then the structure under it, as often as the passes allow: the solution,
         and the mean velocity (n, 6) with which the blocks moved. One pass where no block is wetted."""
         from coupler.scheme import corrected_free_velocity, defect, solve_coupled
         from coupler.wetting import Wetting
+        from fluid.bounded import solve_bounded
 
-        structure, solve = self.structure, partial(self._solve, kept=[])
+        structure, solve = self.structure, partial(solve_bounded, kept=[])
         with self.clock("structure in pressure"):
             mass, response, v_free = self._response(problem)
             wetting = Wetting.of(problem.coupling)
@@ -271,8 +273,7 @@ class Coupling:
         for record.passes in range(1, most + 1):
             self._pause()
             with self.clock("pressure"):
-                guess = None if found is None else found.x
-                found = solve_coupled(problem, response, v_free, solve, self.rtol, guess, wetting)
+                found = solve_coupled(problem, response, v_free, solve, self.rtol, found, wetting)
             with self.clock("structure"):
                 if record.passes > 1:
                     structure.restore(start.structure)
@@ -311,14 +312,15 @@ class Coupling:
 
     def _water_step(self, dt: float, record: StepRecord) -> None:
         from coupler.scheme import water_load
+        from fluid.bounded import solve_pressure
 
         with self.clock("water"):
             problem = self.water.predict(dt)
         self._pause()
         with self.clock("pressure"), self._placed(problem):
-            result = self._solve(problem.matrix, problem.rhs, problem.guess, self.rtol)
+            result = solve_pressure(problem, self.rtol)
         with self.clock("water"):
-            self.water.correct(problem, result.x)
+            self.water.correct(problem, result.x, result.parting)
         record.load = water_load(problem, result.x)
         record.iterations, record.passes, record.unknowns = result.iterations, 1, len(result.x)
         self._note_loads(problem, record, self.water.body_velocity)
@@ -328,12 +330,6 @@ class Coupling:
             report = self.structure.advance(dt)
         record.substeps, record.substep = report.substeps, report.dt_s
         record.opening_rate, record.impulses = report.opening_rate, report.impulses
-
-    @property
-    def _solve(self):
-        from fluid.solve import solve
-
-        return solve
 
     def _padded(self, values: Array) -> Array:
         """Rows of zeros appended for the fixed solids: (n, 6) → (n + m, 6)."""

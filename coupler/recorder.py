@@ -42,7 +42,7 @@ class Recorder:
         water, structure = coupling.water, coupling.structure
         self.impulse = np.zeros(3)
         self.reinserted, self.clipped = 0.0, 0
-        self.reinserted_net = self.left = 0.0
+        self.reinserted_net = self.left = self.parted = 0.0
         self._kept = kept
         self._tables: dict[str, HistoryTable] = {}
         self._energy = self._table("energy", ENERGY)
@@ -83,6 +83,7 @@ class Recorder:
         self.impulse = kept["impulse"].copy()
         self.reinserted, self.clipped = float(kept["reinserted"]), int(kept["clipped"])
         self.reinserted_net, self.left = float(kept["reinserted_net"]), float(kept["left"])
+        self.parted = float(kept["parted"])
         for k, gauge in enumerate(self.gauges):
             if gauge.windows is not None:
                 start = f"gauge_{k}_"
@@ -111,6 +112,7 @@ class Recorder:
                 "reinserted": np.array(self.reinserted),
                 "reinserted_net": np.array(self.reinserted_net),
                 "left": np.array(self.left),
+                "parted": np.array(self.parted),
                 "clipped": np.array(self.clipped),
             }
         )
@@ -133,6 +135,7 @@ class Recorder:
             water_potential=b.water_potential,
             numerical_dissipation=b.numerical_dissipation,
             shear_dissipation=b.shear_dissipation,
+            parting_work=b.parting_work,
             entered=b.entered,
             left=b.left,
             work_given=b.work_given,
@@ -174,6 +177,7 @@ class Recorder:
         self.reinserted_net += w.report.reinserted
         self.clipped += w.report.clipped
         self.left += w.report.left
+        self.parted += w.report.bound.volume
         sides = w.sides
         self._water.append(
             time=record.time,
@@ -184,6 +188,9 @@ class Recorder:
             reinserted=self.reinserted,
             reinserted_net=self.reinserted_net,
             clipped=self.clipped,
+            lowest_pressure=w.report.bound.lowest,
+            wall_at_bound=w.report.bound.wall,
+            parted=self.parted,
             **_xyz("momentum", w.momentum()),
         )
 

@@ -121,12 +121,15 @@ def _answer(bodies, inverse, force, velocity):
 
 @dataclass(frozen=True)
 class CoupledSolution:
-    """x (n_dofs,) [Pa] · velocity (n_bodies, 6) [m/s, rad/s] · load (n_bodies, 6) [N, N m] on the bodies."""
+    """x (n_dofs,) [Pa] · velocity (n_bodies, 6) [m/s, rad/s] · load (n_bodies, 6) [N, N m] on the bodies ·
+    at_bound (n_dofs,) bool, parting (n_dofs,) [m³/s]: see `fluid.bounded`."""
 
     x: Array
     velocity: Array
     load: Array
     iterations: int
+    at_bound: Array
+    parting: Array
 
 
 def water_load(problem, x: Array) -> Array:
@@ -140,28 +143,30 @@ def solve_coupled(
     v_free: Array,
     solve: Callable,
     rtol: float,
-    guess: Array | None = None,
+    before: CoupledSolution | None = None,
     wetting: Wetting | None = None,
 ) -> CoupledSolution:
-    """Solve (3). `problem` is the water's PressureProblem, `solve` its linear solver, v_free (6 n_bodies,);
-    guess (n_dofs,) [Pa] and wetting: those of the problem unless given."""
+    """Solve (3) with the bound of the pressure. `problem` is the water's PressureProblem, `solve` does the work of
+    `fluid.bounded.solve_bounded`, v_free (6 n_bodies,) · before: solution of the pass before, to start from ·
+    wetting: that of the problem unless given."""
     wets = Wetting.of(problem.coupling) if wetting is None else wetting
     feels_water = len(response.free) > 0 and problem.coupling.nnz > 0
 
     def added_inertia(p: Array) -> Array:
         return wets.on_water(response.compliance(wets.on_bodies(p)))
 
-    result = solve(
+    found = solve(
         problem.matrix,
         problem.rhs + wets.on_water(v_free),
-        problem.guess if guess is None else guess,
+        problem.guess if before is None else before.x,
         rtol,
+        lower=problem.lower,
+        at_bound=problem.at_bound if before is None else before.at_bound,
         extra=added_inertia if feels_water else None,
     )
-    velocity = v_free - response.compliance(wets.on_bodies(result.x))
-    return CoupledSolution(
-        result.x, velocity.reshape(-1, 6), water_load(problem, result.x), result.iterations
-    )
+    velocity = (v_free - response.compliance(wets.on_bodies(found.x))).reshape(-1, 6)
+    load = water_load(problem, found.x)
+    return CoupledSolution(found.x, velocity, load, found.iterations, found.at_bound, found.parting)
 
 
 def corrected_free_velocity(response: StructureResponse, mean_velocity: Array, x: Array, coupling) -> Array:

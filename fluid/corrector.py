@@ -17,6 +17,7 @@ from numba import njit
 from fluid.extension import extend_velocity
 from fluid.kinks import damp_kinks
 from fluid.momentum import Stages, momentum_change
+from fluid.pressure_bound import BoundMet
 from fluid.projection import (
     cell_gradient,
     cell_velocity,
@@ -55,11 +56,13 @@ class Corrected:
     flux: Flux
     listed: np.ndarray
     layer_start: np.ndarray
+    at_bound: np.ndarray
+    ventilated: np.ndarray
     report: object
 
 
-def corrected(water, problem, x) -> Corrected:
-    """End the step with the pressure x (n,) [Pa]."""
+def corrected(water, problem, x, parting) -> Corrected:
+    """End the step with the pressure x (n,) [Pa]; parting (n,) [m³/s] or None, as in `Water.correct`."""
     t, kept, dt = water.topology, problem.predicted, problem.dt
     unknown, pressure = np.zeros(len(kept.wet)), np.zeros(len(kept.wet))
     unknown[problem.dofs], pressure[problem.dofs] = x, x + problem.known
@@ -80,7 +83,8 @@ def corrected(water, problem, x) -> Corrected:
     momentum = momentum_change(
         water, problem, unknown, pressure, Stages(projected, limited, damped, slipping, u)
     )
-    report = _report(water, problem, x, projected, u, clipped, momentum)
+    bound = BoundMet.of(water, problem, x, parting)
+    report = _report(water, problem, x, projected, u, clipped, momentum, bound)
     return Corrected(
         u,
         a,
@@ -93,6 +97,8 @@ def corrected(water, problem, x) -> Corrected:
         flux,
         listed,
         start,
+        bound.at_bound,
+        bound.ventilated,
         report,
     )
 
@@ -262,7 +268,7 @@ def to_middle(cell_list, now, before):
     return out
 
 
-def _report(water, problem, x, projected, u, clipped, momentum):
+def _report(water, problem, x, projected, u, clipped, momentum, bound):
     from fluid.water import StepReport, kinetic_energy
 
     kept, p = problem.predicted, water.parameters
@@ -285,7 +291,7 @@ def _report(water, problem, x, projected, u, clipped, momentum):
         change["viscosity and friction"] = kept.shear.energy
     volume = float(kept.nodal_water.sum())
     left = kept.left
-    moved_by_bodies = problem.matrix @ x - problem.rhs
+    moved_by_bodies = problem.matrix @ x - problem.rhs - bound.rate
     return StepReport(
         problem.dt,
         volume,
@@ -298,4 +304,5 @@ def _report(water, problem, x, projected, u, clipped, momentum):
         momentum,
         0.0 if left is None else float(left.volume.sum()),
         0.0 if left is None else left.energy,
+        bound,
     )

@@ -16,13 +16,15 @@ class WaterParameters:
     courant: cells crossed per step by the fastest water, spray apart (`pace.py`); 1 for loads, 2 to 4 for drafts.
     divergence_damping: weight c_L of the element grad-div term.
     correction_length: κ/h, length over which the volume correction is spread.
-    kick_limit: largest acceleration carried over to the next step, in g (spray).
+    kick_limit: largest acceleration carried over to the next step in slow water, in g (`Water.largest_kick`).
     speed_limit: cap of the speed in units of sqrt(g H), H the height of the tank; clipped nodes are counted.
     subscale_memory: keep the element-wise remainder of the velocity correction (added mass of bodies).
     advection: "semi-lagrangian", or "supg" for stabilised finite elements (the reference; slower).
     viscosity: dynamic viscosity [Pa s]; 0 leaves the term out.
     walls: what sides of the tank and solids do to the water along them: "slip", "no-slip" (needs viscosity) or
     "friction" with either roughness k_s [m] (log law) or manning n [s/m^(1/3)] (bed).
+    suction: "bounded": the pressure does not fall below the air's where air can reach, nor below vapour_pressure [Pa],
+        relative to the air, elsewhere (`pressure_bound.py`); "unlimited": water may pull as hard as it likes.
     """
 
     density: float = 1000.0
@@ -42,12 +44,20 @@ class WaterParameters:
     walls: str = "slip"
     roughness: float | None = None
     manning: float | None = None
+    suction: str = "bounded"
+    vapour_pressure: float = -98e3
     pocket_compliance: float = 1e-8
     """Compressibility of pockets without free surface, where the pressure level floats, in dt/(ρ h²)."""
 
     def __post_init__(self):
         if self.advection not in ("semi-lagrangian", "supg"):
             raise ValueError(f"advection = {self.advection!r} is unknown; choose 'semi-lagrangian' or 'supg'")
+        if self.suction not in ("bounded", "unlimited"):
+            raise ValueError(f"suction = {self.suction!r} is unknown; choose 'bounded' or 'unlimited'")
+        if not self.vapour_pressure < 0.0:
+            raise ValueError(
+                f"vapour_pressure = {self.vapour_pressure!r} Pa must lie below that of the air, 0"
+            )
 
     @property
     def shear(self) -> bool:

@@ -1,6 +1,6 @@
 """First half of the step: what the water does before its pressure is known.
 
-û = uⁿ + (1-θ) dt âⁿ,   âⁿ = aⁿ f,  f = min(1, 3g/|aⁿ|)           part of the last acceleration, limited
+û = uⁿ + (1-θ) dt âⁿ,   âⁿ = aⁿ f,  f = min(1, a_max/|aⁿ|)         part of the last acceleration, limited
 φ̃, u_adv = transport of φ, û by uⁿ + dt/2 âⁿ     semi-Lagrangian, MacCormack; `surface_momentum.py`
 φ = redistanced φ̃, corrected towards the conservative volume
 u* = u_adv + θ dt g
@@ -19,6 +19,7 @@ from fluid.level_set import redistance
 from fluid.obtuse import about, reserve
 from fluid.outflow import Outflow
 from fluid.paths_in_solids import levels_in_solids
+from fluid.pressure_bound import lowest_pressure
 from fluid.projection import (
     PressureProblem,
     cell_velocity,
@@ -70,7 +71,7 @@ class Predicted:
 def predicted(water, dt: float) -> PressureProblem:
     """Everything of the step before the solve; reads the state of `water`, changes nothing."""
     theta, parameters = water.theta(dt), water.parameters
-    kick = kick_factor(water.acceleration, parameters)
+    kick = kick_factor(water.acceleration, water.largest_kick())
     u_adv, phi = _transported(water, dt, theta, kick)
     found = water.carried(dt, theta)
     carried = found.water
@@ -89,7 +90,16 @@ def predicted(water, dt: float) -> PressureProblem:
     surface = _new_surface(water, phi, carried, conserved)
     if found.velocity is not None:
         graph = water.graph_for(water.listed)
-        found.into(u_adv, water.listed, phi, water.mesh.spacing, graph, surface.shift, water.topology)
+        found.into(
+            u_adv,
+            water.listed,
+            phi,
+            water.mesh.spacing,
+            graph,
+            surface.shift,
+            water.topology,
+            water._walls.open_node,
+        )
         water.hold(u_adv, water.time + dt)
     shear = None
     if water.viscous is not None:
@@ -109,9 +119,9 @@ def _sheared(water, dt, theta, kick, surface, u_adv):
     return water.viscous.change(water, surface.level_set, surface.nodal_water, w, dt)
 
 
-def kick_factor(acceleration, parameters):
-    """f = min(1, limit g / |a|) (N,): spray must not be thrown on by the acceleration of an impact."""
-    return _factor(acceleration, parameters.kick_limit * parameters.gravity)
+def kick_factor(acceleration, most: float):
+    """f = min(1, most / |a|) (N,), most [m/s²]: see `Water.largest_kick`."""
+    return _factor(acceleration, most)
 
 
 @njit(cache=True)
@@ -215,7 +225,18 @@ def _problem(water, dt, theta, kick, surface, conserved, u_adv, u_star, shear, l
     if shear is not None:
         other += shear.load
     return PressureProblem(
-        matrix, rhs[dofs] + extra, coupling[dofs], known, guess, dofs, dt, density, other, kept
+        matrix,
+        rhs[dofs] + extra,
+        coupling[dofs],
+        known,
+        guess,
+        dofs,
+        dt,
+        density,
+        other,
+        kept,
+        lowest_pressure(water, graph, dofs, phi),
+        water.at_bound[dofs],
     )
 
 

@@ -38,7 +38,9 @@ class PressureProblem:
 
     matrix csr (n, n) [m³/(s Pa)], SPD · rhs (n,) [m³/s], without body velocities · coupling csr (n, 6 n_bodies)
     [m², m³] · known (n,) [Pa] · guess (n,) [Pa] · dofs (n,) node of each unknown · dt [s] · density [kg/m³] ·
-    other_load (n_bodies, 6) [N, N m]: what the pressure does not do (wall shear) or does otherwise (`waterline.py`).
+    other_load (n_bodies, 6) [N, N m]: what the pressure does not do (wall shear) or does otherwise (`waterline.py`) ·
+    bound (n,) [Pa] that p = x + known does not fall below, None: it may · at_bound (n,) bool: where it is first sought
+    there (`bounded.py`).
     """
 
     matrix: sp.csr_array
@@ -52,6 +54,13 @@ class PressureProblem:
     other_load: np.ndarray
     predicted: object = None
     """What the water keeps between predict and correct."""
+    bound: np.ndarray | None = None
+    at_bound: np.ndarray | None = None
+
+    @property
+    def lower(self) -> np.ndarray | None:
+        """Bound of x (n,) [Pa]."""
+        return None if self.bound is None else self.bound - self.known
 
 
 @njit(cache=True)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numba import njit
@@ -52,33 +53,68 @@ def solve(
     A: csr (n, n), symmetric positive definite · b, x0 (n,) · extra: v ↦ S v, S symmetric positive semidefinite.
     kept: an empty list takes the preconditioner; hand it in again with the same A.
     Raises NotConverged after `most` iterations or when A turns out not to be positive definite."""
-    scale = np.linalg.norm(b)
-    if scale == 0.0:
+    if np.linalg.norm(b) == 0.0:
         return SolveResult(np.zeros_like(b), 0, 0.0)
+    apply, precondition = operators(A, extra, kept)
+    return conjugate_gradients(apply, precondition, b, np.array(x0, float), rtol, most)
+
+
+def operators(A, extra: Callable | None = None, kept: list | None = None) -> tuple[Callable, Callable]:
+    """v ↦ (A + extra) v, and a preconditioner of it; arguments of `solve`."""
     kept = [] if kept is None else kept
     if not kept:
         kept.append(_preconditioner(A, MULTIGRID_FROM if extra is None else MULTIGRID_FROM_WITH_EXTRA))
-    precondition = kept[0]
     rows = (*unsigned(A), A.data)
     apply = (lambda v: _product(*rows, v)) if extra is None else (lambda v: _product(*rows, v) + extra(v))
-    x = np.array(x0, float)
-    r = b - apply(x)
+    return apply, kept[0]
+
+
+def conjugate_gradients(
+    apply: Callable,
+    precondition: Callable,
+    b,
+    x,
+    rtol: float,
+    most: int = MOST_ITERATIONS,
+    held=None,
+    enough: Callable | None = None,
+) -> SolveResult:
+    """Preconditioned conjugate gradients from x (n,), which is overwritten, down to a residual of rtol ‖b‖.
+
+    held (n,) bool: unknowns that keep their value, their rows do not count; None: all are free.
+    enough: called with x after every iteration; True ends the iteration there.
+    Raises NotConverged."""
+    scale = np.linalg.norm(b) or 1.0
+    free = _all if held is None else partial(_without, held)
+    r = free(b - apply(x))
     history = [np.linalg.norm(r) / scale]
     p = rz = None
     while not history[-1] <= rtol:
         if len(history) > most or not np.isfinite(history[-1]):
             raise _failure("did not converge", history, rtol, r)
-        z = precondition(r)
+        z = free(precondition(r))
         rz, rz_before = r @ z, rz
         p = z if p is None else z + (rz / rz_before) * p
-        Ap = apply(p)
+        Ap = free(apply(p))
         curvature = p @ Ap
         if curvature <= 0.0:
             raise _failure(f"met a direction of curvature {curvature:.3g} ≤ 0", history, rtol, p)
         x += (rz / curvature) * p
         r -= (rz / curvature) * Ap
         history.append(np.linalg.norm(r) / scale)
+        if enough is not None and enough(x, history[-1]):
+            break
     return SolveResult(x, len(history) - 1, history[-1])
+
+
+def _all(v):
+    return v
+
+
+def _without(held, v):
+    """v (n,) with zeros where held, in place."""
+    v[held] = 0.0
+    return v
 
 
 @njit(cache=True)

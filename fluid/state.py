@@ -11,7 +11,16 @@ import numpy as np
 from fluid.topology import Graph
 from fluid.volume import Flux
 
-NODAL = ("level_set", "velocity", "acceleration", "pressure", "end_pressure", "nodal_water")
+NODAL = (
+    "level_set",
+    "velocity",
+    "acceleration",
+    "pressure",
+    "end_pressure",
+    "nodal_water",
+    "at_bound",
+    "ventilated",
+)
 OF_CELLS = ("remainder", "kick_remainder", "cell_velocity")
 NUMBERS = {
     "time": float,

@@ -24,6 +24,7 @@ from fluid.momentum import MomentumChange
 from fluid.pace import LEAST_COUNTED, LEAST_GATHERED, gathered, largest_component, pace
 from fluid.parameters import WaterParameters
 from fluid.predictor import kick_factor, predicted
+from fluid.pressure_bound import BoundMet
 from fluid.projection import PressureProblem
 from fluid.surface_momentum import Carried
 from fluid.topology import Graph, Topology, layers_around
@@ -42,7 +43,8 @@ class StepReport:
     volume [m³] of water · volume_error, (volume - conserved) / conserved · reinserted [m³] moved by the uniform
     shift (signed) · clipped: nodes at the speed limit · unknowns of the pressure · work_on_bodies [J] ·
     energy_change [J]: change of kinetic + potential energy by stage (transport and gravity, volume correction,
-    pressure, damping and limit) · momentum: what changed it · left [m³], left_energy [J]: through open sides."""
+    pressure, damping and limit) · momentum: what changed it · left [m³], left_energy [J]: through open sides ·
+    bound: where the pressure met its lower bound."""
 
     dt: float
     volume: float
@@ -55,6 +57,7 @@ class StepReport:
     momentum: MomentumChange
     left: float
     left_energy: float
+    bound: BoundMet
 
 
 class Water:
@@ -63,12 +66,14 @@ class Water:
     mesh: Background · domain: PhysicalDomain of it · fill: points (n, 3) [m] → signed distance (n,) [m], negative
     in the water, or the level set (N,) itself · is_open: (normals (B, 3), centres (B, 3)) → bool (B,), sides of
     the tank that let water out; None: all closed · is_smooth: the same, sides that stay smooth whatever
-    `parameters.walls` says · sides: `inflow.Sides`, where water is led in or a sea stands; None: nowhere.
+    `parameters.walls` says · sides: `inflow.Sides`, where water is led in or a sea stands; None: nowhere ·
+    velocity (N, 3) [m/s] at the nodes of the domain at the start; None: at rest.
 
     State at the nodes of the domain: level_set (N,) [m], velocity (N, 3) [m/s], acceleration (N, 3) [m/s²],
     pressure (N,) [Pa] that acted over the last step, end_pressure (N,) [Pa] that goes with the acceleration at its end
-    (the two differ by up to 1/θ in an impact), nodal_water (N,) [m³]; at its cells: remainder (M, 3) [m/s], what the
-    nodes could not hold of the velocity correction.  Velocity goes on for some layers outside the water.
+    (the two differ by up to 1/θ in an impact), nodal_water (N,) [m³], at_bound and ventilated (N,) bool: where the
+    pressure was at its bound, and where that is the pressure of the air; at its cells: remainder (M, 3) [m/s], what
+    the nodes could not hold of the velocity correction.  Velocity goes on for some layers outside the water.
 
     body_velocity (n_bodies, 6) [m/s, rad/s] about the centres: set it before `predict` where solids that move drag the
     water along (viscosity, friction); it is not used otherwise.
@@ -83,6 +88,7 @@ class Water:
         is_open: Callable | None = None,
         is_smooth: Callable | None = None,
         sides=None,
+        velocity=None,
     ):
         self.mesh, self.parameters = mesh, parameters or WaterParameters()
         self.time, self.steps = 0.0, 0
@@ -114,6 +120,7 @@ class Water:
         self.velocity, self.acceleration = np.zeros((n, 3)), np.zeros((n, 3))
         self.pressure = self._pressure_at_rest()
         self.end_pressure = self.pressure.copy()
+        self.at_bound, self.ventilated = np.zeros(n, bool), np.zeros(n, bool)
         self.cell_velocity = np.zeros((len(self.topology.cells), 3))
         self.remainder, self.kick_remainder = (
             np.zeros_like(self.cell_velocity),
@@ -123,10 +130,18 @@ class Water:
         self.conserved_volume = float(self.nodal_water.sum())
         self.initial_volume = self.conserved_volume
         self._find_band()
+        if velocity is not None:
+            self._start_moving(velocity)
         self._renumbered, self._left_behind = None, None
         self.flux = edge_flux(
             self.topology, self.graph_for(self.listed), self.listed, self.cell_velocity, self.nodal_water
         )
+
+    def _start_moving(self, velocity) -> None:
+        """Velocity (N, 3) [m/s] of the nodes that the step works on, and of the cells between them."""
+        self.velocity[self.listed] = velocity[self.listed]
+        self.hold(self.velocity, 0.0)
+        self.cell_velocity = self.velocity[self.topology.cells].mean(axis=1)
 
     # ---- the step
 
@@ -165,6 +180,12 @@ class Water:
         worst = int(speed.argmax())
         return float(speed[worst]), self.topology.nodes[counted[worst]]
 
+    def largest_kick(self) -> float:
+        """Largest acceleration [m/s²] that is carried over to the next step: kick_limit g, or what turns the fastest
+        stream aside within two cells, v²/(2 h).  More would throw spray on by the acceleration of an impact."""
+        p = self.parameters
+        return max(p.kick_limit * p.gravity, 0.5 * self.fastest() ** 2 / self.mesh.spacing)
+
     def _counted(self):
         return (self.level_set < 0.0) & (self.topology.node_volume > LEAST_COUNTED * self.mesh.spacing**3)
 
@@ -172,15 +193,17 @@ class Water:
         """Advection, volume and gravity over dt [s], and the system for the pressure."""
         return predicted(self, dt)
 
-    def correct(self, problem: PressureProblem, x) -> None:
-        """Take over the pressure x (n,) [Pa] of the problem and end the step."""
-        new: Corrected = corrected(self, problem, np.asarray(x))
+    def correct(self, problem: PressureProblem, x, parting=None) -> None:
+        """Take over the pressure x (n,) [Pa] of the problem and end the step; parting (n,) [m³/s]: rate at which the
+        water parts where x is at its bound, None: nowhere (`bounded.py`)."""
+        new: Corrected = corrected(self, problem, np.asarray(x), parting)
         self.level_set, self.nodal_water = problem.predicted.level_set, new.nodal_water
         self.velocity, self.acceleration = new.velocity, new.acceleration
         self.pressure, self.end_pressure = new.pressure, new.end_pressure
         self.remainder, self.kick_remainder = new.remainder, new.kick_remainder
         self.cell_velocity, self.flux = new.cell_velocity, new.flux
         self.listed, self.layer_start = new.listed, new.layer_start
+        self.at_bound, self.ventilated = new.at_bound, new.ventilated
         self.conserved_volume = problem.predicted.conserved_volume
         if self.sides is not None:
             self.sides.book(problem.predicted.through, self.head())
@@ -245,7 +268,7 @@ class Water:
         if self.parameters.advection == "supg":
             return Carried(carry_volume(self.flux, dt))
         u, a = (self.velocity, self.acceleration) if self._left_behind is None else self._left_behind
-        kick = (1.0 - theta) * dt * kick_factor(a, self.parameters)
+        kick = (1.0 - theta) * dt * kick_factor(a, self.largest_kick())
         u_hat = u + kick[:, None] * a
         return Carried.by(self.flux, dt, u_hat, a, self.parameters.gravity, self.mesh.spacing)
 
@@ -257,6 +280,7 @@ class Water:
         self.level_set = self._dry_if_inactive(moved[0][:, 0])
         self.pressure, self.end_pressure = moved[0][:, 1].copy(), moved[0][:, 2].copy()
         self.velocity, self.acceleration = moved[1], moved[2]
+        self.at_bound, self.ventilated = known & self.at_bound[source], known & self.ventilated[source]
         self.hold(self.velocity, self.time)
 
     def _carry_cells(self, old: Topology):
@@ -278,6 +302,9 @@ class Water:
         self._walls = self._sides.on_copies(domain.parent_node)
         self.on_sides = self._on_sides[domain.parent_node]
         """(N,) bool: nodes on the sides of the tank."""
+        self.open_to_air = np.zeros(len(domain.nodes), bool)
+        """(N,) bool: nodes on open sides."""
+        self.open_to_air[self._walls.open_faces] = True
         if self.sides is not None:
             self.sides.place(domain, self.topology.active)
         self._domain_is_new = True

@@ -11,7 +11,7 @@ from yade_scripts.impulses import Impulses
 
 @dataclass(frozen=True)
 class FakeProblem:
-    """A PressureProblem made of given matrices."""
+    """A PressureProblem made of given matrices, without a bound."""
 
     matrix: sp.csr_array
     rhs: np.ndarray
@@ -19,6 +19,8 @@ class FakeProblem:
     known: np.ndarray
     guess: np.ndarray
     other_load: np.ndarray
+    lower: np.ndarray | None = None
+    at_bound: np.ndarray | None = None
 
 
 def piston_column(length=1.0, area=1.0, cells=10, dt=0.01, density=1000.0, known=0.0) -> FakeProblem:
@@ -47,10 +49,12 @@ class DirectResult:
     x: np.ndarray
     iterations: int
     residual: float
+    at_bound: np.ndarray | None = None
+    parting: np.ndarray | None = None
 
 
-def direct_solve(A, b, x0, rtol, extra=None) -> DirectResult:
-    """The linear solver of the fakes: dense, exact, with the same call as the water's."""
+def direct_solve(A, b, x0, rtol, lower=None, at_bound=None, extra=None) -> DirectResult:
+    """The linear solver of the fakes: dense, exact, with the same call as the water's, without a bound."""
     dense = A.toarray()
     if extra is not None:
         dense = dense + np.column_stack([extra(e) for e in np.eye(len(b))])

@@ -87,11 +87,11 @@ def dam_break(nodes: int, height: float = 1.0):
 
 def step(water) -> int:
     """One step of the water alone; the iterations of its pressure."""
-    from fluid import solve
+    from fluid.bounded import solve_pressure
 
     problem = water.predict(water.stable_step())
-    found = solve.solve(problem.matrix, problem.rhs, problem.guess, 1e-8)
-    water.correct(problem, found.x)
+    found = solve_pressure(problem, 1e-8)
+    water.correct(problem, found.x, found.parting)
     return found.iterations
 
 

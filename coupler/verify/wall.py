@@ -15,7 +15,7 @@ from coupler.clock import Clock
 from coupler.scheme import water_load
 from coupler.verify.figures import columns
 from coupler.verify.registry import Finding, check
-from fluid.solve import solve
+from fluid.bounded import solve_pressure
 from yade_scripts.equilibrium import CannotStand, settle
 
 HEIGHT, THICKNESS, STRENGTH, DENSITY = 2.0, 0.2, 1e5, 2000.0
@@ -108,7 +108,7 @@ def _stands(depth: float, ratio: float) -> bool:
 def _load_at_rest(water) -> np.ndarray:
     """Force and moment (n, 6) of still water on the blocks while they are held."""
     problem = water.predict(water.stable_step())
-    return water_load(problem, solve(problem.matrix, problem.rhs, problem.guess, 1e-10).x)
+    return water_load(problem, solve_pressure(problem, 1e-10).x)
 
 
 def _run(coupling, end: float) -> None:

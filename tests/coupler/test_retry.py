@@ -27,7 +27,7 @@ class Pipe:
     velocity, pressure = np.zeros((1, 3)), np.zeros(1)
     topology = SimpleNamespace(nodes=np.zeros((1, 3)))
     mesh = SimpleNamespace(spacing=1.0)
-    report = SimpleNamespace(left_energy=0.0)
+    report = SimpleNamespace(left_energy=0.0, bound=SimpleNamespace(work=0.0))
     volume_off = 0.0
     body_velocity = np.zeros((1, 6))
 
@@ -45,7 +45,7 @@ class Pipe:
         problem = piston_column(dt=dt)
         return SimpleNamespace(**vars(problem) | {"predicted": SimpleNamespace(shear=None)}, dt=dt)
 
-    def correct(self, problem, x):
+    def correct(self, problem, x, parting):
         self.taken.append(problem.dt)
         self.energy += self.gains * (problem.dt > self.gains_above)
 

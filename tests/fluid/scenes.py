@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from fluid.bodies import ConvexBodies
+from fluid.bounded import solve_pressure
 from fluid.domain import cut_domain
 from fluid.mesh import box_mesh
 from fluid.parameters import WaterParameters
-from fluid.solve import solve
 from fluid.water import Water
 
 
@@ -23,8 +23,8 @@ def advance(water: Water, dt=None, body_velocity=None, rtol=1e-9):
     """One step with bodies at a prescribed velocity (6 n_bodies,); returns (problem, x)."""
     problem = water.predict(water.stable_step() if dt is None else dt)
     moved = 0.0 if body_velocity is None else problem.coupling @ body_velocity
-    found = solve(problem.matrix, problem.rhs + moved, problem.guess, rtol)
-    water.correct(problem, found.x)
+    found = solve_pressure(problem, rtol, moved)
+    water.correct(problem, found.x, found.parting)
     return problem, found.x
 
 

@@ -22,8 +22,9 @@ def test_velocity_carried_with_the_volume_keeps_momentum_and_range():
     assert np.all(u[wet] >= before.min(axis=0) - 1e-12)
 
 
-def test_momentum_counts_at_jumps_only():
-    """A low wave and a front on a dry bed go along the paths alone, a dam break into two cells of water does not."""
+def test_momentum_counts_at_jumps_and_in_fast_water_only():
+    """A low wave goes along the paths alone. In a front on a dry bed there is no jump, but water faster than the wave
+    of a cell; where a dam breaks into two cells of water there is a jump."""
     wave = tank([2, 0.125, 1.0], 0.125, lambda x: x[:, 2] - 0.55 - 0.005 * np.cos(np.pi * x[:, 0]))
     dam = column(0.8, 0.8)
     dry = tank([2, 0.125, 1.0], 0.125, dam)
@@ -33,5 +34,9 @@ def test_momentum_counts_at_jumps_only():
             advance(water)
     dt = wave.stable_step()
     assert wave.carried(dt, 0.6).weight is None
-    assert dry.carried(dt, 0.6).weight is None
+    front = dry.carried(dt, 0.6)
+    assert front.weight.max() == 0.0
+    assert front.fast.max() > 0.5
+    slow = np.linalg.norm(dry.velocity, axis=1) < np.sqrt(9.81 * 0.125)
+    assert front.fast[slow].max() == 0.0
     assert bore.carried(dt, 0.6).weight.max() > 0.5

@@ -74,11 +74,10 @@ def _still_water(structure, mesh, tank, upper, covers):
 def load_at_rest(water):
     """Force and moment (n, 6) of the water on bodies that are held."""
     from coupler.scheme import water_load
-    from fluid.solve import solve
+    from fluid.bounded import solve_pressure
 
     problem = water.predict(water.stable_step())
-    x = solve(problem.matrix, problem.rhs, problem.guess, 1e-12).x
-    return water_load(problem, x)
+    return water_load(problem, solve_pressure(problem, 1e-12).x)
 
 
 def moment_about_base(coupling, load, face, thickness):
