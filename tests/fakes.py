@@ -119,6 +119,9 @@ class FreeBody:
     def gravity_force(self):
         return np.concatenate([self.mass[:, None] * self._g, np.zeros((1, 3))], axis=1)
 
+    def weight_now(self):
+        return self.gravity_force()
+
     def joined_planes(self):
         return np.zeros(0, int), np.zeros(0, int), np.zeros(0)
 
