@@ -144,7 +144,9 @@ class FreeBody:
         self._x += dt * mean[:, :3]
         self._work += dt * float(np.sum(self._load * mean))
         nothing = np.zeros((1, 9))
-        impulses = Impulses(nothing, nothing, dt * (self._x - 0.5 * dt * mean[:, :3]), dt, np.zeros(3))
+        impulses = Impulses(
+            nothing, nothing, dt * (self._x - 0.5 * dt * mean[:, :3]), dt, np.zeros(3), np.zeros((1, 3))
+        )
         return FakeAdvance(self._v.copy(), impulses)
 
     def momentum(self, about):
