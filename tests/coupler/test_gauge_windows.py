@@ -89,3 +89,9 @@ def test_a_patch_reads_its_free_part_and_says_how_much_is_covered():
     mean, covered = free_mean(np.full(3, np.nan))
     assert np.isnan(mean)
     assert covered == 1.0
+
+
+def test_only_what_lies_in_the_window_counts():
+    """2 N over 1 s in steps of 0.1 s, from 0.35 to 0.75 s: 0.8 N s, steps cut at both ends."""
+    _, (impulse,) = run(Windows((0.35, 0.75), None), [(0.1, 2.0)] * 10)
+    assert impulse == pytest.approx(0.8, rel=1e-12)

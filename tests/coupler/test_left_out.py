@@ -6,11 +6,13 @@ import signal
 import subprocess
 import sys
 import time
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from coupler.history import read_history
-from coupler.left_out import HEAVY
+from coupler.left_out import HEAVY, note_work
 from coupler.provenance import ROOT
 
 from .test_case_file import WATER, write
@@ -135,3 +137,14 @@ def test_a_run_without_the_right_yade_says_what_to_do(tmp_path, wrong, says):
     assert "apt install yade" in done.stderr
     assert "Traceback" not in done.stderr
     assert json.loads((tmp_path / "run" / "run.json").read_text(encoding="utf-8"))["exit_code"] == 1
+
+
+def test_counts_of_work_are_means_over_the_steps():
+    work = {}
+    for step, count in enumerate([2, 4, 9], start=1):
+        structure = SimpleNamespace(n=10, loose=lambda n=count: np.arange(10) < n, contacts=list)
+        coupling = SimpleNamespace(water=None, structure=structure)
+        note_work(work, coupling, None, SimpleNamespace(intact=count, broken=10 - count), step)
+    assert work["loose_blocks"] == pytest.approx(5.0)
+    assert work["live_joints"] == pytest.approx(5.0)
+    assert work["joints"] == pytest.approx(10.0)

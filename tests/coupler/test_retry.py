@@ -10,7 +10,7 @@ import pytest
 
 from coupler import loop
 from coupler.build import build
-from coupler.defects import MISSES, RETRIES
+from coupler.defects import MISSES, RETRIES, Defects
 from coupler.limits import Diverged, Limits
 from coupler.loop import Coupling
 from coupler.momentum import book_step, momentum_ledger
@@ -229,3 +229,10 @@ def test_what_a_retry_leaves_behind_is_saved_and_restored():
     first.step(0.1)
     second.restore(first.save())
     assert second.step_size(1.0) == first.step_size(1.0)
+
+
+def test_a_step_is_taken_again_from_three_fifths_of_the_largest_defect_on():
+    defects = Defects(0.5, 0.01)
+    assert not defects.too_large(0.6 * 0.5)
+    assert defects.too_large(0.61 * 0.5)
+    assert defects.too_large(np.nan)

@@ -160,3 +160,19 @@ def test_short_rows_give_both_products_of_the_coupling(seed, dofs, bodies):
     p, V = random.normal(size=dofs), random.normal(size=6 * bodies)
     assert wets.on_bodies(p) == pytest.approx(dense.T @ p, abs=1e-12)
     assert wets.on_water(V) == pytest.approx(dense @ V, abs=1e-12)
+
+
+def test_a_driven_body_takes_along_what_hangs_on_it():
+    """A spring k between a driven body at 0.4 m/s and a free one at rest: (m/dt + dt k) V = dt k 0.4."""
+    dt, mass, k = 0.01, 100.0, 1e6
+    K = np.zeros((12, 12))
+    K[np.ix_([0, 6], [0, 6])] = k * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    M = mass_matrix(np.array([50.0, mass]), np.tile(np.eye(3), (2, 1, 1)))
+    velocity = np.zeros((2, 6))
+    velocity[0, 0] = 0.4
+    response = StructureResponse(
+        M, sp.csr_array(K), sp.csr_array((12, 12)), dt, np.array([True, False]), velocity
+    )
+    found = response.free_velocity(velocity, np.zeros((2, 6))).reshape(2, 6)
+    assert found[0, 0] == 0.4
+    assert found[1, 0] == pytest.approx(dt * k * 0.4 / (mass / dt + dt * k), rel=1e-12)
