@@ -66,6 +66,7 @@ class Accounts:
     def start_here(self) -> None:
         """The present state is the start: blocks were displaced by hand."""
         self.joint_work = -self.joint_stored() - self.law_dissipation()
+        self.joint_work -= 0.0 if self._joints is None else float(self._joints.rubbed.sum())
 
     def take_joints(self, F: Array, before: Array, rows: Array, dt: float) -> None:
         """Work of the joint forces F (n, 6) on `rows` in a substep dt that began with velocities `before` (n, 6)."""
@@ -96,10 +97,12 @@ class Accounts:
         e["load_work"], e["driving_work"] = self.load_work, self.driving_work
         e["joint_damping"] = 0.0 if self._joints is None else float(self._joints.damped.sum())
         e["joint_dissipated"] = -self.joint_work - e["joint_stored"] - e["joint_damping"] - self.handed_over
-        e["dashpot"] = e["friction"] = 0.0
+        e["dashpot"], e["friction"] = 0.0, 0.0 if self._joints is None else float(self._joints.rubbed.sum())
+        e["joint_dissipated"] -= e["friction"]
         if self._contacts is not None:
             e["driving_work"] += self._contacts.driving
-            e["dashpot"], e["friction"] = self._contacts.dashpot, self._contacts.friction
+            e["dashpot"] = self._contacts.dashpot
+            e["friction"] += self._contacts.friction
         return e
 
     def law_dissipation(self) -> float:

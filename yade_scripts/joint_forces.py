@@ -25,8 +25,10 @@ from yade_scripts import laws, mixed_modes
 from yade_scripts.joint_kernel import add_forces, arm, cross, dot, parting, place, split, turned
 from yade_scripts.specialise import specialised
 
-UNIT, DF, BETA, KC, K0 = range(5)
-"""Columns of the law of a joint (J, 5): T_max/δ_f [Pa/m], δ_f [m], β, k_c [Pa/m], k_0 [Pa/m]."""
+UNIT, DF, BETA, KC, K0, MU = range(6)
+"""Columns of the law of a joint (J, 6): T_max/δ_f [Pa/m], δ_f [m], β, k_c [Pa/m], k_0 [Pa/m], μ where it has failed."""
+STICKS = 1.0 - 1e-9
+"""Share of μ |t_n| below which a failed point sticks."""
 WORK, PULL = 0, 1
 """Columns of `paid` (P, 2): work taken [J/m²], traction of the last substep [Pa], NOT_GROWING before."""
 NOT_GROWING = -1.0
@@ -45,6 +47,29 @@ def dashpot(eta, kn, kt, w, n):
     along, across = eta * (kn - kt) * wn, eta * kt
     t = (along * n[0] + across * w[0], along * n[1] + across * w[1], along * n[2] + across * w[2])
     return t, dot(t, w)
+
+
+@njit(cache=True)
+def rubbing(s, s0, k, limit, move):
+    """Friction of a failed point that is pressed: a spring of k [Pa/m] from where it last stuck, s0, to the sliding s
+    now [m], at most `limit` [Pa]; move (3,) [m]: sliding over the last substep.
+
+    → traction on a as a tuple, and what friction took [J/m²]: the slip times the mean traction before and after"""
+    S = (k * (s[0] - s0[0]), k * (s[1] - s0[1]), k * (s[2] - s0[2]))
+    size = np.sqrt(dot(S, S))
+    if size <= limit:
+        return S, 0.0
+    share = limit / size
+    before = size - k * dot(S, move) / size
+    return (share * S[0], share * S[1], share * S[2]), 0.5 * (limit + before) * (size - limit) / k
+
+
+@njit(cache=True)
+def stuck_at(s, S, k, row, R, out):
+    """Where a point sticks, s - S/k [m], in the frame of a block."""
+    a0, a1, a2 = s[0] - S[0] / k, s[1] - S[1] / k, s[2] - S[2] / k
+    for c in range(3):
+        out[c] = R[row, 0, c] * a0 + R[row, 1, c] * a1 + R[row, 2, c] * a2
 
 
 # ---- with a law: `secant` and `work` are its functions, the others those of the mixed mode ----------------------
@@ -93,6 +118,7 @@ def joint_forces(
     peak,
     largest,
     paid,
+    rub,
     eta,
     x,
     v,
@@ -101,13 +127,15 @@ def joint_forces(
     advance,
     F,
     damped,
+    rubbed,
 ):
     """Forces of the live joints on the blocks; with `advance` also their history and what their dashpots take.
 
     live (l,) joints to visit · a, b (J,) rows · start (J+1,) first point of a joint · xi_a, xi_b (P, 3) [m]
-    weight (P,) [m²] · normal (J, 3) in block a · law (J, 5) · peak p
-    largest (P,) λ [m] · paid (P, 2) · eta [s] dashpot time · x (n, 3), v (n, 6), R (n, 3, 3)
-    F (n, 6) is added to · damped (J,) [J] too   →   largest growth of λ/δ_f in this call
+    weight (P,) [m²] · normal (J, 3) in block a · law (J, 6) · peak p
+    largest (P,) λ [m] · paid (P, 2) · rub (P, 3) [m]: where failed points stick, in the frame of a · eta [s] dashpot
+    time · x (n, 3), v (n, 6), R (n, 3, 3)
+    F (n, 6) is added to · damped, rubbed (J,) [J] too   →   largest growth of λ/δ_f in this call
     """
     fastest = 0.0
     for j in live:
@@ -140,6 +168,17 @@ def joint_forces(
                 t0, t1, t2 = t0 + c[0], t1 + c[1], t2 + c[2]
                 if advance:
                     damped[j] += weight[p] * power * dt
+            if after >= df and law[j, MU] > 0.0:
+                taken, S, k = 0.0, (0.0, 0.0, 0.0), beta**2 * k0
+                if dn < 0.0 and before >= df:
+                    w = parting(ra, rb, x, v, mid)
+                    wn = dt * dot(w, n)
+                    move = (dt * w[0] - wn * n[0], dt * w[1] - wn * n[1], dt * w[2] - wn * n[2])
+                    S, taken = rubbing(s, turned(ra, R, rub[p]), k, -law[j, MU] * tn, move)
+                if advance:
+                    rubbed[j] += weight[p] * taken
+                    stuck_at(s, S, k, ra, R, rub[p])
+                t0, t1, t2 = t0 + S[0], t1 + S[1], t2 + S[2]
             t = (weight[p] * t0, weight[p] * t1, weight[p] * t2)
             c0, c1, c2 = cross(arm(ra, x, mid), t)
             f0, f1, f2, m0, m1, m2 = f0 + t[0], f1 + t[1], f2 + t[2], m0 + c0, m1 + c1, m2 + c2
@@ -147,7 +186,7 @@ def joint_forces(
     return fastest
 
 
-def stored_between(live, a, b, start, xi_a, xi_b, weight, normal, law, peak, largest, x, R, x0, R0, out):
+def stored_between(live, a, b, start, xi_a, xi_b, weight, normal, law, peak, largest, rub, x, R, x0, R0, out):
     """Elastic energy out (J,) [J] of the live joints half a substep before (x, R), between it and the place (x0, R0).
 
     Leapfrog conserves kinetic(t + dt/2) + 1/2 k δ(t)·δ(t + dt) exactly, so the product of the two openings is used.
@@ -162,6 +201,10 @@ def stored_between(live, a, b, start, xi_a, xi_b, weight, normal, law, peak, lar
             df = law[j, DF]
             ks = softened(law[j, UNIT], largest[p] / df, peak)
             out[j] += weight[p] * stored(ks, dn, en, dot(d, e), largest[p], law[j, K0], df, law[j, BETA], kc)
+            if largest[p] >= df and law[j, MU] > 0.0 and dn < 0.0:
+                at, k = turned(a[j], R, rub[p]), law[j, BETA] ** 2 * law[j, K0]
+                for c in range(3):
+                    out[j] += 0.5 * weight[p] * k * (d[c] - at[c]) * (e[c] - at[c])
 
 
 def lost(start, weight, law, peak, largest, out):
@@ -175,7 +218,7 @@ def lost(start, weight, law, peak, largest, out):
             out[j] += weight[p] * (separation_work(unit, df, r, peak) - back)
 
 
-def point_springs(index, joint_of, a, b, xi_a, xi_b, normal, law, peak, largest, x, R, arms, normals, k):
+def point_springs(index, joint_of, a, b, xi_a, xi_b, normal, law, peak, largest, rub, x, R, arms, normals, k):
     """Of the points `index` (s,): arms (2, s, 3) from both centres, normals (s, 3), k_n and k_t in k (2, s) [Pa/m]."""
     for i in range(len(index)):
         p = index[i]
@@ -190,7 +233,11 @@ def point_springs(index, joint_of, a, b, xi_a, xi_b, normal, law, peak, largest,
         df = law[j, DF]
         ks = softened(law[j, UNIT], largest[p] / df, peak)
         kc = law[j, KC]
-        _, k[0, i], k[1, i] = response(ks, dn, dot(s, s), largest[p], law[j, K0], df, law[j, BETA], kc)
+        tn, k[0, i], k[1, i] = response(ks, dn, dot(s, s), largest[p], law[j, K0], df, law[j, BETA], kc)
+        if largest[p] >= df and law[j, MU] > 0.0:
+            stick, limit = law[j, BETA] ** 2 * law[j, K0], -law[j, MU] * min(tn, 0.0)
+            S, _ = rubbing(s, turned(a[j], R, rub[p]), stick, limit, n)
+            k[1, i] = stick if dot(S, S) < (STICKS * limit) ** 2 else 0.0
 
 
 def point_tangents(index, joint_of, a, b, xi_a, xi_b, normal, law, peak, largest, x, R, out):

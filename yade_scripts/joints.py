@@ -11,7 +11,7 @@ from yade_scripts import joint_kernel as kernel
 from yade_scripts.blocks import Block
 from yade_scripts.cohesion import JointParameters
 from yade_scripts.faces import TouchingFaces, gauss_points, to_body
-from yade_scripts.joint_forces import NOT_GROWING, PULL, JointKernels, kernels_of
+from yade_scripts.joint_forces import MU, NOT_GROWING, PULL, JointKernels, kernels_of
 
 Array = np.ndarray
 
@@ -92,7 +92,7 @@ class Joints:
         known = {law: _numbers(law) for law in dict.fromkeys(laws)}
         numbers = np.array([known[law] for law in laws]).reshape(-1, 5)
         unit, self.df, self.beta, self.kc, self.k0 = (column.copy() for column in numbers.T)
-        self.law = np.stack([unit, self.df, self.beta, self.kc, self.k0], axis=1)
+        self.law = np.stack([unit, self.df, self.beta, self.kc, self.k0, np.zeros(n)], axis=1)
         """Columns as in `joint_forces`."""
         self.eta = 0.0
         """Time constant of the stiffness-proportional dashpot [s]."""
@@ -105,6 +105,10 @@ class Joints:
         self.paid[:, PULL] = NOT_GROWING
         self.damped = np.zeros(n)
         """Energy that the dashpots of each joint have taken [J]."""
+        self.rub = np.zeros((len(self.weight), 3))
+        """Sliding at which the failed points stick [m], in the frames of the blocks a."""
+        self.rubbed = np.zeros(n)
+        """Energy that this friction has taken [J]."""
         self.failure_time = np.full(n, np.nan)
         self.final_openings = np.zeros((n, 3))
 
@@ -115,7 +119,9 @@ class Joints:
         """Add the joint forces on the blocks to F (n, 6); see `joint_forces.joint_forces`."""
         eta, fastest = self.eta if eta is None else eta, 0.0
         for kernels, arrays in self._live_families():
-            growth = kernels.joint_forces(*arrays, self.paid, eta, x, v, R, dt, advance, F, self.damped)
+            growth = kernels.joint_forces(
+                *arrays, self.paid, self.rub, eta, x, v, R, dt, advance, F, self.damped, self.rubbed
+            )
             fastest = max(fastest, growth)
         return fastest
 
@@ -135,7 +141,7 @@ class Joints:
         """Elastic energy of each joint between two places of the blocks, (J,) [J]."""
         out = np.zeros(len(self))
         for kernels, arrays in self._live_families():
-            kernels.stored_between(*arrays, x, R, x0, R0, out)
+            kernels.stored_between(*arrays, self.rub, x, R, x0, R0, out)
         return out
 
     def lost(self) -> Array:
@@ -164,6 +170,21 @@ class Joints:
     def broken_now(self) -> Array:
         """Live joints that have failed since the last call of `retire`."""
         return self.live[kernel.broken(self.live, self.start, self.largest, self.df)]
+
+    def set_friction(self, friction: Array) -> None:
+        """μ (J,) of points that have failed and are pressed, while the rest of their joint holds."""
+        self.law[:, MU] = friction
+
+    def let_go(self, joints: Array, x: Array, R: Array) -> float:
+        """Friction of `joints` ends at the places x (n, 3), R (n, 3, 3): it takes what its springs hold, which is
+        returned [J]."""
+        friction = self.law[joints, MU]
+        whole = self.stored_between(x, R, x, R)[joints]
+        self.law[joints, MU] = 0.0
+        held = whole - self.stored_between(x, R, x, R)[joints]
+        self.law[joints, MU] = friction
+        self.rubbed[joints] += held
+        return float(held.sum())
 
     def retire(self, joints: Array, x: Array, R: Array, time: float) -> None:
         """Take failed joints out: they have dissipated G_c A and cost nothing from now on."""
@@ -252,7 +273,17 @@ class Joints:
 
     def history(self) -> dict[str, Array]:
         """Copies of everything that changes in time, for `restore`."""
-        names = ("alive", "live", "largest", "paid", "damped", "failure_time", "final_openings")
+        names = (
+            "alive",
+            "live",
+            "largest",
+            "paid",
+            "rub",
+            "rubbed",
+            "damped",
+            "failure_time",
+            "final_openings",
+        )
         return {name: getattr(self, name).copy() for name in names}
 
     def restore(self, history: dict[str, Array]) -> None:

@@ -97,6 +97,7 @@ class Structure(StructureReadings):
         faces = _Faces.of(local, local_planes, self.joint_rules, impermeable)
         self.joints = faces.joints(local, self.joint_rules)
         self._seals = Seals(local, faces.sealed) if faces.sealed else None
+        self._rub_failed_points()
         self.face_stiffness = self._face_stiffness()
         self._set_damping()
         self._substep = substep
@@ -134,6 +135,19 @@ class Structure(StructureReadings):
         self._masses = Masses(self.mass, inertia, ~self.fixed, self.gravity)
         self._spin = SpinCorrection(inertia, ~self.fixed)
         self._radius = np.array([b.radius for b in blocks])
+
+    def _rub_failed_points(self) -> None:
+        """Friction of contact where a joint has failed in part."""
+        if self.joints is None or self.contact is None:
+            return
+        materials = sorted({b.material for b in self.blocks} | {p.material for p in self.planes})
+        row = {name: i for i, name in enumerate(materials)}
+        of_block = np.array([row[b.material] for b in self.blocks])
+        of_plane = np.array([row[p.material] for p in self.planes], np.int64)
+        j = self.joints
+        other = of_block[j.b]
+        other[j.b < 0] = of_plane[j.plane[j.b < 0]]
+        j.set_friction(self.contact.friction_table(materials)[of_block[j.a], other])
 
     def _face_stiffness(self) -> Array:
         """K [N/m] of each block: as given, or that of its joints in closing."""
@@ -268,6 +282,7 @@ class Structure(StructureReadings):
         """Take failed joints out; contact goes on with what of their energy was compression."""
         stored = self._accounts.joint_stored()
         self._motion.read()
+        stored -= self.joints.let_go(broken, self._motion.x, self._motion.R)
         self.joints.retire(broken, self._motion.x, self._motion.R, self.time)
         self._limit = None
         self._onset.loosen(self._onset.of_failed(broken))

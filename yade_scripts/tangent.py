@@ -109,7 +109,7 @@ def joint_springs(joints, x: Array, R: Array) -> Springs:
     arm, normal, k = np.zeros((2, len(index), 3)), np.zeros((len(index), 3)), np.zeros((2, len(index)))
     for kernels, own, arrays in joints.of_points(index):
         arms, normals, stiffness = arm[:, own], normal[own], k[:, own]  # copies
-        kernels.point_springs(*arrays, x, R, arms, normals, stiffness)
+        kernels.point_springs(*arrays, joints.rub, x, R, arms, normals, stiffness)
         arm[:, own], normal[own], k[:, own] = arms, normals, stiffness
     j = joints.joint_of[index]
     kn, kt = k * joints.weight[index]
