@@ -17,6 +17,8 @@ from coupler import terminal
 from coupler.errors import FULL, BadCase, ExitCode
 
 OURS = ("coupler", "fluid", "yade_scripts")
+CLOSED = (errno.EACCES, errno.EPERM, errno.EROFS)
+"""Numbers of an OSError that mean: not for this user."""
 NO_MEMORY = ("cannot allocate memory", "failed to map segment", "not enough memory")
 """What the loader of libraries says when there is no room for one, in small letters."""
 
@@ -42,6 +44,8 @@ class Failure:
             )
         if isinstance(error, OSError) and error.errno in FULL:
             return cls(ExitCode.STOPPED, _full(error))
+        if isinstance(error, OSError) and error.errno in CLOSED:
+            return cls(ExitCode.BAD_CASE, _closed(error))
         if out_of_memory(error):
             return cls(ExitCode.STOPPED, _memory(error))
         code = getattr(error, "exit_code", None)
@@ -61,6 +65,11 @@ def _full(error: OSError) -> str:
         f"{place}no room for the results ({error.strerror or error}); what was written before is readable; "
         "free some space, give --output a larger disk, or raise time.output_every"
     )
+
+
+def _closed(error: OSError) -> str:
+    place = f"{error.filename}: " if error.filename else ""
+    return f"{place}{error.strerror}; name a place that you may read and write"
 
 
 def out_of_memory(error: BaseException | None) -> bool:

@@ -1,5 +1,6 @@
 """One process a run directory, and an end of the session that a run survives as a stopped one."""
 
+import errno
 import json
 import os
 import pty
@@ -144,3 +145,13 @@ def test_a_lack_of_memory_is_called_so(error, monkeypatch):
 
 def test_other_errors_are_no_lack_of_memory():
     assert Failure.of(chained(RuntimeError("a"), ImportError("no module"))).exit_code == ExitCode.CRASHED
+
+
+@pytest.mark.parametrize("number", [errno.EACCES, errno.EROFS, errno.EPERM])
+def test_places_that_are_closed_to_the_user_are_named(number):
+    failure = Failure.of(OSError(number, os.strerror(number), "/a/report.html"))
+    assert failure.exit_code == ExitCode.BAD_CASE
+    assert (
+        failure.message == f"/a/report.html: {os.strerror(number)}; name a place that you may read and write"
+    )
+    assert not failure.traceback
