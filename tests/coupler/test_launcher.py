@@ -389,6 +389,27 @@ def test_a_checkout_whose_path_has_a_blank_and_an_umlaut(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("folder", "locale", "passed"),
+    [
+        ("schöner", {"LC_ALL": "C"}, "C.UTF-8"),
+        ("schöner", {"LANG": "de_DE.ISO-8859-1"}, "C.UTF-8"),
+        ("schöner", {"LANG": "de_DE.UTF-8"}, ""),
+        ("schöner", {"LC_ALL": "en_GB.utf8"}, "en_GB.utf8"),
+        ("plain ~folder", {"LC_ALL": "C"}, "C"),
+    ],
+)
+def test_a_path_with_an_umlaut_in_a_locale_without(tmp_path, folder, locale, passed):
+    """Python would not start: it reads where its packages are in the encoding of the locale."""
+    (tmp_path / folder).mkdir()
+    machine = Machine(tmp_path / folder).ready()
+    machine("doctor")
+    (machine.root / ".venv/bin/surgebreak").write_text(
+        '#!/bin/sh\necho "[$LC_ALL]" >>"$CALLS"\n', encoding="utf-8"
+    )
+    assert machine("doctor", **locale)[2] == [f"[{passed}]"]
+
+
+@pytest.mark.parametrize(
     ("log", "told"),
     [
         ("OSError: [Errno 28] No space left on device", "The disk is full"),
