@@ -59,12 +59,12 @@ def _path(place: tuple) -> KeyPath:
 def _unknown(path: KeyPath) -> str:
     name = str(path[-1])
     here = [known for known in names_in(path[:-1]) if known != name]
+    elsewhere = [key.path for key in keys() if key.path.endswith(f".{name}") or key.path == name]
+    if elsewhere:  # the very name is surer than one that looks like it
+        return f"unknown name here; did you mean '{elsewhere[0]}'?"
     hint = did_you_mean(name, here)
     if hint:
         return f"unknown name{hint}"
-    elsewhere = [key.path for key in keys() if key.path.endswith(f".{name}") or key.path == name]
-    if elsewhere:
-        return f"unknown name here; did you mean '{elsewhere[0]}'?"
     return f"unknown name; known here: {', '.join(here)}" if here else "unknown name"
 
 

@@ -7,6 +7,7 @@ A path is a tuple of names and list places, ("structure", "block", 1, "size"). T
 from __future__ import annotations
 
 import re
+from bisect import bisect_left
 
 Path = tuple[str | int, ...]
 
@@ -39,6 +40,7 @@ class _Scan:
 
     def __init__(self, text: str):
         self.text, self.at = text, 0
+        self.ends = [found.start() for found in re.finditer("\n", text)]
         self.lines: dict[Path, int] = {}
         self.count: dict[Path, int] = {}
 
@@ -59,7 +61,7 @@ class _Scan:
         return self.at < len(self.text)
 
     def _note(self, path: Path) -> None:
-        self.lines.setdefault(path, self.text.count("\n", 0, self.at) + 1)
+        self.lines.setdefault(path, bisect_left(self.ends, self.at) + 1)
 
     def _key(self) -> tuple[str, ...]:
         """A dotted key, bare or quoted."""
