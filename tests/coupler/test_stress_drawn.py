@@ -179,25 +179,32 @@ def test_a_block_that_left_through_an_open_side_is_not_looked_for(tmp_path):
     assert written(tmp_path / "run", places=((1.0, 1.0, 0.5), (9.0, 1.0, 7.0))) == []
 
 
-def test_still_water_that_moves_is_seen(tmp_path):
-    """A scene whose water stands still, and the same file with a kinetic energy that it should not have."""
-    still = next(n for n in range(200) if draw(SEED, n).still)
-    file, _ = made(tmp_path, still, 0.05)
-    carry_out(file, RunDirectory.create(file, tmp_path / "out"))
-    speed = [m for m in measures(tmp_path / "out", still=True) if m.quantity == "speed of still water"]
-    assert [m.kept for m in speed] == [True]
-    path = tmp_path / "out" / "history" / "energy.csv"
+def rewritten(path, column, value):
+    """The last row of a history with another value."""
     head = [line for line in path.read_text().splitlines() if line.startswith("#")]
     found = read_history(path)
-    found.values["water_kinetic"][-1] = found["water_potential"][-1]
+    found.values[column][-1] = value
     rows = [
         ",".join(found.values),
         *(",".join(map(repr, map(float, row))) for row in zip(*found.values.values())),
     ]
     path.write_text("\n".join([*head, *rows]) + "\n")
-    assert "speed of still water" in [
-        m.quantity for m in measures(tmp_path / "out", still=True) if not m.kept
-    ]
+
+
+def test_still_water_that_moves_or_pulls_is_seen(tmp_path):
+    """A scene whose water stands still, with a kinetic energy and a pressure that it should not have."""
+    still = next(n for n in range(200) if draw(SEED, n).still)
+    file, _ = made(tmp_path, still, 0.05)
+    out = tmp_path / "out"
+    carry_out(file, RunDirectory.create(file, out))
+    speed = [m for m in measures(out, still=True) if m.quantity == "speed of still water"]
+    assert [m.kept for m in speed] == [True]
+    assert [m for m in measures(out, still=True) if not m.kept] == []
+    energy, water = out / "history" / "energy.csv", out / "history" / "water.csv"
+    rewritten(energy, "water_kinetic", read_history(energy)["water_potential"][-1])
+    rewritten(water, "lowest_pressure", -1.2e5)
+    missed = [m.quantity for m in measures(out, still=True) if not m.kept]
+    assert {"speed of still water", "pull over that of vapour"} <= set(missed)
 
 
 # ---------------------------------------------------------------- failures made small

@@ -26,6 +26,8 @@ OVERLAP = 0.1
 """Share of the thinner block by which two bodies may overlap, or a block may reach through a wall."""
 VAPOUR = -98e3
 """[Pa] gauge below which water away from air parts."""
+PULL_SLACK = 1e-2
+"""Share of it that the tolerance of the solver leaves."""
 LOOKED_AT = 4
 """Written states in which bodies are compared with one another."""
 HELD_STILL = 1e-6
@@ -89,13 +91,14 @@ def _momentum(momentum: dict) -> Iterator[Measure]:
 
 
 def _water(water: dict, case: Case) -> Iterator[Measure]:
-    """Volume kept, and no more of it than the tank holds; pressures within their bounds where they are written."""
+    """Volume kept, and no more of it than the tank holds; no pull beyond that at which water parts."""
     held = water["volume"] + water["left"] - water["entered"]
     scale = np.maximum(held[:1] + np.maximum(water["entered"], 0.0), 1e-300)
     yield Measure("error of the volume", _largest(np.abs(held - held[:1]) / scale), VOLUME)
     yield Measure("error of the volume as told", _largest(np.abs(water["volume_error"])), VOLUME)
     tank = np.prod(np.subtract(case.tank.upper, case.tank.lower))
     yield Measure("water over the room in the tank", _largest(water["volume"]) / float(tank), 1.0 + 1e-9)
+    yield Measure("pull over that of vapour", _largest(water["lowest_pressure"] / VAPOUR), 1.0 + PULL_SLACK)
 
 
 def _stillness(tables: dict, case: Case) -> Measure:
