@@ -84,7 +84,13 @@ def read_mesh(path: Path) -> tuple[Array, dict[str, Array], bool]:
     cells: dict[str, list] = {}
     for block in mesh.cells:
         rows = np.asarray(block.data)
-        if rows.size and not 0 <= rows.min() <= rows.max() < len(mesh.points):
+        if not rows.size:
+            continue
+        if rows.ndim != 2 or rows.dtype.kind not in "iu":
+            raise MeshFileError(
+                f"{path.name}: its cells of kind '{block.type}' are not rows of numbers of points"
+            )
+        if not 0 <= rows.min() <= rows.max() < len(mesh.points):
             raise MeshFileError(f"{path.name}: a cell names point {rows.max()} of {len(mesh.points)} points")
         kind = f"polygon{rows.shape[1]}" if block.type == "polygon" else block.type
         cells.setdefault(kind, []).append(rows)

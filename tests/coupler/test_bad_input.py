@@ -385,3 +385,10 @@ def test_an_open_surface_names_the_key_of_its_own_table(tmp_path):
     assert "case.toml:14: solid[0]: open.stl: open surface" in line
     assert "weld of this table sets that" in line
     assert "structure.file" not in line
+
+
+def test_a_file_that_ends_within_a_face_has_the_faces_before(tmp_path):
+    """Its reader returns the torn one as a list of its own, without entries."""
+    (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf ", encoding="utf-8")
+    _, cells, _ = read_mesh(tmp_path / "a.obj")
+    assert {kind: rows.tolist() for kind, rows in cells.items()} == {"triangle": [[0, 1, 2]]}
