@@ -176,3 +176,11 @@ def test_a_driven_body_takes_along_what_hangs_on_it():
     found = response.free_velocity(velocity, np.zeros((2, 6))).reshape(2, 6)
     assert found[0, 0] == 0.4
     assert found[1, 0] == pytest.approx(dt * k * 0.4 / (mass / dt + dt * k), rel=1e-12)
+
+
+def test_defect_of_a_body_that_stood_still_is_whole():
+    """The larger of what was found and what was assumed is the measure: neither alone may vanish."""
+    M = mass_matrix(np.array([2.0]), np.eye(3)[None])
+    moving, still = np.array([[1.0, 0, 0, 0, 0, 0]]), np.zeros((1, 6))
+    assert defect(M, moving, still) == pytest.approx(1.0)
+    assert defect(M, still, moving) == pytest.approx(1.0)

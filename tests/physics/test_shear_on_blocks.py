@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from coupler.shear import minmod
 from coupler.verify.scenes import level_at, tank
 from coupler.verify.spheres import sphere
 from fluid.bodies import ConvexBodies
@@ -83,3 +84,8 @@ def test_a_coarse_sphere_that_spins_feels_the_moment_of_stokes(cells, limit):
     assert left < 1e-6
     _, load = momentum_rate(terms, u, spin)
     assert -load[0, 5] / (8 * np.pi * radius**3) == pytest.approx(1.004, abs=limit)
+
+
+def test_a_block_is_moved_on_by_the_smaller_of_two_accelerations_of_one_sign():
+    found = minmod(np.array([1.0, 3.0, -2.0, -1.0, 2.0, 0.0]), np.array([2.0, 1.0, -5.0, 4.0, -3.0, 1.0]))
+    np.testing.assert_array_equal(found, [1.0, 1.0, -2.0, 0.0, 0.0, 0.0])

@@ -8,10 +8,12 @@ from scipy.spatial.transform import Rotation
 
 from yade_scripts.blocks import Block
 from yade_scripts.cohesion import JointParameters
+from yade_scripts.contact import ContactLaw
 from yade_scripts.faces import FixedPlane, touching_faces
 from yade_scripts.generators.wall import wall_of_blocks
 from yade_scripts.joint_forces import KC
 from yade_scripts.joints import Joints
+from yade_scripts.quadrature import NEEDED, enough
 from yade_scripts.structure import Structure
 from yade_scripts.timestep import exact_joint_frequency, joint_frequency
 
@@ -392,3 +394,23 @@ def test_sealed_faces_tell_half_of_the_largest_opening():
     assert block.tolist() == [0, 1]
     assert [pair.blocks[b].planes[0][f][2] for b, f in zip(block, face)] == [1.0, -1.0]
     np.testing.assert_allclose(half, 0.5 * (2e-4 + 2e-4 * farthest), rtol=1e-3)
+
+
+def test_a_rule_holds_up_to_and_with_its_stiffness_ratio():
+    assert [len(enough(limit, 1)) for limit, _ in NEEDED] == [points for _, points in NEEDED]
+    assert len(enough(1.001 * NEEDED[0][0], 1)) == NEEDED[1][1]
+
+
+def test_a_piece_that_leaves_its_place_meets_other_blocks_though_its_joints_hold():
+    """Two glued cubes are torn off the ground: the upper one has lost no joint, and counts as loose all the same."""
+    blocks = [Block(name, (0, 0, z), size=0.5, density=1000.0) for name, z in (("low", 0.25), ("high", 0.75))]
+    with Structure(blocks, ContactLaw(1e6), JointParameters(1e5, 1e-3), ground=0.0) as s:
+        assert not s.loose().any()
+        load = np.zeros((2, 6))
+        load[:, 2] = 5e4
+        s.set_load(load)
+        for _ in range(5):
+            s.advance(0.01)
+        assert s.joint_table().alive.tolist().count(True) == 1
+        assert s.centre()[0, 2] > 0.26
+        assert s.loose().all()
