@@ -78,6 +78,16 @@ class Immersion:
         self.domain = cut_domain(self.mesh, self.bodies, self.covers, self.domain, connection=self.connection)
         return True
 
+    def moved_on(self) -> Array:
+        """How far the bodies stand from where their cells were last cut (n + m, 6) [m, rad]."""
+        centre, rotation = self._pose()
+        turn = rotation @ self._rotation.transpose(0, 2, 1)
+        axial = 0.5 * np.stack(
+            [turn[:, 2, 1] - turn[:, 1, 2], turn[:, 0, 2] - turn[:, 2, 0], turn[:, 1, 0] - turn[:, 0, 1]],
+            axis=1,
+        )
+        return np.concatenate([centre - self._centre, axial], axis=1)
+
     def save(self) -> dict[str, Array]:
         """Where the solids stood when their cells were last cut."""
         return {

@@ -12,9 +12,10 @@ Water:      Δ(kinetic + potential) + W_given + D_shear + D_vapour + D = E_sides
 A scheme that gains energy shows D < 0; dissipation D > 0 is damping of the water by the numerics and is reported, not
 counted as an error. The energy error is (|r_s| + |r_i| + max(0, −D − E_left)) / E_in: the head of water at an open
 side is not that of the water which the volume correction then takes off, within five cells of the side, so a gain is
-told from an outflow only beyond it. E_in is the energy that the scene puts in: the potential energy of the water
-above its level state and what inflows and seas can bring, the potential energy the blocks give up, kinetic energy, or
-work of imposed motions, whichever is the largest so far.
+told from an outflow only beyond it. E_in is the energy that the scene puts in, whichever is the largest so far: the
+potential energy of the water above its level state and what inflows and seas can bring, the potential energy that water
+and blocks have given up together, kinetic energy, or work of imposed motions. What a body that floats gives to the
+water and gets back is not in it, so the error of a small swing is measured by the energy of the swing.
 """
 
 from __future__ import annotations
@@ -27,8 +28,9 @@ STORED = ("kinetic", "gravity", "joint_stored", "contact_stored")
 DISSIPATED = ("joint_dissipated", "joint_damping", "dashpot", "friction")
 
 
-NEGLIGIBLE = 1e-6
-"""Share of the energy that water and blocks hold at the start below which nothing counts as put in."""
+NEGLIGIBLE = 1e-5
+"""Share of the energy that water and blocks hold at the start below which nothing counts as put in: the volume of the
+water is corrected to 1e-6, and what comes and goes with that is 5 % of this (a box afloat in a tank)."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +64,8 @@ class Ledger:
     available: float = 0.0
     """Potential energy of the water above its level state at the start, and what inflows and seas can bring [J]."""
     work_given: float = 0.0
+    behind: float = 0.0
+    """Part of it that the blocks count half a substep later [J]."""
     entered: float = 0.0
     """Energy that came with water through inflows and seas so far, less what left there [J]."""
     left: float = 0.0
@@ -72,6 +76,7 @@ class Ledger:
     """Energy spent so far on parting water from its vapour [J]."""
     _water_start: tuple[float, float] | None = None
     _structure_start: float | None = None
+    _potential_start: float = 0.0
     _input: float = field(default=0.0)
     _before: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Residuals of structure and interface, and what the water lost beyond the outflow, at the last balance [J]."""
@@ -80,10 +85,12 @@ class Ledger:
         """Fix the reference state: water (kinetic, potential) [J], structure energies by name [J]."""
         self._water_start = water
         self._structure_start = None if structure is None else _structure_total(structure)
-        self._gravity_start = None if structure is None else structure["gravity"]
+        gravity = 0.0 if structure is None else structure["gravity"]
+        self._potential_start = gravity + (0.0 if water is None else water[1])
         # a scene at perfect rest puts nothing in: then a small part of what it holds is the scale
-        held = abs(sum(water or (0.0,))) + abs(self._gravity_start or 0.0)
-        self._input = max(self.available, NEGLIGIBLE * held)
+        held = abs(sum(water or (0.0,))) + abs(gravity)
+        thrown = 0.0 if structure is None else structure["kinetic"]
+        self._input = max(self.available, thrown, NEGLIGIBLE * held)
 
     def save(self) -> dict[str, np.ndarray]:
         """Everything that it holds, by name."""
@@ -100,26 +107,29 @@ class Ledger:
         """What the scene has put in so far [J], the scale of every error."""
         return self._input
 
-    def give(self, work: float) -> None:
-        """Add the work that the water gave to the bodies in a step [J]."""
+    def give(self, work: float, behind: float = 0.0) -> None:
+        """Add the work that the water gave to the bodies in a step [J]; behind: the part of it that belongs to the half
+        substep by which the kinetic energy of the blocks, and the work that they count, lag behind their places."""
         self.work_given += work
+        self.behind += behind
 
     def balance(self, water: tuple[float, float] | None, structure: dict[str, float] | None) -> Balance:
         """The ledger now."""
         kinetic, potential = water or (0.0, 0.0)
-        dissipation = 0.0
+        dissipation, potential_now = 0.0, potential
         if water is not None:
             change = kinetic + potential - sum(self._water_start)
             taken = self.work_given + self.shear + self.parting
             dissipation = self.entered - self.left - change - taken
         received = residual = 0.0
         if structure is not None:
-            received = structure["load_work"]
+            received = structure["load_work"] + self.behind
             driven = structure["driving_work"]
-            residual = _structure_total(structure) - self._structure_start - received - driven
-            released = self._gravity_start - structure["gravity"]
-            self._input = max(self._input, abs(released), structure["kinetic"], abs(driven))
-        self._input = max(self._input, kinetic, abs(self.work_given), abs(self.entered))
+            residual = _structure_total(structure) - self._structure_start - structure["load_work"] - driven
+            self._input = max(self._input, structure["kinetic"], abs(driven))
+            potential_now = potential + structure["gravity"]
+        released = self._potential_start - potential_now
+        self._input = max(self._input, abs(released), kinetic, abs(self.entered))
         interface = self.work_given - received if water is not None and structure is not None else 0.0
         now = (residual, interface, dissipation + self.left)
         share, step = (self._share(*rows) for rows in (now, np.subtract(now, self._before).tolist()))

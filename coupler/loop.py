@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -19,7 +19,7 @@ from coupler.ledger import Balance, Ledger
 from coupler.limits import Diverged, Limits, check_finite, check_pressure, no_room
 from coupler.momentum import MomentumBalance, book_step, momentum_ledger
 from coupler.observe import fastest_point
-from coupler.step_limits import check_step, one_step_too_far
+from coupler.step_limits import is_bad
 from coupler.step_start import StepStart
 
 Array = np.ndarray
@@ -193,13 +193,7 @@ class Coupling:
         """Whether the step that was just taken may stay."""
         if record.wetted and self.defects.too_large(record.defect):
             return False
-        if self.limits is None:
-            return True
-        try:
-            check_step(self, record, self.limits)
-        except Diverged:
-            return False
-        return not one_step_too_far(record, self.limits)
+        return self.limits is None or not is_bad(self, record, self.limits)
 
     def _take(self, record: StepRecord, start: StepStart | None) -> None:
         """One step of record.dt on both sides and in the books. Raises what the solvers say, and Diverged."""
@@ -228,24 +222,29 @@ class Coupling:
             if self.water.slits is not None:
                 self.water.set_cracks(self.immersion.cracks.cracks())
             record.bodies_cut = self.immersion.cut_again
+            self.water.moved_on = self.immersion.moved_on()
         if self.water.viscous is not None:
             self.water.body_velocity = self._padded(self.structure.velocity())
         if self.sheared is not None:
             self.water.free_bodies = self.sheared.now()
 
     def _coupled_step(self, dt: float, record: StepRecord, start: StepStart) -> None:
-        n = self.structure.n
+        n, before = self.structure.n, self.structure.velocity()
         with self.clock("water"):
             problem = self.water.predict(dt)
         with self._placed(problem):
-            found, moved = self._exchange(problem, record, start)
+            problem, found, moved, assumed = self._exchange(problem, record, start)
+        self.water.farther = dt * (self._padded(moved) - self.water.pushed_by)
+        self.water.pushed_by = found.velocity
         with self.clock("water"):
             self.water.correct(problem, found.x, found.parting)
         record.load, record.unknowns = found.load, len(found.x)
-        given = found.load[:n] * found.velocity[:n]
-        self.ledger.give(dt * float(np.sum(given)))
+        given = found.load[:n] * assumed
+        gained = (self.structure.velocity() - before)[~self.structure.fixed]
+        behind = 0.5 * record.substep * float(np.sum(found.load[:n][~self.structure.fixed] * gained))
+        self.ledger.give(dt * float(np.sum(given)), behind)
         record.missed_work = dt * np.sum(given - found.load[:n] * moved, axis=1)
-        self._note_loads(problem, record, found.velocity)
+        self._note_loads(problem, record, self._padded(assumed))
 
     def _note_loads(self, problem, record: StepRecord, velocity: Array) -> None:
         """The parts of the load, and the energy that shear and outflow take; velocity (n_bodies, 6) of the bodies."""
@@ -258,17 +257,22 @@ class Coupling:
         self.ledger.parting += self.water.report.bound.work
 
     def _exchange(self, problem, record: StepRecord, start: StepStart):
-        """Pressure with the structure inside, then the structure under it, as often as the passes allow: the solution,
-        and the mean velocity (n, 6) with which the blocks moved. One pass where no block is wetted."""
+        """Pressure with the structure inside, then the structure under it, as often as the passes allow. One pass where
+        no block is wetted.
+
+        Returns the problem with all of its load, the solution, and the mean velocities (n, 6) with which the blocks
+        moved and were assumed to move."""
         from coupler.scheme import corrected_free_velocity, defect, solve_coupled
         from coupler.wetting import Wetting
         from fluid.bounded import solve_bounded
 
         structure, solve = self.structure, partial(solve_bounded, kept=[])
         with self.clock("structure in pressure"):
-            mass, response, v_free = self._response(problem)
+            problem, afloat = self._afloat(problem)
+            mass, response, v_free = self._response(problem, afloat)
             wetting = Wetting.of(problem.coupling)
         record.wetted = problem.coupling.nnz > 0
+        before = self._padded(structure.velocity())
         found, most = None, self.passes if record.wetted else 1
         for record.passes in range(1, most + 1):
             self._pause()
@@ -282,20 +286,24 @@ class Coupling:
             record.iterations += found.iterations
             record.substeps += report.substeps
             floor = STANDS_STILL * self.ledger.input_energy
-            record.defect = defect(mass, found.velocity[: structure.n], report.mean_velocity, floor)
+            lead = response.lead(found.velocity, before, report.dt_s)
+            assumed = (found.velocity - lead)[: structure.n]
+            record.defect = defect(mass, assumed, report.mean_velocity, floor)
             if record.defect <= self.tolerance:
                 break
-            mean = self._padded(report.mean_velocity)
-            v_free = corrected_free_velocity(response, mean, found.x, problem.coupling)
+            after = self._padded(report.mean_velocity) + lead
+            v_free = corrected_free_velocity(response, after, found.x, problem.coupling)
         record.substep, record.opening_rate = report.dt_s, report.opening_rate
         record.impulses = report.impulses
-        return found, report.mean_velocity
+        if found.restoring.any():
+            problem = replace(problem, other_load=problem.other_load + found.restoring)
+        return problem, found, report.mean_velocity, assumed
 
     def _pause(self) -> None:
         if self.pause is not None:
             self.pause()
 
-    def _response(self, problem):
+    def _response(self, problem, afloat: Array | None):
         """Mass of the blocks, the answer of all bodies to forces, and V_free of the first pass."""
         from coupler.scheme import StructureResponse, mass_matrix, water_load
 
@@ -304,11 +312,28 @@ class Coupling:
         velocity = self._padded(structure.velocity())
         driven = np.append(structure.fixed, np.ones(self.immersion.n_solids, bool))
         response = StructureResponse(
-            *self._with_solids(mass, *structure.tangent()), problem.dt, driven, velocity
+            *self._with_solids(mass, *structure.tangent()),
+            problem.dt,
+            driven,
+            velocity,
+            afloat,
         )
         known = water_load(problem, 0.0)
         force = structure.weight_now() + structure.internal_force()
         return mass, response, response.free_velocity(velocity, self._padded(force) + known)
+
+    def _afloat(self, problem):
+        """The problem with the bodies where they stand, not where their cells were cut, and how still water resists the
+        free ones that its surface cuts, (n, 3, 3); None where there is none."""
+        from fluid.waterline import hydrostatic_stiffness
+
+        driven = np.append(self.structure.fixed, np.ones(self.immersion.n_solids, bool))
+        stiffness = hydrostatic_stiffness(self.water, problem.predicted.level_set, ~driven)
+        if stiffness is None:
+            return problem, None
+        load = problem.other_load.copy()
+        load[:, 2:5] -= np.einsum("nij,nj->ni", stiffness, self.water.moved_on[:, 2:5])
+        return replace(problem, other_load=load), stiffness
 
     def _water_step(self, dt: float, record: StepRecord) -> None:
         from coupler.scheme import water_load

@@ -18,8 +18,18 @@ C: their dashpots. Eliminating V gives one symmetric positive definite system,
 The force −Gᵀ (x + known) is the exact adjoint of how the bodies move the water in (1), so the power leaving the water
 through the wetted surfaces is the power given to the velocities V, to round-off. `other_load` of the water (wall
 shear; its surface in the cells of a body) is part of f.
-A second pass replaces the guess of (2) by what the discrete elements did under the first load x₁, whose mean
-velocity over the step was W:  V_free = W + D⁻¹ Gᵀ x₁.
+
+The blocks move on while the load is held, and one that floats is lifted less the higher it comes. So K_h, what still
+water does to a body that moves in it (`fluid.waterline`, 3), acts over the half of the way: D has (dt/2) K_h besides,
+and the load is less by (dt/2) K_h V. With the load of the place at the start a swing grows by ω² dt²/4 in every step.
+
+V is the velocity at the end of the step.  Over the step the blocks move with the mean
+
+    V − L,    L = ½ (1 − dt_s/dt) D⁻¹ (M/dt + dt/2 K_h) (V − V^n)                                         (4)
+
+(dt_s: substep; the load acts from the first one on).  Stiff joints and contacts, which make D⁻¹ small, swing to and
+fro within a step and have no other velocity than their mean.  A second pass replaces the guess of (2) by what the
+discrete elements did under the first load x₁, whose mean velocity over the step was W:  V_free = W + L + D⁻¹ Gᵀ x₁.
 """
 
 from __future__ import annotations
@@ -50,17 +60,30 @@ class StructureResponse:
     """Equation (2): the velocities that a force held over the step gives to the bodies.
 
     mass, stiffness, damping: (6n, 6n) sparse, world axes · dt [s] · driven (n,) bool: bodies whose velocity
-    `driven_velocity` (n, 6) is imposed (fixed solids, prescribed motions); they take any load without answer.
+    `driven_velocity` (n, 6) is imposed (fixed solids, prescribed motions); they take any load without answer ·
+    afloat (n, 3, 3): K_h for heave, roll and pitch, None: of no body.
     """
 
-    def __init__(self, mass, stiffness, damping, dt: float, driven: Array, driven_velocity: Array):
+    def __init__(
+        self,
+        mass,
+        stiffness,
+        damping,
+        dt: float,
+        driven: Array,
+        driven_velocity: Array,
+        afloat: Array | None = None,
+    ):
         self.dt = dt
         self.mass = mass
         self.imposed = np.where(driven[:, None], driven_velocity, 0.0).ravel()
         self.free = np.flatnonzero(np.repeat(~driven, 6))
+        self._restoring = (
+            None if afloat is None else _of_heave(0.5 * dt * afloat, mass.diagonal().reshape(-1, 6))
+        )
         self.matrix = sp.csr_array(mass / dt)
-        for part in (damping, dt * stiffness):
-            if part.nnz:
+        for part in (damping, dt * stiffness, self._restoring):
+            if part is not None and part.nnz:
                 self.matrix = self.matrix + part
         own, tied = _own_blocks(self.matrix.indptr, self.matrix.indices, self.matrix.data, len(driven))
         tied &= ~driven
@@ -92,6 +115,37 @@ class StructureResponse:
         """V_free of (3) from the velocities at t^n and the force without the unknown pressure, each (n, 6)."""
         return self.velocity(self.mass @ velocity.ravel() / self.dt + force.ravel())
 
+    def restoring_load(self, velocity: Array) -> Array:
+        """-(dt/2) K_h V (n, 6) [N, N m] of V (n, 6): what the load loses over the first half of the way."""
+        if self._restoring is None:
+            return np.zeros_like(velocity)
+        return -(self._restoring @ velocity.ravel()).reshape(-1, 6)
+
+    def lead(self, velocity: Array, before: Array, substep: float) -> Array:
+        """L (n, 6) of (4) from V and V^n (n, 6): by how much V is ahead of the mean velocity; zero for driven bodies.
+
+        substep dt_s [s]."""
+        held, change = self.mass / self.dt, (velocity - before).ravel()
+        gained = held @ change if self._restoring is None else held @ change + self._restoring @ change
+        return 0.5 * (1.0 - substep / self.dt) * self.compliance(gained).reshape(-1, 6)
+
+
+def _of_heave(blocks: Array, mass: Array) -> sp.csr_array:
+    """(6n, 6n) from blocks (n, 3, 3) for heave, roll and pitch; only what resists them, the rest left out.
+
+    mass (n, 6) [kg, kg m²]: of every component; its radius of gyration makes lengths of angles."""
+    n = len(blocks)
+    gyration = np.sqrt(mass[:, 3:].mean(axis=1) / np.where(mass[:, 0] > 0.0, mass[:, 0], 1.0))
+    length = np.ones((n, 3))
+    length[:, 1:] = np.where(gyration > 0.0, gyration, 1.0)[:, None]
+    unit = length[:, :, None] * length[:, None, :]
+    value, vector = np.linalg.eigh(0.5 * (blocks + blocks.transpose(0, 2, 1)) / unit)
+    whole = np.zeros((n, 6, 6))
+    whole[:, 2:5, 2:5] = unit * np.einsum("nik,nk,njk->nij", vector, np.maximum(value, 0.0), vector)
+    matrix = sp.csr_array(sp.bsr_array((whole, np.arange(n), np.arange(n + 1)), shape=(6 * n, 6 * n)))
+    matrix.eliminate_zeros()
+    return matrix
+
 
 @njit(cache=True)
 def _own_blocks(indptr, indices, data, n):
@@ -121,12 +175,14 @@ def _answer(bodies, inverse, force, velocity):
 
 @dataclass(frozen=True)
 class CoupledSolution:
-    """x (n_dofs,) [Pa] · velocity (n_bodies, 6) [m/s, rad/s] · load (n_bodies, 6) [N, N m] on the bodies ·
+    """x (n_dofs,) [Pa] · velocity (n_bodies, 6) [m/s, rad/s] at the end of the step · load (n_bodies, 6) [N, N m] on
+    the bodies · restoring (n_bodies, 6): the part of it by which floating bodies are lifted less on their way ·
     at_bound (n_dofs,) bool, parting (n_dofs,) [m³/s]: see `fluid.bounded`."""
 
     x: Array
     velocity: Array
     load: Array
+    restoring: Array
     iterations: int
     at_bound: Array
     parting: Array
@@ -165,8 +221,11 @@ def solve_coupled(
         extra=added_inertia if feels_water else None,
     )
     velocity = (v_free - response.compliance(wets.on_bodies(found.x))).reshape(-1, 6)
-    load = water_load(problem, found.x)
-    return CoupledSolution(found.x, velocity, load, found.iterations, found.at_bound, found.parting)
+    restoring = response.restoring_load(velocity)
+    load = water_load(problem, found.x) + restoring
+    return CoupledSolution(
+        found.x, velocity, load, restoring, found.iterations, found.at_bound, found.parting
+    )
 
 
 def corrected_free_velocity(response: StructureResponse, mean_velocity: Array, x: Array, coupling) -> Array:

@@ -1,8 +1,9 @@
 """Whether a step is to be taken again: which limit it broke, looked at once it is complete.
 
-A step is bad where it, or the run with it, breaks a limit at which a run stops, and where it alone puts more energy
+A step is bad where its momentum or volume breaks the limit at which a run stops, and where it alone puts more energy
 out of balance than a share of what a whole run may: a wall that fell once lost in one step all that its run was
-allowed, with the blocks missing the motion that the water was given by less than their own limit.
+allowed, with the blocks missing the motion that the water was given by less than their own limit. What built up over
+many steps no shorter step cures.
 """
 
 from __future__ import annotations
@@ -22,9 +23,16 @@ def check_step(coupling, record, limits: Limits) -> None:
         check_momentum(record.time, record.momentum.error, limits.momentum_error)
 
 
-def one_step_too_far(record, limits: Limits) -> bool:
-    """Whether this step alone put more energy out of balance than it may."""
-    return not record.balance.step_error <= STEP_SHARE * limits.energy_error
+def is_bad(coupling, record, limits: Limits) -> bool:
+    """Whether this step is to be taken again."""
+    volume = 0.0 if coupling.water is None else coupling.water.volume_error()
+    momentum = 0.0 if record.momentum is None else record.momentum.error
+    kept = (
+        abs(volume) <= limits.volume_error
+        and momentum <= limits.momentum_error
+        and record.balance.step_error <= STEP_SHARE * limits.energy_error
+    )
+    return not kept
 
 
 def worst_place(coupling, record) -> str:

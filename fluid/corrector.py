@@ -246,7 +246,9 @@ def _flux(water, kept, listed, start, u, u_cell):
     middle = (
         to_middle(around, cell_field, water.cell_velocity) if water.parameters.theta < 1.0 else cell_field
     )
-    return cell_field, edge_flux(t, water.graph_for(reached), reached, middle, kept.nodal_water)
+    return cell_field, edge_flux(
+        t, water.graph_for(reached), reached, middle, kept.nodal_water - kept.displaced
+    )
 
 
 @njit(cache=True)
@@ -289,7 +291,7 @@ def _report(water, problem, x, projected, u, clipped, momentum, bound):
     if water.viscous is not None:
         change["transport and gravity"] -= kept.shear.energy
         change["viscosity and friction"] = kept.shear.energy
-    volume = float(kept.nodal_water.sum())
+    volume = float(kept.nodal_water.sum()) - float(kept.displaced.sum())
     left = kept.left
     moved_by_bodies = problem.matrix @ x - problem.rhs - bound.rate
     return StepReport(

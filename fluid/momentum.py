@@ -12,7 +12,9 @@ linear functions are integrated exactly.  So
        the cells              the tank           the bodies, -Gᵀp on them
 
 to round-off, whatever the pressure is: `pressure_closure` is what is missing.  b_i is summed over the cells around
-nodes of the sides, so that (1) is a check of the cutting and not an identity.
+nodes of the sides, so that (1) is a check of the cutting and not an identity.  Where thresholds of the covers close
+narrow openings, water pushes on what closes them: the same sum over the cells around the nodes there, those with
+several copies, is the line "openings", and (1) stays a check at all other nodes.
 
 What the nodes make of it differs from (1) where the surface cuts cells or leaves them void, and where the part of the
 last pressure that is carried over acts on other nodes than it came from. These differences, and what transport,
@@ -40,7 +42,7 @@ NUMERICAL = (
     "shear_solve",
 )
 """Lines of the scheme, in the order of the step."""
-PHYSICAL = ("weight", "tank", "tank_shear", "sides", "bodies")
+PHYSICAL = ("weight", "tank", "tank_shear", "sides", "openings", "bodies")
 """Lines of what acts on the water."""
 
 
@@ -109,6 +111,7 @@ def momentum_change(water, problem, unknown, pressure, stages: Stages) -> Moment
     x, p = np.where(kept.wet, unknown, 0.0), np.where(kept.wet, pressure, 0.0)
     at = _momenta(water, kept, dt, stages)
     cells, tank, held = _reactions(water, kept, x, p, dt)
+    openings = _at_closed_openings(water, kept, p, dt)
     told, shear_told, tank_shear = _loads(water, problem, p)
     through, side_pressure = _through(water, kept), -dt * _pressure_on_sides(water, p)
     weight = dt * at["weight"]
@@ -117,6 +120,7 @@ def momentum_change(water, problem, unknown, pressure, stages: Stages) -> Moment
         "tank": tank - side_pressure,
         "tank_shear": tank_shear,
         "sides": through + side_pressure,
+        "openings": openings,
         "bodies": -told,
         "transport": at["carried"] - at["kicked"] - through,
         "volume_correction": at["advected"] - at["carried"],
@@ -134,7 +138,7 @@ def momentum_change(water, problem, unknown, pressure, stages: Stages) -> Moment
         "slip": at["slipping"] - at["damped"],
         "shear_solve": at["sheared"] - at["advected"] + shear_told - tank_shear,
     }
-    return MomentumChange(at["before"], at["end"], lines, cells[0] + cells[1] - tank - held)
+    return MomentumChange(at["before"], at["end"], lines, cells[0] + cells[1] - tank - held - openings)
 
 
 def _momenta(water, kept, dt, stages: Stages) -> dict[str, np.ndarray]:
@@ -171,6 +175,19 @@ def _reactions(water, kept, x, p, dt):
     of_x, of_p, of_sides = hat_forces(cells, x, p, at_side, water.reference, *mesh)
     of_sides += _on_bodies(water, np.where(at_side, p, 0.0))
     return (-dt * of_x, -dt * (of_p - of_x)), -dt * of_sides, dt * _on_bodies(water, p)
+
+
+def _at_closed_openings(water, kept, p, dt):
+    """Impulse (6,) on the water by what closes narrow openings; zero without thresholds of the covers."""
+    t, connection = water.topology, water.domain.memory.connection
+    if connection is None or connection.face == 0.0:
+        return np.zeros(6)
+    parent = water.domain.parent_node
+    beside = (np.bincount(parent)[parent] > 1) & ~water.on_sides
+    cells = np.concatenate([kept.wet_cells, kept.void])
+    mesh = (t.nodes, t.cells, t.parent, t.gradients, t.volume, t.share)
+    total = hat_forces(cells, p, p, beside, water.reference, *mesh)[2]
+    return -dt * (total + _on_bodies(water, np.where(beside, p, 0.0)))
 
 
 def _on_bodies(water, p):

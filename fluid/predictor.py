@@ -45,7 +45,8 @@ class Predicted:
     cells, remainder (M, 3) [m/s], theta, conserved_volume and reinserted [m³], uncorrected_water (N,) [m³] before the
     volume correction, shear: ViscousChange by viscosity and friction, None without; end [s]: time at the end of the
     step; left: what leaves through open sides, None if nothing; through (N,) [m³] that comes in through sides,
-    None without any; held (N,) [Pa]: unknown part of the pressure on the nodes of seas, None without any side."""
+    None without any; held (N,) [Pa]: unknown part of the pressure on the nodes of seas, None without any side;
+    displaced (N,) [m³]: part of nodal_water that the bodies take in this step."""
 
     level_set: np.ndarray
     nodal_water: np.ndarray
@@ -66,6 +67,7 @@ class Predicted:
     left: Outflow | None
     through: np.ndarray | None
     held: np.ndarray | None
+    displaced: np.ndarray
 
 
 def predicted(water, dt: float) -> PressureProblem:
@@ -87,7 +89,8 @@ def predicted(water, dt: float) -> PressureProblem:
         through, inflow_rate = water.sides.through(phi, u_now, dt, carried)
         carried += through
         conserved += float(through.sum())
-    surface = _new_surface(water, phi, carried, conserved)
+    displaced = water.displacement(dt)
+    surface = _new_surface(water, phi, carried + displaced, conserved + float(displaced.sum()))
     if found.velocity is not None:
         graph = water.graph_for(water.listed)
         found.into(
@@ -108,7 +111,19 @@ def predicted(water, dt: float) -> PressureProblem:
     u_star = u_adv + theta * dt * parameters.weight
     u_star[water.topology.node_start[1:] == water.topology.node_start[:-1]] = 0.0
     return _problem(
-        water, dt, theta, kick, surface, conserved, u_adv, u_star, shear, left, through, inflow_rate
+        water,
+        dt,
+        theta,
+        kick,
+        surface,
+        conserved,
+        u_adv,
+        u_star,
+        shear,
+        left,
+        through,
+        inflow_rate,
+        displaced,
     )
 
 
@@ -174,7 +189,9 @@ def _new_surface(water, phi, carried, conserved):
     )
 
 
-def _problem(water, dt, theta, kick, surface, conserved, u_adv, u_star, shear, left, through, inflow_rate):
+def _problem(
+    water, dt, theta, kick, surface, conserved, u_adv, u_star, shear, left, through, inflow_rate, displaced
+):
     t, density = water.topology, water.parameters.density
     phi = surface.level_set
     part = WetPart.of(t, water.domain, phi, water.mesh.spacing)
@@ -191,6 +208,8 @@ def _problem(water, dt, theta, kick, surface, conserved, u_adv, u_star, shear, l
         rhs += inflow_rate
         gravity = water.parameters.gravity
         held = theta * water.sides.pressure(density, gravity, water.velocity, water.time + dt)
+        # at the edge that a sea shares with an inflow the pressure is sought, not held
+        held[~water._walls.open_node] = 0.0
         rhs[dofs] += pull_of_held(graph, dofs, held, dt / density)
     known = (1.0 - theta) * kick[dofs] * water.end_pressure[dofs]
     guess = theta * water.end_pressure[dofs]
@@ -219,6 +238,7 @@ def _problem(water, dt, theta, kick, surface, conserved, u_adv, u_star, shear, l
         left,
         through,
         held,
+        displaced,
     )
     acted = _known_pressure(water, water.pressure, phi)
     other = waterline_load(water.domain, faces, left_out, phi, wet, acted, water._walls.open_node)

@@ -18,17 +18,18 @@ NODAL = (
     "pressure",
     "end_pressure",
     "nodal_water",
+    "displaced",
     "at_bound",
     "ventilated",
 )
 OF_CELLS = ("remainder", "kick_remainder", "cell_velocity")
+OF_BODIES = ("pushed_by",)
 NUMBERS = {
     "time": float,
     "steps": int,
     "conserved_volume": float,
     "initial_volume": float,
     "_surface_lag": float,
-    "_solids_move": bool,
     "_domain_is_new": bool,
 }
 SIDES = ("entered", "left", "energy")
@@ -46,7 +47,7 @@ def save(water) -> dict[str, np.ndarray]:
     """Everything of a Water that changes in time, by name.  Raises NotAfterAStep."""
     if water.flux.capacity is not water.topology.node_volume:
         raise NotAfterAStep("the state of the water can be saved after a step, before the solids move on")
-    arrays = {name: np.array(getattr(water, name)) for name in (*NODAL, *OF_CELLS, *NUMBERS)}
+    arrays = {name: np.array(getattr(water, name)) for name in (*NODAL, *OF_CELLS, *OF_BODIES, *NUMBERS)}
     arrays |= {"listed": water.listed, "layer_start": water.layer_start}
     arrays |= {"graph_nodes": water.flux.graph.nodes, "flux_nodes": water.flux.nodes, "flux": water.flux.rate}
     if water.sides is not None:
@@ -60,7 +61,7 @@ def restore(water, domain, arrays) -> None:
     """Back to a saved state on `domain`, the same as the one that it was saved on.  Raises OtherWater."""
     _check(domain, arrays, water.sides)
     water._set_domain(domain)
-    for name in (*NODAL, *OF_CELLS, "listed", "layer_start"):
+    for name in (*NODAL, *OF_CELLS, *OF_BODIES, "listed", "layer_start"):
         setattr(water, name, np.array(arrays[name]))
     for name, kind in NUMBERS.items():
         setattr(water, name, kind(arrays[name]))
@@ -70,7 +71,7 @@ def restore(water, domain, arrays) -> None:
         np.array(arrays["flux_nodes"]),
         water._graph,
         np.array(arrays["flux"]),
-        water.nodal_water,
+        water.nodal_water - water.displaced,
         water.topology.node_volume,
     )
     if water.sides is not None:
@@ -83,7 +84,17 @@ def restore(water, domain, arrays) -> None:
 
 
 def _check(domain, arrays, sides) -> None:
-    wanted = {*NODAL, *OF_CELLS, *NUMBERS, "listed", "layer_start", "graph_nodes", "flux_nodes", "flux"}
+    wanted = {
+        *NODAL,
+        *OF_CELLS,
+        *OF_BODIES,
+        *NUMBERS,
+        "listed",
+        "layer_start",
+        "graph_nodes",
+        "flux_nodes",
+        "flux",
+    }
     missing = sorted((wanted | (set(SIDES) if sides is not None else set())) - set(arrays))
     if missing:
         raise OtherWater(f"not the state of this water: {', '.join(missing)} missing")

@@ -55,6 +55,38 @@ def waterline_load(domain, faces, left_out, phi, wet, pressure, open_node) -> np
     return load
 
 
+def hydrostatic_stiffness(water, phi, bodies) -> np.ndarray | None:
+    """K (n_bodies, 3, 3) [N/m, N, N m]: how the load of still water on a body changes as it heaves, rolls and pitches
+    about its centre in water that stays where it is,
+
+        K = -ρ g ∮_{φ<0} [n_z; (r × n)_x; (r × n)_y] ⊗ [1, y, -x] dA,    d(F_z, M_x, M_y) = -K d(z, θ_x, θ_y),      (3)
+
+    zero for a body wholly under water (Newman, Marine Hydrodynamics, 1977, chapter 6). None: the surface cuts no body.
+
+    phi (N,) [m] of the surface · bodies (n_bodies,) bool: the others get zeros."""
+    domain, weight = water.domain, water.parameters.density * water.parameters.gravity
+    corners = domain.cells[domain.face_cell]
+    below = phi[corners] < 0.0
+    cut = np.unique(domain.face_body[below.any(axis=1) & ~below.all(axis=1)])
+    chosen = np.zeros(domain.n_bodies, bool)
+    chosen[cut] = bodies[cut]
+    at = np.flatnonzero(chosen[domain.face_body] & below.any(axis=1))
+    if len(at) == 0:
+        return None
+    stiffness = np.zeros((domain.n_bodies, 3, 3))
+    hats = hat_values(domain.nodes[corners[at]], domain.face_corners[at])
+    height = np.einsum("kqa,ka->kq", hats, phi[corners[at]])
+    body, normal, area = domain.face_body[at], domain.face_normal[at], domain.face_area[at]
+    arm = domain.face_corners[at] - domain.body_centre[body][:, None]
+    nothing = np.zeros_like(height)
+    for k, lift in enumerate((np.ones_like(height), arm[:, :, 1], -arm[:, :, 0])):
+        force, first = _differences(height, np.ascontiguousarray(lift), nothing, arm, area)
+        moment = np.cross(first, normal)
+        for row, value in enumerate((force * normal[:, 2], moment[:, 0], moment[:, 1])):
+            np.add.at(stiffness[:, row, k], body, weight * value)
+    return stiffness
+
+
 @njit(cache=True)
 def _differences(height, full, acting, arm, area):
     """∫ p_acting - ∫_{height<0} p_full over triangles with corner values (k, 3): (k,), and times the arm: (k, 3)."""

@@ -147,7 +147,7 @@ class FreeBody:
         impulses = Impulses(
             nothing, nothing, dt * (self._x - 0.5 * dt * mean[:, :3]), dt, np.zeros(3), np.zeros((1, 3))
         )
-        return FakeAdvance(self._v.copy(), impulses)
+        return FakeAdvance(mean, impulses)
 
     def momentum(self, about):
         p = self.mass[:, None] * self._v[:, :3]

@@ -157,3 +157,46 @@ def test_a_block_that_strikes_a_held_one_is_stopped_by_it():
     assert max(errors) < 1e-12
     np.testing.assert_allclose(lines["held_blocks"][2], 0.3 * G * 1000 * 0.1**3, rtol=1e-2)
     assert np.abs(lines["ground"]).max() < 1e-12
+
+
+def test_what_closes_narrow_openings_has_a_line():
+    """A pillar in the water of coarse cells: what closes the openings beside it holds the water."""
+    errors, held = [], []
+
+    def each(coupling, record):
+        errors.append(record.momentum.error)
+        held.append(np.abs(record.momentum.lines["openings"]).max())
+
+    sections = {
+        "tank": {"lower": [0, 0, 0], "upper": [1, 1, 1], "cell": 0.2},
+        "water": {
+            "covers": "multiple",
+            "openings": "wide",
+            "fill": [{"lower": [0, 0, 0], "upper": [1, 1, 0.6]}],
+        },
+        "solid": [{"name": "b", "centre": [0.5, 0.5, 0.5], "size": [0.3, 0.3, 0.3]}],
+    }
+    run(scene(**sections, structure=None, contact=None, joints=None), 0.06, each)
+    assert max(errors) < 1e-13
+    assert max(held) > 1e-2
+
+
+def test_an_edge_that_an_inflow_shares_with_a_sea_closes_beside_blocks():
+    """There the velocity is given and the pressure sought, not held: a block in the cells beside it feels the same."""
+    errors = []
+    sections = {
+        "tank": {"lower": [0, 0, 0], "upper": [0.6, 0.4, 0.4], "cell": 0.1},
+        "water": {
+            "fill": [{"lower": [0, 0, 0], "upper": [0.6, 0.4, 0.15]}],
+            "inflow": [{"kind": "steady", "side": "y+", "level": 0.15, "velocity": 0.2}],
+            "sea": [{"side": "x+", "level": 0.25}],
+        },
+        "structure": {
+            "block": [{"name": "b", "centre": [0.54, 0.34, 0.08], "size": [0.1, 0.1, 0.1], "fixed": True}]
+        },
+        "contact": None,
+        "joints": None,
+        "solid": [],
+    }
+    run(scene(**sections), 0.04, lambda coupling, record: errors.append(record.momentum.error))
+    assert max(errors) < 1e-13

@@ -1,0 +1,87 @@
+"""A body that swings in still water neither gains nor hides energy, at long steps and at any density."""
+
+import numpy as np
+import pytest
+
+from coupler.build import build
+from tests.fakes import no_clock
+from tests.physics.scenes import case, run
+
+PERIOD = 0.92
+"""Of the box of half the density of water [s], about."""
+
+
+def let_go(density=500.0, lift=2e-3, step=0.02, passes=2):
+    """A slice of a long box, let go `lift` [m] above its place of rest, in cells of half its draught at 500 kg/m3."""
+    height, level = 0.2, 0.5
+    centre = level - density / 1000.0 * height + 0.5 * height + lift
+    found = case(
+        time={"end": 16.0, "step_max": step},
+        tank={"lower": [0, 0, 0], "upper": [1, 0.1, 0.8], "cell": 0.05},
+        water={"fill": [{"lower": [0, 0, 0], "upper": [1, 0.1, level]}]},
+        structure={
+            "density": density,
+            "block": [{"name": "box", "centre": [0.5, 0.05, centre], "size": [0.3, 0.1, height]}],
+        },
+        contact={"stiffness": 1e6, "friction": 0.0},
+        coupling={"passes": passes},
+    )
+    return build(found, no_clock).coupling
+
+
+def swing(end, **scene):
+    """Time (n,) [s], height (n,) [m] of the centre, and the balances of every step."""
+    coupling, time, height, balance = let_go(**scene), [], [], []
+
+    def note(record):
+        time.append(coupling.time)
+        height.append(coupling.structure.centre()[0, 2])
+        balance.append(record.balance)
+
+    try:
+        run(coupling, end, note)
+    finally:
+        coupling.structure.close()
+    return np.array(time), np.array(height), balance
+
+
+def sizes(time, height, period=PERIOD):
+    """Half of the range of every period [m]."""
+    number = (time / period).astype(int)
+    return np.array([0.5 * np.ptp(height[number == k]) for k in range(int(time[-1] / period))])
+
+
+@pytest.mark.parametrize("passes", [1, 2])
+def test_a_small_swing_at_the_longest_step_does_not_grow(passes):
+    """With the load of the place at the start of a step it grows by a tenth a period at 20 ms."""
+    time, height, _ = swing(4.0, passes=passes)
+    size = sizes(time, height)
+    assert size[0] == pytest.approx(1.4e-3, rel=0.1)
+    assert np.all(size[1:] < size[:-1])
+
+
+def test_the_error_of_a_small_swing_is_measured_by_its_own_energy():
+    """ρ g A z²/2 is 0.6 mJ in a tank of 120 J: the scale of the error is a millijoule."""
+    _, _, balance = swing(1.5)
+    assert 5e-4 < balance[-1].input_energy < 2e-3
+    assert max(b.energy_error for b in balance) < 1e-3
+    lost = np.array([b.numerical_dissipation for b in balance])
+    assert np.ptp(lost[40:]) < 1e-4
+
+
+@pytest.mark.parametrize("density", [20.0, 200.0, 900.0])
+def test_no_density_swings_higher(density):
+    """A plate of a tenth of a cell's draught, a light and a heavy box, 2 mm above their place."""
+    time, height, _ = swing(2.0, density=density)
+    late, early = (np.ptp(height[part]) for part in (time > 1.0, time <= 1.0))
+    assert late < 1.05 * early
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("step", [0.005, 0.01, 0.02])
+def test_a_swing_dies_alike_at_any_step(step):
+    """Over 17 periods, let go by 20 mm: the loss is that of waves on these cells, 7 % a period, not of the step."""
+    time, height, balance = swing(16.0, lift=0.02, step=step)
+    size = sizes(time, height)
+    assert (size[-1] / size[2]) ** (1.0 / (len(size) - 3)) == pytest.approx(0.94, abs=0.03)
+    assert max(b.energy_error for b in balance) < 0.02
