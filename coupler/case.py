@@ -259,7 +259,7 @@ class RunLimits(Section):
         "twenty steps; a single step that misses by more than 0.6 of it is halved and taken again",
     )
     overlap: quantity("", gt=0) = Field(
-        0.1,
+        0.25,
         description="depth to which a block may be in another, the ground or a side of the tank, over the thickness "
         "of the thinner one: twice the distance of its nearest face from its centre of mass",
     )

@@ -10,6 +10,7 @@ from coupler.clock import Clock
 from coupler.exchange import Immersion
 from coupler.fill import start_level
 from coupler.loop import Coupling
+from fluid.covers import WIDE_OPENINGS
 from fluid.mesh import box_mesh
 from fluid.parameters import WaterParameters
 from fluid.water import Water
@@ -39,15 +40,17 @@ def tank(
     is_open=None,
     is_smooth=None,
     covers: str = "single",
+    openings: str = "all",
     split: str = "kuhn",
     **parameters,
 ) -> Coupling:
     """Water in [0, size] on cells (nx, ny, nz) with blocks and fixed solids; is_open, is_smooth: see `Water`;
-    split: see `box_mesh`.
+    split: see `box_mesh`; openings: "all" or "wide", of multiple covers, as in a case.
 
     fill: as in `Water`, or boxes (lower (3,), upper (3,)) filled like those of a case, which end at walls."""
     mesh = box_mesh(np.zeros(3), size, np.asarray(size, float) / np.asarray(cells), split=split)
-    immersion = Immersion(mesh, structure, list(solids), covers)
+    connection = WIDE_OPENINGS if openings == "wide" else None
+    immersion = Immersion(mesh, structure, list(solids), covers, connection=connection)
     parameters = WaterParameters(**({"density": DENSITY, "gravity": G} | parameters))
     if not callable(fill):
         fill = start_level(fill, (np.zeros(3), np.asarray(size, float)), mesh, immersion.domain)
