@@ -201,11 +201,8 @@ def _damp_surface(water, kept, u) -> None:
 
 
 def _limit_speed(water, u, a) -> int:
-    """|u| ≤ speed_limit sqrt(g H) in place; clipped nodes go on in free fall."""
-    p = water.parameters
-    low, high = water.mesh.bounds
-    limit = p.speed_limit * np.sqrt(p.gravity * (high - low)[2])
-    return _clip(u, a, limit, p.weight)
+    """|u| ≤ `Water.speed_cap` in place; clipped nodes go on in free fall."""
+    return _clip(u, a, water.speed_cap(), water.parameters.weight)
 
 
 @njit(cache=True)

@@ -17,7 +17,8 @@ class WaterParameters:
     divergence_damping: weight c_L of the element grad-div term.
     correction_length: κ/h, length over which the volume correction is spread.
     kick_limit: largest acceleration carried over to the next step in slow water, in g (`Water.largest_kick`).
-    speed_limit: cap of the speed in units of sqrt(g H), H the height of the tank; clipped nodes are counted.
+    speed_limit: cap of the speed in units of sqrt(g H), H the height of the tank (`Water.speed_cap`); clipped nodes are
+        counted.
     subscale_memory: keep the element-wise remainder of the velocity correction (added mass of bodies).
     advection: "semi-lagrangian", or "supg" for stabilised finite elements (the reference; slower).
     viscosity: dynamic viscosity [Pa s]; 0 leaves the term out.

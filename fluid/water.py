@@ -140,6 +140,7 @@ class Water:
         self.conserved_volume = float(self.nodal_water.sum())
         self.initial_volume = self.conserved_volume
         self._find_band()
+        self._start_speed = 0.0
         if velocity is not None:
             self._start_moving(velocity)
         self._renumbered, self._left_behind = None, None
@@ -149,6 +150,7 @@ class Water:
 
     def _start_moving(self, velocity) -> None:
         """Velocity (N, 3) [m/s] of the nodes that the step works on, and of the cells between them."""
+        self._start_speed = float(np.sqrt((velocity**2).sum(axis=1).max()))
         self.velocity[self.listed] = velocity[self.listed]
         self.hold(self.velocity, 0.0)
         self.cell_velocity = self.velocity[self.topology.cells].mean(axis=1)
@@ -195,6 +197,12 @@ class Water:
         stream aside within two cells, v²/(2 h).  More would throw spray on by the acceleration of an impact."""
         p = self.parameters
         return max(p.kick_limit * p.gravity, 0.5 * self.fastest() ** 2 / self.mesh.spacing)
+
+    def speed_cap(self) -> float:
+        """Largest speed [m/s] that is let stand: speed_limit sqrt(g H + v²/2) in a tank of height H whose water starts
+        with at most v; twice what the fall of all of it could give."""
+        p, (low, high) = self.parameters, self.mesh.bounds
+        return float(p.speed_limit * np.sqrt(p.gravity * (high - low)[2] + 0.5 * self._start_speed**2))
 
     def _counted(self):
         return (self.level_set < 0.0) & (self.topology.node_volume > LEAST_COUNTED * self.mesh.spacing**3)

@@ -137,9 +137,7 @@ def _start(width: float, n: int, angle: float, courant: float, suction: str):
 
     speed = np.zeros((len(domain.nodes), 3))
     speed[:, 0] = 1.0
-    parameters = WaterParameters(
-        density=DENSITY, gravity=GRAVITY, courant=courant, speed_limit=1e6, suction=suction
-    )
+    parameters = WaterParameters(density=DENSITY, gravity=GRAVITY, courant=courant, suction=suction)
     return Water(mesh, domain, fill, parameters, is_open, velocity=speed), front, along
 
 

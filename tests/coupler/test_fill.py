@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from coupler.fill import merged, start_level
+from coupler.fill import merged, start_level, start_velocity
 from fluid.bodies import ConvexBodies
 from fluid.domain import cut_domain
 from fluid.mesh import box_mesh
@@ -57,3 +57,13 @@ def test_boxes_become_one_where_they_fill_one():
     ]
     apart = [box, ((1.1, 0.0, 0.0), (2.0, 1.0, 1.0)), ((1.0, 0.0, 0.0), (1.1, 1.0, 0.5))]
     assert len(merged(apart, 1e-9)) == 3
+
+
+def test_water_starts_with_the_velocity_of_the_box_that_it_is_in():
+    """Of two boxes the one that a node lies in counts, beyond both the nearest; none where all water is at rest."""
+    boxes = [((0, 0, 0), (1, 1, 1)), ((2, 0, 0), (3, 1, 1))]
+    nodes = np.array([[0.5, 0.5, 0.5], [2.5, 0.5, 0.5], [1.2, 0.5, 0.5], [1.8, 0.5, 0.5], [0.5, 0.5, 4.0]])
+    found = start_velocity(boxes, [(3.0, 0.0, -1.0)], nodes)
+    np.testing.assert_array_equal(found[:, 0], [3.0, 0.0, 3.0, 0.0, 3.0])
+    np.testing.assert_array_equal(found[:, 2], [-1.0, 0.0, -1.0, 0.0, -1.0])
+    assert start_velocity(boxes, [(0.0, 0.0, 0.0)], nodes) is None

@@ -1,0 +1,28 @@
+"""Jets on plates: force and pressure where the water can only push, against free-streamline theory."""
+
+import numpy as np
+import pytest
+
+from coupler.verify.figures import columns
+from coupler.verify.jets import LIMITS, jet
+
+EXACT = dict(zip(*(columns("jet_on_plate")[name].tolist() for name in ("L_over_D", "F"))))
+
+
+@pytest.mark.parametrize(("width", "n"), [(1.0, 4), (2.0, 4), (8.0, 2), (1.0, 2)])
+def test_a_jet_of_a_few_cells_gives_a_plate_its_force(width, n):
+    """Momentum reaches the plate though the jet is two or four cells thick; half of it got lost along paths."""
+    assert jet(width, n).force == pytest.approx(EXACT[width], rel=LIMITS[n])
+
+
+def test_without_the_bound_the_edges_of_a_plate_are_pulled_at():
+    """Suction at the edges takes force off the plate; the bound lets air in there, as it is."""
+    bounded, pulled = jet(1.0, 4), jet(1.0, 4, suction="unlimited")
+    assert pulled.lowest < -0.5
+    assert bounded.pressure.min() >= 0.0
+    assert bounded.force > 1.05 * pulled.force
+
+
+def test_an_inclined_plate_takes_the_part_of_the_momentum_across_it():
+    force = jet(12.0, 2, angle=60.0).force
+    assert force == pytest.approx(np.sin(np.radians(60.0)), rel=0.08)
