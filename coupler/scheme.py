@@ -177,7 +177,7 @@ def _answer(bodies, inverse, force, velocity):
 class CoupledSolution:
     """x (n_dofs,) [Pa] · velocity (n_bodies, 6) [m/s, rad/s] at the end of the step · load (n_bodies, 6) [N, N m] on
     the bodies · restoring (n_bodies, 6): the part of it by which floating bodies are lifted less on their way ·
-    at_bound (n_dofs,) bool, parting (n_dofs,) [m³/s]: see `fluid.bounded`."""
+    at_bound (n_dofs,) bool, parting (n_dofs,) [m³/s], lower (n_dofs,) [Pa]: see `fluid.bounded`."""
 
     x: Array
     velocity: Array
@@ -186,6 +186,7 @@ class CoupledSolution:
     iterations: int
     at_bound: Array
     parting: Array
+    lower: Array
 
 
 def water_load(problem, x: Array) -> Array:
@@ -216,15 +217,16 @@ def solve_coupled(
         problem.rhs + wets.on_water(v_free),
         problem.guess if before is None else before.x,
         rtol,
-        lower=problem.lower,
+        lower=problem.lower if before is None else before.lower,
         at_bound=problem.at_bound if before is None else before.at_bound,
+        air=problem.air,
         extra=added_inertia if feels_water else None,
     )
     velocity = (v_free - response.compliance(wets.on_bodies(found.x))).reshape(-1, 6)
     restoring = response.restoring_load(velocity)
     load = water_load(problem, found.x) + restoring
     return CoupledSolution(
-        found.x, velocity, load, restoring, found.iterations, found.at_bound, found.parting
+        found.x, velocity, load, restoring, found.iterations, found.at_bound, found.parting, found.lower
     )
 
 

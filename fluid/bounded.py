@@ -16,6 +16,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
 from fluid.solve import MOST_ITERATIONS, NotConverged, conjugate_gradients, operators, solve
 
@@ -25,6 +26,8 @@ FAR_BELOW, SLACK = 1e-2, 1e-6
 """Shares of the largest |x|: how far x may lie below its bound while a round ends, and when it is done."""
 UNSETTLED = 10.0
 """Rate at which water may flow together at the bound, in residuals of the solver: it is no more exact than that."""
+REACH = 8
+"""Cells that air goes on within a step: it is faster than any water."""
 PATIENCE = 5
 """Rounds without fewer wrong signs after which single unknowns are exchanged."""
 MOST_ROUNDS = 100
@@ -32,12 +35,13 @@ MOST_ROUNDS = 100
 
 @dataclass(frozen=True)
 class BoundedResult:
-    """x (n,) · at_bound (n,) bool: held at the bound · parting (n,) [m³/s]: A x - b there, 0 elsewhere · iterations,
-    of all rounds · residual of the free rows over ‖b‖ · rounds."""
+    """x (n,) · at_bound (n,) bool: held at the bound · parting (n,) [m³/s]: A x - b there, 0 elsewhere · lower (n,):
+    bound at the end, None: there is none · iterations, of all rounds · residual of the free rows over ‖b‖ · rounds."""
 
     x: np.ndarray
     at_bound: np.ndarray
     parting: np.ndarray
+    lower: np.ndarray | None
     iterations: int
     residual: float
     rounds: int
@@ -50,26 +54,28 @@ def solve_bounded(
     rtol: float,
     lower=None,
     at_bound=None,
+    air=None,
     extra: Callable | None = None,
     most: int = MOST_ITERATIONS,
     kept: list | None = None,
 ) -> BoundedResult:
     """Problem (1) for A + extra to a residual of rtol ‖b‖.
 
-    lower (n,): bound l, None: there is none · at_bound (n,) bool: first guess of the set, None: empty · the other
-    arguments as in `solve`.  Without any unknown at the bound, x is that of `solve` to the last bit.
-    Raises NotConverged."""
+    lower (n,): bound l, None: there is none · at_bound (n,) bool: first guess of the set, None: empty · air (n,): bound
+    where air is, which the unknowns that it reaches beforehand have already; where water parts there, air goes on to
+    unknowns beside it that lie below `air`, REACH cells at most; None: it does not · the other arguments as in `solve`.
+    Without any unknown at the bound, x is that of `solve` to the last bit.  Raises NotConverged."""
     if lower is None:
         found = solve(A, b, x0, rtol, extra, most, kept)
         return BoundedResult(
-            found.x, np.zeros(len(b), bool), np.zeros(len(b)), found.iterations, found.residual, 1
+            found.x, np.zeros(len(b), bool), np.zeros(len(b)), None, found.iterations, found.residual, 1
         )
     held = np.zeros(len(b), bool) if at_bound is None else at_bound.copy()
     scale = np.linalg.norm(b)
     if scale == 0.0 and not held.any() and not (lower > 0.0).any():
-        return BoundedResult(np.zeros_like(b), held, np.zeros_like(b), 0, 0.0, 1)
+        return BoundedResult(np.zeros_like(b), held, np.zeros_like(b), lower, 0, 0.0, 1)
     apply, precondition = operators(A, extra, kept)
-    x, signs, iterations = np.array(x0, float), _Signs(lower), 0
+    x, signs, iterations, reach = np.array(x0, float), _Signs(lower), 0, 0
     for rounds in range(1, MOST_ROUNDS + 1):
         x[held] = lower[held]
         free = None if not held.any() else held
@@ -81,15 +87,20 @@ def solve_bounded(
             rtol,
             most,
             free,
-            lambda x, residual, held=held: signs.early(x, residual, held),
+            lambda x, residual, held=held, signs=signs: signs.early(x, residual, held),
         )
         x, iterations = found.x, iterations + found.iterations
         parting = apply(x) - b if free is not None else None
         wrong = signs.wrong(x, held, parting, UNSETTLED * rtol * scale)
         if not wrong.any():
-            if found.residual <= rtol:
-                apart = np.zeros_like(b) if parting is None else np.where(held, np.maximum(parting, 0.0), 0.0)
-                return BoundedResult(x, held, apart, iterations, found.residual, rounds)
+            if found.residual > rtol:
+                continue
+            apart = np.zeros_like(b) if parting is None else np.where(held, np.maximum(parting, 0.0), 0.0)
+            vented = _air_goes_on(A, x, apart, lower, air) if air is not None and reach < REACH else None
+            if vented is None or not vented.any():
+                return BoundedResult(x, held, apart, lower, iterations, found.residual, rounds)
+            lower, held, reach = np.where(vented, air, lower), held | vented, reach + 1
+            signs = _Signs(lower)
             continue
         held = signs.exchanged(held, wrong)
     raise NotConverged(
@@ -103,8 +114,27 @@ def solve_bounded(
 def solve_pressure(problem, rtol: float, moved=0.0) -> BoundedResult:
     """The pressure of a `projection.PressureProblem` whose bodies move as given: moved (n,) [m³/s], G V of theirs."""
     return solve_bounded(
-        problem.matrix, problem.rhs + moved, problem.guess, rtol, problem.lower, problem.at_bound
+        problem.matrix, problem.rhs + moved, problem.guess, rtol, problem.lower, problem.at_bound, problem.air
     )
+
+
+def _air_goes_on(A, x, apart, lower, air):
+    """(n,) bool: unknowns below the bound of air that it has not reached, beside those where it parts the water."""
+    source = (apart > 0.0) & (lower == air)
+    below = (x < air) & (lower < air)
+    if not source.any() or not below.any():
+        return None
+    return below & _beside(A.indptr, A.indices, source)
+
+
+@njit(cache=True)
+def _beside(indptr, indices, source):
+    """(n,) bool: rows with an entry in the column of a source (n,) bool."""
+    found = np.zeros(source.shape[0], np.bool_)
+    for i in range(source.shape[0]):
+        for s in range(indptr[i], indptr[i + 1]):
+            found[i] = found[i] or source[indices[s]]
+    return found
 
 
 class _Signs:

@@ -2,7 +2,8 @@
 
 Water open to the air cannot pull on a wall: air comes in, and the water parts from the wall.  Air reaches the nodes
 that share a cell with a dry one or with an open side, and from there a cell a step through water that has parted
-already.  Water that no air reaches parts where its pressure falls to that of its vapour.
+already; within a step it goes on where water parts (`bounded.py`).  Water that no air reaches parts where its pressure
+falls to that of its vapour.
 """
 
 from __future__ import annotations
@@ -47,12 +48,13 @@ class BoundMet:
         lowest = float(pressure.min(initial=0.0))
         if problem.bound is None:
             return cls(at_bound, ventilated, 0.0, 0.0, 0.0, lowest, 0.0)
-        met = x <= problem.lower
+        vented = x == problem.air  # also where air came to within the step
+        met = vented | (x <= problem.lower)
         at_bound[problem.dofs[met]] = True
-        ventilated[problem.dofs[met & (problem.bound == 0.0)]] = True
+        ventilated[problem.dofs[vented]] = True
         rate = 0.0 if parting is None else parting
         opened = problem.dt * float(np.sum(rate))
-        work = -problem.dt * float(np.sum(rate * problem.bound))
+        work = -problem.dt * float(np.sum(rate * np.where(vented, 0.0, problem.bound)))
         wall = 0.0
         if met.any():
             area = wall_area(water.mesh, water.domain)

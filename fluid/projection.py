@@ -62,6 +62,11 @@ class PressureProblem:
         """Bound of x (n,) [Pa]."""
         return None if self.bound is None else self.bound - self.known
 
+    @property
+    def air(self) -> np.ndarray | None:
+        """Bound of x (n,) [Pa] where air is."""
+        return None if self.bound is None else 0.0 - self.known
+
 
 @njit(cache=True)
 def _wet_matrix(dofs, column, graph_row, start, neighbour, stiffness, phi, open_node, scale, reserve):

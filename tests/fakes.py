@@ -21,6 +21,7 @@ class FakeProblem:
     other_load: np.ndarray
     lower: np.ndarray | None = None
     at_bound: np.ndarray | None = None
+    air: np.ndarray | None = None
 
 
 def piston_column(length=1.0, area=1.0, cells=10, dt=0.01, density=1000.0, known=0.0) -> FakeProblem:
@@ -51,9 +52,10 @@ class DirectResult:
     residual: float
     at_bound: np.ndarray | None = None
     parting: np.ndarray | None = None
+    lower: np.ndarray | None = None
 
 
-def direct_solve(A, b, x0, rtol, lower=None, at_bound=None, extra=None) -> DirectResult:
+def direct_solve(A, b, x0, rtol, lower=None, at_bound=None, air=None, extra=None) -> DirectResult:
     """The linear solver of the fakes: dense, exact, with the same call as the water's, without a bound."""
     dense = A.toarray()
     if extra is not None:

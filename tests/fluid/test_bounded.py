@@ -80,19 +80,18 @@ def plate_that_leaves(steps: int, **settings):
 
 
 def test_air_comes_under_a_plate_that_leaves_the_water():
-    """Beside the air the pressure does not fall below it; from there air comes in by a cell a step, so that after five
-    steps nothing holds the plate any more. Without the bound the water pulls at it with kilopascals for ever."""
+    """Beside the air the pressure does not fall below it; where the water parts there, air goes on at once, so that
+    nothing holds the plate. Without the bound the water pulls at it with kilopascals for ever."""
     water, bound, pressure, lift = plate_that_leaves(1)
     assert (bound == 0.0).any()
-    assert pressure[bound == 0.0].min() >= -1e-5 * np.abs(pressure).max()
-    assert pressure[bound < 0.0].min() < -1e3
+    assert (bound < 0.0).any()
+    assert pressure.min() >= -1e-5 * np.abs(pressure).max()
     assert water.report.bound.volume > 0.0
-    after = plate_that_leaves(6)
-    assert after[3] > -0.02 * abs(lift)
     _, none, free, pulled = plate_that_leaves(6, suction="unlimited")
     assert none is None
     assert free.min() < -1e3
     assert pulled < -1.0
+    assert lift > 0.02 * pulled
 
 
 def test_cavities_open_at_the_pressure_of_vapour_where_no_air_comes():
