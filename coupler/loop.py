@@ -19,7 +19,7 @@ from coupler.ledger import Balance, Ledger
 from coupler.limits import Diverged, Limits, check_finite, check_pressure, no_room
 from coupler.momentum import MomentumBalance, book_step, momentum_ledger
 from coupler.observe import fastest_point
-from coupler.step_limits import is_bad
+from coupler.step_limits import Attempt, attempt_of, best_of, volume_error
 from coupler.step_start import StepStart
 
 Array = np.ndarray
@@ -47,6 +47,8 @@ class StepRecord:
     bodies_cut: int = 0
     retries: int = 0
     """Times that the step was halved, and dt with it, because it failed or broke a limit."""
+    bad: bool = False
+    """Whether it stays although it breaks a limit, since shorter ones do so too."""
     wetted: bool = False
     """Whether water touched a body in this step."""
     load: Array = field(default_factory=lambda: np.zeros((0, 6)))
@@ -91,7 +93,7 @@ class Coupling:
         self.passes, self.tolerance = passes, tolerance
         self.pause: Callable[[], None] | None = None
         """Called between the parts of a step, where the run may be ended by an exception."""
-        self.defects = Defects(most_defect, step_max)
+        self.defects = Defects(most_defect)
         self.limits = limits
         self.water, self.structure, self.immersion = water, structure, immersion
         self.rtol, self.step_max, self.clock = rtol, step_max, clock
@@ -130,13 +132,14 @@ class Coupling:
 
     def step_size(self, remaining: float) -> float:
         """The largest step [s] that water, blocks and the case allow, dividing `remaining` evenly."""
-        dt = min(self.step_max, self.defects.longest)
+        dt = self.step_max
         if self.water is not None:
             dt = min(dt, self.water.stable_step())
         if self.coupled:
             speed = fastest_point(self.structure.velocity(), self.radius)
             if speed > 0.0:
                 dt = min(dt, BLOCK_COURANT * self.water.mesh.spacing / speed)
+        dt *= self.defects.share
         return remaining / max(1, math.ceil(remaining / dt * (1.0 - 1e-9)))
 
     def step(self, dt: float) -> StepRecord:
@@ -153,27 +156,43 @@ class Coupling:
         self._take_until_good(dt, record)
         if self.sheared is not None:
             self.sheared.note(before, record.shear_load[: self.structure.n], record.dt)
-        self.defects.note(self.time, record.dt, record.defect, record.retries)
+        self.defects.note(self.time, record)
         return record
 
     def _take_until_good(self, dt: float, record: StepRecord) -> None:
-        """A step of dt [s]; its half, and so on, where that has no solution or breaks a limit. The shortest one stays
-        also where it breaks one: whether the run stops there is for its caller to say.
+        """A step of dt [s]; its half, and so on, where that has no solution or breaks a limit. Where the shortest one
+        breaks one too, the better of it and the longest (`best_of`) stays: whether the run stops there is for its
+        caller to say.
 
-        Raises Diverged where the shortest one has no solution."""
-        start = self._start()
+        Raises Diverged where none has a solution."""
+        start, volume = self._start(), volume_error(self)
+        tried: list[Attempt] = []
         for record.retries in range(RETRIES + 1):
             record.dt = dt / 2**record.retries
             try:
                 self._take(record, start)
-                good = self._is_good(record)
             except self._failures() as error:
-                if record.retries == RETRIES:
+                if record.retries == RETRIES and not tried:
                     raise _no_way_on(self.time, error, record.dt) from error
-                good = False
-            if good or record.retries == RETRIES:
-                return
+            else:
+                attempt = self._judge(record, volume)
+                if not attempt.broken:
+                    return
+                tried.append(attempt)
+                if record.retries >= self.defects.halvings:
+                    break
             start.restore(self)
+        record.bad = True
+        self._keep(best_of(tried), tried[-1], dt, record, start)
+
+    def _keep(self, best: Attempt, last: Attempt, dt: float, record: StepRecord, start: StepStart) -> None:
+        """Take the best attempt once more, unless it is the one in which both sides stand."""
+        if best is last and record.retries == last.retries:
+            return
+        start.restore(self)
+        record.retries = best.retries
+        record.dt = dt / 2**best.retries
+        self._take(record, start)
 
     def _start(self) -> StepStart:
         with self.clock("water" if self.structure is None else "structure"):
@@ -189,11 +208,9 @@ class Coupling:
 
         return Diverged, NotConverged, NotFinite
 
-    def _is_good(self, record: StepRecord) -> bool:
-        """Whether the step that was just taken may stay."""
-        if record.wetted and self.defects.too_large(record.defect):
-            return False
-        return self.limits is None or not is_bad(self, record, self.limits)
+    def _judge(self, record: StepRecord, volume_before: float) -> Attempt:
+        """What the step that was just taken breaks."""
+        return attempt_of(self, record, self.limits, volume_before)
 
     def _take(self, record: StepRecord, start: StepStart | None) -> None:
         """One step of record.dt on both sides and in the books. Raises what the solvers say, and Diverged."""

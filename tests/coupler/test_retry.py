@@ -10,11 +10,11 @@ import pytest
 
 from coupler import loop
 from coupler.build import build
-from coupler.defects import MISSES, RETRIES, Defects
+from coupler.defects import MISSES, RETRIES, SHORTEST, Defects
 from coupler.limits import Diverged, Limits
 from coupler.loop import Coupling
 from coupler.momentum import book_step, momentum_ledger
-from coupler.step_limits import check_step
+from coupler.step_limits import Attempt, check_step
 from fluid.solve import NotConverged
 from tests.fakes import FreeBody, no_clock, piston_column
 from tests.physics.scenes import case
@@ -33,23 +33,24 @@ class Pipe:
     volume_off = 0.0
     body_velocity = pushed_by = moved_on = np.zeros((1, 6))
 
-    def __init__(self, fails_above=np.inf, gains_above=np.inf, gains=0.0):
-        """gains [J] in every step longer than gains_above."""
+    def __init__(self, fails_above=np.inf, gains_above=np.inf, gains=0.0, rate=0.0, fails_below=0.0):
+        """gains [J] in every step longer than gains_above; rate [W] in all."""
         self.fails_above, self.gains_above, self.gains = fails_above, gains_above, gains
+        self.fails_below, self.rate = fails_below, rate
         self.energy, self.taken = 0.0, []
 
     def stable_step(self):
         return 1.0
 
     def predict(self, dt):
-        if dt > self.fails_above:
+        if dt > self.fails_above or dt < self.fails_below:
             raise NotConverged("pressure solver did not converge.", np.zeros(1))
         problem = piston_column(dt=dt)
         return SimpleNamespace(**vars(problem) | {"predicted": SimpleNamespace(shear=None)}, dt=dt)
 
     def correct(self, problem, x, parting):
         self.taken.append(problem.dt)
-        self.energy += self.gains * (problem.dt > self.gains_above)
+        self.energy += self.gains * (problem.dt > self.gains_above) + self.rate * problem.dt
 
     def remember(self):
         return {"energy": self.energy, "taken": list(self.taken)}
@@ -93,15 +94,15 @@ def _no_books_of_momentum(monkeypatch):
     monkeypatch.setattr(Coupling, "_afloat", lambda self, problem: (problem, None))
 
 
-def coupling(pipe, piston, **more):
+def coupling(pipe, piston, step_max=0.1, **more):
     still = SimpleNamespace(update=lambda: False, moved_on=lambda: np.zeros((1, 6)), cut_again=0, n_solids=0)
-    return Coupling(pipe, piston, still, rtol=1e-10, step_max=1.0, clock=no_clock, **more)
+    return Coupling(pipe, piston, still, rtol=1e-10, step_max=step_max, clock=no_clock, **more)
 
 
 def test_a_good_step_is_taken_as_it_is():
     c = coupling(Pipe(), Piston())
     record = c.step(0.1)
-    assert (record.retries, record.dt, c.time, c.defects.longest) == (0, 0.1, 0.1, np.inf)
+    assert (record.retries, record.dt, c.time, c.defects.share) == (0, 0.1, 0.1, 1.0)
 
 
 @pytest.mark.parametrize(("pipe", "piston"), [(Pipe(0.03), Piston()), (Pipe(), Piston(0.03))])
@@ -125,17 +126,21 @@ def test_a_solver_that_never_converges_stops_the_run_with_what_it_said():
 
 
 def test_blocks_that_never_follow_stop_the_run_and_say_which_limit():
-    """One step may miss, as when a joint breaks; several in a row at their shortest are no chance."""
+    """One step may miss, as when a joint breaks; several in a row are no chance. Shorter ones miss as much, so the
+    whole one stays."""
     c = coupling(Pipe(), Piston(0.0))
-    for _ in range(MISSES - 1):
-        assert c.step(0.1).retries == RETRIES
+    for number in range(1, MISSES):
+        record = c.step(0.1)
+        assert (record.retries, record.dt, record.bad) == (0, 0.1, True)
+        assert c.time == pytest.approx(0.1 * number)
+        assert c.step_size(1.0) == 0.1
     with pytest.raises(Diverged, match=r"3 steps in a row.*limits\.defect.*coupling\.passes"):
         c.step(0.1)
 
 
 def alone(pipe):
     """Water without blocks."""
-    return Coupling(pipe, None, None, rtol=1e-10, step_max=1.0, clock=no_clock, limits=LIMITS)
+    return Coupling(pipe, None, None, rtol=1e-10, step_max=0.1, clock=no_clock, limits=LIMITS)
 
 
 LIMITS = Limits(volume_error=0.02, energy_error=0.05, cpu_seconds=None)
@@ -160,19 +165,77 @@ def test_a_step_that_gains_little_stays():
 def test_a_limit_that_shorter_steps_do_not_keep_is_reported_with_the_place():
     c = alone(Pipe(gains_above=0.0, gains=0.1))
     record = c.step(0.1)
-    assert record.retries == RETRIES
+    assert (record.retries, record.bad) == (0, True)
     with pytest.raises(Diverged, match=r"energy balance.*fastest, 3 m/s, at \(0\.1, 0\.2, 0\.3\) m\. Reduce"):
         check_step(c, record, LIMITS)
 
 
 def test_water_that_lost_its_volume_is_stepped_again():
+    """Shorter steps lose none, so none helps."""
     pipe = Pipe()
     pipe.volume_off = 0.03
     c = alone(pipe)
+    taken = []
+    c._take = lambda record, start: (taken.append(record.dt), Coupling._take(c, record, start))
     record = c.step(0.1)
-    assert record.retries == RETRIES
+    assert taken == [0.1, 0.05, 0.025, 0.0125, 0.1]
+    assert (record.retries, record.dt) == (0, 0.1)
     with pytest.raises(Diverged, match="water volume"):
         check_step(c, record, LIMITS)
+
+
+STEADY = 0.12
+"""[J] in 0.1 s: 1.5 times what a step may put out of balance even in its eighth."""
+
+
+def test_what_goes_wrong_as_fast_in_shorter_steps_leaves_the_step_as_it_is():
+    """Shorter steps take it in more pieces, no less in all. The run has gained so much that none of them ends it."""
+    c = alone(Pipe(rate=STEADY / 0.1))
+    c._judge = not_ending(c)
+    for _ in range(3):
+        record = c.step(c.step_size(1.0))
+        assert (record.retries, record.bad) == (0, True)
+        assert record.dt == pytest.approx(0.1, rel=0.2)
+    assert c.water.energy == pytest.approx(STEADY / 0.1 * c.time)
+
+
+def not_ending(c):
+    """As `Coupling._judge`, of a run that goes on."""
+    return lambda record, volume: replace(Coupling._judge(c, record, volume), ends=False)
+
+
+def test_only_the_longest_ends_the_run_so_the_shortest_stays():
+    """10 % of the energy at once would end it; the last eighth of that does not."""
+    c = alone(Pipe(rate=STEADY / 0.1))
+    record = c.step(0.1)
+    assert (record.retries, record.dt, record.bad) == (RETRIES, 0.0125, True)
+    check_step(c, record, LIMITS)
+
+
+def test_no_row_of_bad_steps_makes_them_shorter_than_three_halvings_do():
+    """What the blocks miss falls with the step, but never enough."""
+    c = coupling(Pipe(), Piston())
+    c._judge = lambda record, volume: Attempt(
+        record.retries, {"defect": record.dt}, frozenset({"defect"}), False
+    )
+    steps = [c.step(c.step_size(100.0)) for _ in range(40)]
+    assert steps[0].dt == pytest.approx(0.1 * SHORTEST)
+    assert min(record.dt for record in steps) > 0.99 * 0.1 * SHORTEST
+    assert all(record.bad for record in steps)
+
+
+def test_halves_without_a_solution_leave_the_whole_one():
+    """It gains too much, but shorter ones do not even have a pressure."""
+    c = alone(Pipe(gains_above=0.0, gains=0.02, fails_below=0.1))
+    record = c.step(0.1)
+    assert (record.retries, record.dt, record.bad, c.water.taken) == (0, 0.1, True, [0.1])
+
+
+def test_a_step_without_a_solution_is_halved_although_it_is_short_already():
+    c = coupling(Pipe(0.1 * SHORTEST / 2), Piston())
+    c.defects.share = SHORTEST
+    assert c.step(0.1 * SHORTEST).retries == 1
+    assert c.defects.share == SHORTEST
 
 
 def splash(**sections):
@@ -215,7 +278,9 @@ def after_steps(c, good):
     for _ in range(3):
         c.step(0.01)
     verdicts = iter(good)
-    c._is_good = lambda record: next(verdicts, True)
+    c._judge = lambda record, volume: Attempt(
+        0, {}, frozenset() if next(verdicts, True) else {"defect"}, False
+    )
     dt = 0.005 * 2 ** (len(good) - 1)
     assert c.step(dt).retries == len(good) - 1
     c.step(0.005)
@@ -232,11 +297,12 @@ def test_what_a_retry_leaves_behind_is_saved_and_restored():
     first, second = coupling(Pipe(0.03), Piston()), coupling(Pipe(), Piston())
     first.step(0.1)
     second.restore(first.save())
-    assert second.step_size(1.0) == first.step_size(1.0)
+    assert second.step_size(1.0) == first.step_size(1.0) == 0.025
+    assert second.defects.halvings == first.defects.halvings == 1
 
 
 def test_a_step_is_taken_again_from_three_fifths_of_the_largest_defect_on():
-    defects = Defects(0.5, 0.01)
+    defects = Defects(0.5)
     assert not defects.too_large(0.6 * 0.5)
     assert defects.too_large(0.61 * 0.5)
     assert defects.too_large(np.nan)
