@@ -37,9 +37,9 @@ class Pairs(NamedTuple):
     """a < b (p,) bodies; b may be a plane · start (p+1,) first slot: the nodes of a, those of b, then
     one for edges that cross
 
-    fresh (p,) bool: contact takes over from a joint, with the depth there is · touching (p,) bool: had contacts last
-    time · calm (p,) [m]: way that the two must move before they can touch · overlap (p,) [m]: way that parts them,
-    zero if they are apart.
+    fresh (p,): contact begins with the depth there is, what held the two until now having this share of its stiffness;
+    0: it does not · touching (p,) bool: had contacts last time · calm (p,) [m]: way that the two must move before they
+    can touch · overlap (p,) [m]: way that parts them, zero if they are apart.
     """
 
     a: Array

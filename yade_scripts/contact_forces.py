@@ -23,7 +23,8 @@ class ContactForces:
     """Contacts of the blocks with what `neighbours` says is near.
 
     blocks, planes: in the scene's coordinates · face_stiffness (n,) K [N/m] · neighbours(now) → (p, 2) pairs of
-    rows whose bounding boxes are close · reach [m]: how far a block can move before `neighbours` is asked again
+    rows whose bounding boxes are close · closing (n,): K of the faces while joints hold them [N/m] · reach [m]: how far
+    a block can move before `neighbours` is asked again
     free (n,) bool: motion not prescribed.
 
     Running sums [J]: taken by dashpots, by friction and by springs let go; driving: put in by driven blocks.
@@ -35,6 +36,7 @@ class ContactForces:
         planes: list[FixedPlane],
         law: ContactLaw,
         face_stiffness: Array,
+        closing: Array,
         free: Array,
         motion: Motion,
         neighbours: Callable[[bool], Array],
@@ -51,6 +53,7 @@ class ContactForces:
         self._law = Law(
             law.shear_ratio, law.damping_ratio, law.tangential_damping_ratio, law.friction_table(materials)
         )
+        self._closing = np.concatenate([closing, np.full(len(planes), np.inf)])
         self._free = np.concatenate([free, np.zeros(len(planes), bool)])
         self._nodes = np.diff(self._shapes.node_start)
         self._on = np.zeros(self._n, bool)
@@ -107,15 +110,24 @@ class ContactForces:
         start = np.concatenate([[0], np.cumsum(size)]).astype(np.int64)
         total = int(start[-1])
         slots = Slots.empty(total)
-        fresh, known, touching = (np.zeros(len(a), bool) for _ in range(3))
+        known, touching = (np.zeros(len(a), bool) for _ in range(2))
+        fresh = np.zeros(len(a))
         if hasattr(self, "_pairs") and len(self._pairs.a):
             known = self._carry(a, b, start, fresh, touching, slots)
-        if as_deep or parted is not None:
-            fresh |= ~known & (as_deep or np.isin(self._key(a, b), parted))
+        if as_deep:
+            fresh[~known] = 1.0
+        elif parted is not None:
+            begins = ~known & np.isin(self._key(a, b), parted)
+            fresh[begins] = self._joint_share(a[begins], b[begins])
         self._pairs = Pairs(a, b, start, fresh, touching, np.zeros(len(a)), np.zeros(len(a)))
         self._slots = slots
         if not hasattr(self, "_rows") or len(self._rows.a) < total:
             self._rows = empty_rows(total + total // 4)
+
+    def _joint_share(self, a: Array, b: Array) -> Array:
+        """Stiffness of the joints that held the pairs a, b (k,) over that of their contact."""
+        K = self._bodies.stiffness
+        return (1.0 / K[a] + 1.0 / K[b]) / (1.0 / self._closing[a] + 1.0 / self._closing[b])
 
     def _carry(self, a, b, start, fresh: Array, touching: Array, slots: Slots) -> Array:
         """Copy the slots of pairs that were known before; (p,) bool."""

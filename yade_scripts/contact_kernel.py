@@ -63,7 +63,7 @@ def contact_forces(shapes, bodies, law, pairs, slots, x, v, R, dt, last_dt, rows
         pairs.overlap[p] = max(0.0, -apart)
         if slots.face[last] >= 0:
             pairs.overlap[p] = min(pairs.overlap[p], rows.depth[count - 1] + slots.rest[last])
-        pairs.fresh[p], pairs.touching[p] = False, count > first
+        pairs.fresh[p], pairs.touching[p] = 0.0, count > first
         if count > first:
             yields, K = set_dashpots(bodies, law, a, b, R, rows, first, count, scratch)
             mode = Mode(law.zeta, np.sqrt(yields * K))

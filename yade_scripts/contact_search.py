@@ -10,7 +10,7 @@ import numpy as np
 
 from yade_scripts.contact_arrays import BEGINS
 from yade_scripts.contact_edges import crossing, find_crossing
-from yade_scripts.contact_springs import ARRIVED, let_go, stiffness_together, way_of
+from yade_scripts.contact_springs import ARRIVED, let_go, stiffness_together, take_over, way_of
 from yade_scripts.jit import inner
 
 ALIGNED = 0.02
@@ -122,7 +122,10 @@ def scan(
             slots.shear[s, 0] = slots.shear[s, 1] = slots.shear[s, 2] = 0.0
             slots.push[s] = BEGINS
             way_of(v, R, x, a, b, xi0, xi1, xi2, planes[g], last_dt, scratch, way)
-            slots.rest[s] = 0.0 if fresh else max(0.0, depth - ARRIVED * max(way[1, 0], 0.0))
+            if fresh > 0.0:
+                lost += take_over(slots, s, fresh, depth, way[1, 0])
+            else:
+                slots.rest[s] = max(0.0, depth - ARRIVED * max(way[1, 0], 0.0))
         slots.rest[s] = min(slots.rest[s], depth)
         _write_row(rows, count, a, b, s, planes[g], depth, xi0, xi1, xi2, x, R)
         rows.depth[count], rows.kn[count] = depth - slots.rest[s], slots.k[s]
@@ -153,7 +156,10 @@ def cross(
         slots.shear[s, 0] = slots.shear[s, 1] = slots.shear[s, 2] = 0.0
         slots.push[s] = BEGINS
         way_of(v, R, x, a, b, xi[0], xi[1], xi[2], plane, last_dt, scratch, way)
-        slots.rest[s] = 0.0 if fresh else max(0.0, depth - ARRIVED * max(way[1, 0], 0.0))
+        if fresh > 0.0:
+            lost += take_over(slots, s, fresh, depth, way[1, 0])
+        else:
+            slots.rest[s] = max(0.0, depth - ARRIVED * max(way[1, 0], 0.0))
     slots.rest[s] = min(slots.rest[s], depth)
     _write_row(rows, count, a, b, s, plane, depth, xi[0], xi[1], xi[2], x, R)
     rows.depth[count], rows.kn[count] = depth - slots.rest[s], slots.k[s]

@@ -331,6 +331,19 @@ def stiffness_together(K_a, K_b):
 
 
 @inner
+def take_over(slots, s, share, depth, into):
+    """Begin a contact at the depth there is [m], where a spring of `share` of its stiffness held until now: with the
+    force that this had, or the depth there is where contact is softer; → what of its energy is lost [J], half a substep
+    ago.
+
+    into [m]: of `way_of` over the last substep. A stiffer spring that took on all of the depth would push the blocks
+    apart with energy from nowhere."""
+    u = min(share, 1.0) * depth
+    slots.rest[s] = depth - u
+    return 0.5 * slots.k[s] * (share * depth * max(depth - into, 0.0) - u * max(u - into, 0.0))
+
+
+@inner
 def let_go(slots, s, shear, depth, way, R, b):
     """End a contact; what its springs still held is lost [J], half a substep ago.
 

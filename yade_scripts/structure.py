@@ -166,6 +166,7 @@ class Structure(StructureReadings):
             planes,
             self.contact,
             self.face_stiffness,
+            self.face_stiffness if self.joints is None else matched_stiffness(self.blocks, self.joints),
             ~self.fixed,
             self._motion,
             scene.neighbours,
