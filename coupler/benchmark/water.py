@@ -25,7 +25,7 @@ STAGES = {
     ),
     "pressure matrix": (("predictor", "_problem"),),
     "solver, set-up": (("solve", "Multigrid"),),
-    "solver, iterations": (("solve", "solve"),),
+    "solver, iterations": (("bounded", "solve_bounded"),),
     "correction": (
         ("corrector", "_projected"),
         ("corrector", "_remainders"),

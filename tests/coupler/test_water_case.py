@@ -10,6 +10,7 @@ from coupler.case_checks import problems, remarks
 from coupler.forecast import forecast
 from coupler.limits import Diverged, check_pressure
 from coupler.side_energy import side_energy
+from fluid import bounded
 from fluid.solve import NotConverged
 from tests.fakes import no_clock
 
@@ -286,7 +287,8 @@ def test_wave_onto_a_beach_keeps_its_books():
     assert record.balance.energy_error < 0.02
     # the crest brings c H in a second over the width, give or take the coarse cells
     assert max(row["q_flux"] for row in rows) == pytest.approx(2.33 * 0.05 * 0.2, rel=0.25)
-    assert max(row["p_peak"] for row in rows) == pytest.approx(9810 * 0.45, rel=0.05)
+    # the first tenth of a second, in which inflow and sea set the still water moving at once, left out
+    assert max(row["p_mean"] for row in rows[6:]) == pytest.approx(9810 * 0.45, rel=0.02)
 
 
 def test_a_stone_that_covers_gauges_leaves_their_cells_empty():
@@ -335,11 +337,11 @@ def test_a_pressure_that_is_not_found_is_told_with_its_place_and_cause(monkeypat
     """Words of moving solids were told where there are none."""
     coupling = build(case(water), no_clock).coupling
 
-    def fails(A, b, x0, rtol):
-        assert np.isfinite(b).all()
+    def fails(problem, rtol):
+        assert np.isfinite(problem.rhs).all()
         raise NotConverged("no way", np.ones(1), unknown=7)
 
-    monkeypatch.setattr(type(coupling), "_solve", property(lambda self: fails))
+    monkeypatch.setattr(bounded, "solve_pressure", fails)
     dofs = coupling.water.predict(1e-3).dofs
     place = ", ".join(f"{x:.3g}" for x in coupling.water.topology.nodes[dofs[7]])
     with pytest.raises(Diverged) as error:
