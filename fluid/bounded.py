@@ -96,7 +96,7 @@ def solve_bounded(
             if found.residual > rtol:
                 continue
             apart = np.zeros_like(b) if parting is None else np.where(held, np.maximum(parting, 0.0), 0.0)
-            vented = _air_goes_on(A, x, apart, lower, air) if air is not None and reach < REACH else None
+            vented = _air_goes_on(A, x, lower, air) if air is not None and reach < REACH else None
             if vented is None or not vented.any():
                 return BoundedResult(x, held, apart, lower, iterations, found.residual, rounds)
             lower, held, reach = np.where(vented, air, lower), held | vented, reach + 1
@@ -118,10 +118,16 @@ def solve_pressure(problem, rtol: float, moved=0.0) -> BoundedResult:
     )
 
 
-def _air_goes_on(A, x, apart, lower, air):
+def at_air(x, air):
+    """(n,) bool: where x is at the bound of air, to the slack of the solver: a hair above it may not decide where air
+    comes next."""
+    return x <= air + SLACK * np.abs(x).max(initial=0.0)
+
+
+def _air_goes_on(A, x, lower, air):
     """(n,) bool: unknowns below the bound of air that it has not reached, beside those where it parts the water."""
-    source = (apart > 0.0) & (lower == air)
-    below = (x < air) & (lower < air)
+    near = at_air(x, air)
+    source, below = near & (lower == air), near & (lower < air)
     if not source.any() or not below.any():
         return None
     return below & _beside(A.indptr, A.indices, source)

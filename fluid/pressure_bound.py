@@ -13,6 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
+from fluid.bounded import at_air
+
 
 def lowest_pressure(water, graph, dofs, phi) -> np.ndarray | None:
     """Bound (n,) [Pa] of the pressure at the wet nodes dofs (n,) of the level set φ (N,) [m]; None: there is none."""
@@ -50,8 +52,9 @@ class BoundMet:
             return cls(at_bound, ventilated, 0.0, 0.0, 0.0, lowest, 0.0)
         vented = x == problem.air  # also where air came to within the step
         met = vented | (x <= problem.lower)
+        open_ = at_air(x, problem.air) & (vented | (problem.bound == 0.0))
         at_bound[problem.dofs[met]] = True
-        ventilated[problem.dofs[vented]] = True
+        ventilated[problem.dofs[open_]] = True
         rate = 0.0 if parting is None else parting
         opened = problem.dt * float(np.sum(rate))
         work = -problem.dt * float(np.sum(rate * np.where(vented, 0.0, problem.bound)))

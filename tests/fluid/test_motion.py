@@ -90,13 +90,14 @@ def test_a_straight_dam_break_stays_straight():
 
 def test_symmetric_scene_stays_symmetric():
     """Kuhn's split is the same after x and y are swapped, so a column in the corner must spread alike both ways: to
-    round-off at first, then to the ties between equally close surface polygons (1e-3 of the speed)."""
+    round-off at first, then to the ties between equally close surface polygons: 1e-3 h in the level set after three
+    steps, which water that falls freely carries on to some hundredths of its speed."""
     water = tank(
         [1, 1, 0.75], 0.125, lambda x: np.max([x[:, 0] - 0.42, x[:, 1] - 0.42, x[:, 2] - 0.55], axis=0)
     )
     x = np.round(water.topology.nodes, 9)
     order, mirrored = np.lexsort(x[:, [0, 1, 2]].T), np.lexsort(x[:, [1, 0, 2]].T)
-    for limit in (1e-12, 5e-3):
+    for limit in (1e-12, 5e-2):
         for _ in range(3 if limit < 1e-3 else 9):
             advance(water, rtol=1e-10)
         np.testing.assert_allclose(
