@@ -107,7 +107,7 @@ def solve_bounded(
         f"the bound of the pressure was not settled in {MOST_ROUNDS} rounds: {int(wrong.sum())} of {len(b)} unknowns "
         "still change sides. Reduce time.cfl.",
         np.array([found.residual]),
-        int(np.flatnonzero(wrong)[-1]),
+        int(np.flatnonzero(wrong)[-1]) if wrong.any() else None,
     )
 
 
