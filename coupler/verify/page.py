@@ -21,7 +21,7 @@ NOTES = {
     "P40": "P3 is 1.2 cells below the edge of the box. With one unknown for both faces of the edge it reads 0.45 to "
     "0.81 of the measured impulse on cells of 4.2 to 6.3 cm, with unknowns of their own 0.69 to 0.83; what is missing "
     "then is the first 40 ms, since the front comes that late ([theory](theory.md#3-coupling)).",
-    "P62": "On one cell over the jet a plate of half its width is thinner than what a node sees.",
+    "P62": "Next to an edge the pressure goes like the square root of the distance; linear cells spread that over two.",
     "P63": "At 60 degrees the force is 6 to 7 % too large on all cells: the sheet that runs back along the plate is a "
     "quarter as thick as the jet.",
     "P42": "The wave is less than half a cell high, its run-up one to two cells of water; where the tongue tears off "
