@@ -8,7 +8,6 @@ from __future__ import annotations
 import contextlib
 import copy
 import json
-import os
 import random
 import shutil
 import signal
@@ -210,8 +209,3 @@ def write(folder: Path, content: bytes | str) -> Path:
     path = folder / "case.toml"
     path.write_bytes(content if isinstance(content, bytes) else content.encode("utf-8", "surrogatepass"))
     return folder
-
-
-def number_of(usual: int) -> int:
-    """How many inputs are tried; SURGEBREAK_FUZZ multiplies it."""
-    return usual * int(os.environ.get("SURGEBREAK_FUZZ", "1"))
