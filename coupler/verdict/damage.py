@@ -1,0 +1,208 @@
+"""Damage of groups of blocks: how many joints broke, how much weight left its place, and what state that is.
+
+Plain arrays in, one `Damage` a group out, for any division of the blocks: walls and floors of one building, storeys,
+buildings of a town. It knows neither a run nor YADE, so that a table of a finished run does as well.
+
+State       rule (keys of [verdict])
+stands      no more than `damaged_joints` of the joined area is broken, and no block has left its place
+damaged     anything else that is not collapsed
+collapsed   at least `collapsed_weight` of the weight has left its place, or at least `collapsed_joints` of the joined
+            area is broken, where the case gives that key
+
+A block has left its place when its centre has moved by `moved` of its thickness (the smallest width across a face
+through its centre of mass, as for limits.overlap).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+
+Array = np.ndarray
+NOWHERE = -1
+"""Label of a block that belongs to no group, and of the ground."""
+
+
+class State(IntEnum):
+    """In the order of severity, so that states of a sweep can be counted from one upwards."""
+
+    STANDS = 0
+    DAMAGED = 1
+    COLLAPSED = 2
+
+    @property
+    def word(self) -> str:
+        """As it is told."""
+        return self.name.lower()
+
+
+@dataclass(frozen=True)
+class Rules:
+    """Shares (0 to 1) from which a group counts as damaged and as collapsed; see the head of this file."""
+
+    moved: float = 0.1
+    damaged_joints: float = 0.0
+    collapsed_weight: float = 0.2
+    collapsed_joints: float | None = None
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """mass (n,) [kg] · thickness (n,) [m] · moved (n,) [m]: how far each centre has moved since the start, the farthest
+    so far"""
+
+    mass: Array
+    thickness: Array
+    moved: Array
+
+    def left(self, rules: Rules) -> Array:
+        """(n,) bool: blocks that have left their place."""
+        return self.moved > rules.moved * self.thickness
+
+
+@dataclass(frozen=True)
+class Joints:
+    """a, b (J,) rows of the blocks, negative for the ground · area (J,) [m²] · broken (J,) [s]: time of failure, NaN
+    while it holds"""
+
+    a: Array
+    b: Array
+    area: Array
+    broken: Array
+
+    @classmethod
+    def none(cls) -> Joints:
+        """Of blocks that are not glued."""
+        return cls(np.zeros(0, int), np.zeros(0, int), np.zeros(0), np.zeros(0))
+
+
+@dataclass(frozen=True)
+class Damage:
+    """What happened to one group.
+
+    blocks, blocks_moved: number of all, and of those that left their place · joints, joints_broken · area_broken: share
+    of the joined area · weight_moved: share of the weight that left its place · farthest [m] and farthest_block: the
+    way of the block that moved most, and its row · first_break [s] and first_joint: time and row of the first joint
+    that broke, None and -1 without one · state · rule: the sentence that decided it
+    """
+
+    name: str
+    blocks: int
+    blocks_moved: int
+    joints: int
+    joints_broken: int
+    area_broken: float
+    weight_moved: float
+    farthest: float
+    farthest_block: int
+    first_break: float | None
+    first_joint: int
+    state: State
+    rule: str
+
+    @property
+    def joined(self) -> bool:
+        """Whether anything of it was glued at the start."""
+        return self.joints > 0
+
+    @property
+    def word(self) -> str:
+        """The state in words: what was never glued cannot break, it is moved or carried away."""
+        if self.joined:
+            return self.state.word
+        return ("in place", "moved", "carried away")[self.state]
+
+
+def damage(label: Array, names: Sequence[str], blocks: Blocks, joints: Joints, rules: Rules) -> list[Damage]:
+    """The damage of each group, in the order of names.
+
+    label (n,): number of the group of each block, NOWHERE for none. A joint belongs to the groups of both of its
+    blocks: a crack between a wall and a floor is damage to either. Groups without blocks are whole.
+    """
+    label = np.asarray(label)
+    left = blocks.left(rules)
+    of_a, of_b = _labels_of(label, joints.a), _labels_of(label, joints.b)
+    return [
+        _of_group(
+            name,
+            np.flatnonzero(label == k),
+            np.flatnonzero((of_a == k) | (of_b == k)),
+            blocks,
+            joints,
+            left,
+            rules,
+        )
+        for k, name in enumerate(names)
+    ]
+
+
+def _labels_of(label: Array, rows: Array) -> Array:
+    """Group of each row; NOWHERE for the ground."""
+    return (
+        np.where(rows < 0, NOWHERE, label[np.maximum(rows, 0)]) if len(label) else np.full(len(rows), NOWHERE)
+    )
+
+
+def _of_group(name, rows, own, blocks: Blocks, joints: Joints, left: Array, rules: Rules) -> Damage:
+    """rows: of its blocks · own: rows of its joints."""
+    broken = own[np.isfinite(joints.broken[own])]
+    first = broken[np.argmin(joints.broken[broken])] if len(broken) else -1
+    farthest = rows[np.argmax(blocks.moved[rows])] if len(rows) else -1
+    area = _share(joints.area[broken].sum(), joints.area[own].sum())
+    weight = _share(blocks.mass[rows[left[rows]]].sum(), blocks.mass[rows].sum())
+    moved = int(left[rows].sum())
+    state, rule = state_of(area, weight, moved, rules)
+    return Damage(
+        name=name,
+        blocks=len(rows),
+        blocks_moved=moved,
+        joints=len(own),
+        joints_broken=len(broken),
+        area_broken=area,
+        weight_moved=weight,
+        farthest=float(blocks.moved[farthest]) if farthest >= 0 else 0.0,
+        farthest_block=int(farthest),
+        first_break=float(joints.broken[first]) if first >= 0 else None,
+        first_joint=int(first),
+        state=state,
+        rule=rule,
+    )
+
+
+def state_of(area_broken: float, weight_moved: float, blocks_moved: int, rules: Rules) -> tuple[State, str]:
+    """The state and the rule that decided it, from shares of the joined area and of the weight."""
+    if weight_moved >= rules.collapsed_weight and blocks_moved:
+        return State.COLLAPSED, (
+            f"{weight_moved:.0%} of its weight left its place (verdict.collapsed_weight: {rules.collapsed_weight:.0%})"
+        )
+    if rules.collapsed_joints is not None and area_broken >= rules.collapsed_joints:
+        return State.COLLAPSED, (
+            f"{area_broken:.0%} of its joined area is broken (verdict.collapsed_joints: {rules.collapsed_joints:.0%})"
+        )
+    if blocks_moved:
+        return (
+            State.DAMAGED,
+            f"{_count(blocks_moved, 'block')} left {'its' if blocks_moved == 1 else 'their'} place",
+        )
+    if area_broken > rules.damaged_joints:
+        return State.DAMAGED, f"{_percent(area_broken)} of its joined area is broken"
+    if area_broken > 0.0:
+        return State.STANDS, (
+            f"{_percent(area_broken)} of its joined area is broken (verdict.damaged_joints: {rules.damaged_joints:.0%})"
+        )
+    return State.STANDS, "no joint broke and no block left its place"
+
+
+def _share(part: float, whole: float) -> float:
+    return float(part / whole) if whole > 0.0 else 0.0
+
+
+def _percent(share: float) -> str:
+    return f"{share:.0%}" if share >= 0.01 else f"{share:.2%}"
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}{'' if number == 1 else 's'}"
