@@ -1,4 +1,7 @@
-"""Compiled kernels need a folder: the home, else one among the temporary files, else a word about it."""
+"""Compiled kernels need a folder: the home, else one among the temporary files, else a word about it.
+
+In it each module has one folder for each state of its source and of what it imports.
+"""
 
 import os
 import tempfile
@@ -6,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from coupler.kernel_cache import NoCache, use_kernel_cache
+from coupler import kernel_cache
+from coupler.kernel_cache import KEPT, ByContent, NoCache, use_kernel_cache
 
 
 @pytest.fixture
@@ -15,6 +19,7 @@ def places(tmp_path, monkeypatch):
     for name in ("home", "temporary"):
         (tmp_path / name).mkdir()
     monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    monkeypatch.setenv("NUMBA_CACHE_LOCATOR_CLASSES", "")  # so that what is set is undone
     monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
@@ -53,3 +58,75 @@ def test_a_folder_that_somebody_else_prepared_is_not_used(places, monkeypatch):
     (places / "temporary" / "surgebreak-12345").mkdir()
     with pytest.raises(NoCache, match=r"compiled kernels can be kept nowhere .*XDG_CACHE_HOME=DIR"):
         chosen(monkeypatch)
+
+
+SOURCES = {
+    "fluid/edges.py": "from fluid.signs import (\n    plus,\n    minus,\n)\nimport numpy\n",
+    "fluid/signs.py": "from fluid import edges, parts\n",
+    "fluid/parts/__init__.py": "",
+    "fluid/parts/halves.py": "",
+    "fluid/levels.py": "from fluid.parts import halves\n",
+    "coupler/levels.py": "",
+}
+
+
+@pytest.fixture
+def checkout(tmp_path, monkeypatch):
+    """Makes a checkout with SOURCES, in which the cache then looks, and gives a function: file -> folder."""
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kernels"))
+
+    def make(name, **edited):
+        root = tmp_path / name
+        for file, text in (SOURCES | edited).items():
+            (root / file).parent.mkdir(parents=True, exist_ok=True)
+            (root / file).write_text(text)
+        monkeypatch.setattr(kernel_cache, "ROOT", root)
+        kernel_cache._folder.cache_clear()
+        kernel_cache._imports.cache_clear()
+        return lambda file: ByContent.from_function(None, str(root / file)).get_cache_path()
+
+    yield make
+    kernel_cache._folder.cache_clear()
+    kernel_cache._imports.cache_clear()
+
+
+@pytest.mark.parametrize(
+    ("edited", "anew"),
+    [
+        ("fluid/edges.py", {"fluid/edges.py", "fluid/signs.py"}),  # the two import one another
+        ("fluid/signs.py", {"fluid/edges.py", "fluid/signs.py"}),
+        (
+            "fluid/parts/__init__.py",
+            {"fluid/edges.py", "fluid/signs.py", "fluid/levels.py", "fluid/parts/__init__.py"},
+        ),
+        ("fluid/parts/halves.py", {"fluid/levels.py", "fluid/parts/halves.py"}),
+        ("coupler/levels.py", set()),
+    ],
+)
+def test_an_edit_compiles_again_what_imports_it_and_nothing_else(checkout, edited, anew):
+    """A kernel has the code of the kernels that it calls in it: with the old one of these it would be wrong."""
+    kernels = [file for file in SOURCES if file.startswith("fluid")]
+    folder = checkout("here")
+    before = {file: folder(file) for file in kernels}
+    folder = checkout("here", **{edited: SOURCES[edited] + "# edited\n"})
+    assert {file for file in kernels if folder(file) != before[file]} == anew
+
+
+def test_checkouts_with_the_same_sources_share_their_kernels(checkout):
+    assert checkout("here")("fluid/edges.py") == checkout("there")("fluid/edges.py")
+
+
+def test_files_elsewhere_are_left_to_numba(checkout, tmp_path):
+    checkout("here")
+    assert ByContent.from_function(None, str(tmp_path / "law.py")) is None
+    assert ByContent.from_function(None, str(tmp_path / "here" / "coupler" / "levels.py")) is None
+
+
+def test_old_states_are_dropped(checkout, tmp_path):
+    for number in range(KEPT + 3):
+        checkout("here", **{"fluid/edges.py": f"# {number}\n"})
+        kept = ByContent.from_function(None, str(tmp_path / "here" / "fluid" / "edges.py"))
+        kept.ensure_cache_path()
+        os.utime(kept.get_cache_path(), (number, number))
+    assert len(list((tmp_path / "kernels" / "fluid.edges").iterdir())) == KEPT
+    assert Path(kept.get_cache_path()).is_dir()
