@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from yade_scripts.impulses import Impulses
+from yade_scripts.dynamics.impulses import Impulses
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import meshio
 import numpy as np
 from scipy.spatial import Delaunay
 
-from coupler.provenance import ROOT
+from coupler.program.provenance import ROOT
 
 SPLIT_PRISM = ((0, 1, 2, 5), (0, 1, 4, 5), (0, 3, 4, 5))
 """Tetrahedra of a prism whose corners 0 < 1 < 2 lie below 3, 4, 5: neighbours split their common side alike."""

@@ -4,7 +4,7 @@ import shutil
 
 import pytest
 
-from coupler.checkpoint import FOLDER, listed
+from coupler.run.checkpoint import FOLDER, listed
 from tests.coupler.resumed import DRY, begin
 
 

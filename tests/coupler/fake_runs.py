@@ -6,11 +6,11 @@ A run with time.step_max = h gives the value 2 (1 + h²) at a cost of 1 s/h; wha
 import json
 from pathlib import Path
 
-from coupler.case import Case, effective
-from coupler.case_file import load
-from coupler.errors import ExitCode
-from coupler.history import HistoryTable
-from coupler.study.runner import Cost
+from coupler.case.case import Case, effective
+from coupler.checks.read_case import load
+from coupler.commands.study.runner import Cost
+from coupler.program.errors import ExitCode
+from coupler.results.history import HistoryTable
 
 CASE = """\
 [case]

@@ -15,7 +15,7 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from coupler.errors import BadCase, ExitCode
+from coupler.program.errors import BadCase, ExitCode
 
 SLOWEST = 20.0
 """Processor time [s] after which a refusal comes too late."""

@@ -6,13 +6,13 @@ import sys
 
 import numpy as np
 
-from coupler import vtkhdf
-from coupler.case_file import load
-from coupler.checkpoint import FOLDER, Checkpoint, listed
-from coupler.resume import prepare
-from coupler.run import run
-from coupler.run_directory import RunDirectory
-from coupler.warm_up import Silent
+from coupler.checks.read_case import load
+from coupler.commands.warm_up import Silent
+from coupler.results import vtkhdf
+from coupler.run.checkpoint import FOLDER, Checkpoint, listed
+from coupler.run.directory import RunDirectory
+from coupler.run.resume import prepare
+from coupler.run.run import run
 
 DRY = """\
 [case]
@@ -101,7 +101,10 @@ def check_same_steps(one, two):
 
 def command(*words, check=True):
     done = subprocess.run(
-        [sys.executable, "-m", "coupler.cli", *map(str, words)], capture_output=True, text=True, check=False
+        [sys.executable, "-m", "coupler.commands.cli", *map(str, words)],
+        capture_output=True,
+        text=True,
+        check=False,
     )
     assert not check or done.returncode == 0, done.stderr
     return done

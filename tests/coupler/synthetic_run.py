@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 from skfem import MeshTet
 
-from coupler.history import HistoryTable
-from coupler.output import BlockWriter, WaterWriter, write_solids
+from coupler.results.fields import BlockWriter, WaterWriter, write_solids
+from coupler.results.history import HistoryTable
 
 GRAVITY = 9.81
 BOX_FACES = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]]

@@ -8,8 +8,8 @@ import sys
 
 import pytest
 
-from coupler import arithmetic
-from coupler.process import environment
+from coupler.program import arithmetic
+from coupler.program.process import environment
 
 OLD = "flags\t\t: fpu sse2 ssse3 sse4_1 sse4_2 popcnt avx\n"
 NEW = OLD.strip() + " avx2 bmi1 bmi2 f16c fma abm movbe avx512f\n"
@@ -18,7 +18,7 @@ needs_baseline = pytest.mark.skipif(bool(arithmetic.missing()), reason="an older
 
 IN_FORCE = """
 import json
-from coupler.cli import one_thread
+from coupler.commands.cli import one_thread
 one_thread()
 import numpy.linalg, scipy.linalg, threadpoolctl
 from numba.core.registry import cpu_target
@@ -31,11 +31,11 @@ print(json.dumps({
 """
 KERNELS = """
 import sys
-from coupler.cli import one_thread
+from coupler.commands.cli import one_thread
 one_thread()
 import numpy as np
-from fluid.mesh import box_mesh
-from fluid.predictor import carry_remainder
+from fluid.mesh.background import box_mesh
+from fluid.step.predictor import carry_remainder
 from tests.yade_scripts.test_joints import JointParameters, Pair
 random = np.random.default_rng(3)
 mesh = box_mesh((0, 0, 0), (1, 1, 1), 0.3)
@@ -50,7 +50,7 @@ found += [pair.force(1e-3 * np.array(way), 1e-6, advance=True) for way in random
 print(b"".join(np.ascontiguousarray(a).tobytes() for a in found).hex())
 """
 SCENE = """
-from coupler.cli import one_thread
+from coupler.commands.cli import one_thread
 one_thread()
 from tests.coupler.test_momentum import run, scene
 rows = []
@@ -89,7 +89,9 @@ def test_kernels_give_the_same_bits_with_and_without_fused_and_wide_instructions
 def test_a_scene_has_the_same_bits_with_kernels_of_another_baseline(name):
     """Water, free and held blocks, joints that break: the kernels compiled anew for another processor."""
     other = {"NUMBA_CPU_NAME": name, "NUMBA_CPU_FEATURES": ""} if name else {}
-    with_host = "from coupler import arithmetic\n" + "arithmetic.ONE_INSTRUCTION_SET.pop('NUMBA_CPU_NAME')\n"
+    with_host = (
+        "from coupler.program import arithmetic\n" + "arithmetic.ONE_INSTRUCTION_SET.pop('NUMBA_CPU_NAME')\n"
+    )
     with_host += "arithmetic.ONE_INSTRUCTION_SET.pop('NUMBA_CPU_FEATURES')\n"
     numba = ("NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES")
     assert told_by(SCENE) == told_by(SCENE if name else with_host + SCENE, without=numba, **other)

@@ -5,8 +5,8 @@ import resource
 import numpy as np
 import pytest
 
-from coupler.array_file import Damaged, read_arrays, write_arrays
-from coupler.storage import DiskFull, NotFinite
+from coupler.results.storage import DiskFull, NotFinite
+from coupler.run.array_file import Damaged, read_arrays, write_arrays
 
 ARRAYS = {
     "water/velocity": np.random.default_rng(1).normal(size=(500, 3)),

@@ -8,15 +8,15 @@ import meshio
 import numpy as np
 import pytest
 
-from coupler.case_file import load
-from coupler.errors import BadCase, briefly
-from coupler.mesh_files import MeshFileError, read_mesh, readable
-from coupler.paths import BadPath, read_text
-from coupler.records import NoSuchData, read_record
-from coupler.solids import solids_of
-from coupler.study.formula import BadFormula, evaluate
-from coupler.table_checks import column_names
-from fluid.mesh import MeshError, box_mesh
+from coupler.case.paths import BadPath, read_text
+from coupler.case.records import NoSuchData, read_record
+from coupler.checks.read_case import load
+from coupler.checks.tables import column_names
+from coupler.commands.study.formula import BadFormula, evaluate
+from coupler.geometry.mesh_files import MeshFileError, read_mesh, readable
+from coupler.geometry.solids import solids_of
+from coupler.program.errors import BadCase, briefly
+from fluid.mesh.background import MeshError, box_mesh
 from tests.coupler.test_case_file import BLOCKS, WATER, mistakes, write
 
 DRY = '[case]\ntitle = "x"\n[time]\nend = 1\n[contact]\nstiffness = 1e6\n'
@@ -185,7 +185,7 @@ def test_a_text_is_read_up_to_a_limit(tmp_path):
     ],
 )
 def test_torn_meshes_are_refused_whatever_their_reader_does(tmp_path, monkeypatch, name, content):
-    monkeypatch.setattr("coupler.mesh_files.PATIENCE", 0.3)
+    monkeypatch.setattr("coupler.geometry.mesh_files.PATIENCE", 0.3)
     (tmp_path / name).write_bytes(content)
     start = time.process_time()
     with pytest.raises(MeshFileError, match=f"{name}: meshio cannot read it"):

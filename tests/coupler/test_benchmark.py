@@ -6,10 +6,10 @@ import time
 import numpy as np
 import pytest
 
-from coupler.benchmark import command, cutting, debris, part, scenes, solver, water
-from coupler.benchmark.command import Line
-from coupler.errors import ExitCode
-from yade_scripts.faces import touching_faces
+from coupler.commands.benchmark import command, cutting, debris, part, scenes, solver, water
+from coupler.commands.benchmark.command import Line
+from coupler.program.errors import ExitCode
+from yade_scripts.blocks.faces import touching_faces
 
 
 @pytest.mark.parametrize("joints", [56, 500, 1000])

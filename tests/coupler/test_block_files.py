@@ -8,11 +8,11 @@ from hypothesis import strategies as st
 from scipy.spatial import Delaunay
 from scipy.spatial.transform import Rotation
 
-from coupler.block_files import VOLUME_FACES, blocks_from_file
-from coupler.case_structure import BlockFile
-from coupler.mesh_files import MeshFileError
-from yade_scripts.blocks import BOX_CORNERS, BOX_FACES
-from yade_scripts.faces import touching_faces
+from coupler.case.structure import BlockFile
+from coupler.geometry.block_files import VOLUME_FACES, blocks_from_file
+from coupler.geometry.mesh_files import MeshFileError
+from yade_scripts.blocks.block import BOX_CORNERS, BOX_FACES
+from yade_scripts.blocks.faces import touching_faces
 
 TRIANGLES = np.array([(f[0], f[i], f[i + 1]) for f in BOX_FACES for i in (1, 2)])
 BRICKS = [(x, y, z) for x in (0, 2) for y in (0, 1, 2) for z in (0, 1)]
@@ -212,7 +212,7 @@ stiffness = "1 MN/m"
 
 def test_a_case_finds_its_file_beside_it_and_refuses_it_with_the_line(tmp_path, capsys):
     """Exit code 2, the line of the path, and what is wrong in the file; overlaps inside a file are told as well."""
-    from coupler.cli import main
+    from coupler.commands.cli import main
 
     (tmp_path / "case.toml").write_text(CASE, encoding="utf-8")
     points, cells = joined([brick((0, 0, 0)), brick((1.5, 0, 0))], TRIANGLES)

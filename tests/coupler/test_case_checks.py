@@ -6,10 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 
-from coupler.bodies import Body, overlap_depth, rotation_matrix
-from coupler.case import Case
-from coupler.case_checks import problems, remarks
-from yade_scripts.blocks import Block
+from coupler.case.case import Case
+from coupler.checks.case import problems, remarks
+from coupler.geometry.bodies import Body, overlap_depth, rotation_matrix
+from yade_scripts.blocks.block import Block
 
 SPACE = st.floats(-3.0, 3.0)
 EDGE = st.floats(0.1, 2.0)
@@ -270,7 +270,7 @@ def test_a_mesh_beyond_the_memory_of_the_machine_is_refused(monkeypatch):
         "water": {"fill": [{"lower": [0, 0, 0], "upper": [1, 1, 0.5]}]},
     }
     assert problems(Case.model_validate(content)) == []
-    monkeypatch.setattr("coupler.place_checks.os.sysconf", lambda name: 1000)
+    monkeypatch.setattr("coupler.checks.places.os.sysconf", lambda name: 1000)
     ((place, message),) = problems(Case.model_validate(content))
     assert place == ("tank", "cell")
     fits = float(message.rpartition("cells of ")[2].split()[0])

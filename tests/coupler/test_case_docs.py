@@ -2,13 +2,13 @@
 
 import pytest
 
-from coupler.case_docs import PAGE, explanation, page
-from coupler.case_schema import keys
-from coupler.units import DIMENSIONS
+from coupler.case.docs import PAGE, explanation, page
+from coupler.case.keys import keys
+from coupler.case.units import DIMENSIONS
 
 
 def test_the_page_is_up_to_date():
-    """Remedy: .venv/bin/python -m coupler.case_docs"""
+    """Remedy: .venv/bin/python -m coupler.case.docs"""
     assert PAGE.read_text(encoding="utf-8") == page()
 
 

@@ -2,9 +2,9 @@
 
 import pytest
 
-from coupler.case import Case, effective, modules
-from coupler.case_file import load
-from coupler.errors import BadCase
+from coupler.case.case import Case, effective, modules
+from coupler.checks.read_case import load
+from coupler.program.errors import BadCase
 
 WATER = """\
 [case]

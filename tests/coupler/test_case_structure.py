@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from coupler.build import rows_by_name
-from coupler.case_file import load
-from coupler.errors import BadCase
-from coupler.parts import parts_of
+from coupler.checks.read_case import load
+from coupler.geometry.parts import parts_of
+from coupler.program.errors import BadCase
+from coupler.scene.build import rows_by_name
 
 HEAD = """\
 [case]
@@ -191,8 +191,8 @@ def test_one_mistake_one_line(tmp_path, text, wrong, right, message):
 
 def test_friction_by_pairs_of_materials_reaches_the_contact_law(tmp_path, monkeypatch):
     """Order does not matter; pairs that are not given have the friction of all."""
-    from coupler import build
-    from yade_scripts import structure
+    from coupler.scene import build
+    from yade_scripts.dynamics import structure
 
     seen = {}
 

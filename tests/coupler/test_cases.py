@@ -4,12 +4,12 @@ import tomllib
 
 import pytest
 
-from coupler.build import build_structure
-from coupler.case_checks import remarks
-from coupler.case_file import load
-from coupler.expected import TAKE
-from coupler.forecast import forecast
-from coupler.provenance import ROOT
+from coupler.checks.case import remarks
+from coupler.checks.read_case import load
+from coupler.program.provenance import ROOT
+from coupler.results.expected import TAKE
+from coupler.run.forecast import forecast
+from coupler.scene.build import build_structure
 
 CASES = sorted(path.parent for path in (ROOT / "cases").glob("*/case.toml"))
 

@@ -4,10 +4,10 @@ import json
 
 import pytest
 
-from coupler.carry_out import carry_out
-from coupler.case_file import load
-from coupler.errors import ExitCode
-from coupler.run_directory import RunDirectory
+from coupler.checks.read_case import load
+from coupler.program.errors import ExitCode
+from coupler.run.directory import RunDirectory
+from coupler.run.execute import carry_out
 from tests.coupler.test_cases import CASES
 
 LONG = {

@@ -8,9 +8,9 @@ import sys
 import numpy as np
 import pytest
 
-from coupler.checkpoint import FOLDER, Checkpoint, listed
-from coupler.resume import CannotResume, prepare
-from coupler.storage import NotFinite
+from coupler.results.storage import NotFinite
+from coupler.run.checkpoint import FOLDER, Checkpoint, listed
+from coupler.run.resume import CannotResume, prepare
 from tests.coupler.resumed import DRY, begin, check_same, directory_of, go_on
 
 
@@ -69,7 +69,7 @@ def test_without_any_usable_checkpoint_nothing_is_touched(copy):
 
 def test_a_state_that_is_not_finite_is_never_saved(tmp_path, monkeypatch):
     """The run ends with the name of the array; the checkpoint before stays."""
-    from coupler.loop import Coupling
+    from coupler.step.coupled_step import Coupling
 
     honest = Coupling.save
 
@@ -86,14 +86,14 @@ def test_a_state_that_is_not_finite_is_never_saved(tmp_path, monkeypatch):
 NOTHING_LOADED = """
 import sys
 from pathlib import Path
-from coupler.case_file import load
-from coupler.run import run
-from coupler.run_directory import RunDirectory
-from coupler.warm_up import Silent
+from coupler.checks.read_case import load
+from coupler.run.run import run
+from coupler.run.directory import RunDirectory
+from coupler.commands.warm_up import Silent
 file = load(sys.argv[1], ["time.checkpoint_every=0", "time.end='10 ms'"])
 with RunDirectory.create(file, Path(sys.argv[2])) as directory:
     run(file.case, directory, Silent())
-print([name for name in ("coupler.checkpoint", "coupler.array_file", "fluid.state") if name in sys.modules])
+print([x for x in ("coupler.run.checkpoint", "coupler.run.array_file", "fluid.step.state") if x in sys.modules])
 """
 
 

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from coupler import cli
-from coupler.case_docs import FIRST_CASE
-from coupler.provenance import ROOT, version
+from coupler.case.docs import FIRST_CASE
+from coupler.commands import cli
+from coupler.program.provenance import ROOT, version
 
 from .test_case_file import BLOCKS, WATER, write
 
@@ -37,7 +37,7 @@ def test_ctrl_c_ends_any_command_with_a_word(monkeypatch, capsys):
     def interrupted(key):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("coupler.case_docs.explanation", interrupted)
+    monkeypatch.setattr("coupler.case.docs.explanation", interrupted)
     with pytest.raises(SystemExit) as left:
         cli.app(["explain"])
     assert left.value.code == 4
@@ -47,7 +47,7 @@ def test_ctrl_c_ends_any_command_with_a_word(monkeypatch, capsys):
 def test_help_names_every_command_and_loads_nothing_that_takes_time():
     done = surgebreak("--help", PYTHONPROFILEIMPORTTIME="1")
     told, loaded = done.stdout, {line.split("|")[-1].strip() for line in done.stderr.splitlines()}
-    assert "coupler.cli" in loaded
+    assert "coupler.commands.cli" in loaded
     assert not loaded & {"numpy", "numba", "pydantic", "pint", "h5py", "skfem", "yade"}
     for command in ("run", "resume", "check", "render", "doctor", "explain", "init", "test"):
         assert f"\n  {command} " in told
@@ -102,7 +102,7 @@ def test_explain_offers_the_nearest_name():
 def test_init_writes_a_case_that_passes_and_never_overwrites(tmp_path):
     place = tmp_path / "new" / "case"
     assert surgebreak("init", place).returncode == 0
-    from coupler.case_file import load
+    from coupler.checks.read_case import load
 
     assert load(place).case.structure.block[0].name == "box"
     (place / "case.toml").write_text("mine", encoding="utf-8")
@@ -115,7 +115,7 @@ def test_init_writes_a_case_that_passes_and_never_overwrites(tmp_path):
 def test_without_the_optional_packages_the_way_to_get_them_is_told(tmp_path):
     """Called past the launcher, nothing may be installed behind the user's back."""
     code = (
-        "import sys, coupler.cli as cli, coupler.extras as extras\n"
+        "import sys, coupler.commands.cli as cli, coupler.program.extras as extras\n"
         "extras.EXTRAS['test'] = ('a_package_that_is_nowhere',)\n"
         "sys.argv = ['surgebreak', 'test']\n"
         "cli.main()"
@@ -134,14 +134,14 @@ def test_pytest_gets_its_words(tmp_path):
 FAKE_RUN = """
 import sys
 import types
-import coupler.cli as cli
-fake = types.ModuleType("coupler.run")
+import coupler.commands.cli as cli
+fake = types.ModuleType("coupler.run.run")
 def run(case, directory, tell, checkpoint=None):
     for k in range(1, 11):
         tell.step(case.time.end * k / 10, {{"dt": "1 ms"}})
     {then}
 fake.run = run
-sys.modules["coupler.run"] = fake
+sys.modules["coupler.run.run"] = fake
 sys.argv = ["surgebreak", "run", {case!r}]
 cli.main()
 """
@@ -151,8 +151,12 @@ cli.main()
     ("then", "code", "says"),
     [
         ("return 0", 0, "results in "),
-        ("from coupler.limits import Diverged; raise Diverged('too much')", 3, "surgebreak: too much"),
-        ("from coupler.limits import LimitReached; raise LimitReached('enough')", 4, "surgebreak: enough"),
+        ("from coupler.step.limits import Diverged; raise Diverged('too much')", 3, "surgebreak: too much"),
+        (
+            "from coupler.step.limits import LimitReached; raise LimitReached('enough')",
+            4,
+            "surgebreak: enough",
+        ),
         ("raise OSError(28, 'No space left on device')", 4, "no room for the results"),
         ("raise KeyError('x')", 1, "surgebreak: unexpected KeyError: 'x'"),
     ],

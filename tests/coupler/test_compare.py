@@ -10,16 +10,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coupler.case_file import load
-from coupler.compare.command import _multiples, show_laws
-from coupler.compare.matching import matched
-from coupler.compare.outcome import Exact, Outcome, curve_error, errors, exact_answers
-from coupler.compare.plan import OwnLaw, general_limits, make_plan
-from coupler.compare.report import COLUMNS, rows, table, write
-from coupler.compare.run import run_plan
-from coupler.errors import BadCase
-from coupler.provenance import ROOT
-from yade_scripts.cohesion import JointParameters
+from coupler.checks.read_case import load
+from coupler.commands.compare.command import _multiples, show_laws
+from coupler.commands.compare.matching import matched
+from coupler.commands.compare.outcome import Exact, Outcome, curve_error, errors, exact_answers
+from coupler.commands.compare.plan import OwnLaw, general_limits, make_plan
+from coupler.commands.compare.report import COLUMNS, rows, table, write
+from coupler.commands.compare.run import run_plan
+from coupler.program.errors import BadCase
+from coupler.program.provenance import ROOT
+from yade_scripts.joints.cohesion import JointParameters
 from yade_scripts.stock.script import stock_law
 
 PULLED = ROOT / "cases" / "joint_pulled"
@@ -196,7 +196,7 @@ def test_the_figure_is_made_from_the_files_alone(tmp_path):
     for o in outcomes:
         lines = [",".join(o.table), *(",".join(map(str, line)) for line in zip(*o.table.values()))]
         (tmp_path / "laws" / f"{o.law.stem}.csv").write_text("\n".join(lines), encoding="utf-8")
-    command = [sys.executable, "-m", "coupler.view.comparison", str(tmp_path)]
+    command = [sys.executable, "-m", "coupler.commands.view.comparison", str(tmp_path)]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     for ending in ("png", "pdf", "svg"):

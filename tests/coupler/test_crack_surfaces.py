@@ -4,12 +4,12 @@ import meshio
 import numpy as np
 import pytest
 
-from coupler.crack_surfaces import write_crack_surfaces
-from coupler.observe import crack_columns
-from yade_scripts.blocks import Block
-from yade_scripts.cohesion import JointParameters
-from yade_scripts.polyhedra import polygon_area_vector
-from yade_scripts.structure import Structure
+from coupler.results.crack_surfaces import write_crack_surfaces
+from coupler.step.observe import crack_columns
+from yade_scripts.blocks.block import Block
+from yade_scripts.blocks.polyhedra import polygon_area_vector
+from yade_scripts.dynamics.structure import Structure
+from yade_scripts.joints.cohesion import JointParameters
 
 
 def test_the_surfaces_are_the_overlaps_of_the_faces_and_follow_their_block(tmp_path):

@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
-from coupler.cracks import THINNEST, WIDEST, NarrowCracks
-from coupler.exchange import Immersion
-from fluid.covers import components
-from fluid.mesh import box_mesh
-from fluid.parameters import WaterParameters
-from fluid.water import Water
+from coupler.step.cracks import THINNEST, WIDEST, NarrowCracks
+from coupler.step.immersion import Immersion
+from fluid.domain.covers import components
+from fluid.mesh.background import box_mesh
+from fluid.step.parameters import WaterParameters
+from fluid.step.water import Water
 from tests.fluid.scenes import advance
-from yade_scripts.cohesion import JointParameters
-from yade_scripts.generators.wall import wall_of_blocks
-from yade_scripts.structure import Structure
+from yade_scripts.blocks.generators.wall import wall_of_blocks
+from yade_scripts.dynamics.structure import Structure
+from yade_scripts.joints.cohesion import JointParameters
 
 CELL = 0.25
 WIDTH = 0.5

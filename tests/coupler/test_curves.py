@@ -5,15 +5,15 @@ import json
 import numpy as np
 import pytest
 
-from coupler.history import HistoryTable
-from coupler.records import SHIPPED, NoSuchData, find_record, read_record
-from coupler.verify import one
-from coupler.verify.courant import figures as peak_mean_impulse
-from coupler.verify.curves import Curve, Figure, Panel, as_json
-from coupler.verify.registry import Check, Finding
+from coupler.case.records import SHIPPED, NoSuchData, find_record, read_record
+from coupler.commands.verify import one
+from coupler.commands.verify.courant import figures as peak_mean_impulse
+from coupler.commands.verify.curves import Curve, Figure, Panel, as_json
+from coupler.commands.verify.registry import Check, Finding
+from coupler.results.history import HistoryTable
 
-view = pytest.importorskip("coupler.view.over_data", reason="the extra `view` is not installed")
-draw = pytest.importorskip("coupler.view.curves").draw
+view = pytest.importorskip("coupler.commands.view.over_data", reason="the extra `view` is not installed")
+draw = pytest.importorskip("coupler.commands.view.curves").draw
 RAMP = np.linspace(0.0, 2.0, 21)
 FIGURE = Figure(
     "ramp",

@@ -7,12 +7,12 @@ import tomllib
 import pytest
 from typer.main import get_command
 
-from coupler.case_schema import keys, names_in
-from coupler.cli import app
-from coupler.provenance import ROOT
-from coupler.stress.registry import Measure, Outcome
-from coupler.verify.registry import Result
-from coupler.verify.report import json_line
+from coupler.case.keys import keys, names_in
+from coupler.commands.cli import app
+from coupler.commands.stress.registry import Measure, Outcome
+from coupler.commands.verify.registry import Result
+from coupler.commands.verify.report import json_line
+from coupler.program.provenance import ROOT
 
 PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md"), *(ROOT / "cases").glob("*/README.md")])
 KNOWN = {key.path for key in keys()}

@@ -2,7 +2,7 @@
 
 import pytest
 
-from coupler import doctor
+from coupler.commands import doctor
 
 pytestmark = pytest.mark.before_yade
 
@@ -32,7 +32,7 @@ def test_a_crash_in_another_process_is_a_finding(code, says):
 
 
 def test_yade_not_found_is_told_with_the_way_out(monkeypatch, tmp_path):
-    from yade_scripts import engine
+    from yade_scripts.yade_side import engine
 
     monkeypatch.setattr(engine, "PACKAGED", (str(tmp_path / "nowhere"),))
     finding = doctor._yade()
@@ -42,7 +42,7 @@ def test_yade_not_found_is_told_with_the_way_out(monkeypatch, tmp_path):
 
 def test_the_wrong_yade_package_is_told(monkeypatch, tmp_path):
     """Another project on the package index is called yade; it must be named, not imported."""
-    from yade_scripts import engine
+    from yade_scripts.yade_side import engine
 
     (tmp_path / "yade").mkdir()
     (tmp_path / "yade" / "__init__.py").write_text("", encoding="utf-8")

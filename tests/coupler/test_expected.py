@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from coupler.case_file import load
-from coupler.errors import BadCase
-from coupler.expected import TAKE, verdicts
-from coupler.history import HistoryTable
-from coupler.promises import mistakes_in
+from coupler.case.promises import mistakes_in
+from coupler.checks.read_case import load
+from coupler.program.errors import BadCase
+from coupler.results.expected import TAKE, verdicts
+from coupler.results.history import HistoryTable
 from tests.coupler.test_case_file import WATER
 
 TIME = np.linspace(0.0, 4.0, 401)

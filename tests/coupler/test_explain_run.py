@@ -6,10 +6,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from coupler.errors import NoRun
-from coupler.explain_run import explanation_of_run, not_loaded, shares, skipped
-from coupler.left_out import note_work
-from coupler.observe import JointCounts
+from coupler.commands.explain_run import explanation_of_run, not_loaded, shares, skipped
+from coupler.program.errors import NoRun
+from coupler.run.left_out import note_work
+from coupler.step.observe import JointCounts
 from tests.coupler.fake_runs import SUMMARY
 
 

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from coupler.fill import merged, start_level, start_velocity
-from fluid.bodies import ConvexBodies
-from fluid.domain import cut_domain
-from fluid.mesh import box_mesh
-from fluid.parameters import WaterParameters
-from fluid.water import Water
+from coupler.scene.fill import merged, start_level, start_velocity
+from fluid.cut.bodies import ConvexBodies
+from fluid.domain.physical_domain import cut_domain
+from fluid.mesh.background import box_mesh
+from fluid.step.parameters import WaterParameters
+from fluid.step.water import Water
 from tests.fluid.scenes import advance
 
 TANK = ((0.0, 0.0, 0.0), (1.0, 0.5, 0.5))

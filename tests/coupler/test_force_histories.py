@@ -5,8 +5,8 @@ import pytest
 
 pytest.importorskip("matplotlib")
 
-from coupler.history import HistoryTable
-from coupler.view import force_histories
+from coupler.commands.view import force_histories
+from coupler.results.history import HistoryTable
 
 
 def run_of(folder, force, breaks=np.inf):

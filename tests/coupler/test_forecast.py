@@ -32,7 +32,7 @@ stiffness = "1 MN/m"
 """
 
 
-COMMAND = [sys.executable, "-m", "coupler.cli"]
+COMMAND = [sys.executable, "-m", "coupler.commands.cli"]
 PEAK = """
 import resource, subprocess, sys
 subprocess.run(sys.argv[1:], stdout=subprocess.DEVNULL, check=True)

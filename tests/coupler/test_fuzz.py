@@ -10,16 +10,16 @@ import meshio
 import numpy as np
 import pytest
 
-from coupler.block_files import blocks_from_file
-from coupler.build_water import RecordError, record_columns
-from coupler.case_checks import remarks
-from coupler.case_file import load
-from coupler.case_structure import BlockFile
-from coupler.explain_run import explanation_of_run
-from coupler.forecast import forecast
-from coupler.mesh_files import read_mesh
-from coupler.report.command import report
-from coupler.resume import prepare
+from coupler.case.structure import BlockFile
+from coupler.checks.case import remarks
+from coupler.checks.read_case import load
+from coupler.commands.explain_run import explanation_of_run
+from coupler.commands.report.command import report
+from coupler.geometry.block_files import blocks_from_file
+from coupler.geometry.mesh_files import read_mesh
+from coupler.run.forecast import forecast
+from coupler.run.resume import prepare
+from coupler.scene.build_water import RecordError, record_columns
 from tests.coupler import fuzz
 from tests.coupler.test_resume import COUPLED, STREAM
 
@@ -230,7 +230,7 @@ def runs(count, seed, folder, dry):
 @pytest.fixture
 def quick_readers(monkeypatch):
     """Readers that go in circles are given up sooner."""
-    monkeypatch.setattr("coupler.mesh_files.PATIENCE", 0.2)
+    monkeypatch.setattr("coupler.geometry.mesh_files.PATIENCE", 0.2)
 
 
 def mixed(verdicts, taken=1):

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coupler.gauge_windows import Windows
-from coupler.gauges import disc, free_mean, parallelogram
+from coupler.results.gauge_windows import Windows
+from coupler.results.gauges import disc, free_mean, parallelogram
 
 STEPS = st.lists(st.tuples(st.floats(1e-3, 0.5), st.floats(-10, 10)), min_size=1, max_size=30)
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from coupler.exchange import STILL, Immersion
-from fluid.mesh import box_mesh
-from yade_scripts.blocks import Block
-from yade_scripts.cohesion import JointParameters
-from yade_scripts.structure import Structure
+from coupler.step.immersion import STILL, Immersion
+from fluid.mesh.background import box_mesh
+from yade_scripts.blocks.block import Block
+from yade_scripts.dynamics.structure import Structure
+from yade_scripts.joints.cohesion import JointParameters
 
 CELL = 0.25
 

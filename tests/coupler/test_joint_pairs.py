@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from coupler.build import build_structure
-from coupler.case_file import load
+from coupler.checks.read_case import load
+from coupler.scene.build import build_structure
 
 from .test_case_file import mistakes, write
 

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from coupler import kernel_cache
-from coupler.kernel_cache import KEPT, ByContent, NoCache, use_kernel_cache
+from coupler.program import kernel_cache
+from coupler.program.kernel_cache import KEPT, ByContent, NoCache, use_kernel_cache
 
 
 @pytest.fixture

@@ -11,8 +11,8 @@ import time
 
 import pytest
 
-from coupler.cli import app
-from coupler.provenance import ROOT
+from coupler.commands.cli import app
+from coupler.program.provenance import ROOT
 
 TOOLS = (
     "sh",
@@ -170,12 +170,15 @@ def test_extras_come_with_the_command_that_needs_them(machine):
 def test_the_kernels_are_compiled_once_before_the_first_run(machine):
     """A failure there is no reason to refuse the run, which compiles what it needs itself."""
     machine.ready()
-    assert "python -m coupler.warm_up" not in machine("check", str(machine.root))[2]
+    assert "python -m coupler.commands.warm_up" not in machine("check", str(machine.root))[2]
     (machine.root / ".venv/bin/python").write_text(
         '#!/bin/sh\necho "python $*" >>"$CALLS"\nexit 1\n', encoding="utf-8"
     )
     code, told, calls = machine("run", "x")
-    assert (code, calls) == (0, ["surgebreak run x --dry", "python -m coupler.warm_up", "surgebreak run x"])
+    assert (code, calls) == (
+        0,
+        ["surgebreak run x --dry", "python -m coupler.commands.warm_up", "surgebreak run x"],
+    )
     assert "left to the first run" in told
     assert machine("run", "x")[2] == ["surgebreak run x"]
 

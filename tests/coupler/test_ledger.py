@@ -2,7 +2,7 @@
 
 import pytest
 
-from coupler.ledger import DISSIPATED, STORED, Ledger
+from coupler.balance.energy import DISSIPATED, STORED, Ledger
 
 NOTHING = dict.fromkeys((*STORED, *DISSIPATED, "load_work", "driving_work"), 0.0)
 

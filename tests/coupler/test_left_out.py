@@ -11,16 +11,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from coupler.history import read_history
-from coupler.left_out import HEAVY, note_work
-from coupler.provenance import ROOT
+from coupler.program.provenance import ROOT
+from coupler.results.history import read_history
+from coupler.run.left_out import HEAVY, note_work
 
 from .test_case_file import WATER, write
 
 DRY = ROOT / "cases" / "bonded_wall_pulled"
 LOADED = (
     "import sys; sys.argv = ['surgebreak', 'run', *sys.argv[1:]]\n"
-    "from coupler.cli import main\n"
+    "from coupler.commands.cli import main\n"
     "try: main()\n"
     "except SystemExit as end: assert not end.code, end.code\n"
     "print(*sys.modules, file=sys.stderr)"
@@ -81,7 +81,7 @@ def test_a_wish_to_stop_ends_a_run_cleanly(tmp_path, ask):
     command = [
         sys.executable,
         "-m",
-        "coupler.cli",
+        "coupler.commands.cli",
         "run",
         str(DRY),
         "--end",
@@ -109,9 +109,9 @@ def test_a_wish_to_stop_ends_a_run_cleanly(tmp_path, ask):
 
 WITHOUT_YADE = (
     "import sys; sys.argv = ['surgebreak', 'run', *sys.argv[1:]]\n"
-    "from yade_scripts import engine\n"
+    "from yade_scripts.yade_side import engine\n"
     "engine.PACKAGED = ('/nowhere/yade',)\n"
-    "from coupler.cli import main\n"
+    "from coupler.commands.cli import main\n"
     "main()"
 )
 

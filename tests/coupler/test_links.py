@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from coupler.provenance import ROOT
+from coupler.program.provenance import ROOT
 
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md"), *(ROOT / "cases").glob("*/README.md")])

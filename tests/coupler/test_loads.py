@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from coupler.build import build
-from coupler.case import Case
-from coupler.case_checks import problems
-from coupler.loads import BlockLoads, GroupLoads, loads
+from coupler.case.case import Case
+from coupler.checks.case import problems
+from coupler.results.loads import BlockLoads, GroupLoads, loads
+from coupler.scene.build import build
 from tests.coupler.test_momentum import run, scene
 from tests.fakes import no_clock
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from coupler.build import build
-from coupler.case import Case
-from coupler.limits import Diverged, check_momentum
-from coupler.momentum import LINES, BlocksStep, MomentumLedger
+from coupler.balance.momentum import LINES, BlocksStep, MomentumLedger
+from coupler.case.case import Case
+from coupler.scene.build import build
+from coupler.step.limits import Diverged, check_momentum
 from tests.fakes import no_clock
 
 G = 9.81

@@ -18,9 +18,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coupler import storage, vtkhdf
-from coupler.output import BlockWriter, WaterWriter, write_solids
-from coupler.storage import DiskFull, NotFinite, WrongShape
+from coupler.results import storage, vtkhdf
+from coupler.results.fields import BlockWriter, WaterWriter, write_solids
+from coupler.results.storage import DiskFull, NotFinite, WrongShape
 from tests.coupler.synthetic_run import BOX_FACES, box_vertices, rotations, tank_mesh
 
 pytestmark = pytest.mark.before_yade
@@ -181,7 +181,7 @@ def test_a_viewer_that_holds_the_file_does_not_stop_the_run(tmp_path):
 
 KILLED = """
 import sys, numpy as np
-from coupler.output import WaterWriter
+from coupler.results.fields import WaterWriter
 from tests.coupler.synthetic_run import tank_mesh
 nodes, cells = tank_mesh((6.0, 6.0, 6.0), 1.0)
 writer, rng = WaterWriter(sys.argv[1]), np.random.default_rng(0)

@@ -11,7 +11,8 @@ import h5py
 import numpy as np
 import pytest
 
-from coupler import output, vtkhdf
+from coupler.results import fields as output
+from coupler.results import vtkhdf
 from tests.coupler.synthetic_run import tank_mesh
 
 

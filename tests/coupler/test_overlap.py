@@ -5,16 +5,16 @@ import sys
 
 import pytest
 
-from coupler.build import build
-from coupler.case_checks import remarks
-from coupler.case_file import load
-from coupler.errors import ExitCode
-from coupler.limits import Diverged, check_overlap
-from coupler.overlaps import deepest_overlap
+from coupler.checks.case import remarks
+from coupler.checks.read_case import load
+from coupler.geometry.overlaps import deepest_overlap
+from coupler.program.errors import ExitCode
+from coupler.scene.build import build
+from coupler.step.limits import Diverged, check_overlap
 from tests.fakes import no_clock
-from yade_scripts.blocks import Block
-from yade_scripts.contact import ContactLaw
-from yade_scripts.structure import Structure
+from yade_scripts.blocks.block import Block
+from yade_scripts.contact.law import ContactLaw
+from yade_scripts.dynamics.structure import Structure
 
 from .test_case_file import write
 
@@ -42,7 +42,7 @@ def test_a_soft_contact_is_remarked_and_ends_the_run(tmp_path, stiffness, soft):
     path = write(tmp_path, SOFT.format(stiffness=stiffness))
     told = [text for text in remarks(load(path).case) if "too soft" in text]
     assert [("'plate', 0.1 m thick" in text) for text in told] == ([True] if soft else [])
-    program = "import sys; sys.argv[0] = 'surgebreak'; from coupler.cli import main; main()"
+    program = "import sys; sys.argv[0] = 'surgebreak'; from coupler.commands.cli import main; main()"
     command = [sys.executable, "-c", program, "run", str(path), "--output", str(tmp_path / "out")]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == (ExitCode.DIVERGED if soft else 0), done.stderr
@@ -73,7 +73,7 @@ def test_crossed_edges_are_measured_by_the_way_that_parts_them():
 
 
 def test_a_joint_that_closes_too_far_counts():
-    from yade_scripts.cohesion import JointParameters
+    from yade_scripts.joints.cohesion import JointParameters
 
     blocks = [Block("low", (0, 0, 0.5), size=1.0), Block("high", (0, 0, 1.5), size=1.0, density=2000.0)]
     with Structure(blocks, ContactLaw(), JointParameters(1e3, 0.1), ground=0.0) as s:

@@ -7,17 +7,20 @@ import sys
 
 import pytest
 
-from coupler import extras, process
-from coupler.benchmark import command
-from coupler.provenance import ROOT
+from coupler.commands.benchmark import command
+from coupler.program import extras, process
+from coupler.program.provenance import ROOT
 
 HERE = "print(__file__)\n"
 
 
 def checkout(folder):
     """The least of a checkout that starts a child, with a module that tells where it stands."""
-    (folder / "coupler").mkdir(parents=True)
-    for name in ("__init__.py", "arithmetic.py", "process.py", "provenance.py"):
+    (folder / "coupler" / "program").mkdir(parents=True)
+    for name in (
+        "__init__.py",
+        *(f"program/{n}.py" for n in ("__init__", "arithmetic", "process", "provenance")),
+    ):
         shutil.copy(ROOT / "coupler" / name, folder / "coupler" / name)
     shutil.copy(ROOT / "pyproject.toml", folder)
     (folder / "coupler" / "here.py").write_text(HERE, encoding="utf-8")
@@ -27,7 +30,7 @@ def checkout(folder):
 def test_children_are_of_the_checkout_of_their_parent(tmp_path):
     """Called from within another checkout, in an environment where a third one is installed."""
     mine, other = checkout(tmp_path / "mine"), checkout(tmp_path / "other")
-    code = "from coupler.process import run_module; run_module('coupler.here')"
+    code = "from coupler.program.process import run_module; run_module('coupler.here')"
     parent = os.environ | {"PYTHONPATH": str(mine), "PYTHONSAFEPATH": "1"}
     done = subprocess.run(
         [sys.executable, "-c", code], cwd=other, env=parent, capture_output=True, text=True, check=True

@@ -7,9 +7,9 @@ import signal
 
 import pytest
 
-from coupler.progress import BarReporter, LineReporter, reporter
-from coupler.stop import StopRequest
-from coupler.terminal import Row, duration, newtons, table
+from coupler.program.terminal import Row, duration, newtons, table
+from coupler.run.progress import BarReporter, LineReporter, reporter
+from coupler.run.stop import StopRequest
 
 FIGURES = {"dt": "10 ms", "joints broken": "3/90"}
 
@@ -33,7 +33,7 @@ def test_one_line_for_each_tenth(steps):
 def test_time_left_does_not_count_the_first_step(monkeypatch):
     """The first step compiles: it took 100 s here, the others 1 s each; after two of ten steps 8 s are left."""
     now = iter([100.0, 101.0])
-    monkeypatch.setattr("coupler.progress.clock.monotonic", lambda: next(now))
+    monkeypatch.setattr("coupler.run.progress.clock.monotonic", lambda: next(now))
     told = io.StringIO()
     tell = LineReporter(10.0, lambda line: None, lambda: None, told)
     tell.step(1.0, {})

@@ -9,15 +9,15 @@ from html.parser import HTMLParser
 
 import pytest
 
-from coupler import extras
-from coupler.errors import NoRun
-from coupler.history import CRACK_COLUMNS, HistoryTable, write_cracks
-from coupler.history_columns import ENERGY, WATER
-from coupler.report import html
-from coupler.report.command import report
-from coupler.report.html import figure, quantity, table
-from coupler.report.markdown import to_html
-from coupler.study import command, runner
+from coupler.commands.report import html
+from coupler.commands.report.command import report
+from coupler.commands.report.html import figure, quantity, table
+from coupler.commands.report.markdown import to_html
+from coupler.commands.study import command, runner
+from coupler.program import extras
+from coupler.program.errors import NoRun
+from coupler.results.columns import ENERGY, WATER
+from coupler.results.history import CRACK_COLUMNS, HistoryTable, write_cracks
 
 from .fake_runs import CASE, FakeProcesses
 
@@ -125,7 +125,7 @@ def test_a_directory_of_something_else_is_refused(tmp_path):
 def test_the_report_leaves_yade_and_pictures_alone(run):
     """It reads files; VTK and matplotlib are loaded by the processes that draw."""
     code = (
-        "import sys; from pathlib import Path; from coupler.report.command import report\n"
+        "import sys; from pathlib import Path; from coupler.commands.report.command import report\n"
         f"report(Path({str(run)!r}), False)\n"
         "print(*sys.modules)"
     )

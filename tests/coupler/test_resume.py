@@ -6,11 +6,11 @@ import shutil
 import numpy as np
 import pytest
 
-from coupler.checkpoint import FOLDER, Checkpoint, listed
-from coupler.errors import ExitCode
-from coupler.limits import LimitReached
-from coupler.resume import CannotResume, prepare
-from coupler.warm_up import Silent
+from coupler.commands.warm_up import Silent
+from coupler.program.errors import ExitCode
+from coupler.run.checkpoint import FOLDER, Checkpoint, listed
+from coupler.run.resume import CannotResume, prepare
+from coupler.step.limits import LimitReached
 from tests.coupler.resumed import DRY, begin, check_same, command, go_on
 
 COUPLED = """\

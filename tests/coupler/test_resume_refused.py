@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from coupler.array_file import write_arrays
-from coupler.checkpoint import FOLDER, UNSET, Checkpoint, OtherScene, listed
-from coupler.errors import BadCase, ExitCode, NoRun
-from coupler.resume import CannotResume, prepare
+from coupler.program.errors import BadCase, ExitCode, NoRun
+from coupler.run.array_file import write_arrays
+from coupler.run.checkpoint import FOLDER, UNSET, Checkpoint, OtherScene, listed
+from coupler.run.resume import CannotResume, prepare
 from tests.coupler.resumed import command, go_on
 
 

@@ -8,14 +8,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from coupler import loop
-from coupler.build import build
-from coupler.defects import MISSES, RETRIES, SHORTEST, Defects
-from coupler.limits import Diverged, Limits
-from coupler.loop import Coupling
-from coupler.momentum import book_step, momentum_ledger
-from coupler.step_limits import Attempt, check_step
-from fluid.solve import NotConverged
+from coupler.balance.momentum import book_step, momentum_ledger
+from coupler.scene.build import build
+from coupler.step import coupled_step as loop
+from coupler.step.coupled_step import Coupling
+from coupler.step.limits import Diverged, Limits
+from coupler.step.residual import MISSES, RETRIES, SHORTEST, Defects
+from coupler.step.step_limits import Attempt, check_step
+from fluid.numerics.solve import NotConverged
 from tests.fakes import FreeBody, no_clock, piston_column
 from tests.physics.scenes import case
 

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from coupler.provenance import ROOT
+from coupler.program.provenance import ROOT
 
 ALLOWED = {
     "fluid": {"fluid"},
     "yade_scripts": {"yade_scripts", "yade"},
     "coupler": {"coupler", "fluid", "yade_scripts"},
-    "coupler/view": {"coupler"},
+    "coupler/commands/view": {"coupler"},
 }
 """Packages of this project, and YADE, that each room may import."""
 
@@ -95,7 +95,7 @@ def test_help_and_explanations_load_little(command, absent):
     """Help answers at once: nothing numerical is imported for it."""
     code = (
         "import sys; sys.argv = ['surgebreak', *sys.argv[1:]]\n"
-        "from coupler.cli import main\n"
+        "from coupler.commands.cli import main\n"
         "try: main()\n"
         "except SystemExit as end: assert not end.code, end.code\n"
         "print(*sys.modules, file=sys.stderr)"

@@ -10,10 +10,10 @@ import sys
 import numpy as np
 import pytest
 
-from coupler.case_file import load
-from coupler.errors import CannotWrite, ExitCode, RunDirectoryExists, SurgebreakError
-from coupler.failures import Failure, Failures
-from coupler.run_directory import RunDirectory, write_json
+from coupler.checks.read_case import load
+from coupler.program.errors import CannotWrite, ExitCode, RunDirectoryExists, SurgebreakError
+from coupler.program.failures import Failure, Failures
+from coupler.run.directory import RunDirectory, write_json
 
 from .test_case_file import WATER, write
 
@@ -57,7 +57,7 @@ def test_of_two_runs_that_begin_in_one_directory_at_once_the_second_is_refused(f
     """Both found it empty; the first to make the folder of the histories has it."""
     place = tmp_path / "results"
     RunDirectory.create(file, place)
-    monkeypatch.setattr("coupler.run_directory._make", lambda *_: place)
+    monkeypatch.setattr("coupler.run.directory._make", lambda *_: place)
     with pytest.raises(
         RunDirectoryExists, match="another run has just begun there; name another with --output"
     ):
@@ -139,7 +139,7 @@ def test_a_command_leaves_with_the_code_of_the_error(file, capsys):
 
 def test_errors_of_the_rooms_are_messages_without_traceback():
     """fluid and yade_scripts know nothing of exit codes; their named errors are told as they are."""
-    from yade_scripts.engine import YadeMissing
+    from yade_scripts.yade_side.engine import YadeMissing
 
     failure = Failure.of(YadeMissing("YADE is not installed"))
     assert (failure.exit_code, failure.message, failure.traceback) == (1, "YADE is not installed", "")
@@ -148,9 +148,9 @@ def test_errors_of_the_rooms_are_messages_without_traceback():
 FULL_DISK = """
 import sys
 from pathlib import Path
-from coupler.case_file import load
-from coupler.failures import Failures
-from coupler.run_directory import RunDirectory
+from coupler.checks.read_case import load
+from coupler.program.failures import Failures
+from coupler.run.directory import RunDirectory
 with Failures(), RunDirectory.create(load(sys.argv[1]), Path(sys.argv[2])) as run:
     run.record(steps=1)
     with (run.path / "fields").open("wb") as stream:
@@ -179,8 +179,8 @@ def test_a_really_full_disk(file, tmp_path):
 
 KILLED = """
 import sys, time
-from coupler.case_file import load
-from coupler.run_directory import RunDirectory
+from coupler.checks.read_case import load
+from coupler.run.directory import RunDirectory
 with RunDirectory.create(load(sys.argv[1])) as run:
     run.record(steps=7)
     print(run.path, flush=True)

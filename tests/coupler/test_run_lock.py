@@ -12,17 +12,17 @@ import time
 
 import pytest
 
-from coupler.errors import ExitCode
-from coupler.failures import Failure
-from coupler.resume import prepare
-from coupler.run_lock import Busy, RunLock
-from coupler.stop import StopRequest
+from coupler.program.errors import ExitCode
+from coupler.program.failures import Failure
+from coupler.run.lock import Busy, RunLock
+from coupler.run.resume import prepare
+from coupler.run.stop import StopRequest
 from tests.coupler.resumed import DRY, directory_of
 
 HOLDER = """
 import sys, time
 from pathlib import Path
-from coupler.run_lock import RunLock
+from coupler.run.lock import RunLock
 lock = RunLock(Path(sys.argv[1]))
 print("held", flush=True)
 time.sleep(60)
@@ -73,7 +73,7 @@ def run_in_a_terminal(tmp_path):
         os.close(os.open(os.ttyname(other), os.O_RDWR))
 
     run = subprocess.Popen(
-        [sys.executable, "-m", "coupler.cli", "run", case, "--output", tmp_path / "run"],
+        [sys.executable, "-m", "coupler.commands.cli", "run", case, "--output", tmp_path / "run"],
         stdin=other, stdout=other, stderr=other, preexec_fn=take_the_terminal,
     )  # fmt: skip
     os.close(other)

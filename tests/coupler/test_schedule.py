@@ -4,9 +4,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coupler.case_checks import problems
-from coupler.forecast import _disk_remark
-from coupler.schedule import Schedule, checkpoint_interval, next_multiple
+from coupler.case.schedule import Schedule, checkpoint_interval, next_multiple
+from coupler.checks.case import problems
+from coupler.run.forecast import _disk_remark
 from tests.physics.scenes import case
 
 TIMES = st.floats(1e-3, 1e5)

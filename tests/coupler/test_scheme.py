@@ -6,14 +6,14 @@ import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coupler.scheme import (
+from coupler.step.coupling_rows import Wetting
+from coupler.step.pressure_with_structure import (
     StructureResponse,
     corrected_free_velocity,
     defect,
     mass_matrix,
     solve_coupled,
 )
-from coupler.wetting import Wetting
 from tests.fakes import direct_solve, piston_column
 
 WATER = 1000.0  # mass of the water in the pipe [kg]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from coupler.verify.scenes import level_at, tank
+from coupler.commands.verify.scenes import level_at, tank
 from tests.fakes import FreeBody
 
 

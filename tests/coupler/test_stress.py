@@ -4,11 +4,11 @@ import json
 
 import pytest
 
-from coupler.errors import BadCase, ExitCode
-from coupler.stress import page, report, runner
-from coupler.stress.one import outcome
-from coupler.stress.registry import GROUPS, Measure, Scene, scenes
-from yade_scripts.contact import ContactLaw
+from coupler.commands.stress import page, report, runner
+from coupler.commands.stress.one import outcome
+from coupler.commands.stress.registry import GROUPS, Measure, Scene, scenes
+from coupler.program.errors import BadCase, ExitCode
+from yade_scripts.contact.law import ContactLaw
 
 
 def made(run, refusal="never"):

@@ -8,22 +8,22 @@ import tomllib
 import numpy as np
 import pytest
 
-from coupler.carry_out import carry_out
-from coupler.case import Case, effective
-from coupler.case_file import load
-from coupler.errors import BadCase, ExitCode
-from coupler.history import HistoryTable, read_history
-from coupler.limits import Diverged, check_overlap
-from coupler.output import BlockWriter
-from coupler.overlaps import Overlap
-from coupler.run_directory import RunDirectory, write_json
-from coupler.stress.drawn import command
-from coupler.stress.drawn.case import toml, write
-from coupler.stress.drawn.judge import measures
-from coupler.stress.drawn.scene import draw
-from coupler.stress.drawn.shrink import shrunk
-from coupler.stress.drawn.trial import Trial, asked_too_much
-from coupler.stress.registry import Measure
+from coupler.case.case import Case, effective
+from coupler.checks.read_case import load
+from coupler.commands.stress.drawn import command
+from coupler.commands.stress.drawn.case import toml, write
+from coupler.commands.stress.drawn.judge import measures
+from coupler.commands.stress.drawn.scene import draw
+from coupler.commands.stress.drawn.shrink import shrunk
+from coupler.commands.stress.drawn.trial import Trial, asked_too_much
+from coupler.commands.stress.registry import Measure
+from coupler.geometry.overlaps import Overlap
+from coupler.program.errors import BadCase, ExitCode
+from coupler.results.fields import BlockWriter
+from coupler.results.history import HistoryTable, read_history
+from coupler.run.directory import RunDirectory, write_json
+from coupler.run.execute import carry_out
+from coupler.step.limits import Diverged, check_overlap
 
 SEED = 2
 NUMBERS = (*range(3), *range(4, 21))

@@ -4,10 +4,10 @@ import json
 
 import pytest
 
-from coupler.errors import BadCase, ExitCode
-from coupler.study import command, runner
-from coupler.study.formula import BadFormula
-from coupler.study.plan import make_plan
+from coupler.commands.study import command, runner
+from coupler.commands.study.formula import BadFormula
+from coupler.commands.study.plan import make_plan
+from coupler.program.errors import BadCase, ExitCode
 
 from .fake_runs import CASE, FakeProcesses
 

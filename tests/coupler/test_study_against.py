@@ -6,9 +6,9 @@ import json
 import pytest
 from typer.testing import CliRunner
 
-from coupler.cli import app
-from coupler.errors import BadCase, ExitCode
-from coupler.study.against import compare
+from coupler.commands.cli import app
+from coupler.commands.study.against import compare
+from coupler.program.errors import BadCase, ExitCode
 
 
 def point(label, cpu, error, reason=""):

@@ -5,10 +5,10 @@ import sys
 
 import pytest
 
-from coupler.case import effective
-from coupler.case_file import load
-from coupler.errors import BadCase
-from coupler.study.formula import BadFormula, evaluate
+from coupler.case.case import effective
+from coupler.checks.read_case import load
+from coupler.commands.study.formula import BadFormula, evaluate
+from coupler.program.errors import BadCase
 
 from .fake_runs import CASE
 
@@ -58,8 +58,8 @@ def test_a_run_takes_no_notice_of_the_study(tmp_path):
 def test_a_case_without_a_study_loads_nothing_of_it(tmp_path):
     (tmp_path / "case.toml").write_text(CASE.partition("[study]")[0], encoding="utf-8")
     code = (
-        "import sys; from coupler.case_file import load; load(sys.argv[1]); "
-        "print([name for name in sys.modules if name.startswith('coupler.study')])"
+        "import sys; from coupler.checks.read_case import load; load(sys.argv[1]); "
+        "print([name for name in sys.modules if name.startswith('coupler.commands.study')])"
     )
     done = subprocess.run(
         [sys.executable, "-c", code, str(tmp_path)], capture_output=True, text=True, check=True

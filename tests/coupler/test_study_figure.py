@@ -2,9 +2,18 @@
 
 import itertools
 
-from coupler.view.labels import _extent, place_labels
-from coupler.view.plots import plt
-from coupler.view.study import crosses, figure, footnotes, labels, ladder_curves, limits, line, ylabel
+from coupler.commands.view.labels import _extent, place_labels
+from coupler.commands.view.plots import plt
+from coupler.commands.view.study import (
+    crosses,
+    figure,
+    footnotes,
+    labels,
+    ladder_curves,
+    limits,
+    line,
+    ylabel,
+)
 
 
 def point(ladder, label, cpu, error, reason=""):

@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coupler.case_study import Quantity
-from coupler.study.order import last_slope, slope, three_run_order
-from coupler.study.reading import Curve, taken
-from coupler.study.reference import against_curve
+from coupler.case.study import Quantity
+from coupler.commands.study.order import last_slope, slope, three_run_order
+from coupler.commands.study.reading import Curve, taken
+from coupler.commands.study.reference import against_curve
 
 ORDERS = st.floats(0.3, 5.0)
 SIZES = st.sampled_from([(0.4, 0.2, 0.1), (0.1, 0.07, 0.05), (1.0, 0.5, 0.4), (3e-3, 1e-3, 5e-4)])

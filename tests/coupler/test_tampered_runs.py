@@ -6,14 +6,14 @@ import shutil
 import numpy as np
 import pytest
 
-from coupler.array_file import write_arrays
-from coupler.checkpoint import FOLDER, UNSET, Checkpoint, OtherScene, listed
-from coupler.errors import ExitCode, SurgebreakError
-from coupler.explain_run import explanation_of_run
-from coupler.history import BadTable, read_history
-from coupler.report.command import report
-from coupler.resume import CannotResume, prepare
-from coupler.run_summary import NoRun
+from coupler.commands.explain_run import explanation_of_run
+from coupler.commands.report.command import report
+from coupler.program.errors import ExitCode, SurgebreakError
+from coupler.results.history import BadTable, read_history
+from coupler.run.array_file import write_arrays
+from coupler.run.checkpoint import FOLDER, UNSET, Checkpoint, OtherScene, listed
+from coupler.run.resume import CannotResume, prepare
+from coupler.run.summary import NoRun
 from tests.coupler.resumed import go_on
 
 JUNK = ["[]", "{}", "null", "1", '"x"', "", "\0", "{", '{"status": 1}', "[" * 100_000, '{"figures": []}']

@@ -8,17 +8,17 @@ import sys
 import numpy as np
 import pytest
 
-from coupler.build import build
-from coupler.case_checks import remarks
-from coupler.case_file import load
-from coupler.checkpoint import FOLDER, OtherScene, listed
-from coupler.errors import BadCase
-from coupler.expected import verdicts
-from coupler.forecast import forecast
-from coupler.provenance import ROOT
-from coupler.tank_mesh import basin_edges, mesh_of, on_side
-from fluid.gauges import level
-from fluid.mesh import box_mesh
+from coupler.checks.case import remarks
+from coupler.checks.read_case import load
+from coupler.geometry.tank_mesh import basin_edges, mesh_of, on_side
+from coupler.program.errors import BadCase
+from coupler.program.provenance import ROOT
+from coupler.results.expected import verdicts
+from coupler.run.checkpoint import FOLDER, OtherScene, listed
+from coupler.run.forecast import forecast
+from coupler.scene.build import build
+from fluid.mesh.background import box_mesh
+from fluid.readings.gauges import level
 from tests.coupler.basins import cylinder, write
 from tests.coupler.resumed import begin, check_same, directory_of, go_on
 from tests.fakes import no_clock
@@ -359,7 +359,7 @@ def test_check_tells_the_true_mesh_and_its_thin_cells(tmp_path):
 
 
 def test_meshio_is_loaded_for_a_file_only():
-    told = "import sys; from coupler.case_file import load; load(sys.argv[1]); print('meshio' in sys.modules)"
+    told = "import sys; from coupler.checks.read_case import load; load(sys.argv[1]); print('meshio' in sys.modules)"
     for case, loads in (("sloshing", "False"), ("sloshing_cylinder", "True")):
         run = subprocess.run(
             [sys.executable, "-c", told, str(ROOT / "cases" / case)],

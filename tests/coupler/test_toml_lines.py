@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coupler.toml_lines import key_lines, line_of
+from coupler.case.toml_lines import key_lines, line_of
 
 TEXT = '''# comment with [brackets] and a = 1
 title = "one # no comment"

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coupler.errors import UnitError
-from coupler.units import DIMENSIONS, to_si
+from coupler.case.units import DIMENSIONS, to_si
+from coupler.program.errors import UnitError
 
 SIZES = st.floats(1e-9, 1e9)
 

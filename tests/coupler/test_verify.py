@@ -5,11 +5,11 @@ import math
 
 import pytest
 
-from coupler.errors import BadCase, ExitCode
-from coupler.records import SHIPPED
-from coupler.verify import page, registry, report, runner
-from coupler.verify.figures import columns, named_values
-from coupler.verify.registry import Check, Finding, Result
+from coupler.case.records import SHIPPED
+from coupler.commands.verify import page, registry, report, runner
+from coupler.commands.verify.figures import columns, named_values
+from coupler.commands.verify.registry import Check, Finding, Result
+from coupler.program.errors import BadCase, ExitCode
 
 
 def test_the_error_is_a_share_or_a_difference():

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from coupler import extras
-from coupler.history import HistoryTable, read_history
-from coupler.output import WaterWriter
-from coupler.view.__main__ import main, pixels, rate
-from coupler.view.plots import grouped
+from coupler.commands.view.__main__ import main, pixels, rate
+from coupler.commands.view.plots import grouped
+from coupler.program import extras
+from coupler.results.fields import WaterWriter
+from coupler.results.history import HistoryTable, read_history
 from tests.coupler.synthetic_run import tank_mesh, write_run
 
 ROOT = Path(__file__).parents[2]
@@ -23,8 +23,8 @@ if not all((Path(p) / "pyvista").exists() for p in sys.path if p.endswith("site-
 
 
 def render(*arguments, **environment):
-    """Run `python -m coupler.view` as the command does."""
-    command = [sys.executable, "-m", "coupler.view", *map(str, arguments)]
+    """Run `python -m coupler.commands.view` as the command does."""
+    command = [sys.executable, "-m", "coupler.commands.view", *map(str, arguments)]
     return subprocess.run(
         command, cwd=ROOT, capture_output=True, text=True, env=os.environ | environment, check=False
     )
@@ -76,7 +76,7 @@ def test_a_run_that_is_still_being_written_can_be_looked_at(tmp_path):
     writer = WaterWriter(tmp_path / "fields.vtkhdf")
     for k in range(3):
         writer.append(0.1 * k, nodes, cells, {"level_set": nodes[:, 2] - 1.0}, {})
-    command = [sys.executable, "-m", "coupler.view", str(tmp_path), "--still", "--size", "160x90"]
+    command = [sys.executable, "-m", "coupler.commands.view", str(tmp_path), "--still", "--size", "160x90"]
     with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as viewer:
         while viewer.poll() is None:
             writer.append(0.1 * k, nodes, cells, {"level_set": nodes[:, 2] - 1.0}, {})
@@ -89,7 +89,7 @@ def test_pictures_need_neither_side_of_the_solver(tmp_path):
     """VTK crashes in a process that holds YADE: nothing on the way to a picture may import it, or the fluid."""
     run = write_run(tmp_path / "run", [0.0, 1.0], cell=4.0)
     code = (
-        "import sys; from coupler.view.__main__ import main; code = main(sys.argv[1:]);"
+        "import sys; from coupler.commands.view.__main__ import main; code = main(sys.argv[1:]);"
         "loaded = {m.split('.')[0] for m in sys.modules};"
         "print(sorted(loaded & {'yade', 'yade_scripts', 'fluid', 'skfem', 'numba'}), code)"
     )
@@ -128,8 +128,8 @@ def test_layers_of_water_are_drawn_from_far_to_near(tmp_path):
     """Translucent triangles hide what is drawn after them: in the order of the cells two layers made a mosaic."""
     run = write_run(tmp_path / "run", [0.0], cell=4.0)
     code = (
-        "import sys, numpy as np; from coupler.view.run_files import open_run;"
-        "from coupler.view.scene import water_surface; eye = np.array([50.0, -80.0, 30.0]);"
+        "import sys, numpy as np; from coupler.commands.view.run_files import open_run;"
+        "from coupler.commands.view.scene import water_surface; eye = np.array([50.0, -80.0, 30.0]);"
         "x = water_surface(open_run(sys.argv[1]).water.at(0.0), eye).points.reshape(-1, 3, 3).mean(axis=1);"
         "print(np.diff(np.linalg.norm(x - eye, axis=1)).max(), len(x))"
     )
@@ -173,7 +173,7 @@ def test_bad_options_are_refused(read, text):
 def test_a_reader_who_has_enough_ends_the_pictures_quietly(tmp_path):
     """`surgebreak render RUN | head -1` leaves no message about a broken pipe."""
     run = write_run(tmp_path / "run", [0.0], cell=4.0)
-    words = [sys.executable, "-m", "coupler.view", str(run), "--still", "--size", "160x90"]
+    words = [sys.executable, "-m", "coupler.commands.view", str(run), "--still", "--size", "160x90"]
     with subprocess.Popen(words, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as view:
         view.stdout.close()
         assert view.stderr.read() == ""
@@ -194,7 +194,7 @@ def test_panels_hold_whole_vectors_of_like_size(tmp_path):
 
 def test_a_figure_of_many_panels_goes_on_where_a_page_of_paper_ends():
     """A figure taller than A4 would be shrunk until its letters cannot be read."""
-    from coupler.view.plots import LOW_PANEL, PANEL, TALLEST, leaves
+    from coupler.commands.view.plots import LOW_PANEL, PANEL, TALLEST, leaves
 
     panels = [("N", ["a"])] * 5 + [("1", ["b"])] * 4
     found = leaves(panels)

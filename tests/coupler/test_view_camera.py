@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coupler.view import palette
-from coupler.view.camera import frame
+from coupler.commands.view import palette
+from coupler.commands.view.camera import frame
 
 MARGIN = (0.04, 0.1, 0.17, 0.05)
 

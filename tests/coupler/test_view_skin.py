@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coupler.view.water_surface import shading_normals, skin
+from coupler.commands.view.water_surface import shading_normals, skin
 from tests.coupler.synthetic_run import tank_mesh
 
 SIZE = (3.0, 2.0, 2.0)

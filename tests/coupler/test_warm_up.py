@@ -1,8 +1,8 @@
 """The warm-up must touch every kernel, or the first real run compiles after all."""
 
-from coupler.case import modules
-from coupler.case_file import load
-from coupler.warm_up import CASE
+from coupler.case.case import modules
+from coupler.checks.read_case import load
+from coupler.commands.warm_up import CASE
 
 
 def test_the_warm_up_case_switches_on_both_sides_and_what_joins_them(tmp_path):

@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from coupler.build import build
-from coupler.build_water import RecordError, record_columns
-from coupler.case import Case, modules
-from coupler.case_checks import problems, remarks
-from coupler.forecast import forecast
-from coupler.limits import Diverged, check_pressure
-from coupler.side_energy import side_energy
-from fluid import bounded
-from fluid.solve import NotConverged
+from coupler.case.case import Case, modules
+from coupler.checks.case import problems, remarks
+from coupler.run.forecast import forecast
+from coupler.scene.build import build
+from coupler.scene.build_water import RecordError, record_columns
+from coupler.scene.side_energy import side_energy
+from coupler.step.limits import Diverged, check_pressure
+from fluid.numerics import bounded
+from fluid.numerics.solve import NotConverged
 from tests.fakes import no_clock
 
 TANK = {"lower": [0, 0, 0], "upper": [2, 0.2, 1], "cell": 0.1, "smooth": ["y-", "y+"]}

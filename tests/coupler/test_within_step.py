@@ -2,11 +2,11 @@
 
 import pytest
 
-from coupler import within_step
-from coupler.checkpoint import FOLDER, listed
-from coupler.limits import LimitReached
-from coupler.warm_up import Silent
-from coupler.within_step import LongSteps, StepLeft
+from coupler.commands.warm_up import Silent
+from coupler.run import within_step
+from coupler.run.checkpoint import FOLDER, listed
+from coupler.run.within_step import LongSteps, StepLeft
+from coupler.step.limits import LimitReached
 from tests.coupler.resumed import DRY, begin, check_same, go_on
 from tests.coupler.test_resume import COUPLED, STREAM
 

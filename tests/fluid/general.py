@@ -4,7 +4,7 @@ import meshio
 import numpy as np
 from scipy.spatial import Delaunay
 
-from fluid.mesh import CORNERS_OF_FACE, Background
+from fluid.mesh.background import CORNERS_OF_FACE, Background
 
 LEAST_ANGLE = 5.0
 """[degrees] between two faces of a cell: slivers below it are shaken out, as generators do."""

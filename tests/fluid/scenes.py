@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from fluid.bodies import ConvexBodies
-from fluid.bounded import solve_pressure
-from fluid.domain import cut_domain
-from fluid.mesh import box_mesh
-from fluid.parameters import WaterParameters
-from fluid.water import Water
+from fluid.cut.bodies import ConvexBodies
+from fluid.domain.physical_domain import cut_domain
+from fluid.mesh.background import box_mesh
+from fluid.numerics.bounded import solve_pressure
+from fluid.step.parameters import WaterParameters
+from fluid.step.water import Water
 
 
 def tank(size, cell, fill, bodies=None, is_open=None, covers="single", **parameters) -> Water:

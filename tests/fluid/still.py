@@ -6,8 +6,8 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import spsolve
 
-from fluid.domain import gradients
-from fluid.wetted import wetted_coupling
+from fluid.domain.coupling_matrix import wetted_coupling
+from fluid.domain.physical_domain import gradients
 
 RHO_G = 9810.0
 

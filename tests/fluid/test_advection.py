@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from fluid.advection import feet, transport
-from fluid.bodies import ConvexBodies
-from fluid.domain import cut_domain
-from fluid.mesh import Background, box_mesh
-from fluid.topology import Topology
+from fluid.cut.bodies import ConvexBodies
+from fluid.domain.physical_domain import cut_domain
+from fluid.domain.topology import Topology
+from fluid.mesh.background import Background, box_mesh
+from fluid.transport.advection import feet, transport
 
 
 @pytest.fixture(scope="module", params=["lattice", "jittered"])

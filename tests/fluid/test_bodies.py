@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from fluid.bodies import BodyShapes, ConvexBodies, NotConvex, centre_of_volume
+from fluid.cut.bodies import BodyShapes, ConvexBodies, NotConvex, centre_of_volume
 
 WEDGE = np.array([[0, 0, 0], [2, 0, 0], [0, 1, 0], [2, 1, 0], [0, 0, 1], [2, 0, 1.0]])
 WEDGE_FACES = [[0, 1, 3, 2], [0, 1, 5, 4], [2, 3, 5, 4], [0, 2, 4], [1, 3, 5]]

@@ -6,9 +6,9 @@ import scipy.sparse as sp
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fluid.bodies import ConvexBodies
-from fluid.bounded import solve_bounded
-from fluid.solve import NotConverged, solve
+from fluid.cut.bodies import ConvexBodies
+from fluid.numerics.bounded import solve_bounded
+from fluid.numerics.solve import NotConverged, solve
 from tests.fluid.scenes import advance, tank
 
 

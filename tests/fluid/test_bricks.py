@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from fluid.bodies import ConvexBodies
-from fluid.domain import cut_domain
-from fluid.mesh import MeshError, box_mesh
-from fluid.parameters import WaterParameters
-from fluid.water import Water
+from fluid.cut.bodies import ConvexBodies
+from fluid.domain.physical_domain import cut_domain
+from fluid.mesh.background import MeshError, box_mesh
+from fluid.step.parameters import WaterParameters
+from fluid.step.water import Water
 from tests.fluid.scenes import advance, column
 
 CELL = 0.1

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from fluid.bodies import ConvexBodies
-from fluid.covers import Connection, components
-from fluid.domain import carry, cut_domain
+from fluid.cut.bodies import ConvexBodies
+from fluid.domain.covers import Connection, components
+from fluid.domain.physical_domain import carry, cut_domain
 from tests.fluid.test_thin_walls import BOX, MESH, H
 
 SHARP = Connection(inner=0.1, face=0.2)

@@ -9,11 +9,11 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fluid.cube_root import cube_root
+from fluid.numerics.cube_root import cube_root
 
 PRINT_ROOTS = """
 import numpy as np
-from fluid.cube_root import cube_root
+from fluid.numerics.cube_root import cube_root
 print(cube_root(np.random.default_rng(1).uniform(1e-6, 1e6, 4001)).tobytes().hex())
 """
 

@@ -7,9 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from fluid.bodies import ConvexBodies
-from fluid.domain import cut_domain, gradients, wetted_coupling
-from fluid.mesh import box_mesh
+from fluid.cut.bodies import ConvexBodies
+from fluid.domain.physical_domain import cut_domain, gradients, wetted_coupling
+from fluid.mesh.background import box_mesh
 
 MESH = box_mesh((0, 0, 0), (1, 1, 1), 0.25)
 

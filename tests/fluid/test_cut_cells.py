@@ -6,10 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from fluid.bodies import ConvexBodies
-from fluid.covers import Connection
-from fluid.domain import cut_domain, gradients
-from fluid.mesh import Background, box_mesh
+from fluid.cut.bodies import ConvexBodies
+from fluid.domain.covers import Connection
+from fluid.domain.physical_domain import cut_domain, gradients
+from fluid.mesh.background import Background, box_mesh
 from tests.fluid import solid_modeller
 from tests.fluid.test_cut import divergence_defect
 

@@ -8,11 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from fluid import contacts
-from fluid.bodies import ConvexBodies
-from fluid.covers import Connection, components, without_pockets
-from fluid.domain import cut_domain
-from fluid.mesh import Background, box_mesh
+from fluid.cut import openings as contacts
+from fluid.cut.bodies import ConvexBodies
+from fluid.domain.covers import Connection, components, without_pockets
+from fluid.domain.physical_domain import cut_domain
+from fluid.mesh.background import Background, box_mesh
 
 N = 6
 H = 1 / N

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from fluid.bodies import ConvexBodies
-from fluid.domain import cut_domain, wetted_coupling
-from fluid.mesh import box_mesh
+from fluid.cut.bodies import ConvexBodies
+from fluid.domain.physical_domain import cut_domain, wetted_coupling
+from fluid.mesh.background import box_mesh
 
 MESH = box_mesh((0, 0, 0), (4, 4, 4), 1.0)
 EMPTY = ConvexBodies.empty()

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from fluid.outflow import Outflow
-from fluid.volume_transport import carry_volume
+from fluid.sides.outflow import Outflow
+from fluid.transport.volume_transport import carry_volume
 from tests.fluid.scenes import advance, column, tank
 
 

@@ -5,11 +5,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from fluid.bodies import ConvexBodies
-from fluid.domain import cut_domain
-from fluid.mesh import box_mesh
-from fluid.topology import Topology
-from fluid.volume import nodal_volume
+from fluid.cut.bodies import ConvexBodies
+from fluid.domain.physical_domain import cut_domain
+from fluid.domain.topology import Topology
+from fluid.mesh.background import box_mesh
+from fluid.surface.volume import nodal_volume
 
 N = 4
 BOX = box_mesh((0, 0, 0), (1, 1, 1), 1 / N)

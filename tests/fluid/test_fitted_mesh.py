@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from skfem import MeshTet
 
-from fluid.fitted_mesh import fitted_mesh
-from fluid.mesh import MeshError, box_mesh
+from fluid.mesh.background import MeshError, box_mesh
+from fluid.mesh.fitted_mesh import fitted_mesh
 
 
 def wavy(x, y):

@@ -8,12 +8,14 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 from skfem import asm
 
-from fluid import forms
-from fluid.bodies import ConvexBodies
-from fluid.domain import cut_domain, wetted_coupling
-from fluid.mesh import box_mesh
-from fluid.moments import nodal_water
-from fluid.projection import (
+from fluid.cut.bodies import ConvexBodies
+from fluid.domain.moments import nodal_water
+from fluid.domain.physical_domain import cut_domain, wetted_coupling
+from fluid.domain.quadrature import surface_basis
+from fluid.domain.topology import Graph, Topology
+from fluid.mesh.background import box_mesh
+from fluid.numerics.solve import solve
+from fluid.pressure.projection import (
     cell_gradient,
     cell_velocity,
     damp_divergence,
@@ -21,11 +23,9 @@ from fluid.projection import (
     nodal_mean,
     pressure_matrix,
 )
-from fluid.quadrature import surface_basis
-from fluid.solve import solve
-from fluid.strain import edge_strain, spread_stress
-from fluid.topology import Graph, Topology
-from fluid.viscous_kernels import wall_stress
+from fluid.transport import forms
+from fluid.viscous.kernels import wall_stress
+from fluid.viscous.strain import edge_strain, spread_stress
 from tests.fluid.scenes import tank
 
 MESH = box_mesh((0, 0, 0), (1, 1, 1), 1 / 6)

@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fluid import gauges
-from fluid.bodies import ConvexBodies
-from fluid.clip import clipped, volumes
-from fluid.places import Outside
+from fluid.cut.bodies import ConvexBodies
+from fluid.domain.point_location import Outside
+from fluid.readings import gauges
+from fluid.readings.clip import clipped, volumes
 from tests.fluid.scenes import advance, column, load, tank
 
 

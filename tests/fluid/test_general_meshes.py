@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from fluid.bodies import ConvexBodies
-from fluid.domain import cut_domain
-from fluid.kinks import damp_kinks
-from fluid.parameters import WaterParameters
-from fluid.paths_in_solids import levels_in_solids
-from fluid.topology import Topology
-from fluid.water import Water
+from fluid.cut.bodies import ConvexBodies
+from fluid.domain.physical_domain import cut_domain
+from fluid.domain.topology import Topology
+from fluid.step.parameters import WaterParameters
+from fluid.step.water import Water
+from fluid.surface.gradient_jump_damping import damp_kinks
+from fluid.transport.paths_in_solids import levels_in_solids
 from tests.fluid.general import unstructured
 from tests.fluid.scenes import advance, load, rotation
 from tests.fluid.test_obtuse import jittered, thin_wall

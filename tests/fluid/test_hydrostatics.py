@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fluid.bodies import ConvexBodies
+from fluid.cut.bodies import ConvexBodies
 from tests.fluid.scenes import advance, load, rotation, tank
 
 WEIGHT = 1000.0 * 9.81

@@ -6,13 +6,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from fluid import gauges, waves
-from fluid.bodies import ConvexBodies
-from fluid.domain import cut_domain
-from fluid.inflow import Side, Sides, wet_shares
-from fluid.mesh import box_mesh
-from fluid.parameters import WaterParameters
-from fluid.water import Water
+from fluid.cut.bodies import ConvexBodies
+from fluid.domain.physical_domain import cut_domain
+from fluid.mesh.background import box_mesh
+from fluid.readings import gauges
+from fluid.sides import waves
+from fluid.sides.inflow import Side, Sides, wet_shares
+from fluid.step.parameters import WaterParameters
+from fluid.step.water import Water
 from tests.fluid.scenes import advance
 
 G = 9.81

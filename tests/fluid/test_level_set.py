@@ -5,12 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fluid.bodies import ConvexBodies
-from fluid.domain import cut_domain
-from fluid.level_set import FAR, redistance, squared_distance
-from fluid.mesh import box_mesh
-from fluid.topology import Topology
-from fluid.volume import nodal_volume
+from fluid.cut.bodies import ConvexBodies
+from fluid.domain.physical_domain import cut_domain
+from fluid.domain.topology import Topology
+from fluid.mesh.background import box_mesh
+from fluid.surface.level_set import FAR, redistance, squared_distance
+from fluid.surface.volume import nodal_volume
 
 H = 0.1
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fluid.mesh import Background, MeshError, box_mesh
+from fluid.mesh.background import Background, MeshError, box_mesh
 
 
 @pytest.fixture(scope="module")

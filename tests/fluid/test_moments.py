@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fluid.moments import wet_moments
+from fluid.domain.moments import wet_moments
 
 values = st.floats(-1, 1).filter(lambda v: abs(v) > 1e-6)
 

@@ -4,14 +4,14 @@ round-off and with arms, whatever cuts the cells; the rest is shown by name."""
 import numpy as np
 import pytest
 
-from fluid.bodies import ConvexBodies
-from fluid.domain import cut_domain
-from fluid.inflow import Side, Sides
-from fluid.mesh import box_mesh
-from fluid.momentum import NUMERICAL, PHYSICAL, about, momentum
-from fluid.parameters import WaterParameters
-from fluid.water import Water
-from fluid.waves import steady
+from fluid.cut.bodies import ConvexBodies
+from fluid.domain.physical_domain import cut_domain
+from fluid.mesh.background import box_mesh
+from fluid.sides.inflow import Side, Sides
+from fluid.sides.waves import steady
+from fluid.step.momentum import NUMERICAL, PHYSICAL, about, momentum
+from fluid.step.parameters import WaterParameters
+from fluid.step.water import Water
 from tests.fluid.scenes import advance, column, load, rotation, tank
 
 RHO, G = 1000.0, 9.81

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from coupler.verify.figures import columns
+from coupler.commands.verify.figures import columns
 from tests.fluid.scenes import advance, column, tank
 
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from fluid.bodies import ConvexBodies
-from fluid.domain import cut_domain
-from fluid.mesh import box_mesh
-from fluid.solve import solve
-from fluid.water import Water
+from fluid.cut.bodies import ConvexBodies
+from fluid.domain.physical_domain import cut_domain
+from fluid.mesh.background import box_mesh
+from fluid.numerics.solve import solve
+from fluid.step.water import Water
 from tests.fluid.scenes import advance, load, tank
 
 

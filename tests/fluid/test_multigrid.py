@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from fluid.bodies import ConvexBodies
-from fluid.multigrid import Multigrid
-from fluid.solve import solve
+from fluid.cut.bodies import ConvexBodies
+from fluid.numerics.multigrid import Multigrid
+from fluid.numerics.solve import solve
 from tests.fluid.scenes import tank
 
 

@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from fluid.bodies import ConvexBodies
-from fluid.domain import cut_domain
-from fluid.mesh import Background, box_mesh
-from fluid.obtuse import about, reserve
-from fluid.parameters import WaterParameters
-from fluid.projection import pressure_matrix
-from fluid.topology import Graph, Topology
-from fluid.water import Water
-from fluid.wet_part import WetPart
+from fluid.cut.bodies import ConvexBodies
+from fluid.domain.physical_domain import cut_domain
+from fluid.domain.topology import Graph, Topology
+from fluid.mesh.background import Background, box_mesh
+from fluid.pressure.active_cells import WetPart
+from fluid.pressure.indefinite_cells import about, reserve
+from fluid.pressure.projection import pressure_matrix
+from fluid.step.parameters import WaterParameters
+from fluid.step.water import Water
 from tests.fluid.scenes import advance
 
 N = 8

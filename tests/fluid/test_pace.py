@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fluid.pace import LEAST_COUNTED, SPRAY, SPRAY_COURANT, SPRAY_SPEED, largest_component, pace
+from fluid.step.time_step import LEAST_COUNTED, SPRAY, SPRAY_COURANT, SPRAY_SPEED, largest_component, pace
 from tests.fluid.scenes import tank
 
 

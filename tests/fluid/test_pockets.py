@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from fluid.covers import components
-from fluid.domain import cut_domain
+from fluid.domain.covers import components
+from fluid.domain.physical_domain import cut_domain
 from tests.fluid.scenes import advance, load, tank
 from tests.fluid.still import RHO_G
 from tests.fluid.test_covers import hollow_box

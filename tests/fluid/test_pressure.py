@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from coupler.verify.figures import columns
-from fluid.bodies import ConvexBodies
-from fluid.moments import cells_touching
-from fluid.predictor import carry_remainder
-from fluid.projection import cell_gradient
+from coupler.commands.verify.figures import columns
+from fluid.cut.bodies import ConvexBodies
+from fluid.domain.moments import cells_touching
+from fluid.pressure.projection import cell_gradient
+from fluid.step.predictor import carry_remainder
 from tests.fluid.scenes import advance, column, rotation, tank
 
 

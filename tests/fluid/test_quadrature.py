@@ -6,10 +6,10 @@ from scipy.spatial.transform import Rotation
 from skfem import BilinearForm, LinearForm
 from skfem.helpers import dot, grad
 
-from fluid.bodies import ConvexBodies
-from fluid.domain import cut_domain, gradients, wetted_coupling
-from fluid.mesh import box_mesh
-from fluid.quadrature import cell_basis, quadrature_rule, surface_basis
+from fluid.cut.bodies import ConvexBodies
+from fluid.domain.physical_domain import cut_domain, gradients, wetted_coupling
+from fluid.domain.quadrature import cell_basis, quadrature_rule, surface_basis
+from fluid.mesh.background import box_mesh
 
 MESH = box_mesh((0, 0, 0), (1, 1, 1), 1 / 6)
 BODIES = ConvexBodies.boxes(

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from fluid.mesh import Background, box_mesh
-from fluid.shapes import MOST_SHAPES, SAME
+from fluid.mesh.background import Background, box_mesh
+from fluid.mesh.shapes import MOST_SHAPES, SAME
 
 
 def test_a_box_has_six_shapes_with_the_gradients_of_its_cells():

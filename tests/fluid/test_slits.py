@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from fluid import state
-from fluid.bodies import ConvexBodies
-from fluid.covers import WIDE_OPENINGS
-from fluid.domain import cut_domain
-from fluid.mesh import Background, box_mesh
-from fluid.parameters import WaterParameters
-from fluid.slits import Cracks, Slits, conductance
-from fluid.water import Water
+from fluid.cut.bodies import ConvexBodies
+from fluid.domain.covers import WIDE_OPENINGS
+from fluid.domain.physical_domain import cut_domain
+from fluid.mesh.background import Background, box_mesh
+from fluid.pressure.slits import Cracks, Slits, conductance
+from fluid.step import state
+from fluid.step.parameters import WaterParameters
+from fluid.step.water import Water
 from tests.fluid.plane_reference import released
 from tests.fluid.scenes import advance
 from tests.fluid.still import RHO_G, forces, pressure

@@ -7,10 +7,10 @@ import pytest
 import scipy.sparse as sp
 from scipy.spatial.transform import Rotation
 
-from fluid.bodies import ConvexBodies
-from fluid.domain import cut_domain, gradients, wetted_coupling
-from fluid.mesh import box_mesh
-from fluid.solve import solve
+from fluid.cut.bodies import ConvexBodies
+from fluid.domain.physical_domain import cut_domain, gradients, wetted_coupling
+from fluid.mesh.background import box_mesh
+from fluid.numerics.solve import solve
 from tests.fluid.scenes import advance, tank
 
 H = 1 / 6

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from fluid import solve as solver
-from fluid.solve import NotConverged, solve
+from fluid.numerics import solve as solver
+from fluid.numerics.solve import NotConverged, solve
 
 
 def laplace(n):

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from fluid import state
-from fluid.bodies import ConvexBodies
-from fluid.domain import cut_domain
-from fluid.mesh import box_mesh
-from fluid.state import NotAfterAStep, OtherWater
-from fluid.water import Water
+from fluid.cut.bodies import ConvexBodies
+from fluid.domain.physical_domain import cut_domain
+from fluid.mesh.background import box_mesh
+from fluid.step import state
+from fluid.step.state import NotAfterAStep, OtherWater
+from fluid.step.water import Water
 from tests.fluid.scenes import advance, column, tank
 
 SIZES = np.array([[0.3, 0.25, 0.2], [0.08, 0.9, 0.7]])

@@ -11,16 +11,17 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 from skfem import asm
 
-from fluid import forms, supg, waves
-from fluid.bodies import ConvexBodies
-from fluid.domain import cut_domain
-from fluid.inflow import Side, Sides
-from fluid.mesh import box_mesh
-from fluid.parameters import WaterParameters
-from fluid.solve import NotConverged
-from fluid.supg import Band, Transport, ghost_penalty, midpoint_velocity, stabilisation_time
-from fluid.topology import Topology
-from fluid.water import Water
+from fluid.cut.bodies import ConvexBodies
+from fluid.domain.physical_domain import cut_domain
+from fluid.domain.topology import Topology
+from fluid.mesh.background import box_mesh
+from fluid.numerics.solve import NotConverged
+from fluid.sides import waves
+from fluid.sides.inflow import Side, Sides
+from fluid.step.parameters import WaterParameters
+from fluid.step.water import Water
+from fluid.transport import forms, supg
+from fluid.transport.supg import Band, Transport, ghost_penalty, midpoint_velocity, stabilisation_time
 from tests.fluid.scenes import advance, column, load, rotation, tank
 
 H = 1 / 3
@@ -296,9 +297,9 @@ def test_paths_alone_load_nothing_of_it():
         "import sys\n"
         "from tests.fluid.scenes import advance, column, tank\n"
         "advance(tank([1, 0.5, 1], 0.25, column(0.5, 0.5)))\n"
-        "print('fluid.supg' in sys.modules, 'fluid.forms' in sys.modules)\n"
+        "print('fluid.transport.supg' in sys.modules, 'fluid.transport.forms' in sys.modules)\n"
         "advance(tank([1, 0.5, 1], 0.25, column(0.5, 0.5), advection='supg'))\n"
-        "print('fluid.supg' in sys.modules, 'fluid.forms' in sys.modules)"
+        "print('fluid.transport.supg' in sys.modules, 'fluid.transport.forms' in sys.modules)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["False", "False", "True", "True"]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fluid.volume_transport import carry_volume
+from fluid.transport.volume_transport import carry_volume
 from tests.fluid.scenes import advance, column, tank
 
 

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from fluid.bodies import ConvexBodies
-from fluid.covers import components
-from fluid.domain import cut_domain
-from fluid.mesh import Background, box_mesh
-from fluid.parameters import WaterParameters
-from fluid.water import Water
+from fluid.cut.bodies import ConvexBodies
+from fluid.domain.covers import components
+from fluid.domain.physical_domain import cut_domain
+from fluid.mesh.background import Background, box_mesh
+from fluid.step.parameters import WaterParameters
+from fluid.step.water import Water
 from tests.fluid.scenes import advance, load
 from tests.fluid.still import RHO_G, forces, hydrostatic, pressure
 

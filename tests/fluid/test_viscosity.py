@@ -6,16 +6,16 @@ import sys
 import numpy as np
 import pytest
 
-from fluid import gauges
-from fluid.bodies import ConvexBodies
-from fluid.domain import cut_domain
-from fluid.extension import extend_velocity
-from fluid.mesh import box_mesh
-from fluid.parameters import WaterParameters
-from fluid.viscosity import Viscosity
-from fluid.viscous_kernels import momentum_rate
-from fluid.wall_friction import WallFriction, column_depth, log_law
-from fluid.water import Water
+from fluid.cut.bodies import ConvexBodies
+from fluid.domain.physical_domain import cut_domain
+from fluid.mesh.background import box_mesh
+from fluid.readings import gauges
+from fluid.step.parameters import WaterParameters
+from fluid.step.water import Water
+from fluid.surface.extrapolation import extend_velocity
+from fluid.viscous.kernels import momentum_rate
+from fluid.viscous.viscosity import Viscosity
+from fluid.viscous.wall_friction import WallFriction, column_depth, log_law
 from tests.fluid.scenes import advance, rotation, tank
 
 DENSITY = 1000.0
@@ -265,5 +265,5 @@ def test_smooth_water_without_viscosity_loads_none_of_it():
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     loaded = set(done.stdout.split())
     absent = {"viscosity", "viscous_kernels", "wall_friction", "inflow", "waves"}
-    assert "fluid.water" in loaded
+    assert "fluid.step.water" in loaded
     assert loaded & {f"fluid.{name}" for name in absent} == set()

@@ -5,11 +5,11 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from fluid.advection import feet, transport
-from fluid.bodies import ConvexBodies
-from fluid.covers import components
-from fluid.domain import cut_domain
-from fluid.topology import Topology
+from fluid.cut.bodies import ConvexBodies
+from fluid.domain.covers import components
+from fluid.domain.physical_domain import cut_domain
+from fluid.domain.topology import Topology
+from fluid.transport.advection import feet, transport
 from tests.fluid.test_thin_walls import BOX, MESH, H, bricks, plate, side_growth
 
 

@@ -4,10 +4,10 @@ import manifold3d
 import numpy as np
 import pytest
 
-from fluid.bodies import ConvexBodies
-from fluid.domain import cut_domain
-from fluid.mesh import box_mesh
-from fluid.waterline import waterline_load
+from fluid.cut.bodies import ConvexBodies
+from fluid.domain.physical_domain import cut_domain
+from fluid.mesh.background import box_mesh
+from fluid.pressure.waterline import waterline_load
 from tests.fluid.scenes import advance, load, rotation, tank
 
 SIZE = np.array([0.3, 0.25, 0.2])

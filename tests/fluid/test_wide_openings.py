@@ -5,12 +5,12 @@ import pytest
 import scipy.sparse as sp
 from scipy.spatial.transform import Rotation
 
-from fluid.bodies import ConvexBodies
-from fluid.covers import WIDE_OPENINGS, components
-from fluid.domain import cut_domain
-from fluid.mesh import box_mesh
-from fluid.solve import solve
-from fluid.wetted import wetted_coupling
+from fluid.cut.bodies import ConvexBodies
+from fluid.domain.coupling_matrix import wetted_coupling
+from fluid.domain.covers import WIDE_OPENINGS, components
+from fluid.domain.physical_domain import cut_domain
+from fluid.mesh.background import box_mesh
+from fluid.numerics.solve import solve
 from tests.fluid.plane_reference import released
 from tests.fluid.still import RHO_G, forces, laplace, pressure
 from tests.fluid.test_slits import LEVELS, opened

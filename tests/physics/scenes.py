@@ -2,18 +2,18 @@
 
 import numpy as np
 
-from coupler.case import Case
-from coupler.exchange import Immersion
-from coupler.fill import start_level
-from coupler.loop import Coupling
-from fluid.mesh import box_mesh
-from fluid.parameters import WaterParameters
-from fluid.water import Water
+from coupler.case.case import Case
+from coupler.scene.fill import start_level
+from coupler.step.coupled_step import Coupling
+from coupler.step.immersion import Immersion
+from fluid.mesh.background import box_mesh
+from fluid.step.parameters import WaterParameters
+from fluid.step.water import Water
 from tests.fakes import no_clock
-from yade_scripts.cohesion import JointParameters
-from yade_scripts.equilibrium import CannotStand, settle
-from yade_scripts.generators.wall import wall_of_blocks
-from yade_scripts.structure import Structure
+from yade_scripts.blocks.generators.wall import wall_of_blocks
+from yade_scripts.dynamics.equilibrium import CannotStand, settle
+from yade_scripts.dynamics.structure import Structure
+from yade_scripts.joints.cohesion import JointParameters
 
 G, RHO = 9.81, 1000.0
 SLICE = 0.5
@@ -73,8 +73,8 @@ def _still_water(structure, mesh, tank, upper, covers):
 
 def load_at_rest(water):
     """Force and moment (n, 6) of the water on bodies that are held."""
-    from coupler.scheme import water_load
-    from fluid.bounded import solve_pressure
+    from coupler.step.pressure_with_structure import water_load
+    from fluid.numerics.bounded import solve_pressure
 
     problem = water.predict(water.stable_step())
     return water_load(problem, solve_pressure(problem, 1e-12).x)

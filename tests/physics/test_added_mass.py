@@ -1,18 +1,18 @@
 """Bodies lighter and heavier than water, released in a full, closed tank: the added mass is in the pressure solve.
 
 Stepping water and body in turn diverges below a density ratio of about the added mass coefficient; here the first
-acceleration must be g (1 - s)/(s + ca) at any ratio s. Reference: potential flow, coupler/verify/reference/
+acceleration must be g (1 - s)/(s + ca) at any ratio s. Reference: potential flow, coupler/reference/
 added_mass_closed_tank.csv (cube of side a in a cubic tank of side 3a: ca = 0.7177).
 """
 
 import numpy as np
 import pytest
 
-from coupler.exchange import Immersion
-from coupler.loop import Coupling
-from fluid.mesh import box_mesh
-from fluid.parameters import WaterParameters
-from fluid.water import Water
+from coupler.step.coupled_step import Coupling
+from coupler.step.immersion import Immersion
+from fluid.mesh.background import box_mesh
+from fluid.step.parameters import WaterParameters
+from fluid.step.water import Water
 from tests.fakes import FreeBody, no_clock
 
 G = 9.81

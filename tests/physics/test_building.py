@@ -6,8 +6,8 @@ The wave is the same, so the difference is the joints' alone; the ledger and the
 import numpy as np
 import pytest
 
-from coupler.build import build
-from coupler.case import Case
+from coupler.case.case import Case
+from coupler.scene.build import build
 from tests.fakes import no_clock
 
 SCENE = {

@@ -1,7 +1,7 @@
 """What a column of water gains while it collapses is an error of the mesh: it goes with the cells."""
 
-from coupler.build import build
-from coupler.case import Case
+from coupler.case.case import Case
+from coupler.scene.build import build
 from tests.fakes import no_clock
 
 

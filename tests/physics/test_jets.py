@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from coupler.verify.figures import columns
-from coupler.verify.jets import LIMITS, jet
+from coupler.commands.verify.figures import columns
+from coupler.commands.verify.jets import LIMITS, jet
 
 EXACT = dict(zip(*(columns("jet_on_plate")[name].tolist() for name in ("L_over_D", "F"))))
 

@@ -1,6 +1,6 @@
 """Water that falls out of a tank through an open side takes no more energy with it than it had."""
 
-from coupler.verify.scenes import level_at, tank
+from coupler.commands.verify.scenes import level_at, tank
 
 
 def test_a_pool_that_drains_neither_gains_nor_loses_energy_at_its_open_side():

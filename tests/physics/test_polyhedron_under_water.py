@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from coupler.build import build
-from coupler.case import Case
-from coupler.clock import Clock
+from coupler.case.case import Case
+from coupler.run.clock import Clock
+from coupler.scene.build import build
 
 
 def case(**block):

@@ -7,11 +7,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from coupler.limits import Diverged
-from coupler.verify.scenes import DENSITY, G, box, level_at, tank
-from yade_scripts.blocks import Block
-from yade_scripts.contact import ContactLaw
-from yade_scripts.structure import Structure
+from coupler.commands.verify.scenes import DENSITY, G, box, level_at, tank
+from coupler.step.limits import Diverged
+from yade_scripts.blocks.block import Block
+from yade_scripts.contact.law import ContactLaw
+from yade_scripts.dynamics.structure import Structure
 
 CELLS = (6, 6, 7)
 SIZE = (1.0, 1.0, 7.0 / 6.0)

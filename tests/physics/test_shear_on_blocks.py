@@ -3,18 +3,18 @@
 import numpy as np
 import pytest
 
-from coupler.shear import minmod
-from coupler.verify.scenes import level_at, tank
-from coupler.verify.spheres import sphere
-from fluid.bodies import ConvexBodies
-from fluid.domain import cut_domain
-from fluid.mesh import box_mesh
-from fluid.parameters import WaterParameters
-from fluid.viscosity import Viscosity
-from fluid.viscous_kernels import implicit_change, momentum_rate
-from fluid.water import Water
-from yade_scripts.blocks import Block
-from yade_scripts.structure import Structure
+from coupler.commands.verify.scenes import level_at, tank
+from coupler.commands.verify.spheres import sphere
+from coupler.step.shear import minmod
+from fluid.cut.bodies import ConvexBodies
+from fluid.domain.physical_domain import cut_domain
+from fluid.mesh.background import box_mesh
+from fluid.step.parameters import WaterParameters
+from fluid.step.water import Water
+from fluid.viscous.kernels import implicit_change, momentum_rate
+from fluid.viscous.viscosity import Viscosity
+from yade_scripts.blocks.block import Block
+from yade_scripts.dynamics.structure import Structure
 
 THICK = 200.0
 """Viscosity [Pa s]."""

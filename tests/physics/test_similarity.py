@@ -8,7 +8,7 @@ are the same bit for bit: a constant with a unit would show at any size.
 import numpy as np
 import pytest
 
-from coupler.build import build
+from coupler.scene.build import build
 from tests.fakes import no_clock
 from tests.physics.scenes import case, run
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from coupler.build import build
-from coupler.case import Case
+from coupler.case.case import Case
+from coupler.scene.build import build
 from tests.fakes import no_clock
 
 G, MU = 9.81, 0.3

@@ -2,10 +2,10 @@
 
 import pytest
 
-from coupler.build import build
-from coupler.case import Case
+from coupler.case.case import Case
+from coupler.scene.build import build
 from tests.fakes import no_clock
-from yade_scripts.equilibrium import CannotStand
+from yade_scripts.dynamics.equilibrium import CannotStand
 
 CANTILEVER = {
     "case": {"title": "a beam out of a fixed block"},

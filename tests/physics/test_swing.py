@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from coupler.build import build
+from coupler.scene.build import build
 from tests.fakes import no_clock
 from tests.physics.scenes import case, run
 

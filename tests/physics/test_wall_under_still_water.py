@@ -13,7 +13,7 @@ from tests.physics.scenes import (
     run,
     standing_wall,
 )
-from yade_scripts.equilibrium import CannotStand
+from yade_scripts.dynamics.equilibrium import CannotStand
 
 WALL = {"face": 1.1, "thickness": 0.2}
 HOLDS = 0.981

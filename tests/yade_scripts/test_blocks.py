@@ -10,9 +10,9 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial.transform import Rotation
 
-from yade_scripts.blocks import BOX_CORNERS, Block, BlockError
-from yade_scripts.faces import FixedPlane, gauss_points, touching_faces
-from yade_scripts.generators.building import Building, Opening, building_blocks
+from yade_scripts.blocks.block import BOX_CORNERS, Block, BlockError
+from yade_scripts.blocks.faces import FixedPlane, gauss_points, touching_faces
+from yade_scripts.blocks.generators.building import Building, Opening, building_blocks
 
 GROUND = FixedPlane((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
 edges = st.tuples(*[st.floats(0.01, 50.0)] * 3)
@@ -57,7 +57,7 @@ def test_a_dented_block_is_refused_with_the_face():
     """A cube with one corner pushed in is not convex."""
     corners = BOX_CORNERS.copy()
     corners[6] = 0.1
-    from yade_scripts.blocks import BOX_FACES
+    from yade_scripts.blocks.block import BOX_FACES
 
     with pytest.raises(BlockError, match="not convex"):
         Block("dented", np.zeros(3), vertices=corners, faces=BOX_FACES)

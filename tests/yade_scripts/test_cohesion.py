@@ -2,7 +2,7 @@
 
 import pytest
 
-from yade_scripts.cohesion import JointParameterError, JointParameters
+from yade_scripts.joints.cohesion import JointParameterError, JointParameters
 
 
 @pytest.mark.parametrize(

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from coupler.verify.figures import columns
-from yade_scripts.blocks import Block
-from yade_scripts.contact import (
+from coupler.commands.verify.figures import columns
+from yade_scripts.blocks.block import Block
+from yade_scripts.contact.law import (
     ContactError,
     ContactLaw,
     PairFriction,
@@ -14,7 +14,7 @@ from yade_scripts.contact import (
     paper_damping_ratio,
     restitution_without_tension,
 )
-from yade_scripts.structure import Structure
+from yade_scripts.dynamics.structure import Structure
 
 K = 1e8
 G = 9.81
@@ -125,7 +125,7 @@ def test_a_tilted_block_rocks_back_or_topples(tilt, falls):
 
 
 def test_a_block_stops_at_a_tank_wall():
-    from yade_scripts.faces import FixedPlane
+    from yade_scripts.blocks.faces import FixedPlane
 
     wall = FixedPlane((2.0, 0.0, 0.0), (-1.0, 0.0, 0.0), "east")
     block = Block("b", (0.0, 0.0, 0.5), size=1.0, density=2000.0, velocity=(5.0, 0.0, 0.0))

@@ -6,10 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from yade_scripts.blocks import Block
-from yade_scripts.contact import ContactLaw
-from yade_scripts.contact_nodes import block_edges
-from yade_scripts.structure import Structure
+from yade_scripts.blocks.block import Block
+from yade_scripts.contact.law import ContactLaw
+from yade_scripts.contact.nodes import block_edges
+from yade_scripts.dynamics.structure import Structure
 
 STILL = (0.0, 0.0, 0.0)
 DENSITY = 2000.0

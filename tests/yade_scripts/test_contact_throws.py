@@ -6,9 +6,9 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from yade_scripts.blocks import Block
-from yade_scripts.contact import ContactLaw
-from yade_scripts.structure import Structure
+from yade_scripts.blocks.block import Block
+from yade_scripts.contact.law import ContactLaw
+from yade_scripts.dynamics.structure import Structure
 
 K = 1e8
 STILL = (0.0, 0.0, 0.0)

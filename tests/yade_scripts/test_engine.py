@@ -20,7 +20,7 @@ def test_loading_is_quiet_and_clean():
     out = run("""
 import builtins, sys, glob, os, tempfile
 names, path, flags = set(dir(builtins)), list(sys.path), sys.getdlopenflags()
-from yade_scripts.engine import load_yade
+from yade_scripts.yade_side.engine import load_yade
 engine = load_yade()
 assert set(dir(builtins)) == names, set(dir(builtins)) - names
 assert sys.path == path and sys.getdlopenflags() == flags
@@ -34,7 +34,7 @@ print(os.path.dirname(engine.O.tmpFilename()))
 @pytest.mark.parametrize("package", ["vtk", "pyvista", "rasterio"])
 def test_packages_that_would_crash_are_refused(package):
     out = run(f"""
-from yade_scripts.engine import load_yade, CrashesAfterYade
+from yade_scripts.yade_side.engine import load_yade, CrashesAfterYade
 load_yade()
 try:
     import {package}
@@ -46,7 +46,7 @@ except CrashesAfterYade as error:
 
 def test_missing_yade_says_how_to_install_it():
     out = run("""
-import yade_scripts.engine as e
+import yade_scripts.yade_side.engine as e
 e.PACKAGED = ("/nowhere/yade",)
 try:
     e.load_yade()
@@ -62,7 +62,7 @@ def test_the_wrong_package_called_yade_is_named(tmp_path):
     out = run(f"""
 import sys
 sys.path.insert(0, {str(tmp_path)!r})
-import yade_scripts.engine as e
+import yade_scripts.yade_side.engine as e
 e.PACKAGED = ("/nowhere/yade",)
 try:
     e.load_yade()
@@ -75,7 +75,7 @@ except e.WrongYade as error:
 
 def test_a_package_that_yade_needs_is_named():
     out = run("""
-import yade_scripts.engine as e
+import yade_scripts.yade_side.engine as e
 e.UNDECLARED = ("mpmath", "surely_not_installed")
 try:
     e.load_yade()

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from coupler.verify.figures import columns
-from yade_scripts.blocks import Block
-from yade_scripts.cohesion import JointParameters
-from yade_scripts.contact import ContactLaw
-from yade_scripts.equilibrium import SLACK, CannotStand, Search, settle
-from yade_scripts.generators.building import Building, Opening, building_blocks
-from yade_scripts.generators.wall import wall_of_blocks
-from yade_scripts.structure import Structure
+from coupler.commands.verify.figures import columns
+from yade_scripts.blocks.block import Block
+from yade_scripts.blocks.generators.building import Building, Opening, building_blocks
+from yade_scripts.blocks.generators.wall import wall_of_blocks
+from yade_scripts.contact.law import ContactLaw
+from yade_scripts.dynamics.equilibrium import SLACK, CannotStand, Search, settle
+from yade_scripts.dynamics.structure import Structure
+from yade_scripts.joints.cohesion import JointParameters
 
 G = 9.81
 STILL = 1e-6

@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from yade_scripts.blocks import BlockError
-from yade_scripts.faces import FixedPlane, touching_faces
-from yade_scripts.generators.arch import Arch, abutment_blocks, arch_blocks
-from yade_scripts.generators.column import column_of_boxes, column_of_drums
-from yade_scripts.generators.rubble import rubble_blocks
-from yade_scripts.generators.wall import wall_of_blocks
+from yade_scripts.blocks.block import BlockError
+from yade_scripts.blocks.faces import FixedPlane, touching_faces
+from yade_scripts.blocks.generators.arch import Arch, abutment_blocks, arch_blocks
+from yade_scripts.blocks.generators.column import column_of_boxes, column_of_drums
+from yade_scripts.blocks.generators.rubble import rubble_blocks
+from yade_scripts.blocks.generators.wall import wall_of_blocks
 
 GROUND = FixedPlane((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
 

@@ -6,11 +6,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from yade_scripts.blocks import Block
-from yade_scripts.cohesion import JointParameters
-from yade_scripts.contact import ContactLaw
-from yade_scripts.generators.wall import wall_of_blocks
-from yade_scripts.structure import Structure
+from yade_scripts.blocks.block import Block
+from yade_scripts.blocks.generators.wall import wall_of_blocks
+from yade_scripts.contact.law import ContactLaw
+from yade_scripts.dynamics.structure import Structure
+from yade_scripts.joints.cohesion import JointParameters
 
 ABOUT = np.array([1.0, 2.0, -3.0])
 G = 9.81

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from yade_scripts.blocks import Block
-from yade_scripts.cohesion import JointParameterError, JointParameters
-from yade_scripts.contact import ContactLaw
-from yade_scripts.joint_rules import JointRules, PairJoints, Scatter
-from yade_scripts.structure import Structure
+from yade_scripts.blocks.block import Block
+from yade_scripts.contact.law import ContactLaw
+from yade_scripts.dynamics.structure import Structure
+from yade_scripts.joints.cohesion import JointParameterError, JointParameters
+from yade_scripts.joints.rules import JointRules, PairJoints, Scatter
 
 GLUE = JointParameters(1e6, 1e-3)
 BRITTLE = JointParameters(2e5, 5e-4, law="bilinear")

@@ -6,16 +6,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from yade_scripts.blocks import Block
-from yade_scripts.cohesion import JointParameters
-from yade_scripts.contact import ContactLaw
-from yade_scripts.faces import FixedPlane, touching_faces
-from yade_scripts.generators.wall import wall_of_blocks
-from yade_scripts.joint_forces import KC
-from yade_scripts.joints import Joints
-from yade_scripts.quadrature import NEEDED, enough
-from yade_scripts.structure import Structure
-from yade_scripts.timestep import exact_joint_frequency, joint_frequency
+from yade_scripts.blocks.block import Block
+from yade_scripts.blocks.faces import FixedPlane, touching_faces
+from yade_scripts.blocks.generators.wall import wall_of_blocks
+from yade_scripts.blocks.quadrature import NEEDED, enough
+from yade_scripts.contact.law import ContactLaw
+from yade_scripts.dynamics.structure import Structure
+from yade_scripts.dynamics.timestep import exact_joint_frequency, joint_frequency
+from yade_scripts.joints.cohesion import JointParameters
+from yade_scripts.joints.forces import KC
+from yade_scripts.joints.joints import Joints
 
 LAWS = [
     ("polynomial", None),
@@ -340,7 +340,7 @@ def test_full_and_sparse_eigenvalues_agree(monkeypatch):
     blocks = wall_of_blocks("w", (0, -0.25, 0), (4.0, 0.5, 3.0), (1.0, 0.5, 1.0))
     joints = Joints(blocks, touching_faces(blocks), JointParameters(1e6, 1e-3))
     sparse = exact_joint_frequency(blocks, joints)
-    monkeypatch.setattr("yade_scripts.timestep.DENSE", 10**6)
+    monkeypatch.setattr("yade_scripts.dynamics.timestep.DENSE", 10**6)
     assert exact_joint_frequency(blocks, joints) == pytest.approx(sparse, rel=1e-9)
 
 

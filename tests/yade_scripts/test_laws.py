@@ -13,9 +13,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from coupler.verify.figures import columns
-from yade_scripts import laws
-from yade_scripts.cohesion import JointParameterError, JointParameters
+from coupler.commands.verify.figures import columns
+from yade_scripts.joints import laws
+from yade_scripts.joints.cohesion import JointParameterError, JointParameters
 
 PEAKS = [
     ("polynomial", None),
@@ -137,12 +137,12 @@ PAGE = ROOT / "docs" / "add_a_law.md"
 TORN = """
 import sys
 import numpy as np
-from yade_scripts import laws
+from yade_scripts.joints import laws
 laws.__path__.append(sys.argv[1])
-from yade_scripts.blocks import Block
-from yade_scripts.cohesion import JointParameters
-from yade_scripts.faces import touching_faces
-from yade_scripts.joints import Joints
+from yade_scripts.blocks.block import Block
+from yade_scripts.joints.cohesion import JointParameters
+from yade_scripts.blocks.faces import touching_faces
+from yade_scripts.joints.joints import Joints
 blocks = [Block("held", (0, 0, 0), size=1.0), Block("moved", (0, 0, 1), size=1.0)]
 joints = Joints(blocks, touching_faces(blocks), JointParameters(1e6, 1e-3, law="trapezoidal", peak=0.05))
 x, v, R, force = np.array([b.centre for b in blocks], float), np.zeros((2, 6)), np.array([np.eye(3)] * 2), []
@@ -195,4 +195,4 @@ def test_the_law_of_the_page_holds_what_a_law_must(tmp_path, monkeypatch):
         assert law.work_of_separation == pytest.approx(0.65 * STRENGTH * FAILURE, rel=1e-12)
         assert law.stiffness == pytest.approx(5.0 * STRENGTH / FAILURE, rel=1e-12)
     finally:
-        sys.modules.pop("yade_scripts.laws.trapezoidal", None)
+        sys.modules.pop("yade_scripts.joints.laws.trapezoidal", None)

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from scipy.spatial import ConvexHull, Delaunay
 from scipy.spatial.transform import Rotation
 
-from yade_scripts.blocks import BOX_CORNERS, BOX_FACES, Block, BlockError
-from yade_scripts.polyhedra import convex_polyhedron, face_planes, flattened, polyhedron_moments
+from yade_scripts.blocks.block import BOX_CORNERS, BOX_FACES, Block, BlockError
+from yade_scripts.blocks.polyhedra import convex_polyhedron, face_planes, flattened, polyhedron_moments
 
 seeds = st.integers(0, 10**6)
 

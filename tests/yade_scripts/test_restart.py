@@ -7,13 +7,13 @@ import sys
 import numpy as np
 import pytest
 
-from yade_scripts.blocks import Block
-from yade_scripts.cohesion import JointParameters
-from yade_scripts.contact import ContactLaw
-from yade_scripts.generators.column import column_of_boxes
-from yade_scripts.generators.wall import wall_of_blocks
-from yade_scripts.structure import Structure
-from yade_scripts.structure_state import OtherStructure, StructureState
+from yade_scripts.blocks.block import Block
+from yade_scripts.blocks.generators.column import column_of_boxes
+from yade_scripts.blocks.generators.wall import wall_of_blocks
+from yade_scripts.contact.law import ContactLaw
+from yade_scripts.dynamics.state import OtherStructure, StructureState
+from yade_scripts.dynamics.structure import Structure
+from yade_scripts.joints.cohesion import JointParameters
 
 STILL = (0.0, 0.0, 0.0)
 WEDGE = np.array([[0.1, 0, 0.6], [0.6, 0, 0.6], [0.1, 0.4, 0.6], [0.1, 0, 0.9]])
@@ -92,7 +92,7 @@ CHILD = """
 import sys
 import numpy as np
 from tests.yade_scripts.test_restart import SCENES, figures, steps
-from yade_scripts.structure_state import StructureState
+from yade_scripts.dynamics.state import StructureState
 name, state, result = sys.argv[1:]
 build, _, count = SCENES[name]
 with build() as s, np.load(state) as arrays:

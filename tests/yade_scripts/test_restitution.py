@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from yade_scripts.blocks import Block
-from yade_scripts.contact import ContactLaw
-from yade_scripts.structure import Structure
+from yade_scripts.blocks.block import Block
+from yade_scripts.contact.law import ContactLaw
+from yade_scripts.dynamics.structure import Structure
 
 K = 1e8
 STILL = (0.0, 0.0, 0.0)

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from yade_scripts.blocks import Block
-from yade_scripts.contact import ContactLaw
-from yade_scripts.structure import Structure
+from yade_scripts.blocks.block import Block
+from yade_scripts.contact.law import ContactLaw
+from yade_scripts.dynamics.structure import Structure
 
 G, MU, K, SPIN = 9.81, 0.3, 1e7, 5.0
 

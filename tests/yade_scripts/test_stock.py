@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from yade_scripts.blocks import Block
-from yade_scripts.cohesion import JointParameters
-from yade_scripts.faces import FixedPlane, touching_faces
+from yade_scripts.blocks.block import Block
+from yade_scripts.blocks.faces import FixedPlane, touching_faces
+from yade_scripts.joints.cohesion import JointParameters
 from yade_scripts.stock import cohfrict, cpm, jcfpm, mortar, scene
 from yade_scripts.stock.script import (
     LAWS,

@@ -5,15 +5,15 @@ import pytest
 from scipy.linalg import eigh
 from scipy.spatial.transform import Rotation
 
-from coupler.verify.figures import columns
-from yade_scripts.blocks import Block, BlockError
-from yade_scripts.cohesion import JointParameters
-from yade_scripts.contact import ContactLaw
-from yade_scripts.contact_state import sum_on_blocks
-from yade_scripts.generators.column import column_of_boxes
-from yade_scripts.generators.wall import wall_of_blocks
-from yade_scripts.scene import SceneInUse
-from yade_scripts.structure import NotFinite, Structure
+from coupler.commands.verify.figures import columns
+from yade_scripts.blocks.block import Block, BlockError
+from yade_scripts.blocks.generators.column import column_of_boxes
+from yade_scripts.blocks.generators.wall import wall_of_blocks
+from yade_scripts.contact.law import ContactLaw
+from yade_scripts.contact.state import sum_on_blocks
+from yade_scripts.dynamics.structure import NotFinite, Structure
+from yade_scripts.joints.cohesion import JointParameters
+from yade_scripts.yade_side.scene import SceneInUse
 
 LAW = JointParameters(strength=1e6, opening_at_failure=1e-3)
 STILL = (0.0, 0.0, 0.0)

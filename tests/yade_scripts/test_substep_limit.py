@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from yade_scripts.blocks import Block
-from yade_scripts.cohesion import JointParameters
-from yade_scripts.contact import ContactLaw
-from yade_scripts.structure import Structure
-from yade_scripts.timestep import SubstepTooLong, exact_joint_frequency
+from yade_scripts.blocks.block import Block
+from yade_scripts.contact.law import ContactLaw
+from yade_scripts.dynamics.structure import Structure
+from yade_scripts.dynamics.timestep import SubstepTooLong, exact_joint_frequency
+from yade_scripts.joints.cohesion import JointParameters
 
 STILL = (0.0, 0.0, 0.0)
 JOINT = JointParameters(1e6, 1e-3)

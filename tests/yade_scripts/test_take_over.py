@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from yade_scripts.blocks import Block
-from yade_scripts.cohesion import JointParameters
-from yade_scripts.contact import ContactLaw
-from yade_scripts.structure import Structure
+from yade_scripts.blocks.block import Block
+from yade_scripts.contact.law import ContactLaw
+from yade_scripts.dynamics.structure import Structure
+from yade_scripts.joints.cohesion import JointParameters
 
 JOINT = JointParameters(1e5, 1e-3)
 PUSH, DT = 1e5, 5e-6

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from yade_scripts.blocks import Block
-from yade_scripts.cohesion import JointParameters
-from yade_scripts.faces import TouchingFaces, gauss_points
+from yade_scripts.blocks.block import Block
+from yade_scripts.blocks.faces import TouchingFaces, gauss_points
+from yade_scripts.joints.cohesion import JointParameters
 
 Array = np.ndarray
 

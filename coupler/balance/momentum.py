@@ -1,0 +1,228 @@
+"""The books of momentum: linear and angular, of the water and of the blocks that move freely, over the whole scene.
+
+    P = P_water + P_blocks = Σ lines,     each (6,): [N s] and, about one fixed point, [N m s]
+
+A line is what it has added since the start, so weight is negative in z and the floor that carries it positive:
+
+    water_weight, blocks_weight      weight
+    tank, tank_shear                 sides of the tank on the water: pressure; viscosity and friction
+    sides                            water that came in through open sides, inflows and seas, with the pressure there
+    openings                         what closes narrow openings (`openings = "wide"`) on the water
+    solids                           fixed solids on the water (with a structure they are held blocks)
+    held_blocks                      blocks of prescribed motion on the water and on free blocks
+    ground, ground_joints            ground and tank on free blocks: by contact, and through joints
+    transport ... shear_solve        what the scheme of the water adds (`fluid.step.momentum`)
+    recut                            handing the fields of the water to newly cut cells
+    lag                              moments only: a load is held while its block moves on under it
+
+What water and free blocks give each other, and blocks one another, is no line: it must cancel.  The residual, what the
+lines miss, is round-off in every step; `error` is its size over the impulses exchanged in the step.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+Array = np.ndarray
+
+LINES = (
+    ("water_weight", "weight of the water"),
+    ("blocks_weight", "weight of the blocks"),
+    ("tank", "pressure of the sides of the tank on the water"),
+    ("tank_shear", "viscosity and friction of the sides of the tank on the water"),
+    ("sides", "water that came in less what left, with the pressure on inflows and seas"),
+    ("openings", 'what closes narrow openings on the water (`water.openings = "wide"`)'),
+    ("solids", "fixed solids on the water"),
+    ("held_blocks", "held and driven blocks on water and free blocks"),
+    ("ground", "ground and tank on free blocks by contact"),
+    ("ground_joints", "the ground on free blocks through joints"),
+    ("transport", "scheme: transport of the velocity"),
+    ("volume_correction", "scheme: correction of the volume"),
+    ("carried", "scheme: the part of the last pressure that is carried over acts at other places"),
+    ("surface", "scheme: pressure in cells that the surface cuts"),
+    ("damping", "scheme: damping of divergence"),
+    ("limit", "scheme: limit of the speed"),
+    (
+        "slip",
+        "scheme: velocity into the sides of the tank taken off, that of inflows given, after the pressure",
+    ),
+    ("shear_solve", "scheme: residual of the viscous solve"),
+    ("recut", "scheme: fields handed to newly cut cells"),
+    ("lag", "scheme: loads held on blocks that move on (moments only)"),
+)
+SCHEME = tuple(name for name, meaning in LINES if meaning.startswith("scheme"))
+MOVING = 1e-3
+"""Share of the momentum there is that counts as exchanged: a block that flies freely exchanges nothing."""
+
+
+@dataclass(frozen=True)
+class MomentumBalance:
+    """water, blocks, residual (6,) [N s, N m s] · lines: name → (6,) so far · exchanged [N s]: sum of the sizes of all
+    impulses so far · scheme [1]: sum of the lines of the scheme over it · error [1]: residual of this step over the
+    impulses of this step."""
+
+    water: Array
+    blocks: Array
+    residual: Array
+    lines: dict[str, Array]
+    exchanged: float
+    scheme: float
+    error: float
+
+
+class MomentumLedger:
+    """Accumulates the lines of a run. about (3,) [m]: point of the moments · reach [m]: arm that makes moments of
+    impulses comparable with impulses."""
+
+    def __init__(self, about: Array, reach: float):
+        self.about, self.reach = np.array(about, float), float(reach)
+        self.lines = {name: np.zeros(6) for name, _ in LINES}
+        self.residual, self.exchanged = np.zeros(6), 0.0
+        self.water, self.blocks = np.zeros(6), np.zeros(6)
+
+    def start(self, water: Array | None, blocks: Array | None) -> None:
+        """Momenta (6,) at the start; None: no such side."""
+        self.water = np.zeros(6) if water is None else water
+        self.blocks = np.zeros(6) if blocks is None else blocks
+
+    def save(self) -> dict[str, Array]:
+        """Everything that it holds, by name."""
+        own = {name: np.array(value) for name, value in vars(self).items() if name != "lines"}
+        return own | {f"line_{name}": value.copy() for name, value in self.lines.items()}
+
+    def restore(self, saved: dict[str, Array]) -> None:
+        """Back to what was saved."""
+        self.lines = {name: saved[f"line_{name}"].copy() for name in self.lines}
+        self.about, self.residual = saved["about"].copy(), saved["residual"].copy()
+        self.water, self.blocks = saved["water"].copy(), saved["blocks"].copy()
+        self.reach, self.exchanged = float(saved["reach"]), float(saved["exchanged"])
+
+    def book(self, water: WaterStep | None, blocks: BlocksStep | None) -> MomentumBalance:
+        """Take a step of either side; they agree on which bodies are free blocks."""
+        before, found, exchanged, given = self.water + self.blocks, {}, 0.0, np.zeros(6)
+        if water is not None:
+            found |= water.lines | {"recut": water.change.before - self.water}
+            exchanged, given, self.water = water.exchanged, water.given, water.change.after
+        if blocks is not None:
+            found |= blocks.lines
+            lag = blocks.received - given
+            found["lag"] = np.concatenate([np.zeros(3), lag[3:]])
+            found["held_blocks"] = found.get("held_blocks", np.zeros(6)) + blocks.held
+            exchanged, self.blocks = exchanged + blocks.exchanged, blocks.after
+        for name, value in found.items():
+            self.lines[name] = self.lines[name] + value
+        residual = self.water + self.blocks - before - sum(found.values())
+        self.residual, self.exchanged = self.residual + residual, self.exchanged + exchanged
+        return self._balance(residual, exchanged)
+
+    def _balance(self, residual: Array, exchanged: float) -> MomentumBalance:
+        scale = exchanged + MOVING * (np.linalg.norm(self.water[:3]) + np.linalg.norm(self.blocks[:3]))
+        size = max(np.abs(residual[:3]).max(), np.abs(residual[3:]).max() / self.reach)
+        scheme = np.linalg.norm(sum(self.lines[name][:3] for name in SCHEME))
+        return MomentumBalance(
+            self.water,
+            self.blocks,
+            self.residual.copy(),
+            dict(self.lines),
+            self.exchanged,
+            float(scheme / self.exchanged) if self.exchanged > 0.0 else 0.0,
+            float(size / scale) if scale > 0.0 else 0.0,
+        )
+
+
+@dataclass(frozen=True)
+class WaterStep:
+    """change: MomentumChange of the step · lines: as in LINES · given (6,): to free blocks · exchanged [N s]"""
+
+    change: object
+    lines: dict[str, Array]
+    given: Array
+    exchanged: float
+
+    @classmethod
+    def of(cls, water, load: Array, dt: float, free: Array) -> WaterStep:
+        """After a step: load (n_bodies, 6) that was told to the bodies, blocks first; free (n_blocks,) bool."""
+        from fluid.step.momentum import NUMERICAL, about
+
+        change, n = water.report.momentum, len(free)
+        centre = water.domain.body_centre
+
+        def told(rows):
+            return dt * about(water.reference, load[rows], centre[rows])
+
+        is_free = np.append(free, np.zeros(len(load) - n, bool))
+        is_held = np.append(~free, np.zeros(len(load) - n, bool))
+        is_solid = np.arange(len(load)) >= n
+        own = change.lines
+        lines = {name: own[name] for name in ("tank", "tank_shear", "sides", "openings", *NUMERICAL)}
+        lines |= {"water_weight": own["weight"], "solids": -told(is_solid), "held_blocks": -told(is_held)}
+        acting = [own[name][:3] for name in ("weight", "tank", "tank_shear", "sides", "openings")]
+        exchanged = sum(np.linalg.norm(a) for a in acting) + dt * np.linalg.norm(load[:, :3], axis=1).sum()
+        return cls(change, lines, told(is_free), float(exchanged))
+
+
+@dataclass(frozen=True)
+class BlocksStep:
+    """after (6,): momentum of the free blocks · lines · held (6,): held blocks on free ones · received (6,): from the
+    water · exchanged [N s]"""
+
+    after: Array
+    lines: dict[str, Array]
+    held: Array
+    received: Array
+    exchanged: float
+
+    @classmethod
+    def of(cls, structure, impulses, load: Array, about: Array) -> BlocksStep:
+        """After a step under the load (n, 6) with its Impulses."""
+        free = ~structure.fixed
+        contact, joint = (impulses.about(about, which) for which in (impulses.contact, impulses.joint))
+        weight = impulses.of_weight(structure.gravity_force(), about)[free]
+        received = impulses.of_held(load, about)[free]
+        lines = {
+            "blocks_weight": weight.sum(axis=0),
+            "ground": contact.sum(axis=0),
+            "ground_joints": joint.sum(axis=0),
+        }
+        acting = (weight, contact, joint)
+        exchanged = sum(np.linalg.norm(part[:, :3], axis=1).sum() for part in acting)
+        held = -(contact + joint)[~free].sum(axis=0)
+        return cls(structure.momentum(about), lines, held, received.sum(axis=0), float(exchanged))
+
+
+def momentum_ledger(water, structure) -> MomentumLedger:
+    """The books of a scene that starts: moments about the middle of the tank, or of the blocks; either may be None."""
+    if water is not None:
+        about, reach = water.reference, 0.5 * np.linalg.norm(np.ptp(water.mesh.bounds, axis=0))
+    else:
+        about = structure.centre().mean(axis=0).round(6)
+        away = np.linalg.norm(structure.centre() - about, axis=1)
+        reach = (away + [np.linalg.norm(v, axis=1).max() for v in structure.shape_vertices]).max()
+    ledger = MomentumLedger(about, reach)
+    ledger.start(
+        None if water is None else momentum_of_water(water),
+        None if structure is None else structure.momentum(ledger.about),
+    )
+    return ledger
+
+
+def momentum_of_water(water) -> Array:
+    """P, L (6,) of the water now."""
+    from fluid.step.momentum import momentum
+
+    return momentum(water)
+
+
+def book_step(coupling, record) -> MomentumBalance:
+    """Book the step that has just ended in `coupling.momentum`."""
+    ledger, structure = coupling.momentum, coupling.structure
+    free = np.zeros(0, bool) if structure is None else ~structure.fixed
+    water = blocks = None
+    if coupling.water is not None:
+        water = WaterStep.of(coupling.water, record.load, record.dt, free)
+    if structure is not None:
+        load = record.load[: structure.n] if len(record.load) else np.zeros((structure.n, 6))
+        blocks = BlocksStep.of(structure, record.impulses, load, ledger.about)
+    return ledger.book(water, blocks)

@@ -1,0 +1,311 @@
+"""The case: what a `case.toml` may say, in SI, with a description and a unit for every name.
+
+A section that is absent switches its module off (`modules`). Unknown names are refused. The page
+`docs/case_file.md` and `surgebreak explain` are made from this file and the others named `case_...`.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from coupler.case.gauges import Gauge
+from coupler.case.structure import Structure
+from coupler.case.study import Study
+from coupler.case.types import (
+    Name,
+    Point,
+    PositiveLength,
+    PositiveTime,
+    Section,
+    Side,
+    Switch,
+    VelocityVector,
+)
+from coupler.case.units import quantity
+from coupler.case.water import Solid, Water
+
+
+class About(Section):
+    """What the case is, and what holds everywhere in it."""
+
+    title: str = Field(description="one line for people")
+    description: str = Field("", description="what happens, where it comes from, what to look at")
+    gravity: quantity("m/s2", ge=0) = Field(
+        9.81, description="acceleration of gravity, along -z; z points up"
+    )
+
+
+class Time(Section):
+    """How long, in which steps, and how often results are written."""
+
+    end: PositiveTime = Field(description="the run ends at this time", examples=["4 s"])
+    step_max: PositiveTime = Field(0.05, description="largest step of the coupled scheme")
+    cfl: quantity("", gt=0, le=10) = Field(
+        1.0,
+        description="cells that the fastest water may cross in one step; sets the step up to step_max. Spray, the "
+        "hundredth of the water that is more than a third faster than all the rest, may cross twice as many",
+    )
+    output_every: PositiveTime | None = Field(
+        None,
+        description="time between two written states; a step ends at each of them, so none is longer than this; "
+        "absent: a hundredth of the end time",
+    )
+    checkpoint_every: quantity("s", ge=0) | None = Field(
+        None,
+        description="time between two checkpoints, from which `surgebreak resume` goes on; absent: a tenth of the end "
+        "time; 0: none, also when the run is stopped",
+    )
+
+
+class Tank(Section):
+    """Where water may be: a fixed mesh of tetrahedra, of a box (lower, upper, cell) or from a file (mesh). Closed sides
+    are walls for blocks too."""
+
+    lower: Point | None = Field(
+        None, description="corner with the smallest coordinates; needed without mesh", examples=[[0, 0, 0]]
+    )
+    upper: Point | None = Field(
+        None, description="corner with the largest coordinates; needed without mesh", examples=[[60, 24, 16]]
+    )
+    cell: PositiveLength | None = Field(
+        None,
+        description="wanted edge of the mesh cells, needed without mesh; changed so that a whole number fits each side",
+        examples=["1 m"],
+    )
+    split: Literal["kuhn", "mirrored"] = Field(
+        "kuhn",
+        description="how bricks become cells: all along the same diagonal, or each as the mirror image of those beside "
+        "it, so that what parts at an obstacle parts alike on both sides",
+    )
+    mesh: Annotated[str, Field(min_length=1)] | None = Field(
+        None,
+        description="a file of tetrahedra in any format that meshio reads (MSH, VTU, VTK, ...), from the directory of "
+        "the case, instead of lower, upper, cell and split; its whole boundary is wall but for the flat ends along the "
+        "axes that open, smooth, an inflow or a sea name. Water alone may have a basin of any shape; with blocks the "
+        "mesh must fill a box",
+        examples=["basin.msh"],
+    )
+    scale: PositiveLength = Field(1.0, description="length of one unit of mesh", examples=["1 mm"])
+    offset: Point = Field((0.0, 0.0, 0.0), description="added to all places of mesh, after the scale")
+    open: tuple[Side, ...] = Field(
+        ("z+",), description="sides through which air and water may leave; the others are walls"
+    )
+    smooth: tuple[Side, ...] = Field(
+        (),
+        description="closed sides along which water slips whatever water.walls says, for instance of a slice",
+    )
+
+
+class ContactPair(Section):
+    """Friction between two materials that differs from the rest."""
+
+    materials: tuple[Name, Name] = Field(
+        description="names that blocks, ground (ground) or tank sides (tank) give as their material",
+        examples=[["brick", "ground"]],
+    )
+    friction: quantity("", ge=0) = Field(description="mu of this pair")
+
+
+class Contact(Section):
+    """Spring, dashpot and friction between touching faces."""
+
+    stiffness: quantity("N/m", gt=0) | None = Field(
+        None,
+        description="K of a whole face in contact; absent: that of the joints in closing, so that a face whose joint "
+        "breaks goes on as it was",
+        examples=["1 GN/m"],
+    )
+    restitution: quantity("", gt=0, le=1) = Field(
+        0.3, description="e, velocity after a normal impact over the velocity before"
+    )
+    friction: quantity("", ge=0) = Field(0.5, description="mu, largest tangential over normal force")
+    shear_ratio: quantity("", gt=0, le=10) = Field(
+        1.0, description="tangential over normal stiffness, K_t/K_n"
+    )
+    tangential_restitution: quantity("", gt=0, le=1) | None = Field(
+        None,
+        description="the same as restitution along the face; absent: the dashpot goes with the stiffness",
+    )
+    rule: Literal["exact", "paper"] = Field(
+        "exact",
+        description="dashpot that gives e exactly and never pulls, or the closed formula of the method",
+    )
+    nodes_per_edge: Annotated[int, Field(strict=True, ge=3, le=33)] = Field(
+        3, description="contact nodes along an edge of a block; crossing edges hold each other whatever it is"
+    )
+    impermeable: Switch = Field(
+        False,
+        description="true: faces that touch at the start without a joint keep the water out for as long as they lie "
+        "on one another, on the ground or on the floor of the tank; false: water reaches between them",
+    )
+    pair: tuple[ContactPair, ...] = Field((), description="pairs of materials with a friction of their own")
+
+
+class JointPair(Section):
+    """Joints between chosen blocks that differ from the rest, or none; of several that fit, the last counts."""
+
+    between: tuple[Name, Name] = Field(
+        description="two names: of blocks, groups or materials, ground (the ground) or tank (its floor)",
+        examples=[["wall", "ground"]],
+    )
+    joined: Switch = Field(True, description="false: no joint, whatever else is said")
+    strength: quantity("Pa", gt=0) | None = Field(
+        None, description="absent, like all below: that of [joints]"
+    )
+    opening_at_failure: PositiveLength | None = Field(
+        None, description="opening at which nothing holds any more"
+    )
+    law: Name | None = Field(
+        None, description="as in [joints]; with a law of its own, its peak is that law's"
+    )
+    peak: quantity("", gt=0, lt=1) | None = Field(
+        None, description="opening at T_max over opening_at_failure"
+    )
+    mixed_mode: Literal["effective", "needleman"] | None = Field(None, description="as in [joints]")
+    shear_ratio: quantity("", gt=0) | None = Field(None, description="beta")
+    closing_ratio: quantity("", gt=0) | None = Field(
+        None, description="stiffness in compression over the first in tension"
+    )
+
+
+class Joints(Section):
+    """Cohesion between touching faces, by default T = 27/4 T_max d (1 - d)^2, d = opening/opening_at_failure."""
+
+    strength: quantity("Pa", gt=0) = Field(description="T_max, largest traction", examples=["0.5 MPa"])
+    opening_at_failure: PositiveLength = Field(
+        description="opening at which nothing holds any more", examples=["5 mm"]
+    )
+    law: Name = Field(
+        "polynomial",
+        description="polynomial, bilinear, exponential, or the name of another file in yade_scripts/joints/laws",
+    )
+    peak: quantity("", gt=0, lt=1) | None = Field(
+        None,
+        description="opening at T_max over opening_at_failure; absent: 1/3 polynomial (fixed), 0.1 bilinear "
+        "(0.01 to 0.9) and exponential (0.01 to 0.2)",
+    )
+    mixed_mode: Literal["effective", "needleman"] = Field(
+        "effective",
+        description="effective: one history for opening and sliding; needleman: his potential of 1987, polynomial "
+        "law only, shear does not soften without opening",
+    )
+    shear_ratio: quantity("", gt=0) = Field(
+        1.0,
+        description="beta, weight of sliding in the effective opening and in the shear traction; needleman: "
+        "square root of alpha",
+    )
+    closing_ratio: quantity("", gt=0) = Field(
+        1.0, description="stiffness in compression over the first stiffness in tension"
+    )
+    damping: quantity("", ge=0, lt=1) = Field(
+        0.02, description="share of critical damping, proportional to the stiffness of the joint"
+    )
+    points: Literal["auto"] | Annotated[int, Field(strict=True, ge=2, le=12)] = Field(
+        "auto",
+        description="Gauss points along each direction of a joined face; auto: for a peak moment to 2 %, from 3 up "
+        "with closing_ratio and the law",
+    )
+    ground: Switch = Field(
+        True,
+        description="blocks that stand on the ground are glued to it; a pair with the ground counts in any case",
+    )
+    distribution: Literal["weibull", "lognormal"] | None = Field(
+        None,
+        description="strengths are random, joint by joint, with strength as their mean; opening_at_failure stays, so "
+        "stiffness and work of separation go along; absent: all alike",
+    )
+    variation: quantity("", ge=0.001, le=1) | None = Field(
+        None, description="standard deviation of the strengths over their mean, needed with distribution"
+    )
+    seed: Annotated[int, Field(strict=True, ge=0)] = Field(
+        1, description="of the random strengths; the same seed gives the same strengths"
+    )
+    pair: tuple[JointPair, ...] = Field((), description="joints between chosen blocks")
+
+
+class Motion(Section):
+    """A block that moves as prescribed, for instance the grip of a testing machine."""
+
+    block: Name = Field(description="name of the block")
+    velocity: VelocityVector = Field(description="its velocity for the whole run")
+
+
+class Exchange(Section):
+    """How water and blocks agree on a step."""
+
+    passes: Annotated[int, Field(strict=True, ge=1, le=4)] = Field(
+        2,
+        description="most pressure solves in a step: the blocks' stiffness is in the first; with what the blocks then "
+        "did, the step is taken again while the defect is above the tolerance",
+    )
+    tolerance: quantity("", gt=0, le=1) = Field(
+        0.02, description="defect of a step above which another pass is made"
+    )
+
+
+class RunLimits(Section):
+    """When a run stops early because its numbers are not to be trusted, or have cost enough."""
+
+    volume_error: quantity("", gt=0) = Field(0.02, description="lost or gained share of the water")
+    energy_error: quantity("", gt=0) = Field(0.05, description="unbalanced share of the energy put in")
+    momentum_error: quantity("", gt=0) = Field(
+        1e-8, description="share of the impulses of a step by which the books of momentum miss"
+    )
+    defect: quantity("", gt=0) = Field(
+        0.5,
+        description="share by which the blocks may miss the motion that the water was told, on the mean of the last "
+        "twenty steps; a single step that misses by more than 0.6 of it is halved and taken again",
+    )
+    overlap: quantity("", gt=0) = Field(
+        0.25,
+        description="depth to which a block may be in another, the ground or a side of the tank, over the thickness "
+        "of the thinner one: twice the distance of its nearest face from its centre of mass",
+    )
+    cpu_seconds: PositiveTime | None = Field(
+        None, description="processor time that the run may take; a resumed run has as much again"
+    )
+
+
+class Case(Section):
+    """A whole case file."""
+
+    case: About = Field(description="what the case is")
+    time: Time = Field(description="how long and how often")
+    tank: Tank | None = Field(None, description="where water may be: a box, or a mesh from a file")
+    water: Water | None = Field(None, description="the water")
+    solid: tuple[Solid, ...] = Field((), description="fixed bodies in the water")
+    structure: Structure | None = Field(None, description="rigid blocks")
+    contact: Contact | None = Field(None, description="what happens where blocks touch")
+    joints: Joints | None = Field(None, description="glue between touching faces, which may break")
+    gauge: tuple[Gauge, ...] = Field((), description="what is measured at every step")
+    motion: tuple[Motion, ...] = Field((), description="blocks that move as prescribed")
+    coupling: Exchange = Field(default_factory=Exchange, description="how water and blocks agree on a step")
+    limits: RunLimits = Field(default_factory=RunLimits, description="when a run stops early")
+    study: Study | None = Field(None, exclude=True, description="what `surgebreak study` varies and measures")
+
+
+def modules(case: Case) -> dict[str, bool]:
+    """Which parts of the program a case switches on, by name, in the order in which they are told."""
+    structure = case.structure is not None
+    water = case.water is not None
+    return {
+        "water": water,
+        "stabilised transport": water and case.water.advection == "supg",
+        "viscosity": water and case.water.viscosity > 0.0,
+        "wall friction": water and case.water.walls == "friction",
+        "inflow": water and bool(case.water.inflow or case.water.sea),
+        "structure": structure,
+        "coupling": water and structure,
+        "fixed solids": bool(case.solid),
+        "contact": case.contact is not None,
+        "joints": case.joints is not None,
+        "prescribed motion": bool(case.motion),
+        "gauges": bool(case.gauge),
+    }
+
+
+def effective(case: Case) -> dict:
+    """The case with every default filled in, as plain data in SI; `Case.model_validate` reads it back."""
+    return case.model_dump(mode="json", exclude_none=True)

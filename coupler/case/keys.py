@@ -1,0 +1,149 @@
+"""Reading the schema itself: every key of a case with its unit, limits, default and description."""
+
+from __future__ import annotations
+
+import types
+import typing
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import annotated_types
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+from coupler.case.case import Case
+from coupler.case.units import Unit
+
+REQUIRED = "required"
+
+
+@dataclass(frozen=True)
+class Key:
+    """One name of the case file. `path` leaves list places out: "structure.block.size"."""
+
+    path: str
+    description: str
+    unit: str
+    limits: str
+    default: str
+    example: str
+    sections: tuple[type[BaseModel], ...]
+    several: bool
+
+    @property
+    def required(self) -> bool:
+        return self.default == REQUIRED
+
+
+def sections_of(annotation: object) -> tuple[type[BaseModel], ...]:
+    """The section classes that a type holds, through lists, optional and one-of types."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return (annotation,)
+    found: list[type[BaseModel]] = []
+    for inner in typing.get_args(annotation):
+        found += [section for section in sections_of(inner) if section not in found]
+    return tuple(found)
+
+
+def keys(section: type[BaseModel] = Case, above: str = "") -> Iterator[Key]:
+    """Every key below a section, in the order of the schema, each section before what is in it."""
+    for name, field in section.model_fields.items():
+        key = _key(f"{above}{name}", field)
+        yield key
+        seen = set()
+        for inner in key.sections:
+            for below in keys(inner, f"{key.path}."):
+                if below.path not in seen:
+                    seen.add(below.path)
+                    yield below
+
+
+def find(path: tuple[str | int, ...]) -> Key | None:
+    """The key at a place of the case; list places are skipped. None when the schema has no such name."""
+    names = ".".join(part for part in path if isinstance(part, str))
+    return next((key for key in keys() if key.path == names), None)
+
+
+def names_in(path: tuple[str | int, ...]) -> list[str]:
+    """The names that a section may hold; () is the whole file."""
+    if not path:
+        return list(Case.model_fields)
+    key = find(path)
+    return [] if key is None else list(dict.fromkeys(n for s in key.sections for n in s.model_fields))
+
+
+def _key(path: str, field: FieldInfo) -> Key:
+    parts = list(_leaves(field.annotation)) + list(field.metadata)
+    unit = next((part.symbol for part in parts if isinstance(part, Unit)), "")
+    return Key(
+        path=path,
+        description=field.description or "",
+        unit=unit,
+        limits=_limits(field, parts),
+        default=_default(field),
+        example=_text(field.examples[0]) if field.examples else "",
+        sections=sections_of(field.annotation),
+        several=_is_list(field.annotation),
+    )
+
+
+def _leaves(annotation: object) -> Iterator[object]:
+    """The metadata of every Annotated inside a type (field infos taken apart)."""
+    if typing.get_origin(annotation) is typing.Annotated:
+        for item in annotation.__metadata__:
+            yield from item.metadata if isinstance(item, FieldInfo) else (item,)
+    for inner in typing.get_args(annotation):
+        if not isinstance(inner, str | int | float):
+            yield from _leaves(inner)
+
+
+_SIGNS = {"gt": "> ", "ge": "≥ ", "lt": "< ", "le": "≤ "}
+
+
+def _limits(field: FieldInfo, parts: list) -> str:
+    choices = _choices(field.annotation)
+    if choices:
+        return " | ".join(choices)
+    found = []
+    for part in parts:
+        if isinstance(part, annotated_types.BaseMetadata) and not isinstance(part, Unit):
+            text = [f"{sign}{getattr(part, name):g}" for name, sign in _SIGNS.items() if hasattr(part, name)]
+            found += [item for item in text if item not in found]
+    return ", ".join(found)
+
+
+def _choices(annotation: object) -> list[str]:
+    if typing.get_origin(annotation) is typing.Literal:
+        return list(typing.get_args(annotation))
+    found: list[str] = []
+    for inner in typing.get_args(annotation):
+        if not isinstance(inner, str) and not sections_of(inner):
+            found += _choices(inner)
+    return found
+
+
+def _is_list(annotation: object) -> bool:
+    origin = typing.get_origin(annotation)
+    if origin is typing.Annotated or origin in (typing.Union, types.UnionType):
+        return any(
+            _is_list(inner) for inner in typing.get_args(annotation) if not isinstance(inner, FieldInfo)
+        )
+    return origin is tuple and bool(sections_of(annotation))
+
+
+def _default(field: FieldInfo) -> str:
+    if field.is_required():
+        return REQUIRED
+    value = field.get_default(call_default_factory=True)
+    return "" if value is None or value == () or isinstance(value, BaseModel) else _text(value)
+
+
+def _text(value: object) -> str:
+    """A value as it is written in TOML."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str):
+        return f'"{value}"' if value else '""'
+    if isinstance(value, tuple | list):
+        return "[" + ", ".join(_text(item) for item in value) + "]"
+    return f"{value:g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,125 @@
+"""What the schema's refusals mean, in words: a pydantic error becomes a place and a sentence."""
+
+from __future__ import annotations
+
+from coupler.case.keys import Key, find, keys, names_in
+from coupler.program.errors import briefly, did_you_mean
+
+KeyPath = tuple[str | int, ...]
+
+GAUGE_KINDS = (
+    "level", "pressure", "patch", "velocity", "flux", "volume", "force", "loads", "reaction", "motion",
+)  # fmt: skip
+INFLOW_KINDS = ("steady", "record", "bore", "solitary")
+
+
+def explain_error(error: dict) -> tuple[KeyPath, str]:
+    """Key path and message of one entry of `ValidationError.errors()`."""
+    path = _path(error["loc"])
+    kind, value, context = error["type"], error.get("input"), error.get("ctx", {})
+    key = find(path)
+    if kind == "extra_forbidden":
+        return path, _unknown(path)
+    if kind == "missing" and isinstance(path[-1], int):
+        return path[:-1], f"too few values ({path[-1]}); {_is(key)}"
+    if kind == "missing":
+        return path, f"missing; {_is(key)}"
+    if kind in _COMPARE:
+        word, name = _COMPARE[kind]
+        unit = f" {key.unit}" if key and key.unit else ""
+        return path, f"{briefly(value)} is out of range; must be {word} {context[name]:g}{unit}"
+    if kind == "literal_error":
+        return path, f"{briefly(value)} is not known; one of {context['expected']}" + _near(
+            value, context["expected"]
+        )
+    if kind in ("union_tag_invalid", "union_tag_not_found"):
+        return _kind(path, kind, context)
+    if kind == "value_error":
+        return path, str(context["error"])
+    return path, _shape(kind, value, context, key, error["msg"])
+
+
+_COMPARE = {
+    "greater_than": ("greater than", "gt"),
+    "greater_than_equal": ("at least", "ge"),
+    "less_than": ("less than", "lt"),
+    "less_than_equal": ("at most", "le"),
+}
+
+
+def _path(place: tuple) -> KeyPath:
+    """The place without the kind of a gauge or an inflow, which pydantic puts between the list place and the key."""
+    for above, kinds in ((("gauge",), GAUGE_KINDS), (("water", "inflow"), INFLOW_KINDS)):
+        n = len(above) + 1
+        if len(place) > n and place[: n - 1] == above and place[n] in kinds:
+            return place[:n] + place[n + 1 :]
+    return place
+
+
+def _unknown(path: KeyPath) -> str:
+    name = str(path[-1])
+    here = [known for known in names_in(path[:-1]) if known != name]
+    elsewhere = [key.path for key in keys() if key.path.endswith(f".{name}") or key.path == name]
+    if elsewhere:  # the very name is surer than one that looks like it
+        return f"unknown name here; did you mean '{elsewhere[0]}'?"
+    hint = did_you_mean(name, here)
+    if hint:
+        return f"unknown name{hint}"
+    return f"unknown name; known here: {', '.join(here)}" if here else "unknown name"
+
+
+def _is(key: Key | None) -> str:
+    if key is None:
+        return "it is required"
+    unit = f" [{key.unit}]" if key.unit else ""
+    name = key.path.rsplit(".", 1)[-1]
+    if key.sections:
+        return f"write a section [{key.path}]: {key.description}"
+    example = f", for instance {name} = {key.example}" if key.example else ""
+    return f"{key.description}{unit}{example}"
+
+
+def _near(value: object, expected: str) -> str:
+    return did_you_mean(str(value), [word.strip("' ") for word in expected.replace(" or ", ",").split(",")])
+
+
+def _kind(path: KeyPath, kind: str, context: dict) -> tuple[KeyPath, str]:
+    """A gauge or an inflow of no kind, or of one that there is not."""
+    what, kinds = (
+        ("what comes in", INFLOW_KINDS) if path[0] == "water" else ("what the gauge measures", GAUGE_KINDS)
+    )
+    if kind == "union_tag_not_found":
+        return (*path, "kind"), f"missing; {what}, one of {', '.join(kinds)}"
+    tag = str(context["tag"])
+    return (*path, "kind"), f"{briefly(tag)} is not known; one of {', '.join(kinds)}" + did_you_mean(
+        tag, kinds
+    )
+
+
+def _shape(kind: str, value: object, context: dict, key: Key | None, message: str) -> str:
+    """Wrong kinds of values: a list where a number belongs, a text where a switch belongs, and so on."""
+    if kind == "string_pattern_mismatch":
+        return f"{briefly(value)} is no name; use letters, digits, - and _, beginning with a letter"
+    if kind in ("tuple_type", "list_type") and key is not None and key.several:
+        return f"write [[{key.path}]] with double brackets: there may be several"
+    if kind in ("tuple_type", "list_type") and isinstance(value, str):
+        return f"{briefly(value)} is not a list; write [{briefly(value)}]"
+    if kind in ("tuple_type", "list_type"):
+        return f"{briefly(value)} is not a list of numbers; {_is(key)}"
+    if kind in ("model_type", "model_attributes_type", "dict_type"):
+        return f"{briefly(value)} is not a section; {_is(key)}"
+    if kind == "too_long":
+        return f"{len(value)} values where {context['max_length']} belong; {_is(key)}"
+    if kind == "too_short":
+        return f"{len(value)} values where at least {context['min_length']} belong; {_is(key)}"
+    if kind == "string_too_short":
+        return f"{briefly(value)} is empty; {_is(key)}"
+    if kind == "bool_type":
+        return f"{briefly(value)} is neither true nor false"
+    if kind == "finite_number":
+        return f"{briefly(value)} is not a finite number"
+    if kind == "int_type":
+        return f"{briefly(value)} is not a whole number"
+    if kind == "string_type":
+        return f"{briefly(value)} is not a text; put it in quotes"
+    return f"{message[:1].lower()}{message[1:]}"

@@ -1,0 +1,66 @@
+"""When a run writes: output times that divide it evenly, and times of checkpoints."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from coupler.case.case import Case
+
+ROUNDING = 1e-9
+"""Share of an interval within which a time counts as reached."""
+OUTPUTS, CHECKPOINTS = 100, 10
+"""Of a run that does not say how many."""
+MOST_OUTPUTS = 100_000
+"""More written states are a mistake of the unit: an hour of film has 90 000 pictures."""
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """Outputs at span k/count for k = 1, 2, ... before `end`, and at `end` [s].
+
+    A run that goes on beyond its first end keeps the interval of its outputs.
+    """
+
+    span: float
+    count: int
+    end: float
+
+    @classmethod
+    def of(cls, case: Case) -> Schedule:
+        """That of a new run: with the interval of the case if it divides the end, else with one near it that does."""
+        end, every = case.time.end, case.time.output_every
+        count = max(1, round(end / every)) if every else OUTPUTS
+        divides = every is not None and abs(every * count - end) < ROUNDING * every
+        return cls(every, 1, end) if divides else cls(end, count, end)
+
+    @property
+    def interval(self) -> float:
+        """Time between two outputs [s]: a step ends at each, so none is longer."""
+        return self.span / self.count
+
+    def until(self, end: float) -> Schedule:
+        """The same outputs with another end [s]."""
+        return replace(self, end=end)
+
+    def next_output(self, time: float) -> float:
+        """The first output after a time [s]."""
+        k = _intervals(time, self.interval) + 1
+        target = self.span * k / self.count
+        return target if target < self.end * (1.0 - ROUNDING) else self.end
+
+
+def checkpoint_interval(case: Case) -> float:
+    """Time between two checkpoints [s], 0 for none at all."""
+    every = case.time.checkpoint_every
+    return case.time.end / CHECKPOINTS if every is None else every
+
+
+def next_multiple(time: float, every: float) -> float:
+    """The first multiple of an interval [s] after a time [s]."""
+    return every * (_intervals(time, every) + 1)
+
+
+def _intervals(time: float, every: float) -> int:
+    """Whole intervals up to a time, which counts as the next multiple if only rounding misses it."""
+    return math.floor(time / every * (1.0 + 1e-12) + ROUNDING)

@@ -1,0 +1,230 @@
+"""The tables below [structure]: single blocks, generators and files of blocks, and the ground."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from coupler.case.types import (
+    Density,
+    Length,
+    Name,
+    Point,
+    PositiveLength,
+    PositiveTime,
+    Rotation,
+    Section,
+    Size,
+    SpinVector,
+    Switch,
+    VelocityVector,
+    Wall,
+)
+
+
+class Block(Section):
+    """One rigid block that moves: a box (size) or a convex polyhedron (vertices)."""
+
+    name: Name = Field(description="for joints, gauges, motions and results; one block a name")
+    centre: Point | None = Field(
+        None,
+        description="centre of mass at the start; a polyhedron without it stands where its vertices are",
+    )
+    size: Size | None = Field(None, description="edges of the box along its own axes")
+    vertices: Annotated[tuple[Point, ...], Field(min_length=4)] | None = Field(
+        None,
+        description="corners of a convex polyhedron in any order, its faces are found; with a centre from any origin",
+        examples=[[[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]],
+    )
+    rotation: Rotation | None = Field(
+        None, description="turn about the centre of mass; absent: along the axes"
+    )
+    velocity: VelocityVector = Field((0.0, 0.0, 0.0), description="velocity of the centre at the start")
+    spin: SpinVector = Field((0.0, 0.0, 0.0), description="angular velocity at the start, world axes")
+    density: Density | None = Field(None, description="mass per volume; absent: structure.density")
+    material: Name = Field("block", description="a name that contact.pair may go by")
+    fixed: Switch = Field(False, description="true: held in place for the whole run")
+    group: Name | None = Field(None, description="a name shared by blocks; gauges can add up a group")
+
+
+class Opening(Section):
+    """A door or a window: a rectangle without blocks in one wall of a building."""
+
+    wall: Wall = Field(description="the wall, by the side on which it stands")
+    lower: tuple[Length, Length] = Field(
+        description="its corner: distance along the wall from the wall's end with the smaller coordinate, "
+        "and height above the foot of the building",
+        examples=[[4, 0]],
+    )
+    size: tuple[PositiveLength, PositiveLength] = Field(description="width and height", examples=[[2, 3]])
+
+
+class Building(Section):
+    """Four walls of blocks, floors between the storeys and a roof."""
+
+    name: Name = Field("building", description="the group of all its blocks")
+    lower: Point = Field(description="lowest corner of the foot, outside of the walls", examples=[[30, 7, 0]])
+    size: Size = Field(description="outside length, depth and height, roof included", examples=[[20, 10, 12]])
+    wall_thickness: PositiveLength = Field(description="thickness of the walls", examples=["1 m"])
+    block: tuple[PositiveLength, PositiveLength] = Field(
+        description="wanted length and height of the blocks; changed so that whole numbers fit",
+        examples=[["2 m", "2 m"]],
+    )
+    storeys: Annotated[int, Field(strict=True, ge=1, le=100)] = Field(
+        1, description="number of storeys of equal height, with a floor between two of them"
+    )
+    floor_thickness: PositiveLength | None = Field(
+        None, description="thickness of floors and roof; absent: wall_thickness"
+    )
+    roof: Switch = Field(True, description="false: open at the top")
+    density: Density | None = Field(None, description="mass per volume; absent: structure.density")
+    material: Name = Field("block", description="a name that contact.pair may go by")
+    opening: tuple[Opening, ...] = Field((), description="doors and windows")
+
+
+class MasonryWall(Section):
+    """A straight wall or pier: a box divided into equal blocks."""
+
+    name: Name = Field(
+        "wall", description="the group of all its blocks, which are called NAME-0-0-0 and so on"
+    )
+    lower: Point = Field(description="corner with the smallest coordinates")
+    size: Size = Field(description="outside edges")
+    block: Size = Field(description="wanted edges of the blocks; changed so that whole numbers fit")
+    bond: Literal["stack", "running"] = Field(
+        "stack",
+        description="stack: joints in line; running: every other course and wythe shifted by half a block",
+    )
+    along: Literal["x", "y"] | None = Field(
+        None, description="length of the wall, along which a running bond is shifted; absent: its longer side"
+    )
+    density: Density | None = Field(None, description="mass per volume; absent: structure.density")
+    material: Name = Field("block", description="a name that contact.pair may go by")
+
+
+class Column(Section):
+    """Equal drums on one another: boxes (size) or prisms of many sides (radius)."""
+
+    name: Name = Field("column", description="the group of its drums, NAME-0 the lowest")
+    foot: Point = Field(description="middle of its underside")
+    height: PositiveLength = Field(description="of the whole column")
+    drums: Annotated[int, Field(strict=True, ge=1, le=1000)] = Field(description="number of drums")
+    size: tuple[PositiveLength, PositiveLength] | None = Field(
+        None, description="edges of boxes along x and y"
+    )
+    radius: PositiveLength | None = Field(
+        None, description="of the circle through the corners of round drums, at the foot"
+    )
+    top_radius: PositiveLength | None = Field(
+        None, description="the same at the top, of a column that tapers; absent: radius"
+    )
+    sides: Annotated[int, Field(strict=True, ge=3, le=64)] = Field(12, description="sides of a round drum")
+    density: Density | None = Field(None, description="mass per volume; absent: structure.density")
+    material: Name = Field("block", description="a name that contact.pair may go by")
+
+
+class Arch(Section):
+    """Wedge-shaped blocks (voussoirs) on a circle; their joints point to its centre."""
+
+    name: Name = Field("arch", description="the group of its blocks; NAME-0 and so on along the span")
+    foot: Point = Field(description="middle of the span, at the level where the inner edges spring")
+    span: PositiveLength = Field(description="clear width between the springings")
+    rise: PositiveLength | None = Field(
+        None, description="of the inner edge above the springing; absent: half the span, a half circle"
+    )
+    thickness: PositiveLength = Field(description="of the ring, along the joints")
+    width: PositiveLength = Field(description="across the span")
+    voussoirs: Annotated[int, Field(strict=True, ge=2, le=1000)] = Field(
+        description="number of blocks in the ring"
+    )
+    along: Literal["x", "y"] = Field("x", description="direction of the span")
+    abutment: tuple[PositiveLength, PositiveLength] | None = Field(
+        None,
+        description="length along the span and depth below the springing of two blocks that the arch stands on, "
+        "NAME-low and NAME-high; absent: none",
+    )
+    abutment_fixed: Switch = Field(True, description="false: the abutments may move")
+    density: Density | None = Field(None, description="mass per volume; absent: structure.density")
+    material: Name = Field("block", description="a name that contact.pair may go by")
+
+
+class Rubble(Section):
+    """Loose random blocks scattered in a box, none touching another."""
+
+    name: Name = Field("rubble", description="the group of its blocks, NAME-0 and so on")
+    lower: Point = Field(description="corner of the box with the smallest coordinates")
+    size: Size = Field(
+        description="edges of the box; a third of it can be filled with spheres around the blocks"
+    )
+    count: Annotated[int, Field(strict=True, ge=1, le=20_000)] = Field(description="number of blocks")
+    diameter: tuple[PositiveLength, PositiveLength] = Field(
+        description="smallest and largest of the spheres around the blocks", examples=[["20 cm", "40 cm"]]
+    )
+    shape: Literal["polyhedra", "boxes", "mixed"] = Field("polyhedra", description="what the blocks are")
+    corners: Annotated[int, Field(strict=True, ge=4, le=100)] = Field(12, description="of each polyhedron")
+    seed: Annotated[int, Field(strict=True, ge=0)] = Field(
+        1, description="the same seed gives the same blocks"
+    )
+    density: Density | None = Field(None, description="mass per volume; absent: structure.density")
+    material: Name = Field("block", description="a name that contact.pair may go by")
+
+
+class BlockFile(Section):
+    """Blocks from a mesh: each cell (tetrahedron, pyramid, wedge, hexahedron) or each closed convex surface is one."""
+
+    name: Name = Field(
+        "file", description="the group of its blocks, NAME-0 and so on in the order of the file"
+    )
+    path: Annotated[str, Field(min_length=1)] = Field(
+        description="any format that meshio reads (STL, OBJ, PLY, MSH, VTK, VTU, ...), from the directory of the case",
+        examples=["house.stl"],
+    )
+    scale: PositiveLength = Field(1.0, description="length of one unit of the file", examples=["1 mm"])
+    offset: Point = Field((0.0, 0.0, 0.0), description="added to all places, after the scale")
+    weld: PositiveLength | None = Field(
+        None,
+        description="corners closer than this are one; absent: a hundred-thousandth of the usual edge, or what the "
+        "digits of the file resolve",
+    )
+    density: Density | None = Field(None, description="mass per volume; absent: structure.density")
+    material: Name = Field("block", description="a name that contact.pair may go by")
+    fixed: Switch = Field(False, description="true: held in place for the whole run")
+
+
+class Ground(Section):
+    """A flat, rough ground without end under the blocks. With a tank its floor is ground as well."""
+
+    level: Length = Field(0.0, description="height of the ground")
+    material: Name = Field("ground", description="a name that contact.pair may go by")
+
+
+class Structure(Section):
+    """Rigid blocks. Absent: nothing moves but water, and YADE is never loaded."""
+
+    density: Density = Field(2400.0, description="mass per volume of blocks that do not say their own")
+    block: tuple[Block, ...] = Field((), description="single blocks")
+    wall: tuple[MasonryWall, ...] = Field((), description="walls of equal blocks")
+    building: tuple[Building, ...] = Field((), description="buildings with floors, roof and openings")
+    column: tuple[Column, ...] = Field((), description="columns of drums")
+    arch: tuple[Arch, ...] = Field((), description="arches of voussoirs")
+    rubble: tuple[Rubble, ...] = Field((), description="loose random blocks")
+    file: tuple[BlockFile, ...] = Field((), description="blocks from files")
+    ground: Ground | None = Field(None, description="flat ground under the blocks")
+    start: Literal["settled", "sudden", "ramp"] = Field(
+        "settled",
+        description="settled: joined blocks that reach the ground start in equilibrium with their weight and the "
+        "water around them; sudden: the weight comes on at once; ramp: the weight comes on gradually over the time "
+        "`ramp`, while water acts in full from the start",
+    )
+    ramp: PositiveTime | None = Field(
+        None,
+        description="with start = 'ramp', the time over which the weight of the blocks grows to its whole, as "
+        "tau^2 (3 - 2 tau); several periods of the structure leave it nearly at rest",
+        examples=["2 s"],
+    )
+    substep: PositiveTime | None = Field(
+        None,
+        description="longest step of the motion of the blocks; absent: the one at which energy is accurate. Longer "
+        "ones are taken up to the limit of stability, with a note, and refused beyond",
+    )

@@ -1,0 +1,163 @@
+"""Quantities at the door: text with a unit becomes a float in SI; plain numbers are SI already.
+
+    to_si("24 kN/m3", "N/m3") = 24000.0        to_si(24000, "N/m3") = 24000.0
+
+Units are read by pint, which is imported only when a value is text. A digit behind a letter is a power
+(`kg/m3`, `m/s2`, `s-1`), which pint itself does not read; `kg/m³` is the same.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from functools import lru_cache, partial
+from typing import Annotated
+
+from pydantic import BeforeValidator, Field
+
+from coupler.program.errors import UnitError, briefly
+
+DIMENSIONS = {
+    "": "a plain number",
+    "m": "a length",
+    "m2": "an area",
+    "m3": "a volume",
+    "s": "a time",
+    "1/s": "a frequency",
+    "kg": "a mass",
+    "m/s": "a velocity",
+    "m/s2": "an acceleration",
+    "kg/m3": "a density",
+    "Pa": "a pressure",
+    "Pa s": "a dynamic viscosity",
+    "N": "a force",
+    "N/m": "a stiffness",
+    "J": "an energy",
+    "rad": "an angle",
+    "rad/s": "an angular velocity",
+}
+"""What a quantity of each unit of the case file is called."""
+
+LEAST, MOST = 1e-30, 1e30
+"""Sizes of numbers, zero aside, with whose products and powers the program can still count."""
+LONGEST = 100
+"""Characters of the text of a quantity."""
+
+_QUANTITY = re.compile(r"\s*([-+]?(?:\d[\d_]*\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
+_FACTOR = r"[^\W\d_%°]*[A-Za-z%°](?:(?:\^|\*\*)?-?\d+)?"
+_UNIT_TEXT = re.compile(rf"(?:(?:1\s*/\s*)?{_FACTOR}(?:(?:\s*[*/·]\s*|\s+){_FACTOR})*)?")
+_CAPITALS = (
+    "m", "mm", "cm", "km", "s", "ms", "g", "kg", "t", "N", "kN", "MN", "Pa", "kPa", "MPa", "GPa", "J", "kJ", "Hz",
+    "rad", "deg", "kg/m3", "t/m3", "g/cm3", "kN/m3", "N/m", "kN/m", "MN/m", "GN/m", "N/mm", "m/s", "mm/s", "m/s2",
+)  # fmt: skip
+"""Units that people write with wrong capitals."""
+_RAISED = str.maketrans("⁻¹²³⁴", "-1234")
+_POWER = re.compile(r"(?<=[A-Za-z])(-?\d+)")
+
+
+@dataclass(frozen=True)
+class Unit:
+    """Marks a field of the case with the SI unit of its value."""
+
+    symbol: str
+
+
+def quantity(unit: str, **limits: float):
+    """The type of a case field: a float in SI `unit` or text with any unit of its kind."""
+    return Annotated[float, BeforeValidator(partial(to_si, unit=unit)), Field(**limits), Unit(unit)]
+
+
+def to_si(value: object, unit: str) -> float:
+    """value (number, or text such as "5 MN/mm") in SI `unit`.
+
+    Raises UnitError, naming the value, when the text is no quantity or one of another kind.
+    """
+    if isinstance(value, bool) or not isinstance(value, int | float | str):
+        raise UnitError(f"{briefly(value)} is not a number{_example(unit)}")
+    if isinstance(value, str) and len(value) > LONGEST:
+        raise UnitError(
+            f"{briefly(value)} has {len(value)} characters, a quantity at most {LONGEST}{_example(unit)}"
+        )
+    number = _from_text(value, unit) if isinstance(value, str) else value
+    if _is_finite(number) and number != 0 and not LEAST <= abs(number) <= MOST:
+        raise UnitError(
+            f"{briefly(value)} is beyond all that is computed with: write 0, or a number of a size "
+            f"between {LEAST:g} and {MOST:g}{_in(unit)}"
+        )
+    return float(number)
+
+
+def _is_finite(number: int | float) -> bool:
+    """Infinities and NaN are refused by the schema, as of any number; whole numbers may have any length."""
+    return isinstance(number, int) or math.isfinite(number)
+
+
+def _from_text(text: str, unit: str) -> float:
+    match = _QUANTITY.fullmatch(text)
+    if match is None:
+        raise UnitError(f"{text!r} is not a number with a unit{_example(unit)}")
+    number, given = float(match[1]), match[2].translate(_RAISED)
+    if not given and unit:
+        raise UnitError(f"{text!r} has no unit{_example(unit)}")
+    return number * _factor(given, unit, text)
+
+
+@lru_cache(maxsize=256)
+def _factor(given: str, unit: str, value: str) -> float:
+    import pint
+
+    registry = _registry()
+    try:
+        if not _UNIT_TEXT.fullmatch(given):
+            raise ValueError(given)
+        source = 1.0 * registry.parse_units(_POWER.sub(r"^\1", given.replace("·", "*")))
+    except (pint.PintError, ValueError, AttributeError, ArithmeticError) as error:
+        raise UnitError(f"{value!r}: unknown unit '{given}'{_near(given)}{_example(unit)}") from error
+    target = _si(unit)
+    of_other_kind = source.dimensionality != target.dimensionality
+    if of_other_kind or _is_angle(source) != _is_angle(target):
+        raise UnitError(f"{value!r} is {_kind(source)}, needs {DIMENSIONS[unit]}{_in(unit)}")
+    return float(source.to(target.units).magnitude)
+
+
+def _near(given: str) -> str:
+    """The same with other capitals, if that is a unit: kpa, MM."""
+    right = {name.lower(): name for name in _CAPITALS}.get(given.lower())
+    return f"; did you mean '{right}'?" if right and right != given else ""
+
+
+def _is_angle(source) -> bool:
+    """Pint counts angles as plain numbers; a friction of "30 deg" is a mistake all the same."""
+    return any(name == "radian" for name, _ in source.to_root_units().unit_items())
+
+
+@lru_cache(maxsize=1)
+def _registry():
+    import pint
+
+    return pint.UnitRegistry()
+
+
+def _si(unit: str):
+    text = _POWER.sub(r"^\1", unit).replace("1/", "dimensionless/")
+    return 1.0 * _registry().parse_units(text)
+
+
+def _kind(source) -> str:
+    """The name of the dimension of a pint quantity, in words where it has one here."""
+    for unit, name in DIMENSIONS.items():
+        known = _si(unit)
+        if known.dimensionality == source.dimensionality and _is_angle(known) == _is_angle(source):
+            return name
+    return f"of dimension {source.dimensionality}"
+
+
+def _in(unit: str) -> str:
+    return f" [{unit}]" if unit else ""
+
+
+def _example(unit: str) -> str:
+    if not unit:
+        return "; write a plain number"
+    return f'; write {DIMENSIONS[unit]} as a number in {unit}, or as text such as "2 {unit}"'

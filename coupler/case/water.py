@@ -1,0 +1,179 @@
+"""The water of a case: fluid, walls, where it stands at the start, where it comes in, and what stands fixed in it."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from coupler.case.types import (
+    Density,
+    Length,
+    Name,
+    Point,
+    PositiveLength,
+    PositiveTime,
+    Rotation,
+    Section,
+    Size,
+    Velocity,
+    Wall,
+)
+from coupler.case.units import quantity
+
+File = Annotated[str, Field(min_length=1)]
+
+
+class Fill(Section):
+    """A box full of water at the start; solids and blocks in it displace the water."""
+
+    lower: Point = Field(description="corner with the smallest coordinates", examples=[[0, 0, 0]])
+    upper: Point = Field(description="corner with the largest coordinates", examples=[[20, 24, 10]])
+    velocity: tuple[Velocity, Velocity, Velocity] = Field(
+        (0.0, 0.0, 0.0), description="velocity of its water at the start", examples=[[3, 0, 0]]
+    )
+
+
+class SteadyInflow(Section):
+    """A stream of constant level and velocity."""
+
+    kind: Literal["steady"] = Field(description="what comes in: a steady stream")
+    side: Wall = Field(description="the side of the tank, across its whole width")
+    level: Length = Field(description="height z of its surface")
+    velocity: Velocity = Field(description="velocity into the tank, the same over the depth")
+
+
+class RecordInflow(Section):
+    """Level and velocity from a table, straight lines between its times."""
+
+    kind: Literal["record"] = Field(description="what comes in: a record")
+    side: Wall = Field(description="the side of the tank, across its whole width")
+    path: File = Field(
+        description="CSV with the columns time [s], level (z) [m], velocity (into the tank) [m/s], from the directory "
+        "of the case; lines that begin with # are skipped",
+        examples=["wave.csv"],
+    )
+
+
+class BoreInflow(Section):
+    """A bore: behind its front the water is deeper and moves, ahead of it it stands still."""
+
+    kind: Literal["bore"] = Field(description="what comes in: a bore")
+    side: Wall = Field(description="the side of the tank, across its whole width")
+    ahead: Length = Field(description="height z of the still water")
+    level: Length = Field(description="height z of the surface behind the front")
+
+
+class SolitaryInflow(Section):
+    """One solitary wave."""
+
+    kind: Literal["solitary"] = Field(description="what comes in: a solitary wave")
+    side: Wall = Field(description="the side of the tank, across its whole width")
+    level: Length = Field(description="height z of the still water")
+    height: PositiveLength = Field(description="height of the crest above the still water")
+    crest: PositiveTime = Field(description="time at which the crest passes the side")
+    theory: Literal["goring", "grimshaw"] = Field(
+        "grimshaw",
+        description="first order, with a uniform velocity that carries the volume of the wave, or third order",
+    )
+
+
+Inflow = Annotated[SteadyInflow | RecordInflow | BoreInflow | SolitaryInflow, Field(discriminator="kind")]
+
+
+class Sea(Section):
+    """A side beyond which the water stands still at a level; water goes in and out there as it likes."""
+
+    side: Wall = Field(description="the side of the tank, across its whole width")
+    level: Length = Field(description="height z of the still sea")
+
+
+class Water(Section):
+    """The water. Absent: no water, and nothing of the flow solver is loaded."""
+
+    density: Density = Field(1000.0, description="mass per volume")
+    viscosity: quantity("Pa s", ge=0) = Field(
+        0.0,
+        description="dynamic viscosity; 0: the term is left out",
+        examples=["1 mPa s"],
+    )
+    walls: Literal["slip", "no-slip", "friction"] = Field(
+        "slip",
+        description="what closed sides, solids and blocks do to the water along them: nothing, hold it (needs "
+        "viscosity), or rub it by roughness or manning; tank.smooth excepts sides",
+    )
+    roughness: PositiveLength | None = Field(
+        None, description="sand roughness k_s of all walls, for friction by the log law", examples=["3 mm"]
+    )
+    manning: quantity("", gt=0, le=1) | None = Field(
+        None,
+        description="Manning's n [s/m^(1/3)] of the floor and of faces that look up, for friction of a bed",
+        examples=[0.025],
+    )
+    advection: Literal["semi-lagrangian", "supg"] = Field(
+        "semi-lagrangian",
+        description="how the flow carries velocity and surface: along paths, or by stabilised finite elements, the "
+        "reference, which costs four to seven times as much a step",
+    )
+    theta: quantity("", ge=0.5, le=1) = Field(
+        0.6, description="weight of the new pressure in the projection; 0.5 damps least, 1 most"
+    )
+    suction: Literal["bounded", "unlimited"] = Field(
+        "bounded",
+        description="how far the pressure may fall: to that of the air where air can reach the water, and to "
+        "vapour_pressure elsewhere, where the water parts; or without any bound, for comparison",
+    )
+    vapour_pressure: quantity("Pa", lt=0) = Field(
+        -98e3, description="pressure of the vapour of the water, relative to the air", examples=["-98 kPa"]
+    )
+    covers: Literal["single", "multiple"] = Field(
+        "single",
+        description="one set of unknowns per node, or one per part of the water that a thin wall separates",
+    )
+    openings: Literal["all", "wide"] = Field(
+        "all",
+        description="with multiple covers, what counts as an opening of a thin wall: any, which acts as one cell wide "
+        "at least, or only those about a cell wide and more, for right edges and added mass of thin plates",
+    )
+    cracks: Literal["open", "closed", "slit"] = Field(
+        "open",
+        description="broken joints of walls thinner than two cells, while narrower than a quarter of a cell: openings "
+        "as the mesh sees them (one cell wide at least), closed, or closed with the flow through them lumped",
+    )
+    fill: tuple[Fill, ...] = Field(
+        (),
+        description="where the water stands at the start; at least one box, or an inflow or a sea, "
+        "which then begin with a strip of water one cell wide",
+    )
+    inflow: tuple[Inflow, ...] = Field((), description="sides through which water comes in")
+    sea: tuple[Sea, ...] = Field((), description="sides with a still sea beyond")
+
+
+class Solid(Section):
+    """A fixed body in the water, for instance an obstacle: a box (centre, size), the hull of points (vertices), or the
+    convex bodies of a file (path). It takes forces and never moves. In a case with a structure it is one of its blocks,
+    held in place: blocks hit it, rest on it and, with joints, are glued to it where their faces touch."""
+
+    name: Name = Field("solid", description="for gauges and results")
+    centre: Point | None = Field(None, description="centre of a box")
+    size: Size | None = Field(None, description="edges of the box along its own axes")
+    rotation: Rotation | None = Field(None, description="turn of the box; absent: along the axes")
+    vertices: tuple[Point, ...] | None = Field(
+        None,
+        description="points whose convex hull is the body",
+        examples=[[[5, 0, 0], [9, 0, 0], [9, 0, 2], [5, 4, 0], [9, 4, 0], [9, 4, 2]]],
+    )
+    path: File | None = Field(
+        None,
+        description="mesh of volume cells or closed convex surfaces that meshio reads, from the directory of the case",
+        examples=["pier.stl"],
+    )
+    scale: PositiveLength = Field(1.0, description="length of one unit of the file", examples=["1 mm"])
+    offset: Point = Field((0.0, 0.0, 0.0), description="added to all places of the file, after the scale")
+    weld: PositiveLength | None = Field(
+        None, description="corners of the file closer than this are one; absent: found from its edges"
+    )
+    material: Name = Field("solid", description="a name that contact.pair may go by")
+    density: Density | None = Field(
+        None, description="mass per volume, for its weight among the loads; absent: structure.density"
+    )

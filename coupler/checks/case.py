@@ -1,0 +1,356 @@
+"""What a schema cannot see: sections that need each other, names that must exist, bodies that cannot be made.
+
+Every check yields (key path, message); none needs YADE or the flow solver.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import suppress
+
+import numpy as np
+
+from coupler.case.case import Case
+from coupler.case.schedule import MOST_OUTPUTS
+from coupler.case.toml_lines import shown
+from coupler.checks.joints import joint_problems, pair_problems
+from coupler.checks.motion import motion_problems
+from coupler.checks.places import frame_problems, opening_problems, place_problems, solid_bodies
+from coupler.checks.softness import softness_remarks
+from coupler.checks.tables import table_problems
+from coupler.checks.water import water_problems, water_remarks
+from coupler.geometry.parts import PARTS, Part, parts_of, recipes
+from coupler.geometry.solids import refused_solids
+from coupler.geometry.tank_mesh import is_measured, mesh_remarks
+from coupler.program.errors import did_you_mean
+
+KeyPath = tuple[str | int, ...]
+Problem = tuple[KeyPath, str]
+
+LIGHTEST, HEAVIEST = 5.0, 25e3
+"""Densities [kg/m3] between which solids lie: foam and platinum."""
+WEAKEST = 1.0
+"""Strength [Pa] below which a joint holds nothing: a millimetre of stone weighs more."""
+
+
+def problems(case: Case) -> list[Problem]:
+    """Everything that is wrong with a case whose sections are valid one by one."""
+    wrong_frames = [*frame_problems(case), *refused_solids(case)]
+    found = [*_sections(case), *_study(case), *wrong_frames]
+    if wrong_frames or (case.tank is not None and not is_measured(case.tank)):
+        return found  # without a direction or a tank the rest would report nonsense
+    shapes = [*_shapes(case), *opening_problems(case)]
+    parts, refused = _made(case, {path[:3] for path, _ in shapes})
+    found += [*shapes, *refused, *_unique_names(case, parts), *_known_names(case, parts), *_pairs(case)]
+    found += [*_law(case), *place_problems(case, parts), *table_problems(case)]
+    found += pair_problems(case, parts)
+    if case.structure is not None:
+        found += motion_problems(case, parts)
+    return found if found else list(joint_problems(case, parts))
+
+
+def _study(case: Case) -> Iterator[Problem]:
+    if case.study is None:
+        return
+    from coupler.case.study_names import study_problems
+
+    yield from study_problems(case.study)
+
+
+def remarks(case: Case) -> list[str]:
+    """What is allowed but worth knowing before the run."""
+    found = [
+        *_thin_remarks(case),
+        *_contact_remarks(case),
+        *softness_remarks(case),
+        *water_remarks(case),
+        *_joint_remarks(case),
+        *_loose_remarks(case),
+    ]
+    found += mesh_remarks(case.tank) if case.tank is not None else []
+    return [*found, *_unit_remarks(case), *_window_remarks(case)]
+
+
+def _thin_remarks(case: Case) -> Iterator[str]:
+    if case.tank is None or case.water is None or case.water.covers != "single":
+        return
+    thin = [(name, width) for name, width in _widths(case) if width < case.tank.cell]
+    if thin:
+        name, width = min(thin, key=lambda item: item[1])
+        yield (
+            f"{name} is {width:g} m thick, thinner than a cell ({case.tank.cell:g} m): with single covers "
+            "the water on its two sides is one field there and the load comes out too small"
+        )
+
+
+def _widths(case: Case) -> Iterator[tuple[str, float]]:
+    """Name and smallest width [m] of solids, walls and floors as wholes, and of all other blocks."""
+    from coupler.geometry.bodies import Body
+
+    for _, name, body in solid_bodies(case):
+        yield name, body.thickness()
+    for part in parts_of(case):
+        spec = getattr(case.structure, str(part.path[1]))[part.path[2]]
+        if part.path[1] == "wall":
+            yield part.name, min(spec.size)
+        elif part.path[1] == "building":
+            yield part.name, min(spec.wall_thickness, spec.floor_thickness or np.inf)
+        else:
+            yield part.name, min(Body.of_block(b).thickness() for b in part.blocks)
+
+
+def _joint_remarks(case: Case) -> Iterator[str]:
+    j = case.joints
+    if j is None:
+        return
+    from yade_scripts.blocks.quadrature import enough
+
+    if j.points != "auto" and j.points < len(enough(j.closing_ratio, 3)):
+        yield (
+            f"joints.points = {j.points} with joints.closing_ratio = {j.closing_ratio:g}: too few for the strength in "
+            f"bending (3 are 8 % weak at 10, 16 % at 100); 'auto' takes {len(enough(j.closing_ratio, 3))} or more"
+        )
+
+
+def _loose_remarks(case: Case) -> Iterator[str]:
+    """Walls and buildings are rarely meant to be dry."""
+    if case.structure is None or case.joints is not None:
+        return
+    for part in (*case.structure.wall, *case.structure.building):
+        yield f"the blocks of '{part.name}' lie loose on one another; a section [joints] glues them"
+
+
+def _contact_remarks(case: Case) -> Iterator[str]:
+    if case.structure is not None and case.contact is None:
+        yield (
+            "there is no section [contact]: blocks whose joints break pass through one another, the ground and the "
+            "sides of the tank; with [joints] an empty section [contact] will do"
+        )
+
+
+def _unit_remarks(case: Case) -> Iterator[str]:
+    """Values that nobody builds with: most likely another unit was meant."""
+    blocks = [block for part in parts_of(case) for block in part.blocks]
+    for block in blocks:
+        if not LIGHTEST <= block.density <= HEAVIEST:
+            yield f"the density of '{block.name}' is {block.density:g} kg/m3; other units are text, \"2.4 g/cm3\""
+            break
+    j = case.joints
+    if j is not None and j.strength < WEAKEST:
+        yield f'joints.strength is {j.strength:g} Pa, next to nothing; "1 MPa" is a million, "1 mPa" a thousandth'
+    if j is not None and blocks:
+        from coupler.geometry.bodies import Body
+
+        thinnest = min(Body.of_block(block).thickness() for block in blocks)
+        if j.opening_at_failure > 0.5 * thinnest:
+            yield (
+                f"joints.opening_at_failure is {j.opening_at_failure:g} m, more than half the thinnest block "
+                f'({thinnest:g} m); millimetres are text, "1 mm"'
+            )
+
+
+def _window_remarks(case: Case) -> Iterator[str]:
+    """Sums that never begin."""
+    for gauge in case.gauge:
+        window = getattr(gauge, "impulse", None)
+        if window is not None and window[0] >= case.time.end:
+            yield f"gauge '{gauge.name}' begins to add up at {window[0]:g} s, after the end ({case.time.end:g} s)"
+
+
+# ---------------------------------------------------------------- sections
+
+
+def _sections(case: Case) -> Iterator[Problem]:
+    if case.water is None and case.structure is None:
+        yield (), "nothing to compute: write a section [water] or [structure], or both"
+    if case.water is not None and case.tank is None:
+        yield ("water",), "the water needs a section [tank] that says where it may be"
+    if case.tank is not None and case.water is None and case.structure is None:
+        yield ("tank",), "a tank without water; write a section [water] with [[water.fill]]"
+    yield from _outputs(case)
+    yield from water_problems(case)
+    if case.structure is not None:
+        yield from _structure_sections(case)
+    elif case.joints is not None or case.contact is not None or case.motion:
+        absent = [name for name in ("contact", "joints", "motion") if getattr(case, name)]
+        yield (absent[0],), f"[{absent[0]}] is for blocks; write a section [structure] or leave this one out"
+
+
+def _outputs(case: Case) -> Iterator[Problem]:
+    """A step ends at each output, so that too many of them make a run endless and fill the disk."""
+    end, every = case.time.end, case.time.output_every
+    if every is not None and end > MOST_OUTPUTS * every:
+        yield (
+            ("time", "output_every"),
+            f"{every:g} s makes {end / every:.3g} written states until {end:g} s, at most {MOST_OUTPUTS}; write "
+            f"{end / MOST_OUTPUTS:.2g} s or more (histories have a row every step anyway)",
+        )
+
+
+def _structure_sections(case: Case) -> Iterator[Problem]:
+    if not any(True for _ in recipes(case)):
+        yield (
+            ("structure",),
+            "no block: write [[structure.block]], .wall, .building, .column, .arch, .rubble or .file in double "
+            "brackets",
+        )
+    start, ramp = case.structure.start, case.structure.ramp
+    if (start == "ramp") != (ramp is not None):
+        yield (
+            ("structure", "ramp"),
+            "missing; start = 'ramp' needs the time over which the weight comes on, for instance \"2 s\""
+            if ramp is None
+            else f"is for start = 'ramp', not '{start}'; leave one of them out",
+        )
+    if case.contact is None and case.joints is None:
+        yield ("structure",), "blocks need a section [contact] with stiffness, restitution and friction"
+    elif case.contact is not None and case.contact.stiffness is None and case.joints is None:
+        yield ("contact",), "stiffness: missing; without [joints] there is nothing to take it from"
+
+
+def _law(case: Case) -> Iterator[Problem]:
+    if case.joints is None:
+        return
+    from yade_scripts.joints import laws
+
+    law = case.joints.law
+    if law not in laws.names():
+        yield ("joints", "law"), _no_such("law", law, laws.names())
+    if case.joints.mixed_mode == "needleman" and law != "polynomial":
+        yield (
+            ("joints", "mixed_mode"),
+            f"'needleman' is a potential for the law polynomial, not {law}; use 'effective'",
+        )
+
+
+# ---------------------------------------------------------------- parts of the structure
+
+
+def _shapes(case: Case) -> Iterator[Problem]:
+    """Tables that say too little or too much about the shape of their blocks."""
+    structure = case.structure
+    for i, block in enumerate(structure.block if structure else ()):
+        path = ("structure", "block", i)
+        if block.size is None and block.vertices is None:
+            yield (
+                (*path, "size"),
+                "missing; give size (edges of a box) or vertices (corners of a convex polyhedron)",
+            )
+        elif block.size is not None and block.vertices is not None:
+            yield (*path, "vertices"), "size is given as well; a block is a box or a polyhedron"
+        elif block.size is not None and block.centre is None:
+            yield (*path, "centre"), "missing; centre of mass of the box at the start [m]"
+    for i, column in enumerate(structure.column if structure else ()):
+        path = ("structure", "column", i)
+        if (column.size is None) == (column.radius is None):
+            yield (
+                path,
+                f"'{column.name}' needs either size (drums are boxes) or radius (drums have many sides)",
+            )
+        elif column.size is not None and column.top_radius is not None:
+            yield (*path, "top_radius"), "is for round drums; leave it out, or give radius instead of size"
+
+
+def _made(case: Case, skipped: set[KeyPath]) -> tuple[list[Part], list[Problem]]:
+    """The parts that can be made, and why the others cannot; those in `skipped` are known to be wrong."""
+    if case.structure is None:
+        return [], []
+    from coupler.geometry.mesh_files import MeshFileError
+    from yade_scripts.blocks.polyhedra import BlockError
+
+    if not skipped:
+        with suppress(BlockError, MeshFileError, OSError):
+            return list(parts_of(case)), []
+    made, refused = [], []
+    for recipe in recipes(case):
+        if recipe.path in skipped:
+            continue
+        try:
+            made.append(Part(recipe.path, recipe.name, tuple(recipe.make())))
+        except BlockError as error:
+            refused.append((recipe.path, str(error)))
+        except MeshFileError as error:
+            refused.append(((*recipe.path, "path"), str(error)))
+    return made, refused
+
+
+# ---------------------------------------------------------------- names
+
+
+def _unique_names(case: Case, parts: list[Part]) -> Iterator[Problem]:
+    """One name for one body, group of blocks, or gauge of a kind."""
+    places: dict[str, KeyPath] = {}
+    bodies = [(("solid", i), solid.name) for i, solid in enumerate(case.solid)]
+    for path, name in [*bodies, *((r.path, r.name) for r in recipes(case))]:
+        first = places.setdefault(name, path)
+        if first != path:
+            yield (*path, "name"), f"'{name}' is taken by {shown(first)}; give every body its own name"
+    for part in parts:
+        for name in (block.name for block in part.blocks if block.name != part.name):
+            first = places.setdefault(name, part.path)
+            if first != part.path:
+                yield (
+                    (*part.path, "name"),
+                    f"a block of '{part.name}' would be called '{name}' as {shown(first)} is",
+                )
+                break
+    seen: dict[tuple[str, str], int] = {}
+    for i, gauge in enumerate(case.gauge):
+        first = seen.setdefault((gauge.kind, gauge.name), i)
+        if first != i:
+            yield ("gauge", i, "name"), f"'{gauge.name}' is taken by gauge[{first}] of the same kind"
+
+
+def _known_names(case: Case, parts: list[Part]) -> Iterator[Problem]:
+    """Motions and gauges name what there is; what could not be made is taken for granted."""
+    blocks = [block.name for part in parts for block in part.blocks]
+    several = [part.name for part in parts] + [b.group for part in parts for b in part.blocks]
+    moving, solids = list(dict.fromkeys([*several, *blocks])), [solid.name for solid in case.solid]
+    unmade = {r.name for r in recipes(case)} - {part.name for part in parts}
+
+    def absent(name: str, known: list[str]) -> bool:
+        return name not in known and not any(name == n or name.startswith(f"{n}-") for n in unmade)
+
+    for i, motion in enumerate(case.motion):
+        if case.structure and absent(motion.block, blocks):
+            yield ("motion", i, "block"), _no_such("block", motion.block, blocks)
+    for i, gauge in enumerate(case.gauge):
+        if gauge.kind in ("force", "loads") and absent(gauge.on, moving + solids):
+            yield ("gauge", i, "on"), _no_such("body", gauge.on, moving + solids)
+        if gauge.kind == "reaction" and absent(gauge.on, moving + solids):
+            yield ("gauge", i, "on"), _no_such("block, group or solid", gauge.on, moving + solids)
+        if gauge.kind == "motion" and absent(gauge.of, blocks):
+            yield ("gauge", i, "of"), _no_such("block", gauge.of, blocks)
+
+
+def _pairs(case: Case) -> Iterator[Problem]:
+    """Friction by pairs: materials that something has, each pair once."""
+    if case.contact is None or case.structure is None:
+        return
+    known = list(_materials(case))
+    seen: dict[frozenset[str], int] = {}
+    for i, pair in enumerate(case.contact.pair):
+        path = ("contact", "pair", i)
+        for material in dict.fromkeys(pair.materials):
+            if material not in known:
+                yield (*path, "materials"), _no_such("material", material, known)
+        first = seen.setdefault(frozenset(pair.materials), i)
+        if first != i:
+            yield (*path, "materials"), f"this pair is given by contact.pair[{first}] already; leave one out"
+
+
+def _materials(case: Case) -> dict[str, None]:
+    """Materials of blocks, solids, ground and tank, each once."""
+    structure = case.structure
+    tables = [spec for kind in PARTS for spec in getattr(structure, kind)]
+    found = [spec.material for spec in (*tables, *case.solid)]
+    if structure.ground is not None:
+        found.append(structure.ground.material)
+    if case.tank is not None:
+        found.append("tank")
+    return dict.fromkeys(found)
+
+
+def _no_such(kind: str, name: str, known: list[str]) -> str:
+    hint = did_you_mean(name, known)
+    return f"there is no {kind} '{name}'" + (hint or (f"; there are {', '.join(known[:8])}" if known else ""))

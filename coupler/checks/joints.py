@@ -1,0 +1,99 @@
+"""Cases whose joints must do what a contact would: faces that touch, and no block without one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from coupler.case.case import Case
+from coupler.geometry.parts import Part
+from coupler.program.errors import did_you_mean
+
+KeyPath = tuple[str | int, ...]
+Problem = tuple[KeyPath, str]
+
+
+def joint_problems(case: Case, parts: list[Part]) -> Iterator[Problem]:
+    """Joints that give contact no stiffness, since no faces touch, and blocks that neither joint nor contact hold."""
+    if case.joints is None or not parts or (case.contact and case.contact.stiffness is not None):
+        return
+    blocks, joined = joined_blocks(case, parts)
+    if not joined:
+        yield (
+            ("joints",),
+            "no two faces touch, so there is no joint"
+            + (" and no stiffness for [contact] either; give contact.stiffness" if case.contact else "")
+            + "; move blocks until faces touch, or leave [joints] out",
+        )
+    elif case.contact is None:
+        loose = [block.name for row, block in enumerate(blocks) if not block.fixed and row not in joined]
+        if loose:
+            yield (
+                ("structure",),
+                f"'{loose[0]}' has no joint, and {len(loose) - 1} more: blocks that lie loose need a section [contact] "
+                "with stiffness, restitution and friction",
+            )
+
+
+def pair_problems(case: Case, parts: list[Part]) -> Iterator[Problem]:
+    """Pairs of joints: names that something has, laws that can be; scatter with its measure."""
+    j = case.joints
+    if j is None or case.structure is None:
+        return
+    if (j.distribution is None) != (j.variation is None):
+        absent, given = (
+            ("variation", "distribution") if j.variation is None else ("distribution", "variation")
+        )
+        yield (
+            ("joints", absent),
+            f"missing; it belongs to joints.{given}, for instance "
+            + ("0.2" if absent == "variation" else "'weibull'"),
+        )
+    known = _names(case, parts)
+    for i, pair in enumerate(j.pair):
+        for name in dict.fromkeys(pair.between):
+            if name not in known:
+                hint = did_you_mean(name, known) or f"; there are {', '.join(known[:8])}"
+                yield ("joints", "pair", i, "between"), f"nothing is called '{name}'{hint}"
+        yield from _pair_law(case, i, pair)
+
+
+def _pair_law(case: Case, i: int, pair) -> Iterator[Problem]:
+    from coupler.scene.build import joint_parameters, of_pair
+    from yade_scripts.joints import laws
+    from yade_scripts.joints.cohesion import JointParameterError
+
+    if pair.law is not None and pair.law not in laws.names():
+        known = laws.names()
+        hint = did_you_mean(pair.law, known) or f"; there are {', '.join(known)}"
+        yield ("joints", "pair", i, "law"), f"there is no law '{pair.law}'{hint}"
+    elif case.joints.law in laws.names():
+        try:
+            joint_parameters(of_pair(case.joints, pair))
+        except JointParameterError as error:
+            yield ("joints", "pair", i), str(error)
+
+
+def _names(case: Case, parts: list[Part]) -> list[str]:
+    """Names, groups and materials of blocks and solids, and of the planes that joints may be to."""
+    from coupler.geometry.solids import obstacle_blocks
+    from coupler.scene.build import planes_of
+
+    blocks = [block for part in parts for block in part.blocks] + obstacle_blocks(case)
+    found = [name for b in blocks for name in (b.group, b.name, b.material) if name]
+    return list(
+        dict.fromkeys([*found, *(n for p in planes_of(case) if p.bonds for n in (p.name, p.material))])
+    )
+
+
+def joined_blocks(case: Case, parts: list[Part]) -> tuple[list, set[int]]:
+    """All blocks with the fixed solids behind them, and the rows of those with a face that joints glue to another."""
+    from coupler.geometry.solids import obstacle_blocks
+    from coupler.scene.build import joint_rules, planes_of
+    from yade_scripts.blocks.faces import both_held, touching_faces
+
+    blocks = [block for part in parts for block in part.blocks] + obstacle_blocks(case)
+    planes = planes_of(case)
+    faces = touching_faces(blocks, planes)
+    laws = joint_rules(case.joints).of_faces(faces, blocks, planes)
+    glued = [face for face, law in zip(faces, laws) if law is not None and not both_held(blocks, face)]
+    return blocks, {row for face in glued for row in (face.a, face.b) if row >= 0}

@@ -1,0 +1,50 @@
+"""Blocks with a prescribed motion that nothing stops: where they are when the run ends is known before it begins."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from coupler.case.case import Case
+from coupler.geometry.bodies import Body
+from coupler.geometry.parts import Part
+
+KeyPath = tuple[str | int, ...]
+Problem = tuple[KeyPath, str]
+
+THROUGH = 1e-3
+"""Share of its thickness by which a driven block may enter a wall: what rounding of speeds and times leaves."""
+
+
+def motion_problems(case: Case, parts: list[Part]) -> Iterator[Problem]:
+    """Driven blocks that pass through a closed side of the tank, or through the ground, before the end."""
+    blocks = {block.name: block for part in parts for block in part.blocks}
+    walls = list(_walls(case))
+    for i, motion in enumerate(case.motion):
+        if motion.block in blocks:
+            body = Body.of_block(blocks[motion.block])
+            yield from _passed(case, ("motion", i, "velocity"), motion, body, walls)
+
+
+def _passed(case: Case, path: KeyPath, motion, body: Body, walls) -> Iterator[Problem]:
+    low, high = body.bounds()
+    for what, axis, sign, place in walls:
+        speed = sign * motion.velocity[axis]
+        room = sign * (place - (high if sign > 0.0 else low)[axis])
+        if speed > 0.0 and speed * case.time.end > room + THROUGH * body.thickness():
+            yield (
+                path,
+                f"'{motion.block}' reaches {what} ({'xyz'[axis]} = {place:g} m) at t = {max(0.0, room) / speed:.4g} s "
+                f"and would pass through it until the end ({case.time.end:g} s): nothing stops a prescribed motion; "
+                "end the run before, or change the velocity or the place",
+            )
+
+
+def _walls(case: Case) -> Iterator[tuple[str, int, float, float]]:
+    """What blocks cannot pass: its name, the axis across it, the sign of the way out, and its place [m]."""
+    if case.structure.ground is not None:
+        yield "the ground", 2, -1.0, case.structure.ground.level
+    for axis, letter in enumerate("xyz" if case.tank is not None else ""):
+        for sign, corner in ((-1.0, case.tank.lower), (1.0, case.tank.upper)):
+            side = f"{letter}{'+' if sign > 0.0 else '-'}"
+            if side not in case.tank.open and not (side == "z-" and case.structure.ground is not None):
+                yield f"the closed side {side} of the tank", axis, sign, corner[axis]

@@ -1,0 +1,307 @@
+"""Bodies, fills and gauges that cannot be where a case puts them. Every check yields (key path, message)."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterator
+
+import numpy as np
+
+from coupler.case.case import Case
+from coupler.case.structure import Building
+from coupler.geometry.bodies import Body, overlap_depth
+from coupler.geometry.parts import Part
+from coupler.geometry.solids import solids_of
+from coupler.geometry.tank_mesh import beside_mesh, is_measured, mesh_of, tank_places
+
+KeyPath = tuple[str | int, ...]
+Problem = tuple[KeyPath, str]
+Placed = tuple[KeyPath, str, Body]
+
+TOUCH = 1e-5
+"""Overlap below this share of the smallest width is contact, not overlap (rounding of decimals and of files)."""
+BYTES_PER_CELL = 1100
+"""Resident memory that a cell of the mesh takes in a run of water alone: topology, moments and fields."""
+
+
+def mesh_size(tank) -> tuple[int, int]:
+    """Cells and nodes of the mesh of a tank: those of its file, or six tetrahedra a box of about the wanted edge."""
+    if tank.mesh is not None:
+        mesh = mesh_of(tank)
+        return len(mesh.cells), len(mesh.nodes)
+    edges = np.subtract(tank.upper, tank.lower)
+    parts = [int(n) for n in np.maximum(1.0, np.rint(edges / tank.cell))]  # of any length: cells may be tiny
+    return 6 * math.prod(parts), math.prod(n + 1 for n in parts)
+
+
+def solid_bodies(case: Case) -> list[Placed]:
+    """The fixed solids."""
+    return [(solid.path, solid.name, solid.body) for solid in solids_of(case)]
+
+
+def frame_problems(case: Case) -> Iterator[Problem]:
+    """Turns without a direction, and boxes whose corners are in the wrong order; nothing else can be checked then."""
+    turned = [(("solid", i), solid) for i, solid in enumerate(case.solid)]
+    turned += [
+        (("structure", "block", i), b) for i, b in enumerate(case.structure.block if case.structure else ())
+    ]
+    for path, body in turned:
+        if body.rotation is not None and not np.any(body.rotation.axis):
+            yield (*path, "rotation", "axis"), "[0, 0, 0] is no direction; write for instance [0, 0, 1]"
+    if case.tank is not None and is_measured(case.tank):
+        yield from _corners_in_order(("tank",), case.tank)
+
+
+def place_problems(case: Case, parts: list[Part]) -> Iterator[Problem]:
+    """Everything about places; parts: those of the structure that could be made."""
+    solids = solid_bodies(case)
+    blocks = [(part.path, part.name, Body.of_block(b)) for part in parts for b in part.blocks]
+    yield from _tank(case)
+    yield from tank_places(case)
+    yield from _fills(case)
+    yield from _overlaps(solids, blocks, [b.name for part in parts for b in part.blocks])
+    yield from _outside(case, solids, blocks, [b.name for part in parts for b in part.blocks])
+    yield from _submerged_fills(case, [*solids, *blocks])
+    held = [(part.path, b.name, Body.of_block(b)) for part in parts for b in part.blocks if b.fixed]
+    yield from _gauges(case, [*solids, *held])
+
+
+def _corners_in_order(path: KeyPath, box) -> Iterator[Problem]:
+    for axis, low, high in zip("xyz", box.lower, box.upper):
+        if low >= high:
+            yield (*path, "upper"), f"{axis}: upper ({high:g} m) must be greater than lower ({low:g} m)"
+
+
+def _tank(case: Case) -> Iterator[Problem]:
+    if case.tank is None:
+        return
+    smallest = min(np.subtract(case.tank.upper, case.tank.lower))
+    if case.tank.mesh is None and 0 < smallest < case.tank.cell:
+        yield (
+            ("tank", "cell"),
+            f"{case.tank.cell:g} m is larger than the smallest side of the tank ({smallest:g} m)",
+        )
+    elif smallest > 0 and case.water:
+        yield from _memory(case)
+
+
+def _memory(case: Case) -> Iterator[Problem]:
+    """A mesh that this machine cannot hold: the system would kill the run without a word."""
+    cells, _ = mesh_size(case.tank)
+    needed, there = BYTES_PER_CELL * cells, os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    if needed > there and case.tank.mesh is not None:
+        yield (
+            ("tank", "mesh"),
+            f"{cells:.3g} cells need about {needed / 1e9:.3g} GB, this machine has {there / 1e9:.0f} GB; mesh coarser",
+        )
+    elif needed > there:
+        fits = case.tank.cell * (needed / there) ** (1.0 / 3.0)
+        yield (
+            ("tank", "cell"),
+            f"{cells:.3g} cells of {case.tank.cell:g} m need about {needed / 1e9:.3g} GB, this machine has "
+            f"{there / 1e9:.0f} GB; use cells of {1.1 * fits:.2g} m or more",
+        )
+
+
+def _fills(case: Case) -> Iterator[Problem]:
+    for i, fill in enumerate(case.water.fill if case.water else ()):
+        path = ("water", "fill", i)
+        yield from _corners_in_order(path, fill)
+        if case.tank is not None and case.tank.mesh is None:  # a basin of any shape cuts its boxes of water
+            yield from _beyond_tank(case, path, f"water fill {i}", np.array([fill.lower, fill.upper]))
+
+
+def _beyond_tank(case: Case, path: KeyPath, name: str, bounds: np.ndarray) -> Iterator[Problem]:
+    """bounds (2, 3) [m]"""
+    slack = TOUCH * np.ptp(bounds, axis=0).min()
+    for axis, letter in enumerate("xyz"):
+        for side, excess, limit in (
+            ("-", case.tank.lower[axis] - bounds[0, axis], case.tank.lower[axis]),
+            ("+", bounds[1, axis] - case.tank.upper[axis], case.tank.upper[axis]),
+        ):
+            if excess > slack:
+                yield (
+                    path,
+                    (
+                        f"{name} reaches {excess:.4g} m beyond the side {letter}{side} of the tank "
+                        f"({letter} = {limit:g} m); move it or enlarge the tank"
+                    ),
+                )
+
+
+def _outside(case: Case, solids: list[Placed], blocks: list[Placed], names: list[str]) -> Iterator[Problem]:
+    """Blocks must lie inside the tank; fixed solids may stick out of it, but not be wholly outside."""
+    outlines = _outlines(blocks)
+    if case.tank is not None:
+        tank = Body.between(case.tank.lower, case.tank.upper)
+        for path, name, bounds in outlines:
+            for place, text in _beyond_tank(case, path, f"'{name}'", bounds):
+                yield place, text + _which_blocks(case, path, name, blocks, names)
+        for path, name, body in solids:
+            if overlap_depth(tank, body) <= 0:
+                yield (
+                    path,
+                    f"'{name}' lies outside the tank, where there is no water; move it or leave it out",
+                )
+    ground = case.structure.ground if case.structure else None
+    for path, name, bounds in outlines if ground else ():
+        depth = ground.level - bounds[0, 2]
+        if depth > TOUCH * np.ptp(bounds, axis=0).min():
+            yield path, f"'{name}' reaches {depth:.4g} m below the ground (z = {ground.level:g} m); raise it"
+
+
+def _which_blocks(case: Case, path: KeyPath, name: str, blocks: list[Placed], names: list[str]) -> str:
+    """Which blocks of a part reach out of the tank, where it has several: of a file they are found by number alone."""
+    of_part = [
+        (own, np.array(body.bounds()))
+        for (at, part, body), own in zip(blocks, names)
+        if (at, part) == (path, name)
+    ]
+    out = [own for own, bounds in of_part if any(True for _ in _beyond_tank(case, path, own, bounds))]
+    if len(of_part) < 2 or not out:
+        return ""
+    return f" ({len(out)} of its {len(of_part)} blocks: {', '.join(out[:3])}{' ...' if len(out) > 3 else ''})"
+
+
+def _outlines(bodies: list[Placed]) -> list[tuple[KeyPath, str, np.ndarray]]:
+    """Bounds (2, 3) [m] of all bodies of each part, so that a building is told once."""
+    parts: dict[tuple[KeyPath, str], list[np.ndarray]] = {}
+    for path, name, body in bodies:
+        parts.setdefault((path, name), []).append(np.array(body.bounds()))
+    return [
+        (path, name, np.array([np.min(bounds, axis=0)[0], np.max(bounds, axis=0)[1]]))
+        for (path, name), bounds in parts.items()
+    ]
+
+
+def _overlaps(solids: list[Placed], blocks: list[Placed], block_names: list[str]) -> Iterator[Problem]:
+    """Bodies of different parts, and blocks of one file, that share a volume; told once for two parts, the deepest."""
+    if not blocks:
+        return
+    from yade_scripts.blocks.faces import touching_bounds
+    from yade_scripts.blocks.polyhedra import shown
+
+    bodies, names = [*solids, *blocks], [*(name for _, name, _ in solids), *block_names]
+    bounds = np.array([body.bounds() for _, _, body in bodies])
+    deepest: dict[tuple[KeyPath, KeyPath], tuple[float, int, int]] = {}
+    for i, j in touching_bounds(bounds[:, 0], bounds[:, 1], 0.0).tolist():
+        path, other = bodies[i][0], bodies[j][0]
+        if not _may_overlap(path, other):
+            continue
+        a, b = bodies[i][2], bodies[j][2]
+        enough = TOUCH * min(a.thickness(), b.thickness())
+        depth = overlap_depth(a, b, enough)
+        if depth > max(enough, deepest.get((path, other), (0.0,))[0]):
+            deepest[path, other] = depth, i, j
+    for (path, other), (depth, i, j) in deepest.items():
+        if path == other:
+            place = 0.5 * (bodies[i][2].vertices.mean(axis=0) + bodies[j][2].vertices.mean(axis=0))
+            text = f"'{names[j]}' overlaps '{names[i]}' by {depth:.4g} m near {shown(place)}; mend the file"
+        else:
+            text = (
+                f"'{bodies[j][1]}' overlaps '{bodies[i][1]}' by {depth:.4g} m; move one of them by that much"
+            )
+        yield other, text
+
+
+def _may_overlap(path: KeyPath, other: KeyPath) -> bool:
+    """Solids may overlap each other; generators make blocks that do not."""
+    if path == other:
+        return path[:2] == ("structure", "file")
+    return not path[0] == other[0] == "solid"
+
+
+def _submerged_fills(case: Case, bodies: list[Placed]) -> Iterator[Problem]:
+    """A body in the water displaces it; a fill that one body swallows whole is a mistake."""
+    for i, fill in enumerate(case.water.fill if case.water else ()):
+        corners = Body.between(fill.lower, fill.upper).vertices
+        for _, name, body in bodies:
+            if (body.depth(corners) > -TOUCH * body.thickness()).all():
+                yield ("water", "fill", i), f"this water lies wholly inside '{name}', so there is none"
+                break
+
+
+def opening_problems(case: Case) -> Iterator[Problem]:
+    """Buildings without room inside, and openings that reach out of their wall."""
+    for i, building in enumerate(case.structure.building if case.structure else ()):
+        path = ("structure", "building", i)
+        yield from _hollow(path, building)
+        for j, opening in enumerate(building.opening):
+            width = building.size[1] if opening.wall[0] == "x" else building.size[0]
+            limits = (("along the wall", width), ("in height", building.size[2]))
+            for (direction, limit), start, length in zip(limits, opening.lower, opening.size):
+                if start < -TOUCH or start + length > limit + TOUCH:
+                    yield (
+                        (*path, "opening", j),
+                        f"reaches from {start:g} to {start + length:g} m {direction}, outside the wall "
+                        f"{opening.wall} of '{building.name}' (0 to {limit:g} m)",
+                    )
+
+
+def _hollow(path: KeyPath, building: Building) -> Iterator[Problem]:
+    inside = min(building.size[:2]) - 2 * building.wall_thickness
+    if inside <= 0:
+        yield (
+            (*path, "wall_thickness"),
+            f"two walls of {building.wall_thickness:g} m leave no room in '{building.name}' "
+            f"({min(building.size[:2]):g} m); use [[structure.wall]] for a solid body",
+        )
+    floor = building.floor_thickness or building.wall_thickness
+    if building.size[2] / building.storeys <= floor:
+        yield (
+            (*path, "storeys"),
+            f"storeys of {building.size[2] / building.storeys:.4g} m have no room above floors of {floor:g} m",
+        )
+
+
+def _gauges(case: Case, held: list[Placed]) -> Iterator[Problem]:
+    for i, gauge in enumerate(case.gauge):
+        path = ("gauge", i)
+        window = getattr(gauge, "impulse", None)
+        if window is not None and window[0] >= window[1]:
+            yield (
+                (*path, "impulse"),
+                f"from {window[0]:g} s to {window[1]:g} s: the end must come after the start",
+            )
+        if gauge.kind == "loads" and gauge.every is not None and not gauge.each_block:
+            yield (*path, "every"), "is for the rows of each block; add each_block = true"
+        if gauge.kind not in ("motion", "reaction", "loads") and case.water is None:
+            yield (*path, "kind"), f"a {gauge.kind} gauge measures water; write a section [water]"
+        elif gauge.kind == "volume":
+            yield from _corners_in_order(path, gauge)
+        elif gauge.kind in ("level", "pressure", "patch", "velocity", "flux") and case.tank is not None:
+            yield from _gauge_place(case, path, gauge, held)
+            yield from _patch(path, gauge)
+
+
+def _patch(path: KeyPath, gauge) -> Iterator[Problem]:
+    """Patches have a shape and an area, windows a length."""
+    if gauge.kind == "patch" and (gauge.edges is None) == (gauge.radius is None):
+        yield path, f"'{gauge.name}' needs either edges (a parallelogram) or radius and normal (a disc)"
+    elif gauge.kind == "patch" and gauge.radius is not None and not np.any(gauge.normal or 0.0):
+        yield (*path, "normal"), f"'{gauge.name}' is a disc and needs a normal, for instance [-1, 0, 0]"
+    edges = getattr(gauge, "edges", None)
+    if edges is not None and not np.any(np.cross(*edges)):
+        yield (*path, "edges"), f"the edges of '{gauge.name}' are parallel: the patch has no area"
+
+
+def _gauge_place(case: Case, path: KeyPath, gauge, held: list[Placed]) -> Iterator[Problem]:
+    for axis, value in enumerate(gauge.at):
+        low, high = case.tank.lower[axis], case.tank.upper[axis]
+        if not low <= value <= high:
+            yield (
+                (*path, "at"),
+                f"'{gauge.name}' is outside the tank: {'xyz'[axis]} = {value:g} m, not in {low:g} to {high:g} m",
+            )
+            return
+    if case.tank.mesh is not None and gauge.kind != "flux" and beside_mesh(case.tank, gauge.at):
+        yield (*path, "at"), f"'{gauge.name}' is outside tank.mesh: no cell is there; move it inside"
+    if len(gauge.at) == 3 and gauge.kind != "flux":
+        for _, name, body in held:
+            (depth,) = body.depth(np.array([gauge.at]))
+            if depth > TOUCH * body.thickness():
+                yield (
+                    (*path, "at"),
+                    f"'{gauge.name}' lies {depth:.3g} m inside '{name}'; put it on the face",
+                )

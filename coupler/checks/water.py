@@ -1,0 +1,265 @@
+"""What is wrong with the water of a case: walls, friction, inflows and seas. Every check yields (key path, message)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from coupler.case.case import Case
+from coupler.geometry.tank_mesh import is_measured
+from coupler.scene.build_water import SLACK, RecordError, fills_beside, level_at_start, record_columns
+
+KeyPath = tuple[str | int, ...]
+Problem = tuple[KeyPath, str]
+
+HIGHEST_WAVE = 0.78
+"""Height of a solitary wave over the depth beyond which it breaks."""
+
+EARLY = 0.05
+"""Share of its height that a solitary wave may have at the start without a remark."""
+
+WHOLE_DEPTH = 0.9
+"""Share of the depth of still water from which an inflow pushes all of it."""
+
+LEAST_CELLS = 3
+"""Cells of the thinnest water without a remark: a falling drop of one gains 14 % of its energy in a step, a column of
+two 5 % before it reaches a wall."""
+
+STILL = 0.1
+"""Share of a cell by which the still water may miss the level that a wave is made for, without a remark."""
+
+
+def water_problems(case: Case) -> Iterator[Problem]:
+    """Everything about [water] that needs more than one of its names."""
+    if case.water is None:
+        return
+    w = case.water
+    if case.case.gravity == 0.0:
+        yield (
+            ("case", "gravity"),
+            "0: water needs a weight, by which its step, its spray and its pressure at the start go; give a small one, "
+            "for instance 0.01 m/s2, or leave [water] out",
+        )
+    if not (w.fill or w.inflow or w.sea):
+        yield (
+            ("water",),
+            "no water: write at least one [[water.fill]] with lower and upper, or an inflow or a sea",
+        )
+    yield from _walls(w)
+    if case.tank is not None and is_measured(case.tank):
+        wrong = list(_sides(case))
+        yield from wrong
+        if not wrong:
+            yield from _filled_up(case)
+            yield from _struck(case)
+
+
+def water_remarks(case: Case) -> Iterator[str]:
+    """Water that the mesh does not resolve, waves that are under way at the start, and waves without the still water
+    that they run into."""
+    if case.water and case.tank:
+        yield from _thin_water(case)
+    for spec in case.water.inflow if case.water and case.tank else ():
+        if spec.kind in ("bore", "solitary"):
+            yield from _still_water(case, spec)
+        if spec.kind == "solitary":
+            share = _share_at_start(spec, spec.level - case.tank.lower[2], case.case.gravity)
+            if share > EARLY:
+                yield (
+                    f"the solitary wave at {spec.side} starts at {100 * share:.0f} % of its height: a jump that "
+                    f"strikes; let its crest come later than {spec.crest:g} s"
+                )
+
+
+def _thin_water(case: Case) -> Iterator[str]:
+    """Boxes of water, inflows and seas that are thinner than a few cells; walls and other water lengthen a box."""
+    tank, cell = case.tank, case.tank.cell
+    found = []
+    if tank.mesh is None:
+        for i, fill in enumerate(case.water.fill):
+            found += [(f"water.fill[{i}]", edge) for edge in _free_edges(case, fill)]
+    for kind in ("inflow", "sea"):
+        for i, spec in enumerate(getattr(case.water, kind)):
+            found.append((f"the water at water.{kind}[{i}]", level_at_start(spec) - tank.lower[2]))
+    for name, edge in found:
+        if 0.0 < edge < LEAST_CELLS * cell * (1.0 - SLACK):
+            yield (
+                f"{name} is {edge:.3g} m thin, {edge / cell:.2g} cells: under {LEAST_CELLS} cells water is not "
+                f"resolved, volume and energy may be off by more than a run allows; take tank.cell = {edge / 4:.2g} m"
+            )
+
+
+def _free_edges(case: Case, fill) -> Iterator[float]:
+    """Edges [m] of a box of water between two ends of which one at least is free: neither at a wall nor in other water.
+    From wall to wall it is a slice, whatever its width; on the floor it is a layer."""
+    slack = SLACK * case.tank.cell
+    for axis in range(3):
+        ends = fill.lower[axis], fill.upper[axis]
+        at_wall = ends[0] <= case.tank.lower[axis] + slack, ends[1] >= case.tank.upper[axis] - slack
+        others = [f for f in case.water.fill if f is not fill and _meet(f, fill, slack)]
+        if not all(at_wall) and not others:
+            yield ends[1] - ends[0]
+
+
+def _meet(other, fill, slack: float) -> bool:
+    """Whether two boxes of water touch or overlap, so that their water is one."""
+    return all(
+        other.lower[k] <= fill.upper[k] + slack and fill.lower[k] <= other.upper[k] + slack for k in range(3)
+    )
+
+
+def _still_water(case: Case, spec) -> Iterator[str]:
+    wanted = level_at_start(spec)
+    there = max([fill.upper[2] for fill in fills_beside(case, spec.side)], default=case.tank.lower[2])
+    if abs(there - wanted) > STILL * case.tank.cell:
+        yield (
+            f"the {'bore' if spec.kind == 'bore' else 'solitary wave'} at {spec.side} runs into still water up to "
+            f"z = {wanted:g} m, but [[water.fill]] reaches z = {there:g} m beside it: that difference falls at once"
+        )
+
+
+def _share_at_start(spec, depth: float, gravity: float) -> float:
+    """sech²(κ c t_crest), the first-order wave."""
+    phase = math.sqrt(0.75 * spec.height / depth**3) * math.sqrt(gravity * (depth + spec.height)) * spec.crest
+    return 1.0 / math.cosh(min(phase, 100.0)) ** 2
+
+
+def _walls(w) -> Iterator[Problem]:
+    if w.walls == "no-slip" and w.viscosity == 0.0:
+        yield ("water", "walls"), "walls that hold the water need water.viscosity"
+    laws = [name for name in ("roughness", "manning") if getattr(w, name) is not None]
+    if w.walls == "friction" and len(laws) != 1:
+        yield (
+            ("water", "walls"),
+            f"friction needs water.roughness or water.manning, one of them; there are {len(laws)}",
+        )
+    if w.walls != "friction" and laws:
+        yield ("water", laws[0]), f'is for walls = "friction"; they are "{w.walls}"'
+
+
+def _filled_up(case: Case) -> Iterator[Problem]:
+    """Inflows into a tank without a way out, which they fill before the end."""
+    if case.tank.open or case.water.sea or case.tank.mesh is not None:
+        return
+    size = [high - low for low, high in zip(case.tank.lower, case.tank.upper)]
+    boxes = [[high - low for low, high in zip(fill.lower, fill.upper)] for fill in case.water.fill]
+    room = math.prod(size) - max((math.prod(box) for box in boxes), default=0.0)
+    for i, spec in enumerate(case.water.inflow):
+        brought = size[1 if spec.side[0] == "x" else 0] * _brought(case, spec)
+        if brought > room:
+            yield (
+                ("water", "inflow", i),
+                f"brings {brought:.3g} m3 until the end of the run ({case.time.end:g} s) into a tank without a way out "
+                f"that has room for {room:.3g} m3: name open sides (tank.open), or end before it is full",
+            )
+
+
+def _struck(case: Case) -> Iterator[Problem]:
+    """Streams that set still water beside them in motion at once and have no room for the bore that this makes."""
+    bed, top = case.tank.lower[2], case.tank.upper[2]
+    for i, spec in enumerate(case.water.inflow):
+        still = max([fill.upper[2] for fill in fills_beside(case, spec.side)], default=bed) - bed
+        if spec.kind != "steady" or still <= 0.0 or spec.level - bed < WHOLE_DEPTH * still:
+            continue
+        behind = _depth_behind(still, spec.velocity, case.case.gravity)
+        if bed + behind > top:
+            yield (
+                ("water", "inflow", i, "velocity"),
+                f"{spec.velocity:g} m/s strike still water {still:g} m deep: as a bore it would rise to "
+                f"z = {bed + behind:.3g} m at once, above the top of the tank ({top:g} m); take a lower velocity, less "
+                'still water, a higher tank, or a velocity that grows with time (kind = "record")',
+            )
+
+
+def _depth_behind(ahead: float, speed: float, gravity: float) -> float:
+    """Depth [m] behind the bore that a piston of this speed [m/s] pushes into still water of depth `ahead` [m]:
+    u = (h₂ - h₁) sqrt(g (h₁ + h₂) / (2 h₁ h₂))    (Stoker 1957, 10.6)."""
+    low, high = ahead, ahead + max(speed, 0.0) * math.sqrt(2.0 * ahead / gravity)
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        reached = (middle - ahead) * math.sqrt(gravity * (ahead + middle) / (2.0 * ahead * middle))
+        low, high = (middle, high) if reached < speed else (low, middle)
+    return high
+
+
+def _brought(case: Case, spec) -> float:
+    """Volume a metre of width [m2] that an inflow brings until the end of the run, what it takes back not counted."""
+    bed, end = case.tank.lower[2], case.time.end
+    if spec.kind == "solitary":
+        return 0.0
+    if spec.kind == "record":
+        time, level, velocity = record_columns(spec.path)
+        return float(np.trapezoid(np.maximum((level - bed) * velocity, 0.0)[time <= end], time[time <= end]))
+    depth = spec.level - bed
+    if spec.kind == "steady":
+        return max(spec.velocity, 0.0) * depth * end
+    from fluid.sides.waves import bore_speed
+
+    return bore_speed(spec.ahead - bed, depth, case.case.gravity)[1] * depth * end
+
+
+def _sides(case: Case) -> Iterator[Problem]:
+    taken = {side: "tank.open" for side in case.tank.open}
+    for kind in ("inflow", "sea"):
+        for i, spec in enumerate(getattr(case.water, kind)):
+            path = ("water", kind, i)
+            if spec.side in taken:
+                yield (
+                    (*path, "side"),
+                    f"{spec.side} is given to {taken[spec.side]} already; take it out of one of them",
+                )
+            taken[spec.side] = f"water.{kind}[{i}]"
+            yield from _levels(case, path, spec)
+
+
+def _levels(case: Case, path: KeyPath, spec) -> Iterator[Problem]:
+    bed, top = case.tank.lower[2], case.tank.upper[2]
+    if _kind(spec) == "record":
+        yield from _record(path, spec, bed, top, case.time.end)
+        return
+    if not bed < spec.level <= top:
+        yield (
+            (*path, "level"),
+            f"z = {spec.level:g} m is not between the floor ({bed:g} m) and the top ({top:g} m)",
+        )
+    elif _kind(spec) == "bore" and not bed < spec.ahead < spec.level:
+        yield (
+            (*path, "ahead"),
+            f"z = {spec.ahead:g} m must lie above the floor ({bed:g} m) and below the level behind ({spec.level:g} m); "
+            'over a dry bed write kind = "steady"',
+        )
+    elif _kind(spec) == "solitary" and spec.height > HIGHEST_WAVE * (spec.level - bed):
+        yield (
+            (*path, "height"),
+            f"{spec.height:g} m breaks at once on a depth of {spec.level - bed:g} m; at most {HIGHEST_WAVE:g} of it",
+        )
+
+
+def _record(path: KeyPath, spec, bed: float, top: float, end: float) -> Iterator[Problem]:
+    try:
+        time, level, _ = record_columns(spec.path)
+    except RecordError as error:
+        yield (*path, "path"), str(error)
+        return
+    if time[0] >= end or time[-1] < 0.0:
+        yield (
+            (*path, "path"),
+            f"its times go from {time[0]:g} to {time[-1]:g} s, all {'after' if time[0] >= end else 'before'} the run "
+            f"(0 to {end:g} s); shift them",
+        )
+    if level.min() < bed:
+        yield (
+            (*path, "path"),
+            f"its level falls to z = {level.min():g} m, below the floor of the tank ({bed:g} m)",
+        )
+    if level.max() > top:
+        yield (
+            (*path, "path"),
+            f"its level rises to z = {level.max():g} m, above the top of the tank ({top:g} m)",
+        )
+
+
+def _kind(spec) -> str:
+    return getattr(spec, "kind", "sea")

@@ -1,0 +1,5 @@
+"""`python -m coupler.cli`"""
+
+from coupler.commands.cli import main
+
+main()

@@ -1,0 +1,41 @@
+"""Blocks of the measurements: walls with so many joints, a building, a pile."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from yade_scripts.blocks.block import Block
+from yade_scripts.blocks.generators.building import Building, building_blocks
+
+RATTLE = 1e-7
+"""Speed [m/s] of blocks in random directions: joints open and close, none is damaged."""
+
+
+def wall_edge(joints: int) -> int:
+    """m of the m x m wall of cubes whose 2 m (m - 1) joints come nearest to a number."""
+    return max(2, round(0.5 + np.sqrt(0.25 + 0.5 * joints)))
+
+
+def wall(joints: int) -> list[Block]:
+    """m x m unit cubes side by side and on one another, rattling a little."""
+    m = wall_edge(joints)
+    random = np.random.default_rng(1)
+    velocity = random.uniform(-RATTLE, RATTLE, (m * m, 3))
+    return [
+        Block(f"b{i}-{k}", (i, 0.0, k + 0.5), size=1.0, velocity=velocity[i * m + k])
+        for i in range(m)
+        for k in range(m)
+    ]
+
+
+def building() -> list[Block]:
+    """501 blocks: three storeys with floors and a roof."""
+    return building_blocks(
+        Building((0.0, 0.0), (21.0, 8.0), height=12.0, thickness=0.5, block=1.6, course=1.2, storeys=3)
+    )
+
+
+def pile(edge: int = 8) -> list[Block]:
+    """edge³ loose unit cubes stacked on the ground, every neighbour touching."""
+    places = np.stack(np.meshgrid(*[np.arange(edge)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    return [Block(f"b{i}", p + np.array([0.0, 0.0, 0.5]), size=1.0) for i, p in enumerate(places)]

@@ -1,0 +1,401 @@
+"""The command `surgebreak`. Commands import what they need when they are called: help must stay quick."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from shlex import quote
+from typing import Annotated
+
+import typer
+from typer.core import TyperGroup
+
+from coupler.program.extras import need
+from coupler.program.failures import Failures
+from coupler.program.process import run_module
+
+
+class Commands(TyperGroup):
+    """All commands; Ctrl-C ends each with a word and the code of a stop, where typer would say nothing."""
+
+    def invoke(self, ctx):
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt:
+            with Failures():
+                raise
+
+
+app = typer.Typer(
+    cls=Commands,
+    name="surgebreak",
+    help="How a structure breaks when water hits it, and how its debris then changes the flow.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+PASS_ON = {"allow_extra_args": True, "ignore_unknown_options": True}
+
+CasePlace = Annotated[Path, typer.Argument(metavar="CASE", help="a case directory or a case.toml")]
+Overrides = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set", metavar="KEY=VALUE", help="change a value of the case, for instance time.end='2 s'"
+    ),
+]
+
+
+def main() -> None:
+    """Entry point; leaves with 0 done, 1 failure, 2 bad case, 3 diverged or out of balance, 4 stopped."""
+    with Failures():
+        app()
+
+
+@app.callback(invoke_without_command=True)
+def _root(
+    version: Annotated[bool, typer.Option("--version", help="print the version and leave")] = False,
+) -> None:
+    if version:
+        from coupler.program.provenance import version as number
+
+        print(f"surgebreak {number()}")
+        raise typer.Exit
+
+
+@app.command()
+def run(
+    case: CasePlace,
+    set: Overrides = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR", help="a new directory for the results; else runs/<time>-<hash> beside the case"
+        ),
+    ] = None,
+    end: Annotated[str | None, typer.Option(metavar="TIME", help="short for --set time.end=...")] = None,
+    dry: Annotated[bool, typer.Option("--dry", help="only read the case; nothing is run")] = False,
+) -> None:
+    """Run a case. Ctrl-C or a file named `stop` in the run directory ends it cleanly."""
+    one_thread()
+    from coupler.checks.read_case import load
+
+    file = load(case, [*(set or []), *([f"time.end={end}"] if end else [])])
+    if dry:
+        return
+    from coupler.run.directory import RunDirectory
+    from coupler.run.execute import carry_out
+
+    raise typer.Exit(int(carry_out(file, RunDirectory.create(file, output))))
+
+
+@app.command()
+def resume(
+    run: Annotated[Path, typer.Argument(metavar="RUN", help="the directory of a run that stopped")],
+    end: Annotated[
+        str | None, typer.Option(metavar="TIME", help="another end; short for --set time.end=...")
+    ] = None,
+    set: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set", metavar="KEY=VALUE", help="change time.end, time.cfl, time.step_max, limits.* ..."
+        ),
+    ] = None,
+    any_version: Annotated[
+        bool, typer.Option("--any-version", help="go on although the program has changed since")
+    ] = False,
+) -> None:
+    """Go on with a run that was stopped or killed.
+
+    From its newest checkpoint, to the last digit as if it had never stopped.
+    """
+    one_thread()
+    from coupler.run.execute import carry_out
+    from coupler.run.resume import prepare
+
+    found = prepare(run, [*(set or []), *([f"time.end={end}"] if end else [])], any_version)
+    raise typer.Exit(int(carry_out(found.file, found.directory, found.checkpoint)))
+
+
+@app.command()
+def check(
+    case: CasePlace,
+    set: Overrides = None,
+    exact: Annotated[
+        bool, typer.Option("--exact", help="solve for the exact frequency of the joints as well")
+    ] = False,
+) -> None:
+    """Check a case, and forecast steps, memory and disk.
+
+    Nothing is run; with a structure YADE is asked for the substep.
+    """
+    one_thread()
+    from coupler.checks.read_case import load
+    from coupler.program import terminal
+    from coupler.run.execute import describe
+
+    file = load(case, set or [])
+    describe(file, print)
+    from coupler.run.forecast import forecast
+
+    terminal.table("forecast", forecast(file.case, exact, file.directory).rows)
+
+
+@app.command(context_settings=PASS_ON | {"help_option_names": []})
+def render(context: typer.Context) -> None:
+    """Make stills, a film and plots of a run."""
+    raise typer.Exit(run_module("coupler.commands.view", *context.args).returncode)
+
+
+@app.command()
+def report(
+    place: Annotated[Path, typer.Argument(metavar="RUN|STUDY", help="the directory of a run or of a study")],
+    pictures: Annotated[
+        bool, typer.Option("--pictures/--no-pictures", help="with stills and figures of a run")
+    ] = True,
+) -> None:
+    """Write one HTML page about a run or a study.
+
+    report.html in the directory: pictures, figures and tables in one file, for screen and paper.
+    """
+    from coupler.commands.report.command import report as write
+
+    print(f"report: {write(place, pictures)}")
+
+
+@app.command()
+def doctor() -> None:
+    """Check that YADE and the rest work here."""
+    one_thread()
+    from coupler.commands.doctor import examine
+
+    raise typer.Exit(int(examine()))
+
+
+@app.command()
+def explain(
+    key: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="KEY|RUN",
+            help="a name of the case file, for instance joints.strength, or a run directory",
+        ),
+    ] = None,
+) -> None:
+    """Explain a name of the case file, or what a run left out.
+
+    Without a name: all sections. Of a run: what it skipped, and what that would have cost.
+    """
+    if key and (os.sep in key or (Path(key) / "run.json").is_file()):
+        from coupler.commands.explain_run import explanation_of_run
+
+        print(explanation_of_run(Path(key)))
+        return
+    from coupler.case.docs import explanation
+
+    print(explanation(key))
+
+
+@app.command()
+def init(directory: Annotated[Path, typer.Argument(metavar="DIR", help="the new case directory")]) -> None:
+    """Write a small commented case that runs."""
+    from coupler.case.docs import write_first_case
+
+    path, word = write_first_case(directory), quote(str(directory))
+    print(f"wrote {path}; next: surgebreak check {word}, surgebreak run {word}")
+
+
+@app.command()
+def verify(
+    ids: Annotated[list[str] | None, typer.Argument(metavar="ID", help="cases (P01 ...); else all")] = None,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="only the cheap cases, three minutes of processor time in all")
+    ] = False,
+    json: Annotated[bool, typer.Option("--json", help="one JSON object a quantity, one a line")] = False,
+    list_: Annotated[bool, typer.Option("--list", help="list the cases, and those not covered")] = False,
+    plots: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="a folder for figures: computed curves over measured ones"),
+    ] = None,
+) -> None:
+    """Compare with exact solutions and measured records.
+
+    Leaves with 3 if one misses its tolerance.
+    """
+    one_thread()
+    if plots is not None:
+        need("view")
+    from coupler.commands.verify.report import verify as run_cases
+
+    raise typer.Exit(int(run_cases(ids or [], quick=quick, as_json=json, only_list=list_, plots=plots)))
+
+
+@app.command()
+def stress(
+    scenes: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="ID", help="scenes (S01 ..., R1-12 ...) or groups: structure, water, coupling; else all"
+        ),
+    ] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="only scenes that take less than a minute")] = False,
+    json: Annotated[bool, typer.Option("--json", help="one JSON object a scene, one a line")] = False,
+    list_: Annotated[bool, typer.Option("--list", help="list the scenes")] = False,
+    random: Annotated[
+        int | None, typer.Option(min=1, metavar="N", help="N scenes drawn over the whole case format instead")
+    ] = None,
+    seed: Annotated[
+        int, typer.Option(min=0, help="of the random scenes; the same seed, the same scenes")
+    ] = 1,
+    first: Annotated[int, typer.Option("--from", min=0, metavar="K", help="number of the first one")] = 0,
+    group: Annotated[
+        list[str] | None, typer.Option(metavar="GROUP", help="only of this group; may be given again")
+    ] = None,
+    keep: Annotated[
+        Path,
+        typer.Option(metavar="DIR", help="where random scenes that fail are kept, as cases and made small"),
+    ] = Path("stress-failures"),
+    shrink: Annotated[
+        float, typer.Option(min=0.0, metavar="SECONDS", help="processor time to make each of them small")
+    ] = 60.0,
+) -> None:
+    """Run stiff and extreme scenes, or random ones.
+
+    Each is passed, refused with a message, or failed; leaves with 3 if one failed.
+    """
+    one_thread()
+    from coupler.commands.stress.drawn.command import is_drawn, named, numbered, stress_drawn
+
+    words = [*(scenes or []), *(group or [])]
+    if random is not None or (words and all(map(is_drawn, words))):
+        asked = named(words) if random is None else numbered(seed, random, first, words)
+        raise typer.Exit(int(stress_drawn(asked, keep, shrink, as_json=json, only_list=list_)))
+    from coupler.commands.stress.report import stress as run_scenes
+
+    raise typer.Exit(int(run_scenes(words, quick=quick, as_json=json, only_list=list_)))
+
+
+@app.command(name="compare")
+def compare_laws(
+    case: CasePlace,
+    laws: Annotated[
+        str,
+        typer.Option(
+            metavar="A,B,...",
+            help="comma-separated; else all of ours, cohfrict, jcfpm, mortar and cpm; `--list` names them",
+        ),
+    ] = "",
+    set: Overrides = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR", help="a new directory for the results; else runs/compare-<time> beside the case"
+        ),
+    ] = None,
+    substeps: Annotated[
+        str,
+        typer.Option(
+            metavar="N,N,...", help="multiples of the case's own substep, for error against run time"
+        ),
+    ] = "1,2,4,8",
+    records: Annotated[int, typer.Option(min=10, metavar="N", help="rows of the tables")] = 1000,
+    list_: Annotated[
+        bool, typer.Option("--list", help="list the laws and what the stock ones do not match")
+    ] = False,
+) -> None:
+    """Run a dry case under our laws and YADE's own.
+
+    Matched as far as they can be; table, figure, CSV, JSON, and the scripts for yade.
+    """
+    one_thread()
+    from coupler.commands.compare.command import compare, show_laws
+
+    raise typer.Exit(int(show_laws() if list_ else compare(case, laws, set or [], output, substeps, records)))
+
+
+@app.command()
+def study(
+    words: Annotated[
+        list[Path],
+        typer.Argument(metavar="CASE|compare A B", help="a case with a section [study], or two studies"),
+    ],
+    ladder: Annotated[
+        str, typer.Option(metavar="A,B,...", help="comma-separated names of ladders; else all of the case")
+    ] = "",
+    repeat: Annotated[
+        int | None,
+        typer.Option(min=1, metavar="N", help="times that each run is made; else study.repeat of the case"),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="directory of the study; else runs/study beside the case"),
+    ] = None,
+    larger: Annotated[bool, typer.Option("--larger", help="with the larger rungs of the ladders")] = False,
+    any_version: Annotated[
+        bool, typer.Option("--any-version", help="keep runs that another version of the program made")
+    ] = False,
+    error: Annotated[
+        float, typer.Option(min=1.0, metavar="RATIO", help="compare: largest ratio of errors, B over A")
+    ] = 1.1,
+    cpu: Annotated[
+        float, typer.Option(min=1.0, metavar="RATIO", help="compare: largest ratio of CPU seconds")
+    ] = 1.2,
+) -> None:
+    """Error against run time over ladders of a case.
+
+    Goes on where it stopped. `study compare A B` leaves with 3 if B is worse than A.
+    """
+    one_thread()
+    if len(words) == 3 and str(words[0]) == "compare":
+        from coupler.commands.study.against import compare as compare_studies
+
+        raise typer.Exit(int(compare_studies(words[1], words[2], error, cpu)))
+    if len(words) != 1:
+        raise typer.BadParameter("give one case, or: compare A B")
+    from coupler.commands.study.command import study as make_study
+
+    names = [name.strip() for name in ladder.split(",") if name.strip()]
+    raise typer.Exit(int(make_study(words[0], names, repeat, output, larger, any_version)))
+
+
+@app.command()
+def benchmark(
+    quick: Annotated[bool, typer.Option("--quick", help="small sizes only")] = False,
+    json: Annotated[bool, typer.Option("--json", help="one JSON object")] = False,
+    only: Annotated[
+        str | None,
+        typer.Option(metavar="PART", help="joints, scenes, dead, cutting, debris, water, solver or stock"),
+    ] = None,
+) -> None:
+    """Measure what substeps, cuts and solvers cost.
+
+    Leaves with 3 if a target is missed.
+    """
+    one_thread()
+    from coupler.commands.benchmark.command import benchmark as measure
+
+    raise typer.Exit(int(measure(quick, json, only)))
+
+
+@app.command(context_settings=PASS_ON)
+def test(context: typer.Context) -> None:
+    """Run the tests; further words go to pytest."""
+    need("test")
+    one_thread()
+    from coupler.program.provenance import ROOT
+
+    raise typer.Exit(run_module("pytest", *context.args, cwd=ROOT).returncode)
+
+
+def one_thread() -> None:
+    """One thread unless the user asks, one instruction set, and the kernels of the present sources."""
+    from coupler.program.arithmetic import fix_arithmetic
+    from coupler.program.kernel_cache import use_kernel_cache
+
+    fix_arithmetic()
+    use_kernel_cache()
+
+
+if __name__ == "__main__":
+    main()

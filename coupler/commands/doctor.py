@@ -1,0 +1,216 @@
+"""Is this machine ready? Each part is tried for real; what may crash is tried in a process of its own."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from importlib.util import find_spec
+from typing import NamedTuple
+
+from coupler.program import terminal
+from coupler.program.arithmetic import BASELINE, missing, remark
+from coupler.program.errors import ExitCode
+from coupler.program.provenance import version, versions
+
+
+class Finding(NamedTuple):
+    """What was looked at, how it is, whether that is good, and what to do when not."""
+
+    what: str
+    found: str
+    good: bool
+    remedy: str = ""
+
+
+def examine() -> ExitCode:
+    """Try every part, print a table, and return 0 when all is well."""
+    findings = []
+    for check in CHECKS:
+        found = check()
+        findings.append(found)
+        mark = "ok " if found.good else "BAD"
+        print(f"{mark}  {found.what:22} {found.found}", flush=True)
+        if not found.good:
+            print(f"     {'':22} -> {found.remedy}", flush=True)
+    bad = sum(not finding.good for finding in findings)
+    terminal.console().print(f"{bad} of {len(findings)} checks failed" if bad else "everything works")
+    return ExitCode.CRASHED if bad else ExitCode.DONE
+
+
+def _python() -> Finding:
+    system = os.path.realpath("/usr/bin/python3")
+    mine = os.path.realpath(sys.executable)
+    told = f"{sys.version.split()[0]}, surgebreak {version()}"
+    return Finding(
+        "Python", told, mine == system,
+        f"this is {mine}, YADE is built for {system}; remove .venv and call ./surgebreak again",
+    )  # fmt: skip
+
+
+def _packages() -> Finding:
+    import_names = {"scikit-fem": "skfem"}
+    names = ("numpy", "scipy", "scikit-fem", "meshio", "h5py", "numba", "pydantic", "pint", "rich")
+    absent = [name for name in names if find_spec(import_names.get(name, name)) is None]
+    held = ", ".join(f"{name} {number}" for name, number in versions().items() if name in names)
+    return Finding(
+        "packages", f"missing: {' '.join(absent)}" if absent else held, not absent,
+        "remove .venv and call ./surgebreak again",
+    )  # fmt: skip
+
+
+def _yade_packages() -> Finding:
+    """YADE imports these without declaring them; without mpmath its error is unreadable."""
+    absent = [name for name in ("future", "IPython", "mpmath") if find_spec(name) is None]
+    return Finding(
+        "packages YADE needs", f"missing: {' '.join(absent)}" if absent else "future, ipython, mpmath",
+        not absent, f"pip install {' '.join(absent).lower()}",
+    )  # fmt: skip
+
+
+def _yade() -> Finding:
+    from yade_scripts.yade_side.engine import YadeError, find_yade
+
+    try:
+        place = find_yade()
+    except YadeError as error:
+        return Finding("YADE", "not usable", False, str(error))
+    return Finding("YADE", f"{versions().get('yade', 'version unknown')} in {place}", True)
+
+
+_FALLING_SPHERE = """
+import json, sys
+from yade_scripts.yade_side.engine import load_yade
+engine = load_yade()
+O, utils, wrapper = engine.O, engine.utils, engine.wrapper
+O.reset()
+O.bodies.append(utils.sphere((0, 0, 0), 1.0))
+O.engines = [wrapper.ForceResetter(), wrapper.NewtonIntegrator(damping=0, gravity=(0, 0, -9.81))]
+O.dt = 1e-3
+for _ in range(10):
+    O.step()
+print(json.dumps({"version": str(engine.version), "z": O.bodies[0].state.vel[2]}))
+"""
+
+
+def _yade_run() -> Finding:
+    """Ten steps of a falling sphere: v = g t."""
+    status, told = _in_process(_FALLING_SPHERE)
+    if status != 0:
+        return Finding("ten steps of YADE", _last(told), False, "apt install --reinstall yade")
+    result = json.loads(told.splitlines()[-1])
+    good = abs(result["z"] + 9.81 * 0.01) < 1e-12
+    return Finding(
+        "ten steps of YADE", f"version {result['version']}, v = {result['z']:.6f} m/s after 10 ms", good,
+        "expected -0.098100 m/s; apt install --reinstall yade",
+    )  # fmt: skip
+
+
+def _threads() -> Finding:
+    asked = os.environ.get("OMP_NUM_THREADS", "not set")
+    cores = len(os.sched_getaffinity(0))
+    good = asked.isdigit() and 1 <= int(asked) <= cores
+    return Finding(
+        "threads",
+        f"{asked} of {cores} cores",
+        good,
+        "unset OMP_NUM_THREADS (one thread) or set at most that many",
+    )
+
+
+def _processor() -> Finding:
+    """Older ones work: their last digits are their own."""
+    absent = missing()
+    return Finding(
+        "processor", f"works; {remark()}" if absent else f"{BASELINE}: last digits as on every such one", True
+    )
+
+
+_WRITE = """
+import h5py, sys
+with h5py.File(sys.argv[1], "w", libver=("earliest", "v110")) as file:
+    root = file.create_group("VTKHDF")
+    root.attrs["Version"] = (2, 0)
+    root.attrs.create("Type", b"UnstructuredGrid", dtype=h5py.string_dtype("ascii", len("UnstructuredGrid")))
+    for name, values in (("NumberOfPoints", [4]), ("NumberOfCells", [1]), ("NumberOfConnectivityIds", [4])):
+        root[name] = values
+    root["Points"] = [[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    root["Connectivity"], root["Offsets"] = [0, 1, 2, 3], [0, 4]
+    root.create_dataset("Types", data=[10], dtype="uint8")
+"""
+_READ = """
+import sys
+from vtkmodules.vtkIOHDF import vtkHDFReader
+reader = vtkHDFReader()
+reader.SetFileName(sys.argv[1])
+reader.Update()
+grid = reader.GetOutput()
+assert (grid.GetNumberOfPoints(), grid.GetNumberOfCells()) == (4, 1)
+"""
+
+
+def _files() -> Finding:
+    """h5py writes a tetrahedron, VTK (when installed) reads it; never in one process with YADE."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = os.path.join(folder, "one.vtkhdf")
+        status, told = _in_process(_WRITE, path)
+        if status == 0 and find_spec("vtkmodules") is None:
+            return Finding("result files", "written; VTK is not installed (`render` brings it)", True)
+        if status == 0:
+            status, told = _in_process(_READ, path)
+    return Finding(
+        "result files", "written by h5py, read by VTK" if status == 0 else _last(told), status == 0,
+        "h5py and VTK do not fit together; install with -c constraints.txt",
+    )  # fmt: skip
+
+
+_DRAW = """
+import sys
+import pyvista
+plotter = pyvista.Plotter(off_screen=True, window_size=(64, 48))
+plotter.add_mesh(pyvista.Sphere(), color="red")
+picture = plotter.screenshot(return_img=True)
+assert len({tuple(p) for p in picture.reshape(-1, 3)}) > 2, "the picture is empty"
+"""
+
+
+def _pictures() -> Finding:
+    if find_spec("pyvista") is None:
+        return Finding("pictures", "not installed (`render` brings what it needs)", True)
+    status, told = _in_process(_DRAW, VTK_DEFAULT_OPENGL_WINDOW="vtkEGLRenderWindow")
+    return Finding(
+        "pictures", "drawn without a screen" if status == 0 else _last(told), status == 0,
+        "apt install libegl1 libgl1-mesa-dri",
+    )  # fmt: skip
+
+
+def _in_process(code: str, *arguments: str, **environment: str) -> tuple[int, str]:
+    """Exit status and output of some Python; a crash there is a finding here."""
+    command = [sys.executable, "-c", code, *arguments]
+    try:
+        done = subprocess.run(
+            command,
+            capture_output=True,
+            text=True,
+            timeout=120,
+            check=False,
+            env={**os.environ, **environment},
+        )
+    except subprocess.TimeoutExpired:
+        return 1, "no answer within two minutes"
+    if done.returncode < 0:
+        return done.returncode, f"crashed with signal {-done.returncode}"
+    return done.returncode, (done.stdout or done.stderr) if done.returncode == 0 else done.stderr
+
+
+def _last(told: str) -> str:
+    lines = told.strip().splitlines()
+    return lines[-1][:200] if lines else "no output"
+
+
+CHECKS: tuple[Callable[[], Finding], ...] = (
+    _python, _packages, _yade_packages, _yade, _yade_run, _threads, _processor, _files, _pictures,
+)  # fmt: skip

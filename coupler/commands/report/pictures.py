@@ -1,0 +1,56 @@
+"""Pictures for a report, made from files in processes of their own: VTK and YADE do not live in one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from coupler.program import extras
+from coupler.program.process import run_module
+
+STILL = "800x450"
+"""Of a film of that camera; a still has twice the pixels each way."""
+LETTERS = "1.7"
+"""Times the usual size: two stills stand side by side on a page of paper."""
+
+
+def missing() -> str:
+    """Why no pictures can be made here; empty where they can."""
+    return extras.missing("view")
+
+
+def stills(run: Path, folder: Path, times: Sequence[float]) -> str:
+    """A still of each time [s] into folder; the reason if one could not be made, else empty."""
+    for time in times:
+        words = ("--still", "--time", repr(time), "--size", STILL, "--letters", LETTERS, "--to", folder)
+        reason = _view("coupler.commands.view", run, *words)
+        if reason:
+            return reason
+    return ""
+
+
+def plots(run: Path, folder: Path) -> str:
+    """Figures of the histories and curves over data into folder; the reason if they could not be made."""
+    return _view("coupler.commands.view", run, "--plots", "--to", folder)
+
+
+def study_figures(study: Path) -> str:
+    """Error against run time beside study.json; the reason if they could not be drawn."""
+    return _view("coupler.commands.view.study", study)
+
+
+def draw(module: str, folder: Path) -> None:
+    """Figures of a comparison or a study beside its tables; where the extra is absent, that is told instead."""
+    absent = missing()
+    if absent:
+        print(f"no figures: {absent}")
+        return
+    run_module(module, folder, check=True)
+
+
+def _view(module: str, *words: object) -> str:
+    done = run_module(module, *words, capture_output=True, text=True)
+    if done.returncode == 0:
+        return ""
+    told = done.stderr.strip().splitlines()
+    return told[-1] if told else f"{module} ended with {done.returncode}"

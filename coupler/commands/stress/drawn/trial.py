@@ -1,0 +1,97 @@
+"""One drawn scene in a process of its own, as a user would run it, and what came of it.
+
+passed: it ended, or used up its processor time, and its files keep every figure · refused: the case was not accepted,
+each message with file, line and key, or the run was refused for what a drawn scene may ask too much ·
+failed: anything else
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from coupler.commands.stress.drawn.judge import measures
+from coupler.commands.stress.registry import Measure, Verdict
+from coupler.program.errors import ExitCode
+from coupler.program.process import run_module, trouble
+
+WALL_SECONDS = 300
+"""After which a scene counts as failed: thirty times its processor time."""
+MISTAKE = re.compile(r"case\.toml(:\d+)?: [a-z][\w.\[\]-]*: .{20,}")
+"""A message about a case: file, line, key and a reason."""
+TOO_WEAK = "the structure cannot carry its own weight and the load at the start"
+TOO_SOFT = "is too soft for the weight or the speed of the blocks"
+"""Messages with which a run may refuse a drawn scene: strengths are drawn without knowing what they will carry, and
+contact may take its stiffness from joints of such a strength."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What came of one run: verdict, what was told, figures, processor and wall seconds, time reached [s]."""
+
+    verdict: Verdict
+    told: str
+    measures: list[Measure]
+    cpu_s: float
+    wall_s: float
+    reached: float | None
+
+    @property
+    def kind(self) -> str:
+        """Of a failure: the same for the same fault, whatever its numbers and names."""
+        missed = [m.quantity.split(" (")[0] for m in self.measures if not m.kept]
+        if missed:
+            return "not kept: " + missed[0]
+        words = re.sub(r"[^A-Za-z ]+", " ", re.sub(r"'[^']*'|\([^)]*\)|\S*\d\S*", " ", self.told))
+        return " ".join(words.split()[:8])
+
+
+def trial(case: Path, output: Path, still: bool) -> Trial:
+    """Run a case directory into a new directory."""
+    began = time.perf_counter()
+    try:
+        done = run_module(
+            "coupler.commands.cli",
+            "run",
+            case,
+            "--output",
+            output,
+            capture_output=True,
+            text=True,
+            timeout=WALL_SECONDS,
+        )
+    except subprocess.TimeoutExpired:
+        return Trial("failed", f"not done after {WALL_SECONDS} s", [], 0.0, time.perf_counter() - began, None)
+    summary = _summary(output)
+    figures = summary.get("figures", {})
+    spent = (summary.get("cpu_seconds", 0.0), time.perf_counter() - began, figures.get("time"))
+    if done.returncode == ExitCode.BAD_CASE:
+        return Trial(*_refusal(done.stderr), [], *spent)
+    if done.returncode in (ExitCode.DONE, ExitCode.STOPPED):
+        found = list(measures(output, still))
+        verdict: Verdict = "passed" if all(m.kept for m in found) else "failed"
+        return Trial(verdict, "" if done.returncode == 0 else "stopped at its processor time", found, *spent)
+    told = summary.get("exit_reason") or trouble(done.returncode, done.stderr)
+    return Trial("refused" if asked_too_much(told, summary.get("case", {})) else "failed", told, [], *spent)
+
+
+def asked_too_much(told: str, case: dict) -> bool:
+    """Whether a run was refused for what a drawn scene may ask; contact with a stiffness of its own is stiff enough."""
+    return TOO_WEAK in told or (TOO_SOFT in told and "stiffness" not in case.get("contact", {}))
+
+
+def _refusal(stderr: str) -> tuple[Verdict, str]:
+    """Whether all that was told of a case says where and why."""
+    lines = [line for line in stderr.splitlines() if line.strip()]
+    mistakes = [line for line in lines if not line.startswith("surgebreak: ")]
+    right = bool(mistakes) and all(MISTAKE.search(line) for line in mistakes)
+    return ("refused" if right else "failed"), " | ".join(mistakes or lines)
+
+
+def _summary(output: Path) -> dict:
+    path = output / "run.json"
+    return json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}

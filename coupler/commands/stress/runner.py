@@ -1,0 +1,61 @@
+"""Run scenes one after the other, each in a process of its own: an extreme scene may take its process with it."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import tempfile
+import time
+from pathlib import Path
+
+from coupler.commands.stress.registry import Measure, Outcome, Scene, scenes
+from coupler.program.errors import BadCase, did_you_mean
+from coupler.program.process import run_module, trouble
+
+TIME_LIMIT = {"S": 600, "M": 3600}
+"""Wall seconds after which a scene counts as failed: far more than its cost."""
+
+
+def chosen(ids: list[str], quick: bool) -> list[Scene]:
+    """The scenes asked for, by id or group; all without; with quick only those of cost S. Raises BadCase."""
+    known = scenes()
+    groups = sorted({s.group for s in known.values()})
+    names = [*known, *groups]
+    wrong = [
+        f"{word}: unknown scene{did_you_mean(word, names)}; see surgebreak stress --list"
+        for word in ids
+        if word.upper() not in known and word not in groups
+    ]
+    if wrong:
+        raise BadCase(wrong)
+    words = {word.upper() for word in ids} | set(ids)
+    found = [s for s in known.values() if not ids or s.id in words or s.group in words]
+    return [s for s in found if s.cost == "S" or not quick]
+
+
+def run(scene: Scene) -> Outcome:
+    """The outcome of a scene from its own process; a process that breaks off is a failure with what it said."""
+    began = time.perf_counter()
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "lines"
+        trouble = _trouble(scene, path)
+        lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
+    rows = [json.loads(line) for line in lines]
+    measures = [Measure(**row["measure"]) for row in rows if "measure" in row]
+    ended = next((row["outcome"] for row in rows if "outcome" in row), None)
+    if trouble or ended is None:
+        ended = ("failed", trouble or "its process gave no outcome", 0.0, time.perf_counter() - began)
+    verdict, told, cpu, wall = ended
+    return Outcome(scene.id, scene.group, scene.title, verdict, told, measures, cpu, wall)
+
+
+def _trouble(scene: Scene, path: Path) -> str:
+    """Run the process; how it ended, when not well."""
+    limit = TIME_LIMIT[scene.cost]
+    try:
+        done = run_module(
+            "coupler.commands.stress.one", scene.id, path, capture_output=True, text=True, timeout=limit
+        )
+    except subprocess.TimeoutExpired as error:
+        return f"not done after {error.timeout} s"
+    return "" if done.returncode == 0 else trouble(done.returncode, done.stderr)

@@ -1,0 +1,81 @@
+"""What a quantity is compared with, of one kind for all its runs: exact, measured, or the finest run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from coupler.case.records import column as table_column
+from coupler.case.records import read_record
+from coupler.case.study import Quantity
+from coupler.commands.study.formula import evaluate
+from coupler.commands.study.reading import Curve, taken
+from coupler.program.errors import BadCase
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A quantity in one run: value, what it was compared with, error (a share), band (a share; 0 without)."""
+
+    value: float
+    reference: float
+    error: float
+    band: float = 0.0
+
+
+def against_number(q: Quantity, value: float, reference: float, place: str) -> Reading:
+    """|value - reference| over the scale: |reference| unless the quantity has one. Raises BadCase for a scale of 0."""
+    scale = abs(reference) if q.scale is None else abs(q.scale)
+    if scale == 0.0:
+        raise BadCase(
+            [
+                f"{place}: the reference is 0, so an error has no share of it; give scale, what it counts against"
+            ]
+        )
+    band = half_band(q) / scale if q.against == "measured" else 0.0
+    return Reading(value, reference, abs(value - reference) / scale, band)
+
+
+def against_curve(q: Quantity, found: Curve) -> Reading:
+    """Root mean square distance from the reference curve, over its root mean square (or the scale).
+
+    Both are compared at the times of the reference that lie in the window and in the run.
+    """
+    reference = file_curve(q).within(q.window)
+    inside = (reference.time >= found.time[0]) & (reference.time <= found.time[-1])
+    time, values = reference.time[inside], reference.values[inside]
+    difference = rms(time, np.interp(time, found.time, found.values) - values)
+    scale = rms(time, values) if q.scale is None else abs(q.scale)
+    band = 0.0
+    if q.band is not None:
+        band = q.band / scale
+    elif q.band_columns is not None:
+        low, high = (file_curve(q, name).within(q.window) for name in q.band_columns)
+        band = rms(low.time, 0.5 * (high.values - low.values)) / scale
+    return Reading(difference, 0.0, difference / scale, band)
+
+
+def rms(time, values) -> float:
+    """(1/T ∫ v² dt)^(1/2)"""
+    return float(np.sqrt(np.trapezoid(values**2, time) / (time[-1] - time[0])))
+
+
+def fixed_reference(q: Quantity, case: dict) -> float:
+    """The exact or measured number of a quantity, for a run with this effective case."""
+    return evaluate(q.value, case) if q.value is not None else taken(q, file_curve(q))
+
+
+def half_band(q: Quantity) -> float:
+    """Half the scatter of a measured number; of two curves, that of what is taken from them."""
+    if q.band is not None:
+        return abs(q.band)
+    low, high = (taken(q, file_curve(q, name)) for name in q.band_columns)
+    return 0.5 * abs(high - low)
+
+
+def file_curve(q: Quantity, column: str | None = None) -> Curve:
+    """Columns of the reference file: time and value, or time and another one. Raises NoSuchData."""
+    table = read_record(Path(q.path))
+    return Curve(*(table_column(table, name, q.path) for name in (q.columns[0], column or q.columns[1])))

@@ -1,0 +1,252 @@
+"""Dam breaks against a wall and against a box: measured records."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from coupler.commands.verify import courant
+from coupler.commands.verify.curves import Curve, Figure, Panel
+from coupler.commands.verify.figures import columns
+from coupler.commands.verify.losses import Losses
+from coupler.commands.verify.registry import TOLD, Finding, check
+from coupler.commands.verify.scenes import DENSITY, G, box, column, slice_sides, tank, top
+from fluid.readings import gauges
+
+SMOOTH = 3e-5
+"""k_s [m] of a hydraulically smooth wall in the log law, 3.3 ν/u*, at u* = 0.1 m/s: 4 to 5 % of the fronts' speed."""
+RUBBED = {"walls": "friction", "roughness": SMOOTH}
+
+DEPTH = 0.3
+"""H of Lobovsky et al. [m]."""
+FROM, TO = 2.4, 6.0
+"""Window of t* for the impulse."""
+WINDOW = 0.5
+"""t* over which the mean of an impact is taken, 87 ms."""
+
+
+@dataclass(frozen=True)
+class Impact:
+    """t* (n,), p* (n, 3) at the heights SENSORS, depth of water over H (n,) on the wall; losses of the run."""
+
+    t: np.ndarray
+    p: np.ndarray
+    losses: Losses
+
+    def within(self, at, sensor: int):
+        """p* of a sensor at times `at`."""
+        return np.interp(at, self.t, self.p[:, sensor])
+
+
+SENSORS = (0.003, 0.015, 0.030)
+"""Heights of sensors 1 to 3 [m]."""
+
+
+@check("P38", "dam break on a wall, sensor 2", "Lobovsky et al., J. Fluids Struct. 48 (2014) 407", "M")
+def wall_impact():
+    table = columns("lobovsky_p2_percentiles_H300")
+    runs, slipping = {n: _impact(n, **RUBBED) for n in (16, 24, 32)}, _impact(16)
+    for n, run in runs.items():
+        yield from _impact_findings(f"cells H/{n}: ", run, table)
+        yield from run.losses.findings(f"cells H/{n}: ")
+    sph = columns("decourcy_p2_sph")
+    at = np.linspace(3.0, 6.0, 301)
+    differs = slipping.within(at, 1) - np.interp(at, sph["tstar"], sph["pstar"])
+    rms = np.sqrt(np.mean(differs**2))
+    yield Finding(
+        "walls that slip: rms difference of p* to published δ-SPH, 3 < t* < 6", rms, 0.0, 0.05, False
+    )
+    yield from slipping.losses.findings("walls that slip: ")
+    yield _impact_figure(runs[32], slipping, table, sph)
+    yield _cells_figure(runs, table)
+    steps = {number: _impact(16, courant=number) for number in courant.NUMBERS if number != 1.0} | {
+        1.0: slipping
+    }
+    sensor = {number: (steps[number].t, steps[number].p[:, 1]) for number in courant.NUMBERS}
+    yield from courant.findings(sensor, WINDOW, TO)
+    yield courant.figure("P38_courant", sensor, WINDOW, TO, P_AXES, (2.2, 4.0))
+
+
+def _cells_figure(runs: dict[int, Impact], table) -> Figure:
+    """Sensor 2 with rubbed walls on different cells."""
+    some = slice(None, None, 10)
+    t = table["tstar"][some]
+    curves = [Curve("measured, 2.5 to 97.5 %", "band", t, table["p2p5"][some], table["p97p5"][some])]
+    curves += [Curve(f"smooth walls, H/{n}", "computed", run.t, run.p[:, 1]) for n, run in runs.items()]
+    return Figure("P38_cells", (Panel(*P_AXES, tuple(curves), (2.2, 6.6), (-0.1, 3.0)),))
+
+
+P_AXES = ("time $t\\sqrt{g/H}$ [–]", "pressure $p/\\rho g H$ [–], z = 15 mm")
+
+
+def _impact_findings(where: str, run: Impact, table):
+    at = np.linspace(FROM, TO, 721)
+    found = run.within(at, 1)
+    low, high = (np.interp(at, table["tstar"], table[k]) for k in ("p2p5", "p97p5"))
+    arrival = run.t[np.argmax(run.p[:, 1] > 0.1)]
+    measured = table["tstar"][np.argmax((table["median"] > 0.1) & (table["tstar"] > 1.0))]
+    yield Finding(f"{where}arrival t* (p* = 0.1)", arrival, measured, 0.15, False)
+    # the band of the repeats lies unevenly about the median: judged against its middle
+    ends = np.trapezoid(low, at), np.trapezoid(high, at)
+    impulse, middle, half = np.trapezoid(found, at), 0.5 * sum(ends), 0.5 * (ends[1] - ends[0])
+    yield Finding(f"{where}impulse {FROM} < t* < {TO:g}", impulse, middle, half, False)
+    late = at > 3.0
+    inside = np.mean((found >= low)[late] & (found <= high)[late])
+    yield Finding(f"{where}share of 3 < t* < 6 within the 2.5-97.5 % band", inside, 1.0, 0.2, False)
+
+
+def _impact(n: int, **settings) -> Impact:
+    """The tank of 1.61 m, open at the top, as a slice two cells wide on cells of H/n, to t* = 6.6."""
+    cell = DEPTH / n
+    size = np.array([round(1.61 / cell) * cell, 2 * cell, 2 * DEPTH])
+    cells = (round(size[0] / cell), 2, 2 * n)
+    settings = {"is_open": top, "is_smooth": slice_sides, "rtol": 1e-7} | settings
+    c = tank(size, cells, column(2 * DEPTH, DEPTH), **settings)
+    scale, losses = np.sqrt(G / DEPTH), Losses(c.water)
+    places = np.array([[size[0] - 1e-9, cell, z] for z in SENSORS])
+    t, p = [0.0], [np.zeros(len(SENSORS))]
+    while t[-1] < 6.6:
+        c.step(c.water.stable_step())
+        losses.add()
+        t.append(c.time * scale)
+        p.append(gauges.pressure(c.water, places) / (DENSITY * G * DEPTH))
+    return Impact(np.array(t), np.array(p), losses)
+
+
+def _impact_figure(rubbed: Impact, slipping: Impact, table, sph) -> Figure:
+    axes = ("time $t\\sqrt{g/H}$ [–]", "pressure $p/\\rho g H$ [–]")
+    some = slice(None, None, 10)
+    t = table["tstar"][some]
+    second = (
+        Curve("measured, 2.5 to 97.5 %", "band", t, table["p2p5"][some], table["p97p5"][some]),
+        Curve("measured, median", "measured", t, table["median"][some]),
+        Curve("friction of smooth walls, H/32", "computed", rubbed.t, rubbed.p[:, 1]),
+        Curve("walls that slip, H/16", "computed", slipping.t, slipping.p[:, 1]),
+        Curve("δ-SPH, walls that slip, H/400", "other", sph["tstar"], sph["pstar"]),
+    )
+    panels = [Panel(axes[0], f"{axes[1]}, z = 15 mm", second, (2.2, 6.6), (-0.1, 3.0))]
+    for row, name, height in ((0, "lobovsky_p1_H300", "3 mm"), (2, "lobovsky_p3_H300", "30 mm")):
+        single = columns(name)
+        curves = (
+            Curve("measured, one run", "measured", single["tstar"], single["pstar"]),
+            Curve("friction of smooth walls, H/32", "computed", rubbed.t, rubbed.p[:, row]),
+            Curve("walls that slip, H/16", "computed", slipping.t, slipping.p[:, row]),
+        )
+        panels.append(Panel(axes[0], f"{axes[1]}, z = {height}", curves, (2.2, 6.6), (-0.1, 3.0)))
+    return Figure("P38_wall", tuple(panels))
+
+
+LENGTH = 3.22
+"""Tank of SPHERIC test 2 [m]; x runs from the wall of the reservoir here, from the other end in the records."""
+ANY = 10.0
+"""Tolerance of what is told, not judged."""
+ANY_PRESSURE = 98e3
+"""[Pa] how far the pressure may fall where no air has come yet."""
+PROBES = {"H1": 1.488, "H2": 0.992, "H3": 0.496, "H4": 2.638}
+
+
+EDGES = {"covers": "multiple", "openings": "wide"}
+"""Both faces of an edge with unknowns of their own."""
+
+
+def spheric(until: float, per_metre: int = 20, **settings) -> tuple[dict[str, np.ndarray], Losses]:
+    """Levels H1..H4 [m] and pressures P1, P3, lowest [Pa] over time of the dam break against a box, on cells of
+    1/per_metre [m]; settings: of `tank`."""
+    centre = (LENGTH - 0.744, 0.5, 0.0805)
+    c = tank(
+        (LENGTH, 1, 1),
+        (round(LENGTH * per_metre), per_metre, per_metre),
+        column(1.228, 0.55),
+        solids=[box(centre, (0.161, 0.403, 0.161))],
+        rtol=1e-8,
+        **settings,
+    )
+    face, losses = LENGTH - 0.8245, Losses(c.water)
+    sensors = np.array([[face, 0.5255, 0.021], [face, 0.5255, 0.101]])
+    rows = []
+    while c.time < until:
+        c.step(c.water.stable_step())
+        losses.add()
+        levels = [gauges.level(c.water, (LENGTH - x, 0.5)) for x in PROBES.values()]
+        lowest = c.water.report.bound.lowest
+        rows.append([c.time, *levels, *gauges.pressure(c.water, sensors), lowest])
+    return dict(zip(("t", *PROBES, "P1", "P3", "lowest"), np.array(rows).T)), losses
+
+
+def _record(table, name: str):
+    """The column of a record whose heading begins with the name of a probe."""
+    return next(v for k, v in table.items() if k.startswith(name))
+
+
+def _rms(found, table, probe: str) -> float:
+    """Rms difference [m] of a level to its record over the first 2 s."""
+    until = table["t_s"] <= 2.0
+    own = np.interp(table["t_s"][until], found["t"], found[probe])
+    return float(np.sqrt(np.mean((own - _record(table, probe)[until]) ** 2)))
+
+
+@check("P39", "SPHERIC test 2: levels", "Kleefsman et al., J. Comput. Phys. 206 (2005) 363", "M")
+def levels():
+    (found, losses), table = spheric(2.05), columns("kleefsman_heights_h1_h4")
+    time = table["t_s"]
+    for probe, measured, tolerance in (("H1", 0.218, 0.05), ("H2", 0.368, 0.05), ("H3", 0.920, 0.15)):
+        arrival = found["t"][np.argmax(found[probe] > 0.02)]
+        yield Finding(f"arrival at {probe} [s] (level 2 cm)", arrival, measured, tolerance, False)
+    until = time <= 2.0
+    for probe in PROBES:
+        rms = _rms(found, table, probe)
+        yield Finding(f"rms difference of {probe} to 2 s [m]", rms, 0.0, 0.05, False)
+    for at, measured in ((1.0, 0.279), (2.0, 0.130)):
+        level = np.interp(at, found["t"], found["H4"])
+        yield Finding(f"H4 at {at:g} s [m]", level, measured, 0.05, False)
+    yield from losses.findings()
+    mirrored = spheric(2.05, split="mirrored")[0]
+    arrival = mirrored["t"][np.argmax(mirrored["H3"] > 0.02)]
+    yield Finding(f"mirrored cells: arrival at H3 [s] {TOLD}", arrival, 0.920, ANY, False)
+    rms = _rms(mirrored, table, "H3")
+    yield Finding(f"mirrored cells: rms difference of H3 to 2 s [m] {TOLD}", rms, 0.0, ANY, False)
+    yield _box_figure("P39_levels", found, table, PROBES, until, "depth of water at {} [m]", 1.0)
+    yield Figure("P39_losses", losses.panels("cells of 5 cm, CFL 1"), columns=2)
+
+
+def _impulse(time, pressure) -> float:
+    """∫ p dt [Pa s] from 0.35 to 1 s."""
+    within = (time >= 0.35) & (time <= 1.0)
+    return float(np.trapezoid(pressure[within], time[within]))
+
+
+@check("P40", "SPHERIC test 2: impulse of the pressure", "Kleefsman et al. 2005", "M")
+def impulses():
+    (found, losses), table = spheric(2.0), columns("kleefsman_pressure_p1_p3_p5_p7")
+    time = table["t_s"]
+    for sensor in ("P1", "P3"):
+        measured = _impulse(time, _record(table, sensor))
+        found_impulse = _impulse(found["t"], found[sensor])
+        yield Finding(f"impulse of {sensor} from 0.35 to 1 s [Pa s]", found_impulse, measured, 0.20)
+    yield from losses.findings()
+    yield Finding(
+        "lowest pressure to 2 s [Pa]", min(0.0, float(found["lowest"].min())), 0.0, ANY_PRESSURE, False
+    )
+    mirrored = spheric(1.0, split="mirrored")[0]
+    impulse = _impulse(mirrored["t"], mirrored["P3"])
+    yield Finding(f"mirrored cells: the same of P3 [Pa s] {TOLD}", impulse, measured, ANY)
+    for per_metre in (16, 18, 20, 22, 24):
+        edges = spheric(1.0, per_metre, **EDGES)[0]
+        impulse = _impulse(edges["t"], edges["P3"])
+        what = f"faces of an edge apart, cells of 1/{per_metre} m: impulse of P3 [Pa s]"
+        yield Finding(f"{what} {TOLD}", impulse, measured, ANY)
+    shown = time <= 2.0
+    yield _box_figure("P40_pressures", found, table, ("P1", "P3"), shown, "pressure at {} [kPa]", 1e-3)
+
+
+def _box_figure(name, found, table, probes, shown, label: str, unit: float) -> Figure:
+    """A panel a probe: the record, and what was found."""
+    panels = []
+    for probe in probes:
+        curves = (
+            Curve("measured", "measured", table["t_s"][shown], unit * _record(table, probe)[shown]),
+            Curve("computed, cells of 5 cm", "computed", found["t"], unit * found[probe]),
+        )
+        panels.append(Panel("time [s]", label.format(probe), curves, (0.0, 2.0)))
+    return Figure(name, tuple(panels), columns=2)

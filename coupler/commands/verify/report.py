@@ -1,0 +1,93 @@
+"""Results for people (a table that grows case by case, with totals) and for programs (one JSON object a line)."""
+
+from __future__ import annotations
+
+import json
+import sys
+from dataclasses import asdict
+from pathlib import Path
+
+from coupler.commands.verify.registry import NOT_COVERED, Check, Result
+from coupler.commands.verify.runner import chosen, run
+from coupler.program.errors import ExitCode
+from coupler.program.process import run_module
+
+HEAD = ("case", "quantity", "value", "expected", "error", "limit", "", "cpu s")
+FORM = "{:5} {:73} {:>12} {:>12} {:>9} {:>8} {:4} {:>7}"
+
+
+def verify(
+    ids: list[str], quick: bool, as_json: bool, only_list: bool, plots: Path | None = None
+) -> ExitCode:
+    """Run the cases asked for and print each result as it comes; DIVERGED if one did not pass.
+
+    plots: a folder for figures of computed curves over measured ones, one or more a case that has any."""
+    cases = chosen(ids, quick)
+    if only_list:
+        print(listing(cases))
+        return ExitCode.DONE
+    if plots is not None:
+        plots.mkdir(parents=True, exist_ok=True)
+    if not as_json:
+        print(head())
+    results = []
+    for case in cases:
+        for result in run(case, plots):
+            results.append(result)
+            print(json_line(result) if as_json else line(result), flush=True)
+    if not as_json:
+        print(totals(results))
+    if plots is not None:
+        draw(plots, [case.id for case in cases])
+    return ExitCode.DONE if all(r.passed for r in results) else ExitCode.DIVERGED
+
+
+def draw(plots: Path, ids: list[str]) -> None:
+    """Draw the figures that the cases left, in a process of its own, and tell the pictures on stderr."""
+    there = [str(path) for id in ids if (path := plots / f"{id}.json").exists() and path.stat().st_size]
+    if there:
+        run_module("coupler.commands.view.curves", plots, *there, check=True, stdout=sys.stderr)
+
+
+def head() -> str:
+    """Heading of the table."""
+    return FORM.format(*HEAD)
+
+
+def line(result: Result) -> str:
+    """One row; a case that broke off says why instead of its figures."""
+    verdict = "told" if not result.judged else "ok" if result.passed else "FAIL"
+    if result.value is None:
+        return f"{result.id:5} {verdict}: {result.reason}"
+    error, limit = (_share(v) if result.relative else f"{v:.3g}" for v in (result.error, result.tolerance))
+    values = (f"{result.value:.6g}", f"{result.expected:.6g}", error, limit)
+    return FORM.format(result.id, result.quantity, *values, verdict, f"{result.cpu_s:.1f}")
+
+
+def json_line(result: Result) -> str:
+    """One object a quantity."""
+    row = asdict(result)
+    row["pass"] = row.pop("passed")
+    return json.dumps(row)
+
+
+def totals(results: list[Result]) -> str:
+    """How many passed, which did not, and the processor time."""
+    failed = sorted({r.id for r in results if not r.passed})
+    cases = len({r.id for r in results})
+    judged = [r for r in results if r.judged]
+    told = f"{cases - len(failed)} of {cases} cases pass, {sum(r.passed for r in judged)} of {len(judged)} figures"
+    if failed:
+        told += f"; not: {', '.join(failed)}"
+    return f"{told}; {sum(r.cpu_s for r in results):.1f} CPU s"
+
+
+def listing(cases: list[Check]) -> str:
+    """Every case with its source and cost, then what is not covered and why."""
+    rows = [f"{c.id:5} {c.group:8} {c.cost}  {c.title} [{c.source}]" for c in cases]
+    rows += ["", "not covered:", *(f"{id:5} {why}" for id, why in NOT_COVERED.items())]
+    return "\n".join(rows)
+
+
+def _share(value: float) -> str:
+    return f"{100 * value:.3g} %"

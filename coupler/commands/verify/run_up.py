@@ -1,0 +1,127 @@
+"""Run-up of a solitary wave on a plane beach that cuts the cells (Synolakis)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from coupler.commands.verify.curves import Curve, Figure, Panel
+from coupler.commands.verify.figures import columns, named_values
+from coupler.commands.verify.losses import Losses
+from coupler.commands.verify.registry import Finding, check
+from coupler.commands.verify.scenes import DENSITY, G
+from coupler.run.clock import Clock
+from coupler.step.coupled_step import Coupling
+from coupler.step.immersion import Immersion
+from fluid.mesh.background import box_mesh
+from fluid.readings import gauges
+from fluid.sides.inflow import Side, Sides
+from fluid.sides.waves import SolitaryWave
+from fluid.step.parameters import WaterParameters
+from fluid.step.water import Water
+
+HEIGHT, SLOPE = 0.0185, 19.85
+"""H/d of the wave; cot β of the beach."""
+FLAT, ABOVE = 2.0, 0.2
+"""Flat bed before the toe of the beach and tank above the still water, in depths."""
+AHEAD = 18.4
+"""Way of the crest to the inflow in depths, arccosh(sqrt 20)/sqrt(3H/4d): at the start 5 % of its height is there."""
+CELLS, STRETCH = 24, 2
+"""Cells over the depth, and length of a cell over its height."""
+FILM = 0.1
+"""Height over the beach at which it counts as wet, in cells: the experiment saw the tip of the water."""
+REST = 2.0
+"""[s] over which still water is watched."""
+
+
+@dataclass(frozen=True)
+class RunUp:
+    """Times t sqrt(g/d) (n,) and height of the water line R/d (n,), wave or still water; fastest water [m/s]."""
+
+    t: np.ndarray
+    R: np.ndarray
+    fastest: float
+    losses: Losses
+
+
+@check(
+    "P42", "run-up of a solitary wave on a beach of 1:19.85", "Synolakis, J. Fluid Mech. 185 (1987) 523", "L"
+)
+def run_up():
+    exact = named_values("wave_closed_forms")["runup_R_over_d_cot=19.85_H/d=0.0185"]
+    still = _beach(REST, waves=False)
+    yield Finding("still water on the beach: fastest after 2 s [m/s]", still.fastest, 0.0, 1e-3, False)
+    run = _beach(_end())
+    yield Finding("largest run-up R/d at H/d = 0.0185", float(run.R.max()), exact, 0.10)
+    yield from run.losses.findings()
+    lab = columns("synolakis_runup_lab")
+    heights = np.geomspace(0.005, 0.05, 40)
+    law = 2.831 * np.sqrt(SLOPE) * heights**1.25
+    against = (
+        Curve("laboratory, Synolakis 1987", "measured", lab["H_over_d"], lab["R_over_d"], points=True),
+        Curve("law of waves that do not break", "exact", heights, law),
+        Curve("computed", "computed", np.array([HEIGHT]), run.R.max(keepdims=True), points=True),
+    )
+    line = (
+        Curve("largest of the law", "exact", run.t[[0, -1]], np.full(2, exact)),
+        Curve(f"computed, cells d/{CELLS}", "computed", run.t, run.R),
+    )
+    panels = (
+        Panel("time $t\\sqrt{g/d}$ [–]", "height of the water line $R/d$ [–]", line),
+        Panel("height of the wave $H/d$ [–]", "largest run-up $R/d$ [–]", against, (0.0, 0.05), (0.0, 0.35)),
+    )
+    yield Figure("P42_run_up", panels, columns=2)
+
+
+def _end() -> float:
+    """Time [s] at which the water has run up: crest to the inflow, over the flat, up the beach, and a fifth more."""
+    c = np.sqrt(G * (1.0 + HEIGHT))
+    return (AHEAD + FLAT) / c + 2.0 * SLOPE / np.sqrt(G) + 5.0
+
+
+def _beach(until: float, waves: bool = True) -> RunUp:
+    """A slice two cells wide with d = 1 m; the beach is a fixed body."""
+    dx = STRETCH / CELLS
+    length = np.round((FLAT + SLOPE * (1.0 + 0.8 * ABOVE)) / dx) * dx
+    mesh = box_mesh(np.zeros(3), [length, 2 * dx, 1.0 + ABOVE], [dx, dx, 1.0 / CELLS])
+    immersion = Immersion(mesh, None, [_ramp(length + 1.0, 2 * dx)], "single")
+    sides = Sides([Side.of(mesh, lambda normal, _: normal[:, 0] < -0.5, _wave())]) if waves else None
+    settings = WaterParameters(density=DENSITY, gravity=G)
+    water = Water(mesh, immersion.domain, lambda x: x[:, 2] - 1.0, settings, None, None, sides)
+    c = Coupling(water, None, immersion, rtol=1e-7, step_max=1.0, clock=Clock())
+    x = np.linspace(FLAT + 0.8 * SLOPE, length - 1e-6, 2000)
+    bed = (x - FLAT) / SLOPE
+    line = np.column_stack([x, np.full_like(x, dx), bed + FILM / CELLS])
+    t, R, losses = [0.0], [0.0], Losses(water)
+    while c.time < until:
+        c.step(water.stable_step())
+        losses.add()
+        t.append(c.time * np.sqrt(G))
+        R.append(_water_line(water, line, bed) - 1.0)
+    return RunUp(np.array(t), np.array(R), _fastest(water), losses)
+
+
+def _wave():
+    """The solitary wave through the side x = 0."""
+    speed = SolitaryWave(1.0, HEIGHT, G, 0.0).speed
+    return SolitaryWave(1.0, HEIGHT, G, AHEAD / speed).flow((1.0, 0.0, 0.0), 0.0)
+
+
+def _ramp(end: float, width: float):
+    """A wedge under the beach from its toe to x = end, wider than the slice: corners (6, 3) and faces."""
+    top = (end - FLAT) / SLOPE
+    corners = [(x, y, z) for y in (-1.0, width + 1.0) for x, z in ((FLAT, 0.0), (end, 0.0), (end, top))]
+    faces = ((0, 1, 2), (3, 5, 4), (0, 3, 4, 1), (1, 4, 5, 2), (2, 5, 3, 0))
+    return np.array(corners), faces
+
+
+def _water_line(water, line, bed) -> float:
+    """Height z [m] of the beach where its line of points first falls dry."""
+    wet = gauges.level_set_at(water, line) < 0.0
+    return bed[-1] if wet.all() else bed[int(np.argmin(wet))]
+
+
+def _fastest(water) -> float:
+    wet = (water.level_set < 0.0) & water.topology.active
+    return float(np.abs(water.velocity[wet]).max())

@@ -1,0 +1,52 @@
+"""Run cases one after the other, each in a process of its own."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+from coupler.commands.verify.registry import NOT_COVERED, Check, Result, checks
+from coupler.program.errors import BadCase, did_you_mean
+from coupler.program.process import run_module, trouble
+
+TIME_LIMIT = {"S": 1800, "M": 2 * 3600, "L": 6 * 3600}
+"""Wall seconds after which a case counts as failed: far more than its cost, also on a machine with much else to do."""
+
+
+def chosen(ids: list[str], quick: bool) -> list[Check]:
+    """The cases asked for; all without ids; with quick only those of cost S. Raises BadCase for unknown ids."""
+    known = checks()
+    wrong = [_unknown(id, known) for id in ids if id.upper() not in known]
+    if wrong:
+        raise BadCase(wrong)
+    found = [known[id.upper()] for id in ids] if ids else list(known.values())
+    return [case for case in found if case.cost == "S" or not quick]
+
+
+def _unknown(id: str, known) -> str:
+    if id.upper() in NOT_COVERED:
+        return f"{id}: not covered: {NOT_COVERED[id.upper()]}"
+    return f"{id}: unknown case{did_you_mean(id.upper(), known)}; see surgebreak verify --list"
+
+
+def run(case: Check, plots: Path | None = None) -> Iterator[Result]:
+    """Results of one case from its own process; how that ended, when not well, is a result too.
+
+    plots: an existing folder for the figures of the case, <id>.json; None: it has none to write."""
+    figures = [] if plots is None else [str(plots / f"{case.id}.json")]
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "results"
+        quietly = {"capture_output": True, "text": True, "timeout": TIME_LIMIT[case.cost]}
+        try:
+            done = run_module("coupler.commands.verify.one", case.id, path, *figures, **quietly)
+            wrong = "" if done.returncode == 0 else trouble(done.returncode, done.stderr)
+        except subprocess.TimeoutExpired as error:
+            wrong = f"not done after {error.timeout} s"
+        lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
+    found = [Result(**json.loads(line)) for line in lines]
+    yield from found
+    if wrong or not found:
+        yield Result.failed(case.id, wrong or "the case gave no result", 0.0)

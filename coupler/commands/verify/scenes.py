@@ -1,0 +1,78 @@
+"""Scenes shared by the cases with water: a tank, what is in it, and their coupling."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from coupler.run.clock import Clock
+from coupler.scene.fill import start_level
+from coupler.step.coupled_step import Coupling
+from coupler.step.immersion import Immersion
+from fluid.domain.covers import WIDE_OPENINGS
+from fluid.mesh.background import box_mesh
+from fluid.step.parameters import WaterParameters
+from fluid.step.water import Water
+
+G = 9.81
+DENSITY = 1000.0
+BOX = np.array(
+    [[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]],
+    float,
+)
+BOX_FACES = ((0, 4, 7, 3), (1, 2, 6, 5), (0, 1, 5, 4), (3, 7, 6, 2), (0, 3, 2, 1), (4, 5, 6, 7))
+
+
+def box(centre, size, rotation=None) -> tuple[np.ndarray, tuple]:
+    """A fixed box for `tank`: vertices (8, 3) [m] and faces."""
+    turn = np.eye(3) if rotation is None else rotation
+    return np.asarray(centre) + (0.5 * np.asarray(size) * BOX) @ turn.T, BOX_FACES
+
+
+def tank(
+    size,
+    cells,
+    fill: Callable | list,
+    structure=None,
+    solids=(),
+    rtol: float = 1e-9,
+    is_open=None,
+    is_smooth=None,
+    covers: str = "single",
+    openings: str = "all",
+    split: str = "kuhn",
+    **parameters,
+) -> Coupling:
+    """Water in [0, size] on cells (nx, ny, nz) with blocks and fixed solids; is_open, is_smooth: see `Water`;
+    split: see `box_mesh`; openings: "all" or "wide", of multiple covers, as in a case.
+
+    fill: as in `Water`, or boxes (lower (3,), upper (3,)) filled like those of a case, which end at walls."""
+    mesh = box_mesh(np.zeros(3), size, np.asarray(size, float) / np.asarray(cells), split=split)
+    connection = WIDE_OPENINGS if openings == "wide" else None
+    immersion = Immersion(mesh, structure, list(solids), covers, connection=connection)
+    parameters = WaterParameters(**({"density": DENSITY, "gravity": G} | parameters))
+    if not callable(fill):
+        fill = start_level(fill, (np.zeros(3), np.asarray(size, float)), mesh, immersion.domain)
+    water = Water(mesh, immersion.domain, fill, parameters, is_open, is_smooth)
+    return Coupling(water, structure, immersion, rtol=rtol, step_max=1.0, clock=Clock())
+
+
+def slice_sides(normal, centre):
+    """Sides of a slice of a wide flow, which do not rub it: those that y pierces."""
+    return np.abs(normal[:, 1]) > 0.5
+
+
+def top(normal, centre):
+    """The open top of a tank."""
+    return normal[:, 2] > 0.5
+
+
+def level_at(z: float) -> Callable:
+    """Fill up to z."""
+    return lambda x: x[:, 2] - z
+
+
+def column(width: float, height: float) -> Callable:
+    """A column of water at the wall x = 0, over the whole depth of the tank."""
+    return lambda x: np.maximum(x[:, 0] - width, x[:, 2] - height)

@@ -1,0 +1,172 @@
+"""python -m coupler.commands.view RUN: stills, films and figures of a run, from its files alone."""
+
+import argparse
+import ctypes
+import json
+import os
+import sys
+import time
+from pathlib import Path
+
+from coupler.program.errors import FULL, ExitCode, SurgebreakError
+from coupler.program.extras import need
+from coupler.program.process import was_killed
+
+
+class CannotDraw(SurgebreakError):
+    """The system has nothing to draw with."""
+
+
+def arguments(given):
+    """The command line; without a choice of what to make, all is made."""
+    parser = argparse.ArgumentParser(prog="surgebreak render", description=__doc__.partition(":")[2].strip())
+    parser.add_argument(
+        "run", type=Path, metavar="RUN", help="a run directory, finished or still being written"
+    )
+    parser.add_argument("--still", action="store_true", help="one picture for print, of --time")
+    parser.add_argument("--film", action="store_true", help="H.264 film, one frame per stored step")
+    parser.add_argument(
+        "--plots",
+        action="store_true",
+        help="histories, and curves over the data of the case, as PDF, SVG and PNG",
+    )
+    parser.add_argument(
+        "--time", type=float, metavar="S", help="of the still [s]; default: the last stored step"
+    )
+    parser.add_argument(
+        "--size", type=pixels, default=(1280, 720), metavar="WxH", help="of the film; a still has twice that"
+    )
+    parser.add_argument("--fps", type=rate, default=20.0, help="frames a second of the film (default 20)")
+    parser.add_argument(
+        "--azimuth", type=float, default=-62.0, help="of the camera, degrees from +x towards +y"
+    )
+    parser.add_argument(
+        "--elevation", type=angle, default=22.0, help="of the camera above the ground, degrees"
+    )
+    parser.add_argument(
+        "--letters", type=letters, default=1.0, metavar="TIMES", help="the usual size, for a small picture"
+    )
+    parser.add_argument("--to", type=Path, metavar="FOLDER", help="where to write; default RUN/pictures")
+    options = parser.parse_args(given)
+    if not (options.still or options.film or options.plots):
+        options.still = options.film = options.plots = True
+    return options
+
+
+def pixels(text):
+    """(width, height) of "1280x720"."""
+    try:
+        width, height = (int(part) for part in text.lower().split("x"))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a size; write it like 1280x720") from None
+    if not (64 <= width <= 8192 and 64 <= height <= 8192):
+        raise argparse.ArgumentTypeError(f"'{text}': width and height must be between 64 and 8192")
+    return width, height
+
+
+def rate(text):
+    """Frames a second."""
+    return within(text, 1.0, 120.0, "frames a second")
+
+
+def angle(text):
+    """Elevation of the camera [degree]; from straight above, up would have no meaning."""
+    return within(text, -5.0, 85.0, "degrees")
+
+
+def letters(text):
+    """Size of the letters as multiples of the usual one."""
+    return within(text, 0.5, 3.0, "times the usual size")
+
+
+def within(text, low, high, unit):
+    """A number in [low, high]."""
+    try:
+        value = float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a number") from None
+    if not low <= value <= high:
+        raise argparse.ArgumentTypeError(f"{text} is not between {low:g} and {high:g} {unit}")
+    return value
+
+
+def check_drawing():
+    """Raise CannotDraw if the system cannot draw: without a display that takes EGL and a software renderer."""
+    try:
+        ctypes.CDLL("libEGL.so.1")
+    except OSError:
+        raise CannotDraw(
+            "no EGL found: run `apt install libegl1 libgl1-mesa-dri` (YADE brings it along)"
+        ) from None
+
+
+def make(options):
+    """Make what the options ask for and say what was made."""
+    need("view")
+    check_drawing()
+    from coupler.commands.view.run_files import open_run
+
+    run = open_run(options.run)
+    if was_killed(summary(options.run)):
+        print(f"note: the run was killed; shown is what it wrote, until t = {run.times[-1]:g} s", flush=True)
+    folder = options.to or options.run / "pictures"
+    folder.mkdir(parents=True, exist_ok=True)
+    camera = {"azimuth": options.azimuth, "elevation": options.elevation, "letters": options.letters}
+    if options.still:
+        from coupler.commands.view.pictures import still
+
+        report(still, run, folder, options.size, options.time, **camera)
+    if options.plots:
+        from coupler.commands.view.plots import plots
+
+        report(plots, options.run, folder)
+        from coupler.commands.view.over_data import over_data
+
+        report(over_data, options.run, folder)
+    if options.film:
+        from coupler.commands.view.pictures import film
+
+        report(film, run, folder, options.size, options.fps, tell=tell, **camera)
+
+
+def summary(run):
+    """What run.json says; nothing where there is none."""
+    path = run / "run.json"
+    return json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+
+
+def report(action, *given, **options):
+    """Do it and print what it wrote and the CPU time."""
+    start = time.process_time()
+    written = action(*given, **options)
+    for path in written if isinstance(written, list) else [written]:
+        print(f"{path}", flush=True)
+    print(f"  {action.__name__}: {time.process_time() - start:.1f} CPU-s", flush=True)
+
+
+def tell(done, frames):
+    """A line for every tenth of the film."""
+    if done == frames or done % max(1, frames // 10) == 0:
+        print(f"  frame {done} of {frames}", flush=True)
+
+
+def main(given=None):
+    """Exit code 0, or the code of the error after its message."""
+    options = arguments(given)
+    try:
+        make(options)
+    except SurgebreakError as error:
+        print(f"surgebreak render: {error}", file=sys.stderr)
+        return int(error.exit_code)
+    except BrokenPipeError:  # `| head` has read enough: end as quietly as other commands do
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return int(ExitCode.STOPPED)
+    except OSError as error:
+        remedy = "; free some space, or write elsewhere with --to" if error.errno in FULL else ""
+        print(f"surgebreak render: {options.run}: {error}{remedy}", file=sys.stderr)
+        return int(ExitCode.STOPPED)
+    return int(ExitCode.DONE)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,147 @@
+"""The files of a run, read step by step, also while the run still writes them.
+
+HDF5 reads them, not VTK: VTK's reader may crash on a file that grows under its hands.
+"""
+
+import time as clock
+from dataclasses import dataclass
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pyvista as pv
+
+from coupler.program.errors import ExitCode, SurgebreakError
+from coupler.results import vtkhdf
+
+TRIES, PAUSE = 20, 0.1  # a step that is just being added takes milliseconds
+
+
+class NothingToShow(SurgebreakError):
+    """The directory is no run, or the run has written no fields yet."""
+
+    exit_code = ExitCode.BAD_CASE
+
+
+@dataclass(frozen=True)
+class Water:
+    """The water at one time: nodes (n, 3) [m], cells (m, 4), level_set (n,) [m], velocity (n, 3) [m/s]."""
+
+    nodes: np.ndarray
+    cells: np.ndarray
+    level_set: np.ndarray
+    velocity: np.ndarray
+
+
+class Series:
+    """The complete steps of one file: times (steps,) [s]."""
+
+    def __init__(self, path):
+        self.path = Path(path)
+        self.times = patiently(vtkhdf.read_times, path)
+
+    def step(self, time):
+        """Number of the step nearest to `time` [s]."""
+        return int(np.argmin(np.abs(self.times - time)))
+
+
+class WaterSeries(Series):
+    """fields.vtkhdf"""
+
+    def at(self, time):
+        """Water of the step nearest to `time` [s]."""
+        k = self.step(time)
+        nodes, values, _ = patiently(vtkhdf.read_step, self.path, k)
+        cells = patiently(vtkhdf.read_tetrahedra, self.path, k).astype(np.int64)
+        velocity = values.get("velocity", np.zeros_like(nodes))
+        return Water(nodes.astype(float), cells, values["level_set"].astype(float), velocity)
+
+
+class BlockSeries(Series):
+    """blocks.vtkhdf"""
+
+    def __init__(self, path):
+        super().__init__(path)
+        self._faces = faces_for_vtk(*patiently(vtkhdf.read_polygons, path))
+
+    def at(self, time):
+        """The blocks as a surface mesh with their data on the faces, at the step nearest to `time` [s]."""
+        points, _, values = patiently(vtkhdf.read_step, self.path, self.step(time))
+        mesh = pv.PolyData(points, self._faces)
+        for name, array in values.items():
+            mesh.cell_data[name] = array
+        return mesh
+
+
+def patiently(read, *given):
+    """read(*given), again after a moment if the run is just changing the file under our hands."""
+    for left in reversed(range(TRIES)):
+        try:
+            return read(*given)
+        except vtkhdf.UNREADABLE as error:
+            if left == 0:
+                raise NothingToShow(f"{given[0]}: not what a run writes: {error}") from error
+            clock.sleep(PAUSE)
+    raise AssertionError("the last try returns or raises")
+
+
+def faces_for_vtk(connectivity, ends):
+    """Polygons in the order size, corners, size, corners, …"""
+    sizes = np.diff(ends, prepend=0)
+    return np.insert(connectivity, ends - sizes, sizes)
+
+
+@dataclass(frozen=True)
+class RunFiles:
+    """What a run has to show; absent parts are None. tank (2, 3) and the edges of one that is no box, basin (k, 2, 3),
+    [m] relative to the origin."""
+
+    directory: Path
+    water: WaterSeries | None
+    blocks: BlockSeries | None
+    solids: object
+    tank: np.ndarray | None
+    times: np.ndarray
+    basin: np.ndarray | None = None
+
+    def nearest(self, time):
+        """The stored time nearest to `time`; the last one for None."""
+        return self.times[-1] if time is None else self.times[np.argmin(np.abs(self.times - time))]
+
+
+def open_run(directory):
+    """Open a run directory; raise NothingToShow with what is missing and what to do."""
+    directory = Path(directory)
+    if not directory.is_dir():
+        raise NothingToShow(
+            f"{directory}: no such run directory; `surgebreak run CASE` makes one under runs/"
+        )
+    water = _series(WaterSeries, directory / "fields.vtkhdf")
+    blocks = _series(BlockSeries, directory / "blocks.vtkhdf")
+    if water is None and blocks is None:
+        raise NothingToShow(
+            f"{directory}: neither fields.vtkhdf nor blocks.vtkhdf holds a step; the run has not reached its first "
+            "output yet, or it was stopped before"
+        )
+    solids, tank, basin = _solids(directory / "solids.vtkhdf")
+    return RunFiles(directory, water, blocks, solids, tank, (water or blocks).times, basin)
+
+
+def _series(kind, path):
+    """The series at `path`, None if it is absent or holds no step."""
+    if not path.exists() or len(patiently(vtkhdf.read_times, path)) == 0:
+        return None
+    return kind(path)
+
+
+def _solids(path):
+    """Fixed solids (None without any), tank corners (None without a tank) and its edges where it is no box, relative
+    to the origin."""
+    if not path.exists():
+        return None, None, None
+    with h5py.File(path, "r", locking=False) as file:
+        scene, points = file["scene"].attrs, file["VTKHDF/Points"][:]
+        tank = scene["tank"] - scene["origin"] if "tank" in scene else None
+        basin = file["scene/basin"][:] - scene["origin"] if "basin" in file["scene"] else None
+    faces = faces_for_vtk(*vtkhdf.read_polygons(path))
+    return (pv.PolyData(points, faces) if len(points) else None), tank, basin

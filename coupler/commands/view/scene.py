@@ -1,0 +1,302 @@
+"""The picture of one instant: water as a volume coloured by speed, blocks by damage, solids grey, on white paper."""
+
+import os
+from pathlib import Path
+
+# Must stand before VTK opens a window: without a display its X window only warns and falls back to EGL.
+os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+
+import matplotlib
+import numpy as np
+import pyvista as pv
+from matplotlib.colors import ListedColormap
+
+from coupler.commands.view import palette
+from coupler.commands.view.camera import frame
+from coupler.commands.view.water_surface import shading_normals, skin
+
+WATER_OPACITY = 0.78
+SUN = np.array([-0.45, -0.75, 1.1])  # from the scene to the light, for a camera at azimuth -90 degree
+FILL = np.array([1.0, -0.2, 0.25])
+LETTERS = Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"
+VTK_FONT_FILE = 4  # vtkTextProperty: use the font file
+SAMPLED_STEPS = 25
+BAR = 0.075  # height of a colour bar with its text, as a share of that of the picture
+
+
+class Scene:
+    """Draws the steps of a run into one window with one camera and fixed colour scales, so that pictures compare."""
+
+    def __init__(self, run, size=(1280, 720), azimuth=-62.0, elevation=22.0, soft=True, letters=1.0):
+        """run: RunFiles · size: (width, height) in pixels · azimuth, elevation of the camera in degrees ·
+        soft: darken corners where little light comes (costs three times as much as all the rest) ·
+        letters: times the usual size, for a picture that is shown small."""
+        self.run = run
+        self.size, self.letters = size, letters
+        self.lower, self.upper = bounds(run)
+        self.fastest = nice_ceiling(fastest_water(run)) if run.water else 0.0
+        self.light, self.fill = turned(SUN, azimuth + 90.0), turned(FILL, azimuth + 90.0)
+        self.ground = ground(self.lower, self.upper, run.tank is None)
+        self.plotter = pv.Plotter(off_screen=True, window_size=size, lighting="none")
+        self.plotter.set_background(palette.PAPER)
+        self._set_lights()
+        self._draw_still_parts(azimuth)
+        self._set_camera(azimuth, elevation)
+        self._smooth(soft)
+
+    def draw(self, time):
+        """Put the stored step nearest to `time` [s] into the window; return its time [s]."""
+        time = self.run.nearest(time)
+        if self.run.blocks:
+            self._draw_blocks(self.run.blocks.at(time))
+        if self.run.water:
+            self._draw_water(self.run.water.at(time))
+        self._draw_time(time)
+        self.plotter.reset_camera_clipping_range()
+        return time
+
+    def picture(self):
+        """The window as (height, width, 3) bytes."""
+        self.plotter.render()
+        return self.plotter.screenshot(return_img=True)
+
+    def close(self):
+        """Free the window."""
+        self.plotter.close()
+
+    def _points(self, size):
+        """A font size that keeps its share of the picture's height."""
+        return max(6, round(self.letters * size * self.size[1] / 720))
+
+    def _draw_time(self, time):
+        stamp = f"t = {time:.{decimals(self.run.times)}f} s"
+        text = self.plotter.add_text(
+            stamp, name="time", position=(0.025, 0.925), viewport=True, font_size=self._points(14),
+            color=palette.INK, render=False,
+        )  # fmt: skip
+        lettered(text.prop)
+
+    def _set_lights(self):
+        """One sun, a weak light from the right and one from the camera: soft, and no face is black."""
+        span = np.linalg.norm(self.upper - self.lower)
+        middle = (self.lower + self.upper) / 2
+        for way, intensity in ((self.light, 0.5), (self.fill, 0.3)):
+            self.plotter.add_light(
+                pv.Light(position=middle + 3 * span * way, focal_point=middle, intensity=intensity)
+            )
+        self.plotter.add_light(pv.Light(light_type="headlight", intensity=0.3))
+
+    def _set_camera(self, azimuth, elevation):
+        view = frame(
+            self.lower,
+            self.upper,
+            self.size[0] / self.size[1],
+            azimuth,
+            elevation,
+            margin=(0.04, 0.04, 0.095 + BAR * self.letters, 0.05),
+        )
+        camera = self.plotter.camera
+        camera.position, camera.focal_point, camera.up = view.position, view.focus, view.up
+        camera.view_angle = view.view_angle
+
+    def _smooth(self, soft):
+        """Smooth edges (2 x 2 samples a pixel) and, if `soft`, screen-space ambient occlusion: depth is seen."""
+        if soft:
+            span = np.linalg.norm(self.upper - self.lower)
+            self.plotter.enable_ssao(radius=0.045 * span, bias=0.003 * span, kernel_size=32, blur=True)
+        self.plotter.enable_anti_aliasing("ssaa")
+
+    def _line(self, width):
+        """A line width that keeps its share of the picture's height; smoothing halves it."""
+        return 2 * width * self.size[1] / 720
+
+    def _draw_still_parts(self, azimuth):
+        self.plotter.add_mesh(self.ground, color=palette.GROUND, lighting=False)
+        if self.run.solids is not None:
+            self.plotter.add_mesh(
+                self.run.solids, color=palette.SOLID, show_edges=True, edge_color="#6b6b6b", ambient=0.3
+            )
+            self._draw_shadow(self.run.solids, "solid_shadow")
+        if self.run.tank is not None:
+            if self.run.basin is None:
+                tank = pv.Box(np.ravel(self.run.tank, order="F")).extract_all_edges()
+            else:
+                tank = pv.line_segments_from_points(self.run.basin.reshape(-1, 3))
+            self.plotter.add_mesh(tank, color=palette.TANK, line_width=self._line(0.9))
+        self._draw_scale_bar(azimuth)
+
+    def _draw_scale_bar(self, azimuth):
+        """A bar of a round length on the ground along the edge that faces the camera, its length under it."""
+        side = -1 if np.sin(np.radians(azimuth)) < 0 else 1
+        step = 0.03 * side * (self.upper - self.lower)[:2].max()
+        length = nice_floor(0.25 * (self.upper[0] - self.lower[0]))
+        start = np.array([self.lower[0], (self.lower if side < 0 else self.upper)[1] + step, self.lower[2]])
+        bar = pv.Line(start, start + np.array([length, 0.0, 0.0]))
+        self.plotter.add_mesh(bar, color=palette.INK, line_width=self._line(2.5))
+        self.plotter.add_point_labels(
+            [start + np.array([length / 2, 0.7 * step, 0.0])], [f"{length:g} m"], font_size=self._points(15),
+            text_color=palette.INK, shape=None, show_points=False, always_visible=True, font_file=str(LETTERS),
+            bold=False, justification_vertical="top", justification_horizontal="center",
+        )  # fmt: skip
+
+    def _draw_blocks(self, blocks):
+        options = (
+            {"scalars": "damage", "clim": (0.0, 1.0)}
+            if "damage" in blocks.cell_data
+            else {"color": "#d9c7a8"}
+        )
+        self.plotter.add_mesh(
+            blocks, name="blocks", cmap=ListedColormap(palette.scale(palette.DAMAGE_ENDS)), show_edges=True,
+            edge_color="#5b4a3a", line_width=self._line(0.7), ambient=0.3, show_scalar_bar=False,
+            reset_camera=False, render=False, **options,
+        )  # fmt: skip
+        self._draw_shadow(blocks, "block_shadow")
+        if "damage" in blocks.cell_data:
+            self._draw_bar("blocks", "damage of blocks [–]", 0.35 if self.run.water else 0.03)
+
+    def _draw_water(self, grid):
+        surface = water_surface(grid, np.array(self.plotter.camera.position))
+        if surface.n_cells == 0:
+            self.plotter.remove_actor("water", reset_camera=False, render=False)
+            return
+        actor = self.plotter.add_mesh(
+            surface, name="water", scalars="speed", clim=(0.0, self.fastest), opacity=WATER_OPACITY,
+            cmap=ListedColormap(palette.scale(palette.WATER_ENDS)), culling="back",
+            specular=0.3, specular_power=30, ambient=0.3, show_scalar_bar=False, reset_camera=False, render=False,
+        )  # fmt: skip
+        behind(actor.mapper)
+        self._draw_bar("water", "speed of water [m/s]", 0.03)
+
+    def _draw_bar(self, actor, title, left):
+        """A colour bar under the scene for the named actor, once."""
+        if title in self.plotter.scalar_bars:
+            return
+        bar = self.plotter.add_scalar_bar(
+            title=title, mapper=self.plotter.actors[actor].mapper, n_labels=2, fmt="%.3g", vertical=False,
+            width=0.26, height=BAR * self.letters, position_x=left, position_y=0.03, color=palette.INK, render=False,
+            title_font_size=self._points(17), label_font_size=self._points(15), unconstrained_font_size=True,
+        )  # fmt: skip
+        lettered(bar.GetTitleTextProperty())
+        lettered(bar.GetLabelTextProperty())
+
+    def _draw_shadow(self, mesh, name):
+        """The shadow that the sun throws on the ground: the mesh pressed flat along the light, as far as the plate."""
+        flat = pv.PolyData(
+            mesh.points - (mesh.points[:, 2:] - self.lower[2]) * self.light / self.light[2], mesh.faces
+        )
+        flat.points[:, 2] = self.lower[2] + 1e-3 * (self.upper[2] - self.lower[2])
+        x0, x1, y0, y1, *_ = self.ground.bounds
+        for way, edge in (((1, 0, 0), x1), ((-1, 0, 0), x0), ((0, 1, 0), y1), ((0, -1, 0), y0)):
+            flat = flat.clip(normal=way, origin=np.abs(way) * edge)
+        self.plotter.remove_actor(name, reset_camera=False, render=False)
+        if flat.n_cells:
+            self.plotter.add_mesh(
+                flat, name=name, color=palette.SHADOW, lighting=False, reset_camera=False, render=False
+            )
+
+
+def water_surface(water, eye):
+    """The skin of the water as a mesh with "speed" [m/s] and shading normals at its points.
+
+    The triangles farthest from the eye (3,) come first: each is then seen through those before it, where otherwise
+    the order of the cells would decide which of two layers shows, triangle by triangle."""
+    found = skin(water.nodes, water.cells, water.level_set)
+    corners = found.of(water.nodes)
+    far_first = np.argsort(-np.linalg.norm(corners.mean(axis=1) - eye, axis=1), kind="stable")
+    normals = shading_normals(found, water.nodes, water.cells, water.level_set)
+    speed = np.linalg.norm(found.of(water.velocity), axis=2)
+    mesh = pv.PolyData.from_regular_faces(
+        corners[far_first].reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3)
+    )
+    mesh["speed"] = speed[far_first].ravel()
+    mesh["normals"] = normals[far_first].reshape(-1, 3)
+    mesh.point_data.active_normals_name = "normals"
+    return mesh
+
+
+def ground(lower, upper, room_for_shadows):
+    """A plate under the scene, a little larger than it."""
+    margin = 0.06 * (upper - lower)[:2].max() + (0.15 * (upper - lower)[2] if room_for_shadows else 0.0)
+    x = [lower[0] - margin, upper[0] + margin]
+    y = [lower[1] - margin, upper[1] + margin]
+    z = lower[2] - 2e-3 * (upper[2] - lower[2])
+    return pv.PolyData([[x[0], y[0], z], [x[1], y[0], z], [x[1], y[1], z], [x[0], y[1], z]], [4, 0, 1, 2, 3])
+
+
+def bounds(run):
+    """Corners (lower, upper) (3,) [m] of what the pictures show: the tank, or else all the places of the blocks."""
+    boxes = []
+    if run.tank is not None:
+        boxes.append(np.asarray(run.tank, dtype=float))
+    elif run.water:
+        nodes = run.water.at(run.water.times[0]).nodes
+        boxes.append((nodes.min(axis=0), nodes.max(axis=0)))
+    if run.solids is not None:
+        boxes.append(corners(run.solids))
+    if run.blocks and not boxes:
+        boxes += [corners(run.blocks.at(time)) for time in sampled(run.blocks.times)]
+    elif run.blocks:
+        boxes.append(corners(run.blocks.at(run.blocks.times[0])))
+    lower, upper = np.min([b[0] for b in boxes], axis=0), np.max([b[1] for b in boxes], axis=0)
+    return lower, np.maximum(upper, lower + 1e-3 * np.max(upper - lower))
+
+
+def corners(mesh):
+    """Lower and upper corner (2, 3) of a data set."""
+    return np.reshape(mesh.bounds, (3, 2)).T
+
+
+def sampled(times):
+    """At most SAMPLED_STEPS of the times, first and last among them."""
+    return times[np.unique(np.linspace(0, len(times) - 1, SAMPLED_STEPS).astype(int))]
+
+
+def fastest_water(run):
+    """Speed [m/s] that 99 % of the wet nodes stay below, at the step where that is largest."""
+    speeds = [0.0]
+    for time in sampled(run.water.times):
+        water = run.water.at(time)
+        wet = water.level_set < 0
+        if wet.any():
+            speeds.append(np.percentile(np.linalg.norm(water.velocity[wet], axis=1), 99))
+    return max(speeds)
+
+
+def nice_ceiling(value):
+    """The next round number, so that little of a colour scale is left unused (1 for nothing that moves)."""
+    if value <= 0:
+        return 1.0
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(next(r * power for r in (1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8, 10, 12) if r * power >= value))
+
+
+def nice_floor(value):
+    """The last of 1, 2, 5, 10, … times a power of ten that is not larger."""
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(next(r * power for r in (5, 2, 1) if r * power <= value * (1 + 1e-12)))
+
+
+def behind(mapper):
+    """Let others win where surfaces coincide: a block at a wall of the tank lies in one plane with the water."""
+    mapper.SetResolveCoincidentTopologyToPolygonOffset()
+    mapper.SetRelativeCoincidentTopologyPolygonOffsetParameters(1.0, 8.0)
+
+
+def decimals(times):
+    """Digits after the point that tell neighbouring times apart, at least two."""
+    apart = np.diff(np.unique(times))
+    return 2 if len(apart) == 0 else int(np.clip(np.ceil(-np.log10(apart.min() * 1.001)), 2, 6))
+
+
+def turned(vector, angle):
+    """`vector` (3,) turned about z by `angle` [degree]."""
+    c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+    return np.array([c * vector[0] - s * vector[1], s * vector[0] + c * vector[1], vector[2]])
+
+
+def lettered(text):
+    """Set a VTK text property in a plain sans-serif face."""
+    text.SetFontFamily(VTK_FONT_FILE)
+    text.SetFontFile(str(LETTERS))
+    text.BoldOff()
+    text.ItalicOff()

@@ -1,0 +1,199 @@
+"""From the structure of a case to its blocks, part by part: single blocks, generators and files."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from coupler.case.case import Case
+from coupler.geometry.bodies import turned
+
+KeyPath = tuple[str | int, ...]
+
+
+@dataclass(frozen=True)
+class Part:
+    """What one table of the structure makes: where it is written, its name, and its blocks."""
+
+    path: KeyPath
+    name: str
+    blocks: tuple
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """A part that is still to be made; make() raises BlockError or MeshFileError where it cannot be."""
+
+    path: KeyPath
+    name: str
+    make: Callable[[], list]
+
+
+def parts_of(case: Case) -> tuple[Part, ...]:
+    """All parts with their blocks, in the order of the rows of the structure; empty without a structure.
+
+    Kept for the next call: a case is checked, forecast and built from the same blocks, unless a file changed.
+    """
+    stamps = tuple(stamp(spec.path) for spec in case.structure.file) if case.structure else ()
+    return _made(case, stamps)
+
+
+@lru_cache(maxsize=1)
+def _made(case: Case, stamps: tuple) -> tuple[Part, ...]:
+    return tuple(Part(r.path, r.name, tuple(r.make())) for r in recipes(case))
+
+
+def stamp(path: str) -> tuple[int, int]:
+    """Time of the last change [ns] and size [B] of a file: by these it is read again or not."""
+    there = os.stat(path)
+    return there.st_mtime_ns, there.st_size
+
+
+def recipes(case: Case) -> Iterator[Recipe]:
+    """Every part of the structure, not made yet."""
+    if case.structure is None:
+        return
+    driven = {motion.block: motion.velocity for motion in case.motion}
+    for kind, make in _MAKERS.items():
+        for i, spec in enumerate(getattr(case.structure, kind)):
+            yield Recipe(
+                ("structure", kind, i),
+                spec.name,
+                lambda spec=spec, make=make: _made_from(case, spec, make, driven),
+            )
+
+
+def _made_from(case: Case, spec, make, driven: dict) -> list:
+    """The blocks of one table, those with a prescribed motion driven."""
+    common = {"density": spec.density or case.structure.density, "material": spec.material}
+    blocks = make(spec, common)
+    return [
+        b.changed(driven=True, fixed=False, velocity=np.array(driven[b.name])) if b.name in driven else b
+        for b in blocks
+    ]
+
+
+def _single(spec, common: dict) -> list:
+    from yade_scripts.blocks.block import Block
+
+    more = common | {
+        "rotation": turned(spec.rotation),
+        "group": spec.group or spec.name,
+        "fixed": spec.fixed,
+        "velocity": np.array(spec.velocity),
+        "spin": np.array(spec.spin),
+    }
+    if spec.size is not None:
+        return [Block(spec.name, np.array(spec.centre), size=np.array(spec.size), **more)]
+    block = Block.standing(spec.name, np.array(spec.vertices), **more)
+    return [block if spec.centre is None else block.changed(centre=np.array(spec.centre))]
+
+
+def _wall(spec, common: dict) -> list:
+    from yade_scripts.blocks.generators.wall import wall_of_blocks
+
+    return wall_of_blocks(
+        spec.name, spec.lower, spec.size, spec.block, spec.bond, spec.along, group=spec.name, **common
+    )
+
+
+def _building(spec, common: dict) -> list:
+    from yade_scripts.blocks.generators.building import Building, building_blocks
+
+    lower, size = np.array(spec.lower), np.array(spec.size)
+    return building_blocks(
+        Building(
+            lower=lower[:2],
+            upper=lower[:2] + size[:2],
+            height=size[2],
+            thickness=spec.wall_thickness,
+            floor_thickness=spec.floor_thickness,
+            block=spec.block[0],
+            course=spec.block[1],
+            storeys=spec.storeys,
+            roof=spec.roof,
+            base=lower[2],
+            openings=tuple(_opening(spec, o) for o in spec.opening),
+            name=spec.name,
+            **common,
+        )
+    )
+
+
+def _opening(spec, opening):
+    """A rectangle in a wall as a box through that wall."""
+    from yade_scripts.blocks.generators.building import Opening
+
+    lower, upper = np.array(spec.lower), np.add(spec.lower, spec.size)
+    across = "xy".index(opening.wall[0])
+    along = 1 - across
+    box_low, box_high = lower.copy(), upper.copy()
+    if opening.wall[1] == "-":
+        box_high[across] = lower[across] + spec.wall_thickness
+    else:
+        box_low[across] = upper[across] - spec.wall_thickness
+    for axis, start, length in zip((along, 2), opening.lower, opening.size):
+        box_low[axis] = lower[axis] + start
+        box_high[axis] = box_low[axis] + length
+    return Opening(box_low, box_high)
+
+
+def _column(spec, common: dict) -> list:
+    from yade_scripts.blocks.generators.column import column_of_boxes, column_of_drums
+
+    common = common | {"group": spec.name}
+    if spec.size is not None:
+        return column_of_boxes(spec.name, spec.foot, (*spec.size, spec.height), spec.drums, **common)
+    return column_of_drums(
+        spec.name, spec.foot, spec.radius, spec.height, spec.drums, spec.sides, spec.top_radius, **common
+    )
+
+
+def _arch(spec, common: dict) -> list:
+    from yade_scripts.blocks.generators.arch import Arch, abutment_blocks, arch_blocks
+
+    arch = Arch(
+        spec.name,
+        np.array(spec.foot),
+        spec.span,
+        spec.span / 2 if spec.rise is None else spec.rise,
+        spec.thickness,
+        spec.width,
+        spec.voussoirs,
+        spec.along,
+        spec.abutment,
+    )
+    common = common | {"group": spec.name}
+    return arch_blocks(arch, **common) + abutment_blocks(arch, fixed=spec.abutment_fixed, **common)
+
+
+def _rubble(spec, common: dict) -> list:
+    from yade_scripts.blocks.generators.rubble import rubble_blocks
+
+    return rubble_blocks(
+        spec.name, spec.lower, spec.size, spec.count, spec.diameter, spec.seed, spec.shape, spec.corners,
+        group=spec.name, **common,
+    )  # fmt: skip
+
+
+def _file(spec, common: dict) -> list:
+    from coupler.geometry.block_files import blocks_from_file
+
+    return blocks_from_file(spec, fixed=spec.fixed, group=spec.name, **common)
+
+
+_MAKERS = {
+    "block": _single,
+    "wall": _wall,
+    "building": _building,
+    "column": _column,
+    "arch": _arch,
+    "rubble": _rubble,
+    "file": _file,
+}
+PARTS = tuple(_MAKERS)
+"""Tables of the structure that make blocks, in the order of their rows."""

@@ -1,0 +1,210 @@
+"""The mesh of a tank: split bricks of a box, or the tetrahedra of a file.
+
+With a file, lower, upper and cell of the tank follow from it: the box around its nodes and the mean edge of its cells.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from coupler.case.case import Case, Tank
+from coupler.geometry.mesh_files import MeshFileError
+from coupler.geometry.parts import stamp
+from coupler.geometry.tetrahedra import read_tetrahedra, shown
+
+Array = np.ndarray
+KeyPath = tuple[str | int, ...]
+Problem = tuple[KeyPath, str]
+
+OF_BOX = {
+    "lower": "corner with the smallest coordinates [m]",
+    "upper": "corner with the largest coordinates [m]",
+    "cell": "wanted edge of the mesh cells [m]",
+}
+OF_FILE = ("scale", "offset")
+SHARP = 30.0
+"""Least angle [degrees] between two faces of the boundary whose common edge is drawn."""
+FULL = 1e-4
+"""Share of the box around a mesh that may be missing in one that fills it."""
+THIN = 5.0
+"""Least angle [degrees] between two faces of a cell without a remark."""
+UNLIKE = 4.0
+"""Largest over smallest cell without a remark."""
+IN_PLANE = 1e-3
+"""Share of a cell within which a face lies in a side of the box around the mesh."""
+
+
+def measured(case: Case) -> tuple[Case, list[Problem]]:
+    """The case with lower, upper and cell of its tank, from the file if it names one; and why that cannot be."""
+    tank = case.tank
+    if tank is None:
+        return case, []
+    wrong = list(_wrong_keys(tank))
+    if wrong or tank.mesh is None:
+        return case, wrong
+    try:
+        mesh = mesh_of(tank)
+    except MeshFileError as error:
+        return case, [(("tank", "mesh"), str(error))]
+    lower, upper = (tuple(corner) for corner in mesh.bounds.tolist())
+    found = {"lower": lower, "upper": upper, "cell": mesh.spacing}
+    return case.model_copy(update={"tank": tank.model_copy(update=found)}), []
+
+
+def is_measured(tank: Tank) -> bool:
+    """Whether the place and the cells of a tank are known."""
+    return None not in (tank.lower, tank.upper, tank.cell)
+
+
+def mesh_of(tank: Tank):
+    """The `Background` of a tank; a file is read once unless it changes. Raises MeshFileError."""
+    from fluid.mesh.background import box_mesh
+
+    if tank.mesh is None:
+        return box_mesh(tank.lower, tank.upper, tank.cell, split=tank.split)
+    there = stamp(tank.mesh) if Path(tank.mesh).is_file() else None
+    return _kept(Path(tank.mesh), tank.scale, tank.offset, there)
+
+
+def on_side(mesh, side: str, normals: Array, centres: Array) -> Array:
+    """(B,) bool: faces of the boundary, by normals and centres (B, 3), in the named side of the box around the mesh.
+
+    A centre is in the plane of a side only if all corners are; the rest of a boundary of any shape is wall."""
+    axis, sign = "xyz".index(side[0]), 1.0 if side[1] == "+" else -1.0
+    plane = mesh.bounds[int(sign > 0.0), axis]
+    return (sign * normals[:, axis] > 0.5) & (np.abs(centres[:, axis] - plane) <= IN_PLANE * mesh.spacing)
+
+
+def tank_places(case: Case) -> Iterator[Problem]:
+    """Sides that a mesh from a file has not, water beside it, and blocks in one that is no box."""
+    if case.tank is None or case.tank.mesh is None:
+        return
+    mesh = mesh_of(case.tank)
+    yield from _sides(case, mesh)
+    for i, fill in enumerate(case.water.fill if case.water else ()):
+        if not _within(mesh.nodes, fill).any():
+            yield (
+                ("water", "fill", i),
+                "no node of tank.mesh lies in this box, so there is no water; enlarge it",
+            )
+    if case.structure is not None and not _fills_its_box(mesh):
+        share = mesh.cell_volume.sum() / np.prod(np.ptp(mesh.bounds, axis=0))
+        low, high = (shown(corner) for corner in mesh.bounds)
+        yield (
+            ("tank", "mesh"),
+            f"it fills {share:.1%} of the box around it, {low} to {high} m, and blocks know no walls but the sides of "
+            "that box: with [structure] the mesh must fill it; mesh the whole box and make bed and shores [[solid]]s",
+        )
+
+
+def mesh_remarks(tank: Tank) -> Iterator[str]:
+    """Cells of a file on which the flow was not tried: thinner, or less alike in size, than in its tests."""
+    if tank.mesh is None:
+        return
+    from fluid.mesh.background import CORNERS_OF_FACE
+
+    mesh = mesh_of(tank)
+    normals = -mesh.gradients / np.linalg.norm(mesh.gradients, axis=2, keepdims=True)
+    cosine = -np.einsum("eak,ebk->eab", normals, normals) - 2.0 * np.eye(len(CORNERS_OF_FACE))
+    cosine = cosine.max(axis=(1, 2))
+    thin = int(cosine.argmax())
+    angle = float(np.degrees(np.arccos(min(1.0, cosine[thin]))))
+    if angle < THIN:
+        place = shown(mesh.nodes[mesh.cells[thin]].mean(axis=0))
+        yield (
+            f"tank.mesh has a cell at {place} m with two faces {angle:.2g} degrees apart; flows were tried down to "
+            f"{THIN:g}: optimise the mesh (gmsh: Mesh.Optimize = 1)"
+        )
+    small, large = mesh.cell_size.min(), mesh.cell_size.max()
+    if large > UNLIKE * small:
+        yield (
+            f"tank.mesh has cells of {small:.2g} to {large:.2g} m; steps, films and smoothing go by their mean, "
+            f"{mesh.spacing:.2g} m, for all of them"
+        )
+
+
+def water_in(tank: Tank, boxes) -> float:
+    """Volume [m³] of the cells of a mesh file whose middle lies in one of the boxes."""
+    mesh = mesh_of(tank)
+    middle = mesh.nodes[mesh.cells].mean(axis=1)
+    inside = np.any([_within(middle, box) for box in boxes], axis=0) if boxes else np.zeros(len(middle), bool)
+    return float(mesh.cell_volume[inside].sum())
+
+
+def basin_edges(mesh) -> Array | None:
+    """Ends (k, 2, 3) [m] of the sharp edges of the boundary, for pictures; None for a box, whose edges are known."""
+    if _fills_its_box(mesh):
+        return None
+    faces = np.sort(mesh.boundary_faces, axis=1)
+    edges = np.concatenate([faces[:, [0, 1]], faces[:, [0, 2]], faces[:, [1, 2]]])
+    face = np.tile(np.arange(len(faces)), 3)
+    order = np.lexsort(edges.T)
+    edges, normal = edges[order], mesh.boundary_normal[face[order]]
+    same = (edges[1:] == edges[:-1]).all(axis=1)
+    sharp = np.einsum("ek,ek->e", normal[1:], normal[:-1]) < np.cos(np.radians(SHARP))
+    return mesh.nodes[edges[1:][same & sharp]]
+
+
+def _fills_its_box(mesh) -> bool:
+    share = mesh.cell_volume.sum() / np.prod(np.ptp(mesh.bounds, axis=0))
+    return bool(abs(share - 1.0) <= FULL)
+
+
+def beside_mesh(tank: Tank, place) -> bool:
+    """Whether a point (3,), or the vertical line over a point (2,) [m], misses all cells of a mesh file."""
+    mesh = mesh_of(tank)
+    points = np.atleast_2d(np.asarray(place, float))
+    if len(place) == 2:
+        low, high = mesh.bounds[:, 2]
+        z = np.arange(low, high, 0.25 * mesh.spacing)
+        points = np.column_stack([np.full(len(z), place[0]), np.full(len(z), place[1]), z])
+    return not (mesh.locate(points) >= 0).any()
+
+
+def _wrong_keys(tank: Tank) -> Iterator[Problem]:
+    if tank.mesh is None:
+        for name, meaning in OF_BOX.items():
+            if getattr(tank, name) is None:
+                yield (
+                    ("tank", name),
+                    f"missing; {meaning}. Write lower, upper and cell, or mesh, a file of tetrahedra",
+                )
+        for name in OF_FILE:
+            if name in tank.model_fields_set:
+                yield ("tank", name), "is for tank.mesh, and there is none; leave it out"
+        return
+    for name in (*OF_BOX, "split"):
+        if name in tank.model_fields_set:
+            yield ("tank", name), "follows from tank.mesh, which is given as well; leave one of them out"
+
+
+def _sides(case: Case, mesh) -> Iterator[Problem]:
+    """Sides that a case names although no face of the mesh lies there."""
+    named = [(("tank", "open"), s) for s in case.tank.open] + [
+        (("tank", "smooth"), s) for s in case.tank.smooth
+    ]
+    for kind in ("inflow", "sea"):
+        specs = getattr(case.water, kind) if case.water else ()
+        named += [(("water", kind, i, "side"), spec.side) for i, spec in enumerate(specs)]
+    centres = mesh.nodes[mesh.boundary_faces].mean(axis=1)
+    for path, side in named:
+        if not on_side(mesh, side, mesh.boundary_normal, centres).any():
+            plane = mesh.bounds[int(side[1] == "+"), "xyz".index(side[0])]
+            yield (
+                path,
+                f"{side}: no face of tank.mesh lies in the plane {side[0]} = {plane:g} m at its end; only flat ends "
+                "along an axis are sides, the rest is wall: cut the mesh flat there, or leave this side out",
+            )
+
+
+def _within(points: Array, box) -> Array:
+    return np.all((points >= box.lower) & (points <= box.upper), axis=1)
+
+
+@lru_cache(maxsize=1)
+def _kept(path: Path, scale: float, offset: tuple, _stamp):
+    return read_tetrahedra(path, scale, offset)

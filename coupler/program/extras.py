@@ -1,0 +1,53 @@
+"""Packages that only some commands need: the extras of pyproject.toml, and what to say where one is absent."""
+
+from __future__ import annotations
+
+from importlib import metadata
+
+from coupler.program.errors import SurgebreakError
+
+EXTRAS = {
+    "view": ("pyvista", "matplotlib", "imageio-ffmpeg", "pillow"),
+    "benchmark": ("pyamg",),
+    "test": ("pytest", "hypothesis", "manifold3d", "pyamg"),
+}
+"""Packages of an extra; of those that tests need, without the tools that read the code."""
+COMMANDS = {"view": "render", "benchmark": "benchmark", "test": "test"}
+"""Command of the launcher that installs the extra."""
+
+
+class NotInstalled(SurgebreakError):
+    """A package of an extra is absent."""
+
+
+def absent(extra: str) -> list[str]:
+    """Packages of the extra that are not installed."""
+    return [name for name in EXTRAS[extra] if not _is_there(name)]
+
+
+def _is_there(name: str) -> bool:
+    """Asked of the installer's records, not of the importer, which refuses VTK in a process that holds YADE."""
+    try:
+        metadata.distribution(name)
+    except metadata.PackageNotFoundError:
+        return False
+    return True
+
+
+def missing(extra: str) -> str:
+    """What is absent of an extra and what brings it; empty where all of it is there."""
+    names = absent(extra)
+    if not names:
+        return ""
+    what = f"{', '.join(names)} {'is' if len(names) == 1 else 'are'} not installed"
+    return (
+        f"{what} (the extra `{extra}`); `./surgebreak {COMMANDS[extra]}` of the checkout brings it, "
+        f"or there: .venv/bin/pip install -c constraints.txt -e '.[{extra}]'"
+    )
+
+
+def need(extra: str) -> None:
+    """Raise NotInstalled, with the way out, where a package of the extra is absent."""
+    told = missing(extra)
+    if told:
+        raise NotInstalled(told)

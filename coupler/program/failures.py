@@ -1,0 +1,135 @@
+"""How a command ends when something goes wrong: which exit code, and what the user and the log are told.
+
+Errors of this program carry a message that says everything. A full disk is told as such. Whatever else
+happens is a mistake in the program: its traceback belongs to the log (or to standard error without a run).
+"""
+
+from __future__ import annotations
+
+import errno
+import resource
+import sys
+import traceback
+from dataclasses import dataclass
+from types import TracebackType
+
+from coupler.program import terminal
+from coupler.program.errors import FULL, BadCase, ExitCode
+
+OURS = ("coupler", "fluid", "yade_scripts")
+CLOSED = (errno.EACCES, errno.EPERM, errno.EROFS)
+"""Numbers of an OSError that mean: not for this user."""
+NO_MEMORY = ("cannot allocate memory", "failed to map segment", "not enough memory")
+"""What the loader of libraries says when there is no room for one, in small letters."""
+
+
+@dataclass(frozen=True)
+class Failure:
+    """The exit code, the message, and the traceback when there is something to mend in the program."""
+
+    exit_code: ExitCode
+    message: str
+    traceback: str = ""
+
+    @classmethod
+    def of(cls, error: BaseException) -> Failure:
+        """What an exception means for the user."""
+        if isinstance(error, KeyboardInterrupt):
+            return cls(
+                ExitCode.STOPPED, "stopped at once by Ctrl-C; the last written state and checkpoint are sound"
+            )
+        if isinstance(error, BrokenPipeError):
+            return cls(
+                ExitCode.STOPPED, "nobody reads the output any more (a pipe to `head`, for instance); stopped"
+            )
+        if isinstance(error, OSError) and error.errno in FULL:
+            return cls(ExitCode.STOPPED, _full(error))
+        if isinstance(error, OSError) and error.errno in CLOSED:
+            return cls(ExitCode.BAD_CASE, _closed(error))
+        if out_of_memory(error):
+            return cls(ExitCode.STOPPED, _memory(error))
+        code = getattr(error, "exit_code", None)
+        if code is None and type(error).__module__.split(".")[0] in OURS:
+            code = ExitCode.DIVERGED if isinstance(error, ArithmeticError) else ExitCode.CRASHED
+        if code is not None:
+            return cls(ExitCode(code), str(error))
+        told = "".join(traceback.format_exception(error))
+        return cls(ExitCode.CRASHED, f"unexpected {type(error).__name__}: {error}", told)
+
+
+def _full(error: OSError) -> str:
+    if type(error).__module__.split(".")[0] in OURS:
+        return str(error)
+    place = f"{error.filename}: " if error.filename else ""
+    return (
+        f"{place}no room for the results ({error.strerror or error}); what was written before is readable; "
+        "free some space, give --output a larger disk, or raise time.output_every"
+    )
+
+
+def _closed(error: OSError) -> str:
+    place = f"{error.filename}: " if error.filename else ""
+    return f"{place}{error.strerror}; name a place that you may read and write"
+
+
+def out_of_memory(error: BaseException | None) -> bool:
+    """Whether an error, or what it came from, is a lack of memory: libraries have words of their own for it."""
+    if error is None:
+        return False
+    if isinstance(error, MemoryError) or getattr(error, "errno", None) == errno.ENOMEM:
+        return True
+    if isinstance(error, ImportError | OSError):
+        library = any(words in str(error).lower() for words in NO_MEMORY)
+        return library or out_of_memory(error.__cause__ or error.__context__)
+    return out_of_memory(error.__cause__)
+
+
+def _memory(error: BaseException) -> str:
+    most, _ = resource.getrlimit(resource.RLIMIT_AS)
+    limit = (
+        "" if most == resource.RLIM_INFINITY else f"; this process may take {most / 1e6:.0f} MB (ulimit -v)"
+    )
+    while (inner := error.__cause__ or error.__context__) and not isinstance(error, MemoryError):
+        error = inner
+    return (
+        f"there is not enough memory ({str(error) or type(error).__name__}){limit}. What was written before is "
+        "readable; `surgebreak check CASE` tells what a case needs: use a larger tank.cell, fewer blocks, or another "
+        "machine"
+    )
+
+
+class Failures:
+    """A context around a command: tells what went wrong and leaves with its exit code."""
+
+    def __enter__(self) -> Failures:
+        return self
+
+    def __exit__(self, kind: type | None, error: BaseException | None, _: TracebackType | None) -> None:
+        if not isinstance(error, Exception | KeyboardInterrupt) or _is_click(error):
+            return
+        failure = Failure.of(error)
+        if isinstance(error, BadCase):
+            _tell_mistakes(error.lines)
+        else:
+            terminal.error(failure.message)
+        log = getattr(error, "log_path", None)
+        if failure.traceback and log is None:
+            terminal.error(failure.traceback)
+        elif failure.traceback:
+            terminal.error(f"the traceback is in {log}")
+        if log is not None:
+            terminal.error(f"results so far in {log.parent}")
+        raise SystemExit(int(failure.exit_code)) from None
+
+
+def _tell_mistakes(lines: list[str]) -> None:
+    """One line each, beginning with the place, as editors and people expect it of compilers."""
+    for line in lines:
+        print(line, file=sys.stderr)
+    count = "1 mistake" if len(lines) == 1 else f"{len(lines)} mistakes"
+    terminal.error(f"{count} in the case; nothing was run")
+
+
+def _is_click(error: BaseException) -> bool:
+    """Wrong options and early exits are told by the command line library itself."""
+    return type(error).__module__.split(".")[0] in ("click", "typer")

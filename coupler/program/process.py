@@ -1,0 +1,56 @@
+"""Processes: those that a command starts run the program that it is itself, wherever it is called from; and whether the
+one of a run is still there.
+
+A child would otherwise find the installed package, or one in the folder in which the user happens to stand: another
+checkout would then be checked, measured or drawn with than the one that was called.
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+import subprocess
+import sys
+
+from coupler.program.provenance import ROOT
+
+LAST_LINES = 3
+"""Of what a process told, in a message about how it ended."""
+
+
+def run_module(module: str, *words: object, **options) -> subprocess.CompletedProcess:
+    """`python -m module words...` of this very program; options of subprocess.run, of which check is False."""
+    command = [sys.executable, "-m", module, *map(str, words)]
+    return subprocess.run(command, **{"check": False, "env": environment(), **options})
+
+
+def trouble(exit_code: int, told: str) -> str:
+    """How a process ended that did not end well, with the last lines of what it told."""
+    last = " | ".join(told.strip().splitlines()[-LAST_LINES:])
+    return f"its process ended with {exit_code}: {last}"
+
+
+def environment() -> dict[str, str]:
+    """The variables of this process, with this checkout first on the path and the working directory not on it."""
+    found = dict(os.environ, PYTHONSAFEPATH="1")
+    if (ROOT / "pyproject.toml").exists():  # else it was installed, and is found by itself
+        others = [place for place in found.get("PYTHONPATH", "").split(os.pathsep) if place]
+        found["PYTHONPATH"] = os.pathsep.join([str(ROOT), *(p for p in others if p != str(ROOT))])
+    return found
+
+
+def was_killed(summary: dict) -> bool:
+    """Whether run.json (its content) says "running" although its process is gone: nothing could tell how the run ended.
+
+    Of a run on another machine that cannot be known.
+    """
+    here = summary.get("machine", {}).get("host", platform.node()) == platform.node()
+    if summary.get("status") != "running" or not here:
+        return False
+    try:
+        os.kill(summary["process"], 0)
+    except ProcessLookupError:
+        return True
+    except PermissionError:  # somebody else's process: it lives
+        return False
+    return False

@@ -1,0 +1,98 @@
+"""What a case promises, and whether a run kept it: `expected.toml` against the histories of a run directory.
+
+[[expect]]
+what = "..."           for people                    table, column   of the history
+take = "last"          last | largest (by size, sign kept) | max | min | mean | at (time) | integral (from, to) |
+                       period | arrival (above): first time that the column exceeds a value
+value, tolerance       |taken - value| ≤ tolerance   or at_least = / at_most =
+source = "..."         where the number comes from
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from coupler.program.errors import did_you_mean
+from coupler.results.history import read_history
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """One promise: what was expected and what the run has."""
+
+    what: str
+    found: float
+    expected: str
+    kept: bool
+    reason: str = ""
+    """Why there is nothing to compare."""
+
+    def __str__(self) -> str:
+        return f"{self.what}: {self.reason or f'{self.found:.4g}'}, expected {self.expected}"
+
+
+def verdicts(run: Path, expected: Path) -> list[Verdict]:
+    """Compare a run directory with an expected.toml, whose entries are sound (`promises.py`)."""
+    entries = tomllib.loads(expected.read_text(encoding="utf-8")).get("expect", [])
+    return [_judge(entry, run) for entry in entries]
+
+
+def _judge(entry: dict, run: Path) -> Verdict:
+    exact = "value" in entry
+    low, high = entry.get("at_least", -np.inf), entry.get("at_most", np.inf)
+    told = f"{entry['value']:g} ± {entry['tolerance']:g}" if exact else f"{low:g} to {high:g}"
+    columns, reason = _columns(entry, run)
+    if reason:
+        return Verdict(entry["what"], float("nan"), told, False, reason)
+    found = float(TAKE[entry["take"]](columns["time"], columns[entry["column"]], entry))
+    kept = abs(found - entry["value"]) <= entry["tolerance"] if exact else low <= found <= high
+    return Verdict(entry["what"], found, told, bool(kept))
+
+
+def _columns(entry: dict, run: Path) -> tuple[dict, str]:
+    """The table that a promise is about; why there is nothing to take from it."""
+    table, name = entry["table"], entry["column"]
+    if not (run / table).is_file():
+        return {}, f"the run has no table {table}"
+    columns = read_history(run / table).values
+    if name not in columns:
+        return {}, f"{table} has no column '{name}'{did_you_mean(name, columns)}"
+    return columns, "" if len(columns["time"]) else f"{table} has no rows"
+
+
+def _integral(time: np.ndarray, values: np.ndarray, entry: dict) -> float:
+    grid = np.unique(np.concatenate([[entry["from"], entry["to"]], time]))
+    grid = grid[(grid >= entry["from"]) & (grid <= entry["to"])]
+    return np.trapezoid(np.interp(grid, time, values), grid)
+
+
+def _period(time: np.ndarray, values: np.ndarray, entry: dict) -> float:
+    """Mean distance of upward crossings of the mean [s]; NaN with fewer than two."""
+    around = values - values.mean()
+    up = np.flatnonzero((around[:-1] < 0) & (around[1:] >= 0))
+    crossing = time[up] - around[up] * (time[up + 1] - time[up]) / (around[up + 1] - around[up])
+    return np.diff(crossing).mean() if len(crossing) > 1 else np.nan
+
+
+def _arrival(time: np.ndarray, values: np.ndarray, entry: dict) -> float:
+    """First time at which the values exceed entry["above"] [s]; NaN if they never do."""
+    above = values > entry["above"]
+    return time[above.argmax()] if above.any() else np.nan
+
+
+TAKE: dict[str, Callable[[np.ndarray, np.ndarray, dict], float]] = {
+    "last": lambda time, values, entry: values[-1],
+    "largest": lambda time, values, entry: values[np.abs(values).argmax()],
+    "max": lambda time, values, entry: values.max(),
+    "min": lambda time, values, entry: values.min(),
+    "mean": lambda time, values, entry: np.trapezoid(values, time) / (time[-1] - time[0]),
+    "at": lambda time, values, entry: np.interp(entry["time"], time, values),
+    "integral": _integral,
+    "period": _period,
+    "arrival": _arrival,
+}

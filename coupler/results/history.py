@@ -1,0 +1,280 @@
+"""Histories: one CSV table per subject, a row per step, which anything can read.
+
+Lines that begin with '#' give name, unit and meaning (with the sign) of every column; then the names; then rows
+with as many digits as tell two floats apart. A row is in the file as soon as it is written, and a row that a killed
+run left unfinished is not read.
+"""
+
+import csv
+import io
+import math
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from coupler.case.paths import BadPath, read_text
+from coupler.program.errors import FULL, ExitCode, SurgebreakError
+from coupler.results.storage import DiskFull, NotFinite, WrongShape
+
+
+@dataclass(frozen=True)
+class Column:
+    """name · unit ("1" for a pure number, "" for text) · meaning, with what a positive value says."""
+
+    name: str
+    unit: str
+    meaning: str
+
+
+class BadTable(SurgebreakError):
+    """A file that is no table of a run, or was changed since; the message names it."""
+
+    exit_code = ExitCode.BAD_CASE
+
+
+MOST_BYTES = 4_000_000_000
+"""Size of a table that is read: millions of steps."""
+
+
+@dataclass(frozen=True)
+class History:
+    """A table read back: columns as declared, values by name (float (rows,), NaN where empty; text as it stands)."""
+
+    title: str
+    columns: tuple
+    values: dict
+
+    def __getitem__(self, name):
+        """The values of a column. Raises BadTable where there is none of that name."""
+        if name not in self.values:
+            raise BadTable(f"the table '{self.title}' has no column '{name}'")
+        return self.values[name]
+
+
+CRACK_COLUMNS = tuple(
+    Column(*c)
+    for c in (
+        ("joint", "1", "number of the joint"),
+        ("a", "1", "row of the first block"),
+        ("b", "1", "row of the second block, -1 for the ground"),
+        ("time", "s", "when the joint lost its last traction; empty if it still holds"),
+        ("area", "m2", "joined area"),
+        ("centre", "m", "centre of the joined face now; it moves with block a"),
+        ("normal", "1", "unit normal of that face now, out of block a"),
+        ("damage", "1", "largest effective opening of its points over the opening at failure, 0 to 1"),
+        ("opening", "m", "mean normal opening, positive when open"),
+        ("sliding", "m", "mean tangential opening, a length"),
+        ("mode_mix", "1", "share of sliding in the effective opening: 0 pulled apart, 1 sheared"),
+        ("dissipated", "J", "energy the joint has used up"),
+        ("intact", "1", "1 while the joint carries traction, else 0"),
+    )
+)
+
+
+class CannotContinue(SurgebreakError):
+    """A file of results is not what the run left; it cannot be continued."""
+
+
+class HistoryTable:
+    """A growing CSV table; columns: Column or (name, unit, meaning).
+
+    keep: `place` at which an existing table is continued; what stands behind is cut off. Raises CannotContinue.
+    """
+
+    def __init__(self, path, columns, title=None, keep=None):
+        self.path = Path(path)
+        self.columns = tuple(c if isinstance(c, Column) else Column(*c) for c in columns)
+        self._names = [c.name for c in self.columns]
+        self._known = set(self._names)
+        self._title = title or self.path.stem
+        self._rows = 0
+        mode = "x" if keep is None else "r+"
+        if keep is not None:
+            self._check_kept(keep)
+        self._file = open(self.path, mode, newline="", encoding="utf-8")  # noqa: SIM115 (lives as long as the run)
+        if keep is None:
+            self._write(header(self._title, self.columns))
+        else:
+            self._rows, size = keep
+            self._file.truncate(size)
+            self._file.seek(size)
+
+    def _check_kept(self, keep):
+        """The table is there, has these columns, and is at least as long as it was."""
+        if not self.path.exists() or self.path.stat().st_size < keep[1]:
+            raise CannotContinue(f"{self.path} is shorter than it was when the checkpoint was written")
+        with open(self.path, newline="", encoding="utf-8") as file:
+            wanted = header(self._title, self.columns)
+            if file.read(len(wanted)) != wanted:
+                raise CannotContinue(f"{self.path} has other columns than this version of the program writes")
+
+    @property
+    def place(self):
+        """Rows and bytes written so far."""
+        return self._rows, self._file.tell()
+
+    def append(self, **row):
+        """Write one row, every column by its name; None leaves a cell empty, NaN and infinity are refused.
+
+        Raises NotFinite, WrongShape (missing or unknown names), DiskFull.
+        """
+        names = self._names
+        if row.keys() != self._known:
+            missing, unknown = sorted(set(names) - set(row)), sorted(set(row) - set(names))
+            raise WrongShape(
+                f"{self.path}, row {self._rows}: missing columns {missing}, unknown columns {unknown}"
+            )
+        self._write(line([self._cell(name, row[name]) for name in names]))
+        self._rows += 1
+
+    def _cell(self, name, value):
+        if value is None or isinstance(value, str):
+            return value or ""
+        if not math.isfinite(value):
+            raise NotFinite(f"{self.path}: {name} is {value} in row {self._rows}; None leaves a cell empty")
+        return number(value)
+
+    def _write(self, text):
+        """Write and flush; a full disk takes the half-written line back."""
+        whole = self._file.tell()
+        try:
+            self._file.write(text)
+            self._file.flush()
+        except OSError as error:
+            if error.errno not in FULL:
+                raise
+            self._abandon(whole)
+            raise DiskFull(self.path, len(text), f"and holds {self._rows} rows", error) from None
+
+    def _abandon(self, whole):
+        """Cut the file back to its last whole row and let go of what Python still wants to write."""
+        descriptor = os.dup(self._file.fileno())
+        try:
+            self._file.close()
+        except OSError:  # the same full disk, again: closing tries to write the rest
+            pass
+        finally:
+            os.ftruncate(descriptor, whole)
+            os.close(descriptor)
+
+    def close(self):
+        """Close the file; rows are in it already."""
+        self._file.close()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *exception):
+        self.close()
+
+
+def header(title, columns):
+    """The '#' lines and the line of names."""
+    lines = [f"# {title}"] + [f"# {c.name} [{c.unit}]: {c.meaning}" for c in columns]
+    return "\n".join(lines) + "\n" + line([c.name for c in columns])
+
+
+def line(cells):
+    """One CSV line."""
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerow(cells)
+    return text.getvalue()
+
+
+def number(value):
+    """The shortest text that reads back as the same number."""
+    value = value.item() if hasattr(value, "item") else value
+    return str(int(value)) if isinstance(value, (bool, int)) else repr(float(value))
+
+
+def read_history(path):
+    """Read a table written by HistoryTable or write_cracks, also while it grows; an unfinished last row is left out.
+
+    Raises BadTable for what is no such table."""
+    try:
+        whole = read_text(Path(path), most=MOST_BYTES).rpartition("\n")[0].splitlines()
+        about = [text[2:] for text in whole if text.startswith("# ")]
+        records = list(csv.reader(text for text in whole if not text.startswith("#")))
+        columns = tuple(_declared(text) for text in about[1:])
+        _check_whole(columns, records)
+        cells = list(zip(*records[1:])) or [()] * len(columns)
+        values = {c.name: _values(c, given) for c, given in zip(columns, cells)}
+    except BadPath as error:
+        raise BadTable(f"{path}: {error}") from error
+    except (ValueError, csv.Error) as error:
+        raise BadTable(f"{path}: not a table as a run writes it: {error}") from error
+    return History(about[0], columns, values)
+
+
+def _check_whole(columns, records):
+    """The line of names says what the head declares, each once, and every row has a value for each."""
+    names = [c.name for c in columns]
+    if not records or records[0] != names or len(set(names)) < len(names):
+        raise ValueError("its columns are not those that its head declares")
+    bad = next((k for k, row in enumerate(records[1:]) if len(row) != len(names)), None)
+    if bad is not None:
+        raise ValueError(f"row {bad} has {len(records[bad + 1])} values, there are {len(names)} columns")
+
+
+def _declared(text):
+    name, _, rest = text.partition(" [")
+    unit, _, meaning = rest.partition("]: ")
+    return Column(name, unit, meaning)
+
+
+def _values(column, cells):
+    if column.unit == "":
+        return np.array(cells, dtype=str)
+    return np.array([float(c) if c else np.nan for c in cells])
+
+
+def write_cracks(path, table):
+    """Write the crack table from a dict of arrays with names out of CRACK_COLUMNS (n,) or, for vectors, (n, 3).
+
+    Written beside and then renamed, so that a killed run leaves the table before or the table after. A time that is
+    not finite (the joint holds) becomes an empty cell. Raises WrongShape (unknown name, unequal lengths), NotFinite,
+    DiskFull.
+    """
+    columns, arrays = _crack_arrays(path, table)
+    body = "".join(
+        line([_crack_cell(path, c.name, i, a[i]) for c, a in zip(columns, arrays)])
+        for i in range(len(arrays[0]) if arrays else 0)
+    )
+    _replace(Path(path), header("joints: which broke, when and how", columns) + body)
+
+
+def _crack_arrays(path, table):
+    known = {c.name: c for c in CRACK_COLUMNS}
+    unknown = sorted(set(table) - set(known))
+    lengths = {name: np.shape(values)[:1] for name, values in table.items()}
+    if unknown or len(set(lengths.values())) > 1:
+        raise WrongShape(f"{path}: unknown columns {unknown} (known: {', '.join(known)}); rows {lengths}")
+    columns, arrays = [], []
+    for name in (c.name for c in CRACK_COLUMNS if c.name in table):
+        values = np.asarray(table[name])
+        parts = [("", values)] if values.ndim == 1 else [("_" + "xyz"[i], values[:, i]) for i in range(3)]
+        columns += [Column(name + tail, known[name].unit, known[name].meaning) for tail, _ in parts]
+        arrays += [part for _, part in parts]
+    return columns, arrays
+
+
+def _crack_cell(path, name, row, value):
+    if np.isfinite(value):
+        return number(value)
+    if name == "time":
+        return ""
+    raise NotFinite(f"{path}: {name} is {value} in row {row}")
+
+
+def _replace(path, text):
+    beside = path.with_name(path.name + ".new")
+    try:
+        beside.write_text(text, encoding="utf-8")
+        os.replace(beside, path)
+    except OSError as error:
+        if error.errno not in FULL:
+            raise
+        beside.unlink(missing_ok=True)
+        raise DiskFull(path, len(text), "as it was before", error) from None

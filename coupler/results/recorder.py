@@ -1,0 +1,245 @@
+"""What a run leaves behind: histories every step, fields at the output times, the crack table.
+
+`history/energy.csv`   energy               `history/momentum.csv`, `angular_momentum.csv`  the books of momentum
+`history/coupling.csv` how each step went   `history/water.csv`     volume
+`history/gauges.csv`   the gauges           `history/structure.csv` joints, fastest block
+`history/loads_*.csv`  loads by what they come from, where a case asks for them
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from coupler.geometry.tank_mesh import basin_edges
+from coupler.results.columns import (
+    COUPLING,
+    ENERGY,
+    MOMENTUM_TITLE,
+    STRUCTURE,
+    STRUCTURE_LINES,
+    WATER,
+    momentum_columns,
+)  # fmt: skip
+from coupler.results.crack_surfaces import write_crack_surfaces
+from coupler.results.fields import BlockWriter, WaterWriter, write_solids
+from coupler.results.history import HistoryTable, write_cracks
+from coupler.step.observe import block_damage, crack_columns, fastest_point, joint_counts
+
+
+class Recorder:
+    """Writes a run as it goes; absent sides leave no files.
+
+    directory: of the run · coupling: Coupling · gauges: list of Gauge
+    solids: [(vertices, faces)] that never move, with a structure its last blocks ·
+    tank: (lower, upper) or None · kept: what `save` gave, to continue the files from there. Raises CannotContinue.
+    """
+
+    def __init__(self, directory, coupling, gauges, solids, tank, kept=None):
+        self.coupling, self.gauges = coupling, gauges
+        self.history = directory / "history"
+        self.history.mkdir(exist_ok=True)
+        self.cracks = directory / "cracks.csv"
+        water, structure = coupling.water, coupling.structure
+        self.impulse = np.zeros(3)
+        self.reinserted, self.clipped = 0.0, 0
+        self.reinserted_net = self.left = self.parted = 0.0
+        self._kept = kept
+        self._tables: dict[str, HistoryTable] = {}
+        self._energy = self._table("energy", ENERGY)
+        self._coupling = self._table("coupling", COUPLING)
+        about = "({:g}, {:g}, {:g})".format(*coupling.momentum.about)
+        of = f"angular momentum about {about}"
+        self._momentum = self._table("momentum", momentum_columns("N s", "momentum"), MOMENTUM_TITLE)
+        self._angular = self._table(
+            "angular_momentum", momentum_columns("N m s", of), f"angular {MOMENTUM_TITLE}"
+        )
+        self._water = self._table("water", WATER) if water else None
+        self._structure = self._table("structure", STRUCTURE) if structure else None
+        self._gauges = self._table("gauges", self._gauge_columns()) if self._together() else None
+        self._own = [(gauge, self._table(gauge.table, gauge.columns)) for gauge in gauges if gauge.table]
+        self._written = 0 if kept is None else int(kept["outputs"])
+        keep = None if kept is None else self._written
+        self._fields = WaterWriter(directory / "fields.vtkhdf", keep=keep) if water else None
+        self._blocks = None
+        if structure:
+            s = structure
+            self._n_blocks = s.n - len(solids)
+            shapes = (s.shape_vertices, s.shape_faces, s.names, s.groups)
+            own = (values[: self._n_blocks] for values in shapes)
+            self._blocks = BlockWriter(directory / "blocks.vtkhdf", *own, keep=keep)
+        if kept is not None:
+            self._restore_sums(kept)
+        elif solids or tank:
+            basin = basin_edges(water.mesh) if water else None
+            bodies = ([v for v, _ in solids], [f for _, f in solids])
+            write_solids(directory / "solids.vtkhdf", *bodies, tank, basin=basin)
+
+    def _table(self, name: str, columns, title: str | None = None) -> HistoryTable:
+        keep = None if self._kept is None else self._kept[f"table_{name}"].tolist()
+        self._tables[name] = HistoryTable(self.history / f"{name}.csv", columns, title, keep)
+        return self._tables[name]
+
+    def _restore_sums(self, kept) -> None:
+        self.impulse = kept["impulse"].copy()
+        self.reinserted, self.clipped = float(kept["reinserted"]), int(kept["clipped"])
+        self.reinserted_net, self.left = float(kept["reinserted_net"]), float(kept["left"])
+        self.parted = float(kept["parted"])
+        for k, gauge in enumerate(self.gauges):
+            if gauge.windows is not None:
+                start = f"gauge_{k}_"
+                own = {name.removeprefix(start): a for name, a in kept.items() if name.startswith(start)}
+                gauge.windows.restore(own)
+        self._write_cracks()
+
+    def _gauge_memory(self) -> dict[str, np.ndarray]:
+        """What the gauges have accumulated, by number of the gauge."""
+        return {
+            f"gauge_{k}_{name}": array
+            for k, gauge in enumerate(self.gauges)
+            if gauge.windows is not None
+            for name, array in gauge.windows.save().items()
+        }
+
+    def save(self) -> dict[str, np.ndarray]:
+        """Sums so far, and how far the files go: written states, rows and bytes of each table."""
+        places = {f"table_{name}": np.array(table.place) for name, table in self._tables.items()}
+        return (
+            places
+            | self._gauge_memory()
+            | {
+                "outputs": np.array(self._written),
+                "impulse": self.impulse.copy(),
+                "reinserted": np.array(self.reinserted),
+                "reinserted_net": np.array(self.reinserted_net),
+                "left": np.array(self.left),
+                "parted": np.array(self.parted),
+                "clipped": np.array(self.clipped),
+            }
+        )
+
+    def _together(self):
+        """The gauges that share a table."""
+        return [gauge for gauge in self.gauges if gauge.table is None]
+
+    def _gauge_columns(self):
+        return [("time", "s", "time"), *(column for gauge in self._together() for column in gauge.columns)]
+
+    def step(self, record) -> None:
+        """Append one row to each history."""
+        c = self.coupling
+        b = record.balance
+        e = c.structure.energies() if c.structure else {}
+        self._energy.append(
+            time=record.time,
+            water_kinetic=b.water_kinetic,
+            water_potential=b.water_potential,
+            numerical_dissipation=b.numerical_dissipation,
+            shear_dissipation=b.shear_dissipation,
+            parting_work=b.parting_work,
+            entered=b.entered,
+            left=b.left,
+            work_given=b.work_given,
+            work_received=b.work_received,
+            blocks_kinetic=e.get("kinetic", 0.0),
+            blocks_gravity=e.get("gravity", 0.0),
+            **{name: e.get(name, 0.0) for name in STRUCTURE_LINES},
+            driving_work=e.get("driving_work", 0.0),
+            structure_residual=b.structure_residual,
+            interface_residual=b.interface_residual if c.coupled else 0.0,
+            input_energy=b.input_energy,
+            energy_error=b.energy_error,
+        )
+        self._coupling.append(**{name: getattr(record, name) for name, *_ in COUPLING})
+        self._append_momentum(record)
+        if self._water:
+            self._append_water(record)
+        if self._structure:
+            self._append_structure(record)
+        if self._gauges:
+            values = {}
+            for gauge in self._together():
+                values |= gauge.read(c, record)
+            self._gauges.append(time=record.time, **values)
+        for gauge, table in self._own:
+            for row in gauge.read(c, record):
+                table.append(**row)
+
+    def _append_momentum(self, record) -> None:
+        m = record.momentum
+        vectors = {"water": m.water, "blocks": m.blocks, **m.lines, "residual": m.residual}
+        for table, part in ((self._momentum, slice(0, 3)), (self._angular, slice(3, 6))):
+            row = {n: v for name, vector in vectors.items() for n, v in _xyz(name, vector[part]).items()}
+            table.append(time=record.time, **row)
+
+    def _append_water(self, record) -> None:
+        w = self.coupling.water
+        self.reinserted += abs(w.report.reinserted)
+        self.reinserted_net += w.report.reinserted
+        self.clipped += w.report.clipped
+        self.left += w.report.left
+        self.parted += w.report.bound.volume
+        sides = w.sides
+        self._water.append(
+            time=record.time,
+            volume=w.volume(),
+            entered=0.0 if sides is None else sides.entered,
+            left=self.left + (0.0 if sides is None else sides.left),
+            volume_error=w.volume_error(),
+            reinserted=self.reinserted,
+            reinserted_net=self.reinserted_net,
+            clipped=self.clipped,
+            lowest_pressure=w.report.bound.lowest,
+            wall_at_bound=w.report.bound.wall,
+            parted=self.parted,
+            **_xyz("momentum", w.momentum()),
+        )
+
+    def _append_structure(self, record) -> None:
+        s = self.coupling.structure
+        self.impulse += record.dt * record.load[: s.n, :3].sum(axis=0)
+        joints = joint_counts(s)
+        self._structure.append(
+            time=record.time,
+            joints_intact=joints.intact,
+            joints_broken=joints.broken,
+            largest_damage=joints.largest_damage,
+            **_xyz("momentum", (s.mass[:, None] * s.velocity()[:, :3])[~s.fixed].sum(axis=0)),
+            **_xyz("impulse", self.impulse),
+            fastest=fastest_point(s.velocity(), self.coupling.radius),
+        )
+
+    def fields(self, time: float) -> None:
+        """Write water, blocks and the crack table as they are now."""
+        c = self.coupling
+        if self._fields:
+            w = c.water
+            self._fields.append(
+                time,
+                w.domain.nodes,
+                w.domain.cells,
+                {"level_set": w.level_set, "velocity": w.velocity, "pressure": w.pressure},
+                {"fluid_fraction": w.topology.fraction},
+            )
+        if self._blocks:
+            s = c.structure
+            data = {"speed": np.linalg.norm(s.velocity()[:, :3], axis=1)}
+            data |= {} if s.joints is None else {"damage": block_damage(s)}
+            data = {name: values[: self._n_blocks] for name, values in data.items()}
+            self._blocks.append(time, s.centre()[: self._n_blocks], s.rotation()[: self._n_blocks], data)
+        self._write_cracks()
+        self._written += 1
+
+    def _write_cracks(self) -> None:
+        structure = self.coupling.structure
+        cracks = crack_columns(structure) if structure else {}
+        if cracks:
+            write_cracks(self.cracks, cracks)
+            write_crack_surfaces(self.cracks.with_suffix(".vtu"), *structure.joint_polygons(), cracks)
+
+    def close(self) -> None:
+        for table in self._tables.values():
+            table.close()
+
+
+def _xyz(name: str, vector) -> dict[str, float]:
+    return {f"{name}_{axis}": float(v) for axis, v in zip("xyz", vector)}

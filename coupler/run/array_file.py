@@ -1,0 +1,98 @@
+"""A file of named arrays and one text that is there as a whole or not at all, and tells if it was damaged since.
+
+Written beside and renamed; a digest of every name, type, shape and byte stands in the file and is checked on reading.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from coupler.program.errors import FULL
+from coupler.results.storage import DiskFull, claim, finite
+
+LAYOUT = ("v110", "v110")
+SMALL = 512
+"""Numbers below which an array is not worth compressing."""
+HEADROOM = 1 << 16
+
+
+class Damaged(ValueError):
+    """The file is torn or was changed: its content cannot be trusted."""
+
+
+def write_arrays(path: Path, arrays: dict[str, np.ndarray], text: str, unset=()) -> None:
+    """Write arrays by name (slashes make groups) and a text. unset: names in which NaN means "not yet".
+
+    Raises NotFinite before anything is written, and DiskFull; the file at `path` is then as it was before."""
+    for name, array in arrays.items():
+        if name not in unset:
+            finite(name, array, path)
+    part = path.with_name(f".{path.name}.part")
+    part.unlink(missing_ok=True)
+    size = sum(a.nbytes + 512 for a in arrays.values()) + len(text) + HEADROOM
+    try:
+        claim(part, size)
+        _write(part, arrays, text)
+        os.replace(part, path)
+    except OSError as error:
+        part.unlink(missing_ok=True)
+        if error.errno not in FULL:
+            raise
+        why = OSError(error.errno, os.strerror(error.errno))
+        raise DiskFull(path, size, "as it was before, if there was one", why) from None
+    _flush_directory(path.parent)
+
+
+def _write(path: Path, arrays: dict[str, np.ndarray], text: str) -> None:
+    with h5py.File(path, "w", libver=LAYOUT, locking=False) as file:
+        for name, array in arrays.items():
+            packed = {"compression": "lzf", "shuffle": True} if array.size > SMALL else {}
+            file.create_dataset(name, data=array, **packed)
+        file["text"] = np.frombuffer(text.encode("utf-8"), np.uint8)
+        file.attrs["digest"] = digest(arrays, text)
+    with path.open("rb") as stream:
+        os.fsync(stream.fileno())
+
+
+def _flush_directory(path: Path) -> None:
+    """So that the new name outlives a machine that loses power."""
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def read_arrays(path: Path) -> tuple[dict[str, np.ndarray], str]:
+    """Arrays by name and the text.  Raises Damaged."""
+    arrays: dict[str, np.ndarray] = {}
+
+    def take(name: str, item) -> None:
+        if isinstance(item, h5py.Dataset):
+            arrays[name] = np.asarray(item[()])
+
+    try:
+        with h5py.File(path, "r", locking=False) as file:
+            file.visititems(take)
+            wanted = file.attrs["digest"]
+        text = arrays.pop("text").tobytes().decode("utf-8")
+    except (OSError, KeyError, RuntimeError, ValueError, TypeError) as error:
+        raise Damaged(f"{path} cannot be read: {str(error).splitlines()[0]}") from error
+    if digest(arrays, text) != wanted:
+        raise Damaged(f"{path} does not hold what was written into it (checksum)")
+    return arrays, text
+
+
+def digest(arrays: dict[str, np.ndarray], text: str) -> str:
+    """Checksum of names, types, shapes, values and the text."""
+    found = hashlib.blake2b(text.encode("utf-8"), digest_size=16)
+    for name in sorted(arrays):
+        array = np.ascontiguousarray(arrays[name])
+        found.update(f"{name} {array.dtype.str} {np.shape(arrays[name])} ".encode())
+        found.update(array.tobytes())
+    return found.hexdigest()

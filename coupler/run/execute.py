@@ -1,0 +1,51 @@
+"""A run from its case to its end, as the commands `run` and `resume` make it: told, compared, ended with its code."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from coupler.case.case import modules
+from coupler.checks.case import remarks
+from coupler.checks.read_case import CaseFile
+from coupler.program import arithmetic
+from coupler.program.errors import ExitCode
+from coupler.results.expected import verdicts
+from coupler.run.directory import RunDirectory
+
+
+def carry_out(file: CaseFile, directory: RunDirectory, checkpoint=None) -> ExitCode:
+    """Run a case in its directory to the end, from a checkpoint or from the start; how it ended."""
+    # here, because `check` describes a case without what a run loads
+    from coupler.run.progress import reporter
+    from coupler.run.run import run
+    from coupler.run.stop import StopRequest
+
+    with directory, StopRequest(directory.path) as stop:
+        with reporter(file.case.time.end, directory.log, stop.requested) as tell:
+            describe(file, tell.message)
+            code = ExitCode(run(file.case, directory, tell, checkpoint))
+            compare(file, directory, tell.message)
+        directory.finish(code, "reached the end" if code == ExitCode.DONE else "see log.txt")
+    print(f"results in {directory.path}")
+    return code
+
+
+def describe(file: CaseFile, tell: Callable[[str], object]) -> None:
+    """Tell which parts are on and off, and what is worth knowing before the run."""
+    parts = modules(file.case)
+    tell(f"{file.path}: {file.case.case.title}")
+    tell("on:  " + (", ".join(name for name, on in parts.items() if on) or "nothing"))
+    tell("off: " + (", ".join(name for name, on in parts.items() if not on) or "nothing"))
+    for remark in [*remarks(file.case), *filter(None, [arithmetic.remark()])]:
+        tell(f"note: {remark}")
+
+
+def compare(file: CaseFile, directory: RunDirectory, tell: Callable[[str], object]) -> None:
+    """Tell whether a run of the case as it is written kept what its expected.toml promises; no file, no promise."""
+    promises = file.directory / "expected.toml"
+    if file.overrides or not promises.exists():
+        return
+    found = verdicts(directory.path, promises)
+    for verdict in found:
+        tell(f"{'as expected' if verdict.kept else 'UNEXPECTED'}: {verdict}")
+    directory.record(expected={verdict.what: verdict.kept for verdict in found})

@@ -1,0 +1,78 @@
+"""What a scene is made of and which program ran it, short enough to be told: to refuse a restart of something else."""
+
+from __future__ import annotations
+
+import hashlib
+
+import numpy as np
+
+from coupler.program import provenance
+
+FREE = ("time.end", "time.step_max", "time.cfl", "time.checkpoint_every", "coupling.", "limits.")
+"""Names of the case that may change when a run goes on; with a dot at the end: a whole section."""
+
+
+def scene_parts(coupling) -> dict[str, str]:
+    """Mesh, blocks and joints with what tells them from others."""
+    parts = {}
+    if coupling.water is not None:
+        mesh = coupling.water.mesh
+        parts["mesh"] = _told(f"{len(mesh.nodes)} nodes, {len(mesh.cells)} cells", mesh.nodes, mesh.cells)
+    structure = coupling.structure
+    if structure is not None:
+        shapes = np.concatenate([np.zeros((0, 3)), *structure.shape_vertices])
+        parts["blocks"] = _told(f"{structure.n} blocks", shapes, structure.mass, structure.fixed)
+        joints = structure.joints
+        if joints is not None:
+            arrays = (joints.a, joints.b, joints.xi_a, joints.xi_b, joints.weight, joints.law)
+            parts["joints"] = _told(f"{len(joints)} joints", *arrays)
+    return parts
+
+
+def _told(count: str, *arrays) -> str:
+    digest = hashlib.blake2b(digest_size=4)
+    for array in arrays:
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return f"{count} ({digest.hexdigest()})"
+
+
+def program() -> dict[str, str]:
+    """Versions on which the last digit may depend, and the commit of the checkout."""
+    git = provenance.git_state()
+    return provenance.versions() | ({"commit": git["commit"][:12]} if git else {})
+
+
+def differences(then: object, now: object, name: str = "") -> list[str]:
+    """`name: was ..., is ...` for every value that differs between two tables."""
+    if isinstance(then, dict) and isinstance(now, dict):
+        keys = [*then, *(key for key in now if key not in then)]
+        inner = [differences(then.get(k), now.get(k), f"{name}.{k}" if name else k) for k in keys]
+        return [line for lines in inner for line in lines]
+    if isinstance(then, list) and isinstance(now, list) and len(then) == len(now):
+        inner = [differences(a, b, f"{name}[{k}]") for k, (a, b) in enumerate(zip(then, now))]
+        return [line for lines in inner for line in lines]
+    return [] if then == now else [f"{name}: was {_shown(then)}, is {_shown(now)}"]
+
+
+def case_differences(then: dict, now: dict) -> list[str]:
+    """Those between two effective cases that change the scene or its results so far."""
+    found = differences(_as_written(then), _as_written(now))
+    return [line for line in found if not any(is_free(line.partition(":")[0], name) for name in FREE)]
+
+
+def _as_written(case: dict) -> dict:
+    """Without what a tank has from its mesh file: a change of that is told with the mesh itself."""
+    tank = case.get("tank") or {}
+    if "mesh" not in tank:
+        return case
+    return case | {"tank": {key: tank[key] for key in tank if key not in ("lower", "upper", "cell")}}
+
+
+def is_free(key: str, name: str) -> bool:
+    """Whether the key of a case is the given name, or inside it."""
+    return key.startswith(name) if name.endswith(".") else key == name
+
+
+def _shown(value: object) -> str:
+    text = "absent" if value is None else str(value)
+    return text if len(text) <= 60 else text[:57] + "..."

@@ -1,0 +1,182 @@
+"""What a run will take, before it is run: steps, substeps, memory, disk, and what sets them.
+
+The steps follow from the speed that the highest water could fall to, √(2 g H); the substep is the structure's own.
+Memory and disk per cell were read off runs; they are forecasts, not bounds.
+"""
+
+from __future__ import annotations
+
+import math
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from coupler.case.case import Case
+from coupler.case.schedule import Schedule, checkpoint_interval
+from coupler.checks.places import BYTES_PER_CELL, mesh_size
+from coupler.geometry.tank_mesh import water_in
+from coupler.program.terminal import Row
+from coupler.scene.build_water import record_columns
+from coupler.step.observe import joint_counts
+
+LONGEST_REST_STEP = 0.3
+BYTES_PER_BLOCK = 60_000
+"""Resident memory per block, its contact nodes included."""
+BYTES_PER_WET_BLOCK = 300_000
+"""The same with the cells that it cuts."""
+BYTES_PER_COUPLED_CELL = 1500
+"""Resident memory per cell where blocks move: now and then two domains are there at once."""
+PROGRAM_BYTES = {"base": 105e6, "water": 155e6, "structure": 330e6, "both": 375e6}
+"""Resident memory of code and libraries: of every run, and what each side adds, kernels included."""
+DISK_BYTES_PER_NODE = 12
+"""Compressed level set, velocity and pressure of one written state."""
+DISK_BYTES_PER_BLOCK = 150
+CHECKPOINT_BYTES_PER_CELL = 36
+"""Of one checkpoint, compressed; blocks take less than a tenth of it."""
+HISTORY_BYTES_PER_STEP = 4000
+"""Rows of all histories without gauges."""
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """rows: (name, value, unit, remark), in the order in which they are told."""
+
+    rows: list[Row]
+
+
+def forecast(case: Case, exact: bool = False, place: Path = Path()) -> Forecast:
+    """The forecast of a case; starts YADE when the case has a structure, to ask it for the substep.
+
+    exact: with the exact frequency of the joints beside the bound that sets the substep (an eigenvalue problem) ·
+    place: a directory on the disk that the results go to."""
+    rows: list[Row] = []
+    cells = blocks = 0
+    disk = 0.0
+    interval = Schedule.of(case).interval
+    outputs = max(1, round(case.time.end / interval))
+    step = min(case.time.step_max, interval)
+    if case.water:
+        step = _water_rows(case, interval, rows)
+        cells, nodes = mesh_size(case.tank)
+        disk += DISK_BYTES_PER_NODE * nodes * (outputs + 1)
+    steps = math.ceil(case.time.end / step)
+    rows.append(Row("steps", steps, "", "at least, while the water is fast" if case.water else ""))
+    if case.structure:
+        blocks = _structure_rows(case, rows, exact)
+        disk += DISK_BYTES_PER_BLOCK * blocks * (outputs + 1)
+    disk += HISTORY_BYTES_PER_STEP * steps + _checkpoint_bytes(case)
+    rows.append(Row("written states", outputs + 1, "", ""))
+    rows.append(Row("memory", memory(case, cells, blocks) / 1e6, "MB", "about"))
+    rows.append(Row("disk", disk / 1e6, "MB", _disk_remark(disk, shutil.disk_usage(place).free)))
+    return Forecast(rows)
+
+
+def memory(case: Case, cells: int, blocks: int) -> float:
+    """Largest resident memory [B] of a run with so many cells and blocks."""
+    if case.water is None:
+        return PROGRAM_BYTES["base"] + PROGRAM_BYTES["structure"] + BYTES_PER_BLOCK * blocks
+    if case.structure is None:
+        return PROGRAM_BYTES["base"] + PROGRAM_BYTES["water"] + BYTES_PER_CELL * cells
+    both = PROGRAM_BYTES["base"] + PROGRAM_BYTES["both"]
+    return both + BYTES_PER_COUPLED_CELL * cells + BYTES_PER_WET_BLOCK * blocks
+
+
+def _disk_remark(wanted: float, free: float) -> str:
+    """Whether the disk has room for the results [B]."""
+    if wanted < free:
+        return "about"
+    return f"more than the {free / 1e6:.4g} MB that are free: raise time.output_every, or give --output another disk"
+
+
+def _checkpoint_bytes(case: Case) -> float:
+    """Those that stay [B]; none where the case wants none."""
+    if checkpoint_interval(case) == 0.0 or case.water is None:
+        return 0.0
+    from coupler.run.checkpoint import KEPT
+
+    return float(KEPT * CHECKPOINT_BYTES_PER_CELL * mesh_size(case.tank)[0])
+
+
+def _water_rows(case: Case, interval: float, rows: list[Row]) -> float:
+    """Rows of the water; the step [s] that its greatest speed allows."""
+    cells, nodes = mesh_size(case.tank)
+    volume = sum(float(np.prod(np.subtract(f.upper, f.lower))) for f in case.water.fill)
+    if case.tank.mesh is not None:
+        volume = water_in(case.tank, case.water.fill)
+    height = _highest(case) - case.tank.lower[2]
+    g, h = case.case.gravity, case.tank.cell
+    fastest = math.sqrt(2.0 * g * height)
+    limits = {
+        "time.step_max": case.time.step_max,
+        "time.output_every": interval,
+        "time.cfl at the speed of a free fall": case.time.cfl * h / fastest if fastest > 0.0 else math.inf,
+        "the cell size at rest": LONGEST_REST_STEP * math.sqrt(h / g) if g > 0.0 else math.inf,
+    }
+    reason = min(limits, key=limits.get)
+    rows.append(Row("mesh", cells, "cells", f"{nodes} nodes, edge {h:g} m"))
+    rows.append(Row("water", volume, "m3", "in the fill boxes, solids not taken off"))
+    rows.append(Row("step", 1e3 * limits[reason], "ms", f"set by {reason}"))
+    return limits[reason]
+
+
+def _highest(case: Case) -> float:
+    """Height z [m] of the highest water: in the boxes at the start, of a sea, or that comes in."""
+    found = [box.upper[2] for box in case.water.fill] + [sea.level for sea in case.water.sea]
+    for spec in case.water.inflow:
+        if spec.kind == "record":
+            found.append(float(record_columns(spec.path)[1].max()))
+        else:
+            found.append(spec.level + (spec.height if spec.kind == "solitary" else 0.0))
+    return min(max(found), case.tank.upper[2])
+
+
+def _structure_rows(case: Case, rows: list[Row], exact: bool) -> int:
+    """Rows of the structure; the number of its blocks."""
+    from coupler.scene.build import build_structure
+
+    structure = build_structure(case)
+    try:
+        limit, substep = structure.substep_limit(), structure.substep()
+        rows.append(
+            Row(
+                "blocks",
+                structure.n,
+                "",
+                f"{structure.mass[~structure.fixed].sum() / 1e3:.4g} t that can move",
+            )
+        )
+        rows.append(Row("joints", joint_counts(structure).intact, "", ""))
+        reason = (
+            limit.remark(substep) or f"set by {limit.what if case.structure.substep is None else 'the case'}"
+        )
+        rows.append(Row("substep", 1e6 * substep, "us", reason))
+        if exact and structure.joints is not None:
+            rows.append(_frequency_row(structure, limit.omega))
+        rows.append(Row("substeps", math.ceil(case.time.end / substep), "", ""))
+        if case.joints and case.structure.start == "settled":
+            _row_at_rest(structure, rows)
+        return structure.n
+    finally:
+        structure.close()
+
+
+def _row_at_rest(structure, rows: list[Row]) -> None:
+    """Row of the damage under the structure's own weight; raises CannotStand where that is too much."""
+    from yade_scripts.dynamics.equilibrium import settle
+
+    moved = settle(structure)
+    damage = structure.joint_table().damage.max()
+    rows.append(
+        Row("damage at rest", float(damage), "", f"under its own weight; blocks move {1e3 * moved:.3g} mm")
+    )
+
+
+def _frequency_row(structure, bound: float) -> Row:
+    """ω_max of the joints from the eigenvalue problem of all blocks, and how far the bound is above it."""
+    from yade_scripts.dynamics.timestep import exact_joint_frequency
+
+    omega = exact_joint_frequency(structure.blocks, structure.joints)
+    remark = f"the bound is {bound / omega:.3f} of it" if omega > 0.0 else "no joint can move"
+    return Row("frequency of the joints, exact", omega, "rad/s", remark)

@@ -1,0 +1,53 @@
+"""One process a run directory: whoever runs or resumes there holds a lock, which the system lets go when it dies.
+
+The lock is an flock on log.txt, which every run has: no file of its own is left behind, and that of a killed process
+holds up nobody.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import fcntl
+import os
+import weakref
+from pathlib import Path
+
+from coupler.program.errors import ExitCode, SurgebreakError
+
+HELD = (errno.EAGAIN, errno.EACCES)
+NO_LOCKS = (errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS)
+"""Numbers of an OSError of file systems that know no locks."""
+
+
+class Busy(SurgebreakError):
+    """Another process runs in the directory."""
+
+    exit_code = ExitCode.BAD_CASE
+
+
+class RunLock:
+    """Holds a run directory until `release`, or until this process ends in any way."""
+
+    def __init__(self, path: Path):
+        """Raises Busy where another process holds it; `known` is False where the file system has no locks."""
+        handle = os.open(path / "log.txt", os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o644)
+        self._close = weakref.finalize(self, os.close, handle)
+        self.known = True
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            if error.errno in HELD:
+                self._close()
+                raise Busy(
+                    f"{path}: another process runs or resumes it at this moment; wait for its end, or end it with "
+                    f"Ctrl-C or `touch {path / 'stop'}`"
+                ) from error
+            if error.errno not in NO_LOCKS:
+                raise
+            self.known = False
+
+    def release(self) -> None:
+        """Let others in; may be called twice."""
+        with contextlib.suppress(OSError):
+            self._close()

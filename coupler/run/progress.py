@@ -1,0 +1,124 @@
+"""How a run tells what it does: a bar with the time left on a terminal, one line per 10 % anywhere else.
+
+The loop knows only the protocol `Reporter`; figures are ordered name -> text, for instance
+{"dt": "12 ms", "joints broken": "140/900", "force": "2.1 MN", "volume": "+0.02 %", "energy": "0.4 %"}.
+"""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Callable, Mapping
+from typing import Protocol, TextIO
+
+from coupler.program.terminal import console, duration
+
+
+class Reporter(Protocol):
+    """What the loop tells while it runs."""
+
+    def step(self, time: float, figures: Mapping[str, str]) -> None:
+        """After each coupled step: the time reached [s] and the figures that matter."""
+
+    def message(self, text: str) -> None:
+        """A sentence for the user and the log (modules on and off, remarks, written files)."""
+
+    def stop_requested(self) -> str | None:
+        """Why the user wants the run to end, or None; asked once a step."""
+
+
+class _Base:
+    """What both reporters share: the log, the wish to stop and the clock."""
+
+    def __init__(self, end: float, log: Callable[[str], None], stop: Callable[[], str | None]):
+        self.end, self.log, self.stop_requested = end, log, stop
+        self._first: tuple[float, float] | None = None
+        self._tenth = 0
+
+    def _line(self, time: float, figures: Mapping[str, str]) -> str:
+        share = min(1.0, time / self.end)
+        told = "  ".join(f"{name} {text}" for name, text in figures.items())
+        return f"{share:4.0%}  t {time:.3f} of {self.end:g} s  {told}  {self._left(time)}".rstrip()
+
+    def _left(self, time: float) -> str:
+        """Time to go at the pace since the first step, which had to load and compile what it uses."""
+        began, started = self._first
+        if time <= began:
+            return ""
+        return f"left {duration((clock.monotonic() - started) * max(self.end - time, 0.0) / (time - began))}"
+
+    def _new_tenth(self, time: float) -> bool:
+        if self._first is None:
+            self._first = (time, clock.monotonic())
+        tenth = int(10.0 * time / self.end + 1e-9)
+        new, self._tenth = tenth > self._tenth, max(tenth, self._tenth)
+        return new
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_) -> None:
+        return None
+
+
+class LineReporter(_Base):
+    """One line per 10 %, for pipes, logs and batch systems."""
+
+    def __init__(self, end, log, stop, stream: TextIO | None = None):
+        super().__init__(end, log, stop)
+        self.stream = stream
+
+    def step(self, time: float, figures: Mapping[str, str]) -> None:
+        if self._new_tenth(time):
+            line = self._line(time, figures)
+            print(line, file=self.stream, flush=True)
+            self.log(line)
+
+    def message(self, text: str) -> None:
+        print(text, file=self.stream, flush=True)
+        self.log(text)
+
+
+class BarReporter(_Base):
+    """A bar that is redrawn five times a second; the log gets the line per 10 %."""
+
+    def __init__(self, end, log, stop):
+        super().__init__(end, log, stop)
+        from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+        self._bar = Progress(
+            BarColumn(bar_width=24),
+            TextColumn("{task.percentage:3.0f} %  {task.description}"),
+            TimeRemainingColumn(elapsed_when_finished=True),
+            console=console(),
+            auto_refresh=False,
+            speed_estimate_period=120.0,
+        )
+        self._drawn = 0.0
+        self._task = self._bar.add_task("starting", total=end)
+
+    def __enter__(self):
+        self._bar.start()
+        return self
+
+    def __exit__(self, *_) -> None:
+        self._bar.refresh()
+        self._bar.stop()
+
+    def step(self, time: float, figures: Mapping[str, str]) -> None:
+        if self._new_tenth(time):
+            self.log(self._line(time, figures))
+        told = "  ".join(f"{name} {text}" for name, text in figures.items())
+        self._bar.update(self._task, completed=min(time, self.end), description=f"t {time:.3f} s  {told}")
+        if clock.monotonic() - self._drawn > 0.2:  # redrawn here, because a thread would starve in long calls
+            self._drawn = clock.monotonic()
+            self._bar.refresh()
+
+    def message(self, text: str) -> None:
+        self._bar.console.print(text, markup=False)
+        self.log(text)
+
+
+def reporter(end: float, log: Callable[[str], None], stop: Callable[[], str | None]):
+    """The reporter that suits standard output; a context manager that is a Reporter."""
+    kind = BarReporter if console().is_terminal else LineReporter
+    return kind(end, log, stop)

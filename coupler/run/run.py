@@ -1,0 +1,248 @@
+"""A whole run: build the scene, step to the end, write, and end with a reason."""
+
+from __future__ import annotations
+
+from functools import partial
+from shlex import quote
+
+import numpy as np
+
+from coupler.case.case import Case, effective
+from coupler.case.schedule import Schedule, checkpoint_interval
+from coupler.geometry.overlaps import deepest_overlap
+from coupler.program.errors import ExitCode
+from coupler.program.terminal import newtons
+from coupler.results.recorder import Recorder
+from coupler.run.clock import Clock
+from coupler.run.left_out import imports, note_work
+from coupler.run.within_step import LongSteps, StepLeft
+from coupler.scene.build import Scene, build, limits_of
+from coupler.step.limits import LimitReached, Limits, check_defect, check_overlap
+from coupler.step.observe import joint_counts, size
+from coupler.step.step_limits import check_step
+
+FAST_OPENING = 0.25
+"""Growth of λ/δ_f in a substep from which tearing counts as averaged over it."""
+
+
+def run(case: Case, directory, reporter, checkpoint=None) -> ExitCode:
+    """Run a case into a RunDirectory; its figures go into run.json however the run ends.
+
+    checkpoint: Checkpoint of an earlier process from which the run goes on.
+
+    Raises SurgebreakError (or an error of the water or the structure) when the run ends before its time; what was
+    written until then stays.
+    """
+    clock = Clock(checkpoint.about["cpu_seconds"] if checkpoint else None)
+    figures: dict[str, float] = {"steps": 0, "substeps": 0}
+    if checkpoint:
+        figures |= checkpoint.about["figures"]
+    try:
+        scene = build(case, clock, from_start=checkpoint is None)
+        try:
+            if checkpoint:
+                _restore(scene, checkpoint, clock)
+            _describe(scene, reporter)
+            if checkpoint is None:  # the size at the start
+                directory.record(size=size(scene.coupling))
+            if scene.coupling.structure is not None:
+                directory.record(laws=laws_of(scene.coupling.structure))
+            _steps(case, scene, directory, reporter, clock, figures, checkpoint)
+        finally:
+            if scene.coupling.structure is not None:
+                scene.coupling.structure.close()
+    finally:
+        directory.record(**figures, cpu_seconds=clock.split(), imports=imports())
+    _tell_fast_openings(figures, reporter)
+    _tell_split(clock, reporter)
+    return ExitCode.DONE
+
+
+def _tell_fast_openings(figures: dict, reporter) -> None:
+    rate = figures.get("largest_opening_rate", 0.0)
+    if rate > FAST_OPENING:
+        reporter.message(
+            f"note: a joint opened by {rate:.2g} of joints.opening_at_failure in one substep: its work of "
+            "separation is kept, its softening is not resolved in time. Reduce structure.substep where that matters"
+        )
+
+
+def _restore(scene: Scene, checkpoint, clock: Clock) -> None:
+    from coupler.run.checkpoint import restore
+
+    with clock("set-up"):
+        restore(scene.coupling, checkpoint)
+
+
+def _tell_split(clock: Clock, reporter) -> None:
+    parts = ", ".join(f"{name} {seconds:.1f}" for name, seconds in clock.split().items())
+    reporter.message(f"processor time {clock.total():.1f} s: {parts}")
+
+
+def _describe(scene: Scene, reporter) -> None:
+    c = scene.coupling
+    if c.water is not None:
+        d = c.water.domain
+        reporter.message(
+            f"water: {len(c.water.mesh.cells)} cells in the mesh, {len(d.cells)} outside the solids "
+            f"({int(d.is_cut.sum())} cut), {c.water.volume():.6g} m3"
+        )
+    if c.structure is not None:
+        limit, substep = c.structure.substep_limit(), c.structure.substep()
+        joints = joint_counts(c.structure).intact
+        held = f" ({int(c.structure.fixed.sum())} held or driven)" if c.structure.fixed.any() else ""
+        reporter.message(
+            f"structure: {c.structure.n} blocks{held}, {joints} joints, substep {substep:.3g} s ({limit.what})"
+        )
+        if limit.remark(substep):
+            reporter.message(f"note: {limit.remark(substep)}")
+        for what, law in laws_of(c.structure).items():
+            reporter.message(f"{what}: {law}")
+
+
+def laws_of(structure) -> dict[str, str]:
+    """What its contact and joints go by, in words: what every result of theirs depends on."""
+    found = {}
+    if structure.contact is not None:
+        found["contact"] = structure.contact.described(structure.face_stiffness)
+    if structure.joints is not None:
+        found["joints"] = structure.joint_rules.described(structure.joints.laws)
+    return found
+
+
+def _steps(
+    case: Case, scene: Scene, directory, reporter, clock: Clock, figures: dict, checkpoint=None
+) -> None:
+    coupling = scene.coupling
+    limits = limits_of(case)
+    schedule = checkpoint.schedule(case.time.end) if checkpoint else Schedule.of(case)
+    kept = checkpoint.part("recorder") if checkpoint else None
+    recorder = Recorder(directory.path, coupling, scene.gauges, scene.solids, scene.tank, kept)
+    checkpoints = _checkpoints(case, scene, directory, recorder, schedule)
+    way_on = f"; `surgebreak resume {quote(str(directory.path))}` goes on" if checkpoints is not None else ""
+    long = _long_steps(coupling, limits, reporter, clock, figures, checkpoints)
+    try:
+        if checkpoint is None:
+            with clock("output"):
+                recorder.fields(0.0)
+        while not _reached(coupling.time, schedule.end):
+            target = schedule.next_output(coupling.time)
+            dt = coupling.step_size(target - coupling.time)
+            record = long.around(partial(coupling.step, dt))
+            with clock("output"):
+                recorder.step(record)
+            _note(coupling, record, figures)
+            reporter.step(coupling.time, _told(coupling, record))
+            check_step(coupling, record, limits)
+            check_defect(coupling.time, coupling.defects.mean, case.limits.defect)
+            if coupling.structure is not None:
+                depth = case.limits.overlap
+                check_overlap(coupling.time, deepest_overlap(coupling.structure, depth), depth)
+            if _reached(coupling.time, target):
+                with clock("output"):
+                    recorder.fields(coupling.time)
+            at_end = _reached(coupling.time, schedule.end)
+            wish = None if at_end else _wish_to_stop(clock, limits, reporter)
+            if checkpoints is not None and (wish or at_end or checkpoints.due()):
+                _save(checkpoints, directory, figures, clock)
+            if wish:
+                raise LimitReached(wish + way_on)
+    except StepLeft as left:
+        if checkpoints is not None:
+            with clock("output"):
+                checkpoints.put(long.held)
+        raise LimitReached(str(left) + way_on) from None
+    finally:
+        recorder.close()
+
+
+def _long_steps(coupling, limits: Limits, reporter, clock: Clock, figures: dict, checkpoints) -> LongSteps:
+    """What leaves a long step where the run is to end, asked by both sides."""
+
+    def hold():
+        return None if checkpoints is None else checkpoints.hold(figures, clock.split())
+
+    long = LongSteps(lambda: _wish_to_stop(clock, limits, reporter), hold)
+    coupling.pause = long
+    if coupling.structure is not None:
+        coupling.structure.pause = long
+    return long
+
+
+def _reached(time: float, target: float) -> bool:
+    return time >= target * (1.0 - 1e-12)
+
+
+def _checkpoints(case: Case, scene: Scene, directory, recorder: Recorder, schedule: Schedule):
+    """Checkpoints of the run, None if the case wants none; then nothing of theirs is loaded."""
+    every = checkpoint_interval(case)
+    if every == 0.0:
+        return None
+    from coupler.run.checkpoint import Checkpoints
+
+    return Checkpoints(directory.path, every, effective(case), schedule, scene, recorder)
+
+
+def _save(checkpoints, directory, figures: dict, clock: Clock) -> None:
+    with clock("output"):
+        checkpoints.write(figures, clock.split())
+    directory.record(**figures, cpu_seconds=clock.split())
+
+
+def _note(coupling, record, figures: dict) -> None:
+    """Carry the step into the figures of the run."""
+
+    def largest(name: str, value: float) -> None:
+        figures[f"largest_{name}"] = max(figures.get(f"largest_{name}", 0.0), float(value))
+
+    balance = record.balance
+    figures["time"] = coupling.time
+    figures["steps"] += 1
+    figures["substeps"] += record.substeps
+    figures["energy_error"] = float(balance.energy_error)
+    largest("energy_error", balance.energy_error)
+    largest("momentum_error", record.momentum.error)
+    if coupling.water is not None:
+        figures["numerical_dissipation"] = float(
+            balance.numerical_dissipation / max(balance.input_energy, 1e-300)
+        )
+        figures["numerical_impulse"] = record.momentum.scheme
+        figures["volume_error"] = coupling.water.volume_error()
+        largest("volume_error", abs(figures["volume_error"]))
+        largest("water_force", np.linalg.norm(record.load[:, :3].sum(axis=0)))
+    joints = None
+    if coupling.structure is not None:
+        joints = joint_counts(coupling.structure)
+        figures["joints"], figures["joints_broken"] = joints.intact + joints.broken, joints.broken
+        largest("defect", record.defect)
+        largest("opening_rate", record.opening_rate)
+    note_work(figures.setdefault("work", {}), coupling, record, joints, figures["steps"])
+
+
+def _told(coupling, record) -> dict[str, str]:
+    told = {"dt": f"{1e3 * record.dt:.3g} ms"}
+    if coupling.structure is not None:
+        joints = joint_counts(coupling.structure)
+        told["broken"] = f"{joints.broken}/{joints.intact + joints.broken}"
+    if coupling.water is not None:
+        if len(record.load):
+            told["force"] = newtons(float(np.linalg.norm(record.load[:, :3].sum(axis=0))))
+        told["volume"] = f"{_volume_error(coupling):+.2%}"
+    if coupling.coupled:
+        told["defect"] = f"{record.defect:.1e}"
+    told["energy"] = f"{record.balance.energy_error:.2%}"
+    return told
+
+
+def _volume_error(coupling) -> float:
+    return 0.0 if coupling.water is None else coupling.water.volume_error()
+
+
+def _wish_to_stop(clock: Clock, limits: Limits, reporter) -> str | None:
+    """Why the run is to end now, None to go on."""
+    if limits.cpu_seconds is not None and clock.here() > limits.cpu_seconds:
+        return (
+            f"the run has used {clock.here():.0f} s of processor time; limit {limits.cpu_seconds:.0f} s "
+            "(limits.cpu_seconds). Raise it, or use a coarser tank.cell"
+        )
+    return reporter.stop_requested()

@@ -1,0 +1,58 @@
+"""Wishes to stop and budgets are met within a step too, where that is a long one: with fine cells and many substeps it
+may take minutes.
+
+A step that is left in the middle leaves no state: what the run stood at before it was held, and is what is saved.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+
+from coupler.step.limits import LimitReached
+
+LONG = 0.5
+"""Time [s] of a step from which the next one may be left; before one that takes less nothing is held."""
+PATIENCE = 2.0
+"""Time [s] that the step under way has to end by itself."""
+INTERVAL = 0.2
+"""Time [s] between two questions."""
+
+
+class StepLeft(LimitReached):
+    """The step under way was left; the state before it is sound."""
+
+
+class LongSteps:
+    """Called again and again within a step, between solves and substeps; `around` makes one step with that.
+
+    wish: why the run is to end now, or None · hold: keeps the state before a step, of which `held` is what it returned
+    """
+
+    def __init__(self, wish: Callable[[], str | None], hold: Callable[[], object]):
+        self._wish, self._hold = wish, hold
+        self._last = math.inf  # the first step loads and compiles what it uses
+        self._may_leave, self._began, self._ask = False, 0.0, 0.0
+        self.held: object = None
+
+    def around(self, step: Callable[[], object]):
+        """What the step returns. Raises StepLeft, and what the step raises."""
+        self._may_leave = self._last >= LONG
+        self.held = self._hold() if self._may_leave else None
+        self._began = time.monotonic()
+        self._ask = self._began + PATIENCE
+        found = step()
+        self._last = time.monotonic() - self._began
+        self.held = None
+        return found
+
+    def __call__(self) -> None:
+        """Raises StepLeft where the run is to end now, and the step has had its time."""
+        now = time.monotonic()
+        if not self._may_leave or now < self._ask:
+            return
+        self._ask = now + INTERVAL
+        wish = self._wish()
+        if wish:
+            raise StepLeft(f"{wish}. The step under way was left")

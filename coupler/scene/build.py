@@ -1,0 +1,253 @@
+"""From a case to both sides of the scene, and nothing that the case does not ask for.
+
+A case without `[water]` imports no fluid code here, one without `[structure]` never starts YADE.
+"""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from dataclasses import dataclass
+
+import numpy as np
+
+from coupler.case.case import Case
+from coupler.geometry.parts import Part, parts_of
+from coupler.geometry.solids import obstacle_blocks, solids_of
+from coupler.results.gauges import Bodies, Gauge, make_gauges
+from coupler.scene.build_water import water_of
+from coupler.step.coupled_step import Coupling
+from coupler.step.limits import Limits
+
+PRESSURE_RTOL = 1e-8
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What a run works on: both sides, the gauges and what never moves (with a structure its last blocks too)."""
+
+    coupling: Coupling
+    gauges: list[Gauge]
+    solids: list[tuple[np.ndarray, tuple]]
+    tank: tuple | None
+
+
+def build(case: Case, clock, from_start: bool = True) -> Scene:
+    """Build the scene of a case. clock(name) is a context that books processor time to a part of the run.
+
+    from_start: bring the blocks to rest if the case says so; not before a state is restored."""
+    solids = [(solid.vertices, solid.faces) for solid in solids_of(case)]
+    with clock("set-up"), ExitStack() as on_failure:  # YADE holds one scene: the next build needs it free
+        structure = build_structure(case) if case.structure else None
+        if structure is not None:
+            on_failure.callback(structure.close)
+        only_in_water = [] if structure else solids
+        coupling = _coupling(case, structure, only_in_water, clock, from_start)
+        on_failure.pop_all()
+    tank = (case.tank.lower, case.tank.upper) if case.tank else None
+    return Scene(coupling, _gauges(case), solids, tank)
+
+
+def _coupling(case: Case, structure, solids, clock, from_start: bool) -> Coupling:
+    """Both sides, the structure at rest if the case says so."""
+    water = immersion = None
+    if case.water:
+        water, immersion = water_of(case, structure, solids)
+    settles = from_start and case.joints and case.structure.start == "settled"
+    if settles and _settled(structure, water) and case.water:
+        water, immersion = water_of(case, structure, solids)
+    return Coupling(
+        water,
+        structure,
+        immersion,
+        rtol=PRESSURE_RTOL,
+        step_max=case.time.step_max,
+        clock=clock,
+        passes=case.coupling.passes,
+        tolerance=case.coupling.tolerance,
+        most_defect=case.limits.defect,
+        limits=limits_of(case),
+        expected=_side_energy(case),
+    )
+
+
+def limits_of(case: Case) -> Limits:
+    """The limits of a case."""
+    wanted = case.limits
+    return Limits(wanted.volume_error, wanted.energy_error, wanted.cpu_seconds, wanted.momentum_error)
+
+
+def _side_energy(case: Case) -> float:
+    """What inflows and seas can bring [J]; without any their code is not loaded."""
+    if case.water is None or not (case.water.inflow or case.water.sea):
+        return 0.0
+    from coupler.scene.side_energy import side_energy
+
+    return side_energy(case)
+
+
+def _settled(structure, water) -> bool:
+    """Move the joined blocks to their equilibrium with weight and still water; True if any moved."""
+    from yade_scripts.dynamics.equilibrium import settle
+
+    load = None if water is None else _load_at_rest(structure, water)
+    return settle(structure, load) > 0.0
+
+
+def _load_at_rest(structure, water) -> np.ndarray:
+    """Force and moment (n, 6) of the water on the blocks while these are held."""
+    from coupler.step.pressure_with_structure import water_load
+    from fluid.numerics.bounded import solve_pressure
+
+    problem = water.predict(water.stable_step())
+    if problem.coupling.nnz == 0:
+        return np.zeros((structure.n, 6))
+    return water_load(problem, solve_pressure(problem, PRESSURE_RTOL).x)[: structure.n]
+
+
+def build_structure(case: Case):
+    """The structure of a case, in a new YADE scene."""
+    from yade_scripts.contact.law import ContactLaw, PairFriction
+    from yade_scripts.dynamics.structure import Structure
+
+    c, j = case.contact, case.joints
+    contact = joints = None
+    if c:
+        contact = ContactLaw(
+            c.stiffness,
+            c.restitution,
+            c.friction,
+            shear_ratio=c.shear_ratio,
+            tangential_restitution=c.tangential_restitution,
+            rule=c.rule,
+            nodes_per_edge=c.nodes_per_edge,
+            pairs=tuple(PairFriction(*pair.materials, pair.friction) for pair in c.pair),
+        )
+    if j:
+        joints = joint_rules(j)
+    gravity = (0.0, 0.0, -case.case.gravity)
+    planes = planes_of(case)
+    blocks = [block for part in parts_of(case) for block in part.blocks] + obstacle_blocks(case)
+    return Structure(
+        blocks,
+        contact,
+        joints,
+        None,
+        planes,
+        gravity,
+        substep=case.structure.substep,
+        impermeable=bool(c and c.impermeable),
+        ramp=case.structure.ramp or 0.0,
+    )
+
+
+def joint_rules(joints):
+    """What a section [joints] says of all joints, of pairs and of the scatter of strengths."""
+    from yade_scripts.joints.rules import JointRules, PairJoints, Scatter
+
+    pairs = tuple(
+        PairJoints(*pair.between, joint_parameters(of_pair(joints, pair)) if pair.joined else None)
+        for pair in joints.pair
+    )
+    scatter = joints.distribution and Scatter(joints.distribution, joints.variation, joints.seed)
+    return JointRules(joint_parameters(joints), pairs, scatter)
+
+
+def of_pair(joints, pair):
+    """The section [joints] as it is for a pair."""
+    own = {name for name in pair.model_fields_set if getattr(pair, name) is not None}
+    own -= {"between", "joined"}
+    change = {name: getattr(pair, name) for name in own}
+    if pair.law is not None and pair.law != joints.law and pair.peak is None:
+        change["peak"] = None
+    return joints.model_copy(update=change)
+
+
+def joint_parameters(joints):
+    """The law of a section [joints]."""
+    from yade_scripts.joints.cohesion import JointParameters
+
+    return JointParameters(
+        strength=joints.strength,
+        opening_at_failure=joints.opening_at_failure,
+        shear_ratio=joints.shear_ratio,
+        closing_ratio=joints.closing_ratio,
+        damping=joints.damping,
+        points=joints.points,
+        ground=joints.ground,
+        law=joints.law,
+        peak=joints.peak,
+        mixed_mode=joints.mixed_mode,
+    )
+
+
+def planes_of(case: Case) -> list:
+    """What bounds the room of the blocks: the ground and the closed sides of the tank."""
+    return [*_ground(case), *_tank_planes(case)]
+
+
+def _ground(case: Case) -> list:
+    """The ground as a plane, none without one."""
+    from yade_scripts.blocks.faces import FixedPlane
+
+    ground = case.structure.ground
+    return (
+        [FixedPlane((0.0, 0.0, ground.level), (0.0, 0.0, 1.0), "ground", material=ground.material)]
+        if ground
+        else []
+    )
+
+
+def _tank_planes(case: Case) -> list:
+    """The closed sides of the tank as walls for blocks; its floor only where the case says no ground."""
+    from yade_scripts.blocks.faces import FixedPlane
+
+    if case.tank is None:
+        return []
+    planes = []
+    for axis, name in enumerate("xyz"):
+        for sign, corner in (("-", case.tank.lower), ("+", case.tank.upper)):
+            side = name + sign
+            if side in case.tank.open or (side == "z-" and case.structure.ground is not None):
+                continue
+            normal = np.zeros(3)
+            normal[axis] = 1.0 if sign == "-" else -1.0
+            planes.append(FixedPlane(np.array(corner), normal, f"tank {side}", side == "z-", "tank"))
+    return planes
+
+
+def _gauges(case: Case) -> list[Gauge]:
+    if not case.gauge:
+        return []
+    bodies = _bodies(case)
+    return [gauge for spec in case.gauge for gauge in make_gauges(spec, bodies)]
+
+
+def _bodies(case: Case) -> Bodies:
+    """Blocks and fixed solids as gauges know them."""
+    parts, solids = parts_of(case), solids_of(case)
+    blocks = [block for part in parts for block in part.blocks]
+    centre = [block.centre for block in blocks] + [solid.vertices.mean(axis=0) for solid in solids]
+    mass = [block.mass for block in blocks] + [1.0] * len(solids)
+    names = [block.name for block in blocks] + [solid.name for solid in solids]
+    present = {
+        "pressure": case.water, "friction": case.water, "contact": case.contact, "joint": case.joints,
+        "weight": case.structure,
+    }  # fmt: skip
+    loads = [name for name, section in present.items() if section is not None]
+    rows = rows_by_name(case, parts)
+    return Bodies(names, np.array(centre, float).reshape(-1, 3), np.array(mass), rows, loads)
+
+
+def rows_by_name(case: Case, parts: tuple[Part, ...]) -> dict[str, np.ndarray]:
+    """Rows of the load table for every name a case may use: blocks, groups, parts of the structure, solids."""
+    rows: dict[str, list[int]] = {}
+    row = 0
+    for part in parts:
+        for block in part.blocks:
+            for known in {block.name, block.group, part.name}:
+                rows.setdefault(known, []).append(row)
+            row += 1
+    for solid in solids_of(case):
+        rows.setdefault(solid.name, []).append(row)
+        row += 1
+    return {name: np.array(found) for name, found in rows.items()}

@@ -1,0 +1,210 @@
+"""The water of a case: mesh, solids in it, walls, and the sides where it comes in or goes out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from coupler.case.case import Case
+from coupler.case.paths import BadPath, read_text
+from coupler.case.records import repeated
+from coupler.geometry.tank_mesh import mesh_of, on_side
+from coupler.program.errors import briefly
+
+SLACK = 1e-3
+"""Share of a cell within which a box of water reaches a side of the tank."""
+
+
+def water_of(case: Case, structure, solids):
+    """(Water, Immersion) of a case with a structure or None and fixed solids [(vertices, faces)]."""
+    from coupler.scene.fill import start_level, start_velocity
+    from coupler.step.immersion import Immersion
+    from fluid.domain.covers import WIDE_OPENINGS
+    from fluid.step.parameters import WaterParameters
+    from fluid.step.water import Water
+
+    w = case.water
+    mesh = mesh_of(case.tank)
+    cracks = _narrow_cracks(w.cracks, structure, mesh)
+    connection = WIDE_OPENINGS if w.openings == "wide" else None
+    immersion = Immersion(mesh, structure, solids, w.covers, cracks, connection)
+    parameters = WaterParameters(
+        density=w.density,
+        gravity=case.case.gravity,
+        advection=w.advection,
+        theta=w.theta,
+        courant=case.time.cfl,
+        viscosity=w.viscosity,
+        walls=w.walls,
+        roughness=w.roughness,
+        manning=w.manning,
+        suction=w.suction,
+        vapour_pressure=w.vapour_pressure,
+    )
+    level = np.full(len(immersion.domain.nodes), np.ptp(mesh.bounds, axis=0).max())
+    boxes = [_reaching(case.tank, fill) for fill in w.fill] + _strips(case)
+    velocity = None
+    if boxes:
+        level = start_level(boxes, (case.tank.lower, case.tank.upper), mesh, immersion.domain)
+        velocity = start_velocity(boxes, [fill.velocity for fill in w.fill], immersion.domain.nodes)
+    opened, smooth = sides_named(case.tank.open, mesh), sides_named(case.tank.smooth, mesh)
+    water = Water(
+        mesh, immersion.domain, level, parameters, opened, smooth, _flows(case, mesh), velocity=velocity
+    )
+    if immersion.cracks is not None and immersion.cracks.lumped:
+        water.set_cracks(immersion.cracks.cracks())
+    return water, immersion
+
+
+def _reaching(tank, fill) -> tuple:
+    """A box of water (lower, upper); ends that miss a side of the tank by the rounding of a file are moved to it."""
+    pairs = ((fill.lower, tank.lower), (fill.upper, tank.upper))
+    return tuple(
+        tuple(side if abs(end - side) <= SLACK * tank.cell else end for end, side in zip(ends, sides))
+        for ends, sides in pairs
+    )
+
+
+def _strips(case: Case) -> list[tuple]:
+    """Boxes (lower, upper) of water, one cell wide, beside inflows and seas that no fill reaches: without any water
+    beside it a side would begin with a film, in which neither pressure nor volume mean anything."""
+    found = []
+    for spec in (*case.water.inflow, *case.water.sea):
+        top = level_at_start(spec)
+        if top > case.tank.lower[2] and not fills_beside(case, spec.side):
+            lower, upper = [*case.tank.lower], [*case.tank.upper]
+            axis, end = "xyz".index(spec.side[0]), spec.side[1]
+            if end == "-":
+                upper[axis] = lower[axis] + case.tank.cell
+            else:
+                lower[axis] = upper[axis] - case.tank.cell
+            found.append((lower, [*upper[:2], top]))
+    return found
+
+
+def level_at_start(spec) -> float:
+    """Height z [m] of the surface that an inflow or a sea has at the start, ahead of any wave."""
+    if getattr(spec, "kind", "sea") == "record":
+        return float(record_columns(spec.path)[1][0])
+    return spec.ahead if getattr(spec, "kind", "sea") == "bore" else spec.level
+
+
+def fills_beside(case: Case, side: str) -> list:
+    """The boxes of water at the start that reach a side of the tank."""
+    axis, end = "xyz".index(side[0]), "upper" if side[1] == "+" else "lower"
+    wall, slack = getattr(case.tank, end)[axis], SLACK * case.tank.cell
+    return [f for f in case.water.fill if f.lower[axis] - slack <= wall <= f.upper[axis] + slack]
+
+
+def _narrow_cracks(kind: str, structure, mesh):
+    """What keeps narrow cracks closed; None where they are open or nothing can break."""
+    if kind == "open" or structure is None or structure.joints is None:
+        return None
+    from coupler.step.cracks import NarrowCracks
+
+    return NarrowCracks(structure, mesh.spacing, lumped=kind == "slit")
+
+
+def sides_named(names, mesh):
+    """Face normals (B, 3), centres (B, 3) → (B,) bool: those on the sides of these names; None without any."""
+    if not names:
+        return None
+
+    def chosen(normals, centres):
+        return np.any([on_side(mesh, name, normals, centres) for name in names], axis=0)
+
+    return chosen
+
+
+def _outward(side: str) -> np.ndarray:
+    direction = np.zeros(3)
+    direction["xyz".index(side[0])] = 1.0 if side[1] == "+" else -1.0
+    return direction
+
+
+def _flows(case: Case, mesh):
+    """Inflows and seas; None without any, and then their code is not loaded."""
+    if not (case.water.inflow or case.water.sea):
+        return None
+    from fluid.sides.inflow import Side, Sides
+
+    sides = [Side.of(mesh, sides_named([i.side], mesh), flow_of(case, i)) for i in case.water.inflow]
+    for sea in case.water.sea:
+        sides.append(Side.of(mesh, sides_named([sea.side], mesh), level=lambda time, level=sea.level: level))
+    return Sides(sides)
+
+
+def flow_of(case: Case, spec):
+    """What an inflow of the case brings."""
+    from fluid.sides import waves
+
+    inward, bed, gravity = -_outward(spec.side), case.tank.lower[2], case.case.gravity
+    if spec.kind == "steady":
+        return waves.steady(inward, spec.level, spec.velocity)
+    if spec.kind == "bore":
+        _, speed = waves.bore_speed(spec.ahead - bed, spec.level - bed, gravity)
+        return waves.steady(inward, spec.level, speed)
+    if spec.kind == "solitary":
+        order = 1 if spec.theory == "goring" else 3
+        wave = waves.SolitaryWave(spec.level - bed, spec.height, gravity, spec.crest, order)
+        return wave.flow(inward, bed)
+    return waves.record(inward, *record_columns(spec.path))
+
+
+class RecordError(ValueError):
+    """The table of an inflow cannot be used; the message says why."""
+
+
+COLUMNS = ("time", "level", "velocity")
+
+
+def record_columns(path: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Columns time [s], level [m], velocity [m/s] of a CSV file. Raises RecordError."""
+    numbered = _written_lines(path)
+    head = [name.strip() for name in numbered[0][1].split(",")] if numbered else []
+    twice = repeated(head)
+    if twice:
+        raise RecordError(f"{path}: the column '{twice}' is there twice; rename or remove one")
+    missing = [name for name in COLUMNS if name not in head]
+    if missing:
+        raise RecordError(
+            f"{path}: no column {', '.join(missing)}; its first line must name "
+            f"{', '.join(COLUMNS)}, with commas between"
+        )
+    table = np.array([_numbers(path, n, line, len(head)) for n, line in numbered[1:]]).reshape(-1, len(head))
+    if not len(table):
+        raise RecordError(f"{path}: no line of numbers below the names of the columns")
+    time, level, velocity = (table[:, head.index(name)] for name in COLUMNS)
+    back = np.flatnonzero(np.diff(time) <= 0.0)
+    if len(back):
+        n, later = numbered[back[0] + 2][0], time[back[0] + 1]
+        raise RecordError(f"{path}:{n}: times must increase; {later:g} s comes after {time[back[0]]:g} s")
+    return time, level, velocity
+
+
+def _written_lines(path: str) -> list[tuple[int, str]]:
+    """Lines with their numbers, without comments and empty ones; a byte-order mark of a spreadsheet is skipped."""
+    try:
+        text = read_text(Path(path), encoding="utf-8-sig")
+    except BadPath as error:
+        raise RecordError(f"{path}: {error}") from error
+    return [
+        (n, line) for n, line in enumerate(text.split("\n"), 1) if line.strip() and not line.startswith("#")
+    ]
+
+
+def _numbers(path: str, n: int, line: str, count: int) -> list[float]:
+    """The numbers of line n, finite and one a column. Raises RecordError."""
+    entries = line.strip().split(",")
+    if len(entries) != count:
+        raise RecordError(f"{path}:{n}: {len(entries)} values; every line needs {count}, one a column")
+    found = []
+    for entry in entries:
+        try:
+            found.append(float(entry))
+        except ValueError:
+            raise RecordError(f"{path}:{n}: {briefly(entry.strip())} is not a number") from None
+    if not np.isfinite(found).all():
+        raise RecordError(f"{path}:{n}: {briefly(line.strip())} is not finite")
+    return found

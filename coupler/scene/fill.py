@@ -1,0 +1,210 @@
+"""Where the water stands at the start: boxes of a case → level set at the nodes of the physical domain.
+
+A fill box often ends at a wall. That side is no surface: left as it is, the level set would be zero in the face of
+the wall and the water there without pressure; and beside a thin wall the copies of its nodes on the dry side would
+count as wet. So a side of a box counts at a node only where water and air can meet in the cells around it:
+
+    s = distance to the side, negative inside;  [s_low, s_high] over the fluid part of the cells around the node
+    a solid that faces the side cuts these cells short on the outer side, |s_high| < t, or s ≥ 0 and s_high < t
+                                                            →  s ← -far             wet up to the solid: no side
+    one cuts them short on the inner side, s_low > -t       →  s ← max(s, +2 c)     dry from the solid on
+
+c: cell edge, t = TOUCHES c. Elsewhere s stays, so that a level surface stays a plane up to the wall.
+"""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+
+from fluid.domain.quadrature import part_points
+
+Array = np.ndarray
+
+TOUCHES = 0.1
+"""Share of a cell edge within which the side of a box counts as the face of the solid."""
+MISSING = 0.05
+"""Share of a cell edge that a solid must take off the cells around a node to count."""
+SEAM = 1e-6
+"""Share of a cell edge within which two boxes touch."""
+
+
+def start_level(boxes, tank, mesh, domain) -> Array:
+    """Level set (N,) [m] of the union of the boxes at the nodes of a PhysicalDomain, negative in the water.
+
+    boxes: list of (lower (3,), upper (3,)) [m] · tank: (lower, upper) of the tank, whose walls are no surfaces either.
+    """
+    low, high = _reach(domain.nodes, domain.cells, *_fluid_extent(domain))
+    edge = _cell_edge(mesh)
+    boxes = merged(boxes, SEAM * edge)
+    whole_low, whole_high = _reach(mesh.nodes, mesh.cells, *_extent(mesh.nodes[mesh.cells]))
+    cut_low = low - whole_low[domain.parent_node] > MISSING * edge
+    cut_high = whole_high[domain.parent_node] - high > MISSING * edge
+    faced_low, faced_high = _facing(domain)
+    stars = (domain.nodes, low, high, cut_low & faced_low, cut_high & faced_high)
+    level = np.min([_box_level(box, tank, stars, edge) for box in boxes], axis=0)
+    return _without_seams(level, boxes, tank, domain.nodes, edge)
+
+
+def merged(boxes, slack: float) -> list:
+    """The boxes, those side by side that make one together as that one: it has no side where they touch, and between
+    nodes the distance to such a side would take water away. slack [m]: within which ends are the same."""
+    found, before = [np.array(box, float) for box in boxes], len(boxes) + 1
+    while len(found) < before:
+        before = len(found)
+        for axis in range(3):
+            found = _joined_along(axis, found, slack)
+    return [(tuple(low), tuple(high)) for low, high in np.array(found).tolist()]
+
+
+def _joined_along(axis: int, boxes: list[Array], slack: float) -> list[Array]:
+    """Boxes (2, 3) with the same ends across an axis that meet along it are one."""
+    rows: dict[tuple, list[Array]] = {}
+    for box in boxes:
+        across = np.delete(box, axis, axis=1)
+        rows.setdefault(tuple(np.round(across / slack).ravel()), []).append(box)
+    joined: list[Array] = []
+    for row in rows.values():
+        row.sort(key=lambda box: box[0, axis])
+        joined.append(row[0].copy())
+        for box in row[1:]:
+            if box[0, axis] <= joined[-1][1, axis] + slack:
+                joined[-1][1, axis] = max(joined[-1][1, axis], box[1, axis])
+            else:
+                joined.append(box.copy())
+    return joined
+
+
+def start_velocity(boxes, velocities, nodes) -> Array | None:
+    """Velocity (N, 3) [m/s] at nodes (N, 3): that of the box in which a node lies deepest, or else of the nearest one.
+
+    boxes: as in `start_level` · velocities: of the first of them, the others are at rest; None if all are."""
+    if not np.any(velocities):
+        return None
+    moving = np.zeros((len(boxes), 3))
+    moving[: len(velocities)] = velocities
+    outside = [np.maximum(np.array(low) - nodes, nodes - np.array(high)).max(axis=1) for low, high in boxes]
+    return moving[np.argmin(outside, axis=0)]
+
+
+def _facing(domain) -> tuple[Array, Array]:
+    """(N, 3) bool each: nodes with a solid around them whose face looks up, or down, each axis: a side of a box can
+    only end at such a one, not where a wall across it cuts the cells short."""
+    up, down = np.zeros(domain.nodes.shape, bool), np.zeros(domain.nodes.shape, bool)
+    for a in range(4):
+        corner = domain.cells[domain.face_cell, a]
+        np.logical_or.at(up, corner, domain.face_normal > 0.5)
+        np.logical_or.at(down, corner, domain.face_normal < -0.5)
+    return up, down
+
+
+def _without_seams(level, boxes, tank, nodes, edge: float) -> Array:
+    """The level (N,) with water where boxes touch: the distance to both is zero on the face that they share."""
+    step = SEAM * edge
+    at = np.flatnonzero(np.abs(level) < step)
+    inside = np.ones(len(at), bool)
+    for offset in product((-step, step), repeat=3):
+        inside &= np.any([_in_box(box, tank, nodes[at] + offset) for box in boxes], axis=0)
+    at = at[inside]
+    if len(at) > 0:
+        ways = [_reach_of(boxes, tank, nodes[at], k, sign, step) for k in range(3) for sign in (-1, 1)]
+        level[at] = -np.min(ways, axis=0)
+    return level
+
+
+def _reach_of(boxes, tank, points, axis: int, sign: int, step: float) -> Array:
+    """How far (n,) [m] the union of the boxes reaches from points (n, 3) in it along an axis."""
+    way, whole = np.zeros(len(points)), np.ptp(np.array(tank))
+    for box in list(boxes) * len(boxes):  # from box to box, at most through all of them
+        ahead = points.copy()
+        ahead[:, axis] += sign * (way + step)
+        end = box[0 if sign < 0 else 1][axis]
+        goes_on = end <= tank[0][axis] if sign < 0 else end >= tank[1][axis]
+        far = whole if goes_on else sign * (end - points[:, axis])
+        way = np.where(_in_box(box, tank, ahead, 0.5 * step), np.maximum(way, far), way)
+    return way
+
+
+def _in_box(box, tank, points, slack: float = 0.0) -> Array:
+    """(n,) bool: inside the box, which goes on beyond the walls of the tank that it reaches."""
+    (box_low, box_high), (tank_low, tank_high) = np.array(box), np.array(tank)
+    low = np.where(box_low > tank_low, box_low - slack, -np.inf)
+    high = np.where(box_high < tank_high, box_high + slack, np.inf)
+    return np.all((points > low) & (points < high), axis=1)
+
+
+def _box_level(box, tank, stars, edge: float) -> Array:
+    """Signed distance (N,) of one box, its sides at solids and tank walls left out."""
+    nodes, low, high, cut_low, cut_high = stars
+    (box_low, box_high), (tank_low, tank_high) = box, tank
+    level = np.full(len(nodes), -np.inf)
+    for k in range(3):
+        x = nodes[:, k]
+        if box_high[k] < tank_high[k]:
+            plane = box_high[k]
+            side = _side(
+                x - plane, low[:, k] - plane, high[:, k] - plane, cut_low[:, k], cut_high[:, k], edge
+            )
+            level = np.maximum(level, side)
+        if box_low[k] > tank_low[k]:
+            plane = box_low[k]
+            side = _side(
+                plane - x, plane - high[:, k], plane - low[:, k], cut_high[:, k], cut_low[:, k], edge
+            )
+            level = np.maximum(level, side)
+    far = np.ptp(nodes, axis=0).max()  # a distance that no surface reaches
+    return np.maximum(level, -far)
+
+
+def _side(s, s_low, s_high, cut_inner, cut_outer, edge: float) -> Array:
+    """Distance to one side (N,), pushed away from the solids that stand there."""
+    touch = TOUCHES * edge
+    # a star below the surface, cut short by a slanting solid, keeps its distance
+    wet = cut_outer & (s_high < touch) & ((s >= 0.0) | (s_high > -touch))
+    dry = cut_inner & (s_low > -touch)
+    sliver = wet & dry  # counts to the side on which it mostly lies
+    wet &= ~sliver | (-s_low >= s_high)
+    dry &= ~wet
+    return np.where(wet, -np.inf, np.where(dry, np.maximum(s, 2.0 * edge), s))
+
+
+def _cell_edge(mesh) -> float:
+    """Longest side of the bounding boxes of the cells, the typical one [m]."""
+    corners = mesh.nodes[mesh.cells]
+    return float(np.median(np.ptp(corners, axis=1).max(axis=1)))
+
+
+def _extent(points) -> tuple[Array, Array]:
+    return points.min(axis=1), points.max(axis=1)
+
+
+def _fluid_extent(domain) -> tuple[Array, Array]:
+    """Bounds (M, 3) each of the fluid part of every cell: its corners are those of its wetted polygons and the corners
+    of the cell in front of all of these; the points of its quadrature besides, for parts that are not convex."""
+    d = domain
+    corners = d.nodes[d.cells]
+    low, high = _extent(corners)
+    behind = np.zeros(d.cells.shape, bool)
+    to_corner = corners[d.face_cell] - d.face_centroid[:, None]
+    np.logical_or.at(behind, d.face_cell, np.einsum("sak,sk->sa", to_corner, d.face_normal) < 0.0)
+    cut = np.flatnonzero(d.is_cut)
+    points = part_points(corners[cut], d.volume[cut], d.centroid[cut], d.second[cut])
+    part_low, part_high = np.full(low.shape, np.inf), np.full(low.shape, -np.inf)
+    part_low[cut], part_high[cut] = _extent(points)
+    np.minimum.at(part_low, d.face_cell, d.face_corners.min(axis=1))
+    np.maximum.at(part_high, d.face_cell, d.face_corners.max(axis=1))
+    shown = ~behind[cut, :, None]
+    part_low[cut] = np.minimum(part_low[cut], np.where(shown, corners[cut], np.inf).min(axis=1))
+    part_high[cut] = np.maximum(part_high[cut], np.where(shown, corners[cut], -np.inf).max(axis=1))
+    low[cut], high[cut] = np.maximum(low[cut], part_low[cut]), np.minimum(high[cut], part_high[cut])
+    return low, high
+
+
+def _reach(nodes, cells, low, high) -> tuple[Array, Array]:
+    """Bounds (N, 3) each of what the cells around every node reach."""
+    node_low, node_high = np.full(nodes.shape, np.inf), np.full(nodes.shape, -np.inf)
+    for a in range(4):
+        np.minimum.at(node_low, cells[:, a], low)
+        np.maximum.at(node_high, cells[:, a], high)
+    return node_low, node_high

@@ -1,0 +1,426 @@
+"""The coupled step and the run around it.
+
+One step: cut → advect → pressure with the structure inside → correct → YADE substeps → defect → ledger.
+A scene may lack either side: without water the structure runs alone, without a structure the water does.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from functools import partial
+
+import numpy as np
+
+from coupler.balance.energy import Balance, Ledger
+from coupler.balance.momentum import MomentumBalance, book_step, momentum_ledger
+from coupler.step.limits import Diverged, Limits, check_finite, check_pressure, no_room
+from coupler.step.observe import fastest_point
+from coupler.step.residual import RETRIES, Defects
+from coupler.step.step_limits import Attempt, attempt_of, best_of, volume_error
+from coupler.step.step_start import StepStart
+
+Array = np.ndarray
+
+BLOCK_COURANT = 0.5
+"""Share of a cell that the fastest block may cross in one step: its cells are cut once a step."""
+STANDS_STILL = 1e-3
+"""Share of the energy of the scene below which the motion of the structure is no measure of the defect."""
+
+
+@dataclass
+class StepRecord:
+    """What one step did, for the histories. Absent sides leave zeros."""
+
+    time: float
+    dt: float
+    iterations: int = 0
+    passes: int = 0
+    defect: float = 0.0
+    substeps: int = 0
+    substep: float = 0.0
+    opening_rate: float = 0.0
+    """Largest v dt_s / d_f of a substep: 1 and more means that a joint opened within one substep."""
+    unknowns: int = 0
+    bodies_cut: int = 0
+    retries: int = 0
+    """Times that the step was halved, and dt with it, because it failed or broke a limit."""
+    bad: bool = False
+    """Whether it stays although it breaks a limit, since shorter ones do so too."""
+    wetted: bool = False
+    """Whether water touched a body in this step."""
+    load: Array = field(default_factory=lambda: np.zeros((0, 6)))
+    shear_load: Array = field(default_factory=lambda: np.zeros((0, 6)))
+    """The part of `load` that walls of bodies take by viscosity and friction."""
+    surface_load: Array = field(default_factory=lambda: np.zeros((0, 6)))
+    """The part of `load` that corrects the pressure where the surface passes through the cells of a body."""
+    missed_work: Array = field(default_factory=lambda: np.zeros(0))
+    """Work of the load on each block (n,) [J] that the blocks got less than the water gave."""
+    impulses: object = None
+    """What contacts and joints gave to the blocks; None without a structure."""
+    balance: Balance = field(default_factory=Balance)
+    momentum: MomentumBalance | None = None
+
+
+class Coupling:
+    """The two sides and the state of their coupling; `step` advances both.
+
+    water, structure, immersion: either side may be None (immersion only with water).
+    passes: most pressure solves in a step; beyond the first, the structure goes back and takes the step again, as long
+    as the defect is above `tolerance`.
+    most_defect, limits: above a share of the one (`Defects`), beyond the others (`step_limits.py`), or where no
+    pressure is found, both sides go back and take half of the step; without limits only what is not finite counts.
+    expected: energy that inflows and seas can bring [J], a scale for errors.
+    """
+
+    def __init__(
+        self,
+        water,
+        structure,
+        immersion,
+        *,
+        rtol: float,
+        step_max: float,
+        clock,
+        passes: int = 1,
+        tolerance: float = 0.02,
+        most_defect: float = 0.5,
+        limits: Limits | None = None,
+        expected: float = 0.0,
+    ):
+        self.passes, self.tolerance = passes, tolerance
+        self.pause: Callable[[], None] | None = None
+        """Called between the parts of a step, where the run may be ended by an exception."""
+        self.defects = Defects(most_defect)
+        self.limits = limits
+        self.water, self.structure, self.immersion = water, structure, immersion
+        self.rtol, self.step_max, self.clock = rtol, step_max, clock
+        self.radius = np.zeros(0)
+        if structure is not None:
+            self.radius = np.array([np.linalg.norm(v, axis=1).max() for v in structure.shape_vertices])
+        self.time = 0.0
+        self.sheared = None
+        if self.coupled and water.viscous is not None and water.parameters.walls == "no-slip":
+            from coupler.step.shear import ShearedBlocks
+
+            self.sheared = ShearedBlocks(structure, immersion.n_solids)
+        self.ledger = Ledger()
+        if water is not None:
+            self.ledger.available = water.available_energy() + expected
+        self.ledger.start(self._water_energy(), self._structure_energies())
+        self.momentum = momentum_ledger(water, structure)
+
+    def save(self) -> dict[str, Array]:
+        """What the coupling itself remembers between two steps; both sides and the ledger save theirs."""
+        found = {"time": np.array(self.time), **self.defects.save()}
+        if self.sheared is not None:
+            found["sheared"] = self.sheared.accelerations.copy()
+        return found
+
+    def restore(self, saved: dict[str, Array]) -> None:
+        """Back to what was saved."""
+        self.time = float(saved["time"])
+        self.defects.restore(saved)
+        if self.sheared is not None:
+            self.sheared.accelerations = saved["sheared"].copy()
+
+    @property
+    def coupled(self) -> bool:
+        return self.water is not None and self.structure is not None
+
+    def step_size(self, remaining: float) -> float:
+        """The largest step [s] that water, blocks and the case allow, dividing `remaining` evenly."""
+        dt = self.step_max
+        if self.water is not None:
+            dt = min(dt, self.water.stable_step())
+        if self.coupled:
+            speed = fastest_point(self.structure.velocity(), self.radius)
+            if speed > 0.0:
+                dt = min(dt, BLOCK_COURANT * self.water.mesh.spacing / speed)
+        dt *= self.defects.share
+        return remaining / max(1, math.ceil(remaining / dt * (1.0 - 1e-9)))
+
+    def step(self, dt: float) -> StepRecord:
+        """Advance both sides by dt [s], or by the half of it, its half, ... where a whole one fails: `record.dt`.
+
+        Raises Diverged, or what the pressure solver says, when that does not help either."""
+        record = StepRecord(self.time + dt, dt)
+        if self.water is None:
+            self._take(record, None)
+            return record
+        if self.coupled:
+            self._cut(record)
+            before = self.structure.velocity()
+        self._take_until_good(dt, record)
+        if self.sheared is not None:
+            self.sheared.note(before, record.shear_load[: self.structure.n], record.dt)
+        self.defects.note(self.time, record)
+        return record
+
+    def _take_until_good(self, dt: float, record: StepRecord) -> None:
+        """A step of dt [s]; its half, and so on, where that has no solution or breaks a limit. Where the shortest one
+        breaks one too, the better of it and the longest (`best_of`) stays: whether the run stops there is for its
+        caller to say.
+
+        Raises Diverged where none has a solution."""
+        start, volume = self._start(), volume_error(self)
+        tried: list[Attempt] = []
+        for record.retries in range(RETRIES + 1):
+            record.dt = dt / 2**record.retries
+            try:
+                self._take(record, start)
+            except self._failures() as error:
+                if record.retries == RETRIES and not tried:
+                    raise _no_way_on(self.time, error, record.dt) from error
+            else:
+                attempt = self._judge(record, volume)
+                if not attempt.broken:
+                    return
+                tried.append(attempt)
+                if record.retries >= self.defects.halvings:
+                    break
+            start.restore(self)
+        record.bad = True
+        self._keep(best_of(tried), tried[-1], dt, record, start)
+
+    def _keep(self, best: Attempt, last: Attempt, dt: float, record: StepRecord, start: StepStart) -> None:
+        """Take the best attempt once more, unless it is the one in which both sides stand."""
+        if best is last and record.retries == last.retries:
+            return
+        start.restore(self)
+        record.retries = best.retries
+        record.dt = dt / 2**best.retries
+        self._take(record, start)
+
+    def _start(self) -> StepStart:
+        with self.clock("water" if self.structure is None else "structure"):
+            return StepStart.of(self)
+
+    def _failures(self) -> tuple:
+        """What a step raises that a shorter one may cure."""
+        from fluid.numerics.solve import NotConverged
+
+        if self.structure is None:
+            return Diverged, NotConverged
+        from yade_scripts.dynamics.structure import NotFinite
+
+        return Diverged, NotConverged, NotFinite
+
+    def _judge(self, record: StepRecord, volume_before: float) -> Attempt:
+        """What the step that was just taken breaks."""
+        return attempt_of(self, record, self.limits, volume_before)
+
+    def _take(self, record: StepRecord, start: StepStart | None) -> None:
+        """One step of record.dt on both sides and in the books. Raises what the solvers say, and Diverged."""
+        dt = record.dt
+        if self.coupled:
+            self._coupled_step(dt, record, start)
+        elif self.water is not None:
+            self._water_step(dt, record)
+        else:
+            self._structure_step(dt, record)
+        self.time += dt
+        record.time = self.time
+        self._check_finite()
+        if self.water is not None and self.water.sides is not None:
+            self.ledger.entered = self.water.sides.energy
+        record.balance = self.ledger.balance(self._water_energy(), self._structure_energies())
+        record.momentum = book_step(self, record)
+
+    def _cut(self, record: StepRecord) -> None:
+        """The domain that the bodies leave now, and what they do to the water besides."""
+        with self.clock("cut"):
+            changed = self.immersion.update()
+        with self.clock("carry over"):
+            if changed:
+                self.water.move_solids(self.immersion.domain)
+            if self.water.slits is not None:
+                self.water.set_cracks(self.immersion.cracks.cracks())
+            record.bodies_cut = self.immersion.cut_again
+            self.water.moved_on = self.immersion.moved_on()
+        if self.water.viscous is not None:
+            self.water.body_velocity = self._padded(self.structure.velocity())
+        if self.sheared is not None:
+            self.water.free_bodies = self.sheared.now()
+
+    def _coupled_step(self, dt: float, record: StepRecord, start: StepStart) -> None:
+        n, before = self.structure.n, self.structure.velocity()
+        with self.clock("water"):
+            problem = self.water.predict(dt)
+        with self._placed(problem):
+            problem, found, moved, assumed = self._exchange(problem, record, start)
+        self.water.farther = dt * (self._padded(moved) - self.water.pushed_by)
+        self.water.pushed_by = found.velocity
+        with self.clock("water"):
+            self.water.correct(problem, found.x, found.parting)
+        record.load, record.unknowns = found.load, len(found.x)
+        given = found.load[:n] * assumed
+        gained = (self.structure.velocity() - before)[~self.structure.fixed]
+        behind = 0.5 * record.substep * float(np.sum(found.load[:n][~self.structure.fixed] * gained))
+        self.ledger.give(dt * float(np.sum(given)), behind)
+        record.missed_work = dt * np.sum(given - found.load[:n] * moved, axis=1)
+        self._note_loads(problem, record, self._padded(assumed))
+
+    def _note_loads(self, problem, record: StepRecord, velocity: Array) -> None:
+        """The parts of the load, and the energy that shear and outflow take; velocity (n_bodies, 6) of the bodies."""
+        shear = problem.predicted.shear
+        record.shear_load = np.zeros_like(record.load) if shear is None else shear.load
+        record.surface_load = problem.other_load - record.shear_load
+        if shear is not None:
+            self.ledger.shear -= shear.energy + record.dt * float(np.sum(shear.load * velocity))
+        self.ledger.left += self.water.report.left_energy
+        self.ledger.parting += self.water.report.bound.work
+
+    def _exchange(self, problem, record: StepRecord, start: StepStart):
+        """Pressure with the structure inside, then the structure under it, as often as the passes allow. One pass where
+        no block is wetted.
+
+        Returns the problem with all of its load, the solution, and the mean velocities (n, 6) with which the blocks
+        moved and were assumed to move."""
+        from coupler.step.coupling_rows import Wetting
+        from coupler.step.pressure_with_structure import corrected_free_velocity, defect, solve_coupled
+        from fluid.numerics.bounded import solve_bounded
+
+        structure, solve = self.structure, partial(solve_bounded, kept=[])
+        with self.clock("structure in pressure"):
+            problem, afloat = self._afloat(problem)
+            mass, response, v_free = self._response(problem, afloat)
+            wetting = Wetting.of(problem.coupling)
+        record.wetted = problem.coupling.nnz > 0
+        before = self._padded(structure.velocity())
+        found, most = None, self.passes if record.wetted else 1
+        for record.passes in range(1, most + 1):
+            self._pause()
+            with self.clock("pressure"):
+                found = solve_coupled(problem, response, v_free, solve, self.rtol, found, wetting)
+            with self.clock("structure"):
+                if record.passes > 1:
+                    structure.restore(start.structure)
+                structure.set_load(found.load[: structure.n])
+                report = structure.advance(problem.dt)
+            record.iterations += found.iterations
+            record.substeps += report.substeps
+            floor = STANDS_STILL * self.ledger.input_energy
+            lead = response.lead(found.velocity, before, report.dt_s)
+            assumed = (found.velocity - lead)[: structure.n]
+            record.defect = defect(mass, assumed, report.mean_velocity, floor)
+            if record.defect <= self.tolerance:
+                break
+            after = self._padded(report.mean_velocity) + lead
+            v_free = corrected_free_velocity(response, after, found.x, problem.coupling)
+        record.substep, record.opening_rate = report.dt_s, report.opening_rate
+        record.impulses = report.impulses
+        if found.restoring.any():
+            problem = replace(problem, other_load=problem.other_load + found.restoring)
+        return problem, found, report.mean_velocity, assumed
+
+    def _pause(self) -> None:
+        if self.pause is not None:
+            self.pause()
+
+    def _response(self, problem, afloat: Array | None):
+        """Mass of the blocks, the answer of all bodies to forces, and V_free of the first pass."""
+        from coupler.step.pressure_with_structure import StructureResponse, mass_matrix, water_load
+
+        structure = self.structure
+        mass = mass_matrix(structure.mass, structure.inertia())
+        velocity = self._padded(structure.velocity())
+        driven = np.append(structure.fixed, np.ones(self.immersion.n_solids, bool))
+        response = StructureResponse(
+            *self._with_solids(mass, *structure.tangent()),
+            problem.dt,
+            driven,
+            velocity,
+            afloat,
+        )
+        known = water_load(problem, 0.0)
+        force = structure.weight_now() + structure.internal_force()
+        return mass, response, response.free_velocity(velocity, self._padded(force) + known)
+
+    def _afloat(self, problem):
+        """The problem with the bodies where they stand, not where their cells were cut, and how still water resists the
+        free ones that its surface cuts, (n, 3, 3); None where there is none."""
+        from fluid.pressure.waterline import hydrostatic_stiffness
+
+        driven = np.append(self.structure.fixed, np.ones(self.immersion.n_solids, bool))
+        stiffness = hydrostatic_stiffness(self.water, problem.predicted.level_set, ~driven)
+        if stiffness is None:
+            return problem, None
+        load = problem.other_load.copy()
+        load[:, 2:5] -= np.einsum("nij,nj->ni", stiffness, self.water.moved_on[:, 2:5])
+        return replace(problem, other_load=load), stiffness
+
+    def _water_step(self, dt: float, record: StepRecord) -> None:
+        from coupler.step.pressure_with_structure import water_load
+        from fluid.numerics.bounded import solve_pressure
+
+        with self.clock("water"):
+            problem = self.water.predict(dt)
+        self._pause()
+        with self.clock("pressure"), self._placed(problem):
+            result = solve_pressure(problem, self.rtol)
+        with self.clock("water"):
+            self.water.correct(problem, result.x, result.parting)
+        record.load = water_load(problem, result.x)
+        record.iterations, record.passes, record.unknowns = result.iterations, 1, len(result.x)
+        self._note_loads(problem, record, self.water.body_velocity)
+
+    def _structure_step(self, dt: float, record: StepRecord) -> None:
+        with self.clock("structure"):
+            report = self.structure.advance(dt)
+        record.substeps, record.substep = report.substeps, report.dt_s
+        record.opening_rate, record.impulses = report.opening_rate, report.impulses
+
+    def _padded(self, values: Array) -> Array:
+        """Rows of zeros appended for the fixed solids: (n, 6) → (n + m, 6)."""
+        return np.concatenate([values, np.zeros((self.immersion.n_solids, 6))])
+
+    def _with_solids(self, *matrices):
+        """Sparse (6n, 6n) matrices with empty rows for the fixed solids."""
+        import scipy.sparse as sp
+
+        size = 6 * self.immersion.n_solids
+        if size == 0:
+            return matrices
+        empty = sp.csr_array((size, size))
+        return tuple(sp.block_diag([m, empty], format="csr") for m in matrices)
+
+    def _water_energy(self) -> tuple[float, float] | None:
+        if self.water is None:
+            return None
+        return self.water.kinetic_energy(), self.water.potential_energy()
+
+    def _structure_energies(self) -> dict[str, float] | None:
+        return None if self.structure is None else self.structure.energies()
+
+    def _driven_by(self) -> tuple[bool, bool]:
+        """Whether blocks may move, and whether water comes in through sides."""
+        return self.structure is not None and not self.structure.fixed.all(), self.water.sides is not None
+
+    @contextmanager
+    def _placed(self, problem):
+        """A pressure of the problem that is not found is told with its place and what may be the cause."""
+        from fluid.numerics.solve import NotConverged
+
+        try:
+            yield
+        except NotConverged as error:
+            if error.unknown is None:
+                raise
+            place = self.water.topology.nodes[problem.dofs[error.unknown]]
+            text = f"{error} {no_room(place, *self._driven_by())}"
+            raise NotConverged(text, error.history, error.unknown) from error
+
+    def _check_finite(self) -> None:
+        if self.water is not None:
+            check_finite(self.time, "the velocity of the water", self.water.velocity, "node")
+            check_pressure(self.time, self.water.pressure, self.water.topology.nodes, *self._driven_by())
+        if self.structure is not None:
+            check_finite(self.time, "the velocity of the structure", self.structure.velocity(), "block")
+
+
+def _no_way_on(time: float, error: Exception, dt: float) -> Diverged:
+    at = "" if isinstance(error, Diverged) else f"t = {time:.4g} s: "
+    return Diverged(f"{at}{error} Steps down to {dt:.3g} s did not help.")

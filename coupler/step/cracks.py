@@ -1,0 +1,70 @@
+"""Narrow cracks between blocks: which broken joints the water still takes for closed, and what flows through them.
+
+An open crack in a wall thinner than about two cells acts on the water as an opening one cell wide, however narrow it
+is. So, unless the case asks for open cracks, a broken joint stays closed in the geometry of the water while its faces
+are nearly where they were: opened by less than a quarter of a cell, in a wall thinner than two. What flows through it
+is left out (`closed`) or lumped (`slit`, see fluid/pressure/slits.py). Wider ones open, and are cut.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from fluid.pressure.slits import Cracks
+
+Array = np.ndarray
+
+WIDEST = 0.25
+"""Largest opening in cells of a crack that is closed: below it a closed one is nearer to the truth than an open one."""
+THINNEST = 2.0
+"""Depth in cells from which a crack is open: the mesh sees the channel itself."""
+NO_OPENING = 1e-6
+"""Openings in cells below which nothing flows."""
+
+
+class NarrowCracks:
+    """The broken joints of a structure that the water takes for closed.
+
+    structure: blocks with joints · spacing [m] of the mesh · lumped: water flows through them."""
+
+    def __init__(self, structure, spacing: float, lumped: bool):
+        self.structure, self.spacing, self.lumped = structure, spacing, lumped
+        corners, start = structure.joint_polygons()
+        self._width = np.array([_least_width(corners[first:last]) for first, last in pairwise(start)])
+
+    def faces(self) -> tuple[Array, Array, Array]:
+        """Faces to be closed: block (m,), face (m,), half of the largest opening (m,) [m]."""
+        _, block, face, opening = self._narrow()
+        half = 0.5 * np.repeat(opening[:, 2], 2)
+        there = block.ravel() >= 0
+        return block.ravel()[there], face.ravel()[there], half[there]
+
+    def cracks(self) -> Cracks:
+        """The same for the water: where it may flow through."""
+        joint, block, _, opening = self._narrow()
+        flows = opening[:, 0] > NO_OPENING * self.spacing
+        joint, block, opening = joint[flows], block[flows], opening[flows]
+        corners, start = self.structure.joint_polygons()
+        length = np.diff(start)[joint]
+        first = np.concatenate([[0], np.cumsum(length)]).astype(np.int64)
+        rows = np.repeat(start[joint] - first[:-1], length) + np.arange(first[-1])
+        return Cracks(corners[rows], first, opening[:, 0], block, joint)
+
+    def _narrow(self) -> tuple[Array, Array, Array, Array]:
+        """Joint (m,), blocks (m, 2), faces (m, 2), openings (m, 3) [m]: mean, sliding, largest."""
+        joint, block, face, opening = self.structure.broken_joints()
+        depth = self._width[joint]
+        near = (opening[:, 2] < WIDEST * self.spacing) & (opening[:, 1] < WIDEST * depth)
+        near &= depth < THINNEST * self.spacing
+        return joint[near], block[near], face[near], opening[near]
+
+
+def _least_width(corners: Array) -> float:
+    """Smallest width [m] of a convex polygon (k, 3) across one of its edges."""
+    ahead = np.roll(corners, -1, axis=0) - corners
+    normal = np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)
+    inward = np.cross(normal, ahead)
+    inward /= np.linalg.norm(inward, axis=1)[:, None]
+    return float(min((((corners - c) @ n).max()) for c, n in zip(corners, inward)))

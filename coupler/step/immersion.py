@@ -1,0 +1,188 @@
+"""Where the structure cuts the water: block geometry → physical domain, cut again only where blocks moved."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fluid.cut.bodies import ConvexBodies
+from fluid.domain.physical_domain import cut_domain
+
+Array = np.ndarray
+
+STILL = 1e-3
+"""Share of a cell edge that a block may move before its cells are cut again."""
+FILM = 1e-4
+"""Share of a cell edge by which loose blocks are drawn in, so that water reaches a face that rests on another:
+sealed or open must follow from the joints, not from the micrometres of a contact (a sealed face takes the
+buoyancy away). Faces that overlap others are drawn in by the overlap as well, in doubling steps."""
+MOST_FILM = 0.05
+"""Share of a cell edge by which a face is drawn in at most; in harder impacts it seals for a moment."""
+FACES_IT = 0.5
+"""Least n·e of a face of a block that counts as the one which the contact along e is on."""
+SPANS = 0.02
+"""Share of a cell edge within which a block that reaches two opposite sides of the tank closes it: a slice of a long
+body. A film of micrometres there would be water of no volume, with any velocity."""
+ALONG = 1e-3
+"""Largest 1 - |n·e| of a face that counts as parallel to a side of the tank."""
+
+
+class Immersion:
+    """The solids in the water: n blocks of the structure, then m fixed solids; keeps the domain they leave.
+
+    mesh: Background · structure: Structure or None · solids: list of (vertices (k, 3), faces) fixed in space ·
+    cracks: `NarrowCracks` of the structure, or None: broken joints are open · connection: thresholds of the covers.
+    """
+
+    def __init__(self, mesh, structure, solids, covers: str, cracks=None, connection=None):
+        self.mesh, self.structure, self.covers, self.cracks = mesh, structure, covers, cracks
+        self.connection = connection
+        self.n_blocks = 0 if structure is None else structure.n
+        self.n_solids = len(solids)
+        self._solid_centre = np.array([v.mean(axis=0) for v, _ in solids]).reshape(-1, 3)
+        shapes = [] if structure is None else list(zip(structure.shape_vertices, structure.shape_faces))
+        shapes += [(v - c, f) for (v, f), c in zip(solids, self._solid_centre)]
+        self._reference = (
+            ConvexBodies.from_polyhedra(shapes, centre=np.zeros((len(shapes), 3)))
+            if shapes
+            else ConvexBodies.empty()
+        )
+        self._body_of_plane = np.repeat(np.arange(len(shapes)), np.diff(self._reference.plane_start))
+        self._radius = np.array([np.linalg.norm(v, axis=1).max() for v, _ in shapes])
+        low, high = mesh.bounds
+        self._long = np.flatnonzero(2.0 * self._radius[: self.n_blocks] > (high - low).min() - mesh.spacing)
+        """Blocks long enough to reach across the tank."""
+        self._tolerance = STILL * mesh.spacing
+        self._centre, self._rotation = self._pose()
+        self._growth = self._new_growth(np.zeros(len(self._body_of_plane)))
+        self.bodies = self._placed()
+        self.domain = cut_domain(mesh, self.bodies, covers, connection=connection)
+        self.cut_again = 0
+        """Bodies whose cells the last update cut again."""
+
+    def update(self) -> bool:
+        """Cut again where blocks moved or came loose since they were last cut; True if the domain changed."""
+        if self.n_blocks == 0:
+            return False
+        centre, rotation = self._pose()
+        turned = np.abs(rotation - self._rotation).max(axis=(1, 2)) * self._radius
+        moved = np.linalg.norm(centre - self._centre, axis=1) + turned > self._tolerance
+        growth = self._new_growth(self._growth)
+        changed = moved.copy()
+        changed[self._body_of_plane[growth != self._growth]] = True
+        self.cut_again = int(changed.sum())
+        if not self.cut_again:
+            return False
+        self._centre[moved], self._rotation[moved] = centre[moved], rotation[moved]
+        self._growth = growth
+        self.bodies = self._placed()
+        self.domain = cut_domain(self.mesh, self.bodies, self.covers, self.domain, connection=self.connection)
+        return True
+
+    def moved_on(self) -> Array:
+        """How far the bodies stand from where their cells were last cut (n + m, 6) [m, rad]."""
+        centre, rotation = self._pose()
+        turn = rotation @ self._rotation.transpose(0, 2, 1)
+        axial = 0.5 * np.stack(
+            [turn[:, 2, 1] - turn[:, 1, 2], turn[:, 0, 2] - turn[:, 2, 0], turn[:, 1, 0] - turn[:, 0, 1]],
+            axis=1,
+        )
+        return np.concatenate([centre - self._centre, axial], axis=1)
+
+    def save(self) -> dict[str, Array]:
+        """Where the solids stood when their cells were last cut."""
+        return {
+            "centre": self._centre.copy(),
+            "rotation": self._rotation.copy(),
+            "growth": self._growth.copy(),
+        }
+
+    def restore(self, saved: dict[str, Array]) -> None:
+        """The domain that these places leave, cut anew: the same, bit for bit."""
+        self._centre, self._rotation = saved["centre"].copy(), saved["rotation"].copy()
+        self._growth = saved["growth"].copy()
+        self.bodies = self._placed()
+        self.domain = cut_domain(self.mesh, self.bodies, self.covers, connection=self.connection)
+        self.cut_again = 0
+
+    def _pose(self) -> tuple[Array, Array]:
+        """Centre (n + m, 3) and rotation (n + m, 3, 3) of blocks and fixed solids now."""
+        fixed = np.broadcast_to(np.eye(3), (self.n_solids, 3, 3))
+        if self.structure is None:
+            return self._solid_centre.copy(), fixed.copy()
+        return (
+            np.concatenate([self.structure.centre(), self._solid_centre]),
+            np.concatenate([self.structure.rotation(), fixed]),
+        )
+
+    def _new_growth(self, before: Array) -> Array:
+        """Outward shift of each plane (P,) [m]: sealed faces reach over the gap to the other block, loose blocks
+        that touch something are drawn in by a film. In steps, and never less while a face stays sealed, so that a
+        block that stands still keeps its planes bit for bit and is not cut again."""
+        growth = np.zeros(len(self._body_of_plane))
+        if self.n_blocks == 0:
+            return growth
+        block, plane, half_gap = self._closed_faces()
+        loose = np.ones(self.n_blocks, bool)
+        loose[block] = False
+        growth -= self._films(loose)
+        rows = self._reference.plane_start[block] + plane
+        steps = (
+            np.ceil(2.0 * np.maximum(half_gap, 0.0) / self._tolerance) + 1.0
+        )  # the other side may be a step behind
+        np.maximum.at(growth, rows, steps * self._tolerance)
+        growth[rows] = np.maximum(growth[rows], before[rows])
+        growth[self._closing_planes()] = 2.0 * SPANS * self.mesh.spacing
+        return growth
+
+    def _closed_faces(self) -> tuple[Array, Array, Array]:
+        """Faces that joints close, or narrow cracks that count as closed: block (m,), face (m,), half gap (m,) [m]."""
+        joined = self.structure.joined_planes()
+        if self.cracks is None:
+            return joined
+        return tuple(np.concatenate(two) for two in zip(joined, self.cracks.faces()))
+
+    def _films(self, loose: Array) -> Array:
+        """How far each plane (P,) [m] is drawn in for the contacts of the loose blocks (n,) bool."""
+        film = np.zeros(len(self._body_of_plane))
+        block, direction, depth = self.structure.overlaps()
+        block, direction, depth = (a[loose[block]] for a in (block, direction, depth))
+        if len(block) == 0:
+            return film
+        least = FILM * self.mesh.spacing
+        touching = np.zeros(self.n_blocks + self.n_solids, bool)
+        touching[block] = True
+        film[touching[self._body_of_plane]] = least
+        start = self._reference.plane_start
+        count = np.diff(start)[block]
+        contact = np.repeat(np.arange(len(block)), count)
+        plane = np.arange(len(contact)) - np.repeat(np.cumsum(count) - count, count) + start[block][contact]
+        local = np.einsum("kij,ki->kj", self.structure.rotation()[block], direction)
+        on = np.einsum("ki,ki->k", self._reference.normals[plane], local[contact]) > FACES_IT
+        doubled = least * 2.0 ** np.ceil(np.log2(1.0 + np.maximum(depth, 0.0) / least))
+        np.maximum.at(film, plane[on], np.minimum(doubled, MOST_FILM * self.mesh.spacing)[contact[on]])
+        return film
+
+    def _closing_planes(self) -> Array:
+        """(P,) bool: faces along the tank sides of blocks that reach from one side to the opposite one."""
+        closing = np.zeros(len(self._body_of_plane), bool)
+        if len(self._long) == 0:
+            return closing
+        low, high = self.mesh.bounds
+        margin = SPANS * self.mesh.spacing
+        centre, rotation = self.structure.centre(), self.structure.rotation()
+        normals = np.einsum("pij,pj->pi", self._turns(rotation), self._reference.normals)
+        for b in self._long:
+            corners = centre[b] + self.structure.shape_vertices[b] @ rotation[b].T
+            spans = (corners.min(axis=0) < low + margin) & (corners.max(axis=0) > high - margin)
+            if spans.any():
+                own = self._body_of_plane == b
+                closing[own] = (np.abs(normals[own][:, spans]) > 1.0 - ALONG).any(axis=1)
+        return closing
+
+    def _turns(self, rotation: Array) -> Array:
+        """Rotation of the body of each plane (P, 3, 3)."""
+        fixed = np.broadcast_to(np.eye(3), (self.n_solids, 3, 3))
+        return np.concatenate([rotation, fixed])[self._body_of_plane]
+
+    def _placed(self) -> ConvexBodies:
+        return self._reference.moved(self._centre, self._rotation).grown(self._growth)

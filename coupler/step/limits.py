@@ -1,0 +1,155 @@
+"""When a run ends before its time: out of balance, not finite, or over a limit that the case set."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from coupler.program.errors import ExitCode, SurgebreakError
+
+
+class Diverged(SurgebreakError):
+    """Not finite or out of balance: what comes after is not to be used."""
+
+    exit_code = ExitCode.DIVERGED
+
+
+class LimitReached(SurgebreakError):
+    """A budget that the case set, or the user's own wish to stop; the results so far are sound."""
+
+    exit_code = ExitCode.STOPPED
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Shares of the reference quantity beyond which a run stops (volume, energy, momentum), and its budget [CPU s]."""
+
+    volume_error: float
+    energy_error: float
+    cpu_seconds: float | None
+    momentum_error: float = 1e-8
+
+
+def check_balance(
+    time: float, volume_error: float, energy_error: float, limits: Limits, where: str = ""
+) -> None:
+    """Stop a run whose water volume or energy no longer balances.
+
+    where: what to look at, a clause without a full stop.
+    Raises Diverged with the quantity, its value, its limit and the remedy.
+    """
+    if not math.isfinite(volume_error) or abs(volume_error) > limits.volume_error:
+        raise Diverged(
+            f"the water volume is off by {volume_error:+.2%} at t = {time:.4g} s; limit "
+            f"{limits.volume_error:.2%} (limits.volume_error). Reduce time.cfl or tank.cell."
+        )
+    if not math.isfinite(energy_error) or energy_error > limits.energy_error:
+        place = f" {where[0].upper()}{where[1:]}." if where else ""
+        raise Diverged(
+            f"the energy balance is off by {energy_error:.2%} of the input energy at t = {time:.4g} s; limit "
+            f"{limits.energy_error:.2%} (limits.energy_error).{place} Reduce time.step_max, raise joints.damping, "
+            "or see history/energy.csv for the line that grows."
+        )
+
+
+def check_momentum(time: float, momentum_error: float, limit: float) -> None:
+    """Stop a run whose forces no longer balance its momentum. Raises Diverged."""
+    if not math.isfinite(momentum_error) or momentum_error > limit:
+        raise Diverged(
+            f"the lines of momentum miss {momentum_error:.2g} of the impulses of the step at t = {time:.4g} s; limit "
+            f"{limit:.2g} (limits.momentum_error). They close to round-off wherever solids cut the cells; look in "
+            "history/momentum.csv from when the residual grows, and for blocks or solids that overlap there."
+        )
+
+
+def check_defect(time: float, mean_defect: float, limit: float) -> None:
+    """Stop a run in which water and blocks no longer agree on how the blocks move.
+
+    mean_defect: over the last steps, since a joint that breaks makes a single step miss. Raises Diverged.
+    """
+    if not math.isfinite(mean_defect) or mean_defect > limit:
+        raise Diverged(
+            f"the blocks miss the motion that the water was told by {100 * mean_defect:.3g} % on the mean of the last "
+            f"steps, t = {time:.4g} s; limit {100 * limit:.3g} % (limits.defect). Reduce time.step_max to a tenth of "
+            "the period of the structure, raise coupling.passes to 2, or raise joints.damping."
+        )
+
+
+def check_misses(time: float, defects: list[float], most: int, limit: float, dt: float) -> None:
+    """Stop where the last `most` steps missed by more than the limit although they were halved as often as allowed.
+
+    Raises Diverged.
+    """
+    if len(defects) < most or min(defects) <= limit:
+        return
+    raise Diverged(
+        f"the blocks miss the motion that the water was told by {100 * defects[-1]:.3g} % at t = {time:.4g} s, in "
+        f"{most} steps in a row, the last of {dt:.3g} s; limit {100 * limit:.3g} % (limits.defect). A shorter step "
+        "does not help: raise coupling.passes or joints.damping, or use a larger tank.cell or heavier blocks."
+    )
+
+
+def check_overlap(time: float, found, limit: float) -> None:
+    """Stop where blocks are in one another, or in the ground, deeper than contact between solids can be.
+
+    found: Overlap (`coupler.geometry.overlaps`) or None. Raises Diverged.
+    """
+    if found is None:
+        return
+    stiffer = max(2.0, (found.share / limit) ** 2)
+    raise Diverged(
+        f"'{found.block}' is {found.depth:.3g} m deep in {found.other} at t = {time:.4g} s, {found.share:.2g} of the "
+        f"thickness of the thinner one ({found.depth / found.share:.3g} m); limit {limit:g} (limits.overlap). What "
+        "holds them apart is too soft for the weight or the speed of the blocks: try a contact.stiffness (absent: by "
+        f"joints.closing_ratio) about {stiffer:.2g} times as high, or thicker or slower blocks."
+    )
+
+
+HIGHEST_PRESSURE = 1e8
+"""[Pa] beyond any impact: water hammer at 70 m/s."""
+
+
+def no_room(place, blocks: bool, sides: bool) -> str:
+    """Where water finds no pressure, place (3,) [m], and what of a scene may be the cause: blocks that move, sides that
+    water comes through, or neither."""
+    causes = ["a block closes or makes smaller"] * blocks + ["an inflow or a sea fills"] * sides
+    at = ", ".join(f"{x:.3g}" for x in place)
+    if causes:
+        remedy = f"look for a full chamber that {' or '.join(causes)}, and leave it an opening or some air"
+    else:
+        remedy = (
+            "nothing moves or flows in, so look at the mesh and for slivers of water between solids there, and move "
+            "them or change tank.cell a little"
+        )
+    return f"Water has no room to go at ({at}) m: {remedy}."
+
+
+def check_pressure(time: float, pressure, nodes, blocks: bool, sides: bool) -> None:
+    """Stop where water has no room: a chamber without a free surface that something driven makes smaller.
+
+    pressure (N,) [Pa] at nodes (N, 3) [m]; blocks, sides as in `no_room`. Raises Diverged.
+    """
+    worst = int(np.argmax(np.abs(pressure))) if len(pressure) else 0
+    if len(pressure) == 0 or abs(pressure[worst]) <= HIGHEST_PRESSURE:
+        return
+    raise Diverged(
+        f"the pressure is {pressure[worst]:.3g} Pa at t = {time:.4g} s; limit {HIGHEST_PRESSURE:.0e} Pa. "
+        f"{no_room(nodes[worst], blocks, sides)}"
+    )
+
+
+def check_finite(time: float, what: str, values, item: str) -> None:
+    """Stop at the first NaN or infinity, naming the quantity and the item (node, block) that holds it.
+
+    Raises Diverged.
+    """
+    values = np.asarray(values)
+    if np.isfinite(values).all():
+        return
+    bad = int(np.argwhere(~np.isfinite(values))[0][0])
+    raise Diverged(
+        f"{what} is not finite at {item} {bad}, t = {time:.6g} s. The last written step is sound; "
+        "reduce time.step_max or time.cfl, or look for a very light or very stiff block there."
+    )

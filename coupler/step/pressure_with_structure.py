@@ -1,0 +1,252 @@
+"""The pressure solve with the structure inside, so that light debris and bonded walls need no iteration.
+
+One step of length dt, about block centres, world axes; one row of six [velocity, angular velocity] a body.
+Water (x: unknown part of the pressure, p = x + known; q_i: hat functions):
+
+    (dt/ρ) K x = ∫ u*·∇q + G V                                   mass balance with moving walls          (1)
+
+Structure, implicit in its own stiffness and damping over the step:
+
+    D V = M/dt V^n + f − Gᵀ (x + known),   D = M/dt + C + dt K_sec                                     (2)
+
+f: gravity, joint and contact forces at t^n; K_sec: secant stiffness of live joints and active contacts;
+C: their dashpots. Eliminating V gives one symmetric positive definite system,
+
+    [(dt/ρ) K + G D⁻¹ Gᵀ] x = ∫ u*·∇q + G V_free,   V = V_free − D⁻¹ Gᵀ x,                             (3)
+    V_free = D⁻¹ (M/dt V^n + f − Gᵀ known).
+
+The force −Gᵀ (x + known) is the exact adjoint of how the bodies move the water in (1), so the power leaving the water
+through the wetted surfaces is the power given to the velocities V, to round-off. `other_load` of the water (wall
+shear; its surface in the cells of a body) is part of f.
+
+The blocks move on while the load is held, and one that floats is lifted less the higher it comes. So K_h, what still
+water does to a body that moves in it (`fluid.pressure.waterline`, 3), acts over the half of the way: D has (dt/2) K_h
+besides, and the load is less by (dt/2) K_h V. With the load of the place at the start a swing grows by ω² dt²/4 in
+every step.
+
+V is the velocity at the end of the step.  Over the step the blocks move with the mean
+
+    V − L,    L = ½ (1 − dt_s/dt) D⁻¹ (M/dt + dt/2 K_h) (V − V^n)                                         (4)
+
+(dt_s: substep; the load acts from the first one on).  Stiff joints and contacts, which make D⁻¹ small, swing to and
+fro within a step and have no other velocity than their mean.  A second pass replaces the guess of (2) by what the
+discrete elements did under the first load x₁, whose mean velocity over the step was W:  V_free = W + L + D⁻¹ Gᵀ x₁.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from numba import njit
+from scipy.sparse.linalg import splu
+
+from coupler.step.coupling_rows import Wetting
+
+Array = np.ndarray
+
+
+def mass_matrix(mass: Array, inertia: Array) -> sp.csr_array:
+    """Block-diagonal mass of rigid bodies: mass (n,) [kg], inertia (n, 3, 3) [kg m²], world axes → (6n, 6n)."""
+    n = len(mass)
+    blocks = np.zeros((n, 6, 6))
+    blocks[:, [0, 1, 2], [0, 1, 2]] = np.asarray(mass)[:, None]
+    blocks[:, 3:, 3:] = inertia
+    return sp.csr_array(sp.bsr_array((blocks, np.arange(n), np.arange(n + 1)), shape=(6 * n, 6 * n)))
+
+
+class StructureResponse:
+    """Equation (2): the velocities that a force held over the step gives to the bodies.
+
+    mass, stiffness, damping: (6n, 6n) sparse, world axes · dt [s] · driven (n,) bool: bodies whose velocity
+    `driven_velocity` (n, 6) is imposed (fixed solids, prescribed motions); they take any load without answer ·
+    afloat (n, 3, 3): K_h for heave, roll and pitch, None: of no body.
+    """
+
+    def __init__(
+        self,
+        mass,
+        stiffness,
+        damping,
+        dt: float,
+        driven: Array,
+        driven_velocity: Array,
+        afloat: Array | None = None,
+    ):
+        self.dt = dt
+        self.mass = mass
+        self.imposed = np.where(driven[:, None], driven_velocity, 0.0).ravel()
+        self.free = np.flatnonzero(np.repeat(~driven, 6))
+        self._restoring = (
+            None if afloat is None else _of_heave(0.5 * dt * afloat, mass.diagonal().reshape(-1, 6))
+        )
+        self.matrix = sp.csr_array(mass / dt)
+        for part in (damping, dt * stiffness, self._restoring):
+            if part is not None and part.nnz:
+                self.matrix = self.matrix + part
+        own, tied = _own_blocks(self.matrix.indptr, self.matrix.indices, self.matrix.data, len(driven))
+        tied &= ~driven
+        self._alone = np.flatnonzero(~driven & ~tied)
+        self._inverse = np.linalg.inv(own[self._alone])
+        self._tied = np.flatnonzero(np.repeat(tied, 6))
+        self._factor = None
+        if len(self._tied):
+            block = self.matrix[self._tied][:, self._tied]
+            self._factor = splu(
+                sp.csc_matrix(block), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}
+            )
+
+    def compliance(self, force: Array) -> Array:
+        """D⁻¹ force over the free bodies, zero on the driven ones. force (6n,) [N, N m] → (6n,) [m/s, rad/s]
+
+        Bodies that nothing ties to others are solved each by itself."""
+        velocity = np.zeros_like(force)
+        _answer(self._alone, self._inverse, force, velocity)
+        if self._factor is not None:
+            velocity[self._tied] = self._factor.solve(np.ascontiguousarray(force[self._tied]))
+        return velocity
+
+    def velocity(self, force: Array) -> Array:
+        """Solve D V = force with the driven bodies at their imposed velocity. (6n,) → (6n,)"""
+        return self.imposed + self.compliance(force - self.matrix @ self.imposed)
+
+    def free_velocity(self, velocity: Array, force: Array) -> Array:
+        """V_free of (3) from the velocities at t^n and the force without the unknown pressure, each (n, 6)."""
+        return self.velocity(self.mass @ velocity.ravel() / self.dt + force.ravel())
+
+    def restoring_load(self, velocity: Array) -> Array:
+        """-(dt/2) K_h V (n, 6) [N, N m] of V (n, 6): what the load loses over the first half of the way."""
+        if self._restoring is None:
+            return np.zeros_like(velocity)
+        return -(self._restoring @ velocity.ravel()).reshape(-1, 6)
+
+    def lead(self, velocity: Array, before: Array, substep: float) -> Array:
+        """L (n, 6) of (4) from V and V^n (n, 6): by how much V is ahead of the mean velocity; zero for driven bodies.
+
+        substep dt_s [s]."""
+        held, change = self.mass / self.dt, (velocity - before).ravel()
+        gained = held @ change if self._restoring is None else held @ change + self._restoring @ change
+        return 0.5 * (1.0 - substep / self.dt) * self.compliance(gained).reshape(-1, 6)
+
+
+def _of_heave(blocks: Array, mass: Array) -> sp.csr_array:
+    """(6n, 6n) from blocks (n, 3, 3) for heave, roll and pitch; only what resists them, the rest left out.
+
+    mass (n, 6) [kg, kg m²]: of every component; its radius of gyration makes lengths of angles."""
+    n = len(blocks)
+    gyration = np.sqrt(mass[:, 3:].mean(axis=1) / np.where(mass[:, 0] > 0.0, mass[:, 0], 1.0))
+    length = np.ones((n, 3))
+    length[:, 1:] = np.where(gyration > 0.0, gyration, 1.0)[:, None]
+    unit = length[:, :, None] * length[:, None, :]
+    value, vector = np.linalg.eigh(0.5 * (blocks + blocks.transpose(0, 2, 1)) / unit)
+    whole = np.zeros((n, 6, 6))
+    whole[:, 2:5, 2:5] = unit * np.einsum("nik,nk,njk->nij", vector, np.maximum(value, 0.0), vector)
+    matrix = sp.csr_array(sp.bsr_array((whole, np.arange(n), np.arange(n + 1)), shape=(6 * n, 6 * n)))
+    matrix.eliminate_zeros()
+    return matrix
+
+
+@njit(cache=True)
+def _own_blocks(indptr, indices, data, n):
+    """Diagonal blocks (n, 6, 6) of a csr matrix (6n, 6n), and (n,) bool: bodies with entries in the rows of others."""
+    blocks, tied = np.zeros((n, 6, 6)), np.zeros(n, np.bool_)
+    for row in range(6 * n):
+        for s in range(indptr[row], indptr[row + 1]):
+            column = indices[s]
+            if column // 6 == row // 6:
+                blocks[row // 6, row % 6, column % 6] += data[s]
+            elif data[s] != 0.0:
+                tied[row // 6] = tied[column // 6] = True
+    return blocks, tied
+
+
+@njit(cache=True)
+def _answer(bodies, inverse, force, velocity):
+    """Rows of `bodies` (k,) of velocity (6n,) from force (6n,) and inverse (k, 6, 6), in place."""
+    for k in range(len(bodies)):
+        first = 6 * bodies[k]
+        for i in range(6):
+            total = 0.0
+            for j in range(6):
+                total += inverse[k, i, j] * force[first + j]
+            velocity[first + i] = total
+
+
+@dataclass(frozen=True)
+class CoupledSolution:
+    """x (n_dofs,) [Pa] · velocity (n_bodies, 6) [m/s, rad/s] at the end of the step · load (n_bodies, 6) [N, N m] on
+    the bodies · restoring (n_bodies, 6): the part of it by which floating bodies are lifted less on their way ·
+    at_bound (n_dofs,) bool, parting (n_dofs,) [m³/s], lower (n_dofs,) [Pa]: see `fluid.numerics.bounded`."""
+
+    x: Array
+    velocity: Array
+    load: Array
+    restoring: Array
+    iterations: int
+    at_bound: Array
+    parting: Array
+    lower: Array
+
+
+def water_load(problem, x: Array) -> Array:
+    """−Gᵀ (x + known) + other_load: force and moment of the water on each body, (n_bodies, 6) [N, N m]."""
+    return problem.other_load - (problem.coupling.T @ (x + problem.known)).reshape(-1, 6)
+
+
+def solve_coupled(
+    problem,
+    response: StructureResponse,
+    v_free: Array,
+    solve: Callable,
+    rtol: float,
+    before: CoupledSolution | None = None,
+    wetting: Wetting | None = None,
+) -> CoupledSolution:
+    """Solve (3) with the bound of the pressure. `problem` is the water's PressureProblem, `solve` does the work of
+    `fluid.numerics.bounded.solve_bounded`, v_free (6 n_bodies,) · before: solution of the pass before, to start from ·
+    wetting: that of the problem unless given."""
+    wets = Wetting.of(problem.coupling) if wetting is None else wetting
+    feels_water = len(response.free) > 0 and problem.coupling.nnz > 0
+
+    def added_inertia(p: Array) -> Array:
+        return wets.on_water(response.compliance(wets.on_bodies(p)))
+
+    found = solve(
+        problem.matrix,
+        problem.rhs + wets.on_water(v_free),
+        problem.guess if before is None else before.x,
+        rtol,
+        lower=problem.lower if before is None else before.lower,
+        at_bound=problem.at_bound if before is None else before.at_bound,
+        air=problem.air,
+        extra=added_inertia if feels_water else None,
+    )
+    velocity = (v_free - response.compliance(wets.on_bodies(found.x))).reshape(-1, 6)
+    restoring = response.restoring_load(velocity)
+    load = water_load(problem, found.x) + restoring
+    return CoupledSolution(
+        found.x, velocity, load, restoring, found.iterations, found.at_bound, found.parting, found.lower
+    )
+
+
+def corrected_free_velocity(response: StructureResponse, mean_velocity: Array, x: Array, coupling) -> Array:
+    """V_free of a second pass from what the bodies did, mean_velocity (n, 6), under the pressure x."""
+    return mean_velocity.ravel() + response.compliance(coupling.T @ x)
+
+
+def defect(mass, assumed: Array, found: Array, floor: float = 0.0) -> float:
+    """How far the bodies missed the motion that the water was told, velocities (n, 6) found and assumed:
+
+        sqrt( E(found − assumed) / max(E(found), E(assumed), floor) ),   E(V) = ½ V·M V
+
+    floor [J]: a share of the energy of the scene, since a structure that hardly moves has no velocity to compare with.
+    """
+    energy = [_kinetic(mass, v) for v in (found - assumed, found, assumed)]
+    scale = max(energy[1], energy[2], floor)
+    return float(np.sqrt(energy[0] / scale)) if scale > 0.0 else 0.0
+
+
+def _kinetic(mass, velocity: Array) -> float:
+    return 0.5 * float(velocity.ravel() @ (mass @ velocity.ravel()))

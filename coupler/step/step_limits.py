@@ -1,0 +1,102 @@
+"""Whether a step is to be taken again, and which of its attempts stays: the limits it broke, looked at once it is
+complete.
+
+A step is bad where the blocks miss the motion that the water was given, where its momentum or volume breaks the limit
+at which a run stops, and where it alone puts more energy out of balance than a share of what a whole run may: a wall
+that fell once lost in one step all that its run was allowed, with the blocks missing their motion by less than their
+own limit. What built up over many steps no shorter step cures, nor what goes wrong as fast in a shorter one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from coupler.step.limits import Diverged, Limits, check_balance, check_momentum
+
+STEP_SHARE = 0.25
+"""Share of `limits.energy_error` that a single step may put out of balance."""
+HELPS = 0.5
+"""Share to which the shortest attempt must bring what the longest one broke, over the same time: an error of the
+first order in the step falls to an eighth in three halvings, one that the step has no part in stays."""
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """A step that has a solution.
+
+    retries: times that it was halved · measures: what each limit looks at, energy and volume by the second, defect and
+    momentum as shares of what moved · broken: names of those for which the step is bad · ends: whether the run ends
+    with it.
+    """
+
+    retries: int
+    measures: dict[str, float]
+    broken: frozenset[str]
+    ends: bool
+
+
+def attempt_of(coupling, record, limits: Limits | None, volume_before: float) -> Attempt:
+    """The step that was just taken; volume_before: error of the volume at its start. Without limits only the defect
+    counts."""
+    measures, broken = {"defect": record.defect}, set()
+    if record.wetted and coupling.defects.too_large(record.defect):
+        broken.add("defect")
+    if limits is None:
+        return Attempt(record.retries, measures, frozenset(broken), False)
+    volume = volume_error(coupling)
+    measures["volume"] = abs(volume - volume_before) / record.dt
+    measures["energy"] = record.balance.step_error / record.dt
+    measures["momentum"] = 0.0 if record.momentum is None else record.momentum.error
+    kept = {
+        "volume": abs(volume) <= limits.volume_error,
+        "energy": record.balance.step_error <= STEP_SHARE * limits.energy_error,
+        "momentum": measures["momentum"] <= limits.momentum_error,
+    }
+    broken.update(name for name, good in kept.items() if not good)
+    return Attempt(record.retries, measures, frozenset(broken), _ends(coupling, record, limits))
+
+
+def _ends(coupling, record, limits: Limits) -> bool:
+    try:
+        check_step(coupling, record, limits)
+    except Diverged:
+        return True
+    return False
+
+
+def best_of(attempts: list[Attempt]) -> Attempt:
+    """Which of the bad attempts, longest first, stays: the shortest where it is better in something that the longest
+    breaks, or where only the longest ends the run; else the longest."""
+    longest, shortest = attempts[0], attempts[-1]
+    helped = any(shortest.measures[name] < HELPS * longest.measures[name] for name in longest.broken)
+    return shortest if helped or (longest.ends and not shortest.ends) else longest
+
+
+def volume_error(coupling) -> float:
+    """That of the water; 0 where there is none."""
+    return 0.0 if coupling.water is None else coupling.water.volume_error()
+
+
+def check_step(coupling, record, limits: Limits) -> None:
+    """Raises Diverged with the limit that the step broke, or the run with it."""
+    where = worst_place(coupling, record)
+    check_balance(record.time, volume_error(coupling), record.balance.energy_error, limits, where)
+    if record.momentum is not None:
+        check_momentum(record.time, record.momentum.error, limits.momentum_error)
+
+
+def worst_place(coupling, record) -> str:
+    """Where to look when the energy does not balance: the block that missed the most work in the last step, and where
+    the water is fastest. "" where there is neither."""
+    parts = []
+    if len(record.missed_work) and abs(record.missed_work).max() > 0.0:
+        worst = int(abs(record.missed_work).argmax())
+        name = coupling.structure.names[worst]
+        parts.append(
+            f"block '{name}' missed {abs(record.missed_work[worst]):.3g} J of the water's work in this step"
+        )
+    if coupling.water is not None:
+        speed, place = coupling.water.fastest_place()
+        at = ", ".join(f"{x:.3g}" for x in place)
+        parts.append(f"the water is fastest, {speed:.3g} m/s, at ({at}) m")
+    return "; ".join(parts)

@@ -1,0 +1,77 @@
+"""Which cells each body may meet: the broad search before the exact cut.
+
+A pair (cell, body) is kept unless one plane of the body has the whole cell on its outer side by more than
+`margin`. The margin must exceed the tolerance of the cut: with a tighter search, a body that touches a mesh
+plane to round-off would lose surface.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from fluid.mesh.background import bin_of
+
+
+def near_pairs(mesh, solids, chosen, margin) -> tuple[np.ndarray, np.ndarray]:
+    """mesh: Background · solids: ConvexBodies · chosen (c,) bodies to search for · margin [m]
+    -> cell (k,), body (k,), sorted by cell, then body."""
+    chosen = np.asarray(chosen, dtype=np.int64)
+    if len(chosen) == 0:
+        return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
+    bounds = solids.bounds()[chosen]
+    low = np.stack([bin_of(a, bounds[:, 0, k] - margin) for k, a in enumerate(mesh.axes)], axis=1)
+    high = np.stack([bin_of(a, bounds[:, 1, k] + margin) for k, a in enumerate(mesh.axes)], axis=1)
+    capacity = 64 * len(chosen) + 1024
+    while True:
+        cell, body = np.empty(capacity, dtype=np.int64), np.empty(capacity, dtype=np.int64)
+        n = _search(
+            mesh.nodes, mesh.cells, mesh.bin_start, mesh.bin_cells, len(mesh.axes[1]) - 1,
+            len(mesh.axes[2]) - 1, chosen, low, high, solids.normals, solids.cut_offsets(),
+            solids.plane_start, margin, cell, body,
+        )  # fmt: skip
+        if n <= capacity:
+            break
+        capacity = n
+    key = np.unique(cell[:n] * len(solids) + body[:n])
+    return key // len(solids), key % len(solids)
+
+
+@njit(cache=True)
+def _apart(nodes, cells, e, normals, offsets, first, last, margin):
+    """Is the cell wholly beyond one of the planes first:last?"""
+    for g in range(first, last):
+        beyond = True
+        for k in range(4):
+            i = cells[e, k]
+            d = normals[g, 0] * nodes[i, 0] + normals[g, 1] * nodes[i, 1] + normals[g, 2] * nodes[i, 2]
+            if d - offsets[g] <= margin:
+                beyond = False
+                break
+        if beyond:
+            return True
+    return False
+
+
+@njit(cache=True)
+def _search(
+    nodes, cells, bin_start, bin_cells, ny, nz, chosen, low, high, normals, offsets, plane_start, margin,
+    cell, body,
+):  # fmt: skip
+    """Fill the pairs as far as they fit -> how many there are."""
+    n = 0
+    for b in range(len(chosen)):
+        first, last = plane_start[chosen[b]], plane_start[chosen[b] + 1]
+        for i in range(low[b, 0], high[b, 0] + 1):
+            for j in range(low[b, 1], high[b, 1] + 1):
+                for k in range(low[b, 2], high[b, 2] + 1):
+                    at = (i * ny + j) * nz + k
+                    for s in range(bin_start[at], bin_start[at + 1]):
+                        e = bin_cells[s]
+                        if _apart(nodes, cells, e, normals, offsets, first, last, margin):
+                            continue
+                        if n < len(cell):
+                            cell[n] = e
+                            body[n] = chosen[b]
+                        n += 1
+    return n

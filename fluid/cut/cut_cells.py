@@ -1,0 +1,294 @@
+"""Which part of a tetrahedron lies outside convex bodies: exact, for any number of bodies per cell.
+
+Sequential convex splitting. The fluid in a cell is a list of convex pieces, at first the cell itself. For
+each body B, each piece P is split by the planes of B one after the other: what lies outside a plane is set
+aside, what lies inside goes on to the next plane. If nothing is left inside, P does not meet B and stays
+whole; else P is replaced by what was set aside. The *wetted surface* is then read off the pieces: a face of
+a piece that lies in a plane of B, with the piece on the outer side, clipped by the other planes of B. This
+one rule serves faces made by splitting and faces of a body that coincide with faces of the mesh, so each is
+counted once, in the cell on its water side, and never between two bodies that touch.
+
+Two tolerances: mesh nodes nearer to a plane than `tolerance` [m], one for the whole mesh, lie in it; at
+vertices made by splitting only round-off is snapped (see `pieces.py`).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from fluid.cut.cut_arrays import Cuts, doubled, output, trimmed
+from fluid.cut.fans import fan
+from fluid.cut.parts_of_cell import label_parts
+from fluid.cut.pieces import (
+    BROKEN_CAP,
+    DONE,
+    OUTPUT_FULL,
+    ROUND_OFF,
+    WORKSPACE_FULL,
+    classify,
+    copy_piece,
+    merge_moments,
+    piece_moments,
+    split,
+    start_piece,
+    workspace,
+)
+from fluid.cut.wetted_polygons import wetted
+from fluid.numerics.jit import inner
+
+# A piece too thin for its cross-section to close goes to one side whole; thicker ones are an error.
+THIN = 1e-6
+# Wetted polygons below this share of h^2 are round-off.
+NO_AREA = 1e-15
+
+
+class CutFailed(RuntimeError):
+    """The cross-section of a piece could not be closed although the piece is not thin."""
+
+
+@inner
+def _nearby(w, x, bodies, normals, offsets, plane_start, tolerance):
+    """Bodies that meet or touch the cell x (4, 3), with the planes of each that separate some of its nodes.
+
+    -> number of bodies, or -1 when one body holds the whole cell."""
+    n = 0
+    w.near_start[0] = 0
+    for at in range(len(bodies)):
+        body = bodies[at]
+        end = w.near_start[n]
+        apart = False
+        for g in range(plane_start[body], plane_start[body + 1]):
+            low, high = np.inf, -np.inf
+            for k in range(4):
+                d = normals[g, 0] * x[k, 0] + normals[g, 1] * x[k, 1] + normals[g, 2] * x[k, 2] - offsets[g]
+                if abs(d) <= tolerance:
+                    d = 0.0
+                w.near_distance[end, k] = d
+                low = min(low, d)
+                high = max(high, d)
+            if low > 0.0:
+                apart = True
+                break
+            if high > 0.0:
+                _align(w, end, tolerance)
+                w.near_plane[end] = g
+                end += 1
+        if apart:
+            continue
+        if end == w.near_start[n]:
+            return -1
+        w.near_body[n] = body
+        n += 1
+        w.near_start[n] = end
+    return n
+
+
+@inner
+def _align(w, row, tolerance):
+    """Give a plane the distances of an earlier one (or their negatives) that it misses by the tolerance, so
+    that touching and flush faces of two bodies are in one plane exactly and not up to their noise."""
+    for r in range(row):
+        for sign in (1.0, -1.0):
+            same = True
+            for k in range(4):
+                if abs(w.near_distance[row, k] - sign * w.near_distance[r, k]) > tolerance:
+                    same = False
+                    break
+            if same:
+                for k in range(4):
+                    w.near_distance[row, k] = sign * w.near_distance[r, k]
+                return
+
+
+@inner
+def _subtract(w, piece, at, round_off, thin, top, n_vertices):
+    """Take body number `at` of the cell away from a piece.
+
+    Fragments are left on top of the stack -> (state, whole, new top, number of vertices)."""
+    start, end = w.near_start[at], w.near_start[at + 1]
+    for r in range(start, end):
+        low, _ = classify(w, piece, w.near_distance[r], round_off)
+        if low == 0.0:
+            return DONE, True, top, n_vertices
+    # Fragments stack up from `top`; what is still inside alternates between the last two slots.
+    current, fresh, spare = piece, top, len(w.faces) - 1
+    for r in range(start, end):
+        low, high = classify(w, current, w.near_distance[r], round_off)
+        if low == 0.0:
+            return DONE, True, top, n_vertices
+        if high == 0.0:
+            continue
+        if fresh + 3 > len(w.faces):
+            return WORKSPACE_FULL, False, top, n_vertices
+        state, n_vertices = split(w, current, fresh, spare, w.near_plane[r], n_vertices)
+        if state == BROKEN_CAP and (min(high, -low) < thin or _is_thin(w, current, thin)):
+            if high >= -low:
+                return DONE, True, top, n_vertices
+            continue
+        if state != DONE:
+            return state, False, top, n_vertices
+        fresh += 1
+        current = spare
+        spare = 2 * len(w.faces) - 3 - spare
+    return DONE, False, fresh, n_vertices
+
+
+@inner
+def _is_thin(w, piece, thin):
+    """Is the volume of a piece below that of a layer `thin` over a tenth of the spacing squared?"""
+    piece_moments(w, piece, w.moments)
+    return w.moments[0] < thin * (thin / THIN) ** 2 * 0.01
+
+
+@inner
+def _fluid_pieces(w, n_near, round_off, thin):
+    """Subtract all bodies near the cell -> (state, number of pieces, nothing removed)."""
+    count, n_vertices, whole_cell = 1, 4, True
+    for at in range(n_near):
+        kept, top = 0, count
+        for piece in range(count):
+            state, whole, top_new, n_vertices = _subtract(w, piece, at, round_off, thin, top, n_vertices)
+            if state != DONE:
+                return state, 0, False
+            if whole:
+                if kept != piece:
+                    copy_piece(w, piece, kept)
+                kept += 1
+            else:
+                whole_cell = False
+                top = top_new
+        for piece in range(count, top):
+            if kept != piece:
+                copy_piece(w, piece, kept)
+            kept += 1
+        count = kept
+    return DONE, count, whole_cell
+
+
+@inner
+def _openings(w, piece, origin, part, out, n_open):
+    """Append the faces of a piece that lie on faces of the cell -> (state, number of openings)."""
+    for f in range(w.faces[piece]):
+        if w.tag[piece, f] >= 0:
+            continue
+        start = out.open_start[n_open]
+        if n_open + 1 >= len(out.open_part) or start + w.size[piece, f] > len(out.open_x):
+            return OUTPUT_FULL, n_open
+        out.open_part[n_open] = part
+        out.open_face[n_open] = -1 - w.tag[piece, f]
+        for k in range(w.size[piece, f]):
+            v = w.loop[piece, f, k]
+            for c in range(3):
+                out.open_x[start + k, c] = origin[c] + w.x[v, 4 + c]
+        n_open += 1
+        out.open_start[n_open] = start + w.size[piece, f]
+    return DONE, n_open
+
+
+@inner
+def _emit(w, cell, origin, count, n_near, whole, normals, round_off, least, link_area, out, at):
+    """Write the parts of one cell, their moments, wetted polygons and tetrahedra (and openings if link_area >= 0)."""
+    n_part, n_wet, n_open, n_tet = at[1], at[2], at[3], at[4]
+    parts = label_parts(w, count, normals, round_off, link_area)
+    if n_part + parts > len(out.part_cell):
+        return OUTPUT_FULL
+    for part in range(n_part, n_part + parts):
+        out.part_cell[part] = cell
+        out.part_whole[part] = whole
+        for c in range(10):
+            out.part_moments[part, c] = 0.0
+    for piece in range(count):
+        part = n_part + w.label[piece]
+        piece_moments(w, piece, w.moments)
+        merge_moments(out.part_moments[part], w.moments)
+        state, n_wet = wetted(w, piece, origin, n_near, normals, round_off, least, part, out, n_wet)
+        if state == DONE and link_area >= 0.0:
+            state, n_open = _openings(w, piece, origin, part, out, n_open)
+        if state == DONE and not whole:
+            state, n_tet = fan(w, piece, part, out, n_tet)
+        if state != DONE:
+            return state
+    for part in range(n_part, n_part + parts):
+        for c in range(3):
+            out.part_moments[part, 1 + c] += origin[c]
+    at[1], at[2], at[3], at[4] = n_part + parts, n_wet, n_open, n_tet
+    return DONE
+
+
+@njit(cache=True)
+def _cut_cells(
+    nodes, cells, chosen, body_start, bodies, normals, offsets, plane_start, tolerance, spacing, link_area,
+    w, out, at,
+):  # fmt: skip
+    """Cut the cells `chosen` from at[0] on; at (5,) <- cells, parts, wetted polygons, openings, tetrahedra done."""
+    x = np.empty((4, 3))
+    round_off, thin, least = ROUND_OFF * spacing, THIN * spacing, NO_AREA * spacing * spacing
+    for row in range(at[0], len(chosen)):
+        for k in range(4):
+            for c in range(3):
+                x[k, c] = nodes[cells[chosen[row], k], c]
+        near = _nearby(
+            w, x, bodies[body_start[row] : body_start[row + 1]], normals, offsets, plane_start, tolerance
+        )
+        if near >= 0:
+            start_piece(w, x)
+            state, count, whole = _fluid_pieces(w, near, round_off, thin)
+            if state != DONE:
+                return state
+            if count > 0:
+                state = _emit(
+                    w, chosen[row], x[0], count, near, whole, normals, round_off, least, link_area, out, at
+                )
+                if state != DONE:
+                    return state
+        at[0] = row + 1
+    return DONE
+
+
+def cut_cells(nodes, cells, chosen, body_start, bodies, solids, tolerance, spacing, link_area=-1.0) -> Cuts:
+    """Cut chosen cells by the bodies near each.
+
+    nodes (N, 3) [m] · cells (M, 4) · chosen (C,) cells to cut · body_start (C+1,), bodies: those near each
+    solids: ConvexBodies · tolerance [m] for nodes, spacing [m] of the mesh
+    link_area [m2]: pieces of a cell are one part where they touch over more than this; < 0: all pieces of
+    a cell are one part and no openings are listed.
+    Raises CutFailed where the cross-section of a piece that is not thin cannot be closed."""
+    at = np.zeros(5, dtype=np.int64)
+    scale = 1
+    most_bodies = int(np.diff(body_start).max()) if len(chosen) else 0
+    most_planes = int(np.diff(solids.plane_start).max()) if len(solids) else 0
+    w = workspace(scale, most_bodies, most_bodies * most_planes)
+    out = output(len(chosen) * 4 + 64, len(chosen) * 32 + 256, link_area >= 0)
+    offsets = solids.cut_offsets()
+    while True:
+        state = _cut_cells(
+            nodes, cells, chosen, body_start, bodies, solids.normals, offsets, solids.plane_start,
+            tolerance, spacing, link_area, w, out, at,
+        )  # fmt: skip
+        if state == DONE:
+            return _with_volume(trimmed(out, at))
+        if state == BROKEN_CAP:
+            raise CutFailed(_failure(cells, nodes, chosen, body_start, bodies, int(at[0])))
+        if state == WORKSPACE_FULL:
+            scale *= 2
+            w = workspace(scale, most_bodies, most_bodies * most_planes)
+        else:
+            out = doubled(out, at)
+
+
+def _with_volume(cuts):
+    """Without the parts whose volume is lost in round-off (their surface is of the same order)."""
+    solid = cuts.moments[:, 0] > 0.0
+    if solid.all():
+        return cuts
+    return cuts.kept(solid)
+
+
+def _failure(cells, nodes, chosen, body_start, bodies, row):
+    centre = nodes[cells[chosen[row]]].mean(axis=0)
+    near = bodies[body_start[row] : body_start[row + 1]].tolist()
+    return (
+        f"cell {chosen[row]} at {np.round(centre, 6).tolist()} m could not be cut by bodies {near}: "
+        "check that the polyhedra are convex and no smaller than a millionth of the cell"
+    )

@@ -1,0 +1,75 @@
+"""The fluid part of a cut cell as tetrahedra, so that a surface linear in the cell can clip it exactly.
+
+Every convex piece is a fan of tetrahedra from one of its vertices.  Their corners are kept as barycentric coordinates
+in the cell: a field linear in the cell is known there without any geometry.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from fluid.cut.pieces import DONE, OUTPUT_FULL
+from fluid.numerics.jit import inner
+
+
+@inner
+def fan(w, piece, part, out, n):
+    """Append the tetrahedra of a piece -> (state, number of tetrahedra).
+
+    Volumes from coordinates relative to the common vertex, so that slivers keep their relative accuracy."""
+    o = w.loop[piece, 0, 0]
+    ox, oy, oz = w.x[o, 4], w.x[o, 5], w.x[o, 6]
+    for f in range(w.faces[piece]):
+        touches = False
+        for k in range(w.size[piece, f]):
+            touches = touches or w.loop[piece, f, k] == o
+        if touches:
+            continue
+        a = w.loop[piece, f, 0]
+        ax, ay, az = w.x[a, 4] - ox, w.x[a, 5] - oy, w.x[a, 6] - oz
+        for k in range(2, w.size[piece, f]):
+            b, c = w.loop[piece, f, k - 1], w.loop[piece, f, k]
+            bx, by, bz = w.x[b, 4] - ox, w.x[b, 5] - oy, w.x[b, 6] - oz
+            cx, cy, cz = w.x[c, 4] - ox, w.x[c, 5] - oy, w.x[c, 6] - oz
+            v = (ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)) / 6.0
+            if v <= 0.0:
+                continue
+            if n >= len(out.tet_part):
+                return OUTPUT_FULL, n
+            out.tet_part[n] = part
+            out.tet[n, 0] = v
+            for j in range(4):
+                out.tet[n, 1 + j] = w.x[o, j]
+                out.tet[n, 5 + j] = w.x[a, j]
+                out.tet[n, 9 + j] = w.x[b, j]
+                out.tet[n, 13 + j] = w.x[c, j]
+            n += 1
+    return DONE, n
+
+
+def fans(tet_part, tet, element_of_part, n_elements: int):
+    """The tetrahedra (T, 17) of cut parts tet_part (T,) in the order of their elements element_of_part (K,), -1 gone.
+
+    -> start (n_elements + 1,), none in whole cells · volume (T,) [m³] · corners (T, 4, 4), the barycentric coordinates
+    of the four corners in their cell."""
+    start, order = _sorted(element_of_part[tet_part], n_elements)
+    rows = tet[order]
+    return start, np.ascontiguousarray(rows[:, 0]), np.ascontiguousarray(rows[:, 1:]).reshape(-1, 4, 4)
+
+
+@njit(cache=True)
+def _sorted(element, n_elements):
+    """start (n_elements + 1,), and the places of the entries (T,) of `element` in its order; those < 0 are left out."""
+    start = np.zeros(n_elements + 1, np.int64)
+    for t in range(len(element)):
+        if element[t] >= 0:
+            start[element[t] + 1] += 1
+    for e in range(n_elements):
+        start[e + 1] += start[e]
+    filled, order = start[:-1].copy(), np.empty(start[-1], np.int64)
+    for t in range(len(element)):
+        if element[t] >= 0:
+            order[filled[element[t]]] = t
+            filled[element[t]] += 1
+    return start, order

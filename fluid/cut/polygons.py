@@ -1,0 +1,186 @@
+"""Convex polygons on the faces of pieces: clipping, area, and the three-point rule.
+
+Corners hold barycentric coordinates in the cell, then the position relative to its first node.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fluid.numerics.jit import inner
+
+# Corners of the equilateral triangle with unit second moment about its centre.
+SQRT2 = np.sqrt(2.0)
+TRIANGLE = np.array([[SQRT2, 0.0], [-SQRT2 / 2, np.sqrt(1.5)], [-SQRT2 / 2, -np.sqrt(1.5)]])
+
+
+@inner
+def load_face(w, piece, f, polygon):
+    """Copy a face of a piece to a polygon slot."""
+    for k in range(w.size[piece, f]):
+        v = w.loop[piece, f, k]
+        for c in range(7):
+            w.polygon[polygon, k, c] = w.x[v, c]
+    w.corners[polygon] = w.size[piece, f]
+
+
+@inner
+def copy_polygon(w, source, target):
+    """Copy slot `source` to slot `target`."""
+    w.corners[target] = w.corners[source]
+    for k in range(w.corners[source]):
+        for c in range(7):
+            w.polygon[target, k, c] = w.polygon[source, k, c]
+
+
+@inner
+def split_polygon(w, polygon, outer, inner, round_off):
+    """Split a convex polygon by the plane whose distances are in w.height -> (outside, inside) not empty.
+
+    Where one side is empty nothing is written. A polygon within the plane counts as inside."""
+    corners = w.corners[polygon]
+    outside, inside = False, False
+    for k in range(corners):
+        if w.height[k] > round_off:
+            outside = True
+        elif w.height[k] < -round_off:
+            inside = True
+        else:
+            w.height[k] = 0.0
+    if not (outside and inside):
+        return outside, inside or not outside
+    n_out, n_in, a = 0, 0, corners - 1
+    for b in range(corners):
+        if w.height[a] * w.height[b] < 0.0:
+            t = w.height[a] / (w.height[a] - w.height[b])
+            for c in range(7):
+                x = w.polygon[polygon, a, c] + t * (w.polygon[polygon, b, c] - w.polygon[polygon, a, c])
+                w.polygon[outer, n_out, c] = x
+                w.polygon[inner, n_in, c] = x
+            n_out += 1
+            n_in += 1
+        if w.height[b] >= 0.0:
+            for c in range(7):
+                w.polygon[outer, n_out, c] = w.polygon[polygon, b, c]
+            n_out += 1
+        if w.height[b] <= 0.0:
+            for c in range(7):
+                w.polygon[inner, n_in, c] = w.polygon[polygon, b, c]
+            n_in += 1
+        a = b
+    w.corners[outer] = n_out
+    w.corners[inner] = n_in
+    return True, True
+
+
+@inner
+def polygon_area(w, polygon):
+    sx, sy, sz = 0.0, 0.0, 0.0
+    o = w.polygon[polygon, 0]
+    for k in range(1, w.corners[polygon] - 1):
+        a, b = w.polygon[polygon, k], w.polygon[polygon, k + 1]
+        ax, ay, az = a[4] - o[4], a[5] - o[5], a[6] - o[6]
+        bx, by, bz = b[4] - o[4], b[5] - o[5], b[6] - o[6]
+        sx += ay * bz - az * by
+        sy += az * bx - ax * bz
+        sz += ax * by - ay * bx
+    return np.sqrt(sx * sx + sy * sy + sz * sz) / 2.0
+
+
+@inner
+def _turn(w, polygon, nx, ny, nz):
+    """Twice the area of a polygon, signed by its sense about n."""
+    o = w.polygon[polygon, 0]
+    turn = 0.0
+    for k in range(1, w.corners[polygon] - 1):
+        a, b = w.polygon[polygon, k], w.polygon[polygon, k + 1]
+        ax, ay, az = a[4] - o[4], a[5] - o[5], a[6] - o[6]
+        bx, by, bz = b[4] - o[4], b[5] - o[5], b[6] - o[6]
+        turn += nx * (ay * bz - az * by) + ny * (az * bx - ax * bz) + nz * (ax * by - ay * bx)
+    return turn
+
+
+@inner
+def shared_area(w, one, two, nx, ny, nz, round_off):
+    """Area common to the coplanar convex polygons in slots `one` and `two` (unit normal n); uses the two
+    slots behind them and overwrites `one`."""
+    corners = w.corners[two]
+    way = 1.0 if _turn(w, two, nx, ny, nz) > 0.0 else -1.0
+    spare = max(one, two) + 1
+    for k in range(corners):
+        a, b = w.polygon[two, k], w.polygon[two, (k + 1) % corners]
+        ex, ey, ez = b[4] - a[4], b[5] - a[5], b[6] - a[6]
+        mx, my, mz = way * (ey * nz - ez * ny), way * (ez * nx - ex * nz), way * (ex * ny - ey * nx)
+        length = np.sqrt(mx * mx + my * my + mz * mz)
+        if length <= round_off:
+            continue
+        for j in range(w.corners[one]):
+            p = w.polygon[one, j]
+            w.height[j] = (mx * (p[4] - a[4]) + my * (p[5] - a[5]) + mz * (p[6] - a[6])) / length
+        outside, inside = split_polygon(w, one, spare, spare + 1, round_off)
+        if not inside:
+            return 0.0
+        if outside:
+            copy_polygon(w, spare + 1, one)
+    return polygon_area(w, one)
+
+
+@inner
+def polygon_rule(w, polygon, nx, ny, nz, least, row):
+    """row (16,) <- area, centroid, normal and three points, weight area / 3, exact to degree 2.
+
+    Points c + R s_q, R the symmetric root of the in-plane covariance, s_q the corners of an equilateral
+    triangle with unit covariance. row[0] = 0 for an area of at most `least` [m2]."""
+    x0, y0, z0 = w.polygon[polygon, 0, 4], w.polygon[polygon, 0, 5], w.polygon[polygon, 0, 6]
+    # Any two directions in the plane: the rule does not depend on them but for a turn of the points.
+    if abs(nx) <= abs(ny) and abs(nx) <= abs(nz):
+        tx, ty, tz = 0.0, nz, -ny
+    elif abs(ny) <= abs(nz):
+        tx, ty, tz = -nz, 0.0, nx
+    else:
+        tx, ty, tz = ny, -nx, 0.0
+    length = np.sqrt(tx * tx + ty * ty + tz * tz)
+    tx, ty, tz = tx / length, ty / length, tz / length
+    rx, ry, rz = ny * tz - nz * ty, nz * tx - nx * tz, nx * ty - ny * tx
+    area, fs, ft, ss, tt, st = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    a_s, a_t = 0.0, 0.0
+    for k in range(1, w.corners[polygon]):
+        dx, dy, dz = (
+            w.polygon[polygon, k, 4] - x0,
+            w.polygon[polygon, k, 5] - y0,
+            w.polygon[polygon, k, 6] - z0,
+        )
+        b_s = dx * tx + dy * ty + dz * tz
+        b_t = dx * rx + dy * ry + dz * rz
+        if k > 1:
+            half = (a_s * b_t - a_t * b_s) / 2.0
+            s, t = a_s + b_s, a_t + b_t
+            area += half
+            fs += half * s / 3.0
+            ft += half * t / 3.0
+            ss += half * (a_s * a_s + b_s * b_s + s * s) / 12.0
+            tt += half * (a_t * a_t + b_t * b_t + t * t) / 12.0
+            st += half * (a_s * a_t + b_s * b_t + s * t) / 12.0
+        a_s, a_t = b_s, b_t
+    if abs(area) <= least:
+        row[0] = 0.0
+        return
+    fs, ft = fs / area, ft / area
+    ss = max(ss / area - fs * fs, 0.0)
+    tt = max(tt / area - ft * ft, 0.0)
+    st = st / area - fs * ft
+    # A sliver may come out with a negative determinant by round-off.
+    root = np.sqrt(max(ss * tt - st * st, 0.0))
+    st = min(max(st, -np.sqrt(ss * tt)), np.sqrt(ss * tt))
+    trace = np.sqrt(max(ss + tt + 2.0 * root, least * 1e-6))
+    row[0] = abs(area)
+    row[1] = x0 + fs * tx + ft * rx
+    row[2] = y0 + fs * ty + ft * ry
+    row[3] = z0 + fs * tz + ft * rz
+    row[4], row[5], row[6] = nx, ny, nz
+    for q in range(3):
+        s = ((ss + root) * TRIANGLE[q, 0] + st * TRIANGLE[q, 1]) / trace
+        t = (st * TRIANGLE[q, 0] + (tt + root) * TRIANGLE[q, 1]) / trace
+        row[7 + 3 * q] = row[1] + s * tx + t * rx
+        row[8 + 3 * q] = row[2] + s * ty + t * ry
+        row[9 + 3 * q] = row[3] + s * tz + t * rz

@@ -1,0 +1,127 @@
+"""The wetted surface of a piece: which of its faces lie in a plane of a body, and how much of each is that body's.
+
+A face of a piece that lies in a plane of a body, with the piece on the outer side, is clipped by the other planes of
+the body. Polygons 0..top of the stack are what no body has claimed yet.
+"""
+
+from __future__ import annotations
+
+from fluid.cut.pieces import DONE, OUTPUT_FULL, WORKSPACE_FULL, interpolated
+from fluid.cut.polygons import copy_polygon, load_face, polygon_rule, split_polygon
+from fluid.numerics.jit import inner
+
+
+@inner
+def _lies_in(w, piece, f, r, normals, round_off):
+    """Does a face lie in near plane r, with the piece on the outer side of it?"""
+    g = w.near_plane[r]
+    if w.tag[piece, f] == 2 * g:
+        return True
+    corners = w.size[piece, f]
+    for k in range(corners):
+        if abs(interpolated(w.x[w.loop[piece, f, k]], w.near_distance[r])) > round_off:
+            return False
+    o = w.loop[piece, f, 0]
+    facing = 0.0
+    for k in range(1, corners - 1):
+        a, b = w.loop[piece, f, k], w.loop[piece, f, k + 1]
+        ax, ay, az = w.x[a, 4] - w.x[o, 4], w.x[a, 5] - w.x[o, 5], w.x[a, 6] - w.x[o, 6]
+        bx, by, bz = w.x[b, 4] - w.x[o, 4], w.x[b, 5] - w.x[o, 5], w.x[b, 6] - w.x[o, 6]
+        facing += normals[g, 0] * (ay * bz - az * by)
+        facing += normals[g, 1] * (az * bx - ax * bz) + normals[g, 2] * (ax * by - ay * bx)
+    return facing < 0.0
+
+
+@inner
+def _claim(w, polygon, at, plane, round_off, top):
+    """Clip a polygon in near plane `plane` by the other planes of body number `at` -> (claimed, new top).
+
+    What is left replaces the polygon, the remainders go on top of the stack; if nothing is left the polygon
+    stays as it was."""
+    work, inner = len(w.corners) - 1, len(w.corners) - 2
+    copy_polygon(w, polygon, work)
+    new_top = top
+    for r in range(w.near_start[at], w.near_start[at + 1]):
+        if r == plane:
+            continue
+        for k in range(w.corners[work]):
+            w.height[k] = interpolated(w.polygon[work, k], w.near_distance[r])
+        outside, inside = split_polygon(w, work, new_top + 1, inner, round_off)
+        if not inside:
+            return False, top
+        if outside:
+            copy_polygon(w, inner, work)
+            new_top += 1
+    copy_polygon(w, work, polygon)
+    return True, new_top
+
+
+@inner
+def _claim_face(w, at, r, origin, normals, round_off, least, top, part, out, n_wet):
+    """Let one body claim its share of the polygons 0..top of a face -> (state, new top, polygons written)."""
+    planes = w.near_start[at + 1] - w.near_start[at]
+    g = w.near_plane[r]
+    for polygon in range(top, -1, -1):
+        if top + planes + 4 > len(w.corners) or w.corners[polygon] + planes + 2 > w.polygon.shape[1]:
+            return WORKSPACE_FULL, top, n_wet
+        claimed, top = _claim(w, polygon, at, r, round_off, top)
+        if not claimed:
+            continue
+        state, n_wet = _append(w, polygon, at, g, origin, normals, least, part, out, n_wet)
+        if state != DONE:
+            return state, top, n_wet
+        if polygon != top:
+            copy_polygon(w, top, polygon)
+        top -= 1
+    return DONE, top, n_wet
+
+
+@inner
+def _append(w, polygon, at, g, origin, normals, least, part, out, n_wet):
+    """Write a polygon in plane g of body number `at` as triangles -> (state, triangles written).
+
+    Triangles, because the water surface may clip them later."""
+    triangle = len(w.corners) - 1
+    w.corners[triangle] = 3
+    for second in range(1, w.corners[polygon] - 1):
+        if n_wet >= len(out.wet_part):
+            return OUTPUT_FULL, n_wet
+        row = out.wet[n_wet]
+        for k in range(3):
+            corner = 0 if k == 0 else second + k - 1
+            for c in range(7):
+                w.polygon[triangle, k, c] = w.polygon[polygon, corner, c]
+            for c in range(3):
+                row[16 + 3 * k + c] = w.polygon[polygon, corner, 4 + c]
+        polygon_rule(w, triangle, normals[g, 0], normals[g, 1], normals[g, 2], least, row)
+        if row[0] > 0.0:
+            for c in range(3):
+                for q in (1, 7, 10, 13, 16, 19, 22):
+                    row[q + c] += origin[c]
+            out.wet_part[n_wet] = part
+            out.wet_body[n_wet] = w.near_body[at]
+            n_wet += 1
+    return DONE, n_wet
+
+
+@inner
+def wetted(w, piece, origin, n_near, normals, round_off, least, part, out, n_wet):
+    """Append the wetted polygons of a piece -> (state, number of polygons).
+
+    Polygons 0..top of the stack are the part of a face that no body has claimed yet; only bodies that
+    overlap and share a plane compete for the same part."""
+    for f in range(w.faces[piece]):
+        top, loaded = 0, False
+        for at in range(n_near):
+            for r in range(w.near_start[at], w.near_start[at + 1]):
+                if top < 0 or not _lies_in(w, piece, f, r, normals, round_off):
+                    continue
+                if not loaded:
+                    load_face(w, piece, f, 0)
+                    loaded = True
+                state, top, n_wet = _claim_face(
+                    w, at, r, origin, normals, round_off, least, top, part, out, n_wet
+                )
+                if state != DONE:
+                    return state, n_wet
+    return DONE, n_wet

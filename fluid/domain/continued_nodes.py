@@ -1,0 +1,156 @@
+"""Which old copy of a node each new one continues when solids have moved through multiple covers."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from fluid.numerics.jit import inner
+
+
+def pick_old_nodes(old, new) -> np.ndarray:
+    """(N_new,) old virtual node for each new one, -1 = none.
+
+    Away from the bodies a node has one copy before and after. Near them each new element votes with
+    min(V_old, V_new) for the node at the same corner of an old element of the same background cell; most
+    votes win. Water moves with a wall: the old element is sought from where the wall has carried the new
+    centroid from, nearest first, and never across the wall."""
+    n = len(new.memory.mesh.nodes)
+    near = _near_bodies(old) | _near_bodies(new)
+    only = np.full(n, -1, dtype=np.int64)
+    only[old.parent_node] = np.arange(len(old.nodes))
+    source = only[new.parent_node]
+    voters = _touching(near[new.parent_node], new.cells)
+    matched = _old_elements(old, new, voters)
+    chosen = near[new.parent_node]
+    copies = np.searchsorted(old.parent_node, np.arange(n + 1))
+    elected = _elected(voters, matched, new.cells, old.cells, new.volume, old.volume, new.parent_node, copies)
+    source[chosen] = elected[chosen]
+    return source
+
+
+def _near_bodies(domain):
+    """(background nodes,) bool: nodes of cells that a body meets."""
+    memory = domain.memory
+    near = np.zeros(len(memory.mesh.nodes), dtype=bool)
+    near[memory.mesh.cells[memory.pair_cell]] = True
+    return near
+
+
+@njit(cache=True)
+def _touching(marked, cells):
+    """Cells with a marked corner."""
+    found = np.empty(len(cells), np.int64)
+    n = 0
+    for e in range(len(cells)):
+        if marked[cells[e, 0]] or marked[cells[e, 1]] or marked[cells[e, 2]] or marked[cells[e, 3]]:
+            found[n] = e
+            n += 1
+    return found[:n].copy()
+
+
+@njit(cache=True)
+def _elected(voters, matched, cells, old_cells, volume, old_volume, parent_node, copies):
+    """Winner of the votes for every new node, -1 where nobody voted.
+
+    copies (nodes + 1,): first old copy of each background node, which the candidates are."""
+    start = np.zeros(len(parent_node) + 1, np.int64)
+    for i in range(len(parent_node)):
+        start[i + 1] = start[i] + copies[parent_node[i] + 1] - copies[parent_node[i]]
+    votes = np.full(start[-1], -1.0)
+    for s in range(len(voters)):
+        e, o = voters[s], matched[s]
+        if o < 0:
+            continue
+        weight = min(old_volume[o], volume[e])
+        for k in range(4):
+            i = cells[e, k]
+            slot = start[i] + old_cells[o, k] - copies[parent_node[i]]
+            votes[slot] = max(votes[slot], 0.0) + weight
+    elected = np.full(len(parent_node), -1, np.int64)
+    for i in range(len(parent_node)):
+        most = 0.0
+        for slot in range(start[i], start[i + 1]):
+            if votes[slot] >= most:
+                most = votes[slot]
+                elected[i] = copies[parent_node[i]] + slot - start[i]
+    return elected
+
+
+def _old_elements(old, new, chosen):
+    """Old element in the same background cell for each chosen new one, -1 where there is none."""
+    cell = new.parent_cell[chosen]
+    first = np.searchsorted(old.parent_cell, cell)
+    last = np.searchsorted(old.parent_cell, cell, side="right")
+    before, after = old.memory.bodies, new.memory.bodies
+    return _same_side(
+        first, last, new.centroid[chosen], _wall_of(new)[chosen], old.centroid, _wall_of(old),
+        before.centre, before.rotation, after.centre, after.rotation,
+        before.normals, before.cut_offsets(), before.plane_start,
+    )  # fmt: skip
+
+
+def _wall_of(domain):
+    """(M,) a body that each element is wetted by, -1 = none."""
+    wall = np.full(len(domain.cells), -1, dtype=np.int64)
+    wall[domain.face_cell] = domain.face_body
+    return wall
+
+
+@njit(cache=True)
+def _same_side(
+    first, last, point, wall, centroid, old_wall, centre, rotation, new_centre, new_rotation, normals,
+    offsets, plane_start,
+):  # fmt: skip
+    found = np.full(len(first), -1, dtype=np.int64)
+    x, local = np.empty(3), np.empty(3)
+    for e in range(len(first)):
+        nearest = np.inf
+        for o in range(first[e], last[e]):
+            body = wall[e] if wall[e] >= 0 else old_wall[o]
+            for c in range(3):
+                x[c] = point[e, c]
+            if body >= 0:
+                _carry_back(x, centre[body], rotation[body], new_centre[body], new_rotation[body], local)
+            distance = 0.0
+            for c in range(3):
+                distance += (x[c] - centroid[o, c]) ** 2
+            if distance >= nearest:
+                continue
+            if body < 0 or not blocked(
+                x, centroid[o], normals, offsets, plane_start[body], plane_start[body + 1]
+            ):
+                nearest = distance
+                found[e] = o
+    return found
+
+
+@inner
+def _carry_back(x, centre, rotation, new_centre, new_rotation, local):
+    """x <- centre + rotation new_rotation^T (x - new_centre): where a point fixed to the body came from."""
+    for i in range(3):
+        local[i] = 0.0
+        for j in range(3):
+            local[i] += new_rotation[j, i] * (x[j] - new_centre[j])
+    for i in range(3):
+        x[i] = centre[i]
+        for j in range(3):
+            x[i] += rotation[i, j] * local[j]
+
+
+@inner
+def blocked(a, b, normals, offsets, start, end):
+    """Does the segment from a to b pass through the body with planes start:end?"""
+    enter, leave = 0.0, 1.0
+    for g in range(start, end):
+        d_a, d_b = -offsets[g], -offsets[g]
+        for c in range(3):
+            d_a += normals[g, c] * a[c]
+            d_b += normals[g, c] * b[c]
+        if d_a >= 0.0 and d_b >= 0.0:
+            return False
+        if d_a > 0.0:
+            enter = max(enter, d_a / (d_a - d_b))
+        elif d_b > 0.0:
+            leave = min(leave, d_a / (d_a - d_b))
+    return enter < leave

@@ -1,0 +1,359 @@
+"""The physical domain: what the background tetrahedra hold of the water's side of the solids.
+
+Every element keeps its P1 functions; only the region of integration shrinks to the fluid part, known by its
+exact moments V = ∫ dV, c = ∫ x dV / V, S = ∫ (x - c)(x - c)^T dV, and by its wetted surface, polygons with
+owner, normal n (out of the body into the water) and a three-point rule. For linear fields that is all that
+integration over the part needs.
+
+With `covers = "single"` nodes and cells are those of the background (cells without fluid left out); with
+"multiple" they are the virtual mesh of `covers.py`.
+
+A step that moves few bodies cuts again only the cells near their old or new positions.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numba import njit
+
+from fluid.cut.bodies import ConvexBodies
+from fluid.cut.candidate_pairs import near_pairs
+from fluid.cut.cut_arrays import Cuts
+from fluid.cut.cut_cells import cut_cells
+from fluid.cut.fans import fans
+from fluid.cut.openings import Contacts, find_contacts
+from fluid.cut.recut import joined
+from fluid.domain.continued_nodes import pick_old_nodes
+from fluid.domain.coupling_matrix import wetted_coupling
+from fluid.domain.covers import Connection, virtual_cells, without_pockets
+from fluid.mesh.background import Background, gradients
+
+__all__ = ["PhysicalDomain", "carry", "cut_domain", "gradients", "wetted_coupling"]
+
+# One absolute tolerance for the whole mesh, as a share of its spacing; the search takes ten times that.
+TOLERANCE = 1e-10
+SEARCH_MARGIN = 1e-9
+# Entries of the second moments in the order of the kernel.
+XX = np.array([0, 1, 2, 0, 0, 1])
+YY = np.array([0, 1, 2, 1, 2, 2])
+
+
+@dataclass(frozen=True)
+class WholeCells:
+    """Moments of the uncut background cells: volume (M,), centroid (M, 3), second (M, 6)."""
+
+    volume: np.ndarray
+    centroid: np.ndarray
+    second: np.ndarray
+
+
+@dataclass(frozen=True)
+class Memory:
+    """What the next cut needs of this one: mesh, bodies, pairs sorted by (cell, body), cut parts; contacts of the parts
+    with multiple covers, else None."""
+
+    mesh: Background
+    bodies: ConvexBodies
+    whole: WholeCells
+    pair_cell: np.ndarray
+    pair_body: np.ndarray
+    cuts: Cuts
+    connection: Connection
+    contacts: Contacts | None
+
+
+@dataclass(frozen=True)
+class Elements:
+    """Fluid elements in the order of the background cells: parent (M,) background cell · part (M,) row of the cut
+    part, -1 whole or nothing removed · start (cells + 1,) first element of each cell · of_part (K,) element of each cut
+    part."""
+
+    parent: np.ndarray
+    part: np.ndarray
+    start: np.ndarray
+    of_part: np.ndarray
+
+
+@dataclass(frozen=True)
+class PhysicalDomain:
+    """The part of the background tetrahedra outside the solids: N nodes, M cells, S wetted polygons.
+
+    nodes (N, 3) [m] · cells (M, 4) · parent_node (N,), parent_cell (M,) in the background
+    volume (M,) [m3], centroid (M, 3) [m], second (M, 6) [m5] (xx, yy, zz, xy, xz, yz): of the fluid part
+    is_cut (M,): something was removed from the cell
+    fan_start (M + 1,), fan_volume (T,) [m3], fan_corners (T, 4, 4): tetrahedra that fill the cut cells (`fans.py`)
+    face_cell (S,) row of `cells` · face_body (S,) · face_area (S,) [m2] · face_centroid (S, 3) [m]
+    face_normal (S, 3) out of the body · face_points (S, 3, 3) [m] three points, weight area / 3, degree 2
+    face_corners (S, 3, 3) [m] (the polygons are triangles)
+    n_bodies · body_centre (n_bodies, 3) [m] · covers "single" or "multiple".
+    """
+
+    nodes: np.ndarray
+    cells: np.ndarray
+    parent_node: np.ndarray
+    parent_cell: np.ndarray
+    volume: np.ndarray
+    centroid: np.ndarray
+    second: np.ndarray
+    is_cut: np.ndarray
+    fan_start: np.ndarray
+    fan_volume: np.ndarray
+    fan_corners: np.ndarray
+    face_cell: np.ndarray
+    face_body: np.ndarray
+    face_area: np.ndarray
+    face_centroid: np.ndarray
+    face_normal: np.ndarray
+    face_points: np.ndarray
+    face_corners: np.ndarray
+    n_bodies: int
+    body_centre: np.ndarray
+    covers: str
+    memory: Memory = field(repr=False, compare=False)
+
+
+def cut_domain(
+    mesh: Background,
+    bodies: ConvexBodies,
+    covers: str = "single",
+    previous: PhysicalDomain | None = None,
+    moved=None,
+    connection: Connection | None = None,
+) -> PhysicalDomain:
+    """Cut the background mesh by the bodies.
+
+    previous: a domain of the same mesh and bodies. Only cells near bodies whose planes changed since (old or
+    new position, growth too) are cut again, which gives the same domain bit for bit as a full cut.
+    moved (n_bodies,) bool: bodies to cut again in any case; not needed.
+    connection: thresholds of the multiple covers (default: connect over any area)."""
+    if covers not in ("single", "multiple"):
+        raise ValueError(f"covers = {covers!r} is unknown; choose 'single' or 'multiple'")
+    connection = connection or Connection()
+    memory = _remembered(mesh, bodies, covers, previous, connection)
+    if memory is None:
+        memory, again = _cut_all(mesh, bodies, covers, connection), None
+    else:
+        changed = changed_bodies(memory.bodies, bodies)
+        memory, again = _cut_moved(memory, bodies, changed if moved is None else changed | moved, covers)
+    elements = _elements(memory)
+    if covers == "multiple":
+        contacts = find_contacts(
+            mesh, elements.part, elements.start, memory.cuts, connection.enough, memory.contacts, again
+        )
+        memory = replace(memory, contacts=contacts)
+    return _assembled(memory, elements, covers)
+
+
+def changed_bodies(old: ConvexBodies, new: ConvexBodies) -> np.ndarray:
+    """(n,) bool: some plane of the body differs, in direction, position or growth."""
+    if len(new) == 0:
+        return np.zeros(0, dtype=bool)
+    planes = (old.normals != new.normals).any(axis=1) | (old.cut_offsets() != new.cut_offsets())
+    return np.logical_or.reduceat(planes, new.plane_start[:-1])
+
+
+def whole_cells(mesh) -> WholeCells:
+    """Moments of the full tetrahedra: S = V/20 sum_a (x_a - c)(x_a - c)^T."""
+    x = mesh.nodes[mesh.cells]
+    centroid = (x[:, 0] + x[:, 1] + x[:, 2] + x[:, 3]) / 4
+    d = x - centroid[:, None]
+    second = (d[:, :, XX] * d[:, :, YY]).sum(axis=1) * (mesh.cell_volume / 20)[:, None]
+    return WholeCells(mesh.cell_volume, centroid, second)
+
+
+def hat_values(corners, points) -> np.ndarray:
+    """P1 functions of tetrahedra corners (k, 4, 3) at points (k, q, 3) -> (k, q, 4)."""
+    e1, e2, e3 = (corners[:, a] - corners[:, 0] for a in (1, 2, 3))
+    normals = np.stack([np.cross(e2, e3), np.cross(e3, e1), np.cross(e1, e2)], axis=2)
+    normals /= np.einsum("ki,ki->k", e1, normals[:, :, 0])[:, None, None]
+    rest = (points - corners[:, :1]) @ normals
+    return np.concatenate([1.0 - rest.sum(axis=2, keepdims=True), rest], axis=2)
+
+
+def carry(old: PhysicalDomain, new: PhysicalDomain) -> np.ndarray:
+    """(N_new,) index of the old node each new node takes its values from, -1 = no source.
+
+    Single covers keep their nodes. Multiple covers: the copy of the same background node that shares the
+    most fluid volume, sum over parts of min(V_old, V_new)."""
+    if old.covers == "single" and new.covers == "single":
+        return np.arange(len(new.nodes))
+    return pick_old_nodes(old, new)
+
+
+def _remembered(mesh, bodies, covers, previous, connection):
+    if previous is None:
+        return None
+    memory = previous.memory
+    if memory.mesh is not mesh or memory.connection != connection or previous.covers != covers:
+        raise ValueError(
+            "cut_domain: `previous` belongs to another mesh, other covers or other thresholds; "
+            "pass previous=None to start afresh"
+        )
+    if not np.array_equal(memory.bodies.plane_start, bodies.plane_start):
+        raise ValueError(
+            f"cut_domain: `previous` holds {len(memory.bodies)} bodies of other shapes than the {len(bodies)} now; "
+            "pass previous=None when bodies come, go or change their faces"
+        )
+    return memory
+
+
+def _cut_all(mesh, bodies, covers, connection):
+    every = np.arange(len(bodies))
+    cell, body = near_pairs(mesh, bodies, every, SEARCH_MARGIN * mesh.spacing)
+    cuts = _cut_pairs(mesh, bodies, cell, body, covers, connection)
+    return Memory(mesh, bodies, whole_cells(mesh), cell, body, cuts, connection, None)
+
+
+def _cut_moved(memory, bodies, moved, covers):
+    """Replace the pairs of moved bodies and cut the cells of the pairs that went or came → Memory with the contacts
+    from before, and these cells (cells,) bool."""
+    mesh = memory.mesh
+    gone = moved[memory.pair_body]
+    new_cell, new_body = near_pairs(mesh, bodies, np.flatnonzero(moved), SEARCH_MARGIN * mesh.spacing)
+    touched = np.zeros(len(mesh.cells), dtype=bool)
+    touched[memory.pair_cell[gone]] = True
+    touched[new_cell] = True
+    cell = np.concatenate([memory.pair_cell[~gone], new_cell])
+    body = np.concatenate([memory.pair_body[~gone], new_body])
+    order = np.argsort(cell * len(bodies) + body, kind="stable")
+    cell, body = cell[order], body[order]
+    again = touched[cell]
+    fresh = _cut_pairs(mesh, bodies, cell[again], body[again], covers, memory.connection)
+    cuts = joined(memory.cuts, touched, fresh)
+    return replace(memory, bodies=bodies, pair_cell=cell, pair_body=body, cuts=cuts), touched
+
+
+def _cut_pairs(mesh, bodies, cell, body, covers, connection):
+    chosen, first = np.unique(cell, return_index=True)
+    start = np.append(first, len(cell)).astype(np.int64)
+    link_area = -1.0 if covers == "single" else connection.link_area(mesh.spacing)
+    tolerance = TOLERANCE * mesh.spacing
+    return cut_cells(mesh.nodes, mesh.cells, chosen, start, body, bodies, tolerance, mesh.spacing, link_area)
+
+
+def _assembled(memory: Memory, elements: Elements, covers: str) -> PhysicalDomain:
+    mesh, cuts = memory.mesh, memory.cuts
+    if covers == "single":
+        cells, parent_node = mesh.cells[elements.parent], np.arange(len(mesh.nodes))
+    else:
+        cells, parent_node = virtual_cells(
+            mesh, elements.parent, elements.part, elements.start, memory.contacts, memory.connection
+        )
+    volume = _volume(memory, elements)
+    of_part = elements.of_part
+    face_cell, wet, wet_body = of_part[cuts.wet_part], cuts.wet, cuts.wet_body
+    parent, part = elements.parent, elements.part
+    keep = np.ones(len(parent), bool)
+    if covers == "multiple":
+        least = memory.connection.pocket * mesh.spacing**3
+        keep = without_pockets(cells, volume, len(parent_node), least)
+    if not keep.all():
+        used, renumbered, cells = _compressed(cells, keep, len(parent_node))
+        parent_node = parent_node[used]
+        left = keep[face_cell]
+        face_cell, wet, wet_body = renumbered[face_cell[left]], wet[left], wet_body[left]
+        of_part = np.where(keep[of_part], renumbered[of_part], -1)
+        parent, part, volume = parent[keep], part[keep], volume[keep]
+    fan_start, fan_volume, fan_corners = fans(cuts.tet_part, cuts.tet, of_part, len(parent))
+    centroid, second = _moments(parent, part, memory.whole.centroid, memory.whole.second, cuts.moments)
+    return PhysicalDomain(
+        nodes=mesh.nodes if covers == "single" else mesh.nodes[parent_node],
+        cells=cells,
+        parent_node=parent_node,
+        parent_cell=parent,
+        volume=volume,
+        centroid=centroid,
+        second=second,
+        is_cut=part >= 0,
+        fan_start=fan_start,
+        fan_volume=fan_volume,
+        fan_corners=fan_corners,
+        face_cell=face_cell,
+        face_body=wet_body,
+        face_area=wet[:, 0],
+        face_centroid=wet[:, 1:4],
+        face_normal=wet[:, 4:7],
+        face_points=wet[:, 7:16].reshape(-1, 3, 3),
+        face_corners=wet[:, 16:].reshape(-1, 3, 3),
+        n_bodies=len(memory.bodies),
+        body_centre=memory.bodies.centre,
+        covers=covers,
+        memory=memory,
+    )
+
+
+def _volume(memory, elements):
+    """Fluid volume (M,) [m3] of the elements: of the whole cell, or of the part."""
+    volume = memory.whole.volume[elements.parent]
+    cut = elements.part >= 0
+    volume[cut] = memory.cuts.moments[elements.part[cut], 0]
+    return volume
+
+
+@njit(cache=True)
+def _moments(parent, part, centroid, second, moments):
+    """Centroid (M, 3) [m] and second moments (M, 6) [m5] of the elements: of the whole cell, or of the part."""
+    c, s = np.empty((len(parent), 3)), np.empty((len(parent), 6))
+    for e in range(len(parent)):
+        if part[e] >= 0:
+            for k in range(3):
+                c[e, k] = moments[part[e], 1 + k]
+            for k in range(6):
+                s[e, k] = moments[part[e], 4 + k]
+        else:
+            for k in range(3):
+                c[e, k] = centroid[parent[e], k]
+            for k in range(6):
+                s[e, k] = second[parent[e], k]
+    return c, s
+
+
+@njit(cache=True)
+def _compressed(cells, keep, n_nodes):
+    """Nodes (N,) bool of the elements to keep (M,) bool, the new number of each element, and its nodes renumbered."""
+    used = np.zeros(n_nodes, np.bool_)
+    renumbered = np.empty(len(cells), np.int64)
+    n = 0
+    for e in range(len(cells)):
+        renumbered[e] = n
+        if keep[e]:
+            n += 1
+            for k in range(4):
+                used[cells[e, k]] = True
+    number = np.cumsum(used) - 1
+    left = np.empty((n, 4), np.int64)
+    for e in range(len(cells)):
+        if keep[e]:
+            for k in range(4):
+                left[renumbered[e], k] = number[cells[e, k]]
+    return used, renumbered, left
+
+
+def _elements(memory) -> Elements:
+    cuts = memory.cuts
+    met = np.zeros(len(memory.mesh.cells), bool)
+    met[memory.pair_cell] = True
+    return Elements(*_listed(met, cuts.part_cell, cuts.part_whole))
+
+
+@njit(cache=True)
+def _listed(met, part_cell, part_whole):
+    """Elements: each cell that no body meets, and each part of the others."""
+    most = len(met) + len(part_cell)
+    parent, part, n = np.empty(most, np.int64), np.full(most, -1, np.int64), 0
+    start, of_part, k = np.empty(len(met) + 1, np.int64), np.empty(len(part_cell), np.int64), 0
+    for cell in range(len(met)):
+        start[cell] = n
+        if not met[cell]:
+            parent[n] = cell
+            n += 1
+        while k < len(part_cell) and part_cell[k] == cell:
+            parent[n], of_part[k] = cell, n
+            if not part_whole[k]:
+                part[n] = k
+            n += 1
+            k += 1
+    start[-1] = n
+    return parent[:n].copy(), part[:n].copy(), start, of_part

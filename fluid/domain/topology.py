@@ -1,0 +1,406 @@
+"""Who touches whom in the physical domain, laid out for the kernels of the step.
+
+The gradients of a cell are those of its cell in the background mesh (a cover is a copy with the same
+corners), so that nothing geometric is recomputed when solids move.  Every loop over cells reads them: cells of one
+shape share a row (`shapes.py`), which stays in the cache of the processor.  Numbers of
+nodes and cells are unsigned: a loop that gathers by them need not ask whether one counts from the end, as negative
+numbers do in Python, and takes half of the time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numba import njit
+
+from fluid.domain.coupling_matrix import polygons_of_nodes
+from fluid.domain.moments import FluidParts
+from fluid.mesh.background import Background
+
+
+@dataclass(frozen=True)
+class Topology:
+    """nodes (N, 3) [m] · cells (M, 4) · background (M,) cell of the background mesh, of n_background ·
+    parent (M,) row of `gradients` (.., 4, 3) [1/m] and of their `products` ·
+    volume (M,) [m³] of the fluid part · fraction (M,) fluid share of the cell ·
+    share (M, 4) mean of N_a over the fluid part (∫ N_a = volume · share_a) · size (M,) [m] (6 |e|)^(1/3) ·
+    node_start (N+1,), node_cells (4M,) cells around each node · neighbours (M, 4) across faces, -1 none ·
+    node_volume (N,) [m³] ∫ N_i · covered (N,) bool: nodes inside a solid · beside_solid (N,) bool: nodes of
+    cut cells · parts: what of the cells water can fill · is_obtuse: the mesh has obtuse dihedral angles ·
+    upright (rows of `gradients`,) bool: `Background.upright`."""
+
+    nodes: np.ndarray
+    cells: np.ndarray
+    background: np.ndarray
+    n_background: int
+    parent: np.ndarray
+    gradients: np.ndarray
+    products: np.ndarray
+    volume: np.ndarray
+    fraction: np.ndarray
+    share: np.ndarray
+    size: np.ndarray
+    node_start: np.ndarray
+    node_cells: np.ndarray
+    neighbours: np.ndarray
+    node_volume: np.ndarray
+    covered: np.ndarray
+    beside_solid: np.ndarray
+    parts: FluidParts
+    is_obtuse: bool
+    upright: np.ndarray
+
+    @classmethod
+    def of(cls, mesh: Background, domain) -> Topology:
+        """Lay out a PhysicalDomain of the background mesh."""
+        cells, background = domain.cells.astype(np.uint32), np.ascontiguousarray(domain.parent_cell)
+        nodes = np.ascontiguousarray(domain.nodes)
+        start, members = _cells_of_nodes(cells, len(nodes))
+        shapes = mesh.shapes
+        share, fraction, size, node_volume, beside_solid = _measures(
+            nodes, cells, background, mesh.gradients, mesh.cell_volume, mesh.cell_size, domain.volume, domain.centroid,
+            domain.is_cut,
+        )  # fmt: skip
+        return cls(
+            nodes=nodes,
+            cells=cells,
+            background=background,
+            n_background=len(mesh.cells),
+            parent=shapes.row[background],
+            gradients=shapes.gradients,
+            products=shapes.products,
+            volume=domain.volume,
+            fraction=fraction,
+            share=share,
+            size=size,
+            node_start=start,
+            node_cells=members,
+            neighbours=_neighbours_in(mesh, nodes, cells, background),
+            node_volume=node_volume,
+            covered=covered_nodes(domain),
+            beside_solid=beside_solid,
+            parts=FluidParts(
+                cells, domain.volume, share, domain.fan_start, domain.fan_volume, domain.fan_corners
+            ),
+            is_obtuse=mesh.is_obtuse,
+            upright=shapes.upright,
+        )
+
+    @cached_property
+    def row_of_background(self) -> np.ndarray:
+        """Row of the (first) cell of each background cell, -1 inside solids; a last -1 for "no cell"."""
+        row = np.full(self.n_background + 1, -1, np.int64)
+        row[self.background[::-1]] = np.arange(len(self.background))[::-1]
+        return row
+
+    @cached_property
+    def rows_of_background(self) -> tuple[np.ndarray, np.ndarray]:
+        """First row and number of the cells of each background cell: none inside solids, several where a thin wall
+        parts it."""
+        cells = np.arange(self.n_background)
+        first = np.searchsorted(self.background, cells)
+        return first, np.searchsorted(self.background, cells, side="right") - first
+
+    @property
+    def around(self) -> tuple[np.ndarray, np.ndarray]:
+        """start (N+1,), neighbours: the nodes that share a cell with each node."""
+        return self.around_by_cells[:2]
+
+    @cached_property
+    def around_by_cells(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """`around`, and how many cells each of these neighbours shares with the node."""
+        return _nodes_around(self.cells, self.node_start, self.node_cells)
+
+    @cached_property
+    def near_solids(self) -> np.ndarray:
+        """(N,) bool: nodes of cut cells and two layers around them."""
+        near = self.beside_solid.copy()
+        near[layers_around(near, 2, *self.around)[0]] = True
+        return near
+
+    def cells_around(self, nodes) -> np.ndarray:
+        """Numbers of the cells with at least one of these nodes (N,) bool, in order; cost grows with their number only,
+        but for a byte a cell."""
+        return np.flatnonzero(_touched(nodes, self.node_start, self.node_cells, len(self.cells)))
+
+    @property
+    def active(self) -> np.ndarray:
+        """(N,) bool: nodes that belong to a cell with fluid volume."""
+        return np.diff(self.node_start) > 0
+
+
+def covered_nodes(domain) -> np.ndarray:
+    """(N,) bool: nodes behind every wetted polygon that some one body has in the cells around them.
+
+    A body is convex, so a node with all of its nearby faces in front of it lies inside."""
+    d = domain
+    if len(d.face_cell) == 0:
+        return np.zeros(len(d.nodes), bool)
+    start, members = polygons_of_nodes(d.face_cell, d.cells, len(d.nodes))
+    return _covered(start, members, d.nodes, d.face_body, d.face_centroid, d.face_normal)
+
+
+@njit(cache=True)
+def _covered(start, members, nodes, body, centroid, normal):
+    covered = np.zeros(len(nodes), np.bool_)
+    # marks of the node in hand: a body seen at all, a body with a face that the node is in front of
+    seen, in_front = np.full(body.max() + 1, -1, np.int64), np.full(body.max() + 1, -1, np.int64)
+    for i in range(len(nodes)):
+        behind = 0
+        for t in range(start[i], start[i + 1]):
+            s = members[t] // 4
+            b = body[s]
+            if seen[b] != i:
+                seen[b] = i
+                behind += 1
+            height = 0.0
+            for c in range(3):
+                height += (nodes[i, c] - centroid[s, c]) * normal[s, c]
+            if height >= -1e-12 and in_front[b] != i:
+                in_front[b] = i
+                behind -= 1
+        covered[i] = behind > 0
+    return covered
+
+
+@njit(cache=True)
+def _measures(nodes, cells, parent, g, full, full_size, volume, centroid, is_cut):
+    """share (M, 4), fraction (M,), size (M,), node_volume (N,) and beside_solid (N,) of Topology.
+
+    Mean of N_a over the fluid part of a cell: N_a at its centroid; exactly 1/4 in whole cells."""
+    share, fraction, size = np.empty(cells.shape), np.empty(len(cells)), np.empty(len(cells))
+    node_volume, beside_solid = np.zeros(len(nodes)), np.zeros(len(nodes), np.bool_)
+    for e in range(len(cells)):
+        p = parent[e]
+        fraction[e], size[e] = volume[e] / full[p], full_size[p]
+        for a in range(4):
+            share[e, a] = 0.25
+            if is_cut[e]:
+                at = 0.0
+                for k in range(3):
+                    at += g[p, a, k] * (centroid[e, k] - nodes[cells[e, 0], k])
+                share[e, a] = min(max(at + 1.0 if a == 0 else at, 0.0), 1.0)
+                beside_solid[cells[e, a]] = True
+            node_volume[cells[e, a]] += volume[e] * share[e, a]
+    return share, fraction, size, node_volume, beside_solid
+
+
+@njit(cache=True)
+def _cells_of_nodes(cells, n):
+    start = np.zeros(n + 1, np.uint32)
+    for e in range(cells.shape[0]):
+        for a in range(4):
+            start[cells[e, a] + 1] += 1
+    for i in range(n):
+        start[i + 1] += start[i]
+    filled = start[:-1].copy()
+    members = np.empty(4 * cells.shape[0], np.uint32)
+    for e in range(cells.shape[0]):
+        for a in range(4):
+            i = cells[e, a]
+            members[filled[i]] = e
+            filled[i] += 1
+    return start, members
+
+
+def _neighbours_in(mesh, nodes, cells, parent):
+    """neighbours (M, 4); where every node is its background node, those of the parents, renumbered."""
+    if len(nodes) > len(mesh.nodes):
+        return _neighbours(mesh.neighbours, cells, parent, len(mesh.cells))
+    row = np.full(len(mesh.cells) + 1, -1, np.int32)  # the last entry answers for "no neighbour", -1
+    row[parent] = np.arange(len(parent))
+    return row[mesh.neighbours[parent]]
+
+
+@njit(cache=True)
+def _neighbours(parent_neighbours, cells, parent, n_parents):
+    """Copies of the parents' neighbours that share the three nodes of the face."""
+    start = np.zeros(n_parents + 1, np.int64)
+    for e in range(cells.shape[0]):
+        start[parent[e] + 1] += 1
+    for k in range(n_parents):
+        start[k + 1] += start[k]
+    found = np.full(cells.shape, -1, np.int32)
+    for e in range(cells.shape[0]):
+        for a in range(4):
+            p = parent_neighbours[parent[e], a]
+            if p < 0:
+                continue
+            for other in range(start[p], start[p + 1]):  # elements are in the order of their parents
+                shared = 0
+                for b in range(4):
+                    for c in range(4):
+                        if b != a and cells[other, c] == cells[e, b]:
+                            shared += 1
+                if shared == 3:
+                    found[e, a] = other
+                    break
+    return found
+
+
+@njit(cache=True)
+def _nodes_around(cells, node_start, node_cells):
+    """start (N + 1,), neighbours: nodes that share a cell with each node, in the order of its cells; how many cells."""
+    n = node_start.shape[0] - 1
+    start = np.zeros(n + 1, np.uint32)
+    slot = np.full(n, -1, np.int64)
+    around, shared = np.empty(16 * n + 64, np.uint32), np.empty(16 * n + 64, np.uint8)
+    count = 0
+    for i in range(n):
+        most = 3 * int(node_start[i + 1] - node_start[i])
+        if count + most > around.shape[0]:
+            around = np.concatenate((around, np.empty(around.shape[0] + most, np.uint32)))
+            shared = np.concatenate((shared, np.empty(shared.shape[0] + most, np.uint8)))
+        for t in range(node_start[i], node_start[i + 1]):
+            for a in range(4):
+                j = cells[node_cells[t], a]
+                if j == i:
+                    continue
+                if slot[j] < start[i]:
+                    slot[j] = count
+                    around[count], shared[count] = j, 0
+                    count += 1
+                shared[slot[j]] += 1
+        start[i + 1] = count
+    return start, around[:count].copy(), shared[:count].copy()
+
+
+@njit(cache=True)
+def _touched(nodes, node_start, node_cells, n_cells):
+    """(n_cells,) bool: cells around these nodes (N,) bool."""
+    touched = np.zeros(n_cells, np.bool_)
+    for i in range(nodes.shape[0]):
+        if nodes[i]:
+            for t in range(node_start[i], node_start[i + 1]):
+                touched[node_cells[t]] = True
+    return touched
+
+
+@njit(cache=True)
+def layers_around(seed, depth, start, around):
+    """Nodes in order of distance from the seed nodes (bool (N,)): (list, layer_start (depth + 2,)).
+
+    Layer 0 is the seed; layer k + 1 shares a cell with layer k. start, around: `Topology.around`."""
+    n = seed.shape[0]
+    order = np.empty(n, np.int64)
+    layer_start = np.zeros(depth + 2, np.int64)
+    seen = seed.copy()
+    count = 0
+    for i in range(n):
+        if seed[i] and start[i + 1] > start[i]:
+            order[count] = i
+            count += 1
+    layer_start[1] = count
+    for layer in range(depth):
+        for s in range(layer_start[layer], layer_start[layer + 1]):
+            for t in range(start[order[s]], start[order[s] + 1]):
+                j = around[t]
+                if not seen[j]:
+                    seen[j] = True
+                    order[count] = j
+                    count += 1
+        layer_start[layer + 2] = count
+    return order[:count].copy(), layer_start
+
+
+@dataclass(frozen=True)
+class Graph:
+    """Edges of the listed nodes with the stiffness of the physical domain.
+
+    row (N,) place of a node in `nodes`, -1 if not listed · start (n+1,), neighbour, stiffness [m]: CSR without
+    diagonal, K_ij = Σ_e volume_e ∇N_i·∇N_j."""
+
+    nodes: np.ndarray
+    row: np.ndarray
+    start: np.ndarray
+    neighbour: np.ndarray
+    stiffness: np.ndarray
+
+    def covers(self, nodes) -> bool:
+        """Whether all these nodes (n,) are listed."""
+        return bool((self.row[nodes] >= 0).all())
+
+    @classmethod
+    def of(cls, topology: Topology, nodes) -> Graph:
+        """Edges around the given nodes (n,); cost grows with n only."""
+        t = topology
+        row = np.full(len(t.nodes), -1, np.int64)
+        row[nodes] = np.arange(len(nodes))
+        start, neighbour, stiffness = _edges(
+            nodes, t.cells, t.parent, t.products, t.volume, t.node_start, t.node_cells
+        )
+        return cls(nodes, row, start, neighbour, stiffness)
+
+    def without(self, topology: Topology, cell_list) -> Graph:
+        """The same edges with the stiffness of the listed cells (k,) taken out."""
+        if len(cell_list) == 0:
+            return self
+        t, stiffness = topology, self.stiffness.copy()
+        _take_out(
+            cell_list,
+            t.cells,
+            t.parent,
+            t.products,
+            t.volume,
+            self.row,
+            self.start,
+            self.neighbour,
+            stiffness,
+        )
+        return replace(self, stiffness=stiffness)
+
+
+_PAIR = np.array([[-1, 0, 1, 2], [0, -1, 3, 4], [1, 3, -1, 5], [2, 4, 5, -1]])
+"""Column of Background.products that holds the corners a, b."""
+
+
+@njit(cache=True)
+def _take_out(cell_list, cells, parent, products, volume, row, start, neighbour, stiffness):
+    for e in cell_list:
+        for a in range(4):
+            r = row[cells[e, a]]
+            if r < 0:
+                continue
+            for s in range(start[r], start[r + 1]):
+                for b in range(4):
+                    if b != a and neighbour[s] == cells[e, b]:
+                        stiffness[s] -= volume[e] * products[parent[e], _PAIR[a, b]]
+
+
+@njit(cache=True)
+def _edges(rows, cells, parent, products, volume, node_start, node_cells):
+    slot = np.full(node_start.shape[0] - 1, -1, np.int64)
+    start = np.zeros(rows.shape[0] + 1, np.uint32)
+    capacity = 16 * rows.shape[0] + 64
+    neighbour = np.empty(capacity, np.uint32)
+    stiffness = np.empty(capacity)
+    count = 0
+    for r in range(rows.shape[0]):
+        i = rows[r]
+        most = 3 * int(node_start[i + 1] - node_start[i])
+        if count + most > capacity:
+            capacity = 2 * capacity + most
+            neighbour = np.concatenate((neighbour[:count], np.empty(capacity - count, np.uint32)))
+            stiffness = np.concatenate((stiffness[:count], np.empty(capacity - count)))
+        for t in range(node_start[i], node_start[i + 1]):
+            e = node_cells[t]
+            p = parent[e]
+            la = 0
+            while cells[e, la] != i:
+                la += 1
+            for b in range(4):
+                if b == la:
+                    continue
+                j = cells[e, b]
+                k = volume[e] * products[p, _PAIR[la, b]]
+                if slot[j] < start[r]:
+                    slot[j] = count
+                    neighbour[count] = j
+                    stiffness[count] = k
+                    count += 1
+                else:
+                    stiffness[slot[j]] += k
+        start[r + 1] = count
+    return start, neighbour[:count].copy(), stiffness[:count].copy()

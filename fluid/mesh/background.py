@@ -1,0 +1,320 @@
+"""The background (mathematical) mesh: tetrahedra that cover water, air and solids alike.
+
+A cell with nodes x_0..x_3 carries the barycentric coordinates λ_a(x) = c_a + g_a·x, with the constant P1
+gradients g_a = ∇N_a [1/m].  Neighbours are numbered by the opposite corner: neighbours[e, a] shares the
+face of cell e that does not hold corner a; -1 means the boundary of the mesh.
+
+Points are found through a lattice of bins (coordinate axes, graded allowed).  In a box mesh the bins are
+the bricks that were split into tetrahedra; for any other mesh they are uniform boxes of one mean spacing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numba import njit
+from skfem import MeshTet
+
+from fluid.mesh.bricks import SPLITS, split_bricks
+from fluid.mesh.shapes import Shapes
+from fluid.numerics.cube_root import cube_root
+
+CORNERS_OF_FACE = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])  # outward for a positive cell
+MOST_SLENDER = 2.5
+"""Longest over shortest edge of a cell, 1.73 in a split cube, up to which its volume goes through upright borders."""
+MOST_BRICKS = 3e8
+"""Of a box: the numbers of the tetrahedra of more, six a brick, pass 32 bits."""
+
+
+class MeshError(ValueError):
+    """The background mesh cannot be used; the message names the cell or node and the remedy."""
+
+
+@dataclass(frozen=True)
+class Background:
+    """Tetrahedra with what every step needs of them.  Cells are positively oriented.
+
+    nodes (N, 3) [m] · cells (M, 4) · spacing [m], mean edge of the equivalent brick (6 |e|)^(1/3) ·
+    gradients (M, 4, 3) [1/m] · cell_volume (M,) [m³] · neighbours (M, 4) ·
+    boundary_faces (B, 3) · boundary_cell (B,) · boundary_normal (B, 3), outward, unit ·
+    axes: three increasing arrays [m], the walls of the bins · bin_start, bin_cells: cells of each bin (CSR).
+    """
+
+    nodes: np.ndarray
+    cells: np.ndarray
+    spacing: float
+    gradients: np.ndarray
+    cell_volume: np.ndarray
+    neighbours: np.ndarray
+    boundary_faces: np.ndarray
+    boundary_cell: np.ndarray
+    boundary_normal: np.ndarray
+    axes: tuple[np.ndarray, np.ndarray, np.ndarray]
+    bin_start: np.ndarray
+    bin_cells: np.ndarray
+
+    @classmethod
+    def from_arrays(cls, nodes, cells, axes=None) -> Background:
+        """Any tetrahedra: nodes (N, 3) [m], cells (M, 4).  Cells may have either orientation.
+
+        axes: walls of bins such that no cell straddles two bins (a split brick lattice), or None.
+        Raises MeshError for cells without volume or indices out of range."""
+        nodes = np.ascontiguousarray(nodes, float)
+        cells = _oriented(nodes, _checked_cells(nodes, cells))
+        g, volume = gradients(nodes, cells)
+        neighbours = cell_neighbours(cells, len(nodes))
+        faces, owner = _boundary(cells, neighbours)
+        spacing = float(cube_root(6.0 * volume.mean()))
+        lattice = axes is not None
+        axes = tuple(np.asarray(a, float) for a in axes) if lattice else _uniform_axes(nodes, spacing)
+        start, members = _bins(nodes, cells, axes, lattice)
+        normal = _face_normals(nodes, faces)
+        return cls(nodes, cells, spacing, g, volume, neighbours, faces, owner, normal, axes, start, members)
+
+    def locate(self, points) -> np.ndarray:
+        """Cell that holds each point (m, 3) [m] → (m,), -1 outside; ties go to the first cell of the bin."""
+        points = np.ascontiguousarray(np.atleast_2d(points), float)
+        x, y, z = self.axes
+        return _locate(
+            points, x, y, z, self.bin_start, self.bin_cells, self.nodes, self.cells, self.gradients
+        )
+
+    @cached_property
+    def bounds(self) -> np.ndarray:
+        """(2, 3) [m] lowest and highest coordinates."""
+        return np.array([self.nodes.min(axis=0), self.nodes.max(axis=0)])
+
+    @cached_property
+    def cell_size(self) -> np.ndarray:
+        """(M,) [m] edge of the brick that holds six such cells, (6 |e|)^(1/3)."""
+        return cube_root(6.0 * self.cell_volume)
+
+    @cached_property
+    def boundary_area(self) -> np.ndarray:
+        """(B,) [m²] of the boundary faces."""
+        x = self.nodes[self.boundary_faces]
+        return 0.5 * np.linalg.norm(np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), axis=1)
+
+    @cached_property
+    def products(self) -> np.ndarray:
+        """∇N_a·∇N_b (M, 6) [1/m²] of the pairs ab = 01, 02, 03, 12, 13, 23."""
+        return _products(self.gradients)
+
+    @cached_property
+    def obtuse(self) -> np.ndarray:
+        """(M,) bool: some dihedral angle of the cell is more than a right one, ∇N_a·∇N_b > 0: never in `box_mesh`."""
+        return self.products.max(axis=1) * self.cell_size**2 > 1e-9
+
+    @cached_property
+    def is_obtuse(self) -> bool:
+        """Some cell is obtuse."""
+        return bool(self.obtuse.any())
+
+    @cached_property
+    def upright(self) -> np.ndarray:
+        """(M,) bool: cells in which the borders upright on the edges serve the volume (`volume.py`): neither obtuse nor
+        slender."""
+        return ~self.obtuse & (_slenderness(self.nodes, self.cells) <= MOST_SLENDER)
+
+    @cached_property
+    def shapes(self) -> Shapes:
+        """The different cells of the mesh."""
+        return Shapes.of(self)
+
+    @cached_property
+    def skfem(self) -> MeshTet:
+        """The same mesh for scikit-fem (node and cell numbers unchanged)."""
+        return MeshTet(self.nodes.T.copy(), self.cells.T.copy(), sort_t=False, validate=False)
+
+
+def box_mesh(lower, upper, cell_size=None, axes=None, split: str = "kuhn") -> Background:
+    """Box [lower, upper] (3,) [m] in bricks of about cell_size ((3,) or one number [m]), six cells each.
+
+    axes: three increasing coordinate arrays instead (graded meshes); lower, upper and cell_size are then ignored.
+    split: "kuhn" or "mirrored", see `bricks.py`.  Raises MeshError for extents that are not positive and for
+    any other split."""
+    if split not in SPLITS:
+        raise MeshError(f"split {split!r} of the bricks: must be one of {', '.join(SPLITS)}")
+    if axes is None:
+        axes = _axes_of_box(np.asarray(lower, float), np.asarray(upper, float), cell_size)
+    return Background.from_arrays(*split_bricks(axes, split), axes)
+
+
+def gradients(nodes, cells) -> tuple[np.ndarray, np.ndarray]:
+    """∇N_a (M, 4, 3) [1/m] and volume (M,) [m³] of cells (M, 4) with nodes (N, 3) [m].
+
+    ∇N_a is the row a of the inverse of the edge matrix; ∇N_0 = -Σ ∇N_a, so that they sum to zero exactly."""
+    x = nodes[cells]
+    e1, e2, e3 = x[:, 1] - x[:, 0], x[:, 2] - x[:, 0], x[:, 3] - x[:, 0]
+    n1, n2, n3 = np.cross(e2, e3), np.cross(e3, e1), np.cross(e1, e2)
+    six_volume = np.einsum("ij,ij->i", e1, n1)
+    g = np.empty((len(cells), 4, 3))
+    g[:, 1], g[:, 2], g[:, 3] = (n / six_volume[:, None] for n in (n1, n2, n3))
+    g[:, 0] = -(g[:, 1] + g[:, 2] + g[:, 3])
+    return g, six_volume / 6.0
+
+
+def cell_neighbours(cells, n_nodes: int) -> np.ndarray:
+    """neighbours (M, 4) of cells (M, 4): the cell across the face opposite to each corner, -1 = none."""
+    faces = np.sort(cells[:, CORNERS_OF_FACE].reshape(-1, 3), axis=1)
+    order = np.lexsort(faces.T[::-1])
+    same = np.all(faces[order[1:]] == faces[order[:-1]], axis=1)
+    first, second = order[:-1][same], order[1:][same]
+    neighbours = np.full(4 * len(cells), -1, np.int64)
+    neighbours[first], neighbours[second] = second // 4, first // 4
+    return neighbours.reshape(-1, 4)
+
+
+def _checked_cells(nodes, cells):
+    cells = np.ascontiguousarray(cells, np.int64)
+    if cells.ndim != 2 or cells.shape[1] != 4 or len(cells) == 0:
+        raise MeshError(f"cells has shape {cells.shape}; tetrahedra need (M, 4) with M > 0")
+    if cells.min() < 0 or cells.max() >= len(nodes):
+        raise MeshError(f"cells name node {cells.max()} of {len(nodes)}; node numbers start at 0")
+    return cells
+
+
+def _oriented(nodes, cells):
+    """Swap two corners of the cells of negative volume; refuse flat ones."""
+    volume = _signed_volume(nodes, cells)
+    flat = np.flatnonzero(np.abs(volume) <= 1e-14 * np.abs(volume).max())
+    if flat.size:
+        raise MeshError(f"cell {flat[0]} (and {flat.size - 1} more) has no volume; remove or repair it")
+    cells = cells.copy()
+    turned = volume < 0
+    cells[turned, 2:] = cells[turned, 3:1:-1]
+    return cells
+
+
+def _signed_volume(nodes, cells):
+    x = nodes[cells]
+    return np.linalg.det(x[:, 1:] - x[:, :1]) / 6.0
+
+
+def _boundary(cells, neighbours):
+    cell, corner = np.nonzero(neighbours < 0)
+    return cells[cell[:, None], CORNERS_OF_FACE[corner]], cell
+
+
+def _face_normals(nodes, faces):
+    x = nodes[faces]
+    n = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
+    return n / np.linalg.norm(n, axis=1, keepdims=True)
+
+
+def _axes_of_box(lower, upper, cell_size):
+    if cell_size is None or np.any(np.asarray(cell_size) <= 0) or np.any(upper <= lower):
+        raise MeshError(
+            f"box {lower} to {upper} with cell size {cell_size}: all three extents must be positive"
+        )
+    count = np.maximum(1.0, np.rint((upper - lower) / cell_size))
+    if not np.prod(count) < MOST_BRICKS:
+        raise MeshError(f"box {lower} to {upper} with cell size {cell_size}: {np.prod(count):.3g} bricks")
+    return [np.linspace(lower[k], upper[k], int(count[k]) + 1) for k in range(3)]
+
+
+def _uniform_axes(nodes, spacing):
+    low, high = nodes.min(axis=0), nodes.max(axis=0)
+    count = np.maximum(1, np.floor((high - low) / spacing).astype(int))
+    return tuple(np.linspace(low[k], high[k], count[k] + 1) for k in range(3))
+
+
+def _bins(nodes, cells, axes, lattice):
+    """Cells of each bin as CSR: of the centroid in a lattice, otherwise all that the box of a cell meets."""
+    x = nodes[cells]
+    corners = (x.mean(axis=1), x.mean(axis=1)) if lattice else (x.min(axis=1), x.max(axis=1))
+    low, high = (np.stack([bin_of(axes[k], c[:, k]) for k in range(3)], axis=1) for c in corners)
+    shape = [len(a) - 1 for a in axes]
+    return _fill_bins(low, high, *shape)
+
+
+def bin_of(axis, x) -> np.ndarray:
+    """Number of the bin along one of the axes that holds each coordinate x (m,) [m]; beyond the ends, the nearest."""
+    return np.clip(np.searchsorted(axis, x, side="right") - 1, 0, len(axis) - 2)
+
+
+def _fill_bins(low, high, nx, ny, nz):
+    """CSR of the bins [low, high] (M, 3) that each cell occupies: start (bins + 1,), cells."""
+    span = high - low + 1
+    count = span.prod(axis=1)
+    cell = np.repeat(np.arange(len(low)), count)
+    rank = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+    sy, sz = span[cell, 1], span[cell, 2]
+    i, j, k = low[cell, 0] + rank // (sy * sz), low[cell, 1] + rank // sz % sy, low[cell, 2] + rank % sz
+    bin_of_entry = (i * ny + j) * nz + k
+    order = np.argsort(bin_of_entry, kind="stable")
+    start = np.concatenate([[0], np.cumsum(np.bincount(bin_of_entry, minlength=nx * ny * nz))])
+    return start, cell[order]
+
+
+@njit(cache=True)
+def _products(g):
+    out = np.empty((g.shape[0], 6))
+    for e in range(g.shape[0]):
+        n = 0
+        for a in range(4):
+            for b in range(a + 1, 4):
+                out[e, n] = g[e, a, 0] * g[e, b, 0] + g[e, a, 1] * g[e, b, 1] + g[e, a, 2] * g[e, b, 2]
+                n += 1
+    return out
+
+
+@njit(cache=True)
+def _slenderness(x, cells):
+    """Longest over shortest edge (M,) of the cells."""
+    out = np.empty(cells.shape[0])
+    for e in range(cells.shape[0]):
+        shortest, longest = np.inf, 0.0
+        for a in range(4):
+            for b in range(a + 1, 4):
+                length = 0.0
+                for k in range(3):
+                    length += (x[cells[e, b], k] - x[cells[e, a], k]) ** 2
+                shortest, longest = min(shortest, length), max(longest, length)
+        out[e] = np.sqrt(longest / shortest)
+    return out
+
+
+@njit(cache=True)
+def smallest_barycentric(p, e, nodes, cells, g):
+    """min_a λ_a of the point p (3,) in cell e: ≥ 0 inside."""
+    lowest = 1.0
+    last = 1.0
+    for a in range(1, 4):
+        lam = 0.0
+        for k in range(3):
+            lam += g[e, a, k] * (p[k] - nodes[cells[e, 0], k])
+        last -= lam
+        lowest = min(lowest, lam)
+    return min(lowest, last)
+
+
+@njit(cache=True)
+def _bin_index(axis, x):
+    low, high = 0, axis.shape[0] - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if axis[middle] <= x:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+@njit(cache=True)
+def _locate(points, ax, ay, az, bin_start, bin_cells, nodes, cells, g):
+    found = np.full(points.shape[0], -1, np.int64)
+    for m in range(points.shape[0]):
+        i, j, k = (_bin_index(ax, points[m, 0]), _bin_index(ay, points[m, 1]), _bin_index(az, points[m, 2]))
+        b = (i * (ay.shape[0] - 1) + j) * (az.shape[0] - 1) + k
+        best = -1e-10  # round-off: a point on a shared face belongs to the first cell that holds it
+        for s in range(bin_start[b], bin_start[b + 1]):
+            lowest = smallest_barycentric(points[m], bin_cells[s], nodes, cells, g)
+            if lowest >= best:
+                found[m] = bin_cells[s]
+                if lowest >= 0.0:
+                    break
+                best = lowest
+    return found

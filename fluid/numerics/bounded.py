@@ -1,0 +1,175 @@
+"""Pressure with a lower bound: water pushes, and parts where it would pull harder than the bound.
+
+    x ≥ l,    A x - b ≥ 0,    (x - l)·(A x - b) = 0                                                         (1)
+
+Where x lies above its bound the mass balance A x = b holds; where it is at the bound, A x - b [m³/s] is the rate at
+which the water parts there, from itself or from a wall.  For a symmetric positive definite A there is one solution.
+It is found by block principal pivoting: solve with the unknowns of a set held at their bound, exchange all that
+have the wrong sign, repeat; where that does not lessen their number for some rounds, one at a time (the last one),
+which ends after finitely many rounds (Murty's rule; Judice and Pires, Comput. Oper. Res. 21 (1994) 587).  With the
+set of the step before it takes one to three rounds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from fluid.numerics.solve import MOST_ITERATIONS, NotConverged, conjugate_gradients, operators, solve
+
+LOOSE = 1e-3
+"""Residual at which a round ends that has unknowns far below their bound: the next one goes on from there."""
+FAR_BELOW, SLACK = 1e-2, 1e-6
+"""Shares of the largest |x|: how far x may lie below its bound while a round ends, and when it is done."""
+UNSETTLED = 10.0
+"""Rate at which water may flow together at the bound, in residuals of the solver: it is no more exact than that."""
+REACH = 8
+"""Cells that air goes on within a step: it is faster than any water."""
+PATIENCE = 5
+"""Rounds without fewer wrong signs after which single unknowns are exchanged."""
+MOST_ROUNDS = 100
+
+
+@dataclass(frozen=True)
+class BoundedResult:
+    """x (n,) · at_bound (n,) bool: held at the bound · parting (n,) [m³/s]: A x - b there, 0 elsewhere · lower (n,):
+    bound at the end, None: there is none · iterations, of all rounds · residual of the free rows over ‖b‖ · rounds."""
+
+    x: np.ndarray
+    at_bound: np.ndarray
+    parting: np.ndarray
+    lower: np.ndarray | None
+    iterations: int
+    residual: float
+    rounds: int
+
+
+def solve_bounded(
+    A,
+    b,
+    x0,
+    rtol: float,
+    lower=None,
+    at_bound=None,
+    air=None,
+    extra: Callable | None = None,
+    most: int = MOST_ITERATIONS,
+    kept: list | None = None,
+) -> BoundedResult:
+    """Problem (1) for A + extra to a residual of rtol ‖b‖.
+
+    lower (n,): bound l, None: there is none · at_bound (n,) bool: first guess of the set, None: empty · air (n,): bound
+    where air is, which the unknowns that it reaches beforehand have already; where water parts there, air goes on to
+    unknowns beside it that lie below `air`, REACH cells at most; None: it does not · the other arguments as in `solve`.
+    Without any unknown at the bound, x is that of `solve` to the last bit.  Raises NotConverged."""
+    if lower is None:
+        found = solve(A, b, x0, rtol, extra, most, kept)
+        return BoundedResult(
+            found.x, np.zeros(len(b), bool), np.zeros(len(b)), None, found.iterations, found.residual, 1
+        )
+    held = np.zeros(len(b), bool) if at_bound is None else at_bound.copy()
+    scale = np.linalg.norm(b)
+    if scale == 0.0 and not held.any() and not (lower > 0.0).any():
+        return BoundedResult(np.zeros_like(b), held, np.zeros_like(b), lower, 0, 0.0, 1)
+    apply, precondition = operators(A, extra, kept)
+    x, signs, iterations, reach = np.array(x0, float), _Signs(lower), 0, 0
+    for rounds in range(1, MOST_ROUNDS + 1):
+        x[held] = lower[held]
+        free = None if not held.any() else held
+        found = conjugate_gradients(
+            apply,
+            precondition,
+            b,
+            x,
+            rtol,
+            most,
+            free,
+            lambda x, residual, held=held, signs=signs: signs.early(x, residual, held),
+        )
+        x, iterations = found.x, iterations + found.iterations
+        parting = apply(x) - b if free is not None else None
+        wrong = signs.wrong(x, held, parting, UNSETTLED * rtol * scale)
+        if not wrong.any():
+            if found.residual > rtol:
+                continue
+            apart = np.zeros_like(b) if parting is None else np.where(held, np.maximum(parting, 0.0), 0.0)
+            vented = _air_goes_on(A, x, lower, air) if air is not None and reach < REACH else None
+            if vented is None or not vented.any():
+                return BoundedResult(x, held, apart, lower, iterations, found.residual, rounds)
+            lower, held, reach = np.where(vented, air, lower), held | vented, reach + 1
+            signs = _Signs(lower)
+            continue
+        held = signs.exchanged(held, wrong)
+    raise NotConverged(
+        f"the bound of the pressure was not settled in {MOST_ROUNDS} rounds: {int(wrong.sum())} of {len(b)} unknowns "
+        "still change sides. Reduce time.cfl.",
+        np.array([found.residual]),
+        int(np.flatnonzero(wrong)[-1]) if wrong.any() else None,
+    )
+
+
+def solve_pressure(problem, rtol: float, moved=0.0) -> BoundedResult:
+    """The pressure of a `projection.PressureProblem` whose bodies move as given: moved (n,) [m³/s], G V of theirs."""
+    return solve_bounded(
+        problem.matrix, problem.rhs + moved, problem.guess, rtol, problem.lower, problem.at_bound, problem.air
+    )
+
+
+def at_air(x, air):
+    """(n,) bool: where x is at the bound of air, to the slack of the solver: a hair above it may not decide where air
+    comes next."""
+    return x <= air + SLACK * np.abs(x).max(initial=0.0)
+
+
+def _air_goes_on(A, x, lower, air):
+    """(n,) bool: unknowns below the bound of air that it has not reached, beside those where it parts the water."""
+    near = at_air(x, air)
+    source, below = near & (lower == air), near & (lower < air)
+    if not source.any() or not below.any():
+        return None
+    return below & _beside(A.indptr, A.indices, source)
+
+
+@njit(cache=True)
+def _beside(indptr, indices, source):
+    """(n,) bool: rows with an entry in the column of a source (n,) bool."""
+    found = np.zeros(source.shape[0], np.bool_)
+    for i in range(source.shape[0]):
+        for s in range(indptr[i], indptr[i + 1]):
+            found[i] = found[i] or source[indices[s]]
+    return found
+
+
+class _Signs:
+    """Which unknowns have the wrong sign, and which of them to exchange."""
+
+    def __init__(self, lower):
+        self.lower, self.fewest, self.patience = lower, len(lower) + 1, PATIENCE
+
+    def _below(self, x, held, share: float):
+        return ~held & (x < self.lower - share * np.abs(x).max(initial=0.0))
+
+    def early(self, x, residual: float, held) -> bool:
+        """Whether to end a round: it is loosely solved, and something lies far below its bound."""
+        return residual <= LOOSE and bool(self._below(x, held, FAR_BELOW).any())
+
+    def wrong(self, x, held, parting, tolerance: float):
+        """(n,) bool: below the bound, or held there although water flows together."""
+        below = self._below(x, held, SLACK)
+        return below if parting is None else below | (held & (parting < -tolerance))
+
+    def exchanged(self, held, wrong):
+        """The next set (n,) bool."""
+        count = int(wrong.sum())
+        if count < self.fewest:
+            self.fewest, self.patience = count, PATIENCE
+        elif self.patience == 0:
+            last = np.flatnonzero(wrong)[-1]
+            wrong = np.zeros(len(held), bool)
+            wrong[last] = True
+        else:
+            self.patience -= 1
+        return held ^ wrong

@@ -1,0 +1,86 @@
+"""Which nodes and cells take part in the pressure of a step.
+
+A node below the surface inside a solid may have no water at all around it: on a gentle slope the cells beyond the water
+line have such nodes for many cells, and their fluid part is air.  A cut cell whose fluid part lies above the surface is
+void: it is left out of the matrix, the right hand side, the coupling to the solids and the correction alike.  Water at
+rest stays at rest exactly, as its balance holds cell by cell.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from fluid.domain.moments import wet_fraction
+from fluid.pressure.indefinite_cells import without_indefinite
+
+DRY = 1e-9
+"""A fluid part that lies above φ = -DRY h holds no water."""
+
+
+@dataclass(frozen=True)
+class WetPart:
+    """nodes (N,) bool with an unknown · cells (n,), share (n,) of each with φ < 0, 1 in wholly wet ones ·
+    void (k,) cells left out: without water, or those that `indefinite_cells.py` drops."""
+
+    nodes: np.ndarray
+    cells: np.ndarray
+    share: np.ndarray
+    void: np.ndarray
+
+    @classmethod
+    def of(cls, topology, domain, phi, spacing: float) -> WetPart:
+        """The wet part below the level set φ (N,) [m]; spacing [m] of the mesh."""
+        t = topology
+        below = (phi < 0.0) & t.active
+        cells = t.cells_around(below)
+        holds = ~domain.is_cut[cells] | _holding(domain, t, phi, -DRY * spacing)[cells]
+        if t.is_obtuse:
+            holds[holds] = without_indefinite(t, cells[holds], below, phi)
+        void = cells[~holds]
+        if len(void) > 0:
+            cells = cells[holds]
+            reached = np.zeros(len(phi), bool)
+            reached[t.cells[cells]] = True
+            below &= reached
+        return cls(below, cells, wet_fraction(cells, phi, t.parts), void)
+
+
+def _holding(d, t, phi, dry):
+    """(M,) bool: cells with φ < dry at a corner outside the solids, or at a corner of a wetted polygon.
+
+    These are all corners of the fluid part, on which φ is linear."""
+    return _lowest_below(
+        d.face_cell, d.face_corners, t.nodes, t.cells, t.parent, t.gradients, t.covered, phi, dry
+    )
+
+
+@njit(cache=True)
+def _lowest_below(face_cell, corners, nodes, cells, parent, g, covered, phi, dry):
+    holds = np.zeros(cells.shape[0], np.bool_)
+    slope = np.empty(3)
+    for s in range(face_cell.shape[0]):
+        e = face_cell[s]
+        if holds[e]:
+            continue
+        lowest = np.inf
+        for a in range(4):
+            i = cells[e, a]
+            lowest = min(lowest, phi[i])
+            if not covered[i] and phi[i] < dry:
+                holds[e] = True
+        if holds[e] or lowest >= dry:
+            continue
+        o = cells[e, 0]
+        for k in range(3):
+            slope[k] = 0.0
+            for a in range(4):
+                slope[k] += phi[cells[e, a]] * g[parent[e], a, k]
+        for q in range(3):
+            level = phi[o]
+            for k in range(3):
+                level += slope[k] * (corners[s, q, k] - nodes[o, k])
+            holds[e] = holds[e] or level < dry
+    return holds

@@ -1,0 +1,91 @@
+"""How far the pressure may fall: to that of the air where air can reach, to the vapour pressure elsewhere.
+
+Water open to the air cannot pull on a wall: air comes in, and the water parts from the wall.  Air reaches the nodes
+that share a cell with a dry one or with an open side, and from there a cell a step through water that has parted
+already; within a step it goes on where water parts (`bounded.py`).  Water that no air reaches parts where its pressure
+falls to that of its vapour.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from fluid.numerics.bounded import at_air
+
+
+def lowest_pressure(water, graph, dofs, phi) -> np.ndarray | None:
+    """Bound (n,) [Pa] of the pressure at the wet nodes dofs (n,) of the level set φ (N,) [m]; None: there is none."""
+    p = water.parameters
+    if p.suction != "bounded":
+        return None
+    vented = _beside_air(
+        dofs, graph.row, graph.start, graph.neighbour, phi, water.open_to_air, water.ventilated
+    )
+    return np.where(vented, 0.0, p.vapour_pressure)
+
+
+@dataclass(frozen=True)
+class BoundMet:
+    """Where the pressure of a step met its bound: at_bound (N,) bool, ventilated (N,) bool where that is the air's ·
+    rate (n,) [m³/s] at which the water parts at the unknowns, a number where it does nowhere · volume [m³] that
+    opened · work [J] that it took to part water from its vapour (the air's pressure is zero) · lowest [Pa] pressure
+    of the water · wall: share of the wetted walls, of tank and bodies, on which the pressure is at its bound."""
+
+    at_bound: np.ndarray
+    ventilated: np.ndarray
+    rate: np.ndarray | float
+    volume: float
+    work: float
+    lowest: float
+    wall: float
+
+    @classmethod
+    def of(cls, water, problem, x, parting) -> BoundMet:
+        """After a step with x (n,) [Pa] and parting (n,) [m³/s] or None, as in `Water.correct`."""
+        n_nodes, pressure = len(problem.predicted.wet), x + problem.known
+        at_bound, ventilated = np.zeros(n_nodes, bool), np.zeros(n_nodes, bool)
+        lowest = float(pressure.min(initial=0.0))
+        if problem.bound is None:
+            return cls(at_bound, ventilated, 0.0, 0.0, 0.0, lowest, 0.0)
+        vented = x == problem.air  # also where air came to within the step
+        met = vented | (x <= problem.lower)
+        open_ = at_air(x, problem.air) & (vented | (problem.bound == 0.0))
+        at_bound[problem.dofs[met]] = True
+        ventilated[problem.dofs[open_]] = True
+        rate = 0.0 if parting is None else parting
+        opened = problem.dt * float(np.sum(rate))
+        work = -problem.dt * float(np.sum(rate * np.where(vented, 0.0, problem.bound)))
+        wall = 0.0
+        if met.any():
+            area = wall_area(water.mesh, water.domain)
+            wall = float(area[at_bound].sum()) / max(float(area[problem.dofs].sum()), 1e-300)
+        return cls(at_bound, ventilated, rate, opened, work, lowest, wall)
+
+
+def wall_area(mesh, domain) -> np.ndarray:
+    """Area (N,) [m²] of the walls around each node: of the sides of the tank a third to each corner of a face, of
+    bodies a quarter to each corner of the cell that a polygon lies in."""
+    of_tank = np.bincount(
+        mesh.boundary_faces.ravel(), np.repeat(mesh.boundary_area / 3.0, 3), minlength=len(mesh.nodes)
+    )
+    corners, quarter = domain.cells[domain.face_cell], 0.25 * domain.face_area
+    of_bodies = np.bincount(corners.ravel(), np.repeat(quarter, 4), minlength=len(domain.nodes))
+    return of_tank[domain.parent_node] + of_bodies
+
+
+@njit(cache=True)
+def _beside_air(dofs, graph_row, start, neighbour, phi, open_to_air, ventilated):
+    """(n,) bool: nodes beside a dry one, on an open side or beside one, in parted water or beside it."""
+    found = np.zeros(dofs.shape[0], np.bool_)
+    for r in range(dofs.shape[0]):
+        i = dofs[r]
+        vented = open_to_air[i] or ventilated[i]
+        row = graph_row[i]
+        for s in range(start[row], start[row + 1]):
+            j = neighbour[s]
+            vented = vented or phi[j] >= 0.0 or open_to_air[j] or ventilated[j]
+        found[r] = vented
+    return found

@@ -1,0 +1,363 @@
+"""Pressure: the matrix, its right hand side, and the correction of the velocity.
+
+Mass balance with moving walls, for every hat function of a wet node (n out of the bodies, into the water):
+
+    ∫ u·∇N_i dV = -(G V)_i,    u = u* - (dt/ρ) ∇x     ⇒     (dt/ρ) K x = ∫ u*·∇N_i dV + G V.              (1)
+
+Free surface: p = 0 at the crossing of each wet-dry edge, ϑ_ij = φ_i / (φ_i - φ_j) from its wet end, so that the
+dry value is x_j = x_i (1 - 1/ϑ_ij) and the row of i becomes (Gibou, Fedkiw, Cheng, Kang, J. Comput. Phys. 176
+(2002) 205, on the edges of a finite element matrix)
+
+    Σ_{j wet} k_ij (x_i - x_j) + Σ_{j dry} k_ij x_i / ϑ_ij,       k_ij = -K_ij.                              (2)
+
+Symmetric; exact for a pressure that is linear in space, so a tilted tank at rest stays at rest.  ϑ is kept above
+1e-7 only: the usual 1e-2 breaks that balance (0.2 m/s).
+
+Velocity: u_i = u*_i - (dt/ρ) Σ_e w_e ∇x_e / Σ_e w_e with w_e = ∫ N_i over e times its wet share: weight without
+water in it must not push (growth of 0.1 a step otherwise).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from numba import njit
+
+SMALLEST_CUT = 1e-7
+SMALLEST_WET_SHARE = 1e-6
+LEAST_RESERVE = 0.05
+"""Share of what the diagonal of a row may lose behind obtuse angles that is to be left."""
+
+
+@dataclass(frozen=True)
+class PressureProblem:
+    """(dt/ρ) K x = rhs + G V for the unknown part x of the pressure; p = x + known acts on the bodies, with the load
+    -Gᵀp + other_load.
+
+    matrix csr (n, n) [m³/(s Pa)], SPD · rhs (n,) [m³/s], without body velocities · coupling csr (n, 6 n_bodies)
+    [m², m³] · known (n,) [Pa] · guess (n,) [Pa] · dofs (n,) node of each unknown · dt [s] · density [kg/m³] ·
+    other_load (n_bodies, 6) [N, N m]: what the pressure does not do (wall shear) or does otherwise (`waterline.py`) ·
+    bound (n,) [Pa] that p = x + known does not fall below, None: it may · at_bound (n,) bool: where it is first sought
+    there (`bounded.py`).
+    """
+
+    matrix: sp.csr_array
+    rhs: np.ndarray
+    coupling: sp.csr_array
+    known: np.ndarray
+    guess: np.ndarray
+    dofs: np.ndarray
+    dt: float
+    density: float
+    other_load: np.ndarray
+    predicted: object = None
+    """What the water keeps between predict and correct."""
+    bound: np.ndarray | None = None
+    at_bound: np.ndarray | None = None
+
+    @property
+    def lower(self) -> np.ndarray | None:
+        """Bound of x (n,) [Pa]."""
+        return None if self.bound is None else self.bound - self.known
+
+    @property
+    def air(self) -> np.ndarray | None:
+        """Bound of x (n,) [Pa] where air is."""
+        return None if self.bound is None else 0.0 - self.known
+
+
+@njit(cache=True)
+def _wet_matrix(dofs, column, graph_row, start, neighbour, stiffness, phi, open_node, scale, reserve):
+    n = dofs.shape[0]
+    indptr = np.zeros(n + 1, np.int32)
+    for r in range(n):
+        row = graph_row[dofs[r]]
+        count = 1
+        for s in range(start[row], start[row + 1]):
+            count += column[neighbour[s]] >= 0
+        indptr[r + 1] = indptr[r] + count
+    indices = np.empty(indptr[n], np.int32)
+    entries = np.empty(indptr[n])
+    anchored, turned = np.zeros(n, np.bool_), np.zeros(n)
+    for r in range(n):
+        i = dofs[r]
+        row = graph_row[i]
+        at = indptr[r]
+        diagonal, beyond = 0.0, 0.0
+        for s in range(start[row], start[row + 1]):
+            j = neighbour[s]
+            k = -scale * stiffness[s]
+            if column[j] >= 0:
+                diagonal += k
+                at += 1
+                indices[at] = column[j]
+                entries[at] = -k
+            elif open_node[j]:
+                diagonal += k
+                anchored[r] = True
+            elif phi[j] >= 0.0:  # a node under water without an unknown shares void cells only
+                cut = max(phi[i] / (phi[i] - phi[j]), SMALLEST_CUT)
+                diagonal += k / cut
+                beyond += k / cut - k
+                anchored[r] = True
+        if beyond < 0.0 and -beyond > (1.0 - LEAST_RESERVE) * scale * reserve[i]:
+            turned[r] = -2.0 * beyond
+            diagonal += turned[r]
+        indices[indptr[r]] = r
+        entries[indptr[r]] = diagonal
+    return indptr, indices, entries, anchored, turned
+
+
+def pressure_matrix(graph, phi, dofs, open_node, scale: float, reserve):
+    """Equation (2) times scale = dt/ρ for the wet nodes dofs (n,): csr (n, n), (n,) bool next to p = 0, and (n,) what
+    was added to the diagonal to keep it definite; that times the pressure belongs on the right hand side
+    (`indefinite_cells.py`).
+
+    open_node (N,) bool: nodes on open sides, p = 0 · reserve (N,) [m] of `obtuse.reserve`, zeros without obtuse cells.
+    """
+    column = np.full(len(phi), -1, np.int64)
+    column[dofs] = np.arange(len(dofs))
+    g = graph
+    indptr, indices, entries, anchored, turned = _wet_matrix(
+        dofs, column, g.row, g.start, g.neighbour, g.stiffness, phi, open_node, scale, reserve
+    )
+    matrix = sp.csr_array((entries, indices, indptr), shape=(len(dofs),) * 2)
+    return matrix, anchored, turned
+
+
+def pull_of_held(graph, dofs, held, scale: float):
+    """-Σ_j K_ij x_j scale (n,) for the wet nodes dofs (n,): what nodes with a given pressure held (N,) [Pa] add to the
+    right hand side; zero on all others."""
+    g = graph
+    return _pull(dofs, g.row, g.start, g.neighbour, g.stiffness, held, scale)
+
+
+@njit(cache=True)
+def _pull(dofs, graph_row, start, neighbour, stiffness, held, scale):
+    out = np.zeros(dofs.shape[0])
+    for r in range(dofs.shape[0]):
+        row = graph_row[dofs[r]]
+        for s in range(start[row], start[row + 1]):
+            out[r] -= scale * stiffness[s] * held[neighbour[s]]
+    return out
+
+
+def seal_pockets(matrix, anchored, volume, compliance: float, pressure):
+    """Water cut off from every surface has no pressure level: give it a compressibility.
+
+    Adds V_i · compliance [1/(Pa s)] to the diagonal of the components without an anchored row and the same times
+    `pressure` (n,) [Pa] to the right hand side, so that a state at rest is unchanged.  volume (n,) [m³].
+    Returns (matrix, addition to the right hand side (n,))."""
+    floating = ~_reached(matrix.indptr, matrix.indices, anchored)
+    if not floating.any():
+        return matrix, np.zeros(len(anchored))
+    added = np.where(floating, volume * compliance, 0.0)
+    return sp.csr_array(matrix + sp.diags_array(added)), added * pressure
+
+
+@njit(cache=True)
+def _reached(indptr, indices, seed):
+    """Rows (n,) bool that the entries of a symmetric matrix connect to a row of the seed (n,) bool."""
+    reached = seed.copy()
+    waiting = np.empty(seed.shape[0], np.int64)
+    count = 0
+    for i in range(seed.shape[0]):
+        if seed[i]:
+            waiting[count] = i
+            count += 1
+    while count > 0:
+        count -= 1
+        i = waiting[count]
+        for s in range(indptr[i], indptr[i + 1]):
+            j = indices[s]
+            if not reached[j]:
+                reached[j] = True
+                waiting[count] = j
+                count += 1
+    return reached
+
+
+@njit(cache=True)
+def cell_velocity(cell_list, u, remainder, cells, share):
+    """u at the centroid of the fluid part of the listed cells plus the remainder of the cell, (n, 3).
+
+    remainder (M, 3), or (0, 3) for none."""
+    out = np.zeros((cell_list.shape[0], 3))
+    for s in range(cell_list.shape[0]):
+        e = cell_list[s]
+        for k in range(3):
+            if remainder.shape[0] > 0:
+                out[s, k] = remainder[e, k]
+            for a in range(4):
+                out[s, k] += share[e, a] * u[cells[e, a], k]
+    return out
+
+
+@njit(cache=True)
+def inflow(cell_list, u_cell, cells, parent, g, volume, n_nodes):
+    """∫ u·∇N_i dV (N,) [m³/s] over the listed cells, u_cell (n, 3) one velocity each: exact for P1 velocities."""
+    out = np.zeros(n_nodes)
+    for s in range(cell_list.shape[0]):
+        e = cell_list[s]
+        p = parent[e]
+        for a in range(4):
+            out[cells[e, a]] += volume[e] * (
+                u_cell[s, 0] * g[p, a, 0] + u_cell[s, 1] * g[p, a, 1] + u_cell[s, 2] * g[p, a, 2]
+            )
+    return out
+
+
+@njit(cache=True)
+def with_ghosts(pressure, wet, open_node, phi, cell_list, cells):
+    """Pressure (N,) continued to the dry corners of the listed cells through the zero at the surface:
+
+    p_j = φ_j Σ_i p_i φ_i / Σ_i φ_i² over the wet corners i beside j (weighted by the cells they share)."""
+    up, down = np.zeros(pressure.shape[0]), np.zeros(pressure.shape[0])
+    for s in range(cell_list.shape[0]):
+        e = cell_list[s]
+        for a in range(4):
+            j = cells[e, a]
+            if wet[j]:
+                continue
+            for b in range(4):
+                i = cells[e, b]
+                if wet[i] and not open_node[i]:
+                    up[j] += pressure[i] * phi[i]
+                    down[j] += phi[i] * phi[i]
+    out = pressure.copy()
+    for j in range(pressure.shape[0]):
+        if not wet[j]:
+            out[j] = phi[j] * up[j] / down[j] if down[j] > 0.0 else 0.0
+    return out
+
+
+@njit(cache=True)
+def cell_gradient(cell_list, f, cells, parent, g):
+    """∇f (n, 3) of nodal f (N,) in the listed cells."""
+    out = np.zeros((cell_list.shape[0], 3))
+    for s in range(cell_list.shape[0]):
+        e = cell_list[s]
+        for a in range(4):
+            for k in range(3):
+                out[s, k] += f[cells[e, a]] * g[parent[e], a, k]
+    return out
+
+
+@njit(cache=True)
+def nodal_mean(cell_list, value, wet_share, cells, share, volume, n_nodes):
+    """Σ_e w_e value_e / Σ_e w_e (N, 3), w_e = volume_e share_ea wet_e; value (n, 3), wet_share (n,) of the cells."""
+    out = np.zeros((n_nodes, 3))
+    weight = np.zeros(n_nodes)
+    for s in range(cell_list.shape[0]):
+        e = cell_list[s]
+        w = volume[e] * max(wet_share[s], 1e-6)
+        for a in range(4):
+            i = cells[e, a]
+            wa = w * max(share[e, a], 1e-9)
+            weight[i] += wa
+            for k in range(3):
+                out[i, k] += wa * value[s, k]
+    for i in range(n_nodes):
+        if weight[i] > 0.0:
+            for k in range(3):
+                out[i, k] /= weight[i]
+    return out
+
+
+@njit(cache=True)
+def damp_divergence(cell_list, weight, phi, beside_solid, deep, u, cells, parent, g, volume, size, wet_share):
+    """u_i -= c_L Σ_e |e| l_e² (div u)_e ∇N_i / m_i over wholly wet cells, in place on wet nodes (LSIC).
+
+    Equal-order elements leave divergence that the pressure cannot see; without this sloshing gains energy.
+    Deep cells (φ < deep) beside solids are left out: there the remainder of the cells, not the nodes, holds the
+    balance, and damping would let the added mass of a body drift (26 % in 25 steps)."""
+    mass = np.zeros(u.shape[0])
+    push = np.zeros((u.shape[0], 3))
+    for s in range(cell_list.shape[0]):
+        e = cell_list[s]
+        p = parent[e]
+        highest, beside, divergence = -np.inf, False, 0.0
+        for a in range(4):
+            i = cells[e, a]
+            mass[i] += 0.25 * volume[e] * max(wet_share[s], 1e-6)
+            highest = max(highest, phi[i])
+            beside = beside or beside_solid[i]
+            for k in range(3):
+                divergence += u[i, k] * g[p, a, k]
+        if highest < 0.0 and not (beside and highest < deep):
+            c = weight * volume[e] * size[e] * size[e] * divergence
+            for a in range(4):
+                for k in range(3):
+                    push[cells[e, a], k] += c * g[p, a, k]
+    for i in range(u.shape[0]):
+        if phi[i] < 0.0 and mass[i] > 0.0:
+            for k in range(3):
+                u[i, k] -= push[i, k] / mass[i]
+
+
+def damp_waterline(cell_list, weight, phi, wet, beside_solid, deep, u, cells, volume, wet_share):
+    """u ← u - c (M⁻¹L)² u in place on wet nodes, over the cells beside solids that reach up to φ > deep:
+    (L u)_i = Σ_e w_e (u_i - mean of u over the wet corners of e), w_e the water of the cell, M all water around a node.
+
+    Where a surface meets a solid slantwise, velocity of one cell's wave length and the surface feed each other (growth
+    of 0.03 a step on still water against 1:20).  L is symmetric and positive and annihilates a uniform velocity, so its
+    square only takes energy and no momentum; squared, because L alone is a viscosity that holds a thin tongue of
+    run-up back."""
+    near = _around_waterline(cell_list, phi, beside_solid, deep, cells)
+    cell_list, wet_share = cell_list[near], wet_share[near]
+    one = _unlike_neighbours(cell_list, phi, wet, beside_solid, deep, u, cells, volume, wet_share)
+    u -= weight * _unlike_neighbours(cell_list, phi, wet, beside_solid, deep, one, cells, volume, wet_share)
+
+
+@njit(cache=True)
+def _around_waterline(cell_list, phi, beside_solid, deep, cells):
+    """Places in the list of the cells beside solids that reach up to φ > deep, and of all that touch them."""
+    reached = np.zeros(phi.shape[0], np.bool_)
+    for e in cell_list:
+        beside, highest = False, -np.inf
+        for a in range(4):
+            beside = beside or beside_solid[cells[e, a]]
+            highest = max(highest, phi[cells[e, a]])
+        if beside and highest > deep:
+            for a in range(4):
+                reached[cells[e, a]] = True
+    found, n = np.empty(cell_list.shape[0], np.int64), 0
+    for s in range(cell_list.shape[0]):
+        e = cell_list[s]
+        if reached[cells[e, 0]] or reached[cells[e, 1]] or reached[cells[e, 2]] or reached[cells[e, 3]]:
+            found[n] = s
+            n += 1
+    return found[:n].copy()
+
+
+@njit(cache=True)
+def _unlike_neighbours(cell_list, phi, wet, beside_solid, deep, u, cells, volume, wet_share):
+    """M⁻¹L u (N, 3), zero on dry nodes."""
+    mass, out, mean = np.zeros(u.shape[0]), np.zeros((u.shape[0], 3)), np.empty(3)
+    for s in range(cell_list.shape[0]):
+        e = cell_list[s]
+        w = volume[e] * max(wet_share[s], SMALLEST_WET_SHARE)
+        count, beside, highest = 0, False, -np.inf
+        mean[:] = 0.0
+        for a in range(4):
+            i = cells[e, a]
+            beside = beside or beside_solid[i]
+            highest = max(highest, phi[i])
+            if wet[i]:
+                count += 1
+                mass[i] += w
+                for k in range(3):
+                    mean[k] += u[i, k]
+        if beside and highest > deep:
+            for a in range(4):
+                i = cells[e, a]
+                if wet[i]:
+                    for k in range(3):
+                        out[i, k] += w * (u[i, k] - mean[k] / count)
+    for i in range(u.shape[0]):
+        if mass[i] > 0.0:
+            for k in range(3):
+                out[i, k] /= mass[i]
+    return out

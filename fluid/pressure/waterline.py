@@ -1,0 +1,164 @@
+"""The load on solids where the water surface passes through their cells.
+
+The coupling G of the pressure solve takes the wetted polygons of a cell whole.  It has to: for every hat function of
+a wet node, ∫ V·∇N_i dV + G V = 0 must hold for water and solid that move together, and that leaves no other G.  As a
+load, -Gᵀp is then wrong by what the hat functions of the wet corners reach up the dry part of a face, up to
+(h/depth)²/2, or all over a deck less than a cell above the water.  The pressure itself ends at the surface,
+
+    F = -∫_{φ<0} p n dA,        p = Σ_wet p_i N_i + Σ_dry p_j N_j,                                        (1)
+
+with the dry values p_j continued through the zero at the surface (`projection.with_ghosts`).  The difference
+
+    R = F + Gᵀp = -∫_{φ<0} p n dA + ∫ Σ_wet p_i N_i n dA                                                  (2)
+
+is added to the load as a known force, with the pressure of the step before.  It opposes a share of Gᵀp itself, which
+the solve has inside, so its lag cannot grow: with a share ε of the added mass m_a of a body of mass m, an error of the
+acceleration is multiplied by ε m_a / (m + m_a) < 1 in every step.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from fluid.domain.moments import cells_touching
+from fluid.domain.physical_domain import hat_values
+from fluid.pressure.projection import with_ghosts
+
+
+def waterline_load(domain, faces, left_out, phi, wet, pressure, open_node) -> np.ndarray:
+    """R of (2): force and moment on every body (n_bodies, 6) [N, N m].
+
+    faces (k,) rows of the polygons of G · left_out (l,) rows of those that are not in G though their cells hold water ·
+    phi (N,) [m] · wet (N,) bool · pressure (N,) [Pa], read on wet nodes · open_node (N,) bool: p = 0."""
+    load = np.zeros((domain.n_bodies, 6))
+    count = wet[domain.cells[domain.face_cell[faces]]].sum(axis=1)
+    mixed = faces[(count > 0) & (count < 4)]
+    at = np.concatenate([mixed, left_out])
+    if len(at) == 0:
+        return load
+    corners = domain.cells[domain.face_cell[at]]
+    p = np.where(wet & ~open_node, pressure, 0.0)
+    reached = np.zeros(len(phi), bool)
+    reached[corners] = True
+    beside = cells_touching(reached, domain.cells)
+    ghosts = with_ghosts(p, wet, open_node, phi, beside, domain.cells)
+    hats = hat_values(domain.nodes[corners], domain.face_corners[at])
+    height, full, acting = (np.einsum("kqa,ka->kq", hats, f[corners]) for f in (phi, ghosts, p))
+    acting[len(mixed) :] = 0.0
+    body = domain.face_body[at]
+    arm = domain.face_corners[at] - domain.body_centre[body][:, None]
+    force, first = _differences(height, full, acting, arm, domain.face_area[at])
+    normal = domain.face_normal[at]
+    np.add.at(load[:, :3], body, force[:, None] * normal)
+    np.add.at(load[:, 3:], body, np.cross(first, normal))
+    return load
+
+
+def hydrostatic_stiffness(water, phi, bodies) -> np.ndarray | None:
+    """K (n_bodies, 3, 3) [N/m, N, N m]: how the load of still water on a body changes as it heaves, rolls and pitches
+    about its centre in water that stays where it is,
+
+        K = -ρ g ∮_{φ<0} [n_z; (r × n)_x; (r × n)_y] ⊗ [1, y, -x] dA,    d(F_z, M_x, M_y) = -K d(z, θ_x, θ_y),      (3)
+
+    zero for a body wholly under water (Newman, Marine Hydrodynamics, 1977, chapter 6). None: the surface cuts no body.
+
+    phi (N,) [m] of the surface · bodies (n_bodies,) bool: the others get zeros."""
+    domain, weight = water.domain, water.parameters.density * water.parameters.gravity
+    corners = domain.cells[domain.face_cell]
+    below = phi[corners] < 0.0
+    cut = np.unique(domain.face_body[below.any(axis=1) & ~below.all(axis=1)])
+    chosen = np.zeros(domain.n_bodies, bool)
+    chosen[cut] = bodies[cut]
+    at = np.flatnonzero(chosen[domain.face_body] & below.any(axis=1))
+    if len(at) == 0:
+        return None
+    stiffness = np.zeros((domain.n_bodies, 3, 3))
+    hats = hat_values(domain.nodes[corners[at]], domain.face_corners[at])
+    height = np.einsum("kqa,ka->kq", hats, phi[corners[at]])
+    body, normal, area = domain.face_body[at], domain.face_normal[at], domain.face_area[at]
+    arm = domain.face_corners[at] - domain.body_centre[body][:, None]
+    nothing = np.zeros_like(height)
+    for k, lift in enumerate((np.ones_like(height), arm[:, :, 1], -arm[:, :, 0])):
+        force, first = _differences(height, np.ascontiguousarray(lift), nothing, arm, area)
+        moment = np.cross(first, normal)
+        for row, value in enumerate((force * normal[:, 2], moment[:, 0], moment[:, 1])):
+            np.add.at(stiffness[:, row, k], body, weight * value)
+    return stiffness
+
+
+@njit(cache=True)
+def _differences(height, full, acting, arm, area):
+    """∫ p_acting - ∫_{height<0} p_full over triangles with corner values (k, 3): (k,), and times the arm: (k, 3)."""
+    n = height.shape[0]
+    force, first = np.zeros(n), np.zeros((n, 3))
+    share = np.empty((2, 3, 3))
+    corner = np.eye(3)
+    for s in range(n):
+        _add(1.0, area[s], corner, acting[s], arm[s], force, first, s)
+        for k in range(_wet_triangles(height[s], share)):
+            part = share[k]
+            _add(-1.0, area[s] * _relative_area(part), part, full[s], arm[s], force, first, s)
+    return force, first
+
+
+@njit(cache=True)
+def _wet_triangles(height, share):
+    """Barycentric corners (·, 3, 3) of the part with height < 0, as 0, 1 or 2 triangles → how many."""
+    share[:] = 0.0
+    n_wet = 0
+    for k in range(3):
+        n_wet += height[k] < 0.0
+    if n_wet == 0:
+        return 0
+    if n_wet == 3:
+        for k in range(3):
+            share[0, k, k] = 1.0
+        return 1
+    a = 0  # the corner alone on its side
+    while (height[a] < 0.0) != (n_wet == 1):
+        a += 1
+    b, c = (a + 1) % 3, (a + 2) % 3
+    to_b, to_c = height[a] / (height[a] - height[b]), height[a] / (height[a] - height[c])
+    if n_wet == 1:
+        share[0, 0, a] = 1.0
+        share[0, 1, a], share[0, 1, b] = 1.0 - to_b, to_b
+        share[0, 2, a], share[0, 2, c] = 1.0 - to_c, to_c
+        return 1
+    share[0, 0, b], share[0, 1, c] = 1.0, 1.0
+    share[0, 2, a], share[0, 2, b] = 1.0 - to_b, to_b
+    share[1, 0, c] = 1.0
+    share[1, 1, a], share[1, 1, b] = 1.0 - to_b, to_b
+    share[1, 2, a], share[1, 2, c] = 1.0 - to_c, to_c
+    return 2
+
+
+@njit(cache=True)
+def _relative_area(part):
+    """|det| of barycentric corners (3, 3): the area of the part over that of the triangle."""
+    d = part[0, 0] * (part[1, 1] * part[2, 2] - part[1, 2] * part[2, 1])
+    d -= part[0, 1] * (part[1, 0] * part[2, 2] - part[1, 2] * part[2, 0])
+    d += part[0, 2] * (part[1, 0] * part[2, 1] - part[1, 1] * part[2, 0])
+    return abs(d)
+
+
+@njit(cache=True)
+def _add(sign, area, part, p, arm, force, first, s):
+    """force[s] += sign ∫ p dA, first[s] += sign ∫ p arm dA over the part with barycentric corners (3, 3).
+
+    Products of linear functions f, g over a triangle: A/12 (Σ f_k g_k + Σ f_k Σ g_k)."""
+    total = 0.0
+    value, place, sum_place = np.empty(3), np.zeros((3, 3)), np.zeros(3)
+    for k in range(3):
+        value[k] = part[k, 0] * p[0] + part[k, 1] * p[1] + part[k, 2] * p[2]
+        total += value[k]
+        for c in range(3):
+            for q in range(3):
+                place[k, c] += part[k, q] * arm[q, c]
+            sum_place[c] += place[k, c]
+    force[s] += sign * area * total / 3.0
+    for c in range(3):
+        mixed = total * sum_place[c]
+        for k in range(3):
+            mixed += value[k] * place[k, c]
+        first[s, c] += sign * area * mixed / 12.0

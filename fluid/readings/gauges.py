@@ -1,0 +1,105 @@
+"""Reading the water at places: level, pressure, velocity, flux through a plane, volume in a box."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fluid.domain.moments import wet_fraction
+from fluid.domain.point_location import Places
+from fluid.readings.clip import clipped, volumes
+from fluid.sides.inflow import wet_shares
+
+SAMPLES_PER_CELL = 4
+
+
+def level(water, xy) -> float:
+    """Depth [m] of water over xy (2,) [m]: the wet length of a vertical line, as a wire gauge measures it.
+
+    φ is read on the line, SAMPLES_PER_CELL a cell, and taken as linear between two samples; inside solids it is dry.
+    Spray and the space under an overturning crest do not count; over a solid that stands on the floor the depth is
+    that above it."""
+    low, high = water.mesh.bounds[:, 2]
+    count = int(np.ceil(SAMPLES_PER_CELL * (high - low) / water.mesh.spacing)) + 1
+    z = np.linspace(low, high, count)
+    line = np.column_stack([np.full(count, xy[0]), np.full(count, xy[1]), z])
+    phi = Places.of(water, line, beyond=True).read(water.level_set)
+    wet = np.fmax(-phi, 0.0)  # NaN inside solids and outside a mesh of another shape than a box
+    length = np.abs(phi[1:] - phi[:-1])
+    share = np.divide(np.abs(wet[1:] - wet[:-1]), length, out=(wet[1:] > 0.0) * 1.0, where=length > 0.0)
+    both = (phi[1:] < 0.0) & (phi[:-1] < 0.0)
+    open_water = np.isfinite(phi[1:]) & np.isfinite(phi[:-1])
+    return float((z[1] - z[0]) * np.where(both, 1.0, share)[open_water].sum())
+
+
+def pressure(water, points):
+    """Pressure [Pa] at points (m, 3) or (3,) [m] → (m,) or a number; 0 in the air, NaN inside a solid."""
+    places = Places.of(water, points)
+    p = np.where(places.read(water.level_set) >= 0.0, 0.0, places.read(water.pressure))
+    return p if np.ndim(points) == 2 else float(p[0])
+
+
+def velocity(water, points):
+    """Velocity [m/s] at points (m, 3) or (3,) [m] → the same shape; 0 in the air, NaN inside a solid."""
+    places = Places.of(water, points)
+    u = np.where(places.read(water.level_set)[:, None] >= 0.0, 0.0, places.read(water.velocity))
+    return u if np.ndim(points) == 2 else u[0]
+
+
+def level_set_at(water, points) -> np.ndarray:
+    """φ [m] at points (m, 3) [m] → (m,), negative in the water, NaN inside a solid."""
+    return Places.of(water, points).read(water.level_set)
+
+
+def flux(water, at, edges) -> float:
+    """Water [m³/s] through the parallelogram with the centre `at` (3,) and edges (2, 3) [m], positive along the cross
+    product of the edges: ∫_{φ<0} u·n dA.
+
+    φ and u are read on a lattice of triangles no longer than half a cell and taken as linear in each; a triangle whose
+    middle is inside a solid counts as dry."""
+    edges = np.asarray(edges, float)
+    m, n = (int(np.ceil(2.0 * np.linalg.norm(e) / water.mesh.spacing)) for e in edges)
+    i, j = np.meshgrid(np.arange(m + 1), np.arange(n + 1), indexing="ij")
+    place = np.column_stack([i.ravel() / m - 0.5, j.ravel() / n - 0.5])
+    points = np.asarray(at, float) + place @ edges
+    places = Places.of(water, points, beyond=True)
+    phi = places.read(water.level_set, inside=True)
+    through = places.read(water.velocity, inside=True) @ np.cross(*edges) / (2.0 * m * n)
+    corner = np.arange((m + 1) * (n + 1)).reshape(m + 1, n + 1)
+    low, right, up, top = (
+        c.ravel() for c in (corner[:-1, :-1], corner[1:, :-1], corner[:-1, 1:], corner[1:, 1:])
+    )
+    triangles = np.concatenate([np.column_stack([low, right, top]), np.column_stack([low, top, up])])
+    free = ~Places.of(water, points[triangles].mean(axis=1), beyond=True).inside & np.isfinite(
+        phi[triangles]
+    ).all(axis=1)
+    triangles = triangles[free]
+    return float((wet_shares(phi[triangles]) * through[triangles]).sum())
+
+
+def volume_in_box(water, lower, upper) -> float:
+    """Water [m³] in the box from lower to upper (3,) [m]: exact for the surface φ = 0 as the cells have it.
+
+    A cell that the border of the box and a solid cut at once counts with its share outside the solid."""
+    t = water.topology
+    wet = t.cells_around(water.level_set < 0.0)
+    x = t.nodes[t.cells[wet]]
+    inside = ((x >= lower) & (x <= upper)).all(axis=(1, 2))
+    beyond = ((x <= lower).all(axis=1) | (x >= upper).all(axis=1)).any(axis=1)
+    whole, border = wet[inside], wet[~inside & ~beyond]
+    total = float(wet_fraction(whole, water.level_set, t.parts) @ t.volume[whole])
+    return total + float(_in_box(water, border, lower, upper) @ t.fraction[border])
+
+
+def _in_box(water, cells, lower, upper):
+    """Water (n,) [m³] of the cells (n,) inside the box, solids not taken off."""
+    t = water.topology
+    number = np.broadcast_to(np.arange(len(cells))[:, None, None], (len(cells), 4, 1))
+    parts = np.concatenate(
+        [t.nodes[t.cells[cells]], water.level_set[t.cells[cells]][..., None], number], axis=2
+    )
+    for axis in range(3):
+        parts = clipped(parts, lower[axis] - parts[:, :, axis])
+        parts = clipped(parts, parts[:, :, axis] - upper[axis])
+    parts = clipped(parts, parts[:, :, 3])
+    of_cell = np.rint(parts[:, 0, 4]).astype(np.int64)
+    return np.bincount(of_cell, volumes(parts), minlength=len(cells))

@@ -1,0 +1,307 @@
+"""Second half of the step: the velocity that the pressure leaves.
+
+u_i = u*_i - (dt/ρ) Π(∇x)_i,   a_i = (u_i - u_adv_i) / (θ dt)                 on wet nodes, Π: weighted mean
+p = x + known, mean over the step, acts on the bodies;  x/θ belongs to a_i and starts the next step
+u'_e ← u'_e - (dt/ρ) (∇x_e - mean of Π(∇x) over the cell)                     on deep cells
+u_e = u*_e + u'_e - (dt/ρ) ∇x_e                                               balances exactly: carries volume
+speed limit · divergence damping · continuation outside the water
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from fluid.pressure.pressure_bound import BoundMet
+from fluid.pressure.projection import (
+    cell_gradient,
+    cell_velocity,
+    damp_divergence,
+    damp_waterline,
+    nodal_mean,
+    with_ghosts,
+)
+from fluid.step.momentum import Stages, momentum_change
+from fluid.surface.extrapolation import extend_velocity
+from fluid.surface.gradient_jump_damping import damp_kinks
+from fluid.surface.volume import Flux, edge_flux
+
+FLUX_LAYERS = 3
+"""Layers of dry nodes that water may reach within the next step."""
+MEMORY_DEPTH = 2.0
+"""Cells nearer to the surface than this (in cell sizes) keep no remainder: there it feeds surface noise."""
+WATERLINE_DAMPING, WATERLINE_DEPTH = 0.5, 1.0
+"""c of `damp_waterline` in calm water, and how far below the surface it acts (in cell sizes). Noise on a slope of 1:20
+grows by 0.03 a step without, and not with 0.5. Less in faster water, none where it crosses a cell in a step: there it
+would take what is real."""
+KINK_DAMPING, KINK_DEPTH, SURFACE_DAMPING = 1.0 / 8.0, 2.0, 0.025
+"""On meshes with obtuse cells, in calm water: c of `damp_kinks` and how far below the surface it acts (cells of the
+surface reach 1.6 cell sizes down), and c of `damp_waterline` along the whole surface, for cells not wholly wet."""
+
+
+@dataclass(frozen=True)
+class Corrected:
+    """The state at the end of the step; names as in Water."""
+
+    velocity: np.ndarray
+    acceleration: np.ndarray
+    pressure: np.ndarray
+    end_pressure: np.ndarray
+    remainder: np.ndarray
+    kick_remainder: np.ndarray
+    cell_velocity: np.ndarray
+    nodal_water: np.ndarray
+    flux: Flux
+    listed: np.ndarray
+    layer_start: np.ndarray
+    at_bound: np.ndarray
+    ventilated: np.ndarray
+    report: object
+
+
+def corrected(water, problem, x, parting) -> Corrected:
+    """End the step with the pressure x (n,) [Pa]; parting (n,) [m³/s] or None, as in `Water.correct`."""
+    t, kept, dt = water.topology, problem.predicted, problem.dt
+    unknown, pressure = np.zeros(len(kept.wet)), np.zeros(len(kept.wet))
+    unknown[problem.dofs], pressure[problem.dofs] = x, x + problem.known
+    if kept.held is not None:
+        unknown += kept.held
+        pressure += kept.held / kept.theta
+    gradient = _pressure_gradient(water, kept, unknown, dt / problem.density)
+    u, mean = _projected(t, kept, gradient)
+    a = np.where(kept.wet[:, None], (u - kept.advected) / (kept.theta * dt), 0.0)
+    remainder, kick_remainder = _remainders(water, kept, gradient, mean, dt)
+    u_cell = kept.cell_star - gradient
+    projected = u.copy()
+    clipped, limited, damped = _limit_and_damp(water, kept, u, a)
+    slipping = u.copy()
+    listed, start = water.layers(kept.wet)
+    _continue(water, kept, listed, start, u, a, kept.u_star - mean)
+    cell_field, flux = _flux(water, kept, listed, start, u, u_cell)
+    momentum = momentum_change(
+        water, problem, unknown, pressure, Stages(projected, limited, damped, slipping, u)
+    )
+    bound = BoundMet.of(water, problem, x, parting)
+    report = _report(water, problem, x, projected, u, clipped, momentum, bound)
+    return Corrected(
+        u,
+        a,
+        pressure,
+        unknown / kept.theta,
+        remainder,
+        kick_remainder,
+        cell_field,
+        kept.nodal_water,
+        flux,
+        listed,
+        start,
+        bound.at_bound,
+        bound.ventilated,
+        report,
+    )
+
+
+def _pressure_gradient(water, kept, pressure, scale):
+    """(dt/ρ) ∇x of the wet cells (n, 3) [m/s]."""
+    t = water.topology
+    unheld = water._walls.open_node if kept.held is None else water._walls.open_node & (kept.held == 0.0)
+    full = with_ghosts(pressure, kept.wet, unheld, kept.level_set, kept.wet_cells, t.cells)
+    return scale * cell_gradient(kept.wet_cells, full, t.cells, t.parent, t.gradients)
+
+
+def _projected(t, kept, gradient):
+    """u (N, 3) after the pressure, and Π of the gradient (N, 3)."""
+    mean = nodal_mean(kept.wet_cells, gradient, kept.wet_share, t.cells, t.share, t.volume, len(kept.wet))
+    return np.where(kept.wet[:, None], kept.u_star - mean, kept.u_star), mean
+
+
+def _remainders(water, kept, gradient, mean, dt):
+    """u' (M, 3) [m/s] after this step and its rate -(∇x - Π∇x)/(θ ρ) (M, 3) [m/s²] for the next kick."""
+    t = water.topology
+    remainder, rate = np.zeros(water.remainder.shape), np.zeros(water.remainder.shape)
+    if water.parameters.subscale_memory:
+        whole = _all_below(kept.wet_cells, kept.level_set, -MEMORY_DEPTH * water.mesh.spacing, t.cells)
+        time = kept.theta * dt
+        _leave(whole, kept.wet_cells, mean, gradient, kept.remainder, time, t.cells, t.share, remainder, rate)
+    return remainder, rate
+
+
+@njit(cache=True)
+def _leave(places, cell_list, mean, gradient, before, time, cells, share, remainder, rate):
+    """What the nodes do not hold of the gradient, Π∇x - ∇x [m/s], in the cells at these places of the list: added to
+    the remainder before, and over a time [s] as its rate."""
+    for s in places:
+        e = cell_list[s]
+        for k in range(3):
+            left = 0.0
+            for a in range(4):
+                left += share[e, a] * mean[cells[e, a], k]
+            left -= gradient[s, k]
+            remainder[e, k] = before[e, k] + left
+            rate[e, k] = left / time
+
+
+@njit(cache=True)
+def _all_below(cell_list, phi, deep, cells):
+    """Places in the list of the cells with φ < deep at all corners."""
+    found = np.empty(cell_list.shape[0], np.int64)
+    n = 0
+    for s in range(cell_list.shape[0]):
+        e = cell_list[s]
+        highest = max(max(phi[cells[e, 0]], phi[cells[e, 1]]), max(phi[cells[e, 2]], phi[cells[e, 3]]))
+        if highest < deep:
+            found[n] = s
+            n += 1
+    return found[:n].copy()
+
+
+def _limit_and_damp(water, kept, u, a):
+    """Speed limit, damping of divergence and along water lines, slip, in place; the number of clipped nodes, and the
+    velocity (N, 3) after the first and after the second."""
+    t, parameters = water.topology, water.parameters
+    clipped = _limit_speed(water, u, a)
+    limited = u.copy()
+    damp_divergence(
+        kept.wet_cells,
+        parameters.divergence_damping,
+        kept.level_set,
+        t.beside_solid,
+        -MEMORY_DEPTH * water.mesh.spacing,
+        u,
+        t.cells,
+        t.parent,
+        t.gradients,
+        t.volume,
+        t.size,
+        kept.wet_share,
+    )
+    _damp_surface(water, kept, u)
+    damped = u.copy()
+    water.hold(u, kept.end)
+    return clipped, limited, damped
+
+
+def _damp_surface(water, kept, u) -> None:
+    """`damp_waterline`, and `damp_kinks` on meshes with obtuse cells, in calm water, in place."""
+    t, h, calm = water.topology, water.mesh.spacing, water.calm(kept.end - water.time)
+    wet = (kept.wet_cells, kept.level_set, kept.wet)
+
+    def even_out(weight, where):
+        list_, *level = wet
+        deep = -WATERLINE_DEPTH * h
+        damp_waterline(list_, weight * calm, *level, where, deep, u, t.cells, t.volume, kept.wet_share)
+
+    even_out(WATERLINE_DAMPING, t.beside_solid)
+    if t.is_obtuse:
+        mesh = (t.cells, t.parent, t.gradients, t.volume, t.neighbours)
+        damp_kinks(*wet, KINK_DAMPING * calm, -KINK_DEPTH * h, u, *mesh)
+        even_out(SURFACE_DAMPING, np.ones_like(t.beside_solid))
+
+
+def _limit_speed(water, u, a) -> int:
+    """|u| ≤ `Water.speed_cap` in place; clipped nodes go on in free fall."""
+    return _clip(u, a, water.speed_cap(), water.parameters.weight)
+
+
+@njit(cache=True)
+def _clip(u, a, limit, weight):
+    count = 0
+    for i in range(u.shape[0]):
+        speed = np.sqrt(u[i, 0] * u[i, 0] + u[i, 1] * u[i, 1] + u[i, 2] * u[i, 2])
+        if speed > limit:
+            count += 1
+            for k in range(3):
+                u[i, k] *= limit / speed
+                a[i, k] = weight[k]
+    return count
+
+
+def _continue(water, kept, listed, start, u, a, forced) -> None:
+    """Velocity and acceleration outside the water, in place; limited again, slipping again.
+
+    forced: see `extend_velocity`."""
+    calm = water.calm(kept.end - water.time)
+    rubbed = water.rubbed_nodes()
+    extend_velocity(water.topology, listed, start, kept.wet, kept.wet_cells, u, a, calm, forced, rubbed)
+    _limit_speed(water, u, a)
+    water.hold(u, kept.end)
+
+
+def _flux(water, kept, listed, start, u, u_cell):
+    """Velocity of the cells (M, 3) and the volume flux of the next step, extrapolated to its middle."""
+    t = water.topology
+    reached = listed[: start[FLUX_LAYERS + 1]]
+    near = np.zeros(len(u), bool)
+    near[reached] = True
+    around = t.cells_around(near)
+    cell_field = np.zeros(water.cell_velocity.shape)
+    put(around, cell_velocity(around, u, np.zeros((0, 3)), t.cells, t.share), cell_field)
+    put(kept.wet_cells, u_cell, cell_field)
+    # with implicit Euler the velocity at the end of the step is the stable choice
+    middle = (
+        to_middle(around, cell_field, water.cell_velocity) if water.parameters.theta < 1.0 else cell_field
+    )
+    return cell_field, edge_flux(
+        t, water.graph_for(reached), reached, middle, kept.nodal_water - kept.displaced
+    )
+
+
+@njit(cache=True)
+def put(rows, values, field):
+    """field[rows] = values, of (n, 3) in (M, 3), in place: a quarter of the time that indexing by a list takes."""
+    for s in range(rows.shape[0]):
+        for k in range(3):
+            field[rows[s], k] = values[s, k]
+
+
+@njit(cache=True)
+def to_middle(cell_list, now, before):
+    """1.5 u - 0.5 u_before (M, 3) in the listed cells: the velocity half a step ahead; u where none was before."""
+    out = np.empty(now.shape)
+    for e in cell_list:
+        known = before[e, 0] != 0.0 or before[e, 1] != 0.0 or before[e, 2] != 0.0
+        for k in range(3):
+            out[e, k] = 1.5 * now[e, k] - 0.5 * before[e, k] if known else now[e, k]
+    return out
+
+
+def _report(water, problem, x, projected, u, clipped, momentum, bound):
+    from fluid.step.water import StepReport, kinetic_energy
+
+    kept, p = problem.predicted, water.parameters
+    g_x = water.below_floor(water.topology.nodes)
+
+    def energy(volume, velocity):
+        return kinetic_energy(p.density, volume, velocity) - p.density * float(volume @ g_x)
+
+    stages = [
+        energy(water.nodal_water, water.velocity),
+        energy(kept.uncorrected_water, kept.u_star),
+        energy(kept.nodal_water, kept.u_star),
+        energy(kept.nodal_water, projected),
+        energy(kept.nodal_water, u),
+    ]
+    names = ("transport and gravity", "volume correction", "pressure", "damping and limit")
+    change = dict(zip(names, np.diff(stages)))
+    if water.viscous is not None:
+        change["transport and gravity"] -= kept.shear.energy
+        change["viscosity and friction"] = kept.shear.energy
+    volume = float(kept.nodal_water.sum()) - float(kept.displaced.sum())
+    left = kept.left
+    moved_by_bodies = problem.matrix @ x - problem.rhs - bound.rate
+    return StepReport(
+        problem.dt,
+        volume,
+        (volume - kept.conserved_volume) / max(water.handled_volume, 1e-300),
+        kept.reinserted,
+        clipped,
+        len(x),
+        -problem.dt * float((x + problem.known) @ moved_by_bodies),
+        change,
+        momentum,
+        0.0 if left is None else float(left.volume.sum()),
+        0.0 if left is None else left.energy,
+        bound,
+    )

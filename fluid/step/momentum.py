@@ -1,0 +1,271 @@
+"""The momentum of the water and what changes it in a step, line by line.
+
+    P = ρ Σ W_i u_i,    L = ρ Σ W_i (x_i - x_0) × u_i         W_i: nodal volume, x_0: `Water.reference`
+
+A vector of six holds both, [N s, N m s]; every line is what it adds to the water in the step.
+
+Pressure.  A cell gets -|e| dt ∇p_e.  For every hat function ∫ ∇N_i dV = b_i - G_i over the physical domain, with b_i
+= ∮ N_i n dA over the sides of the tank and G_i the coupling to the bodies, and the same with arms, since products of
+linear functions are integrated exactly.  So
+
+    -dt Σ_e |e| ∇p_e  =  -dt Σ_i p_i b_i  +  dt Σ_i p_i G_i                                               (1)
+       the cells              the tank           the bodies, -Gᵀp on them
+
+to round-off, whatever the pressure is: `pressure_closure` is what is missing.  b_i is summed over the cells around
+nodes of the sides, so that (1) is a check of the cutting and not an identity.  Where thresholds of the covers close
+narrow openings, water pushes on what closes them: the same sum over the cells around the nodes there, those with
+several copies, is the line "openings", and (1) stays a check at all other nodes.
+
+What the nodes make of it differs from (1) where the surface cuts cells or leaves them void, and where the part of the
+last pressure that is carried over acts on other nodes than it came from. These differences, and what transport,
+volume correction, damping, limit and slip do, are lines of their own: the semi-Lagrangian transport does not conserve
+momentum.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from fluid.step.predictor import kick_factor
+
+NUMERICAL = (
+    "transport",
+    "volume_correction",
+    "carried",
+    "surface",
+    "damping",
+    "limit",
+    "slip",
+    "shear_solve",
+)
+"""Lines of the scheme, in the order of the step."""
+PHYSICAL = ("weight", "tank", "tank_shear", "sides", "openings", "bodies")
+"""Lines of what acts on the water."""
+
+
+@dataclass(frozen=True)
+class MomentumChange:
+    """before, after (6,) [N s, N m s]: momentum of the water at both ends of the step · lines: name → (6,), all of
+    PHYSICAL and NUMERICAL · pressure_closure (6,): what (1) misses, the residual of the step."""
+
+    before: np.ndarray
+    after: np.ndarray
+    lines: dict[str, np.ndarray]
+    pressure_closure: np.ndarray
+
+
+@dataclass(frozen=True)
+class Stages:
+    """Velocities (N, 3) [m/s] through the second half of the step: after the pressure, the speed limit, the damping,
+    the slip along the sides, and at the end."""
+
+    projected: np.ndarray
+    limited: np.ndarray
+    damped: np.ndarray
+    slipping: np.ndarray
+    end: np.ndarray
+
+
+def momentum_of(weight, u, place) -> np.ndarray:
+    """Σ m_i [u_i; r_i × u_i] (6,); weight m (n,), u (n, 3), place r (n, 3)."""
+    return _momentum(np.arange(len(weight)), 1.0, weight, u, place, np.zeros(3))
+
+
+@njit(cache=True)
+def _momentum(rows, density, volume, u, nodes, reference):
+    out = np.zeros(6)
+    for i in rows:
+        m = density * volume[i]
+        r0, r1, r2 = nodes[i, 0] - reference[0], nodes[i, 1] - reference[1], nodes[i, 2] - reference[2]
+        p0, p1, p2 = m * u[i, 0], m * u[i, 1], m * u[i, 2]
+        out[0] += p0
+        out[1] += p1
+        out[2] += p2
+        out[3] += r1 * p2 - r2 * p1
+        out[4] += r2 * p0 - r0 * p2
+        out[5] += r0 * p1 - r1 * p0
+    return out
+
+
+def about(point, load, centre) -> np.ndarray:
+    """Loads (n, 6) about their centres (n, 3) → their sum (6,) about a point (3,)."""
+    load, arm = np.reshape(load, (-1, 6)), np.reshape(centre, (-1, 3)) - point
+    return np.concatenate([load[:, :3].sum(axis=0), (load[:, 3:] + np.cross(arm, load[:, :3])).sum(axis=0)])
+
+
+def momentum(water) -> np.ndarray:
+    """P, L (6,) of a Water now."""
+    wet = np.flatnonzero(water.nodal_water > 0.0)
+    state = (water.nodal_water, water.velocity, water.topology.nodes, water.reference)
+    return _momentum(wet, water.parameters.density, *state)
+
+
+def momentum_change(water, problem, unknown, pressure, stages: Stages) -> MomentumChange:
+    """The lines of a step that ends; `water` still holds the state at its beginning.
+
+    unknown, pressure (N,) [Pa]: x and x + known on wet nodes and seas."""
+    kept, dt = problem.predicted, problem.dt
+    x, p = np.where(kept.wet, unknown, 0.0), np.where(kept.wet, pressure, 0.0)
+    at = _momenta(water, kept, dt, stages)
+    cells, tank, held = _reactions(water, kept, x, p, dt)
+    openings = _at_closed_openings(water, kept, p, dt)
+    told, shear_told, tank_shear = _loads(water, problem, p)
+    through, side_pressure = _through(water, kept), -dt * _pressure_on_sides(water, p)
+    weight = dt * at["weight"]
+    lines = {
+        "weight": weight,
+        "tank": tank - side_pressure,
+        "tank_shear": tank_shear,
+        "sides": through + side_pressure,
+        "openings": openings,
+        "bodies": -told,
+        "transport": at["carried"] - at["kicked"] - through,
+        "volume_correction": at["advected"] - at["carried"],
+        "carried": at["kicked"] - at["before"] + at["star"] - at["sheared"] - weight - cells[1],
+        "surface": at["projected"]
+        - at["star"]
+        - cells[0]
+        + at["end"]
+        - at["slipping"]
+        + told
+        + held
+        - shear_told,
+        "damping": at["damped"] - at["limited"],
+        "limit": at["limited"] - at["projected"],
+        "slip": at["slipping"] - at["damped"],
+        "shear_solve": at["sheared"] - at["advected"] + shear_told - tank_shear,
+    }
+    return MomentumChange(at["before"], at["end"], lines, cells[0] + cells[1] - tank - held - openings)
+
+
+def _momenta(water, kept, dt, stages: Stages) -> dict[str, np.ndarray]:
+    """Momentum (6,) after every stage of the step; "weight" [N, N m]: that of the water."""
+    W0, own, W1 = water.nodal_water, kept.uncorrected_water, kept.nodal_water
+    rows = np.flatnonzero((W0 > 0.0) | (own > 0.0) | (W1 > 0.0))
+    nodes, parameters = water.topology.nodes, water.parameters
+    kicked = water.velocity.copy()
+    a = water.acceleration[rows]
+    kicked[rows] += (1.0 - kept.theta) * dt * kick_factor(a, water.largest_kick())[:, None] * a
+    unsheared = kept.advected if kept.shear is None else kept.advected - kept.shear.change
+    found = {
+        "before": (W0, water.velocity),
+        "kicked": (W0, kicked),
+        "carried": (own, unsheared),
+        "advected": (W1, unsheared),
+        "sheared": (W1, kept.advected),
+        "star": (W1, kept.u_star),
+    }
+    found |= {name: (W1, u) for name, u in vars(stages).items()}
+    density, about_point = parameters.density, water.reference
+    at = {name: _momentum(rows, density, W, u, nodes, about_point) for name, (W, u) in found.items()}
+    at["weight"] = _momentum(
+        rows, density, W1, np.broadcast_to(parameters.weight, nodes.shape), nodes, about_point
+    )
+    return at
+
+
+def _reactions(water, kept, x, p, dt):
+    """Impulses on the water: by the cells, of x and of p - x; by the sides of the tank and by the bodies, of p."""
+    t, at_side = water.topology, water.on_sides
+    cells = np.concatenate([kept.wet_cells, kept.void])
+    mesh = (t.nodes, t.cells, t.parent, t.gradients, t.volume, t.share)
+    of_x, of_p, of_sides = hat_forces(cells, x, p, at_side, water.reference, *mesh)
+    of_sides += _on_bodies(water, np.where(at_side, p, 0.0))
+    return (-dt * of_x, -dt * (of_p - of_x)), -dt * of_sides, dt * _on_bodies(water, p)
+
+
+def _at_closed_openings(water, kept, p, dt):
+    """Impulse (6,) on the water by what closes narrow openings; zero without thresholds of the covers."""
+    t, connection = water.topology, water.domain.memory.connection
+    if connection is None or connection.face == 0.0:
+        return np.zeros(6)
+    parent = water.domain.parent_node
+    beside = (np.bincount(parent)[parent] > 1) & ~water.on_sides
+    cells = np.concatenate([kept.wet_cells, kept.void])
+    mesh = (t.nodes, t.cells, t.parent, t.gradients, t.volume, t.share)
+    total = hat_forces(cells, p, p, beside, water.reference, *mesh)[2]
+    return -dt * (total + _on_bodies(water, np.where(beside, p, 0.0)))
+
+
+def _on_bodies(water, p):
+    """Gᵀ p about the reference (6,) [N, N m]."""
+    return about(water.reference, water.coupling.T @ p, water.domain.body_centre)
+
+
+def _loads(water, problem, p):
+    """Impulses: told to the bodies, of it the wall shear, and that of the sides of the tank on the water by shear."""
+    centre, dt, shear = water.domain.body_centre, problem.dt, problem.predicted.shear
+    told = problem.other_load - (problem.coupling.T @ p[problem.dofs]).reshape(-1, 6)
+    told = dt * about(water.reference, told, centre)
+    if shear is None:
+        return told, np.zeros(6), np.zeros(6)
+    return told, dt * about(water.reference, shear.load, centre), dt * shear.tank
+
+
+def _through(water, kept):
+    """Momentum (6,) that came in with the water through sides, less what left."""
+    total = np.zeros(6)
+    if kept.left is None and kept.through is None:
+        return total
+    arm = water.topology.nodes - water.reference
+    density = water.parameters.density
+    if kept.left is not None:
+        total -= momentum_of(density * kept.left.volume, water.velocity, arm)
+    if kept.through is not None:
+        u = water.velocity.copy()
+        water.hold(u, kept.end)
+        total += momentum_of(density * kept.through, u, arm)
+    return total
+
+
+def _pressure_on_sides(water, p):
+    """∮ p [n; r × n] dA (6,) over what is open of inflows and seas, n outward."""
+    total = np.zeros(6)
+    for side in water.sides.now if water.sides is not None else ():
+        place = np.einsum("fca,fak->fck", side.hats, water.topology.nodes[side.faces]) - water.reference
+        value = np.einsum("fca,fa->fc", side.hats, p[side.faces])
+        mean, middle = value.sum(axis=1) / 12.0, place.sum(axis=1)
+        first = np.einsum("fa,fak->fk", value, place) / 12.0 + mean[:, None] * middle
+        total[:3] += (value.mean(axis=1)[:, None] * side.area).sum(axis=0)
+        total[3:] += np.cross(first, side.area).sum(axis=0)
+    return total
+
+
+@njit(cache=True)
+def hat_forces(cell_list, x, p, at_side, reference, nodes, cells, parent, g, volume, share):
+    """Σ_e |e| [∇f; (c_e - x_0) × ∇f] (3, 6) over the listed cells for f = x, p, and p on the nodes at_side (N,) only.
+
+    c_e: centroid of the fluid part; exact for linear f."""
+    out = np.zeros((3, 6))
+    arm, beside = np.empty(3), np.empty(4, np.bool_)
+    for e in cell_list:
+        q = parent[e]
+        for k in range(3):
+            arm[k] = -reference[k]
+        at_any = False
+        for a in range(4):
+            i = cells[e, a]
+            beside[a] = at_side[i]
+            at_any = at_any or beside[a]
+            for k in range(3):
+                arm[k] += share[e, a] * nodes[i, k]
+        for m in range(3 if at_any else 2):
+            f0, f1, f2 = 0.0, 0.0, 0.0
+            for a in range(4):
+                if m == 2 and not beside[a]:
+                    continue
+                value = x[cells[e, a]] if m == 0 else p[cells[e, a]]
+                f0 += value * g[q, a, 0]
+                f1 += value * g[q, a, 1]
+                f2 += value * g[q, a, 2]
+            f0, f1, f2 = volume[e] * f0, volume[e] * f1, volume[e] * f2
+            out[m, 0] += f0
+            out[m, 1] += f1
+            out[m, 2] += f2
+            out[m, 3] += arm[1] * f2 - arm[2] * f1
+            out[m, 4] += arm[2] * f0 - arm[0] * f2
+            out[m, 5] += arm[0] * f1 - arm[1] * f0
+    return out

@@ -1,0 +1,332 @@
+"""First half of the step: what the water does before its pressure is known.
+
+û = uⁿ + (1-θ) dt âⁿ,   âⁿ = aⁿ f,  f = min(1, a_max/|aⁿ|)         part of the last acceleration, limited
+φ̃, u_adv = transport of φ, û by uⁿ + dt/2 âⁿ     semi-Lagrangian, MacCormack; `surface_momentum.py`
+φ = redistanced φ̃, corrected towards the conservative volume
+u* = u_adv + θ dt g
+(dt/ρ) K x = ∫ (u* + u')·∇N dV + G V
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from fluid.domain.coupling_matrix import wetted_coupling
+from fluid.pressure.active_cells import WetPart
+from fluid.pressure.indefinite_cells import about, reserve
+from fluid.pressure.pressure_bound import lowest_pressure
+from fluid.pressure.projection import (
+    PressureProblem,
+    cell_velocity,
+    inflow,
+    pressure_matrix,
+    pull_of_held,
+    seal_pockets,
+)
+from fluid.pressure.waterline import waterline_load
+from fluid.sides.outflow import Outflow
+from fluid.surface.level_set import redistance
+from fluid.surface.volume import correct_volume
+from fluid.transport.advection import transport
+from fluid.transport.paths_in_solids import levels_in_solids
+
+TRANSPORT_WIDTH = 5.0
+"""|φ| in cell sizes within which the level set moves; beyond, only its sign matters."""
+RESCALE_EVERY = 5
+
+
+@dataclass(frozen=True)
+class Predicted:
+    """Between predict and correct: level_set (N,), nodal_water (N,) [m³], advected (N, 3) and u_star (N, 3) [m/s],
+    wet (N,) bool, wet_cells (n,), wet_share (n,) and void (k,) of WetPart, cell_star (n, 3) [m/s] velocity of the wet
+    cells, remainder (M, 3) [m/s], theta, conserved_volume and reinserted [m³], uncorrected_water (N,) [m³] before the
+    volume correction, shear: ViscousChange by viscosity and friction, None without; end [s]: time at the end of the
+    step; left: what leaves through open sides, None if nothing; through (N,) [m³] that comes in through sides,
+    None without any; held (N,) [Pa]: unknown part of the pressure on the nodes of seas, None without any side;
+    displaced (N,) [m³]: part of nodal_water that the bodies take in this step."""
+
+    level_set: np.ndarray
+    nodal_water: np.ndarray
+    advected: np.ndarray
+    u_star: np.ndarray
+    wet: np.ndarray
+    wet_cells: np.ndarray
+    wet_share: np.ndarray
+    void: np.ndarray
+    cell_star: np.ndarray
+    remainder: np.ndarray
+    theta: float
+    conserved_volume: float
+    reinserted: float
+    uncorrected_water: np.ndarray
+    shear: object | None
+    end: float
+    left: Outflow | None
+    through: np.ndarray | None
+    held: np.ndarray | None
+    displaced: np.ndarray
+
+
+def predicted(water, dt: float) -> PressureProblem:
+    """Everything of the step before the solve; reads the state of `water`, changes nothing."""
+    theta, parameters = water.theta(dt), water.parameters
+    kick = kick_factor(water.acceleration, water.largest_kick())
+    u_adv, phi = _transported(water, dt, theta, kick)
+    found = water.carried(dt, theta)
+    carried = found.water
+    conserved, left = water.conserved_volume, Outflow.of(water, dt, carried)
+    if left is not None:
+        carried -= left.volume
+        conserved -= float(left.volume.sum())
+    through = inflow_rate = None
+    if water.sides is not None:
+        water.sides.surface(phi, water.time + dt)
+        u_now = water.velocity.copy()
+        water.hold(u_now, water.time + dt)
+        through, inflow_rate = water.sides.through(phi, u_now, dt, carried)
+        carried += through
+        conserved += float(through.sum())
+    displaced = water.displacement(dt)
+    surface = _new_surface(water, phi, carried + displaced, conserved + float(displaced.sum()))
+    if found.velocity is not None:
+        graph = water.graph_for(water.listed)
+        found.into(
+            u_adv,
+            water.listed,
+            phi,
+            water.mesh.spacing,
+            graph,
+            surface.shift,
+            water.topology,
+            water._walls.open_node,
+        )
+        water.hold(u_adv, water.time + dt)
+    shear = None
+    if water.viscous is not None:
+        shear = _sheared(water, dt, theta, kick, surface, u_adv)
+        u_adv = u_adv + shear.change
+    u_star = u_adv + theta * dt * parameters.weight
+    u_star[water.topology.node_start[1:] == water.topology.node_start[:-1]] = 0.0
+    return _problem(
+        water,
+        dt,
+        theta,
+        kick,
+        surface,
+        conserved,
+        u_adv,
+        u_star,
+        shear,
+        left,
+        through,
+        inflow_rate,
+        displaced,
+    )
+
+
+def _sheared(water, dt, theta, kick, surface, u_adv):
+    """What viscosity and walls change over the step, seen from where the last pressure would lead: ViscousChange."""
+    w = u_adv + theta * dt * kick[:, None] * water.acceleration
+    water.hold(w, water.time + dt)
+    return water.viscous.change(water, surface.level_set, surface.nodal_water, w, dt)
+
+
+def kick_factor(acceleration, most: float):
+    """f = min(1, most / |a|) (N,), most [m/s²]: see `Water.largest_kick`."""
+    return _factor(acceleration, most)
+
+
+@njit(cache=True)
+def _factor(a, limit):
+    out = np.empty(a.shape[0])
+    for i in range(a.shape[0]):
+        size = np.sqrt(a[i, 0] * a[i, 0] + a[i, 1] * a[i, 1] + a[i, 2] * a[i, 2])
+        out[i] = min(1.0, limit / max(size, 1e-300))
+    return out
+
+
+def _transported(water, dt, theta, kick):
+    """u_adv (N, 3) and φ̃ (N,); nodes outside the list keep û and φ."""
+    a = kick[:, None] * water.acceleration
+    u_hat = water.velocity + (1.0 - theta) * dt * a
+    u_m = water.velocity + (0.5 * dt * a if water.parameters.theta < 1.0 else 0.0)
+    for u in (u_hat, u_m):
+        water.hold(u, water.time + dt)
+    fields = np.column_stack([u_hat, water.level_set])
+    moved = transport(water.topology, water.listed, dt, u_m, fields, water._walls.open_node)
+    if water.parameters.advection == "supg":
+        from fluid.transport.supg import carried_velocity
+
+        moved[:, :3] = carried_velocity(water, dt, u_m, u_hat)
+    u_adv, phi = u_hat, water.level_set.copy()
+    u_adv[water.listed] = moved[:, :3]
+    if water.topology.is_obtuse:
+        places, levels = levels_in_solids(water.topology, water.listed, dt, u_m, phi, water.mesh.spacing)
+        moved[places, 3] = levels
+    near = np.abs(phi[water.listed]) < TRANSPORT_WIDTH * water.mesh.spacing
+    phi[water.listed[near]] = moved[near, 3]
+    water._walls.let_air_in(phi, u_m, dt, water.mesh.spacing)
+    water.hold(u_adv, water.time + dt)
+    return u_adv, phi
+
+
+def _new_surface(water, phi, carried, conserved):
+    """φ redistanced and corrected: VolumeCorrection."""
+    t, h = water.topology, water.mesh.spacing
+    phi = redistance(t, phi, h, rescale=(water.steps % RESCALE_EVERY == RESCALE_EVERY - 1))
+    return correct_volume(
+        t,
+        water.graph_for(water.listed),
+        water.listed,
+        phi,
+        carried,
+        conserved,
+        water.parameters.correction_length,
+        h,
+    )
+
+
+def _problem(
+    water, dt, theta, kick, surface, conserved, u_adv, u_star, shear, left, through, inflow_rate, displaced
+):
+    t, density = water.topology, water.parameters.density
+    phi = surface.level_set
+    part = WetPart.of(t, water.domain, phi, water.mesh.spacing)
+    wet, cells = part.nodes, part.cells
+    graph = water.graph_for(water.listed).without(t, part.void)
+    remainder = _carried_remainder(water, dt, theta, cells)
+    star = cell_velocity(cells, u_star, remainder, t.cells, t.share)
+    rhs = inflow(cells, star, t.cells, t.parent, t.gradients, t.volume, len(phi))
+    dofs = np.flatnonzero(wet & ~water._walls.open_node)
+    matrix, anchored, held_back = _definite(water, graph, phi, cells, dofs, dt / density, theta)
+    rhs[dofs] += held_back
+    held = None
+    if water.sides is not None:
+        rhs += inflow_rate
+        gravity = water.parameters.gravity
+        held = theta * water.sides.pressure(density, gravity, water.velocity, water.time + dt)
+        # at the edge that a sea shares with an inflow the pressure is sought, not held
+        held[~water._walls.open_node] = 0.0
+        rhs[dofs] += pull_of_held(graph, dofs, held, dt / density)
+    known = (1.0 - theta) * kick[dofs] * water.end_pressure[dofs]
+    guess = theta * water.end_pressure[dofs]
+    coupling, faces, left_out = _coupling(water, part.void)
+    matrix, extra = _sealed(water, matrix, anchored, dofs, dt, guess)
+    if water.slits is not None:
+        lumped, drive = water.slits.pressure_terms(dofs, known, water.parameters.weight, dt, density)
+        matrix, extra = matrix + lumped, extra + drive
+    kept = Predicted(
+        phi,
+        surface.nodal_water,
+        u_adv,
+        u_star,
+        wet,
+        cells,
+        part.share,
+        part.void,
+        star,
+        remainder,
+        theta,
+        conserved,
+        surface.reinserted,
+        surface.uncorrected_water,
+        shear,
+        water.time + dt,
+        left,
+        through,
+        held,
+        displaced,
+    )
+    acted = _known_pressure(water, water.pressure, phi)
+    other = waterline_load(water.domain, faces, left_out, phi, wet, acted, water._walls.open_node)
+    if shear is not None:
+        other += shear.load
+    return PressureProblem(
+        matrix,
+        rhs[dofs] + extra,
+        coupling[dofs],
+        known,
+        guess,
+        dofs,
+        dt,
+        density,
+        other,
+        kept,
+        lowest_pressure(water, graph, dofs, phi),
+        water.at_bound[dofs],
+    )
+
+
+def _known_pressure(water, pressure, phi):
+    """A pressure (N,) [Pa] of the last step; before the first there is none to go by: that of still water."""
+    return pressure if water.steps else -water.parameters.density * water.parameters.gravity * phi
+
+
+def _definite(water, graph, phi, cells, dofs, scale, theta):
+    """The matrix, rows beside p = 0, and what rows behind obtuse angles at the surface add to the right hand side."""
+    open_node = water._walls.open_node
+    if not water.topology.is_obtuse:
+        matrix, anchored, _ = pressure_matrix(graph, phi, dofs, open_node, scale, np.zeros(len(phi)))
+        return matrix, anchored, 0.0
+    unknown = np.zeros(len(phi), bool)
+    unknown[dofs] = True
+    spare = reserve(water.topology, cells, unknown)
+    matrix, anchored, turned = pressure_matrix(graph, phi, dofs, open_node, scale, spare)
+    rows, held_back, beside = np.flatnonzero(turned), np.zeros(len(dofs)), np.zeros(len(phi), bool)
+    beside[dofs[anchored]] = True
+    held_back[rows] = turned[rows] * about(
+        graph, dofs[rows], beside, phi, theta * _known_pressure(water, water.end_pressure, phi)
+    )
+    return matrix, anchored, held_back
+
+
+def _coupling(water, void):
+    """G (N, 6 n_bodies) without the polygons of void cells, the rows of the polygons that count, and of those others
+    whose cells may hold water (`indefinite_cells.py`)."""
+    cell, none = water.domain.face_cell, np.zeros(0, np.int64)
+    if len(void) == 0:
+        return water.coupling, np.arange(len(cell)), none
+    left_out = np.isin(cell, void)
+    coupling = water.coupling - wetted_coupling(water.domain, left_out)
+    return coupling, np.flatnonzero(~left_out), np.flatnonzero(left_out) if water.topology.is_obtuse else none
+
+
+def _carried_remainder(water, dt, theta, cells):
+    """u'_e = β (u'_e - (1-θ) dt r_e) (M, 3) with β = 1/(1 + (4 ν/l_e² + 2 |u_e|/l_e) dt): the remainder that lives on.
+
+    It is swept out of the cell in the time that the water takes to cross it, and viscosity stops it (dynamic subscales;
+    Codina, Principe, Guasch, Badia, Comput. Methods Appl. Mech. Eng. 196 (2007) 2413)."""
+    t, p = water.topology, water.parameters
+    if not p.subscale_memory:
+        return np.zeros_like(water.remainder)
+    rate = (1.0 - theta) * dt
+    out = np.zeros(water.remainder.shape)  # pages that nobody writes to are never touched
+    nu = p.viscosity / p.density
+    carry_remainder(
+        cells, water.remainder, water.kick_remainder, rate, water.velocity, dt, nu, t.cells, t.size, out
+    )
+    return out
+
+
+@njit(cache=True)
+def carry_remainder(cell_list, remainder, kick, kick_time, u, dt, nu, cells, size, out):
+    """β (u' + kick_time r) (M, 3) in the listed cells of `out`; nu: kinematic viscosity [m²/s]."""
+    for e in cell_list:
+        square = 0.0
+        for k in range(3):
+            mean = 0.25 * (u[cells[e, 0], k] + u[cells[e, 1], k] + u[cells[e, 2], k] + u[cells[e, 3], k])
+            square += mean * mean
+        beta = 1.0 / (1.0 + (4.0 * nu / size[e] + 2.0 * np.sqrt(square)) * dt / size[e])
+        for k in range(3):
+            out[e, k] = beta * (remainder[e, k] + kick_time * kick[e, k])
+
+
+def _sealed(water, matrix, anchored, dofs, dt, pressure):
+    """Closed pockets get a compliance far below what the pressure differences in them feel, c ρ h²/dt ≪ (π h/L)²: real
+    water is softer than that in short steps, and its waves would take part in the added mass of bodies."""
+    p = water.parameters
+    compliance = p.pocket_compliance * dt / (p.density * water.mesh.spacing**2)
+    return seal_pockets(matrix, anchored, water.topology.node_volume[dofs], compliance, pressure)

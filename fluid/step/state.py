@@ -1,0 +1,106 @@
+"""The state of the water as arrays: saved after a step, taken over later, in this process or in a new one.
+
+What follows from the mesh and from the solids is left out: whoever restores makes the same domain first.  A step after
+`restore` gives what it would have given after `save`, bit for bit.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fluid.domain.topology import Graph
+from fluid.surface.volume import Flux
+
+NODAL = (
+    "level_set",
+    "velocity",
+    "acceleration",
+    "pressure",
+    "end_pressure",
+    "nodal_water",
+    "displaced",
+    "at_bound",
+    "ventilated",
+)
+OF_CELLS = ("remainder", "kick_remainder", "cell_velocity")
+OF_BODIES = ("pushed_by",)
+NUMBERS = {
+    "time": float,
+    "steps": int,
+    "conserved_volume": float,
+    "initial_volume": float,
+    "_surface_lag": float,
+    "_domain_is_new": bool,
+}
+SIDES = ("entered", "left", "energy")
+
+
+class NotAfterAStep(RuntimeError):
+    """The solids were moved after the last step: its volume flux belongs to the domain before."""
+
+
+class OtherWater(ValueError):
+    """A state does not fit the mesh or the domain of the water that is to take it over."""
+
+
+def save(water) -> dict[str, np.ndarray]:
+    """Everything of a Water that changes in time, by name.  Raises NotAfterAStep."""
+    if water.flux.capacity is not water.topology.node_volume:
+        raise NotAfterAStep("the state of the water can be saved after a step, before the solids move on")
+    arrays = {name: np.array(getattr(water, name)) for name in (*NODAL, *OF_CELLS, *OF_BODIES, *NUMBERS)}
+    arrays |= {"listed": water.listed, "layer_start": water.layer_start}
+    arrays |= {"graph_nodes": water.flux.graph.nodes, "flux_nodes": water.flux.nodes, "flux": water.flux.rate}
+    if water.sides is not None:
+        arrays |= {name: np.array(getattr(water.sides, name)) for name in SIDES}
+    if water.slits is not None:
+        arrays |= {"slit_name": water.slits.name, "slit_flow": water.slits.flow}
+    return arrays
+
+
+def restore(water, domain, arrays) -> None:
+    """Back to a saved state on `domain`, the same as the one that it was saved on.  Raises OtherWater."""
+    _check(domain, arrays, water.sides)
+    water._set_domain(domain)
+    for name in (*NODAL, *OF_CELLS, *OF_BODIES, "listed", "layer_start"):
+        setattr(water, name, np.array(arrays[name]))
+    for name, kind in NUMBERS.items():
+        setattr(water, name, kind(arrays[name]))
+    water._graph = Graph.of(water.topology, np.array(arrays["graph_nodes"]))
+    water._renumbered, water._left_behind, water.report = None, None, None
+    water.flux = Flux(
+        np.array(arrays["flux_nodes"]),
+        water._graph,
+        np.array(arrays["flux"]),
+        water.nodal_water - water.displaced,
+        water.topology.node_volume,
+    )
+    if water.sides is not None:
+        for name in SIDES:
+            setattr(water.sides, name, float(arrays[name]))
+    if "slit_name" in arrays:
+        from fluid.pressure.slits import Slits
+
+        water.slits = Slits.remembered(np.array(arrays["slit_name"]), np.array(arrays["slit_flow"]))
+
+
+def _check(domain, arrays, sides) -> None:
+    wanted = {
+        *NODAL,
+        *OF_CELLS,
+        *OF_BODIES,
+        *NUMBERS,
+        "listed",
+        "layer_start",
+        "graph_nodes",
+        "flux_nodes",
+        "flux",
+    }
+    missing = sorted((wanted | (set(SIDES) if sides is not None else set())) - set(arrays))
+    if missing:
+        raise OtherWater(f"not the state of this water: {', '.join(missing)} missing")
+    nodes, cells = len(arrays["level_set"]), len(arrays["remainder"])
+    if (nodes, cells) != (len(domain.nodes), len(domain.cells)):
+        raise OtherWater(
+            f"the state has {nodes} nodes and {cells} cells, the domain {len(domain.nodes)} and {len(domain.cells)}; "
+            "it belongs to another mesh, or its solids stand elsewhere"
+        )

@@ -1,0 +1,524 @@
+"""The water: its state on a physical domain, and one step split around the pressure solve.
+
+    problem = water.predict(dt)        advect, correct the volume, assemble the pressure
+    x = ...                            solved by the caller, with the structure inside if there is one
+    water.correct(problem, x)          velocity, divergence damping, extension
+
+`predict` changes nothing; a caller may drop its problem and ask again with another dt.  Scheme: theory 2.2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numba import njit
+
+from fluid.domain.physical_domain import carry, wetted_coupling
+from fluid.domain.topology import Graph, Topology, layers_around
+from fluid.mesh.background import Background
+from fluid.pressure.pressure_bound import BoundMet
+from fluid.pressure.projection import PressureProblem
+from fluid.sides.walls import Walls
+from fluid.step.corrector import Corrected, corrected
+from fluid.step.momentum import MomentumChange
+from fluid.step.parameters import WaterParameters
+from fluid.step.predictor import kick_factor, predicted
+from fluid.step.time_step import LEAST_COUNTED, LEAST_GATHERED, gathered, largest_component, pace
+from fluid.surface.extrapolation import BAND, fill_missing
+from fluid.surface.level_set import FAR, redistance, without_films
+from fluid.surface.volume import edge_flux, nodal_volume, renumbering
+from fluid.transport.surface_momentum import Carried
+from fluid.transport.volume_transport import carry_volume
+
+LEVEL_HALVINGS = 40
+LONGEST_STEP = 0.3
+"""dt ≤ LONGEST_STEP sqrt(h/g): a step at rest."""
+
+
+@dataclass(frozen=True)
+class StepReport:
+    """What the last step did.
+
+    volume [m³] of water · volume_error, (volume - conserved) / conserved · reinserted [m³] moved by the uniform
+    shift (signed) · clipped: nodes at the speed limit · unknowns of the pressure · work_on_bodies [J] ·
+    energy_change [J]: change of kinetic + potential energy by stage (transport and gravity, volume correction,
+    pressure, damping and limit) · momentum: what changed it · left [m³], left_energy [J]: through open sides ·
+    bound: where the pressure met its lower bound."""
+
+    dt: float
+    volume: float
+    volume_error: float
+    reinserted: float
+    clipped: int
+    unknowns: int
+    work_on_bodies: float
+    energy_change: dict[str, float]
+    momentum: MomentumChange
+    left: float
+    left_energy: float
+    bound: BoundMet
+
+
+class Water:
+    """Water with a free surface in a tank.
+
+    mesh: Background · domain: PhysicalDomain of it · fill: points (n, 3) [m] → signed distance (n,) [m], negative
+    in the water, or the level set (N,) itself · is_open: (normals (B, 3), centres (B, 3)) → bool (B,), sides of
+    the tank that let water out; None: all closed · is_smooth: the same, sides that stay smooth whatever
+    `parameters.walls` says · sides: `inflow.Sides`, where water is led in or a sea stands; None: nowhere ·
+    velocity (N, 3) [m/s] at the nodes of the domain at the start; None: at rest.
+
+    State at the nodes of the domain: level_set (N,) [m], velocity (N, 3) [m/s], acceleration (N, 3) [m/s²],
+    pressure (N,) [Pa] that acted over the last step, end_pressure (N,) [Pa] that goes with the acceleration at its end
+    (the two differ by up to 1/θ in an impact), nodal_water (N,) [m³], at_bound and ventilated (N,) bool: where the
+    pressure was at its bound, and where that is the pressure of the air; at its cells: remainder (M, 3) [m/s], what
+    the nodes could not hold of the velocity correction.  Velocity goes on for some layers outside the water.
+
+    body_velocity (n_bodies, 6) [m/s, rad/s] about the centres: set it before `predict` where solids that move drag the
+    water along (viscosity, friction); it is not used otherwise.
+    """
+
+    def __init__(
+        self,
+        mesh: Background,
+        domain,
+        fill: Callable | np.ndarray,
+        parameters: WaterParameters | None = None,
+        is_open: Callable | None = None,
+        is_smooth: Callable | None = None,
+        sides=None,
+        velocity=None,
+    ):
+        self.mesh, self.parameters = mesh, parameters or WaterParameters()
+        self.time, self.steps = 0.0, 0
+        self._surface_lag = 0.0
+        self.report: StepReport | None = None
+        self.sides = sides
+        self.slits = None
+        self.reference = mesh.bounds.mean(axis=0)
+        """Point (3,) [m] that angular momentum is taken about."""
+        self._lowest = float((mesh.bounds * self.parameters.weight).max(axis=0).sum())
+        """g·x at the floor [m²/s²]."""
+        no_slip = self.parameters.walls == "no-slip"
+        self._sides = Walls.of(mesh, is_open, is_smooth, no_slip, sides)
+        self._on_sides = np.zeros(len(mesh.nodes), bool)
+        self._on_sides[mesh.boundary_faces] = True
+        self.viscous = _viscosity(self.parameters)
+        self.body_velocity = np.zeros((domain.n_bodies, 6))
+        self.pushed_by = np.zeros((domain.n_bodies, 6))
+        """Velocities (n_bodies, 6) [m/s, rad/s] of the bodies in the last pressure solve: set before `correct`."""
+        self.moved_on = np.zeros((domain.n_bodies, 6))
+        """How far (n_bodies, 6) [m, rad] they stand from where the cells are cut: set before `predict`."""
+        self.farther = np.zeros((domain.n_bodies, 6))
+        """How much farther (n_bodies, 6) [m, rad] they moved in the last step than `displacement` took for granted: the
+        water that this takes has yet to rise to the surface. Set after a step, for the potential energy."""
+        self.free_bodies = None
+        """`viscosity.FreeBodies` that answer to shear within the step; None: all keep their velocity."""
+        self._set_domain(domain)
+        n = len(self.topology.nodes)
+        level = fill(self.topology.nodes) if callable(fill) else np.asarray(fill, float)
+        if sides is not None:
+            sides.surface(level, 0.0)
+        level = self._dry_if_inactive(level)
+        self.level_set = without_films(
+            redistance(self.topology, level, mesh.spacing, rescale=False), mesh.spacing
+        )
+        self.velocity, self.acceleration = np.zeros((n, 3)), np.zeros((n, 3))
+        self.pressure = self._pressure_at_rest()
+        self.end_pressure = self.pressure.copy()
+        self.at_bound, self.ventilated = np.zeros(n, bool), np.zeros(n, bool)
+        self.cell_velocity = np.zeros((len(self.topology.cells), 3))
+        self.remainder, self.kick_remainder = (
+            np.zeros_like(self.cell_velocity),
+            np.zeros_like(self.cell_velocity),
+        )
+        self.nodal_water = nodal_volume(self.topology, self.level_set)
+        self.displaced = np.zeros(n)
+        """(N,) [m³], part of `nodal_water`: what the bodies take of it as they move on to where the surface is."""
+        self.conserved_volume = float(self.nodal_water.sum())
+        self.initial_volume = self.conserved_volume
+        self._find_band()
+        self._start_speed = 0.0
+        if velocity is not None:
+            self._start_moving(velocity)
+        self._renumbered, self._left_behind = None, None
+        self.flux = edge_flux(
+            self.topology, self.graph_for(self.listed), self.listed, self.cell_velocity, self.nodal_water
+        )
+
+    def _start_moving(self, velocity) -> None:
+        """Velocity (N, 3) [m/s] of the nodes that the step works on, and of the cells between them."""
+        self._start_speed = float(np.sqrt((velocity**2).sum(axis=1).max()))
+        self.velocity[self.listed] = velocity[self.listed]
+        self.hold(self.velocity, 0.0)
+        self.cell_velocity = self.velocity[self.topology.cells].mean(axis=1)
+
+    # ---- the step
+
+    def theta(self, dt: float) -> float:
+        """Weight of the new pressure in a step dt [s]: from `calm_theta` in slow water to `theta` where the fastest
+        crosses a cell in a step; 1 for the first two steps, so that a start at rest does not ring, and always where
+        `theta` is 1."""
+        p = self.parameters
+        if self.steps < 2 or p.theta == 1.0:
+            return 1.0
+        return min(p.theta, p.theta - (p.theta - p.calm_theta) * self.calm(dt))
+
+    def calm(self, dt: float) -> float:
+        """1 for water at rest, 0 where the fastest crosses a cell in a step dt [s]."""
+        return 1.0 - min(1.0, self.fastest() * dt / self.mesh.spacing)
+
+    def stable_step(self) -> float:
+        """dt [s]: Courant number of all but spray and trickles (`time_step.py`), and LONGEST_STEP sqrt(h/g)."""
+        h = self.mesh.spacing
+        at_rest = LONGEST_STEP * np.sqrt(h / self.parameters.gravity)
+        least = LEAST_GATHERED * h**3
+        counted = gathered(self._counted(), self.nodal_water, least, *self.topology.around)
+        speed = pace(self.velocity, self.nodal_water, counted)
+        return float(min(at_rest, self.parameters.courant * h / max(speed, 1e-12)))
+
+    def fastest(self) -> float:
+        """Largest component of the velocity of the water [m/s], films beside solids left out."""
+        return largest_component(self.velocity, self._counted())
+
+    def fastest_place(self) -> tuple[float, np.ndarray]:
+        """Speed [m/s] and place (3,) [m] of the fastest water, films beside solids left out; zeros without water."""
+        counted = np.flatnonzero(self._counted())
+        if len(counted) == 0:
+            return 0.0, np.zeros(3)
+        speed = np.linalg.norm(self.velocity[counted], axis=1)
+        worst = int(speed.argmax())
+        return float(speed[worst]), self.topology.nodes[counted[worst]]
+
+    def largest_kick(self) -> float:
+        """Largest acceleration [m/s²] that is carried over to the next step: kick_limit g, or what turns the fastest
+        stream aside within two cells, v²/(2 h).  More would throw spray on by the acceleration of an impact."""
+        p = self.parameters
+        return max(p.kick_limit * p.gravity, 0.5 * self.fastest() ** 2 / self.mesh.spacing)
+
+    def speed_cap(self) -> float:
+        """Largest speed [m/s] that is let stand: speed_limit sqrt(g H + v²/2) in a tank of height H whose water starts
+        with at most v; twice what the fall of all of it could give."""
+        p, (low, high) = self.parameters, self.mesh.bounds
+        return float(p.speed_limit * np.sqrt(p.gravity * (high - low)[2] + 0.5 * self._start_speed**2))
+
+    def _counted(self):
+        return (self.level_set < 0.0) & (self.topology.node_volume > LEAST_COUNTED * self.mesh.spacing**3)
+
+    def predict(self, dt: float) -> PressureProblem:
+        """Advection, volume and gravity over dt [s], and the system for the pressure."""
+        return predicted(self, dt)
+
+    def correct(self, problem: PressureProblem, x, parting=None) -> None:
+        """Take over the pressure x (n,) [Pa] of the problem and end the step; parting (n,) [m³/s]: rate at which the
+        water parts where x is at its bound, None: nowhere (`bounded.py`)."""
+        new: Corrected = corrected(self, problem, np.asarray(x), parting)
+        self.level_set, self.nodal_water = problem.predicted.level_set, new.nodal_water
+        self.displaced = problem.predicted.displaced
+        self.velocity, self.acceleration = new.velocity, new.acceleration
+        self.pressure, self.end_pressure = new.pressure, new.end_pressure
+        self.remainder, self.kick_remainder = new.remainder, new.kick_remainder
+        self.cell_velocity, self.flux = new.cell_velocity, new.flux
+        self.listed, self.layer_start = new.listed, new.layer_start
+        self.at_bound, self.ventilated = new.at_bound, new.ventilated
+        self.conserved_volume = problem.predicted.conserved_volume
+        if self.sides is not None:
+            self.sides.book(problem.predicted.through, self.head())
+        if self.slits is not None:
+            p = self.parameters
+            pressure = x + problem.known
+            self.slits = self.slits.advanced(problem.dofs, pressure, p.weight, problem.dt, p.density)
+        self.report = new.report
+        share = 1.0 - self.calm(problem.dt) if self.pushed_by.any() else 1.0
+        self._surface_lag = 0.5 * problem.dt * share
+        self.time += problem.dt
+        self.steps += 1
+        self._domain_is_new, self._renumbered, self._left_behind = False, None, None
+
+    def remember(self) -> dict:
+        """The state now, for `go_back`: a step replaces what it changes, so these are references."""
+        return vars(self) | {"sides": None if self.sides is None else dict(vars(self.sides))}
+
+    def go_back(self, remembered: dict) -> None:
+        """Back to what `remember` gave, bit for bit."""
+        sides = self.sides
+        vars(self).update(remembered)
+        self.sides = sides
+        if sides is not None:
+            vars(sides).update(remembered["sides"])
+
+    # ---- moving solids
+
+    def move_solids(self, domain) -> None:
+        """Go over to the domain that the solids leave now: every field is carried, newly wet nodes are continued
+        from their neighbours.  The volume of water in the books does not change; the next step lifts the surface
+        by what the solids displaced."""
+        old, old_topology = self.domain, self.topology
+        source = carry(old, domain)
+        self._set_domain(domain)
+        known = (source >= 0) & old_topology.active[source]
+        if self._left_behind is None:
+            self._left_behind = (self.velocity, self.acceleration)
+        self._carry_nodes(source, known)
+        self._carry_cells(old_topology)
+        self._find_band()
+        if not np.array_equal(source, np.arange(len(source))):
+            handed_on = renumbering(source, old.parent_node, domain.parent_node, self.topology.node_volume)
+            self.nodal_water = handed_on @ self.nodal_water
+            self.displaced = handed_on @ self.displaced
+            self._renumbered = handed_on if self._renumbered is None else handed_on @ self._renumbered
+
+    def set_cracks(self, cracks) -> None:
+        """Lump the flow through these `slits.Cracks`: anew after every change of the domain or of the cracks."""
+        from fluid.pressure.slits import Slits
+
+        self.slits = Slits.of(self.domain, cracks, self.mesh.spacing, self.slits)
+
+    def carried(self, dt: float, theta: float) -> Carried:
+        """What the fluxes make of volume and momentum in dt [s], carried on the domain of the last projection; of the
+        volume alone with `advection = "supg"`, where velocity does not go along paths."""
+        carried = self._carried(dt, theta)
+        carried = carried if self._renumbered is None else carried.handed_on(self._renumbered)
+        if self.slits is None:
+            return carried
+        return replace(carried, water=carried.water + self.slits.carried(dt))
+
+    def _carried(self, dt: float, theta: float) -> Carried:
+        if self.parameters.advection == "supg":
+            return Carried(carry_volume(self.flux, dt))
+        u, a = (self.velocity, self.acceleration) if self._left_behind is None else self._left_behind
+        kick = (1.0 - theta) * dt * kick_factor(a, self.largest_kick())
+        u_hat = u + kick[:, None] * a
+        return Carried.by(self.flux, dt, u_hat, a, self.parameters.gravity, self.mesh.spacing)
+
+    def _carry_nodes(self, source, known):
+        scalars = np.column_stack([self.level_set, self.pressure, self.end_pressure])
+        fields = [scalars, self.velocity, self.acceleration]
+        moved = [np.ascontiguousarray(f[source]) for f in fields]
+        fill_missing(self.topology, known, *moved)
+        self.level_set = self._dry_if_inactive(moved[0][:, 0])
+        self.pressure, self.end_pressure = moved[0][:, 1].copy(), moved[0][:, 2].copy()
+        self.velocity, self.acceleration = moved[1], moved[2]
+        self.at_bound, self.ventilated = known & self.at_bound[source], known & self.ventilated[source]
+        self.hold(self.velocity, self.time)
+
+    def _carry_cells(self, old: Topology):
+        """Cell fields go to the cell of the same parent (of several covers: the first)."""
+        if np.array_equal(old.background, self.topology.background):
+            return
+        source = same_cells(old.background, self.topology.background, len(self.mesh.cells))
+        for name in ("cell_velocity", "remainder", "kick_remainder"):
+            setattr(self, name, carried_rows(source, getattr(self, name)))
+        fresh = np.flatnonzero(source < 0)
+        self.cell_velocity[fresh] = self.velocity[self.topology.cells[fresh]].mean(axis=1)
+
+    # ---- layout
+
+    def _set_domain(self, domain) -> None:
+        self.domain = domain
+        self.topology = Topology.of(self.mesh, domain)
+        self.coupling = wetted_coupling(domain).tocsr()
+        self._walls = self._sides.on_copies(domain.parent_node)
+        self.on_sides = self._on_sides[domain.parent_node]
+        """(N,) bool: nodes on the sides of the tank."""
+        self.open_to_air = np.zeros(len(domain.nodes), bool)
+        """(N,) bool: nodes on open sides."""
+        self.open_to_air[self._walls.open_faces] = True
+        if self.sides is not None:
+            self.sides.place(domain, self.topology.active)
+        self._domain_is_new = True
+        self._graph = None
+
+    def _find_band(self) -> None:
+        """The nodes that the step works on: the water and the layers around it."""
+        self.listed, self.layer_start = self.layers((self.level_set < 0.0) & self.topology.active)
+
+    def layers(self, wet):
+        """Wet nodes, then BAND layers around them: (list, layer_start)."""
+        t = self.topology
+        order, start = layers_around(wet, BAND, *t.around)
+        if self.sides is None:
+            return order, start
+        # sides count with the last layer wherever they are: water may come in far from all water
+        missing = np.setdiff1d(self.sides.nodes(), order)
+        start[-1] += len(missing)
+        return np.concatenate([order, missing]), start
+
+    def graph_for(self, nodes) -> Graph:
+        """A graph that lists these nodes: the one at hand if it does; of all nodes, once, when the solids have
+        stood still for a step."""
+        if self._graph is None or not self._graph.covers(nodes):
+            every = nodes if self._domain_is_new else np.flatnonzero(self.topology.active)
+            self._graph = Graph.of(self.topology, every)
+        return self._graph
+
+    def _pressure_at_rest(self):
+        """ρ g times the depth (N,) [Pa] below the highest water: a first guess, and the level of closed pockets."""
+        wet = (self.level_set < 0.0) & self.topology.active
+        below = self.topology.nodes @ self.parameters.weight
+        top = below[wet].min() if wet.any() else 0.0
+        return np.where(wet, self.parameters.density * (below - top), 0.0)
+
+    def _dry_if_inactive(self, level):
+        return np.where(self.topology.active, level, FAR * self.mesh.spacing)
+
+    # ---- sides of the tank
+
+    def hold(self, u, time: float) -> None:
+        """What the sides of the tank do to u (N, 3) [m/s] at a time [s], in place."""
+        self._walls.slip(u)
+        if self.sides is not None:
+            self.sides.hold(u, time)
+
+    @property
+    def handled_volume(self) -> float:
+        """Water at the start and what came in since [m³]: the scale of volume errors."""
+        return self.initial_volume + (0.0 if self.sides is None else self.sides.entered)
+
+    def held_by_sides(self):
+        """Nodes (n,) on the sides of the tank and projectors (n, 3, 3) onto what friction and viscosity may change."""
+        return self._walls.restriction()
+
+    def rubbed_nodes(self):
+        """Nodes (N,) bool on sides of the tank and beside solids that rub or hold the water; None if all are smooth."""
+        if self.parameters.walls == "slip":
+            return None
+        rubbed = self.topology.beside_solid.copy()
+        rubbed[self._walls.rough_faces] = True
+        return rubbed
+
+    def rough_faces(self):
+        """Faces of the closed sides that rub the water: (nodes (C, 3), outward area (C, 3) [m²], cell (C,))."""
+        w = self._walls
+        cell = self.topology.row_of_background[w.rough_cell]
+        there = cell >= 0
+        return w.rough_faces[there], w.rough_area[there], cell[there]
+
+    # ---- figures
+
+    def volume(self) -> float:
+        """Water in the tank [m³]."""
+        return float(self.nodal_water.sum()) - float(self.displaced.sum())
+
+    def displacement(self, dt: float) -> np.ndarray:
+        """Volume (N,) [m³] that the bodies have taken from the nodes at the end of a step dt [s], negative where they
+        left room, since they stood where the cells are cut.
+
+        Surface and pressure are those at the end of a step. With the volume of the cut alone the level of a pool would
+        follow a body that floats in it a step late, which lets it swing higher and higher."""
+        way = self.moved_on + dt * self.pushed_by
+        return self._taken_by(way)
+
+    def _taken_by(self, way) -> np.ndarray:
+        """Volume (N,) [m³] that bodies take from the nodes on a way (n_bodies, 6) [m, rad]."""
+        if not way.any():
+            return np.zeros(len(self.level_set))
+        share = np.clip(self.nodal_water / np.maximum(self.topology.node_volume, 1e-300), 0.0, 1.0)
+        return share * (self.coupling @ way.ravel())
+
+    def volume_error(self) -> float:
+        """(volume - conserved volume) / handled volume, what the step could not put right."""
+        return (self.volume() - self.conserved_volume) / max(self.handled_volume, 1e-300)
+
+    def momentum(self) -> np.ndarray:
+        """∫ ρ u dV (3,) [kg m/s]."""
+        return self.parameters.density * (self.nodal_water @ self.velocity)
+
+    def kinetic_energy(self) -> float:
+        """½ ρ Σ W_i |u_i|² [J]."""
+        return kinetic_energy(self.parameters.density, self.nodal_water, self.velocity)
+
+    def potential_energy(self) -> float:
+        """-∫ ρ g·x dV [J] above the floor of the tank, at the time of the velocity.
+
+        The surface of water that falls lags by up to half a step, which the rate -∫ ρ g·u dV makes up for (energy of a
+        dam break at steps of 20 to 2.5 ms). In calm water it does not: it moves with the velocity half a step ahead,
+        and where a body swings in it what is made up for would come and go.
+
+        What the volume is off by within the tolerance of its correction counts as if it were put right at the surface:
+        a millionth of a deep pool would outweigh a small wave."""
+        p, held = self.parameters, self.nodal_water - self.displaced
+        found = -p.density * float(held @ self.below_floor(self.topology.nodes))
+        found -= self._surface_lag * float(self.momentum() @ p.weight)
+        surface, farther = self._surface_potential(), self._taken_by(self.farther)
+        found += p.density * float(farther @ (self.below_floor(self.topology.nodes) - surface))
+        return found + p.density * (self.volume() - self.conserved_volume) * surface
+
+    def _surface_potential(self) -> float:
+        """g·x [m²/s²] of the surface, mean over the nodes within half a cell of it; 0 where there is none."""
+        near = self.listed[np.abs(self.level_set[self.listed]) < 0.5 * self.mesh.spacing]
+        return float(self.below_floor(self.topology.nodes[near]).mean()) if len(near) else 0.0
+
+    def head(self) -> np.ndarray:
+        """½ ρ u² - ρ g·x + p (N,) [J/m³] at the nodes."""
+        p = self.parameters
+        kinetic = 0.5 * p.density * np.einsum("ij,ij->i", self.velocity, self.velocity)
+        return kinetic - p.density * self.below_floor(self.topology.nodes) + self.pressure
+
+    def below_floor(self, x) -> np.ndarray:
+        """g·x (...) [m²/s²] of places x (..., 3) [m], zero at the floor of the tank and negative above it: what leaves
+        the tank takes energy with it, wherever the tank lies."""
+        return x @ self.parameters.weight - self._lowest
+
+    def available_energy(self) -> float:
+        """Kinetic energy, and the potential energy above that of the same water at a level between the solids where
+        they stand; where sides are open, of what stays below their lowest edge of it [J]."""
+        return self.kinetic_energy() + max(self.potential_energy() - self._level_energy(), 0.0)
+
+    def _level_energy(self) -> float:
+        """Potential energy [J] above the floor of the tank of the water at a level, which an open side may bound."""
+        t, p, weight = self.topology, self.parameters, self.parameters.weight
+        height = -(t.nodes @ weight) / max(p.gravity, 1e-300)
+        low, high = height.min(), height.max()
+        faces, area = self._walls.open_faces, self._walls.open_area
+        upright = area @ weight > -0.9 * p.gravity * np.linalg.norm(area, axis=1)
+        spill = height[faces[upright]].min() if upright.any() else np.inf
+        for _ in range(LEVEL_HALVINGS):
+            level = 0.5 * (low + high)
+            held = nodal_volume(t, height - level)
+            low, high = (level, high) if held.sum() < self.conserved_volume else (low, level)
+        if high > spill:
+            held = nodal_volume(t, height - spill)
+        return -p.density * float(held @ self.below_floor(t.nodes))
+
+
+def _viscosity(parameters: WaterParameters):
+    """The viscous stage, or None where the case has neither viscosity nor rough walls."""
+    if not parameters.shear:
+        return None
+    from fluid.viscous.viscosity import Viscosity
+
+    return Viscosity(parameters)
+
+
+@njit(cache=True)
+def kinetic_energy(density, nodal_water, velocity):
+    """½ ρ Σ W_i |u_i|² [J]; nodal_water (N,) [m³], velocity (N, 3) [m/s]."""
+    total = 0.0
+    for i in range(nodal_water.shape[0]):
+        if nodal_water[i] != 0.0:  # most of a tank is dry: its velocities are not even read
+            u = velocity[i]
+            total += nodal_water[i] * (u[0] * u[0] + u[1] * u[1] + u[2] * u[2])
+    return 0.5 * density * total
+
+
+@njit(cache=True)
+def same_cells(old_parent, new_parent, n_parents):
+    """Row of the old cell with the same parent for each new one (n,), -1 if none; of several the first."""
+    row = np.full(n_parents, -1, np.int64)
+    for e in range(old_parent.shape[0] - 1, -1, -1):
+        row[old_parent[e]] = e
+    return row[new_parent]
+
+
+@njit(cache=True)
+def carried_rows(source, field):
+    """field[source] (n, 3), zero where source is -1."""
+    out = np.zeros((source.shape[0], 3))
+    for e in range(source.shape[0]):
+        if source[e] >= 0:
+            for k in range(3):
+                out[e, k] = field[source[e], k]
+    return out

@@ -1,0 +1,257 @@
+"""The level set φ [m], negative in the water: signed distance to the surface, kept near it only.
+
+Nodes of cells that the surface passes through keep φ: their zero is the surface, and moving them by the true
+closest point pulls the surface off the walls (0.2 m/s in a tilted tank at rest).  Only where the mean |∇φ| around
+such a node has left [0.9, 1.1] is φ divided by it.  All other nodes take the distance to the closest polygon of
+the surface, handed from layer to layer; beyond the layers φ = ±FAR h.
+
+What is handed on is the closest polygon of a neighbour.  Where the cells are obtuse that may be some polygons away from
+the node's own, φ too large by 0.02 h to 0.15 h there, and its slope in the cells above and below the surface so far
+from upright that velocity along still water lifts it (growth of 0.005 a step).  There the nodes of the first layers
+look for their own among the polygons around the one in hand until none is closer: on a surface that is nearly flat
+over a cell, the closest of all.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from fluid.domain.topology import layers_around
+from fluid.numerics.jit import inner, plain
+
+LAYERS = 6
+EXACT_LAYERS = 2
+"""Layers that look for their own closest polygon on meshes with obtuse cells: those next to the surface."""
+FAR = 7.0
+FILM = 1e-7
+
+
+def without_films(phi, spacing: float):
+    """φ (N,) with water thinner than FILM h at a node taken as none: its pressure would be 0/0 at the surface."""
+    return np.where((phi < 0.0) & (phi > -FILM * spacing), 0.0, phi)
+
+
+@njit(cache=True)
+def surface_cells(phi, cell_list, cells):
+    """Those of the listed cells with water on one corner and air on another."""
+    found = np.empty(cell_list.shape[0], np.int64)
+    n = 0
+    for e in cell_list:
+        wet = 0
+        for a in range(4):
+            wet += phi[cells[e, a]] < 0.0
+        if 0 < wet < 4:
+            found[n] = e
+            n += 1
+    return found[:n].copy()
+
+
+@njit(cache=True)
+def surface_triangles(cut, phi, nodes, cells):
+    """φ = 0 in the cut cells as triangles (T, 3, 3) [m] and the cell of each (T,)."""
+    triangles = np.empty((2 * cut.shape[0], 3, 3))
+    owner = np.empty(2 * cut.shape[0], np.int64)
+    crossing = np.empty((4, 3))
+    wet, dry = np.empty(4, np.int64), np.empty(4, np.int64)
+    n = 0
+    for s in range(cut.shape[0]):
+        e = cut[s]
+        n_wet, n_dry = 0, 0
+        for a in range(4):
+            if phi[cells[e, a]] < 0.0:
+                wet[n_wet] = cells[e, a]
+                n_wet += 1
+            else:
+                dry[n_dry] = cells[e, a]
+                n_dry += 1
+        count = 0
+        for w in range(n_wet):
+            for d in range(n_dry):
+                i = wet[w]
+                # the second wet corner runs backwards so that the four crossings go round the quadrilateral
+                j = dry[n_dry - 1 - d] if w == 1 and n_wet == 2 else dry[d]
+                t = phi[i] / (phi[i] - phi[j])
+                for k in range(3):
+                    crossing[count, k] = nodes[i, k] + t * (nodes[j, k] - nodes[i, k])
+                count += 1
+        triangles[n] = crossing[:3]
+        owner[n] = e
+        n += 1
+        if count == 4:
+            triangles[n, 0], triangles[n, 1], triangles[n, 2] = crossing[0], crossing[2], crossing[3]
+            owner[n] = e
+            n += 1
+    return triangles[:n].copy(), owner[:n].copy()
+
+
+@plain
+def squared_distance(p, t):
+    """Squared distance [m²] from the point p (3,) to the triangle t (3, 3) (Ericson, Real-Time Collision
+    Detection (2005), 5.1.5).  Scalars only: this is called millions of times a second."""
+    abx, aby, abz = t[1, 0] - t[0, 0], t[1, 1] - t[0, 1], t[1, 2] - t[0, 2]
+    acx, acy, acz = t[2, 0] - t[0, 0], t[2, 1] - t[0, 1], t[2, 2] - t[0, 2]
+    apx, apy, apz = p[0] - t[0, 0], p[1] - t[0, 1], p[2] - t[0, 2]
+    d1 = abx * apx + aby * apy + abz * apz
+    d2 = acx * apx + acy * apy + acz * apz
+    ab2 = abx * abx + aby * aby + abz * abz
+    ac2 = acx * acx + acy * acy + acz * acz
+    abac = abx * acx + aby * acy + abz * acz
+    d3, d4, d5, d6 = d1 - ab2, d2 - abac, d1 - abac, d2 - ac2
+    va, vb, vc = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
+    v, w = 0.0, 0.0
+    if d1 <= 0.0 and d2 <= 0.0:
+        pass
+    elif d3 >= 0.0 and d4 <= d3:
+        v = 1.0
+    elif d6 >= 0.0 and d5 <= d6:
+        w = 1.0
+    elif vc <= 0.0 and d1 >= 0.0 and d3 <= 0.0 and ab2 > 0.0:
+        v = _ratio(d1, d1 - d3)
+    elif vb <= 0.0 and d2 >= 0.0 and d6 <= 0.0 and ac2 > 0.0:
+        w = _ratio(d2, d2 - d6)
+    elif va <= 0.0 and d4 >= d3 and d5 >= d6:
+        w = _ratio(d4 - d3, (d4 - d3) + (d5 - d6))
+        v = 1.0 - w
+    else:
+        v, w = _ratio(vb, va + vb + vc), _ratio(vc, va + vb + vc)
+    x, y, z = apx - v * abx - w * acx, apy - v * aby - w * acy, apz - v * abz - w * acz
+    return x * x + y * y + z * z
+
+
+@plain
+def _ratio(part, whole):
+    """part / whole; 0 for an edge or a triangle without extent."""
+    return part / whole if whole > 0.0 else 0.0
+
+
+@njit(cache=True)
+def _closest_in_layers(
+    order, layer_start, triangles, owner, nodes, cells, start, around, exact, node_start, node_cells
+):
+    """Distance (N,) [m] of the nodes of `order` to the triangles, handed outward; two sweeps a layer.
+
+    exact: first layers whose nodes go on to the closest of all (`_descend`)."""
+    n = nodes.shape[0]
+    closest, best = np.full(n, -1, np.int64), np.full(n, np.inf)
+    tried = np.full(triangles.shape[0], -1, np.int64)
+    first = _first_triangles(owner, cells.shape[0] if exact > 0 else 0)
+    asked, found = np.zeros(n, np.int32), np.zeros(n, np.int32)
+    _hand_outward(
+        order, layer_start, triangles, owner, nodes, cells, start, around, closest, best, tried, asked, found
+    )
+    for s in range(layer_start[1], layer_start[exact + 1]):
+        i = order[s]
+        if closest[i] >= 0:
+            best[i] = _descend(
+                nodes[i], closest[i], best[i], triangles, owner, first, cells, node_start, node_cells
+            )
+    return np.sqrt(best)
+
+
+@njit(cache=True)
+def _first_triangles(owner, n_cells):
+    """First triangle of each cell (n_cells,), -1 none; those of a cell follow each other."""
+    first = np.full(n_cells, -1, np.int64)
+    if n_cells > 0:
+        for t in range(owner.shape[0] - 1, -1, -1):
+            first[owner[t]] = t
+    return first
+
+
+@njit(cache=True)
+def _descend(x, closest, best, triangles, owner, first, cells, node_start, node_cells):
+    """Squared distance [m²] of x (3,) to the closest triangle that can be reached from `closest`, at the squared
+    distance `best`, through cells with a common node, always coming closer."""
+    before = -1
+    while closest != before:
+        before = closest
+        for a in range(4):
+            i = cells[owner[before], a]
+            for s in range(node_start[i], node_start[i + 1]):
+                t = first[node_cells[s]]
+                while 0 <= t < owner.shape[0] and owner[t] == node_cells[s]:
+                    d = squared_distance(x, triangles[t])
+                    if d < best:
+                        best, closest = d, t
+                    t += 1
+    return best
+
+
+@inner
+def _hand_outward(
+    order, layer_start, triangles, owner, nodes, cells, start, around, closest, best, tried, asked, found
+):  # fmt: skip
+    """Squared distance `best` (N,) and number of the `closest` triangle (N,); tried (T,): the last node that asked.
+
+    asked, found (N,): when a node asked last and when it found its triangle. In the second sweep only neighbours that
+    have found another one since are worth a question."""
+    now = 1
+    for t in range(triangles.shape[0]):
+        for a in range(4):
+            i = cells[owner[t], a]
+            d = squared_distance(nodes[i], triangles[t])
+            if d < best[i]:
+                best[i], closest[i], found[i] = d, t, now
+    for layer in range(1, layer_start.shape[0] - 1):
+        for _ in range(2):
+            for s in range(layer_start[layer], layer_start[layer + 1]):
+                i = order[s]
+                now += 1
+                for t in range(start[i], start[i + 1]):
+                    j = around[t]
+                    if found[j] <= asked[i]:
+                        continue
+                    c = closest[j]
+                    if tried[c] == i:
+                        continue
+                    tried[c] = i
+                    d = squared_distance(nodes[i], triangles[c])
+                    if d < best[i]:
+                        best[i], closest[i], found[i] = d, c, now
+                asked[i] = now
+
+
+@njit(cache=True)
+def _mean_slope(cut, phi, cells, parent, g, n_nodes):
+    """Mean |∇φ| over the cut cells around each node, (N,); zero elsewhere."""
+    total, count = np.zeros(n_nodes), np.zeros(n_nodes)
+    for s in range(cut.shape[0]):
+        e = cut[s]
+        square = 0.0
+        for k in range(3):
+            slope = 0.0
+            for a in range(4):
+                slope += phi[cells[e, a]] * g[parent[e], a, k]
+            square += slope * slope
+        for a in range(4):
+            total[cells[e, a]] += np.sqrt(square)
+            count[cells[e, a]] += 1.0
+    return total / np.maximum(count, 1.0)
+
+
+def redistance(topology, phi, spacing: float, rescale: bool):
+    """φ (N,) as a signed distance near its zero, ±FAR·spacing elsewhere; the zero itself does not move.
+
+    rescale: also divide by the mean slope at the nodes of cut cells where it left [0.9, 1.1]."""
+    t = topology
+    cut = surface_cells(phi, t.cells_around(phi < 0.0), t.cells)
+    far = np.copysign(FAR * spacing, phi)
+    if len(cut) == 0:
+        return far
+    front = np.zeros(len(phi), bool)
+    front[t.cells[cut]] = True
+    order, start = layers_around(front, LAYERS, *t.around)
+    triangles, owner = surface_triangles(cut, phi, t.nodes, t.cells)
+    exact = EXACT_LAYERS if t.is_obtuse else 0
+    distance = _closest_in_layers(
+        order, start, triangles, owner, t.nodes, t.cells, *t.around, exact, t.node_start, t.node_cells
+    )
+    listed = order[start[1] :]
+    far[listed] = np.copysign(np.minimum(distance[listed], FAR * spacing), phi[listed])
+    far[front] = phi[front]
+    if rescale:
+        slope = _mean_slope(cut, phi, t.cells, t.parent, t.gradients, len(phi))
+        off = front & ((slope > 1.1) | (slope < 0.9)) & (slope > 0.0)
+        far[off] /= slope[off]
+    return far

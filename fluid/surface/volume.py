@@ -1,0 +1,284 @@
+"""The conservative volume of water at the nodes, and the level set corrected towards it.
+
+A level set alone loses thin sheets (a dam break lost its own volume once over).  Cure (after Kees, Akkerman,
+Farthing and Bazilevs, J. Comput. Phys. 230 (2011) 4536, lumped):  the volume W_i = ∫_{φ<0} N_i dV of the step before
+is carried by the fluxes of the projected velocity u_e, which balance exactly at wholly wet nodes,
+
+    q_ij = -Σ_e |e| (∇N_i·∇N_j) (x_j - x_i)·u_e,      Σ_j q_ij = -Σ_e |e| ∇N_i·u_e = (G V)_i,              (1)
+
+along the edges (`volume_transport.py`): what goes through the cell borders that stand upright on the edge, half way;
+in split bricks along the sides of the bricks only. A cell with an obtuse dihedral angle, where this may run against the
+water, or with edges that differ by more than 2.5 times gives |e|/4 (∇N_j - ∇N_i)·u_e, through the planes of its
+medians: in cells three times as high as wide a dam break gains 1.1 % of its energy with it, 3.5 % with (1).  In split
+cubes that sends a third of the flow across, along diagonals and back along sides, and where the surface slopes less
+comes back than goes: a dam break in a tank 0.5 m wide ran 7 cm farther along one side than along the other, on any
+cells.
+
+Then φ takes the shift ψ that brings its own volume there,
+
+    (c + κ K) ψ = W - ∫_{φ<0} N dV,        c_i = d/dψ ∫_{φ<ψ} N_i dV,                                       (2)
+
+spread over the length sqrt(κ ...) ~ κ.  What is left of the total is met by one uniform shift, counted and reported.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from numba import njit
+
+from fluid.domain.moments import nodal_water
+from fluid.domain.topology import Graph
+from fluid.surface.level_set import without_films
+
+BAND_WIDTH = 3.0
+LARGEST_SHIFT = 0.3
+LARGEST_UNIFORM_SHIFT = 0.1
+ANCHOR = 1e-3
+MOST_SECANTS = 4
+VOLUME_TOLERANCE = 1e-6
+_PROBE = 0.05
+"""Half width of the band of (2), limits of the shifts and step of the difference for c, in cell sizes; share of V/h
+added to c, so that regions without surface stay where they are; secant steps for the total volume and their
+relative tolerance."""
+
+
+@dataclass(frozen=True)
+class Flux:
+    """Volume flux along the edges of the listed nodes (n,): rate [m³/s] out of each, on the edges of `graph`;
+    water (N,) and capacity (N,) [m³]: what every node holds and could hold on the same domain."""
+
+    nodes: np.ndarray
+    graph: Graph
+    rate: np.ndarray
+    water: np.ndarray
+    capacity: np.ndarray
+
+
+@njit(cache=True)
+def _edge_rates(
+    listed, graph_row, start, neighbour, u_cell, nodes, cells, parent, g, upright, volume, around
+):
+    rate = np.zeros(neighbour.shape[0])
+    slot = np.empty(nodes.shape[0], np.int64)
+    node_start, node_cells = around
+    for i in listed:
+        r = graph_row[i]
+        for s in range(start[r], start[r + 1]):
+            slot[neighbour[s]] = s
+        for t in range(node_start[i], node_start[i + 1]):
+            e = node_cells[t]
+            p, own = parent[e], 0
+            x, y, z = volume[e] * u_cell[e, 0], volume[e] * u_cell[e, 1], volume[e] * u_cell[e, 2]
+            while cells[e, own] != i:
+                own += 1
+            gx, gy, gz = g[p, own, 0], g[p, own, 1], g[p, own, 2]
+            for a in range(4):
+                j = cells[e, a]
+                if a != own and not upright[p]:
+                    rate[slot[j]] += 0.25 * (
+                        (g[p, a, 0] - gx) * x + (g[p, a, 1] - gy) * y + (g[p, a, 2] - gz) * z
+                    )
+                elif a != own:
+                    slopes = gx * g[p, a, 0] + gy * g[p, a, 1] + gz * g[p, a, 2]
+                    if slopes != 0.0:  # it is zero along half of the edges of a split brick
+                        rate[slot[j]] -= slopes * (
+                            (nodes[j, 0] - nodes[i, 0]) * x
+                            + (nodes[j, 1] - nodes[i, 1]) * y
+                            + (nodes[j, 2] - nodes[i, 2]) * z
+                        )
+    return rate
+
+
+def edge_flux(topology, graph, listed, u_cell, water) -> Flux:
+    """Equation (1) on the edges of the listed nodes (n,); u_cell (M, 3) [m/s] projected velocity of the cells,
+    water (N,) [m³] volume at the nodes."""
+    t, g = topology, graph
+    mesh = (t.nodes, t.cells, t.parent, t.gradients, t.upright, t.volume, (t.node_start, t.node_cells))
+    rate = _edge_rates(listed, g.row, g.start, g.neighbour, u_cell, *mesh)
+    return Flux(listed, g, rate, water, t.node_volume)
+
+
+@njit(cache=True)
+def _diffused_shift(band, place, graph_row, start, neighbour, stiffness, c, residual, kappa, tolerance, most):
+    """Equation (2) on the band nodes by conjugate gradients with the diagonal as preconditioner, (n,)."""
+    n = band.shape[0]
+    diagonal = c.copy()
+    first, column, entry = np.zeros(n + 1, np.uint32), np.empty(40 * n, np.uint32), np.empty(40 * n)
+    count = 0
+    for r in range(n):
+        row = graph_row[band[r]]
+        for s in range(start[row], start[row + 1]):
+            q = place[neighbour[s]]
+            if q >= 0 and stiffness[s] != 0.0:
+                if count == column.shape[0]:
+                    column = np.concatenate((column, np.empty_like(column)))
+                    entry = np.concatenate((entry, np.empty_like(entry)))
+                column[count], entry[count] = q, kappa * stiffness[s]
+                diagonal[r] -= entry[count]
+                count += 1
+        first[r + 1] = count
+    typical = diagonal.mean() if n > 0 else 1.0
+    x, r_, Ap = np.zeros(n), residual.copy(), np.empty(n)
+    for r in range(n):
+        if diagonal[r] <= 1e-9 * typical:  # nothing to shift there and nobody to pass it to
+            diagonal[r], r_[r] = typical, 0.0
+    z = r_ / diagonal
+    p = z.copy()
+    rz = np.dot(r_, z)
+    goal = tolerance * tolerance * rz
+    for _ in range(most):
+        if rz <= goal or rz <= 0.0:
+            break
+        for r in range(n):
+            total = diagonal[r] * p[r]
+            for s in range(first[r], first[r + 1]):
+                total += entry[s] * p[column[s]]
+            Ap[r] = total
+        alpha = rz / np.dot(p, Ap)
+        x += alpha * p
+        r_ -= alpha * Ap
+        z = r_ / diagonal
+        new = np.dot(r_, z)
+        p = z + (new / rz) * p
+        rz = new
+    return x
+
+
+@dataclass(frozen=True)
+class Shift:
+    """ψ of (2): value (n,) [m] at the nodes of the band (n,), with its κ [m]."""
+
+    band: np.ndarray
+    value: np.ndarray
+    kappa: float
+
+
+@dataclass(frozen=True)
+class VolumeCorrection:
+    """level_set (N,) · nodal_water (N,) [m³] of it, and `uncorrected_water` before · reinserted [m³] moved by the
+    uniform shift · shift: ψ of (2)."""
+
+    level_set: np.ndarray
+    nodal_water: np.ndarray
+    uncorrected_water: np.ndarray
+    reinserted: float
+    shift: Shift
+
+
+def correct_volume(topology, graph, listed, phi, carried, target: float, kappa: float, spacing: float):
+    """Equation (2) and the uniform shift. φ (N,), carried W (N,) [m³], target total [m³] → VolumeCorrection.
+
+    kappa in cell sizes · listed (n,) nodes of the graph to look at, all with water and |φ| small among them."""
+    n = len(phi)
+    seen = np.zeros(n, bool)
+    seen[listed] = True
+    reach = (LARGEST_SHIFT + LARGEST_UNIFORM_SHIFT) * spacing
+    whole, near = _split(topology.cells_around(seen), phi, topology.cells, reach)
+    inner = nodal_water(whole, 0.0, phi, topology.parts, n)
+    own = inner + nodal_water(near, 0.0, phi, topology.parts, n)
+    slope = _volume_slope(topology, near, phi, spacing)
+    band = listed[np.abs(phi[listed]) < BAND_WIDTH * spacing]
+    place = np.full(n, -1, np.int64)
+    place[band] = np.arange(len(band))
+    shift = _diffused_shift(
+        band,
+        place,
+        graph.row,
+        graph.start,
+        graph.neighbour,
+        graph.stiffness,
+        slope[band] + ANCHOR * topology.node_volume[band] / spacing,
+        (carried - own)[band],
+        kappa * spacing,
+        1e-2,
+        40,
+    )
+    phi = phi.copy()
+    phi[band] -= np.clip(shift, -LARGEST_SHIFT * spacing, LARGEST_SHIFT * spacing)
+    left = target - float(inner.sum())
+    phi, reinserted = _meet_total(
+        topology, near, phi, band, slope.sum(), left, VOLUME_TOLERANCE * abs(target), spacing
+    )
+    return VolumeCorrection(
+        phi,
+        inner + nodal_water(near, 0.0, phi, topology.parts, n),
+        own,
+        reinserted,
+        Shift(band, shift, kappa * spacing),
+    )
+
+
+@njit(cache=True)
+def _split(cell_list, phi, cells, reach):
+    """The listed cells that are all water whatever shift within ±reach φ takes, and those that a surface can reach."""
+    whole, near = np.empty(cell_list.shape[0], np.int64), np.empty(cell_list.shape[0], np.int64)
+    n_whole, n_near = 0, 0
+    for e in cell_list:
+        low, high = np.inf, -np.inf
+        for a in range(4):
+            low, high = min(low, phi[cells[e, a]]), max(high, phi[cells[e, a]])
+        if high < -reach:
+            whole[n_whole] = e
+            n_whole += 1
+        elif low < reach:
+            near[n_near] = e
+            n_near += 1
+    return whole[:n_whole].copy(), near[:n_near].copy()
+
+
+def _volume_slope(t, near, phi, spacing):
+    """c (N,) [m²] by a central difference over the cells that the surface can reach."""
+    step = _PROBE * spacing
+    cut = _split(near, phi, t.cells, step)[1]
+    wider = nodal_water(cut, -step, phi, t.parts, len(t.nodes))
+    slope = (wider - nodal_water(cut, step, phi, t.parts, len(t.nodes))) / (2 * step)
+    # in slivers beside solids the last corner to get wet moves water between nodes: no slope may be negative
+    return np.maximum(slope, 0.0)
+
+
+def _meet_total(t, near, phi, band, area, target, tolerance, spacing):
+    """φ after a uniform shift of the band that brings the water in the cells `near` to a target [m³] within a
+    tolerance [m³], and the volume [m³] that it moved.
+
+    Secant steps on the shift, from the slope `area`; the shift stays within LARGEST_UNIFORM_SHIFT."""
+    limit, shift = LARGEST_UNIFORM_SHIFT * spacing, 0.0
+    start = volume = float(nodal_water(near, 0.0, phi, t.parts, len(phi)).sum())
+    shifted = phi
+    for _ in range(MOST_SECANTS):
+        if abs(target - volume) <= tolerance or area <= 0.0:
+            break
+        trial = np.clip(shift + (target - volume) / area, -limit, limit)
+        if trial == shift:
+            break
+        shifted = phi.copy()
+        shifted[band] -= trial
+        before, volume = volume, float(nodal_water(near, 0.0, shifted, t.parts, len(phi)).sum())
+        area, shift = (volume - before) / (trial - shift), trial
+    return without_films(shifted, spacing), volume - start
+
+
+def nodal_volume(topology, phi):
+    """∫_{φ<0} N_i dV (N,) [m³]."""
+    return nodal_water(topology.cells_around(phi < 0.0), 0.0, phi, topology.parts, len(topology.nodes))
+
+
+def renumbering(source, old_parent, new_parent, new_volume) -> sp.csr_array:
+    """T (N_new, N_old) that hands the volume of every old node to its copies: W_new = T W_old, columns sum to 1.
+
+    source (N_new,): old node that each new one continues, -1 none · parents (N,): background node of each copy ·
+    new_volume (N_new,) [m³] by which several heirs share.  A node without heir leaves its water to the first
+    copy of its background node; without any copy the water is left to the uniform shift."""
+    heir = np.flatnonzero(source >= 0)
+    weight = np.maximum(new_volume[heir], 1e-300)
+    total = np.bincount(source[heir], weight, minlength=len(old_parent))
+    orphan = np.flatnonzero(total == 0.0)
+    first = np.full(max(old_parent.max(), new_parent.max()) + 1, -1)
+    first[new_parent[::-1]] = np.arange(len(new_parent))[::-1]
+    orphan = orphan[first[old_parent[orphan]] >= 0]
+    rows = np.concatenate([heir, first[old_parent[orphan]]])
+    columns = np.concatenate([source[heir], orphan])
+    share = np.concatenate([weight / total[source[heir]], np.ones(len(orphan))])
+    return sp.csr_array((share, (rows, columns)), shape=(len(new_parent), len(old_parent)))

@@ -1,0 +1,120 @@
+"""The conservative volume of the nodes, carried by the fluxes along the edges (`volume.Flux`).
+
+Share of water that leaves node i for j, with s = W/V and the Courant number C_i = dt Σ out / V_i:
+
+    s_ij = s_i + ½ (1 - C_i) B(s_j - s_i, s_i - s_up)                                                       (1)
+
+s_up: mean share of what flows into i.  B: the superbee of both differences (Roe 1985; Sweby, SIAM J. Numer. Anal. 21
+(1984) 995), 0 where their signs differ, so that no s leaves the range around it and front and back of a drop are alike.
+B = 0 is upwind, which smears the water over the cells: a front is fed by what diffuses into it and takes the speed that
+is there, and sloshing loses a sixth more of its height.  Zalesak's correction towards Lax and Wendroff keeps still
+more, but lets a falling drop of five cells lag by 0.7 %.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from fluid.surface.volume import Flux
+from fluid.transport.velocity_transport import carry_velocity
+
+LARGEST_COURANT = 0.8
+LEAST_COUNTED = 0.3
+"""Courant number of a substep, and nodes that set it: those of at least this share of the median volume."""
+
+
+def carry_volume(flux: Flux, dt: float, u=None):
+    """W (N,) [m³] after dt [s] by the flux; Σ W is kept to round-off.
+
+    u (N, 3) [m/s], if given, goes along (`velocity_transport.py`), in place; nodes without water keep theirs."""
+    water = flux.water.copy()
+    capacity = np.maximum(flux.capacity, 1e-300)
+    least = LEAST_COUNTED * np.median(capacity[flux.nodes]) if len(flux.nodes) else 0.0
+    g = flux.graph
+    turnover = _largest_turnover(flux.nodes, g.row, g.start, flux.rate, capacity, least)
+    n_sub = int(np.ceil(dt * turnover / LARGEST_COURANT)) or 1
+    along = (flux.nodes, g.row, g.start, g.neighbour)
+    for _ in range(n_sub):
+        moved = _moved(*along, flux.rate, water, capacity, dt / n_sub)
+        if u is not None:
+            carry_velocity(*along, moved, water, u)
+        _hand_over(*along, moved, water)
+    return water
+
+
+@njit(cache=True)
+def _largest_turnover(nodes, graph_row, start, rate, capacity, least):
+    """max_i Σ out / V_i [1/s] over nodes of some size."""
+    largest = 0.0
+    for i in nodes:
+        if capacity[i] > least:
+            largest = max(largest, _out(graph_row[i], start, rate) / capacity[i])
+    return largest
+
+
+@njit(cache=True)
+def _out(r, start, rate):
+    """Σ of the fluxes [m³/s] that leave the node of row r."""
+    out = 0.0
+    for s in range(start[r], start[r + 1]):
+        out += max(rate[s], 0.0)
+    return out
+
+
+@njit(cache=True)
+def _moved(nodes, graph_row, start, neighbour, rate, water, capacity, h):
+    """w_ij (edges,) [m³]: what leaves the listed nodes within h [s] by (1); no node gives more than it holds."""
+    share, moved = np.zeros(water.shape[0]), np.zeros(rate.shape[0])
+    for i in nodes:
+        share[i] = min(max(water[i], 0.0) / capacity[i], 1.0)
+    for i in nodes:
+        r = graph_row[i]
+        out = h * _out(r, start, rate)
+        if out <= 0.0 or water[i] <= 0.0:
+            continue
+        behind = share[i] - _upstream(r, start, neighbour, rate, share)
+        second = 0.5 * max(1.0 - out / capacity[i], 0.0)
+        total = 0.0
+        for s in range(start[r], start[r + 1]):
+            if rate[s] > 0.0:
+                moved[s] = h * rate[s] * _leaving(share[i], behind, share[neighbour[s]], second)
+                total += moved[s]
+        if total > water[i]:
+            for s in range(start[r], start[r + 1]):
+                moved[s] *= water[i] / total
+    return moved
+
+
+@njit(cache=True)
+def _hand_over(nodes, graph_row, start, neighbour, moved, water):
+    """The volumes moved (edges,) [m³] off the one node and on to the other, in place."""
+    change = np.zeros(water.shape[0])
+    for i in nodes:
+        r = graph_row[i]
+        for s in range(start[r], start[r + 1]):
+            change[i] -= moved[s]
+            change[neighbour[s]] += moved[s]
+    water += change
+
+
+@njit(cache=True)
+def _upstream(r, start, neighbour, rate, share):
+    """Mean share of what flows into the node of row r."""
+    weight, total = 0.0, 0.0
+    for s in range(start[r], start[r + 1]):
+        if rate[s] < 0.0:
+            weight += rate[s]
+            total += rate[s] * share[neighbour[s]]
+    return total / weight if weight < 0.0 else 0.0
+
+
+@njit(cache=True)
+def _leaving(own, behind, other, second):
+    """s_ij of (1); own s_i, behind s_i - s_up, other s_j, second ½ (1 - C)."""
+    ahead = other - own
+    if behind * ahead <= 0.0:
+        return own
+    a, b = abs(ahead), abs(behind)
+    limited = max(min(2.0 * b, a), min(b, 2.0 * a))
+    return own + second * (limited if ahead > 0.0 else -limited)

@@ -1,0 +1,238 @@
+"""Viscous stress and wall stress of P1 velocities, and conjugate gradients on them, without a matrix.
+
+r = f - K u: the rate of momentum [N] that stresses give to the nodes,
+
+    r_i = - ∫ 2μ ε(u) ∇N_i dV  +  ∫_Γ N_i (t - λ (u - u_Γ)) dA  +  ∫_Γ (u - u_Γ)·t(N_i) dA  -  ∫_Γ N_i C (u - u_Γ)_t dA
+
+ε: strain rate, smoothed over edges (`strain`), t(v) = -2μ ε(v) n, n out of the body into the water, u_Γ the velocity
+of the body there.  The second and third terms hold u = u_Γ weakly (symmetric Nitsche), the last is wall friction.  With
+λ = 4 μ A/V, A wetted area and V water of the cell, the form is positive definite on every cut, since ε is constant in a
+cell (trace inequality ∫_Γ |ε n|² ≤ A/V ∫ |ε|²; De Prenter, Lehrenfeld, Massing, Comput. Math. Appl. 75 (2018) 4322).
+The body gets what the hats sum up to, -∫ (t - λ (u - u_Γ) - C (u - u_Γ)_t) dA: momentum is exchanged to round-off.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from fluid.viscous.strain import COLUMN, ROW, add_to_edges, edge_strain, mean_strain, spread_stress
+
+
+@njit(cache=True)
+def wall_stress(walls, mu, u, body_velocity, edge, edge_weight, strain, flux, cells, out, load):
+    """The terms on Γ: those with hats added to out (N, 3), what the bodies get to load (n_bodies, 6), and those with
+    t(N_i) to the strains flux (n_edges, 6), for `spread_stress`.
+
+    walls: (cell (S,), row (S,) of the cell in the list of wet cells, -1 if it is not there, body (S,), normal (S, 3),
+    hat (S, 3, 4), arm (S, 3, 3) [m], area (S, 3) [m²] of each point, nitsche (S,) λ [kg/(m² s)], drag (S,) C
+    [kg/(m² s)]) · body_velocity (n_bodies, 6) · strain (n_edges, 6) of u."""
+    cell, row, body, normal, hat, arm, area, nitsche, drag = walls
+    mean = np.empty((3, 3))
+    t, v, f, pull, x = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(6)
+    for s in range(cell.shape[0]):
+        e, b = cell[s], body[s]
+        held = nitsche[s] > 0.0 and row[s] >= 0
+        t[:], pull[:] = 0.0, 0.0
+        if held:
+            mean_strain(strain, edge[row[s]], mean)
+            for k in range(3):
+                for m in range(3):
+                    t[k] -= 2.0 * mu * mean[k, m] * normal[s, m]
+        for q in range(3):
+            w = area[s, q]
+            if w == 0.0:
+                continue
+            _slip_velocity(s, q, e, b, u, hat, arm, body_velocity, cells, v)
+            into = v[0] * normal[s, 0] + v[1] * normal[s, 1] + v[2] * normal[s, 2]
+            for k in range(3):
+                f[k] = w * (t[k] - nitsche[s] * v[k] - drag[s] * (v[k] - into * normal[s, k]))
+                pull[k] += 2.0 * mu * w * v[k]
+            for a in range(4):
+                for k in range(3):
+                    out[cells[e, a], k] += hat[s, q, a] * f[k]
+            for k in range(3):
+                load[b, k] -= f[k]
+            load[b, 3] -= arm[s, q, 1] * f[2] - arm[s, q, 2] * f[1]
+            load[b, 4] -= arm[s, q, 2] * f[0] - arm[s, q, 0] * f[2]
+            load[b, 5] -= arm[s, q, 0] * f[1] - arm[s, q, 1] * f[0]
+        if held:
+            for c in range(6):
+                x[c] = 0.5 * (pull[ROW[c]] * normal[s, COLUMN[c]] + pull[COLUMN[c]] * normal[s, ROW[c]])
+            add_to_edges(flux, edge[row[s]], edge_weight, x)
+
+
+@njit(cache=True)
+def _slip_velocity(s, q, e, b, u, hat, arm, V, cells, v):
+    """v = u - u_Γ at a point of a polygon, in place."""
+    v[0] = -(V[b, 0] + V[b, 4] * arm[s, q, 2] - V[b, 5] * arm[s, q, 1])
+    v[1] = -(V[b, 1] + V[b, 5] * arm[s, q, 0] - V[b, 3] * arm[s, q, 2])
+    v[2] = -(V[b, 2] + V[b, 3] * arm[s, q, 1] - V[b, 4] * arm[s, q, 0])
+    for a in range(4):
+        for k in range(3):
+            v[k] += hat[s, q, a] * u[cells[e, a], k]
+
+
+@njit(cache=True)
+def momentum_rate(terms, u, body_velocity):
+    """r (N, 3) [N] and load (n_bodies, 6) [N, N m].  terms: see `implicit_change`."""
+    node_drag, node, projector, idle = terms[4], terms[5], terms[6], terms[7]
+    r, load = unheld_rate(terms, u, body_velocity)
+    for i in range(u.shape[0]):
+        if node_drag[i] != 0.0:
+            for k in range(3):
+                r[i, k] -= node_drag[i] * u[i, k]
+    _restrict(r, node, projector, idle)
+    return r, load
+
+
+@njit(cache=True)
+def unheld_rate(terms, u, body_velocity):
+    """The same without the sides of the tank: without drag on their nodes, and as if they held nothing."""
+    cell_list, weight, walls, mu, _drag, _node, _projector, _idle, cells, parent, g, edge, edge_weight = terms
+    r = np.zeros_like(u)
+    load = np.zeros_like(body_velocity)
+    strain = edge_strain(cell_list, weight, edge, edge_weight, u, cells, parent, g)
+    flux = strain.copy()
+    wall_stress(walls, mu, u, body_velocity, edge, edge_weight, strain, flux, cells, r, load)
+    spread_stress(cell_list, weight, edge, flux, cells, parent, g, r)
+    return r, load
+
+
+@njit(cache=True)
+def _restrict(r, node, projector, idle):
+    """Only what the sides of the tank leave free, in place."""
+    moved = np.empty(3)
+    for s in range(node.shape[0]):
+        for k in range(3):
+            moved[k] = 0.0
+            for m in range(3):
+                moved[k] += projector[s, k, m] * r[node[s], m]
+        r[node[s]] = moved
+    for i in range(r.shape[0]):
+        if idle[i]:
+            for k in range(3):
+                r[i, k] = 0.0
+
+
+@njit(cache=True)
+def preconditioner(terms, mass, tau):
+    """1 / diagonal (N,) of M + τ K, the flux terms left out; 0 on idle nodes."""
+    cell_list, weight, walls, _mu, node_drag, _node, _projector, idle, cells, parent, g, _edge, _total = terms
+    cell, _row, _body, _normal, hat, _arm, area, nitsche, drag = walls
+    diagonal = mass + tau * node_drag
+    for s in range(cell_list.shape[0]):
+        e = cell_list[s]
+        for a in range(4):
+            square = 0.0
+            for k in range(3):
+                square += g[parent[e], a, k] ** 2
+            diagonal[cells[e, a]] += tau * 2.0 / 3.0 * weight[s] * square
+    for s in range(cell.shape[0]):
+        for q in range(3):
+            for a in range(4):
+                diagonal[cells[cell[s], a]] += tau * area[s, q] * (nitsche[s] + drag[s]) * hat[s, q, a] ** 2
+    inverse = np.zeros_like(diagonal)
+    for i in range(diagonal.shape[0]):
+        if not idle[i] and diagonal[i] > 0.0:
+            inverse[i] = 1.0 / diagonal[i]
+    return inverse
+
+
+@njit(cache=True)
+def body_preconditioner(terms, body_mass, moves, tau):
+    """Inverse (n_bodies, 6, 6) of the diagonal blocks of the bodies without the flux terms; 0 where they are driven."""
+    _cell, _row, body, normal, _hat, arm, area, nitsche, drag = terms[2]
+    block, c = body_mass.copy(), np.zeros((3, 6))
+    for s in range(body.shape[0]):
+        b = body[s]
+        if not moves[b]:
+            continue
+        for q in range(3):
+            _slip_of_body(s, q, arm, c)
+            for i in range(6):
+                for j in range(6):
+                    across_i, across_j, together = 0.0, 0.0, 0.0
+                    for k in range(3):
+                        across_i += normal[s, k] * c[k, i]
+                        across_j += normal[s, k] * c[k, j]
+                        together += c[k, i] * c[k, j]
+                    along = together - across_i * across_j
+                    block[b, i, j] += tau * area[s, q] * (nitsche[s] * together + drag[s] * along)
+    inverse = np.zeros_like(block)
+    for b in range(block.shape[0]):
+        if moves[b]:
+            inverse[b] = np.linalg.inv(block[b])
+    return inverse
+
+
+@njit(cache=True)
+def _slip_of_body(s, q, arm, c):
+    """c (3, 6): velocity of a point of a polygon by the six velocities of its body, in place."""
+    x, y, z = arm[s, q, 0], arm[s, q, 1], arm[s, q, 2]
+    c[:] = 0.0
+    for k in range(3):
+        c[k, k] = 1.0
+    c[0, 4], c[0, 5] = z, -y
+    c[1, 3], c[1, 5] = -z, x
+    c[2, 3], c[2, 4] = y, -x
+
+
+@njit(cache=True)
+def implicit_change(terms, mass, tau, right, bodies, body_right, tolerance, most):
+    """d (N, 3) and D (n_bodies, 6) with (M + τ K) (d, D) = (right, body_right) by conjugate gradients: (d, D,
+    iterations, residual reached over the first).
+
+    terms: (cells in the water (n,), 2μ times their water (n,), walls of `wall_stress`, μ, drag of the nodes on sides
+    (N,) [kg/s], nodes on sides (n,), their projectors (n, 3, 3), idle (N,) bool: nodes that keep their velocity, cells,
+    parent, gradients, edges of the cells in the water (n, 6) and their weight (n_edges,)) · mass (N,) [kg] · tau [s] ·
+    right (N, 3) [N s] · bodies: (mass (n_bodies, 6, 6) [kg, kg m²], moves (n_bodies,) bool: the others keep their
+    velocity) · body_right (n_bodies, 6) [N s, N m s]."""
+    body_mass, moves = bodies
+    inverse = preconditioner(terms, mass, tau)
+    body_inverse = body_preconditioner(terms, body_mass, moves, tau)
+    d, r = np.zeros_like(right), right.copy()
+    D, R = np.zeros_like(body_right), body_right.copy()
+    z, Z = _scaled(inverse, r), _answers(body_inverse, R)
+    p, P = z.copy(), Z.copy()
+    rz = np.sum(r * z) + np.sum(R * Z)
+    first = rz
+    count = 0
+    while rz > tolerance * tolerance * first and count < most:
+        change, load = momentum_rate(terms, p, P)
+        Ap, AP = np.empty_like(p), np.zeros_like(P)
+        for i in range(p.shape[0]):
+            for k in range(3):
+                Ap[i, k] = mass[i] * p[i, k] - tau * change[i, k]
+        for b in range(len(moves)):
+            if moves[b]:
+                AP[b] = body_mass[b] @ P[b] - tau * load[b]
+        alpha = rz / (np.sum(p * Ap) + np.sum(P * AP))
+        d += alpha * p
+        D += alpha * P
+        r -= alpha * Ap
+        R -= alpha * AP
+        z, Z = _scaled(inverse, r), _answers(body_inverse, R)
+        before, rz = rz, np.sum(r * z) + np.sum(R * Z)
+        p = z + (rz / before) * p
+        P = Z + (rz / before) * P
+        count += 1
+    return d, D, count, np.sqrt(rz / first) if first > 0.0 else 0.0
+
+
+@njit(cache=True)
+def _answers(inverse, R):
+    """inverse (n, 6, 6) times R (n, 6), body by body."""
+    out = np.zeros_like(R)
+    for b in range(R.shape[0]):
+        out[b] = inverse[b] @ R[b]
+    return out
+
+
+@njit(cache=True)
+def _scaled(factor, r):
+    out = np.empty_like(r)
+    for i in range(r.shape[0]):
+        for k in range(3):
+            out[i, k] = factor[i] * r[i, k]
+    return out

@@ -1,0 +1,195 @@
+"""Viscosity and walls that hold the water: the stage of a step between transport and pressure.
+
+    M du/dt = r(u) + M (w - uⁿ)/dt,   u(0) = uⁿ         r = f - K u: `viscous_kernels`, symmetric gradient, walls
+
+w = u_adv + θ dt âⁿ is where transport and the last pressure would lead without viscosity; its rate is the source, so
+that a steady state is steady for any dt (transport, then diffusion: 5 % off in a channel) and walls are felt by
+what stays after the projection.  The change δ = u - w is added to u_adv.  In time the two-stage
+method of order two that damps stiff parts fully (Alexander, SIAM J. Numer. Anal. 14 (1977) 1006), γ = 1 - 1/√2:
+
+    u₁ = uⁿ + γ (w - uⁿ) + γ dt M⁻¹ r(u₁)
+    u = w + dt M⁻¹ [(1-γ) r(u₁) + γ r(u)],        impulse on bodies  dt [(1-γ) F(u₁) + γ F(u)].
+
+Bodies that move freely are part of the stage, with their own mass and the motion that the other forces of the last
+step would give them (`FreeBodies`): what a light body and the water that sticks to it exchange does not depend on dt.
+
+M: the water at each node, ∫_{φ<0} ρ N_i dV; cells count with their water.  No traction on the free surface (natural).
+Sides of the tank: no-slip holds u = 0 on their nodes; friction acts on their nodes.  On open sides only the normal
+velocity changes: the tangential one leaves as it came, or the missing ∇uᵀ n would bend a parallel stream.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fluid.domain.moments import wet_fraction
+from fluid.domain.physical_domain import hat_values
+from fluid.numerics.solve import NotConverged
+from fluid.step.momentum import momentum_of
+from fluid.viscous.kernels import implicit_change, momentum_rate, unheld_rate
+from fluid.viscous.strain import edges_of
+
+GAMMA = 1.0 - np.sqrt(0.5)
+TOLERANCE = 1e-7
+MOST_ITERATIONS = 1000
+STEEPEST = 1e6
+"""Largest A/V of a cell in 1/h: slivers."""
+
+
+@dataclass(frozen=True)
+class ViscousChange:
+    """velocity change δ (N, 3) [m/s] · load (n_bodies, 6) [N, N m], mean over the step · energy [J]: work of the
+    stresses on the water, at the velocities of the stages (that at the velocity that the step would reach without them
+    is too large by a third in thick liquids) · iterations · tank (6,) [N, N m] of the sides of the tank on the water,
+    mean over the step."""
+
+    change: np.ndarray
+    load: np.ndarray
+    energy: float
+    iterations: int
+    tank: np.ndarray
+
+
+@dataclass(frozen=True)
+class FreeBodies:
+    """How bodies answer to shear within a step: mass (n_bodies, 6, 6) [kg, kg m²] about their centres, world axes ·
+    moves (n_bodies,) bool: the others keep their velocity · acceleration (n_bodies, 6) [m/s², rad/s²] by all but
+    shear."""
+
+    mass: np.ndarray
+    moves: np.ndarray
+    acceleration: np.ndarray
+
+    @classmethod
+    def none(cls, n: int) -> FreeBodies:
+        """n bodies that keep their velocity."""
+        return cls(np.zeros((n, 6, 6)), np.zeros(n, bool), np.zeros((n, 6)))
+
+
+class WettedWalls:
+    """Polygons of a domain with the values of the hats at their points; made once per domain.
+
+    cell, body (S,) · normal (S, 3) · hat (S, 3, 4) · arm (S, 3, 3) [m] from the centre of the body · area (S,) [m²] ·
+    per_volume (S,) [1/m] wetted area of the cell over the volume left of it."""
+
+    def __init__(self, domain, spacing: float):
+        d = domain
+        self.domain = d
+        corners = d.nodes[d.cells[d.face_cell]]
+        self.cell, self.body = d.face_cell.astype(np.int64), d.face_body.astype(np.int64)
+        self.normal = np.ascontiguousarray(d.face_normal)
+        self.hat = (
+            np.ascontiguousarray(hat_values(corners, d.face_points))
+            if len(self.cell)
+            else np.zeros((0, 3, 4))
+        )
+        self.arm = np.ascontiguousarray(d.face_points - d.body_centre[d.face_body][:, None])
+        self.area = d.face_area
+        wetted = np.bincount(d.face_cell, d.face_area, minlength=len(d.cells))[d.face_cell]
+        self.per_volume = wetted / np.maximum(d.volume[d.face_cell], wetted * spacing / STEEPEST)
+
+    def at_points(self, f, cells):
+        """P1 values (S, 3) or (S, 3, k) of nodal f (N,) or (N, k) at the points of the polygons."""
+        return np.einsum("sqa,sa...->sq...", self.hat, f[cells[self.cell]])
+
+
+class Viscosity:
+    """The stage for a Water with viscosity or walls that are not smooth."""
+
+    def __init__(self, parameters):
+        self.parameters = parameters
+        self._walls: WettedWalls | None = None
+        self.friction = None
+        if parameters.walls == "friction":
+            from fluid.viscous.wall_friction import WallFriction
+
+            self.friction = WallFriction.of(parameters)
+
+    def change(self, water, phi, nodal_water, w, dt: float) -> ViscousChange:
+        """δ over dt [s] on the way of the water to w (N, 3) [m/s]; surface phi (N,), nodal_water (N,) [m³].
+
+        Raises NotConverged."""
+        mass = self.parameters.density * nodal_water
+        terms = self._terms(water, phi, mass, w)
+        V, bodies = water.body_velocity, water.free_bodies or FreeBodies.none(len(water.body_velocity))
+        change, lead = dt * bodies.acceleration, (1.0 - GAMMA) / GAMMA
+        half_way, V_half_way = water.velocity + GAMMA * (w - water.velocity), V + GAMMA * change
+        first, first_V, n1 = self._stage(terms, mass, bodies, dt, half_way, V_half_way)
+        load1, tank1, power1 = _acting(water, terms, half_way + first, V_half_way + first_V)
+        start, V_start = w + lead * first, V + change + lead * first_V
+        second, second_V, n2 = self._stage(terms, mass, bodies, dt, start, V_start)
+        u = start + second
+        load2, tank2, power2 = _acting(water, terms, u, V_start + second_V)
+        both = ((load1, load2), (tank1, tank2), (power1, power2))
+        load, tank, power = ((1.0 - GAMMA) * one + GAMMA * two for one, two in both)
+        return ViscousChange(u - w, load, dt * power, n1 + n2, tank)
+
+    def _stage(self, terms, mass, bodies, dt, start, V):
+        """Changes (d, D) of the velocity of the water and of the bodies: (M + γ dt K) (d, D) = γ dt r(start, V)."""
+        tau = GAMMA * dt
+        rate, load = momentum_rate(terms, start, V)
+        load[~bodies.moves] = 0.0
+        d, D, count, left = implicit_change(
+            terms, mass, tau, tau * rate, (bodies.mass, bodies.moves), tau * load, TOLERANCE, MOST_ITERATIONS
+        )
+        if not left <= TOLERANCE:
+            raise NotConverged(
+                f"the viscous step stopped after {count} iterations at a residual of {left:.3g}, "
+                f"wanted {TOLERANCE:.3g}; reduce time.step_max or time.cfl",
+                np.array([left]),
+            )
+        return d, D, count
+
+    def _terms(self, water, phi, mass, w):
+        t, p = water.topology, self.parameters
+        if self._walls is None or self._walls.domain is not water.domain:
+            self._walls = WettedWalls(water.domain, water.mesh.spacing)
+        wet = (phi < 0.0) & t.active
+        cells = np.flatnonzero(wet[t.cells].any(axis=1))
+        share = wet_fraction(cells, phi, t.parts)
+        cells, share = cells[share > 0.0], share[share > 0.0]
+        idle = mass <= 0.0
+        drag = np.zeros(len(phi)) if self.friction is None else self.friction.of_nodes(water, phi, w)
+        weight = 2.0 * p.viscosity * share * t.volume[cells]
+        return (
+            cells,
+            weight,
+            self._wall_terms(water, phi, w, cells, share),
+            p.viscosity,
+            drag,
+            *water.held_by_sides(),
+            idle,
+            t.cells,
+            t.parent,
+            t.gradients,
+            *edges_of(cells, weight, t.cells, len(phi)),
+        )
+
+    def _wall_terms(self, water, phi, w, wet_cells, share):
+        """The polygons that the water touches, with λ and C; λ rises as the surface takes water off a cell."""
+        p, k, cells = self.parameters, self._walls, water.topology.cells
+        water_share = np.ones(len(cells))
+        water_share[wet_cells] = np.maximum(share, 1.0 / STEEPEST)
+        wet = k.at_points(phi, cells) < 0.0
+        area = np.where(wet, k.area[:, None] / 3.0, 0.0)
+        nothing = np.zeros(len(k.cell))
+        nitsche = 4.0 * p.viscosity * k.per_volume / water_share[k.cell] if p.walls == "no-slip" else nothing
+        drag = nothing if self.friction is None else self.friction.of_faces(water, k, phi, w)
+        row = np.full(len(cells), -1, np.int64)
+        row[wet_cells] = np.arange(len(wet_cells))
+        use = (area > 0.0).any(axis=1) & ((nitsche > 0.0) | (drag > 0.0))
+        return tuple(
+            np.ascontiguousarray(a[use])
+            for a in (k.cell, row[k.cell], k.body, k.normal, k.hat, k.arm, area, nitsche, drag)
+        )
+
+
+def _acting(water, terms, u, V):
+    """Loads (n_bodies, 6) of the velocity u (N, 3) on bodies with the velocity V, (6,) of the sides of the tank on the
+    water, and the power [W] that all stresses give the water."""
+    held, load = momentum_rate(terms, u, V)
+    free, _ = unheld_rate(terms, u, V)
+    arm = water.topology.nodes - water.reference
+    return load, momentum_of(np.ones(len(u)), held - free, arm), float(np.sum(held * u))

@@ -1,0 +1,168 @@
+"""Edges that cross between contact nodes: one contact of edge against edge for a pair of blocks.
+
+Two convex bodies are apart if a plane along a face or along an edge of each parts them (separating axes: Gottschalk,
+Lin and Manocha, SIGGRAPH 1996). Where no node is in contact or contact begins, no such plane is left, and the smallest
+overlap is that of two edges with directions d_a and d_b, these carry:
+
+    n = ± d_a x d_b / |d_a x d_b|, out of b,   depth δ = n·(p_b - p_a),   p: nearest points of the two lines
+
+with the force of a node contact. The edges are kept until they part, become parallel or leave each other past an end.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from yade_scripts.contact.jit import inner
+
+PARALLEL = 0.05
+"""Sine of the angle below which two edges do not cross."""
+SUPPORT = 1e-6
+"""Share of the radius by which an edge may be off the outermost point of its block."""
+SCRATCH = 8
+"""Rows of the work space of a pair before those for the vertices of both blocks."""
+
+
+@njit(cache=True)
+def pair_scratch(shapes):
+    """Work space (.., 3) of a pair of blocks."""
+    most = 0
+    for a in range(len(shapes.vertex_end)):
+        most = max(most, shapes.vertex_end[a] - shapes.node_start[a])
+    return np.empty((SCRATCH + 2 * most, 3))
+
+
+@inner
+def find_crossing(shapes, a, b, x, R, deepest, scratch):
+    """Edges of a and b with the smallest overlap, if that is less than `deepest` [m]; scratch: of `pair_scratch`.
+
+    → (number of the pair of edges or -1, distance that parts the blocks or -1 [m])
+    """
+    count = shapes.vertex_end[a] - shapes.node_start[a]
+    A, B = scratch[SCRATCH : SCRATCH + count], scratch[SCRATCH + count :]
+    n, d, da, db = scratch[0], scratch[1], scratch[2], scratch[3]
+    for k in range(3):
+        d[k], n[k] = 0.0, x[b, k] - x[a, k]
+    _vertices(shapes, a, d, R, A)
+    _vertices(shapes, b, n, R, B)
+    A, B = A[:count], B[: shapes.vertex_end[b] - shapes.node_start[b]]
+    for k in range(3):
+        d[k] = x[a, k] - x[b, k]
+    off = SUPPORT * (shapes.radius[a] + shapes.radius[b])
+    found = -1
+    first_a, first_b = shapes.edge_start[a], shapes.edge_start[b]
+    count_a, count_b = shapes.edge_start[a + 1] - first_a, shapes.edge_start[b + 1] - first_b
+    for i in range(count_a):
+        a0, a1 = shapes.edge[first_a + i, 0], shapes.edge[first_a + i, 1]
+        for k in range(3):
+            da[k] = A[a1, k] - A[a0, k]
+        for j in range(count_b):
+            b0, b1 = shapes.edge[first_b + j, 0], shapes.edge[first_b + j, 1]
+            for k in range(3):
+                db[k] = B[b1, k] - B[b0, k]
+            if not _normal(da, db, n):
+                continue
+            if n[0] * d[0] + n[1] * d[1] + n[2] * d[2] < 0.0:
+                for k in range(3):
+                    n[k] *= -1.0
+            low, high = _least(A, n, 1.0), -_least(B, n, -1.0)
+            if low > high:
+                return -1, low - high
+            at_a = n[0] * A[a0, 0] + n[1] * A[a0, 1] + n[2] * A[a0, 2]
+            at_b = n[0] * B[b0, 0] + n[1] * B[b0, 1] + n[2] * B[b0, 2]
+            if high - low < deepest and at_a - low < off and high - at_b < off:
+                s, t = _nearest(A[a0], da, B[b0], db)
+                if 0.0 <= s <= 1.0 and 0.0 <= t <= 1.0:
+                    found, deepest = i * count_b + j, high - low
+    return found, -1.0
+
+
+@inner
+def crossing(shapes, a, b, number, x, R, plane, point, scratch):
+    """Depth of a pair of edges [m], and whether they still meet between their ends.
+
+    plane, point (3,): set to the normal out of b and to the point of a, both in the frame of a; scratch (8, 3), of
+    which rows 4 and 5 are not used."""
+    count_b = shapes.edge_start[b + 1] - shapes.edge_start[b]
+    ea, eb = shapes.edge_start[a] + number // count_b, shapes.edge_start[b] + number % count_b
+    pa, da, pb, db, n, outward = scratch[0], scratch[1], scratch[2], scratch[3], scratch[6], 0.0
+    _line(shapes, a, ea, R, pa, da)
+    _line(shapes, b, eb, R, pb, db)
+    for k in range(3):
+        pb[k] += x[b, k] - x[a, k]
+    if not _normal(da, db, n):
+        return 0.0, False
+    for k in range(3):
+        for j in range(3):
+            outward += n[k] * (R[b, k, j] * shapes.edge_out[eb, j] - R[a, k, j] * shapes.edge_out[ea, j])
+    sign = 1.0 if outward > 0.0 else -1.0
+    s, t = _nearest(pa, da, pb, db)
+    depth = 0.0
+    for k in range(3):
+        plane[k] = sign * (R[a, 0, k] * n[0] + R[a, 1, k] * n[1] + R[a, 2, k] * n[2])
+        depth += sign * n[k] * (pb[k] - pa[k])
+        point[k] = 0.0
+        for j in range(3):
+            point[k] += R[a, j, k] * (pa[j] + s * da[j])
+    return depth, 0.0 <= s <= 1.0 and 0.0 <= t <= 1.0
+
+
+@inner
+def _line(shapes, a, edge, R, p, d):
+    """Start p and direction d (3,) of an edge, seen from the centre of its block, world axes."""
+    begin = shapes.node_start[a]
+    first, second = begin + shapes.edge[edge, 0], begin + shapes.edge[edge, 1]
+    for k in range(3):
+        p[k] = d[k] = 0.0
+        for j in range(3):
+            p[k] += R[a, k, j] * shapes.node[first, j]
+            d[k] += R[a, k, j] * (shapes.node[second, j] - shapes.node[first, j])
+
+
+@inner
+def _vertices(shapes, a, shift, R, out):
+    """Vertices of a block, turned and moved, in out (k, 3)."""
+    begin, end = shapes.node_start[a], shapes.vertex_end[a]
+    for i in range(end - begin):
+        for k in range(3):
+            out[i, k] = shift[k]
+            for j in range(3):
+                out[i, k] += R[a, k, j] * shapes.node[begin + i, j]
+
+
+@inner
+def _normal(da, db, n):
+    """Unit normal of two directions in n; False where they are nearly parallel."""
+    n[0] = da[1] * db[2] - da[2] * db[1]
+    n[1] = da[2] * db[0] - da[0] * db[2]
+    n[2] = da[0] * db[1] - da[1] * db[0]
+    size = np.sqrt(n[0] ** 2 + n[1] ** 2 + n[2] ** 2)
+    if size < PARALLEL * np.sqrt(_dot(da, da) * _dot(db, db)):
+        return False
+    for k in range(3):
+        n[k] /= size
+    return True
+
+
+@inner
+def _dot(u, w):
+    return u[0] * w[0] + u[1] * w[1] + u[2] * w[2]
+
+
+@inner
+def _least(points, n, sign):
+    """Smallest sign n·p over the points."""
+    least = np.inf
+    for i in range(len(points)):
+        least = min(least, sign * (n[0] * points[i, 0] + n[1] * points[i, 1] + n[2] * points[i, 2]))
+    return least
+
+
+@inner
+def _nearest(pa, da, pb, db):
+    """Where the lines pa + s da and pb + t db are nearest: (s, t)."""
+    aa, bb, ab = _dot(da, da), _dot(db, db), _dot(da, db)
+    ra, rb = _dot(pb, da) - _dot(pa, da), _dot(pb, db) - _dot(pa, db)
+    size = aa * bb - ab * ab
+    return (ra * bb - rb * ab) / size, (ra * ab - rb * aa) / size

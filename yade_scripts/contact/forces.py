@@ -1,0 +1,232 @@
+"""Contact between blocks, and of blocks with fixed planes: candidate pairs, history, forces and their account."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from yade_scripts.blocks.block import Block
+from yade_scripts.blocks.faces import FixedPlane
+from yade_scripts.contact.arrays import Bodies, Law, Pairs, Slots, empty_rows
+from yade_scripts.contact.kernel import carry_slots, contact_forces
+from yade_scripts.contact.law import ContactLaw
+from yade_scripts.contact.nodes import contact_shapes
+from yade_scripts.contact.springs import contact_work
+from yade_scripts.contact.state import Contacts, contacts_of_rows
+from yade_scripts.yade_side.motion import Motion
+
+Array = np.ndarray
+
+
+class ContactForces:
+    """Contacts of the blocks with what `neighbours` says is near.
+
+    blocks, planes: in the scene's coordinates · face_stiffness (n,) K [N/m] · neighbours(now) → (p, 2) pairs of
+    rows whose bounding boxes are close · closing (n,): K of the faces while joints hold them [N/m] · reach [m]: how far
+    a block can move before `neighbours` is asked again
+    free (n,) bool: motion not prescribed.
+
+    Running sums [J]: taken by dashpots, by friction and by springs let go; driving: put in by driven blocks.
+    """
+
+    def __init__(
+        self,
+        blocks: list[Block],
+        planes: list[FixedPlane],
+        law: ContactLaw,
+        face_stiffness: Array,
+        closing: Array,
+        free: Array,
+        motion: Motion,
+        neighbours: Callable[[bool], Array],
+        reach: float,
+    ):
+        self._motion, self._neighbours, self._reach = motion, neighbours, reach
+        self._planes = planes
+        self._n = len(blocks)
+        self._shapes = contact_shapes(blocks, planes, law.nodes_per_edge)
+        names = [b.material for b in blocks] + [p.material for p in planes]
+        materials = sorted(set(names))
+        rows = np.array([materials.index(name) for name in names], np.int64)
+        self._bodies = _bodies(blocks, len(planes), face_stiffness, free, rows)
+        self._law = Law(
+            law.shear_ratio, law.damping_ratio, law.tangential_damping_ratio, law.friction_table(materials)
+        )
+        self._closing = np.concatenate([closing, np.full(len(planes), np.inf)])
+        self._free = np.concatenate([free, np.zeros(len(planes), bool)])
+        self._nodes = np.diff(self._shapes.node_start)
+        self._on = np.zeros(self._n, bool)
+        self._joined = np.zeros(0, np.int64)
+        self._set_pairs(np.zeros((0, 2), np.int64))
+        self._count, self._read = 0, None
+        self.dashpot = self.friction = self.driving = 0.0
+
+    # ---- pairs ----------------------------------------------------------------------------------------------
+
+    def switch_on(self, rows: Array, as_deep: bool = False) -> None:
+        """Blocks that meet others by contact from now on. as_deep: with the depth there is; else counted from here."""
+        self._on[rows] = True
+        self.search(True, as_deep=as_deep)
+
+    def leave_out(self, joined: Array) -> None:
+        """Pairs (p, 2) that live joints hold, in compression too; pairs that were among them before and are no more go
+        on by contact, with the depth there is."""
+        keys = np.unique(self._key(*np.sort(joined, axis=1).T))
+        parted = np.setdiff1d(self._joined, keys)
+        self._joined = keys
+        if len(parted):
+            self.search(True, parted)
+
+    def search(self, now: bool, parted: Array | None = None, as_deep: bool = False) -> None:
+        """Renew the pairs from YADE's last search, or from one made now."""
+        self._set_pairs(_in_order(self._near(now)), parted, as_deep)
+
+    def _key(self, a: Array, b: Array) -> Array:
+        return a * len(self._free) + b
+
+    def _near(self, now: bool) -> Array:
+        """Pairs that may touch before the next search, (p, 2)."""
+        near = self._neighbours(now)
+        near = np.concatenate([near[self._on[near].any(axis=1)], self._near_planes()])
+        near = np.sort(near[self._free[near].any(axis=1)], axis=1)
+        return near[~np.isin(self._key(*near.T), self._joined)]
+
+    def _near_planes(self) -> Array:
+        """Blocks that may reach a plane before the next search, (k, 2)."""
+        rows = np.arange(self._n)
+        radius = self._shapes.radius[rows] + 2.0 * self._reach
+        found = [np.zeros((0, 2), np.int64)]
+        for number, plane in enumerate(self._planes):
+            near = rows[(self._motion.x[rows] - plane.point) @ plane.normal < radius]
+            found.append(np.stack([near, np.full(len(near), self._n + number)], axis=1))
+        return np.concatenate(found)
+
+    def _set_pairs(self, pairs: Array, parted: Array | None = None, as_deep: bool = False) -> None:
+        """Pairs (p, 2) in order; what known pairs remember goes on. Others begin with the depth there is where a joint
+        has parted (keys `parted`) or as_deep."""
+        a, b = pairs.T.copy()
+        size = self._nodes[a] + self._nodes[b] + 1
+        start = np.concatenate([[0], np.cumsum(size)]).astype(np.int64)
+        total = int(start[-1])
+        slots = Slots.empty(total)
+        known, touching = (np.zeros(len(a), bool) for _ in range(2))
+        fresh = np.zeros(len(a))
+        if hasattr(self, "_pairs") and len(self._pairs.a):
+            known = self._carry(a, b, start, fresh, touching, slots)
+        if as_deep:
+            fresh[~known] = 1.0
+        elif parted is not None:
+            begins = ~known & np.isin(self._key(a, b), parted)
+            fresh[begins] = self._joint_share(a[begins], b[begins])
+        self._pairs = Pairs(a, b, start, fresh, touching, np.zeros(len(a)), np.zeros(len(a)))
+        self._slots = slots
+        if not hasattr(self, "_rows") or len(self._rows.a) < total:
+            self._rows = empty_rows(total + total // 4)
+
+    def _joint_share(self, a: Array, b: Array) -> Array:
+        """Stiffness of the joints that held the pairs a, b (k,) over that of their contact."""
+        K = self._bodies.stiffness
+        return (1.0 / K[a] + 1.0 / K[b]) / (1.0 / self._closing[a] + 1.0 / self._closing[b])
+
+    def _carry(self, a, b, start, fresh: Array, touching: Array, slots: Slots) -> Array:
+        """Copy the slots of pairs that were known before; (p,) bool."""
+        old = self._pairs
+        old_keys, keys = self._key(old.a, old.b), self._key(a, b)
+        spot = np.minimum(np.searchsorted(old_keys, keys), len(old_keys) - 1)
+        known = old_keys[spot] == keys
+        fresh[known], touching[known] = old.fresh[spot[known]], old.touching[spot[known]]
+        self.friction += carry_slots(
+            old, self._slots, np.flatnonzero(known), spot[known], start, slots, self._law.shear
+        )
+        return known
+
+    # ---- forces ---------------------------------------------------------------------------------------------
+
+    def add_forces(self, dt: float, F: Array) -> None:
+        """Add the contact forces at the present places to F (n, 6) for a substep of dt [s]."""
+        m = self._motion
+        self._count, lost = contact_forces(
+            self._shapes, self._bodies, self._law, self._pairs, self._slots, m.all_x, m.all_v, m.all_R, dt, m.dt,
+            self._rows, F,
+        )  # fmt: skip
+        self.friction += lost
+        self._read = None
+
+    def settle(self, dt: float) -> None:
+        """Book the work of the contacts over the substep that has just ended."""
+        dashpot, driving = contact_work(self._rows, self._count, self._motion.all_v, ~self._free, dt)
+        self.dashpot += dashpot
+        self.driving += driving
+
+    def now(self) -> Contacts:
+        """Contacts at the present places, found afresh after `moved`."""
+        if self._read is None:
+            self.add_forces(0.0, np.zeros((self._n, 6)))
+            self._read = contacts_of_rows(self._rows, self._count, self._n)
+        return self._read
+
+    def deepest(self) -> tuple[Array, Array, Array]:
+        """Pairs that overlap: blocks a (p,) and b (p,), -1 - number for a fixed plane, and the way that parts them
+        (p,) [m]."""
+        self.now()
+        pairs = self._pairs
+        on = np.flatnonzero(pairs.overlap > 0.0)
+        b = pairs.b[on]
+        return pairs.a[on], np.where(b < self._n, b, self._n - 1 - b), pairs.overlap[on]
+
+    def moved(self) -> None:
+        """Places have changed since the last evaluation."""
+        self._read = None
+
+    # ---- saving and going back ------------------------------------------------------------------------------
+
+    def save(self) -> dict[str, Array]:
+        """History of the contacts there are, and the sums."""
+        self.now()  # contacts that are to take over from joints begin here, not after the way back
+        index = np.flatnonzero(self._slots.face >= 0)
+        pair = np.searchsorted(self._pairs.start, index, side="right") - 1
+        return {
+            "on": self._on.copy(),
+            "joined": self._joined.copy(),
+            "a": self._pairs.a[pair],
+            "b": self._pairs.b[pair],
+            "node": index - self._pairs.start[pair],
+            "face": self._slots.face[index],
+            "k": self._slots.k[index],
+            "rest": self._slots.rest[index],
+            "shear": self._slots.shear[index],
+            "spread": self._slots.spread[index],
+            "push": self._slots.push[index],
+            "speed": self._slots.speed[index],
+            "sums": np.array([self.dashpot, self.friction, self.driving]),
+        }
+
+    def restore(self, saved: dict[str, Array]) -> None:
+        """Back to a saved state, the blocks being where they were then."""
+        self._on[:], self._joined = saved["on"], saved["joined"].copy()
+        self._set_pairs(np.zeros((0, 2), np.int64))
+        in_contact = np.stack([saved["a"], saved["b"]], axis=1)
+        self._set_pairs(_in_order(np.concatenate([self._near(now=True), in_contact])))
+        pair = np.searchsorted(self._key(self._pairs.a, self._pairs.b), self._key(saved["a"], saved["b"]))
+        slot = self._pairs.start[pair] + saved["node"]
+        self._pairs.touching[pair] = True
+        for name in Slots._fields:
+            getattr(self._slots, name)[slot] = saved[name]
+        self.dashpot, self.friction, self.driving = saved["sums"].tolist()
+        self._read = None
+
+
+def _in_order(pairs: Array) -> Array:
+    """Pairs (p, 2) with the smaller row first, sorted, each once."""
+    return np.unique(np.sort(pairs, axis=1), axis=0)
+
+
+def _bodies(blocks, planes: int, face_stiffness: Array, free: Array, material: Array) -> Bodies:
+    inverse_mass = np.array([1.0 / b.mass if f else 0.0 for b, f in zip(blocks, free)] + [0.0] * planes)
+    inverse_inertia = np.zeros((len(blocks) + planes, 3, 3))
+    for row, block in enumerate(blocks):
+        if free[row]:
+            inverse_inertia[row] = np.linalg.inv(block.inertia)
+    stiffness = np.concatenate([face_stiffness, np.full(planes, np.inf)])
+    return Bodies(inverse_mass, inverse_inertia, stiffness, material)

@@ -1,0 +1,98 @@
+"""The loop over pairs of blocks that are near: places and velocities of the blocks → contact forces and what they take.
+
+A node of block a inside block b, behind its face f, is a contact: normal n out of f, depth δ = offset - n·y with y the
+node in the frame of b. `contact_search` finds them, `contact_springs` says what they do; edges that cross are in
+`contact_edges`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from yade_scripts.contact.edges import pair_scratch
+from yade_scripts.contact.search import closing_bound, cross, planes_seen_from, scan, separation
+from yade_scripts.contact.springs import Mode, apply, set_dashpots
+
+CROSSING = 0.5
+"""Overlap of crossing edges over that of faces below which nodes that touch leave the contact to the edges as well."""
+
+
+@njit(cache=True)
+def contact_forces(shapes, bodies, law, pairs, slots, x, v, R, dt, last_dt, rows, F):
+    """Find the contacts at the present places and add their forces to F (n, 6).
+
+    dt [s]: substep to come, 0: only look · last_dt [s]: substep that led here
+    → (contacts, work of friction and of springs that were let go [J])
+    """
+    count, lost = 0, 0.0
+    planes, scratch = np.empty((np.diff(shapes.face_start).max(), 4)), pair_scratch(shapes)
+    for p in range(len(pairs.a)):
+        a, b = pairs.a[p], pairs.b[p]
+        if pairs.calm[p] > 0.0:
+            pairs.calm[p] -= last_dt * closing_bound(v, a, b, shapes.radius[a], shapes.radius[b])
+            if pairs.calm[p] > 0.0:
+                continue
+        first, apart = count, -np.inf
+        for node_body, face_body in ((a, b), (b, a)):
+            begin, end = shapes.node_start[node_body], shapes.node_start[node_body + 1]
+            if begin == end:
+                continue
+            faces = planes_seen_from(
+                shapes.face_start, shapes.normal, shapes.offset, node_body, face_body, x, R, planes
+            )
+            margin = min(shapes.margin[node_body], shapes.margin[face_body])
+            gap, nearest = separation(shapes.node, begin, shapes.vertex_end[node_body], planes, faces)
+            apart = max(apart, gap)
+            if gap <= margin or pairs.touching[p]:
+                slot = pairs.start[p] if node_body == a else pairs.start[p + 1] - 1 - (end - begin)
+                count, lost = scan(
+                    shapes, bodies, law.shear, slots, slot, pairs.fresh[p], node_body, face_body, planes, faces,
+                    nearest, margin, x, v, R, last_dt, rows, count, lost, scratch,
+                )  # fmt: skip
+        last = pairs.start[p + 1] - 1
+        if slots.face[last] >= 0 or (
+            apart < 0.0 and b < len(F) and (count == first or not pairs.touching[p])
+        ):
+            deepest = -apart if count == first else -CROSSING * apart
+            count, lost, parted = cross(
+                shapes, bodies, law.shear, slots, last, pairs.fresh[p], a, b, deepest, x, v, R, last_dt, rows, count,
+                lost, scratch,
+            )  # fmt: skip
+            apart = max(apart, parted)
+        pairs.overlap[p] = max(0.0, -apart)
+        if slots.face[last] >= 0:
+            pairs.overlap[p] = min(pairs.overlap[p], rows.depth[count - 1] + slots.rest[last])
+        pairs.fresh[p], pairs.touching[p] = 0.0, count > first
+        if count > first:
+            yields, K = set_dashpots(bodies, law, a, b, R, rows, first, count, scratch)
+            mode = Mode(law.zeta, np.sqrt(yields * K))
+            lost += apply(slots, v, R, dt, last_dt, mode, a, rows, first, count, F, scratch)
+        pairs.calm[p] = apart if count == first else 0.0
+    return count, lost
+
+
+@njit(cache=True)
+def carry_slots(old_pairs, old, new_index, old_index, start, new, shear):
+    """Copy the memory of pairs old_index to pairs new_index; → energy of contacts in pairs that are no more [J]."""
+    kept = np.zeros(len(old_pairs.a), np.bool_)
+    for i in range(len(new_index)):
+        p, q = new_index[i], old_index[i]
+        kept[q] = True
+        for s in range(start[p + 1] - start[p]):
+            to, source = start[p] + s, old_pairs.start[q] + s
+            new.face[to] = old.face[source]
+            new.k[to] = old.k[source]
+            new.rest[to] = old.rest[source]
+            new.shear[to] = old.shear[source]
+            new.spread[to] = old.spread[source]
+            new.push[to] = old.push[source]
+            new.speed[to] = old.speed[source]
+    lost = 0.0
+    for q in range(len(kept)):
+        if not kept[q]:
+            for s in range(old_pairs.start[q], old_pairs.start[q + 1]):
+                if old.face[s] >= 0:
+                    held = old.shear[s, 0] ** 2 + old.shear[s, 1] ** 2 + old.shear[s, 2] ** 2
+                    lost += 0.5 * held / (shear * old.k[s])
+    return lost

@@ -1,0 +1,205 @@
+"""Which nodes of a block are behind which faces of another, and how deep: the contacts of one pair.
+
+A contact keeps its face until the node leaves b. Where a node appears deep inside (from the side, or past an edge) its
+depth counts from there on, so that no contact begins with a force: contacts add no energy when they begin.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from yade_scripts.contact.arrays import BEGINS
+from yade_scripts.contact.edges import crossing, find_crossing
+from yade_scripts.contact.jit import inner
+from yade_scripts.contact.springs import ARRIVED, let_go, stiffness_together, take_over, way_of
+
+ALIGNED = 0.02
+"""Least cosine between a face and the opposite of one that holds the node: others cannot be what it ran into."""
+SHALLOW = 2.0
+"""Depth in margins up to which a node beside a face counts as on it."""
+
+
+@inner
+def closing_bound(v, a, b, radius_a, radius_b):
+    """Upper bound of the speed at which points of two bodies approach [m/s]; planes (radius inf) stand still."""
+    linear = turn_a = turn_b = 0.0
+    for k in range(3):
+        linear += (v[a, k] - v[b, k]) ** 2
+        turn_a += v[a, 3 + k] ** 2
+        turn_b += v[b, 3 + k] ** 2
+    speed = np.sqrt(linear) + np.sqrt(turn_a) * radius_a
+    return speed + np.sqrt(turn_b) * radius_b if turn_b > 0.0 else speed
+
+
+@inner
+def planes_seen_from(face_start, normal, offset, a, b, x, R, planes):
+    """Face planes of b in the frame of a: depth of a point ξ of a behind face g is d - m·ξ, planes (g, 4) = (m, d).
+
+    → number of faces"""
+    first = face_start[b]
+    count = face_start[b + 1] - first
+    for g in range(count):
+        n0, n1, n2 = normal[first + g, 0], normal[first + g, 1], normal[first + g, 2]
+        w0 = R[b, 0, 0] * n0 + R[b, 0, 1] * n1 + R[b, 0, 2] * n2
+        w1 = R[b, 1, 0] * n0 + R[b, 1, 1] * n1 + R[b, 1, 2] * n2
+        w2 = R[b, 2, 0] * n0 + R[b, 2, 1] * n1 + R[b, 2, 2] * n2
+        for j in range(3):
+            planes[g, j] = R[a, 0, j] * w0 + R[a, 1, j] * w1 + R[a, 2, j] * w2
+        between = w0 * (x[a, 0] - x[b, 0]) + w1 * (x[a, 1] - x[b, 1]) + w2 * (x[a, 2] - x[b, 2])
+        planes[g, 3] = offset[first + g] - between
+    return count
+
+
+@inner
+def separation(node, begin, end, planes, faces):
+    """Largest distance of all nodes begin .. end before one plane [m], and that plane: two bodies are at least that far
+    apart. The vertices are enough."""
+    best, witness = -np.inf, 0
+    for g in range(faces):
+        m0, m1, m2 = planes[g, 0], planes[g, 1], planes[g, 2]
+        nearest = np.inf
+        for i in range(begin, end):
+            nearest = min(nearest, m0 * node[i, 0] + m1 * node[i, 1] + m2 * node[i, 2])
+        if nearest - planes[g, 3] > best:
+            best, witness = nearest - planes[g, 3], g
+    return best, witness
+
+
+@inner
+def scan(
+    shapes,
+    bodies,
+    shear,
+    slots,
+    slot,
+    fresh,
+    a,
+    b,
+    planes,
+    faces,
+    nearest,
+    margin,
+    x,
+    v,
+    R,
+    last_dt,
+    rows,
+    count,
+    lost,
+    scratch,
+):
+    """Contacts of the nodes of a with the faces of b; contacts that ended leave their springs' energy in `lost`.
+
+    Most nodes are outside the plane `nearest`, so it is asked first."""
+    begin, base, way = shapes.node_start[a], shapes.face_start[b], scratch[6:8]
+    for i in range(begin, shapes.node_start[a + 1]):
+        s = slot + i - begin
+        xi0, xi1, xi2 = shapes.node[i, 0], shapes.node[i, 1], shapes.node[i, 2]
+        smallest = _behind(planes, nearest, xi0, xi1, xi2)
+        for g in range(faces):
+            if smallest < -margin:
+                break
+            smallest = min(smallest, _behind(planes, g, xi0, xi1, xi2))
+        g = slots.face[s] - base if slots.face[s] >= 0 else -1
+        if g >= 0:
+            depth = _behind(planes, g, xi0, xi1, xi2)
+            if depth <= 0.0 or smallest < -margin:
+                way_of(v, R, x, a, b, xi0, xi1, xi2, planes[g], last_dt, scratch, way)
+                lost += let_go(slots, s, shear, depth, way, R, b)
+                continue
+        elif smallest < -margin:
+            continue
+        else:
+            g, own = _entered(
+                shapes.of_start, shapes.of, shapes.normal, i, xi0, xi1, xi2, planes, faces, smallest, margin
+            )
+            if g < 0:
+                continue
+            depth = _behind(planes, g, xi0, xi1, xi2)
+            slots.face[s] = base + g
+            slots.k[s] = stiffness_together(bodies.stiffness[a], bodies.stiffness[b]) / shapes.face_nodes[own]
+            slots.spread[s] = shapes.face_spread[own]
+            slots.shear[s, 0] = slots.shear[s, 1] = slots.shear[s, 2] = 0.0
+            slots.push[s] = BEGINS
+            way_of(v, R, x, a, b, xi0, xi1, xi2, planes[g], last_dt, scratch, way)
+            if fresh > 0.0:
+                lost += take_over(slots, s, fresh, depth, way[1, 0])
+            else:
+                slots.rest[s] = max(0.0, depth - ARRIVED * max(way[1, 0], 0.0))
+        slots.rest[s] = min(slots.rest[s], depth)
+        _write_row(rows, count, a, b, s, planes[g], depth, xi0, xi1, xi2, x, R)
+        rows.depth[count], rows.kn[count] = depth - slots.rest[s], slots.k[s]
+        count += 1
+    return count, lost
+
+
+@inner
+def cross(
+    shapes, bodies, shear, slots, s, fresh, a, b, deepest, x, v, R, last_dt, rows, count, lost, scratch
+):  # fmt: skip
+    """Contact of an edge of a with one of b, known or new; the third result parts the blocks if it is positive [m]."""
+    plane, xi, way = scratch[4], scratch[5], scratch[6:8]
+    known = slots.face[s] >= 0
+    if not known:
+        slots.face[s], parted = find_crossing(shapes, a, b, x, R, deepest, scratch)
+        if slots.face[s] < 0:
+            return count, lost, parted
+    depth, meet = crossing(shapes, a, b, slots.face[s], x, R, plane, xi, scratch)
+    if not meet or depth <= 0.0:
+        if known:
+            way_of(v, R, x, a, b, xi[0], xi[1], xi[2], plane, last_dt, scratch, way)
+            lost += let_go(slots, s, shear, depth, way, R, b)
+        slots.face[s] = -1
+        return count, lost, -1.0
+    if not known:
+        slots.k[s], slots.spread[s] = stiffness_together(bodies.stiffness[a], bodies.stiffness[b]), 1.0
+        slots.shear[s, 0] = slots.shear[s, 1] = slots.shear[s, 2] = 0.0
+        slots.push[s] = BEGINS
+        way_of(v, R, x, a, b, xi[0], xi[1], xi[2], plane, last_dt, scratch, way)
+        if fresh > 0.0:
+            lost += take_over(slots, s, fresh, depth, way[1, 0])
+        else:
+            slots.rest[s] = max(0.0, depth - ARRIVED * max(way[1, 0], 0.0))
+    slots.rest[s] = min(slots.rest[s], depth)
+    _write_row(rows, count, a, b, s, plane, depth, xi[0], xi[1], xi[2], x, R)
+    rows.depth[count], rows.kn[count] = depth - slots.rest[s], slots.k[s]
+    return count + 1, lost, -1.0
+
+
+@inner
+def _behind(planes, g, xi0, xi1, xi2):
+    """Depth of the point ξ behind a plane [m]."""
+    return planes[g, 3] - planes[g, 0] * xi0 - planes[g, 1] * xi1 - planes[g, 2] * xi2
+
+
+@inner
+def _entered(of_start, of, normal, i, xi0, xi1, xi2, planes, faces, smallest, margin):
+    """Face g of b that node i of a is behind, and the face of a opposite; -1 if it is outside.
+
+    Of the faces that the node can have run into, the nearest; one that the node is still before keeps it outside."""
+    face, own, best = -1, -1, np.inf
+    for g in range(faces):
+        depth = _behind(planes, g, xi0, xi1, xi2)
+        if depth >= best:
+            continue
+        cosine = ALIGNED
+        for at in range(of_start[i], of_start[i + 1]):
+            f = of[at]
+            c = -(planes[g, 0] * normal[f, 0] + planes[g, 1] * normal[f, 1] + planes[g, 2] * normal[f, 2])
+            if c > cosine:
+                cosine, face, own, best = c, g, f, depth
+    if best <= 0.0 or (smallest < 0.0 and best > SHALLOW * margin):
+        return -1, -1
+    return face, own
+
+
+@inner
+def _write_row(rows, c, a, b, s, plane, depth, xi0, xi1, xi2, x, R):
+    """Geometry of a contact: half way between the node ξ and the face."""
+    rows.a[c], rows.b[c], rows.slot[c] = a, b, s
+    for k in range(3):
+        n = R[a, k, 0] * plane[0] + R[a, k, 1] * plane[1] + R[a, k, 2] * plane[2]
+        arm = R[a, k, 0] * xi0 + R[a, k, 1] * xi1 + R[a, k, 2] * xi2 + 0.5 * depth * n
+        rows.normal[c, k], rows.arm_a[c, k] = n, arm
+        rows.point[c, k] = x[a, k] + arm
+        rows.arm_b[c, k] = rows.point[c, k] - x[b, k]

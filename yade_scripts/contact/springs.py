@@ -1,0 +1,374 @@
+"""Springs, dashpots and friction of contacts that were found: their forces, and what these take.
+
+The force on a at the middle of node and face is
+
+    N n + S,   N = max(0, k δ + c δ'),   S: spring k_t over the slip, |S| ≤ μ N, dashpot c_t while it sticks,
+
+with -(N n + S) on b, so momentum is exact. S is kept in the frame of b, where n does not turn.
+
+A force that acts over a substep of dt is the mean of N over it (`normal_force`), to the second order in dt: the speed
+δ' is that at the time of δ, and where contact begins or ends within the substep only the part in contact counts.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from yade_scripts.contact.arrays import BEGINS
+from yade_scripts.contact.jit import inner
+
+SHARP = 1e-3
+"""Sum of the normals of a pair below which they have no mean direction."""
+ARRIVED = 1.5
+"""Depth in paths of one substep up to which a node counts as having come through the face."""
+ENDS = 2.1
+"""Forces up to this many halves of their fall in a substep end within the next one. (At 2 they end with it; the rest
+covers the curvature.)"""
+CATCH_UP = 0.7
+"""Speed in ω times the depth of free flight ahead of the oscillator's that leaves restitution within 0.001 (by
+integrating an impact at substeps of 0.05 to 0.2/ω, e of 0.05 to 1, any time of touch)."""
+TERMS = 12
+"""Of the series of `since_touch`."""
+
+
+class Mode(NamedTuple):
+    """How a pair moves against its contacts: damping ratio ζ and ω = sqrt(K/m) [rad/s] of all of them together."""
+
+    zeta: float
+    omega: float
+
+
+@inner
+def set_dashpots(bodies, law, a, b, R, rows, first, count, scratch):
+    """Dashpots of all contacts of a pair, c = 2 ζ sqrt(m K) k/K with K = Σ k and the effective mass m at their middle.
+
+    So a face, an edge and a corner that land all return e. scratch (5, 3): work space, its first two rows are
+    set to the middle of the contacts seen from a and from b   →   (1/m [1/kg], K [N/m])"""
+    K, middle_a, middle_b, n, u, axis = 0.0, scratch[0], scratch[1], scratch[2], scratch[3], scratch[4]
+    for i in range(3):
+        middle_a[i] = middle_b[i] = n[i] = 0.0
+    for c in range(first, count):
+        k, same = rows.kn[c], rows.a[c] == a
+        K += k
+        for i in range(3):
+            middle_a[i] += k * (rows.arm_a[c, i] if same else rows.arm_b[c, i])
+            middle_b[i] += k * (rows.arm_b[c, i] if same else rows.arm_a[c, i])
+            n[i] += k * (rows.normal[c, i] if same else -rows.normal[c, i])
+    length = np.sqrt(n[0] ** 2 + n[1] ** 2 + n[2] ** 2) / K
+    if length > SHARP:
+        for i in range(3):
+            n[i] /= K * length
+    else:
+        for i in range(3):
+            n[i] = rows.normal[first, i]
+    for i in range(3):
+        middle_a[i] /= K
+        middle_b[i] /= K
+    across = bodies.inverse_mass[a] + bodies.inverse_mass[b]
+    normal = across + _turning(bodies, a, R, middle_a, n, u) + _turning(bodies, b, R, middle_b, n, u)
+    cn = 2.0 * law.zeta / np.sqrt(normal * K)
+    ct = np.sqrt(law.shear) * cn
+    if law.zeta_t >= 0.0:
+        trace = _all_turning(bodies, a, R, middle_a, axis, u) + _all_turning(bodies, b, R, middle_b, axis, u)
+        tangential = across + 0.5 * (trace - (normal - across))
+        ct = 2.0 * law.zeta_t * np.sqrt(law.shear) / np.sqrt(tangential * K)
+    for c in range(first, count):
+        rows.cn[c], rows.ct[c] = cn * rows.kn[c], ct * rows.kn[c]
+        rows.kt[c] = law.shear * rows.kn[c]
+        rows.mu[c] = law.friction[bodies.material[rows.a[c]], bodies.material[rows.b[c]]]
+    return normal, K
+
+
+@inner
+def _turning(bodies, a, R, arm, n, u):
+    """(r x n)·I⁻¹(r x n) [1/kg]: how much a body yields by turning under a force along n at the arm r; u (3,): work
+    space."""
+    t0, t1, t2 = arm[1] * n[2] - arm[2] * n[1], arm[2] * n[0] - arm[0] * n[2], arm[0] * n[1] - arm[1] * n[0]
+    for k in range(3):
+        u[k] = R[a, 0, k] * t0 + R[a, 1, k] * t1 + R[a, 2, k] * t2
+    total = 0.0
+    for i in range(3):
+        for j in range(3):
+            total += u[i] * bodies.inverse_inertia[a, i, j] * u[j]
+    return total
+
+
+@inner
+def _all_turning(bodies, a, R, arm, axis, u):
+    """Sum of `_turning` over three axes; axis, u (3,): work space."""
+    total = 0.0
+    for k in range(3):
+        for i in range(3):
+            axis[i] = 1.0 if i == k else 0.0
+        total += _turning(bodies, a, R, arm, axis, u)
+    return total
+
+
+@inner
+def apply(slots, v, R, dt, last_dt, mode, pair_a, rows, first, count, F, scratch):
+    """Forces of the contacts first .. count of a pair on F; → work of friction [J]. scratch (6, 3): work space,
+    its first two rows the middles of the contacts seen from both blocks; pair_a: the first of these.
+
+    Work of friction: the way slipped times the mean of the forces before and after it, which is what the leapfrog
+    takes.
+    A spring that began within the last substep is stretched for the time since it touched only, and pulls for half of
+    that and half a substep.
+    dt [s]: substep to come, 0: only look, nothing is remembered · last_dt [s]: substep that led here."""
+    lost, w, S, n, old = 0.0, scratch[2], scratch[3], scratch[4], scratch[5]
+    for c in range(first, count):
+        a, b, s = rows.a[c], rows.b[c], rows.slot[c]
+        w[0], w[1], w[2] = slip(v, a, b, rows.arm_a[c], rows.arm_b[c])
+        for k in range(3):
+            n[k] = rows.normal[c, k]
+        wn = w[0] * n[0] + w[1] * n[1] + w[2] * n[2]
+        if count - first > 1 and slots.spread[s] < 1.0:
+            middle = scratch[0] if a == pair_a else scratch[1]
+            set_shift(rows, c, middle, slots.spread[s] - 1.0)
+            turn_slip(v, a, b, rows.shift[c], n, w)
+        else:
+            rows.shift[c, 0] = rows.shift[c, 1] = rows.shift[c, 2] = 0.0
+        touched = dt
+        if dt == 0.0:
+            N = max(0.0, rows.kn[c] * rows.depth[c] - rows.cn[c] * wn)
+        else:
+            if slots.push[s] == BEGINS and wn < 0.0:
+                touched = min(dt, rows.depth[c] / -wn)
+            N = normal_force(slots, s, rows, c, -wn, dt, last_dt, mode)
+        spring = rows.kn[c] * rows.depth[c]
+        size = before = 0.0
+        rows.held[c] = 0.0
+        for k in range(3):
+            rows.velocity[c, k] = w[k]
+            old[k] = (
+                R[b, k, 0] * slots.shear[s, 0]
+                + R[b, k, 1] * slots.shear[s, 1]
+                + R[b, k, 2] * slots.shear[s, 2]
+            )
+            S[k] = old[k] - touched * rows.kt[c] * (w[k] - wn * n[k])
+            rows.held[c] += 0.5 * old[k] * (old[k] / rows.kt[c] - last_dt * (w[k] - wn * n[k]))
+            size += S[k] ** 2
+            before += S[k] * old[k]
+        size, limit = np.sqrt(size), rows.mu[c] * N
+        sticks = size < limit
+        if not sticks and size > 0.0:
+            lost += 0.5 * (limit + before / size) * (size - limit) / rows.kt[c]
+            for k in range(3):
+                S[k] *= limit / size
+                lost -= 0.5 * (dt - touched) * S[k] * w[k]
+        share = 0.5 * (1.0 + touched / dt) if sticks and dt > 0.0 else 1.0
+        for k in range(3):
+            viscous = -rows.ct[c] * (w[k] - wn * n[k]) if sticks else 0.0
+            rows.shear[c, k] = S[k]
+            rows.viscous[c, k] = viscous + (N - spring) * n[k]
+            rows.force[c, k] = spring * n[k] + share * S[k] + rows.viscous[c, k]
+        if not sticks:
+            rows.ct[c] = 0.0
+        if dt > 0.0:
+            for k in range(3):
+                slots.shear[s, k] = R[b, 0, k] * S[0] + R[b, 1, k] * S[1] + R[b, 2, k] * S[2]
+        for k in range(3):
+            S[k] = rows.force[c, k] - N * n[k]
+        _add(F, a, 1.0, rows.force[c], rows.arm_a[c], S, rows.shift[c])
+        _add(F, b, -1.0, rows.force[c], rows.arm_b[c], S, rows.shift[c])
+    return lost if dt > 0.0 else 0.0
+
+
+@inner
+def set_shift(rows, c, middle, share):
+    """Set the way from a contact to where it rubs: along the face, `share` of its arm from the middle (3,) of all
+    contacts of the pair, seen from the block of the node."""
+    across = 0.0
+    for k in range(3):
+        rows.shift[c, k] = share * (rows.arm_a[c, k] - middle[k])
+        across += rows.shift[c, k] * rows.normal[c, k]
+    for k in range(3):
+        rows.shift[c, k] -= across * rows.normal[c, k]
+
+
+@inner
+def turn_slip(v, a, b, shift, n, w):
+    """Take the velocity w (3,) of a against b to a place `shift` further along the face; its part along n stays."""
+    w0 = (v[a, 4] - v[b, 4]) * shift[2] - (v[a, 5] - v[b, 5]) * shift[1]
+    w1 = (v[a, 5] - v[b, 5]) * shift[0] - (v[a, 3] - v[b, 3]) * shift[2]
+    w2 = (v[a, 3] - v[b, 3]) * shift[1] - (v[a, 4] - v[b, 4]) * shift[0]
+    along = w0 * n[0] + w1 * n[1] + w2 * n[2]
+    w[0] += w0 - along * n[0]
+    w[1] += w1 - along * n[1]
+    w[2] += w2 - along * n[2]
+
+
+@inner
+def normal_force(slots, s, rows, c, closing, dt, last_dt, mode):
+    """Mean of N over the substep of dt around the present time [N]; closing [m/s]: speed half a substep ago.
+
+    A contact that has begun in the last substep moves as a linear oscillator since then; that its depth is of a free
+    flight is made good by a lower speed. Later the speed at the present
+    time is w + (w - w')/2 + (N' - N) dt/(2 m), w' and N' of the substep before, which makes
+
+        N = [k δ + c (3 w - w')/2 + q N']/(1 + q),   q = c dt/(2 m) = ζ ω dt.
+
+    Where N falls to zero before the end of the next substep, its straight fall is what is left to push."""
+    k, depth = rows.kn[c], rows.depth[c]
+    if slots.push[s] == BEGINS:
+        if 0.0 < depth <= 1.01 * ARRIVED * last_dt * closing:
+            path, _ = since_touch(mode.zeta, mode.omega * depth / closing)
+            _, speed = since_touch(mode.zeta, mode.omega * (depth / closing + 0.5 * dt))
+            ahead = depth - path * closing / mode.omega
+            N = k * (closing * (1.0 - speed) + CATCH_UP * mode.omega * ahead) / (mode.omega**2 * dt)
+        else:
+            N = max(0.0, k * depth + rows.cn[c] * closing)
+        slots.push[s] = N
+    else:
+        q, push = mode.zeta * mode.omega * dt, slots.push[s]
+        N = (k * depth + rows.cn[c] * (1.5 * closing - 0.5 * slots.speed[s]) + q * push) / (1.0 + q)
+        N = max(N, 0.0)
+        slots.push[s] = N
+        fall = 0.5 * (push - N)
+        if 0.0 < N < ENDS * fall:
+            N = 0.25 * (N + fall) ** 2 / fall
+            slots.push[s] = 0.0
+    slots.speed[s] = closing
+    return N
+
+
+@inner
+def since_touch(zeta, phase):
+    """Depth in v/ω and speed in v of a mass with spring and dashpot that touched with v at the phase ωt = 0.
+
+    Power series of u'' + 2 ζ u' + u = 0."""
+    slope, bend, term = 1.0, -2.0 * zeta, 1.0
+    path = 0.0
+    speed = 0.0
+    for i in range(TERMS):
+        speed += slope * term
+        term *= phase / (i + 1.0)
+        path += slope * term
+        slope, bend = bend, -2.0 * zeta * bend - slope
+    return path, speed
+
+
+@inner
+def _add(F, row, sign, force, arm, shear, shift):
+    """Force and its moment about the centre, of which the part `shear` acts `shift` further on; F has rows for blocks
+    only."""
+    if row >= len(F):
+        return
+    f0, f1, f2 = sign * force[0], sign * force[1], sign * force[2]
+    F[row, 0] += f0
+    F[row, 1] += f1
+    F[row, 2] += f2
+    s0, s1, s2 = sign * shear[0], sign * shear[1], sign * shear[2]
+    F[row, 3] += arm[1] * f2 - arm[2] * f1 + shift[1] * s2 - shift[2] * s1
+    F[row, 4] += arm[2] * f0 - arm[0] * f2 + shift[2] * s0 - shift[0] * s2
+    F[row, 5] += arm[0] * f1 - arm[1] * f0 + shift[0] * s1 - shift[1] * s0
+
+
+@njit(cache=True)
+def contact_work(rows, count, v, given, dt):
+    """Work of the contacts over the substep that ended with velocities v (n+m, 6): F·(w⁻ + w⁺)/2 dt is the exact change
+    of kinetic energy in the leapfrog. given (n+m,) bool: bodies of prescribed motion.
+
+    Springs hold energy from the time at which they touch until they part: what the leapfrog counts beyond these, in the
+    substeps in which they do, is taken back.
+
+    → (taken by dashpots, put in by what moves the driven bodies) [J]
+    """
+    dashpot = driving = 0.0
+    w = np.empty(3)
+    for c in range(count):
+        a, b = rows.a[c], rows.b[c]
+        w[0], w[1], w[2] = slip(v, a, b, rows.arm_a[c], rows.arm_b[c])
+        turn_slip(v, a, b, rows.shift[c], rows.normal[c], w)
+        came = goes = 0.0
+        for k in range(3):
+            dashpot -= 0.5 * rows.viscous[c, k] * (rows.velocity[c, k] + w[k]) * dt
+            came -= rows.velocity[c, k] * rows.normal[c, k] * dt
+            goes -= w[k] * rows.normal[c, k] * dt
+        depth = rows.depth[c]
+        dashpot += 0.5 * rows.kn[c] * depth * (min(depth + goes, 0.0) - min(depth - came, 0.0))
+        if given[a]:
+            driving -= _power(rows, c, rows.arm_a[c], v[a]) * dt
+        if given[b]:
+            driving += _power(rows, c, rows.arm_b[c], v[b]) * dt
+    return dashpot, driving
+
+
+@inner
+def _power(rows, c, arm, v):
+    """Power of the force on a of a contact at its place on a body that moves with v (6,) [W]."""
+    f, n, shift = rows.force[c], rows.normal[c], rows.shift[c]
+    N = f[0] * n[0] + f[1] * n[1] + f[2] * n[2]
+    u0 = v[0] + v[4] * arm[2] - v[5] * arm[1]
+    u1 = v[1] + v[5] * arm[0] - v[3] * arm[2]
+    u2 = v[2] + v[3] * arm[1] - v[4] * arm[0]
+    s0 = (f[0] - N * n[0]) * (v[4] * shift[2] - v[5] * shift[1])
+    s1 = (f[1] - N * n[1]) * (v[5] * shift[0] - v[3] * shift[2])
+    s2 = (f[2] - N * n[2]) * (v[3] * shift[1] - v[4] * shift[0])
+    return f[0] * u0 + f[1] * u1 + f[2] * u2 + s0 + s1 + s2
+
+
+@inner
+def slip(v, a, b, arm_a, arm_b):
+    """Velocity of a against b at a point, given from both centres, as three floats."""
+    w0 = v[a, 0] + v[a, 4] * arm_a[2] - v[a, 5] * arm_a[1]
+    w1 = v[a, 1] + v[a, 5] * arm_a[0] - v[a, 3] * arm_a[2]
+    w2 = v[a, 2] + v[a, 3] * arm_a[1] - v[a, 4] * arm_a[0]
+    w0 -= v[b, 0] + v[b, 4] * arm_b[2] - v[b, 5] * arm_b[1]
+    w1 -= v[b, 1] + v[b, 5] * arm_b[0] - v[b, 3] * arm_b[2]
+    w2 -= v[b, 2] + v[b, 3] * arm_b[1] - v[b, 4] * arm_b[0]
+    return w0, w1, w2
+
+
+@inner
+def stiffness_together(K_a, K_b):
+    """Stiffness of a face of a against b [N/m].
+
+    Both faces carry nodes where two blocks meet, and their springs are in series; a plane is rigid."""
+    return K_a * K_b / (K_a + K_b) if K_b < np.inf else K_a
+
+
+@inner
+def take_over(slots, s, share, depth, into):
+    """Begin a contact at the depth there is [m], where a spring of `share` of its stiffness held until now: with the
+    force that this had, or the depth there is where contact is softer; → what of its energy is lost [J], half a substep
+    ago.
+
+    into [m]: of `way_of` over the last substep. A stiffer spring that took on all of the depth would push the blocks
+    apart with energy from nowhere."""
+    u = min(share, 1.0) * depth
+    slots.rest[s] = depth - u
+    return 0.5 * slots.k[s] * (share * depth * max(depth - into, 0.0) - u * max(u - into, 0.0))
+
+
+@inner
+def let_go(slots, s, shear, depth, way, R, b):
+    """End a contact; what its springs still held is lost [J], half a substep ago.
+
+    depth [m]: now · way (2, 3) [m]: of `way_of` over the last substep: the springs were stretched by that much less."""
+    u, k_t, left = max(depth - slots.rest[s], 0.0), shear * slots.k[s], 0.0
+    for k in range(3):
+        S = R[b, k, 0] * slots.shear[s, 0] + R[b, k, 1] * slots.shear[s, 1] + R[b, k, 2] * slots.shear[s, 2]
+        left += 0.5 * S * (S / k_t - way[0, k])
+    into = way[1, 0]
+    left += 0.5 * slots.k[s] * u * max(u - into, 0.0)
+    slots.face[s], slots.rest[s] = -1, 0.0
+    return left
+
+
+@inner
+def way_of(v, R, x, a, b, xi0, xi1, xi2, plane, dt, scratch, way):
+    """Set way[0] [m] to what a point ξ of a moves along a face of b in dt, way[1, 0] to what it moves into the face;
+    the normal of the face in the frame of a is plane[:3]. scratch (3, 3)."""
+    arm, point, n = scratch[0], scratch[1], scratch[2]
+    for k in range(3):
+        arm[k] = R[a, k, 0] * xi0 + R[a, k, 1] * xi1 + R[a, k, 2] * xi2
+        point[k] = x[a, k] + arm[k] - x[b, k]
+        n[k] = R[a, k, 0] * plane[0] + R[a, k, 1] * plane[1] + R[a, k, 2] * plane[2]
+    w = slip(v, a, b, arm, point)
+    wn = w[0] * n[0] + w[1] * n[1] + w[2] * n[2]
+    way[1, 0] = -dt * wn
+    for k in range(3):
+        way[0, k] = dt * (w[k] - wn * n[k])

@@ -1,0 +1,193 @@
+"""What others read of a structure between its steps: places, forces, stiffness, joints, contacts, energies.
+
+World coordinates and SI units; one row a block; motions and forces are six numbers a block about its centre,
+[velocity, angular velocity] and [force, moment], world axes.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+
+from yade_scripts.blocks import tangent
+from yade_scripts.contact.forces import ContactForces
+from yade_scripts.contact.state import Contacts, no_contacts, sum_on_blocks
+from yade_scripts.dynamics.energy import Accounts, Masses
+from yade_scripts.dynamics.onset import ContactOnset
+from yade_scripts.dynamics.spin import SpinCorrection
+from yade_scripts.dynamics.substep import Substepper
+from yade_scripts.joints.joints import Joints, JointTable
+from yade_scripts.joints.seals import Seals
+from yade_scripts.yade_side.motion import Motion
+from yade_scripts.yade_side.scene import Scene
+
+Array = np.ndarray
+
+
+class StructureReadings:
+    """The half of `Structure` that changes nothing; that one sets the parts up and moves them on."""
+
+    n: int
+    time: float
+    mass: Array
+    fixed: Array
+    gravity: Array
+    joints: Joints | None
+    _origin: Array
+    _masses: Masses
+    _scene: Scene
+    _motion: Motion
+    _spin: SpinCorrection
+    _contacts: ContactForces | None
+    _onset: ContactOnset
+    _seals: Seals | None
+    _accounts: Accounts
+    _substepper: Substepper
+
+    def centre(self) -> Array:
+        """(n, 3) [m]"""
+        return self._motion.x + self._origin
+
+    def rotation(self) -> Array:
+        """(n, 3, 3): body frame → world."""
+        return self._motion.R.copy()
+
+    def velocity(self) -> Array:
+        """(n, 6) [m/s, rad/s]"""
+        return self._motion.v.copy()
+
+    def momentum(self, about: Array) -> Array:
+        """Momentum, and angular momentum about a point (3,), of the blocks that move freely (6,) [N s, N m s].
+
+        Of the velocities, half a substep before the places; with these it changes by the impulses to round-off."""
+        free = self._accounts.free
+        p = self.mass[free, None] * self._motion.v[free, :3]
+        orbital = np.cross(self._motion.x[free] + (self._origin - np.asarray(about)), p)
+        spin = self._scene.angular_momentum(free) - self._spin.save()[free]
+        return np.concatenate([p.sum(axis=0), (orbital + spin).sum(axis=0)])
+
+    def inertia(self) -> Array:
+        """(n, 3, 3) [kg m²] about the centres, world axes."""
+        return self._masses.inertia(self._motion.R)
+
+    def loose(self) -> Array:
+        """(n,) bool: blocks that lost a joint, never had one, or left their place: they meet others by contact."""
+        return self._onset.loose.copy()
+
+    def contacts(self) -> Contacts:
+        """Contacts at the present positions."""
+        return no_contacts() if self._contacts is None else self._contacts.now()
+
+    def gravity_force(self) -> Array:
+        """(n, 6) [N, N m]"""
+        force = np.zeros((self.n, 6))
+        force[:, :3] = self.mass[:, None] * self.gravity
+        return force
+
+    def weight_now(self) -> Array:
+        """(n, 6) [N, N m]: as `gravity_force`, less what has not come on yet."""
+        return self.gravity_force() - self._substepper.missing_weight(self.time) * self._accounts.weight
+
+    def internal_force(self, viscous: bool = False) -> Array:
+        """Forces of joints and contacts on the blocks at the present state, (n, 6).
+
+        Elastic parts only by default: the dashpots act through the damping matrix of `tangent`.
+        """
+        m, contacts = self._motion, self.contacts()
+        force = contacts.forces(m.v, m.x) if viscous else contacts.elastic_forces()
+        F = sum_on_blocks(contacts, force, m.x)
+        if self.joints is not None:
+            self.joints.forces(m.x, m.v, m.R, F, eta=None if viscous else 0.0)
+        return F
+
+    def reaction(self) -> Array:
+        """(n, 6): what holds the blocks of prescribed motion, minus every force on them; zero for the others."""
+        total = self.internal_force(viscous=True) + self.gravity_force() + self._substepper.load
+        return np.where(self.fixed[:, None], -total, 0.0)
+
+    def tangent(self) -> tuple[sp.csr_array, sp.csr_array]:
+        """(K, C), each (6n, 6n): secant stiffness and damping of live joints and of contacts."""
+        springs = self.contacts().springs(self._motion.x)
+        if self.joints is not None:
+            springs = springs.and_(tangent.joint_springs(self.joints, self._motion.x, self._motion.R))
+        return tangent.assemble(springs, self.n)
+
+    def opening_tangent(self) -> sp.csr_array:
+        """(6n, 6n): as K of `tangent`, with the joints as they answer while they open further: softening counts."""
+        contacts = tangent.assemble(self.contacts().springs(self._motion.x), self.n)[0]
+        if self.joints is None:
+            return contacts
+        return contacts + tangent.joint_tangent(self.joints, self._motion.x, self._motion.R, self.n)
+
+    def joint_table(self) -> JointTable | None:
+        """State of every joint, None without joints."""
+        if self.joints is None:
+            return None
+        table = self.joints.table(self._motion.x, self._motion.R)
+        table.centre[:] += self._origin
+        return table
+
+    def joint_polygons(self) -> tuple[Array, Array]:
+        """Joined faces as polygons where block a of each is: corners (c, 3) [m], first corner of each (J + 1,)."""
+        if self.joints is None:
+            return np.zeros((0, 3)), np.zeros(1, np.int64)
+        m = self._motion
+        return self.joints.corners(m.x, m.R) + self._origin, self.joints.corner_start
+
+    def overlaps(self) -> tuple[Array, Array, Array]:
+        """Contacts seen from each block in them: block (m,), direction to the other body (m, 3), depth (m,) [m]."""
+        c = self.contacts()
+        other = c.b >= 0
+        rows = np.concatenate([c.a, c.b[other]])
+        return rows, np.concatenate([c.normal, -c.normal[other]]), np.concatenate([c.depth, c.depth[other]])
+
+    def deepest(self) -> tuple[Array, Array, Array, Array]:
+        """Pairs that are in one another: blocks a (p,) and b (p,), -1 - number for a fixed plane, depth (p,) [m] and
+        depth over the thickness of the thinner block (p,). Of contacts: the way that parts the two, at most (faces are
+        tried, and edges that cross where these carry); of live joints: the mean closing."""
+        thickness = 2.0 * np.array([b.planes[1].min() for b in self.blocks])
+        a, b, depth = (np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0))
+        if self._contacts is not None:
+            a, b, depth = self._contacts.deepest()
+        if self.joints is not None:
+            live = self.joints.live
+            closing = -self.joints.openings(live, self._motion.x, self._motion.R)[:, 0]
+            other = np.where(self.joints.b < 0, -1 - self.joints.plane, self.joints.b)
+            a, b = np.concatenate([a, self.joints.a[live]]), np.concatenate([b, other[live]])
+            depth = np.concatenate([depth, np.maximum(closing, 0.0)])
+        thinner = np.minimum(thickness[a], np.where(b >= 0, thickness[np.maximum(b, 0)], np.inf))
+        return a, b, depth, depth / thinner
+
+    def joined_planes(self) -> tuple[Array, Array, Array]:
+        """Faces sealed by a live joint, or by lying on one another where that is impermeable: block (m,), face (m,),
+        half of the largest opening (m,) [m]."""
+        m = self._motion
+        none = np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0)
+        glued = none if self.joints is None else self.joints.sealed_faces(m.x, m.R)
+        lying = none if self._seals is None else self._seals.closed_faces(m.x, m.R)
+        return tuple(np.concatenate(two) for two in zip(glued, lying))
+
+    def broken_joints(self) -> tuple[Array, Array, Array, Array]:
+        """Joints that carry nothing any more: number (m,), blocks and their faces (m, 2), -1 a fixed plane, and now
+        their mean normal opening, mean sliding and largest normal opening (m, 3) [m]."""
+        if self.joints is None:
+            none = np.zeros((0, 2), np.int64)
+            return np.zeros(0, np.int64), none, none, np.zeros((0, 3))
+        j, m = self.joints, self._motion
+        dead = np.flatnonzero(~j.alive)
+        blocks, faces = np.column_stack([j.a, j.b])[dead], np.column_stack([j.face_a, j.face_b])[dead]
+        return dead, blocks, faces, j.openings(dead, m.x, m.R)
+
+    def energies(self) -> dict[str, float]:
+        """Ledger [J]: kinetic + gravity + joint_stored + joint_dissipated + joint_damping + contact_stored + dashpot
+        + friction changes by load_work + driving_work.
+
+        Kinetic energy lives at half substeps (leapfrog), so the potentials are taken there too. joint_dissipated,
+        dashpot and friction are sums over substeps of force times velocity; friction holds the springs of contacts
+        that ended as well.
+        """
+        return self._accounts.energies()
+
+    def law_dissipation(self) -> float:
+        """Energy that the damage stands for by the law, Σ A D(λ) [J]: to compare with joint_dissipated."""
+        return self._accounts.law_dissipation()

@@ -1,0 +1,404 @@
+"""The structure as its neighbours see it: blocks, joints and contact, moved by YADE under given loads.
+
+World coordinates and SI units outside; one row a block; motions and forces are six numbers a block about its centre,
+[velocity, angular velocity] and [force, moment], world axes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from yade_scripts.blocks.block import Block, BlockError
+from yade_scripts.blocks.faces import FixedPlane, TouchingFaces, both_held, touching_faces
+from yade_scripts.contact.forces import ContactForces
+from yade_scripts.contact.law import ContactLaw
+from yade_scripts.dynamics.description import check_names, local_origin, matched_stiffness, moved_block
+from yade_scripts.dynamics.energy import Accounts, Masses
+from yade_scripts.dynamics.impulses import Impulses, ImpulseSums
+from yade_scripts.dynamics.onset import ContactOnset, loose_at_start, moves
+from yade_scripts.dynamics.readings import StructureReadings
+from yade_scripts.dynamics.spin import SpinCorrection
+from yade_scripts.dynamics.state import StructureState, check_belongs
+from yade_scripts.dynamics.substep import Substepper
+from yade_scripts.dynamics.timestep import SubstepLimit, substep_limit
+from yade_scripts.joints.cohesion import JointParameters
+from yade_scripts.joints.joints import Joints
+from yade_scripts.joints.rules import JointRules
+from yade_scripts.joints.seals import Seals
+from yade_scripts.yade_side.engine import load_yade
+from yade_scripts.yade_side.motion import Motion
+from yade_scripts.yade_side.scene import Scene
+
+Array = np.ndarray
+
+GRAVITY = (0.0, 0.0, -9.81)
+
+
+class NotFinite(RuntimeError):
+    """Positions, velocities or loads of blocks are no numbers."""
+
+
+@dataclass(frozen=True)
+class AdvanceReport:
+    """substeps · dt_s [s] · opening_rate: largest growth of λ/δ_f in a substep (beyond about 0.25 the tearing is
+    averaged over the substep) · mean_velocity (n, 6) = displacement and rotation vector over the step / dt
+    load_work [J] done by the load · broken: joints that failed, rows of the joint table
+    impulses: what contacts and joints gave to every block
+    """
+
+    substeps: int
+    dt_s: float
+    opening_rate: float
+    mean_velocity: Array
+    load_work: float
+    broken: Array
+    impulses: Impulses
+
+
+class Structure(StructureReadings):
+    """Rigid blocks with contact (`contact=None`: none) and cohesive joints (`joints=None`: none).
+
+    blocks: list of Block, unique names · ground: level of a horizontal floor [m] or None
+    planes: further fixed planes (tank walls) · gravity (3,) [m/s²]
+    joints: one law for all touching faces, or rules by pairs and scatter
+    substep: used in place of the one that `substep_limit` finds accurate, None: that one
+    ramp [s]: time over which the weight of the blocks comes on
+    impermeable: faces that touch at the start without a joint count as sealed while they do (`joined_planes`)
+
+    Fixed blocks are not joined to one another or to planes, since nothing could break there; their faces are sealed
+    as those of a joint. Driven blocks are joined: they may part.
+
+    One structure in a process at a time (YADE has one scene): use it as a context manager or call close().
+    """
+
+    def __init__(
+        self,
+        blocks: list[Block],
+        contact: ContactLaw | None = None,
+        joints: JointParameters | JointRules | None = None,
+        ground: float | None = None,
+        planes: list[FixedPlane] | tuple = (),
+        gravity=GRAVITY,
+        threads: int = 1,
+        substep: float | None = None,
+        impermeable: bool = False,
+        ramp: float = 0.0,
+    ):
+        self._describe(blocks, gravity)
+        self.contact = contact
+        self.planes = _with_ground(ground, planes)
+        origin = self._origin = local_origin(blocks)
+        local = [moved_block(b, -origin) for b in blocks]
+        local_planes = [replace(p, point=p.point - origin) for p in self.planes]
+        self.joint_rules = JointRules(joints) if isinstance(joints, JointParameters) else joints
+        faces = _Faces.of(local, local_planes, self.joint_rules, impermeable)
+        self.joints = faces.joints(local, self.joint_rules)
+        self._seals = Seals(local, faces.sealed) if faces.sealed else None
+        self._rub_failed_points()
+        self.face_stiffness = self._face_stiffness()
+        self._set_damping()
+        self._substep = substep
+        if substep is not None:
+            self.substep_limit().check(substep)
+        self._scene = Scene(load_yade(threads), local, contact is not None, self.gravity)
+        self._motion = Motion(self._scene, local_planes)
+        self._motion.read()
+        self._contacts = self._contact_forces(local, local_planes)
+        loose = loose_at_start(blocks, self.joints)
+        loose[[row for row in faces.held_rows if not moves(blocks[row])]] = False
+        self._onset = ContactOnset(
+            self._scene, self._motion, self.joints, self._contacts, self._radius, loose
+        )
+        self._start_accounts(ramp)
+
+    # ---- setting up -----------------------------------------------------------------------------------------
+
+    def _describe(self, blocks: list[Block], gravity) -> None:
+        check_names(blocks)
+        self.blocks = list(blocks)
+        self.n = len(self.blocks)
+        self.pause: Callable[[], None] | None = None
+        """Called after every substep, where the run may be ended by an exception."""
+        self.names = [b.name for b in blocks]
+        self.groups = [b.group for b in blocks]
+        self.mass = np.array([b.mass for b in blocks])
+        self.volume = np.array([b.volume for b in blocks])
+        self.fixed = np.array([b.fixed or b.driven for b in blocks], bool)
+        """Blocks whose motion is prescribed: still, or driven at their velocity."""
+        self.shape_vertices = [b.vertices for b in blocks]
+        self.shape_faces = [[list(f) for f in b.faces] for b in blocks]
+        self.gravity = np.asarray(gravity, float)
+        inertia = np.array([b.inertia for b in blocks]).reshape(-1, 3, 3)
+        self._masses = Masses(self.mass, inertia, ~self.fixed, self.gravity)
+        self._spin = SpinCorrection(inertia, ~self.fixed)
+        self._radius = np.array([b.radius for b in blocks])
+
+    def _rub_failed_points(self) -> None:
+        """Friction of contact where a joint has failed in part."""
+        if self.joints is None or self.contact is None:
+            return
+        materials = sorted({b.material for b in self.blocks} | {p.material for p in self.planes})
+        row = {name: i for i, name in enumerate(materials)}
+        of_block = np.array([row[b.material] for b in self.blocks])
+        of_plane = np.array([row[p.material] for p in self.planes], np.int64)
+        j = self.joints
+        other = of_block[j.b]
+        other[j.b < 0] = of_plane[j.plane[j.b < 0]]
+        j.set_friction(self.contact.friction_table(materials)[of_block[j.a], other])
+
+    def _face_stiffness(self) -> Array:
+        """K [N/m] of each block: as given, or that of its joints in closing."""
+        if self.contact is None:
+            return np.zeros(self.n)
+        if self.contact.stiffness is not None:
+            return np.full(self.n, self.contact.stiffness)
+        return matched_stiffness(self.blocks, self.joints)
+
+    def _contact_forces(self, blocks: list[Block], planes: list[FixedPlane]) -> ContactForces | None:
+        if self.contact is None:
+            return None
+        scene = self._scene
+        return ContactForces(
+            blocks,
+            planes,
+            self.contact,
+            self.face_stiffness,
+            self.face_stiffness if self.joints is None else matched_stiffness(self.blocks, self.joints),
+            ~self.fixed,
+            self._motion,
+            scene.neighbours,
+            scene.margin,
+        )
+
+    def _set_damping(self) -> None:
+        """Dashpot time η = 2 z/ω of the stiffest joint mode; none where all joined blocks are held."""
+        self._limit: SubstepLimit | None = None
+        if self.joints is not None and self.joints.parameters.damping > 0.0:
+            omega = self.substep_limit().omega
+            self.joints.eta = 2.0 * self.joints.parameters.damping / omega if omega > 0.0 else 0.0
+
+    def _start_accounts(self, ramp: float) -> None:
+        self.time = 0.0
+        self._accounts = Accounts(self._masses, self._motion, self.joints, self._contacts)
+        self._impulses = ImpulseSums(self.n, self._origin)
+        self._substepper = Substepper(
+            self._scene,
+            self._motion,
+            self.joints,
+            self._contacts,
+            self._spin,
+            self._accounts,
+            self._impulses,
+            ramp,
+        )
+        self._substepper.list_bodies(self._onset.loose)
+
+    # ---- moving on ------------------------------------------------------------------------------------------
+
+    def set_load(self, F: Array) -> None:
+        """Force and moment (n, 6) [N, N m] on the blocks from now on, about their centres as they move."""
+        F = np.asarray(F, float)
+        if F.shape != (self.n, 6) or not np.isfinite(F).all():
+            raise NotFinite(f"load of shape {F.shape} for {self.n} blocks, finite: {np.isfinite(F).all()}")
+        self._substepper.load = F.copy()
+        self._substepper.list_bodies(self._onset.loose)
+
+    def drive(self, name: str, velocity=(0.0, 0.0, 0.0), spin=(0.0, 0.0, 0.0)) -> None:
+        """New prescribed motion of a driven block: velocity (3,) [m/s], spin (3,) [rad/s]."""
+        row = self.names.index(name)
+        if not self.blocks[row].driven:
+            raise BlockError(
+                f"block '{name}' is not driven; only blocks with driven=True take a prescribed motion"
+            )
+        self.blocks[row] = self.blocks[row].changed(velocity=velocity, spin=spin)
+        self._scene.set_motion(row, np.concatenate([np.asarray(velocity, float), np.asarray(spin, float)]))
+        self._limit = None
+        self._motion.read()
+
+    def substep_limit(self) -> SubstepLimit:
+        """Largest substep and what limits it; found anew when joints have failed."""
+        if self._limit is None:
+            stiffness = self.face_stiffness if self.contact is not None else None
+            damping = 0.0 if self.joints is None else self.joints.parameters.damping
+            contact_damping = 0.0 if self.contact is None else self.contact.damping_ratio
+            self._limit = substep_limit(self.blocks, self.joints, stiffness, damping, contact_damping)
+        return self._limit
+
+    def stable_substep(self) -> tuple[float, str]:
+        """(dt_s [s], the joint or contact that limits it)."""
+        limit = self.substep_limit()
+        return limit.dt, limit.what
+
+    def substep(self) -> float:
+        """[s] as asked for, else the accurate one."""
+        return self.stable_substep()[0] if self._substep is None else self._substep
+
+    def advance(self, dt: float, substep: float | None = None) -> AdvanceReport:
+        """Move on by dt [s] under the load of `set_load`, in equal substeps no longer than `substep`, by default that
+        of the structure. Raises SubstepTooLong where the motion would be unstable."""
+        limit = self.substep() if substep is None else substep
+        self.substep_limit().check(min(limit, dt))
+        count = max(1, int(np.ceil(dt / limit * (1.0 - 1e-12)))) if np.isfinite(limit) else 1
+        m = self._motion
+        self._turn_on_contacts()
+        x0, R0, half, spin = m.x.copy(), m.R.copy(), m.half_step_back(), m.v[:, 3:].copy()
+        self._substepper.fastest = 0.0
+        self._impulses.start()
+        broken = [self._one_substep(dt / count) for _ in range(count)]
+        m.read()
+        self._check_finite()
+        turn = m.turned_since(R0)
+        work = self._accounts.take_load(self._substepper.load, x0, half, turn, spin)
+        mean = np.concatenate([m.x - x0, turn], axis=1) / dt
+        failed = np.concatenate(broken).astype(np.int64)
+        return AdvanceReport(
+            count, dt / count, self._substepper.fastest, mean, work, failed, self._impulses.taken()
+        )
+
+    def _turn_on_contacts(self) -> None:
+        """Before a step: for pieces that left their place."""
+        if self.contact is None:
+            return
+        moved = self._onset.moved()
+        if len(moved):
+            self._motion.read()
+            self._onset.loosen(moved)
+            self._substepper.list_bodies(self._onset.loose)
+
+    def _one_substep(self, dt: float) -> Array:
+        """Joints that failed, rows of the table."""
+        self._substepper.step(dt, self.time)
+        self.time += dt
+        broken = self.joints.broken_now() if self.joints is not None else np.zeros(0, np.int64)
+        if len(broken):
+            self._retire(broken)
+        if self.pause is not None:
+            self.pause()
+        return broken
+
+    def _retire(self, broken: Array) -> None:
+        """Take failed joints out; contact goes on with what of their energy was compression."""
+        stored = self._accounts.joint_stored()
+        self._motion.read()
+        stored -= self.joints.let_go(broken, self._motion.x, self._motion.R)
+        self.joints.retire(broken, self._motion.x, self._motion.R, self.time)
+        self._limit = None
+        self._onset.loosen(self._onset.of_failed(broken))
+        self._onset.leave_out_joined()
+        self._accounts.handed_over += stored - self._accounts.joint_stored()
+        self._substepper.list_bodies(self._onset.loose)
+
+    def _check_finite(self) -> None:
+        wrong = np.flatnonzero(~np.isfinite(self._motion.x).all(axis=1))
+        if len(wrong):
+            raise NotFinite(
+                f"block '{self.names[wrong[0]]}' has no finite position at t = {self.time:.6g} s; use a shorter substep"
+            )
+
+    def displace(self, rows: Array, shift: Array, turn: Array) -> None:
+        """Move blocks at once: shift (m, 3) [m], turn (m, 3, 3) about their centres; the joints take note of what
+        opens, velocities stay, and the energy accounts start anew from here."""
+        m = self._motion
+        self._scene.displace(rows, shift, turn)
+        m.read()
+        if self.joints is not None:
+            self.joints.forces(m.x, m.v, m.R, np.zeros((self.n, 6)), advance=True)
+        self._onset.rest_here()
+        if self._contacts is not None:
+            self._contacts.search(now=True)
+            self._contacts.moved()
+        self._accounts.start_here()
+
+    # ---- saving and going back ------------------------------------------------------------------------------
+
+    def save(self) -> StructureState:
+        """Everything that changes in time, for a second pass over a step, or for a file (`StructureState.arrays`)."""
+        return StructureState(
+            self._scene.save(),
+            self.time,
+            self._motion.dt,
+            self._substepper.load.copy(),
+            self._spin.save(),
+            self._onset.save(),
+            self._accounts.sums(),
+            self.joints.history() if self.joints is not None else None,
+            self._contacts.save() if self._contacts is not None else None,
+        )
+
+    def restore(self, saved: StructureState) -> None:
+        """Back to a saved state, bit for bit; it may come from another process, with the structure built alike.
+
+        Raises OtherStructure if the state has other blocks or joints."""
+        points = None if self.joints is None else len(self.joints.largest)
+        check_belongs(saved, self.n, points, self._contacts is not None)
+        self.time, self._motion.dt, self._limit = saved.time, saved.dt, None
+        self._scene.restore(saved.motion)
+        self._take_driven(saved.motion)
+        self._motion.read()
+        self._spin.restore(saved.lent_spin)
+        self._onset.restore(saved.onset)
+        self._accounts.restore(saved.sums)
+        if self.joints is not None:
+            self.joints.restore(saved.joints)
+        if self._contacts is not None:
+            self._contacts.restore(saved.contacts)
+        self.set_load(saved.load)
+
+    def _take_driven(self, motion: Array) -> None:
+        """Prescribed motions as they were, in case `drive` has changed them since."""
+        for row in np.flatnonzero([b.driven for b in self.blocks]):
+            velocity, spin = motion[row, 7:10], motion[row, 10:13]
+            block = self.blocks[row]
+            if (block.velocity != velocity).any() or (block.spin != spin).any():
+                self.blocks[row] = block.changed(velocity=velocity, spin=spin)
+
+    def close(self) -> None:
+        """Give YADE's scene back."""
+        self._scene.close()
+
+    def __enter__(self) -> Structure:
+        return self
+
+    def __exit__(self, *error) -> None:
+        self.close()
+
+
+def _with_ground(ground: float | None, planes) -> list[FixedPlane]:
+    floor = [] if ground is None else [FixedPlane((0.0, 0.0, ground), (0.0, 0.0, 1.0), "ground")]
+    return [*floor, *planes]
+
+
+@dataclass(frozen=True)
+class _Faces:
+    """Touching faces: those that get a joint, those that only keep water out, and blocks held at others that are
+    held."""
+
+    joined: list[TouchingFaces]
+    laws: list[JointParameters]
+    sealed: list[TouchingFaces]
+    held_rows: list[int]
+
+    @classmethod
+    def of(cls, blocks, planes, rules: JointRules | None, impermeable: bool) -> _Faces:
+        if rules is None and not impermeable:
+            return cls([], [], [], [])
+        faces = touching_faces(blocks, planes)
+        laws = [None] * len(faces) if rules is None else rules.of_faces(faces, blocks, planes)
+        joined, sealed, held_rows = [], [], set()
+        for face, law in zip(faces, laws):
+            held = both_held(blocks, face)
+            if law is not None and not held:
+                joined.append((face, law))
+            elif law is not None or impermeable:
+                sealed.append(face)
+            held_rows.update(row for row in (face.a, face.b) if row >= 0 and law is not None and held)
+        return cls([face for face, _ in joined], [law for _, law in joined], sealed, sorted(held_rows))
+
+    def joints(self, blocks, rules: JointRules | None) -> Joints | None:
+        """None where no faces are joined."""
+        if not self.joined:
+            return None
+        return Joints(blocks, self.joined, rules.everywhere, rules.scattered(self.laws))

@@ -1,0 +1,105 @@
+"""One substep: forces of contacts, joints and load on the blocks, then the integration of YADE.
+
+    v⁺ = v + dt F(x)/m,   x⁺ = x + dt v⁺
+
+so that a load F held over substeps of any length gives the momentum F dt exactly, as the water is told. Energies are
+taken at the time of the velocities, half a substep before the places.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from yade_scripts.contact.forces import ContactForces
+from yade_scripts.dynamics.energy import Accounts
+from yade_scripts.dynamics.impulses import ImpulseSums
+from yade_scripts.dynamics.spin import SpinCorrection
+from yade_scripts.joints.joints import Joints
+from yade_scripts.yade_side.motion import Motion
+from yade_scripts.yade_side.scene import Scene
+
+Array = np.ndarray
+
+
+class Substepper:
+    """Moves the scene by one substep at a time. load (n, 6) [N, N m] acts in every substep.
+
+    ramp [s]: the weight comes on over this time from the start, as τ² (3 - 2 τ); 0: it is there at once.
+
+    fastest: largest growth of λ/δ_f in a substep since it was set to zero.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        motion: Motion,
+        joints: Joints | None,
+        contacts: ContactForces | None,
+        spin: SpinCorrection,
+        accounts: Accounts,
+        impulses: ImpulseSums,
+        ramp: float = 0.0,
+    ):
+        self._scene, self._motion, self._joints, self._contacts = scene, motion, joints, contacts
+        self._spin, self._accounts, self._impulses = spin, accounts, impulses
+        self.load = np.zeros((len(scene.ids), 6))
+        self.fastest = 0.0
+        self._F = np.zeros_like(self.load)
+        self._joint_F = np.zeros_like(self.load)
+        self._without_contact = np.zeros_like(self.load)
+        self.ramp = ramp
+        self._lift = np.zeros_like(self.load)
+        self.list_bodies(np.ones(len(scene.ids), bool))
+
+    def list_bodies(self, loose: Array) -> None:
+        """Find the bodies to read and push: after joints failed, the load changed or blocks became loose (n,) bool.
+
+        Read are those with a live joint, in reach of contact, or free to move; pushed also those under load."""
+        none = np.zeros(0, np.int64)
+        self._joined = self._joints.rows() if self._joints is not None else none
+        self._turning = np.flatnonzero(self._spin.unequal)
+        meeting = np.flatnonzero(loose) if self._contacts is not None else none
+        watched = np.union1d(np.union1d(self._joined, meeting), self._accounts.free)
+        self._motion.watch(watched)
+        self._pushed = np.union1d(watched, np.flatnonzero(self.load.any(axis=1)))
+        self._pushed_ids = [self._scene.ids[r] for r in self._pushed]
+
+    def missing_weight(self, time: float) -> float:
+        """Share of the weight that is not there yet."""
+        if time >= self.ramp:
+            return 0.0
+        part = time / self.ramp
+        return 1.0 - part**2 * (3.0 - 2.0 * part)
+
+    def step(self, dt: float, time: float) -> None:
+        """From the present places, at `time` [s], to those dt [s] later."""
+        m = self._motion
+        before = m.v.copy()
+        self._F[:] = self.load
+        missing = self.missing_weight(time)
+        if missing > 0.0:
+            self._lift[:] = -missing * self._accounts.weight
+            self._F += self._lift
+            self._impulses.lift(dt, m.x, missing)
+        self._joint_F[:] = 0.0
+        if len(self._joined):
+            growth = self._joints.forces(m.x, m.v, m.R, self._joint_F, dt, advance=True)
+            self.fastest = max(self.fastest, growth)
+            self._F += self._joint_F
+        self._without_contact[:] = self._F
+        if self._contacts is not None:
+            self._contacts.add_forces(dt, self._F)
+        self._impulses.add(dt, m.x, self._joint_F, self._without_contact, self._F)
+        if len(self._turning):
+            self._spin.add(self._turning, m.R, m.v, dt, m.dt, self._F)
+        self._scene.step(dt, self._pushed_ids, self._F[self._pushed])
+        m.dt = dt
+        m.read_watched()
+        if missing > 0.0:
+            self._accounts.take_lift(self._lift, before, dt)
+        if len(self._joined):
+            self._accounts.take_joints(self._joint_F, before, self._joined, dt)
+        if self._contacts is not None:
+            self._contacts.settle(dt)
+            if self._scene.searched():
+                self._contacts.search(now=False)

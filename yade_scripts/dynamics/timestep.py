@@ -1,0 +1,213 @@
+"""Time step of the structure: accuracy of joints and contacts, with the pair of blocks that limits it.
+
+    dt = min( 0.1 * 2/ω_max,  0.2 sqrt(m/K) ),   ω_max² ≤ max over blocks of the largest eigenvalue of M_i⁻¹ Σ c K_ii
+
+K_ii: what a joint holds block i with; c = 2, since |d_a - d_b|² ≤ 2 |d_a|² + 2 |d_b|², or 1 where d_b = 0 is fixed.
+As M_i⁻¹ Σ K_ii is part of the whole, the bound is at most √2 of the exact ω_max. The explicit limit is 2/ω_max; a
+tenth of it keeps the energy of a half-broken joint (the kink between tension and compression and the damage make the
+leapfrog gain energy at larger steps). A dashpot of ratio z shortens the limit by sqrt(1+z²) - z.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.linalg import eigsh
+
+from yade_scripts.blocks.block import Block
+from yade_scripts.blocks.tangent import assemble, joint_springs
+
+Array = np.ndarray
+
+JOINT_SHARE = 0.1
+CONTACT_SHARE = 0.2
+"""Of √(m/K), which is the explicit limit 2/ω of a chain of equal blocks in contact, ω² ≤ 4 K/m."""
+DRIVEN_SHARE = 0.002
+DENSE = 60
+"""Unknowns up to which the exact frequency is found with full matrices."""
+
+
+class SubstepTooLong(ValueError):
+    """A substep was asked for at which the explicit scheme is not stable."""
+
+    exit_code = 2
+
+
+@dataclass(frozen=True)
+class SubstepLimit:
+    """dt [s] · what: the joint or block that limits it, in words · omega [rad/s] of the joints (0 without)
+
+    stable [s], stable_what: the same for the explicit limit, beyond which energy grows without end.
+    """
+
+    dt: float
+    what: str
+    omega: float
+    stable: float = np.inf
+    stable_what: str = ""
+
+    def check(self, substep: float) -> None:
+        """Raise SubstepTooLong beyond the explicit limit."""
+        if substep > self.stable * (1.0 + 1e-9):
+            raise SubstepTooLong(
+                f"substep {substep:.4g} s is too long: the motion is unstable beyond {self.stable:.4g} s "
+                f"({self.stable_what}); accurate up to {self.dt:.4g} s ({self.what}). Take that, or leave it out"
+            )
+
+    def remark(self, substep: float) -> str:
+        """What is worth knowing of a substep that is stable, "" if it is accurate too."""
+        if substep <= self.dt * (1.0 + 1e-9):
+            return ""
+        return (
+            f"substep {substep:.4g} s is stable, but longer than the {self.dt:.4g} s that the accuracy of energy asks "
+            f"for ({self.what})"
+        )
+
+
+def joint_frequency(blocks: list[Block], joints) -> tuple[float, int]:
+    """Upper bound of ω_max [rad/s], at most √2 of it, and the joint that gives most to it (-1 without joints)."""
+    if joints is None or len(joints.live) == 0:
+        return 0.0, -1
+    if joints.stiffness_on is None:
+        joints.stiffness_on = _stiffness_on_blocks(blocks, joints)
+    live = joints.live
+    K = np.zeros((len(blocks) + 1, 6, 6))  # the last one stands for the ground
+    for side, row in zip(joints.stiffness_on, (joints.a, joints.b)):
+        np.add.at(K, row[live], side[live])
+    largest = np.linalg.eigvalsh(K)[:, -1]
+    worst = int(np.argmax(largest))
+    share = [
+        np.where(row[live] % len(K) == worst, np.trace(side[live], axis1=1, axis2=2), 0.0)
+        for side, row in zip(joints.stiffness_on, (joints.a, joints.b))
+    ]
+    return float(np.sqrt(largest[worst])), int(live[np.argmax(share[0] + share[1])])
+
+
+def exact_joint_frequency(blocks: list[Block], joints) -> float:
+    """ω_max [rad/s] of the live joints: the largest eigenvalue of M⁻¹ K, K with k_0 or k_c, the larger, in the normals
+    and β² k_0 across. Takes a sparse eigenvalue problem of six unknowns a block."""
+    held = [b.fixed or b.driven for b in blocks]
+    free = np.flatnonzero(~np.repeat(held, 6))
+    if joints is None or len(joints.live) == 0 or len(free) == 0:
+        return 0.0
+    x, R = np.array([b.centre for b in blocks]), np.array([b.rotation for b in blocks])
+    springs = _first_springs(joints, x, R)
+    root = sp.block_diag([_inverse_root(b) for b in blocks], format="csr")
+    K = (root.T @ assemble(springs, len(blocks))[0] @ root)[free][:, free]
+    if len(free) <= DENSE:
+        return float(np.sqrt(np.linalg.eigvalsh(K.toarray())[-1]))
+    start = np.cos(np.arange(len(free)))  # fixed, so that the same blocks give the same number
+    return float(np.sqrt(eigsh(K, k=1, which="LA", v0=start, return_eigenvectors=False)[0]))
+
+
+def _first_springs(joints, x: Array, R: Array):
+    """Springs of the undamaged live joints, closed or open, whichever is stiffer; arms in world axes."""
+    springs = joint_springs(joints, x, R)
+    index = np.flatnonzero(joints.alive[joints.joint_of])
+    j = joints.joint_of[index]
+    kn = joints.weight[index] * np.maximum(joints.k0[j], joints.kc[j])
+    kt = joints.weight[index] * joints.beta[j] ** 2 * joints.k0[j]
+    return replace(springs, kn=kn, kt=kt)
+
+
+def _inverse_root(block: Block) -> Array:
+    """A with A Aᵀ = M⁻¹ (6, 6), world axes."""
+    root = np.zeros((6, 6))
+    root[:3, :3] = np.eye(3) / np.sqrt(block.mass)
+    turned = block.rotation @ block.inertia @ block.rotation.T
+    root[3:, 3:] = np.linalg.inv(np.linalg.cholesky(turned)).T
+    return root
+
+
+def _stiffness_on_blocks(blocks: list[Block], joints) -> tuple[Array, Array]:
+    """What each joint adds to 2 M⁻¹ᐟ² K_ii M⁻¹ᐟ² of its block a and its block b, (J, 6, 6) each [1/s²].
+
+    Once instead of twice where the other side does not yield; zero for blocks that do not."""
+    root = np.zeros((len(blocks) + 1, 6, 6))  # the last one stands for the ground
+    for i, block in enumerate(blocks):
+        if not (block.fixed or block.driven):
+            root[i, :3, :3] = np.eye(3) / np.sqrt(block.mass)
+            root[i, 3:, 3:] = np.linalg.inv(np.linalg.cholesky(block.inertia)).T
+    frame = np.array([b.rotation for b in blocks] + [np.eye(3)])
+    normal = np.einsum("jkl,jl->jk", frame[joints.a], joints.normal)
+    yields = root.any(axis=(1, 2))
+    count = np.where(yields[joints.a] & yields[joints.b], 2.0, 1.0)[:, None, None]
+    sides = ((joints.xi_a, joints.a), (joints.xi_b, joints.b))
+    first, second = (
+        count
+        * root[row].transpose(0, 2, 1)
+        @ _block_stiffness(joints, arm, _in_frame(frame[row], normal))
+        @ root[row]
+        for arm, row in sides
+    )
+    return first, second
+
+
+def _in_frame(frame: Array, vectors: Array) -> Array:
+    """World vectors (J, 3) in the axes of frames (J, 3, 3)."""
+    return np.einsum("jkl,jk->jl", frame, vectors)
+
+
+def _block_stiffness(joints, arm: Array, normal: Array) -> Array:
+    """K (J, 6, 6) that each joint holds one of its blocks with: points at arm (P, 3), axes those of normal (J, 3);
+    k_0 or k_c, the larger, along the normals and β² k_0 across."""
+    kn, kt = np.maximum(joints.k0, joints.kc), joints.beta**2 * joints.k0
+    D = (kn - kt)[:, None, None] * normal[:, :, None] * normal[:, None, :] + kt[:, None, None] * np.eye(3)
+    D = D[joints.joint_of] * joints.weight[:, None, None]
+    B = np.zeros((len(arm), 3, 6))
+    B[:, range(3), range(3)] = 1.0
+    B[:, 0, 4], B[:, 0, 5] = arm[:, 2], -arm[:, 1]
+    B[:, 1, 3], B[:, 1, 5] = -arm[:, 2], arm[:, 0]
+    B[:, 2, 3], B[:, 2, 4] = arm[:, 1], -arm[:, 0]
+    return np.add.reduceat(B.transpose(0, 2, 1) @ (D @ B), joints.start[:-1])
+
+
+def substep_limit(
+    blocks: list[Block],
+    joints,
+    face_stiffness: Array | None,
+    damping: float = 0.0,
+    contact_damping: float = 0.0,
+) -> SubstepLimit:
+    """The substep that joints and contacts allow, and the explicit limit.
+
+    face_stiffness (n,) [N/m], None without contact
+    damping, contact_damping: ζ of joints and contacts; a dashpot in parallel shortens the limit of the explicit
+    scheme by √(1 + ζ²) - ζ."""
+    best = SubstepLimit(np.inf, "nothing limits the substep (no joints, no contact)", 0.0)
+    omega, j = joint_frequency(blocks, joints)
+    if omega > 0.0:
+        stable = 2.0 / omega * _dashpot_share(damping)
+        other = blocks[joints.b[j]].name if joints.b[j] >= 0 else "ground"
+        text = f"joint {blocks[joints.a[j]].name} - {other}, ω ≤ {omega:.4g} rad/s"
+        best = SubstepLimit(JOINT_SHARE * stable, text, omega, stable, text)
+    if face_stiffness is not None and len(blocks):
+        mass = np.array([np.inf if b.fixed or b.driven else b.mass for b in blocks])
+        limit = _dashpot_share(contact_damping) * np.sqrt(mass / face_stiffness)
+        i = int(np.argmin(limit))
+        text = f"contact of block {blocks[i].name}: m = {mass[i]:.4g} kg, K = {face_stiffness[i]:.4g} N/m"
+        if CONTACT_SHARE * limit[i] < best.dt:
+            best = replace(best, dt=float(CONTACT_SHARE * limit[i]), what=text)
+        if limit[i] < best.stable:
+            best = replace(best, stable=float(limit[i]), stable_what=text)
+    return _driven_limit(blocks, joints, best)
+
+
+def _dashpot_share(damping: float) -> float:
+    """√(1 + ζ²) - ζ."""
+    return float(np.sqrt(1.0 + damping**2) - damping)
+
+
+def _driven_limit(blocks: list[Block], joints, best: SubstepLimit) -> SubstepLimit:
+    """A driven block opens no joint by more than DRIVEN_SHARE δ_f a substep."""
+    if joints is None:
+        return best
+    for block in blocks:
+        speed = np.linalg.norm(block.velocity) + np.linalg.norm(block.spin) * block.radius
+        if block.driven and speed * best.dt > DRIVEN_SHARE * joints.df.min():
+            dt = DRIVEN_SHARE * joints.df.min() / speed
+            text = f"prescribed motion of block {block.name}, {speed:.4g} m/s"
+            best = replace(best, dt=float(dt), what=text)
+    return best

@@ -1,0 +1,1 @@
+"""The chapter `yade_scripts.joints`."""

@@ -1,0 +1,298 @@
+"""Joints with their law: forces, damage, energies and stiffness, compiled for each law and mixed mode.
+
+Law and mixed mode are compiled into the kernels that need them (`kernels_of`). Work of separation at any speed: the
+force F_n of a leapfrog substep does the work F_n·(δ_{n+1} - δ_{n-1})/2, half over the move before it, half over the
+move after it. While λ grows, every point keeps the work W* that it has taken, and its traction is
+
+    τ_n = [W(λ_n + Δ/2) - W*]/Δ,   Δ = λ_n - λ_{n-1},      W* ← W* + τ_{n-1} Δ/2 before,  W* + τ_n Δ/2 after
+
+so that a joint torn in a few substeps, or in one, takes G_c. For Δ << δ_f that is T(λ_n); there T itself is used, with
+the weight 1 - min(1, (8 Δ/δ_f)²), since the account would amplify what a vibrating joint gains from round to round.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from zlib import crc32
+
+import numpy as np
+from numba import njit
+
+from yade_scripts.joints import laws, mixed_modes
+from yade_scripts.joints.kernel import add_forces, arm, cross, dot, parting, place, split, turned
+from yade_scripts.joints.specialise import specialised
+
+UNIT, DF, BETA, KC, K0, MU = range(6)
+"""Columns of the law of a joint (J, 6): T_max/δ_f [Pa/m], δ_f [m], β, k_c [Pa/m], k_0 [Pa/m], μ where it has failed."""
+STICKS = 1.0 - 1e-9
+"""Share of μ |t_n| below which a failed point sticks."""
+WORK, PULL = 0, 1
+"""Columns of `paid` (P, 2): work taken [J/m²], traction of the last substep [Pa], NOT_GROWING before."""
+NOT_GROWING = -1.0
+SHARP = 8.0
+"""The mean traction has its full weight from Δ = δ_f/SHARP on."""
+SLOW = 0.005
+"""Below Δ = SLOW δ_f the weight is under 0.2 %: the traction is T itself, which saves the account."""
+
+secant = work = measure = pace = response = stored = None  # given by `kernels_of`
+
+
+@njit(cache=True)
+def dashpot(eta, kn, kt, w, n):
+    """Traction η (k_n w_n n + k_t w_t) of the relative velocity w as a tuple, and its power [W/m²]."""
+    wn = dot(w, n)
+    along, across = eta * (kn - kt) * wn, eta * kt
+    t = (along * n[0] + across * w[0], along * n[1] + across * w[1], along * n[2] + across * w[2])
+    return t, dot(t, w)
+
+
+@njit(cache=True)
+def rubbing(s, s0, k, limit, move):
+    """Friction of a failed point that is pressed: a spring of k [Pa/m] from where it last stuck, s0, to the sliding s
+    now [m], at most `limit` [Pa]; move (3,) [m]: sliding over the last substep.
+
+    → traction on a as a tuple, and what friction took [J/m²]: the slip times the mean traction before and after"""
+    S = (k * (s[0] - s0[0]), k * (s[1] - s0[1]), k * (s[2] - s0[2]))
+    size = np.sqrt(dot(S, S))
+    if size <= limit:
+        return S, 0.0
+    share = limit / size
+    before = size - k * dot(S, move) / size
+    return (share * S[0], share * S[1], share * S[2]), 0.5 * (limit + before) * (size - limit) / k
+
+
+@njit(cache=True)
+def stuck_at(s, S, k, row, R, out):
+    """Where a point sticks, s - S/k [m], in the frame of a block."""
+    a0, a1, a2 = s[0] - S[0] / k, s[1] - S[1] / k, s[2] - S[2] / k
+    for c in range(3):
+        out[c] = R[row, 0, c] * a0 + R[row, 1, c] * a1 + R[row, 2, c] * a2
+
+
+# ---- with a law: `secant` and `work` are its functions, the others those of the mixed mode ----------------------
+
+
+def softened(unit, r, peak):
+    """k_s [Pa/m] at λ/δ_f = r, zero beyond failure."""
+    return unit * secant(r, peak) if r < 1.0 else 0.0
+
+
+def separation_work(unit, df, r, peak):
+    """W [J/m²] at λ/δ_f = r, G_c beyond failure."""
+    return unit * df * df * work(min(r, 1.0), peak)
+
+
+def torn_traction(before, now, move, ks, unit, df, peak, paid):
+    """Traction [Pa] of a substep in which λ grows from `before` to `now`, the measure by `move`; paid (2,) changes."""
+    move = max(move, now - before)
+    if move < SLOW * df:
+        paid[PULL] = NOT_GROWING
+        return ks * now
+    if paid[PULL] == NOT_GROWING:
+        was = max(now - move, 0.0)
+        k = softened(unit, before / df, peak)
+        paid[PULL] = k * was
+        paid[WORK] = separation_work(unit, df, before / df, peak) - 0.5 * k * (before * before - was * was)
+    paid[WORK] += 0.5 * paid[PULL] * move
+    mean = max(separation_work(unit, df, (now + 0.5 * move) / df, peak) - paid[WORK], 0.0) / move
+    share = min(1.0, (SHARP * move / df) ** 2)
+    pull = (1.0 - share) * ks * now + share * mean
+    paid[WORK] += 0.5 * pull * move
+    paid[PULL] = pull
+    return pull
+
+
+def joint_forces(
+    live,
+    a,
+    b,
+    start,
+    xi_a,
+    xi_b,
+    weight,
+    normal,
+    law,
+    peak,
+    largest,
+    paid,
+    rub,
+    eta,
+    x,
+    v,
+    R,
+    dt,
+    advance,
+    F,
+    damped,
+    rubbed,
+):
+    """Forces of the live joints on the blocks; with `advance` also their history and what their dashpots take.
+
+    live (l,) joints to visit · a, b (J,) rows · start (J+1,) first point of a joint · xi_a, xi_b (P, 3) [m]
+    weight (P,) [m²] · normal (J, 3) in block a · law (J, 6) · peak p
+    largest (P,) λ [m] · paid (P, 2) · rub (P, 3) [m]: where failed points stick, in the frame of a · eta [s] dashpot
+    time · x (n, 3), v (n, 6), R (n, 3, 3)
+    F (n, 6) is added to · damped, rubbed (J,) [J] too   →   largest growth of λ/δ_f in this call
+    """
+    fastest = 0.0
+    for j in live:
+        ra, rb = a[j], b[j]
+        unit, df, beta, k0 = law[j, UNIT], law[j, DF], law[j, BETA], law[j, K0]
+        kc = law[j, KC]
+        n = turned(ra, R, normal[j])
+        f0 = f1 = f2 = m0 = m1 = m2 = 0.0
+        for p in range(start[j], start[j + 1]):
+            pa, pb = place(ra, R, x, xi_a[p]), place(rb, R, x, xi_b[p])
+            mid = (0.5 * (pa[0] + pb[0]), 0.5 * (pa[1] + pb[1]), 0.5 * (pa[2] + pb[2]))
+            dn, s = split(pa, pb, n)
+            ss = dot(s, s)
+            before, now = largest[p], measure(dn, ss, beta)
+            after = max(before, now)
+            ks = softened(unit, after / df, peak)
+            if advance:
+                largest[p] = after
+                fastest = max(fastest, (after - before) / df)
+                if before < now and before < df and dt > 0.0:
+                    w = parting(ra, rb, x, v, mid)
+                    move = dt * pace(dn, ss, dot(w, n), dot(w, s), beta)
+                    ks = torn_traction(before, now, move, ks, unit, df, peak, paid[p]) / now
+                else:
+                    paid[p, PULL] = NOT_GROWING
+            tn, kn, kt = response(ks, dn, ss, after, k0, df, beta, kc)
+            t0, t1, t2 = tn * n[0] + kt * s[0], tn * n[1] + kt * s[1], tn * n[2] + kt * s[2]
+            if eta > 0.0:
+                c, power = dashpot(eta, kn, kt, parting(ra, rb, x, v, mid), n)
+                t0, t1, t2 = t0 + c[0], t1 + c[1], t2 + c[2]
+                if advance:
+                    damped[j] += weight[p] * power * dt
+            if after >= df and law[j, MU] > 0.0:
+                taken, S, k = 0.0, (0.0, 0.0, 0.0), beta**2 * k0
+                if dn < 0.0 and before >= df:
+                    w = parting(ra, rb, x, v, mid)
+                    wn = dt * dot(w, n)
+                    move = (dt * w[0] - wn * n[0], dt * w[1] - wn * n[1], dt * w[2] - wn * n[2])
+                    S, taken = rubbing(s, turned(ra, R, rub[p]), k, -law[j, MU] * tn, move)
+                if advance:
+                    rubbed[j] += weight[p] * taken
+                    stuck_at(s, S, k, ra, R, rub[p])
+                t0, t1, t2 = t0 + S[0], t1 + S[1], t2 + S[2]
+            t = (weight[p] * t0, weight[p] * t1, weight[p] * t2)
+            c0, c1, c2 = cross(arm(ra, x, mid), t)
+            f0, f1, f2, m0, m1, m2 = f0 + t[0], f1 + t[1], f2 + t[2], m0 + c0, m1 + c1, m2 + c2
+        add_forces(ra, rb, x, (f0, f1, f2), (m0, m1, m2), F)
+    return fastest
+
+
+def stored_between(live, a, b, start, xi_a, xi_b, weight, normal, law, peak, largest, rub, x, R, x0, R0, out):
+    """Elastic energy out (J,) [J] of the live joints half a substep before (x, R), between it and the place (x0, R0).
+
+    Leapfrog conserves kinetic(t + dt/2) + 1/2 k δ(t)·δ(t + dt) exactly, so the product of the two openings is used.
+    """
+    for j in live:
+        kc = law[j, KC]
+        n, n0 = turned(a[j], R, normal[j]), turned(a[j], R0, normal[j])
+        out[j] = 0.0
+        for p in range(start[j], start[j + 1]):
+            dn, d = split(place(a[j], R, x, xi_a[p]), place(b[j], R, x, xi_b[p]), n)
+            en, e = split(place(a[j], R0, x0, xi_a[p]), place(b[j], R0, x0, xi_b[p]), n0)
+            df = law[j, DF]
+            ks = softened(law[j, UNIT], largest[p] / df, peak)
+            out[j] += weight[p] * stored(ks, dn, en, dot(d, e), largest[p], law[j, K0], df, law[j, BETA], kc)
+            if largest[p] >= df and law[j, MU] > 0.0 and dn < 0.0:
+                at, k = turned(a[j], R, rub[p]), law[j, BETA] ** 2 * law[j, K0]
+                for c in range(3):
+                    out[j] += 0.5 * weight[p] * k * (d[c] - at[c]) * (e[c] - at[c])
+
+
+def lost(start, weight, law, peak, largest, out):
+    """Energy out (J,) [J] that the damage of every joint has taken for good, Σ weight (W(λ) - k_s λ²/2)."""
+    for j in range(len(out)):
+        out[j] = 0.0
+        unit, df = law[j, UNIT], law[j, DF]
+        for p in range(start[j], start[j + 1]):
+            r = largest[p] / df
+            back = 0.5 * softened(unit, r, peak) * largest[p] ** 2
+            out[j] += weight[p] * (separation_work(unit, df, r, peak) - back)
+
+
+def point_springs(index, joint_of, a, b, xi_a, xi_b, normal, law, peak, largest, rub, x, R, arms, normals, k):
+    """Of the points `index` (s,): arms (2, s, 3) from both centres, normals (s, 3), k_n and k_t in k (2, s) [Pa/m]."""
+    for i in range(len(index)):
+        p = index[i]
+        j = joint_of[p]
+        pa, pb = place(a[j], R, x, xi_a[p]), place(b[j], R, x, xi_b[p])
+        mid = (0.5 * (pa[0] + pb[0]), 0.5 * (pa[1] + pb[1]), 0.5 * (pa[2] + pb[2]))
+        n = turned(a[j], R, normal[j])
+        dn, s = split(pa, pb, n)
+        to_a, to_b = arm(a[j], x, mid), arm(b[j], x, mid)
+        for c in range(3):
+            arms[0, i, c], arms[1, i, c], normals[i, c] = to_a[c], to_b[c], n[c]
+        df = law[j, DF]
+        ks = softened(law[j, UNIT], largest[p] / df, peak)
+        kc = law[j, KC]
+        tn, k[0, i], k[1, i] = response(ks, dn, dot(s, s), largest[p], law[j, K0], df, law[j, BETA], kc)
+        if largest[p] >= df and law[j, MU] > 0.0:
+            stick, limit = law[j, BETA] ** 2 * law[j, K0], -law[j, MU] * min(tn, 0.0)
+            S, _ = rubbing(s, turned(a[j], R, rub[p]), stick, limit, n)
+            k[1, i] = stick if dot(S, S) < (STICKS * limit) ** 2 else 0.0
+
+
+def point_tangents(index, joint_of, a, b, xi_a, xi_b, normal, law, peak, largest, x, R, out):
+    """out (s, 3, 3) [Pa/m]: ∂t/∂δ of the points `index` while λ may grow, by central differences over 1e-7 δ_f."""
+    d = np.empty(3)
+    for i in range(len(index)):
+        p = index[i]
+        j = joint_of[p]
+        pa, pb = place(a[j], R, x, xi_a[p]), place(b[j], R, x, xi_b[p])
+        n = turned(a[j], R, normal[j])
+        unit, df, beta, k0 = law[j, UNIT], law[j, DF], law[j, BETA], law[j, K0]
+        kc = law[j, KC]
+        h = 1e-7 * df
+        for c in range(3):
+            for side in (1.0, -1.0):
+                d[0], d[1], d[2] = pb
+                d[c] += side * h
+                dn, s = split(pa, d, n)
+                after = max(largest[p], measure(dn, dot(s, s), beta))
+                ks = softened(unit, after / df, peak)
+                tn, _, kt = response(ks, dn, dot(s, s), after, k0, df, beta, kc)
+                for k in range(3):
+                    change = side * (tn * n[k] + kt * s[k]) / (2.0 * h)
+                    out[i, k, c] = change if side > 0.0 else out[i, k, c] + change
+
+
+# ---- kernels of a law -------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class JointKernels:
+    """The functions above of the same names, compiled for a law and a mixed mode."""
+
+    joint_forces: Callable
+    stored_between: Callable
+    lost: Callable
+    point_springs: Callable
+    point_tangents: Callable
+
+
+@cache
+def kernels_of(law: str, mixed_mode: str) -> JointKernels:
+    """Compiled at the first call of each; kept on disk under the checksum of the file of the law."""
+    chosen = laws.find(law)
+    mode = mixed_modes.find(mixed_mode)
+    source = Path(chosen.secant.py_func.__code__.co_filename).read_bytes()
+    name = f"{law}_{mixed_mode}_{crc32(source):08x}"
+
+    def inner(function, **functions):
+        return specialised(function, name, cache=False, **functions)
+
+    names = {"secant": chosen.secant, "work": chosen.work}
+    names["softened"] = inner(softened, **names)
+    names["separation_work"] = inner(separation_work, **names)
+    names["torn_traction"] = inner(torn_traction, **names)
+    names |= {part: getattr(mode, part) for part in ("measure", "pace", "response", "stored")}
+    parts = (joint_forces, stored_between, lost, point_springs, point_tangents)
+    return JointKernels(*(specialised(part, name, **names) for part in parts))

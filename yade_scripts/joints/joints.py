@@ -1,0 +1,307 @@
+"""Cohesive joints of a structure: built from touching faces, state through time, table for reports."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from yade_scripts.blocks.block import Block
+from yade_scripts.blocks.faces import TouchingFaces, gauss_points, to_body
+from yade_scripts.joints import kernel
+from yade_scripts.joints.cohesion import JointParameters
+from yade_scripts.joints.forces import MU, NOT_GROWING, PULL, JointKernels, kernels_of
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class JointTable:
+    """One row a joint. a, b: blocks (b = -1: ground or wall) · face_a, face_b: their faces (-1: fixed plane)
+
+    area [m²] · centre (J, 3) [m] and normal (J, 3) out of a, now (both follow block a) · damage: largest λ/δ_f of the
+    joint's points, weighted mean in `mean_damage` · opening, sliding [m] means · mode_mix: share of shear in the
+    effective opening, 0 (opening) .. 1 (shear), frozen at failure · stored, dissipated, damped [J]
+    failure_time [s], nan while alive · intact: nothing broken · alive: still carries tension
+    """
+
+    a: Array
+    b: Array
+    face_a: Array
+    face_b: Array
+    area: Array
+    centre: Array
+    normal: Array
+    damage: Array
+    mean_damage: Array
+    opening: Array
+    sliding: Array
+    mode_mix: Array
+    stored: Array
+    dissipated: Array
+    damped: Array
+    failure_time: Array
+    alive: Array
+
+    def __len__(self) -> int:
+        return len(self.a)
+
+
+class Joints:
+    """Geometry (constant), history λ of every point, and which joints are alive.
+
+    faces: from `touching_faces` (coordinates of the scene) · parameters: the law of most joints · laws: that of each,
+    None: the same for all.
+    """
+
+    def __init__(
+        self,
+        blocks: list[Block],
+        faces: list[TouchingFaces],
+        parameters: JointParameters,
+        laws: list[JointParameters] | None = None,
+    ):
+        self.parameters = parameters
+        n = len(faces)
+        laws = [parameters] * n if laws is None else laws
+        self.laws = laws
+        self.families, self.family = _families(laws)
+        self.a = np.array([f.a for f in faces], np.int64)
+        self.b = np.array([max(f.b, -1) for f in faces], np.int64)
+        self.plane = np.array([-1 - f.b for f in faces], np.int64)
+        """Number of the fixed plane where b = -1."""
+        self.face_a = np.array([f.face_a for f in faces], np.int64)
+        self.face_b = np.array([f.face_b for f in faces], np.int64)
+        rules = [gauss_points(f.polygon, law.rule) for f, law in zip(faces, laws)]
+        self.start = np.concatenate([[0], np.cumsum([len(w) for _, w in rules])]).astype(np.int64)
+        self.weight = np.concatenate([w for _, w in rules]) if n else np.zeros(0)
+        place = np.concatenate([p for p, _ in rules]) if n else np.zeros((0, 3))
+        self.joint_of = np.repeat(np.arange(n), np.diff(self.start))
+        self.area = np.bincount(self.joint_of, self.weight, minlength=n)
+        centre = np.array([b.centre for b in blocks]).reshape(-1, 3)
+        R = np.array([b.rotation for b in blocks]).reshape(-1, 3, 3)
+        corners = np.concatenate([f.polygon for f in faces]) if n else np.zeros((0, 3))
+        self.corner_start = np.concatenate([[0], np.cumsum([len(f.polygon) for f in faces])]).astype(np.int64)
+        self._corner_of = np.repeat(np.arange(n), np.diff(self.corner_start))
+        self._corner = to_body(corners, self.a[self._corner_of], centre, R)
+        self.xi_a = to_body(place, self.a[self.joint_of], centre, R)
+        self.xi_b = to_body(place, self.b[self.joint_of], centre, R)
+        normal = np.array([f.normal for f in faces]).reshape(-1, 3)
+        self.normal = np.einsum("nji,nj->ni", R[self.a], normal) if n else np.zeros((0, 3))
+        known = {law: _numbers(law) for law in dict.fromkeys(laws)}
+        numbers = np.array([known[law] for law in laws]).reshape(-1, 5)
+        unit, self.df, self.beta, self.kc, self.k0 = (column.copy() for column in numbers.T)
+        self.law = np.stack([unit, self.df, self.beta, self.kc, self.k0, np.zeros(n)], axis=1)
+        """Columns as in `joint_forces`."""
+        self.eta = 0.0
+        """Time constant of the stiffness-proportional dashpot [s]."""
+        self.stiffness_on: tuple[Array, Array] | None = None
+        """What each joint adds to the stiffness of its blocks (J, 6, 6), kept by `timestep.joint_frequency`."""
+        self.alive = np.ones(n, bool)
+        self.live = np.arange(n)
+        self.largest = np.zeros(len(self.weight))
+        self.paid = np.zeros((len(self.weight), 2))
+        self.paid[:, PULL] = NOT_GROWING
+        self.damped = np.zeros(n)
+        """Energy that the dashpots of each joint have taken [J]."""
+        self.rub = np.zeros((len(self.weight), 3))
+        """Sliding at which the failed points stick [m], in the frames of the blocks a."""
+        self.rubbed = np.zeros(n)
+        """Energy that this friction has taken [J]."""
+        self.failure_time = np.full(n, np.nan)
+        self.final_openings = np.zeros((n, 3))
+
+    def __len__(self) -> int:
+        return len(self.a)
+
+    def forces(self, x, v, R, F, dt: float = 0.0, advance: bool = False, eta: float | None = None) -> float:
+        """Add the joint forces on the blocks to F (n, 6); see `joint_forces.joint_forces`."""
+        eta, fastest = self.eta if eta is None else eta, 0.0
+        for kernels, arrays in self._live_families():
+            growth = kernels.joint_forces(
+                *arrays, self.paid, self.rub, eta, x, v, R, dt, advance, F, self.damped, self.rubbed
+            )
+            fastest = max(fastest, growth)
+        return fastest
+
+    def _live_families(self) -> Iterator[tuple[JointKernels, tuple]]:
+        """Kernels of each law with live joints, and what they read of these, in their order."""
+        for number, (kernels, peak) in enumerate(self.families):
+            live = self.live if len(self.families) == 1 else self.live[self.family[self.live] == number]
+            yield (
+                kernels,
+                (
+                    live, self.a, self.b, self.start, self.xi_a, self.xi_b, self.weight, self.normal, self.law,
+                    peak, self.largest,
+                ),
+            )  # fmt: skip
+
+    def stored_between(self, x: Array, R: Array, x0: Array, R0: Array) -> Array:
+        """Elastic energy of each joint between two places of the blocks, (J,) [J]."""
+        out = np.zeros(len(self))
+        for kernels, arrays in self._live_families():
+            kernels.stored_between(*arrays, self.rub, x, R, x0, R0, out)
+        return out
+
+    def lost(self) -> Array:
+        """Energy that the damage of each joint stands for by its law, G_c A once it has failed, (J,) [J]."""
+        out, own = np.empty(len(self)), np.empty(len(self))
+        for number, (kernels, peak) in enumerate(self.families):
+            kernels.lost(self.start, self.weight, self.law, peak, self.largest, own)
+            of_law = self.family == number
+            out[of_law] = own[of_law]
+        return out
+
+    def of_points(self, index: Array) -> Iterator[tuple[JointKernels, Array, tuple]]:
+        """For each law: its kernels, which of the points `index` are its own (bool), and what the kernels of single
+        points read of these, in their order."""
+        for number, (kernels, peak) in enumerate(self.families):
+            own = self.family[self.joint_of[index]] == number
+            yield (
+                kernels,
+                own,
+                (
+                    index[own], self.joint_of, self.a, self.b, self.xi_a, self.xi_b, self.normal, self.law,
+                    peak, self.largest,
+                ),
+            )  # fmt: skip
+
+    def broken_now(self) -> Array:
+        """Live joints that have failed since the last call of `retire`."""
+        return self.live[kernel.broken(self.live, self.start, self.largest, self.df)]
+
+    def set_friction(self, friction: Array) -> None:
+        """μ (J,) of points that have failed and are pressed, while the rest of their joint holds."""
+        self.law[:, MU] = friction
+
+    def let_go(self, joints: Array, x: Array, R: Array) -> float:
+        """Friction of `joints` ends at the places x (n, 3), R (n, 3, 3): it takes what its springs hold, which is
+        returned [J]."""
+        friction = self.law[joints, MU]
+        whole = self.stored_between(x, R, x, R)[joints]
+        self.law[joints, MU] = 0.0
+        held = whole - self.stored_between(x, R, x, R)[joints]
+        self.law[joints, MU] = friction
+        self.rubbed[joints] += held
+        return float(held.sum())
+
+    def retire(self, joints: Array, x: Array, R: Array, time: float) -> None:
+        """Take failed joints out: they have dissipated G_c A and cost nothing from now on."""
+        self.final_openings[joints] = self.openings(joints, x, R)
+        self.alive[joints] = False
+        self.failure_time[joints] = time
+        self.live = self.live[self.alive[self.live]]
+
+    def joined_pairs(self, n: int) -> Array:
+        """Pairs of bodies (p, 2) with a live joint; fixed planes are bodies n, n + 1, ..."""
+        return np.stack([self.a[self.live], np.where(self.b < 0, n + self.plane, self.b)[self.live]], axis=1)
+
+    def openings(self, joints: Array, x: Array, R: Array) -> Array:
+        """Mean normal opening, mean sliding, largest normal opening of the points of `joints`, (len, 3) [m]."""
+        out = np.zeros((len(self), 3))
+        kernel.joint_openings(
+            np.asarray(joints),
+            self.a,
+            self.b,
+            self.start,
+            self.xi_a,
+            self.xi_b,
+            self.weight,
+            self.normal,
+            x,
+            R,
+            out,
+        )
+        return out[joints]
+
+    def sealed_faces(self, x: Array, R: Array) -> tuple[Array, Array, Array]:
+        """Both faces of each live joint: block (m,), face (m,), half of the joint's largest opening (m,) [m]."""
+        live = self.live
+        half = 0.5 * self.openings(live, x, R)[:, 2]
+        inner = self.b[live] >= 0
+        return (
+            np.concatenate([self.a[live], self.b[live][inner]]),
+            np.concatenate([self.face_a[live], self.face_b[live][inner]]),
+            np.concatenate([half, half[inner]]),
+        )
+
+    def rows(self) -> Array:
+        """Blocks with a live joint, sorted."""
+        ends = np.concatenate([self.a[self.live], self.b[self.live]])
+        return np.unique(ends[ends >= 0])
+
+    def damaged_blocks(self, n: int) -> Array:
+        """(n,) bool: blocks that have lost a joint, or never had one."""
+        loose = np.ones(n, bool)
+        loose[self.a] = False
+        loose[self.b[self.b >= 0]] = False
+        dead = ~self.alive
+        loose[self.a[dead]] = True
+        loose[self.b[dead & (self.b >= 0)]] = True
+        return loose
+
+    def table(self, x: Array, R: Array) -> JointTable:
+        """The joints now. x (n, 3), R (n, 3, 3): places of the blocks."""
+        opening = self.final_openings.copy()
+        opening[self.live] = self.openings(self.live, x, R)
+        ratio = np.minimum(self.largest / self.df[self.joint_of], 1.0)
+        damage = np.zeros(len(self))
+        np.maximum.at(damage, self.joint_of, ratio)
+        mean = np.bincount(self.joint_of, ratio * self.weight, minlength=len(self)) / self.area
+        centre = x[self.a] + np.einsum("nij,nj->ni", R[self.a], self._centre_in_a())
+        normal = np.einsum("nij,nj->ni", R[self.a], self.normal)
+        shear = self.beta * opening[:, 1]
+        effective = np.hypot(np.maximum(opening[:, 0], 0.0), shear)
+        mix = np.divide(shear, effective, out=np.zeros(len(self)), where=effective > 0.0)
+        return JointTable(
+            self.a, self.b, self.face_a, self.face_b, self.area, centre, normal, damage, mean, opening[:, 0],
+            opening[:, 1], mix, self.stored_between(x, R, x, R), self.lost(), self.damped.copy(),
+            self.failure_time.copy(), self.alive.copy(),
+        )  # fmt: skip
+
+    def corners(self, x: Array, R: Array) -> Array:
+        """Corners of the joined faces (c, 3) [m] where block a is, those of joint j from corner_start[j]."""
+        a = self.a[self._corner_of]
+        return x[a] + np.einsum("nij,nj->ni", R[a], self._corner)
+
+    def _centre_in_a(self) -> Array:
+        weighted = self.xi_a * self.weight[:, None]
+        return (
+            np.stack([np.bincount(self.joint_of, w, len(self)) for w in weighted.T], 1) / self.area[:, None]
+        )
+
+    def history(self) -> dict[str, Array]:
+        """Copies of everything that changes in time, for `restore`."""
+        names = (
+            "alive",
+            "live",
+            "largest",
+            "paid",
+            "rub",
+            "rubbed",
+            "damped",
+            "failure_time",
+            "final_openings",
+        )
+        return {name: getattr(self, name).copy() for name in names}
+
+    def restore(self, history: dict[str, Array]) -> None:
+        """Back to a `history`."""
+        for name, value in history.items():
+            setattr(self, name, value.copy())
+
+
+def _numbers(law: JointParameters) -> tuple[float, ...]:
+    """T_max/δ_f [Pa/m], δ_f [m], β, k_c [Pa/m], k_0 [Pa/m] of a law."""
+    unit = law.strength / law.opening_at_failure
+    return unit, law.opening_at_failure, law.shear_ratio, law.closing_stiffness, law.stiffness
+
+
+def _families(laws: list[JointParameters]) -> tuple[list[tuple[JointKernels, float]], Array]:
+    """Kernels and place of the peak of each law that is used, and the number (J,) of that of each joint."""
+    keys = [(law.law, law.mixed_mode, law.peak_share) for law in laws]
+    used = list(dict.fromkeys(keys))
+    numbers = {key: number for number, key in enumerate(used)}
+    families = [(kernels_of(law, mode), peak) for law, mode, peak in used]
+    return families, np.array([numbers[key] for key in keys], np.int64)

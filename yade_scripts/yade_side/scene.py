@@ -1,0 +1,202 @@
+"""The YADE side: one body a block, found by its number and moved by YADE under forces that are given to it.
+
+YADE keeps the bodies, integrates their motion (`NewtonIntegrator`) and looks for neighbours (`InsertionSortCollider`);
+the laws of contact and joints act through its Python interface: forces go in before each step. YADE's own contact
+geometries are not used, because none of them is right for blocks (docs/theory.md).
+"""
+
+from __future__ import annotations
+
+import struct
+from collections import deque
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from yade_scripts.blocks.block import Block
+from yade_scripts.contact.nodes import MARGIN
+from yade_scripts.yade_side.engine import Engine, YadeError
+
+Array = np.ndarray
+
+STANDING, LOOSE = 5, 1
+"""Masks: two bodies are neighbours if they share a bit, unless both stand (equal masks that hold `APART`)."""
+APART = 4
+VERLET = 0.05
+"""Margin of the search for neighbours as a share of the smallest edge of a block."""
+WHITE = (1.0, 1.0, 1.0)
+"""Colour of bodies; left to itself, YADE seeds a random generator for each."""
+STATE = 13
+"""Numbers of a body: position 3, velocity 3, angular velocity 3, orientation 4 (x y z w)."""
+
+
+class SceneInUse(YadeError):
+    """YADE holds one scene in a process; close the structure that has it first."""
+
+
+class Scene:
+    """Bodies of `blocks` (local coordinates) in YADE; meets: whether neighbours are looked for.
+
+    ids: body of each row · frame (n, 3, 3): fixed turn from the block frame to YADE's principal frame
+    margin [m]: how far a body may go before the neighbours are looked for again.
+    """
+
+    _owner: Scene | None = None
+
+    def __init__(self, engine: Engine, blocks: list[Block], meets: bool, gravity: Array):
+        if Scene._owner is not None:
+            raise SceneInUse("YADE holds another structure in this process; call its close() first")
+        Scene._owner = self
+        self.engine, self.O, self.blocks = engine, engine.O, blocks
+        self.O.reset()
+        self.ids: list[int] = []
+        self.frame = np.tile(np.eye(3), (len(blocks), 1, 1))
+        self.margin = VERLET * min((2.0 * b.planes[1].min() for b in blocks), default=1.0)
+        self._subdomain = engine.wrapper.Subdomain()
+        self._searched = -1
+        self._set_engines(gravity, meets)
+        for row, block in enumerate(blocks):
+            self._add_block(row, block)
+
+    # ---- building -------------------------------------------------------------------------------------------
+
+    def _add_block(self, row: int, block: Block) -> None:
+        body = self._shape(block)
+        self.ids.append(self.O.bodies.append(body))
+        state = body.state
+        axes = np.eye(3)
+        if not block.is_box:
+            axes = np.linalg.eigh(block.inertia)[1]
+            axes[:, 2] *= np.sign(np.linalg.det(axes))
+        self.frame[row] = axes.T
+        principal = np.diag(axes.T @ block.inertia @ axes)
+        R = block.rotation @ axes
+        state.pos, state.ori = self._v(block.centre), self._q(R)
+        state.mass, state.inertia = block.mass, self._v(principal)
+        body.aspherical = True
+        state.vel, state.angVel = self._v(block.velocity), self._v(block.spin)
+        state.angMom = self._v(R @ (principal * (R.T @ block.spin)))
+        if block.fixed or block.driven:
+            state.blockedDOFs = "xyzXYZ"
+
+    def _shape(self, block: Block):
+        """Its box, or a sphere around it, with the margin of its faces: what the search for neighbours sees."""
+        margin = MARGIN * block.planes[1].min()
+        if block.is_box:
+            return self.engine.utils.box(
+                self._v(block.centre), self._v(0.5 * block.size + margin), mask=STANDING, color=WHITE
+            )
+        return self.engine.utils.sphere(
+            self._v(block.centre), block.radius + margin, mask=STANDING, color=WHITE
+        )
+
+    def _set_engines(self, gravity: Array, meets: bool) -> None:
+        """Integration first: forces are handed over before the step. (YADE warns of forces that were not reset in the
+        step of its integration; here that is meant.)"""
+        w = self.engine.wrapper
+        newton = w.NewtonIntegrator(
+            damping=0.0, exactAsphericalRot=True, gravity=self._v(gravity), warnNoForceReset=False
+        )
+        self.collider = None
+        engines = [newton, w.ForceResetter()]
+        if meets:
+            self.collider = w.InsertionSortCollider(
+                [w.Bo1_Box_Aabb(), w.Bo1_Sphere_Aabb()],
+                verletDist=self.margin,
+                avoidSelfInteractionMask=APART,
+            )
+            engines.append(self.collider)
+        self.O.engines = engines
+
+    # ---- reading and moving ---------------------------------------------------------------------------------
+
+    def read(self, rows_ids: list[int], buffer: bytearray) -> Array:
+        """States of body ids into a buffer of 8 * 13 bytes each → (k, 13) view on it.
+
+        The list must persist between calls: YADE leaks a reference per fresh item it is handed.
+        """
+        struct.pack_into(
+            f"{STATE * len(rows_ids)}d", buffer, 0, *self._subdomain.getStateValuesFromIds(rows_ids)
+        )
+        return np.frombuffer(buffer, float, STATE * len(rows_ids)).reshape(-1, STATE)
+
+    def angular_momentum(self, rows: Array) -> Array:
+        """About their own centres, as the integrator keeps it, of the blocks `rows` (k,) → (k, 3) [N m s]."""
+        bodies = self.O.bodies
+        return np.array([tuple(bodies[self.ids[r]].state.angMom) for r in rows], float).reshape(-1, 3)
+
+    def step(self, dt: float, ids: list[int], F: Array) -> None:
+        """Move on by dt [s] under the forces and moments F (k, 6) on the bodies `ids`.
+
+        YADE's permanent forces are not used: its integrator aborts when bodies are added after one was set."""
+        forces = self.O.forces
+        deque(map(forces.addF, ids, F[:, :3].tolist()), maxlen=0)
+        deque(map(forces.addT, ids, F[:, 3:].tolist()), maxlen=0)
+        self.O.dt = dt
+        self.O.step()
+
+    def set_motion(self, row: int, motion: Array) -> None:
+        """Velocity and spin (6,) of a block whose motion is prescribed."""
+        state = self.O.bodies[self.ids[row]].state
+        state.vel, state.angVel = self._v(motion[:3]), self._v(motion[3:])
+
+    def set_loose(self, loose: Array) -> None:
+        """loose (n,) bool: blocks that may meet any other; two that are not do not meet."""
+        for i, free in zip(self.ids, loose.tolist()):
+            self.O.bodies[i].mask = LOOSE if free else STANDING
+
+    def neighbours(self, now: bool) -> Array:
+        """Pairs of rows (p, 2) whose bounding boxes are within the margin; now: looked for at the present places, after
+        bodies were moved by hand or became loose."""
+        if now:
+            self.collider.doSort = True
+            self.collider()
+        self._searched = self.collider.numAction
+        return np.array([(i.id1, i.id2) for i in self.O.interactions.all()], np.int64).reshape(-1, 2)
+
+    def searched(self) -> bool:
+        """Whether YADE has looked for neighbours since `neighbours` was asked."""
+        return self.collider.numAction != self._searched
+
+    def displace(self, rows: Array, shift: Array, turn: Array) -> None:
+        """Move the blocks `rows` by shift (m, 3) and turn (m, 3, 3) about their centres."""
+        for row, move, Q in zip(rows, shift, turn):
+            state = self.O.bodies[self.ids[row]].state
+            state.pos = self._v(np.array(state.pos) + move)
+            state.ori = self._q(Q @ _matrix(state.ori))
+
+    # ---- saving and going back ------------------------------------------------------------------------------
+
+    def save(self) -> Array:
+        """Position 3, orientation 4 (w x y z), velocity 3, spin 3 and angular momentum 3 of each block, (n, 16)."""
+        states = [self.O.bodies[i].state for i in self.ids]
+        rows = [
+            (*s.pos, s.ori[3], s.ori[0], s.ori[1], s.ori[2], *s.vel, *s.angVel, *s.angMom) for s in states
+        ]
+        return np.array(rows, float).reshape(-1, 16)
+
+    def restore(self, saved: Array) -> None:
+        """Back to a saved state, bit for bit."""
+        V, Q = self.engine.Vector3, self.engine.Quaternion
+        for i, row in zip(self.ids, saved.tolist()):
+            state = self.O.bodies[i].state
+            state.pos, state.ori = V(*row[:3]), Q(*row[3:7])
+            state.vel, state.angVel, state.angMom = V(*row[7:10]), V(*row[10:13]), V(*row[13:])
+
+    def close(self) -> None:
+        """Give the scene back; the structure cannot be used afterwards."""
+        if Scene._owner is self:
+            self.O.reset()
+            Scene._owner = None
+
+    def _v(self, x) -> object:
+        return self.engine.Vector3(*(float(c) for c in x))
+
+    def _q(self, R: Array):
+        x, y, z, w = Rotation.from_matrix(R).as_quat()
+        return self.engine.Quaternion(float(w), float(x), float(y), float(z))
+
+
+def _matrix(quaternion) -> Array:
+    """Rotation matrix (3, 3) of a YADE quaternion."""
+    return np.array(quaternion.toRotationMatrix(), float).reshape(3, 3)
