@@ -24,6 +24,7 @@ from coupler.case.types import (
     VelocityVector,
 )
 from coupler.case.units import quantity
+from coupler.case.verdict import Verdict
 from coupler.case.water import Solid, Water
 
 
@@ -283,6 +284,9 @@ class Case(Section):
     motion: tuple[Motion, ...] = Field((), description="blocks that move as prescribed")
     coupling: Exchange = Field(default_factory=Exchange, description="how water and blocks agree on a step")
     limits: RunLimits = Field(default_factory=RunLimits, description="when a run stops early")
+    verdict: Verdict = Field(
+        default_factory=Verdict, description="when a structure counts as damaged or collapsed"
+    )
     study: Study | None = Field(None, exclude=True, description="what `surgebreak study` varies and measures")
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from coupler.case.case import Case
 from coupler.case.schedule import MOST_OUTPUTS
 from coupler.case.toml_lines import shown
+from coupler.case.verdict import Verdict
 from coupler.checks.joints import joint_problems, pair_problems
 from coupler.checks.motion import motion_problems
 from coupler.checks.places import frame_problems, opening_problems, place_problems, solid_bodies
@@ -23,6 +24,7 @@ from coupler.geometry.parts import PARTS, Part, parts_of, recipes
 from coupler.geometry.solids import refused_solids
 from coupler.geometry.tank_mesh import is_measured, mesh_remarks
 from coupler.program.errors import did_you_mean
+from coupler.verdict.divisions import member, storey
 
 KeyPath = tuple[str | int, ...]
 Problem = tuple[KeyPath, str]
@@ -174,6 +176,8 @@ def _sections(case: Case) -> Iterator[Problem]:
     elif case.joints is not None or case.contact is not None or case.motion:
         absent = [name for name in ("contact", "joints", "motion") if getattr(case, name)]
         yield (absent[0],), f"[{absent[0]}] is for blocks; write a section [structure] or leave this one out"
+    if case.structure is None and case.verdict != Verdict():
+        yield ("verdict",), "[verdict] is about blocks; write a section [structure] or leave this one out"
 
 
 def _outputs(case: Case) -> Iterator[Problem]:
@@ -308,9 +312,15 @@ def _known_names(case: Case, parts: list[Part]) -> Iterator[Problem]:
     moving, solids = list(dict.fromkeys([*several, *blocks])), [solid.name for solid in case.solid]
     unmade = {r.name for r in recipes(case)} - {part.name for part in parts}
 
+    walls = list(dict.fromkeys([*moving, *(member(name) for name in blocks)]))
+    walls += [name for name in dict.fromkeys(storey(wall) for wall in walls) if name]
+
     def absent(name: str, known: list[str]) -> bool:
         return name not in known and not any(name == n or name.startswith(f"{n}-") for n in unmade)
 
+    for i, name in enumerate(case.verdict.on):
+        if case.structure and absent(name, walls):
+            yield ("verdict", "on", i), _no_such("block, group, wall or floor", name, walls)
     for i, motion in enumerate(case.motion):
         if case.structure and absent(motion.block, blocks):
             yield ("motion", i, "block"), _no_such("block", motion.block, blocks)

@@ -233,16 +233,29 @@ def _values(column, cells):
 def write_cracks(path, table):
     """Write the crack table from a dict of arrays with names out of CRACK_COLUMNS (n,) or, for vectors, (n, 3).
 
-    Written beside and then renamed, so that a killed run leaves the table before or the table after. A time that is
-    not finite (the joint holds) becomes an empty cell. Raises WrongShape (unknown name, unequal lengths), NotFinite,
-    DiskFull.
+    A time that is not finite (the joint holds) becomes an empty cell. Raises WrongShape (unknown name, unequal
+    lengths), NotFinite, DiskFull.
     """
     columns, arrays = _crack_arrays(path, table)
-    body = "".join(
-        line([_crack_cell(path, c.name, i, a[i]) for c, a in zip(columns, arrays)])
-        for i in range(len(arrays[0]) if arrays else 0)
-    )
-    _replace(Path(path), header("joints: which broke, when and how", columns) + body)
+    for c, array in zip(columns, arrays):
+        if c.name != "time" and not np.isfinite(array).all():
+            row = int(np.flatnonzero(~np.isfinite(array))[0])
+            raise NotFinite(f"{path}: {c.name} is {array[row]} in row {row}")
+    write_table(path, "joints: which broke, when and how", columns, arrays)
+
+
+def write_table(path, title, columns, arrays):
+    """Write a whole table: columns of Column, arrays (n,) of numbers or texts; what is not finite leaves a cell empty.
+
+    Written beside and then renamed, so that a killed run leaves the table before or that after. Raises DiskFull."""
+    body = "".join(line([_table_cell(value) for value in row]) for row in zip(*arrays))
+    _replace(Path(path), header(title, columns) + body)
+
+
+def _table_cell(value):
+    if isinstance(value, str):
+        return value
+    return number(value) if np.isfinite(value) else ""
 
 
 def _crack_arrays(path, table):
@@ -258,14 +271,6 @@ def _crack_arrays(path, table):
         columns += [Column(name + tail, known[name].unit, known[name].meaning) for tail, _ in parts]
         arrays += [part for _, part in parts]
     return columns, arrays
-
-
-def _crack_cell(path, name, row, value):
-    if np.isfinite(value):
-        return number(value)
-    if name == "time":
-        return ""
-    raise NotFinite(f"{path}: {name} is {value} in row {row}")
 
 
 def _replace(path, text):

@@ -4,6 +4,7 @@
 `history/coupling.csv` how each step went   `history/water.csv`     volume
 `history/gauges.csv`   the gauges           `history/structure.csv` joints, fastest block
 `history/loads_*.csv`  loads by what they come from, where a case asks for them
+`cracks.csv`, `blocks.csv`  what became of each joint and block, with the verdict in run.json
 """
 
 from __future__ import annotations
@@ -31,14 +32,16 @@ class Recorder:
 
     directory: of the run · coupling: Coupling · gauges: list of Gauge
     solids: [(vertices, faces)] that never move, with a structure its last blocks ·
-    tank: (lower, upper) or None · kept: what `save` gave, to continue the files from there. Raises CannotContinue.
+    tank: (lower, upper) or None · kept: what `save` gave, to continue the files from there · watch: of the verdict,
+    None without a structure. Raises CannotContinue.
     """
 
-    def __init__(self, directory, coupling, gauges, solids, tank, kept=None):
-        self.coupling, self.gauges = coupling, gauges
+    def __init__(self, directory, coupling, gauges, solids, tank, kept=None, watch=None):
+        self.coupling, self.gauges, self.watch = coupling, gauges, watch
         self.history = directory / "history"
         self.history.mkdir(exist_ok=True)
         self.cracks = directory / "cracks.csv"
+        self.each_block = directory / "blocks.csv"
         water, structure = coupling.water, coupling.structure
         self.impulse = np.zeros(3)
         self.reinserted, self.clipped = 0.0, 0
@@ -73,6 +76,13 @@ class Recorder:
             basin = basin_edges(water.mesh) if water else None
             bodies = ([v for v, _ in solids], [f for _, f in solids])
             write_solids(directory / "solids.vtkhdf", *bodies, tank, basin=basin)
+        if kept is None and structure is not None and structure.joints is not None:
+            rows = {
+                "joint": np.arange(len(structure.joints)),
+                "a": structure.joints.a,
+                "b": structure.joints.b,
+            }
+            write_crack_surfaces(directory / "joints.vtu", *structure.joint_polygons(at_start=True), rows)
 
     def _table(self, name: str, columns, title: str | None = None) -> HistoryTable:
         keep = None if self._kept is None else self._kept[f"table_{name}"].tolist()
@@ -86,10 +96,10 @@ class Recorder:
         self.parted = float(kept["parted"])
         for k, gauge in enumerate(self.gauges):
             if gauge.windows is not None:
-                start = f"gauge_{k}_"
-                own = {name.removeprefix(start): a for name, a in kept.items() if name.startswith(start)}
-                gauge.windows.restore(own)
-        self._write_cracks()
+                gauge.windows.restore(_below(f"gauge_{k}_", kept))
+        if self.watch is not None:
+            self.watch.restore(_below("watch_", kept))
+        self._write_tables()
 
     def _gauge_memory(self) -> dict[str, np.ndarray]:
         """What the gauges have accumulated, by number of the gauge."""
@@ -106,6 +116,7 @@ class Recorder:
         return (
             places
             | self._gauge_memory()
+            | {f"watch_{name}": a for name, a in (self.watch.save() if self.watch else {}).items()}
             | {
                 "outputs": np.array(self._written),
                 "impulse": self.impulse.copy(),
@@ -163,6 +174,8 @@ class Recorder:
         for gauge, table in self._own:
             for row in gauge.read(c, record):
                 table.append(**row)
+        if self.watch is not None:
+            self.watch.step(c, record)
 
     def _append_momentum(self, record) -> None:
         m = record.momentum
@@ -226,19 +239,39 @@ class Recorder:
             data |= {} if s.joints is None else {"damage": block_damage(s)}
             data = {name: values[: self._n_blocks] for name, values in data.items()}
             self._blocks.append(time, s.centre()[: self._n_blocks], s.rotation()[: self._n_blocks], data)
-        self._write_cracks()
+        if self.watch is not None and c.water is not None:
+            self.watch.look(c.water, time)
+        self._write_tables()
         self._written += 1
 
-    def _write_cracks(self) -> None:
+    def _write_tables(self) -> None:
+        """Tables of joints and blocks, as they are now."""
         structure = self.coupling.structure
+        if self.watch is not None:
+            from coupler.verdict.table import write_blocks
+
+            write_blocks(self.each_block, structure, self.watch)
         cracks = crack_columns(structure) if structure else {}
         if cracks:
             write_cracks(self.cracks, cracks)
             write_crack_surfaces(self.cracks.with_suffix(".vtu"), *structure.joint_polygons(), cracks)
 
+    def verdict(self) -> dict | None:
+        """What the run says about its structure now (coupler/verdict/judge.py); None without one."""
+        if self.watch is None:
+            return None
+        from coupler.verdict.judge import verdict
+
+        return verdict(self.coupling.structure, self.watch)
+
     def close(self) -> None:
         for table in self._tables.values():
             table.close()
+
+
+def _below(start: str, kept) -> dict[str, np.ndarray]:
+    """What was kept under names with this start, by the rest of the name."""
+    return {name.removeprefix(start): a for name, a in kept.items() if name.startswith(start)}
 
 
 def _xyz(name: str, vector) -> dict[str, float]:

@@ -23,7 +23,13 @@ from coupler.run.fingerprint import differences, program, scene_parts
 FOLDER = "checkpoints"
 KEPT = 2
 LAYOUT = 2
-UNSET = ("structure/joints/failure_time",)
+UNSET = (
+    "structure/joints/failure_time",
+    *(
+        f"recorder/watch_{name}"
+        for name in ("left_at", "pressure_time", "force_time", "moment_time", "depth_time", "depth_at")
+    ),
+)
 """Arrays in which NaN has a meaning."""
 
 

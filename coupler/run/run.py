@@ -117,7 +117,7 @@ def _steps(
     limits = limits_of(case)
     schedule = checkpoint.schedule(case.time.end) if checkpoint else Schedule.of(case)
     kept = checkpoint.part("recorder") if checkpoint else None
-    recorder = Recorder(directory.path, coupling, scene.gauges, scene.solids, scene.tank, kept)
+    recorder = Recorder(directory.path, coupling, scene.gauges, scene.solids, scene.tank, kept, scene.watch)
     checkpoints = _checkpoints(case, scene, directory, recorder, schedule)
     way_on = f"; `surgebreak resume {quote(str(directory.path))}` goes on" if checkpoints is not None else ""
     long = _long_steps(coupling, limits, reporter, clock, figures, checkpoints)
@@ -141,6 +141,7 @@ def _steps(
             if _reached(coupling.time, target):
                 with clock("output"):
                     recorder.fields(coupling.time)
+                    directory.record(**figures, verdict=recorder.verdict())
             at_end = _reached(coupling.time, schedule.end)
             wish = None if at_end else _wish_to_stop(clock, limits, reporter)
             if checkpoints is not None and (wish or at_end or checkpoints.due()):
@@ -154,6 +155,19 @@ def _steps(
         raise LimitReached(str(left) + way_on) from None
     finally:
         recorder.close()
+        _tell_verdict(recorder, directory, reporter)
+
+
+def _tell_verdict(recorder: Recorder, directory, reporter) -> None:
+    """Into run.json and the log, however the run ends."""
+    told = recorder.verdict()
+    if told is None:
+        return
+    from coupler.verdict.words import sentences
+
+    directory.record(verdict=told)
+    for line in sentences(told):
+        reporter.message(line)
 
 
 def _long_steps(coupling, limits: Limits, reporter, clock: Clock, figures: dict, checkpoints) -> LongSteps:

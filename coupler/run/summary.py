@@ -64,6 +64,75 @@ class _Work(_Part):
         return self
 
 
+class _First(_Part):
+    time: Number
+    place: list[Number]
+    blocks: list[Text]
+
+
+class _Way(_Part):
+    block: Text | None
+    way: Number
+
+
+class _Group(_Part):
+    """The damage of a structure, a body, a wall or a storey (coupler/verdict/judge.py)."""
+
+    name: Text
+    word: Text
+    state: Text
+    rule: Text
+    blocks: Whole
+    blocks_moved: Whole
+    joints: Whole
+    joints_broken: Whole
+    area_broken: Number
+    weight_moved: Number
+    farthest: _Way
+    first_break: _First | None
+
+
+class _Peak(_Part):
+    value: Number
+    time: Number
+
+
+class _Gone(_Part):
+    block: Text
+    way: Number
+    left_at: Number
+
+
+class _Displaced(_Part):
+    blocks: Whole
+    first: Number | None
+    list: list[_Gone]
+
+
+class _Hit(_Part):
+    time: Number
+    block: Text
+    other: Text
+    place: list[Number]
+    speed: Number
+    impulse: Number
+    force: Number
+
+
+class _Hits(_Part):
+    pairs: Whole
+    list: list[_Hit]
+
+
+class _Verdict(_Group):
+    largest: dict[str, _Peak | None]
+    bodies: list[_Group]
+    members: list[_Group]
+    storeys: list[_Group]
+    displaced: _Displaced
+    hits: _Hits
+
+
 class _Figures(_Part):
     steps: Whole | None = None
     substeps: Whole | None = None
@@ -80,6 +149,7 @@ class _Figures(_Part):
     size: Numbers = {}
     imports: dict[str, Flag] = {}
     expected: dict[str, Flag] = {}
+    verdict: _Verdict | None = None
 
 
 class _Git(_Part):

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from contextlib import ExitStack
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,6 +18,9 @@ from coupler.results.gauges import Bodies, Gauge, make_gauges
 from coupler.scene.build_water import water_of
 from coupler.step.coupled_step import Coupling
 from coupler.step.limits import Limits
+
+if TYPE_CHECKING:
+    from coupler.verdict.watch import Watch
 
 PRESSURE_RTOL = 1e-8
 
@@ -29,6 +33,8 @@ class Scene:
     gauges: list[Gauge]
     solids: list[tuple[np.ndarray, tuple]]
     tank: tuple | None
+    watch: Watch | None = None
+    """What the verdict is made from; None without a structure."""
 
 
 def build(case: Case, clock, from_start: bool = True) -> Scene:
@@ -44,7 +50,28 @@ def build(case: Case, clock, from_start: bool = True) -> Scene:
         coupling = _coupling(case, structure, only_in_water, clock, from_start)
         on_failure.pop_all()
     tank = (case.tank.lower, case.tank.upper) if case.tank else None
-    return Scene(coupling, _gauges(case), solids, tank)
+    watch = None if structure is None else watch_of(case, structure)
+    return Scene(coupling, _gauges(case), solids, tank, watch)
+
+
+def watch_of(case: Case, structure) -> Watch:
+    """What watches the blocks of a case for its verdict: those that it names, else all that are glued, else all that
+    can move."""
+    from coupler.verdict.damage import Rules
+    from coupler.verdict.divisions import Divisions
+    from coupler.verdict.watch import Watch, joined
+
+    told = case.verdict
+    divisions = Divisions.of(parts_of(case), structure.n)
+    judged = np.zeros(structure.n, bool)
+    for name in told.on:
+        judged[rows_by_name(case, parts_of(case)).get(name, divisions.rows_of(name))] = True
+    if not told.on:
+        movable = ~structure.fixed & (divisions.bodies.label >= 0)
+        glued = movable & joined(structure)
+        judged = glued if glued.any() else movable
+    rules = Rules(told.moved, told.damaged_joints, told.collapsed_weight, told.collapsed_joints)
+    return Watch(structure, divisions, rules, judged, told.hit_speed)
 
 
 def _coupling(case: Case, structure, solids, clock, from_start: bool) -> Coupling:

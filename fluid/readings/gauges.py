@@ -18,17 +18,25 @@ def level(water, xy) -> float:
     φ is read on the line, SAMPLES_PER_CELL a cell, and taken as linear between two samples; inside solids it is dry.
     Spray and the space under an overturning crest do not count; over a solid that stands on the floor the depth is
     that above it."""
+    return float(levels(water, [xy])[0])
+
+
+def levels(water, places) -> np.ndarray:
+    """The same (m,) [m] over places (m, 2) [m]."""
+    places = np.asarray(places, float)
     low, high = water.mesh.bounds[:, 2]
     count = int(np.ceil(SAMPLES_PER_CELL * (high - low) / water.mesh.spacing)) + 1
     z = np.linspace(low, high, count)
-    line = np.column_stack([np.full(count, xy[0]), np.full(count, xy[1]), z])
-    phi = Places.of(water, line, beyond=True).read(water.level_set)
+    lines = np.column_stack([np.repeat(places, count, axis=0), np.tile(z, len(places))])
+    phi = Places.of(water, lines, beyond=True).read(water.level_set).reshape(-1, count)
     wet = np.fmax(-phi, 0.0)  # NaN inside solids and outside a mesh of another shape than a box
-    length = np.abs(phi[1:] - phi[:-1])
-    share = np.divide(np.abs(wet[1:] - wet[:-1]), length, out=(wet[1:] > 0.0) * 1.0, where=length > 0.0)
-    both = (phi[1:] < 0.0) & (phi[:-1] < 0.0)
-    open_water = np.isfinite(phi[1:]) & np.isfinite(phi[:-1])
-    return float((z[1] - z[0]) * np.where(both, 1.0, share)[open_water].sum())
+    length = np.abs(np.diff(phi, axis=1))
+    share = np.divide(np.abs(np.diff(wet, axis=1)), length, out=(wet[:, 1:] > 0.0) * 1.0, where=length > 0.0)
+    both = (phi[:, 1:] < 0.0) & (phi[:, :-1] < 0.0)
+    open_water = np.isfinite(phi[:, 1:]) & np.isfinite(phi[:, :-1])
+    return np.array(
+        [(z[1] - z[0]) * row[here].sum() for row, here in zip(np.where(both, 1.0, share), open_water)]
+    )
 
 
 def pressure(water, points):

@@ -66,13 +66,15 @@ def go_on(path, *overrides, told=None, any_version=True):
 
 def check_same(one, two):
     """Histories byte for byte, fields value for value, and everything that the last checkpoints hold."""
-    tables = [p.relative_to(one) for p in (*one.glob("history/*.csv"), *one.glob("cracks.csv"))]
+    tables = [p.relative_to(one) for p in (*one.glob("history/*.csv"), *one.glob("*.csv"))]
     assert len(tables) > 1
     for table in tables:
         assert (one / table).read_bytes() == (two / table).read_bytes(), table
     for name in ("fields.vtkhdf", "blocks.vtkhdf"):
         if (one / name).exists():
             check_same_steps(one / name, two / name)
+    told = [json.loads((place / "run.json").read_text())["figures"].get("verdict") for place in (one, two)]
+    assert told[0] == told[1]
     a, b = (Checkpoint.read(listed(place / FOLDER)[0]) for place in (one, two))
     assert a.path.name == b.path.name
     assert set(a.arrays) == set(b.arrays)

@@ -11,11 +11,12 @@ import pytest
 
 from coupler.commands.report import html
 from coupler.commands.report.command import report
-from coupler.commands.report.html import figure, quantity, table
+from coupler.commands.report.html import figure, table
 from coupler.commands.report.markdown import to_html
 from coupler.commands.study import command, runner
 from coupler.program import extras
 from coupler.program.errors import NoRun
+from coupler.program.quantities import quantity
 from coupler.results.columns import ENERGY, WATER
 from coupler.results.history import CRACK_COLUMNS, HistoryTable, write_cracks
 

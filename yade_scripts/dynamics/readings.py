@@ -127,10 +127,14 @@ class StructureReadings:
         table.centre[:] += self._origin
         return table
 
-    def joint_polygons(self) -> tuple[Array, Array]:
-        """Joined faces as polygons where block a of each is: corners (c, 3) [m], first corner of each (J + 1,)."""
+    def joint_polygons(self, at_start: bool = False) -> tuple[Array, Array]:
+        """Joined faces as polygons where block a of each is, or was at the start: corners (c, 3) [m], first corner of
+        each (J + 1,)."""
         if self.joints is None:
             return np.zeros((0, 3)), np.zeros(1, np.int64)
+        if at_start:
+            x, R = (np.array([getattr(b, name) for b in self.blocks]) for name in ("centre", "rotation"))
+            return self.joints.corners(x, R), self.joints.corner_start
         m = self._motion
         return self.joints.corners(m.x, m.R) + self._origin, self.joints.corner_start
 

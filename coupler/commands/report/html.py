@@ -8,6 +8,8 @@ from html import escape
 from pathlib import Path
 from string import Template
 
+from coupler.program.quantities import quantity
+
 HERE = Path(__file__).parent
 KIND = {".png": "image/png", ".svg": "image/svg+xml", ".mp4": "video/mp4"}
 LARGEST_FILM = 8_000_000
@@ -16,9 +18,6 @@ SHORT = 16
 """Rows of a table that paper does not break."""
 MOST_COLUMNS = 9
 """Of a table in letters of the usual size; one of more has smaller ones."""
-PREFIXES = {-3: "n", -2: "µ", -1: "m", 0: "", 1: "k", 2: "M", 3: "G", 4: "T"}
-PREFIXED = ("J", "N", "N s", "N m s", "Pa", "W", "s", "m", "m/s", "B")
-UNIT_TEXT = {"1": "", "m2": "m²", "m3": "m³", "m/s2": "m/s²", "kg/m3": "kg/m³"}
 
 
 def document(title: str, parts: Iterable[str]) -> str:
@@ -97,48 +96,3 @@ def film(path: Path, link: str) -> str:
 def as_data(path: Path) -> str:
     """A file as the address of itself."""
     return f"data:{KIND[path.suffix]};base64,{base64.b64encode(path.read_bytes()).decode('ascii')}"
-
-
-def quantity(value: float | None, unit: str) -> str:
-    """A number with its unit and a prefix that keeps it short: 1.23 kN; a dash for none."""
-    if value is None or value != value:
-        return "–"
-    power = power_of(value, unit)
-    told = f"{_digits(value / 1000.0**power)}"
-    return f"{told} {unit_text(unit, power)}".strip()
-
-
-def in_one_unit(value: float, power: int) -> str:
-    """A number of a book whose lines all have the unit with this power of 1000, so that they can be compared."""
-    return _digits(value / 1000.0**power)
-
-
-def unit_text(unit: str, power: int) -> str:
-    """The unit with the prefix of a power of 1000."""
-    return f"{PREFIXES[power]}{UNIT_TEXT.get(unit, unit)}"
-
-
-def power_of(value: float, unit: str) -> int:
-    """Power of 1000 that keeps a number of this unit short."""
-    power = _power(abs(value)) if unit in PREFIXED else 0
-    return min(power, 0) if unit == "s" else power
-
-
-def _digits(value: float) -> str:
-    """Four digits, whole ones without a power of ten."""
-    return f"{value:.0f}" if 1e4 <= abs(value) < 1e9 else f"{value:.4g}"
-
-
-def _power(size: float) -> int:
-    """Of 1000, so that 1 ≤ size / 1000^power < 1000 where a prefix allows it."""
-    power = 0
-    while power < max(PREFIXES) and size >= 1000.0 ** (power + 1):
-        power += 1
-    while power > min(PREFIXES) and 0.0 < size < 1000.0**power:
-        power -= 1
-    return power
-
-
-def percent(value: float | None) -> str:
-    """A share; a dash for none."""
-    return "–" if value is None else f"{100.0 * value:.3g} %"

@@ -16,13 +16,14 @@ from coupler.commands.report.html import (
     film,
     note,
     paragraph,
-    percent,
     preformatted,
-    quantity,
     section,
     table,
 )
+from coupler.commands.report.stands import FIGURES as OF_VERDICT
+from coupler.commands.report.stands import stands
 from coupler.program.process import was_killed
+from coupler.program.quantities import percent, quantity
 
 CAPTIONS = {
     "gauges": "Gauges",
@@ -67,6 +68,7 @@ def run_page(run: Path, summary: dict, pictures: Path, remarks: list[str]) -> st
             f"<h1>{escape(title)}</h1>",
             paragraph(summary["case"]["case"].get("description", "")),
             _verdict(run, summary),
+            section("Does it stand?", *stands(run, summary, pictures)),
             section("What was run", _what(run, summary)),
             section("Results", _figures(summary), _promises(summary)),
             section("Pictures", _stills(run, pictures), *map(note, remarks)),
@@ -204,7 +206,9 @@ def over_data(run: Path, pictures: Path) -> list[Path]:
     """Figures that the case asks for: neither stills nor histories."""
     histories = plots(run, pictures)
     return [
-        p for p in sorted(pictures.glob("*.png")) if p not in histories and not p.name.startswith("still_")
+        p
+        for p in sorted(pictures.glob("*.png"))
+        if p not in histories and p.stem not in OF_VERDICT and not p.name.startswith("still_")
     ]
 
 

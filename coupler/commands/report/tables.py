@@ -6,16 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from coupler.commands.report.html import (
-    in_one_unit,
-    note,
-    paragraph,
-    percent,
-    power_of,
-    quantity,
-    table,
-    unit_text,
-)
+from coupler.commands.report.html import note, paragraph, table
+from coupler.program.quantities import in_one_unit, percent, power_of, quantity, unit_text
 from coupler.results.history import History, read_history
 
 MOST_CRACKS = 25

@@ -120,6 +120,9 @@ def make(options):
         from coupler.commands.view.plots import plots
 
         report(plots, options.run, folder)
+        from coupler.commands.view.damage import damage_figures
+
+        report(damage_figures, options.run, folder)
         from coupler.commands.view.over_data import over_data
 
         report(over_data, options.run, folder)

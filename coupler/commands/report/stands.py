@@ -1,0 +1,121 @@
+"""The first screen of a report of a structure: the verdict, what broke and when, and its figures."""
+
+from __future__ import annotations
+
+from html import escape
+from pathlib import Path
+
+from coupler.commands.report.html import figure, note, table
+from coupler.program.quantities import length, moment_of, percent, quantity
+from coupler.verdict.words import name_of, point, sentences
+
+FIGURES = {
+    "damage": "Share of the joined area that is broken, by wall and floor, in the order of their first break",
+    "cracks": "Cracks by the time at which they opened, in elevation and plan",
+    "wall_pressure": "Envelope: the largest net pressure of the water that each block bore in its place",
+}
+"""Figures of a verdict (coupler/view/damage.py) and what stands below them."""
+MOST = 30
+"""Rows of a table of walls and floors."""
+
+
+def stands(run: Path, summary: dict, pictures: Path) -> list[str]:
+    """Pieces of the section; none for a run without a structure."""
+    told = summary["figures"].get("verdict")
+    if not told:
+        return []
+    first, *rest = sentences(told)
+    shown = [
+        figure(pictures / f"{name}.png", words)
+        for name, words in FIGURES.items()
+        if _is_there(pictures, name)
+    ]
+    return [
+        f'<p class="verdict state-{escape(told["state"])}">{escape(first)}</p>',
+        f"<ul>{''.join(f'<li>{escape(line)}</li>' for line in rest)}</ul>",
+        *_groups("body", told["bodies"] if len(told["bodies"]) > 1 else [], told, loads=True),
+        *_groups("storey", told["storeys"] if len(told["storeys"]) > 1 else [], told),
+        *_groups("wall, floor or part", told["members"] if len(told["members"]) > 1 else [], told),
+        *shown,
+        _displaced(told),
+        _hits(told),
+        note(_rules(told)),
+    ]
+
+
+def _is_there(pictures: Path, name: str) -> bool:
+    return (pictures / f"{name}.png").exists()
+
+
+def _groups(what: str, groups: list[dict], told: dict, loads: bool = False) -> list[str]:
+    """A table of groups, those that broke first come first."""
+    if not groups:
+        return []
+    ranked = sorted(groups, key=lambda g: g["first_break"]["time"] if g["first_break"] else float("inf"))
+    head = [what, "state", "first break", "joints broken", "of the joined area", "blocks moved", "farthest"]
+    head += ["largest force", "at", "largest depth"] if loads else []
+    rows = [_group(group, told, loads) for group in ranked[:MOST]]
+    left = len(ranked) - len(rows)
+    return [table(head, rows, (0, 1)), note(f"and {left} more in run.json" if left else "")]
+
+
+def _group(group: dict, told: dict, loads: bool) -> list[str]:
+    first = group["first_break"]
+    row = [
+        name_of(told, group["name"]),
+        group["word"],
+        moment_of(first["time"]) if first else "–",
+        f"{group['joints_broken']} of {group['joints']}" if group["joints"] else "–",
+        percent(group["area_broken"]) if group["joints"] else "–",
+        f"{group['blocks_moved']} of {group['blocks']}",
+        length(group["farthest"]["way"]),
+    ]
+    if loads:
+        force, depth = (group.get("largest", {}).get(name) for name in ("force", "depth"))
+        row += [
+            quantity(force["value"], "N") if force else "–",
+            moment_of(force["time"]) if force else "–",
+            length(depth["value"]) if depth else "–",
+        ]
+    return row
+
+
+def _displaced(told: dict) -> str:
+    found = told["displaced"]
+    rows = [[b["block"], length(b["way"]), moment_of(b["left_at"])] for b in found["list"]]
+    left = found["blocks"] - len(rows)
+    return table(["block that left its place", "moved by", "left at"], rows) + note(
+        f"and {left} more in blocks.csv" if left else ""
+    )
+
+
+def _hits(told: dict) -> str:
+    rows = [
+        [
+            hit["block"], hit["other"], moment_of(hit["time"]), point(hit["place"]), quantity(hit["speed"], "m/s"),
+            quantity(hit["impulse"], "N s"), quantity(hit["force"], "N"),
+        ]
+        for hit in told["hits"]["list"]
+    ]  # fmt: skip
+    head = ["debris", "hit", "at", "place", "speed lost", "impulse", "mean force of the step"]
+    return table(head, rows, (0, 1)) + note(
+        "Of the hits of a pair the hardest; forces of impacts depend on the length of the step."
+        if rows
+        else ""
+    )
+
+
+def _rules(told: dict) -> str:
+    r = told["rules"]
+    by_joints = r["collapsed_joints"]
+    return (
+        f"Rules: a block has left its place when its centre has moved by more than {percent(r['moved'])} of its "
+        f"thickness (verdict.moved); damaged: more than {percent(r['damaged_joints'])} of the joined area broken "
+        "(verdict.damaged_joints), or a block out of its place; collapsed: "
+        f"{percent(r['collapsed_weight'])} of the weight out of its place (verdict.collapsed_weight)"
+        + (
+            f", or {percent(by_joints)} of the joined area broken (verdict.collapsed_joints)."
+            if by_joints
+            else "."
+        )
+    )

@@ -1,0 +1,102 @@
+"""How a structure is divided for its verdict: into bodies (tables of the case), walls and floors, and storeys.
+
+Names say what is what. A block is called after the wall it is in, with its place in it behind (`house-wall0x--3-0-1`,
+`pier-4`); walls, floors and roofs of a building carry their storey (`house-wall0x-`, `house-floor0`). A single block
+counts by its group.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from coupler.verdict.damage import NOWHERE
+
+Array = np.ndarray
+
+PLACE_IN_WALL = re.compile(r"(-\d+)+$")
+OF_A_STOREY = re.compile(r"(?P<body>.*)-(?P<kind>[a-z]+)(?P<storey>\d+)(?P<which>[a-z]?[+-]?\d*)$")
+"""house-wall0x-, house-floor1, house-wall0n3: kind, number of the storey from 0, which of them."""
+
+
+@dataclass(frozen=True)
+class Division:
+    """names of the groups in the order of their first block · label (n,): group of each block, NOWHERE for none."""
+
+    names: tuple[str, ...]
+    label: Array
+
+    @classmethod
+    def of(cls, names: Iterable[str | None]) -> Division:
+        """From the name of the group of each block, None for none."""
+        known: dict[str, int] = {}
+        label = [NOWHERE if name is None else known.setdefault(name, len(known)) for name in names]
+        return cls(tuple(known), np.array(label, dtype=int))
+
+    def rows(self, group: int) -> Array:
+        """Rows of the blocks of a group."""
+        return np.flatnonzero(self.label == group)
+
+
+@dataclass(frozen=True)
+class Divisions:
+    """The three of them, and the names of all blocks."""
+
+    blocks: tuple[str, ...]
+    bodies: Division
+    members: Division
+    storeys: Division
+
+    @classmethod
+    def of(cls, parts: Sequence, n: int) -> Divisions:
+        """parts: coupler.geometry.parts.Part, their blocks in the order of the rows · n: rows, solids last."""
+        found = [(part, block) for part in parts for block in part.blocks]
+        rest = [None] * (n - len(found))
+        names = tuple(block.name for _, block in found)
+        single = [part.path[1] == "block" for part, _ in found]
+        bodies = [block.group if alone else part.name for (part, block), alone in zip(found, single)]
+        members = [block.group if alone else member(block.name) for (_, block), alone in zip(found, single)]
+        return cls(
+            names,
+            Division.of([*bodies, *rest]),
+            Division.of([*members, *rest]),
+            Division.of([*map(storey, members), *rest]),
+        )
+
+    def rows_of(self, name: str) -> Array:
+        """Rows of the blocks that a name stands for: of a body, a wall or floor, a storey, or a block."""
+        rows: set[int] = set()
+        for division in (self.bodies, self.members, self.storeys):
+            if name in division.names:
+                rows |= set(division.rows(division.names.index(name)).tolist())
+        rows |= {row for row, block in enumerate(self.blocks) if block == name}
+        return np.array(sorted(rows), dtype=int)
+
+
+def member(block: str) -> str:
+    """Wall, floor or part that a block is in: its name without its place."""
+    return PLACE_IN_WALL.sub("", block)
+
+
+def storey(of: str) -> str | None:
+    """The storey of a wall or floor, None for what has none."""
+    found = OF_A_STOREY.fullmatch(of)
+    return None if found is None else f"{found['body']}-storey{found['storey']}"
+
+
+def in_words(name: str, one_body: bool = True) -> str:
+    """'wall x- of storey 1' of house-wall0x-, with the body behind where there are several; other names as they are."""
+    found = OF_A_STOREY.fullmatch(name)
+    if found is None:
+        return name
+    number, which = int(found["storey"]) + 1, f" {found['which']}" if found["which"] else ""
+    told = f"storey {number}" if found["kind"] == "storey" else f"{found['kind']}{which} of storey {number}"
+    return told if one_body else f"{told} ({found['body']})"
+
+
+def named(names: Sequence[str]) -> Callable[[str], str]:
+    """`in_words` for the members of these bodies."""
+    return lambda name: in_words(name, len(names) < 2)

@@ -1,0 +1,150 @@
+"""The verdict of a run, as plain data for run.json, from what was watched and the joints as they are."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+
+import numpy as np
+
+from coupler.verdict.damage import Blocks, Damage, Joints, damage
+from coupler.verdict.divisions import Division
+from coupler.verdict.watch import HIT_COLUMNS, Watch
+
+Array = np.ndarray
+MOST_LISTED = 25
+"""Blocks that left their place, and hits, that are listed one by one; tables hold them all."""
+
+
+def verdict(structure, watch: Watch) -> dict:
+    """Everything that the verdict tells; times in s, places in m, forces in N, SI throughout; None where nothing was.
+
+    structure: with its joint table as it is now."""
+    blocks = Blocks(structure.mass, watch.facts.thickness, watch.moved)
+    joints = joints_of(structure)
+    places = places_of(structure)
+
+    def of(division: Division) -> list[dict]:
+        label = np.where(structure.fixed, -1, division.label)
+        found = damage(label, division.names, blocks, joints, watch.rules)
+        return [_told(d, structure, places) for d in found if d.blocks]
+
+    judged = np.where(watch.judged, 0, -1)
+    (whole,) = damage(judged, ["structure"], blocks, joints, watch.rules)
+    bodies = of(watch.divisions.bodies)
+    _add_loads(bodies, watch)
+    members = of(watch.divisions.members)
+    return _told(whole, structure, places) | {
+        "rules": asdict(watch.rules),
+        "largest": _largest(watch, len(watch.divisions.bodies.names), judged=True),
+        "bodies": bodies,
+        "members": members,
+        "storeys": of(watch.divisions.storeys),
+        "order": [m["name"] for m in sorted(_broken(members), key=lambda m: m["first_break"]["time"])],
+        "displaced": _displaced(structure, watch),
+        "hits": _hits(structure, watch),
+    }
+
+
+def joints_of(structure) -> Joints:
+    """The joints as `damage` wants them: gone when they carry nothing any more."""
+    table = structure.joint_table()
+    if table is None:
+        return Joints.none()
+    return Joints(table.a, table.b, table.area, np.where(table.alive, np.nan, table.failure_time))
+
+
+def places_of(structure) -> Array:
+    """Centre of each joint at the start (J, 3) [m]."""
+    corners, start = structure.joint_polygons(at_start=True)
+    count = np.diff(start)
+    sums = np.add.reduceat(corners, start[:-1], axis=0) if len(count) else np.zeros((0, 3))
+    return sums / count[:, None]
+
+
+def _told(found: Damage, structure, places: Array) -> dict:
+    first = None
+    if found.first_joint >= 0:
+        first = {"time": found.first_break, "place": places[found.first_joint].tolist()}
+        first["blocks"] = _pair(structure, found.first_joint)
+    farthest = structure.names[found.farthest_block] if found.farthest_block >= 0 else None
+    return {
+        "name": found.name,
+        "state": found.state.word,
+        "word": found.word,
+        "rule": found.rule,
+        "blocks": found.blocks,
+        "blocks_moved": found.blocks_moved,
+        "joints": found.joints,
+        "joints_broken": found.joints_broken,
+        "area_broken": found.area_broken,
+        "weight_moved": found.weight_moved,
+        "farthest": {"block": farthest, "way": found.farthest},
+        "first_break": first,
+    }
+
+
+def _pair(structure, joint: int) -> list[str]:
+    a, b = int(structure.joints.a[joint]), int(structure.joints.b[joint])
+    return [structure.names[a], structure.names[b] if b >= 0 else "ground"]
+
+
+def _broken(groups: list[dict]) -> list[dict]:
+    return [group for group in groups if group["first_break"]]
+
+
+def _add_loads(bodies: list[dict], watch: Watch) -> None:
+    for body in bodies:
+        body["largest"] = _largest(watch, watch.divisions.bodies.names.index(body["name"]))
+
+
+def _largest(watch: Watch, k: int, judged: bool = False) -> dict:
+    """Largest force and overturning moment of the water, and depth beside it; None for what was never there."""
+    force, moment = _peak(watch.force, k), _peak(watch.moment, k)
+    if force:
+        force["direction"] = watch.direction[k].tolist()
+    if moment:
+        moment["about"] = watch.foot[k].tolist()
+    if judged:
+        own = np.unique(watch.divisions.bodies.label[watch.judged])
+        own = own[own >= 0]
+        k = int(own[np.argmax(watch.depth.value[own])]) if len(own) else 0
+    depth = _peak(watch.depth, k) if len(watch.depth.value) else None
+    if depth:
+        depth["place"] = watch.depth_at[k].tolist()
+    return {"force": force, "moment": moment, "depth": depth}
+
+
+def _peak(peaks, k: int) -> dict | None:
+    if not peaks.value[k] > 0.0:
+        return None
+    return {"value": float(peaks.value[k]), "time": float(peaks.time[k])}
+
+
+def _displaced(structure, watch: Watch) -> dict:
+    """Blocks that left their place, those that went farthest first."""
+    gone = np.flatnonzero(~np.isnan(watch.left_at) & watch.judged)
+    order = gone[np.argsort(-watch.moved[gone], kind="stable")]
+    told = [
+        {"block": structure.names[i], "way": float(watch.moved[i]), "left_at": float(watch.left_at[i])}
+        for i in order[:MOST_LISTED]
+    ]
+    return {
+        "blocks": len(gone),
+        "first": float(watch.left_at[gone].min()) if len(gone) else None,
+        "list": told,
+    }
+
+
+def _hits(structure, watch: Watch) -> dict:
+    found = [dict(zip(HIT_COLUMNS, row)) for row in watch.hits.tolist()]
+    told = [
+        {
+            "time": hit["time"],
+            "block": structure.names[int(hit["block"])],
+            "other": structure.names[int(hit["other"])],
+            "place": [hit["x"], hit["y"], hit["z"]],
+            **{name: hit[name] for name in ("speed", "impulse", "force")},
+        }
+        for hit in found
+    ]
+    return {"pairs": len(told), "list": told[:MOST_LISTED]}

@@ -1,0 +1,223 @@
+"""What a run keeps an eye on for its verdict: how far blocks went, the largest loads, hits of debris, depths.
+
+Everything is cheap beside a step; it changes nothing in it and goes into checkpoints, so that a run that goes on tells
+the same verdict.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from coupler.verdict.damage import Rules
+from coupler.verdict.divisions import Divisions
+
+Array = np.ndarray
+
+FALL = 0.1
+"""Of its thickness: the fall whose speed a block must lose in a step to count as a hit, unless the case says one."""
+ANSWERS = 0.2
+"""Share of the impulse on a block that another one must have got the other way round to be what it hit."""
+HIT_COLUMNS = ("time", "block", "other", "speed", "impulse", "force", "x", "y", "z")
+"""Of a hit: [s] · rows · speed [m/s] lost in the step · impulse [N s] and its mean over the step [N] · place [m]."""
+
+
+@dataclass
+class Peaks:
+    """The largest of a quantity for each of k groups: value (k,), time (k,) [s], NaN before the first."""
+
+    value: Array
+    time: Array
+
+    @classmethod
+    def none(cls, k: int) -> Peaks:
+        return cls(np.zeros(k), np.full(k, np.nan))
+
+    def take(self, value: Array, time: float) -> Array:
+        """Keep what is larger; (k,) bool: where."""
+        larger = value > self.value
+        self.value[larger], self.time[larger] = value[larger], time
+        return larger
+
+
+@dataclass(frozen=True)
+class Facts:
+    """Of the blocks at the start, one row each, fixed solids too: centre (n, 3) [m] · thickness (n,) [m] ·
+    across (n, 3): unit normal of the widest pair of faces · area (n,) [m²] that it stands for · radius (n,) [m]"""
+
+    centre: Array
+    thickness: Array
+    across: Array
+    area: Array
+    radius: Array
+    lower: Array = field(repr=False)
+    upper: Array = field(repr=False)
+
+    @classmethod
+    def of(cls, blocks) -> Facts:
+        """blocks: yade_scripts Block."""
+        world = [block.world_vertices() for block in blocks]
+        normals, offsets = zip(*(block.planes for block in blocks))
+        thin = [int(np.argmin(d)) for d in offsets]
+        thickness = 2.0 * np.array([d[k] for d, k in zip(offsets, thin)])
+        across = np.array([block.rotation @ n[k] for block, n, k in zip(blocks, normals, thin)])
+        return cls(
+            centre=np.array([block.centre for block in blocks]),
+            thickness=thickness,
+            across=across,
+            area=np.array([block.volume for block in blocks]) / thickness,
+            radius=np.array([np.linalg.norm(x - b.centre, axis=1).max() for x, b in zip(world, blocks)]),
+            lower=np.array([x.min(axis=0) for x in world]),
+            upper=np.array([x.max(axis=0) for x in world]),
+        )
+
+
+class Watch:
+    """structure: yade_scripts Structure · divisions: of its blocks · rules of the verdict · judged (n,) bool: blocks
+    that it is about · hit_speed [m/s] or None"""
+
+    def __init__(
+        self, structure, divisions: Divisions, rules: Rules, judged: Array, hit_speed: float | None = None
+    ):
+        self.divisions, self.rules, self.judged = divisions, rules, np.asarray(judged, bool)
+        n, bodies = structure.n, len(divisions.bodies.names)
+        self.facts = Facts.of(structure.blocks)
+        self.foot = self._feet()
+        self.moved = np.zeros(n)
+        self.left_at = np.full(n, np.nan)
+        self.pressure = Peaks.none(n)
+        self.force, self.moment = Peaks.none(bodies + 1), Peaks.none(bodies + 1)
+        self.direction = np.zeros((bodies + 1, 3))
+        self.depth = Peaks.none(bodies)
+        self.depth_at = np.full((bodies, 2), np.nan)
+        self._before = structure.velocity()[:, :3]
+        g = float(np.linalg.norm(structure.gravity))
+        fall = np.sqrt(2.0 * g * FALL * self.facts.thickness)
+        self._hit_speed = fall if hit_speed is None else np.full(n, hit_speed)
+        self._hits: dict[tuple[int, int], tuple[float, ...]] = {}
+        self._never_joined = ~joined(structure)
+
+    def _feet(self) -> Array:
+        """Middle of the foot of each body, and behind them that of all that is judged (bodies + 1, 3) [m]."""
+        label, f = self.divisions.bodies.label, self.facts
+        groups = [label == k for k in range(len(self.divisions.bodies.names))]
+        return np.array([_foot(f.lower[rows], f.upper[rows]) for rows in [*groups, self.judged]])
+
+    # ---- every step
+
+    def step(self, coupling, record) -> None:
+        """After a coupled step."""
+        s = coupling.structure
+        velocity = s.velocity()[:, :3]
+        way = np.linalg.norm(s.centre() - self.facts.centre, axis=1)
+        in_place = np.isnan(self.left_at)
+        self._hit(s, record, velocity, in_place)
+        np.maximum(self.moved, way, out=self.moved)
+        self.left_at[in_place & (way > self.rules.moved * self.facts.thickness)] = record.time
+        if len(record.load):
+            self._loads(coupling, record, np.isnan(self.left_at))
+        self._before = velocity
+
+    def _loads(self, coupling, record, in_place: Array) -> None:
+        """Force and overturning moment of the water on each body; pressure across blocks that are in their place."""
+        n = coupling.structure.n
+        load, centre = record.load[:n], coupling.water.domain.body_centre[:n]
+        across = np.abs(np.einsum("ni,ni->n", load[:, :3], self.facts.across)) / self.facts.area
+        self.pressure.take(np.where(in_place, across, 0.0), record.time)
+        label = self.divisions.bodies.label
+        of_body = np.array([label == k for k in range(len(self.divisions.bodies.names))] + [self.judged])
+        force = of_body @ load[:, :3]
+        larger = self.force.take(np.linalg.norm(force, axis=1), record.time)
+        self.direction[larger] = force[larger]
+        about_zero = of_body @ (load[:, 3:] + np.cross(centre, load[:, :3]))
+        overturning = about_zero - np.cross(self.foot, force)
+        self.moment.take(np.linalg.norm(overturning[:, :2], axis=1), record.time)
+
+    def _hit(self, s, record, velocity: Array, in_place: Array) -> None:
+        """Debris that lost speed to a contact in this step, and what it met."""
+        if record.impulses is None:
+            return
+        J = record.impulses.contact[:, :3]
+        size = np.linalg.norm(J, axis=1)
+        debris = (self._never_joined | ~in_place) & ~s.fixed & (size > 0.0)
+        lost = np.zeros(s.n)
+        lost[debris] = (
+            np.einsum("ni,ni->n", velocity[debris] - self._before[debris], J[debris]) / size[debris]
+        )
+        hits = np.flatnonzero(debris & (lost >= self._hit_speed) & (size >= s.mass * self._hit_speed))
+        x = s.centre() if len(hits) else None
+        for i in hits:
+            near = np.linalg.norm(x - x[i], axis=1) <= self.facts.radius + self.facts.radius[i]
+            answer = np.where(near, -(J @ J[i]) / size[i], 0.0)
+            answer[i] = 0.0
+            j = int(np.argmax(answer))
+            if answer[j] >= ANSWERS * size[i] and (in_place[j] or self._other_body(i, j)):
+                self._note_hit(int(i), j, record, float(lost[i]), float(size[i]), x[i])
+
+    def _other_body(self, i: int, j: int) -> bool:
+        label = self.divisions.bodies.label
+        return label[i] != label[j]
+
+    def _note_hit(self, i: int, j: int, record, speed: float, impulse: float, place: Array) -> None:
+        """Of the hits of a pair the hardest stays."""
+        old = self._hits.get((i, j))
+        if old is None or impulse > old[4]:
+            self._hits[i, j] = (record.time, i, j, speed, impulse, impulse / record.dt, *map(float, place))
+
+    @property
+    def hits(self) -> Array:
+        """(k, 9) the hardest hit of each pair, columns as HIT_COLUMNS, the hardest first."""
+        rows = np.array(list(self._hits.values())).reshape(-1, len(HIT_COLUMNS))
+        return rows[np.argsort(-rows[:, 4], kind="stable")]
+
+    # ---- at the written states
+
+    def look(self, water, time: float) -> None:
+        """The depth of the water around each body."""
+        from coupler.verdict.depths import depths_around
+
+        depth, place = depths_around(water, self.divisions.bodies, self.facts.lower, self.facts.upper)
+        larger = self.depth.take(depth, time)
+        self.depth_at[larger] = place[larger]
+
+    # ---- checkpoints
+
+    def save(self) -> dict[str, Array]:
+        """Copies of what has been gathered."""
+        peaks = {
+            f"{name}_{part}": getattr(getattr(self, name), part).copy()
+            for name in ("pressure", "force", "moment", "depth")
+            for part in ("value", "time")
+        }
+        own = {name: getattr(self, name).copy() for name in _OWN}
+        return {**peaks, **own, "before": self._before.copy(), "hits": self.hits}
+
+    def restore(self, saved: dict[str, Array]) -> None:
+        """Back to what was saved."""
+        for name in ("pressure", "force", "moment", "depth"):
+            setattr(self, name, Peaks(saved[f"{name}_value"].copy(), saved[f"{name}_time"].copy()))
+        for name in _OWN:
+            setattr(self, name, saved[name].copy())
+        self._before = saved["before"].copy()
+        self._hits = {(int(row[1]), int(row[2])): tuple(row.tolist()) for row in saved["hits"]}
+
+
+_OWN = ("moved", "left_at", "direction", "depth_at")
+
+
+def joined(structure) -> Array:
+    """(n,) bool: blocks that were glued to anything at the start."""
+    found = np.zeros(structure.n, bool)
+    if structure.joints is not None:
+        for side in (structure.joints.a, structure.joints.b):
+            found[side[side >= 0]] = True
+    return found
+
+
+def _foot(lower: Array, upper: Array) -> Array:
+    """(3,) [m] middle of what the blocks cover in plan, at the level of the lowest."""
+    if not len(lower):
+        return np.zeros(3)
+    low, high = lower.min(axis=0), upper.max(axis=0)
+    return np.array([*(0.5 * (low + high))[:2], low[2]])

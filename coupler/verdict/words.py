@@ -1,0 +1,106 @@
+"""The verdict in the words of an engineer."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from coupler.program.quantities import length, moment_of, quantity
+from coupler.verdict.divisions import in_words
+
+MOST_IN_ORDER = 12
+"""Walls and floors whose first break is told in a line; the table has all."""
+
+
+def headline(told: dict) -> str:
+    """The answer in one line: COLLAPSED: 63% of its weight left its place (...)."""
+    return f"{told['word'].upper()}: {told['rule']}"
+
+
+def sentences(told: dict) -> Iterator[str]:
+    """Line by line; told: `judge.verdict`."""
+    yield headline(told)
+    yield from _first_break(told)
+    yield from _order(told)
+    yield from _loads(told["largest"])
+    yield from _displaced(told)
+    yield from _hits(told["hits"])
+
+
+def name_of(told: dict, name: str) -> str:
+    """A wall, floor or storey in words."""
+    return in_words(name, len(told["bodies"]) < 2)
+
+
+def point(place) -> str:
+    """(30.00, 9.00, 2.20) m"""
+    return "({}) m".format(", ".join(f"{x + 0.0:.2f}" for x in place))
+
+
+def _first_break(told: dict) -> Iterator[str]:
+    if not told["joints"]:
+        return
+    first = told["first_break"]
+    if first is None:
+        yield f"no joint of {told['joints']} broke"
+        return
+    yield (
+        f"first break at t = {moment_of(first['time'])} at {point(first['place'])}, between {first['blocks'][0]} "
+        f"and {first['blocks'][1]}; {told['joints_broken']} of {told['joints']} joints broke, "
+        f"{told['area_broken']:.0%} of the joined area"
+    )
+
+
+def _order(told: dict) -> Iterator[str]:
+    """Which wall, floor and storey broke first, and which after it."""
+    for what, key in (("walls and floors", "members"), ("storeys", "storeys")):
+        found = [group for group in told[key] if group["first_break"]]
+        found.sort(key=lambda group: group["first_break"]["time"])
+        if len(told[key]) < 2 or not found:
+            continue
+        listed = [
+            f"{name_of(told, group['name'])} {moment_of(group['first_break']['time'])}"
+            for group in found[:MOST_IN_ORDER]
+        ]
+        more = len(found) - len(listed)
+        yield f"{what} broke in this order: {', '.join(listed)}" + (f", and {more} more" if more else "")
+
+
+def _loads(largest: dict) -> Iterator[str]:
+    force, moment, depth = (largest[name] for name in ("force", "moment", "depth"))
+    parts = []
+    if force:
+        parts.append(f"force of the water {at(force, 'N')}")
+    if moment:
+        parts.append(f"overturning moment about the middle of its foot {at(moment, 'N m')}")
+    if depth:
+        parts.append(f"depth of water beside it {length(depth['value'])} at {moment_of(depth['time'])}")
+    if parts:
+        yield "largest " + ", ".join(parts)
+
+
+def at(peak: dict, unit: str) -> str:
+    """3.2 MN at 1.6 s"""
+    return f"{quantity(peak['value'], unit)} at {moment_of(peak['time'])}"
+
+
+def _displaced(told: dict) -> Iterator[str]:
+    found = told["displaced"]
+    if not found["blocks"]:
+        yield f"no block left its place; the farthest moved by {length(told['farthest']['way'])}"
+        return
+    farthest = found["list"][0]
+    yield (
+        f"{found['blocks']} of {told['blocks']} blocks left their place, the first at t = "
+        f"{moment_of(found['first'])}; the farthest is {farthest['block']}, by {length(farthest['way'])}"
+    )
+
+
+def _hits(hits: dict) -> Iterator[str]:
+    if not hits["pairs"]:
+        return
+    hard = hits["list"][0]
+    yield (
+        f"debris hit something {hits['pairs']} times; hardest: {hard['block']} on {hard['other']} at t = "
+        f"{moment_of(hard['time'])}, at {point(hard['place'])}, losing {quantity(hard['speed'], 'm/s')}, "
+        f"{quantity(hard['impulse'], 'N s')}"
+    )

@@ -1,0 +1,238 @@
+"""The verdict of a run: how blocks are divided, what is watched while it goes, and in which words it is told."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from coupler.case.case import Case
+from coupler.checks.case import problems
+from coupler.commands.report.stands import stands
+from coupler.results.history import read_history
+from coupler.run.summary import read_summary
+from coupler.verdict.damage import Rules
+from coupler.verdict.divisions import Divisions, in_words, member, storey
+from coupler.verdict.judge import verdict
+from coupler.verdict.watch import Watch
+from coupler.verdict.words import sentences
+from tests.coupler.resumed import DRY, begin
+from yade_scripts.blocks.block import Block
+
+G = 9.81
+
+
+def test_the_name_of_a_block_says_wall_and_storey():
+    assert member("house-wall1x--3-0-1") == "house-wall1x-"
+    assert member("pier-12") == "pier"
+    assert storey("house-wall1x-") == storey("house-roof1") == "house-storey1"
+    assert storey("pier") is None
+    assert in_words("house-wall1x-") == "wall x- of storey 2"
+    assert in_words("house-roof1", one_body=False) == "roof of storey 2 (house)"
+
+
+class FakeJoints:
+    """Two joints: block 0 with the ground, block 1 with block 0; x is out of the wall."""
+
+    a, b = np.array([0, 1]), np.array([-1, 0])
+
+    def __len__(self):
+        return 2
+
+
+class FakeStructure:
+    """A wall of two blocks of 1 m, 0.4 m thick along x, one on the other, and a loose crate in front of it."""
+
+    def __init__(self):
+        wall = {"size": np.array([0.4, 1.0, 1.0]), "density": 1000.0}
+        self.blocks = [
+            Block("wall-0", np.array([5.0, 0, 0.5]), **wall),
+            Block("wall-1", np.array([5.0, 0, 1.5]), **wall),
+            Block("crate", np.array([3.0, 0, 0.5]), size=np.ones(3), density=500.0, group="crate"),
+        ]
+        self.names = [b.name for b in self.blocks]
+        self.n, self.fixed = 3, np.zeros(3, bool)
+        self.mass = np.array([b.mass for b in self.blocks])
+        self.gravity = np.array([0.0, 0.0, -G])
+        self.joints = FakeJoints()
+        self.x = np.array([b.centre for b in self.blocks])
+        self.v = np.zeros((3, 6))
+        self.broke = np.full(2, np.nan)
+
+    def centre(self):
+        return self.x
+
+    def velocity(self):
+        return self.v.copy()
+
+    def joint_table(self):
+        return SimpleNamespace(
+            a=FakeJoints.a,
+            b=FakeJoints.b,
+            area=np.array([0.4, 0.4]),
+            alive=np.isnan(self.broke),
+            failure_time=self.broke,
+        )
+
+    def joint_polygons(self, at_start=False):
+        square = np.array([[4.8, -0.5, 0.0], [5.2, -0.5, 0.0], [5.2, 0.5, 0.0], [4.8, 0.5, 0.0]])
+        return np.concatenate([square, square + np.array([0, 0, 1.0])]), np.array([0, 4, 8])
+
+
+@pytest.fixture
+def scene():
+    s = FakeStructure()
+    parts = [
+        SimpleNamespace(path=("structure", "wall", 0), name="wall", blocks=tuple(s.blocks[:2])),
+        SimpleNamespace(path=("structure", "block", 0), name="crate", blocks=tuple(s.blocks[2:])),
+    ]
+    watch = Watch(
+        s, Divisions.of(parts, 3), Rules(moved=0.1, collapsed_weight=0.5), np.array([True, True, False])
+    )
+    water = SimpleNamespace(domain=SimpleNamespace(body_centre=s.x))
+    return s, watch, SimpleNamespace(structure=s, water=water)
+
+
+def record(time, contact=None, load=None):
+    """A step of 10 ms that ends at time, with impulses of contacts (3, 3) [N s] and forces of the water (3, 3) [N]."""
+    impulses = SimpleNamespace(contact=np.zeros((3, 9)))
+    if contact is not None:
+        impulses.contact[:, :3] = contact
+    forces = np.zeros((3, 6))
+    if load is not None:
+        forces[:, :3] = load
+    return SimpleNamespace(time=time, dt=0.01, impulses=impulses, load=forces)
+
+
+def test_nothing_happened(scene):
+    s, watch, coupling = scene
+    watch.step(coupling, record(0.1))
+    told = verdict(s, watch)
+    assert (told["state"], told["first_break"], told["displaced"]["blocks"]) == ("stands", None, 0)
+    assert told["largest"]["force"] is None
+    assert "no joint of 2 broke" in list(sentences(told))
+
+
+def test_the_largest_load_stays_with_its_time_and_the_moment_is_about_the_foot(scene):
+    """100 kN at half the height of the upper block: 1.5 m above the foot, so 150 kN m."""
+    s, watch, coupling = scene
+    push = np.zeros((3, 3))
+    push[1, 0] = 1e5
+    watch.step(coupling, record(0.5, load=push))
+    watch.step(coupling, record(0.6, load=0.5 * push))
+    largest = verdict(s, watch)["largest"]
+    assert (largest["force"]["value"], largest["force"]["time"]) == pytest.approx((1e5, 0.5))
+    assert largest["moment"]["value"] == pytest.approx(1.5e5)
+    assert largest["moment"]["about"] == pytest.approx([5.0, 0.0, 0.0])
+    assert watch.pressure.value[1] == pytest.approx(1e5)  # over a face of 1 m2
+
+
+def test_a_block_that_comes_back_has_left_its_place_all_the_same(scene):
+    s, watch, coupling = scene
+    s.x = s.x + np.array([[0, 0, 0], [0.3, 0, 0], [0, 0, 0]])
+    watch.step(coupling, record(0.4))
+    s.x = s.x - np.array([[0, 0, 0], [0.3, 0, 0], [0, 0, 0]])
+    watch.step(coupling, record(0.5))
+    told = verdict(s, watch)
+    assert told["displaced"]["list"] == [{"block": "wall-1", "way": pytest.approx(0.3), "left_at": 0.4}]
+    assert told["state"] == "collapsed"  # half of the weight of what is judged
+
+
+def test_pressure_counts_only_while_a_block_is_in_its_place(scene):
+    s, watch, coupling = scene
+    push = np.zeros((3, 3))
+    push[1, 0] = 1e5
+    s.x = s.x + np.array([[0, 0, 0], [0.3, 0, 0], [0, 0, 0]])
+    watch.step(coupling, record(0.4, load=push))
+    assert watch.pressure.value[1] == 0.0
+
+
+def crate_hits(scene, contact):
+    """The crate arrives at the wall with 3 m/s and stays there, given the impulses of contacts."""
+    s, watch, coupling = scene
+    s.v[2, 0] = 3.0
+    s.x[2, 0] = 4.2
+    watch.step(coupling, record(0.2))
+    s.v = np.zeros((3, 6))
+    watch.step(coupling, record(0.21, contact=contact))
+    return verdict(s, watch)["hits"]
+
+
+def test_debris_that_loses_its_speed_to_a_wall_has_hit_it(scene):
+    J = 500.0 * 3.0
+    (hit,) = crate_hits(scene, [[J, 0, 0], [0, 0, 0], [-J, 0, 0]])["list"]
+    assert (hit["block"], hit["other"], hit["time"]) == ("crate", "wall-0", 0.21)
+    assert (hit["speed"], hit["impulse"], hit["force"]) == pytest.approx((3.0, J, J / 0.01))
+
+
+def test_what_the_water_stops_has_hit_nothing(scene):
+    """It lost the speed, but no contact took it: only its own weight on the ground."""
+    W = 500.0 * G * 0.01
+    assert crate_hits(scene, [[0, 0, 0], [0, 0, 0], [0, 0, W]])["pairs"] == 0
+
+
+def test_a_press_without_a_change_of_speed_is_no_hit(scene):
+    s, watch, coupling = scene
+    s.x[2, 0] = 4.2
+    J = 500.0 * 3.0
+    watch.step(coupling, record(0.2, contact=[[J, 0, 0], [0, 0, 0], [-J, 0, 0]]))
+    assert verdict(s, watch)["hits"]["pairs"] == 0
+
+
+def test_a_run_that_goes_on_tells_the_same(scene):
+    s, watch, _ = scene
+    crate_hits(scene, [[1500.0, 0, 0], [0, 0, 0], [-1500.0, 0, 0]])
+    other = Watch(s, watch.divisions, watch.rules, watch.judged)
+    other.restore(watch.save())
+    assert verdict(s, other) == verdict(s, watch)
+    assert other.hits.tolist() == watch.hits.tolist()
+
+
+def test_the_order_of_failure_goes_by_the_first_break(scene):
+    s, watch, _ = scene
+    s.broke[:] = (0.9, 0.4)
+    told = verdict(s, watch)
+    assert told["first_break"]["blocks"] == ["wall-1", "wall-0"]
+    assert told["first_break"]["place"] == pytest.approx([5.0, 0.0, 1.0])
+    assert told["order"] == ["wall"]
+
+
+def test_a_run_tells_that_a_shot_broke_a_column(tmp_path):
+    """A block of 300 kg at 12 m/s on the upper half of a column of three drums: it breaks a joint at once, and what the
+    column gave back is what the shot lost."""
+    run = begin(tmp_path / "case", DRY, tmp_path / "run", "time.checkpoint_every=0")
+    told = read_summary(run)["figures"]["verdict"]
+    assert told["state"] == "damaged"
+    assert 0.0 < told["first_break"]["time"] < 0.1
+    assert told["joints"] == 3
+    (hit,) = [hit for hit in told["hits"]["list"] if hit["block"] == "shot"]
+    assert hit["other"] == "column-1"
+    assert hit["impulse"] == pytest.approx(300.0 * hit["speed"], rel=0.02)
+    assert hit["speed"] > 10.0
+    rows = read_history(run / "blocks.csv")
+    assert list(rows["member"]) == ["shot", "column", "column", "column"]
+    assert np.nanmin(rows["first_break"][1:]) == told["first_break"]["time"]
+    assert stands(run, read_summary(run), tmp_path)[0].startswith('<p class="verdict state-damaged">DAMAGED')
+
+
+CASE = {
+    "case": {"title": "a wall"},
+    "time": {"end": 1.0},
+    "structure": {"wall": [{"lower": [0, 0, 0], "size": [1, 0.2, 1], "block": [0.5, 0.2, 0.5]}]},
+    "contact": {"stiffness": 1e6},
+}
+
+
+def test_a_name_that_nothing_has_is_refused():
+    ((path, message),) = problems(Case.model_validate(CASE | {"verdict": {"on": ["wal"]}}))
+    assert path == ("verdict", "on", 0)
+    assert "wall" in message
+
+
+def test_a_verdict_without_a_structure_is_refused():
+    case = {name: value for name, value in CASE.items() if name not in ("structure", "contact")}
+    case |= {
+        "tank": {"lower": [0, 0, 0], "upper": [1, 1, 1], "cell": 0.5},
+        "water": {"fill": [{"lower": [0, 0, 0], "upper": [1, 1, 0.5]}]},
+        "verdict": {"moved": 0.5},
+    }
+    assert [path for path, _ in problems(Case.model_validate(case))] == [("verdict",)]
