@@ -4,7 +4,7 @@ YADE; what needs VTK first, since it cannot be imported any more once YADE is.""
 import pytest
 from hypothesis import HealthCheck, settings
 
-from coupler.commands.cli import one_thread
+from coupler.program.start import one_thread
 
 one_thread()
 settings.register_profile("any machine", deadline=None, suppress_health_check=[HealthCheck.too_slow])

@@ -1,1 +1,7 @@
-"""The chapter `coupler.balance`."""
+"""Energy, volume and momentum of the coupled scene, and what is missing in them (theory 4).
+
+energy       over water, interface and structure, each term of a step, and the volume of the water
+momentum     linear and angular, of the water and of the blocks that move freely
+
+They only add up what both sides report: nothing here changes a step.  Imports `fluid`, lazily.
+"""

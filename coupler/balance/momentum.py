@@ -144,7 +144,8 @@ class WaterStep:
     @classmethod
     def of(cls, water, load: Array, dt: float, free: Array) -> WaterStep:
         """After a step: load (n_bodies, 6) that was told to the bodies, blocks first; free (n_blocks,) bool."""
-        from fluid.step.momentum import NUMERICAL, about
+        from fluid.numerics.sums import about
+        from fluid.step.momentum import NUMERICAL
 
         change, n = water.report.momentum, len(free)
         centre = water.domain.body_centre

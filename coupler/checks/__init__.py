@@ -1,1 +1,9 @@
-"""The chapter `coupler.checks`."""
+"""What is wrong with a case, found before it is run, all at once, each with its file, line and key.
+
+read_case                                    from a case directory to a checked case
+case                                         sections that need each other, names that must exist
+places, motion, joints, softness, water      bodies, prescribed motions, joints, contacts, walls and inflows
+tables                                       results that would be written to one place
+
+A check yields (key path, message) and changes nothing.  Imports `scene` and the chapters below it.
+"""

@@ -8,8 +8,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from coupler.case.case import Case
+from coupler.case.inflow_records import RecordError, record_columns
 from coupler.geometry.tank_mesh import is_measured
-from coupler.scene.build_water import SLACK, RecordError, fills_beside, level_at_start, record_columns
+from coupler.scene.build_water import SLACK, fills_beside, level_at_start
 
 KeyPath = tuple[str | int, ...]
 Problem = tuple[KeyPath, str]

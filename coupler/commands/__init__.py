@@ -1,1 +1,14 @@
-"""The chapter `coupler.commands`."""
+"""What `surgebreak NAME` does: one module or package a command.  Nothing else may import them.
+
+cli                        the command line: words and options of every command
+doctor, explain_run        is this machine ready; what a run computed
+warm_up                    compiles the kernels
+verify                     exact solutions and measured records (docs/benchmarks.md)
+stress                     scenes that are meant to break it (docs/stress.md)
+study                      many runs of one case, and their errors (docs/studies.md)
+compare                    the laws of other YADE users on the same structure (docs/compare.md)
+benchmark                  processor time (docs/speed.md)
+report, pictures, view     pages and pictures, made from the files of a run
+
+`view` is a process of its own, because VTK and YADE crash in one; it imports no solver.
+"""

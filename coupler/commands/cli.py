@@ -13,6 +13,7 @@ from typer.core import TyperGroup
 from coupler.program.extras import need
 from coupler.program.failures import Failures
 from coupler.program.process import run_module
+from coupler.program.start import one_thread
 
 
 class Commands(TyperGroup):
@@ -386,15 +387,6 @@ def test(context: typer.Context) -> None:
     from coupler.program.provenance import ROOT
 
     raise typer.Exit(run_module("pytest", *context.args, cwd=ROOT).returncode)
-
-
-def one_thread() -> None:
-    """One thread unless the user asks, one instruction set, and the kernels of the present sources."""
-    from coupler.program.arithmetic import fix_arithmetic
-    from coupler.program.kernel_cache import use_kernel_cache
-
-    fix_arithmetic()
-    use_kernel_cache()
 
 
 if __name__ == "__main__":

@@ -80,7 +80,7 @@ def warm_up() -> None:
 
 
 if __name__ == "__main__":
-    from coupler.commands.cli import one_thread
+    from coupler.program.start import one_thread
 
     one_thread()
     warm_up()

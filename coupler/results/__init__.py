@@ -1,1 +1,11 @@
-"""The chapter `coupler.results`."""
+"""What a run leaves behind: histories, fields, tables, and whether they are what the case expects.
+
+recorder                               what is written at which time
+history, columns                       CSV tables of one row a step, and their columns
+fields, vtkhdf, crack_surfaces         water, blocks and joints for ParaView
+gauges, loads, gauge_windows           what a case measures
+expected                               `expected.toml` against the histories
+storage                                writing that a full disk does not tear
+
+docs/results.md is its page.  Imports `step`, `balance`, `geometry`, `case` and `program`.
+"""

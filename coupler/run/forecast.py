@@ -14,11 +14,11 @@ from pathlib import Path
 import numpy as np
 
 from coupler.case.case import Case
+from coupler.case.inflow_records import record_columns
 from coupler.case.schedule import Schedule, checkpoint_interval
 from coupler.checks.places import BYTES_PER_CELL, mesh_size
 from coupler.geometry.tank_mesh import water_in
 from coupler.program.terminal import Row
-from coupler.scene.build_water import record_columns
 from coupler.step.observe import joint_counts
 
 LONGEST_REST_STEP = 0.3

@@ -1,1 +1,9 @@
-"""The chapter `fluid.mesh`."""
+"""The background mesh: tetrahedra that cover water, air and solids alike (the mathematical mesh of theory 2.1).
+
+background       nodes, cells, neighbours, gradients; from a box, from arrays
+bricks           lattices of bricks, each split into six tetrahedra
+shapes           cells of one shape share their gradients
+fitted_mesh      a mesh whose boundary is the bed
+
+Imports `numerics`.
+"""

@@ -1,1 +1,10 @@
-"""The chapter `fluid.numerics`."""
+"""Numerical tools without any geometry of the water in them.
+
+solve, multigrid      conjugate gradients for symmetric positive definite systems, and their preconditioner
+bounded               the same with a lower bound on the unknowns (theory 2.2)
+sums                  momentum, kinetic energy and loads of many points
+cube_root             with the same bits on every processor
+jit                   how small kernels are compiled
+
+Imports nothing of the project.
+"""

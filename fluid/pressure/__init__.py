@@ -1,1 +1,11 @@
-"""The chapter `fluid.pressure`."""
+"""The pressure: its matrix, right hand side and bounds (theory 2.2).
+
+projection              mass balance with moving walls, and the correction of the velocity
+active_cells            which nodes and cells take part
+indefinite_cells        obtuse cells at the surface that would make the matrix indefinite
+pressure_bound          how far the pressure may fall: to that of the air, to vapour pressure elsewhere
+waterline               the load on solids where the surface passes through their cells
+slits                   cracks narrower than the mesh, as conductances
+
+Imports `domain` and the chapters below it, never a step.
+"""

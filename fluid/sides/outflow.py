@@ -39,7 +39,7 @@ class Outflow:
     @classmethod
     def of(cls, water, dt: float, carried) -> Outflow | None:
         """Equation (1) over dt [s] from nodes that hold `carried` (N,) [m³]; None where nothing leaves."""
-        faces, area = water._walls.open_faces, water._walls.open_area
+        faces, area = water.walls.open_faces, water.walls.open_area
         holds = (water.nodal_water[faces] > 0.0).any(axis=1)
         faces, area = faces[holds], area[holds]
         if len(faces) == 0:

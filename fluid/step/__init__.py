@@ -1,1 +1,11 @@
-"""The chapter `fluid.step`."""
+"""One step of the water, split around the pressure solve (theory 2.2).
+
+water                       the state, and `predict` and `correct` around the solve
+predictor, corrector        the two halves of a step
+time_step                   the speed that sets the length of a step
+momentum, report            what changed the momentum; what a step did, in numbers
+parameters                  numbers that a case may set
+state                       saved and restored, bit for bit
+
+Imports every other chapter of fluid but `readings`.
+"""

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
+from fluid.numerics.sums import kinetic_energy
 from fluid.pressure.pressure_bound import BoundMet
 from fluid.pressure.projection import (
     cell_gradient,
@@ -24,6 +25,7 @@ from fluid.pressure.projection import (
     with_ghosts,
 )
 from fluid.step.momentum import Stages, momentum_change
+from fluid.step.report import StepReport
 from fluid.surface.extrapolation import extend_velocity
 from fluid.surface.gradient_jump_damping import damp_kinks
 from fluid.surface.volume import Flux, edge_flux
@@ -106,7 +108,7 @@ def corrected(water, problem, x, parting) -> Corrected:
 def _pressure_gradient(water, kept, pressure, scale):
     """(dt/ρ) ∇x of the wet cells (n, 3) [m/s]."""
     t = water.topology
-    unheld = water._walls.open_node if kept.held is None else water._walls.open_node & (kept.held == 0.0)
+    unheld = water.walls.open_node if kept.held is None else water.walls.open_node & (kept.held == 0.0)
     full = with_ghosts(pressure, kept.wet, unheld, kept.level_set, kept.wet_cells, t.cells)
     return scale * cell_gradient(kept.wet_cells, full, t.cells, t.parent, t.gradients)
 
@@ -268,8 +270,6 @@ def to_middle(cell_list, now, before):
 
 
 def _report(water, problem, x, projected, u, clipped, momentum, bound):
-    from fluid.step.water import StepReport, kinetic_energy
-
     kept, p = problem.predicted, water.parameters
     g_x = water.below_floor(water.topology.nodes)
 

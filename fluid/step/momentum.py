@@ -29,6 +29,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
+from fluid.numerics.sums import about, momentum_of, momentum_of_rows
 from fluid.step.predictor import kick_factor
 
 NUMERICAL = (
@@ -69,38 +70,11 @@ class Stages:
     end: np.ndarray
 
 
-def momentum_of(weight, u, place) -> np.ndarray:
-    """Σ m_i [u_i; r_i × u_i] (6,); weight m (n,), u (n, 3), place r (n, 3)."""
-    return _momentum(np.arange(len(weight)), 1.0, weight, u, place, np.zeros(3))
-
-
-@njit(cache=True)
-def _momentum(rows, density, volume, u, nodes, reference):
-    out = np.zeros(6)
-    for i in rows:
-        m = density * volume[i]
-        r0, r1, r2 = nodes[i, 0] - reference[0], nodes[i, 1] - reference[1], nodes[i, 2] - reference[2]
-        p0, p1, p2 = m * u[i, 0], m * u[i, 1], m * u[i, 2]
-        out[0] += p0
-        out[1] += p1
-        out[2] += p2
-        out[3] += r1 * p2 - r2 * p1
-        out[4] += r2 * p0 - r0 * p2
-        out[5] += r0 * p1 - r1 * p0
-    return out
-
-
-def about(point, load, centre) -> np.ndarray:
-    """Loads (n, 6) about their centres (n, 3) → their sum (6,) about a point (3,)."""
-    load, arm = np.reshape(load, (-1, 6)), np.reshape(centre, (-1, 3)) - point
-    return np.concatenate([load[:, :3].sum(axis=0), (load[:, 3:] + np.cross(arm, load[:, :3])).sum(axis=0)])
-
-
 def momentum(water) -> np.ndarray:
     """P, L (6,) of a Water now."""
     wet = np.flatnonzero(water.nodal_water > 0.0)
     state = (water.nodal_water, water.velocity, water.topology.nodes, water.reference)
-    return _momentum(wet, water.parameters.density, *state)
+    return momentum_of_rows(wet, water.parameters.density, *state)
 
 
 def momentum_change(water, problem, unknown, pressure, stages: Stages) -> MomentumChange:
@@ -160,8 +134,8 @@ def _momenta(water, kept, dt, stages: Stages) -> dict[str, np.ndarray]:
     }
     found |= {name: (W1, u) for name, u in vars(stages).items()}
     density, about_point = parameters.density, water.reference
-    at = {name: _momentum(rows, density, W, u, nodes, about_point) for name, (W, u) in found.items()}
-    at["weight"] = _momentum(
+    at = {name: momentum_of_rows(rows, density, W, u, nodes, about_point) for name, (W, u) in found.items()}
+    at["weight"] = momentum_of_rows(
         rows, density, W1, np.broadcast_to(parameters.weight, nodes.shape), nodes, about_point
     )
     return at

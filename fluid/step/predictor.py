@@ -101,7 +101,7 @@ def predicted(water, dt: float) -> PressureProblem:
             graph,
             surface.shift,
             water.topology,
-            water._walls.open_node,
+            water.walls.open_node,
         )
         water.hold(u_adv, water.time + dt)
     shear = None
@@ -156,7 +156,7 @@ def _transported(water, dt, theta, kick):
     for u in (u_hat, u_m):
         water.hold(u, water.time + dt)
     fields = np.column_stack([u_hat, water.level_set])
-    moved = transport(water.topology, water.listed, dt, u_m, fields, water._walls.open_node)
+    moved = transport(water.topology, water.listed, dt, u_m, fields, water.walls.open_node)
     if water.parameters.advection == "supg":
         from fluid.transport.supg import carried_velocity
 
@@ -168,7 +168,7 @@ def _transported(water, dt, theta, kick):
         moved[places, 3] = levels
     near = np.abs(phi[water.listed]) < TRANSPORT_WIDTH * water.mesh.spacing
     phi[water.listed[near]] = moved[near, 3]
-    water._walls.let_air_in(phi, u_m, dt, water.mesh.spacing)
+    water.walls.let_air_in(phi, u_m, dt, water.mesh.spacing)
     water.hold(u_adv, water.time + dt)
     return u_adv, phi
 
@@ -200,7 +200,7 @@ def _problem(
     remainder = _carried_remainder(water, dt, theta, cells)
     star = cell_velocity(cells, u_star, remainder, t.cells, t.share)
     rhs = inflow(cells, star, t.cells, t.parent, t.gradients, t.volume, len(phi))
-    dofs = np.flatnonzero(wet & ~water._walls.open_node)
+    dofs = np.flatnonzero(wet & ~water.walls.open_node)
     matrix, anchored, held_back = _definite(water, graph, phi, cells, dofs, dt / density, theta)
     rhs[dofs] += held_back
     held = None
@@ -209,7 +209,7 @@ def _problem(
         gravity = water.parameters.gravity
         held = theta * water.sides.pressure(density, gravity, water.velocity, water.time + dt)
         # at the edge that a sea shares with an inflow the pressure is sought, not held
-        held[~water._walls.open_node] = 0.0
+        held[~water.walls.open_node] = 0.0
         rhs[dofs] += pull_of_held(graph, dofs, held, dt / density)
     known = (1.0 - theta) * kick[dofs] * water.end_pressure[dofs]
     guess = theta * water.end_pressure[dofs]
@@ -241,7 +241,7 @@ def _problem(
         displaced,
     )
     acted = _known_pressure(water, water.pressure, phi)
-    other = waterline_load(water.domain, faces, left_out, phi, wet, acted, water._walls.open_node)
+    other = waterline_load(water.domain, faces, left_out, phi, wet, acted, water.walls.open_node)
     if shear is not None:
         other += shear.load
     return PressureProblem(
@@ -267,7 +267,7 @@ def _known_pressure(water, pressure, phi):
 
 def _definite(water, graph, phi, cells, dofs, scale, theta):
     """The matrix, rows beside p = 0, and what rows behind obtuse angles at the surface add to the right hand side."""
-    open_node = water._walls.open_node
+    open_node = water.walls.open_node
     if not water.topology.is_obtuse:
         matrix, anchored, _ = pressure_matrix(graph, phi, dofs, open_node, scale, np.zeros(len(phi)))
         return matrix, anchored, 0.0

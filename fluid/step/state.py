@@ -60,16 +60,16 @@ def save(water) -> dict[str, np.ndarray]:
 def restore(water, domain, arrays) -> None:
     """Back to a saved state on `domain`, the same as the one that it was saved on.  Raises OtherWater."""
     _check(domain, arrays, water.sides)
-    water._set_domain(domain)
+    water.set_domain(domain)
     for name in (*NODAL, *OF_CELLS, *OF_BODIES, "listed", "layer_start"):
         setattr(water, name, np.array(arrays[name]))
     for name, kind in NUMBERS.items():
         setattr(water, name, kind(arrays[name]))
-    water._graph = Graph.of(water.topology, np.array(arrays["graph_nodes"]))
-    water._renumbered, water._left_behind, water.report = None, None, None
+    water.graph = Graph.of(water.topology, np.array(arrays["graph_nodes"]))
+    water.renumbered, water.left_behind, water.report = None, None, None
     water.flux = Flux(
         np.array(arrays["flux_nodes"]),
-        water._graph,
+        water.graph,
         np.array(arrays["flux"]),
         water.nodal_water - water.displaced,
         water.topology.node_volume,

@@ -10,7 +10,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numba import njit
@@ -18,13 +18,13 @@ from numba import njit
 from fluid.domain.physical_domain import carry, wetted_coupling
 from fluid.domain.topology import Graph, Topology, layers_around
 from fluid.mesh.background import Background
-from fluid.pressure.pressure_bound import BoundMet
+from fluid.numerics.sums import kinetic_energy
 from fluid.pressure.projection import PressureProblem
 from fluid.sides.walls import Walls
 from fluid.step.corrector import Corrected, corrected
-from fluid.step.momentum import MomentumChange
 from fluid.step.parameters import WaterParameters
 from fluid.step.predictor import kick_factor, predicted
+from fluid.step.report import StepReport
 from fluid.step.time_step import LEAST_COUNTED, LEAST_GATHERED, gathered, largest_component, pace
 from fluid.surface.extrapolation import BAND, fill_missing
 from fluid.surface.level_set import FAR, redistance, without_films
@@ -35,30 +35,6 @@ from fluid.transport.volume_transport import carry_volume
 LEVEL_HALVINGS = 40
 LONGEST_STEP = 0.3
 """dt ≤ LONGEST_STEP sqrt(h/g): a step at rest."""
-
-
-@dataclass(frozen=True)
-class StepReport:
-    """What the last step did.
-
-    volume [m³] of water · volume_error, (volume - conserved) / conserved · reinserted [m³] moved by the uniform
-    shift (signed) · clipped: nodes at the speed limit · unknowns of the pressure · work_on_bodies [J] ·
-    energy_change [J]: change of kinetic + potential energy by stage (transport and gravity, volume correction,
-    pressure, damping and limit) · momentum: what changed it · left [m³], left_energy [J]: through open sides ·
-    bound: where the pressure met its lower bound."""
-
-    dt: float
-    volume: float
-    volume_error: float
-    reinserted: float
-    clipped: int
-    unknowns: int
-    work_on_bodies: float
-    energy_change: dict[str, float]
-    momentum: MomentumChange
-    left: float
-    left_energy: float
-    bound: BoundMet
 
 
 class Water:
@@ -116,7 +92,7 @@ class Water:
         water that this takes has yet to rise to the surface. Set after a step, for the potential energy."""
         self.free_bodies = None
         """`viscosity.FreeBodies` that answer to shear within the step; None: all keep their velocity."""
-        self._set_domain(domain)
+        self.set_domain(domain)
         n = len(self.topology.nodes)
         level = fill(self.topology.nodes) if callable(fill) else np.asarray(fill, float)
         if sides is not None:
@@ -143,7 +119,7 @@ class Water:
         self._start_speed = 0.0
         if velocity is not None:
             self._start_moving(velocity)
-        self._renumbered, self._left_behind = None, None
+        self.renumbered, self.left_behind = None, None
         self.flux = edge_flux(
             self.topology, self.graph_for(self.listed), self.listed, self.cell_velocity, self.nodal_water
         )
@@ -235,7 +211,7 @@ class Water:
         self._surface_lag = 0.5 * problem.dt * share
         self.time += problem.dt
         self.steps += 1
-        self._domain_is_new, self._renumbered, self._left_behind = False, None, None
+        self._domain_is_new, self.renumbered, self.left_behind = False, None, None
 
     def remember(self) -> dict:
         """The state now, for `go_back`: a step replaces what it changes, so these are references."""
@@ -257,10 +233,10 @@ class Water:
         by what the solids displaced."""
         old, old_topology = self.domain, self.topology
         source = carry(old, domain)
-        self._set_domain(domain)
+        self.set_domain(domain)
         known = (source >= 0) & old_topology.active[source]
-        if self._left_behind is None:
-            self._left_behind = (self.velocity, self.acceleration)
+        if self.left_behind is None:
+            self.left_behind = (self.velocity, self.acceleration)
         self._carry_nodes(source, known)
         self._carry_cells(old_topology)
         self._find_band()
@@ -268,7 +244,7 @@ class Water:
             handed_on = renumbering(source, old.parent_node, domain.parent_node, self.topology.node_volume)
             self.nodal_water = handed_on @ self.nodal_water
             self.displaced = handed_on @ self.displaced
-            self._renumbered = handed_on if self._renumbered is None else handed_on @ self._renumbered
+            self.renumbered = handed_on if self.renumbered is None else handed_on @ self.renumbered
 
     def set_cracks(self, cracks) -> None:
         """Lump the flow through these `slits.Cracks`: anew after every change of the domain or of the cracks."""
@@ -280,7 +256,7 @@ class Water:
         """What the fluxes make of volume and momentum in dt [s], carried on the domain of the last projection; of the
         volume alone with `advection = "supg"`, where velocity does not go along paths."""
         carried = self._carried(dt, theta)
-        carried = carried if self._renumbered is None else carried.handed_on(self._renumbered)
+        carried = carried if self.renumbered is None else carried.handed_on(self.renumbered)
         if self.slits is None:
             return carried
         return replace(carried, water=carried.water + self.slits.carried(dt))
@@ -288,7 +264,7 @@ class Water:
     def _carried(self, dt: float, theta: float) -> Carried:
         if self.parameters.advection == "supg":
             return Carried(carry_volume(self.flux, dt))
-        u, a = (self.velocity, self.acceleration) if self._left_behind is None else self._left_behind
+        u, a = (self.velocity, self.acceleration) if self.left_behind is None else self.left_behind
         kick = (1.0 - theta) * dt * kick_factor(a, self.largest_kick())
         u_hat = u + kick[:, None] * a
         return Carried.by(self.flux, dt, u_hat, a, self.parameters.gravity, self.mesh.spacing)
@@ -316,20 +292,20 @@ class Water:
 
     # ---- layout
 
-    def _set_domain(self, domain) -> None:
+    def set_domain(self, domain) -> None:
         self.domain = domain
         self.topology = Topology.of(self.mesh, domain)
         self.coupling = wetted_coupling(domain).tocsr()
-        self._walls = self._sides.on_copies(domain.parent_node)
+        self.walls = self._sides.on_copies(domain.parent_node)
         self.on_sides = self._on_sides[domain.parent_node]
         """(N,) bool: nodes on the sides of the tank."""
         self.open_to_air = np.zeros(len(domain.nodes), bool)
         """(N,) bool: nodes on open sides."""
-        self.open_to_air[self._walls.open_faces] = True
+        self.open_to_air[self.walls.open_faces] = True
         if self.sides is not None:
             self.sides.place(domain, self.topology.active)
         self._domain_is_new = True
-        self._graph = None
+        self.graph = None
 
     def _find_band(self) -> None:
         """The nodes that the step works on: the water and the layers around it."""
@@ -349,10 +325,10 @@ class Water:
     def graph_for(self, nodes) -> Graph:
         """A graph that lists these nodes: the one at hand if it does; of all nodes, once, when the solids have
         stood still for a step."""
-        if self._graph is None or not self._graph.covers(nodes):
+        if self.graph is None or not self.graph.covers(nodes):
             every = nodes if self._domain_is_new else np.flatnonzero(self.topology.active)
-            self._graph = Graph.of(self.topology, every)
-        return self._graph
+            self.graph = Graph.of(self.topology, every)
+        return self.graph
 
     def _pressure_at_rest(self):
         """ρ g times the depth (N,) [Pa] below the highest water: a first guess, and the level of closed pockets."""
@@ -368,7 +344,7 @@ class Water:
 
     def hold(self, u, time: float) -> None:
         """What the sides of the tank do to u (N, 3) [m/s] at a time [s], in place."""
-        self._walls.slip(u)
+        self.walls.slip(u)
         if self.sides is not None:
             self.sides.hold(u, time)
 
@@ -379,19 +355,19 @@ class Water:
 
     def held_by_sides(self):
         """Nodes (n,) on the sides of the tank and projectors (n, 3, 3) onto what friction and viscosity may change."""
-        return self._walls.restriction()
+        return self.walls.restriction()
 
     def rubbed_nodes(self):
         """Nodes (N,) bool on sides of the tank and beside solids that rub or hold the water; None if all are smooth."""
         if self.parameters.walls == "slip":
             return None
         rubbed = self.topology.beside_solid.copy()
-        rubbed[self._walls.rough_faces] = True
+        rubbed[self.walls.rough_faces] = True
         return rubbed
 
     def rough_faces(self):
         """Faces of the closed sides that rub the water: (nodes (C, 3), outward area (C, 3) [m²], cell (C,))."""
-        w = self._walls
+        w = self.walls
         cell = self.topology.row_of_background[w.rough_cell]
         there = cell >= 0
         return w.rough_faces[there], w.rough_area[there], cell[there]
@@ -472,7 +448,7 @@ class Water:
         t, p, weight = self.topology, self.parameters, self.parameters.weight
         height = -(t.nodes @ weight) / max(p.gravity, 1e-300)
         low, high = height.min(), height.max()
-        faces, area = self._walls.open_faces, self._walls.open_area
+        faces, area = self.walls.open_faces, self.walls.open_area
         upright = area @ weight > -0.9 * p.gravity * np.linalg.norm(area, axis=1)
         spill = height[faces[upright]].min() if upright.any() else np.inf
         for _ in range(LEVEL_HALVINGS):
@@ -491,17 +467,6 @@ def _viscosity(parameters: WaterParameters):
     from fluid.viscous.viscosity import Viscosity
 
     return Viscosity(parameters)
-
-
-@njit(cache=True)
-def kinetic_energy(density, nodal_water, velocity):
-    """½ ρ Σ W_i |u_i|² [J]; nodal_water (N,) [m³], velocity (N, 3) [m/s]."""
-    total = 0.0
-    for i in range(nodal_water.shape[0]):
-        if nodal_water[i] != 0.0:  # most of a tank is dry: its velocities are not even read
-            u = velocity[i]
-            total += nodal_water[i] * (u[0] * u[0] + u[1] * u[1] + u[2] * u[2])
-    return 0.5 * density * total
 
 
 @njit(cache=True)

@@ -1,1 +1,9 @@
-"""The chapter `fluid.surface`."""
+"""The free surface: a level set, and a volume of water at the nodes that is conserved (theory 2.2).
+
+level_set                     signed distance near the surface
+volume                        the conservative volume, its fluxes, and the level set corrected towards it
+extrapolation                 values continued from the water into the nodes around it
+gradient_jump_damping         velocity of single nodes along a calm surface on meshes with obtuse cells
+
+Imports `domain` and the chapters below it.
+"""

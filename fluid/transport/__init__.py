@@ -1,1 +1,9 @@
-"""The chapter `fluid.transport`."""
+"""What is carried with the flow: velocity, level set and volume (theory 2.2; stabilised forms 2.5).
+
+advection, paths_in_solids                 semi-Lagrangian transport with the MacCormack correction
+velocity_transport, volume_transport       momentum and volume by the same fluxes, both conserved
+surface_momentum                           where velocity follows the momentum that the volume carries
+supg, forms                                stabilised finite elements instead, assembled from scikit-fem forms
+
+Imports `surface`, `domain` and the chapters below them.
+"""

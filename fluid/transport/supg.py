@@ -228,7 +228,7 @@ def range_around(cells, f, layers):
 
 def rim(water, u_m):
     """(N,) bool: nodes at the rim of the band, and where the velocity u_m (N, 3) leads in from outside the tank."""
-    sides, found = water._walls, np.zeros(len(u_m), bool)
+    sides, found = water.walls, np.zeros(len(u_m), bool)
     found[water.listed[water.layer_start[-2] :]] = True
     found[sides.flowing] = True
     inward = np.einsum("fak,fk->f", u_m[sides.open_faces], sides.open_area) < 0.0
@@ -242,6 +242,6 @@ def rim(water, u_m):
 def _along_sides(water):
     """(N, 3) bool: components that closed sides of the tank leave free; of sides along no axis all."""
     free = np.ones((len(water.topology.nodes), 3), bool)
-    diagonal = np.einsum("nkk->nk", water._walls.projector)
-    free[water._walls.nodes] = diagonal > 1e-12
+    diagonal = np.einsum("nkk->nk", water.walls.projector)
+    free[water.walls.nodes] = diagonal > 1e-12
     return free

@@ -1,1 +1,9 @@
-"""The chapter `fluid.viscous`."""
+"""Viscosity, no-slip and rough walls: the stage of a step between transport and pressure (theory 2.3).
+
+viscosity            the stage and its right hand side
+kernels              stresses as products without a matrix, and conjugate gradients on them
+strain               strain rates smoothed over the edges of the cells
+wall_friction        the log law of rough walls
+
+Loaded only where a case asks for it.  Imports `domain` and the chapters below it.
+"""

@@ -27,7 +27,7 @@ import numpy as np
 from fluid.domain.moments import wet_fraction
 from fluid.domain.physical_domain import hat_values
 from fluid.numerics.solve import NotConverged
-from fluid.step.momentum import momentum_of
+from fluid.numerics.sums import momentum_of
 from fluid.viscous.kernels import implicit_change, momentum_rate, unheld_rate
 from fluid.viscous.strain import edges_of
 
@@ -100,7 +100,7 @@ class Viscosity:
 
     def __init__(self, parameters):
         self.parameters = parameters
-        self._walls: WettedWalls | None = None
+        self.walls: WettedWalls | None = None
         self.friction = None
         if parameters.walls == "friction":
             from fluid.viscous.wall_friction import WallFriction
@@ -144,8 +144,8 @@ class Viscosity:
 
     def _terms(self, water, phi, mass, w):
         t, p = water.topology, self.parameters
-        if self._walls is None or self._walls.domain is not water.domain:
-            self._walls = WettedWalls(water.domain, water.mesh.spacing)
+        if self.walls is None or self.walls.domain is not water.domain:
+            self.walls = WettedWalls(water.domain, water.mesh.spacing)
         wet = (phi < 0.0) & t.active
         cells = np.flatnonzero(wet[t.cells].any(axis=1))
         share = wet_fraction(cells, phi, t.parts)
@@ -169,7 +169,7 @@ class Viscosity:
 
     def _wall_terms(self, water, phi, w, wet_cells, share):
         """The polygons that the water touches, with λ and C; λ rises as the surface takes water off a cell."""
-        p, k, cells = self.parameters, self._walls, water.topology.cells
+        p, k, cells = self.parameters, self.walls, water.topology.cells
         water_share = np.ones(len(cells))
         water_share[wet_cells] = np.maximum(share, 1.0 / STEEPEST)
         wet = k.at_points(phi, cells) < 0.0

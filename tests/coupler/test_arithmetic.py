@@ -18,7 +18,7 @@ needs_baseline = pytest.mark.skipif(bool(arithmetic.missing()), reason="an older
 
 IN_FORCE = """
 import json
-from coupler.commands.cli import one_thread
+from coupler.program.start import one_thread
 one_thread()
 import numpy.linalg, scipy.linalg, threadpoolctl
 from numba.core.registry import cpu_target
@@ -31,7 +31,7 @@ print(json.dumps({
 """
 KERNELS = """
 import sys
-from coupler.commands.cli import one_thread
+from coupler.program.start import one_thread
 one_thread()
 import numpy as np
 from fluid.mesh.background import box_mesh
@@ -50,7 +50,7 @@ found += [pair.force(1e-3 * np.array(way), 1e-6, advance=True) for way in random
 print(b"".join(np.ascontiguousarray(a).tobytes() for a in found).hex())
 """
 SCENE = """
-from coupler.commands.cli import one_thread
+from coupler.program.start import one_thread
 one_thread()
 from tests.coupler.test_momentum import run, scene
 rows = []

@@ -10,6 +10,7 @@ import meshio
 import numpy as np
 import pytest
 
+from coupler.case.inflow_records import RecordError, record_columns
 from coupler.case.structure import BlockFile
 from coupler.checks.case import remarks
 from coupler.checks.read_case import load
@@ -19,7 +20,6 @@ from coupler.geometry.block_files import blocks_from_file
 from coupler.geometry.mesh_files import read_mesh
 from coupler.run.forecast import forecast
 from coupler.run.resume import prepare
-from coupler.scene.build_water import RecordError, record_columns
 from tests.coupler import fuzz
 from tests.coupler.test_resume import COUPLED, STREAM
 

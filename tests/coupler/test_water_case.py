@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from coupler.case.case import Case, modules
+from coupler.case.inflow_records import RecordError, record_columns
 from coupler.checks.case import problems, remarks
 from coupler.run.forecast import forecast
 from coupler.scene.build import build
-from coupler.scene.build_water import RecordError, record_columns
 from coupler.scene.side_energy import side_energy
 from coupler.step.limits import Diverged, check_pressure
 from fluid.numerics import bounded

@@ -7,9 +7,10 @@ import pytest
 from fluid.cut.bodies import ConvexBodies
 from fluid.domain.physical_domain import cut_domain
 from fluid.mesh.background import box_mesh
+from fluid.numerics.sums import about
 from fluid.sides.inflow import Side, Sides
 from fluid.sides.waves import steady
-from fluid.step.momentum import NUMERICAL, PHYSICAL, about, momentum
+from fluid.step.momentum import NUMERICAL, PHYSICAL, momentum
 from fluid.step.parameters import WaterParameters
 from fluid.step.water import Water
 from tests.fluid.scenes import advance, column, load, rotation, tank

@@ -21,6 +21,10 @@ from yade_scripts.blocks.polyhedra import (
 
 Array = np.ndarray
 
+MARGIN = 0.01
+"""In contact a face reaches beyond its edges by this share of the block's inner radius, so that flush blocks carry each
+other."""
+
 BOX_CORNERS = np.array(
     [[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]],
     float,

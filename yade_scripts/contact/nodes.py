@@ -12,13 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from yade_scripts.blocks.block import Block
+from yade_scripts.blocks.block import MARGIN, Block
 from yade_scripts.blocks.faces import FixedPlane, gauss_points
 
 Array = np.ndarray
 
-MARGIN = 0.01
-"""A face reaches beyond its edges by this share of the block's inner radius, so that flush blocks carry each other."""
 
 FINE = 8
 """Gauss points along an edge for the mean distance within a face."""

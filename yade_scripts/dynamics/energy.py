@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from yade_scripts.blocks.kinematics import work_of
 from yade_scripts.contact.forces import ContactForces
-from yade_scripts.joints import kernel as joint_kernel
 from yade_scripts.joints.joints import Joints
 from yade_scripts.yade_side.motion import Motion
 
@@ -70,13 +70,13 @@ class Accounts:
 
     def take_joints(self, F: Array, before: Array, rows: Array, dt: float) -> None:
         """Work of the joint forces F (n, 6) on `rows` in a substep dt that began with velocities `before` (n, 6)."""
-        self.joint_work += joint_kernel.work_of(F[rows], before[rows], self._motion.v[rows], dt)
+        self.joint_work += work_of(F[rows], before[rows], self._motion.v[rows], dt)
         held = rows[~self._masses.free[rows]]
-        self.driving_work -= joint_kernel.work_of(F[held], before[held], self._motion.v[held], dt)
+        self.driving_work -= work_of(F[held], before[held], self._motion.v[held], dt)
 
     def take_lift(self, F: Array, before: Array, dt: float) -> None:
         """Work in a substep dt, begun with velocities `before` (n, 6), of the forces F (n, 6) that hold blocks up."""
-        self.driving_work += joint_kernel.work_of(F, before, self._motion.v, dt)
+        self.driving_work += work_of(F, before, self._motion.v, dt)
 
     def take_load(
         self, load: Array, before: Array, half_before: Array, turn: Array, spin_before: Array

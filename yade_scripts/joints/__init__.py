@@ -1,1 +1,11 @@
-"""The chapter `yade_scripts.joints`."""
+"""Cohesive joints between faces (theory 1.2).
+
+law, laws                     what a cohesive law is; one file a law (docs/add_a_law.md)
+cohesion, mixed_modes         parameters of the joints; how opening and sliding act together
+rules                         which touching faces are joined, and with which parameters
+joints                        the joints of a structure: built, moved through time, reported
+kernel, forces, specialise    their loops, compiled for each law and mixed mode
+seals                         faces without a joint that keep water out as long as they lie on one another
+
+Imports `blocks`.
+"""

@@ -1,4 +1,4 @@
-"""What a cohesive law is, and the parameters of the joints.
+"""The parameters of the joints, and what follows from them and the law.
 
 With r = λ/δ_f, λ = largest opening so far, and p the place of the peak, a law gives two functions without dimensions:
 
@@ -11,7 +11,6 @@ Tractions, works and stiffnesses are per unit area of the joint.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -20,6 +19,7 @@ import numpy as np
 
 from yade_scripts.blocks import quadrature
 from yade_scripts.joints import laws, mixed_modes
+from yade_scripts.joints.law import CohesiveLaw
 
 Array = np.ndarray
 
@@ -28,24 +28,6 @@ class JointParameterError(ValueError):
     """A joint parameter out of range; the message names it, its value and the range."""
 
     exit_code = 2
-
-
-@dataclass(frozen=True)
-class CohesiveLaw:
-    """secant(r, p), work(r, p): numba functions of floats, 0 ≤ r ≤ 1; the joint cuts the secant off at 1 itself
-
-    peak: p where the user gives none · lowest_peak, highest_peak: what p may be
-    points: Gauss points along an edge that a joint as stiff in closing as in opening needs
-    potential: whether Needleman's potential of 1987 belongs to it
-    """
-
-    secant: Callable[[float, float], float]
-    work: Callable[[float, float], float]
-    peak: float
-    lowest_peak: float
-    highest_peak: float
-    points: int = 3
-    potential: bool = False
 
 
 @dataclass(frozen=True)

@@ -21,8 +21,9 @@ from zlib import crc32
 import numpy as np
 from numba import njit
 
+from yade_scripts.blocks.kinematics import add_forces, arm, cross, dot, parting, place, turned
 from yade_scripts.joints import laws, mixed_modes
-from yade_scripts.joints.kernel import add_forces, arm, cross, dot, parting, place, split, turned
+from yade_scripts.joints.kernel import split
 from yade_scripts.joints.specialise import specialised
 
 UNIT, DF, BETA, KC, K0, MU = range(6)

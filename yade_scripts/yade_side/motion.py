@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from yade_scripts.blocks.faces import FixedPlane
-from yade_scripts.joints import kernel as joint_kernel
+from yade_scripts.blocks.kinematics import scatter
 from yade_scripts.yade_side.scene import STATE, Scene
 
 Array = np.ndarray
@@ -48,7 +48,7 @@ class Motion:
     def _take(self, which: _Rows) -> None:
         if len(which.rows):
             states = self._scene.read(which.ids, which.buffer)
-            joint_kernel.scatter(states, which.rows, self._scene.frame, self.x, self.v, self.R)
+            scatter(states, which.rows, self._scene.frame, self.x, self.v, self.R)
 
     def before(self) -> tuple[Array, Array]:
         """Places (x, R) one substep ago."""

@@ -13,8 +13,7 @@ from collections import deque
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from yade_scripts.blocks.block import Block
-from yade_scripts.contact.nodes import MARGIN
+from yade_scripts.blocks.block import MARGIN, Block
 from yade_scripts.yade_side.engine import Engine, YadeError
 
 Array = np.ndarray

@@ -10,7 +10,7 @@ from coupler.commands.compare.outcome import exact_answers
 from coupler.commands.compare.plan import make_plan
 from coupler.commands.compare.report import table, write
 from coupler.commands.compare.run import run_plan
-from coupler.commands.report.pictures import draw
+from coupler.commands.pictures import draw
 from coupler.program.errors import BadCase, ExitCode
 from coupler.run.directory import RunDirectory
 from yade_scripts.joints import laws as own_laws

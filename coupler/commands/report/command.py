@@ -7,7 +7,7 @@ import tempfile
 from pathlib import Path
 
 from coupler.case.paths import BadPath, read_text
-from coupler.commands.report import pictures
+from coupler.commands import pictures
 from coupler.commands.report.html import document
 from coupler.commands.report.markdown import to_html
 from coupler.commands.report.run_page import run_page

@@ -1,7 +1,7 @@
 """Error against run time: a ladder of runs of a case, each in a process of its own.
 
 plan       which runs, named and checked before any of them is made
-one        one run in this process, with the processor time that compiling took
+study_run  (beside this package) one run in this process, with the processor time that compiling took
 runner     runs one after the other, those that are done are not made again
 reading    the number that a quantity has in a run
 reference  what it is compared with: exact, measured, or the finest run

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from coupler.commands.report.pictures import draw
+from coupler.commands.pictures import draw
 from coupler.commands.study.laws import law_points
 from coupler.commands.study.page import page
 from coupler.commands.study.plan import make_plan

@@ -153,7 +153,7 @@ class Runs:
         sets = [word for override in overrides for word in ("--set", override)]
         command = ["run", str(self.plan.file.path), *sets, "--output", str(place)]
         cost = measure(
-            [sys.executable, "-m", "coupler.commands.study.one", str(compiled), *command], log_of(place)
+            [sys.executable, "-m", "coupler.commands.study_run", str(compiled), *command], log_of(place)
         )
         compiling = (
             json.loads(compiled.read_text(encoding="utf-8"))["compile_seconds"] if compiled.exists() else 0.0

@@ -1,6 +1,6 @@
 """Cohesive laws, one file a law; the name of the file is the name of the law.
 
-A file offers `LAW`, a `cohesion.CohesiveLaw`: secant and work of a law in pure opening, without dimensions. Nothing
+A file offers `LAW`, a `CohesiveLaw`: secant and work of a law in pure opening, without dimensions. Nothing
 else in the program knows a law by its formula.
 """
 
@@ -9,10 +9,8 @@ from __future__ import annotations
 import difflib
 from importlib import import_module
 from pkgutil import iter_modules
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from yade_scripts.joints.cohesion import CohesiveLaw
+from yade_scripts.joints.law import CohesiveLaw
 
 
 class UnknownLaw(ValueError):

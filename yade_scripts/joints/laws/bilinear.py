@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from numba import njit
 
-from yade_scripts.joints.cohesion import CohesiveLaw
+from yade_scripts.joints.law import CohesiveLaw
 
 
 @njit

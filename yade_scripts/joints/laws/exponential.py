@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from yade_scripts.joints.cohesion import CohesiveLaw
+from yade_scripts.joints.law import CohesiveLaw
 
 
 @njit

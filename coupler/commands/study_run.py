@@ -1,4 +1,4 @@
-"""One run of a study: `python -m coupler.commands.study.one FIGURES.json run CASE --set ... --output DIR`.
+"""One run of a study: `python -m coupler.commands.study_run FIGURES.json run CASE --set ... --output DIR`.
 
 What follows the file is handed to `surgebreak`, so the run is the one that a user makes. The processor time that
 numba takes to compile is written to the file: it is paid once for each state of the sources, not by every run.
@@ -11,7 +11,8 @@ import sys
 import time
 from pathlib import Path
 
-from coupler.commands.cli import main, one_thread
+from coupler.commands.cli import main
+from coupler.program.start import one_thread
 
 
 class Compilation:
