@@ -7,6 +7,7 @@ Its chapters, each of which imports only those below it (import contracts in pyp
     checks       what is wrong with a case before it is run
     scene        a case becomes water, structure and what joins them
     results      histories, fields, gauges and what a case expects of them
+    verdict      does the structure stand
     step         one coupled step                                                        theory 3
     balance      energy, volume and momentum, and what is missing in them                theory 4
     geometry     solids, blocks and meshes from numbers and files

@@ -248,7 +248,7 @@ class Recorder:
         """Tables of joints and blocks, as they are now."""
         structure = self.coupling.structure
         if self.watch is not None:
-            from coupler.verdict.table import write_blocks
+            from coupler.results.damage_table import write_blocks
 
             write_blocks(self.each_block, structure, self.watch)
         cracks = crack_columns(structure) if structure else {}

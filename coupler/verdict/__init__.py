@@ -1,1 +1,11 @@
-"""Does it stand? Damage of groups of blocks, what a run says about its structure at the end, and in which words."""
+"""Does it stand? The damage of groups of blocks, and what a run says about its structure at the end.
+
+damage         shares of joints and weight of a group, and the state they make
+divisions      bodies, walls and storeys of a structure
+depths         the depth of the water beside a structure
+watch          what is followed from step to step
+judge          the verdict
+words          the verdict in sentences
+
+Arrays in, so that a run, a town and a sweep can all use it.  Imports `program` and the gauges of `fluid`.
+"""
