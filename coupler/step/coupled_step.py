@@ -225,7 +225,7 @@ class Coupling:
         record.time = self.time
         self._check_finite()
         if self.water is not None and self.water.sides is not None:
-            self.ledger.entered = self.water.sides.energy
+            self.ledger.entered = self.water.energy_through_sides()
         record.balance = self.ledger.balance(self._water_energy(), self._structure_energies())
         record.momentum = book_step(self, record)
 

@@ -23,6 +23,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numba import njit
 
+from fluid.domain.moments import nodal_water
+
 ON_FACE = 1e-9
 """Hat value below which a corner of a tetrahedron lies on the face of its cell."""
 
@@ -237,15 +239,25 @@ class Sides:
         return p
 
     def through(self, phi, u, dt: float, carried):
-        """Volume (N,) [m³] that comes in over dt [s] (negative: leaves, at most what is carried (N,) [m³]), and its
-        rate at the inflows (N,) [m³/s], which the pressure must know."""
-        rate, volume = np.zeros(len(phi)), np.zeros(len(phi))
+        """Volume (N,) [m³] that comes in at the inflows over dt [s] (negative: leaves, at most what is carried (N,)
+        [m³]), and its rate (N,) [m³/s], which the pressure must know."""
+        rate = np.zeros(len(phi))
         for side in self.now:
-            q = side.rate(phi, u)
-            volume += dt * q
             if not side.is_sea:
-                rate += q
-        return np.maximum(volume, -np.maximum(carried, 0.0)), rate
+                rate += side.rate(phi, u)
+        return np.maximum(dt * rate, -np.maximum(carried, 0.0)), rate
+
+    def exchanged(self, topology, phi, carried):
+        """Volume (N,) [m³] that comes in from the seas (negative: leaves): what the level set φ (N,) with their levels
+        has at their nodes beyond what the water has carried there (N,) [m³]."""
+        found = np.zeros(len(phi))
+        for side in self.now:
+            if side.is_sea:
+                ours = np.zeros(len(phi), bool)
+                ours[side.nodes] = True
+                held = nodal_water(topology.cells_around(ours), 0.0, phi, topology.parts, len(phi))
+                found[side.nodes] = held[side.nodes] - carried[side.nodes]
+        return found
 
     def book(self, volume, head) -> None:
         """Add what came in at the nodes in a step: volume (N,) [m³], head (N,) [J/m³] its energy and pressure."""

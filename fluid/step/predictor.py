@@ -90,6 +90,17 @@ def predicted(water, dt: float) -> PressureProblem:
         carried += through
         conserved += float(through.sum())
     displaced = water.displacement(dt)
+    phi = redistance(
+        water.topology,
+        phi,
+        water.mesh.spacing,
+        rescale=(water.steps % RESCALE_EVERY == RESCALE_EVERY - 1),
+    )
+    if water.sides is not None:
+        exchanged = water.sides.exchanged(water.topology, phi, carried + displaced)
+        through += exchanged
+        carried += exchanged
+        conserved += float(exchanged.sum())
     surface = _new_surface(water, phi, carried + displaced, conserved + float(displaced.sum()))
     if found.velocity is not None:
         graph = water.graph_for(water.listed)
@@ -174,18 +185,16 @@ def _transported(water, dt, theta, kick):
 
 
 def _new_surface(water, phi, carried, conserved):
-    """φ redistanced and corrected: VolumeCorrection."""
-    t, h = water.topology, water.mesh.spacing
-    phi = redistance(t, phi, h, rescale=(water.steps % RESCALE_EVERY == RESCALE_EVERY - 1))
+    """φ corrected: VolumeCorrection."""
     return correct_volume(
-        t,
+        water.topology,
         water.graph_for(water.listed),
         water.listed,
         phi,
         carried,
         conserved,
         water.parameters.correction_length,
-        h,
+        water.mesh.spacing,
     )
 
 

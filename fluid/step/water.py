@@ -422,6 +422,16 @@ class Water:
         found += p.density * float(farther @ (self.below_floor(self.topology.nodes) - surface))
         return found + p.density * (self.volume() - self.conserved_volume) * surface
 
+    def energy_through_sides(self) -> float:
+        """Energy [J] that came in through inflows and seas, less what left, at the time of the velocity.
+
+        The water that a pressure sets in motion moves in the next step; what the pressure of the sides has done for it
+        by now is missing in what they brought, as the fall of the surface is in `potential_energy`."""
+        if self.sides is None:
+            return 0.0
+        rate = sum(side.rate(self.level_set, self.velocity) for side in self.sides.now)
+        return self.sides.energy + self._surface_lag * float(rate @ self.pressure)
+
     def _surface_potential(self) -> float:
         """g·x [m²/s²] of the surface, mean over the nodes within half a cell of it; 0 where there is none."""
         near = self.listed[np.abs(self.level_set[self.listed]) < 0.5 * self.mesh.spacing]

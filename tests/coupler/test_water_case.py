@@ -291,6 +291,20 @@ def test_wave_onto_a_beach_keeps_its_books():
     assert max(row["p_mean"] for row in rows[6:]) == pytest.approx(9810 * 0.45, rel=0.02)
 
 
+def test_a_wave_pushes_still_water_only_where_it_begins_half_way():
+    """The first step beside an inflow and a sea: a crest of a tenth of the depth 3.2 depths away has speed at once,
+    which takes a push; one 8 depths away begins at rest, and the water stays still."""
+    gauge = {"kind": "patch", "name": "p", "at": [0.01, 0.1, 0.1], "edges": [[0, 0.1, 0], [0, 0, 0.1]]}
+
+    def first(crest):
+        wave = {"kind": "solitary", "side": "x-", "level": 0.5, "height": 0.05, "crest": crest}
+        sides = {"inflow": [wave], "sea": [{"side": "x+", "level": 0.5}]}
+        return run(case(sides, gauge=[gauge]), 0.03)[2][0]["p_pressure"] / (9810 * 0.4)
+
+    assert first(1.6) > 1.03
+    assert first(4.0) == pytest.approx(1.0, abs=2e-3)
+
+
 def test_a_stone_that_covers_gauges_leaves_their_cells_empty():
     """It sinks past them: before and behind it they read the water, inside it there is none, and the run goes on."""
     stone = {"name": "stone", "size": [0.12] * 3, "centre": [0.51, 0.1, 0.62], "velocity": [0, 0, -3.0]}

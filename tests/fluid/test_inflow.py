@@ -100,6 +100,24 @@ def test_tank_fills_to_the_level_of_the_sea():
     assert abs(water.volume_error()) < 1e-4
 
 
+@pytest.mark.parametrize("sea", [0.0425, 0.18])
+def test_a_sea_that_stands_lower_or_higher_puts_no_energy_in(sea):
+    """A pool of 0.11 m beside a sea a cell and a third lower, or higher: what the level of the sea takes off the water
+    beside it, or adds, goes through the side. Lifted onto the rest of the pool (lower) it brought 24 % of what the
+    step in the level holds, on cells of a half and a quarter too."""
+    water = tank([0.45, 0.1, 0.25], 0.05, lambda x: x[:, 2] - 0.11, sea=sea)
+    held = 0.5 * 1000.0 * 9.81 * 0.1 * max(sea, 0.11) * (0.11 - sea) ** 2
+    start = water.kinetic_energy() + water.potential_energy()
+    lost = []
+    while water.time < 0.25:
+        advance(water, rtol=1e-8)
+        now = water.kinetic_energy() + water.potential_energy()
+        lost.append((water.energy_through_sides() - (now - start)) / held)
+    assert min(lost) > -0.01
+    assert max(lost) < 1.0
+    assert abs(water.volume_error()) < 1e-5
+
+
 def test_uniform_stream_from_inflow_to_sea():
     """A stream of 0.5 m/s, Froude 0.23, stays uniform and the books agree."""
     depth, speed = 0.5, 0.5
