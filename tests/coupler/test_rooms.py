@@ -68,6 +68,50 @@ def test_the_contracts_of_pyproject_hold():
     assert done.returncode == 0, done.stdout
 
 
+def test_no_module_imports_itself_by_way_of_others():
+    """Contracts hold chapters apart; within one, two modules that need each other are one module, or need a third."""
+    modules = {
+        ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): path
+        for room in ("fluid", "yade_scripts", "coupler")
+        for path in (ROOT / room).rglob("*.py")
+    }
+    below = {
+        name: {m for m in named(path, modules) if m in modules and m != name}
+        for name, path in modules.items()
+    }
+    while (
+        True
+    ):  # whatever imports nothing that is left, or is imported by nothing that is left, lies on no circle
+        above = set().union(*below.values())
+        on = {name for name, others in below.items() if others & below.keys() and name in above}
+        if on == below.keys():
+            break
+        below = {name: below[name] & on for name in on}
+    assert sorted(below) == []
+
+
+def named(path, modules):
+    """What a file imports of these modules, as a whole or a thing in it."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (name.name for name in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            inside = (f"{node.module}.{name.name}" for name in node.names)
+            yield from (name if name in modules else node.module for name in inside)
+
+
+def test_the_page_names_every_chapter():
+    """Whoever looks for the place of a change starts there."""
+    page = (ROOT / "docs" / "how_it_runs.md").read_text(encoding="utf-8")
+    listed = page[page.index("## Packages and chapters") : page.index("## One run")]
+    chapters = {
+        f"`{init.parent.name}`"
+        for room in ("fluid", "yade_scripts", "coupler")
+        for init in (ROOT / room).glob("*/__init__.py")
+    }
+    assert {chapter for chapter in chapters if f"| {chapter} |" not in listed} == {"`cli`"}
+
+
 HEAVY = {
     "yade",
     "yade_scripts",
