@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, PrivateAttr
 
 from coupler.case.gauges import Gauge
 from coupler.case.structure import Structure
 from coupler.case.study import Study
+from coupler.case.terrain import Terrain
 from coupler.case.types import (
     Name,
     Point,
@@ -97,6 +98,24 @@ class Tank(Section):
         (),
         description="closed sides along which water slips whatever water.walls says, for instance of a slice",
     )
+
+    _ground: object = PrivateAttr(None)
+
+    @property
+    def ground(self):
+        """Height map that the mesh ends on, of a case with [terrain]; None without."""
+        return self._ground
+
+    @property
+    def is_box(self) -> bool:
+        """Whether its water may be everywhere between lower and upper."""
+        return self.mesh is None and self._ground is None
+
+    def standing_on(self, ground) -> Tank:
+        """The same tank over a height map."""
+        other = self.model_copy()
+        other._ground = ground
+        return other
 
 
 class ContactPair(Section):
@@ -275,6 +294,7 @@ class Case(Section):
     case: About = Field(description="what the case is")
     time: Time = Field(description="how long and how often")
     tank: Tank | None = Field(None, description="where water may be: a box, or a mesh from a file")
+    terrain: Terrain | None = Field(None, description="the ground from a file: bed of the water, and land")
     water: Water | None = Field(None, description="the water")
     solid: tuple[Solid, ...] = Field((), description="fixed bodies in the water")
     structure: Structure | None = Field(None, description="rigid blocks")
@@ -295,6 +315,7 @@ def modules(case: Case) -> dict[str, bool]:
     structure = case.structure is not None
     water = case.water is not None
     return {
+        "terrain": case.terrain is not None,
         "water": water,
         "stabilised transport": water and case.water.advection == "supg",
         "viscosity": water and case.water.viscosity > 0.0,

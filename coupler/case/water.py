@@ -56,11 +56,16 @@ class RecordInflow(Section):
 
 
 class BoreInflow(Section):
-    """A bore: behind its front the water is deeper and moves, ahead of it it stands still."""
+    """A bore: behind its front the water is deeper and moves, ahead of it it stands still; or a surge onto dry ground,
+    as behind a dam that vanishes."""
 
     kind: Literal["bore"] = Field(description="what comes in: a bore")
     side: Wall = Field(description="the side of the tank, across its whole width")
-    ahead: Length = Field(description="height z of the still water")
+    ahead: Length | None = Field(
+        None,
+        description="height z of the still water; absent: the ground is dry, and water of depth h at the side comes in "
+        "at sqrt(g h)",
+    )
     level: Length = Field(description="height z of the surface behind the front")
 
 

@@ -13,7 +13,7 @@ from coupler.case.structure import Building
 from coupler.geometry.bodies import Body, overlap_depth
 from coupler.geometry.parts import Part
 from coupler.geometry.solids import solids_of
-from coupler.geometry.tank_mesh import beside_mesh, is_measured, mesh_of, tank_places
+from coupler.geometry.tank_mesh import beside_mesh, is_measured, mesh_of, tank_places, what_of
 
 KeyPath = tuple[str | int, ...]
 Problem = tuple[KeyPath, str]
@@ -27,7 +27,7 @@ BYTES_PER_CELL = 1100
 
 def mesh_size(tank) -> tuple[int, int]:
     """Cells and nodes of the mesh of a tank: those of its file, or six tetrahedra a box of about the wanted edge."""
-    if tank.mesh is not None:
+    if not tank.is_box:
         mesh = mesh_of(tank)
         return len(mesh.cells), len(mesh.nodes)
     edges = np.subtract(tank.upper, tank.lower)
@@ -77,7 +77,7 @@ def _tank(case: Case) -> Iterator[Problem]:
     if case.tank is None:
         return
     smallest = min(np.subtract(case.tank.upper, case.tank.lower))
-    if case.tank.mesh is None and 0 < smallest < case.tank.cell:
+    if case.tank.is_box and 0 < smallest < case.tank.cell:
         yield (
             ("tank", "cell"),
             f"{case.tank.cell:g} m is larger than the smallest side of the tank ({smallest:g} m)",
@@ -108,7 +108,7 @@ def _fills(case: Case) -> Iterator[Problem]:
     for i, fill in enumerate(case.water.fill if case.water else ()):
         path = ("water", "fill", i)
         yield from _corners_in_order(path, fill)
-        if case.tank is not None and case.tank.mesh is None:  # a basin of any shape cuts its boxes of water
+        if case.tank is not None and case.tank.is_box:  # a basin of any shape cuts its boxes of water
             yield from _beyond_tank(case, path, f"water fill {i}", np.array([fill.lower, fill.upper]))
 
 
@@ -295,8 +295,11 @@ def _gauge_place(case: Case, path: KeyPath, gauge, held: list[Placed]) -> Iterat
                 f"'{gauge.name}' is outside the tank: {'xyz'[axis]} = {value:g} m, not in {low:g} to {high:g} m",
             )
             return
-    if case.tank.mesh is not None and gauge.kind != "flux" and beside_mesh(case.tank, gauge.at):
-        yield (*path, "at"), f"'{gauge.name}' is outside tank.mesh: no cell is there; move it inside"
+    if not case.tank.is_box and gauge.kind != "flux" and beside_mesh(case.tank, gauge.at):
+        yield (
+            (*path, "at"),
+            f"'{gauge.name}' is outside {what_of(case.tank)}: no cell is there; move it inside",
+        )
     if len(gauge.at) == 3 and gauge.kind != "flux":
         for _, name, body in held:
             (depth,) = body.depth(np.array([gauge.at]))

@@ -81,10 +81,12 @@ def _place_files(table: dict, directory: Path) -> list[tuple[KeyPath, str]]:
     found = [((*path, "path"), entry, "path") for path, entry in _named_files(table)]
     if isinstance(table.get("tank"), dict):
         found.append((("tank", "mesh"), table["tank"], "mesh"))
+    if isinstance(table.get("terrain"), dict):
+        found.append((("terrain", "path"), table["terrain"], "path"))
     nowhere = []
     for path, entry, key in found:
         if isinstance(entry.get(key), str) and entry[key]:
-            find = find_record if path[1] == "quantity" else place_of
+            find = find_record if path[1:2] == ("quantity",) else place_of
             try:
                 entry[key] = str(find(entry[key], directory))
             except BadPath as error:

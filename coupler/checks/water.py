@@ -9,8 +9,8 @@ import numpy as np
 
 from coupler.case.case import Case
 from coupler.case.inflow_records import RecordError, record_columns
-from coupler.geometry.tank_mesh import is_measured
-from coupler.scene.build_water import SLACK, fills_beside, level_at_start
+from coupler.geometry.tank_mesh import floor_along, is_measured, mean_bed
+from coupler.scene.build_water import SLACK, bore_velocity, fills_beside, level_at_start
 
 KeyPath = tuple[str | int, ...]
 Problem = tuple[KeyPath, str]
@@ -63,10 +63,10 @@ def water_remarks(case: Case) -> Iterator[str]:
     if case.water and case.tank:
         yield from _thin_water(case)
     for spec in case.water.inflow if case.water and case.tank else ():
-        if spec.kind in ("bore", "solitary"):
+        if spec.kind == "solitary" or getattr(spec, "ahead", None) is not None:
             yield from _still_water(case, spec)
         if spec.kind == "solitary":
-            share = _share_at_start(spec, spec.level - case.tank.lower[2], case.case.gravity)
+            share = _share_at_start(spec, _depth(case, spec), case.case.gravity)
             if share > EARLY:
                 yield (
                     f"the solitary wave at {spec.side} starts at {100 * share:.0f} % of its height: a jump that "
@@ -78,12 +78,14 @@ def _thin_water(case: Case) -> Iterator[str]:
     """Boxes of water, inflows and seas that are thinner than a few cells; walls and other water lengthen a box."""
     tank, cell = case.tank, case.tank.cell
     found = []
-    if tank.mesh is None:
+    if tank.is_box:
         for i, fill in enumerate(case.water.fill):
             found += [(f"water.fill[{i}]", edge) for edge in _free_edges(case, fill)]
     for kind in ("inflow", "sea"):
         for i, spec in enumerate(getattr(case.water, kind)):
-            found.append((f"the water at water.{kind}[{i}]", level_at_start(spec) - tank.lower[2]))
+            found.append(
+                (f"the water at water.{kind}[{i}]", level_at_start(spec) - floor_along(tank, spec.side))
+            )
     for name, edge in found:
         if 0.0 < edge < LEAST_CELLS * cell * (1.0 - SLACK):
             yield (
@@ -121,6 +123,11 @@ def _still_water(case: Case, spec) -> Iterator[str]:
         )
 
 
+def _depth(case: Case, spec) -> float:
+    """Mean depth [m] of the still water along a side."""
+    return spec.level - mean_bed(case.tank, spec.side, spec.level)
+
+
 def _share_at_start(spec, depth: float, gravity: float) -> float:
     """sech²(κ c t_crest), the first-order wave."""
     phase = math.sqrt(0.75 * spec.height / depth**3) * math.sqrt(gravity * (depth + spec.height)) * spec.crest
@@ -142,7 +149,7 @@ def _walls(w) -> Iterator[Problem]:
 
 def _filled_up(case: Case) -> Iterator[Problem]:
     """Inflows into a tank without a way out, which they fill before the end."""
-    if case.tank.open or case.water.sea or case.tank.mesh is not None:
+    if case.tank.open or case.water.sea or not case.tank.is_box:
         return
     size = [high - low for low, high in zip(case.tank.lower, case.tank.upper)]
     boxes = [[high - low for low, high in zip(fill.lower, fill.upper)] for fill in case.water.fill]
@@ -159,8 +166,9 @@ def _filled_up(case: Case) -> Iterator[Problem]:
 
 def _struck(case: Case) -> Iterator[Problem]:
     """Streams that set still water beside them in motion at once and have no room for the bore that this makes."""
-    bed, top = case.tank.lower[2], case.tank.upper[2]
+    top = case.tank.upper[2]
     for i, spec in enumerate(case.water.inflow):
+        bed = floor_along(case.tank, spec.side)
         still = max([fill.upper[2] for fill in fills_beside(case, spec.side)], default=bed) - bed
         if spec.kind != "steady" or still <= 0.0 or spec.level - bed < WHOLE_DEPTH * still:
             continue
@@ -187,7 +195,7 @@ def _depth_behind(ahead: float, speed: float, gravity: float) -> float:
 
 def _brought(case: Case, spec) -> float:
     """Volume a metre of width [m2] that an inflow brings until the end of the run, what it takes back not counted."""
-    bed, end = case.tank.lower[2], case.time.end
+    bed, end = floor_along(case.tank, spec.side), case.time.end
     if spec.kind == "solitary":
         return 0.0
     if spec.kind == "record":
@@ -196,9 +204,7 @@ def _brought(case: Case, spec) -> float:
     depth = spec.level - bed
     if spec.kind == "steady":
         return max(spec.velocity, 0.0) * depth * end
-    from fluid.sides.waves import bore_speed
-
-    return bore_speed(spec.ahead - bed, depth, case.case.gravity)[1] * depth * end
+    return bore_velocity(case, spec) * depth * end
 
 
 def _sides(case: Case) -> Iterator[Problem]:
@@ -216,7 +222,7 @@ def _sides(case: Case) -> Iterator[Problem]:
 
 
 def _levels(case: Case, path: KeyPath, spec) -> Iterator[Problem]:
-    bed, top = case.tank.lower[2], case.tank.upper[2]
+    bed, top = floor_along(case.tank, spec.side), case.tank.upper[2]
     if _kind(spec) == "record":
         yield from _record(path, spec, bed, top, case.time.end)
         return
@@ -225,16 +231,22 @@ def _levels(case: Case, path: KeyPath, spec) -> Iterator[Problem]:
             (*path, "level"),
             f"z = {spec.level:g} m is not between the floor ({bed:g} m) and the top ({top:g} m)",
         )
-    elif _kind(spec) == "bore" and not bed < spec.ahead < spec.level:
+    elif _kind(spec) == "bore" and spec.ahead is None and fills_beside(case, spec.side):
+        yield (
+            path,
+            "ahead: missing, which means dry ground, but a [[water.fill]] reaches this side; write its level",
+        )
+    elif _kind(spec) == "bore" and spec.ahead is not None and not bed < spec.ahead < spec.level:
         yield (
             (*path, "ahead"),
             f"z = {spec.ahead:g} m must lie above the floor ({bed:g} m) and below the level behind ({spec.level:g} m); "
-            'over a dry bed write kind = "steady"',
+            "onto dry ground leave it out",
         )
-    elif _kind(spec) == "solitary" and spec.height > HIGHEST_WAVE * (spec.level - bed):
+    elif _kind(spec) == "solitary" and spec.height > HIGHEST_WAVE * _depth(case, spec):
         yield (
             (*path, "height"),
-            f"{spec.height:g} m breaks at once on a depth of {spec.level - bed:g} m; at most {HIGHEST_WAVE:g} of it",
+            f"{spec.height:g} m breaks at once on a depth of {_depth(case, spec):.4g} m; "
+            f"at most {HIGHEST_WAVE:g} of it",
         )
 
 

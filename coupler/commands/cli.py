@@ -199,6 +199,28 @@ def explain(
 
 
 @app.command()
+def terrain(
+    place: Annotated[
+        Path, typer.Argument(metavar="FILE|CASE", help="a terrain file, or a case with a section [terrain]")
+    ],
+    set: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="of [terrain], for instance terrain.scale='1 ft'"),
+    ] = None,
+    map_: Annotated[
+        Path | None, typer.Option("--map", metavar="PNG", help="draw a map; needs the extra `view`")
+    ] = None,
+) -> None:
+    """Show a terrain: extent, heights, slopes, and what cells of a size make of it."""
+    one_thread()
+    if map_ is not None:
+        need("view")
+    from coupler.commands.terrain import show
+
+    show(place, set or [], map_)
+
+
+@app.command()
 def init(directory: Annotated[Path, typer.Argument(metavar="DIR", help="the new case directory")]) -> None:
     """Write a small commented case that runs."""
     from coupler.case.docs import write_first_case

@@ -1,4 +1,4 @@
-"""The mesh of a tank: split bricks of a box, or the tetrahedra of a file.
+"""The mesh of a tank: split bricks of a box, those above a terrain, or the tetrahedra of a file.
 
 With a file, lower, upper and cell of the tank follow from it: the box around its nodes and the mean edge of its cells.
 """
@@ -42,8 +42,15 @@ def measured(case: Case) -> tuple[Case, list[Problem]]:
     """The case with lower, upper and cell of its tank, from the file if it names one; and why that cannot be."""
     tank = case.tank
     if tank is None:
-        return case, []
+        needed = "the ground needs a section [tank] with lower, upper and cell: where water may be above it"
+        return case, [(("terrain",), needed)] if case.terrain is not None else []
     wrong = list(_wrong_keys(tank))
+    if case.terrain is not None and tank.mesh is not None:
+        wrong.append((("tank", "mesh"), "with [terrain] the mesh is made on it; leave one of them out"))
+    if not wrong and case.terrain is not None:
+        return _on_terrain(case)
+    if wrong and tank.mesh is not None:  # which of both is meant is not known: nothing of it is looked at
+        return case.model_copy(update={"tank": tank.model_copy(update={"lower": None})}), wrong
     if wrong or tank.mesh is None:
         return case, wrong
     try:
@@ -64,10 +71,45 @@ def mesh_of(tank: Tank):
     """The `Background` of a tank; a file is read once unless it changes. Raises MeshFileError."""
     from fluid.mesh.background import box_mesh
 
+    if tank.ground is not None:
+        return fitted_of(tank).mesh
     if tank.mesh is None:
         return box_mesh(tank.lower, tank.upper, tank.cell, split=tank.split)
     there = stamp(tank.mesh) if Path(tank.mesh).is_file() else None
     return _kept(Path(tank.mesh), tank.scale, tank.offset, there)
+
+
+def fitted_of(tank: Tank):
+    """The `FittedMesh` of a tank over a terrain, made once. Raises MeshError."""
+    return _fitted(tank.lower, tank.upper, tank.cell, tank.split, tank.ground)
+
+
+def bed_along(tank: Tank, side: str) -> Array:
+    """Places along a side and heights of the bed there (n, 2) [m], at the columns of the mesh that reach the side; the
+    floor of a box, and of a mesh from a file its lowest node."""
+    axis, along = "xyz".index(side[0]), 1 - "xyz".index(side[0])
+    if tank.ground is None:
+        return np.array([[end[along], tank.lower[2]] for end in (tank.lower, tank.upper)])
+    fitted = fitted_of(tank)
+    at = 0 if side[1] == "-" else -1
+    bed = fitted.bed[at] if axis == 0 else fitted.bed[:, at]
+    found = np.column_stack([(fitted.column_x, fitted.column_y)[along], bed])
+    return found[np.isfinite(bed)]
+
+
+def floor_along(tank: Tank, side: str) -> float:
+    """Lowest z [m] of the bed along a side; of a side that is all land, the top of the tank."""
+    return float(bed_along(tank, side)[:, 1].min(initial=tank.upper[2]))
+
+
+def mean_bed(tank: Tank, side: str, level: float) -> float:
+    """Height z [m] of the level bed with as much water over it, up to a level, as along a side: by its wet width."""
+    along = bed_along(tank, side)
+    depth = np.maximum(level - along[:, 1], 0.0)
+    step = np.diff(along[:, 0])
+    wet = ((depth[1:] > 0.0) | (depth[:-1] > 0.0)) * step
+    area = (0.5 * (depth[1:] + depth[:-1]) * step).sum()
+    return level if not wet.sum() > 0.0 else float(level - area / wet.sum())
 
 
 def on_side(mesh, side: str, normals: Array, centres: Array) -> Array:
@@ -81,7 +123,7 @@ def on_side(mesh, side: str, normals: Array, centres: Array) -> Array:
 
 def tank_places(case: Case) -> Iterator[Problem]:
     """Sides that a mesh from a file has not, water beside it, and blocks in one that is no box."""
-    if case.tank is None or case.tank.mesh is None:
+    if case.tank is None or case.tank.is_box:
         return
     mesh = mesh_of(case.tank)
     yield from _sides(case, mesh)
@@ -89,9 +131,9 @@ def tank_places(case: Case) -> Iterator[Problem]:
         if not _within(mesh.nodes, fill).any():
             yield (
                 ("water", "fill", i),
-                "no node of tank.mesh lies in this box, so there is no water; enlarge it",
+                f"no node of {what_of(case.tank)} lies in this box, so there is no water; enlarge it",
             )
-    if case.structure is not None and not _fills_its_box(mesh):
+    if case.structure is not None and case.tank.mesh is not None and not _fills_its_box(mesh):
         share = mesh.cell_volume.sum() / np.prod(np.ptp(mesh.bounds, axis=0))
         low, high = (shown(corner) for corner in mesh.bounds)
         yield (
@@ -165,6 +207,33 @@ def beside_mesh(tank: Tank, place) -> bool:
     return not (mesh.locate(points) >= 0).any()
 
 
+def what_of(tank: Tank) -> str:
+    """Its mesh in messages."""
+    return "tank.mesh" if tank.mesh is not None else "the mesh over the terrain"
+
+
+def _on_terrain(case: Case) -> tuple[Case, list[Problem]]:
+    """The case with its tank over its terrain, and why that cannot be."""
+    from coupler.geometry.terrain.checks import terrain_problems
+    from coupler.geometry.terrain.grids import TerrainError
+    from coupler.geometry.terrain.site import terrain_of
+    from fluid.mesh.background import MeshError
+
+    try:
+        ground = terrain_of(case.terrain)
+    except TerrainError as error:
+        return case, [(("terrain", "path"), str(error))]
+    found = list(terrain_problems(case, ground))
+    if found:
+        return case, found
+    tank = case.tank.standing_on(ground)
+    try:
+        fitted_of(tank)
+    except MeshError as error:
+        return case, [(("terrain",), f"{error} (terrain.smooth, terrain.steepest)")]
+    return case.model_copy(update={"tank": tank}), []
+
+
 def _wrong_keys(tank: Tank) -> Iterator[Problem]:
     if tank.mesh is None:
         for name, meaning in OF_BOX.items():
@@ -196,13 +265,21 @@ def _sides(case: Case, mesh) -> Iterator[Problem]:
             plane = mesh.bounds[int(side[1] == "+"), "xyz".index(side[0])]
             yield (
                 path,
-                f"{side}: no face of tank.mesh lies in the plane {side[0]} = {plane:g} m at its end; only flat ends "
-                "along an axis are sides, the rest is wall: cut the mesh flat there, or leave this side out",
+                f"{side}: no face of {what_of(case.tank)} lies in the plane {side[0]} = {plane:g} m at its end; "
+                "only flat ends along an axis are sides, the rest is wall: cut the mesh flat there, or leave this "
+                "side out",
             )
 
 
 def _within(points: Array, box) -> Array:
     return np.all((points >= box.lower) & (points <= box.upper), axis=1)
+
+
+@lru_cache(maxsize=1)
+def _fitted(lower, upper, cell: float, split: str, ground):
+    from fluid.mesh.fitted_mesh import fitted_mesh
+
+    return fitted_mesh(lower, upper, cell, ground, split=split)
 
 
 @lru_cache(maxsize=1)

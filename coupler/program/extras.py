@@ -9,11 +9,12 @@ from coupler.program.errors import SurgebreakError
 EXTRAS = {
     "view": ("pyvista", "matplotlib", "imageio-ffmpeg", "pillow"),
     "benchmark": ("pyamg",),
+    "terrain": ("rasterio", "pyproj", "pyogrio"),
     "test": ("pytest", "hypothesis", "manifold3d", "pyamg"),
 }
 """Packages of an extra; of those that tests need, without the tools that read the code."""
 COMMANDS = {"view": "render", "benchmark": "benchmark", "test": "test"}
-"""Command of the launcher that installs the extra."""
+"""Command of the launcher that installs the extra; others are installed by pip."""
 
 
 class NotInstalled(SurgebreakError):
@@ -40,9 +41,12 @@ def missing(extra: str) -> str:
     if not names:
         return ""
     what = f"{', '.join(names)} {'is' if len(names) == 1 else 'are'} not installed"
+    by_pip = f".venv/bin/pip install -c constraints.txt -e '.[{extra}]'"
+    if extra not in COMMANDS:
+        return f"{what} (the extra `{extra}`); in the checkout `{by_pip}` brings it"
     return (
         f"{what} (the extra `{extra}`); `./surgebreak {COMMANDS[extra]}` of the checkout brings it, "
-        f"or there: .venv/bin/pip install -c constraints.txt -e '.[{extra}]'"
+        f"or there: {by_pip}"
     )
 
 

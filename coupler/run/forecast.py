@@ -103,7 +103,7 @@ def _water_rows(case: Case, interval: float, rows: list[Row]) -> float:
     """Rows of the water; the step [s] that its greatest speed allows."""
     cells, nodes = mesh_size(case.tank)
     volume = sum(float(np.prod(np.subtract(f.upper, f.lower))) for f in case.water.fill)
-    if case.tank.mesh is not None:
+    if not case.tank.is_box:
         volume = water_in(case.tank, case.water.fill)
     height = _highest(case) - case.tank.lower[2]
     g, h = case.case.gravity, case.tank.cell

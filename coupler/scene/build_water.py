@@ -6,7 +6,7 @@ import numpy as np
 
 from coupler.case.case import Case
 from coupler.case.inflow_records import record_columns
-from coupler.geometry.tank_mesh import mesh_of, on_side
+from coupler.geometry.tank_mesh import floor_along, mean_bed, mesh_of, on_side
 
 SLACK = 1e-3
 """Share of a cell within which a box of water reaches a side of the tank."""
@@ -68,7 +68,7 @@ def _strips(case: Case) -> list[tuple]:
     found = []
     for spec in (*case.water.inflow, *case.water.sea):
         top = level_at_start(spec)
-        if top > case.tank.lower[2] and not fills_beside(case, spec.side):
+        if top > floor_along(case.tank, spec.side) and not fills_beside(case, spec.side):
             lower, upper = [*case.tank.lower], [*case.tank.upper]
             axis, end = "xyz".index(spec.side[0]), spec.side[1]
             if end == "-":
@@ -83,7 +83,7 @@ def level_at_start(spec) -> float:
     """Height z [m] of the surface that an inflow or a sea has at the start, ahead of any wave."""
     if getattr(spec, "kind", "sea") == "record":
         return float(record_columns(spec.path)[1][0])
-    return spec.ahead if getattr(spec, "kind", "sea") == "bore" else spec.level
+    return spec.ahead if getattr(spec, "ahead", None) is not None else spec.level
 
 
 def fills_beside(case: Case, side: str) -> list:
@@ -132,17 +132,27 @@ def _flows(case: Case, mesh):
 
 
 def flow_of(case: Case, spec):
-    """What an inflow of the case brings."""
+    """What an inflow of the case brings; waves count their depth over the bed along their side."""
     from fluid.sides import waves
 
-    inward, bed, gravity = -_outward(spec.side), case.tank.lower[2], case.case.gravity
+    inward, gravity = -_outward(spec.side), case.case.gravity
     if spec.kind == "steady":
         return waves.steady(inward, spec.level, spec.velocity)
+    bed = mean_bed(case.tank, spec.side, spec.level) if spec.kind != "record" else 0.0
     if spec.kind == "bore":
-        _, speed = waves.bore_speed(spec.ahead - bed, spec.level - bed, gravity)
-        return waves.steady(inward, spec.level, speed)
+        return waves.steady(inward, spec.level, bore_velocity(case, spec))
     if spec.kind == "solitary":
         order = 1 if spec.theory == "goring" else 3
         wave = waves.SolitaryWave(spec.level - bed, spec.height, gravity, spec.crest, order)
         return wave.flow(inward, bed)
     return waves.record(inward, *record_columns(spec.path))
+
+
+def bore_velocity(case: Case, spec) -> float:
+    """Velocity [m/s] of the water behind the front of a bore, over wet or dry ground."""
+    from fluid.sides.waves import bore_speed, dry_bore_speed
+
+    depth = spec.level - mean_bed(case.tank, spec.side, spec.level)
+    if spec.ahead is None:
+        return dry_bore_speed(depth, case.case.gravity)
+    return bore_speed(spec.ahead - mean_bed(case.tank, spec.side, spec.ahead), depth, case.case.gravity)[1]

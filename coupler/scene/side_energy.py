@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from coupler.case.case import Case
+from coupler.geometry.tank_mesh import floor_along
 from coupler.scene.build_water import fills_beside, flow_of
 
 TIMES = 101
@@ -22,15 +23,16 @@ def side_energy(case: Case) -> float:
     for spec in case.water.inflow:
         flow = flow_of(case, spec)
         level = np.array([flow.level(time) for time in times])
-        speed = max(_speed(case, flow, time, z) for time, z in zip(times, level))
+        floor = floor_along(case.tank, spec.side)
+        speed = max(_speed(flow, floor, time, z) for time, z in zip(times, level))
         found += _energy(case, spec.side, level, speed)
     return float(found)
 
 
-def _speed(case: Case, flow, time: float, level: float) -> float:
+def _speed(flow, floor: float, time: float, level: float) -> float:
     """Largest speed [m/s] of a flow between the bed and its surface."""
     points = np.zeros((2, 3))
-    points[:, 2] = case.tank.lower[2], level
+    points[:, 2] = floor, level
     return float(np.linalg.norm(flow.velocity(points, time), axis=1).max())
 
 
@@ -38,7 +40,7 @@ def _energy(case: Case, side: str, level, speed: float) -> float:
     """The energy [J] of one side with the levels (k,) [m] that it has in the run."""
     size = np.subtract(case.tank.upper, case.tank.lower)
     width = size[1] if side[0] == "x" else size[0]
-    depth = max(level.max() - case.tank.lower[2], 0.0)
+    depth = max(level.max() - floor_along(case.tank, side), 0.0)
     step = np.abs(level - _level_at(case, side)).max()
     return 0.5 * case.water.density * width * depth * (case.case.gravity * step**2 + depth * speed**2)
 

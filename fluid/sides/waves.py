@@ -33,6 +33,14 @@ def bore_speed(ahead: float, behind: float, gravity: float) -> tuple[float, floa
     return float(front), float(front * (1.0 - ahead / behind))
 
 
+def dry_bore_speed(depth: float, gravity: float) -> float:
+    """Speed [m/s] of a surge of this depth [m] at the side onto dry level ground: u = sqrt(g h).
+
+    Where a dam of depth H stood that vanished, h = 4/9 H and u = 2/3 sqrt(g H) for ever (Ritter, Z. VDI 36 (1892) 947);
+    without friction the tip runs at 2 sqrt(g H) = 3 sqrt(g h)."""
+    return float(np.sqrt(gravity * depth))
+
+
 class SolitaryWave:
     """A solitary wave of height H on depth d; crest at the side at time `crest` [s].
 

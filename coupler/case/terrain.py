@@ -1,0 +1,61 @@
+"""The ground of a case from a file."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from coupler.case.types import Length, Name, Number, Point, PositiveLength, Section, Switch
+from coupler.case.units import quantity
+
+
+class Terrain(Section):
+    """The ground as a height over every place, from a file. The mesh of the tank ends on it: it is the bed of the water
+    and dry land; buildings may stand on it. Heights come out in metres, z up; `surgebreak terrain` shows them."""
+
+    path: Annotated[str, Field(min_length=1)] = Field(
+        description="ESRI ASCII grid (.asc), rows of x, y, z (.csv, .xyz, .txt), NetCDF (.nc, .grd), a surface of "
+        "triangles (.stl, .ply, .obj), or GeoTIFF (.tif; needs the extra terrain), from the directory of the case",
+        examples=["site.asc"],
+    )
+    variable: Name | None = Field(None, description="of a NetCDF file with several")
+    crs: str | None = Field(
+        None, description="coordinate system of a file that does not say it", examples=["EPSG:4326"]
+    )
+    reproject: str | None = Field(
+        None,
+        description="metric coordinate system to change to, needed for degrees; needs the extra terrain",
+        examples=["EPSG:32654"],
+    )
+    scale: PositiveLength = Field(
+        1.0, description="length of one unit of the file along x and y", examples=["1 ft"]
+    )
+    height_scale: PositiveLength | None = Field(None, description="the same of its heights; absent: scale")
+    positive: Literal["up", "down"] = Field("up", description="down: the file holds depths")
+    zero: Length = Field(
+        0.0,
+        description="height above the datum of the file that becomes z = 0, for instance of the sea that day",
+    )
+    crop: tuple[tuple[Number, Number], tuple[Number, Number]] | None = Field(
+        None,
+        description="lowest and highest x, y that are kept, in the coordinates of the file (after reproject)",
+        examples=[[[388_200, 4_253_000], [388_900, 4_253_600]]],
+    )
+    origin: tuple[Length, Length] | None = Field(
+        None,
+        description="x, y of the file that come to lie at offset; absent: its corner with the lowest ones",
+    )
+    turn: quantity("rad") = Field(
+        0.0, description="turn about origin, counter-clockwise", examples=["30 deg"]
+    )
+    offset: Point = Field(
+        (0.0, 0.0, 0.0), description="place of origin in the tank; z is added to all heights"
+    )
+    fill: Switch = Field(False, description="true: holes are closed smoothly from their edges")
+    smooth: PositiveLength | None = Field(
+        None, description="length over which heights are averaged (standard deviation of a Gauss curve)"
+    )
+    steepest: quantity("rad", gt=0, lt=1.5) | None = Field(
+        None, description="steepest slope left; cliffs are cut back from their foot", examples=["60 deg"]
+    )

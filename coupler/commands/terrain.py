@@ -1,0 +1,69 @@
+"""The command `surgebreak terrain`."""
+
+from __future__ import annotations
+
+import tempfile
+import tomllib
+from pathlib import Path
+
+import numpy as np
+from pydantic import ValidationError
+
+from coupler.case.messages import explain_error
+from coupler.case.terrain import Terrain
+from coupler.geometry.terrain.grids import TerrainError
+from coupler.geometry.terrain.show import of_file, resolved
+from coupler.program import terminal
+from coupler.program.errors import BadCase
+from coupler.program.process import run_module, trouble
+
+
+def show(place: Path, sets: list[str], picture: Path | None) -> None:
+    """Tables about a terrain file or the terrain of a case, and a map. Raises TerrainError, BadCase."""
+    path, options = (
+        _of_case(place, sets) if place.is_dir() or place.suffix == ".toml" else (place, _options(sets))
+    )
+    ground, rows = of_file(path, options)
+    terminal.table(str(path), rows)
+    terminal.table("what a mesh makes of it", resolved(ground))
+    if picture is not None:
+        _draw(ground, path.name, picture)
+        print(f"map: {picture}")
+
+
+def _of_case(place: Path, sets: list[str]) -> tuple[Path, dict]:
+    from coupler.checks.read_case import load
+
+    case = load(place, sets).case
+    if case.terrain is None:
+        raise TerrainError(f"{place}: the case has no section [terrain]")
+    spec = case.terrain
+    return Path(spec.path), {name: getattr(spec, name) for name in spec.model_fields_set if name != "path"}
+
+
+def _options(sets: list[str]) -> dict:
+    """KEY=VALUE of [terrain], with the checks of a case."""
+    table: dict = {"path": "-"}
+    for text in sets:
+        key, _, value = text.partition("=")
+        try:
+            table[key.strip().removeprefix("terrain.")] = tomllib.loads(f"x = {value}")["x"]
+        except tomllib.TOMLDecodeError:
+            table[key.strip().removeprefix("terrain.")] = value.strip()
+    try:
+        spec = Terrain.model_validate(table)
+    except ValidationError as error:
+        told = [explain_error(item | {"loc": ("terrain", *item["loc"])}) for item in error.errors()]
+        raise BadCase([f"--set {'.'.join(map(str, path))}: {text}" for path, text in told]) from error
+    return {name: getattr(spec, name) for name in spec.model_fields_set if name != "path"}
+
+
+def _draw(ground, title: str, picture: Path) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        there = Path(folder) / "ground.npz"
+        np.savez(there, x=ground.x, y=ground.y, z=ground.z)
+        done = run_module(
+            "coupler.commands.view.terrain_map", there, picture, title, capture_output=True, text=True
+        )
+    if done.returncode != 0:
+        raise TerrainError(f"no map: {trouble(done.returncode, done.stderr)}")

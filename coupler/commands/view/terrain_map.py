@@ -1,0 +1,54 @@
+"""A map of a height map from a file: colours by height, shaded from the north-west, lines of equal height.
+
+python -m coupler.commands.view.terrain_map GROUND.npz PICTURE.png TITLE
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+SEA, LAND = 0.35, 0.65
+"""Shares of the colour map that lie below and above z = 0."""
+
+
+def draw(place: Path, picture: Path, title: str) -> None:
+    """The map of x, y, z in a .npz file as a PNG."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+    from matplotlib.colors import LightSource, TwoSlopeNorm
+
+    with np.load(place) as file:
+        x, y, z = file["x"], file["y"], file["z"]
+    low, high = float(np.nanmin(z)), float(np.nanmax(z))
+    norm = TwoSlopeNorm(0.0, min(low, -1e-3), max(high, 1e-3))
+    colours = plt.get_cmap("terrain")
+    shown = matplotlib.colors.ListedColormap(
+        np.concatenate([colours(np.linspace(0.0, 0.17, 128)), colours(np.linspace(0.25, 1.0, 128))])
+    )
+    rise = 0.15 * max(np.ptp(x), np.ptp(y)) / max(high - low, 1e-9)
+    light = LightSource(315, 45).hillshade(
+        np.nan_to_num(z.T, nan=low), vert_exag=rise, dx=x[1] - x[0], dy=y[1] - y[0]
+    )
+    figure, axes = plt.subplots(
+        figsize=(9.0, 1.2 + 8.0 * min(1.4, np.ptp(y) / np.ptp(x))), layout="constrained"
+    )
+    extent = (x[0], x[-1], y[0], y[-1])
+    image = axes.imshow(z.T, origin="lower", extent=extent, cmap=shown, norm=norm, interpolation="bilinear")
+    axes.imshow(light, origin="lower", extent=extent, cmap="gray", alpha=0.3, interpolation="bilinear")
+    if high > low:
+        lines = axes.contour(x, y, z.T, levels=12, colors="k", linewidths=0.4, alpha=0.6)
+        axes.clabel(lines, fontsize=7, fmt="%g")
+        if low < 0.0 < high:
+            axes.contour(x, y, z.T, levels=[0.0], colors="navy", linewidths=1.4)
+    axes.set(xlabel="x [m]", ylabel="y [m]", title=title, aspect="equal")
+    figure.colorbar(image, ax=axes, label="height z [m]", shrink=0.8)
+    figure.savefig(picture, dpi=130)
+
+
+if __name__ == "__main__":
+    draw(Path(sys.argv[1]), Path(sys.argv[2]), sys.argv[3])

@@ -1,0 +1,224 @@
+"""The terrain of a case: its file, cropped, re-projected, moved, filled, smoothed and cut, kept beside the case.
+
+    file → [re-project] → crop → units, datum → fill → smooth → limit of slope → height map at its place in the tank
+
+What comes out is kept in `.terrain/` beside the file, under a checksum of the file and of the options: a large GeoTIFF
+is read once.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from coupler.geometry.terrain.grids import MOST_POINTS, Grid, TerrainError, read_grid
+from coupler.geometry.terrain.height_map import HeightMap
+
+Array = np.ndarray
+
+KEPT = ".terrain"
+"""Folder beside the file."""
+FORMAT = 1
+"""Changes when the steps below do: what was kept before is made anew."""
+FEET = re.compile(r'UNIT\["[^"]*f(?:oo|ee)t', re.IGNORECASE)
+PLACED = ("origin", "turn", "offset")
+"""Options that only say where the terrain is: nothing is kept anew for them."""
+
+
+def terrain_of(spec) -> HeightMap:
+    """The height map of a section [terrain]; read once unless the file changes. Raises TerrainError."""
+    there = os.stat(spec.path) if Path(spec.path).is_file() else None
+    return _placed(spec, there and (there.st_mtime_ns, there.st_size))
+
+
+@lru_cache(maxsize=2)
+def _placed(spec, _stamp) -> HeightMap:
+    x, y, z = _kept(spec)
+    pivot = spec.origin or (float(x[0]), float(y[0]))
+    dx, dy, dz = spec.offset
+    return HeightMap(x, y, z + dz, pivot, (dx, dy), spec.turn)
+
+
+def _kept(spec) -> tuple[Array, Array, Array]:
+    """x, y, z of the edited raster, from the folder if they are there."""
+    path = Path(spec.path)
+    if not path.is_file():
+        read_grid(path)  # raises with the reason
+    store = path.parent / KEPT / f"{path.stem}-{_checksum(spec)}.npz"
+    if store.is_file():
+        try:
+            with np.load(store) as file:
+                return file["x"], file["y"], file["z"]
+        except (OSError, ValueError, KeyError, EOFError):
+            store.unlink(missing_ok=True)  # torn by a kill
+    x, y, z = _edited(path.name, read_grid(path, spec.variable), spec)
+    if path.suffix.lower() in SLOW:
+        _keep(store, x, y, z)
+    return x, y, z
+
+
+SLOW = (".tif", ".tiff", ".nc", ".grd", ".stl", ".ply", ".obj")
+"""Endings of files whose reading takes longer than that of what is kept."""
+
+
+def _keep(store: Path, x, y, z) -> None:
+    """Written whole or not at all; a folder that cannot be written costs time only."""
+    new = store.with_name(f"{store.stem}-{os.getpid()}.tmp.npz")
+    try:
+        store.parent.mkdir(exist_ok=True)
+        np.savez(new, x=x, y=y, z=z)
+        new.replace(store)
+    except OSError:
+        new.unlink(missing_ok=True)
+
+
+def _checksum(spec) -> str:
+    options = {k: v for k, v in spec.model_dump(mode="json").items() if k not in (*PLACED, "path")}
+    digest = hashlib.sha256(json.dumps([FORMAT, options], sort_keys=True).encode())
+    for file in (Path(spec.path), Path(spec.path).with_suffix(".prj")):
+        if file.is_file():
+            digest.update(hashlib.sha256(file.read_bytes()).digest())
+    return digest.hexdigest()[:16]
+
+
+def _edited(name: str, grid: Grid, spec) -> tuple[Array, Array, Array]:
+    crs = spec.crs or grid.crs
+    if spec.reproject is not None:
+        from coupler.geometry.terrain.raster import reprojected
+
+        grid = reprojected(name, grid, crs, spec.reproject)
+    else:
+        _refuse_degrees(name, grid, crs, spec)
+    unit, height_unit = spec.scale, spec.height_scale or spec.scale
+    if FEET.search(crs) and spec.scale == 1.0 and spec.reproject is None:
+        raise TerrainError(
+            f"{name}: its coordinate system counts in feet ({FEET.search(crs)[0][5:].strip(chr(34))}); write scale = "
+            '"1 ft", and height_scale where heights have another unit'
+        )
+    x, y, z = _cropped(name, grid, spec.crop)
+    if z.size > MOST_POINTS:
+        raise TerrainError(
+            f"{name}: {z.size:.3g} points; crop it (terrain.crop) to fewer than {MOST_POINTS:.3g}"
+        )
+    x, y = x * unit, y * unit
+    z = (z if spec.positive == "up" else -z) * height_unit - spec.zero
+    if spec.fill:
+        z = filled(z, x, y)
+    if spec.smooth:
+        z = smoothed(z, x, y, spec.smooth)
+    if spec.steepest is not None:
+        z = flattened(z, x, y, float(np.tan(spec.steepest)))
+    return x, y, z
+
+
+def _refuse_degrees(name: str, grid: Grid, crs: str, spec) -> None:
+    """Degrees are no lengths."""
+    geographic = (
+        crs.startswith("GEOGCS") or crs.startswith("GEOGCRS") or crs.upper() in ("EPSG:4326", "EPSG:4269")
+    )
+    if geographic and spec.scale == 1.0:
+        raise TerrainError(
+            f"{name}: its coordinates are degrees ({crs[:40]}); write reproject, the code of a metric system, for "
+            f"instance {_utm(0.5 * (grid.x[0] + grid.x[-1]), 0.5 * (grid.y[0] + grid.y[-1]))!r} there"
+        )
+
+
+def _utm(longitude: float, latitude: float) -> str:
+    zone = int((longitude + 180.0) // 6.0) % 60 + 1
+    return f"EPSG:{32600 + zone if latitude >= 0.0 else 32700 + zone}"
+
+
+def _cropped(name: str, grid: Grid, crop) -> tuple[Array, Array, Array]:
+    if crop is None:
+        return grid.x, grid.y, grid.z
+    found = []
+    for k, (letter, axis) in enumerate((("x", grid.x), ("y", grid.y))):
+        low, high = crop[0][k], crop[1][k]
+        step = axis[1] - axis[0]
+        inside = np.flatnonzero((axis > low - step) & (axis < high + step))
+        if low >= high or len(inside) < 2:
+            raise TerrainError(
+                f"{name}: terrain.crop keeps {letter} from {low:g} to {high:g}, but the file reaches from {axis[0]:g} "
+                f"to {axis[-1]:g} (units of the file)"
+            )
+        found.append(slice(inside[0], inside[-1] + 1))
+    return grid.x[found[0]], grid.y[found[1]], grid.z[found[0], found[1]]
+
+
+# ---------------------------------------------------------------- heights
+
+
+def filled(z, x, y) -> Array:
+    """Holes of z (nx, ny) [m] closed: inside them the height is harmonic, Σ (z_neighbour - z) / d² = 0, with the known
+    points as its edge and no slope across the edge of the raster."""
+    import scipy.sparse as sp
+    from scipy.sparse.linalg import spsolve
+
+    hole = ~np.isfinite(z)
+    if not hole.any():
+        return z
+    number = np.full(z.shape, -1)
+    number[hole] = np.arange(hole.sum())
+    rows, columns, values, rhs = [], [], [], np.zeros(int(hole.sum()))
+    for axis, points in enumerate((x, y)):
+        weight = 1.0 / (points[1] - points[0]) ** 2
+        first = [slice(None), slice(None)]
+        second = [slice(None), slice(None)]
+        first[axis], second[axis] = slice(None, -1), slice(1, None)
+        for here, there in ((tuple(first), tuple(second)), (tuple(second), tuple(first))):
+            at = hole[here]
+            own, other, known = number[here][at], number[there][at], z[there][at]
+            rows.append(own)
+            columns.append(own)
+            values.append(np.full(len(own), weight))
+            inner = other >= 0
+            rows.append(own[inner])
+            columns.append(other[inner])
+            values.append(np.full(int(inner.sum()), -weight))
+            np.add.at(rhs, own[~inner], weight * known[~inner])
+    matrix = sp.coo_array((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))))
+    z = z.copy()
+    z[hole] = spsolve(matrix.tocsc(), rhs)
+    return z
+
+
+def smoothed(z, x, y, length: float) -> Array:
+    """Mean of z (nx, ny) [m] with the weight of a Gauss curve of this standard deviation [m]; holes stay."""
+    from scipy.ndimage import gaussian_filter
+
+    sigma = (length / (x[1] - x[0]), length / (y[1] - y[0]))
+    known = np.isfinite(z)
+    total = gaussian_filter(np.where(known, z, 0.0), sigma, mode="nearest")
+    weight = gaussian_filter(known.astype(float), sigma, mode="nearest")
+    return np.where(known, total / np.maximum(weight, 1e-12), np.nan)
+
+
+def flattened(z, x, y, slope: float) -> Array:
+    """Largest surface not above z (nx, ny) [m] that rises by at most `slope` between neighbours: cliffs are cut back
+    from their foot. Holes stay."""
+    steps = ((1, 0), (0, 1), (1, 1), (1, -1))
+    d = [slope * float(np.hypot(i * (x[1] - x[0]), j * (y[1] - y[0]))) for i, j in steps]
+    low = np.where(np.isfinite(z), z, np.inf)
+    for _ in range(sum(z.shape)):
+        before = low.copy()
+        for (i, j), rise in zip(steps, d):
+            here, there = _shifted(low, i, j)
+            np.minimum(here, there + rise, out=here)
+            np.minimum(there, here + rise, out=there)
+        if np.array_equal(before, low):
+            break
+    return np.where(np.isfinite(z), low, np.nan)
+
+
+def _shifted(a, i: int, j: int):
+    """Views of a (nx, ny) and of its neighbours at (i, j), i ≥ 0."""
+    nx, ny = a.shape
+    rows = slice(0, nx - i), slice(i, nx)
+    columns = (slice(0, ny - j), slice(j, ny)) if j >= 0 else (slice(-j, ny), slice(0, ny + j))
+    return a[rows[0], columns[0]], a[rows[1], columns[1]]

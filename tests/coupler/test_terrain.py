@@ -1,0 +1,252 @@
+"""Terrain files and what is done to them: every format gives the same ground, and what cannot be read is refused."""
+
+import re
+
+import numpy as np
+import pytest
+
+from coupler.case.terrain import Terrain
+from coupler.checks.read_case import load
+from coupler.geometry.tank_mesh import bed_along, fitted_of, mean_bed
+from coupler.geometry.terrain.grids import TerrainError, read_grid
+from coupler.geometry.terrain.site import filled, flattened, smoothed, terrain_of
+from coupler.program.errors import BadCase
+
+X, Y = np.arange(100.0, 121.0), np.arange(50.0, 63.0)
+
+
+def ground(x, y):
+    """Quadratic, not symmetric in x and y: a raster that is turned or mirrored by mistake differs."""
+    return 0.3 * (x - 108.0) + 0.01 * (x - 100.0) * (y - 50.0) - 0.05 * (y - 55.0)
+
+
+Z = ground(*np.meshgrid(X, Y, indexing="ij"))
+
+
+def write_esri(path, z=Z, more=""):
+    rows = "\n".join(" ".join(f"{v:.6f}" for v in z[:, j]) for j in range(z.shape[1] - 1, -1, -1))
+    path.write_text(
+        f"# made by a test\nncols {len(z)}\nnrows {z.shape[1]}\nxllcenter 100\nyllcorner 49.5\ncellsize 1\n"
+        f"NODATA_value -9999\n{more}{rows}\n"
+    )
+
+
+def write_csv(path):
+    rows = [f"{y:g},{x:g},{ground(x, y):.6f}" for x in X[::-1] for y in Y]
+    path.write_text("y,x,elevation\n" + "\n".join(rows) + "\n")
+
+
+def write_xyz(path):
+    """Scattered points with the corners of the raster among them."""
+    rng = np.random.default_rng(2)
+    points = np.concatenate(
+        [rng.uniform((100, 50), (120, 62), (4000, 2)), [(x, y) for x in (100, 120) for y in (50, 62)]]
+    )
+    np.savetxt(path, np.column_stack([points, ground(*points.T)]))
+
+
+def write_classic(path):
+    from scipy.io import netcdf_file
+
+    with netcdf_file(path, "w") as file:
+        for name, values in (("x", X), ("y", Y)):
+            file.createDimension(name, len(values))
+            file.createVariable(name, "d", (name,))[:] = values
+        file.createVariable("elevation", "d", ("y", "x"))[:] = Z.T
+
+
+def write_hdf(path):
+    import h5py
+
+    with h5py.File(path, "w") as file:
+        for name, values in (("x", X), ("y", Y[::-1])):
+            file[name] = values
+            file[name].make_scale(name)
+        file["elevation"] = Z.T[::-1]
+        for k, name in enumerate(("y", "x")):
+            file["elevation"].dims[k].attach_scale(file[name])
+
+
+def write_stl(path):
+    import meshio
+
+    x, y = np.meshgrid(np.linspace(100, 120, 61), np.linspace(50, 62, 41), indexing="ij")
+    points = np.column_stack([x.ravel(), y.ravel(), ground(x, y).ravel()])
+    n = np.arange(61 * 41).reshape(61, 41)
+    lower = np.stack([n[:-1, :-1], n[1:, :-1], n[1:, 1:]], axis=-1).reshape(-1, 3)
+    upper = np.stack([n[:-1, :-1], n[1:, 1:], n[:-1, 1:]], axis=-1).reshape(-1, 3)
+    meshio.write_points_cells(path, points, [("triangle", np.concatenate([lower, upper]))], binary=True)
+
+
+FORMATS = {
+    "g.asc": (write_esri, 1e-6),
+    "g.csv": (write_csv, 1e-6),
+    "g.xyz": (write_xyz, 5e-3),
+    "classic.nc": (write_classic, 1e-9),
+    "four.nc": (write_hdf, 1e-9),
+    "g.stl": (write_stl, 5e-3),
+}
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_every_format_gives_the_same_ground(name, tmp_path):
+    write, exact = FORMATS[name]
+    write(tmp_path / name)
+    found = terrain_of(Terrain(path=str(tmp_path / name), origin=(0, 0)))
+    x, y = np.random.default_rng(1).uniform((100.5, 50.5), (119.5, 61.5), (200, 2)).T
+    x, y = np.round(x), np.round(y)
+    np.testing.assert_allclose(found(x, y), ground(x, y), atol=exact)
+    assert np.isnan(found(np.array([99.0]), np.array([55.0]))).all()
+
+
+def test_place_of_the_origin_turn_unit_and_datum(tmp_path):
+    write_esri(tmp_path / "g.asc")
+    options = {"origin": (104.0, 53.0), "turn": np.pi / 2, "offset": (7.0, 1.0, 0.25), "zero": 0.5}
+    found = terrain_of(Terrain(path=str(tmp_path / "g.asc"), **options))
+    place = found(
+        np.array([7.0, 7.0, 5.0]), np.array([1.0, 4.0, 1.0])
+    )  # the origin, 3 m along x, 2 m along y of the file
+    there = ground(np.array([104.0, 107.0, 104.0]), np.array([53.0, 53.0, 55.0])) - 0.5 + 0.25
+    np.testing.assert_allclose(place, there, atol=1e-6)
+    feet = terrain_of(Terrain(path=str(tmp_path / "g.asc"), scale=0.3048, positive="down", origin=(0.0, 0.0)))
+    x, y = np.array([110.0]), np.array([57.0])
+    np.testing.assert_allclose(feet(0.3048 * x, 0.3048 * y), -0.3048 * ground(x, y), atol=1e-6)
+
+
+def test_holes_are_filled_harmonically_and_only_on_demand(tmp_path):
+    """A plane with a hole is the plane again: it is harmonic."""
+    x, y = np.meshgrid(X, Y, indexing="ij")
+    plane = 0.2 * x - 0.4 * y
+    holed = plane.copy()
+    holed[5:9, 3:8] = np.nan
+    np.testing.assert_allclose(filled(holed, X, Y), plane, atol=1e-9)
+    holed[np.isnan(holed)] = -9999
+    write_esri(tmp_path / "g.asc", holed)
+    found = terrain_of(Terrain(path=str(tmp_path / "g.asc")))
+    assert np.isnan(found(np.array([6.0]), np.array([5.0]))).all()
+    assert np.isfinite(found(np.array([4.0]), np.array([5.0]))).all(), "the edge of a hole is known"
+
+
+def test_smoothing_keeps_planes_and_wears_waves_down():
+    x, y = np.meshgrid(np.arange(200.0), np.arange(20.0), indexing="ij")
+    wave = smoothed(0.1 * x + np.cos(2 * np.pi * x / 10), x[:, 0], y[0], 3.0)
+    inner = wave[60:140] - 0.1 * x[60:140]
+    np.testing.assert_allclose(np.ptp(inner) / 2, np.exp(-0.5 * (2 * np.pi * 3.0 / 10) ** 2), rtol=0.01)
+
+
+def test_cliffs_are_cut_back_to_the_slope_and_nothing_else():
+    x, y = np.arange(30.0), np.arange(8.0)
+    z = np.where(x[:, None] < 15, 0.0, 10.0) + 0.0 * y
+    cut = flattened(z, x, y, 2.0)
+    assert np.abs(np.diff(cut, axis=0)).max() <= 2.0 + 1e-12
+    np.testing.assert_array_equal(cut[:15], 0.0)
+    np.testing.assert_array_equal(cut[20:], 10.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "told"),
+    [
+        ("g.asc", "ncols 3\nnrows 2\ncellsize 1\n1 2 3\n4 5\n", "5 heights, but its head says 3 x 2"),
+        ("g.asc", "ncols 3\nnrows 2\n1 2 3\n", "no cellsize"),
+        ("g.asc", "ncols 2\nnrows 2\ncellsize 1\n1 2\n3 x\n", "'x'.* among its heights"),
+        ("g.csv", "x,y,depth\n1,2,3\n", "no column 'z' among x, y, depth"),
+        ("g.csv", "1,2,3\n1,2\n", "row 2"),
+        ("g.dem", "1", "no terrain is read from .dem"),
+        ("g.nc", "1", "cannot be read as NetCDF"),
+    ],
+)
+def test_files_that_are_no_terrain_are_refused_with_the_reason(name, text, told, tmp_path):
+    (tmp_path / name).write_text(text)
+    with pytest.raises(TerrainError, match=told):
+        read_grid(tmp_path / name)
+
+
+def test_feet_and_degrees_are_refused_until_they_are_said(tmp_path):
+    write_esri(tmp_path / "g.asc")
+    (tmp_path / "g.prj").write_text('PROJCS["x",GEOGCS["y"],UNIT["US survey foot",0.3048006096]]')
+    with pytest.raises(TerrainError, match=r"counts in feet.*scale"):
+        terrain_of(Terrain(path=str(tmp_path / "g.asc")))
+    assert terrain_of(Terrain(path=str(tmp_path / "g.asc"), scale=0.3048006096)).spacing[0] == pytest.approx(
+        0.3048006
+    )
+    (tmp_path / "g.prj").write_text('GEOGCS["WGS 84"]')
+    with pytest.raises(TerrainError, match=r"degrees.*reproject.*EPSG:32"):
+        terrain_of(Terrain(path=str(tmp_path / "g.asc"), smooth=1.0))
+
+
+CASE = """
+[case]
+title = "beach"
+[time]
+end = "1 s"
+[tank]
+lower = [0, 0, -3]
+upper = [20, 12, 4]
+cell = "1 m"
+open = ["z+", "x+"]
+[terrain]
+path = "g.asc"
+[water]
+[[water.inflow]]
+kind = "bore"
+side = "x-"
+level = 0.5
+"""
+
+
+def made(tmp_path, *sets, z=Z):
+    write_esri(tmp_path / "g.asc", z)
+    (tmp_path / "case.toml").write_text(CASE)
+    return load(tmp_path, sets).case
+
+
+def test_tank_ends_on_the_terrain(tmp_path):
+    case = made(tmp_path)
+    fitted = fitted_of(case.tank)
+    on_bed = fitted.mesh.nodes[fitted.on_bed]
+    on_bed = on_bed[
+        on_bed[:, 2] < 2.99
+    ]  # the bed of a column at the edge of land without cells is taken down
+    np.testing.assert_allclose(on_bed[:, 2], ground(on_bed[:, 0] + 100.0, on_bed[:, 1] + 50.0), atol=1e-5)
+    along = bed_along(case.tank, "x-")
+    np.testing.assert_allclose(along[:, 1], ground(100.0, 50.0 + along[:, 0]), atol=1e-5)
+    wet = 0.5 - ground(100.0, 50.0 + np.arange(13.0))
+    assert 0.5 - mean_bed(case.tank, "x-", 0.5) == pytest.approx(np.trapezoid(wet) / 12, rel=1e-4)
+
+
+def test_surge_onto_dry_ground_is_a_dam_break(tmp_path):
+    """Behind a dam of depth H that vanished the depth at its place is 4/9 H, the velocity 2/3 sqrt(g H)."""
+    from coupler.scene.build_water import bore_velocity
+
+    case = made(tmp_path)
+    depth = 0.5 - mean_bed(case.tank, "x-", 0.5)
+    assert bore_velocity(case, case.water.inflow[0]) == pytest.approx(2 / 3 * np.sqrt(9.81 * 9 / 4 * depth))
+
+
+@pytest.mark.parametrize(
+    ("sets", "told"),
+    [
+        (["tank.upper=[25, 12, 4]"], r"terrain: 19.9% of the tank lies beside it.*covers x 0 to 20"),
+        (["terrain.height_scale=100"], r"falls to z = -275 m at \(0, 12\) m, below the floor of the tank"),
+        (["terrain.offset=[0, 0, 50]"], r"nowhere a cell below the top of the tank \(4 m\).*datum"),
+        (["tank.lower=[0, 0, -2]"], r"falls to z = -2.* m at .* below the floor of the tank \(-2 m\)"),
+        (["terrain.crop=[[200, 50], [210, 60]]"], r"the file reaches from 100 to 120"),
+        (["tank.mesh=x.vtu"], "tank.mesh: with .terrain. the mesh is made on it"),
+        (["tank=absent"], "terrain: .*tank"),
+        (["terrain.path=h.asc"], "no such file; did you mean 'g.asc'"),
+        (["water.inflow[0].level=-2.8"], r"not between the floor \(-2.75 m\)"),
+    ],
+)  # fmt: skip
+def test_terrain_that_does_not_fit_is_refused(sets, told, tmp_path):
+    with pytest.raises(BadCase) as error:
+        made(tmp_path, *sets)
+    assert re.search(told, "\n".join(error.value.lines)), error.value.lines
+
+
+def test_hole_under_the_tank_is_refused_with_its_place(tmp_path):
+    z = Z.copy()
+    z[8:10, 3:5] = -9999
+    with pytest.raises(BadCase) as error:
+        made(tmp_path, z=z)
+    assert "holes (no data) under" in error.value.lines[0]
+    assert made(tmp_path, "terrain.fill=true", z=z).tank.ground is not None
