@@ -32,7 +32,7 @@ FULL = 1e-4
 """Share of the box around a mesh that may be missing in one that fills it."""
 THIN = 5.0
 """Least angle [degrees] between two faces of a cell without a remark."""
-UNLIKE = 4.0
+UNLIKE = 8.0
 """Largest over smallest cell without a remark."""
 IN_PLANE = 1e-3
 """Share of a cell within which a face lies in a side of the box around the mesh."""
@@ -118,7 +118,7 @@ def on_side(mesh, side: str, normals: Array, centres: Array) -> Array:
     A centre is in the plane of a side only if all corners are; the rest of a boundary of any shape is wall."""
     axis, sign = "xyz".index(side[0]), 1.0 if side[1] == "+" else -1.0
     plane = mesh.bounds[int(sign > 0.0), axis]
-    return (sign * normals[:, axis] > 0.5) & (np.abs(centres[:, axis] - plane) <= IN_PLANE * mesh.spacing)
+    return (sign * normals[:, axis] > 0.5) & (np.abs(centres[:, axis] - plane) <= IN_PLANE * mesh.finest)
 
 
 def tank_places(case: Case) -> Iterator[Problem]:
@@ -164,8 +164,8 @@ def mesh_remarks(tank: Tank) -> Iterator[str]:
     small, large = mesh.cell_size.min(), mesh.cell_size.max()
     if large > UNLIKE * small:
         yield (
-            f"tank.mesh has cells of {small:.2g} to {large:.2g} m; steps, films and smoothing go by their mean, "
-            f"{mesh.spacing:.2g} m, for all of them"
+            f"tank.mesh has cells of {small:.2g} to {large:.2g} m; flows were tried with cells up to {UNLIKE:g} times "
+            "as large as others: expect small steps, set by the smallest"
         )
 
 
@@ -202,7 +202,7 @@ def beside_mesh(tank: Tank, place) -> bool:
     points = np.atleast_2d(np.asarray(place, float))
     if len(place) == 2:
         low, high = mesh.bounds[:, 2]
-        z = np.arange(low, high, 0.25 * mesh.spacing)
+        z = np.arange(low, high, 0.25 * mesh.finest)
         points = np.column_stack([np.full(len(z), place[0]), np.full(len(z), place[1]), z])
     return not (mesh.locate(points) >= 0).any()
 

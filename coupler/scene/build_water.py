@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from coupler.case.case import Case
@@ -99,7 +101,9 @@ def _narrow_cracks(kind: str, structure, mesh):
         return None
     from coupler.step.cracks import NarrowCracks
 
-    return NarrowCracks(structure, mesh.spacing, lumped=kind == "slit")
+    corners, start = structure.joint_polygons()
+    middle = np.array([corners[first:last].mean(axis=0) for first, last in pairwise(start)])
+    return NarrowCracks(structure, mesh.size_at(middle), lumped=kind == "slit")
 
 
 def sides_named(names, mesh):

@@ -17,7 +17,7 @@ import numpy as np
 from coupler.balance.energy import Balance, Ledger
 from coupler.balance.momentum import MomentumBalance, book_step, momentum_ledger
 from coupler.step.limits import Diverged, Limits, check_finite, check_pressure, no_room
-from coupler.step.observe import fastest_point
+from coupler.step.observe import fastest_points
 from coupler.step.residual import RETRIES, Defects
 from coupler.step.step_limits import Attempt, attempt_of, best_of, volume_error
 from coupler.step.step_start import StepStart
@@ -136,9 +136,10 @@ class Coupling:
         if self.water is not None:
             dt = min(dt, self.water.stable_step())
         if self.coupled:
-            speed = fastest_point(self.structure.velocity(), self.radius)
-            if speed > 0.0:
-                dt = min(dt, BLOCK_COURANT * self.water.mesh.spacing / speed)
+            speed = fastest_points(self.structure.velocity(), self.radius)
+            if speed.any():
+                way = BLOCK_COURANT * self.immersion.cell_sizes()
+                dt = min(dt, float((way / np.maximum(speed, 1e-300)).min()))
         dt *= self.defects.share
         return remaining / max(1, math.ceil(remaining / dt * (1.0 - 1e-9)))
 

@@ -27,11 +27,12 @@ NO_OPENING = 1e-6
 class NarrowCracks:
     """The broken joints of a structure that the water takes for closed.
 
-    structure: blocks with joints · spacing [m] of the mesh · lumped: water flows through them."""
+    structure: blocks with joints · spacing [m]: size of the cells at each joint, or one for all · lumped: water flows through them."""
 
-    def __init__(self, structure, spacing: float, lumped: bool):
-        self.structure, self.spacing, self.lumped = structure, spacing, lumped
+    def __init__(self, structure, spacing, lumped: bool):
+        self.structure, self.lumped = structure, lumped
         corners, start = structure.joint_polygons()
+        self.spacing = np.broadcast_to(np.asarray(spacing, float), len(start) - 1)
         self._width = np.array([_least_width(corners[first:last]) for first, last in pairwise(start)])
 
     def faces(self) -> tuple[Array, Array, Array]:
@@ -44,7 +45,7 @@ class NarrowCracks:
     def cracks(self) -> Cracks:
         """The same for the water: where it may flow through."""
         joint, block, _, opening = self._narrow()
-        flows = opening[:, 0] > NO_OPENING * self.spacing
+        flows = opening[:, 0] > NO_OPENING * self.spacing[joint]
         joint, block, opening = joint[flows], block[flows], opening[flows]
         corners, start = self.structure.joint_polygons()
         length = np.diff(start)[joint]
@@ -56,8 +57,9 @@ class NarrowCracks:
         """Joint (m,), blocks (m, 2), faces (m, 2), openings (m, 3) [m]: mean, sliding, largest."""
         joint, block, face, opening = self.structure.broken_joints()
         depth = self._width[joint]
-        near = (opening[:, 2] < WIDEST * self.spacing) & (opening[:, 1] < WIDEST * depth)
-        near &= depth < THINNEST * self.spacing
+        spacing = self.spacing[joint]
+        near = (opening[:, 2] < WIDEST * spacing) & (opening[:, 1] < WIDEST * depth)
+        near &= depth < THINNEST * spacing
         return joint[near], block[near], face[near], opening[near]
 
 

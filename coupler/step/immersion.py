@@ -49,15 +49,22 @@ class Immersion:
         self._body_of_plane = np.repeat(np.arange(len(shapes)), np.diff(self._reference.plane_start))
         self._radius = np.array([np.linalg.norm(v, axis=1).max() for v, _ in shapes])
         low, high = mesh.bounds
-        self._long = np.flatnonzero(2.0 * self._radius[: self.n_blocks] > (high - low).min() - mesh.spacing)
+        self._long = np.flatnonzero(2.0 * self._radius[: self.n_blocks] > (high - low).min() - mesh.finest)
         """Blocks long enough to reach across the tank."""
-        self._tolerance = STILL * mesh.spacing
+        self._tolerance = STILL * mesh.finest
         self._centre, self._rotation = self._pose()
         self._growth = self._new_growth(np.zeros(len(self._body_of_plane)))
         self.bodies = self._placed()
         self.domain = cut_domain(mesh, self.bodies, covers, connection=connection)
         self.cut_again = 0
         """Bodies whose cells the last update cut again."""
+
+    def cell_sizes(self) -> Array:
+        """Least size [m] of the cells that each block meets (n,); that of the whole mesh for those that meet none."""
+        memory = self.domain.memory
+        size = np.full(len(self.bodies), np.inf)
+        np.minimum.at(size, memory.pair_body, self.mesh.local_size[memory.pair_cell])
+        return np.where(np.isfinite(size), size, self.mesh.spacing)[: self.n_blocks]
 
     def update(self) -> bool:
         """Cut again where blocks moved or came loose since they were last cut; True if the domain changed."""
@@ -131,7 +138,7 @@ class Immersion:
         )  # the other side may be a step behind
         np.maximum.at(growth, rows, steps * self._tolerance)
         growth[rows] = np.maximum(growth[rows], before[rows])
-        growth[self._closing_planes()] = 2.0 * SPANS * self.mesh.spacing
+        growth[self._closing_planes()] = 2.0 * SPANS * self.mesh.finest
         return growth
 
     def _closed_faces(self) -> tuple[Array, Array, Array]:
@@ -148,7 +155,7 @@ class Immersion:
         block, direction, depth = (a[loose[block]] for a in (block, direction, depth))
         if len(block) == 0:
             return film
-        least = FILM * self.mesh.spacing
+        least = FILM * self.mesh.finest
         touching = np.zeros(self.n_blocks + self.n_solids, bool)
         touching[block] = True
         film[touching[self._body_of_plane]] = least
@@ -159,7 +166,7 @@ class Immersion:
         local = np.einsum("kij,ki->kj", self.structure.rotation()[block], direction)
         on = np.einsum("ki,ki->k", self._reference.normals[plane], local[contact]) > FACES_IT
         doubled = least * 2.0 ** np.ceil(np.log2(1.0 + np.maximum(depth, 0.0) / least))
-        np.maximum.at(film, plane[on], np.minimum(doubled, MOST_FILM * self.mesh.spacing)[contact[on]])
+        np.maximum.at(film, plane[on], np.minimum(doubled, MOST_FILM * self.mesh.finest)[contact[on]])
         return film
 
     def _closing_planes(self) -> Array:
@@ -168,7 +175,7 @@ class Immersion:
         if len(self._long) == 0:
             return closing
         low, high = self.mesh.bounds
-        margin = SPANS * self.mesh.spacing
+        margin = SPANS * self.mesh.finest
         centre, rotation = self.structure.centre(), self.structure.rotation()
         normals = np.einsum("pij,pj->pi", self._turns(rotation), self._reference.normals)
         for b in self._long:

@@ -60,10 +60,12 @@ def block_damage(structure) -> Array:
 
 def fastest_point(velocity: Array, radius: Array) -> float:
     """Bound of the speed of any point of blocks with velocity (n, 6) and radius (n,) [m/s]."""
-    if len(velocity) == 0:
-        return 0.0
-    spin = np.linalg.norm(velocity[:, 3:], axis=1)
-    return float((np.linalg.norm(velocity[:, :3], axis=1) + spin * radius).max())
+    return float(fastest_points(velocity, radius).max(initial=0.0))
+
+
+def fastest_points(velocity: Array, radius: Array) -> Array:
+    """Bound (n,) of the speed of the points of each block, as in `fastest_point`."""
+    return np.linalg.norm(velocity[:, :3], axis=1) + np.linalg.norm(velocity[:, 3:], axis=1) * radius
 
 
 def crack_columns(structure) -> dict[str, Array]:

@@ -238,7 +238,18 @@ def _cut_cells(
                 return state
             if count > 0:
                 state = _emit(
-                    w, chosen[row], x[0], count, near, whole, normals, round_off, least, link_area, out, at
+                    w,
+                    chosen[row],
+                    x[0],
+                    count,
+                    near,
+                    whole,
+                    normals,
+                    round_off,
+                    least,
+                    link_area[row],
+                    out,
+                    at,
                 )
                 if state != DONE:
                     return state
@@ -251,15 +262,16 @@ def cut_cells(nodes, cells, chosen, body_start, bodies, solids, tolerance, spaci
 
     nodes (N, 3) [m] · cells (M, 4) · chosen (C,) cells to cut · body_start (C+1,), bodies: those near each
     solids: ConvexBodies · tolerance [m] for nodes, spacing [m] of the mesh
-    link_area [m2]: pieces of a cell are one part where they touch over more than this; < 0: all pieces of
+    link_area [m2], one or (C,): pieces of a cell are one part where they touch over more than this; < 0: all pieces of
     a cell are one part and no openings are listed.
     Raises CutFailed where the cross-section of a piece that is not thin cannot be closed."""
     at = np.zeros(5, dtype=np.int64)
+    link_area = np.broadcast_to(np.asarray(link_area, float), len(chosen)).copy()
     scale = 1
     most_bodies = int(np.diff(body_start).max()) if len(chosen) else 0
     most_planes = int(np.diff(solids.plane_start).max()) if len(solids) else 0
     w = workspace(scale, most_bodies, most_bodies * most_planes)
-    out = output(len(chosen) * 4 + 64, len(chosen) * 32 + 256, link_area >= 0)
+    out = output(len(chosen) * 4 + 64, len(chosen) * 32 + 256, bool((link_area >= 0).all()))
     offsets = solids.cut_offsets()
     while True:
         state = _cut_cells(

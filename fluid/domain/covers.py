@@ -43,8 +43,8 @@ class Connection:
         """Share of a face from which a lower bound of an area will do: areas that are compared must be true ones."""
         return 1.0 if self.face > 0.0 else 1e-6
 
-    def link_area(self, spacing: float) -> float:
-        """[m2] area over which two pieces of a cell must touch; spacing [m]."""
+    def link_area(self, spacing):
+        """[m2] area over which two pieces of a cell must touch; spacing [m], its size, one or (n,)."""
         return max(self.inner, NO_AREA) * spacing**2
 
 
@@ -73,16 +73,20 @@ def components(cells, n_nodes: int) -> np.ndarray:
     return _components(cells, n_nodes)
 
 
-def without_pockets(cells, volume, n_nodes: int, least: float) -> np.ndarray:
-    """(M,) bool: the cell belongs to a component of at least that volume [m3]; volume (M,) [m3].
+def without_pockets(cells, volume, n_nodes: int, least) -> np.ndarray:
+    """(M,) bool: the cell belongs to a component of at least that volume [m3]; volume (M,) [m3], least [m3]
+    one or (M,): that of the largest cell of the component counts.
 
     A cell that has it alone keeps all its neighbours, so only the smaller ones are put together."""
     keep = volume >= least
     small = np.flatnonzero(~keep)
+    least = np.broadcast_to(least, volume.shape)
     if len(small):
         label, kept = _small_components(cells, small, keep, n_nodes)
         total = np.bincount(label, volume[small], minlength=len(kept))
-        keep[small] = (kept | (total >= least))[label]
+        needed = np.zeros(len(kept))
+        np.maximum.at(needed, label, least[small])
+        keep[small] = (kept | (total >= needed))[label]
     return keep
 
 

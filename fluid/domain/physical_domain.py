@@ -228,7 +228,7 @@ def _cut_moved(memory, bodies, moved, covers):
 def _cut_pairs(mesh, bodies, cell, body, covers, connection):
     chosen, first = np.unique(cell, return_index=True)
     start = np.append(first, len(cell)).astype(np.int64)
-    link_area = -1.0 if covers == "single" else connection.link_area(mesh.spacing)
+    link_area = -1.0 if covers == "single" else connection.link_area(mesh.local_size[chosen])
     tolerance = TOLERANCE * mesh.spacing
     return cut_cells(mesh.nodes, mesh.cells, chosen, start, body, bodies, tolerance, mesh.spacing, link_area)
 
@@ -247,7 +247,7 @@ def _assembled(memory: Memory, elements: Elements, covers: str) -> PhysicalDomai
     parent, part = elements.parent, elements.part
     keep = np.ones(len(parent), bool)
     if covers == "multiple":
-        least = memory.connection.pocket * mesh.spacing**3
+        least = memory.connection.pocket * mesh.local_size[elements.parent] ** 3
         keep = without_pockets(cells, volume, len(parent_node), least)
     if not keep.all():
         used, renumbered, cells = _compressed(cells, keep, len(parent_node))

@@ -51,9 +51,9 @@ class Places:
             place = points[np.flatnonzero(outside)[0]]
             raise Outside(f"gauge at {place} lies outside the tank {low} to {high}; move it inside")
         t = water.topology
-        deep = outside | (_depth(water.domain.memory, parent, points) > SKIN * water.mesh.spacing)
+        deep = outside | (_depth(water.domain.memory, parent, points) > SKIN * water.mesh.local_size[parent])
         first, count = t.rows_of_background
-        neighbours, near = water.mesh.neighbours, NEAR * water.mesh.spacing
+        neighbours, near = water.mesh.neighbours, NEAR * water.mesh.finest
         cell = _answering(points, parent, deep, neighbours, first, count, t.parts, t.nodes, near)
         corners = t.cells[cell]
         weight = np.einsum("mak,mk->ma", t.gradients[t.parent[cell]], points - t.nodes[corners[:, 0]])

@@ -28,8 +28,9 @@ class Topology:
     share (M, 4) mean of N_a over the fluid part (∫ N_a = volume · share_a) · size (M,) [m] (6 |e|)^(1/3) ·
     node_start (N+1,), node_cells (4M,) cells around each node · neighbours (M, 4) across faces, -1 none ·
     node_volume (N,) [m³] ∫ N_i · covered (N,) bool: nodes inside a solid · beside_solid (N,) bool: nodes of
-    cut cells · parts: what of the cells water can fill · is_obtuse: the mesh has obtuse dihedral angles ·
-    upright (rows of `gradients`,) bool: `Background.upright`."""
+    cut cells · parts: what of the cells water can fill · obtuse (M,) bool: cells with obtuse dihedral angles, is_obtuse: the mesh has such ·
+    upright (rows of `gradients`,) bool: `Background.upright` ·
+    node_size (N,) [m]: `Background.node_size` · spacing [m] of the mesh."""
 
     nodes: np.ndarray
     cells: np.ndarray
@@ -49,8 +50,11 @@ class Topology:
     covered: np.ndarray
     beside_solid: np.ndarray
     parts: FluidParts
+    obtuse: np.ndarray
     is_obtuse: bool
     upright: np.ndarray
+    node_size: np.ndarray
+    spacing: float
 
     @classmethod
     def of(cls, mesh: Background, domain) -> Topology:
@@ -84,9 +88,31 @@ class Topology:
             parts=FluidParts(
                 cells, domain.volume, share, domain.fan_start, domain.fan_volume, domain.fan_corners
             ),
+            obtuse=mesh.obtuse[background],
             is_obtuse=mesh.is_obtuse,
             upright=shapes.upright,
+            node_size=mesh.node_size[domain.parent_node],
+            spacing=mesh.spacing,
         )
+
+    @cached_property
+    def finer(self) -> np.ndarray:
+        """(N,): how many times finer the mesh is at a node than its mean, exactly 1 where all cells are equal. Lengths
+        times it are in cells at hand where the spacing is the unit."""
+        return self.spacing / self.node_size
+
+    @cached_property
+    def is_uniform(self) -> bool:
+        """All cells have one size."""
+        return bool((self.node_size == self.spacing).all())
+
+    @cached_property
+    def near_obtuse(self) -> np.ndarray:
+        """(N,) bool: nodes of cells with obtuse dihedral angles and three layers around them."""
+        near = np.zeros(len(self.nodes), bool)
+        near[self.cells[self.obtuse]] = True
+        near[layers_around(near, 3, *self.around)[0]] = True
+        return near
 
     @cached_property
     def row_of_background(self) -> np.ndarray:

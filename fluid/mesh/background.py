@@ -24,6 +24,8 @@ from fluid.numerics.cube_root import cube_root
 CORNERS_OF_FACE = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])  # outward for a positive cell
 MOST_SLENDER = 2.5
 """Longest over shortest edge of a cell, 1.73 in a split cube, up to which its volume goes through upright borders."""
+SAME_SIZE = 1e-9
+"""Difference of sizes over the spacing that is round-off."""
 MOST_BRICKS = 3e8
 """Of a box: the numbers of the tetrahedra of more, six a brick, pass 32 bits."""
 
@@ -90,6 +92,30 @@ class Background:
     def cell_size(self) -> np.ndarray:
         """(M,) [m] edge of the brick that holds six such cells, (6 |e|)^(1/3)."""
         return cube_root(6.0 * self.cell_volume)
+
+    @cached_property
+    def local_size(self) -> np.ndarray:
+        """(M,) [m] `cell_size`; exactly the spacing where it differs from that by round-off only, as in a box of equal
+        bricks."""
+        size = self.cell_size
+        return np.where(np.abs(size - self.spacing) <= SAME_SIZE * self.spacing, self.spacing, size)
+
+    @cached_property
+    def node_size(self) -> np.ndarray:
+        """(N,) [m] least `local_size` of the cells around each node: what is near a node goes by it."""
+        size = np.full(len(self.nodes), np.inf)
+        np.minimum.at(size, self.cells.ravel(), np.repeat(self.local_size, 4))
+        return np.where(np.isfinite(size), size, self.spacing)
+
+    def size_at(self, points) -> np.ndarray:
+        """(m,) [m] `local_size` of the cells that hold points (m, 3) [m]; the least of all outside."""
+        cell = self.locate(points)
+        return np.where(cell >= 0, self.local_size[cell], self.finest)
+
+    @cached_property
+    def finest(self) -> float:
+        """Least size of a cell [m]."""
+        return float(self.local_size.min())
 
     @cached_property
     def boundary_area(self) -> np.ndarray:

@@ -25,6 +25,7 @@ mouth and enters it at the other. The pressure within the crack does not load it
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 import scipy.sparse as sp
@@ -54,6 +55,10 @@ class Cracks:
     def __len__(self) -> int:
         return len(self.opening)
 
+    def middle(self) -> np.ndarray:
+        """Mean of the corners of each crack (c, 3) [m]."""
+        return np.array([self.corners[a:b].mean(axis=0) for a, b in pairwise(self.start)]).reshape(-1, 3)
+
 
 @dataclass(frozen=True)
 class Slits:
@@ -74,8 +79,11 @@ class Slits:
         return len(self.conductance)
 
     @classmethod
-    def of(cls, domain, cracks: Cracks, spacing: float, before: Slits | None = None) -> Slits:
-        """The slits of the cracks that have water at two opposite edges; flows are taken over from `before`."""
+    def of(cls, domain, cracks: Cracks, spacing, before: Slits | None = None) -> Slits:
+        """The slits of the cracks that have water at two opposite edges; flows are taken over from `before`.
+
+        spacing [m]: size of the cells at each crack, or one for all."""
+        spacing = np.broadcast_to(np.asarray(spacing, float), len(cracks))
         mouths = _Mouths.of(cracks, spacing)
         node, mouth, weight, centre = _patches(domain, cracks, mouths, spacing)
         n_mouths = len(mouths.crack)
@@ -94,7 +102,7 @@ class Slits:
         name = mouths.name[first]
         return cls(
             difference,
-            conductance(g, length, depth, spacing),
+            conductance(g, length, depth, spacing[mouths.crack[first]]),
             DISCHARGE * g * length,
             centre[first] - centre[first + 1],
             np.zeros(len(first)) if before is None else before.flow_by_name(name),
@@ -138,7 +146,7 @@ class Slits:
         return -dt * (self.difference @ self.flow)
 
 
-def conductance(opening, length, depth, spacing: float):
+def conductance(opening, length, depth, spacing):
     """Equation (1) [m]; opening, length, depth [m], spacing h [m]."""
     return length / (depth / opening + 2.0 / np.pi * np.log(np.maximum(2.0 * spacing / opening, 1.0)))
 
@@ -158,11 +166,11 @@ class _Mouths:
     across: np.ndarray
 
     @classmethod
-    def of(cls, cracks: Cracks, spacing: float) -> _Mouths:
+    def of(cls, cracks: Cracks, spacing) -> _Mouths:
         rows = []
         for i in range(len(cracks)):
             rows += _mouths_of(
-                i, int(cracks.name[i]), cracks.corners[cracks.start[i] : cracks.start[i + 1]], spacing
+                i, int(cracks.name[i]), cracks.corners[cracks.start[i] : cracks.start[i + 1]], spacing[i]
             )
         columns = list(zip(*rows)) if rows else [()] * 8
         shapes = ((), (4,), (), (), (3,), (3,), (3,), (3,))
@@ -207,14 +215,14 @@ def _patches(domain, cracks, mouths, spacing):
     return _hats(
         mouths.crack, mouths.length, mouths.origin, mouths.along, mouths.outward, mouths.across, cracks.bodies,
         order, start, domain.face_cell, domain.face_area, domain.face_normal, domain.face_points, domain.nodes,
-        domain.cells, domain.parent_cell, domain.memory.mesh.gradients, spacing, FACING, NEAREST * spacing,
+        domain.cells, domain.parent_cell, domain.memory.mesh.gradients, spacing, FACING, NEAREST,
     )  # fmt: skip
 
 
 @njit(cache=True)
 def _hats(
     crack, length, origin, along, outward, across, bodies, order, start, face_cell, area, normal, points, nodes,
-    cells, parent, g, h, facing, nearest,
+    cells, parent, g, size, facing, nearest,
 ):  # fmt: skip
     """Σ over the points of the wetted polygons at every mouth of weight N_a; weight: hats across and along the slit."""
     capacity, n = 256, 0
@@ -222,6 +230,7 @@ def _hats(
     centre = np.zeros((len(crack), 3))
     r = np.empty(3)
     for m in range(len(crack)):
+        h = size[crack[m]]
         for side in range(2):
             body = bodies[crack[m], side]
             if body < 0:
@@ -244,7 +253,7 @@ def _hats(
                         d += r[k] * outward[m, k]
                     beyond = max(-t, t - length[m], 0.0)
                     w = area[s] / 3.0 * (1.0 - abs(c) / h) * (1.0 - 2.0 * beyond / h)
-                    if abs(c) >= h or 2.0 * beyond >= h or abs(d) > nearest:
+                    if abs(c) >= h or 2.0 * beyond >= h or abs(d) > nearest * h:
                         continue
                     if n + 4 > capacity:
                         capacity *= 2

@@ -25,7 +25,7 @@ def levels(water, places) -> np.ndarray:
     """The same (m,) [m] over places (m, 2) [m]."""
     places = np.asarray(places, float)
     low, high = water.mesh.bounds[:, 2]
-    count = int(np.ceil(SAMPLES_PER_CELL * (high - low) / water.mesh.spacing)) + 1
+    count = int(np.ceil(SAMPLES_PER_CELL * (high - low) / water.mesh.finest)) + 1
     z = np.linspace(low, high, count)
     lines = np.column_stack([np.repeat(places, count, axis=0), np.tile(z, len(places))])
     phi = Places.of(water, lines, beyond=True).read(water.level_set).reshape(-1, count)
@@ -65,7 +65,7 @@ def flux(water, at, edges) -> float:
     φ and u are read on a lattice of triangles no longer than half a cell and taken as linear in each; a triangle whose
     middle is inside a solid counts as dry."""
     edges = np.asarray(edges, float)
-    m, n = (int(np.ceil(2.0 * np.linalg.norm(e) / water.mesh.spacing)) for e in edges)
+    m, n = (int(np.ceil(2.0 * np.linalg.norm(e) / water.mesh.finest)) for e in edges)
     i, j = np.meshgrid(np.arange(m + 1), np.arange(n + 1), indexing="ij")
     place = np.column_stack([i.ravel() / m - 0.5, j.ravel() / n - 0.5])
     points = np.asarray(at, float) + place @ edges

@@ -108,7 +108,7 @@ class Walls:
             np.add.at(total, corner, self.open_area)
         return nodes, total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-300)
 
-    def let_air_in(self, phi, u, dt: float, spacing: float) -> None:
+    def let_air_in(self, phi, u, dt: float, spacing) -> None:
         """Air lies beyond the open sides: where u (N, 3) [m/s] points into the tank, the surface was at the side at
         most and lies |u·n| dt inside after dt [s]; φ (N,) [m] is raised to that, in place.
 
@@ -117,7 +117,7 @@ class Walls:
         below the surface stay: a channel that is full and open at both ends goes on."""
         nodes, normal = self.outward
         inward = -dt * np.einsum("ij,ij->i", u[nodes], normal)
-        coming = (inward > 0.0) & (phi[nodes] > -spacing)
+        coming = (inward > 0.0) & (phi[nodes] > -spacing[nodes])
         phi[nodes[coming]] = np.maximum(phi[nodes[coming]], inward[coming])
 
     def slip(self, u) -> None:

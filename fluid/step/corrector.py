@@ -124,7 +124,8 @@ def _remainders(water, kept, gradient, mean, dt):
     t = water.topology
     remainder, rate = np.zeros(water.remainder.shape), np.zeros(water.remainder.shape)
     if water.parameters.subscale_memory:
-        whole = _all_below(kept.wet_cells, kept.level_set, -MEMORY_DEPTH * water.mesh.spacing, t.cells)
+        depth = kept.level_set * t.finer
+        whole = _all_below(kept.wet_cells, depth, -MEMORY_DEPTH * water.mesh.spacing, t.cells)
         time = kept.theta * dt
         _leave(whole, kept.wet_cells, mean, gradient, kept.remainder, time, t.cells, t.share, remainder, rate)
     return remainder, rate
@@ -168,7 +169,7 @@ def _limit_and_damp(water, kept, u, a):
     damp_divergence(
         kept.wet_cells,
         parameters.divergence_damping,
-        kept.level_set,
+        kept.level_set * t.finer,
         t.beside_solid,
         -MEMORY_DEPTH * water.mesh.spacing,
         u,
@@ -186,9 +187,9 @@ def _limit_and_damp(water, kept, u, a):
 
 
 def _damp_surface(water, kept, u) -> None:
-    """`damp_waterline`, and `damp_kinks` on meshes with obtuse cells, in calm water, in place."""
+    """`damp_waterline`, and `damp_kinks` where there are obtuse cells, in calm water, in place."""
     t, h, calm = water.topology, water.mesh.spacing, water.calm(kept.end - water.time)
-    wet = (kept.wet_cells, kept.level_set, kept.wet)
+    wet = (kept.wet_cells, kept.level_set * t.finer, kept.wet)
 
     def even_out(weight, where):
         list_, *level = wet
@@ -198,8 +199,9 @@ def _damp_surface(water, kept, u) -> None:
     even_out(WATERLINE_DAMPING, t.beside_solid)
     if t.is_obtuse:
         mesh = (t.cells, t.parent, t.gradients, t.volume, t.neighbours)
-        damp_kinks(*wet, KINK_DAMPING * calm, -KINK_DEPTH * h, u, *mesh)
-        even_out(SURFACE_DAMPING, np.ones_like(t.beside_solid))
+        beside = np.where(t.near_obtuse, wet[1], -np.inf)
+        damp_kinks(wet[0], beside, wet[2], KINK_DAMPING * calm, -KINK_DEPTH * h, u, *mesh)
+        even_out(SURFACE_DAMPING, t.near_obtuse)
 
 
 def _limit_speed(water, u, a) -> int:

@@ -122,7 +122,7 @@ def _momenta(water, kept, dt, stages: Stages) -> dict[str, np.ndarray]:
     nodes, parameters = water.topology.nodes, water.parameters
     kicked = water.velocity.copy()
     a = water.acceleration[rows]
-    kicked[rows] += (1.0 - kept.theta) * dt * kick_factor(a, water.largest_kick())[:, None] * a
+    kicked[rows] += (1.0 - kept.theta) * dt * kick_factor(a, water.largest_kick()[rows])[:, None] * a
     unsheared = kept.advected if kept.shear is None else kept.advected - kept.shear.change
     found = {
         "before": (W0, water.velocity),

@@ -93,7 +93,7 @@ def predicted(water, dt: float) -> PressureProblem:
     phi = redistance(
         water.topology,
         phi,
-        water.mesh.spacing,
+        water.topology.node_size,
         rescale=(water.steps % RESCALE_EVERY == RESCALE_EVERY - 1),
     )
     if water.sides is not None:
@@ -108,7 +108,7 @@ def predicted(water, dt: float) -> PressureProblem:
             u_adv,
             water.listed,
             phi,
-            water.mesh.spacing,
+            water.topology.node_size,
             graph,
             surface.shift,
             water.topology,
@@ -145,8 +145,8 @@ def _sheared(water, dt, theta, kick, surface, u_adv):
     return water.viscous.change(water, surface.level_set, surface.nodal_water, w, dt)
 
 
-def kick_factor(acceleration, most: float):
-    """f = min(1, most / |a|) (N,), most [m/s²]: see `Water.largest_kick`."""
+def kick_factor(acceleration, most):
+    """f = min(1, most / |a|) (N,), most (N,) [m/s²]: see `Water.largest_kick`."""
     return _factor(acceleration, most)
 
 
@@ -155,7 +155,7 @@ def _factor(a, limit):
     out = np.empty(a.shape[0])
     for i in range(a.shape[0]):
         size = np.sqrt(a[i, 0] * a[i, 0] + a[i, 1] * a[i, 1] + a[i, 2] * a[i, 2])
-        out[i] = min(1.0, limit / max(size, 1e-300))
+        out[i] = min(1.0, limit[i] / max(size, 1e-300))
     return out
 
 
@@ -175,11 +175,13 @@ def _transported(water, dt, theta, kick):
     u_adv, phi = u_hat, water.level_set.copy()
     u_adv[water.listed] = moved[:, :3]
     if water.topology.is_obtuse:
-        places, levels = levels_in_solids(water.topology, water.listed, dt, u_m, phi, water.mesh.spacing)
+        places, levels = levels_in_solids(
+            water.topology, water.listed, dt, u_m, phi, water.topology.node_size
+        )
         moved[places, 3] = levels
-    near = np.abs(phi[water.listed]) < TRANSPORT_WIDTH * water.mesh.spacing
+    near = np.abs((phi * water.topology.finer)[water.listed]) < TRANSPORT_WIDTH * water.mesh.spacing
     phi[water.listed[near]] = moved[near, 3]
-    water.walls.let_air_in(phi, u_m, dt, water.mesh.spacing)
+    water.walls.let_air_in(phi, u_m, dt, water.topology.node_size)
     water.hold(u_adv, water.time + dt)
     return u_adv, phi
 
@@ -194,7 +196,7 @@ def _new_surface(water, phi, carried, conserved):
         carried,
         conserved,
         water.parameters.correction_length,
-        water.mesh.spacing,
+        water.topology.node_size,
     )
 
 
@@ -337,5 +339,7 @@ def _sealed(water, matrix, anchored, dofs, dt, pressure):
     """Closed pockets get a compliance far below what the pressure differences in them feel, c ρ h²/dt ≪ (π h/L)²: real
     water is softer than that in short steps, and its waves would take part in the added mass of bodies."""
     p = water.parameters
-    compliance = p.pocket_compliance * dt / (p.density * water.mesh.spacing**2)
+    compliance = (
+        p.pocket_compliance * dt / (p.density * water.mesh.spacing**2) * water.topology.finer[dofs] ** 2
+    )
     return seal_pockets(matrix, anchored, water.topology.node_volume[dofs], compliance, pressure)

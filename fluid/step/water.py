@@ -34,7 +34,9 @@ from fluid.transport.volume_transport import carry_volume
 
 LEVEL_HALVINGS = 40
 LONGEST_STEP = 0.3
-"""dt ≤ LONGEST_STEP sqrt(h/g): a step at rest."""
+"""dt ≤ LONGEST_STEP sqrt(h/g): a step at rest, h the least size of the cells at the surface ..."""
+AT_SURFACE = 3.0
+"""... down to so many of them."""
 
 
 class Water:
@@ -99,7 +101,7 @@ class Water:
             sides.surface(level, 0.0)
         level = self._dry_if_inactive(level)
         self.level_set = without_films(
-            redistance(self.topology, level, mesh.spacing, rescale=False), mesh.spacing
+            redistance(self.topology, level, self.topology.node_size, rescale=False), self.topology.node_size
         )
         self.velocity, self.acceleration = np.zeros((n, 3)), np.zeros((n, 3))
         self.pressure = self._pressure_at_rest()
@@ -144,16 +146,32 @@ class Water:
 
     def calm(self, dt: float) -> float:
         """1 for water at rest, 0 where the fastest crosses a cell in a step dt [s]."""
-        return 1.0 - min(1.0, self.fastest() * dt / self.mesh.spacing)
+        return 1.0 - min(
+            1.0, largest_component(self._cells_crossed(), self._counted()) * dt / self.mesh.spacing
+        )
 
     def stable_step(self) -> float:
         """dt [s]: Courant number of all but spray and trickles (`time_step.py`), and LONGEST_STEP sqrt(h/g)."""
-        h = self.mesh.spacing
-        at_rest = LONGEST_STEP * np.sqrt(h / self.parameters.gravity)
+        h, t = self.mesh.spacing, self.topology
+        at_rest = LONGEST_STEP * np.sqrt(self._finest_surface() / self.parameters.gravity)
         least = LEAST_GATHERED * h**3
-        counted = gathered(self._counted(), self.nodal_water, least, *self.topology.around)
-        speed = pace(self.velocity, self.nodal_water, counted)
+        counted = gathered(self._counted(), self.nodal_water * t.finer**3, least, *t.around)
+        speed = pace(self._cells_crossed(), self.nodal_water, counted)
         return float(min(at_rest, self.parameters.courant * h / max(speed, 1e-12)))
+
+    def _cells_crossed(self):
+        """Velocity (N, 3) [m/s] in which a cell of any size would be crossed in the time of one of the spacing."""
+        return self.velocity * self.topology.finer[:, None]
+
+    def _finest_surface(self) -> float:
+        """Least size [m] of the cells at the surface or, where there is none, in the water."""
+        t = self.topology
+        if t.is_uniform:
+            return self.mesh.spacing
+        wet = t.active & (self.level_set < 0.0)
+        near = wet & (self.level_set > -AT_SURFACE * t.node_size)
+        chosen = near if near.any() else wet
+        return float(t.node_size[chosen].min()) if chosen.any() else self.mesh.finest
 
     def fastest(self) -> float:
         """Largest component of the velocity of the water [m/s], films beside solids left out."""
@@ -168,11 +186,14 @@ class Water:
         worst = int(speed.argmax())
         return float(speed[worst]), self.topology.nodes[counted[worst]]
 
-    def largest_kick(self) -> float:
-        """Largest acceleration [m/s²] that is carried over to the next step: kick_limit g, or what turns the fastest
-        stream aside within two cells, v²/(2 h).  More would throw spray on by the acceleration of an impact."""
+    def largest_kick(self) -> np.ndarray:
+        """Largest acceleration (N,) [m/s²] that is carried over to the next step: kick_limit g, or what turns the
+        fastest stream aside within two cells, v²/(2 h).  More would throw spray on by the acceleration of an impact."""
+        return self._largest_kick(self.topology.node_size)
+
+    def _largest_kick(self, size):
         p = self.parameters
-        return max(p.kick_limit * p.gravity, 0.5 * self.fastest() ** 2 / self.mesh.spacing)
+        return np.maximum(p.kick_limit * p.gravity, 0.5 * self.fastest() ** 2 / size)
 
     def speed_cap(self) -> float:
         """Largest speed [m/s] that is let stand: speed_limit sqrt(g H + v²/2) in a tank of height H whose water starts
@@ -181,7 +202,8 @@ class Water:
         return float(p.speed_limit * np.sqrt(p.gravity * (high - low)[2] + 0.5 * self._start_speed**2))
 
     def _counted(self):
-        return (self.level_set < 0.0) & (self.topology.node_volume > LEAST_COUNTED * self.mesh.spacing**3)
+        t = self.topology
+        return (self.level_set < 0.0) & (t.node_volume * t.finer**3 > LEAST_COUNTED * self.mesh.spacing**3)
 
     def predict(self, dt: float) -> PressureProblem:
         """Advection, volume and gravity over dt [s], and the system for the pressure."""
@@ -236,7 +258,7 @@ class Water:
         self.set_domain(domain)
         known = (source >= 0) & old_topology.active[source]
         if self.left_behind is None:
-            self.left_behind = (self.velocity, self.acceleration)
+            self.left_behind = (self.velocity, self.acceleration, old_topology.node_size)
         self._carry_nodes(source, known)
         self._carry_cells(old_topology)
         self._find_band()
@@ -250,7 +272,7 @@ class Water:
         """Lump the flow through these `slits.Cracks`: anew after every change of the domain or of the cracks."""
         from fluid.pressure.slits import Slits
 
-        self.slits = Slits.of(self.domain, cracks, self.mesh.spacing, self.slits)
+        self.slits = Slits.of(self.domain, cracks, self.mesh.size_at(cracks.middle()), self.slits)
 
     def carried(self, dt: float, theta: float) -> Carried:
         """What the fluxes make of volume and momentum in dt [s], carried on the domain of the last projection; of the
@@ -264,10 +286,10 @@ class Water:
     def _carried(self, dt: float, theta: float) -> Carried:
         if self.parameters.advection == "supg":
             return Carried(carry_volume(self.flux, dt))
-        u, a = (self.velocity, self.acceleration) if self.left_behind is None else self.left_behind
-        kick = (1.0 - theta) * dt * kick_factor(a, self.largest_kick())
+        u, a, size = self.left_behind or (self.velocity, self.acceleration, self.topology.node_size)
+        kick = (1.0 - theta) * dt * kick_factor(a, self._largest_kick(size))
         u_hat = u + kick[:, None] * a
-        return Carried.by(self.flux, dt, u_hat, a, self.parameters.gravity, self.mesh.spacing)
+        return Carried.by(self.flux, dt, u_hat, a, self.parameters.gravity, size)
 
     def _carry_nodes(self, source, known):
         scalars = np.column_stack([self.level_set, self.pressure, self.end_pressure])
@@ -338,7 +360,7 @@ class Water:
         return np.where(wet, self.parameters.density * (below - top), 0.0)
 
     def _dry_if_inactive(self, level):
-        return np.where(self.topology.active, level, FAR * self.mesh.spacing)
+        return np.where(self.topology.active, level, FAR * self.topology.node_size)
 
     # ---- sides of the tank
 
@@ -434,7 +456,9 @@ class Water:
 
     def _surface_potential(self) -> float:
         """g·x [m²/s²] of the surface, mean over the nodes within half a cell of it; 0 where there is none."""
-        near = self.listed[np.abs(self.level_set[self.listed]) < 0.5 * self.mesh.spacing]
+        near = self.listed[
+            np.abs((self.level_set * self.topology.finer)[self.listed]) < 0.5 * self.mesh.spacing
+        ]
         return float(self.below_floor(self.topology.nodes[near]).mean()) if len(near) else 0.0
 
     def head(self) -> np.ndarray:

@@ -27,8 +27,8 @@ FAR = 7.0
 FILM = 1e-7
 
 
-def without_films(phi, spacing: float):
-    """φ (N,) with water thinner than FILM h at a node taken as none: its pressure would be 0/0 at the surface."""
+def without_films(phi, spacing):
+    """φ (N,) with water thinner than FILM h, h = spacing [m] (N,) or one, at a node taken as none: its pressure would be 0/0 at the surface."""
     return np.where((phi < 0.0) & (phi > -FILM * spacing), 0.0, phi)
 
 
@@ -230,13 +230,16 @@ def _mean_slope(cut, phi, cells, parent, g, n_nodes):
     return total / np.maximum(count, 1.0)
 
 
-def redistance(topology, phi, spacing: float, rescale: bool):
+def redistance(topology, phi, spacing, rescale: bool):
     """φ (N,) as a signed distance near its zero, ±FAR·spacing elsewhere; the zero itself does not move.
+
+    spacing [m]: size of the cells at each node (N,), or one for all.
 
     rescale: also divide by the mean slope at the nodes of cut cells where it left [0.9, 1.1]."""
     t = topology
     cut = surface_cells(phi, t.cells_around(phi < 0.0), t.cells)
-    far = np.copysign(FAR * spacing, phi)
+    farthest = np.broadcast_to(FAR * np.asarray(spacing), phi.shape)
+    far = np.copysign(farthest, phi)
     if len(cut) == 0:
         return far
     front = np.zeros(len(phi), bool)
@@ -248,7 +251,7 @@ def redistance(topology, phi, spacing: float, rescale: bool):
         order, start, triangles, owner, t.nodes, t.cells, *t.around, exact, t.node_start, t.node_cells
     )
     listed = order[start[1] :]
-    far[listed] = np.copysign(np.minimum(distance[listed], FAR * spacing), phi[listed])
+    far[listed] = np.copysign(np.minimum(distance[listed], farthest[listed]), phi[listed])
     far[front] = phi[front]
     if rescale:
         slope = _mean_slope(cut, phi, t.cells, t.parent, t.gradients, len(phi))

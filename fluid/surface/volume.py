@@ -116,7 +116,8 @@ def _diffused_shift(band, place, graph_row, start, neighbour, stiffness, c, resi
                 if count == column.shape[0]:
                     column = np.concatenate((column, np.empty_like(column)))
                     entry = np.concatenate((entry, np.empty_like(entry)))
-                column[count], entry[count] = q, kappa * stiffness[s]
+                column[count] = q
+                entry[count] = 0.5 * (kappa[band[r]] + kappa[neighbour[s]]) * stiffness[s]
                 diagonal[r] -= entry[count]
                 count += 1
         first[r + 1] = count
@@ -149,11 +150,11 @@ def _diffused_shift(band, place, graph_row, start, neighbour, stiffness, c, resi
 
 @dataclass(frozen=True)
 class Shift:
-    """ψ of (2): value (n,) [m] at the nodes of the band (n,), with its κ [m]."""
+    """ψ of (2): value (n,) [m] at the nodes of the band (n,), with κ (N,) [m]."""
 
     band: np.ndarray
     value: np.ndarray
-    kappa: float
+    kappa: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -168,11 +169,12 @@ class VolumeCorrection:
     shift: Shift
 
 
-def correct_volume(topology, graph, listed, phi, carried, target: float, kappa: float, spacing: float):
+def correct_volume(topology, graph, listed, phi, carried, target: float, kappa: float, spacing):
     """Equation (2) and the uniform shift. φ (N,), carried W (N,) [m³], target total [m³] → VolumeCorrection.
 
-    kappa in cell sizes · listed (n,) nodes of the graph to look at, all with water and |φ| small among them."""
+    kappa in cell sizes · spacing [m]: size of the cells at each node (N,), or one for all · listed (n,) nodes of the graph to look at, all with water and |φ| small among them."""
     n = len(phi)
+    spacing = np.broadcast_to(np.asarray(spacing, float), phi.shape)
     seen = np.zeros(n, bool)
     seen[listed] = True
     reach = (LARGEST_SHIFT + LARGEST_UNIFORM_SHIFT) * spacing
@@ -180,7 +182,7 @@ def correct_volume(topology, graph, listed, phi, carried, target: float, kappa: 
     inner = nodal_water(whole, 0.0, phi, topology.parts, n)
     own = inner + nodal_water(near, 0.0, phi, topology.parts, n)
     slope = _volume_slope(topology, near, phi, spacing)
-    band = listed[np.abs(phi[listed]) < BAND_WIDTH * spacing]
+    band = listed[np.abs(phi[listed]) < BAND_WIDTH * spacing[listed]]
     place = np.full(n, -1, np.int64)
     place[band] = np.arange(len(band))
     shift = _diffused_shift(
@@ -190,14 +192,15 @@ def correct_volume(topology, graph, listed, phi, carried, target: float, kappa: 
         graph.start,
         graph.neighbour,
         graph.stiffness,
-        slope[band] + ANCHOR * topology.node_volume[band] / spacing,
+        slope[band] + ANCHOR * topology.node_volume[band] / spacing[band],
         (carried - own)[band],
         kappa * spacing,
         1e-2,
         40,
     )
     phi = phi.copy()
-    phi[band] -= np.clip(shift, -LARGEST_SHIFT * spacing, LARGEST_SHIFT * spacing)
+    limit = LARGEST_SHIFT * spacing[band]
+    phi[band] -= np.clip(shift, -limit, limit)
     left = target - float(inner.sum())
     phi, reinserted = _meet_total(
         topology, near, phi, band, slope.sum(), left, VOLUME_TOLERANCE * abs(target), spacing
@@ -213,17 +216,19 @@ def correct_volume(topology, graph, listed, phi, carried, target: float, kappa: 
 
 @njit(cache=True)
 def _split(cell_list, phi, cells, reach):
-    """The listed cells that are all water whatever shift within ±reach φ takes, and those that a surface can reach."""
+    """The listed cells that are all water whatever shift within ±reach (N,) φ takes, and those that a surface can
+    reach."""
     whole, near = np.empty(cell_list.shape[0], np.int64), np.empty(cell_list.shape[0], np.int64)
     n_whole, n_near = 0, 0
     for e in cell_list:
-        low, high = np.inf, -np.inf
+        under, beyond = True, True
         for a in range(4):
-            low, high = min(low, phi[cells[e, a]]), max(high, phi[cells[e, a]])
-        if high < -reach:
+            i = cells[e, a]
+            under, beyond = under and phi[i] < -reach[i], beyond and phi[i] >= reach[i]
+        if under:
             whole[n_whole] = e
             n_whole += 1
-        elif low < reach:
+        elif not beyond:
             near[n_near] = e
             n_near += 1
     return whole[:n_whole].copy(), near[:n_near].copy()
@@ -233,8 +238,8 @@ def _volume_slope(t, near, phi, spacing):
     """c (N,) [m²] by a central difference over the cells that the surface can reach."""
     step = _PROBE * spacing
     cut = _split(near, phi, t.cells, step)[1]
-    wider = nodal_water(cut, -step, phi, t.parts, len(t.nodes))
-    slope = (wider - nodal_water(cut, step, phi, t.parts, len(t.nodes))) / (2 * step)
+    wider = nodal_water(cut, 0.0, phi - step, t.parts, len(t.nodes))
+    slope = (wider - nodal_water(cut, 0.0, phi + step, t.parts, len(t.nodes))) / (2 * step)
     # in slivers beside solids the last corner to get wet moves water between nodes: no slope may be negative
     return np.maximum(slope, 0.0)
 
@@ -243,18 +248,20 @@ def _meet_total(t, near, phi, band, area, target, tolerance, spacing):
     """φ after a uniform shift of the band that brings the water in the cells `near` to a target [m³] within a
     tolerance [m³], and the volume [m³] that it moved.
 
-    Secant steps on the shift, from the slope `area`; the shift stays within LARGEST_UNIFORM_SHIFT."""
-    limit, shift = LARGEST_UNIFORM_SHIFT * spacing, 0.0
+    Secant steps on the shift, from the slope `area`; the shift stays within LARGEST_UNIFORM_SHIFT of the cells at each
+    node, and is one length wherever that allows it."""
+    limit, shift = LARGEST_UNIFORM_SHIFT * spacing[band], 0.0
+    most = limit.max(initial=0.0)
     start = volume = float(nodal_water(near, 0.0, phi, t.parts, len(phi)).sum())
     shifted = phi
     for _ in range(MOST_SECANTS):
         if abs(target - volume) <= tolerance or area <= 0.0:
             break
-        trial = np.clip(shift + (target - volume) / area, -limit, limit)
+        trial = np.clip(shift + (target - volume) / area, -most, most)
         if trial == shift:
             break
         shifted = phi.copy()
-        shifted[band] -= trial
+        shifted[band] -= np.clip(trial, -limit, limit)
         before, volume = volume, float(nodal_water(near, 0.0, shifted, t.parts, len(phi)).sum())
         area, shift = (volume - before) / (trial - shift), trial
     return without_films(shifted, spacing), volume - start

@@ -22,18 +22,19 @@ FARTHEST = 0.1
 """Cell sizes that φ is continued by: enough for calm water; a slope says nothing about what is farther."""
 
 
-def levels_in_solids(topology, listed, dt: float, u_m, phi, spacing: float):
+def levels_in_solids(topology, listed, dt: float, u_m, phi, spacing):
     """Equation (1) at those of the listed nodes (n,) that lie inside solids: their places in the list (k,), φ̃ (k,) [m].
 
-    u_m (N, 3) [m/s], phi (N,) [m], spacing [m]."""
+    u_m (N, 3) [m/s], phi (N,) [m], spacing [m]: size of the cells at each node (N,), or one for all."""
     t = topology
     places = np.flatnonzero(t.covered[listed])
     inside = listed[places]
     cell, weight = feet(
         inside, -1.0, dt, 3, u_m, t.nodes, t.cells, t.parent, t.gradients, t.neighbours, t.node_start, t.node_cells
     )  # fmt: skip
+    farthest = np.broadcast_to(FARTHEST * np.asarray(spacing), phi.shape)[inside]
     return places, _continued(
-        inside, cell, weight, dt, FARTHEST * spacing, u_m, phi, t.nodes, t.cells, t.parent, t.gradients
+        inside, cell, weight, dt, farthest, u_m, phi, t.nodes, t.cells, t.parent, t.gradients
     )
 
 
@@ -51,7 +52,7 @@ def _continued(inside, cell, weight, dt, farthest, u_m, phi, nodes, cells, paren
             length += missing[k] * missing[k]
         for a in range(4):
             out[s] += weight[s, a] * phi[cells[e, a]]
-        share = min(1.0, farthest / max(np.sqrt(length), 1e-300))
+        share = min(1.0, farthest[s] / max(np.sqrt(length), 1e-300))
         for k in range(3):
             out[s] += share * missing[k] * slope[k]
     return out

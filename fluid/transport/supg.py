@@ -202,7 +202,8 @@ def carried_velocity(water, dt: float, u_m, u_hat):
     water.hold(c, water.time + 0.5 * dt)
     old = u_hat[members]
     new = old + Transport.of(t, band, c[members], dt).change(old, free)
-    reach = int(np.ceil(np.abs(c[members]).max() * dt / water.mesh.spacing))
+    crossing = np.abs(c[members]).max(axis=1) * t.finer[members]
+    reach = int(np.ceil(crossing.max() * dt / water.mesh.spacing))
     moved = u_hat.copy()
     moved[members] = np.clip(new, *range_around(band.cells, old, max(reach, 1)))
     return moved[water.listed]

@@ -63,8 +63,9 @@ class Carried:
     fast: np.ndarray | None = None
 
     @classmethod
-    def by(cls, flux: Flux, dt: float, velocity, acceleration, gravity: float, spacing: float) -> Carried:
-        """After dt [s] by the flux; velocity (N, 3) [m/s] before, acceleration (N, 3) [m/s²] then."""
+    def by(cls, flux: Flux, dt: float, velocity, acceleration, gravity: float, spacing) -> Carried:
+        """After dt [s] by the flux; velocity (N, 3) [m/s] before, acceleration (N, 3) [m/s²] then, spacing (N,)
+        [m]: size of the cells."""
         g = flux.graph
         along = (flux.nodes, g.row, g.start, g.neighbour)
         weight = _jumps(
@@ -89,16 +90,16 @@ class Carried:
         fields = (heirs @ (held * fields)) / np.maximum(heirs @ held, 1e-300)
         return Carried(water, fields[:, :3].copy(), fields[:, 3].copy(), fields[:, 4].copy())
 
-    def into(
-        self, u, nodes, phi, spacing: float, graph: Graph, shift: Shift, t: Topology, on_open_side
-    ) -> None:
+    def into(self, u, nodes, phi, spacing, graph: Graph, shift: Shift, t: Topology, on_open_side) -> None:
         """Equations (1) and (2) for u (N, 3) [m/s] at the listed nodes (n,) that hold water, in place; φ (N,) [m].
 
         on_open_side (N,) bool: nodes that water leaves through: what the fluxes bring there is not yet all that came.
         Only where some water is fast, or there is a jump."""
         carried = self.velocity.copy()
         _pass_on(graph, shift, self.water, carried)
-        weight = self.weight[nodes] * np.clip((phi[nodes] / spacing + DEEP) / (DEEP - SHALLOW), 0.0, 1.0)
+        weight = self.weight[nodes] * np.clip(
+            (phi[nodes] / spacing[nodes] + DEEP) / (DEEP - SHALLOW), 0.0, 1.0
+        )
         weight[t.near_solids[nodes]] = 0.0
         weight = np.maximum(weight, np.where(on_open_side[nodes], 0.0, self.fast[nodes]))
         weight[self.water[nodes] <= 0.0] = 0.0
@@ -114,7 +115,7 @@ def _pass_on(graph: Graph, shift: Shift, water, u) -> None:
 
 @njit(cache=True)
 def _corrected(band, graph_row, start, neighbour, stiffness, value, kappa, water):
-    """v_ij (edges,) [m³] of (2) out of each node of the band, where both hold water; none gives more than it holds."""
+    """v_ij (edges,) [m³] of (2) out of each node of the band, κ (N,), where both hold water; none gives more than it holds."""
     psi, inside = np.zeros(water.shape[0]), np.zeros(water.shape[0], np.bool_)
     for r in range(band.shape[0]):
         psi[band[r]] = value[r]
@@ -127,7 +128,10 @@ def _corrected(band, graph_row, start, neighbour, stiffness, value, kappa, water
         total = 0.0
         for s in range(start[row], start[row + 1]):
             if inside[neighbour[s]]:
-                moved[s] = max(0.0, -kappa * stiffness[s] * (psi[i] - psi[neighbour[s]]))
+                moved[s] = max(
+                    0.0,
+                    -(0.5 * (kappa[i] + kappa[neighbour[s]])) * stiffness[s] * (psi[i] - psi[neighbour[s]]),
+                )
                 total += moved[s]
         if total > water[i]:
             for s in range(start[row], start[row + 1]):
@@ -155,20 +159,20 @@ def _jumps(nodes, graph_row, start, neighbour, rate, water, capacity, u, a, grav
                     push[k] += part * (a[j, k] + a[i, k])
         if came > 0.0:
             speed, own = _size(up) / came, _size(u[i])
-            drop = _ramp((speed - own) / np.sqrt(gravity * spacing), DROP)
+            drop = _ramp((speed - own) / np.sqrt(gravity * spacing[i]), DROP)
             if drop > 0.0:
                 work = (up[0] * push[0] + up[1] * push[1] + up[2] * push[2]) / (came * came * speed)
-                lost = 1.0 + (spacing * work - own * own) / (speed * speed)
+                lost = 1.0 + (spacing[i] * work - own * own) / (speed * speed)
                 weight[i] = drop * _ramp(lost, LOST) * _ramp(water[i] / max(capacity[i], 1e-300), FULL)
     return weight
 
 
 @njit(cache=True)
 def _fast(nodes, u, celerity, ends):
-    """(N,): w of fast water at the listed nodes; celerity √(g h) [m/s]."""
+    """(N,): w of fast water at the listed nodes; celerity √(g h) (N,) [m/s]."""
     weight = np.zeros(u.shape[0])
     for i in nodes:
-        weight[i] = _ramp(_size(u[i]) / celerity, ends)
+        weight[i] = _ramp(_size(u[i]) / celerity[i], ends)
     return weight
 
 

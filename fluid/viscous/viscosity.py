@@ -74,7 +74,7 @@ class WettedWalls:
     cell, body (S,) · normal (S, 3) · hat (S, 3, 4) · arm (S, 3, 3) [m] from the centre of the body · area (S,) [m²] ·
     per_volume (S,) [1/m] wetted area of the cell over the volume left of it."""
 
-    def __init__(self, domain, spacing: float):
+    def __init__(self, domain):
         d = domain
         self.domain = d
         corners = d.nodes[d.cells[d.face_cell]]
@@ -88,7 +88,8 @@ class WettedWalls:
         self.arm = np.ascontiguousarray(d.face_points - d.body_centre[d.face_body][:, None])
         self.area = d.face_area
         wetted = np.bincount(d.face_cell, d.face_area, minlength=len(d.cells))[d.face_cell]
-        self.per_volume = wetted / np.maximum(d.volume[d.face_cell], wetted * spacing / STEEPEST)
+        size = d.memory.mesh.local_size[d.parent_cell[d.face_cell]]
+        self.per_volume = wetted / np.maximum(d.volume[d.face_cell], wetted * size / STEEPEST)
 
     def at_points(self, f, cells):
         """P1 values (S, 3) or (S, 3, k) of nodal f (N,) or (N, k) at the points of the polygons."""
@@ -145,7 +146,7 @@ class Viscosity:
     def _terms(self, water, phi, mass, w):
         t, p = water.topology, self.parameters
         if self.walls is None or self.walls.domain is not water.domain:
-            self.walls = WettedWalls(water.domain, water.mesh.spacing)
+            self.walls = WettedWalls(water.domain)
         wet = (phi < 0.0) & t.active
         cells = np.flatnonzero(wet[t.cells].any(axis=1))
         share = wet_fraction(cells, phi, t.parts)

@@ -59,7 +59,8 @@ class WallFriction:
             return self.density * log_law(OFF_WALL * t.size[walls.cell], self.roughness) * speed
         depth = column_depth(water, phi, walls.cell)
         bed = walls.normal[:, 2] > LOOKS_UP
-        return np.where(bed, self.density * self._bed(depth, water.mesh.spacing) * speed, 0.0)
+        least = water.mesh.local_size[t.background[walls.cell]]
+        return np.where(bed, self.density * self._bed(depth, least) * speed, 0.0)
 
     def of_nodes(self, water, phi, u):
         """Drag (N,) [kg/s] of the nodes on closed sides of the tank: C times the wet area of each."""
@@ -69,7 +70,7 @@ class WallFriction:
         if self.manning is not None:
             floor = unit[:, 2] < -LOOKS_UP
             faces, size, cell, unit = faces[floor], size[floor], cell[floor], unit[floor]
-            factor = self._bed(column_depth(water, phi, cell), water.mesh.spacing)
+            factor = self._bed(column_depth(water, phi, cell), water.mesh.local_size[t.background[cell]])
         else:
             factor = log_law(OFF_WALL * t.size[cell], self.roughness)
         size = size * t.fraction[cell]  # what solids stand on does not slide
