@@ -27,7 +27,8 @@ NO_OPENING = 1e-6
 class NarrowCracks:
     """The broken joints of a structure that the water takes for closed.
 
-    structure: blocks with joints · spacing [m]: size of the cells at each joint, or one for all · lumped: water flows through them."""
+    structure: blocks with joints · lumped: water flows through them ·
+    spacing [m]: size of the cells at each joint, or one for all."""
 
     def __init__(self, structure, spacing, lumped: bool):
         self.structure, self.lumped = structure, lumped

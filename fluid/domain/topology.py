@@ -28,8 +28,8 @@ class Topology:
     share (M, 4) mean of N_a over the fluid part (∫ N_a = volume · share_a) · size (M,) [m] (6 |e|)^(1/3) ·
     node_start (N+1,), node_cells (4M,) cells around each node · neighbours (M, 4) across faces, -1 none ·
     node_volume (N,) [m³] ∫ N_i · covered (N,) bool: nodes inside a solid · beside_solid (N,) bool: nodes of
-    cut cells · parts: what of the cells water can fill · obtuse (M,) bool: cells with obtuse dihedral angles, is_obtuse: the mesh has such ·
-    upright (rows of `gradients`,) bool: `Background.upright` ·
+    cut cells · parts: what of the cells water can fill · obtuse (M,) bool: cells with obtuse dihedral
+    angles, is_obtuse: the mesh has such · upright (rows of `gradients`,) bool: `Background.upright` ·
     node_size (N,) [m]: `Background.node_size` · spacing [m] of the mesh."""
 
     nodes: np.ndarray

@@ -28,7 +28,9 @@ FILM = 1e-7
 
 
 def without_films(phi, spacing):
-    """φ (N,) with water thinner than FILM h, h = spacing [m] (N,) or one, at a node taken as none: its pressure would be 0/0 at the surface."""
+    """φ (N,) with water thinner than FILM h at a node taken as none: its pressure would be 0/0 at the surface.
+
+    spacing [m]: h at each node (N,), or one for all."""
     return np.where((phi < 0.0) & (phi > -FILM * spacing), 0.0, phi)
 
 

@@ -172,7 +172,8 @@ class VolumeCorrection:
 def correct_volume(topology, graph, listed, phi, carried, target: float, kappa: float, spacing):
     """Equation (2) and the uniform shift. φ (N,), carried W (N,) [m³], target total [m³] → VolumeCorrection.
 
-    kappa in cell sizes · spacing [m]: size of the cells at each node (N,), or one for all · listed (n,) nodes of the graph to look at, all with water and |φ| small among them."""
+    kappa in cell sizes · spacing [m]: size of the cells at each node (N,), or one for all ·
+    listed (n,) nodes of the graph to look at, all with water and |φ| small among them."""
     n = len(phi)
     spacing = np.broadcast_to(np.asarray(spacing, float), phi.shape)
     seen = np.zeros(n, bool)

@@ -115,7 +115,8 @@ def _pass_on(graph: Graph, shift: Shift, water, u) -> None:
 
 @njit(cache=True)
 def _corrected(band, graph_row, start, neighbour, stiffness, value, kappa, water):
-    """v_ij (edges,) [m³] of (2) out of each node of the band, κ (N,), where both hold water; none gives more than it holds."""
+    """v_ij (edges,) [m³] of (2) out of each node of the band, κ (N,), where both hold water; none gives more than it
+    holds."""
     psi, inside = np.zeros(water.shape[0]), np.zeros(water.shape[0], np.bool_)
     for r in range(band.shape[0]):
         psi[band[r]] = value[r]

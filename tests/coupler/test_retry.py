@@ -95,7 +95,13 @@ def _no_books_of_momentum(monkeypatch):
 
 
 def coupling(pipe, piston, step_max=0.1, **more):
-    still = SimpleNamespace(update=lambda: False, moved_on=lambda: np.zeros((1, 6)), cut_again=0, n_solids=0)
+    still = SimpleNamespace(
+        cell_sizes=lambda: np.ones(1),
+        update=lambda: False,
+        moved_on=lambda: np.zeros((1, 6)),
+        cut_again=0,
+        n_solids=0,
+    )
     return Coupling(pipe, piston, still, rtol=1e-10, step_max=step_max, clock=no_clock, **more)
 
 
