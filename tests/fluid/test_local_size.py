@@ -46,7 +46,7 @@ def uniform():
 def test_a_dam_break_is_the_same_beside_coarse_cells(uniform, times, covers):
     one, other = uniform[covers], run(times, covers=covers)
     assert other.mesh.spacing > 1.1 * one.mesh.spacing
-    assert other.time == pytest.approx(one.time, rel=1e-6)
+    assert other.time == pytest.approx(one.time, rel=1e-4)
     near = [(w.topology.nodes < [0.8, 1.0, 0.5]).all(axis=1) for w in (one, other)]
     assert near[0].sum() == near[1].sum() > 500
     np.testing.assert_allclose(other.nodal_water[near[1]], one.nodal_water[near[0]], atol=1e-3 * FINE**3)
