@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field, PrivateAttr
+from pydantic import Field, PrivateAttr, model_validator
 
 from coupler.case.gauges import Gauge
 from coupler.case.structure import Structure
@@ -118,14 +118,33 @@ class Tank(Section):
         return other
 
 
+def _checked_uplift(section):
+    """A share where uplift = "share", and nowhere else."""
+    if (section.uplift == "share") != (section.uplift_share is not None):
+        raise ValueError(
+            'uplift = "share" and uplift_share (a number from 0 to 1) go together; give both or neither'
+        )
+    return section
+
+
 class ContactPair(Section):
-    """Friction between two materials that differs from the rest."""
+    """Friction and uplift between two materials that differ from the rest."""
 
     materials: tuple[Name, Name] = Field(
         description="names that blocks, ground (ground) or tank sides (tank) give as their material",
         examples=[["brick", "ground"]],
     )
-    friction: quantity("", ge=0) = Field(description="mu of this pair")
+    friction: quantity("", ge=0) | None = Field(
+        None, description="mu of this pair; absent: that of [contact]"
+    )
+    uplift: Literal["full", "none", "share"] | None = Field(
+        None, description="as in [contact]; absent: what is given there"
+    )
+    uplift_share: quantity("", ge=0, le=1) | None = Field(None, description="needed with uplift = share")
+
+    @model_validator(mode="after")
+    def _share_is_known(self):
+        return _checked_uplift(self)
 
 
 class Contact(Section):
@@ -155,12 +174,22 @@ class Contact(Section):
     nodes_per_edge: Annotated[int, Field(strict=True, ge=3, le=33)] = Field(
         3, description="contact nodes along an edge of a block; crossing edges hold each other whatever it is"
     )
-    impermeable: Switch = Field(
-        False,
-        description="true: faces that touch at the start without a joint keep the water out for as long as they lie "
-        "on one another, on the ground or on the floor of the tank; false: water reaches between them",
+    uplift: Literal["full", "none", "share"] = Field(
+        "full",
+        description="pressure of the water between faces that touch at the start without a joint, for as long as they "
+        "lie on one another, on the ground or on the floor of the tank: that of the water around them, none (the faces "
+        "keep the water out), or uplift_share of it",
     )
-    pair: tuple[ContactPair, ...] = Field((), description="pairs of materials with a friction of their own")
+    uplift_share: quantity("", ge=0, le=1) | None = Field(
+        None, description="share of the pressure around that acts, needed with uplift = share", examples=[0.5]
+    )
+    pair: tuple[ContactPair, ...] = Field(
+        (), description="pairs of materials with friction or uplift of their own"
+    )
+
+    @model_validator(mode="after")
+    def _share_is_known(self):
+        return _checked_uplift(self)
 
 
 class JointPair(Section):

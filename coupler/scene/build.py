@@ -147,7 +147,8 @@ def build_structure(case: Case):
             tangential_restitution=c.tangential_restitution,
             rule=c.rule,
             nodes_per_edge=c.nodes_per_edge,
-            pairs=tuple(PairFriction(*pair.materials, pair.friction) for pair in c.pair),
+            pairs=tuple(PairFriction(*pair.materials, pair.friction, share_of(pair)) for pair in c.pair),
+            uplift=share_of(c),
         )
     if j:
         joints = joint_rules(j)
@@ -162,9 +163,13 @@ def build_structure(case: Case):
         planes,
         gravity,
         substep=case.structure.substep,
-        impermeable=bool(c and c.impermeable),
         ramp=case.structure.ramp or 0.0,
     )
+
+
+def share_of(section) -> float | None:
+    """Share of the pressure between faces that `uplift` of [contact] or of one of its pairs asks for; None: nothing."""
+    return {None: None, "full": 1.0, "none": 0.0, "share": section.uplift_share}[section.uplift]
 
 
 def joint_rules(joints):

@@ -240,6 +240,7 @@ class Coupling:
             if self.water.slits is not None:
                 self.water.set_cracks(self.immersion.cracks.cracks())
             record.bodies_cut = self.immersion.cut_again
+            self.water.set_films(*self.immersion.films())
             self.water.moved_on = self.immersion.moved_on()
         if self.water.viscous is not None:
             self.water.body_velocity = self._padded(self.structure.velocity())

@@ -79,11 +79,22 @@ class Immersion:
         self.cut_again = int(changed.sum())
         if not self.cut_again:
             return False
-        self._centre[moved], self._rotation[moved] = centre[moved], rotation[moved]
+        # a block that has just left what it lay on would stand in it still, sealed, where it was cut last
+        self._centre[changed], self._rotation[changed] = centre[changed], rotation[changed]
         self._growth = growth
         self.bodies = self._placed()
         self.domain = cut_domain(self.mesh, self.bodies, self.covers, self.domain, connection=self.connection)
         return True
+
+    def films(self) -> tuple[Array, Array]:
+        """Which bodies may move (n + m,) bool, so that films under them hand on the pressure around, and the share of
+        it (P,) that acts on each plane."""
+        held = [block.fixed for block in self.structure.blocks]
+        loose = ~np.append(np.array(held, bool), np.ones(self.n_solids, bool))
+        share = np.ones(len(self._body_of_plane))
+        block, plane, of_pressure = self.structure.uplift_shares()
+        np.minimum.at(share, self._reference.plane_start[block] + plane, of_pressure)
+        return loose, share
 
     def moved_on(self) -> Array:
         """How far the bodies stand from where their cells were last cut (n + m, 6) [m, rad]."""

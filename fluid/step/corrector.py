@@ -60,6 +60,7 @@ class Corrected:
     layer_start: np.ndarray
     at_bound: np.ndarray
     ventilated: np.ndarray
+    given_by_films: np.ndarray
     report: object
 
 
@@ -101,8 +102,17 @@ def corrected(water, problem, x, parting) -> Corrected:
         start,
         bound.at_bound,
         bound.ventilated,
+        _given_by_films(water, problem),
         report,
     )
+
+
+def _given_by_films(water, problem):
+    """(N,) [m³/s] that films take from their rims as the bodies move."""
+    found, given = np.zeros(len(problem.predicted.wet)), problem.predicted.given_by_films
+    if given is not None:
+        found[problem.dofs] = given @ water.pushed_by.ravel()
+    return found
 
 
 def _pressure_gradient(water, kept, pressure, scale):

@@ -46,7 +46,7 @@ class Predicted:
     volume correction, shear: ViscousChange by viscosity and friction, None without; end [s]: time at the end of the
     step; left: what leaves through open sides, None if nothing; through (N,) [m³] that comes in through sides,
     None without any; held (N,) [Pa]: unknown part of the pressure on the nodes of seas, None without any side;
-    displaced (N,) [m³]: part of nodal_water that the bodies take in this step."""
+    displaced (N,) [m³]: part of nodal_water that the bodies take in this step; given_by_films: `films.Handed.given`."""
 
     level_set: np.ndarray
     nodal_water: np.ndarray
@@ -68,6 +68,7 @@ class Predicted:
     through: np.ndarray | None
     held: np.ndarray | None
     displaced: np.ndarray
+    given_by_films: object | None = None
 
 
 def predicted(water, dt: float) -> PressureProblem:
@@ -255,7 +256,7 @@ def _problem(
     other = waterline_load(water.domain, faces, left_out, phi, wet, acted, water.walls.open_node)
     if shear is not None:
         other += shear.load
-    return PressureProblem(
+    problem = PressureProblem(
         matrix,
         rhs[dofs] + extra,
         coupling[dofs],
@@ -269,6 +270,7 @@ def _problem(
         lowest_pressure(water, graph, dofs, phi),
         water.at_bound[dofs],
     )
+    return problem if water.films is None else water.films.handed_on(water, problem)
 
 
 def _known_pressure(water, pressure, phi):

@@ -21,6 +21,7 @@ NODAL = (
     "displaced",
     "at_bound",
     "ventilated",
+    "given_by_films",
 )
 OF_CELLS = ("remainder", "kick_remainder", "cell_velocity")
 OF_BODIES = ("pushed_by",)

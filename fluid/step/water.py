@@ -74,7 +74,7 @@ class Water:
         self._surface_lag = 0.0
         self.report: StepReport | None = None
         self.sides = sides
-        self.slits = None
+        self.slits, self.films, self._film_rules = None, None, None
         self.reference = mesh.bounds.mean(axis=0)
         """Point (3,) [m] that angular momentum is taken about."""
         self._lowest = float((mesh.bounds * self.parameters.weight).max(axis=0).sum())
@@ -117,6 +117,8 @@ class Water:
         """(N,) [m³], part of `nodal_water`: what the bodies take of it as they move on to where the surface is."""
         self.conserved_volume = float(self.nodal_water.sum())
         self.initial_volume = self.conserved_volume
+        self.given_by_films = np.zeros(n)
+        """(N,) [m³/s] that films and their rims gave each other over the last step (`films.py`)."""
         self._find_band()
         self._start_speed = 0.0
         if velocity is not None:
@@ -221,6 +223,7 @@ class Water:
         self.cell_velocity, self.flux = new.cell_velocity, new.flux
         self.listed, self.layer_start = new.listed, new.layer_start
         self.at_bound, self.ventilated = new.at_bound, new.ventilated
+        self.given_by_films = new.given_by_films
         self.conserved_volume = problem.predicted.conserved_volume
         if self.sides is not None:
             self.sides.book(problem.predicted.through, self.head())
@@ -274,10 +277,24 @@ class Water:
 
         self.slits = Slits.of(self.domain, cracks, self.mesh.size_at(cracks.middle()), self.slits)
 
+    def set_films(self, loose, share) -> None:
+        """Let films of water between loose bodies (n_bodies,) bool and what they lie on hand on the pressure of their
+        rim (`films.py`), a share (P,) of it on each plane of the bodies: anew after every change of the domain."""
+        from fluid.pressure.films import Films
+
+        rules = (self.domain, np.array(loose), np.array(share))
+        known = self._film_rules
+        same = known is not None and known[0] is self.domain
+        if not same or not all(np.array_equal(a, b) for a, b in zip(known[1:], rules[1:])):
+            self.films = Films.of(self.domain, self.topology, *rules[1:])
+            self._film_rules = rules
+
     def carried(self, dt: float, theta: float) -> Carried:
         """What the fluxes make of volume and momentum in dt [s], carried on the domain of the last projection; of the
         volume alone with `advection = "supg"`, where velocity does not go along paths."""
         carried = self._carried(dt, theta)
+        if self.given_by_films.any():
+            carried = replace(carried, water=carried.water + dt * self.given_by_films)
         carried = carried if self.renumbered is None else carried.handed_on(self.renumbered)
         if self.slits is None:
             return carried

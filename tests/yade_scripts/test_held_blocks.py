@@ -42,7 +42,7 @@ def test_a_driven_block_that_leaves_opens_what_it_sealed():
         Block("low", (0, 0, 0.5), size=1.0, fixed=True),
         Block("high", (0, 0, 1.5), size=1.0, driven=True, velocity=(0, 0, 0.1)),
     ]
-    with Structure(blocks, ContactLaw(1e8), gravity=(0, 0, 0), impermeable=True) as s:
+    with Structure(blocks, ContactLaw(1e8, uplift=0.0), gravity=(0, 0, 0)) as s:
         assert len(s.joined_planes()[0]) == 2
         s.advance(0.05)
         assert len(s.joined_planes()[0]) == 2
@@ -50,11 +50,11 @@ def test_a_driven_block_that_leaves_opens_what_it_sealed():
         assert len(s.joined_planes()[0]) == 0
 
 
-@pytest.mark.parametrize(("impermeable", "closed"), [(False, 0), (True, 3)])
-def test_loose_blocks_seal_where_that_is_asked_for(impermeable, closed):
+@pytest.mark.parametrize(("uplift", "closed"), [(1.0, 0), (0.5, 0), (0.0, 3)])
+def test_loose_blocks_seal_where_that_is_asked_for(uplift, closed):
     """A cube on another on the ground: both faces between them and the one below, until the upper one is pushed off."""
     blocks = [Block("low", (0, 0, 0.5), size=1.0), Block("high", (0, 0, 1.5), size=1.0)]
-    with Structure(blocks, ContactLaw(1e8), ground=0.0, impermeable=impermeable) as s:
+    with Structure(blocks, ContactLaw(1e8, uplift=uplift), ground=0.0) as s:
         s.advance(0.1)
         assert len(s.joined_planes()[0]) == closed
         s.displace(np.array([1]), np.array([[0.6, 0.0, 0.0]]), np.eye(3)[None])

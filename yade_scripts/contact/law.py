@@ -28,14 +28,20 @@ class ContactError(ValueError):
 
 @dataclass(frozen=True)
 class PairFriction:
-    """μ where the materials a and b meet."""
+    """μ where the materials a and b meet, and the share of the pressure of the water around that acts between faces of
+    theirs which touch at the start; None: as everywhere."""
 
     a: str
     b: str
-    friction: float
+    friction: float | None = None
+    uplift: float | None = None
 
     def __post_init__(self):
-        _within(f"pair {self.a}-{self.b}: friction", self.friction, -1e-300, np.inf, "-")
+        where = f"pair {self.a}-{self.b}"
+        if self.friction is not None:
+            _within(f"{where}: friction", self.friction, -1e-300, np.inf, "-")
+        if self.uplift is not None:
+            _within(f"{where}: uplift", self.uplift, -1e-300, 1.0, "-", closed_above=True)
 
 
 @dataclass(frozen=True)
@@ -44,8 +50,9 @@ class ContactLaw:
     that loses its joint goes on with the stiffness it had · restitution e in (0, 1] · friction μ ≥ 0
     shear_ratio: K_t/K_n (1 in the paper) · rule: "exact" returns e, "paper" uses equation (3) as printed
     tangential_restitution in (0, 1]: sets the tangential dashpot by equation (3), with the effective mass along the
-    face; None: the normal dashpot times sqrt(shear_ratio) · pairs: friction of pairs of materials that have their own
-    nodes_per_edge: contact nodes along an edge of a block, ≥ 3
+    face; None: the normal dashpot times sqrt(shear_ratio) · pairs: what pairs of materials have of their own
+    nodes_per_edge: contact nodes along an edge of a block, ≥ 3 · uplift: share of the pressure of the water around that
+    acts between faces that touch at the start without a joint, for as long as they lie on one another
     """
 
     stiffness: float | None = None
@@ -56,12 +63,14 @@ class ContactLaw:
     rule: Rule = "exact"
     nodes_per_edge: int = 3
     pairs: tuple[PairFriction, ...] = ()
+    uplift: float = 1.0
 
     def __post_init__(self):
         _within("stiffness", self.stiffness if self.stiffness is not None else 1.0, 0.0, np.inf, "N/m")
         _within("restitution", self.restitution, 0.0, 1.0, "-", closed_above=True)
         _within("friction", self.friction, -1e-300, np.inf, "-")
         _within("shear_ratio", self.shear_ratio, 0.0, 10.0, "-")
+        _within("uplift", self.uplift, -1e-300, 1.0, "-", closed_above=True)
         if self.tangential_restitution is not None:
             _within("tangential_restitution", self.tangential_restitution, 0.0, 1.0, "-", closed_above=True)
         if self.rule not in ("exact", "paper"):
@@ -90,16 +99,31 @@ class ContactLaw:
         table = np.full((len(materials), len(materials)), float(self.friction))
         row = {name: i for i, name in enumerate(materials)}
         for pair in self.pairs:
-            if pair.a in row and pair.b in row:
+            if pair.friction is not None and pair.a in row and pair.b in row:
                 i, j = row[pair.a], row[pair.b]
                 table[i, j] = table[j, i] = pair.friction
         return table
+
+    @property
+    def keeps_water_out(self) -> bool:
+        """Whether any faces that lie on one another get less than all of the pressure around."""
+        return self.uplift < 1.0 or any(p.uplift is not None and p.uplift < 1.0 for p in self.pairs)
+
+    def uplift_between(self, a: str, b: str) -> float:
+        """Share of the pressure that acts between faces of the materials a and b that lie on one another."""
+        found = self.uplift
+        for pair in self.pairs:
+            if pair.uplift is not None and {pair.a, pair.b} == {a, b}:
+                found = pair.uplift
+        return found
 
     def described(self, face_stiffness) -> str:
         """One line for people; face_stiffness (n,) [N/m] that the blocks have."""
         K, obtained = np.atleast_1d(face_stiffness), self.obtained_restitution
         stiffness = f"{K.min():.3g}" + (f" to {K.max():.3g}" if K.max() > 1.001 * K.min() else "")
-        own = "".join(f", {p.friction:g} between {p.a} and {p.b}" for p in self.pairs)
+        own = "".join(
+            f", {p.friction:g} between {p.a} and {p.b}" for p in self.pairs if p.friction is not None
+        )
         return (
             f"K {stiffness} N/m, e {obtained:.3g} obtained for {self.restitution:g} asked (rule '{self.rule}'), "
             f"friction {self.friction:g}{own}"

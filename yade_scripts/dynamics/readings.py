@@ -41,6 +41,8 @@ class StructureReadings:
     _contacts: ContactForces | None
     _onset: ContactOnset
     _seals: Seals | None
+    _partly: Seals | None
+    _shares: Array
     _accounts: Accounts
     _substepper: Substepper
 
@@ -163,13 +165,21 @@ class StructureReadings:
         return a, b, depth, depth / thinner
 
     def joined_planes(self) -> tuple[Array, Array, Array]:
-        """Faces sealed by a live joint, or by lying on one another where that is impermeable: block (m,), face (m,),
+        """Faces sealed by a live joint, or by lying on one another where no water comes between: block (m,), face (m,),
         half of the largest opening (m,) [m]."""
         m = self._motion
         none = np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0)
         glued = none if self.joints is None else self.joints.sealed_faces(m.x, m.R)
         lying = none if self._seals is None else self._seals.closed_faces(m.x, m.R)
         return tuple(np.concatenate(two) for two in zip(glued, lying))
+
+    def uplift_shares(self) -> tuple[Array, Array, Array]:
+        """Faces that lie on one another and get a share of the pressure of the water around: block (m,), face (m,),
+        share (m,)."""
+        if self._partly is None:
+            return np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0)
+        on = self._partly.closed(self._motion.x, self._motion.R)
+        return self._partly.both_faces(on, self._shares[on])
 
     def broken_joints(self) -> tuple[Array, Array, Array, Array]:
         """Joints that carry nothing any more: number (m,), blocks and their faces (m, 2), -1 a fixed plane, and now

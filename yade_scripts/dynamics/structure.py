@@ -66,7 +66,8 @@ class Structure(StructureReadings):
     joints: one law for all touching faces, or rules by pairs and scatter
     substep: used in place of the one that `substep_limit` finds accurate, None: that one
     ramp [s]: time over which the weight of the blocks comes on
-    impermeable: faces that touch at the start without a joint count as sealed while they do (`joined_planes`)
+    Faces that touch at the start without a joint and get none of the pressure of the water around (`contact.uplift`)
+    count as sealed while they do (`joined_planes`).
 
     Fixed blocks are not joined to one another or to planes, since nothing could break there; their faces are sealed
     as those of a joint. Driven blocks are joined: they may part.
@@ -84,7 +85,6 @@ class Structure(StructureReadings):
         gravity=GRAVITY,
         threads: int = 1,
         substep: float | None = None,
-        impermeable: bool = False,
         ramp: float = 0.0,
     ):
         self._describe(blocks, gravity)
@@ -94,9 +94,11 @@ class Structure(StructureReadings):
         local = [moved_block(b, -origin) for b in blocks]
         local_planes = [replace(p, point=p.point - origin) for p in self.planes]
         self.joint_rules = JointRules(joints) if isinstance(joints, JointParameters) else joints
-        faces = _Faces.of(local, local_planes, self.joint_rules, impermeable)
+        faces = _Faces.of(local, local_planes, self.joint_rules, contact)
         self.joints = faces.joints(local, self.joint_rules)
         self._seals = Seals(local, faces.sealed) if faces.sealed else None
+        self._partly = Seals(local, [face for face, _ in faces.partly]) if faces.partly else None
+        self._shares = np.array([share for _, share in faces.partly])
         self._rub_failed_points()
         self.face_stiffness = self._face_stiffness()
         self._set_damping()
@@ -371,31 +373,43 @@ def _with_ground(ground: float | None, planes) -> list[FixedPlane]:
     return [*floor, *planes]
 
 
+def _materials(blocks, planes, face: TouchingFaces) -> tuple[str, str]:
+    """Of both sides of a pair of faces."""
+    other = blocks[face.b] if face.b >= 0 else planes[-1 - face.b]
+    return blocks[face.a].material, other.material
+
+
 @dataclass(frozen=True)
 class _Faces:
-    """Touching faces: those that get a joint, those that only keep water out, and blocks held at others that are
-    held."""
+    """Touching faces: those that get a joint, those that only keep water out, those that get a share of its pressure,
+    and blocks held at others that are held."""
 
     joined: list[TouchingFaces]
     laws: list[JointParameters]
     sealed: list[TouchingFaces]
+    partly: list[tuple[TouchingFaces, float]]
     held_rows: list[int]
 
     @classmethod
-    def of(cls, blocks, planes, rules: JointRules | None, impermeable: bool) -> _Faces:
-        if rules is None and not impermeable:
-            return cls([], [], [], [])
+    def of(cls, blocks, planes, rules: JointRules | None, contact: ContactLaw | None) -> _Faces:
+        if rules is None and (contact is None or not contact.keeps_water_out):
+            return cls([], [], [], [], [])
         faces = touching_faces(blocks, planes)
         laws = [None] * len(faces) if rules is None else rules.of_faces(faces, blocks, planes)
-        joined, sealed, held_rows = [], [], set()
+        joined, sealed, partly, held_rows = [], [], [], set()
         for face, law in zip(faces, laws):
             held = both_held(blocks, face)
+            uplift = 1.0 if contact is None else contact.uplift_between(*_materials(blocks, planes, face))
             if law is not None and not held:
                 joined.append((face, law))
-            elif law is not None or impermeable:
+            elif law is not None or uplift == 0.0:
                 sealed.append(face)
+            elif uplift < 1.0:
+                partly.append((face, uplift))
             held_rows.update(row for row in (face.a, face.b) if row >= 0 and law is not None and held)
-        return cls([face for face, _ in joined], [law for _, law in joined], sealed, sorted(held_rows))
+        return cls(
+            [face for face, _ in joined], [law for _, law in joined], sealed, partly, sorted(held_rows)
+        )
 
     def joints(self, blocks, rules: JointRules | None) -> Joints | None:
         """None where no faces are joined."""

@@ -41,17 +41,29 @@ class Seals:
     def closed_faces(self, x: Array, R: Array) -> tuple[Array, Array, Array]:
         """Both faces of each closed pair: block (m,), face (m,), half of the largest opening (m,) [m]; x (n, 3) [m] and
         R (n, 3, 3): places of the blocks."""
+        opened, on = self._opened(x, R)
+        return self.both_faces(on, 0.5 * opened[on])
+
+    def closed(self, x: Array, R: Array) -> Array:
+        """Numbers (k,) of the closed pairs."""
+        return self._opened(x, R)[1]
+
+    def _opened(self, x: Array, R: Array) -> tuple[Array, Array]:
+        """Largest opening (pairs,) [m], and the numbers (k,) of the closed ones."""
         apart = _in_world(self._in_b, self.b[self._of], x, R) - _in_world(self._in_a, self.a[self._of], x, R)
         normal = np.einsum("nij,nj->ni", R[self.a], self._normal)[self._of]
         opening = np.einsum("ci,ci->c", apart, normal)
         sliding = np.linalg.norm(apart - opening[:, None] * normal, axis=1)
         opened, slid = (np.maximum.reduceat(values, self._start[:-1]) for values in (opening, sliding))
-        on = np.flatnonzero((opened < OPENED * self._size) & (slid < SLID * self._size))
-        half, inner = 0.5 * opened[on], self.b[on] >= 0
+        return opened, np.flatnonzero((opened < OPENED * self._size) & (slid < SLID * self._size))
+
+    def both_faces(self, on, values) -> tuple[Array, Array, Array]:
+        """Both faces of the pairs `on` (k,), with values (k,) of theirs: block (m,), face (m,), value (m,)."""
+        inner = self.b[on] >= 0
         return (
             np.concatenate([self.a[on], self.b[on][inner]]),
             np.concatenate([self.face_a[on], self.face_b[on][inner]]),
-            np.concatenate([half, half[inner]]),
+            np.concatenate([values, values[inner]]),
         )
 
 

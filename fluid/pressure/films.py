@@ -1,0 +1,260 @@
+"""Films of water under blocks: they hand on the pressure of their rim, and push or hold nobody by themselves.
+
+A block that lies on the bed or on another one leaves a film of almost no volume.  As cells of the mesh such a film is
+right at rest, where it hands the pressure of its rim on, whatever its thickness is; but the water that a lifted block
+has to draw in through it has no room to flow in, so that the film holds the block down (or stops one that falls) by
+
+    G_f V_n · A_ff⁻¹ G_f V_n                                                                              (1)
+
+(f: nodes whose cells all lie in films, A: the pressure matrix), the inertia of a sheet of no thickness.  What a real
+film does there depends on the roughness of both faces and not on the cells.  So (1) is left out: in films narrower
+than NARROW h the pressure is that of the water around, r, and its own weight,
+
+    p_f = R p_r + c,     R = -A_ff⁻¹ A_fr,     c = A_ff⁻¹ ∫ dt g·∇N_f dV                                   (2)
+
+and what a block sets free there is drawn in at the rim, Ĝ_r = G_r + Rᵀ G_f, Ĝ_f = 0, the exact adjoint: with Ĝ instead
+of G and the load -G_fᵀ c besides, the system with the structure inside stays symmetric and positive definite, and the
+power that leaves the water is that given to the blocks.  The matrix stays as it is: the rows of the film give (2)
+where their right hand side is ∫ dt g·∇N_f dV - (A known)_f.  Volume: what the rim gave goes to the film,
+
+    dW_r/dt = (Rᵀ G_f V)_r,     dW_f/dt = -(R 1)_f (G_f V)_f.                                             (3)
+
+A film that touches no other water keeps its own balance.  A face may get a share of its pressure only (uplift of
+contacts that keep a part of the water out): its polygons in films count by that share in G.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+from numba import njit
+from scipy.sparse.csgraph import connected_components
+
+from fluid.domain.coupling_matrix import wetted_coupling
+from fluid.pressure.projection import inflow
+
+NARROW = 0.25
+"""Widest film, in cells: narrower ones are no channels that the mesh could see."""
+
+
+@dataclass(frozen=True)
+class Films:
+    """Films of a domain. node (N,) bool: all cells around it lie in films · thinned csr (N, 6 n_bodies): what shares
+    below 1 take off G."""
+
+    node: np.ndarray
+    thinned: sp.csr_array
+
+    @classmethod
+    def of(cls, domain, topology, loose, share) -> Films:
+        """The films between loose bodies (n_bodies,) bool and whatever lies opposite to their faces: other bodies, or
+        the sides of the box around the mesh.
+
+        share (P,): of the pressure that acts on each plane of the bodies where it faces a film."""
+        bodies, mesh = domain.memory.bodies, domain.memory.mesh
+        reach = NARROW * mesh.local_size[domain.parent_cell]
+        beside_loose = _beside_loose(bodies, loose, float(reach.max(initial=0.0)))
+        in_film, plane = _facing(
+            domain.face_body, domain.face_centroid, domain.face_normal, bodies.normals, bodies.cut_offsets(),
+            bodies.plane_start, loose, *beside_loose, mesh.bounds, reach[domain.face_cell],
+        )  # fmt: skip
+        films = _film_cells(domain.face_cell, domain.face_area, in_film, domain.volume, reach)
+        node = _all_around(topology.node_start, topology.node_cells, films)
+        partly = np.flatnonzero(in_film & (share[plane] < 1.0))
+        thinned = sp.csr_array((len(domain.nodes), 6 * domain.n_bodies))
+        for value in np.unique(share[plane[partly]]):
+            rows = partly[share[plane[partly]] == value]
+            thinned = thinned + (1.0 - value) * sp.csr_array(wetted_coupling(domain, rows))
+        return cls(node, sp.csr_array(thinned))
+
+    def handed_on(self, water, problem):
+        """The PressureProblem in which films hand on the pressure of their rim; itself where none takes part."""
+        p, dofs = problem, problem.dofs
+        coupling = p.coupling if self.thinned.nnz == 0 else sp.csr_array(p.coupling - self.thinned[dofs])
+        film = _with_a_rim(p.matrix, self.node[dofs])
+        if not film.any():
+            return replace(p, coupling=coupling)
+        f, r = np.flatnonzero(film), np.flatnonzero(~film)
+        rows, weight = p.matrix[f], self._weight(water, p)[dofs[f]]
+        rim, moved = sp.csr_array(rows[:, r]), sp.csr_array(coupling[f])
+        columns = np.unique(moved.indices)
+        moved = moved[:, columns]
+        solved = _solved(
+            sp.csr_array(rows[:, f]), np.column_stack([moved.toarray(), weight, -rim.sum(axis=1)])
+        )
+        shape = coupling.shape
+        to_rim = _placed(-(rim.T @ solved[:, :-2]), r, columns, shape)
+        offset, whole = solved[:, -2], solved[:, -1]
+        load = np.zeros(shape[1])
+        load[columns] = -(moved.T @ offset)
+        rhs = p.rhs.copy()
+        rhs[f] = weight - rows @ p.known
+        bound, at_bound = p.bound, p.at_bound
+        if bound is not None:
+            bound, at_bound = bound.copy(), at_bound.copy()
+            bound[f], at_bound[f] = water.parameters.vapour_pressure, False
+        return replace(
+            p,
+            rhs=rhs,
+            coupling=sp.csr_array(coupling - _placed(moved, f, columns, shape) + to_rim),
+            other_load=p.other_load + load.reshape(-1, 6),
+            bound=bound,
+            at_bound=at_bound,
+            predicted=replace(
+                p.predicted,
+                given_by_films=to_rim - _placed(sp.diags_array(whole) @ moved, f, columns, shape),
+            ),
+        )
+
+    def _weight(self, water, problem):
+        """∫ dt g·∇N dV (N,) [m³/s] at the nodes in films."""
+        t, kept = water.topology, problem.predicted
+        cells = t.cells_around(self.node)
+        if len(kept.void):
+            cells = np.setdiff1d(cells, kept.void, assume_unique=True)
+        g = np.broadcast_to(problem.dt * water.parameters.weight, (len(cells), 3))
+        return inflow(cells, g, t.cells, t.parent, t.gradients, t.volume, len(self.node))
+
+
+def _placed(block, rows, columns, shape):
+    """A block (k, c) as the listed rows (k,) and columns (c,) of a larger sparse matrix."""
+    b = sp.coo_array(block)
+    return sp.csr_array((b.data, (rows[b.row], columns[b.col])), shape=shape)
+
+
+def _with_a_rim(matrix, film):
+    """(n,) bool: film without the parts that no other unknown touches."""
+    f = np.flatnonzero(film)
+    if len(f) == 0:
+        return film
+    rows = matrix[f]
+    _, part = connected_components(rows[:, f], directed=False)
+    beside = np.asarray(abs(rows) @ (~film).astype(float)) > 0.0
+    rimmed = np.zeros(part.max() + 1, bool)
+    rimmed[part[beside]] = True
+    found = np.zeros(len(film), bool)
+    found[f[rimmed[part]]] = True
+    return found
+
+
+def _solved(own, right):
+    """own⁻¹ right (k, m) for the sparse positive definite matrix of the film nodes (k, k), film by film."""
+    count, part = connected_components(own, directed=False)
+    order = np.argsort(part, kind="stable")
+    start = np.searchsorted(part[order], np.arange(count + 1))
+    out = np.zeros(right.shape)
+    for p in range(count):
+        rows = order[start[p] : start[p + 1]]
+        used = np.flatnonzero(right[rows].any(axis=0))
+        out[np.ix_(rows, used)] = _one_solved(own, rows, right[np.ix_(rows, used)])
+    return out
+
+
+LARGE = 300
+"""Unknowns of a film from which it is solved as a sparse matrix."""
+
+
+def _one_solved(own, rows, right):
+    block = own[rows][:, rows]
+    if len(rows) <= LARGE:
+        return np.linalg.solve(block.toarray(), right)
+    return sp.linalg.splu(sp.csc_array(block)).solve(right)
+
+
+def _beside_loose(bodies, loose, reach: float):
+    """start (n + 1,), members: bodies whose bounds come within reach [m] of those of each body, pairs with at least one
+    loose one of both."""
+    bounds = bodies.bounds()
+    return _near_bodies(bounds[:, 0], bounds[:, 1], loose, reach)
+
+
+@njit(cache=True)
+def _near_bodies(low, high, loose, reach):
+    n = low.shape[0]
+    start = np.zeros(n + 1, np.int64)
+    members, count = np.empty(16 * n + 16, np.int64), 0
+    for a in range(n):
+        for b in range(n):
+            if a == b or not (loose[a] or loose[b]):
+                continue
+            apart = False
+            for k in range(3):
+                apart = apart or low[a, k] > high[b, k] + reach or low[b, k] > high[a, k] + reach
+            if not apart:
+                if count == members.shape[0]:
+                    members = np.concatenate((members, np.empty_like(members)))
+                members[count] = b
+                count += 1
+        start[a + 1] = count
+    return start, members[:count].copy()
+
+
+@njit(cache=True)
+def _facing(
+    face_body, centroid, normal, normals, offsets, plane_start, loose, near_start, near, bounds, reach
+):  # fmt: skip
+    """(S,) bool: something lies within reach (S,) [m] ahead of the polygon; its plane (S,) among all."""
+    in_film, plane = np.zeros(face_body.shape[0], np.bool_), np.empty(face_body.shape[0], np.int64)
+    for s in range(face_body.shape[0]):
+        b = face_body[s]
+        best = -2.0
+        for g in range(plane_start[b], plane_start[b + 1]):
+            along = 0.0
+            for k in range(3):
+                along += normals[g, k] * normal[s, k]
+            if along > best:
+                best, plane[s] = along, g
+        if loose[b]:
+            for k in range(3):
+                if normal[s, k] > 0.5:
+                    in_film[s] |= (bounds[1, k] - centroid[s, k]) < reach[s] * normal[s, k]
+                elif normal[s, k] < -0.5:
+                    in_film[s] |= (centroid[s, k] - bounds[0, k]) < -reach[s] * normal[s, k]
+        for t in range(near_start[b], near_start[b + 1]):
+            if in_film[s]:
+                break
+            other = near[t]
+            first, last = 0.0, reach[s]
+            for g in range(plane_start[other], plane_start[other + 1]):
+                along, room = 0.0, offsets[g]
+                for k in range(3):
+                    along += normals[g, k] * normal[s, k]
+                    room -= normals[g, k] * centroid[s, k]
+                if along > 1e-12:
+                    last = min(last, room / along)
+                elif along < -1e-12:
+                    first = max(first, room / along)
+                elif room < 0.0:
+                    last = -1.0
+            in_film[s] = first <= last
+    return in_film, plane
+
+
+@njit(cache=True)
+def _film_cells(face_cell, area, in_film, volume, reach):
+    """(M,) bool: cells with polygons in films only, and no more water than these have within reach (M,) [m]."""
+    n_cells = len(volume)
+    covered, other = np.zeros(n_cells), np.zeros(n_cells, np.bool_)
+    for s in range(face_cell.shape[0]):
+        if in_film[s]:
+            covered[face_cell[s]] += area[s]
+        else:
+            other[face_cell[s]] = True
+    found = np.zeros(n_cells, np.bool_)
+    for e in range(n_cells):
+        found[e] = covered[e] > 0.0 and not other[e] and volume[e] <= reach[e] * covered[e]
+    return found
+
+
+@njit(cache=True)
+def _all_around(node_start, node_cells, chosen):
+    """(N,) bool: nodes with cells, all of them chosen (M,) bool."""
+    found = np.zeros(node_start.shape[0] - 1, np.bool_)
+    for i in range(found.shape[0]):
+        every = node_start[i + 1] > node_start[i]
+        for t in range(node_start[i], node_start[i + 1]):
+            every = every and chosen[node_cells[t]]
+        found[i] = every
+    return found

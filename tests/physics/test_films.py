@@ -1,0 +1,139 @@
+"""Films of water under blocks hand on the pressure of their rim, and have no inertia of their own."""
+
+import numpy as np
+import pytest
+
+from coupler.case.case import Case
+from coupler.scene.build import build
+from tests.fakes import no_clock
+from tests.physics.scenes import RHO, G, case, run
+
+DEPTH, EDGE, HEIGHT, CELL = 0.6, 0.5, 0.25, 0.1
+AREA = EDGE**2
+PLACE = 0.537
+"""Off the planes of the mesh."""
+
+
+@pytest.fixture
+def scene():
+    made = []
+
+    def make(blocks, uplift=None, **sections):
+        contact = {"stiffness": 1e9, "friction": 0.5} | ({} if uplift is None else uplift)
+        made.append(
+            build(
+                case(
+                    time={"end": 1.0, "step_max": 0.01},
+                    tank={"lower": [0, 0, 0], "upper": [1, 1, 0.8], "cell": CELL},
+                    water={"fill": [{"lower": [0, 0, 0], "upper": [1, 1, DEPTH]}]},
+                    structure={"block": blocks},
+                    contact=contact,
+                    **sections,
+                ),
+                no_clock,
+            ).coupling
+        )
+        return made[-1]
+
+    yield make
+    for coupling in made:
+        coupling.structure.close()
+
+
+def block(bottom=0.0, density=2400.0, name="block", **more):
+    centre = [PLACE, PLACE, bottom + HEIGHT / 2]
+    return {"name": name, "size": [EDGE, EDGE, HEIGHT], "centre": centre, "density": density, **more}
+
+
+@pytest.mark.parametrize(
+    ("uplift", "share"),
+    [
+        (None, 1.0),
+        ({"uplift": "full"}, 1.0),
+        ({"uplift": "share", "uplift_share": 0.3}, 0.3),
+        ({"uplift": "none"}, 0.0),
+        ({"pair": [{"materials": ["block", "tank"], "uplift": "none"}]}, 0.0),
+        ({"uplift": "none", "pair": [{"materials": ["block", "tank"], "uplift": "full"}]}, 1.0),
+    ],
+)
+def test_a_block_on_the_bed_gets_the_share_of_the_pressure_below_that_is_asked_for(scene, uplift, share):
+    """Pressure of the depth on its lower face times the share, less that on the upper one."""
+    coupling = scene([block()], uplift)
+    run(coupling, 0.2)
+    below, above = RHO * G * DEPTH * AREA, RHO * G * (DEPTH - HEIGHT) * AREA
+    load = coupling.step(0.01).load
+    assert load[0, 2] == pytest.approx(share * below - above, abs=2e-4 * below)
+
+
+@pytest.mark.parametrize(("uplift", "share"), [("full", 1.0), ("none", 0.0)])
+def test_stacked_blocks_each_get_the_pressure_between_them(scene, uplift, share):
+    """Both feel their buoyancy; without uplift the lower one gets nothing from the water, the upper one its weight."""
+    coupling = scene([block(name="low"), block(HEIGHT, name="high")], {"uplift": uplift})
+    run(coupling, 0.2)
+    load = coupling.step(0.01).load[:, 2]
+    pressure = RHO * G * AREA * (DEPTH - HEIGHT * np.arange(3))
+    expected = [share * (pressure[0] - pressure[1]), share * pressure[1] - pressure[2]]
+    assert load == pytest.approx(expected, abs=3e-4 * pressure[0])
+
+
+def test_a_block_lighter_than_water_leaves_the_bed_at_once(scene):
+    """It rises as it would elsewhere: slower than without any added mass, faster than with three times the water of its
+    volume. A film with inertia would hold it there for a second."""
+    density, time = 950.0, 0.3
+    coupling = scene([block(density=density)], {"stiffness": 1e7})
+    start = coupling.structure.centre()[0, 2]
+    run(coupling, time)
+    risen = coupling.structure.centre()[0, 2] - start
+    drive = G * (RHO - density)
+    assert 0.5 * drive / (density + 3.0 * RHO) * time**2 < risen < 0.5 * drive / density * time**2
+
+
+def test_without_uplift_a_light_block_stays_on_the_bed(scene):
+    """The water on it presses it down, and none comes below."""
+    coupling = scene([block(density=950.0)], {"stiffness": 1e7, "uplift": "none"})
+    run(coupling, 0.1)
+    assert coupling.structure.centre()[0, 2] == pytest.approx(HEIGHT / 2, abs=2e-3 * CELL)
+
+
+def test_what_a_lifted_block_draws_in_stays_in_the_books(scene):
+    """Volume to the tolerance of its correction, momentum to round-off, energy to what the structure takes."""
+    coupling = scene([block(density=500.0)], {"stiffness": 1e7})
+    errors, momentum = [], []
+
+    def note(record):
+        errors.append(abs(coupling.water.volume_error()))
+        momentum.append(record.momentum.error)
+
+    run(coupling, 0.15, note)
+    assert coupling.structure.centre()[0, 2] - HEIGHT / 2 > 0.005
+    assert coupling.water.films.node.any()
+    assert max(errors) < 2e-6
+    assert max(momentum) < 1e-9
+
+
+@pytest.mark.parametrize("speed", [-0.2, 0.2])
+def test_a_film_does_not_push_or_hold_a_block(scene, speed):
+    """A plate driven towards the bed or away from it through a gap of 0.02 to 0.2 cells: once it has started, its load
+    stays within half the pressure of the depth of buoyancy. The ideal squeeze, 0.035 rho A a^2 speed^2/gap^2, would be
+    ten times that."""
+    gap = 0.002 if speed > 0.0 else 0.02
+    coupling = scene([block(gap, name="plate")], motion=[{"block": "plate", "velocity": [0, 0, speed]}])
+    loads = []
+    run(coupling, 0.08, lambda record: loads.append(record.load[0, 2]))
+    buoyancy, most = RHO * G * AREA * HEIGHT, 0.5 * RHO * G * DEPTH * AREA
+    assert 10.0 * most < 0.035 * RHO * AREA * EDGE**2 * speed**2 / 0.002**2
+    assert np.abs(np.array(loads[2:]) - buoyancy).max() < most
+
+
+def test_uplift_and_its_share_go_together():
+    """One without the other is refused, and so is a share above 1."""
+    for contact in ({"uplift": "share"}, {"uplift_share": 0.5}, {"uplift": "share", "uplift_share": 1.5}):
+        with pytest.raises(ValueError, match="uplift"):
+            Case.model_validate(
+                {
+                    "case": {"title": "t"},
+                    "time": {"end": 1.0},
+                    "structure": {"block": [block()]},
+                    "contact": contact,
+                }
+            )
