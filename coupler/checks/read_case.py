@@ -38,6 +38,8 @@ MOST_BITS = 10_000
 LONGEST_SHOWN = 200
 """Characters of an override in a message."""
 _TOO_DEEP = f"more than {DEEPEST} lists or sections inside of one another; no case is so deep"
+NEW = -1
+"""Place in a list, written [+]: behind its last item."""
 ABSENT = "absent"
 """Value of an override that leaves the name out, as if it had not been written."""
 
@@ -48,31 +50,75 @@ class CaseFile:
 
     case: Case
     path: Path
+    """Of the file; of a case that a script made, a name in the directory from which its paths are meant."""
     overrides: tuple[str, ...]
+    text: str
+    """TOML, as it was before the overrides."""
 
     @property
     def directory(self) -> Path:
         return self.path.parent
 
 
-def load(place: Path | str, overrides: Iterable[str] = (), files: Path | None = None) -> CaseFile:
+def load(
+    place: Path | str, overrides: Iterable[str] = (), files: Path | None = None, text: str | None = None
+) -> CaseFile:
     """Read `place` (a case.toml or the directory that holds one) and the `key=value` overrides.
 
-    files: directory that paths in the case are meant from, by default its own.
+    files: directory that paths in the case are meant from, by default its own · text: what was read there before.
     Raises BadCase with one line for each mistake.
     """
-    path = _find(Path(place))
-    text, table = _read(path)
+    path = _find(Path(place)) if text is None else Path(place)
+    text = _read(path) if text is None else text
+    table = table_of(text, _shown(path))
     overrides = tuple(overrides)
     places = _Places(_shown(path), key_lines(text))
-    for override in overrides:
-        places.override(_apply(table, override), override)
-    nowhere = _place_files(table, files or path.parent)
-    case, lines = _validate(table, places, nowhere)
+    case, lines = _checked(table, overrides, places, files or path.parent)
     lines += mistakes_in(files or path.parent)
     if lines or case is None:
         raise BadCase(lines)
-    return CaseFile(case, path, overrides)
+    return CaseFile(case, path, overrides, text)
+
+
+def from_text(text: str, name: str, directory: Path, overrides: Iterable[str] = ()) -> CaseFile:
+    """A case that is no file, from its TOML text and the overrides; checked as a file is, but for `expected.toml`.
+
+    name: what messages call it · directory: from which paths in the case are meant.
+    Raises BadCase with one line for each mistake.
+    """
+    overrides = tuple(overrides)
+    case, lines = _checked(table_of(text, name), overrides, _Places(name, {}), directory)
+    if lines or case is None:
+        raise BadCase(lines)
+    return CaseFile(case, directory / name, overrides, text)
+
+
+def changed(table: dict, override: str) -> dict:
+    """The table of a case with one more override; the given one stays as it is.
+
+    Raises BadCase where the name is unknown, or the value nothing that the name may have; what it means beside the rest
+    of the case is left to `load` and `from_text`.
+    """
+    found, places = copy.deepcopy(table), _Places("", {})
+    path = _apply(found, override)
+    places.override(path, override)
+    try:
+        Case.model_validate(found)
+    except ValidationError as error:
+        mistakes = [explain_error(item) for item in error.errors()]
+        lines = [_line(place, text, places) for place, text in mistakes if place[: len(path)] == path]
+        if lines:
+            raise BadCase(lines) from None
+    return found
+
+
+def _checked(
+    table: dict, overrides: tuple[str, ...], places: _Places, directory: Path
+) -> tuple[Case | None, list[str]]:
+    """The case with its overrides, None where it has mistakes, and a line for each of these."""
+    for override in overrides:
+        places.override(_apply(table, override), override)
+    return _validate(table, places, _place_files(table, directory))
 
 
 def _place_files(table: dict, directory: Path) -> list[tuple[KeyPath, str]]:
@@ -165,11 +211,15 @@ def _shown(path: Path) -> str:
     return str(path.relative_to(here) if path.is_absolute() and path.is_relative_to(here) else path)
 
 
-def _read(path: Path) -> tuple[str, dict]:
+def _read(path: Path) -> str:
     try:
-        text = read_text(path)
+        return read_text(path)
     except BadPath as error:
         raise BadCase([f"{_shown(path)}: {error}"]) from error
+
+
+def table_of(text: str, name: str) -> dict:
+    """The table of a TOML text. Raises BadCase."""
     try:
         table = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -177,13 +227,13 @@ def _read(path: Path) -> tuple[str, dict]:
         at = re.search(r" \(at line (\d+), column \d+\)", what)
         if at:
             what, line = what.replace(at[0], ""), f":{at[1]}"
-        raise BadCase([f"{_shown(path)}{line}: not valid TOML: {what}"]) from error
+        raise BadCase([f"{name}{line}: not valid TOML: {what}"]) from error
     except ValueError as error:  # a whole number of thousands of digits
-        raise BadCase([f"{_shown(path)}: not valid TOML: {error}"]) from error
+        raise BadCase([f"{name}: not valid TOML: {error}"]) from error
     except RecursionError as error:
-        raise BadCase([f"{_shown(path)}: {_TOO_DEEP}"]) from error
-    _check_readable(table, _shown(path))
-    return text, table
+        raise BadCase([f"{name}: {_TOO_DEEP}"]) from error
+    _check_readable(table, name)
+    return table
 
 
 def _check_readable(table: object, place: str) -> None:
@@ -206,7 +256,8 @@ def _check_readable(table: object, place: str) -> None:
 def _apply(table: dict, override: str) -> KeyPath:
     """Write one `a.b=value` or `a.b[1].c=value` into the table; returns its path.
 
-    `value` is TOML; what is no TOML is taken as text, so that units need no quotes. `a.b=absent` leaves a.b out.
+    `value` is TOML; what is no TOML is taken as text, so that units need no quotes. `a.b=absent` leaves a.b out, and
+    `a[+]=value` adds an item to a list, which need not be there yet.
     """
     if not _is_utf_8(override):
         raise BadCase([f"--set {os.fsencode(override)!r}: no text in UTF-8"])
@@ -222,6 +273,9 @@ def _apply(table: dict, override: str) -> KeyPath:
     holder = table
     for part, following in pairwise(path):
         holder = _step_into(holder, part, [] if isinstance(following, int) else {}, override)
+    if path[-1] == NEW and isinstance(holder, list):
+        path = (*path[:-1], len(holder))
+        holder.append(None)
     _step_into(holder, path[-1], None, override)
     holder[path[-1]] = _value(value.strip(), override)
     _check_readable(table, f"--set {_cut(override)}")
@@ -248,14 +302,16 @@ def _leave_out(table: dict, path: KeyPath, override: str) -> None:
 
 
 def _parse_path(name: str) -> KeyPath:
-    if not re.fullmatch(r"[A-Za-z0-9_-]+(\[\d+\]|\.[A-Za-z0-9_-]+)*", name):
+    if not re.fullmatch(r"[A-Za-z0-9_-]+(\[\d+\]|\.[A-Za-z0-9_-]+)*(\[\+\])?", name):
         return ()
-    parts = re.findall(r"\[(\d+)\]|([A-Za-z0-9_-]+)", name)
-    return tuple(int(place) if place else word for place, word in parts)
+    parts = re.findall(r"\[(\d+|\+)\]|([A-Za-z0-9_-]+)", name)
+    return tuple(word or (NEW if place == "+" else int(place)) for place, word in parts)
 
 
 def _step_into(holder: dict | list, part: str | int, new: dict | list | None, override: str):
     """The thing under `part`, made when a name is new; refuses places that do not exist."""
+    if part == NEW:
+        raise BadCase([f"--set {_cut(override)}: [+] adds to a list, and this is none"])
     if isinstance(part, int):
         if not isinstance(holder, list) or part >= len(holder):
             size = len(holder) if isinstance(holder, list) else 0

@@ -11,6 +11,7 @@ EXTRAS = {
     "benchmark": ("pyamg",),
     "terrain": ("rasterio", "pyproj", "pyogrio"),
     "test": ("pytest", "hypothesis", "manifold3d", "pyamg"),
+    "pandas": ("pandas",),
 }
 """Packages of an extra; of those that tests need, without the tools that read the code."""
 COMMANDS = {"view": "render", "benchmark": "benchmark", "test": "test"}

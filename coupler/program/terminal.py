@@ -47,10 +47,14 @@ def table(title: str, rows: Iterable[Row]) -> None:
 
 
 def _plain(title: str, rows: list[Row]) -> None:
-    print(title)
+    print("\n  ".join([title, *lines(rows)]))
+
+
+def lines(rows: Iterable[Row]) -> list[str]:
+    """The rows as aligned plain lines."""
+    rows = list(rows)
     width = max((len(row.name) for row in rows), default=0)
-    for row in rows:
-        print("  " + f"{row.name:{width}}  {number(row.value)} {row.unit}  {row.remark}".rstrip())
+    return [f"{row.name:{width}}  {number(row.value)} {row.unit}  {row.remark}".rstrip() for row in rows]
 
 
 def number(value: str | float | int) -> str:

@@ -46,6 +46,8 @@ class Recorder:
         self.impulse = np.zeros(3)
         self.reinserted, self.clipped = 0.0, 0
         self.reinserted_net = self.left = self.parted = 0.0
+        self.readings: dict[str, float | None] = {}
+        """What the gauges of the common table read in the last step."""
         self._kept = kept
         self._tables: dict[str, HistoryTable] = {}
         self._energy = self._table("energy", ENERGY)
@@ -171,6 +173,7 @@ class Recorder:
             for gauge in self._together():
                 values |= gauge.read(c, record)
             self._gauges.append(time=record.time, **values)
+            self.readings = values
         for gauge, table in self._own:
             for row in gauge.read(c, record):
                 table.append(**row)

@@ -13,7 +13,6 @@ import hashlib
 import json
 import math
 import os
-import shutil
 import sys
 import time
 from collections.abc import Mapping
@@ -55,7 +54,7 @@ class RunDirectory:
         _claim(path)
         run = cls(path, _summary(file, content), RunLock(path))
         (path / ".reserve").write_bytes(bytes(RESERVE))
-        shutil.copyfile(file.path, path / "case.toml")
+        (path / "case.toml").write_text(file.text, encoding="utf-8")
         write_json(path / "effective.json", content)
         run.begin()
         return run

@@ -13,20 +13,32 @@ from coupler.results.expected import verdicts
 from coupler.run.directory import RunDirectory
 
 
-def carry_out(file: CaseFile, directory: RunDirectory, checkpoint=None) -> ExitCode:
-    """Run a case in its directory to the end, from a checkpoint or from the start; how it ended."""
+def carry_out(
+    file: CaseFile,
+    directory: RunDirectory,
+    checkpoint=None,
+    each: Callable | None = None,
+    wish: Callable[[], str | None] | None = None,
+    quiet: bool = False,
+) -> ExitCode:
+    """Run a case in its directory to the end, from a checkpoint or from the start; how it ended.
+
+    each: see `run` · wish: asked after every step why the run is to end, None to go on · quiet: tells the log alone.
+    """
     # here, because `check` describes a case without what a run loads
     from coupler.run.progress import reporter
     from coupler.run.run import run
     from coupler.run.stop import StopRequest
 
     with directory, StopRequest(directory.path) as stop:
-        with reporter(file.case.time.end, directory.log, stop.requested) as tell:
+        asked = stop.requested if wish is None else lambda: stop.requested() or wish()
+        with reporter(file.case.time.end, directory.log, asked, quiet) as tell:
             describe(file, tell.message)
-            code = ExitCode(run(file.case, directory, tell, checkpoint))
+            code = ExitCode(run(file.case, directory, tell, checkpoint, each))
             compare(file, directory, tell.message)
         directory.finish(code, "reached the end" if code == ExitCode.DONE else "see log.txt")
-    print(f"results in {directory.path}")
+    if not quiet:
+        print(f"results in {directory.path}")
     return code
 
 
@@ -43,7 +55,7 @@ def describe(file: CaseFile, tell: Callable[[str], object]) -> None:
 def compare(file: CaseFile, directory: RunDirectory, tell: Callable[[str], object]) -> None:
     """Tell whether a run of the case as it is written kept what its expected.toml promises; no file, no promise."""
     promises = file.directory / "expected.toml"
-    if file.overrides or not promises.exists():
+    if file.overrides or not file.path.is_file() or not promises.exists():
         return
     found = verdicts(directory.path, promises)
     for verdict in found:

@@ -18,7 +18,7 @@ from coupler.case.inflow_records import record_columns
 from coupler.case.schedule import Schedule, checkpoint_interval
 from coupler.checks.places import BYTES_PER_CELL, mesh_size
 from coupler.geometry.tank_mesh import water_in
-from coupler.program.terminal import Row
+from coupler.program.terminal import Row, lines
 from coupler.step.observe import joint_counts
 
 LONGEST_REST_STEP = 0.3
@@ -41,9 +41,20 @@ HISTORY_BYTES_PER_STEP = 4000
 
 @dataclass(frozen=True)
 class Forecast:
-    """rows: (name, value, unit, remark), in the order in which they are told."""
+    """rows: (name, value, unit, remark), in the order in which they are told · remarks: what else is worth knowing."""
 
     rows: list[Row]
+    remarks: tuple[str, ...] = ()
+
+    def __getitem__(self, name: str) -> str | float | int:
+        """The value of a row, in its unit. Raises KeyError."""
+        for row in self.rows:
+            if row.name == name:
+                return row.value
+        raise KeyError(f"{name}: not in this forecast; it has {', '.join(row.name for row in self.rows)}")
+
+    def __str__(self) -> str:
+        return "\n".join([*lines(self.rows), *(f"note: {remark}" for remark in self.remarks)])
 
 
 def forecast(case: Case, exact: bool = False, place: Path = Path()) -> Forecast:

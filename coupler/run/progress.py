@@ -6,6 +6,7 @@ The loop knows only the protocol `Reporter`; figures are ordered name -> text, f
 
 from __future__ import annotations
 
+import io
 import time as clock
 from collections.abc import Callable, Mapping
 from typing import Protocol, TextIO
@@ -118,7 +119,15 @@ class BarReporter(_Base):
         self.log(text)
 
 
-def reporter(end: float, log: Callable[[str], None], stop: Callable[[], str | None]):
-    """The reporter that suits standard output; a context manager that is a Reporter."""
-    kind = BarReporter if console().is_terminal else LineReporter
+class QuietReporter(LineReporter):
+    """Nothing but the log."""
+
+    def __init__(self, end, log, stop):
+        super().__init__(end, log, stop)
+        self.stream = io.StringIO()
+
+
+def reporter(end: float, log: Callable[[str], None], stop: Callable[[], str | None], quiet: bool = False):
+    """The reporter that suits standard output, or nobody who looks on; a context manager that is a Reporter."""
+    kind = QuietReporter if quiet else BarReporter if console().is_terminal else LineReporter
     return kind(end, log, stop)

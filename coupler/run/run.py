@@ -17,7 +17,7 @@ from coupler.run.clock import Clock
 from coupler.run.left_out import imports, note_work
 from coupler.run.within_step import LongSteps, StepLeft
 from coupler.scene.build import Scene, build, limits_of
-from coupler.step.limits import LimitReached, Limits, check_defect, check_overlap
+from coupler.step.limits import LimitReached, Limits, Stopped, check_defect, check_overlap
 from coupler.step.observe import joint_counts, size
 from coupler.step.step_limits import check_step
 
@@ -25,10 +25,11 @@ FAST_OPENING = 0.25
 """Growth of λ/δ_f in a substep from which tearing counts as averaged over it."""
 
 
-def run(case: Case, directory, reporter, checkpoint=None) -> ExitCode:
+def run(case: Case, directory, reporter, checkpoint=None, each=None) -> ExitCode:
     """Run a case into a RunDirectory; its figures go into run.json however the run ends.
 
-    checkpoint: Checkpoint of an earlier process from which the run goes on.
+    checkpoint: Checkpoint of an earlier process from which the run goes on ·
+    each: called after every step with the Coupling, the StepRecord, the figures so far and the readings of the gauges.
 
     Raises SurgebreakError (or an error of the water or the structure) when the run ends before its time; what was
     written until then stays.
@@ -47,7 +48,7 @@ def run(case: Case, directory, reporter, checkpoint=None) -> ExitCode:
                 directory.record(size=size(scene.coupling))
             if scene.coupling.structure is not None:
                 directory.record(laws=laws_of(scene.coupling.structure))
-            _steps(case, scene, directory, reporter, clock, figures, checkpoint)
+            _steps(case, scene, directory, reporter, clock, figures, checkpoint, each)
         finally:
             if scene.coupling.structure is not None:
                 scene.coupling.structure.close()
@@ -111,7 +112,7 @@ def laws_of(structure) -> dict[str, str]:
 
 
 def _steps(
-    case: Case, scene: Scene, directory, reporter, clock: Clock, figures: dict, checkpoint=None
+    case: Case, scene: Scene, directory, reporter, clock: Clock, figures: dict, checkpoint=None, each=None
 ) -> None:
     coupling = scene.coupling
     limits = limits_of(case)
@@ -133,6 +134,8 @@ def _steps(
                 recorder.step(record)
             _note(coupling, record, figures)
             reporter.step(coupling.time, _told(coupling, record))
+            if each is not None:
+                each(coupling, record, figures, recorder.readings)
             check_step(coupling, record, limits)
             check_defect(coupling.time, coupling.defects.mean, case.limits.defect)
             if coupling.structure is not None:
@@ -147,12 +150,12 @@ def _steps(
             if checkpoints is not None and (wish or at_end or checkpoints.due()):
                 _save(checkpoints, directory, figures, clock)
             if wish:
-                raise LimitReached(wish + way_on)
+                raise _end(reporter)(wish + way_on)
     except StepLeft as left:
         if checkpoints is not None:
             with clock("output"):
                 checkpoints.put(long.held)
-        raise LimitReached(str(left) + way_on) from None
+        raise _end(reporter)(str(left) + way_on) from None
     finally:
         recorder.close()
         _tell_verdict(recorder, directory, reporter)
@@ -181,6 +184,11 @@ def _long_steps(coupling, limits: Limits, reporter, clock: Clock, figures: dict,
     if coupling.structure is not None:
         coupling.structure.pause = long
     return long
+
+
+def _end(reporter) -> type[LimitReached]:
+    """What ends a run before its time: the wish of the user, or else a limit."""
+    return Stopped if reporter.stop_requested() else LimitReached
 
 
 def _reached(time: float, target: float) -> bool:

@@ -17,9 +17,13 @@ class Diverged(SurgebreakError):
 
 
 class LimitReached(SurgebreakError):
-    """A budget that the case set, or the user's own wish to stop; the results so far are sound."""
+    """A budget that the case set; the results so far are sound."""
 
     exit_code = ExitCode.STOPPED
+
+
+class Stopped(LimitReached):
+    """The user's own wish: Ctrl-C, a file named `stop`, a script."""
 
 
 @dataclass(frozen=True)

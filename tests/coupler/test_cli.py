@@ -136,7 +136,7 @@ import sys
 import types
 import coupler.commands.cli as cli
 fake = types.ModuleType("coupler.run.run")
-def run(case, directory, tell, checkpoint=None):
+def run(case, directory, tell, checkpoint=None, each=None):
     for k in range(1, 11):
         tell.step(case.time.end * k / 10, {{"dt": "1 ms"}})
     {then}

@@ -15,8 +15,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
-from zlib import crc32
 
 import numpy as np
 from numba import njit
@@ -24,7 +22,8 @@ from numba import njit
 from yade_scripts.blocks.kinematics import add_forces, arm, cross, dot, parting, place, turned
 from yade_scripts.joints import laws, mixed_modes
 from yade_scripts.joints.kernel import split
-from yade_scripts.joints.specialise import specialised
+from yade_scripts.joints.law import CohesiveLaw
+from yade_scripts.joints.specialise import source_checksum, specialised
 
 UNIT, DF, BETA, KC, K0, MU = range(6)
 """Columns of the law of a joint (J, 6): T_max/δ_f [Pa/m], δ_f [m], β, k_c [Pa/m], k_0 [Pa/m], μ where it has failed."""
@@ -279,13 +278,15 @@ class JointKernels:
     point_tangents: Callable
 
 
-@cache
 def kernels_of(law: str, mixed_mode: str) -> JointKernels:
-    """Compiled at the first call of each; kept on disk under the checksum of the file of the law."""
-    chosen = laws.find(law)
+    """Compiled at the first call of each; kept on disk under a checksum of the law, so that a changed one is noticed."""
+    return _kernels(law, laws.find(law), mixed_mode)
+
+
+@cache
+def _kernels(law: str, chosen: CohesiveLaw, mixed_mode: str) -> JointKernels:
     mode = mixed_modes.find(mixed_mode)
-    source = Path(chosen.secant.py_func.__code__.co_filename).read_bytes()
-    name = f"{law}_{mixed_mode}_{crc32(source):08x}"
+    name = f"{law}_{mixed_mode}_{source_checksum(chosen.secant, chosen.work):08x}"
 
     def inner(function, **functions):
         return specialised(function, name, cache=False, **functions)

@@ -7,7 +7,9 @@ closures between processes. A copy of the kernel with the chosen functions among
 from __future__ import annotations
 
 from collections.abc import Callable
-from types import FunctionType
+from pathlib import Path
+from types import CodeType, FunctionType
+from zlib import crc32
 
 from numba import njit
 
@@ -20,3 +22,33 @@ def specialised(kernel: Callable, name: str, cache: bool = True, **chosen: Calla
     copy = FunctionType(kernel.__code__, kernel.__globals__ | chosen, kernel.__name__, kernel.__defaults__)
     copy.__qualname__, copy.__module__ = f"{kernel.__qualname__}_{name}", kernel.__module__
     return njit(cache=cache)(copy)
+
+
+def source_checksum(*functions: Callable) -> int:
+    """Of compiled functions: of their files where these can be read, and of the code of all that they call."""
+    found, seen = 0, set()
+    for function in functions:
+        place = Path(function.py_func.__code__.co_filename)
+        found = crc32(place.read_bytes() if place.is_file() else b"", found)
+        found = _code_checksum(function.py_func, found, seen)
+    return found
+
+
+def _code_checksum(function: FunctionType, found: int, seen: set[CodeType]) -> int:
+    """Of code, constants, and the globals that it names; functions among them are followed."""
+    code = function.__code__
+    if code in seen:
+        return found
+    seen.add(code)
+    found = crc32(
+        code.co_code + repr([c for c in code.co_consts if not isinstance(c, CodeType)]).encode(), found
+    )
+    held = dict(zip(code.co_freevars, (cell.cell_contents for cell in function.__closure__ or ())))
+    for name in (*code.co_names, *code.co_freevars):
+        value = held.get(name, function.__globals__.get(name))
+        inner = getattr(value, "py_func", value)
+        if isinstance(inner, FunctionType):
+            found = _code_checksum(inner, found, seen)
+        elif isinstance(value, int | float | tuple | str):
+            found = crc32(f"{name}={value!r}".encode(), found)
+    return found

@@ -16,6 +16,7 @@ from coupler.case.case import effective
 from coupler.case.keys import find
 from coupler.case.study import Ladder, Study
 from coupler.case.study_names import without_places
+from coupler.case.toml_text import inline
 from coupler.case.units import to_si
 from coupler.checks.read_case import CaseFile, load
 from coupler.program.errors import BadCase, UnitError
@@ -145,14 +146,9 @@ def steps(ladder: Ladder, larger: bool) -> list[tuple[str, tuple[str, ...], floa
         parts = value if isinstance(ladder.key, tuple) else (value,)
         label = ladder.labels[number] if ladder.labels else ", ".join(str(part) for part in parts)
         size = ladder.sizes[number] if ladder.sizes else _size(names[0], parts[0])
-        overrides = tuple(f"{name}={toml(part)}" for name, part in zip(names, parts))
+        overrides = tuple(f"{name}={inline(part)}" for name, part in zip(names, parts))
         found.append((label, overrides, size))
     return found
-
-
-def toml(value) -> str:
-    """A value as TOML: JSON writes booleans, numbers, texts and lists of them the same way."""
-    return json.dumps(value, ensure_ascii=False)
 
 
 def _size(name: str, value) -> float | None:

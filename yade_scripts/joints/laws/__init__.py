@@ -1,7 +1,7 @@
 """Cohesive laws, one file a law; the name of the file is the name of the law.
 
 A file offers `LAW`, a `CohesiveLaw`: secant and work of a law in pure opening, without dimensions. Nothing
-else in the program knows a law by its formula.
+else in the program knows a law by its formula. Laws of users come by `outside_laws`.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import difflib
 from importlib import import_module
 from pkgutil import iter_modules
 
+from yade_scripts.joints import outside_laws
 from yade_scripts.joints.law import CohesiveLaw
 
 
@@ -20,16 +21,26 @@ class UnknownLaw(ValueError):
 
 
 def names() -> list[str]:
-    """Names of the laws, sorted. Imports none of them."""
+    """Names of all laws, sorted: those of this folder, and those from outside. Imports none of this folder."""
+    return sorted({*shipped(), *outside_laws.names()})
+
+
+def shipped() -> list[str]:
+    """Names of the laws of this folder."""
     return sorted(module.name for module in iter_modules(__path__))
 
 
 def find(name: str) -> CohesiveLaw:
-    """The law of that name. Raises UnknownLaw."""
+    """The law of that name. Raises UnknownLaw, and BadLaw for one of a package that does not hold what a law must."""
+    if name not in shipped():
+        found = outside_laws.find(name)
+        if found is not None:
+            return found
     known = names()
     if name not in known:
         near = difflib.get_close_matches(name, known, n=1, cutoff=0.0)
         raise UnknownLaw(
-            f"joints.law = '{name}': there is no such law; did you mean '{near[0]}'? Laws: {', '.join(known)}"
+            f"joints.law = '{name}': there is no such law; did you mean '{near[0]}'? Laws: {', '.join(known)}; "
+            "one of your own is named by --law FILE.py"
         )
     return import_module(f"{__name__}.{name}").LAW

@@ -1,0 +1,261 @@
+"""A case in the hands of a script: read or built, changed by the names of the case file, checked, run."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from coupler.case import toml_text
+from coupler.api.run import Run
+from coupler.api.step import Step
+from coupler.run.execute import carry_out
+from coupler.case.case import effective
+from coupler.checks.case import remarks
+from coupler.checks.read_case import ABSENT, CaseFile, changed, from_text, load, table_of
+from coupler.program.errors import ExitCode, SurgebreakError
+from coupler.run.forecast import Forecast, forecast
+from coupler.step.limits import Stopped
+from coupler.run.directory import RunDirectory
+
+Callback = Callable[[Step], object]
+_one_at_a_time = threading.Lock()
+
+
+class RunInRun(SurgebreakError):
+    """Another run of this process has not ended yet."""
+
+    exit_code = ExitCode.BAD_CASE
+
+
+class Case:
+    """A case that a script may change. Made by `load`, or from tables as a case file has them:
+
+        Case({"case": {"title": "a drop"}, "time": {"end": "1 s"}, "tank": {...}, "water": {...}})
+
+    Names, units and errors are those of the case file (docs/case_file.md): numbers are SI, texts may carry units.
+    A change that names nothing in the schema, or gives it what it cannot be, raises BadCase at once and changes nothing;
+    what values mean beside one another is looked at by `check` and `run`.
+    """
+
+    def __init__(self, tables: Mapping[str, Any], directory: Path | str = "."):
+        """directory: from which paths in the case are meant, and where `run` puts `runs/`.
+
+        Raises TypeError for values that no case file can hold.
+        """
+        self._text = toml_text.document(tables)
+        self._place: Path | None = None
+        self._directory = Path(directory)
+        self._changes: list[str] = []
+        self._table = table_of(self._text, "case")
+
+    @classmethod
+    def load(cls, place: Path | str, changes: Iterable[str] = ()) -> Case:
+        """The case at a place, a `case.toml` or its directory, with changes `KEY=VALUE` as `--set` takes them.
+
+        Raises BadCase.
+        """
+        file = load(place, changes)
+        found = cls.__new__(cls)
+        found._text, found._place, found._directory = file.text, file.path, file.directory
+        found._changes = []
+        found._table = table_of(file.text, str(file.path))
+        for change in file.overrides:
+            found._change(change)
+        return found
+
+    # ------------------------------------------------------------ values
+
+    def set(self, key: str, value: Any) -> Case:
+        """Give a name of the case file a value: `set("tank.cell", "10 cm")`, `set("structure.block[0].density", 900)`.
+
+        value: a number (SI), a text with a unit, a boolean, a list or array, a table; None leaves the name out.
+        Raises BadCase (an unknown name, a wrong unit, out of range) and TypeError. Returns the case, so that calls
+        can follow one another.
+        """
+        self._change(f"{key}={ABSENT if value is None else toml_text.inline(value)}")
+        return self
+
+    def add(self, section: str, **values: Any) -> Case:
+        """Add an item to a list of tables: `add("gauge", kind="level", name="in_front", at=[2.2, 0.5])`.
+
+        Raises BadCase and TypeError, as `set`.
+        """
+        return self.set(f"{section}[+]", values)
+
+    def get(self, key: str) -> Any:
+        """A value as it was written or set, None where it was not: defaults are in `effective`."""
+        found: Any = self._table
+        for part in key.replace("[", ".[").split("."):
+            try:
+                found = found[int(part[1:-1]) if part.startswith("[") else part]
+            except (KeyError, IndexError, TypeError, ValueError):
+                return None
+        return found
+
+    def __getitem__(self, key: str) -> Any:
+        found = self.get(key)
+        if found is None:
+            raise KeyError(f"{key}: not written in this case; `effective` has the defaults")
+        return found
+
+    def __setitem__(self, key: str, value: Any) -> None:
+        self.set(key, value)
+
+    def __delitem__(self, key: str) -> None:
+        self.set(key, None)
+
+    def __contains__(self, key: str) -> bool:
+        return self.get(key) is not None
+
+    def copy(self) -> Case:
+        """The same case, to be changed apart."""
+        found = Case.__new__(Case)
+        found.__dict__.update(self.__dict__, _changes=list(self._changes))
+        return found
+
+    @property
+    def changes(self) -> tuple[str, ...]:
+        """What was set, as `--set` of the command line takes it."""
+        return tuple(self._changes)
+
+    @property
+    def effective(self) -> dict[str, Any]:
+        """Every value in SI, defaults filled in. Raises BadCase."""
+        return effective(self.file().case)
+
+    def __repr__(self) -> str:
+        title = self.get("case.title")
+        return f"<surgebreak.Case {title!r}, {self._place or 'from a script'}, {len(self._changes)} changes>"
+
+    def _change(self, change: str) -> None:
+        self._table = changed(self._table, change)
+        self._changes.append(change)
+
+    # ------------------------------------------------------------ what to do with it
+
+    def file(self) -> CaseFile:
+        """The checked case, as the rest of the program takes it. Raises BadCase with a line for each mistake."""
+        if self._place is not None:
+            return load(self._place, self._changes, text=self._text)
+        return from_text(self._text, "case", self._directory, self._changes)
+
+    def save(self, directory: Path | str) -> Path:
+        """Write the case, with its changes, as `case.toml` into a directory; its path.
+
+        Paths in it stay as they are written, and are then meant from there. Raises SurgebreakError where there is one
+        already.
+        """
+        path = Path(directory) / "case.toml"
+        if path.exists():
+            raise SurgebreakError(f"{path}: exists and is left as it is; name another directory")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(toml_text.document(self._table), encoding="utf-8")
+        return path
+
+    def check(self, exact: bool = False) -> Forecast:
+        """Check the case and forecast steps, substep, memory and disk; with a structure YADE is asked.
+
+        exact: solve for the exact frequency of the joints as well.
+        Returns `Forecast`: `rows` of name, value, unit, remark, and `remarks`, what is worth knowing. Raises BadCase.
+        """
+        file = self.file()
+        with _alone():
+            found = forecast(file.case, exact, file.directory)
+        return Forecast(found.rows, tuple(remarks(file.case)))
+
+    def run(
+        self,
+        output: Path | str | None = None,
+        callback: Callback | None = None,
+        stop: Callable[[Step], object] | None = None,
+        quiet: bool = True,
+    ) -> Run:
+        """Run the case in this process, to its end or until `stop`; the run, to be read.
+
+        output: a new or empty directory; None: `runs/<time>-<hash>` beside the case ·
+        callback: called after every step with a `Step` · stop: called after it; what is true ends the run, a text says
+        why · quiet: tell nothing but the log of the run.
+
+        A run that `stop`, Ctrl-C or a file named `stop` ended has the status "stopped", and `Run.resume` goes on.
+        Raises BadCase, RunDirectoryExists, RunInRun, Diverged, LimitReached (a limit of the case), and what the callback
+        raises; what was written until then stays, and `surgebreak.open` reads it.
+        """
+        file = self.file()
+        with _alone():
+            directory = RunDirectory.create(file, None if output is None else Path(output))
+            return execute(file, directory, None, callback, stop, quiet)
+
+
+def execute(
+    file: CaseFile,
+    directory: RunDirectory,
+    checkpoint: Any,
+    callback: Callback | None,
+    stop: Callable[[Step], object] | None,
+    quiet: bool,
+) -> Run:
+    """Run in a directory, from the start or a checkpoint; the run. A wish to stop is met, a limit raises."""
+    watch = _Watch(callback, stop)
+    each = watch.step if callback or stop else None
+    try:
+        carry_out(file, directory, checkpoint, each, watch.wish, quiet)
+    except Stopped:
+        pass  # as was asked; run.json says so
+    return Run(directory.path)
+
+
+class _Watch:
+    """What callback and stop of a script say, step by step."""
+
+    def __init__(self, callback: Callback | None, stop: Callable[[Step], object] | None):
+        self._callback, self._stop = callback, stop
+        self.reason: str | None = None
+
+    def step(self, coupling, record, figures, readings) -> None:
+        step = Step(coupling, record, figures, readings)
+        if self._callback is not None:
+            self._callback(step)
+        wish = self._stop(step) if self._stop is not None else None
+        if wish:
+            text = f": {wish}" if isinstance(wish, str) else ""
+            self.reason = f"stopped by the script at t = {coupling.time:.6g} s{text}"
+
+    def wish(self) -> str | None:
+        return self.reason
+
+
+@contextmanager
+def _alone() -> Iterator[None]:
+    """YADE holds one scene a process: a second run, from a callback or another thread, is refused. Raises RunInRun."""
+    if not _one_at_a_time.acquire(blocking=False):
+        raise RunInRun(
+            "another run or check of this process is not over yet, and YADE holds one scene a process; wait for its "
+            "end, or start the other in a process of its own (`surgebreak run`, subprocess)"
+        )
+    try:
+        yield
+    finally:
+        _one_at_a_time.release()
+
+
+def resume(
+    directory: Path,
+    changes: Iterable[str],
+    callback: Callback | None,
+    stop: Callable[[Step], object] | None,
+    quiet: bool,
+    any_version: bool,
+) -> Run:
+    """See `Run.resume`."""
+    from coupler.run.resume import prepare
+
+    with _alone():
+        found = prepare(directory, changes, any_version, _nowhere if quiet else print)
+        return execute(found.file, found.directory, found.checkpoint, callback, stop, quiet)
+
+
+def _nowhere(text: str) -> None:
+    """Nobody looks on."""

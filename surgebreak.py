@@ -1,0 +1,55 @@
+"""How a structure breaks when water hits it: the Python side of surgebreak.
+
+    import surgebreak
+
+    case = surgebreak.load("cases/dam_break_building")
+    case.set("joints.strength", "0.3 MPa").set("time.end", "1 s")
+    run = case.run("weaker", callback=lambda step: print(step.time, step.joints_broken))
+
+    run = surgebreak.open("weaker")
+    force = run.history("gauges")            # numpy; run.frame("gauges") is a pandas table
+    water, blocks = run.water(0.5), run.blocks(0.5)
+
+The names in `__all__`, and the public names of what they return, are what scripts may rely on; the packages below
+(`coupler`, `fluid`, `yade_scripts`) may change with any version. Import this before numpy: the last digits are the same
+on every processor only if numpy is loaded as it is set here.
+"""
+
+from coupler.program.arithmetic import fix_arithmetic as _fix_arithmetic
+from coupler.program.kernel_cache import use_kernel_cache as _use_kernel_cache
+
+_fix_arithmetic()
+_use_kernel_cache()
+
+from coupler.api.case import Case, RunInRun  # noqa: E402
+from coupler.api.laws import register_law  # noqa: E402
+from coupler.api.run import BlockState, Run, WaterState  # noqa: E402
+from coupler.api.step import Blocks, Step  # noqa: E402
+from coupler.program.errors import BadCase, SurgebreakError  # noqa: E402
+from coupler.run.forecast import Forecast  # noqa: E402
+from coupler.results.history import History  # noqa: E402
+from coupler.step.limits import Diverged, LimitReached  # noqa: E402
+from coupler.program.provenance import version as _version  # noqa: E402
+
+__all__ = [
+    "BadCase",
+    "BlockState",
+    "Blocks",
+    "Case",
+    "Diverged",
+    "Forecast",
+    "History",
+    "LimitReached",
+    "Run",
+    "RunInRun",
+    "Step",
+    "SurgebreakError",
+    "WaterState",
+    "load",
+    "open",
+    "register_law",
+]
+__version__ = _version()
+
+load = Case.load
+open = Run
