@@ -26,10 +26,10 @@ from coupler.api.laws import register_law  # noqa: E402
 from coupler.api.run import BlockState, Run, WaterState  # noqa: E402
 from coupler.api.step import Blocks, Step  # noqa: E402
 from coupler.program.errors import BadCase, SurgebreakError  # noqa: E402
-from coupler.run.forecast import Forecast  # noqa: E402
-from coupler.results.history import History  # noqa: E402
-from coupler.step.limits import Diverged, LimitReached  # noqa: E402
 from coupler.program.provenance import version as _version  # noqa: E402
+from coupler.results.history import History  # noqa: E402
+from coupler.run.forecast import Forecast  # noqa: E402
+from coupler.step.limits import Diverged, LimitReached  # noqa: E402
 
 __all__ = [
     "BadCase",

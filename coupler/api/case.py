@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from coupler.case import toml_text
 from coupler.api.run import Run
 from coupler.api.step import Step
-from coupler.run.execute import carry_out
+from coupler.case import toml_text
 from coupler.case.case import effective
 from coupler.checks.case import remarks
 from coupler.checks.read_case import ABSENT, CaseFile, changed, from_text, load, table_of
 from coupler.program.errors import ExitCode, SurgebreakError
-from coupler.run.forecast import Forecast, forecast
-from coupler.step.limits import Stopped
 from coupler.run.directory import RunDirectory
+from coupler.run.execute import carry_out
+from coupler.step.limits import Stopped
+
+if TYPE_CHECKING:
+    from coupler.run.forecast import Forecast
 
 Callback = Callable[[Step], object]
 _one_at_a_time = threading.Lock()
@@ -36,8 +39,8 @@ class Case:
         Case({"case": {"title": "a drop"}, "time": {"end": "1 s"}, "tank": {...}, "water": {...}})
 
     Names, units and errors are those of the case file (docs/case_file.md): numbers are SI, texts may carry units.
-    A change that names nothing in the schema, or gives it what it cannot be, raises BadCase at once and changes nothing;
-    what values mean beside one another is looked at by `check` and `run`.
+    A change that names nothing in the schema, or gives it what it cannot be, raises BadCase at once and changes
+    nothing; what values mean beside one another is looked at by `check` and `run`.
     """
 
     def __init__(self, tables: Mapping[str, Any], directory: Path | str = "."):
@@ -162,9 +165,11 @@ class Case:
         Returns `Forecast`: `rows` of name, value, unit, remark, and `remarks`, what is worth knowing. Raises BadCase.
         """
         file = self.file()
-        with _alone():
+        from coupler.run.forecast import forecast
+
+        with alone():
             found = forecast(file.case, exact, file.directory)
-        return Forecast(found.rows, tuple(remarks(file.case)))
+        return replace(found, remarks=tuple(remarks(file.case)))
 
     def run(
         self,
@@ -180,16 +185,16 @@ class Case:
         why · quiet: tell nothing but the log of the run.
 
         A run that `stop`, Ctrl-C or a file named `stop` ended has the status "stopped", and `Run.resume` goes on.
-        Raises BadCase, RunDirectoryExists, RunInRun, Diverged, LimitReached (a limit of the case), and what the callback
-        raises; what was written until then stays, and `surgebreak.open` reads it.
+        Raises BadCase, RunDirectoryExists, RunInRun, Diverged, LimitReached (a limit of the case), and what the
+        callback raises; what was written until then stays, and `surgebreak.open` reads it.
         """
         file = self.file()
-        with _alone():
+        with alone():
             directory = RunDirectory.create(file, None if output is None else Path(output))
-            return execute(file, directory, None, callback, stop, quiet)
+            return _execute(file, directory, None, callback, stop, quiet)
 
 
-def execute(
+def _execute(
     file: CaseFile,
     directory: RunDirectory,
     checkpoint: Any,
@@ -200,10 +205,8 @@ def execute(
     """Run in a directory, from the start or a checkpoint; the run. A wish to stop is met, a limit raises."""
     watch = _Watch(callback, stop)
     each = watch.step if callback or stop else None
-    try:
+    with suppress(Stopped):  # as was asked; run.json says so
         carry_out(file, directory, checkpoint, each, watch.wish, quiet)
-    except Stopped:
-        pass  # as was asked; run.json says so
     return Run(directory.path)
 
 
@@ -228,7 +231,7 @@ class _Watch:
 
 
 @contextmanager
-def _alone() -> Iterator[None]:
+def alone() -> Iterator[None]:
     """YADE holds one scene a process: a second run, from a callback or another thread, is refused. Raises RunInRun."""
     if not _one_at_a_time.acquire(blocking=False):
         raise RunInRun(
@@ -252,9 +255,9 @@ def resume(
     """See `Run.resume`."""
     from coupler.run.resume import prepare
 
-    with _alone():
+    with alone():
         found = prepare(directory, changes, any_version, _nowhere if quiet else print)
-        return execute(found.file, found.directory, found.checkpoint, callback, stop, quiet)
+        return _execute(found.file, found.directory, found.checkpoint, callback, stop, quiet)
 
 
 def _nowhere(text: str) -> None:

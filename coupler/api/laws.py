@@ -12,9 +12,9 @@ if TYPE_CHECKING:
 def register_law(law: CohesiveLaw | Path | str, name: str | None = None) -> str:
     """Make a cohesive law known, so that cases of this process may name it: `[joints] law = "NAME"`; its name.
 
-    law: a file NAME.py that offers LAW, which is run, or a `CohesiveLaw`; then `name` must be given. Processes that this
-    one starts take a file too, an object they do not. Raises BadLaw for what does not hold what a law must, and for a
-    name that surgebreak has a law of.
+    law: a file NAME.py that offers LAW, which is run, or a `CohesiveLaw`; then `name` must be given. Processes that
+    this one starts take a file too, an object they do not. Raises BadLaw for what lacks what a law must hold, and for
+    a name that surgebreak has a law of.
     """
     from yade_scripts.joints import outside_laws
 

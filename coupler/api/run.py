@@ -11,11 +11,11 @@ import h5py
 import numpy as np
 import numpy.typing as npt
 
-from coupler.results import vtkhdf
 from coupler.program.errors import NoRun, SurgebreakError, UnknownName, did_you_mean
 from coupler.program.extras import need
-from coupler.results.history import History, read_history
 from coupler.program.process import run_module, trouble, was_killed
+from coupler.results import vtkhdf
+from coupler.results.history import History, read_history
 from coupler.run.summary import read_summary
 
 if TYPE_CHECKING:
@@ -247,10 +247,14 @@ class Run:
         return sorted(path for path, stamp in after.items() if before.get(path) != stamp)
 
     def report(self, pictures: bool = True) -> Path:
-        """Write report.html, one page about the run; its path. Raises NotInstalled."""
-        from coupler.commands.report.command import report
-
-        return report(self.directory, pictures)
+        """Write report.html, one page about the run; its path. Raises NotDrawn."""
+        words = [] if pictures else ["--no-pictures"]
+        done = run_module("coupler.cli", "report", self.directory, *words, capture_output=True, text=True)
+        if done.returncode:
+            raise NotDrawn(
+                f"{self.directory}: no report: {trouble(done.returncode, done.stdout + done.stderr)}"
+            )
+        return self.directory / "report.html"
 
     def resume(
         self,

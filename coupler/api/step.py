@@ -18,7 +18,8 @@ class Blocks:
     """The blocks now, held ones with them; copies, which later steps do not change.
 
     names, groups: one text a block · centre (n, 3) [m] · rotation (n, 3, 3), body to world · velocity (n, 6) [m/s and
-    rad/s] of the centre · force (n, 6) [N and N m] of the water in this step · damage (n,): 0 whole, 1 all joints broken
+    rad/s] of the centre · force (n, 6) [N and N m] of the water in this step · damage (n,): 0 whole, 1 all joints
+    broken
     """
 
     names: list[str]

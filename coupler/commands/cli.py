@@ -46,6 +46,14 @@ Overrides = Annotated[
         "--set", metavar="KEY=VALUE", help="change a value of the case, for instance time.end='2 s'"
     ),
 ]
+Laws = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--law",
+        metavar="FILE",
+        help="a Python file with a cohesive law of your own, which is run; repeatable",
+    ),
+]
 
 
 def main() -> None:
@@ -69,6 +77,7 @@ def _root(
 def run(
     case: CasePlace,
     set: Overrides = None,
+    law: Laws = None,
     output: Annotated[
         Path | None,
         typer.Option(
@@ -80,9 +89,10 @@ def run(
 ) -> None:
     """Run a case. Ctrl-C or a file named `stop` in the run directory ends it cleanly."""
     one_thread()
-    from coupler.checks.read_case import load
+    take_laws(law)
+    from coupler.api.case import Case
 
-    file = load(case, [*(set or []), *([f"time.end={end}"] if end else [])])
+    file = Case.load(case, [*(set or []), *([f"time.end={end}"] if end else [])]).file()
     if dry:
         return
     from coupler.run.directory import RunDirectory
@@ -103,6 +113,7 @@ def resume(
             "--set", metavar="KEY=VALUE", help="change time.end, time.cfl, time.step_max, limits.* ..."
         ),
     ] = None,
+    law: Laws = None,
     any_version: Annotated[
         bool, typer.Option("--any-version", help="go on although the program has changed since")
     ] = False,
@@ -112,6 +123,7 @@ def resume(
     From its newest checkpoint, to the last digit as if it had never stopped.
     """
     one_thread()
+    take_laws(law)
     from coupler.run.execute import carry_out
     from coupler.run.resume import prepare
 
@@ -123,6 +135,7 @@ def resume(
 def check(
     case: CasePlace,
     set: Overrides = None,
+    law: Laws = None,
     exact: Annotated[
         bool, typer.Option("--exact", help="solve for the exact frequency of the joints as well")
     ] = False,
@@ -132,15 +145,14 @@ def check(
     Nothing is run; with a structure YADE is asked for the substep.
     """
     one_thread()
-    from coupler.checks.read_case import load
+    take_laws(law)
+    from coupler.api.case import Case
     from coupler.program import terminal
     from coupler.run.execute import describe
 
-    file = load(case, set or [])
-    describe(file, print)
-    from coupler.run.forecast import forecast
-
-    terminal.table("forecast", forecast(file.case, exact, file.directory).rows)
+    found = Case.load(case, set or [])
+    describe(found.file(), print)
+    terminal.table("forecast", found.check(exact).rows)
 
 
 @app.command(context_settings=PASS_ON | {"help_option_names": []})
@@ -310,6 +322,7 @@ def compare_laws(
         ),
     ] = "",
     set: Overrides = None,
+    law: Laws = None,
     output: Annotated[
         Path | None,
         typer.Option(
@@ -332,6 +345,7 @@ def compare_laws(
     Matched as far as they can be; table, figure, CSV, JSON, and the scripts for yade.
     """
     one_thread()
+    take_laws(law)
     from coupler.commands.compare.command import compare, show_laws
 
     raise typer.Exit(int(show_laws() if list_ else compare(case, laws, set or [], output, substeps, records)))
@@ -350,6 +364,7 @@ def study(
         int | None,
         typer.Option(min=1, metavar="N", help="times that each run is made; else study.repeat of the case"),
     ] = None,
+    law: Laws = None,
     output: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="directory of the study; else runs/study beside the case"),
@@ -370,6 +385,7 @@ def study(
     Goes on where it stopped. `study compare A B` leaves with 3 if B is worse than A.
     """
     one_thread()
+    take_laws(law)
     if len(words) == 3 and str(words[0]) == "compare":
         from coupler.commands.study.against import compare as compare_studies
 
@@ -409,6 +425,14 @@ def test(context: typer.Context) -> None:
     from coupler.program.provenance import ROOT
 
     raise typer.Exit(run_module("pytest", *context.args, cwd=ROOT).returncode)
+
+
+def take_laws(files: list[Path] | None) -> None:
+    """Make the laws of files that the user named known, also to processes that this one starts. Raises BadLaw."""
+    for file in files or []:
+        from coupler.api.laws import register_law
+
+        register_law(file)
 
 
 if __name__ == "__main__":

@@ -34,6 +34,7 @@ def carry_out(
         asked = stop.requested if wish is None else lambda: stop.requested() or wish()
         with reporter(file.case.time.end, directory.log, asked, quiet) as tell:
             describe(file, tell.message)
+            tell_laws(file, directory, tell.message)
             code = ExitCode(run(file.case, directory, tell, checkpoint, each))
             compare(file, directory, tell.message)
         directory.finish(code, "reached the end" if code == ExitCode.DONE else "see log.txt")
@@ -50,6 +51,20 @@ def describe(file: CaseFile, tell: Callable[[str], object]) -> None:
     tell("off: " + (", ".join(name for name, on in parts.items() if not on) or "nothing"))
     for remark in [*remarks(file.case), *filter(None, [arithmetic.remark()])]:
         tell(f"note: {remark}")
+
+
+def tell_laws(file: CaseFile, directory: RunDirectory, tell: Callable[[str], object]) -> None:
+    """Tell of laws that did not come with the program, and keep what they were in run.json; others load nothing."""
+    if file.case.joints is None:
+        return
+    from yade_scripts.joints import laws
+
+    own = laws.shipped()
+    used = {file.case.joints.law, *(pair.law for pair in file.case.joints.pair if pair.law)}
+    found = {name: laws.identity(name) for name in sorted(used) if name not in own}
+    for name, law in found.items():
+        tell(f"law '{name}': {law['from']}")
+    directory.summary["laws"] = found
 
 
 def compare(file: CaseFile, directory: RunDirectory, tell: Callable[[str], object]) -> None:

@@ -57,6 +57,7 @@ def prepare(
     checkpoint, unusable = _newest(path)
     for line in unusable:
         tell(f"note: {line}")
+    _check_laws(path, summary.get("laws", {}), any_version)
     file = load(
         path / "case.toml", [*summary["overrides"], *overrides], files=Path(summary["case_file"]).parent
     )
@@ -192,6 +193,25 @@ def _check_program(checkpoint: Checkpoint, any_version: bool, tell) -> None:
             "then the rest of the run need not be what it would have been to the last digit."
         )
     tell(f"note: the checkpoint was written by another program: {'; '.join(found)}")
+
+
+def _check_laws(path: Path, laws: dict, any_version: bool) -> None:
+    """Laws that did not come with the program are given again, and are what they were."""
+    if not laws:
+        return
+    from yade_scripts.joints.laws import identity, names
+
+    for name, then in laws.items():
+        if name not in names():
+            raise CannotResume(
+                f"{path}: its joints go by the law '{name}' of {then.get('from')}, which is not known here; name its "
+                "file again with --law FILE, register it again in the script, or install its package"
+            )
+        if identity(name)["checksum"] != then.get("checksum") and not any_version:
+            raise CannotResume(
+                f"{path}: the law '{name}' of {then.get('from')} is not what it was when the run began. Undo that, "
+                "or give --any-version"
+            )
 
 
 def _check_end(path: Path, checkpoint: Checkpoint, file: CaseFile) -> None:

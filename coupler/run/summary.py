@@ -182,6 +182,7 @@ class _Summary(_Part):
     wall_seconds: Number = 0.0
     cpu_seconds: Number = 0.0
     resumed: list[_Again] = []
+    laws: dict[str, dict[str, Text]] = {}
 
 
 def read_summary(path: Path) -> dict[str, Any]:

@@ -279,7 +279,7 @@ class JointKernels:
 
 
 def kernels_of(law: str, mixed_mode: str) -> JointKernels:
-    """Compiled at the first call of each; kept on disk under a checksum of the law, so that a changed one is noticed."""
+    """Compiled at the first call of each; kept on disk under a checksum of the law, so a changed one is noticed."""
     return _kernels(law, laws.find(law), mixed_mode)
 
 

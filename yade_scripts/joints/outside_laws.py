@@ -1,5 +1,5 @@
-"""Cohesive laws from outside of this program: a file that the user names, an object that a script makes, or an installed
-package with an entry point in the group `surgebreak.laws`.
+"""Cohesive laws from outside of this program: a file that the user names, an object that a script makes, or an
+installed package with an entry point in the group `surgebreak.laws`.
 
 A case file names laws and never runs code: what is here was named by the user, on the command line, in a script, in the
 variable SURGEBREAK_LAWS (by which processes that this one starts get the files too), or by installing a package.
@@ -129,8 +129,8 @@ def _offered(found: Any, origin: str) -> CohesiveLaw:
 def examined(law: CohesiveLaw, place: str) -> CohesiveLaw:
     """The law, its functions compiled by numba if they were not, if it holds what the solver relies on. Raises BadLaw.
 
-    At the lowest, the usual and the highest peak: s finite at 0 and never rising, s r at most 1 and 1 at the peak, w the
-    integral of s r, w - s r²/2 never falling.
+    At the lowest, the usual and the highest peak: s finite at 0 and never rising, s r at most 1 and 1 at the peak, w
+    the integral of s r, w - s r²/2 never falling.
     """
     from numba import njit
 

@@ -30,6 +30,15 @@ def shipped() -> list[str]:
     return sorted(module.name for module in iter_modules(__path__))
 
 
+def identity(name: str) -> dict[str, str]:
+    """Where the law of that name is from, and a checksum of its source. Raises UnknownLaw."""
+    from yade_scripts.joints.specialise import source_checksum
+
+    law = find(name)
+    where = outside_laws.origin(name) or "surgebreak"
+    return {"from": where, "checksum": f"{source_checksum(law.secant, law.work):08x}"}
+
+
 def find(name: str) -> CohesiveLaw:
     """The law of that name. Raises UnknownLaw, and BadLaw for one of a package that does not hold what a law must."""
     if name not in shipped():
