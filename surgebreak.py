@@ -15,6 +15,8 @@ The names in `__all__`, and the public names of what they return, are what scrip
 on every processor only if numpy is loaded as it is set here.
 """
 
+from typing import TYPE_CHECKING
+
 from coupler.program.arithmetic import fix_arithmetic as _fix_arithmetic
 from coupler.program.kernel_cache import use_kernel_cache as _use_kernel_cache
 
@@ -31,11 +33,15 @@ from coupler.results.history import History  # noqa: E402
 from coupler.run.forecast import Forecast  # noqa: E402
 from coupler.step.limits import Diverged, LimitReached  # noqa: E402
 
+if TYPE_CHECKING:
+    from yade_scripts.joints.cohesion import CohesiveLaw
+
 __all__ = [
     "BadCase",
     "BlockState",
     "Blocks",
     "Case",
+    "CohesiveLaw",
     "Diverged",
     "Forecast",
     "History",
@@ -53,3 +59,12 @@ __version__ = _version()
 
 load = Case.load
 open = Run
+
+
+def __getattr__(name: str) -> object:
+    """`CohesiveLaw` loads the room of joints, with numba, and only scripts with a law of their own want it."""
+    if name == "CohesiveLaw":
+        from yade_scripts.joints.cohesion import CohesiveLaw
+
+        return CohesiveLaw
+    raise AttributeError(f"module 'surgebreak' has no attribute {name!r}")

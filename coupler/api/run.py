@@ -20,7 +20,6 @@ from coupler.run.summary import read_summary
 
 if TYPE_CHECKING:
     import pandas
-    import pyvista
 
     from coupler.api.step import Step
 
@@ -48,8 +47,8 @@ class WaterState:
     pressure: Floats
     fluid_fraction: Floats
 
-    def mesh(self) -> pyvista.UnstructuredGrid:
-        """For pyvista. Raises NotInstalled, and CrashesAfterYade in a process that has run a case with a structure."""
+    def mesh(self) -> Any:
+        """A `pyvista.UnstructuredGrid`. Raises NotInstalled, and CrashesAfterYade in a process that has run a case with a structure."""
         pv = _pyvista()
         cells = np.insert(self.cells, 0, 4, axis=1).ravel()
         found = pv.UnstructuredGrid(cells, np.full(len(self.cells), pv.CellType.TETRA), self.nodes)
@@ -85,8 +84,8 @@ class BlockState:
         rows = [face for face, owner in zip(self.faces, self.block) if owner == block]
         return self.points[np.unique(np.concatenate(rows))]
 
-    def mesh(self) -> pyvista.PolyData:
-        """For pyvista, damage and speed on the faces. Raises as `WaterState.mesh`."""
+    def mesh(self) -> Any:
+        """A `pyvista.PolyData`, damage and speed on the faces. Raises as `WaterState.mesh`."""
         faces = np.concatenate([np.insert(face, 0, len(face)) for face in self.faces])
         found = _pyvista().PolyData(self.points, faces)
         for name, values in (("damage", self.damage), ("speed", self.speed)):

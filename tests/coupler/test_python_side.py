@@ -1,4 +1,4 @@
-"""`import surgebreak`: cases changed and run by a script give what the command gives, and what is read back is what ran."""
+"""`import surgebreak`: a case run by a script is what the command makes of it, and what is read back is what ran."""
 
 import subprocess
 import sys
@@ -12,17 +12,19 @@ from coupler.program.provenance import ROOT
 from coupler.results.history import read_history
 
 DRY = {
-    "case": {"title": "a block on another"},
+    "case": {"title": "a block pulled off another"},
     "time": {"end": "40 ms", "step_max": "4 ms", "output_every": "20 ms"},
     "structure": {
         "ground": {},
         "block": [
             {"name": "lower", "size": [1, 1, 1], "centre": [0, 0, 0.5]},
-            {"name": "upper", "size": [1, 1, 1], "centre": [0, 0, 1.5], "fixed": True},
+            {"name": "upper", "size": [1, 1, 1], "centre": [0, 0, 1.5]},
         ],
+        "start": "sudden",
     },
     "contact": {"stiffness": "1 GN/m"},
-    "joints": {"strength": "1 kPa", "opening_at_failure": "0.1 mm"},
+    "joints": {"strength": "0.1 MPa", "opening_at_failure": "1 mm"},
+    "motion": [{"block": "upper", "velocity": [0, 0, "10 cm/s"]}],
 }
 
 
@@ -94,7 +96,7 @@ def test_what_is_saved_is_read_back_as_the_same_case(tmp_path):
 def test_mistakes_of_a_loaded_case_have_the_lines_of_its_file(tmp_path):
     (tmp_path / "case.toml").write_text(FIRST_CASE, encoding="utf-8")
     case = surgebreak.load(tmp_path).set("structure.block[0].centre", [9.0, 0.5, 0.2])
-    with pytest.raises(surgebreak.BadCase, match="structure.block"):
+    with pytest.raises(surgebreak.BadCase, match=r"structure\.block"):
         case.file()
     (tmp_path / "case.toml").write_text(FIRST_CASE.replace("density", "densty"), encoding="utf-8")
     with pytest.raises(surgebreak.BadCase, match=r"case\.toml:\d+: structure\.densty"):
@@ -134,7 +136,7 @@ def test_the_callback_sees_what_the_histories_keep(ran):
     assert [step.time for step in seen] == list(times)
     assert [step.number for step in seen] == list(range(1, len(times) + 1))
     assert [step.dt for step in seen] == pytest.approx(np.diff(times, prepend=0.0), rel=1e-12)
-    assert [step.joints_broken for step in seen][-1] == run.figures["joints_broken"]
+    assert [step.joints_broken for step in seen][-1] == run.figures["joints_broken"] > 0
     assert sum(step.substeps for step in seen) == run.figures["substeps"]
 
 
@@ -216,7 +218,7 @@ def test_tables_are_numpy_and_pandas(ran):
     assert (run.cracks["intact"] == run.cracks_frame()["intact"]).all()
     with pytest.raises(surgebreak.SurgebreakError, match="did you mean 'energy'"):
         run.history("enrgy")
-    with pytest.raises(surgebreak.SurgebreakError, match="no structure|no water"):
+    with pytest.raises(surgebreak.SurgebreakError, match="the case has no water"):
         run.water()
 
 

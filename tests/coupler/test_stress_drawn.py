@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from coupler.case.case import Case, effective
+from coupler.case.toml_text import document
 from coupler.checks.read_case import load
 from coupler.commands.stress.drawn import command
-from coupler.commands.stress.drawn.case import toml, write
+from coupler.commands.stress.drawn.case import write
 from coupler.commands.stress.drawn.judge import measures
 from coupler.commands.stress.drawn.scene import draw
 from coupler.commands.stress.drawn.shrink import shrunk
@@ -39,15 +40,15 @@ def made(directory, number, seconds=SHORT):
 
 
 def test_a_scene_is_the_same_whenever_it_is_drawn():
-    assert [toml(draw(3, n).table) for n in range(20)] == [toml(draw(3, n).table) for n in range(20)]
-    assert len({toml(draw(seed, n).table) for seed in (3, 4) for n in range(20)}) == 40
+    assert [document(draw(3, n).table) for n in range(20)] == [document(draw(3, n).table) for n in range(20)]
+    assert len({document(draw(seed, n).table) for seed in (3, 4) for n in range(20)}) == 40
 
 
 def test_files_say_what_was_drawn(tmp_path):
     for number in range(20):
         drawn = draw(SEED, number)
         place = write(drawn.table, drawn.files, tmp_path / drawn.id)
-        assert tomllib.loads((place / "case.toml").read_text()) == tomllib.loads(toml(drawn.table))
+        assert tomllib.loads((place / "case.toml").read_text()) == tomllib.loads(document(drawn.table))
         assert {path.name for path in place.iterdir()} == {"case.toml", *drawn.files}
 
 
@@ -64,7 +65,7 @@ def test_every_drawn_scene_is_a_case(tmp_path):
 
 def test_scenes_cover_the_case_format():
     """Every section, kind of body, side, wall and law turns up."""
-    text = "\n".join(toml(draw(SEED, number).table) for number in range(300))
+    text = "\n".join(document(draw(SEED, number).table) for number in range(300))
     wanted = [
         "[[solid]]",
         "[joints]",
@@ -278,7 +279,7 @@ def test_a_failure_is_kept_as_a_case_with_its_story(tmp_path, monkeypatch):
     assert (small["joints"], "contact" in small, "structure" in small) == ({}, False, False)
     assert "error of the volume 0.5, at most 0.02" in (tmp_path / drawn.id / "found.txt").read_text()
     (row,) = command.named([drawn.id])
-    assert toml(draw(*row).table) == toml(drawn.table)
+    assert document(draw(*row).table) == document(drawn.table)
 
 
 def test_scenes_of_a_group_keep_their_numbers():

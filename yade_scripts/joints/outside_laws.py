@@ -152,8 +152,8 @@ def _problem(law: CohesiveLaw, peak: float) -> str:
     """What the law does not hold at a peak; empty where it holds all."""
     r = np.unique(np.append(np.linspace(0.0, 1.0, POINTS), peak))
     try:
-        secant = np.array([float(law.secant.py_func(q, peak)) for q in r])
-        work = np.array([float(law.work.py_func(q, peak)) for q in r])
+        secant = np.array([float(law.secant.py_func(q, peak)) for q in r.tolist()])
+        work = np.array([float(law.work.py_func(q, peak)) for q in r.tolist()])
     except (ArithmeticError, TypeError, ValueError) as error:
         return f"cannot be evaluated for 0 <= r <= 1: {error}"
     T = secant * r
