@@ -17,11 +17,9 @@ on every processor only if numpy is loaded as it is set here.
 
 from typing import TYPE_CHECKING
 
-from coupler.program.arithmetic import fix_arithmetic as _fix_arithmetic
-from coupler.program.kernel_cache import use_kernel_cache as _use_kernel_cache
+from coupler.program.start import one_thread as _one_thread
 
-_fix_arithmetic()
-_use_kernel_cache()
+_one_thread()
 
 from coupler.api.case import Case, RunInRun  # noqa: E402
 from coupler.api.laws import register_law  # noqa: E402
@@ -34,7 +32,7 @@ from coupler.run.forecast import Forecast  # noqa: E402
 from coupler.step.limits import Diverged, LimitReached  # noqa: E402
 
 if TYPE_CHECKING:
-    from yade_scripts.joints.cohesion import CohesiveLaw
+    from yade_scripts.joints.law import CohesiveLaw
 
 __all__ = [
     "BadCase",
@@ -62,9 +60,9 @@ open = Run
 
 
 def __getattr__(name: str) -> object:
-    """`CohesiveLaw` loads the room of joints, with numba, and only scripts with a law of their own want it."""
+    """`CohesiveLaw` is of the room of the structure, which a script with water alone does not load."""
     if name == "CohesiveLaw":
-        from yade_scripts.joints.cohesion import CohesiveLaw
+        from yade_scripts.joints.law import CohesiveLaw
 
         return CohesiveLaw
     raise AttributeError(f"module 'surgebreak' has no attribute {name!r}")

@@ -48,7 +48,7 @@ class WaterState:
     fluid_fraction: Floats
 
     def mesh(self) -> Any:
-        """A `pyvista.UnstructuredGrid`. Raises NotInstalled, and CrashesAfterYade in a process that has run a case with a structure."""
+        """A `pyvista.UnstructuredGrid`. Raises NotInstalled, and CrashesAfterYade in a process that holds YADE."""
         pv = _pyvista()
         cells = np.insert(self.cells, 0, 4, axis=1).ravel()
         found = pv.UnstructuredGrid(cells, np.full(len(self.cells), pv.CellType.TETRA), self.nodes)
@@ -248,7 +248,9 @@ class Run:
     def report(self, pictures: bool = True) -> Path:
         """Write report.html, one page about the run; its path. Raises NotDrawn."""
         words = [] if pictures else ["--no-pictures"]
-        done = run_module("coupler.cli", "report", self.directory, *words, capture_output=True, text=True)
+        done = run_module(
+            "coupler.commands.cli", "report", self.directory, *words, capture_output=True, text=True
+        )
         if done.returncode:
             raise NotDrawn(
                 f"{self.directory}: no report: {trouble(done.returncode, done.stdout + done.stderr)}"

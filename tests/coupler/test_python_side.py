@@ -118,7 +118,15 @@ def test_a_run_of_a_script_is_that_of_the_command_to_the_last_digit(ran, tmp_pat
     run, _ = ran
     dry().save(tmp_path / "case")
     done = subprocess.run(
-        [sys.executable, "-m", "coupler.cli", "run", tmp_path / "case", "--output", tmp_path / "run"],
+        [
+            sys.executable,
+            "-m",
+            "coupler.commands.cli",
+            "run",
+            tmp_path / "case",
+            "--output",
+            tmp_path / "run",
+        ],
         capture_output=True,
         text=True,
         check=False,

@@ -160,7 +160,7 @@ opening_at_failure = "1 mm"
 
 def command(*words, **environment):
     return subprocess.run(
-        [sys.executable, "-m", "coupler.cli", *map(str, words)],
+        [sys.executable, "-m", "coupler.commands.cli", *map(str, words)],
         capture_output=True,
         text=True,
         check=False,

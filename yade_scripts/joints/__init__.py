@@ -1,6 +1,7 @@
 """Cohesive joints between faces (theory 1.2).
 
 law, laws                     what a cohesive law is; one file a law (docs/add_a_law.md)
+outside_laws                  laws of users: files, scripts, packages
 cohesion, mixed_modes         parameters of the joints; how opening and sliding act together
 rules                         which touching faces are joined, and with which parameters
 joints                        the joints of a structure: built, moved through time, reported

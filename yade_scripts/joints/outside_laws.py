@@ -16,12 +16,11 @@ from collections.abc import Callable
 from dataclasses import replace
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from yade_scripts.joints.cohesion import CohesiveLaw
+from yade_scripts.joints.law import CohesiveLaw
 
 GROUP = "surgebreak.laws"
 VARIABLE = "SURGEBREAK_LAWS"
@@ -115,8 +114,6 @@ def _packaged() -> dict[str, EntryPoint]:
 
 def _offered(found: Any, origin: str) -> CohesiveLaw:
     """The law itself, or LAW of a module."""
-    from yade_scripts.joints.cohesion import CohesiveLaw
-
     law = getattr(found, "LAW", found)
     if not isinstance(law, CohesiveLaw):
         raise BadLaw(f"{origin}: offers no LAW = CohesiveLaw(secant, work, ...)")
