@@ -21,7 +21,8 @@ from coupler.program.start import one_thread as _one_thread
 
 _one_thread()
 
-from coupler.api.case import Case, RunInRun  # noqa: E402
+from coupler.api.case import Case  # noqa: E402
+from coupler.api.execution import RunInRun  # noqa: E402
 from coupler.api.laws import register_law  # noqa: E402
 from coupler.api.run import BlockState, Run, WaterState  # noqa: E402
 from coupler.api.step import Blocks, Step  # noqa: E402

@@ -11,6 +11,8 @@ import h5py
 import numpy as np
 import numpy.typing as npt
 
+from coupler.api.execution import resume
+from coupler.api.step import Step
 from coupler.program.errors import NoRun, SurgebreakError, UnknownName, did_you_mean
 from coupler.program.extras import need
 from coupler.program.process import run_module, trouble, was_killed
@@ -20,8 +22,6 @@ from coupler.run.summary import read_summary
 
 if TYPE_CHECKING:
     import pandas
-
-    from coupler.api.step import Step
 
 Floats = npt.NDArray[np.float64]
 Whole = npt.NDArray[np.int64]
@@ -270,9 +270,8 @@ class Run:
         changes: `KEY=VALUE`, for instance "time.end=4 s" · the rest as in `Case.run`. Raises CannotResume, Busy, and
         what `Case.run` raises.
         """
-        from coupler.api.case import resume
-
-        return resume(self.directory, changes, callback, stop, quiet, any_version)
+        resume(self.directory, changes, callback, stop, quiet, any_version)
+        return Run(self.directory)
 
 
 def _written(folder: Path) -> dict[Path, int]:

@@ -24,6 +24,7 @@ from yade_scripts.joints.law import CohesiveLaw
 
 GROUP = "surgebreak.laws"
 VARIABLE = "SURGEBREAK_LAWS"
+SHIPPED = Path(__file__).parent / "laws"
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
 POINTS = 401
 """Openings at which a law is examined."""
@@ -46,11 +47,9 @@ def register(name: str, law: CohesiveLaw, origin: str = "a script") -> None:
 
     A law of this name that a script or file gave before is replaced. Raises BadLaw.
     """
-    from yade_scripts.joints import laws
-
     if not NAME.fullmatch(name):
         raise BadLaw(f"{origin}: '{name}' cannot name a law; letters, digits, _ and -, a letter first")
-    if name in laws.shipped():
+    if (SHIPPED / f"{name}.py").exists():
         raise BadLaw(f"{origin}: a law called '{name}' comes with surgebreak; give yours another name")
     _registered[name], _origins[name] = examined(law, f"{origin}: law '{name}'"), origin
 

@@ -1,0 +1,94 @@
+"""Runs of a script in this process: what it is told after each step, its wish to stop, one run at a time."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+from coupler.api.step import Step
+from coupler.checks.read_case import CaseFile
+from coupler.program.errors import ExitCode, SurgebreakError
+from coupler.run.directory import RunDirectory
+from coupler.run.execute import carry_out
+from coupler.step.limits import Stopped
+
+Callback = Callable[[Step], object]
+_one_at_a_time = threading.Lock()
+
+
+class RunInRun(SurgebreakError):
+    """Another run of this process has not ended yet."""
+
+    exit_code = ExitCode.BAD_CASE
+
+
+def execute(
+    file: CaseFile,
+    directory: RunDirectory,
+    checkpoint: Any,
+    callback: Callback | None,
+    stop: Callable[[Step], object] | None,
+    quiet: bool,
+) -> None:
+    """Run in a directory, from the start or a checkpoint. A wish to stop is met, a limit raises."""
+    watch = _Watch(callback, stop)
+    each = watch.step if callback or stop else None
+    with suppress(Stopped):  # as was asked; run.json says so
+        carry_out(file, directory, checkpoint, each, watch.wish, quiet)
+
+
+class _Watch:
+    """What callback and stop of a script say, step by step."""
+
+    def __init__(self, callback: Callback | None, stop: Callable[[Step], object] | None):
+        self._callback, self._stop = callback, stop
+        self.reason: str | None = None
+
+    def step(self, coupling, record, figures, readings) -> None:
+        step = Step(coupling, record, figures, readings)
+        if self._callback is not None:
+            self._callback(step)
+        wish = self._stop(step) if self._stop is not None else None
+        if wish:
+            text = f": {wish}" if isinstance(wish, str) else ""
+            self.reason = f"stopped by the script at t = {coupling.time:.6g} s{text}"
+
+    def wish(self) -> str | None:
+        return self.reason
+
+
+@contextmanager
+def alone() -> Iterator[None]:
+    """YADE holds one scene a process: a second run, from a callback or another thread, is refused. Raises RunInRun."""
+    if not _one_at_a_time.acquire(blocking=False):
+        raise RunInRun(
+            "another run or check of this process is not over yet, and YADE holds one scene a process; wait for its "
+            "end, or start the other in a process of its own (`surgebreak run`, subprocess)"
+        )
+    try:
+        yield
+    finally:
+        _one_at_a_time.release()
+
+
+def resume(
+    directory: Path,
+    changes: Iterable[str],
+    callback: Callback | None,
+    stop: Callable[[Step], object] | None,
+    quiet: bool,
+    any_version: bool,
+) -> None:
+    """See `Run.resume`."""
+    from coupler.run.resume import prepare
+
+    with alone():
+        found = prepare(directory, changes, any_version, _nowhere if quiet else print)
+        execute(found.file, found.directory, found.checkpoint, callback, stop, quiet)
+
+
+def _nowhere(text: str) -> None:
+    """Nobody looks on."""
