@@ -147,7 +147,12 @@ class FreeBody:
         self._work += dt * float(np.sum(self._load * mean))
         nothing = np.zeros((1, 9))
         impulses = Impulses(
-            nothing, nothing, dt * (self._x - 0.5 * dt * mean[:, :3]), dt, np.zeros(3), np.zeros((1, 3))
+            contact=nothing,
+            joint=nothing,
+            place=dt * (self._x - 0.5 * dt * mean[:, :3]),
+            dt=dt,
+            zero=np.zeros(3),
+            lifted=np.zeros((1, 3)),
         )
         return FakeAdvance(mean, impulses)
 

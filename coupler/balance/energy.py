@@ -33,7 +33,7 @@ NEGLIGIBLE = 1e-5
 water is corrected to 1e-6, and what comes and goes with that is 5 % of this (a box afloat in a tank)."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Balance:
     """One line of the ledger, all in joules but the last, a share of the input energy."""
 
@@ -135,19 +135,19 @@ class Ledger:
         share, step = (self._share(*rows) for rows in (now, np.subtract(now, self._before).tolist()))
         self._before = now
         return Balance(
-            kinetic,
-            potential,
-            dissipation,
-            self.shear,
-            self.parting,
-            self.entered,
-            self.left,
-            self.work_given,
-            received,
-            residual,
-            self._input,
-            share,
-            step,
+            water_kinetic=kinetic,
+            water_potential=potential,
+            numerical_dissipation=dissipation,
+            shear_dissipation=self.shear,
+            parting_work=self.parting,
+            entered=self.entered,
+            left=self.left,
+            work_given=self.work_given,
+            work_received=received,
+            structure_residual=residual,
+            input_energy=self._input,
+            energy_error=share,
+            step_error=step,
         )
 
     def _share(self, structure: float, interface: float, lost: float) -> float:

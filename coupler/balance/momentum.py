@@ -57,7 +57,7 @@ MOVING = 1e-3
 """Share of the momentum there is that counts as exchanged: a block that flies freely exchanges nothing."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class MomentumBalance:
     """water, blocks, residual (6,) [N s, N m s] · lines: name → (6,) so far · exchanged [N s]: sum of the sizes of all
     impulses so far · scheme [1]: sum of the lines of the scheme over it · error [1]: residual of this step over the
@@ -122,13 +122,13 @@ class MomentumLedger:
         size = max(np.abs(residual[:3]).max(), np.abs(residual[3:]).max() / self.reach)
         scheme = np.linalg.norm(sum(self.lines[name][:3] for name in SCHEME))
         return MomentumBalance(
-            self.water,
-            self.blocks,
-            self.residual.copy(),
-            dict(self.lines),
-            self.exchanged,
-            float(scheme / self.exchanged) if self.exchanged > 0.0 else 0.0,
-            float(size / scale) if scale > 0.0 else 0.0,
+            water=self.water,
+            blocks=self.blocks,
+            residual=self.residual.copy(),
+            lines=dict(self.lines),
+            exchanged=self.exchanged,
+            scheme=float(scheme / self.exchanged) if self.exchanged > 0.0 else 0.0,
+            error=float(size / scale) if scale > 0.0 else 0.0,
         )
 
 
@@ -164,7 +164,7 @@ class WaterStep:
         return cls(change, lines, told(is_free), float(exchanged))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class BlocksStep:
     """after (6,): momentum of the free blocks · lines · held (6,): held blocks on free ones · received (6,): from the
     water · exchanged [N s]"""
@@ -190,7 +190,13 @@ class BlocksStep:
         acting = (weight, contact, joint)
         exchanged = sum(np.linalg.norm(part[:, :3], axis=1).sum() for part in acting)
         held = -(contact + joint)[~free].sum(axis=0)
-        return cls(structure.momentum(about), lines, held, received.sum(axis=0), float(exchanged))
+        return cls(
+            after=structure.momentum(about),
+            lines=lines,
+            held=held,
+            received=received.sum(axis=0),
+            exchanged=float(exchanged),
+        )
 
 
 def momentum_ledger(water, structure) -> MomentumLedger:

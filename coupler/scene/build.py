@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 PRESSURE_RTOL = 1e-8
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Scene:
     """What a run works on: both sides, the gauges and what never moves (with a structure its last blocks too)."""
 
@@ -51,7 +51,7 @@ def build(case: Case, clock, from_start: bool = True) -> Scene:
         on_failure.pop_all()
     tank = (case.tank.lower, case.tank.upper) if case.tank else None
     watch = None if structure is None else watch_of(case, structure)
-    return Scene(coupling, _gauges(case), solids, tank, watch)
+    return Scene(coupling=coupling, gauges=_gauges(case), solids=solids, tank=tank, watch=watch)
 
 
 def watch_of(case: Case, structure) -> Watch:

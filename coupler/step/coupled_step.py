@@ -30,7 +30,7 @@ STANDS_STILL = 1e-3
 """Share of the energy of the scene below which the motion of the structure is no measure of the defect."""
 
 
-@dataclass
+@dataclass(kw_only=True)
 class StepRecord:
     """What one step did, for the histories. Absent sides leave zeros."""
 
@@ -147,7 +147,7 @@ class Coupling:
         """Advance both sides by dt [s], or by the half of it, its half, ... where a whole one fails: `record.dt`.
 
         Raises Diverged, or what the pressure solver says, when that does not help either."""
-        record = StepRecord(self.time + dt, dt)
+        record = StepRecord(time=self.time + dt, dt=dt)
         if self.water is None:
             self._take(record, None)
             return record

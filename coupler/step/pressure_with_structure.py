@@ -174,7 +174,7 @@ def _answer(bodies, inverse, force, velocity):
             velocity[first + i] = total
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class CoupledSolution:
     """x (n_dofs,) [Pa] · velocity (n_bodies, 6) [m/s, rad/s] at the end of the step · load (n_bodies, 6) [N, N m] on
     the bodies · restoring (n_bodies, 6): the part of it by which floating bodies are lifted less on their way ·
@@ -227,7 +227,14 @@ def solve_coupled(
     restoring = response.restoring_load(velocity)
     load = water_load(problem, found.x) + restoring
     return CoupledSolution(
-        found.x, velocity, load, restoring, found.iterations, found.at_bound, found.parting, found.lower
+        x=found.x,
+        velocity=velocity,
+        load=load,
+        restoring=restoring,
+        iterations=found.iterations,
+        at_bound=found.at_bound,
+        parting=found.parting,
+        lower=found.lower,
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class StepStart:
     """What `of` found; `restore` goes back to it, bit for bit, as often as wanted."""
 
@@ -20,11 +20,11 @@ class StepStart:
         """Before a step. References, not copies, where a step replaces what it changes."""
         water, structure, momentum = coupling.water, coupling.structure, coupling.momentum
         return cls(
-            coupling.time,
-            None if water is None else water.remember(),
-            None if structure is None else structure.save(),
-            dict(vars(coupling.ledger)),
-            None if momentum is None else vars(momentum) | {"lines": dict(momentum.lines)},
+            time=coupling.time,
+            water=None if water is None else water.remember(),
+            structure=None if structure is None else structure.save(),
+            ledger=dict(vars(coupling.ledger)),
+            momentum=None if momentum is None else vars(momentum) | {"lines": dict(momentum.lines)},
         )
 
     def restore(self, coupling) -> None:

@@ -22,7 +22,7 @@ class NotConvex(ValueError):
     """A polyhedron handed to the water is not convex, not closed, or has no volume."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class BodyShapes:
     """n convex polyhedra in their own frames (reference point at the origin, axes of the body).
 
@@ -57,15 +57,15 @@ class BodyShapes:
         offsets = self.offsets + _dot(normals, centre[of_plane])
         grown = np.zeros(len(offsets)) if growth is None else np.array(growth, dtype=np.float64)
         return ConvexBodies(
-            np.ascontiguousarray(normals),
-            offsets,
-            self.plane_start,
-            vertices + centre[of_vertex],
-            self.vertex_start,
-            centre,
-            rotation,
-            grown,
-            self.reach,
+            normals=np.ascontiguousarray(normals),
+            offsets=offsets,
+            plane_start=self.plane_start,
+            vertices=vertices + centre[of_vertex],
+            vertex_start=self.vertex_start,
+            centre=centre,
+            rotation=rotation,
+            growth=grown,
+            reach=self.reach,
             shapes=self,
         )
 
@@ -76,16 +76,16 @@ class BodyShapes:
         planes = [_planes_of(vertices, faces, at) for at, (vertices, faces) in enumerate(polyhedra)]
         vertices = [np.asarray(v, dtype=np.float64) for v, _ in polyhedra]
         return cls(
-            _stacked([n for n, _ in planes]),
-            np.concatenate([o for _, o in planes]) if planes else np.zeros(0),
-            _starts([len(o) for _, o in planes]),
-            _stacked(vertices),
-            _starts([len(v) for v in vertices]),
-            np.array([_reach(v, n, o) for v, (n, o) in zip(vertices, planes)]),
+            normals=_stacked([n for n, _ in planes]),
+            offsets=np.concatenate([o for _, o in planes]) if planes else np.zeros(0),
+            plane_start=_starts([len(o) for _, o in planes]),
+            vertices=_stacked(vertices),
+            vertex_start=_starts([len(v) for v in vertices]),
+            reach=np.array([_reach(v, n, o) for v, (n, o) in zip(vertices, planes)]),
         )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class ConvexBodies:
     """n convex polyhedra in world coordinates; inside: normals @ x <= offsets + growth.
 
@@ -169,12 +169,12 @@ def box_shapes(size) -> BodyShapes:
     axes = np.vstack([-np.eye(3), np.eye(3)])
     corners = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
     return BodyShapes(
-        np.tile(axes, (n, 1)),
-        np.hstack([size, size]).ravel() / 2,
-        np.arange(n + 1) * 6,
-        (corners[None] * size[:, None]).reshape(-1, 3),
-        np.arange(n + 1) * 8,
-        np.full(n, np.sqrt(3.0)),
+        normals=np.tile(axes, (n, 1)),
+        offsets=np.hstack([size, size]).ravel() / 2,
+        plane_start=np.arange(n + 1) * 6,
+        vertices=(corners[None] * size[:, None]).reshape(-1, 3),
+        vertex_start=np.arange(n + 1) * 8,
+        reach=np.full(n, np.sqrt(3.0)),
     )
 
 

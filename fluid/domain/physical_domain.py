@@ -49,7 +49,7 @@ class WholeCells:
     second: np.ndarray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Memory:
     """What the next cut needs of this one: mesh, bodies, pairs sorted by (cell, body), cut parts; contacts of the parts
     with multiple covers, else None."""
@@ -203,7 +203,16 @@ def _cut_all(mesh, bodies, covers, connection):
     every = np.arange(len(bodies))
     cell, body = near_pairs(mesh, bodies, every, SEARCH_MARGIN * mesh.spacing)
     cuts = _cut_pairs(mesh, bodies, cell, body, covers, connection)
-    return Memory(mesh, bodies, whole_cells(mesh), cell, body, cuts, connection, None)
+    return Memory(
+        mesh=mesh,
+        bodies=bodies,
+        whole=whole_cells(mesh),
+        pair_cell=cell,
+        pair_body=body,
+        cuts=cuts,
+        connection=connection,
+        contacts=None,
+    )
 
 
 def _cut_moved(memory, bodies, moved, covers):

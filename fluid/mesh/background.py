@@ -34,7 +34,7 @@ class MeshError(ValueError):
     """The background mesh cannot be used; the message names the cell or node and the remedy."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Background:
     """Tetrahedra with what every step needs of them.  Cells are positively oriented.
 
@@ -73,7 +73,20 @@ class Background:
         axes = tuple(np.asarray(a, float) for a in axes) if lattice else _uniform_axes(nodes, spacing)
         start, members = _bins(nodes, cells, axes, lattice)
         normal = _face_normals(nodes, faces)
-        return cls(nodes, cells, spacing, g, volume, neighbours, faces, owner, normal, axes, start, members)
+        return cls(
+            nodes=nodes,
+            cells=cells,
+            spacing=spacing,
+            gradients=g,
+            cell_volume=volume,
+            neighbours=neighbours,
+            boundary_faces=faces,
+            boundary_cell=owner,
+            boundary_normal=normal,
+            axes=axes,
+            bin_start=start,
+            bin_cells=members,
+        )
 
     def locate(self, points) -> np.ndarray:
         """Cell that holds each point (m, 3) [m] → (m,), -1 outside; ties go to the first cell of the bin."""

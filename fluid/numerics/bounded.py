@@ -33,7 +33,7 @@ PATIENCE = 5
 MOST_ROUNDS = 100
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class BoundedResult:
     """x (n,) · at_bound (n,) bool: held at the bound · parting (n,) [m³/s]: A x - b there, 0 elsewhere · lower (n,):
     bound at the end, None: there is none · iterations, of all rounds · residual of the free rows over ‖b‖ · rounds."""
@@ -68,12 +68,26 @@ def solve_bounded(
     if lower is None:
         found = solve(A, b, x0, rtol, extra, most, kept)
         return BoundedResult(
-            found.x, np.zeros(len(b), bool), np.zeros(len(b)), None, found.iterations, found.residual, 1
+            x=found.x,
+            at_bound=np.zeros(len(b), bool),
+            parting=np.zeros(len(b)),
+            lower=None,
+            iterations=found.iterations,
+            residual=found.residual,
+            rounds=1,
         )
     held = np.zeros(len(b), bool) if at_bound is None else at_bound.copy()
     scale = np.linalg.norm(b)
     if scale == 0.0 and not held.any() and not (lower > 0.0).any():
-        return BoundedResult(np.zeros_like(b), held, np.zeros_like(b), lower, 0, 0.0, 1)
+        return BoundedResult(
+            x=np.zeros_like(b),
+            at_bound=held,
+            parting=np.zeros_like(b),
+            lower=lower,
+            iterations=0,
+            residual=0.0,
+            rounds=1,
+        )
     apply, precondition = operators(A, extra, kept)
     x, signs, iterations, reach = np.array(x0, float), _Signs(lower), 0, 0
     for rounds in range(1, MOST_ROUNDS + 1):
@@ -98,7 +112,15 @@ def solve_bounded(
             apart = np.zeros_like(b) if parting is None else np.where(held, np.maximum(parting, 0.0), 0.0)
             vented = _air_goes_on(A, x, lower, air) if air is not None and reach < REACH else None
             if vented is None or not vented.any():
-                return BoundedResult(x, held, apart, lower, iterations, found.residual, rounds)
+                return BoundedResult(
+                    x=x,
+                    at_bound=held,
+                    parting=apart,
+                    lower=lower,
+                    iterations=iterations,
+                    residual=found.residual,
+                    rounds=rounds,
+                )
             lower, held, reach = np.where(vented, air, lower), held | vented, reach + 1
             signs = _Signs(lower)
             continue

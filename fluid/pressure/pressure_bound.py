@@ -27,7 +27,7 @@ def lowest_pressure(water, graph, dofs, phi) -> np.ndarray | None:
     return np.where(vented, 0.0, p.vapour_pressure)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class BoundMet:
     """Where the pressure of a step met its bound: at_bound (N,) bool, ventilated (N,) bool where that is the air's ·
     rate (n,) [m³/s] at which the water parts at the unknowns, a number where it does nowhere · volume [m³] that
@@ -49,7 +49,15 @@ class BoundMet:
         at_bound, ventilated = np.zeros(n_nodes, bool), np.zeros(n_nodes, bool)
         lowest = float(pressure.min(initial=0.0))
         if problem.bound is None:
-            return cls(at_bound, ventilated, 0.0, 0.0, 0.0, lowest, 0.0)
+            return cls(
+                at_bound=at_bound,
+                ventilated=ventilated,
+                rate=0.0,
+                volume=0.0,
+                work=0.0,
+                lowest=lowest,
+                wall=0.0,
+            )
         vented = x == problem.air  # also where air came to within the step
         met = vented | (x <= problem.lower)
         open_ = at_air(x, problem.air) & (vented | (problem.bound == 0.0))
@@ -62,7 +70,15 @@ class BoundMet:
         if met.any():
             area = wall_area(water.mesh, water.domain)
             wall = float(area[at_bound].sum()) / max(float(area[problem.dofs].sum()), 1e-300)
-        return cls(at_bound, ventilated, rate, opened, work, lowest, wall)
+        return cls(
+            at_bound=at_bound,
+            ventilated=ventilated,
+            rate=rate,
+            volume=opened,
+            work=work,
+            lowest=lowest,
+            wall=wall,
+        )
 
 
 def wall_area(mesh, domain) -> np.ndarray:

@@ -31,7 +31,7 @@ LEAST_RESERVE = 0.05
 """Share of what the diagonal of a row may lose behind obtuse angles that is to be left."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class PressureProblem:
     """(dt/ρ) K x = rhs + G V for the unknown part x of the pressure; p = x + known acts on the bodies, with the load
     -Gᵀp + other_load.

@@ -60,7 +60,7 @@ class Cracks:
         return np.array([self.corners[a:b].mean(axis=0) for a, b in pairwise(self.start)]).reshape(-1, 3)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Slits:
     """s slits, each between two mouths: a piece of a crack about a cell long.
 
@@ -101,19 +101,26 @@ class Slits:
         g, length, depth = cracks.opening[mouths.crack[first]], mouths.length[first], mouths.depth[first]
         name = mouths.name[first]
         return cls(
-            difference,
-            conductance(g, length, depth, spacing[mouths.crack[first]]),
-            DISCHARGE * g * length,
-            centre[first] - centre[first + 1],
-            np.zeros(len(first)) if before is None else before.flow_by_name(name),
-            name,
+            difference=difference,
+            conductance=conductance(g, length, depth, spacing[mouths.crack[first]]),
+            area=DISCHARGE * g * length,
+            rise=centre[first] - centre[first + 1],
+            flow=np.zeros(len(first)) if before is None else before.flow_by_name(name),
+            name=name,
         )
 
     @classmethod
     def remembered(cls, name, flow) -> Slits:
         """Only the flows (s,) [m³/s] by name (s, 4), for `of` to take over."""
         s = len(flow)
-        return cls(sp.csr_array((0, s)), np.zeros(s), np.zeros(s), np.zeros((s, 3)), flow, name)
+        return cls(
+            difference=sp.csr_array((0, s)),
+            conductance=np.zeros(s),
+            area=np.zeros(s),
+            rise=np.zeros((s, 3)),
+            flow=flow,
+            name=name,
+        )
 
     def flow_by_name(self, name) -> np.ndarray:
         """Flows (n,) of the slits with these names (n, 4), zero where there is none."""

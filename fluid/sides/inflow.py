@@ -37,7 +37,7 @@ class Flow:
     velocity: Callable
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Side:
     """A part of the boundary with its nodes on a domain.
 
@@ -72,17 +72,17 @@ class Side:
         cell = mesh.boundary_cell[there]
         beside = (mesh.cells[cell][:, :, None] == faces[:, None, :]).any(axis=2)
         return cls(
-            chosen,
-            flow,
-            flow.level if flow else level,
-            cell,
-            np.argmin(beside, axis=1),
-            mesh.cells[cell][beside].reshape(-1, 3),
-            np.broadcast_to(np.eye(3), (len(cell), 3, 3)),
-            area[there],
-            nodes,
-            mesh.nodes[nodes],
-            normal,
+            chosen=chosen,
+            flow=flow,
+            level=flow.level if flow else level,
+            cell=cell,
+            corner=np.argmin(beside, axis=1),
+            faces=mesh.cells[cell][beside].reshape(-1, 3),
+            hats=np.broadcast_to(np.eye(3), (len(cell), 3, 3)),
+            area=area[there],
+            nodes=nodes,
+            place=mesh.nodes[nodes],
+            normal=normal,
         )
 
     def on_domain(self, domain, active) -> Side:

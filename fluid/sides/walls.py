@@ -12,7 +12,7 @@ _SAME_DIRECTION = 0.3
 """Normals of one node that span less than this (singular value over the largest) count as one direction."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Walls:
     """nodes (n,) on closed sides · projector (n, 3, 3) onto the directions they leave free ·
     open_node (N,) bool, p = 0; open_nodes (k,) the same, open_projector (k, 3, 3) onto their normals ·
@@ -56,10 +56,20 @@ class Walls:
         rough = closed & ~smooth & ~flowing
         if no_slip:
             projector[np.isin(nodes, faces[rough])] = 0.0
-        of_rough = (faces[rough], area[rough], mesh.boundary_cell[rough])
-        opening = (open_node, open_nodes, np.eye(3) - tangential)
         free = opened & ~sea
-        return cls(nodes, projector, *opening, faces[free], area[free], *of_rough, np.unique(faces[flowing]))
+        return cls(
+            nodes=nodes,
+            projector=projector,
+            open_node=open_node,
+            open_nodes=open_nodes,
+            open_projector=np.eye(3) - tangential,
+            open_faces=faces[free],
+            open_area=area[free],
+            rough_faces=faces[rough],
+            rough_area=area[rough],
+            rough_cell=mesh.boundary_cell[rough],
+            flowing=np.unique(faces[flowing]),
+        )
 
     def on_copies(self, parent_node) -> Walls:
         """The same sides for nodes that are copies of background nodes, parent_node (N,)."""
@@ -72,17 +82,17 @@ class Walls:
         faces, rough = first[self.open_faces], first[self.rough_faces]
         kept, left = (faces >= 0).all(axis=1), (rough >= 0).all(axis=1)
         return Walls(
-            copies,
-            self.projector[row],
-            self.open_node[parent_node],
-            open_copies,
-            self.open_projector[open_row],
-            faces[kept],
-            self.open_area[kept],
-            rough[left],
-            self.rough_area[left],
-            self.rough_cell[left],
-            _copies(self.flowing, parent_node)[0],
+            nodes=copies,
+            projector=self.projector[row],
+            open_node=self.open_node[parent_node],
+            open_nodes=open_copies,
+            open_projector=self.open_projector[open_row],
+            open_faces=faces[kept],
+            open_area=self.open_area[kept],
+            rough_faces=rough[left],
+            rough_area=self.rough_area[left],
+            rough_cell=self.rough_cell[left],
+            flowing=_copies(self.flowing, parent_node)[0],
         )
 
     def restriction(self):

@@ -43,7 +43,7 @@ KINK_DAMPING, KINK_DEPTH, SURFACE_DAMPING = 1.0 / 8.0, 2.0, 0.025
 surface reach 1.6 cell sizes down), and c of `damp_waterline` along the whole surface, for cells not wholly wet."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Corrected:
     """The state at the end of the step; names as in Water."""
 
@@ -84,26 +84,30 @@ def corrected(water, problem, x, parting) -> Corrected:
     _continue(water, kept, listed, start, u, a, kept.u_star - mean)
     cell_field, flux = _flux(water, kept, listed, start, u, u_cell)
     momentum = momentum_change(
-        water, problem, unknown, pressure, Stages(projected, limited, damped, slipping, u)
+        water,
+        problem,
+        unknown,
+        pressure,
+        Stages(projected=projected, limited=limited, damped=damped, slipping=slipping, end=u),
     )
     bound = BoundMet.of(water, problem, x, parting)
     report = _report(water, problem, x, projected, u, clipped, momentum, bound)
     return Corrected(
-        u,
-        a,
-        pressure,
-        unknown / kept.theta,
-        remainder,
-        kick_remainder,
-        cell_field,
-        kept.nodal_water,
-        flux,
-        listed,
-        start,
-        bound.at_bound,
-        bound.ventilated,
-        _given_by_films(water, problem),
-        report,
+        velocity=u,
+        acceleration=a,
+        pressure=pressure,
+        end_pressure=unknown / kept.theta,
+        remainder=remainder,
+        kick_remainder=kick_remainder,
+        cell_velocity=cell_field,
+        nodal_water=kept.nodal_water,
+        flux=flux,
+        listed=listed,
+        layer_start=start,
+        at_bound=bound.at_bound,
+        ventilated=bound.ventilated,
+        given_by_films=_given_by_films(water, problem),
+        report=report,
     )
 
 
@@ -304,16 +308,16 @@ def _report(water, problem, x, projected, u, clipped, momentum, bound):
     left = kept.left
     moved_by_bodies = problem.matrix @ x - problem.rhs - bound.rate
     return StepReport(
-        problem.dt,
-        volume,
-        (volume - kept.conserved_volume) / max(water.handled_volume, 1e-300),
-        kept.reinserted,
-        clipped,
-        len(x),
-        -problem.dt * float((x + problem.known) @ moved_by_bodies),
-        change,
-        momentum,
-        0.0 if left is None else float(left.volume.sum()),
-        0.0 if left is None else left.energy,
-        bound,
+        dt=problem.dt,
+        volume=volume,
+        volume_error=(volume - kept.conserved_volume) / max(water.handled_volume, 1e-300),
+        reinserted=kept.reinserted,
+        clipped=clipped,
+        unknowns=len(x),
+        work_on_bodies=-problem.dt * float((x + problem.known) @ moved_by_bodies),
+        energy_change=change,
+        momentum=momentum,
+        left=0.0 if left is None else float(left.volume.sum()),
+        left_energy=0.0 if left is None else left.energy,
+        bound=bound,
     )

@@ -47,7 +47,7 @@ PHYSICAL = ("weight", "tank", "tank_shear", "sides", "openings", "bodies")
 """Lines of what acts on the water."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class MomentumChange:
     """before, after (6,) [N s, N m s]: momentum of the water at both ends of the step · lines: name → (6,), all of
     PHYSICAL and NUMERICAL · pressure_closure (6,): what (1) misses, the residual of the step."""
@@ -58,7 +58,7 @@ class MomentumChange:
     pressure_closure: np.ndarray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Stages:
     """Velocities (N, 3) [m/s] through the second half of the step: after the pressure, the speed limit, the damping,
     the slip along the sides, and at the end."""
@@ -112,7 +112,12 @@ def momentum_change(water, problem, unknown, pressure, stages: Stages) -> Moment
         "slip": at["slipping"] - at["damped"],
         "shear_solve": at["sheared"] - at["advected"] + shear_told - tank_shear,
     }
-    return MomentumChange(at["before"], at["end"], lines, cells[0] + cells[1] - tank - held - openings)
+    return MomentumChange(
+        before=at["before"],
+        after=at["end"],
+        lines=lines,
+        pressure_closure=cells[0] + cells[1] - tank - held - openings,
+    )
 
 
 def _momenta(water, kept, dt, stages: Stages) -> dict[str, np.ndarray]:

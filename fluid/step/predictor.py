@@ -38,7 +38,7 @@ TRANSPORT_WIDTH = 5.0
 RESCALE_EVERY = 5
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Predicted:
     """Between predict and correct: level_set (N,), nodal_water (N,) [m³], advected (N, 3) and u_star (N, 3) [m/s],
     wet (N,) bool, wet_cells (n,), wet_share (n,) and void (k,) of WetPart, cell_star (n, 3) [m/s] velocity of the wet
@@ -231,44 +231,44 @@ def _problem(
         lumped, drive = water.slits.pressure_terms(dofs, known, water.parameters.weight, dt, density)
         matrix, extra = matrix + lumped, extra + drive
     kept = Predicted(
-        phi,
-        surface.nodal_water,
-        u_adv,
-        u_star,
-        wet,
-        cells,
-        part.share,
-        part.void,
-        star,
-        remainder,
-        theta,
-        conserved,
-        surface.reinserted,
-        surface.uncorrected_water,
-        shear,
-        water.time + dt,
-        left,
-        through,
-        held,
-        displaced,
+        level_set=phi,
+        nodal_water=surface.nodal_water,
+        advected=u_adv,
+        u_star=u_star,
+        wet=wet,
+        wet_cells=cells,
+        wet_share=part.share,
+        void=part.void,
+        cell_star=star,
+        remainder=remainder,
+        theta=theta,
+        conserved_volume=conserved,
+        reinserted=surface.reinserted,
+        uncorrected_water=surface.uncorrected_water,
+        shear=shear,
+        end=water.time + dt,
+        left=left,
+        through=through,
+        held=held,
+        displaced=displaced,
     )
     acted = _known_pressure(water, water.pressure, phi)
     other = waterline_load(water.domain, faces, left_out, phi, wet, acted, water.walls.open_node)
     if shear is not None:
         other += shear.load
     problem = PressureProblem(
-        matrix,
-        rhs[dofs] + extra,
-        coupling[dofs],
-        known,
-        guess,
-        dofs,
-        dt,
-        density,
-        other,
-        kept,
-        lowest_pressure(water, graph, dofs, phi),
-        water.at_bound[dofs],
+        matrix=matrix,
+        rhs=rhs[dofs] + extra,
+        coupling=coupling[dofs],
+        known=known,
+        guess=guess,
+        dofs=dofs,
+        dt=dt,
+        density=density,
+        other_load=other,
+        predicted=kept,
+        bound=lowest_pressure(water, graph, dofs, phi),
+        at_bound=water.at_bound[dofs],
     )
     return problem if water.films is None else water.films.handed_on(water, problem)
 

@@ -8,7 +8,7 @@ from fluid.pressure.pressure_bound import BoundMet
 from fluid.step.momentum import MomentumChange
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class StepReport:
     """What the last step did.
 

@@ -69,11 +69,11 @@ def restore(water, domain, arrays) -> None:
     water.graph = Graph.of(water.topology, np.array(arrays["graph_nodes"]))
     water.renumbered, water.left_behind, water.report = None, None, None
     water.flux = Flux(
-        np.array(arrays["flux_nodes"]),
-        water.graph,
-        np.array(arrays["flux"]),
-        water.nodal_water - water.displaced,
-        water.topology.node_volume,
+        nodes=np.array(arrays["flux_nodes"]),
+        graph=water.graph,
+        rate=np.array(arrays["flux"]),
+        water=water.nodal_water - water.displaced,
+        capacity=water.topology.node_volume,
     )
     if water.sides is not None:
         for name in SIDES:

@@ -45,7 +45,7 @@ added to c, so that regions without surface stay where they are; secant steps fo
 relative tolerance."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Flux:
     """Volume flux along the edges of the listed nodes (n,): rate [m³/s] out of each, on the edges of `graph`;
     water (N,) and capacity (N,) [m³]: what every node holds and could hold on the same domain."""
@@ -98,7 +98,7 @@ def edge_flux(topology, graph, listed, u_cell, water) -> Flux:
     t, g = topology, graph
     mesh = (t.nodes, t.cells, t.parent, t.gradients, t.upright, t.volume, (t.node_start, t.node_cells))
     rate = _edge_rates(listed, g.row, g.start, g.neighbour, u_cell, *mesh)
-    return Flux(listed, g, rate, water, t.node_volume)
+    return Flux(nodes=listed, graph=g, rate=rate, water=water, capacity=t.node_volume)
 
 
 @njit(cache=True)
@@ -157,7 +157,7 @@ class Shift:
     kappa: np.ndarray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class VolumeCorrection:
     """level_set (N,) · nodal_water (N,) [m³] of it, and `uncorrected_water` before · reinserted [m³] moved by the
     uniform shift · shift: ψ of (2)."""
@@ -207,11 +207,11 @@ def correct_volume(topology, graph, listed, phi, carried, target: float, kappa: 
         topology, near, phi, band, slope.sum(), left, VOLUME_TOLERANCE * abs(target), spacing
     )
     return VolumeCorrection(
-        phi,
-        inner + nodal_water(near, 0.0, phi, topology.parts, n),
-        own,
-        reinserted,
-        Shift(band, shift, kappa * spacing),
+        level_set=phi,
+        nodal_water=inner + nodal_water(near, 0.0, phi, topology.parts, n),
+        uncorrected_water=own,
+        reinserted=reinserted,
+        shift=Shift(band, shift, kappa * spacing),
     )
 
 

@@ -38,7 +38,7 @@ STEEPEST = 1e6
 """Largest A/V of a cell in 1/h: slivers."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class ViscousChange:
     """velocity change δ (N, 3) [m/s] · load (n_bodies, 6) [N, N m], mean over the step · energy [J]: work of the
     stresses on the water, at the velocities of the stages (that at the velocity that the step would reach without them
@@ -125,7 +125,7 @@ class Viscosity:
         load2, tank2, power2 = _acting(water, terms, u, V_start + second_V)
         both = ((load1, load2), (tank1, tank2), (power1, power2))
         load, tank, power = ((1.0 - GAMMA) * one + GAMMA * two for one, two in both)
-        return ViscousChange(u - w, load, dt * power, n1 + n2, tank)
+        return ViscousChange(change=u - w, load=load, energy=dt * power, iterations=n1 + n2, tank=tank)
 
     def _stage(self, terms, mass, bodies, dt, start, V):
         """Changes (d, D) of the velocity of the water and of the bodies: (M + γ dt K) (d, D) = γ dt r(start, V)."""

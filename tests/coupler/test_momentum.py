@@ -123,7 +123,16 @@ def test_a_load_that_does_not_arrive_is_an_error():
     ledger.start(None, np.zeros(6))
     got = np.array([2.0, 0, 0, 0, 0, 0])
     lines = {name: np.zeros(6) for name in ("blocks_weight", "ground", "ground_joints")}
-    balance = ledger.book(None, BlocksStep(got, lines | {"ground": 0.5 * got}, np.zeros(6), np.zeros(6), 1.0))
+    balance = ledger.book(
+        None,
+        BlocksStep(
+            after=got,
+            lines=lines | {"ground": 0.5 * got},
+            held=np.zeros(6),
+            received=np.zeros(6),
+            exchanged=1.0,
+        ),
+    )
     assert balance.error == pytest.approx(1.0 / 1.002)
     with pytest.raises(Diverged, match="momentum_error"):
         check_momentum(0.1, balance.error, 1e-8)
@@ -133,7 +142,9 @@ def test_books_go_on_from_what_was_saved():
     ledger = MomentumLedger([1.0, 2.0, 3.0], 4.0)
     ledger.start(None, np.arange(6.0))
     lines = {"blocks_weight": np.ones(6), "ground": np.zeros(6), "ground_joints": np.zeros(6)}
-    step = BlocksStep(np.arange(6.0) + 1.0, lines, np.zeros(6), np.zeros(6), 2.0)
+    step = BlocksStep(
+        after=np.arange(6.0) + 1.0, lines=lines, held=np.zeros(6), received=np.zeros(6), exchanged=2.0
+    )
     ledger.book(None, step)
     again = MomentumLedger(np.zeros(3), 1.0)
     again.restore(ledger.save())

@@ -50,7 +50,7 @@ class FixedPlane:
         object.__setattr__(self, "normal", normal / np.linalg.norm(normal))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class TouchingFaces:
     """Overlap of face `face_a` of block a with face `face_b` of block b (b < 0: fixed plane number -1 - b).
 
@@ -101,7 +101,9 @@ def touching_faces(blocks: list[Block], planes: list[FixedPlane] | tuple = ()) -
     found = []
     for a, b, i, j, start, end in rows.tolist():
         face = world.block_start[a] + i
-        found.append(TouchingFaces(a, b, i, j, points[start:end], world.normals[face]))
+        found.append(
+            TouchingFaces(a=a, b=b, face_a=i, face_b=j, polygon=points[start:end], normal=world.normals[face])
+        )
     for p, plane in enumerate(planes):
         if plane.bonds:
             found += _on_plane(world, radius, p, plane)
@@ -171,7 +173,16 @@ def _on_plane(world: _WorldFaces, radius: Array, p: int, plane: FixedPlane) -> l
     for face in np.flatnonzero(on):
         a, corners = int(owner[face]), slice(world.corner_start[face], world.corner_start[face + 1])
         own = int(face - world.block_start[a])
-        found.append(TouchingFaces(a, -1 - p, own, -1, world.corners[corners], world.normals[face]))
+        found.append(
+            TouchingFaces(
+                a=a,
+                b=-1 - p,
+                face_a=own,
+                face_b=-1,
+                polygon=world.corners[corners],
+                normal=world.normals[face],
+            )
+        )
     return found
 
 

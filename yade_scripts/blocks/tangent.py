@@ -6,7 +6,7 @@ With the relative velocity w = B [v_a ω_a v_b ω_b] it adds Bᵀ (k_n nnᵀ + k
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 import scipy.sparse as sp
@@ -15,7 +15,7 @@ from numba import njit
 Array = np.ndarray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Springs:
     """s springs: a, b (s,) rows, -1 for the fixed world · arm_a, arm_b (s, 3) [m] from the centres, world axes
 
@@ -35,14 +35,26 @@ class Springs:
     @classmethod
     def none(cls) -> Springs:
         rows, vectors, scalars = np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros(0)
-        return cls(rows, rows, vectors, vectors, vectors, scalars, scalars, scalars, scalars)
+        return cls(
+            a=rows,
+            b=rows,
+            arm_a=vectors,
+            arm_b=vectors,
+            normal=vectors,
+            kn=scalars,
+            kt=scalars,
+            cn=scalars,
+            ct=scalars,
+        )
 
     def and_(self, other: Springs) -> Springs:
         """Both together."""
-        return Springs(*(np.concatenate([mine, theirs]) for mine, theirs in zip(self._all(), other._all())))
-
-    def _all(self) -> tuple[Array, ...]:
-        return (self.a, self.b, self.arm_a, self.arm_b, self.normal, self.kn, self.kt, self.cn, self.ct)
+        return Springs(
+            **{
+                field.name: np.concatenate([getattr(s, field.name) for s in (self, other)])
+                for field in fields(self)
+            }
+        )
 
 
 def assemble(springs: Springs, n: int) -> tuple[sp.csr_array, sp.csr_array]:
@@ -113,7 +125,17 @@ def joint_springs(joints, x: Array, R: Array) -> Springs:
         arm[:, own], normal[own], k[:, own] = arms, normals, stiffness
     j = joints.joint_of[index]
     kn, kt = k * joints.weight[index]
-    return Springs(joints.a[j], joints.b[j], *arm, normal, kn, kt, joints.eta * kn, joints.eta * kt)
+    return Springs(
+        a=joints.a[j],
+        b=joints.b[j],
+        arm_a=arm[0],
+        arm_b=arm[1],
+        normal=normal,
+        kn=kn,
+        kt=kt,
+        cn=joints.eta * kn,
+        ct=joints.eta * kt,
+    )
 
 
 def joint_tangent(joints, x: Array, R: Array, n: int) -> sp.csr_array:

@@ -15,7 +15,7 @@ SLIPS = 1.0 - 1e-9
 """Share of μ F_n from which a contact counts as sliding."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Contacts:
     """c node contacts. a, b (c,) rows · point, shear_point (c, 3) [m]: where they push and rub · normal (c, 3) from a
     to b
@@ -77,7 +77,17 @@ class Contacts:
 
     def _springs_at(self, point, x, kn, kt, cn, ct) -> Springs:
         """`assemble` reads -1 as the fixed world; its arm is not used there."""
-        return Springs(self.a, self.b, point - x[self.a], point - x[self.b], self.normal, kn, kt, cn, ct)
+        return Springs(
+            a=self.a,
+            b=self.b,
+            arm_a=point - x[self.a],
+            arm_b=point - x[self.b],
+            normal=self.normal,
+            kn=kn,
+            kt=kt,
+            cn=cn,
+            ct=ct,
+        )
 
 
 def point_velocities(row: Array, point: Array, v: Array, x: Array) -> Array:
@@ -105,9 +115,21 @@ def contacts_of_rows(rows: Rows, count: int, n: int) -> Contacts:
     on_face = r.b < n
     normal_force = np.einsum("ci,ci->c", r.force, r.normal)
     return Contacts(
-        r.a, np.where(on_face, r.b, -1), r.point, r.point + r.shift, -r.normal, r.depth, r.kn, r.kt, r.cn, r.ct, r.mu,
-        -normal_force[:, None] * r.normal, -r.shear, r.held,
-    )  # fmt: skip
+        a=r.a,
+        b=np.where(on_face, r.b, -1),
+        point=r.point,
+        shear_point=r.point + r.shift,
+        normal=-r.normal,
+        depth=r.depth,
+        kn=r.kn,
+        ks=r.kt,
+        cn=r.cn,
+        cs=r.ct,
+        mu=r.mu,
+        normal_force=-normal_force[:, None] * r.normal,
+        shear_force=-r.shear,
+        shear_energy=r.held,
+    )
 
 
 def no_contacts() -> Contacts:

@@ -18,7 +18,7 @@ from numba import njit
 Array = np.ndarray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Impulses:
     """Sums over the substeps of a step, one row a block: force [N s], moment about the block's own centre [N m s], and
     moment about the zero of the coordinates [N m s].
@@ -39,7 +39,14 @@ class Impulses:
     @classmethod
     def none(cls, n: int, zero: Array) -> Impulses:
         """Before the first substep."""
-        return cls(np.zeros((n, 9)), np.zeros((n, 9)), np.zeros((n, 3)), 0.0, zero, np.zeros((n, 3)))
+        return cls(
+            contact=np.zeros((n, 9)),
+            joint=np.zeros((n, 9)),
+            place=np.zeros((n, 3)),
+            dt=0.0,
+            zero=zero,
+            lifted=np.zeros((n, 3)),
+        )
 
     def about(self, point: Array, which: Array) -> Array:
         """Impulse and its moment about a point of the world, (n, 6), of `contact` or `joint`."""
@@ -85,7 +92,15 @@ class ImpulseSums:
     def taken(self) -> Impulses:
         """Those since `start`."""
         s = self._sums
-        return Impulses(s.contact, s.joint, s.place, self._dt, s.zero, s.lifted, self._lifted_dt)
+        return Impulses(
+            contact=s.contact,
+            joint=s.joint,
+            place=s.place,
+            dt=self._dt,
+            zero=s.zero,
+            lifted=s.lifted,
+            lifted_dt=self._lifted_dt,
+        )
 
 
 @njit(cache=True)

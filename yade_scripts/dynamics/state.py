@@ -15,7 +15,7 @@ class OtherStructure(ValueError):
     """A state does not belong to the structure that is to take it over."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class StructureState:
     """Everything of a structure that changes in time; the rest follows from how it was built.
 
@@ -56,15 +56,15 @@ class StructureState:
         if missing:
             raise OtherStructure(f"not the state of a structure: {', '.join(missing)} missing")
         return cls(
-            found["motion"],
-            float(found["time"]),
-            float(found["dt"]),
-            found["load"],
-            found["lent_spin"],
-            parts["onset"],
-            {name: float(value) for name, value in parts["sums"].items()},
-            parts["joints"] or None,
-            parts["contacts"] or None,
+            motion=found["motion"],
+            time=float(found["time"]),
+            dt=float(found["dt"]),
+            load=found["load"],
+            lent_spin=found["lent_spin"],
+            onset=parts["onset"],
+            sums={name: float(value) for name, value in parts["sums"].items()},
+            joints=parts["joints"] or None,
+            contacts=parts["contacts"] or None,
         )
 
 

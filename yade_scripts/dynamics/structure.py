@@ -41,7 +41,7 @@ class NotFinite(RuntimeError):
     """Positions, velocities or loads of blocks are no numbers."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class AdvanceReport:
     """substeps · dt_s [s] · opening_rate: largest growth of λ/δ_f in a substep (beyond about 0.25 the tearing is
     averaged over the substep) · mean_velocity (n, 6) = displacement and rotation vector over the step / dt
@@ -257,7 +257,13 @@ class Structure(StructureReadings):
         mean = np.concatenate([m.x - x0, turn], axis=1) / dt
         failed = np.concatenate(broken).astype(np.int64)
         return AdvanceReport(
-            count, dt / count, self._substepper.fastest, mean, work, failed, self._impulses.taken()
+            substeps=count,
+            dt_s=dt / count,
+            opening_rate=self._substepper.fastest,
+            mean_velocity=mean,
+            load_work=work,
+            broken=failed,
+            impulses=self._impulses.taken(),
         )
 
     def _turn_on_contacts(self) -> None:
@@ -319,15 +325,15 @@ class Structure(StructureReadings):
     def save(self) -> StructureState:
         """Everything that changes in time, for a second pass over a step, or for a file (`StructureState.arrays`)."""
         return StructureState(
-            self._scene.save(),
-            self.time,
-            self._motion.dt,
-            self._substepper.load.copy(),
-            self._spin.save(),
-            self._onset.save(),
-            self._accounts.sums(),
-            self.joints.history() if self.joints is not None else None,
-            self._contacts.save() if self._contacts is not None else None,
+            motion=self._scene.save(),
+            time=self.time,
+            dt=self._motion.dt,
+            load=self._substepper.load.copy(),
+            lent_spin=self._spin.save(),
+            onset=self._onset.save(),
+            sums=self._accounts.sums(),
+            joints=self.joints.history() if self.joints is not None else None,
+            contacts=self._contacts.save() if self._contacts is not None else None,
         )
 
     def restore(self, saved: StructureState) -> None:

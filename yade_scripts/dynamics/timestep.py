@@ -35,7 +35,7 @@ class SubstepTooLong(ValueError):
     exit_code = 2
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class SubstepLimit:
     """dt [s] · what: the joint or block that limits it, in words · omega [rad/s] of the joints (0 without)
 
@@ -176,13 +176,13 @@ def substep_limit(
     face_stiffness (n,) [N/m], None without contact
     damping, contact_damping: ζ of joints and contacts; a dashpot in parallel shortens the limit of the explicit
     scheme by √(1 + ζ²) - ζ."""
-    best = SubstepLimit(np.inf, "nothing limits the substep (no joints, no contact)", 0.0)
+    best = SubstepLimit(dt=np.inf, what="nothing limits the substep (no joints, no contact)", omega=0.0)
     omega, j = joint_frequency(blocks, joints)
     if omega > 0.0:
         stable = 2.0 / omega * _dashpot_share(damping)
         other = blocks[joints.b[j]].name if joints.b[j] >= 0 else "ground"
         text = f"joint {blocks[joints.a[j]].name} - {other}, ω ≤ {omega:.4g} rad/s"
-        best = SubstepLimit(JOINT_SHARE * stable, text, omega, stable, text)
+        best = SubstepLimit(dt=JOINT_SHARE * stable, what=text, omega=omega, stable=stable, stable_what=text)
     if face_stiffness is not None and len(blocks):
         mass = np.array([np.inf if b.fixed or b.driven else b.mass for b in blocks])
         limit = _dashpot_share(contact_damping) * np.sqrt(mass / face_stiffness)

@@ -16,7 +16,7 @@ from yade_scripts.joints.forces import MU, NOT_GROWING, PULL, JointKernels, kern
 Array = np.ndarray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class JointTable:
     """One row a joint. a, b: blocks (b = -1: ground or wall) · face_a, face_b: their faces (-1: fixed plane)
 
@@ -255,10 +255,24 @@ class Joints:
         effective = np.hypot(np.maximum(opening[:, 0], 0.0), shear)
         mix = np.divide(shear, effective, out=np.zeros(len(self)), where=effective > 0.0)
         return JointTable(
-            self.a, self.b, self.face_a, self.face_b, self.area, centre, normal, damage, mean, opening[:, 0],
-            opening[:, 1], mix, self.stored_between(x, R, x, R), self.lost(), self.damped.copy(),
-            self.failure_time.copy(), self.alive.copy(),
-        )  # fmt: skip
+            a=self.a,
+            b=self.b,
+            face_a=self.face_a,
+            face_b=self.face_b,
+            area=self.area,
+            centre=centre,
+            normal=normal,
+            damage=damage,
+            mean_damage=mean,
+            opening=opening[:, 0],
+            sliding=opening[:, 1],
+            mode_mix=mix,
+            stored=self.stored_between(x, R, x, R),
+            dissipated=self.lost(),
+            damped=self.damped.copy(),
+            failure_time=self.failure_time.copy(),
+            alive=self.alive.copy(),
+        )
 
     def corners(self, x: Array, R: Array) -> Array:
         """Corners of the joined faces (c, 3) [m] where block a is, those of joint j from corner_start[j]."""
