@@ -11,7 +11,7 @@ from pydantic import ValidationError
 
 from coupler.case.messages import explain_error
 from coupler.case.terrain import Terrain
-from coupler.geometry.terrain.grids import TerrainError
+from coupler.geometry.terrain.grid import TerrainError
 from coupler.geometry.terrain.show import of_file, resolved
 from coupler.program import terminal
 from coupler.program.errors import BadCase

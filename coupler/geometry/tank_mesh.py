@@ -215,7 +215,7 @@ def what_of(tank: Tank) -> str:
 def _on_terrain(case: Case) -> tuple[Case, list[Problem]]:
     """The case with its tank over its terrain, and why that cannot be."""
     from coupler.geometry.terrain.checks import terrain_problems
-    from coupler.geometry.terrain.grids import TerrainError
+    from coupler.geometry.terrain.grid import TerrainError
     from coupler.geometry.terrain.site import terrain_of
     from fluid.mesh.background import MeshError
 

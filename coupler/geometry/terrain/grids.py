@@ -6,13 +6,13 @@ GeoTIFF and whatever else GDAL reads: `raster.py`, in a process of its own.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from coupler.case.paths import BadPath, check_file, read_text
-from coupler.program.errors import ExitCode, SurgebreakError, briefly, did_you_mean
+from coupler.geometry.terrain.grid import Grid, TerrainError
+from coupler.program.errors import briefly, did_you_mean
 
 Array = np.ndarray
 
@@ -22,24 +22,6 @@ MOST_BYTES = 512_000_000
 """Of a terrain file that is read as text."""
 MOST_POINTS = 40_000_000
 """Of a raster: a site of 6 km with points every metre."""
-
-
-class TerrainError(SurgebreakError):
-    """A terrain that cannot be used; the message names the file, what is wrong with it, and the remedy."""
-
-    exit_code = ExitCode.BAD_CASE
-
-
-@dataclass(frozen=True)
-class Grid:
-    """x (nx,), y (ny,), increasing and even · z (nx, ny), NaN where unknown; units of the file · crs: its coordinate
-    system as text, "" if it says none · notes: what was found on the way, for people."""
-
-    x: Array
-    y: Array
-    z: Array
-    crs: str = ""
-    notes: tuple[str, ...] = ()
 
 
 def read_grid(path: Path, variable: str | None = None) -> Grid:

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from coupler.geometry.terrain.grids import Grid, TerrainError
+from coupler.geometry.terrain.grid import Grid, TerrainError
 from coupler.program.extras import missing
 
 ROTATED = 1e-9

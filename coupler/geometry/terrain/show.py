@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from coupler.geometry.terrain.grids import Grid, TerrainError, read_grid
+from coupler.geometry.terrain.grid import Grid, TerrainError
+from coupler.geometry.terrain.grids import read_grid
 from coupler.geometry.terrain.height_map import HeightMap
 from coupler.program.terminal import Row
 

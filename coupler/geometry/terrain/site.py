@@ -17,7 +17,8 @@ from pathlib import Path
 
 import numpy as np
 
-from coupler.geometry.terrain.grids import MOST_POINTS, Grid, TerrainError, read_grid
+from coupler.geometry.terrain.grid import Grid, TerrainError
+from coupler.geometry.terrain.grids import MOST_POINTS, read_grid
 from coupler.geometry.terrain.height_map import HeightMap
 
 Array = np.ndarray

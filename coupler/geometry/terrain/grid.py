@@ -1,0 +1,29 @@
+"""A terrain as it stands in its file, before it has a place in a tank."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from coupler.program.errors import ExitCode, SurgebreakError
+
+Array = np.ndarray
+
+
+class TerrainError(SurgebreakError):
+    """A terrain that cannot be used; the message names the file, what is wrong with it, and the remedy."""
+
+    exit_code = ExitCode.BAD_CASE
+
+
+@dataclass(frozen=True)
+class Grid:
+    """x (nx,), y (ny,), increasing and even · z (nx, ny), NaN where unknown; units of the file · crs: its coordinate
+    system as text, "" if it says none · notes: what was found on the way, for people."""
+
+    x: Array
+    y: Array
+    z: Array
+    crs: str = ""
+    notes: tuple[str, ...] = ()
