@@ -58,10 +58,11 @@ class Background:
     bin_cells: np.ndarray
 
     @classmethod
-    def from_arrays(cls, nodes, cells, axes=None) -> Background:
+    def from_arrays(cls, nodes, cells, axes=None, straddling: bool = False) -> Background:
         """Any tetrahedra: nodes (N, 3) [m], cells (M, 4).  Cells may have either orientation.
 
-        axes: walls of bins such that no cell straddles two bins (a split brick lattice), or None.
+        axes: walls of bins such that no cell straddles two of them (a split brick lattice), or None · straddling: cells
+        may straddle the bins of `axes`.
         Raises MeshError for cells without volume or indices out of range."""
         nodes = np.ascontiguousarray(nodes, float)
         cells = _oriented(nodes, _checked_cells(nodes, cells))
@@ -69,8 +70,8 @@ class Background:
         neighbours = cell_neighbours(cells, len(nodes))
         faces, owner = _boundary(cells, neighbours)
         spacing = float(cube_root(6.0 * volume.mean()))
-        lattice = axes is not None
-        axes = tuple(np.asarray(a, float) for a in axes) if lattice else _uniform_axes(nodes, spacing)
+        lattice = axes is not None and not straddling
+        axes = _uniform_axes(nodes, spacing) if axes is None else tuple(np.asarray(a, float) for a in axes)
         start, members = _bins(nodes, cells, axes, lattice)
         normal = _face_normals(nodes, faces)
         return cls(
@@ -261,12 +262,18 @@ def _uniform_axes(nodes, spacing):
 
 
 def _bins(nodes, cells, axes, lattice):
-    """Cells of each bin as CSR: of the centroid in a lattice, otherwise all that the box of a cell meets."""
+    """Cells of each bin as CSR: of the centroid in a lattice, otherwise all whose box reaches into the bin."""
     x = nodes[cells]
-    corners = (x.mean(axis=1), x.mean(axis=1)) if lattice else (x.min(axis=1), x.max(axis=1))
+    corners = (x.mean(axis=1), x.mean(axis=1)) if lattice else _shrunk(x.min(axis=1), x.max(axis=1))
     low, high = (np.stack([bin_of(axes[k], c[:, k]) for k in range(3)], axis=1) for c in corners)
     shape = [len(a) - 1 for a in axes]
     return _fill_bins(low, high, *shape)
+
+
+def _shrunk(low, high):
+    """Boxes (M, 3), (M, 3) less round-off, so that a cell that ends at a wall of the bins is in one of them only."""
+    less = 1e-11 * (high - low)
+    return low + less, high - less
 
 
 def bin_of(axis, x) -> np.ndarray:
@@ -348,12 +355,31 @@ def _locate(points, ax, ay, az, bin_start, bin_cells, nodes, cells, g):
     for m in range(points.shape[0]):
         i, j, k = (_bin_index(ax, points[m, 0]), _bin_index(ay, points[m, 1]), _bin_index(az, points[m, 2]))
         b = (i * (ay.shape[0] - 1) + j) * (az.shape[0] - 1) + k
-        best = -1e-10  # round-off: a point on a shared face belongs to the first cell that holds it
-        for s in range(bin_start[b], bin_start[b + 1]):
-            lowest = smallest_barycentric(points[m], bin_cells[s], nodes, cells, g)
-            if lowest >= best:
-                found[m] = bin_cells[s]
-                if lowest >= 0.0:
-                    break
-                best = lowest
+        _seek(points, m, b, bin_start, bin_cells, nodes, cells, g, found)
+        if found[m] < 0:  # on a wall of the bins a point may belong to a cell that ends there
+            for near in range(1, 8):
+                p, q, r = near & 1, near >> 1 & 1, near >> 2
+                on = (p == 0 or _on_wall(ax, i, points[m, 0])) and (q == 0 or _on_wall(ay, j, points[m, 1]))
+                if on and (r == 0 or _on_wall(az, k, points[m, 2])) and found[m] < 0:
+                    b = ((i - p) * (ay.shape[0] - 1) + j - q) * (az.shape[0] - 1) + k - r
+                    _seek(points, m, b, bin_start, bin_cells, nodes, cells, g, found)
     return found
+
+
+@njit(cache=True)
+def _on_wall(axis, i, x):
+    """Whether x is on the lower wall of bin i, up to round-off, and there is a bin before it."""
+    return i > 0 and x - axis[i] <= 1e-9 * (axis[i] - axis[i - 1])
+
+
+@njit(cache=True)
+def _seek(points, m, b, bin_start, bin_cells, nodes, cells, g, found):
+    """found[m] <- the cell of bin b that holds point m, if there is one."""
+    best = -1e-10  # round-off: a point on a shared face belongs to the first cell that holds it
+    for s in range(bin_start[b], bin_start[b + 1]):
+        lowest = smallest_barycentric(points[m], bin_cells[s], nodes, cells, g)
+        if lowest >= best:
+            found[m] = bin_cells[s]
+            if lowest >= 0.0:
+                break
+            best = lowest

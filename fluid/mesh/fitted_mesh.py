@@ -43,7 +43,8 @@ class FittedMesh:
     """mesh: Background · on_bed (N,) bool, nodes on the bed · bed_face (B,) bool, faces of the boundary on it ·
     column_x (nx,), column_y (ny,) [m] and bed (nx, ny) [m], heights of the nodes on it (NaN where a column has none) ·
     layer [m], height of a brick · steepest, largest slope of the bed between columns beside each other, at
-    steepest_at (2,) [m] · lowered: columns whose bed was taken down to one layer below the lid."""
+    steepest_at (2,) [m] · lowered: columns whose bed was taken down to one layer below the lid · lattice (N, 3): places
+    of the nodes in bricks of edge 1, for `refinement.py`."""
 
     mesh: Background
     on_bed: np.ndarray
@@ -55,6 +56,7 @@ class FittedMesh:
     steepest: float
     steepest_at: tuple[float, float]
     lowered: int
+    lattice: np.ndarray
 
 
 def fitted_mesh(
@@ -114,6 +116,7 @@ def fitted_mesh(
         steepest,
         place,
         int((above & used).sum()),
+        columns.lattice(),
     )
 
 
@@ -147,6 +150,11 @@ class _Columns:
         nodes = np.column_stack([x[column // len(y)], y[column % len(y)], z])
         height = np.where(np.abs(height - np.rint(height)) < 1e-9, np.rint(height), height)
         return cls(nodes, height, start, bed.shape)
+
+    def lattice(self):
+        """Places (N, 3) of the nodes in bricks of edge 1."""
+        column = np.repeat(np.arange(len(self.start) - 1), np.diff(self.start))
+        return np.column_stack([column // self.shape[1], column % self.shape[1], self.height]).astype(float)
 
     def of_cells(self):
         return self.height, self.start, *self.shape

@@ -13,7 +13,10 @@ import numpy as np
 from numba import njit
 
 MOST_SHAPES = 64
-"""Shapes that are kept apart, 6 kB of gradients; a mesh with more has a row for every cell."""
+"""Shapes that are compared one by one, 6 kB of gradients: those of a box of bricks."""
+MOST_KINDS = 4096
+"""Shapes that are kept apart, 400 kB of gradients: those of bricks that were halved in parts. A mesh with more, or with
+fewer than four cells of a shape, has a row for every cell."""
 SAME = 1e-12
 """Difference of gradients over the largest of them up to which cells count as equal: round-off of their nodes."""
 
@@ -33,10 +36,39 @@ class Shapes:
         """The shapes of a `mesh.Background`."""
         row, first = _shapes(mesh.gradients, MOST_SHAPES, SAME)
         if len(first) == 0:
+            row, first = _kinds(mesh.gradients)
+        if len(first) == 0:
             return cls(
                 np.arange(len(mesh.gradients), dtype=np.uint32), mesh.gradients, mesh.products, mesh.upright
             )
         return cls(row, mesh.gradients[first], mesh.products[first], mesh.upright[first])
+
+
+def _kinds(g):
+    """As `_shapes`, for many: cells are sorted by their gradients in millionths of the largest of the cell."""
+    largest = np.abs(g).max(axis=(1, 2))
+    share, power = np.frexp(largest)
+    whole = np.rint(g.reshape(len(g), 12) / largest[:, None] * 1e6)
+    key = np.column_stack([whole, np.rint(share * 1e6), power]).astype(np.int64) @ _odd_numbers(14)
+    _, first, row = np.unique(key, return_index=True, return_inverse=True)
+    most = min(MOST_KINDS, len(g) // 4)
+    if len(first) > most or not _all_alike(g, first, row, SAME):
+        return row, first[:0]
+    return row.astype(np.uint32), first
+
+
+def _odd_numbers(n):
+    """n fixed odd numbers of 62 bits: products with them, wrapped, tell rows of whole numbers apart."""
+    return np.random.default_rng(7).integers(2**61, 2**62, n) | 1
+
+
+@njit(cache=True)
+def _all_alike(g, first, row, same):
+    """Whether the gradients of every cell are those of the first of its shape."""
+    found = True
+    for e in range(g.shape[0]):
+        found = found and _alike(g[e], g[first[row[e]]], same * np.abs(g[e]).max())
+    return found
 
 
 @njit(cache=True)

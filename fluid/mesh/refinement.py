@@ -1,0 +1,181 @@
+"""Boxes and beds with finer cells in parts: where, and what the flow takes for its mesh.
+
+mesh = refined_mesh(box_mesh((0, 0, 0), (8, 4, 4), 0.5), [InBox((3, 1, 0), (5, 3, 2), levels=2)])
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from fluid.mesh.background import Background, MeshError, bin_of
+from fluid.mesh.bisection import MOST_LEVELS, Tetrahedra, refined
+
+MOST_ENTRIES = 6
+"""Bins that a cell may be listed in, on average."""
+TOUCH = 1e-9
+"""Share of a cell within which one that only touches a region does not belong to it."""
+
+
+@dataclass(frozen=True)
+class InBox:
+    """Cells that reach into the box from lower to upper (3,) [m] are halved `levels` times in every direction."""
+
+    lower: tuple[float, float, float]
+    upper: tuple[float, float, float]
+    levels: int
+
+    def cells(self, mesh: Tetrahedra, level: int) -> np.ndarray:
+        """(M,) bool: cells of the mesh that are to have this level."""
+        low, high = _boxes_of(mesh)
+        touch = TOUCH * (high - low)
+        return ((low + touch < self.upper) & (high - touch > self.lower)).all(axis=1)
+
+
+@dataclass(frozen=True)
+class NearBodies:
+    """Cells within a margin [m] of convex bodies are halved `levels` times in every direction.
+
+    normals (P, 3), unit, outward, and offsets (P,) [m] of their planes n·x = d · start (n + 1,): the planes of each ·
+    lower, upper (n, 3) [m]: boxes around the bodies · margin: one number [m]; twice as far a level less is reached, and
+    so on, so that sizes change gradually."""
+
+    normals: np.ndarray
+    offsets: np.ndarray
+    start: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    margin: float
+    levels: int
+
+    def cells(self, mesh: Tetrahedra, level: int) -> np.ndarray:
+        """(M,) bool: cells of the mesh that are to have this level."""
+        margin = self.margin * 2.0 ** (self.levels - level)
+        low, high = _boxes_of(mesh)
+        return _near(
+            mesh.nodes,
+            mesh.cells,
+            low,
+            high,
+            self.normals,
+            self.offsets,
+            self.start,
+            self.lower,
+            self.upper,
+            margin,
+        )
+
+
+@dataclass(frozen=True)
+class OnBed:
+    """Cells up to a height [m] above a bed where this lies between two levels: a shore, the ground of a town.
+
+    bed(x, y) → z [m] at (n,), (n,) [m] · lowest, highest [m] · height [m] · levels as above."""
+
+    bed: object
+    lowest: float
+    highest: float
+    height: float
+    levels: int
+
+    def cells(self, mesh: Tetrahedra, level: int) -> np.ndarray:
+        """(M,) bool: cells of the mesh that are to have this level."""
+        x = mesh.nodes
+        z = np.asarray(self.bed(x[:, 0], x[:, 1]), float)
+        here = (z >= self.lowest) & (z <= self.highest) & (x[:, 2] - z <= self.height * (1.0 + TOUCH))
+        return here[mesh.cells].any(axis=1)
+
+
+def refined_mesh(mesh: Background, regions, lattice=None) -> Background:
+    """A mesh with finer cells in regions (InBox, NearBodies, OnBed, or others with `levels` and `cells`).
+
+    lattice (N, 3): places of the nodes in bricks of edge 1, None: of a box or of any tetrahedra, found here.
+    Raises MeshError for levels out of 1 to MOST_LEVELS."""
+    return refined_with_parents(mesh, regions, lattice)[0]
+
+
+def refined_with_parents(mesh: Background, regions, lattice=None) -> tuple[Background, Tetrahedra]:
+    """`refined_mesh`, and the cells with what they come from."""
+    regions = list(regions)
+    levels = max((region.levels for region in regions), default=0)
+    if any(not 1 <= region.levels <= MOST_LEVELS for region in regions):
+        raise MeshError(f"levels of refinement must be from 1 to {MOST_LEVELS}")
+    start = Tetrahedra.coarse(mesh.nodes, mesh.cells, _lattice(mesh) if lattice is None else lattice)
+
+    def chosen(now, level):
+        found = np.zeros(len(now.cells), bool)
+        for region in regions:
+            if region.levels >= level:
+                found |= region.cells(now, level)
+        return found
+
+    cells = refined(start, chosen, levels)
+    if len(cells.cells) == len(mesh.cells):
+        return mesh, start
+    return Background.from_arrays(
+        cells.nodes, cells.cells, _bin_walls(mesh.axes, cells), straddling=True
+    ), cells
+
+
+def _lattice(mesh: Background):
+    """Places (N, 3) of the nodes in bricks of edge 1 where the bins are bricks; None for other meshes."""
+    at = [np.searchsorted(axis, mesh.nodes[:, k]) for k, axis in enumerate(mesh.axes)]
+    at = [np.minimum(a, len(axis) - 1) for a, axis in zip(at, mesh.axes)]
+    if any((axis[a] != mesh.nodes[:, k]).any() for k, (a, axis) in enumerate(zip(at, mesh.axes))):
+        return None
+    return np.column_stack(at).astype(float)
+
+
+def _boxes_of(mesh: Tetrahedra):
+    x = mesh.nodes[mesh.cells]
+    return x.min(axis=1), x.max(axis=1)
+
+
+def _bin_walls(axes, mesh: Tetrahedra):
+    """Axes of bins about as small as the smallest cells across them, as far as cells are not listed too often."""
+    low, high = _boxes_of(mesh)
+    for share in (1.0, 2.0, 4.0, 8.0, 16.0):
+        found = tuple(_divided(axis, low[:, k], high[:, k], share) for k, axis in enumerate(axes))
+        listed = 1.0
+        for k, axis in enumerate(found):
+            listed = listed * (1.0 + bin_of(axis, high[:, k]) - bin_of(axis, low[:, k]))
+        if listed.mean() <= MOST_ENTRIES:
+            break
+    return found
+
+
+def _divided(axis, low, high, share):
+    """The axis with each interval divided so that the smallest cell that starts in it covers about `share` parts."""
+    least = np.full(len(axis) - 1, np.inf)
+    np.minimum.at(least, bin_of(axis, 0.5 * (low + high)), high - low)
+    parts = np.maximum(1.0, np.rint(np.diff(axis) / (least * share))).astype(int)
+    return np.concatenate(
+        [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(axis, axis[1:], parts)] + [axis[-1:]]
+    )
+
+
+@njit(cache=True)
+def _near(nodes, cells, low, high, normals, offsets, start, body_low, body_high, margin):
+    """(M,) bool: cells that no plane of some body, moved out by the margin, parts from it, nor its box."""
+    found = np.zeros(cells.shape[0], np.bool_)
+    for e in range(cells.shape[0]):
+        for b in range(start.shape[0] - 1):
+            apart = False
+            for k in range(3):
+                apart = apart or low[e, k] > body_high[b, k] + margin or high[e, k] < body_low[b, k] - margin
+            if apart:
+                continue
+            for p in range(start[b], start[b + 1]):
+                beyond = True
+                for a in range(4):
+                    d = 0.0
+                    for k in range(3):
+                        d += normals[p, k] * nodes[cells[e, a], k]
+                    beyond = beyond and d - offsets[p] > margin
+                apart = apart or beyond
+            if not apart:
+                found[e] = True
+                break
+    return found
