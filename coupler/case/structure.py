@@ -21,6 +21,7 @@ from coupler.case.types import (
     VelocityVector,
     Wall,
 )
+from coupler.case.units import quantity
 
 
 class Block(Section):
@@ -80,6 +81,16 @@ class Building(Section):
     roof: Switch = Field(True, description="false: open at the top")
     density: Density | None = Field(None, description="mass per volume; absent: structure.density")
     material: Name = Field("block", description="a name that contact.pair may go by")
+    on: Literal["terrain"] | None = Field(
+        None,
+        description="terrain: it stands on a footing in the ground, a held box NAME-footing, and the z of lower counts "
+        "from the highest ground under it",
+    )
+    turn: quantity("rad") = Field(
+        0.0,
+        description="turn about the upright axis through its middle, counter-clockwise",
+        examples=["30 deg"],
+    )
     opening: tuple[Opening, ...] = Field((), description="doors and windows")
 
 
@@ -98,6 +109,16 @@ class MasonryWall(Section):
     )
     along: Literal["x", "y"] | None = Field(
         None, description="length of the wall, along which a running bond is shifted; absent: its longer side"
+    )
+    on: Literal["terrain"] | None = Field(
+        None,
+        description="terrain: it stands on a footing in the ground, a held box NAME-footing, and the z of lower counts "
+        "from the highest ground under it",
+    )
+    turn: quantity("rad") = Field(
+        0.0,
+        description="turn about the upright axis through its middle, counter-clockwise",
+        examples=["30 deg"],
     )
     density: Density | None = Field(None, description="mass per volume; absent: structure.density")
     material: Name = Field("block", description="a name that contact.pair may go by")

@@ -11,7 +11,7 @@ import numpy as np
 from coupler.case.case import Case
 from coupler.case.structure import Building
 from coupler.geometry.bodies import Body, overlap_depth
-from coupler.geometry.parts import Part
+from coupler.geometry.parts import Part, standing_on_terrain
 from coupler.geometry.solids import solids_of
 from coupler.geometry.tank_mesh import beside_mesh, is_measured, mesh_of, tank_places, what_of
 
@@ -41,7 +41,11 @@ def solid_bodies(case: Case) -> list[Placed]:
 
 
 def frame_problems(case: Case) -> Iterator[Problem]:
-    """Turns without a direction, and boxes whose corners are in the wrong order; nothing else can be checked then."""
+    """Turns without a direction, boxes whose corners are in the wrong order, and parts on a terrain that is not there;
+    nothing else can be checked then."""
+    for path, _ in standing_on_terrain(case):
+        if case.terrain is None:
+            yield (*path, "on"), "there is no section [terrain] to stand on; write one, or leave `on` out"
     turned = [(("solid", i), solid) for i, solid in enumerate(case.solid)]
     turned += [
         (("structure", "block", i), b) for i, b in enumerate(case.structure.block if case.structure else ())

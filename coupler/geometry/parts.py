@@ -67,14 +67,35 @@ def recipes(case: Case) -> Iterator[Recipe]:
             )
 
 
+def standing_on_terrain(case: Case) -> Iterator[tuple[KeyPath, object]]:
+    """Places and tables of the parts with on = "terrain"."""
+    for kind in ("building", "wall"):
+        for i, spec in enumerate(getattr(case.structure, kind) if case.structure else ()):
+            if spec.on is not None:
+                yield ("structure", kind, i), spec
+
+
 def _made_from(case: Case, spec, make, driven: dict) -> list:
     """The blocks of one table, those with a prescribed motion driven."""
     common = {"density": spec.density or case.structure.density, "material": spec.material}
+    if getattr(spec, "on", None) is not None:
+        from coupler.geometry.terrain.standing import on_ground
+
+        spec = on_ground(case, spec)
     blocks = make(spec, common)
+    if getattr(spec, "turn", 0.0):
+        blocks = _turned(blocks, np.array(spec.lower) + 0.5 * np.array(spec.size), spec.turn)
     return [
         b.changed(driven=True, fixed=False, velocity=np.array(driven[b.name])) if b.name in driven else b
         for b in blocks
     ]
+
+
+def _turned(blocks: list, middle, angle: float) -> list:
+    """The blocks turned about the upright axis through a point (3,) [m], counter-clockwise [rad]."""
+    c, s = np.cos(angle), np.sin(angle)
+    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    return [b.changed(centre=middle + turn @ (b.centre - middle), rotation=turn @ b.rotation) for b in blocks]
 
 
 def _single(spec, common: dict) -> list:

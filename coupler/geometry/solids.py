@@ -12,6 +12,7 @@ from functools import lru_cache
 import numpy as np
 
 from coupler.case.case import Case
+from coupler.case.types import Rotation
 from coupler.geometry.bodies import Body, turned
 from coupler.geometry.parts import stamp
 
@@ -38,12 +39,35 @@ def solids_of(case: Case) -> tuple[FixedSolid, ...]:
     """All fixed bodies in the order of their rows; a file may hold several.
 
     Raises BlockError or MeshFileError where a table makes none. Kept for the next call unless a file changed."""
-    return _made(case.solid, tuple(stamp(s.path) for s in case.solid if s.path))
+    solids = _made(case.solid, tuple(stamp(s.path) for s in case.solid if s.path))
+    return solids + tuple(_as_solid(path, block) for path, block in _footings(case))
 
 
 def obstacle_blocks(case: Case) -> list:
     """The fixed solids as held blocks, in the order of `solids_of`: what blocks meet and joints glue to."""
-    return [block for i, spec in enumerate(case.solid) for block in _held(case, spec)]
+    solids = [block for i, spec in enumerate(case.solid) for block in _held(case, spec)]
+    return solids + [block for _, block in _footings(case)]
+
+
+def _footings(case: Case) -> Iterator[tuple[KeyPath, object]]:
+    """Held boxes under the parts that stand on the terrain, with the places of their tables."""
+    from coupler.geometry.parts import standing_on_terrain
+
+    for path, spec in (
+        standing_on_terrain(case) if case.tank is not None and case.tank.ground is not None else ()
+    ):
+        from coupler.geometry.terrain.standing import footing_box
+        from yade_scripts.blocks.block import Block
+
+        centre, size = footing_box(case, spec)
+        turn = turned(Rotation(axis=(0.0, 0.0, 1.0), angle=spec.turn))
+        name, density = f"{spec.name}-footing", spec.density or case.structure.density
+        more = {"density": density, "material": "ground", "group": name, "fixed": True}
+        yield path, Block(name, centre, size=size, rotation=turn, **more)
+
+
+def _as_solid(path: KeyPath, block) -> FixedSolid:
+    return FixedSolid(path, block.name, block.world_vertices(), block.faces, Body.of_block(block))
 
 
 def _held(case: Case, spec) -> list:

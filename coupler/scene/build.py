@@ -14,6 +14,7 @@ import numpy as np
 from coupler.case.case import Case
 from coupler.geometry.parts import Part, parts_of
 from coupler.geometry.solids import obstacle_blocks, solids_of
+from coupler.geometry.terrain.standing import ground_surface
 from coupler.results.gauges import Bodies, Gauge, make_gauges
 from coupler.scene.build_water import water_of
 from coupler.step.coupled_step import Coupling
@@ -213,8 +214,9 @@ def joint_parameters(joints):
 
 
 def planes_of(case: Case) -> list:
-    """What bounds the room of the blocks: the ground and the closed sides of the tank."""
-    return [*_ground(case), *_tank_planes(case)]
+    """What bounds the room of the blocks: the ground, even or not, and the closed sides of the tank."""
+    uneven = ground_surface(case)
+    return [*_ground(case), *([] if uneven is None else [uneven]), *_tank_planes(case)]
 
 
 def _ground(case: Case) -> list:
@@ -230,16 +232,16 @@ def _ground(case: Case) -> list:
 
 
 def _tank_planes(case: Case) -> list:
-    """The closed sides of the tank as walls for blocks; its floor only where the case says no ground."""
+    """The closed sides of the tank as walls for blocks; its floor only where there is no other ground."""
     from yade_scripts.blocks.faces import FixedPlane
 
     if case.tank is None:
         return []
-    planes = []
+    planes, has_ground = [], case.structure.ground is not None or case.tank.ground is not None
     for axis, name in enumerate("xyz"):
         for sign, corner in (("-", case.tank.lower), ("+", case.tank.upper)):
             side = name + sign
-            if side in case.tank.open or (side == "z-" and case.structure.ground is not None):
+            if side in case.tank.open or (side == "z-" and has_ground):
                 continue
             normal = np.zeros(3)
             normal[axis] = 1.0 if sign == "-" else -1.0

@@ -49,6 +49,10 @@ class FixedPlane:
         object.__setattr__(self, "point", np.asarray(self.point, float))
         object.__setattr__(self, "normal", normal / np.linalg.norm(normal))
 
+    def distance(self, points: Array) -> Array:
+        """(k,) [m] of points (k, 3), negative in the solid."""
+        return (points - self.point) @ self.normal
+
 
 @dataclass(frozen=True, kw_only=True)
 class TouchingFaces:

@@ -9,6 +9,7 @@ import numpy as np
 from yade_scripts.blocks.block import Block
 from yade_scripts.blocks.faces import FixedPlane
 from yade_scripts.contact.arrays import Bodies, Law, Pairs, Slots, empty_rows
+from yade_scripts.contact.ground import NO_GROUND, GroundSurface
 from yade_scripts.contact.kernel import carry_slots, contact_forces
 from yade_scripts.contact.law import ContactLaw
 from yade_scripts.contact.nodes import contact_shapes
@@ -44,6 +45,8 @@ class ContactForces:
     ):
         self._motion, self._neighbours, self._reach = motion, neighbours, reach
         self._planes = planes
+        uneven = [row for row, plane in enumerate(planes) if isinstance(plane, GroundSurface)]
+        self._ground = planes[uneven[0]].as_row(len(blocks) + uneven[0]) if uneven else NO_GROUND
         self._n = len(blocks)
         self._shapes = contact_shapes(blocks, planes, law.nodes_per_edge)
         names = [b.material for b in blocks] + [p.material for p in planes]
@@ -98,7 +101,7 @@ class ContactForces:
         radius = self._shapes.radius[rows] + 2.0 * self._reach
         found = [np.zeros((0, 2), np.int64)]
         for number, plane in enumerate(self._planes):
-            near = rows[(self._motion.x[rows] - plane.point) @ plane.normal < radius]
+            near = rows[plane.distance(self._motion.x[rows]) < radius]
             found.append(np.stack([near, np.full(len(near), self._n + number)], axis=1))
         return np.concatenate(found)
 
@@ -147,8 +150,8 @@ class ContactForces:
         """Add the contact forces at the present places to F (n, 6) for a substep of dt [s]."""
         m = self._motion
         self._count, lost = contact_forces(
-            self._shapes, self._bodies, self._law, self._pairs, self._slots, m.all_x, m.all_v, m.all_R, dt, m.dt,
-            self._rows, F,
+            self._shapes, self._bodies, self._law, self._pairs, self._slots, self._ground, m.all_x, m.all_v, m.all_R,
+            dt, m.dt, self._rows, F,
         )  # fmt: skip
         self.friction += lost
         self._read = None

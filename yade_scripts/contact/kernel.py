@@ -11,6 +11,7 @@ import numpy as np
 from numba import njit
 
 from yade_scripts.contact.edges import pair_scratch
+from yade_scripts.contact.ground import scan_ground
 from yade_scripts.contact.search import closing_bound, cross, planes_seen_from, scan, separation
 from yade_scripts.contact.springs import Mode, apply, set_dashpots
 
@@ -19,10 +20,10 @@ CROSSING = 0.5
 
 
 @njit(cache=True)
-def contact_forces(shapes, bodies, law, pairs, slots, x, v, R, dt, last_dt, rows, F):
+def contact_forces(shapes, bodies, law, pairs, slots, ground, x, v, R, dt, last_dt, rows, F):
     """Find the contacts at the present places and add their forces to F (n, 6).
 
-    dt [s]: substep to come, 0: only look · last_dt [s]: substep that led here
+    ground: `Ground`, NO_GROUND without · dt [s]: substep to come, 0: only look · last_dt [s]: substep that led here
     → (contacts, work of friction and of springs that were let go [J])
     """
     count, lost = 0, 0.0
@@ -34,9 +35,14 @@ def contact_forces(shapes, bodies, law, pairs, slots, x, v, R, dt, last_dt, rows
             if pairs.calm[p] > 0.0:
                 continue
         first, apart = count, -np.inf
+        if b == ground.row:
+            count, lost, apart = scan_ground(
+                shapes, bodies, law.shear, slots, pairs.start[p], pairs.fresh[p], a, ground, x, v, R, last_dt, rows,
+                count, lost, scratch, planes[0],
+            )  # fmt: skip
         for node_body, face_body in ((a, b), (b, a)):
             begin, end = shapes.node_start[node_body], shapes.node_start[node_body + 1]
-            if begin == end:
+            if begin == end or b == ground.row:
                 continue
             faces = planes_seen_from(
                 shapes.face_start, shapes.normal, shapes.offset, node_body, face_body, x, R, planes

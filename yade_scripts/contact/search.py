@@ -127,7 +127,7 @@ def scan(
             else:
                 slots.rest[s] = max(0.0, depth - ARRIVED * max(way[1, 0], 0.0))
         slots.rest[s] = min(slots.rest[s], depth)
-        _write_row(rows, count, a, b, s, planes[g], depth, xi0, xi1, xi2, x, R)
+        write_row(rows, count, a, b, s, planes[g], depth, xi0, xi1, xi2, x, R)
         rows.depth[count], rows.kn[count] = depth - slots.rest[s], slots.k[s]
         count += 1
     return count, lost
@@ -161,7 +161,7 @@ def cross(
         else:
             slots.rest[s] = max(0.0, depth - ARRIVED * max(way[1, 0], 0.0))
     slots.rest[s] = min(slots.rest[s], depth)
-    _write_row(rows, count, a, b, s, plane, depth, xi[0], xi[1], xi[2], x, R)
+    write_row(rows, count, a, b, s, plane, depth, xi[0], xi[1], xi[2], x, R)
     rows.depth[count], rows.kn[count] = depth - slots.rest[s], slots.k[s]
     return count + 1, lost, -1.0
 
@@ -194,7 +194,7 @@ def _entered(of_start, of, normal, i, xi0, xi1, xi2, planes, faces, smallest, ma
 
 
 @inner
-def _write_row(rows, c, a, b, s, plane, depth, xi0, xi1, xi2, x, R):
+def write_row(rows, c, a, b, s, plane, depth, xi0, xi1, xi2, x, R):
     """Geometry of a contact: half way between the node ξ and the face."""
     rows.a[c], rows.b[c], rows.slot[c] = a, b, s
     for k in range(3):

@@ -1,0 +1,183 @@
+"""Contact of blocks with uneven ground: nodes of a block below a surface of triangles over a lattice.
+
+    z_s(x, y) plane on each triangle,   δ = (z_s - z) n_z,   n upward normal of the triangle below the node        (1)
+
+A node goes on from triangle to triangle with the depth it has, so that no seam between them catches it; δ is continuous
+but for the change of n_z.  The ground's own edges meet no faces: a block across a ridge rests on its nodes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from yade_scripts.blocks.faces import FixedPlane
+from yade_scripts.contact.arrays import BEGINS
+from yade_scripts.contact.jit import inner
+from yade_scripts.contact.search import ALIGNED, write_row
+from yade_scripts.contact.springs import ARRIVED, let_go, stiffness_together, take_over, way_of
+
+Array = np.ndarray
+
+
+class Ground(NamedTuple):
+    """What the kernel knows: row of the body, -1 without one · x (nx,), y (ny,), z (nx, ny) [m] from its point ·
+    mirrored: diagonals turn from square to square · upright: least n_z of all triangles."""
+
+    row: int
+    x: Array
+    y: Array
+    z: Array
+    mirrored: bool
+    upright: float
+
+
+NO_GROUND = Ground(-1, np.zeros(2), np.zeros(2), np.zeros((2, 2)), False, 1.0)
+
+
+@dataclass(frozen=True)
+class GroundSurface(FixedPlane):
+    """Uneven ground as a fixed body. x (nx,), y (ny,) increasing, z (nx, ny) [m]: corners of its triangles, counted
+    from `point`, at or above it · mirrored: squares with i + j odd are split from (1, 0) to (0, 1), all others from
+    (0, 0) to (1, 1). Beyond its edges it goes on level."""
+
+    x: Array = None
+    y: Array = None
+    z: Array = None
+    mirrored: bool = False
+
+    @cached_property
+    def upright(self) -> float:
+        """Least n_z of its triangles."""
+        dx, dy = np.diff(self.x), np.diff(self.y)
+        along, across = np.abs(np.diff(self.z, axis=0)) / dx[:, None], np.abs(np.diff(self.z, axis=1)) / dy
+        steepest = np.hypot(
+            np.maximum(along[:, 1:], along[:, :-1]), np.maximum(across[1:], across[:-1])
+        ).max()
+        return float(1.0 / np.sqrt(1.0 + steepest**2))
+
+    def as_row(self, row: int) -> Ground:
+        """For the kernel, as the body of this row."""
+        arrays = (np.ascontiguousarray(a, float) for a in (self.x, self.y, self.z))
+        return Ground(row, *arrays, self.mirrored, self.upright)
+
+    def distance(self, points: Array) -> Array:
+        """Lower bound (k,) [m] of the distance of points (k, 3) from the ground, negative below it."""
+        x, y = (np.clip(points[:, k] - self.point[k], a[0], a[-1]) for k, a in enumerate((self.x, self.y)))
+        i = np.clip(np.searchsorted(self.x, x, side="right") - 1, 0, len(self.x) - 2)
+        j = np.clip(np.searchsorted(self.y, y, side="right") - 1, 0, len(self.y) - 2)
+        highest = np.maximum.reduce([self.z[i + p, j + q] for p in (0, 1) for q in (0, 1)])
+        return self.upright * (points[:, 2] - self.point[2] - highest)
+
+
+@inner
+def _interval(axis, value):
+    low, high = 0, axis.shape[0] - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if axis[middle] <= value:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+@njit(cache=True)
+def surface_at(ground, px, py, normal):
+    """Height [m] of the ground at a place counted from its point, and the normal (3,) of the triangle there."""
+    i, j = _interval(ground.x, px), _interval(ground.y, py)
+    dx, dy = ground.x[i + 1] - ground.x[i], ground.y[j + 1] - ground.y[j]
+    s = min(max((px - ground.x[i]) / dx, 0.0), 1.0)
+    t = min(max((py - ground.y[j]) / dy, 0.0), 1.0)
+    z00, z10, z01, z11 = ground.z[i, j], ground.z[i + 1, j], ground.z[i, j + 1], ground.z[i + 1, j + 1]
+    if ground.mirrored and (i + j) % 2 == 1:
+        if s + t <= 1.0:
+            along, across = z10 - z00, z01 - z00
+            height = z00 + s * along + t * across
+        else:
+            along, across = z11 - z01, z11 - z10
+            height = z11 - (1.0 - s) * along - (1.0 - t) * across
+    elif s >= t:
+        along, across = z10 - z00, z11 - z10
+        height = z00 + s * along + t * across
+    else:
+        along, across = z11 - z01, z01 - z00
+        height = z00 + s * along + t * across
+    normal[0], normal[1], normal[2] = -along / dx, -across / dy, 1.0
+    size = np.sqrt(normal[0] ** 2 + normal[1] ** 2 + 1.0)
+    for k in range(3):
+        normal[k] /= size
+    return height
+
+
+@inner
+def scan_ground(
+    shapes, bodies, shear, slots, slot, fresh, a, ground, x, v, R, last_dt, rows, count, lost, scratch, plane
+):
+    """Contacts of the nodes of a with the ground; → (contacts, energy lost [J], lower bound of the distance [m],
+    negative where a node is below). plane (4,), scratch (8, 3): work space."""
+    b, begin, way, n = ground.row, shapes.node_start[a], scratch[6:8], scratch[4]
+    face, apart = shapes.face_start[b], np.inf
+    for i in range(begin, shapes.node_start[a + 1]):
+        s = slot + i - begin
+        xi0, xi1, xi2 = shapes.node[i, 0], shapes.node[i, 1], shapes.node[i, 2]
+        px = x[a, 0] - x[b, 0] + R[a, 0, 0] * xi0 + R[a, 0, 1] * xi1 + R[a, 0, 2] * xi2
+        py = x[a, 1] - x[b, 1] + R[a, 1, 0] * xi0 + R[a, 1, 1] * xi1 + R[a, 1, 2] * xi2
+        pz = x[a, 2] - x[b, 2] + R[a, 2, 0] * xi0 + R[a, 2, 1] * xi1 + R[a, 2, 2] * xi2
+        above = pz - surface_at(ground, px, py, n)
+        depth = -above * n[2]
+        apart = min(apart, above * ground.upright if above > 0.0 else -depth)
+        known = slots.face[s] >= 0
+        if depth <= 0.0 and not known:
+            continue
+        for j in range(3):
+            plane[j] = R[a, 0, j] * n[0] + R[a, 1, j] * n[1] + R[a, 2, j] * n[2]
+        plane[3] = depth + plane[0] * xi0 + plane[1] * xi1 + plane[2] * xi2
+        if known:
+            across = slots.shear[s, 0] * n[0] + slots.shear[s, 1] * n[1] + slots.shear[s, 2] * n[2]
+            for k in range(
+                3
+            ):  # of another triangle than before: what now stands upright on the ground is no friction
+                slots.shear[s, k] -= across * n[k]
+            lost += 0.5 * across**2 / (shear * slots.k[s])
+            way_of(v, R, x, a, b, xi0, xi1, xi2, plane, last_dt, scratch, way)
+            if depth <= 0.0:
+                lost += let_go(slots, s, shear, depth, way, R, b)
+                continue
+        else:
+            own = _lowest_face(shapes, i, plane)
+            if own < 0:
+                continue
+            slots.face[s] = face
+            slots.k[s] = stiffness_together(bodies.stiffness[a], bodies.stiffness[b]) / shapes.face_nodes[own]
+            slots.spread[s] = shapes.face_spread[own]
+            slots.shear[s, 0] = slots.shear[s, 1] = slots.shear[s, 2] = 0.0
+            slots.push[s] = BEGINS
+            way_of(v, R, x, a, b, xi0, xi1, xi2, plane, last_dt, scratch, way)
+            if fresh > 0.0:
+                lost += take_over(slots, s, fresh, depth, way[1, 0])
+            else:
+                slots.rest[s] = max(0.0, depth - ARRIVED * max(way[1, 0], 0.0))
+        slots.rest[s] = min(slots.rest[s], depth)
+        write_row(rows, count, a, b, s, plane, depth, xi0, xi1, xi2, x, R)
+        rows.depth[count], rows.kn[count] = depth - slots.rest[s], slots.k[s]
+        count += 1
+    return count, lost, apart
+
+
+@inner
+def _lowest_face(shapes, i, plane):
+    """Face of the block that holds node i and looks most against the normal plane[:3] of its frame; -1 if none does."""
+    own, best = -1, ALIGNED
+    for at in range(shapes.of_start[i], shapes.of_start[i + 1]):
+        f = shapes.of[at]
+        c = -(
+            plane[0] * shapes.normal[f, 0] + plane[1] * shapes.normal[f, 1] + plane[2] * shapes.normal[f, 2]
+        )
+        if c > best:
+            own, best = f, c
+    return own
