@@ -281,7 +281,7 @@ class Motion(Section):
     velocity: VelocityVector = Field(description="its velocity for the whole run")
 
 
-class Exchange(Section):
+class Coupling(Section):
     """How water and blocks agree on a step."""
 
     passes: Annotated[int, Field(strict=True, ge=1, le=4)] = Field(
@@ -331,7 +331,7 @@ class Case(Section):
     joints: Joints | None = Field(None, description="glue between touching faces, which may break")
     gauge: tuple[Gauge, ...] = Field((), description="what is measured at every step")
     motion: tuple[Motion, ...] = Field((), description="blocks that move as prescribed")
-    coupling: Exchange = Field(default_factory=Exchange, description="how water and blocks agree on a step")
+    coupling: Coupling = Field(default_factory=Coupling, description="how water and blocks agree on a step")
     limits: RunLimits = Field(default_factory=RunLimits, description="when a run stops early")
     verdict: Verdict = Field(
         default_factory=Verdict, description="when a structure counts as damaged or collapsed"

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
-from coupler.case.keys import Key, find, keys, names_in
+from typing import get_args
+
+from coupler.case.gauges import Gauge
+from coupler.case.keys import Key, find, keys, names_in, sections_of
+from coupler.case.water import Inflow
 from coupler.program.errors import briefly, did_you_mean
 
 KeyPath = tuple[str | int, ...]
 
-GAUGE_KINDS = (
-    "level", "pressure", "patch", "velocity", "flux", "volume", "force", "loads", "reaction", "motion",
-)  # fmt: skip
-INFLOW_KINDS = ("steady", "record", "bore", "solitary")
+
+def _kinds_of(tables: object) -> tuple[str, ...]:
+    """What `kind` may be in a table that is one of several, in their order."""
+    return tuple(get_args(table.model_fields["kind"].annotation)[0] for table in sections_of(tables))
+
+
+GAUGE_KINDS, INFLOW_KINDS = _kinds_of(Gauge), _kinds_of(Inflow)
 
 
 def explain_error(error: dict) -> tuple[KeyPath, str]:

@@ -2,7 +2,8 @@
 
 recorder                               what is written at which time
 history, columns                       CSV tables of one row a step, and their columns
-fields, vtkhdf, crack_surfaces         water, blocks and joints for ParaView
+fields, vtkhdf                         water and blocks for ParaView
+cracks                                 the joints as a table and as surfaces
 gauges, loads, gauge_windows           what a case measures
 expected                               `expected.toml` against the histories
 storage                                writing that a full disk does not tear

@@ -53,26 +53,6 @@ class History:
         return self.values[name]
 
 
-CRACK_COLUMNS = tuple(
-    Column(*c)
-    for c in (
-        ("joint", "1", "number of the joint"),
-        ("a", "1", "row of the first block"),
-        ("b", "1", "row of the second block, -1 for the ground"),
-        ("time", "s", "when the joint lost its last traction; empty if it still holds"),
-        ("area", "m2", "joined area"),
-        ("centre", "m", "centre of the joined face now; it moves with block a"),
-        ("normal", "1", "unit normal of that face now, out of block a"),
-        ("damage", "1", "largest effective opening of its points over the opening at failure, 0 to 1"),
-        ("opening", "m", "mean normal opening, positive when open"),
-        ("sliding", "m", "mean tangential opening, a length"),
-        ("mode_mix", "1", "share of sliding in the effective opening: 0 pulled apart, 1 sheared"),
-        ("dissipated", "J", "energy the joint has used up"),
-        ("intact", "1", "1 while the joint carries traction, else 0"),
-    )
-)
-
-
 class CannotContinue(SurgebreakError):
     """A file of results is not what the run left; it cannot be continued."""
 
@@ -230,20 +210,6 @@ def _values(column, cells):
     return np.array([float(c) if c else np.nan for c in cells])
 
 
-def write_cracks(path, table):
-    """Write the crack table from a dict of arrays with names out of CRACK_COLUMNS (n,) or, for vectors, (n, 3).
-
-    A time that is not finite (the joint holds) becomes an empty cell. Raises WrongShape (unknown name, unequal
-    lengths), NotFinite, DiskFull.
-    """
-    columns, arrays = _crack_arrays(path, table)
-    for c, array in zip(columns, arrays):
-        if c.name != "time" and not np.isfinite(array).all():
-            row = int(np.flatnonzero(~np.isfinite(array))[0])
-            raise NotFinite(f"{path}: {c.name} is {array[row]} in row {row}")
-    write_table(path, "joints: which broke, when and how", columns, arrays)
-
-
 def write_table(path, title, columns, arrays):
     """Write a whole table: columns of Column, arrays (n,) of numbers or texts; what is not finite leaves a cell empty.
 
@@ -256,21 +222,6 @@ def _table_cell(value):
     if isinstance(value, str):
         return value
     return number(value) if np.isfinite(value) else ""
-
-
-def _crack_arrays(path, table):
-    known = {c.name: c for c in CRACK_COLUMNS}
-    unknown = sorted(set(table) - set(known))
-    lengths = {name: np.shape(values)[:1] for name, values in table.items()}
-    if unknown or len(set(lengths.values())) > 1:
-        raise WrongShape(f"{path}: unknown columns {unknown} (known: {', '.join(known)}); rows {lengths}")
-    columns, arrays = [], []
-    for name in (c.name for c in CRACK_COLUMNS if c.name in table):
-        values = np.asarray(table[name])
-        parts = [("", values)] if values.ndim == 1 else [("_" + "xyz"[i], values[:, i]) for i in range(3)]
-        columns += [Column(name + tail, known[name].unit, known[name].meaning) for tail, _ in parts]
-        arrays += [part for _, part in parts]
-    return columns, arrays
 
 
 def _replace(path, text):

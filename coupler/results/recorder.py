@@ -21,16 +21,16 @@ from coupler.results.columns import (
     WATER,
     momentum_columns,
 )  # fmt: skip
-from coupler.results.crack_surfaces import write_crack_surfaces
+from coupler.results.cracks import crack_columns, write_crack_surfaces, write_cracks
 from coupler.results.fields import BlockWriter, WaterWriter, write_solids
-from coupler.results.history import HistoryTable, write_cracks
-from coupler.step.observe import block_damage, crack_columns, fastest_point, joint_counts
+from coupler.results.history import HistoryTable
+from coupler.step.observe import block_damage, fastest_point, joint_counts
 
 
 class Recorder:
     """Writes a run as it goes; absent sides leave no files.
 
-    directory: of the run · coupling: Coupling · gauges: list of Gauge
+    directory: of the run · coupling: CoupledStepper · gauges: list of Gauge
     solids: [(vertices, faces)] that never move, with a structure its last blocks ·
     tank: (lower, upper) or None · kept: what `save` gave, to continue the files from there · watch: of the verdict,
     None without a structure. Raises CannotContinue.

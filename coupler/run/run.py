@@ -29,7 +29,7 @@ def run(case: Case, directory, reporter, checkpoint=None, each=None) -> ExitCode
     """Run a case into a RunDirectory; its figures go into run.json however the run ends.
 
     checkpoint: Checkpoint of an earlier process from which the run goes on ·
-    each: called after every step with the Coupling, the StepRecord, the figures so far and the readings of the gauges.
+    each: called after every step with the CoupledStepper, the StepRecord, the figures so far and what the gauges read.
 
     Raises SurgebreakError (or an error of the water or the structure) when the run ends before its time; what was
     written until then stays.

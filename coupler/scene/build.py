@@ -6,7 +6,7 @@ A case without `[water]` imports no fluid code here, one without `[structure]` n
 from __future__ import annotations
 
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,7 +17,7 @@ from coupler.geometry.solids import obstacle_blocks, solids_of
 from coupler.geometry.terrain.standing import ground_surface
 from coupler.results.gauges import Bodies, Gauge, make_gauges
 from coupler.scene.build_water import water_of
-from coupler.step.coupled_step import Coupling
+from coupler.step.coupled_step import CoupledStepper
 from coupler.step.limits import Limits
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ PRESSURE_RTOL = 1e-8
 class Scene:
     """What a run works on: both sides, the gauges and what never moves (with a structure its last blocks too)."""
 
-    coupling: Coupling
+    coupling: CoupledStepper
     gauges: list[Gauge]
     solids: list[tuple[np.ndarray, tuple]]
     tank: tuple | None
@@ -75,7 +75,7 @@ def watch_of(case: Case, structure) -> Watch:
     return Watch(structure, divisions, rules, judged, told.hit_speed)
 
 
-def _coupling(case: Case, structure, solids, clock, from_start: bool) -> Coupling:
+def _coupling(case: Case, structure, solids, clock, from_start: bool) -> CoupledStepper:
     """Both sides, the structure at rest if the case says so."""
     water = immersion = None
     if case.water:
@@ -83,7 +83,7 @@ def _coupling(case: Case, structure, solids, clock, from_start: bool) -> Couplin
     settles = from_start and case.joints and case.structure.start == "settled"
     if settles and _settled(structure, water) and case.water:
         water, immersion = water_of(case, structure, solids)
-    return Coupling(
+    return CoupledStepper(
         water,
         structure,
         immersion,
@@ -199,18 +199,7 @@ def joint_parameters(joints):
     """The law of a section [joints]."""
     from yade_scripts.joints.cohesion import JointParameters
 
-    return JointParameters(
-        strength=joints.strength,
-        opening_at_failure=joints.opening_at_failure,
-        shear_ratio=joints.shear_ratio,
-        closing_ratio=joints.closing_ratio,
-        damping=joints.damping,
-        points=joints.points,
-        ground=joints.ground,
-        law=joints.law,
-        peak=joints.peak,
-        mixed_mode=joints.mixed_mode,
-    )
+    return JointParameters(**{field.name: getattr(joints, field.name) for field in fields(JointParameters)})
 
 
 def planes_of(case: Case) -> list:

@@ -1,6 +1,7 @@
-"""The coupled step and the run around it.
+"""The coupled step.
 
-One step: cut → advect → pressure with the structure inside → correct → YADE substeps → defect → ledger.
+Cut → advect → pressure with the structure inside → YADE substeps → coupling residual, and once more from the pressure
+where it is too large → correct → balances of energy and momentum.
 A scene may lack either side: without water the structure runs alone, without a structure the water does.
 """
 
@@ -64,7 +65,7 @@ class StepRecord:
     momentum: MomentumBalance | None = None
 
 
-class Coupling:
+class CoupledStepper:
     """The two sides and the state of their coupling; `step` advances both.
 
     water, structure, immersion: either side may be None (immersion only with water).

@@ -66,25 +66,3 @@ def fastest_point(velocity: Array, radius: Array) -> float:
 def fastest_points(velocity: Array, radius: Array) -> Array:
     """Bound (n,) of the speed of the points of each block, as in `fastest_point`."""
     return np.linalg.norm(velocity[:, :3], axis=1) + np.linalg.norm(velocity[:, 3:], axis=1) * radius
-
-
-def crack_columns(structure) -> dict[str, Array]:
-    """Columns of the crack table; empty without joints."""
-    t = structure.joint_table()
-    if t is None:
-        return {}
-    return {
-        "joint": np.arange(len(t)),
-        "a": t.a,
-        "b": t.b,
-        "time": t.failure_time,
-        "area": t.area,
-        "centre": t.centre,
-        "normal": t.normal,
-        "damage": t.damage,
-        "opening": t.opening,
-        "sliding": t.sliding,
-        "mode_mix": t.mode_mix,
-        "dissipated": t.dissipated,
-        "intact": t.alive.astype(int),
-    }

@@ -205,3 +205,14 @@ def test_friction_by_pairs_of_materials_reaches_the_contact_law(tmp_path, monkey
     np.testing.assert_allclose(table, [[0.5, 0.9, 0.5], [0.9, 0.5, 0.3], [0.5, 0.3, 0.5]])
     assert seen["materials"] == {"block", "brick"}
     assert [plane.material for plane in seen["planes"]] == ["ground"]
+
+
+def test_a_joint_has_the_same_defaults_in_a_case_and_in_a_script():
+    """Two numbers for one default would give two answers to one scene."""
+    from dataclasses import MISSING, fields
+
+    from coupler.case.case import Joints
+    from yade_scripts.joints.cohesion import JointParameters
+
+    of_scripts = {f.name: f.default for f in fields(JointParameters) if f.default is not MISSING}
+    assert of_scripts == {name: Joints.model_fields[name].default for name in of_scripts}

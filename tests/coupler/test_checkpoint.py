@@ -69,15 +69,15 @@ def test_without_any_usable_checkpoint_nothing_is_touched(copy):
 
 def test_a_state_that_is_not_finite_is_never_saved(tmp_path, monkeypatch):
     """The run ends with the name of the array; the checkpoint before stays."""
-    from coupler.step.coupled_step import Coupling
+    from coupler.step.coupled_step import CoupledStepper
 
-    honest = Coupling.save
+    honest = CoupledStepper.save
 
     def spoilt(self):
         found = honest(self)
         return found if self.time < 0.06 else found | {"defects": np.array([np.nan])}
 
-    monkeypatch.setattr(Coupling, "save", spoilt)
+    monkeypatch.setattr(CoupledStepper, "save", spoilt)
     with pytest.raises(NotFinite, match="coupling/defects"):
         begin(tmp_path / "case", DRY, tmp_path / "run")
     assert [Checkpoint.read(path).time for path in listed(tmp_path / "run" / FOLDER)] == pytest.approx([0.04])

@@ -29,7 +29,9 @@ def cracked():
         blocks = wall_of_blocks(
             "wall", (1.1, -0.001, 0.0), (thickness, WIDTH + 0.002, 2.0), (thickness, WIDTH + 0.002, 0.25)
         )
-        structure = Structure(blocks, None, JointParameters(1e6, FAILURE), ground=0.0, gravity=(0, 0, 0))
+        structure = Structure(
+            blocks, None, JointParameters(1e6, FAILURE, damping=0.0), ground=0.0, gravity=(0, 0, 0)
+        )
         made.append(structure)
         above = np.flatnonzero(structure.centre()[:, 2] > 0.75)
         structure.displace(

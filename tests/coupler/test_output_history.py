@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coupler.results.history import HistoryTable, read_history, write_cracks
+from coupler.results.cracks import write_cracks
+from coupler.results.history import HistoryTable, read_history
 from coupler.results.storage import DiskFull, NotFinite, WrongShape
 
 COLUMNS = [("time", "s", "simulated time"), ("force_x", "N", "on the building, positive along x")]

@@ -76,7 +76,7 @@ def test_a_joint_that_closes_too_far_counts():
     from yade_scripts.joints.cohesion import JointParameters
 
     blocks = [Block("low", (0, 0, 0.5), size=1.0), Block("high", (0, 0, 1.5), size=1.0, density=2000.0)]
-    with Structure(blocks, ContactLaw(), JointParameters(1e3, 0.1), ground=0.0) as s:
+    with Structure(blocks, ContactLaw(), JointParameters(1e3, 0.1, damping=0.0), ground=0.0) as s:
         s.advance(1.0)
         found = deepest_overlap(s, 0.1)
     assert found.other in ("'high'", "the ground")

@@ -18,7 +18,8 @@ from coupler.program import extras
 from coupler.program.errors import NoRun
 from coupler.program.quantities import quantity
 from coupler.results.columns import ENERGY, WATER
-from coupler.results.history import CRACK_COLUMNS, HistoryTable, write_cracks
+from coupler.results.cracks import CRACK_COLUMNS, write_cracks
+from coupler.results.history import HistoryTable
 
 from .fake_runs import CASE, FakeProcesses
 

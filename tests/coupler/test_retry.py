@@ -11,7 +11,7 @@ import pytest
 from coupler.balance.momentum import book_step, momentum_ledger
 from coupler.scene.build import build
 from coupler.step import coupled_step as loop
-from coupler.step.coupled_step import Coupling
+from coupler.step.coupled_step import CoupledStepper
 from coupler.step.limits import Diverged, Limits
 from coupler.step.residual import MISSES, RETRIES, SHORTEST, Defects
 from coupler.step.step_limits import Attempt, check_step
@@ -19,7 +19,7 @@ from fluid.numerics.solve import NotConverged
 from tests.fakes import FreeBody, no_clock, piston_column
 from tests.physics.scenes import case
 
-AFLOAT = Coupling._afloat
+AFLOAT = CoupledStepper._afloat
 
 
 class Pipe:
@@ -91,7 +91,7 @@ def _no_books_of_momentum(monkeypatch):
     """The pipe has no nodes to sum over, and no surface on the piston."""
     monkeypatch.setattr(loop, "momentum_ledger", lambda water, structure: None)
     monkeypatch.setattr(loop, "book_step", lambda coupling, record: None)
-    monkeypatch.setattr(Coupling, "_afloat", lambda self, problem: (problem, None))
+    monkeypatch.setattr(CoupledStepper, "_afloat", lambda self, problem: (problem, None))
 
 
 def coupling(pipe, piston, step_max=0.1, **more):
@@ -102,7 +102,7 @@ def coupling(pipe, piston, step_max=0.1, **more):
         cut_again=0,
         n_solids=0,
     )
-    return Coupling(pipe, piston, still, rtol=1e-10, step_max=step_max, clock=no_clock, **more)
+    return CoupledStepper(pipe, piston, still, rtol=1e-10, step_max=step_max, clock=no_clock, **more)
 
 
 def test_a_good_step_is_taken_as_it_is():
@@ -146,7 +146,7 @@ def test_blocks_that_never_follow_stop_the_run_and_say_which_limit():
 
 def alone(pipe):
     """Water without blocks."""
-    return Coupling(pipe, None, None, rtol=1e-10, step_max=0.1, clock=no_clock, limits=LIMITS)
+    return CoupledStepper(pipe, None, None, rtol=1e-10, step_max=0.1, clock=no_clock, limits=LIMITS)
 
 
 LIMITS = Limits(volume_error=0.02, energy_error=0.05, cpu_seconds=None)
@@ -182,7 +182,7 @@ def test_water_that_lost_its_volume_is_stepped_again():
     pipe.volume_off = 0.03
     c = alone(pipe)
     taken = []
-    c._take = lambda record, start: (taken.append(record.dt), Coupling._take(c, record, start))
+    c._take = lambda record, start: (taken.append(record.dt), CoupledStepper._take(c, record, start))
     record = c.step(0.1)
     assert taken == [0.1, 0.05, 0.025, 0.0125, 0.1]
     assert (record.retries, record.dt) == (0, 0.1)
@@ -206,8 +206,8 @@ def test_what_goes_wrong_as_fast_in_shorter_steps_leaves_the_step_as_it_is():
 
 
 def not_ending(c):
-    """As `Coupling._judge`, of a run that goes on."""
-    return lambda record, volume: replace(Coupling._judge(c, record, volume), ends=False)
+    """As `CoupledStepper._judge`, of a run that goes on."""
+    return lambda record, volume: replace(CoupledStepper._judge(c, record, volume), ends=False)
 
 
 def test_only_the_longest_ends_the_run_so_the_shortest_stays():
@@ -274,7 +274,7 @@ def test_a_step_taken_again_is_the_short_step_bit_for_bit(sections, monkeypatch)
     """Nothing of the step that was taken back is left in water, sea, structure and books, with and without blocks."""
     monkeypatch.setattr(loop, "momentum_ledger", momentum_ledger)
     monkeypatch.setattr(loop, "book_step", book_step)
-    monkeypatch.setattr(Coupling, "_afloat", AFLOAT)
+    monkeypatch.setattr(CoupledStepper, "_afloat", AFLOAT)
     again, straight = (after_steps(splash(**sections), good) for good in ([False, True], [True]))
     assert all(np.array_equal(a, b) for a, b in zip(again, straight))
 

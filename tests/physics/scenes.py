@@ -4,7 +4,7 @@ import numpy as np
 
 from coupler.case.case import Case
 from coupler.scene.fill import start_level
-from coupler.step.coupled_step import Coupling
+from coupler.step.coupled_step import CoupledStepper
 from coupler.step.immersion import Immersion
 from fluid.mesh.background import box_mesh
 from fluid.step.parameters import WaterParameters
@@ -61,7 +61,9 @@ def standing_wall(
             structure.close()
             raise
         water, immersion = _still_water(structure, mesh, tank, (face, SLICE, depth), covers)
-    return Coupling(water, structure, immersion, rtol=1e-10, step_max=step_max, clock=no_clock, passes=passes)
+    return CoupledStepper(
+        water, structure, immersion, rtol=1e-10, step_max=step_max, clock=no_clock, passes=passes
+    )
 
 
 def _still_water(structure, mesh, tank, upper, covers):

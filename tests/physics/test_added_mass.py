@@ -8,7 +8,7 @@ added_mass_closed_tank.csv (cube of side a in a cubic tank of side 3a: ca = 0.71
 import numpy as np
 import pytest
 
-from coupler.step.coupled_step import Coupling
+from coupler.step.coupled_step import CoupledStepper
 from coupler.step.immersion import Immersion
 from fluid.mesh.background import box_mesh
 from fluid.step.parameters import WaterParameters
@@ -28,7 +28,7 @@ def full_tank(body, cells):
         lambda x: np.full(len(x), -1.0),
         WaterParameters(gravity=G),
     )
-    return Coupling(water, body, immersion, rtol=1e-10, step_max=1.0, clock=no_clock)
+    return CoupledStepper(water, body, immersion, rtol=1e-10, step_max=1.0, clock=no_clock)
 
 
 def added_mass(ratio, cells):

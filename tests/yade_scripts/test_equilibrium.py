@@ -33,9 +33,12 @@ def tall_hall():
 @pytest.mark.parametrize(
     ("blocks", "law"),
     [
-        (wall_of_blocks("w", (0, -0.25, 0), (4.0, 0.5, 3.0), (1.0, 0.5, 0.5)), JointParameters(1e6, 1e-3)),
-        (portal(), JointParameters(2e6, 1e-3)),
-        (tall_hall(), JointParameters(5e5, 0.02)),
+        (
+            wall_of_blocks("w", (0, -0.25, 0), (4.0, 0.5, 3.0), (1.0, 0.5, 0.5)),
+            JointParameters(1e6, 1e-3, damping=0.0),
+        ),
+        (portal(), JointParameters(2e6, 1e-3, damping=0.0)),
+        (tall_hall(), JointParameters(5e5, 0.02, damping=0.0)),
     ],
     ids=["wall", "portal", "hall"],
 )
@@ -66,7 +69,7 @@ def cantilever(count, fixed_end=True):
 def test_a_cantilever_of_blocks_deflects_as_its_joints_turn():
     """Rigid blocks on joint springs k: each joint carries M = w (L - s)²/2 and V = w (L - s), turns by M/(k I) and
     slides by V/(k A); the blocks follow. Small deflection, joints elastic (k = 27/4 T_max/δ_f, closing the same)."""
-    law = JointParameters(strength=1e9, opening_at_failure=1e-2)
+    law = JointParameters(strength=1e9, opening_at_failure=1e-2, damping=0.0)
     count, edge = 5, 0.5
     with Structure(cantilever(count), None, law) as s:
         settle(s)
@@ -84,14 +87,14 @@ def test_a_cantilever_of_blocks_deflects_as_its_joints_turn():
 
 def test_a_cantilever_that_cannot_carry_itself_is_refused_by_its_joint():
     """M at the root: 2000·9.81·0.25·5²/2 = 61 kN m against about 0.24 T_max h³ = 3 kN m."""
-    law = JointParameters(strength=1e5, opening_at_failure=1e-3)
+    law = JointParameters(strength=1e5, opening_at_failure=1e-3, damping=0.0)
     with Structure(cantilever(6), None, law) as s, pytest.raises(CannotStand, match="'b0' with 'b1'"):
         settle(s)
 
 
 def test_blocks_that_nothing_holds_are_left_alone():
     """A row in the air has no equilibrium; it is not moved and falls."""
-    with Structure(cantilever(3, fixed_end=False), None, JointParameters(1e6, 1e-3)) as s:
+    with Structure(cantilever(3, fixed_end=False), None, JointParameters(1e6, 1e-3, damping=0.0)) as s:
         assert settle(s) == 0.0
         s.advance(0.01)
         assert s.velocity()[:, 2] == pytest.approx(-G * 0.01, rel=0.05)
@@ -103,7 +106,7 @@ def test_a_cantilever_of_six_blocks_carries_the_strength_of_its_root(share, stan
     M_max = 0.3802 T_max h³ for a closing stiffness of ten times k_0 (a rigid one would give 0.4523)."""
     ref = columns("coh_joint_Mmax_vs_N")
     row = np.flatnonzero((ref["kc_over_K0"] == 10.0) & (ref["n"] == 0.0))[0]
-    law = JointParameters(1e6, 1e-3, closing_ratio=10.0)
+    law = JointParameters(1e6, 1e-3, closing_ratio=10.0, damping=0.0)
     blocks = [Block(f"b{i}", (0.2 * i, 0.0, 0.0), size=0.2, fixed=i == 0) for i in range(7)]
     strength = ref["mmax"][row] * law.strength * 0.2**3 / 1.2
     load = np.zeros((7, 6))
@@ -124,7 +127,7 @@ def test_a_cantilever_of_six_blocks_carries_the_strength_of_its_root(share, stan
 def test_stiff_closing_settles_too(law, ratio):
     """A door frame that leans on its open and closed joints: no load out of balance but what the rounding of positions
     (1e-16 of 4 m) makes in joints of up to 5e13 N/m, and it stays at rest."""
-    parameters = JointParameters(2e6, 1e-3, closing_ratio=ratio, law=law)
+    parameters = JointParameters(2e6, 1e-3, closing_ratio=ratio, law=law, damping=0.0)
     with Structure(portal(), None, parameters, ground=0.0) as s:
         settle(s)
         residual = s.internal_force() + s.gravity_force()
@@ -137,7 +140,7 @@ def test_stiff_closing_settles_too(law, ratio):
 
 def test_a_search_that_went_too_far_leaves_no_damage_behind():
     """The damage after settling is that of the equilibrium: with slow loading in small steps one gets the same."""
-    law = JointParameters(1.2e6, 1e-3, closing_ratio=1e3)
+    law = JointParameters(1.2e6, 1e-3, closing_ratio=1e3, damping=0.0)
     with Structure(portal(), None, law, ground=0.0) as s:
         settle(s)
         at_once = s.joint_table().damage
@@ -150,13 +153,13 @@ def test_a_search_that_went_too_far_leaves_no_damage_behind():
 
 def test_stiff_closing_does_not_carry_what_it_cannot():
     """The same frame a thousand times weaker is refused, not settled somewhere else."""
-    law = JointParameters(2e3, 1e-3, closing_ratio=1e4)
+    law = JointParameters(2e3, 1e-3, closing_ratio=1e4, damping=0.0)
     with Structure(portal(), None, law, ground=0.0) as s, pytest.raises(CannotStand):
         settle(s)
 
 
 def test_needleman_settles_where_sliding_pushes_the_faces_apart():
-    law = JointParameters(2e6, 1e-3, mixed_mode="needleman")
+    law = JointParameters(2e6, 1e-3, mixed_mode="needleman", damping=0.0)
     with Structure(portal(), None, law, ground=0.0) as s:
         settle(s)
         residual = s.internal_force() + s.gravity_force()
@@ -166,7 +169,7 @@ def test_needleman_settles_where_sliding_pushes_the_faces_apart():
 def test_a_step_that_is_far_too_long_is_cut_until_it_overshoots_by_little():
     """A block lifted off its joint by 0.1 mm and sent 1 m down into it, where closing is ten thousand times as stiff:
     of the whole way only a share is left, downwards, and what the joint gives back there is within SLACK."""
-    law = JointParameters(1e6, 1e-3, closing_ratio=1e4)
+    law = JointParameters(1e6, 1e-3, closing_ratio=1e4, damping=0.0)
     with Structure([Block("b", (0, 0, 0.5), size=1.0)], None, law, ground=0.0) as s:
         s.displace(np.array([0]), np.array([[0.0, 0.0, 1e-4]]), np.eye(3)[None])
         search = Search(s, np.array([0]), s.gravity_force())

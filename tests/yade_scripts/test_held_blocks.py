@@ -8,7 +8,7 @@ from yade_scripts.contact.law import ContactLaw
 from yade_scripts.dynamics.structure import Structure
 from yade_scripts.joints.cohesion import JointParameters
 
-GLUE = JointParameters(1e6, 1e-3)
+GLUE = JointParameters(1e6, 1e-3, damping=0.0)
 
 
 def row_of(count, **more):

@@ -9,8 +9,8 @@ from yade_scripts.dynamics.structure import Structure
 from yade_scripts.joints.cohesion import JointParameterError, JointParameters
 from yade_scripts.joints.rules import JointRules, PairJoints, Scatter
 
-GLUE = JointParameters(1e6, 1e-3)
-BRITTLE = JointParameters(2e5, 5e-4, law="bilinear")
+GLUE = JointParameters(1e6, 1e-3, damping=0.0)
+BRITTLE = JointParameters(2e5, 5e-4, law="bilinear", damping=0.0)
 STILL = (0.0, 0.0, 0.0)
 
 
@@ -36,7 +36,7 @@ def test_the_last_pair_that_fits_decides():
 
 
 def test_a_pair_with_the_ground_counts_where_joints_ground_is_off():
-    off = JointParameters(1e6, 1e-3, ground=False)
+    off = JointParameters(1e6, 1e-3, ground=False, damping=0.0)
     assert (0, -1) not in joined(JointRules(off))
     assert joined(JointRules(off, (PairJoints("low", "ground", BRITTLE),)))[0, -1] == 5e-4
 

@@ -67,7 +67,7 @@ def largest_substep(law, mass=1.0):
 @pytest.mark.parametrize("beta", [1.0, 0.7])
 def test_tractions_follow_the_law_along_any_straight_opening(name, peak, beta):
     """t_n = T(λ) δ_n/λ and t_t = β² T(λ) δ_t/λ with λ = sqrt(δ_n² + β² δ_t²)."""
-    law = JointParameters(1e6, 1e-3, law=name, peak=peak, shear_ratio=beta)
+    law = JointParameters(1e6, 1e-3, law=name, peak=peak, shear_ratio=beta, damping=0.0)
     way = np.array([0.6, 0.3, 0.5])
     pair = Pair(law)
     for far in np.linspace(0.02, 1.2, 60) * 1e-3:
@@ -89,7 +89,7 @@ def test_tractions_follow_the_law_along_any_straight_opening(name, peak, beta):
 def test_work_of_separation_is_exact_at_any_speed(name, peak, speed, direction, phase):
     """From just above the critical speed to 10 δ_f a substep, opening, sliding and between, from any place before
     the joint pulls: what a free mass loses is G_c to 0.5 %."""
-    law = JointParameters(1e6, 1e-3, law=name, peak=peak, points=1)
+    law = JointParameters(1e6, 1e-3, law=name, peak=peak, points=1, damping=0.0)
     dt = largest_substep(law)
     velocity = (
         speed * np.sqrt(2.0 * law.work_of_separation) * np.array([np.sin(direction), 0, np.cos(direction)])
@@ -105,7 +105,7 @@ def test_work_of_separation_is_exact_at_any_speed(name, peak, speed, direction, 
 @pytest.mark.parametrize(("strength", "failure"), [(1e3, 0.1), (1e3, 1e-8), (1e8, 1e-8), (1e8, 0.1)])
 @pytest.mark.parametrize("speed", [1.1, 3.0, 30.0, 300.0])
 def test_extreme_strengths_and_openings_keep_the_work_exact(name, peak, strength, failure, speed):
-    law = JointParameters(strength, failure, law=name, peak=peak, points=1)
+    law = JointParameters(strength, failure, law=name, peak=peak, points=1, damping=0.0)
     velocity = speed * np.sqrt(2.0 * law.work_of_separation) * np.array([0.0, 0.0, 1.0])
     lost = Pair(law).pull_off(np.zeros(3), velocity, largest_substep(law), 2000)
     # openings of 1e-8 m are known to 1e-16 m, the rounding of the position
@@ -116,7 +116,7 @@ def test_extreme_strengths_and_openings_keep_the_work_exact(name, peak, strength
 def test_a_vibration_that_does_not_break_the_joint_gains_no_more_than_leapfrog_alone(name, peak):
     """Largest energy over the start's in 2000 substeps, with the account of work and with T itself: kink between
     tension and compression and damage let leapfrog gain some per cent; the account must not add to it."""
-    law = JointParameters(1e6, 1e-3, law=name, peak=peak, points=1)
+    law = JointParameters(1e6, 1e-3, law=name, peak=peak, points=1, damping=0.0)
     dt = largest_substep(law)
 
     def gain(share, account):
@@ -155,7 +155,9 @@ def test_a_wall_that_flies_apart_takes_the_energy_of_its_law(name, speed, tolera
         for i in range(4)
         for j in range(4)
     ]
-    with Structure(blocks, None, JointParameters(1e6, 1e-3, law=name), gravity=(0.0, 0.0, 0.0)) as s:
+    with Structure(
+        blocks, None, JointParameters(1e6, 1e-3, law=name, damping=0.0), gravity=(0.0, 0.0, 0.0)
+    ) as s:
         s.advance(0.03 / np.sqrt(speed))
         assert (~s.joint_table().alive).sum() > 20
         assert s.energies()["joint_dissipated"] == pytest.approx(s.law_dissipation(), rel=tolerance)
@@ -163,7 +165,7 @@ def test_a_wall_that_flies_apart_takes_the_energy_of_its_law(name, speed, tolera
 
 # ---- Needleman's potential --------------------------------------------------------------------------------------
 
-POTENTIAL = JointParameters(1e6, 1e-3, mixed_mode="needleman", shear_ratio=0.8)
+POTENTIAL = JointParameters(1e6, 1e-3, mixed_mode="needleman", shear_ratio=0.8, damping=0.0)
 
 
 def test_needleman_gives_the_tractions_of_his_potential():
@@ -243,7 +245,7 @@ def test_needleman_unloads_along_the_tangent_of_his_potential():
 @EVERY
 def test_faces_that_overlap_partly_carry_their_share(name, peak, shift):
     """Force and moment of a joint between offset faces: law times overlap, acting at the centre of the overlap."""
-    law = JointParameters(1e6, 1e-3, law=name, peak=peak)
+    law = JointParameters(1e6, 1e-3, law=name, peak=peak, damping=0.0)
     blocks = [Block("a", (0, 0, 0), size=1.0, fixed=True), Block("b", (*shift, 1), size=1.0)]
     joints = Joints(blocks, touching_faces(blocks), law)
     area = np.prod(1.0 - np.abs(shift))
@@ -265,7 +267,9 @@ def test_running_bond_joins_every_block_to_those_above_and_below():
         for i in range(4)
     ]
     joints = Joints(
-        blocks, touching_faces(blocks, [FixedPlane((0, 0, 0), (0, 0, 1))]), JointParameters(1e6, 1e-3)
+        blocks,
+        touching_faces(blocks, [FixedPlane((0, 0, 0), (0, 0, 1))]),
+        JointParameters(1e6, 1e-3, damping=0.0),
     )
     row = [b.name for b in blocks].index("1-1")
     touching = (joints.a == row) | (joints.b == row)
@@ -288,7 +292,7 @@ def test_running_bond_joins_every_block_to_those_above_and_below():
     ],
 )
 def test_auto_takes_as_many_points_as_law_and_closing_stiffness_need(ratio, law, points):
-    pair = Pair(JointParameters(1e6, 1e-3, law=law, closing_ratio=ratio))
+    pair = Pair(JointParameters(1e6, 1e-3, law=law, closing_ratio=ratio, damping=0.0))
     assert len(pair.joints.weight) == points
     assert pair.joints.weight.sum() == pytest.approx(1.0, rel=1e-12)
 
@@ -317,7 +321,7 @@ def rubble_wall(seed, columns, rows):
 def test_the_cheap_bound_is_between_the_exact_frequency_and_root_two_of_it(seed, ratio):
     """Fixed ground, uneven blocks, stiff closing, before and after joints failed."""
     blocks = rubble_wall(seed, 4, 4)
-    law = JointParameters(1e6, 1e-3, closing_ratio=ratio, shear_ratio=1.3)
+    law = JointParameters(1e6, 1e-3, closing_ratio=ratio, shear_ratio=1.3, damping=0.0)
     joints = Joints(blocks, touching_faces(blocks, [FixedPlane((0, 0, 0), (0, 0, 1))]), law)
     for gone in (0, 5):
         joints.alive[:gone] = False
@@ -331,14 +335,14 @@ def test_the_exact_frequency_of_two_free_cubes():
     """Cubes of mass m on a face of k per area: parting ω² = 2 k A/m; sliding with turning in the same sense
     ω² = 2 k A/m (1 + (b/2)²·6/b²) = 5 k A/m, the largest."""
     blocks = [Block("a", (0, 0, 0), size=1.0, density=1000), Block("b", (0, 0, 1), size=1.0, density=1000)]
-    law = JointParameters(1e6, 1e-3)
+    law = JointParameters(1e6, 1e-3, damping=0.0)
     exact = exact_joint_frequency(blocks, Joints(blocks, touching_faces(blocks), law))
     assert exact == pytest.approx(np.sqrt(5.0 * law.stiffness / 1000.0), rel=1e-9)
 
 
 def test_full_and_sparse_eigenvalues_agree(monkeypatch):
     blocks = wall_of_blocks("w", (0, -0.25, 0), (4.0, 0.5, 3.0), (1.0, 0.5, 1.0))
-    joints = Joints(blocks, touching_faces(blocks), JointParameters(1e6, 1e-3))
+    joints = Joints(blocks, touching_faces(blocks), JointParameters(1e6, 1e-3, damping=0.0))
     sparse = exact_joint_frequency(blocks, joints)
     monkeypatch.setattr("yade_scripts.dynamics.timestep.DENSE", 10**6)
     assert exact_joint_frequency(blocks, joints) == pytest.approx(sparse, rel=1e-9)
@@ -350,7 +354,7 @@ def test_full_and_sparse_eigenvalues_agree(monkeypatch):
 @EVERY
 def test_the_table_tells_damage_mode_and_energy(name, peak):
     """Half opened and half slid: opening, sliding, share of shear; stored and lost add up to the work of the law."""
-    law = JointParameters(1e6, 1e-3, law=name, peak=peak, shear_ratio=1.5)
+    law = JointParameters(1e6, 1e-3, law=name, peak=peak, shear_ratio=1.5, damping=0.0)
     pair = Pair(law)
     shift = np.array([0.2e-3, 0.0, 0.4e-3])
     pair.force(shift, advance=True)
@@ -372,7 +376,7 @@ def test_the_table_tells_damage_mode_and_energy(name, peak):
 
 def test_history_brings_everything_back():
     """Restored in the middle of a tearing, the same steps give the same forces to the last bit."""
-    law = JointParameters(1e6, 1e-3)
+    law = JointParameters(1e6, 1e-3, damping=0.0)
     pair = Pair(law)
     pair.v[1, 2] = 300.0
     pair.force(np.array([0, 0, 0.2e-3]), 1e-6, advance=True)
@@ -385,7 +389,7 @@ def test_history_brings_everything_back():
 
 def test_sealed_faces_tell_half_of_the_largest_opening():
     """Two cubes, the upper one lifted by 0.2 mm and turned so that the joint gapes by more at one edge."""
-    pair = Pair(JointParameters(1e6, 1e-3))
+    pair = Pair(JointParameters(1e6, 1e-3, damping=0.0))
     x = pair.x + np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 2e-4]])
     R = pair.R.copy()
     R[1] = Rotation.from_rotvec([2e-4, 0.0, 0.0]).as_matrix()
@@ -404,7 +408,7 @@ def test_a_rule_holds_up_to_and_with_its_stiffness_ratio():
 def test_a_piece_that_leaves_its_place_meets_other_blocks_though_its_joints_hold():
     """Two glued cubes are torn off the ground: the upper one has lost no joint, and counts as loose all the same."""
     blocks = [Block(name, (0, 0, z), size=0.5, density=1000.0) for name, z in (("low", 0.25), ("high", 0.75))]
-    with Structure(blocks, ContactLaw(1e6), JointParameters(1e5, 1e-3), ground=0.0) as s:
+    with Structure(blocks, ContactLaw(1e6), JointParameters(1e5, 1e-3, damping=0.0), ground=0.0) as s:
         assert not s.loose().any()
         load = np.zeros((2, 6))
         load[:, 2] = 5e4

@@ -30,7 +30,7 @@ STRENGTH, FAILURE = 2e6, 1e-3
 
 
 def parameters(name, peak=None, strength=STRENGTH, failure=FAILURE):
-    return JointParameters(strength, failure, law=name, peak=peak)
+    return JointParameters(strength, failure, law=name, peak=peak, damping=0.0)
 
 
 def test_polynomial_law_follows_equation_4():
@@ -121,12 +121,12 @@ def test_an_unknown_law_is_refused_with_the_nearest_one():
 )
 def test_what_a_law_cannot_do_is_refused_by_name(wrong, told):
     with pytest.raises(JointParameterError, match=told):
-        JointParameters(1e6, 1e-3, **wrong)
+        JointParameters(1e6, 1e-3, damping=0.0, **wrong)
 
 
 def test_an_unknown_mixed_mode_is_refused_with_the_nearest_one():
     with pytest.raises(ValueError, match=r"'needelman'.*did you mean 'needleman'"):
-        JointParameters(1e6, 1e-3, mixed_mode="needelman")
+        JointParameters(1e6, 1e-3, mixed_mode="needelman", damping=0.0)
 
 
 # ---- a law of one's own, as docs/add_a_law.md has it -------------------------------------------------------------

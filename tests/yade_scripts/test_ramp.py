@@ -9,7 +9,7 @@ from yade_scripts.dynamics.structure import Structure
 from yade_scripts.joints.cohesion import JointParameters
 
 G, MASS = 9.81, 2000.0
-GLUE = JointParameters(1e6, 1e-3)
+GLUE = JointParameters(1e6, 1e-3, damping=0.0)
 SINK = MASS * G / GLUE.stiffness
 """Of a cube of 1 m on its joint with the ground [m]."""
 

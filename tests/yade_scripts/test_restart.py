@@ -31,7 +31,9 @@ def torn():
 def hanging():
     """A chain that stretches under a load that is held, opening its joints part of the way, faster and faster."""
     blocks = column_of_boxes("c", (0, 0, 0), (1.0, 1.0, 3), 3)
-    s = Structure(blocks, None, JointParameters(1e6, 2e-3, law="bilinear"), ground=0.0, gravity=STILL)
+    s = Structure(
+        blocks, None, JointParameters(1e6, 2e-3, law="bilinear", damping=0.0), ground=0.0, gravity=STILL
+    )
     load = np.zeros((3, 6))
     load[2] = (2e5, 1e5, 4e5, 1e4, -2e4, 3e4)
     s.set_load(load)
@@ -53,7 +55,7 @@ def collapsing():
         *wall_of_blocks("w", (0, -0.25, 0), (3.0, 0.5, 3.0), (1.0, 0.5, 1.0)),
         Block("shot", (1.5, -0.7, 1.5), size=0.6, density=5000.0, velocity=(0, 12.0, 0)),
     ]
-    return Structure(blocks, ContactLaw(), JointParameters(2e5, 2e-3), ground=0.0)
+    return Structure(blocks, ContactLaw(), JointParameters(2e5, 2e-3, damping=0.0), ground=0.0)
 
 
 SCENES = {
@@ -145,7 +147,7 @@ def test_contacts_that_are_just_taking_over_from_a_joint_are_part_of_the_state()
     with Structure(
         column_of_boxes("c", (0, 0, 0), (1.0, 1.0, 4), 4),
         ContactLaw(),
-        JointParameters(2e5, 1e-3),
+        JointParameters(2e5, 1e-3, damping=0.0),
         ground=0.0,
     ) as s:
         s.advance(0.05)

@@ -103,7 +103,7 @@ def moment_at(s, law, axial, turn):
 def test_a_joint_under_axial_load_carries_the_moment_of_its_face(ratio):
     """M_max/(b h² T_max) against the face integral, for n = N/(b h T_max) and both closing stiffnesses."""
     ref = columns("coh_joint_Mmax_vs_N")
-    law = JointParameters(1e6, 1e-3, closing_ratio=ratio, points=10)
+    law = JointParameters(1e6, 1e-3, closing_ratio=ratio, points=10, damping=0.0)
     blocks = [Block("a", (0, 0, 0.5), size=1.0, fixed=True), Block("b", (0, 0, 1.5), size=1.0)]
     with Structure(blocks, None, law, gravity=STILL) as s:
         for n in (0.0, 0.2, 0.5):

@@ -23,7 +23,7 @@ from yade_scripts.stock.script import (
     stock_names,
 )
 
-JOINTS = JointParameters(1e6, 1e-3, points=3)
+JOINTS = JointParameters(1e6, 1e-3, points=3, damping=0.0)
 needs_yade = pytest.mark.skipif(shutil.which("yade") is None, reason="the command yade is not installed")
 
 strengths = st.floats(1e3, 1e8)
@@ -53,7 +53,7 @@ def pulled(law, velocity, folder, end=0.02, records=400):
 @given(strength=strengths, failure=failures, area=st.floats(1e-4, 10.0))
 def test_a_brittle_bond_has_the_stiffness_and_strength_of_the_joint(law, strength, failure, area):
     """Then its work T²/(2 K) is 2/27 T_max δ_f A: the price of matching K with a law that does not soften."""
-    joint = numbers(JointParameters(strength, failure))
+    joint = numbers(JointParameters(strength, failure, damping=0.0))
     made = law.bond(area, joint)
     force = strength * area
     assert made["kn"] == pytest.approx(6.75 * strength / failure * area)
@@ -70,7 +70,7 @@ def test_the_variant_energy_has_the_work_of_separation_of_the_joint(law):
 @pytest.mark.parametrize("variant", ["exponential", "linear"])
 def test_cpm_has_stiffness_strength_and_work_of_the_joint(variant, strength, failure):
     """Its traction T = E u to u_0, then (1 - ω) E u, integrated numerically; the tail of the exponential counts."""
-    joints = JointParameters(strength, failure)
+    joints = JointParameters(strength, failure, damping=0.0)
     made = cpm.bond(1.0, numbers(joints), variant)
     u0, uf = made["onset"], made["end"]
     assert made["E"] * u0 == pytest.approx(strength)

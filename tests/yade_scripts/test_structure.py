@@ -15,7 +15,7 @@ from yade_scripts.dynamics.structure import NotFinite, Structure
 from yade_scripts.joints.cohesion import JointParameters
 from yade_scripts.yade_side.scene import SceneInUse
 
-LAW = JointParameters(strength=1e6, opening_at_failure=1e-3)
+LAW = JointParameters(strength=1e6, opening_at_failure=1e-3, damping=0.0)
 STILL = (0.0, 0.0, 0.0)
 
 
@@ -34,7 +34,7 @@ def pulled(law=LAW, **motion):
 @pytest.mark.parametrize(("direction", "stretch"), [((0, 0, 1), 1.0), ((1, 0, 0), 1.0), ((1, 0, 0), 0.7)])
 def test_pulled_joint_follows_the_law_and_takes_its_work_of_separation(direction, stretch):
     """Opening or sliding at constant speed: force T(β δ) β A, total work 9/16 T_max δ_f A."""
-    law = JointParameters(1e6, 1e-3, shear_ratio=stretch)
+    law = JointParameters(1e6, 1e-3, shear_ratio=stretch, damping=0.0)
     beta = 1.0 if direction[2] else stretch
     speed = 0.01
     with Structure(pulled(velocity=speed * np.array(direction)), None, law, gravity=STILL) as s:
@@ -72,7 +72,7 @@ def test_bending_of_a_joint_matches_the_exact_hinge():
     ref = columns("coh_hinge_moment")
     omega = 0.01
     blocks = pulled(spin=(0, -omega, 0), velocity=np.cross((0, -omega, 0), (0.5, 0.0, 0.5)))
-    law = JointParameters(1e6, 1e-3, closing_ratio=1.0)
+    law = JointParameters(1e6, 1e-3, closing_ratio=1.0, damping=0.0)
     with Structure(blocks, None, law, gravity=STILL) as s:
         for r in (0.2, 0.46, 0.8):
             s.advance(r * 1e-3 / omega - s.time)
@@ -96,7 +96,7 @@ def test_momentum_of_a_free_wall_is_kept_to_round_off():
         spin = np.einsum("nij,nj->ni", s.inertia(), v[:, 3:])
         return p, (np.cross(s.centre(), s.mass[:, None] * v[:, :3]) + spin).sum(axis=0)
 
-    with Structure(blocks, None, JointParameters(1e5, 1e-2), gravity=STILL) as s:
+    with Structure(blocks, None, JointParameters(1e5, 1e-2, damping=0.0), gravity=STILL) as s:
         p0, L0 = momenta(s)
         s.advance(0.2)
         p1, L1 = momenta(s)
@@ -145,7 +145,7 @@ def test_ledger_of_a_wall_broken_by_a_block():
         *wall_of_blocks("w", (0, -0.25, 0), (3.0, 0.5, 3.0), (1.0, 0.5, 1.0)),
         Block("shot", (1.5, -1.0, 1.5), size=0.6, density=5000.0, velocity=(0, 12.0, 0)),
     ]
-    with Structure(blocks, ContactLaw(), JointParameters(2e5, 2e-3), ground=0.0) as s:
+    with Structure(blocks, ContactLaw(), JointParameters(2e5, 2e-3, damping=0.0), ground=0.0) as s:
         start = s.energies()
         for _ in range(8):
             s.advance(0.01, substep=0.5 * s.stable_substep()[0])
@@ -231,7 +231,7 @@ def test_restore_repeats_the_step():
         *wall_of_blocks("w", (0, -0.25, 0), (3.0, 0.5, 3.0), (1.0, 0.5, 1.0)),
         Block("shot", (1.5, -0.7, 1.5), size=0.6, density=5000.0, velocity=(0, 12.0, 0)),
     ]
-    with Structure(blocks, ContactLaw(), JointParameters(2e5, 2e-3), ground=0.0) as s:
+    with Structure(blocks, ContactLaw(), JointParameters(2e5, 2e-3, damping=0.0), ground=0.0) as s:
         s.advance(0.012)
         for _ in range(3):
             saved = s.save()

@@ -12,7 +12,7 @@ from yade_scripts.dynamics.timestep import SubstepTooLong, exact_joint_frequency
 from yade_scripts.joints.cohesion import JointParameters
 
 STILL = (0.0, 0.0, 0.0)
-JOINT = JointParameters(1e6, 1e-3)
+JOINT = JointParameters(1e6, 1e-3, damping=0.0)
 
 
 def two_cubes(**more):

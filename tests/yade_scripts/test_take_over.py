@@ -8,7 +8,7 @@ from yade_scripts.contact.law import ContactLaw
 from yade_scripts.dynamics.structure import Structure
 from yade_scripts.joints.cohesion import JointParameters
 
-JOINT = JointParameters(1e5, 1e-3)
+JOINT = JointParameters(1e5, 1e-3, damping=0.0)
 PUSH, DT = 1e5, 5e-6
 DEPTH = PUSH / JOINT.closing_stiffness
 

@@ -43,7 +43,7 @@ class JointParameters:
     opening_at_failure: float
     shear_ratio: float = 1.0
     closing_ratio: float = 1.0
-    damping: float = 0.0
+    damping: float = 0.02
     points: int | Literal["auto"] = "auto"
     ground: bool = True
     law: str = "polynomial"

@@ -7,6 +7,8 @@ strength of the joint, 2/27 T_max δ_f against 9/16 T_max δ_f of the polynomial
 Bourrier, Kneib, Chareyre and Fourcaud, Ecological Engineering 61 (2013) 646; YADE documentation.
 """
 
+import math
+
 TITLE = "CohFrict"
 LAW2 = "Law2_ScGeom6D_CohFrictPhys_CohesionMoment"
 VARIANTS = {
@@ -33,7 +35,7 @@ def material(joint):
     """Material of the spheres; bonds get their numbers one by one."""
     from yade.wrapper import CohFrictMat
 
-    angle = __import__("math").atan(joint["friction"])
+    angle = math.atan(joint["friction"])
     young = joint["stiffness"] * joint["edge"]
     return CohFrictMat(young=young, poisson=1.0, frictionAngle=angle, normalCohesion=1.0, shearCohesion=1.0)
 

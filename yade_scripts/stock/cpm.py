@@ -8,6 +8,8 @@ YADE: Law2_ScGeom_CpmPhys_Cpm. Šmilauer, Cohesive particle model using the disc
 platform, PhD thesis, CTU Prague (2010). Stiffness, strength and G_c of tension are all matched; the curve is another.
 """
 
+import math
+
 TITLE = "Cpm (concrete)"
 LAW2 = "Law2_ScGeom_CpmPhys_Cpm"
 VARIANTS = {
@@ -55,7 +57,7 @@ def material(joint):
     """Material of the spheres; bonds get their numbers one by one."""
     from yade.wrapper import CpmMat
 
-    angle = __import__("math").atan(joint["friction"])
+    angle = math.atan(joint["friction"])
     young = joint["stiffness"] * joint["edge"]
     return CpmMat(
         young=young, poisson=1.0, frictionAngle=angle, sigmaT=1.0, epsCrackOnset=1.0, relDuctility=2.0

@@ -5,6 +5,8 @@
 YADE: Law2_ScGeom_FrictPhys_CundallStrack. Cundall and Strack, Géotechnique 29 (1979) 47.
 """
 
+import math
+
 TITLE = "FrictPhys (no cohesion)"
 LAW2 = "Law2_ScGeom_FrictPhys_CundallStrack"
 VARIANTS = {"plain": ("strength and G_c: none",)}
@@ -22,7 +24,7 @@ def material(joint):
     """Material of the spheres."""
     from yade.wrapper import FrictMat
 
-    angle = __import__("math").atan(joint["friction"])
+    angle = math.atan(joint["friction"])
     return FrictMat(young=joint["stiffness"] * joint["edge"], poisson=1.0, frictionAngle=angle)
 
 

@@ -6,6 +6,8 @@ YADE: Law2_ScGeom_JCFpmPhys_JointedCohesiveFrictionalPM. Scholtès and Donzé, I
 J. Mech. Phys. Solids 61 (2013) 352. Work of separation F_n,max²/(2 k_n), as CohFrict.
 """
 
+import math
+
 TITLE = "JCFpm"
 LAW2 = "Law2_ScGeom_JCFpmPhys_JointedCohesiveFrictionalPM"
 VARIANTS = {
@@ -32,7 +34,7 @@ def material(joint):
     """Material of the spheres; bonds get their numbers one by one."""
     from yade.wrapper import JCFpmMat
 
-    angle = __import__("math").atan(joint["friction"])
+    angle = math.atan(joint["friction"])
     young = joint["stiffness"] * joint["edge"]
     return JCFpmMat(young=young, poisson=1.0, frictionAngle=angle, tensileStrength=1.0, cohesion=1.0, type=1)
 

@@ -6,6 +6,8 @@ YADE: Law2_ScGeom_MortarPhys_Lourenco, the envelope of Lourenço, Analysis of ma
 elements, TU Delft report 03-21-22-0-01 (1994). A broken bond leaves the scene, contact and all.
 """
 
+import math
+
 TITLE = "Mortar (Lourenço)"
 LAW2 = "Law2_ScGeom_MortarPhys_Lourenco"
 VARIANTS = {
@@ -58,7 +60,7 @@ def material(joint):
     """Material of the spheres; bonds get their numbers one by one."""
     from yade.wrapper import MortarMat
 
-    angle = __import__("math").atan(joint["friction"])
+    angle = math.atan(joint["friction"])
     return MortarMat(young=joint["stiffness"] * joint["edge"], poisson=1.0, frictionAngle=angle)
 
 

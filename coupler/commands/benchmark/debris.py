@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from coupler.program.process import run_module
 from coupler.run.clock import Clock
-from coupler.step.coupled_step import Coupling
+from coupler.step.coupled_step import CoupledStepper
 from coupler.step.immersion import Immersion
 from fluid.mesh.background import box_mesh
 from fluid.step.parameters import WaterParameters
@@ -66,7 +66,7 @@ def scene(count: int, covers: str, blocks: list[Block]):
     immersion, clock = Immersion(mesh, structure, [], covers), Clock()
     tilted = lambda x: x[:, 2] - edge - 0.5 - 0.05 * (x[:, 0] - 0.5 * edge)  # noqa: E731
     water = Water(mesh, immersion.domain, tilted, WaterParameters())
-    c = Coupling(water, structure, immersion, rtol=1e-8, step_max=DT, clock=clock, passes=2)
+    c = CoupledStepper(water, structure, immersion, rtol=1e-8, step_max=DT, clock=clock, passes=2)
     return structure, c, clock
 
 

@@ -20,7 +20,7 @@ from yade_scripts.joints.cohesion import JointParameters
 
 REPEATS, CHUNK = 5, 0.15
 STILL = (0.0, 0.0, 0.0)
-LAW = JointParameters(1e6, 1e-3, points=3)
+LAW = JointParameters(1e6, 1e-3, points=3, damping=0.0)
 CONTACT = ContactLaw(restitution=0.3, friction=0.5)
 STIFF = ContactLaw(stiffness=1e9, restitution=0.3, friction=0.5)
 SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)

@@ -23,7 +23,7 @@ def matched(reference: JointParameters, law: str) -> tuple[JointParameters, tupl
         peak = _peak_for(wanted, law, known.lowest_peak, known.highest_peak)
     else:
         peak = known.peak
-    unit = JointParameters(1.0, 1.0, law=law, peak=peak)
+    unit = JointParameters(1.0, 1.0, law=law, peak=peak, damping=0.0)
     failure = reference.work_of_separation / (reference.strength * unit.work_of_separation)
     made = replace(reference, law=law, peak=peak, opening_at_failure=failure, mixed_mode="effective")
     ratio = made.stiffness / reference.stiffness
@@ -35,6 +35,6 @@ def _peak_for(wanted: float, law: str, low: float, high: float) -> float:
     """p with s(0, p) w(1, p) = wanted, which falls with p; the nearest end where there is none."""
     while high - low > 1e-9:
         middle = 0.5 * (low + high)
-        unit = JointParameters(1.0, 1.0, law=law, peak=middle)
+        unit = JointParameters(1.0, 1.0, law=law, peak=middle, damping=0.0)
         low, high = (middle, high) if unit.stiffness * unit.work_of_separation > wanted else (low, middle)
     return 0.5 * (low + high)

@@ -82,7 +82,9 @@ def _law(name: str, file: CaseFile, overrides: tuple[str, ...]) -> OwnLaw | Stoc
 
 def _parameters(joints) -> JointParameters:
     """What `matched` needs of the joints of a case."""
-    return JointParameters(joints.strength, joints.opening_at_failure, law=joints.law, peak=joints.peak)
+    return JointParameters(
+        joints.strength, joints.opening_at_failure, law=joints.law, peak=joints.peak, damping=0.0
+    )
 
 
 def _unknown(name: str) -> str:

@@ -20,7 +20,7 @@ DEFECT = 0.5
 
 
 class Flow:
-    """Steps a Coupling on as a run does, with its limits, and keeps the worst of what it did.
+    """Steps a CoupledStepper on as a run does, with its limits, and keeps the worst of what it did.
 
     energy: largest error of the ledger · volume: largest error of the volume · fastest [m/s]: fastest water ·
     defect: largest one · retries: steps that were halved · lost: share of the energy put in that the numerics took

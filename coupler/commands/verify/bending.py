@@ -44,14 +44,16 @@ def hinge():
         "polynomial: largest |m - m_exact| to r = 1", np.abs(m[inside] - exact).max(), 0.0, 0.01, False
     )
     yield Finding("polynomial: work / (T_max df h b)", work, ENERGY["polynomial"], 0.01)
-    r, m, _ = _hinge_curve(JointParameters(STRENGTH, FAILURE, points=8), np.array([1.0, 1.5, 2.0]))
+    r, m, _ = _hinge_curve(
+        JointParameters(STRENGTH, FAILURE, points=8, damping=0.0), np.array([1.0, 1.5, 2.0])
+    )
     for at in (1.5, 2.0):
         exact = 9.0 / (40.0 * at**2)
         yield Finding(f"polynomial, 8 x 8 points: tail at r = {at}", float(np.interp(at, r, m)), exact, 0.01)
     y = (np.arange(4000) + 0.5) / 4000
     for name in LAWS[1:]:
         exact = max((exact_traction(name, at * y) * y).mean() for at in stops)
-        r, m, work = _hinge_curve(JointParameters(STRENGTH, FAILURE, law=name), stops)
+        r, m, work = _hinge_curve(JointParameters(STRENGTH, FAILURE, law=name, damping=0.0), stops)
         yield Finding(f"{name}: peak moment / (T_max b h²)", m.max(), exact, 0.02)
         yield Finding(f"{name}: work / (T_max df h b)", work, ENERGY[name], 0.01)
 
@@ -80,10 +82,12 @@ def joint_under_axial_load():
     for ratio in (1, 10, 100, 10000):
         for n in (0.0, 0.2, 0.5):
             row = np.flatnonzero((table["kc_over_K0"] == ratio) & (table["n"] == n))[0]
-            yield _moment(JointParameters(STRENGTH, FAILURE, closing_ratio=ratio), n, table["mmax"][row])
+            yield _moment(
+                JointParameters(STRENGTH, FAILURE, closing_ratio=ratio, damping=0.0), n, table["mmax"][row]
+            )
     for name in LAWS[1:]:
         for ratio, n in ((1, 0.2), (100, 0.2)):
-            law = JointParameters(STRENGTH, FAILURE, closing_ratio=ratio, law=name)
+            law = JointParameters(STRENGTH, FAILURE, closing_ratio=ratio, law=name, damping=0.0)
             yield _moment(law, n, _exact_moment(name, ratio * law.stiffness * FAILURE / STRENGTH, n))
 
 
@@ -166,7 +170,7 @@ def _end_load(P: float, n: int, left: bool = False) -> np.ndarray:
 @check("P24", "cantilever of six blocks", "statically determinate chain; joints with closing stiffness", "M")
 def cantilever():
     for ratio, m in CHAINS:
-        law = JointParameters(STRENGTH, FAILURE, closing_ratio=ratio)
+        law = JointParameters(STRENGTH, FAILURE, closing_ratio=ratio, damping=0.0)
         found = _largest_carried(lambda law=law: _chain(law, -1), lambda P: _end_load(P, 7), 5000.0)
         yield Finding(f"P_max [N], kc/K0 {ratio}", found, m * STRENGTH * EDGE**3 / LENGTH, 0.03)
     table = columns("coh_cantilever_6blocks")
@@ -177,7 +181,7 @@ def cantilever():
 def three_point_bend():
     # Held at the block left of the middle joint with P/2 at both ends: the moments of the supported row, upside down.
     for ratio, m in CHAINS:
-        law = JointParameters(STRENGTH, FAILURE, closing_ratio=ratio)
+        law = JointParameters(STRENGTH, FAILURE, closing_ratio=ratio, damping=0.0)
         found = _largest_carried(
             lambda law=law: _chain(law, 2), lambda P: _end_load(0.5 * P, 6, left=True), 20000.0
         )
@@ -188,7 +192,7 @@ def three_point_bend():
 
 def _deflection(table, held: int, load, deflection):
     """Load and deflection on the way to the peak, and at it, of joints that are as good as rigid in closing."""
-    law = JointParameters(STRENGTH, FAILURE, closing_ratio=RIGID, shear_ratio=RIGID_ACROSS)
+    law = JointParameters(STRENGTH, FAILURE, closing_ratio=RIGID, shear_ratio=RIGID_ACROSS, damping=0.0)
     peak, last = table["P_N"][-1], table["u_m"][-1]
     for share in (0.5, 0.9):
         with _chain(law, held) as s:

@@ -8,7 +8,7 @@ from coupler.commands.verify.figures import columns
 from coupler.commands.verify.registry import Finding, check
 from coupler.commands.verify.scenes import DENSITY, G, column
 from coupler.run.clock import Clock
-from coupler.step.coupled_step import Coupling
+from coupler.step.coupled_step import CoupledStepper
 from coupler.step.immersion import Immersion
 from fluid.mesh.background import box_mesh
 from fluid.step.parameters import WaterParameters
@@ -65,7 +65,7 @@ def cubes(cell: float, until: float) -> tuple[np.ndarray, np.ndarray]:
             WaterParameters(density=DENSITY, gravity=G),
             lambda normal, centre: normal[:, 0] > 0.5,
         )
-        c = Coupling(water, s, immersion, rtol=1e-7, step_max=1.0, clock=Clock(), passes=2)
+        c = CoupledStepper(water, s, immersion, rtol=1e-7, step_max=1.0, clock=Clock(), passes=2)
         t, place = [0.0], [s.centre()]
         while t[-1] < until:
             c.step(c.step_size(1.0))

@@ -16,7 +16,7 @@ from yade_scripts.joints.cohesion import JointParameters
 
 STILL = (0.0, 0.0, 0.0)
 STRENGTH, FAILURE = 1e6, 1e-3
-LAW = JointParameters(STRENGTH, FAILURE)
+LAW = JointParameters(STRENGTH, FAILURE, damping=0.0)
 LAWS = ("polynomial", "bilinear", "exponential")
 ENERGY = {"polynomial": 9 / 16, "bilinear": 0.5, "exponential": np.e * 0.1 * (1 - 11 * np.exp(-10))}
 """G_c / (T_max δ_f) with the peaks that the laws have by default."""
@@ -58,7 +58,7 @@ def mode_one():
 
 def _pulled(name: str):
     """A joint pulled apart slowly, its force recorded 400 times."""
-    speed, law = 0.01, JointParameters(STRENGTH, FAILURE, law=name)
+    speed, law = 0.01, JointParameters(STRENGTH, FAILURE, law=name, damping=0.0)
     with driven_pair(law, velocity=(0, 0, speed)) as s:
         force = []
         for _ in range(400):
@@ -76,7 +76,7 @@ def _pulled(name: str):
 @check("P21", "mode II and mixed mode", "closed forms: effective opening, potential of 1987")
 def mixed_mode():
     table = columns("coh_mixed_mode")
-    needleman = JointParameters(STRENGTH, FAILURE, mixed_mode="needleman")
+    needleman = JointParameters(STRENGTH, FAILURE, mixed_mode="needleman", damping=0.0)
     for law, column in ((LAW, "eff"), (needleman, "N87")):
         for u, v in ((0.0, 0.3), (0.1, 0.2), (0.3, 0.1)):
             row = np.flatnonzero(np.isclose(table["u"], u) & np.isclose(table["v"], v))[0]
@@ -86,7 +86,9 @@ def mixed_mode():
                 yield Finding(f"normal traction / {at}", Tn, table[f"{column}_Tn"][row], 0.01)
             yield Finding(f"shear traction / {at}", Tt, table[f"{column}_Tt"][row], 0.01)
     for name in LAWS:
-        with driven_pair(JointParameters(STRENGTH, FAILURE, law=name), velocity=(0.01, 0, 0)) as s:
+        with driven_pair(
+            JointParameters(STRENGTH, FAILURE, law=name, damping=0.0), velocity=(0.01, 0, 0)
+        ) as s:
             s.advance(1.1 * FAILURE / 0.01)
             work = s.energies()["driving_work"] / (STRENGTH * FAILURE)
         yield Finding(f"{name}: work in pure shear / (T_max df)", work, ENERGY[name], 0.01)
@@ -126,6 +128,8 @@ def _leaves(law: str, speed: float) -> tuple[bool, float]:
         Block("wall", (0, 0, 0.5), size=1.0, fixed=True),
         Block("free", (0, 0, 1.5), size=1.0, velocity=(0, 0, speed)),
     ]
-    with Structure(blocks, None, JointParameters(STRENGTH, FAILURE, law=law), gravity=STILL) as s:
+    with Structure(
+        blocks, None, JointParameters(STRENGTH, FAILURE, law=law, damping=0.0), gravity=STILL
+    ) as s:
         s.advance(0.1)
         return not s.joint_table().alive[0], float(s.velocity()[1, 2])

@@ -14,7 +14,7 @@ MOST_MOVED = 0.05
 
 
 class Losses:
-    """Sums over the steps of a Coupling with water: call `add` after each."""
+    """Sums over the steps of a CoupledStepper with water: call `add` after each."""
 
     def __init__(self, water):
         self.water = water

@@ -12,7 +12,7 @@ from coupler.commands.verify.losses import Losses
 from coupler.commands.verify.registry import Finding, check
 from coupler.commands.verify.scenes import DENSITY, G
 from coupler.run.clock import Clock
-from coupler.step.coupled_step import Coupling
+from coupler.step.coupled_step import CoupledStepper
 from coupler.step.immersion import Immersion
 from fluid.mesh.background import box_mesh
 from fluid.readings import gauges
@@ -89,7 +89,7 @@ def _beach(until: float, waves: bool = True) -> RunUp:
     sides = Sides([Side.of(mesh, lambda normal, _: normal[:, 0] < -0.5, _wave())]) if waves else None
     settings = WaterParameters(density=DENSITY, gravity=G)
     water = Water(mesh, immersion.domain, lambda x: x[:, 2] - 1.0, settings, None, None, sides)
-    c = Coupling(water, None, immersion, rtol=1e-7, step_max=1.0, clock=Clock())
+    c = CoupledStepper(water, None, immersion, rtol=1e-7, step_max=1.0, clock=Clock())
     x = np.linspace(FLAT + 0.8 * SLOPE, length - 1e-6, 2000)
     bed = (x - FLAT) / SLOPE
     line = np.column_stack([x, np.full_like(x, dx), bed + FILM / CELLS])

@@ -8,7 +8,7 @@ import numpy as np
 
 from coupler.run.clock import Clock
 from coupler.scene.fill import start_level
-from coupler.step.coupled_step import Coupling
+from coupler.step.coupled_step import CoupledStepper
 from coupler.step.immersion import Immersion
 from fluid.domain.covers import WIDE_OPENINGS
 from fluid.mesh.background import box_mesh
@@ -43,7 +43,7 @@ def tank(
     openings: str = "all",
     split: str = "kuhn",
     **parameters,
-) -> Coupling:
+) -> CoupledStepper:
     """Water in [0, size] on cells (nx, ny, nz) with blocks and fixed solids; is_open, is_smooth: see `Water`;
     split: see `box_mesh`; openings: "all" or "wide", of multiple covers, as in a case.
 
@@ -55,7 +55,7 @@ def tank(
     if not callable(fill):
         fill = start_level(fill, (np.zeros(3), np.asarray(size, float)), mesh, immersion.domain)
     water = Water(mesh, immersion.domain, fill, parameters, is_open, is_smooth)
-    return Coupling(water, structure, immersion, rtol=rtol, step_max=1.0, clock=Clock())
+    return CoupledStepper(water, structure, immersion, rtol=rtol, step_max=1.0, clock=Clock())
 
 
 def slice_sides(normal, centre):

@@ -13,7 +13,7 @@ from coupler.commands.verify.figures import columns
 from coupler.commands.verify.registry import Finding, check
 from coupler.commands.verify.scenes import level_at, top
 from coupler.run.clock import Clock
-from coupler.step.coupled_step import Coupling
+from coupler.step.coupled_step import CoupledStepper
 from coupler.step.immersion import Immersion
 from fluid.mesh.background import box_mesh
 from fluid.step.parameters import WaterParameters
@@ -50,11 +50,11 @@ def graded(low: float, high: float, fine: tuple[float, float], h: float, most: f
     return np.concatenate([fine[0] - away(fine[0] - low)[::-1], middle, fine[1] + away(high - fine[1])])
 
 
-def _scene(axes, level, body, parameters: WaterParameters, smooth=None) -> Coupling:
+def _scene(axes, level, body, parameters: WaterParameters, smooth=None) -> CoupledStepper:
     mesh = box_mesh(None, None, axes=axes)
     immersion = Immersion(mesh, body, [], "single")
     water = Water(mesh, immersion.domain, level, parameters, None, smooth)
-    return Coupling(water, body, immersion, rtol=1e-8, step_max=1.0, clock=Clock())
+    return CoupledStepper(water, body, immersion, rtol=1e-8, step_max=1.0, clock=Clock())
 
 
 @check(

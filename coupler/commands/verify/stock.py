@@ -21,7 +21,7 @@ from yade_scripts.stock.scene import described, timed
 from yade_scripts.stock.script import StockRun, run_script, stock_law
 
 BRITTLE = ("cohfrict", "jcfpm", "mortar")
-LAW = JointParameters(1e6, 1e-3)
+LAW = JointParameters(1e6, 1e-3, damping=0.0)
 APART = 3.0
 """Distance of pairs that do not meet [m]."""
 
@@ -70,7 +70,7 @@ TENSION, COHESION, FRICTION, COMPRESSION, ASPECT = 1e6, 1.5e6, 0.7, 6e6, 1.2
 )
 def lourenco_envelope():
     angles = np.radians([0, 20, 40, 60, 75, 90, 105, 120, 135, 145, 155, 165, 175, 180])
-    joints = JointParameters(TENSION, 1e-5, shear_ratio=COHESION / TENSION)
+    joints = JointParameters(TENSION, 1e-5, shear_ratio=COHESION / TENSION, damping=0.0)
     K, beta, speed, records = joints.stiffness, joints.shear_ratio, 1e-3, 8000
     velocities = [(speed * np.sin(a) / beta**2, 0.0, speed * np.cos(a)) for a in angles]
     end = 1.1 * COMPRESSION / (K * speed)

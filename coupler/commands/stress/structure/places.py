@@ -74,7 +74,7 @@ def _path(origin) -> np.ndarray:
         Block("foot", np.add(origin, (0.0, 0.0, 0.5)), size=1.0, density=DENSITY),
         Block("high", np.add(origin, (0.1, 0.2, 2.2)), size=1.0, rotation=turn, density=DENSITY),
     ]
-    joints = JointParameters(1e6, 1e-3)
+    joints = JointParameters(1e6, 1e-3, damping=0.0)
     with Structure(blocks, ContactLaw(1e8, 0.3), joints, ground=origin[2]) as s:
         s.advance(0.3)
         return s.centre() - origin

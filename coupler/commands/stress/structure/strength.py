@@ -56,7 +56,7 @@ def errors(cases) -> Iterator[Measure]:
 @scene("S01", "strength 1 kPa to 100 MPa, each at openings of 1e-8 to 0.1 m")
 def strengths() -> Iterator[Measure]:
     yield from errors(
-        (JointParameters(strength, opening), 3.0)
+        (JointParameters(strength, opening, damping=0.0), 3.0)
         for strength in (1e3, 1e5, 1e8)
         for opening in (1e-8, 1e-4, 0.1)
     )
@@ -64,18 +64,20 @@ def strengths() -> Iterator[Measure]:
 
 @scene("S02", "density 100 to 20000 kg/m³, bonded")
 def densities() -> Iterator[Measure]:
-    yield from errors((JointParameters(1e6, 1e-3), 3.0, density) for density in (LIGHT, MASS, HEAVY))
+    yield from errors(
+        (JointParameters(1e6, 1e-3, damping=0.0), 3.0, density) for density in (LIGHT, MASS, HEAVY)
+    )
 
 
 @scene("S03", "torn at 300 times the critical speed, brittle and soft")
 def fast() -> Iterator[Measure]:
-    yield from errors((JointParameters(1e6, opening), 300.0) for opening in (1e-6, 1e-3))
+    yield from errors((JointParameters(1e6, opening, damping=0.0), 300.0) for opening in (1e-6, 1e-3))
 
 
 @scene("S04", "rods and plates of aspect ratio 50, bonded at their ends and faces")
 def slender() -> Iterator[Measure]:
     sizes = ((0.02, 0.02, 1.0), (1.0, 1.0, 0.02), (1.0, 0.02, 0.02))
-    yield from errors((JointParameters(1e6, 1e-3), 3.0, MASS, size) for size in sizes)
+    yield from errors((JointParameters(1e6, 1e-3, damping=0.0), 3.0, MASS, size) for size in sizes)
 
 
 @scene("S05", "bonded rod of aspect ratio 50 held at one end, released under a quarter of its strength")
@@ -88,7 +90,7 @@ def cantilever() -> Iterator[Measure]:
         Block("held", (-0.5 * width, 0, 0), size=width, density=MASS, fixed=True),
         Block("rod", (0.5 * length, 0, 0), size=(length, width, width), density=MASS),
     ]
-    with Structure(blocks, None, JointParameters(strength, opening)) as s:
+    with Structure(blocks, None, JointParameters(strength, opening, damping=0.0)) as s:
         watch = Watch(s, weight * opening * length / width)
         watch.advance(0.6, looks=60)
         early = s.joint_table().damage[0]
