@@ -135,10 +135,12 @@ class Water(Section):
         "single",
         description="one set of unknowns per node, or one per part of the water that a thin wall separates",
     )
-    openings: Literal["all", "wide"] = Field(
+    openings: Literal["all", "wide", "edges"] = Field(
         "all",
         description="with multiple covers, what counts as an opening of a thin wall: any, which acts as one cell wide "
-        "at least, or only those about a cell wide and more, for right edges and added mass of thin plates",
+        "at least; only those about a cell wide and more, for right edges and added mass of thin plates (wide); or the "
+        "same beside free edges, and any where two faces, or a face and a side of the tank, lie less than a cell "
+        "apart, so that slits and films under blocks stay open (edges)",
     )
     cracks: Literal["open", "closed", "slit"] = Field(
         "open",

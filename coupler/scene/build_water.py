@@ -18,15 +18,14 @@ def water_of(case: Case, structure, solids):
     """(Water, Immersion) of a case with a structure or None and fixed solids [(vertices, faces)]."""
     from coupler.scene.fill import start_level, start_velocity
     from coupler.step.immersion import Immersion
-    from fluid.domain.covers import WIDE_OPENINGS
+    from fluid.domain.covers import OPENINGS
     from fluid.step.parameters import WaterParameters
     from fluid.step.water import Water
 
     w = case.water
     mesh = mesh_of(case.tank)
     cracks = _narrow_cracks(w.cracks, structure, mesh)
-    connection = WIDE_OPENINGS if w.openings == "wide" else None
-    immersion = Immersion(mesh, structure, solids, w.covers, cracks, connection)
+    immersion = Immersion(mesh, structure, solids, w.covers, cracks, OPENINGS[w.openings])
     parameters = WaterParameters(
         density=w.density,
         gravity=case.case.gravity,

@@ -31,11 +31,14 @@ class Connection:
 
     inner: pieces of a cell touch over more than inner h^2 (see WIDE_OPENINGS)
     face: parts of two cells overlap by more than this share of the face (0.2 for thin plates)
+    spares: any area counts beside slits, where a face of a solid looks at another one or at a side of the tank within
+    so many cell sizes; 0: nowhere
     pocket: components of the water with less than pocket h^3 are dropped (they have no pressure of their
     own to speak of, and a closed one makes the pressure system singular)."""
 
     inner: float = 0.0
     face: float = 0.0
+    spares: float = 0.0
     pocket: float = 1e-3
 
     @property
@@ -47,23 +50,34 @@ class Connection:
         """[m2] area over which two pieces of a cell must touch; spacing [m], its size, one or (n,)."""
         return max(self.inner, NO_AREA) * spacing**2
 
+    def link_area_in_slits(self, spacing):
+        """The same beside slits."""
+        return NO_AREA * spacing**2
+
 
 WIDE_OPENINGS = Connection(inner=0.35, face=0.35)
 """For thin plates with free edges: added mass of a plate 0.3 h thick and 2.8, 5.6, 8 h wide 0.8, 0.93, 1.0 of theory
 (0.1, 0.4, 0.6 without thresholds), load beside a free edge off by 0.003 of rho g b (0.027 at h = 1/8); openings of thin
 walls that are narrower than about a cell are closed."""
+EDGES_APART = Connection(inner=0.35, face=0.35, spares=1.0)
+"""The same beside free edges, while slits between solids and films under blocks stay open."""
+OPENINGS = {"all": Connection(), "wide": WIDE_OPENINGS, "edges": EDGES_APART}
+"""By the names that a case gives."""
 
 
-def virtual_cells(mesh, parent, part, start, contacts, connection) -> tuple[np.ndarray, np.ndarray]:
+def virtual_cells(
+    mesh, parent, part, start, contacts, connection, part_in_slit
+) -> tuple[np.ndarray, np.ndarray]:
     """Nodes of the virtual elements.
 
     mesh: Background · parent (M,) background cell of each element, ascending · part (M,) row of its cut part, -1 whole
     start (cells + 1,) first element of each cell · contacts: Contacts · connection: Connection
+    part_in_slit (K,) bool: cut parts beside slits, whose contacts count over any area
     -> cells (M, 4), parent_node (N,)."""
     several = _nodes_with_choice(mesh.cells, part, start, len(mesh.nodes))
     label = _unite_corners(
         mesh.cells, mesh.neighbours, parent, part, start, several, contacts.area, contacts.full,
-        connection.face, NO_AREA * mesh.spacing**2,
+        np.append(part_in_slit, False)[part], connection.face, NO_AREA * mesh.spacing**2,
     )  # fmt: skip
     return _numbered(mesh.cells, parent, several, label, len(mesh.nodes))
 
@@ -131,10 +145,11 @@ def _numbered(cells, parent, several, label, n_nodes):
 
 
 @njit(cache=True)
-def _unite_corners(cells, neighbours, parent, part, start, several, areas, fulls, share, least):
+def _unite_corners(cells, neighbours, parent, part, start, several, areas, fulls, slit, share, least):
     """Union-find over the corners 4 e + k of the elements, at nodes that may have several copies.
 
     areas, fulls (L,) [m2]: of the contacts of cut parts, in the order in which they are met here.
+    slit (M,) bool: elements whose contacts count over any area.
     With a threshold, groups of cut parts that it has left without a whole cell are then joined across their
     widest opening, until nothing changes: a threshold closes openings, it makes no pockets."""
     label = np.arange(4 * len(parent))
@@ -175,7 +190,7 @@ def _unite_corners(cells, neighbours, parent, part, start, several, areas, fulls
                         widest[a] = max(widest[a], area)
                         widest[b] = max(widest[b], area)
                         joined = True
-                    elif area > share * full or (
+                    elif area > (0.0 if slit[e] or slit[other] else share) * full or (
                         sweep > 0
                         and (
                             (area == widest[a] and not anchored[a]) or (area == widest[b] and not anchored[b])

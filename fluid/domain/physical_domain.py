@@ -22,6 +22,7 @@ from fluid.cut.bodies import ConvexBodies
 from fluid.cut.candidate_pairs import near_pairs
 from fluid.cut.cut_arrays import Cuts
 from fluid.cut.cut_cells import cut_cells
+from fluid.cut.facing import facing, near_bodies
 from fluid.cut.fans import fans
 from fluid.cut.openings import Contacts, find_contacts
 from fluid.cut.recut import joined
@@ -219,6 +220,8 @@ def _cut_moved(memory, bodies, moved, covers):
     """Replace the pairs of moved bodies and cut the cells of the pairs that went or came → Memory with the contacts
     from before, and these cells (cells,) bool."""
     mesh = memory.mesh
+    if memory.connection.spares > 0.0:
+        moved = _with_neighbours(memory.bodies, moved, memory) | _with_neighbours(bodies, moved, memory)
     gone = moved[memory.pair_body]
     new_cell, new_body = near_pairs(mesh, bodies, np.flatnonzero(moved), SEARCH_MARGIN * mesh.spacing)
     touched = np.zeros(len(mesh.cells), dtype=bool)
@@ -239,7 +242,40 @@ def _cut_pairs(mesh, bodies, cell, body, covers, connection):
     start = np.append(first, len(cell)).astype(np.int64)
     link_area = -1.0 if covers == "single" else connection.link_area(mesh.local_size[chosen])
     tolerance = TOLERANCE * mesh.spacing
-    return cut_cells(mesh.nodes, mesh.cells, chosen, start, body, bodies, tolerance, mesh.spacing, link_area)
+
+    def cut(chosen, start, body, link_area):
+        return cut_cells(
+            mesh.nodes, mesh.cells, chosen, start, body, bodies, tolerance, mesh.spacing, link_area
+        )
+
+    cuts = cut(chosen, start, body, link_area)
+    if covers == "single" or connection.spares == 0.0:
+        return cuts
+    beside = np.zeros(len(mesh.cells), bool)
+    beside[cuts.part_cell[_parts_in_slits(mesh, bodies, cuts, connection)]] = True
+    again, rows = beside[chosen], beside[cell]
+    first = np.concatenate([[0], np.cumsum(np.diff(start)[again])]).astype(np.int64)
+    link_area = connection.link_area_in_slits(mesh.local_size[chosen[again]])
+    return joined(cuts, beside, cut(chosen[again], first, body[rows], link_area))
+
+
+def _parts_in_slits(mesh, bodies, cuts, connection):
+    """(K,) bool: cut parts with a wetted polygon that something else lies opposite to (`Connection.spares`)."""
+    found = np.zeros(len(cuts.part_cell), bool)
+    if connection.spares > 0.0:
+        reach = connection.spares * mesh.local_size[cuts.part_cell[cuts.wet_part]]
+        polygons = (cuts.wet_body, cuts.wet[:, 1:4], cuts.wet[:, 4:7])
+        in_slit, _ = facing(bodies, polygons, reach, mesh.bounds, np.ones(len(bodies), bool))
+        found[cuts.wet_part[in_slit]] = True
+    return found
+
+
+def _with_neighbours(bodies, moved, memory):
+    """(n,) bool: moved bodies, and those within reach of a slit to them."""
+    box, reach = bodies.bounds(), memory.connection.spares * float(memory.mesh.local_size.max())
+    start, near = near_bodies(box[:, 0], box[:, 1], np.ones(len(bodies), bool), reach)
+    beside = np.concatenate([[0], np.cumsum(moved[near])])
+    return moved | (beside[start[1:]] > beside[start[:-1]])
 
 
 def _assembled(memory: Memory, elements: Elements, covers: str) -> PhysicalDomain:
@@ -248,7 +284,13 @@ def _assembled(memory: Memory, elements: Elements, covers: str) -> PhysicalDomai
         cells, parent_node = mesh.cells[elements.parent], np.arange(len(mesh.nodes))
     else:
         cells, parent_node = virtual_cells(
-            mesh, elements.parent, elements.part, elements.start, memory.contacts, memory.connection
+            mesh,
+            elements.parent,
+            elements.part,
+            elements.start,
+            memory.contacts,
+            memory.connection,
+            _parts_in_slits(mesh, memory.bodies, cuts, memory.connection),
         )
     volume = _volume(memory, elements)
     of_part = elements.of_part

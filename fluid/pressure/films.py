@@ -32,6 +32,7 @@ import scipy.sparse as sp
 from numba import njit
 from scipy.sparse.csgraph import connected_components
 
+from fluid.cut.facing import facing
 from fluid.domain.coupling_matrix import wetted_coupling
 from fluid.pressure.projection import inflow
 
@@ -55,11 +56,8 @@ class Films:
         share (P,): of the pressure that acts on each plane of the bodies where it faces a film."""
         bodies, mesh = domain.memory.bodies, domain.memory.mesh
         reach = NARROW * mesh.local_size[domain.parent_cell]
-        beside_loose = _beside_loose(bodies, loose, float(reach.max(initial=0.0)))
-        in_film, plane = _facing(
-            domain.face_body, domain.face_centroid, domain.face_normal, bodies.normals, bodies.cut_offsets(),
-            bodies.plane_start, loose, *beside_loose, mesh.bounds, reach[domain.face_cell],
-        )  # fmt: skip
+        polygons = (domain.face_body, domain.face_centroid, domain.face_normal)
+        in_film, plane = facing(bodies, polygons, reach[domain.face_cell], mesh.bounds, loose)
         films = _film_cells(domain.face_cell, domain.face_area, in_film, domain.volume, reach)
         node = _all_around(topology.node_start, topology.node_cells, films)
         partly = np.flatnonzero(in_film & (share[plane] < 1.0))
@@ -161,75 +159,6 @@ def _one_solved(own, rows, right):
     if len(rows) <= LARGE:
         return np.linalg.solve(block.toarray(), right)
     return sp.linalg.splu(sp.csc_array(block)).solve(right)
-
-
-def _beside_loose(bodies, loose, reach: float):
-    """start (n + 1,), members: bodies whose bounds come within reach [m] of those of each body, pairs with at least one
-    loose one of both."""
-    bounds = bodies.bounds()
-    return _near_bodies(bounds[:, 0], bounds[:, 1], loose, reach)
-
-
-@njit(cache=True)
-def _near_bodies(low, high, loose, reach):
-    n = low.shape[0]
-    start = np.zeros(n + 1, np.int64)
-    members, count = np.empty(16 * n + 16, np.int64), 0
-    for a in range(n):
-        for b in range(n):
-            if a == b or not (loose[a] or loose[b]):
-                continue
-            apart = False
-            for k in range(3):
-                apart = apart or low[a, k] > high[b, k] + reach or low[b, k] > high[a, k] + reach
-            if not apart:
-                if count == members.shape[0]:
-                    members = np.concatenate((members, np.empty_like(members)))
-                members[count] = b
-                count += 1
-        start[a + 1] = count
-    return start, members[:count].copy()
-
-
-@njit(cache=True)
-def _facing(
-    face_body, centroid, normal, normals, offsets, plane_start, loose, near_start, near, bounds, reach
-):  # fmt: skip
-    """(S,) bool: something lies within reach (S,) [m] ahead of the polygon; its plane (S,) among all."""
-    in_film, plane = np.zeros(face_body.shape[0], np.bool_), np.empty(face_body.shape[0], np.int64)
-    for s in range(face_body.shape[0]):
-        b = face_body[s]
-        best = -2.0
-        for g in range(plane_start[b], plane_start[b + 1]):
-            along = 0.0
-            for k in range(3):
-                along += normals[g, k] * normal[s, k]
-            if along > best:
-                best, plane[s] = along, g
-        if loose[b]:
-            for k in range(3):
-                if normal[s, k] > 0.5:
-                    in_film[s] |= (bounds[1, k] - centroid[s, k]) < reach[s] * normal[s, k]
-                elif normal[s, k] < -0.5:
-                    in_film[s] |= (centroid[s, k] - bounds[0, k]) < -reach[s] * normal[s, k]
-        for t in range(near_start[b], near_start[b + 1]):
-            if in_film[s]:
-                break
-            other = near[t]
-            first, last = 0.0, reach[s]
-            for g in range(plane_start[other], plane_start[other + 1]):
-                along, room = 0.0, offsets[g]
-                for k in range(3):
-                    along += normals[g, k] * normal[s, k]
-                    room -= normals[g, k] * centroid[s, k]
-                if along > 1e-12:
-                    last = min(last, room / along)
-                elif along < -1e-12:
-                    first = max(first, room / along)
-                elif room < 0.0:
-                    last = -1.0
-            in_film[s] = first <= last
-    return in_film, plane
 
 
 @njit(cache=True)

@@ -18,14 +18,14 @@ PLACE = 0.537
 def scene():
     made = []
 
-    def make(blocks, uplift=None, **sections):
+    def make(blocks, uplift=None, water=(), **sections):
         contact = {"stiffness": 1e9, "friction": 0.5} | ({} if uplift is None else uplift)
         made.append(
             build(
                 case(
                     time={"end": 1.0, "step_max": 0.01},
                     tank={"lower": [0, 0, 0], "upper": [1, 1, 0.8], "cell": CELL},
-                    water={"fill": [{"lower": [0, 0, 0], "upper": [1, 1, DEPTH]}]},
+                    water={"fill": [{"lower": [0, 0, 0], "upper": [1, 1, DEPTH]}]} | dict(water),
                     structure={"block": blocks},
                     contact=contact,
                     **sections,
@@ -63,6 +63,14 @@ def test_a_block_on_the_bed_gets_the_share_of_the_pressure_below_that_is_asked_f
     below, above = RHO * G * DEPTH * AREA, RHO * G * (DEPTH - HEIGHT) * AREA
     load = coupling.step(0.01).load
     assert load[0, 2] == pytest.approx(share * below - above, abs=2e-4 * below)
+
+
+def test_faces_of_edges_apart_keep_the_uplift(scene):
+    """With multiple covers and openings that spare films."""
+    coupling = scene([block()], water={"covers": "multiple", "openings": "edges"})
+    run(coupling, 0.2)
+    expected = RHO * G * HEIGHT * AREA
+    assert coupling.step(0.01).load[0, 2] == pytest.approx(expected, abs=2e-4 * RHO * G * DEPTH * AREA)
 
 
 @pytest.mark.parametrize(("uplift", "share"), [("full", 1.0), ("none", 0.0)])

@@ -146,7 +146,7 @@ ANY_PRESSURE = 98e3
 PROBES = {"H1": 1.488, "H2": 0.992, "H3": 0.496, "H4": 2.638}
 
 
-EDGES = {"covers": "multiple", "openings": "wide"}
+EDGES = {"covers": "multiple", "openings": "edges"}
 """Both faces of an edge with unknowns of their own."""
 
 

@@ -10,7 +10,7 @@ from coupler.run.clock import Clock
 from coupler.scene.fill import start_level
 from coupler.step.coupled_step import CoupledStepper
 from coupler.step.immersion import Immersion
-from fluid.domain.covers import WIDE_OPENINGS
+from fluid.domain.covers import OPENINGS
 from fluid.mesh.background import box_mesh
 from fluid.step.parameters import WaterParameters
 from fluid.step.water import Water
@@ -45,12 +45,11 @@ def tank(
     **parameters,
 ) -> CoupledStepper:
     """Water in [0, size] on cells (nx, ny, nz) with blocks and fixed solids; is_open, is_smooth: see `Water`;
-    split: see `box_mesh`; openings: "all" or "wide", of multiple covers, as in a case.
+    split: see `box_mesh`; openings: of multiple covers, as in a case.
 
     fill: as in `Water`, or boxes (lower (3,), upper (3,)) filled like those of a case, which end at walls."""
     mesh = box_mesh(np.zeros(3), size, np.asarray(size, float) / np.asarray(cells), split=split)
-    connection = WIDE_OPENINGS if openings == "wide" else None
-    immersion = Immersion(mesh, structure, list(solids), covers, connection=connection)
+    immersion = Immersion(mesh, structure, list(solids), covers, connection=OPENINGS[openings])
     parameters = WaterParameters(**({"density": DENSITY, "gravity": G} | parameters))
     if not callable(fill):
         fill = start_level(fill, (np.zeros(3), np.asarray(size, float)), mesh, immersion.domain)

@@ -1,0 +1,83 @@
+"""What lies opposite to wetted polygons: other bodies, or the sides of the box around the mesh, with water between."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+
+def facing(bodies, polygons, reach, bounds, loose):
+    """(S,) bool: something lies within reach (S,) [m] ahead of the polygon; its plane (S,) among those of all bodies.
+
+    polygons: body (S,), centroid (S, 3) [m], normal (S, 3) out of the body · bounds (2, 3) [m] of the tank · loose
+    (n_bodies,) bool: only what lies between two things one of which is loose counts; sides of the tank are not."""
+    body, centroid, normal = polygons
+    box = bodies.bounds()
+    start, near = near_bodies(box[:, 0], box[:, 1], loose, float(reach.max(initial=0.0)))
+    return _facing(
+        body, np.ascontiguousarray(centroid), np.ascontiguousarray(normal), bodies.normals, bodies.cut_offsets(),
+        bodies.plane_start, loose, start, near, bounds, reach,
+    )  # fmt: skip
+
+
+@njit(cache=True)
+def near_bodies(low, high, loose, reach):
+    """start (n + 1,), members: bodies whose bounds low, high (n, 3) [m] come within reach [m] of those of each body,
+    pairs with at least one loose one."""
+    n = low.shape[0]
+    start = np.zeros(n + 1, np.int64)
+    members, count = np.empty(16 * n + 16, np.int64), 0
+    for a in range(n):
+        for b in range(n):
+            if a == b or not (loose[a] or loose[b]):
+                continue
+            apart = False
+            for k in range(3):
+                apart = apart or low[a, k] > high[b, k] + reach or low[b, k] > high[a, k] + reach
+            if not apart:
+                if count == members.shape[0]:
+                    members = np.concatenate((members, np.empty_like(members)))
+                members[count] = b
+                count += 1
+        start[a + 1] = count
+    return start, members[:count].copy()
+
+
+@njit(cache=True)
+def _facing(
+    face_body, centroid, normal, normals, offsets, plane_start, loose, near_start, near, bounds, reach
+):  # fmt: skip
+    in_film, plane = np.zeros(face_body.shape[0], np.bool_), np.empty(face_body.shape[0], np.int64)
+    for s in range(face_body.shape[0]):
+        b = face_body[s]
+        best = -2.0
+        for g in range(plane_start[b], plane_start[b + 1]):
+            along = 0.0
+            for k in range(3):
+                along += normals[g, k] * normal[s, k]
+            if along > best:
+                best, plane[s] = along, g
+        if loose[b]:
+            for k in range(3):
+                if normal[s, k] > 0.5:
+                    in_film[s] |= (bounds[1, k] - centroid[s, k]) < reach[s] * normal[s, k]
+                elif normal[s, k] < -0.5:
+                    in_film[s] |= (centroid[s, k] - bounds[0, k]) < -reach[s] * normal[s, k]
+        for t in range(near_start[b], near_start[b + 1]):
+            if in_film[s]:
+                break
+            other = near[t]
+            first, last = 0.0, reach[s]
+            for g in range(plane_start[other], plane_start[other + 1]):
+                along, room = 0.0, offsets[g]
+                for k in range(3):
+                    along += normals[g, k] * normal[s, k]
+                    room -= normals[g, k] * centroid[s, k]
+                if along > 1e-12:
+                    last = min(last, room / along)
+                elif along < -1e-12:
+                    first = max(first, room / along)
+                elif room < 0.0:
+                    last = -1.0
+            in_film[s] = first <= last
+    return in_film, plane
