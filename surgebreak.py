@@ -33,6 +33,7 @@ from coupler.run.forecast import Forecast  # noqa: E402
 from coupler.step.limits import Diverged, LimitReached  # noqa: E402
 
 if TYPE_CHECKING:
+    from coupler.commands.sweep import tables as sweep
     from yade_scripts.joints.law import CohesiveLaw
 
 __all__ = [
@@ -53,6 +54,7 @@ __all__ = [
     "load",
     "open",
     "register_law",
+    "sweep",
 ]
 __version__ = _version()
 
@@ -61,9 +63,14 @@ open = Run
 
 
 def __getattr__(name: str) -> object:
-    """`CohesiveLaw` is of the room of the structure, which a script with water alone does not load."""
+    """`CohesiveLaw` is of the room of the structure, which a script with water alone does not load; `sweep` reads the
+    tables of sweeps."""
     if name == "CohesiveLaw":
         from yade_scripts.joints.law import CohesiveLaw
 
         return CohesiveLaw
+    if name == "sweep":
+        from coupler.commands.sweep import tables
+
+        return tables
     raise AttributeError(f"module 'surgebreak' has no attribute {name!r}")

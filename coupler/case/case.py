@@ -13,6 +13,7 @@ from pydantic import Field, PrivateAttr, model_validator
 from coupler.case.gauges import Gauge
 from coupler.case.structure import Structure
 from coupler.case.study import Study
+from coupler.case.sweep import Sweep
 from coupler.case.terrain import Terrain
 from coupler.case.types import (
     Name,
@@ -337,6 +338,7 @@ class Case(Section):
         default_factory=Verdict, description="when a structure counts as damaged or collapsed"
     )
     study: Study | None = Field(None, exclude=True, description="what `surgebreak study` varies and measures")
+    sweep: Sweep | None = Field(None, exclude=True, description="what `surgebreak sweep` varies and measures")
 
 
 def modules(case: Case) -> dict[str, bool]:

@@ -52,11 +52,14 @@ def problems(case: Case) -> list[Problem]:
 
 
 def _study(case: Case) -> Iterator[Problem]:
-    if case.study is None:
-        return
-    from coupler.case.study_names import study_problems
+    if case.study is not None:
+        from coupler.case.study_names import study_problems
 
-    yield from study_problems(case.study)
+        yield from study_problems(case.study)
+    if case.sweep is not None:
+        from coupler.case.sweep_names import sweep_problems
+
+        yield from sweep_problems(case.sweep)
 
 
 def remarks(case: Case) -> list[str]:

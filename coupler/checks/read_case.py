@@ -262,7 +262,7 @@ def _apply(table: dict, override: str) -> KeyPath:
     if not _is_utf_8(override):
         raise BadCase([f"--set {os.fsencode(override)!r}: no text in UTF-8"])
     name, sign, value = override.partition("=")
-    path = _parse_path(name.strip())
+    path = parse_path(name.strip())
     if not sign or not path:
         raise BadCase(
             [f"--set {_cut(override)}: write KEY=VALUE, for instance time.end=2 or joints.strength='1 MPa'"]
@@ -301,7 +301,7 @@ def _leave_out(table: dict, path: KeyPath, override: str) -> None:
         del holder[path[-1]]
 
 
-def _parse_path(name: str) -> KeyPath:
+def parse_path(name: str) -> KeyPath:
     if not re.fullmatch(r"[A-Za-z0-9_-]+(\[\d+\]|\.[A-Za-z0-9_-]+)*(\[\+\])?", name):
         return ()
     parts = re.findall(r"\[(\d+|\+)\]|([A-Za-z0-9_-]+)", name)
@@ -372,7 +372,10 @@ def _without_unknown(table: dict, found: list) -> Case | None:
         for part in path[:-1]:
             holder = holder[part]
         del holder[path[-1]]
-    return Case.model_validate(rest)
+    try:
+        return Case.model_validate(rest)
+    except ValidationError:  # the unknown name was meant for one that its section cannot do without
+        return None
 
 
 def _line(path: KeyPath, text: str, places: _Places) -> str:

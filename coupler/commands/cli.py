@@ -399,6 +399,74 @@ def study(
 
 
 @app.command()
+def sweep(
+    case: CasePlace,
+    vary: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--vary",
+            metavar="KEY=...",
+            help="A,B,... or FROM:TO:STEPS or 'lognormal(median=..., dispersion=...)'; may be given again; adds to the "
+            "case's [sweep]",
+        ),
+    ] = None,
+    set: Overrides = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="directory of the sweep; else runs/sweep beside the case"),
+    ] = None,
+    plan: Annotated[bool, typer.Option("--plan", help="only show the table and a forecast of cost")] = False,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, metavar="N", help="runs at a time; else as many as there are cores")
+    ] = None,
+    threads: Annotated[int, typer.Option(min=1, metavar="N", help="threads of each run")] = 1,
+    engine: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME",
+            help="local; slurm; dask-pbs, dask-slurm, dask-sge, dask-lsf, dask-oar, dask-htcondor, dask-local",
+        ),
+    ] = "local",
+    option: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="KEY=VALUE", help="of a cluster: time=30 (minutes), mem=2GB, partition=...; again"
+        ),
+    ] = None,
+    chunk: Annotated[int, typer.Option(min=1, metavar="N", help="slurm: runs that one job makes")] = 1,
+    detach: Annotated[
+        bool, typer.Option("--detach", help="slurm: submit and leave; the same command waits")
+    ] = False,
+    cancel: Annotated[
+        str | None,
+        typer.Option(metavar="all|ROW,ROW", help="slurm: scancel all jobs of this sweep, or those of rows"),
+    ] = None,
+    export: Annotated[
+        str | None,
+        typer.Option(metavar="snakemake", help="write a Snakefile that makes the runs; nothing is run"),
+    ] = None,
+    any_version: Annotated[
+        bool, typer.Option("--any-version", help="keep runs that another version of the program made")
+    ] = False,
+) -> None:
+    """Many runs of a case: grids, samples, repeats; fragility curves.
+
+    What is done is not done again, a killed run goes on. Table, curves and a report on one page.
+    """
+    one_thread()
+    from coupler.commands.sweep.command import Wish
+    from coupler.commands.sweep.command import sweep as make_sweep
+
+    wish = Wish(
+        vary=tuple(vary or ()), set=tuple(set or ()), output=output, plan=plan, jobs=jobs, threads=threads,
+        engine=engine, options=tuple(option or ()), chunk=chunk, detach=detach,
+        cancel=None if cancel is None else tuple(part.strip() for part in cancel.split(",")), export=export,
+        any_version=any_version,
+    )  # fmt: skip
+    raise typer.Exit(int(make_sweep(case, wish)))
+
+
+@app.command()
 def benchmark(
     quick: Annotated[bool, typer.Option("--quick", help="small sizes only")] = False,
     json: Annotated[bool, typer.Option("--json", help="one JSON object")] = False,

@@ -10,11 +10,14 @@ EXTRAS = {
     "view": ("pyvista", "matplotlib", "imageio-ffmpeg", "pillow"),
     "benchmark": ("pyamg",),
     "terrain": ("rasterio", "pyproj", "pyogrio"),
+    "sweep": ("pandas", "pyarrow", "statsmodels", "matplotlib"),
+    "slurm": ("submitit",),
+    "dask": ("dask-jobqueue",),
     "test": ("pytest", "hypothesis", "manifold3d", "pyamg"),
     "pandas": ("pandas",),
 }
 """Packages of an extra; of those that tests need, without the tools that read the code."""
-COMMANDS = {"view": "render", "benchmark": "benchmark", "test": "test"}
+COMMANDS = {"view": "render", "benchmark": "benchmark", "sweep": "sweep", "test": "test"}
 """Command of the launcher that installs the extra; others are installed by pip."""
 
 

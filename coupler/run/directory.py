@@ -137,6 +137,7 @@ class RunDirectory:
             return
         error.log_path = self.log_path
         failure = Failure.of(error)
+        self.summary["error"] = type(error).__name__
         try:
             self.finish(failure.exit_code, failure.message)
             if failure.traceback:

@@ -43,6 +43,15 @@ def note(text: str) -> str:
     return f'<p class="note">{escape(text)}</p>' if text else ""
 
 
+class Markup(str):
+    """A cell that is HTML already."""
+
+
+def link(text: str, address: str) -> Markup:
+    """A cell that leads to another page."""
+    return Markup(f'<a href="{escape(address)}">{escape(text)}</a>')
+
+
 def table(head: Sequence[str], rows: Sequence[Sequence[str]], texts: Iterable[int] = (0,)) -> str:
     """Rows of text under a head; columns `texts` are words, the others numbers that stand to the right."""
     if not rows:
@@ -51,8 +60,7 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]], texts: Iterable[in
 
     def cells(tag: str, row: Sequence[str]) -> str:
         found = (
-            f"<{tag}{'' if i in words else ' class=n'}>{escape(str(cell))}</{tag}>"
-            for i, cell in enumerate(row)
+            f"<{tag}{'' if i in words else ' class=n'}>{_cell(cell)}</{tag}>" for i, cell in enumerate(row)
         )
         return f"<tr>{''.join(found)}</tr>"
 
@@ -60,6 +68,10 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]], texts: Iterable[in
     kinds = [*(["wide"] if len(head) > MOST_COLUMNS else []), *(["short"] if len(rows) <= SHORT else [])]
     size = f' class="{" ".join(kinds)}"' if kinds else ""
     return f"<table{size}>\n<thead>{cells('th', head)}</thead>\n<tbody>\n{body}\n</tbody>\n</table>"
+
+
+def _cell(content: object) -> str:
+    return content if isinstance(content, Markup) else escape(str(content))
 
 
 def facts(rows: Iterable[tuple[str, str]]) -> str:

@@ -1,0 +1,253 @@
+"""The command `surgebreak sweep`: plan, runs wherever they are made, table, curves, report."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import shutil
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from coupler.commands.sweep import page
+from coupler.commands.sweep.folder import Spec, ended, figures, write_spec
+from coupler.commands.sweep.forecast import forecast
+from coupler.commands.sweep.local import Local, free_cores
+from coupler.commands.sweep.one import FINAL
+from coupler.commands.sweep.plan import Plan, make_plan
+from coupler.commands.sweep.results import Results, collect, write_tables
+from coupler.program import terminal
+from coupler.program.errors import BadCase, ExitCode, SurgebreakError
+from coupler.program.extras import missing
+from coupler.program.process import run_module
+from coupler.run.fingerprint import differences, program
+
+ENGINES = (
+    "local",
+    "slurm",
+    "dask-pbs",
+    "dask-slurm",
+    "dask-sge",
+    "dask-lsf",
+    "dask-oar",
+    "dask-htcondor",
+    "dask-local",
+)
+EXPORTS = ("snakemake",)
+SHOWN = 12
+"""Rows of a table on the terminal."""
+
+
+@dataclass(frozen=True)
+class Wish:
+    """What the command line asks for. options: KEY=VALUE for the engine; chunk: runs that a cluster job makes one after
+    the other."""
+
+    vary: tuple[str, ...] = ()
+    set: tuple[str, ...] = ()
+    output: Path | None = None
+    plan: bool = False
+    jobs: int | None = None
+    threads: int = 1
+    engine: str = "local"
+    options: tuple[str, ...] = ()
+    chunk: int = 1
+    detach: bool = False
+    cancel: tuple[str, ...] | None = None
+    export: str | None = None
+    any_version: bool = False
+
+
+class Busy(SurgebreakError):
+    """Another call makes the runs of this sweep."""
+
+    exit_code = ExitCode.BAD_CASE
+
+
+def sweep(case: Path, wish: Wish) -> ExitCode:
+    """Make the runs of a sweep that have not been made, and tell what came out; DIVERGED if a run failed, STOPPED if
+    runs are left. Raises BadCase, Busy, NotInstalled."""
+    _check(wish)
+    plan = make_plan(case, wish.vary, wish.set)
+    folder = wish.output or plan.file.directory / "runs" / "sweep"
+    spec = write_spec(folder, plan, wish.threads)
+    for remark in plan.remarks:
+        print(f"note: {remark}")
+    if wish.plan:
+        _show(plan)
+        terminal.table("forecast", forecast(spec, wish.jobs or free_cores(wish.threads)))
+        return ExitCode.DONE
+    if wish.export:
+        from coupler.commands.sweep.snakemake import export
+
+        print(f"wrote {export(spec)}")
+        return ExitCode.DONE
+    if wish.cancel is not None:
+        from coupler.commands.sweep.slurm import cancel
+
+        print(cancel(spec, wish.cancel))
+        return ExitCode.DONE
+    with _alone(folder):
+        stopped = _make(spec, wish)
+    return _finish(spec, stopped)
+
+
+def _check(wish: Wish) -> None:
+    wrong = []
+    if wish.engine not in ENGINES:
+        wrong.append(f"--engine {wish.engine}: there are {', '.join(ENGINES)}")
+    if wish.export is not None and wish.export not in EXPORTS:
+        wrong.append(f"--export {wish.export}: there are {', '.join(EXPORTS)}")
+    if wish.engine == "local" and (wish.options or wish.detach or wish.chunk != 1):
+        wrong.append("--option, --chunk and --detach are for cluster engines; give --engine")
+    wrong += [f"--option {o}: write KEY=VALUE" for o in wish.options if "=" not in o]
+    if wrong:
+        raise BadCase(wrong)
+
+
+@contextlib.contextmanager
+def _alone(folder: Path) -> Iterator[None]:
+    """One call at a time makes runs in a directory, where the file system has locks."""
+    with (folder / ".lock").open("w") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise Busy(
+                f"{folder}: another call of `surgebreak sweep` makes its runs; wait, or stop that one"
+            ) from error
+        except OSError:
+            print("note: this file system has no locks; see that no other call makes the same runs")
+        yield
+
+
+def _make(spec: Spec, wish: Wish) -> bool:
+    """Make what is to be made; whether it was stopped before all was."""
+    ids = _to_make(spec, wish.any_version)
+    rows = len(spec.rows)
+    print(f"{rows} rows, {len(spec.runs)} runs, {len(ids)} to make; results in {spec.folder}", flush=True)
+    if not ids:
+        return False
+    told = _Progress(spec, len(ids))
+    try:
+        _engine(spec, wish).make(ids, told)
+    except KeyboardInterrupt:
+        print("stopped by Ctrl-C; what was done is kept, and the same command goes on", flush=True)
+        return True
+    return wish.detach
+
+
+def _engine(spec: Spec, wish: Wish):
+    if wish.engine == "local":
+        return Local(spec, wish.jobs or free_cores(spec.threads))
+    options = dict(option.split("=", 1) for option in wish.options)
+    if wish.engine == "slurm":
+        from coupler.commands.sweep.slurm import Slurm
+
+        return Slurm(spec, wish.jobs or 100, wish.chunk, options, wish.detach)
+    from coupler.commands.sweep.dask import Dask
+
+    return Dask(spec, wish.engine.removeprefix("dask-"), wish.jobs or 10, options)
+
+
+def _to_make(spec: Spec, any_version: bool) -> list[str]:
+    """Ids of runs that have not ended for good; those of another version of the program begin anew."""
+    now = program()
+    left, old = [], 0
+    for id in spec.runs:
+        known = figures(spec, id)
+        if known and not any_version and differences(known["program"], now):
+            shutil.rmtree(spec.place(id), ignore_errors=True)
+            for name in (f"{id}.json", f"{id}.open.json", f"{id}.log"):
+                (spec.folder / "runs" / name).unlink(missing_ok=True)
+            known, old = None, old + 1
+        known = ended(spec, id)
+        may_go_on = known and known["outcome"] == "gave up" and spec.sweep.cpu_seconds > known["cpu_limit"]
+        if known is None or may_go_on:
+            left.append(id)
+    if old:
+        print(
+            f"note: {old} runs were made by another version of the program and are made again; --any-version keeps them"
+        )
+    return left
+
+
+class _Progress:
+    """Tells of every run that ended, and how long the rest may take."""
+
+    def __init__(self, spec: Spec, total: int):
+        self.total, self.count, self.began = total, 0, time.monotonic()
+        self.label = {}
+        for row in spec.rows:
+            values = ", ".join(f"{k} {_brief(v)}" for k, v in row.values.items())
+            self.label.setdefault(row.id, f"row {row.number}: {values}" if values else f"row {row.number}")
+            if row.free:
+                self.label.setdefault(row.free, f"free field of row {row.number}")
+
+    def __call__(self, found: dict) -> None:
+        self.count += 1
+        per_run = (time.monotonic() - self.began) / self.count
+        left = per_run * (self.total - self.count)
+        reason = f": {found['reason']}" if found["reason"] else ""
+        rest = f"  (about {terminal.duration(left)} left)" if self.count < self.total else ""
+        print(
+            f"{self.count}/{self.total}  {self.label.get(found['id'], found['id'])}: {found['outcome']}, "
+            f"{found['cpu_seconds']:.3g} CPU s{rest}{reason}",
+            flush=True,
+        )
+
+
+def _brief(value) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def _show(plan: Plan) -> None:
+    """The first and last rows on the terminal."""
+    head = [c.name + (f" [{c.unit}]" if c.unit else "") for c in plan.columns]
+    seeds = list(plan.sweep.seeds)
+    print(f"{len(plan.rows)} rows, {len(plan.runs)} runs")
+    rows = plan.rows if len(plan.rows) <= SHOWN else (*plan.rows[: SHOWN // 2], *plan.rows[-SHOWN // 2 :])
+    lines = [["row", *head, *seeds]]
+    for row in rows:
+        lines.append(
+            [
+                str(row.number),
+                *(_brief(row.values[c.name]) for c in plan.columns),
+                *(str(row.seeds[s]) for s in seeds),
+            ]
+        )
+    if len(plan.rows) > SHOWN:
+        lines.insert(1 + SHOWN // 2, ["..."] * len(lines[0]))
+    widths = [max(len(line[k]) for line in lines) for k in range(len(lines[0]))]
+    for line in lines:
+        print("  ".join(cell.rjust(width) for cell, width in zip(line, widths)))
+
+
+def _finish(spec: Spec, stopped: bool) -> ExitCode:
+    """Tables, curves, report, and the exit code."""
+    results = collect(spec)
+    for path in write_tables(spec, results):
+        print(f"table: {path}")
+    absent = missing("sweep")
+    if absent:
+        print(f"note: no table in Parquet and no curves: {absent}")
+    elif any(record["outcome"] != "not yet" for record in results.records):
+        page.analyse(spec, results)
+        run_module("coupler.commands.view.sweep", spec.folder, check=True)
+    print(f"report: {page.write(spec, results)}")
+    print(_summary(results))
+    left = any(record["outcome"] not in FINAL for record in results.records)
+    if stopped or left:
+        return ExitCode.STOPPED
+    failed = any(record["outcome"] in ("diverged", "gave up", "refused") for record in results.records)
+    return ExitCode.DIVERGED if failed else ExitCode.DONE
+
+
+def _summary(results: Results) -> str:
+    """How many rows ended how."""
+    counts: dict[str, int] = {}
+    for outcome in results.column("outcome"):
+        counts[outcome] = counts.get(outcome, 0) + 1
+    cpu = sum(told["cpu_seconds"] for told in results.figures.values())
+    told = ", ".join(f"{count} {outcome}" for outcome, count in counts.items())
+    return f"{told}; {terminal.duration(cpu)} of processor time"

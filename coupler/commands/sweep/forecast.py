@@ -1,0 +1,80 @@
+"""What a sweep will take: from its runs that are done, or from the first steps of the first one.
+
+Processor time is that of a run times the runs that are left; a run of which only some steps were made is told as
+(set-up) + (steps) (end time / time that they reached). Runs may differ: it is a forecast, no bound.
+"""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from pathlib import Path
+
+from coupler.checks.read_case import load
+from coupler.commands.sweep.folder import Spec, ended
+from coupler.commands.sweep.one import Process
+from coupler.program.errors import BadCase
+from coupler.program.process import trouble
+from coupler.program.terminal import Row, duration
+from coupler.run.summary import read_summary
+
+STEPS = 3
+"""Steps of the longest length that the trial takes."""
+TRIALS = 5
+"""Runs that are tried: some may not stand at the start."""
+
+
+def forecast(spec: Spec, jobs: int) -> list[Row]:
+    """Rows for the terminal; makes the trial where no run is done. Raises BadCase where that does not run."""
+    done = [told for id in spec.runs if (told := ended(spec, id)) is not None]
+    left = len(spec.runs) - len(done)
+    if done:
+        cpu, memory, disk = (
+            sum(told[n] for told in done) / len(done) for n in ("cpu_seconds", "memory", "disk")
+        )
+        source = f"mean of {len(done)} runs that are done"
+    else:
+        cpu, memory, disk = _trial(spec)
+        source = "from the first steps of the first run"
+    return [
+        Row("rows", len(spec.rows)),
+        Row("runs", len(spec.runs), "", f"{left} of them to make"),
+        Row("a run", cpu, "CPU s", source),
+        Row("processor time", duration(cpu * left)),
+        Row("wall time", duration(cpu * left / jobs), "", f"{jobs} at a time, if each has a core for itself"),
+        Row("memory", memory * jobs / 1e6, "MB", f"{memory / 1e6:.0f} MB each, {jobs} at a time"),
+        Row("disk", disk * left / 1e6, "MB", f"keep = '{spec.sweep.keep}'; {_free(spec)}"),
+    ]
+
+
+def _free(spec: Spec) -> str:
+    return f"{shutil.disk_usage(spec.folder).free / 1e6:.4g} MB are free"
+
+
+def _trial(spec: Spec) -> tuple[float, float, float]:
+    """CPU seconds, memory [B] and disk [B] of the first run that begins, from its first steps."""
+    told = ""
+    for id in list(spec.runs)[:TRIALS]:
+        found = _first_steps(spec, id)
+        if not isinstance(found, str):
+            return found
+        told = told or found
+    raise BadCase([f"the first steps of the first run: {told}"])
+
+
+def _first_steps(spec: Spec, id: str) -> tuple[float, float, float] | str:
+    """The same of one run; how it ended where it did not get so far."""
+    case = load(spec.case_file, spec.runs[id]).case
+    end = case.time.end
+    short = min(end, STEPS * case.time.step_max)
+    with tempfile.TemporaryDirectory() as folder:
+        place, log = Path(folder) / "run", Path(folder) / "log"
+        sets = [w for o in (*spec.runs[id], f"time.end={short!r}") for w in ("--set", o)]
+        cost = Process(spec.threads)(["run", str(spec.case_file), *sets, "--output", str(place)], log)
+        if cost.exit_code:
+            return trouble(cost.exit_code, log.read_text(encoding="utf-8", errors="replace"))
+        figures = read_summary(place)["figures"]
+        disk = sum(f.stat().st_size for f in place.rglob("*") if f.is_file())
+    more = end / figures["time"]
+    steps = sum(seconds for part, seconds in figures["cpu_seconds"].items() if part != "set-up")
+    return cost.cpu_seconds + steps * (more - 1.0), cost.peak_memory, disk * more

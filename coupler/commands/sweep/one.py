@@ -1,0 +1,196 @@
+"""Make one run of a sweep, or go on with it, read it and keep what is wanted: `python -m coupler.commands.sweep.one
+FOLDER ID...`, also as the job of a cluster.
+
+A run that was killed or stopped goes on from its newest checkpoint, without one it begins again. Leaves with 0 if all
+runs have ended in a way that would be the same again (done, or failed with a reason), else with 1.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+from coupler.commands.study.runner import Cost
+from coupler.commands.sweep.folder import Spec, ended, figures, read_spec, write_figures
+from coupler.commands.sweep.quantities import asked, is_derived, middles, read_quantity
+from coupler.program.errors import ExitCode, NoRun
+from coupler.program.process import environment, trouble
+from coupler.run.checkpoint import FOLDER as CHECKPOINTS
+from coupler.run.fingerprint import program
+from coupler.run.summary import read_summary
+
+Execute = Callable[[Sequence[str], Path], Cost]
+"""Runs `surgebreak WORDS` to its end, what it tells into a file."""
+
+LEFT = {
+    "table": ("case.toml", "run.json", "log.txt", "report.html"),
+    "histories": (
+        "case.toml",
+        "run.json",
+        "log.txt",
+        "report.html",
+        "effective.json",
+        "history",
+        "cracks.csv",
+    ),
+}
+"""What stays in a run directory that is done."""
+FINAL = ("done", "cannot stand", "refused", "diverged", "gave up")
+"""Outcomes that would be the same again."""
+OPEN = ("stopped", "killed", "crashed", "lost")
+"""Outcomes after which the next call goes on with the run."""
+
+
+@dataclass
+class Process:
+    """An `Execute` that starts a process for each run; `stop` asks the present one to write a checkpoint and end."""
+
+    threads: int = 1
+    child: subprocess.Popen | None = field(default=None, repr=False)
+
+    def __call__(self, words: Sequence[str], log: Path) -> Cost:
+        """Run the command; user and system time and peak memory are those of the process and what it started."""
+        began = time.perf_counter()
+        variables = environment() | {"OMP_NUM_THREADS": str(self.threads)}
+        command = [sys.executable, "-m", "coupler.cli", *words]
+        with log.open("a", encoding="utf-8") as stream:
+            self.child = subprocess.Popen(
+                command,
+                stdout=stream,
+                stderr=subprocess.STDOUT,
+                env=variables,
+                preexec_fn=_ignore_warning,
+            )
+            _, status, used = os.wait4(self.child.pid, 0)
+        self.child.returncode = os.waitstatus_to_exitcode(status)
+        wall = time.perf_counter() - began
+        return Cost(used.ru_utime + used.ru_stime, wall, used.ru_maxrss * 1024, self.child.returncode)
+
+    def stop(self) -> None:
+        """SIGTERM to the present run, and wait until it is gone."""
+        if self.child is not None and self.child.returncode is None:
+            self.child.send_signal(signal.SIGTERM)
+
+
+def _ignore_warning() -> None:
+    """Slurm warns all processes of a job of its end by SIGUSR2; it is this one that stops the run then."""
+    signal.signal(signal.SIGUSR2, signal.SIG_IGN)
+
+
+def make(spec: Spec, id: str, execute: Execute) -> dict:
+    """How a run of a sweep ended; it is made, or goes on, unless it has ended for good."""
+    known = ended(spec, id)
+    if known is not None and not _may_go_on(spec, known):
+        return known
+    before = figures(spec, id) or {}
+    place, log = spec.place(id), spec.folder / "runs" / f"{id}.log"
+    limit = f"limits.cpu_seconds={spec.sweep.cpu_seconds!r}"
+    cost = None
+    if any((place / CHECKPOINTS).glob("*")):
+        cost = execute(["resume", str(place), "--any-version", "--set", limit], log)
+        cost = None if cost.exit_code == ExitCode.BAD_CASE else cost  # a torn checkpoint: from the start
+    if cost is None:
+        shutil.rmtree(place, ignore_errors=True)
+        log.unlink(missing_ok=True)
+        before = {}
+        sets = [word for override in (*spec.runs[id], limit) for word in ("--set", override)]
+        cost = execute(["run", str(spec.case_file), *sets, "--output", str(place)], log)
+    found = _told(spec, id, cost, before)
+    write_figures(spec, id, found, found["outcome"] in FINAL)
+    if found["outcome"] in FINAL and found["outcome"] != "gave up":
+        _tidy(place, spec.sweep.keep)
+    return found
+
+
+def _may_go_on(spec: Spec, known: dict) -> bool:
+    """Whether a run was given up at a limit that is higher now."""
+    return known["outcome"] == "gave up" and spec.sweep.cpu_seconds > known["cpu_limit"]
+
+
+def _told(spec: Spec, id: str, cost: Cost, before: dict) -> dict:
+    place = spec.place(id)
+    try:
+        summary = read_summary(place)
+    except NoRun:  # it ended before it began
+        summary = {}
+    log = (spec.folder / "runs" / f"{id}.log").read_text(encoding="utf-8", errors="replace")
+    outcome = outcome_of(cost.exit_code, summary)
+    reason = "" if outcome == "done" else summary.get("exit_reason") or trouble(cost.exit_code, log)
+    if outcome == "killed" and not summary.get("exit_reason"):
+        reason = f"killed by {signal.Signals(-cost.exit_code).name}; no memory left, or somebody's wish"
+    middles.cache_clear()
+    read = {
+        q.name: asdict(read_quantity(place, q))
+        for q in asked(spec.sweep)
+        if not is_derived(q) and outcome not in ("refused", "cannot stand")
+    }
+    return {
+        "id": id,
+        "outcome": outcome,
+        "reason": reason,
+        "exit_code": cost.exit_code,
+        "cpu_seconds": max(
+            cost.cpu_seconds + before.get("cpu_seconds", 0.0), summary.get("cpu_seconds", 0.0)
+        ),
+        "wall_seconds": cost.wall_seconds + before.get("wall_seconds", 0.0),
+        "memory": max(cost.peak_memory, before.get("memory", 0)),
+        "disk": sum(f.stat().st_size for f in place.rglob("*") if f.is_file()),
+        "attempts": before.get("attempts", 0) + 1,
+        "cpu_limit": spec.sweep.cpu_seconds,
+        "time": summary.get("figures", {}).get("time"),
+        "host": platform.node(),
+        "job": os.environ.get("SLURM_JOB_ID", ""),
+        "program": program(),
+        "readings": read,
+    }
+
+
+def outcome_of(exit_code: int, summary: dict) -> str:
+    """One of FINAL and OPEN, from the exit code of a run and its run.json (empty without)."""
+    if exit_code == ExitCode.DONE:
+        return "done"
+    if exit_code < 0:
+        return "killed"
+    if exit_code == ExitCode.BAD_CASE:
+        return "cannot stand" if summary.get("error") == "CannotStand" else "refused"
+    if exit_code == ExitCode.DIVERGED:
+        return "diverged"
+    if exit_code == ExitCode.STOPPED:
+        return "gave up" if "limits.cpu_seconds" in (summary.get("exit_reason") or "") else "stopped"
+    return "crashed"
+
+
+def _tidy(place: Path, keep: str) -> None:
+    """Remove from a run directory what is not wanted any more."""
+    if keep == "all" or not place.is_dir():
+        return
+    for entry in place.iterdir():
+        if entry.name in LEFT[keep]:
+            continue
+        if entry.is_dir():
+            shutil.rmtree(entry)
+        else:
+            entry.unlink()
+
+
+def main(words: list[str]) -> int:
+    """The command of this module."""
+    spec = read_spec(Path(words[0]))
+    execute = Process(spec.threads)
+    results = [make(spec, id, execute) for id in words[1:]]
+    for found in results:
+        print(json.dumps({name: found[name] for name in ("id", "outcome", "reason")}))
+    return int(any(found["outcome"] not in FINAL for found in results))
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,172 @@
+"""Numbers of a run: columns of histories and formulas of them, figures of run.json, shares of joints, ways of
+blocks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from coupler.case.sweep import Sweep, SweepQuantity
+from coupler.case.sweep_names import PLAIN
+from coupler.commands.study.formula import BadFormula, evaluate_columns
+from coupler.commands.study.plan import fingerprint
+from coupler.commands.study.reading import Curve, read, taken
+from coupler.program.errors import BadCase, SurgebreakError, did_you_mean
+from coupler.results import vtkhdf
+from coupler.results.history import BadTable, read_history
+
+Array = np.ndarray
+
+
+class NoReading(SurgebreakError):
+    """A run does not have what a quantity is read from; the message says why."""
+
+
+@dataclass(frozen=True)
+class Reading:
+    """value: NaN where there is none, then why says why · of: tells one definition of the quantity from another"""
+
+    value: float
+    why: str
+    of: str
+
+
+def asked(sweep: Sweep) -> tuple[SweepQuantity, ...]:
+    """The quantities of a sweep; without any, the plain figures of run.json."""
+    if sweep.quantity:
+        return sweep.quantity
+    return tuple(
+        SweepQuantity(name=name, what=what, unit=unit, figure=name) for name, (what, unit) in PLAIN.items()
+    )
+
+
+def is_derived(q: SweepQuantity) -> bool:
+    """Whether it follows from other columns, and not from the files of a run."""
+    return q.formula is not None and q.table is None
+
+
+def definition(q: SweepQuantity) -> str:
+    """What tells one definition from another, as far as numbers go."""
+    return fingerprint(q.model_dump(mode="json", exclude={"name", "what", "unit", "source"}))
+
+
+def read_quantity(run: Path, q: SweepQuantity) -> Reading:
+    """The number that a run has for a quantity that is not derived."""
+    try:
+        value = _value(run, q)
+        why = "" if np.isfinite(value) else f"take = '{q.take}' finds no number"
+    except (BadCase, NoReading, BadTable, BadFormula) as error:
+        value, why = np.nan, str(error)
+    return Reading(float(value), why, definition(q))
+
+
+def _value(run: Path, q: SweepQuantity) -> float:
+    if q.damage == "joints":
+        return joints_broken(run, q.of)
+    if q.damage is not None:
+        return drift(run, q) if q.damage == "drift" else drop(run, q)
+    if q.formula is not None:
+        return taken(q, _formula(run, q))
+    return read(run, q, q.name)
+
+
+def _formula(run: Path, q: SweepQuantity) -> Curve:
+    path = run / q.table
+    if not path.exists():
+        raise NoReading(f"no {q.table}")
+    columns = read_history(path).values
+    numbers = {name: values for name, values in columns.items() if values.dtype.kind == "f"}
+    if not len(columns["time"]):
+        raise NoReading(f"{q.table} has no rows")
+    return Curve(columns["time"], evaluate_columns(q.formula, numbers))
+
+
+def joints_broken(run: Path, of: str | None) -> float:
+    """Share of the joints that broke, of those with a block of the group at one end or both."""
+    path = run / "cracks.csv"
+    if not path.exists():
+        raise NoReading("no cracks.csv: the run has no joints, or did not begin")
+    found = read_history(path)
+    counted = np.ones(len(found["intact"]), bool)
+    if of is not None:
+        own = _rows_of(run, of)
+        counted = own[found["a"].astype(int)] | (own[found["b"].astype(int)] & (found["b"] >= 0))
+    if not counted.any():
+        raise NoReading(f"no joints at '{of}'" if of else "no joints")
+    return float(np.mean(found["intact"][counted] == 0))
+
+
+def drift(run: Path, q: SweepQuantity) -> float:
+    """Largest drift ratio: way sideways at the upper height less that at the lower one, over their distance."""
+    middle = middles(run / "blocks.vtkhdf")
+    own = _rows_of(run, q.of) if q.of else np.ones(middle.shape[1], bool)
+    upper = _way(middle, own, q.upper)
+    lower = _way(middle, own, q.lower)
+    return float(np.linalg.norm((upper - lower)[:, :2], axis=1).max() / (q.upper - q.lower))
+
+
+def _way(middle: Array, own: Array, height: float) -> Array:
+    """Mean way (steps, 3) since the start of the own blocks that stood nearest to a height; 0 at the ground."""
+    start = middle[0, :, 2]
+    if height <= start[own].min() - 0.5 * np.ptp(start[own]) / max(own.sum() - 1, 1):
+        return np.zeros((len(middle), 3))
+    distance = np.where(own, np.abs(start - height), np.inf)
+    near = distance <= distance.min() + 1e-3 * max(np.ptp(start), 1e-9)
+    return (middle[:, near] - middle[0, near]).mean(axis=1)
+
+
+def drop(run: Path, q: SweepQuantity) -> float:
+    """Mean fall at the end of the blocks that stood between two heights, over their distance."""
+    middle = middles(run / "blocks.vtkhdf")
+    own = _rows_of(run, q.of) if q.of else np.ones(middle.shape[1], bool)
+    start = middle[0, :, 2]
+    between = own & (start >= q.lower) & (start <= q.upper)
+    if not between.any():
+        raise NoReading(f"no block between the heights {q.lower:g} and {q.upper:g} m")
+    return float((start - middle[-1, :, 2])[between].mean() / (q.upper - q.lower))
+
+
+@lru_cache(maxsize=2)
+def middles(path: Path) -> Array:
+    """Middle of the corners of every block at every written state (steps, n, 3) [m]."""
+    try:
+        with vtkhdf.opened(path, "r") as file:
+            root = file["VTKHDF"]
+            steps, corners = vtkhdf.count(root), int(root["NumberOfPoints"][0])
+            points = root["Points"][: steps * corners].reshape(steps, corners, 3).astype(float)
+            ends = root["Polygons/Offsets"][1:]
+            owner = np.zeros(corners, int)
+            faces = np.repeat(root["CellData/block"][: len(ends)], np.diff(ends, prepend=0))
+            owner[root["Polygons/Connectivity"][: len(faces)]] = faces
+    except vtkhdf.UNREADABLE as error:
+        raise NoReading(f"{path.name} cannot be read: {error}") from error
+    if not steps:
+        raise NoReading(f"{path.name} holds no state")
+    number = np.bincount(owner).astype(float)
+    return np.stack(
+        [[np.bincount(owner, weights=step[:, axis]) / number for axis in range(3)] for step in points]
+    ).transpose(0, 2, 1)
+
+
+def _rows_of(run: Path, name: str) -> Array:
+    """(n,) bool: the blocks of a group or of that name."""
+    path = run / "blocks.vtkhdf"
+    try:
+        with vtkhdf.opened(path, "r") as file:
+            scene, root = file["scene"], file["VTKHDF"]
+            names = [text.decode() for text in scene["names"][:]]
+            groups = [text.decode() for text in scene["group_names"][:]]
+            faces = len(root["Polygons/Offsets"]) - 1
+            group = np.zeros(len(names), int)
+            group[root["CellData/block"][:faces]] = root["CellData/group"][:faces]
+    except vtkhdf.UNREADABLE as error:
+        raise NoReading(f"{path.name} cannot be read: {error}") from error
+    if name in groups:
+        return group == groups.index(name)
+    if name in names:
+        return np.array([other == name for other in names])
+    known = [*groups, *names]
+    raise NoReading(f"no group or block '{name}'{did_you_mean(name, known)}; there are {', '.join(groups)}")

@@ -1,0 +1,200 @@
+"""The table of all runs of a sweep: what was varied, seeds, how each run ended, what it cost, its quantities.
+
+`table.csv` says name, unit and meaning of every column in lines that begin with '#'; `table.parquet` holds the same
+with the units as attributes, where pyarrow is installed. `table` gives it as a pandas DataFrame.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from coupler.commands.study.formula import BadFormula, evaluate
+from coupler.commands.sweep.folder import Spec, figures, number, read_spec
+from coupler.commands.sweep.one import FINAL
+from coupler.commands.sweep.plan import Row
+from coupler.commands.sweep.quantities import asked, definition, is_derived, read_quantity
+from coupler.program.errors import NoRun
+from coupler.program.extras import absent, need
+from coupler.results.history import Column, header, line
+from coupler.results.history import number as shortest
+from coupler.run.summary import read_summary
+
+NOT_YET = "not yet"
+"""Outcome of a row whose run has not been made."""
+
+
+@dataclass(frozen=True)
+class Results:
+    """columns as declared; records: a dict of them for each row; figures: how each run ended, by its id."""
+
+    columns: tuple[Column, ...]
+    records: tuple[dict, ...]
+    figures: dict[str, dict]
+
+    def column(self, name: str) -> list:
+        """The values of a column, row by row."""
+        return [record[name] for record in self.records]
+
+
+def collect(spec: Spec) -> Results:
+    """What all rows of a sweep have come to so far."""
+    found = {id: told for id in _ids(spec) if (told := figures(spec, id)) is not None}
+    records = tuple(_record(spec, row, found) for row in spec.rows)
+    return Results(tuple(_columns(spec)), records, found)
+
+
+def _ids(spec: Spec) -> list[str]:
+    return list(dict.fromkeys(id for row in spec.rows for id in (row.id, row.free) if id))
+
+
+def _columns(spec: Spec) -> Iterator[Column]:
+    yield Column("run", "1", "number of the row")
+    yield Column("point", "1", "point of the grid")
+    yield Column("sample", "1", "sample at that point")
+    yield Column("repeat", "1", "repeat of that sample, with other seeds")
+    for column in spec.columns:
+        yield Column(column.name, column.unit or "1", f"{column.what}{_sets(column.keys)}")
+    for key in spec.sweep.seeds:
+        yield Column(seed_column(key), "1", f"seed: sets {key}")
+    for q in asked(spec.sweep):
+        free = " (free field)" if q.source == "free field" else ""
+        yield Column(q.name, q.unit or "1", f"{q.what or q.name.replace('_', ' ')}{free}")
+    yield Column(
+        "outcome",
+        "",
+        f"{', '.join(FINAL)}, or what the next call goes on with: stopped, killed, crashed, {NOT_YET}",
+    )
+    yield Column("reason", "", "why a run did not reach its end")
+    yield Column("cpu_seconds", "s", "processor time")
+    yield Column("wall_seconds", "s", "time that passed")
+    yield Column("memory", "B", "largest resident memory")
+    yield Column("attempts", "1", "processes that it took")
+    yield Column("id", "", "of the run, its directory in runs/")
+
+
+def _sets(keys: tuple[str, ...]) -> str:
+    return f": sets {', '.join(keys)}" if keys else ""
+
+
+def seed_column(key: str) -> str:
+    """Name of the column of a seed."""
+    return key.replace(".", "_").replace("[", "_").replace("]", "")
+
+
+def _record(spec: Spec, row: Row, found: dict[str, dict]) -> dict:
+    told = found.get(row.id, {})
+    outcome = "refused" if row.wrong else told.get("outcome", NOT_YET)
+    record = {"run": row.number, "point": row.point, "sample": row.sample, "repeat": row.repeat}
+    record |= {column.name: row.values[column.name] for column in spec.columns}
+    record |= {seed_column(key): value for key, value in row.seeds.items()}
+    reasons = [row.wrong or told.get("reason", "")]
+    record |= _quantities(spec, row, found, record, reasons)
+    return record | {
+        "outcome": outcome,
+        "reason": "; ".join(filter(None, dict.fromkeys(reasons))),
+        "cpu_seconds": number(told.get("cpu_seconds")),
+        "wall_seconds": number(told.get("wall_seconds")),
+        "memory": number(told.get("memory")),
+        "attempts": told.get("attempts", 0),
+        "id": row.id,
+    }
+
+
+def _quantities(spec: Spec, row: Row, found: dict, record: dict, reasons: list[str]) -> dict[str, float]:
+    """Quantities of a row; why a run that is done lacks one is told in its reasons."""
+    values: dict[str, float] = {}
+    case = None
+    for q in asked(spec.sweep):
+        id = row.free if q.source == "free field" else row.id
+        told = found.get(id)
+        if told is None or row.wrong:
+            values[q.name] = math.nan
+        elif is_derived(q):
+            case = _case(spec, row.id) if case is None else case
+            numbers = {k: v for k, v in record.items() if isinstance(v, int | float)}
+            values[q.name] = _derived(q.formula, case | numbers | values)
+        else:
+            values[q.name], why = _reading(spec, q, id, told)
+            if why and told["outcome"] == "done" and spec.sweep.quantity:
+                reasons.append(f"{q.name}: {why}")
+            elif id == row.free and told["outcome"] != "done":
+                reasons.append(f"free field: {told['reason']}")
+    return values
+
+
+def _reading(spec: Spec, q, id: str, told: dict) -> tuple[float, str]:
+    """Value and why there is none: as it was read when the run ended, or anew if it is defined otherwise now."""
+    known = told["readings"].get(q.name)
+    if known is not None and known["of"] == definition(q):
+        return number(known["value"]), known["why"]
+    if told["outcome"] in ("refused", "cannot stand"):
+        return math.nan, ""
+    found = read_quantity(spec.place(id), q)
+    return (
+        found.value,
+        found.why
+        and f"{found.why} (it was not asked for when the run was made; keep = 'all' keeps the files)",
+    )
+
+
+def _case(spec: Spec, id: str) -> dict:
+    try:
+        return read_summary(spec.place(id))["case"]
+    except NoRun:
+        return spec.case
+
+
+def _derived(formula: str, names: dict) -> float:
+    """NaN where something that the formula needs has no number."""
+    try:
+        return evaluate(formula, names)
+    except BadFormula:
+        if any(isinstance(v, float) and math.isnan(v) for v in names.values()):
+            return math.nan
+        raise
+
+
+def write_tables(spec: Spec, results: Results) -> list[Path]:
+    """table.csv, and table.parquet where pyarrow is installed; their paths."""
+    path = spec.folder / "table.csv"
+    rows = [line([_cell(record[c.name]) for c in results.columns]) for record in results.records]
+    part = path.with_name(".table.csv.part")
+    part.write_text(header(f"sweep of {spec.title}", results.columns) + "".join(rows), encoding="utf-8")
+    part.replace(path)
+    if absent("sweep"):
+        return [path]
+    frame = as_frame(results)
+    frame.to_parquet(path.with_suffix(".parquet"))
+    return [path, path.with_suffix(".parquet")]
+
+
+def _cell(value) -> str:
+    if isinstance(value, float) and not math.isfinite(value):
+        return ""
+    return shortest(value) if isinstance(value, int | float) else str(value).replace("\n", " ")
+
+
+def as_frame(results: Results):
+    """A pandas DataFrame of all rows, with `attrs["units"]` and `attrs["meaning"]` by column."""
+    import pandas as pd
+
+    frame = pd.DataFrame({c.name: [_plain(v) for v in results.column(c.name)] for c in results.columns})
+    frame.attrs["units"] = {c.name: c.unit for c in results.columns}
+    frame.attrs["meaning"] = {c.name: c.meaning for c in results.columns}
+    return frame
+
+
+def _plain(value):
+    return str(value) if isinstance(value, list | tuple | dict) else value
+
+
+def open_sweep(folder: Path | str):
+    """The table of a sweep in a directory as a pandas DataFrame, with every run that has ended by now.
+
+    `attrs["units"]` has the SI units of its columns. Raises NoRun, NotInstalled (without pandas).
+    """
+    need("sweep")
+    return as_frame(collect(read_spec(Path(folder))))

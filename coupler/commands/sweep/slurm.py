@@ -1,0 +1,189 @@
+"""Runs as jobs of Slurm, through submitit: an array of them, each making one run or a few one after the other.
+
+A job that reaches its time limit is told `signal_delay_s` before; its run then writes a checkpoint, the job is put into
+the queue again, and goes on from there. So does a job that Slurm itself puts back (`scontrol requeue`, a lost node).
+How a run ended stands in the files of the sweep; Slurm is only asked which jobs are in its queue, so no accounting is
+needed. jobs.json holds the job of each run: a call that was left and made again waits for them.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import time
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+from coupler.commands.sweep.folder import Spec, ended, figures, read_spec, write_figures
+from coupler.commands.sweep.one import Process, make
+from coupler.program.errors import BadCase, SurgebreakError
+from coupler.program.extras import need
+from coupler.program.process import environment
+from coupler.run.directory import write_json
+
+Tell = Callable[[dict], None]
+POLL = 2.0
+"""Seconds between two looks at the queue."""
+PATIENCE = 3
+"""Looks that a job may be missing from the queue before its run is told as lost: files take a while to be seen."""
+MINUTES = 60
+"""Time limit of a job unless --option time=... says otherwise."""
+REQUEUES = 100
+"""Times that a job may reach its time limit and go on."""
+
+
+class NoSlurm(SurgebreakError):
+    """The commands of Slurm are not there, or refuse."""
+
+
+class Work:
+    """What a job does: make runs of a sweep. submitit calls it, and `checkpoint` before the time is over."""
+
+    def __init__(self, folder: Path, ids: tuple[str, ...]):
+        self.folder, self.ids = folder, ids
+        self.execute: Process | None = None
+
+    def __call__(self) -> list[str]:
+        """Outcomes of the runs; those that ended for good in an earlier life of the job are left alone."""
+        spec = read_spec(self.folder)
+        self.execute = Process(spec.threads)
+        return [make(spec, id, self.execute)["outcome"] for id in self.ids]
+
+    def checkpoint(self):
+        """Have the present run write its checkpoint, then go on in the next life of the job."""
+        from submitit.helpers import DelayedSubmission
+
+        if self.execute is not None:
+            self.execute.stop()
+            if self.execute.child is not None:
+                self.execute.child.wait()
+        return DelayedSubmission(Work(self.folder, self.ids))
+
+
+class Slurm:
+    """Submits jobs and waits for them. jobs: at a time; chunk: runs of a job; options: as submitit names them"""
+
+    def __init__(self, spec: Spec, jobs: int, chunk: int, options: dict[str, str], detach: bool):
+        need("slurm")
+        missing = [name for name in ("sbatch", "srun", "squeue", "scancel") if shutil.which(name) is None]
+        if missing:
+            raise NoSlurm(
+                f"--engine slurm: no {', '.join(missing)} on this machine's PATH; call it where sbatch works"
+            )
+        self.spec, self.jobs, self.chunk, self.detach = spec, jobs, chunk, detach
+        self.options = {name: int(text) if text.isdecimal() else text for name, text in options.items()}
+
+    def make(self, ids: Iterable[str], tell: Tell) -> None:
+        """Submit the runs that are in no job yet, and tell how each ended, unless the user wants to leave."""
+        known = _known(self.spec)
+        queue = in_queue(set(known.values()))
+        wanted = list(ids)
+        waiting = {id: known[id] for id in wanted if known.get(id) in queue}
+        new = [id for id in wanted if id not in waiting]
+        if new:
+            waiting |= self._submit(new)
+            write_json(self.spec.folder / "jobs.json", known | waiting)
+        jobs = sorted(set(waiting.values()))
+        print(f"{len(waiting)} runs in {len(jobs)} jobs of Slurm, {jobs[0]} to {jobs[-1]}", flush=True)
+        if not self.detach:
+            self._wait(waiting, tell)
+
+    def _submit(self, ids: list[str]) -> dict[str, str]:
+        """The job of each run. Raises BadCase for unknown options, NoSlurm where sbatch refuses."""
+        import submitit
+        from submitit.core.utils import FailedJobError
+
+        os.environ.update(environment())  # sbatch hands it on to the jobs
+        folder = self.spec.folder / "jobs"
+        groups = [tuple(ids[k : k + self.chunk]) for k in range(0, len(ids), self.chunk)]
+        parameters = {
+            "time": MINUTES,
+            "cpus_per_task": self.spec.threads,
+            "job_name": "surgebreak",
+            "array_parallelism": self.jobs,
+        } | self.options
+        try:
+            executor = submitit.SlurmExecutor(folder, max_num_timeout=REQUEUES)
+            executor.update_parameters(**parameters)
+            with executor.batch():
+                made = [executor.submit(Work(self.spec.folder, group)) for group in groups]
+        except (ValueError, TypeError) as error:
+            raise BadCase([f"--option: {error}"]) from error
+        except FailedJobError as error:
+            raise NoSlurm(f"sbatch refused the jobs: {error}") from error
+        return {id: job.job_id for job, group in zip(made, groups) for id in group}
+
+    def _wait(self, waiting: dict[str, str], tell: Tell) -> None:
+        missing = dict.fromkeys(waiting, 0)
+        while waiting:
+            queue = in_queue(set(waiting.values()))
+            for id, job in list(waiting.items()):
+                told = ended(self.spec, id)
+                if told is None and job not in queue:
+                    missing[id] += 1
+                    told = self._left(id, job) if missing[id] >= PATIENCE else None
+                if told is not None:
+                    del waiting[id]
+                    tell(told)
+            if waiting:
+                time.sleep(POLL)
+
+    def _left(self, id: str, job: str) -> dict:
+        """What is told of a run whose job is gone: how its last process ended, or that nobody knows."""
+        told = figures(self.spec, id)
+        if told is not None and told["job"] and told["outcome"] != "lost":
+            return told
+        found = (told or _nothing(id)) | {
+            "outcome": "lost",
+            "reason": f"job {job} is no longer in the queue and left no result: cancelled, killed, or out of memory; "
+            f"what it printed is in {self.spec.folder / 'jobs'}",
+        }
+        write_figures(self.spec, id, found, final=False)
+        return found
+
+
+def _nothing(id: str) -> dict:
+    from coupler.run.fingerprint import program
+
+    return {
+        "id": id, "exit_code": None, "cpu_seconds": 0.0, "wall_seconds": 0.0, "memory": 0, "disk": 0, "attempts": 0,
+        "cpu_limit": 0.0, "time": None, "host": "", "job": "", "program": program(), "readings": {},
+    }  # fmt: skip
+
+
+def _known(spec: Spec) -> dict[str, str]:
+    path = spec.folder / "jobs.json"
+    return json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+
+
+def in_queue(jobs: set[str]) -> set[str]:
+    """Those of the jobs that wait or run. Raises NoSlurm where the queue cannot be asked."""
+    if not jobs:
+        return set()
+    words = ["squeue", "--me", "--noheader", "--array", "--format=%i"]
+    told = subprocess.run(words, capture_output=True, text=True, check=False)
+    if told.returncode:
+        raise NoSlurm(f"squeue: {told.stderr.strip()}; the jobs go on, the same command waits for them again")
+    return jobs & set(told.stdout.split())
+
+
+def cancel(spec: Spec, which: tuple[str, ...]) -> str:
+    """scancel of all jobs of a sweep, or of those that make some rows; what was done, in words. Raises BadCase."""
+    known = _known(spec)
+    if which == ("all",):
+        ids = list(known)
+    else:
+        numbers = {str(row.number): row.id for row in spec.rows}
+        wrong = [word for word in which if word not in numbers]
+        if wrong:
+            raise BadCase([f"--cancel {wrong[0]}: no such row; there are 0 to {len(spec.rows) - 1}, or all"])
+        ids = [numbers[word] for word in which]
+    jobs = sorted(in_queue({known[id] for id in ids if id in known}))
+    if not jobs:
+        return "none of these rows is in the queue"
+    told = subprocess.run(["scancel", *jobs], capture_output=True, text=True, check=False)
+    if told.returncode:
+        raise NoSlurm(f"scancel: {told.stderr.strip()}")
+    return f"cancelled {', '.join(jobs)}; what had begun has a checkpoint, and `surgebreak sweep` goes on with it"

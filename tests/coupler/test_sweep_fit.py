@@ -1,0 +1,91 @@
+"""Fragility curves: the maximum of the likelihood, bands that cover what they promise, refusals."""
+
+import numpy as np
+import pytest
+from scipy.special import ndtr
+
+from coupler.commands.sweep.fit import bootstrap, check, fit, separation
+
+BETA = 0.4
+
+
+def runs(seed, levels=10, each=10, ratios=(1.0,)):
+    """Runs at fixed intensities of structures with log-normal capacity of median 1; states at multiples of it."""
+    rng = np.random.default_rng(seed)
+    x = np.repeat(np.linspace(0.5, 2.0, levels), each)
+    capacity = np.exp(rng.normal(0.0, BETA, len(x)))
+    return x, sum((x > ratio * capacity).astype(int) for ratio in ratios)
+
+
+@pytest.mark.parametrize("ratios", [(1.0,), (1.0, 1.4)])
+def test_the_maximum_is_that_of_statsmodels(ratios):
+    """Its generalised linear model with a probit link to eight digits, its ordered model to what it converges to."""
+    pytest.importorskip("statsmodels")
+    x, state = runs(1, ratios=ratios)
+    found = fit(x, state, len(ratios))
+    dispersion, median = check(x, state, len(ratios))
+    rtol = 1e-7 if len(ratios) == 1 else 1e-4
+    assert found.dispersion[0] == pytest.approx(dispersion, rel=rtol)
+    assert found.median[0] == pytest.approx(median, rel=rtol)
+
+
+def test_the_curve_of_very_many_runs_is_the_known_one():
+    x, state = runs(2, levels=40, each=500, ratios=(1.0, 1.4))
+    found = fit(x, state, 2)
+    assert found.dispersion[0] == pytest.approx(BETA, rel=0.03)
+    assert found.median[0] == pytest.approx([1.0, 1.4], rel=0.02)
+
+
+def test_curves_of_states_never_cross():
+    for seed in range(10):
+        x, state = runs(seed, levels=8, each=5, ratios=(1.0, 1.1, 1.3))
+        p = fit(x, state, 3).probability(np.geomspace(0.05, 20.0, 400))[0]
+        assert (np.diff(p, axis=0) <= 1e-15).all()
+
+
+def test_weights_are_repeated_runs():
+    x, state = runs(3)
+    weight = np.random.default_rng(0).integers(1, 4, len(x))
+    once = fit(x, state, 1, weight[None])
+    again = fit(np.repeat(x, weight), np.repeat(state, weight), 1)
+    assert once.cut == pytest.approx(again.cut, rel=1e-9)
+    assert once.slope == pytest.approx(again.slope, rel=1e-9)
+
+
+def test_a_unit_of_the_intensity_changes_the_median_alone():
+    x, state = runs(4)
+    metres, millimetres = fit(x, state, 1), fit(1e3 * x, state, 1)
+    assert millimetres.dispersion == pytest.approx(metres.dispersion, rel=1e-9)
+    assert millimetres.median == pytest.approx(1e3 * metres.median, rel=1e-9)
+
+
+def test_a_band_of_90_per_cent_covers_the_known_curve_in_85_to_95_per_cent_of_the_samples():
+    """200 sets of 200 runs each, at three intensities: 10, 50 and 80 % of the known curve."""
+    at = np.array([0.6, 1.0, 1.4])
+    exact = ndtr(np.log(at) / BETA)
+    covered = []
+    for seed in range(200):
+        x, state = runs(1000 + seed, levels=20)
+        sets = bootstrap(x, state, 1, 300, seed)
+        assert sets.found.all()
+        low, high = np.percentile(sets.probability(at)[:, 0], [5, 95], axis=0)
+        covered.append((low <= exact) & (exact <= high))
+    share = np.mean(covered, axis=0)
+    assert ((share >= 0.85) & (share <= 0.95)).all(), share
+
+
+def test_separated_runs_have_no_maximum():
+    """Every run breaks above 1 m and none below: the likelihood grows for ever with the slope."""
+    x = np.linspace(0.5, 1.5, 20)
+    state = (x > 1.0).astype(int)
+    assert not fit(x, state, 1).found[0]
+    low, high = separation(x, state >= 1)
+    assert low < 1.0 < high
+    assert separation(*[np.append(x, 0.6), np.append(state, 1) >= 1]) is None
+
+
+def test_states_that_nobody_or_everybody_reached_have_no_fit():
+    x = np.linspace(0.5, 1.5, 20)
+    assert not fit(x, np.zeros(20, int), 1).found[0]
+    assert not fit(x, np.ones(20, int), 1).found[0]
+    assert not fit(np.ones(20), np.arange(20) % 2, 1).found[0]
