@@ -22,7 +22,7 @@ along an axis, its normal component too.
 New velocities are kept within the range of the old ones that can reach the node, as on paths: overshoots at an impact
 else add energy (7 % at six cells a column).  The level set stays on paths: it is a distance near the surface only and
 has a kink in every film, which (1) rounds off; a splash then gains energy too (8 % at six cells a column), and the
-volume correction has more to do.  The pressure has its own stabilisation, `forms.pspg` and `forms.grad_div`.
+volume correction has more to do.  The pressure has its own stabilisation (theory 2.5).
 """
 
 from __future__ import annotations

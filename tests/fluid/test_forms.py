@@ -26,11 +26,11 @@ from fluid.pressure.projection import (
 from fluid.transport import forms
 from fluid.viscous.kernels import wall_stress
 from fluid.viscous.strain import edge_strain, spread_stress
+from tests.fluid import reference_forms
 from tests.fluid.scenes import tank
 
 MESH = box_mesh((0, 0, 0), (1, 1, 1), 1 / 6)
 EXAMPLES = settings(max_examples=12, deadline=None)  # the first call compiles
-
 
 CUTS = given(
     n=st.integers(0, 3), seed=st.integers(0, 2**32 - 1), covers=st.sampled_from(["single", "multiple"])
@@ -68,7 +68,7 @@ def test_pressure_matrix_is_the_stiffness_form(n, seed, covers):
     found, anchored, _ = pressure_matrix(
         graph, -np.ones(len(t.nodes)), dofs, nowhere, 0.02, np.zeros(len(t.nodes))
     )
-    expected = 0.02 * asm(forms.stiffness, forms.basis_of(domain)).tocsr()[dofs][:, dofs]
+    expected = 0.02 * asm(reference_forms.stiffness, forms.basis_of(domain)).tocsr()[dofs][:, dofs]
     difference = abs(found - expected)
     assert difference.max() <= 1e-13 * abs(expected).max()
     assert not anchored.any()
@@ -82,7 +82,7 @@ def test_right_hand_side_of_the_pressure(n, seed, covers):
     basis = forms.basis_of(domain)
     mean = cell_velocity(cells, u, np.zeros((0, 3)), t.cells, t.share)
     found = inflow(cells, mean, t.cells, t.parent, t.gradients, t.volume, len(u))
-    same(found, asm(forms.inflow, basis, u=forms.at_points(basis, u)))
+    same(found, asm(reference_forms.inflow, basis, u=forms.at_points(basis, u)))
 
 
 @EXAMPLES
@@ -92,12 +92,12 @@ def test_nodal_volume_and_what_the_pressure_takes_off_the_momentum(n, seed, cove
     so that no node is without a gradient."""
     domain = cut(n, seed, covers)
     t, cells, f = laid_out(domain)
-    basis, vector = forms.basis_of(domain), forms.vector_basis_of(domain)
-    volume = asm(forms.lumped, basis)
+    basis, vector = forms.basis_of(domain), reference_forms.vector_basis_of(domain)
+    volume = asm(reference_forms.lumped, basis)
     n = len(t.nodes)
     same(nodal_water(cells, 0.0, -np.ones(n), t.parts, n), volume)
     same(t.node_volume, volume)
-    expected = asm(forms.pressure_gradient, vector, p=basis.interpolate(f[:, 0])).reshape(-1, 3)
+    expected = asm(reference_forms.pressure_gradient, vector, p=basis.interpolate(f[:, 0])).reshape(-1, 3)
     gradient = cell_gradient(cells, np.ascontiguousarray(f[:, 0]), t.cells, t.parent, t.gradients)
     mean = nodal_mean(cells, gradient, np.ones(len(cells)), t.cells, t.share, t.volume, n)
     same(mean * volume[:, None], expected, 1e-8)
@@ -109,9 +109,11 @@ def test_divergence_damping(n, seed, covers):
     """Lumped mass times the change of u is -c ∫ l² (div u)(div v) dV, where no cell is left out."""
     domain = cut(n, seed, covers)
     t, cells, u = laid_out(domain)
-    vector = forms.vector_basis_of(domain)
+    vector = reference_forms.vector_basis_of(domain)
     size = forms.per_cell(vector, t.size)
-    expected = -0.05 * asm(forms.grad_div, vector, u=vector.interpolate(forms.by_component(u)), l=size)
+    expected = -0.05 * asm(
+        reference_forms.grad_div, vector, u=vector.interpolate(reference_forms.by_component(u)), l=size
+    )
     damped, everywhere = u.copy(), np.ones(len(cells))
     damp_divergence(
         cells, 0.05, -np.ones(len(u)), t.beside_solid, -np.inf, damped, t.cells, t.parent, t.gradients, t.volume,
@@ -134,9 +136,9 @@ def test_viscous_stress(n, seed, covers):
     edge = _unshared_edges(len(cells))
     strain = edge_strain(cells, weight, edge, weight, u, t.cells, t.parent, t.gradients)
     spread_stress(cells, weight, edge, strain, t.cells, t.parent, t.gradients, rate)
-    vector = forms.vector_basis_of(domain)
-    stiffness = asm(forms.viscous, vector, mu=0.7)
-    same(-rate, (stiffness @ forms.by_component(u)).reshape(-1, 3))
+    vector = reference_forms.vector_basis_of(domain)
+    stiffness = asm(reference_forms.viscous, vector, mu=0.7)
+    same(-rate, (stiffness @ reference_forms.by_component(u)).reshape(-1, 3))
 
 
 def _unshared_edges(n):
@@ -152,7 +154,7 @@ def test_stress_on_wetted_faces(n, seed, covers):
     if len(domain.face_cell) == 0:
         return
     t, cells, u = laid_out(domain)
-    basis, normal = forms.vector_surface_basis_of(domain)
+    basis, normal = reference_forms.vector_surface_basis_of(domain)
     penalty = np.random.default_rng(1).uniform(1.0, 50.0, len(domain.face_cell))
     hat = np.ascontiguousarray(np.moveaxis(_hats(domain), 0, 2))
     arm = domain.face_points - domain.body_centre[domain.face_body][:, None]
@@ -176,9 +178,9 @@ def test_stress_on_wetted_faces(n, seed, covers):
     flux = np.zeros_like(strain)
     wall_stress(walls, 0.7, u, still, edge, weight, strain, flux, t.cells, rate, load)
     spread_stress(cells, weight, edge, flux, t.cells, t.parent, t.gradients, rate)
-    form = asm(forms.nitsche, basis, mu=0.7, n=normal, penalty=forms.per_cell(basis, penalty))
+    form = asm(reference_forms.nitsche, basis, mu=0.7, n=normal, penalty=forms.per_cell(basis, penalty))
     reached = form.shape[0] // 3  # scikit-fem numbers nodes up to the highest one of its cells
-    same(-rate[:reached], (form @ forms.by_component(u[:reached])).reshape(-1, 3))
+    same(-rate[:reached], (form @ reference_forms.by_component(u[:reached])).reshape(-1, 3))
     assert not rate[reached:].any()
 
 
@@ -202,8 +204,8 @@ def test_coupling_of_every_body(n, seed, covers):
         own = normal * (domain.face_body == body)[None, :, None]
         centre = tuple(domain.body_centre[body])
         for axis, along in enumerate(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))):
-            pushed = asm(forms.push, basis, n=own, m=along)
-            turned = asm(forms.twist, basis, n=own, m=along, centre=centre)
+            pushed = asm(reference_forms.push, basis, n=own, m=along)
+            turned = asm(reference_forms.twist, basis, n=own, m=along, centre=centre)
             found = G[:, 6 * body + axis], G[:, 6 * body + 3 + axis]
             np.testing.assert_allclose(found, (pushed, turned), rtol=0, atol=1e-12 * scale)
 
@@ -227,11 +229,11 @@ def test_projection_is_stabilised_by_the_pressure(covers):
     basis = forms.basis_of(water.domain)
     left = np.repeat(gradient.T[:, :, None], 4, axis=2)
     tau = forms.per_cell(basis, np.full(len(t.cells), dt))
-    stabilised = asm(forms.pspg, basis, tau=tau, R=left - forms.at_points(basis, mean))
-    unbalanced = asm(forms.inflow, basis, u=forms.at_points(basis, star - dt * mean))
+    stabilised = asm(reference_forms.pspg, basis, tau=tau, R=left - forms.at_points(basis, mean))
+    unbalanced = asm(reference_forms.inflow, basis, u=forms.at_points(basis, star - dt * mean))
     # what is left is the compliance of the closed tank, 1e-8 of the pressure matrix
     np.testing.assert_allclose(unbalanced + stabilised, 0.0, atol=1e-6 * np.abs(unbalanced).max())
     assert (
         np.abs(stabilised).max()
-        > 0.01 * np.abs(asm(forms.inflow, basis, u=forms.at_points(basis, star))).max()
+        > 0.01 * np.abs(asm(reference_forms.inflow, basis, u=forms.at_points(basis, star))).max()
     )
