@@ -55,6 +55,7 @@ def water_problems(case: Case) -> Iterator[Problem]:
         if not wrong:
             yield from _filled_up(case)
             yield from _struck(case)
+        yield from _without_air(case)
 
 
 def water_remarks(case: Case) -> Iterator[str]:
@@ -161,6 +162,23 @@ def _filled_up(case: Case) -> Iterator[Problem]:
                 ("water", "inflow", i),
                 f"brings {brought:.3g} m3 until the end of the run ({case.time.end:g} s) into a tank without a way out "
                 f"that has room for {room:.3g} m3: name open sides (tank.open), or end before it is full",
+            )
+
+
+def _without_air(case: Case) -> Iterator[Problem]:
+    """Water that fills the tank up to its closed top, with a side that it may leave by: nothing can take its place."""
+    tank = case.tank
+    if tank.mesh is not None or not tank.open or "z+" in tank.open:
+        return
+    slack = SLACK * tank.cell
+    for i, fill in enumerate(case.water.fill):
+        low = all(end <= wall + slack for end, wall in zip(fill.lower, tank.lower))
+        if low and all(end >= wall - slack for end, wall in zip(fill.upper, tank.upper)):
+            sides = " and ".join(tank.open)
+            yield (
+                ("water", "fill", i),
+                f"fills the whole tank, which is open at {sides} and closed above: no air is there to take the place of "
+                'what leaves; open the top (tank.open with "z+"), or end the water below it',
             )
 
 

@@ -43,7 +43,7 @@ def water_of(case: Case, structure, solids):
     boxes = [_reaching(case.tank, fill) for fill in w.fill] + _strips(case)
     velocity = None
     if boxes:
-        level = start_level(boxes, (case.tank.lower, case.tank.upper), mesh, immersion.domain)
+        level = start_level(boxes, _walls(case.tank), mesh, immersion.domain)
         velocity = start_velocity(boxes, [fill.velocity for fill in w.fill], immersion.domain.nodes)
     opened, smooth = sides_named(case.tank.open, mesh), sides_named(case.tank.smooth, mesh)
     water = Water(
@@ -61,6 +61,13 @@ def _reaching(tank, fill) -> tuple:
         tuple(side if abs(end - side) <= SLACK * tank.cell else end for end, side in zip(ends, sides))
         for ends, sides in pairs
     )
+
+
+def _walls(tank) -> tuple:
+    """The box (lower, upper) of the walls, at which a fill has no surface. An open top is none: water up to the brim has
+    its surface there and falls with it, as air takes its place."""
+    lower, upper = tank.lower, tank.upper
+    return (lower, (*upper[:2], 2.0 * upper[2] - lower[2])) if "z+" in tank.open else (lower, upper)
 
 
 def _strips(case: Case) -> list[tuple]:

@@ -8,6 +8,8 @@ from functools import cached_property
 import numpy as np
 from numba import njit
 
+from fluid.surface.level_set import without_films
+
 _SAME_DIRECTION = 0.3
 """Normals of one node that span less than this (singular value over the largest) count as one direction."""
 
@@ -129,6 +131,7 @@ class Walls:
         inward = -dt * np.einsum("ij,ij->i", u[nodes], normal)
         coming = (inward > 0.0) & (phi[nodes] > -spacing[nodes])
         phi[nodes[coming]] = np.maximum(phi[nodes[coming]], inward[coming])
+        phi[nodes] = without_films(phi[nodes], spacing)  # water up to the brim, rounded
 
     def slip(self, u) -> None:
         """Take the part into the closed sides off u (N, 3), in place."""
