@@ -25,8 +25,11 @@ WHOLE_DEPTH = 0.9
 """Share of the depth of still water from which an inflow pushes all of it."""
 
 LEAST_CELLS = 3
-"""Cells of the thinnest water without a remark: a falling drop of one gains 14 % of its energy in a step, a column of
-two 5 % before it reaches a wall."""
+"""Cells of the thinnest water without a remark."""
+
+LEAST_DROP = 1.5
+"""Cells of the thinnest water with air on both sides: of a drop or a sheet of one the surface has one layer of nodes to
+lie between, and loses or gains a tenth of its energy while it falls."""
 
 STILL = 0.1
 """Share of a cell by which the still water may miss the level that a wave is made for, without a remark."""
@@ -56,6 +59,7 @@ def water_problems(case: Case) -> Iterator[Problem]:
             yield from _filled_up(case)
             yield from _struck(case)
         yield from _without_air(case)
+        yield from _drops(case)
 
 
 def water_remarks(case: Case) -> Iterator[str]:
@@ -95,16 +99,28 @@ def _thin_water(case: Case) -> Iterator[str]:
             )
 
 
-def _free_edges(case: Case, fill) -> Iterator[float]:
-    """Edges [m] of a box of water between two ends of which one at least is free: neither at a wall nor in other water.
-    From wall to wall it is a slice, whatever its width; on the floor it is a layer."""
+def _drops(case: Case) -> Iterator[Problem]:
+    """Boxes of water in the air that are thinner than the surface on both of their sides can be."""
+    for i, fill in enumerate(case.water.fill):
+        edge = min(_free_edges(case, fill, ends=2), default=math.inf)
+        if edge < LEAST_DROP * case.tank.cell * (1.0 - SLACK):
+            yield (
+                ("water", "fill", i),
+                f"{edge:.3g} m thin, {edge / case.tank.cell:.2g} cells, with air on both sides: under {LEAST_DROP:g} "
+                f"cells the two surfaces are not told apart; take tank.cell = {edge / 3:.2g} m, or more water",
+            )
+
+
+def _free_edges(case: Case, fill, ends: int = 1) -> Iterator[float]:
+    """Edges [m] of a box of water between two ends of which this many at least are free: neither at a wall nor in other
+    water. From wall to wall it is a slice, whatever its width; on the floor it is a layer."""
     slack = SLACK * case.tank.cell
     for axis in range(3):
-        ends = fill.lower[axis], fill.upper[axis]
-        at_wall = ends[0] <= case.tank.lower[axis] + slack, ends[1] >= case.tank.upper[axis] - slack
+        low, high = fill.lower[axis], fill.upper[axis]
+        at_wall = low <= case.tank.lower[axis] + slack, high >= case.tank.upper[axis] - slack
         others = [f for f in case.water.fill if f is not fill and _meet(f, fill, slack)]
-        if not all(at_wall) and not others:
-            yield ends[1] - ends[0]
+        if sum(at_wall) <= 2 - ends and not others:
+            yield high - low
 
 
 def _meet(other, fill, slack: float) -> bool:
@@ -177,8 +193,8 @@ def _without_air(case: Case) -> Iterator[Problem]:
             sides = " and ".join(tank.open)
             yield (
                 ("water", "fill", i),
-                f"fills the whole tank, which is open at {sides} and closed above: no air is there to take the place of "
-                'what leaves; open the top (tank.open with "z+"), or end the water below it',
+                f"fills the whole tank, which is open at {sides} and closed above: no air is there to take the place "
+                'of what leaves; open the top (tank.open with "z+"), or end the water below it',
             )
 
 

@@ -64,8 +64,8 @@ def _reaching(tank, fill) -> tuple:
 
 
 def _walls(tank) -> tuple:
-    """The box (lower, upper) of the walls, at which a fill has no surface. An open top is none: water up to the brim has
-    its surface there and falls with it, as air takes its place."""
+    """The box (lower, upper) of the walls, at which a fill has no surface. An open top is none: water up to the brim
+    has its surface there and falls with it, as air takes its place."""
     lower, upper = tank.lower, tank.upper
     return (lower, (*upper[:2], 2.0 * upper[2] - lower[2])) if "z+" in tank.open else (lower, upper)
 

@@ -110,12 +110,26 @@ def test_water_up_to_the_brim_sinks_as_it_leaves():
     assert still.water.volume() == pytest.approx(0.4, rel=1e-9)
 
 
+def test_a_drop_that_the_cells_cannot_hold_is_refused():
+    """With air on both sides and under a cell and a half; a layer on the floor and a slice between walls are not."""
+    for low, high, wrong in (
+        ([0.5, 0, 0.5], [1.0, 0.2, 0.61], True),
+        ([0.5, 0, 0.5], [1.0, 0.2, 0.66], False),
+        ([0, 0, 0], [2, 0.2, 0.11], False),
+        ([0.5, 0, 0], [0.6, 0.2, 0.5], True),
+    ):
+        found = problems(case({"fill": [{"lower": low, "upper": high}]}))
+        assert [path for path, text in found if "with air on both sides" in text] == [
+            ("water", "fill", 0)
+        ] * wrong
+
+
 @pytest.mark.parametrize(
     ("fill", "thin"),
     [
         ([[0, 0, 0], [2, 0.2, 0.29]], "water.fill[0] is 0.29 m thin, 2.9 cells"),
         ([[0, 0, 0], [0.15, 0.2, 0.6]], "water.fill[0] is 0.15 m thin, 1.5 cells"),
-        ([[0.5, 0, 0.5], [1.0, 0.2, 0.61]], "water.fill[0] is 0.11 m thin, 1.1 cells"),
+        ([[0.5, 0, 0.5], [1.0, 0.2, 0.69]], "water.fill[0] is 0.19 m thin, 1.9 cells"),
         ([[0, 0, 0], [2, 0.2, 0.3]], None),
         ([[0, 0, 0], [0.5, 0.2, 0.5]], None),
     ],

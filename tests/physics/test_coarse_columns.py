@@ -1,4 +1,4 @@
-"""What a column of water gains while it collapses is an error of the mesh: it goes with the cells."""
+"""A column of a few cells gains no energy while it collapses."""
 
 from coupler.case.case import Case
 from coupler.scene.build import build
@@ -23,8 +23,7 @@ def gained(cell):
     return worst
 
 
-def test_a_coarse_column_gains_less_on_finer_cells():
-    """4.9 % on four cells in its height, 1.5 % on six, 0.2 % on seven and a half."""
-    assert gained(0.02) < 0.06
-    assert gained(0.0133) < 0.025
-    assert gained(0.01) < 0.01
+def test_a_coarse_column_gains_nothing():
+    """It gained 4.9 % on four cells in its height, 1.5 % on six, 0.2 % on seven and a half."""
+    for cell in (0.02, 0.0133, 0.01):
+        assert gained(cell) < 0.005
