@@ -213,6 +213,60 @@ class BlockFile(Section):
     fixed: Switch = Field(False, description="true: held in place for the whole run")
 
 
+class DrawingLayer(Section):
+    """One layer, object or group of a drawing, where it differs from the rest."""
+
+    name: Name = Field(description="of the layer, as `surgebreak blocks FILE` lists them")
+    material: Name | None = Field(None, description="absent, like all below: that of the drawing")
+    density: Density | None = Field(None, description="mass per volume")
+    size: PositiveLength | None = Field(None, description="as in the drawing")
+    course: PositiveLength | None = Field(None, description="as in the drawing")
+    bond: Literal["stack", "running"] | None = Field(None, description="as in the drawing")
+    fixed: Switch = Field(False, description="true: held in place for the whole run")
+    leave_out: Switch = Field(False, description="true: no blocks of this layer, for instance of furniture")
+
+
+class Drawing(Section):
+    """A building drawn as closed surfaces, cut along the planes of its faces into convex blocks of a size."""
+
+    name: Name = Field(
+        "drawing",
+        description="its blocks are called NAME-wall0x--0 and so on, after wall, floor or roof and storey; groups are "
+        "wall, floor, roof, pier and base",
+    )
+    path: Annotated[str, Field(min_length=1)] = Field(
+        description="STL, OBJ, PLY, OFF, 3MF, glTF, or with the extras `cad` and `ifc` STEP, IGES, IFC, from the "
+        "directory of the case",
+        examples=["house.obj"],
+    )
+    size: PositiveLength = Field(
+        description="wanted edge of the blocks along walls and slabs; changed so that whole numbers fit. Walls and "
+        "slabs are one block thick, unless they are thicker than that",
+        examples=["1.2 m"],
+    )
+    course: PositiveLength | None = Field(
+        None, description="wanted height of the blocks in walls; absent: size"
+    )
+    bond: Literal["stack", "running"] = Field(
+        "stack", description="stack: joints in line; running: every other course shifted by half a block"
+    )
+    scale: PositiveLength = Field(1.0, description="length of one unit of the file", examples=["1 mm"])
+    offset: Point = Field((0.0, 0.0, 0.0), description="added to all places, after the scale")
+    up: Literal["z", "y"] = Field("z", description="axis of the file that points up")
+    weld: PositiveLength | None = Field(
+        None, description="corners closer than this are one; absent: what the digits of the file resolve"
+    )
+    sliver: PositiveLength | None = Field(
+        None,
+        description="parts narrower than this are merged with a neighbour where both make a convex block; absent: a "
+        "quarter of the usual thickness",
+    )
+    density: Density | None = Field(None, description="mass per volume; absent: structure.density")
+    material: Name = Field("block", description="a name that contact.pair and joints.pair may go by")
+    fixed: Switch = Field(False, description="true: held in place for the whole run")
+    layer: tuple[DrawingLayer, ...] = Field((), description="layers that differ from the rest")
+
+
 class Ground(Section):
     """A flat, rough ground without end under the blocks. With a tank its floor is ground as well."""
 
@@ -231,6 +285,7 @@ class Structure(Section):
     arch: tuple[Arch, ...] = Field((), description="arches of voussoirs")
     rubble: tuple[Rubble, ...] = Field((), description="loose random blocks")
     file: tuple[BlockFile, ...] = Field((), description="blocks from files")
+    drawing: tuple[Drawing, ...] = Field((), description="buildings from drawings, cut into blocks")
     ground: Ground | None = Field(None, description="flat ground under the blocks")
     start: Literal["settled", "sudden", "ramp"] = Field(
         "settled",

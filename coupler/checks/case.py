@@ -198,8 +198,8 @@ def _structure_sections(case: Case) -> Iterator[Problem]:
     if not any(True for _ in recipes(case)):
         yield (
             ("structure",),
-            "no block: write [[structure.block]], .wall, .building, .column, .arch, .rubble or .file in double "
-            "brackets",
+            "no block: write [[structure.block]], .wall, .building, .column, .arch, .rubble, .file or .drawing in "
+            "double brackets",
         )
     start, ramp = case.structure.start, case.structure.ramp
     if (start == "ramp") != (ramp is not None):

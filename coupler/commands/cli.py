@@ -211,6 +211,50 @@ def explain(
 
 
 @app.command()
+def blocks(
+    drawing: Annotated[
+        Path, typer.Argument(metavar="FILE", help="STL, OBJ, PLY, ...; STEP, IFC with extras")
+    ],
+    size: Annotated[
+        str, typer.Option(metavar="M", help="wanted edge of the blocks along walls and slabs")
+    ] = "1 m",
+    course: Annotated[
+        str | None, typer.Option(metavar="M", help="wanted height in walls; else the size")
+    ] = None,
+    bond: Annotated[str, typer.Option(help="stack or running")] = "stack",
+    scale: Annotated[str, typer.Option(help="length of one unit of the file, for instance '1 mm'")] = "1 m",
+    up: Annotated[str, typer.Option(help="axis of the file that points up: z or y")] = "z",
+    sliver: Annotated[str | None, typer.Option(metavar="M", help="narrower parts are merged")] = None,
+    density: Annotated[str | None, typer.Option(help="mass per volume, for instance '1800 kg/m3'")] = None,
+    strength: Annotated[str, typer.Option(help="of the joints, for the forecast")] = "0.5 MPa",
+    opening: Annotated[str, typer.Option(help="opening at failure, for the forecast")] = "1 mm",
+    picture: Annotated[
+        Path | None, typer.Option(metavar="PNG", help="else FILE_blocks.png beside it")
+    ] = None,
+    to: Annotated[
+        Path | None, typer.Option(metavar="OBJ", help="write the blocks as closed surfaces")
+    ] = None,
+) -> None:
+    """Cut a drawing of a building into blocks.
+
+    Tells how many, what sets the substep and what a second costs, draws them, and says what to write in a case.
+    """
+    one_thread()
+    from coupler.commands.blocks import as_number
+    from coupler.commands.blocks import blocks as cut
+
+    given = {"size": size, "course": course, "bond": bond, "scale": scale, "up": up, "sliver": sliver}
+    given["density"] = density
+    options = {k: as_number(v) for k, v in given.items() if v is not None and (k, v) not in DRAWN_AS_USUAL}
+    joints = {"strength": strength, "opening_at_failure": opening}
+    cut(drawing, options, joints, picture, to)
+
+
+DRAWN_AS_USUAL = (("bond", "stack"), ("scale", "1 m"), ("up", "z"))
+"""Options that a case need not say."""
+
+
+@app.command()
 def terrain(
     place: Annotated[
         Path, typer.Argument(metavar="FILE|CASE", help="a terrain file, or a case with a section [terrain]")

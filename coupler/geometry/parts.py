@@ -38,7 +38,8 @@ def parts_of(case: Case) -> tuple[Part, ...]:
 
     Kept for the next call: a case is checked, forecast and built from the same blocks, unless a file changed.
     """
-    stamps = tuple(stamp(spec.path) for spec in case.structure.file) if case.structure else ()
+    files = (*case.structure.file, *case.structure.drawing) if case.structure else ()
+    stamps = tuple(stamp(spec.path) for spec in files)
     return _made(case, stamps)
 
 
@@ -207,6 +208,12 @@ def _file(spec, common: dict) -> list:
     return blocks_from_file(spec, fixed=spec.fixed, group=spec.name, **common)
 
 
+def _drawing(spec, common: dict) -> list:
+    from coupler.geometry.drawing.drawing import blocks_from_drawing
+
+    return blocks_from_drawing(spec, fixed=spec.fixed, **common)
+
+
 _MAKERS = {
     "block": _single,
     "wall": _wall,
@@ -215,6 +222,7 @@ _MAKERS = {
     "arch": _arch,
     "rubble": _rubble,
     "file": _file,
+    "drawing": _drawing,
 }
 PARTS = tuple(_MAKERS)
 """Tables of the structure that make blocks, in the order of their rows."""

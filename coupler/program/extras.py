@@ -9,11 +9,14 @@ from coupler.program.errors import SurgebreakError
 EXTRAS = {
     "view": ("pyvista", "matplotlib", "imageio-ffmpeg", "pillow"),
     "benchmark": ("pyamg",),
+    "drawing": ("manifold3d", "trimesh"),
+    "cad": ("gmsh",),
+    "ifc": ("ifcopenshell",),
     "terrain": ("rasterio", "pyproj", "pyogrio"),
     "sweep": ("pandas", "pyarrow", "statsmodels", "matplotlib"),
     "slurm": ("submitit",),
     "dask": ("dask-jobqueue",),
-    "test": ("pytest", "hypothesis", "manifold3d", "pyamg"),
+    "test": ("pytest", "hypothesis", "manifold3d", "trimesh", "pyamg"),
     "pandas": ("pandas",),
 }
 """Packages of an extra; of those that tests need, without the tools that read the code."""

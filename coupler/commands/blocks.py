@@ -1,0 +1,177 @@
+"""`surgebreak blocks FILE`: what a drawing is cut into, what that costs, and a picture; nothing is run."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from collections import Counter
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+from pydantic import ValidationError
+
+from coupler.case.case import Case
+from coupler.case.messages import explain_error
+from coupler.geometry.drawing.drawing import Cut, cut_drawing
+from coupler.geometry.drawing.reading import BadDrawing
+from coupler.program import terminal
+from coupler.program.errors import BadCase
+from coupler.program.extras import missing
+from coupler.program.process import run_module, trouble
+from coupler.program.quantities import quantity
+from yade_scripts.blocks.polyhedra import fans, shown
+
+APART = 0.12
+"""Of their size by which blocks are pulled apart in a picture."""
+
+
+def blocks(path: Path, options: dict, joints: dict, picture: Path | None, to: Path | None) -> None:
+    """Cut a drawing, tell about its blocks, draw them. options: of [[structure.drawing]] · joints: of [joints].
+
+    Raises BadDrawing, with a picture of the place where one can be drawn, BadCase and MeshFileError."""
+    case = _case(path, options, joints)
+    spec = case.structure.drawing[0]
+    picture = picture or path.with_name(f"{path.stem}_blocks.png")
+    try:
+        cut = cut_drawing(spec, density=spec.density or case.structure.density, material=spec.material)
+    except BadDrawing as error:
+        if error.surface is not None and not missing("view"):
+            _draw_trouble(error, picture)
+            raise BadDrawing(f"{error}; {picture} shows the place") from error
+        raise
+    terminal.table(str(path), _rows(cut))
+    terminal.table("forecast", _forecast(case))
+    for place, width in cut.slivers:
+        print(
+            f"note: a part at {shown(place)} is {quantity(width, 'm')} wide; it shortens the substep (see sliver)"
+        )
+    if to is not None:
+        write_bodies(to, cut)
+        print(f"blocks: {to}")
+    told = missing("view")
+    if told:
+        print(f"no picture: {told}")
+    else:
+        _draw_blocks(cut, spec.name, picture)
+        print(f"picture: {picture}")
+    print(_snippet(path, options))
+
+
+def as_number(text: str) -> float | str:
+    """A number without a unit is in SI, as in a case file."""
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
+def _case(path: Path, options: dict, joints: dict) -> Case:
+    """A case of the drawing alone, on the ground, with the checks of a case."""
+    table = {
+        "case": {"title": path.name},
+        "time": {"end": 1.0},
+        "structure": {"drawing": [{"path": str(path)} | options], "start": "sudden"},
+        "contact": {},
+        "joints": joints,
+    }
+    try:
+        return Case.model_validate(table)
+    except ValidationError as error:
+        told = [explain_error(item) for item in error.errors()]
+        raise BadCase([f"--{place[-1]}: {text}" for place, text in told]) from error
+
+
+def _rows(cut: Cut) -> Iterable[terminal.Row]:
+    yield terminal.Row("volume", cut.volume, "m3", "of the drawing; that of the blocks is the same")
+    yield terminal.Row("blocks", len(cut.blocks), "", _counted(b.group for b in cut.blocks))
+    for name, (volume, count) in cut.layers.items():
+        yield terminal.Row(f"layer {name}", volume, "m3", f"{count} blocks")
+    volumes = np.array([b.volume for b in cut.blocks])
+    yield terminal.Row(
+        "block", float(np.median(volumes)), "m3", f"usual; {volumes.min():.3g} to {volumes.max():.3g}"
+    )
+
+
+def _counted(names: Iterable[str]) -> str:
+    return ", ".join(f"{count} {name}" for name, count in Counter(names).most_common())
+
+
+def _forecast(case: Case) -> Iterable[terminal.Row]:
+    """Joints, the substep with the block that sets it, and what a second costs."""
+    from coupler.run.forecast import structure_seconds
+    from coupler.scene.build import build_structure
+
+    structure = build_structure(case)
+    try:
+        limit, substep = structure.substep_limit(), structure.substep()
+        joints = structure.joints
+        yield terminal.Row("joints", 0 if joints is None else len(joints), "")
+        yield terminal.Row("substep", 1e6 * substep, "us", f"set by {limit.what}")
+        count = math.ceil(1.0 / substep)
+        seconds = structure_seconds(structure, count)
+        yield terminal.Row(
+            "a second", seconds, "s of processor time", f"{count} substeps, about, without water"
+        )
+    finally:
+        structure.close()
+
+
+def _snippet(path: Path, options: dict) -> str:
+    lines = ["in a case:", "", "[[structure.drawing]]", f'path = "{path}"']
+    for name, value in options.items():
+        lines.append(f"{name} = {_toml(value)}")
+    return "\n".join(lines)
+
+
+def _toml(value: object) -> str:
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(_toml, value)) + "]"
+    return f'"{value}"' if isinstance(value, str) else f"{value:g}"
+
+
+def write_bodies(path: Path, cut: Cut) -> None:
+    """The blocks as closed surfaces, one object each, which [[structure.file]] reads as well (OBJ)."""
+    lines, first = [], 1
+    for block in cut.blocks:
+        lines.append(f"o {block.name}")
+        lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in block.world_vertices().tolist()]
+        triangles = fans(block.faces)[0]
+        lines += ["f " + " ".join(str(first + int(k)) for k in row) for row in triangles]
+        first += len(block.vertices)
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _draw_blocks(cut: Cut, name: str, picture: Path) -> None:
+    groups = sorted({b.group for b in cut.blocks})
+    triangles, part, edges = [], [], []
+    for block in cut.blocks:
+        x = block.world_vertices()
+        x = block.centre + (1.0 - APART) * (x - block.centre)
+        own = fans(block.faces)[0]
+        triangles.append(x[own])
+        part.append(np.full(len(own), groups.index(block.group)))
+        pairs = {tuple(sorted(edge)) for face in block.faces for edge in zip(face, (*face[1:], face[0]))}
+        edges.append(x[np.array(sorted(pairs))])
+    _draw(
+        picture,
+        np.concatenate(triangles),
+        np.concatenate(part),
+        groups,
+        np.concatenate(edges),
+        np.zeros((0, 2, 3)),
+    )
+
+
+def _draw_trouble(error: BadDrawing, picture: Path) -> None:
+    part = np.zeros(len(error.surface), int)
+    _draw(picture, error.surface, part, ["drawing"], np.zeros((0, 2, 3)), error.lines)
+
+
+def _draw(picture: Path, triangles, part, names, edges, lines) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        there = Path(folder) / "blocks.npz"
+        np.savez(there, triangles=triangles, part=part, names=names, edges=edges, lines=lines)
+        done = run_module("coupler.commands.view.drawing", there, picture, capture_output=True, text=True)
+    if done.returncode != 0:
+        raise BadDrawing(f"no picture: {trouble(done.returncode, done.stderr)}")

@@ -1,0 +1,63 @@
+"""python -m coupler.commands.view.drawing FILE.npz PICTURE: blocks of a drawing, pulled apart a little; or where it
+cannot be cut, red lines on its surface.
+
+FILE.npz holds triangles (t, 3, 3) [m], part (t,) their colour, names of the parts, edges (e, 2, 3) [m] of blocks, and
+lines (k, 2, 3) [m] of trouble.
+"""
+
+import os
+import sys
+from pathlib import Path
+
+os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+
+import numpy as np
+import pyvista as pv
+from PIL import Image
+
+from coupler.commands.view import palette
+from coupler.commands.view.camera import frame
+from coupler.commands.view.scene import LETTERS
+
+SIZE = (1600, 1000)
+TINTS = ("#d9c7a8", "#9db8c9", "#c98f7a", "#b7b0a6", "#a9c5a0", "#cdb4d6", "#e0c060")
+"""Of parts in the order of their names, again from the first beyond the last."""
+TROUBLE = "#b3261e"
+
+
+def draw(place, picture):
+    """The picture of what a .npz file holds."""
+    with np.load(place) as file:
+        triangles, part, names = file["triangles"], file["part"], [str(n) for n in file["names"]]
+        edges, lines = file["edges"], file["lines"]
+    plotter = pv.Plotter(off_screen=True, window_size=SIZE, lighting="light kit")
+    plotter.set_background(palette.PAPER)
+    for k, name in enumerate(names):
+        own = triangles[part == k]
+        if len(own):
+            mesh = pv.PolyData.from_regular_faces(own.reshape(-1, 3), np.arange(3 * len(own)).reshape(-1, 3))
+            faint = 0.35 if len(lines) else 1.0
+            plotter.add_mesh(mesh, color=TINTS[k % len(TINTS)], ambient=0.25, opacity=faint, label=name)
+    for ends, colour, width in ((edges, "#5b4a3a", 1.5), (lines, TROUBLE, 8)):
+        if len(ends):
+            plotter.add_mesh(
+                pv.line_segments_from_points(ends.reshape(-1, 3)), color=colour, line_width=width
+            )
+    low, high = triangles.reshape(-1, 3).min(axis=0), triangles.reshape(-1, 3).max(axis=0)
+    middle = lines.reshape(-1, 3).mean(axis=0) if len(lines) else low
+    azimuth = -60.0 if middle[1] <= 0.5 * (low + high)[1] else 60.0
+    view = frame(low, high, SIZE[0] / SIZE[1], azimuth, 30.0, margin=(0.04, 0.18, 0.05, 0.05))
+    camera = plotter.camera
+    camera.position, camera.focal_point, camera.up = view.position, view.focus, view.up
+    camera.view_angle = view.view_angle
+    if len(lines):
+        plotter.add_text("red: where it cannot be cut", font_size=14, color=TROUBLE, font_file=str(LETTERS))
+    plotter.add_legend(bcolor=None, face="rectangle", loc="upper right", size=(0.16, 0.04 * (len(names) + 1)))
+    plotter.enable_anti_aliasing("ssaa")
+    plotter.reset_camera_clipping_range()
+    Image.fromarray(plotter.screenshot(return_img=True)).save(picture, optimize=True)
+    plotter.close()
+
+
+if __name__ == "__main__":
+    draw(Path(sys.argv[1]), Path(sys.argv[2]))

@@ -1,0 +1,1 @@
+"""From a drawing of a building to blocks: read by layers, cut into convex parts, merged, divided to a size, named."""

@@ -1,0 +1,159 @@
+"""Blocks from a drawing: `[[structure.drawing]]` and `surgebreak blocks`."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from coupler.geometry.drawing.convex_parts import CannotCut, Part, convex_parts, merged, smallest_width
+from coupler.geometry.drawing.division import divided
+from coupler.geometry.drawing.names import member_names
+from coupler.geometry.drawing.reading import BadDrawing, Layer, read_layers
+from yade_scripts.blocks.block import Block
+from yade_scripts.blocks.generators.cuts import check_count
+from yade_scripts.blocks.polyhedra import BlockError, shown
+
+Array = np.ndarray
+
+SLIVER = 0.25
+"""Of the usual thickness of a layer: parts narrower than this are merged with a neighbour where that is convex."""
+SAME_VOLUME = 1e-9
+GROUP = re.compile("[a-z]+")
+
+
+@dataclass(frozen=True)
+class Cut:
+    """What a drawing was cut into: blocks · volume [m³] drawn · layers: volume and number of blocks by name · slivers:
+    places (3,) [m] of the narrow parts that no neighbour could take, with their width [m]"""
+
+    blocks: tuple[Block, ...]
+    volume: float
+    layers: dict[str, tuple[float, int]]
+    slivers: tuple[tuple[Array, float], ...]
+
+
+def blocks_from_drawing(spec, **common) -> list[Block]:
+    """Blocks of a `[[structure.drawing]]`; common: for every Block. Raises MeshFileError, BadDrawing."""
+    return list(cut_drawing(spec, **common).blocks)
+
+
+def cut_drawing(spec, **common) -> Cut:
+    """The same, with what is to be told of it."""
+    path = Path(spec.path)
+    layers, tolerance = read_layers(path, spec.scale, spec.offset, spec.up, spec.weld)
+    _check_layers(path, spec, layers)
+    rules = {rule.name: rule for rule in spec.layer}
+    layers = [layer for layer in layers if not (layer.name in rules and rules[layer.name].leave_out)]
+    pieces: list[tuple[Layer, Part, list[Part]]] = []
+    slivers: list[tuple[Array, float]] = []
+    for layer in layers:
+        rule = rules.get(layer.name)
+        size = _size(spec, rule)
+        parts = _parts_of(path, layer, tolerance)
+        least = spec.sliver or SLIVER * _usual(parts)
+        parts = merged(parts, tolerance, max(size), least)
+        slivers += [(p.middle, w) for p in parts for w in [smallest_width(p.corners)] if w < least]
+        bond = (rule and rule.bond) or spec.bond
+        pieces += [(layer, part, divided(_solid(part), part, size, bond)) for part in parts]
+        _check_count(path, sum(len(blocks) for *_, blocks in pieces))
+    blocks = _blocks(path, spec, pieces, rules, tolerance, common)
+    whole = sum(layer.body.volume() for layer in layers)
+    _check_volume(path, blocks, whole, tolerance, layers)
+    counts = Counter(layer.name for layer, _, found in pieces for _ in found)
+    told = {layer.name: (layer.body.volume(), counts[layer.name]) for layer in layers}
+    return Cut(tuple(blocks), whole, told, tuple(slivers))
+
+
+def _size(spec, rule) -> tuple[float, float]:
+    """Wanted length and height of the blocks of a layer [m]."""
+    length = (rule and rule.size) or spec.size
+    return length, (rule and rule.course) or (rule and rule.size) or spec.course or length
+
+
+def _check_layers(path: Path, spec, layers: list[Layer]) -> None:
+    known = [layer.name for layer in layers]
+    for rule in spec.layer:
+        if rule.name not in known:
+            raise BadDrawing(f"{path.name}: no layer '{rule.name}'; it has {', '.join(known)}")
+
+
+def _parts_of(path: Path, layer: Layer, tolerance: float) -> list[Part]:
+    try:
+        return convex_parts(layer.body, tolerance)
+    except CannotCut as error:
+        from coupler.geometry.drawing.convex_parts import mesh_of, reflex_edges
+
+        points, triangles = mesh_of(layer.body)
+        dents = points[reflex_edges(points, triangles, tolerance).ends]
+        near = np.argsort(np.linalg.norm(dents.mean(axis=1) - error.place, axis=1))[:50]
+        raise BadDrawing(
+            f"{path.name}: layer '{layer.name}' at {shown(error.place)} {error}",
+            points[triangles],
+            dents[near],
+        ) from error
+
+
+def _usual(parts: list[Part]) -> float:
+    """Thickness [m] that half of the volume has at most."""
+    width = np.array([smallest_width(part.corners) for part in parts])
+    order = np.argsort(width)
+    volume = np.cumsum(np.array([part.volume for part in parts])[order])
+    return float(width[order][np.searchsorted(volume, 0.5 * volume[-1])])
+
+
+def _solid(part: Part):
+    from manifold3d import Manifold
+
+    return Manifold.hull_points(part.corners)
+
+
+def _check_count(path: Path, count: int) -> None:
+    try:
+        check_count(path.name, count)
+    except BlockError as error:
+        raise BadDrawing(f"{error}; a larger size makes fewer blocks") from error
+
+
+def _blocks(path: Path, spec, pieces, rules: dict, tolerance: float, common: dict) -> list[Block]:
+    middles = [np.array([block.middle for block in blocks]) for *_, blocks in pieces]
+    names = member_names(spec.name, [part.corners for _, part, _ in pieces], middles, tolerance)
+    number: Counter[str] = Counter()
+    found = []
+    for (layer, _, blocks), members in zip(pieces, names):
+        more = common | _of_layer(rules.get(layer.name), common)
+        for block, member in zip(blocks, members):
+            name, group = f"{member}-{number[member]}", GROUP.match(member.removeprefix(f"{spec.name}-"))[0]
+            number[member] += 1
+            try:
+                found.append(
+                    Block.standing(name, block.corners, tolerance=4.0 * tolerance, group=group, **more)
+                )
+            except BlockError as error:
+                raise BadDrawing(f"{path.name}: at {shown(block.middle)}: {error}") from error
+    return found
+
+
+def _of_layer(rule, common: dict) -> dict:
+    """What a layer says for its blocks."""
+    if rule is None:
+        return {}
+    told = {"material": rule.material, "density": rule.density}
+    return {name: value for name, value in told.items() if value is not None} | {
+        "fixed": rule.fixed or common.get("fixed", False)
+    }
+
+
+def _check_volume(
+    path: Path, blocks: list[Block], whole: float, tolerance: float, layers: list[Layer]
+) -> None:
+    """No block is lost or twice: to round-off, or to what the digits of the file leave open."""
+    found = sum(block.volume for block in blocks)
+    allowed = SAME_VOLUME * whole + tolerance * sum(layer.body.surface_area() for layer in layers)
+    if abs(found - whole) > allowed:
+        raise BadDrawing(
+            f"{path.name}: its blocks hold {found:.9g} m3, the drawing {whole:.9g} m3; cut it otherwise"
+        )
