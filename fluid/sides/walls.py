@@ -131,7 +131,7 @@ class Walls:
         inward = -dt * np.einsum("ij,ij->i", u[nodes], normal)
         coming = (inward > 0.0) & (phi[nodes] > -spacing[nodes])
         phi[nodes[coming]] = np.maximum(phi[nodes[coming]], inward[coming])
-        phi[nodes] = without_films(phi[nodes], spacing)  # water up to the brim, rounded
+        phi[nodes] = without_films(phi[nodes], spacing[nodes])  # water up to the brim, rounded
 
     def slip(self, u) -> None:
         """Take the part into the closed sides off u (N, 3), in place."""
