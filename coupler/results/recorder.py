@@ -141,7 +141,7 @@ class Recorder:
         """Append one row to each history."""
         c = self.coupling
         b = record.balance
-        e = c.structure.energies() if c.structure else {}
+        e = record.energies
         self._energy.append(
             time=record.time,
             water_kinetic=b.water_kinetic,

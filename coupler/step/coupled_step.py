@@ -63,6 +63,8 @@ class StepRecord:
     """What contacts and joints gave to the blocks; None without a structure."""
     balance: Balance = field(default_factory=Balance)
     momentum: MomentumBalance | None = None
+    energies: dict[str, float] = field(default_factory=dict)
+    """Of the structure [J], by name (`Structure.energies`); empty without one."""
 
 
 class CoupledStepper:
@@ -228,7 +230,9 @@ class CoupledStepper:
         self._check_finite()
         if self.water is not None and self.water.sides is not None:
             self.ledger.entered = self.water.energy_through_sides()
-        record.balance = self.ledger.balance(self._water_energy(), self._structure_energies())
+        energies = self._structure_energies()
+        record.energies = energies or {}
+        record.balance = self.ledger.balance(self._water_energy(), energies)
         record.momentum = book_step(self, record)
 
     def _cut(self, record: StepRecord) -> None:

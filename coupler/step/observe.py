@@ -19,13 +19,8 @@ class JointCounts(NamedTuple):
 
 def joint_counts(structure) -> JointCounts:
     """The counts now; zeros without joints."""
-    table = structure.joint_table()
-    if table is None:
-        return JointCounts(0, 0, 0.0)
-    alive = table.alive
-    return JointCounts(
-        int(alive.sum()), int((~alive).sum()), float(table.damage[alive].max()) if alive.any() else 0.0
-    )
+    damage, alive = structure.joint_damage()
+    return JointCounts(int(alive.sum()), int((~alive).sum()), float(damage[alive].max(initial=0.0)))
 
 
 def size(coupling) -> dict[str, int]:

@@ -121,6 +121,13 @@ class StructureReadings:
             return contacts
         return contacts + tangent.joint_tangent(self.joints, self._motion.x, self._motion.R, self.n)
 
+    def joint_damage(self) -> tuple[Array, Array]:
+        """Damage (J,) of every joint, 0 to 1, and whether it still carries tension (J,) bool: the quick part of
+        `joint_table`, for every step."""
+        if self.joints is None:
+            return np.zeros(0), np.zeros(0, bool)
+        return self.joints.damage(), self.joints.alive
+
     def joint_table(self) -> JointTable | None:
         """State of every joint, None without joints."""
         if self.joints is None:

@@ -241,14 +241,20 @@ class Joints:
         loose[self.b[dead & (self.b >= 0)]] = True
         return loose
 
+    def _ratio(self) -> Array:
+        return np.minimum(self.largest / self.df[self.joint_of], 1.0)
+
+    def damage(self) -> Array:
+        """Largest λ/δ_f of the points of each joint (J,), at most 1."""
+        found = np.zeros(len(self))
+        np.maximum.at(found, self.joint_of, self._ratio())
+        return found
+
     def table(self, x: Array, R: Array) -> JointTable:
         """The joints now. x (n, 3), R (n, 3, 3): places of the blocks."""
         opening = self.final_openings.copy()
         opening[self.live] = self.openings(self.live, x, R)
-        ratio = np.minimum(self.largest / self.df[self.joint_of], 1.0)
-        damage = np.zeros(len(self))
-        np.maximum.at(damage, self.joint_of, ratio)
-        mean = np.bincount(self.joint_of, ratio * self.weight, minlength=len(self)) / self.area
+        mean = np.bincount(self.joint_of, self._ratio() * self.weight, minlength=len(self)) / self.area
         centre = x[self.a] + np.einsum("nij,nj->ni", R[self.a], self._centre_in_a())
         normal = np.einsum("nij,nj->ni", R[self.a], self.normal)
         shear = self.beta * opening[:, 1]
@@ -262,7 +268,7 @@ class Joints:
             area=self.area,
             centre=centre,
             normal=normal,
-            damage=damage,
+            damage=self.damage(),
             mean_damage=mean,
             opening=opening[:, 0],
             sliding=opening[:, 1],
