@@ -42,6 +42,9 @@ class Pipe:
     def stable_step(self):
         return 1.0
 
+    def set_films(self, loose, share):
+        """There are none."""
+
     def predict(self, dt):
         if dt > self.fails_above or dt < self.fails_below:
             raise NotConverged("pressure solver did not converge.", np.zeros(1))
@@ -99,6 +102,7 @@ def coupling(pipe, piston, step_max=0.1, **more):
         cell_sizes=lambda: np.ones(1),
         update=lambda: False,
         moved_on=lambda: np.zeros((1, 6)),
+        films=lambda: (np.zeros(1, bool), np.zeros(1)),
         cut_again=0,
         n_solids=0,
     )
