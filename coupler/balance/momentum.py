@@ -33,7 +33,7 @@ LINES = (
     ("tank", "pressure of the sides of the tank on the water"),
     ("tank_shear", "viscosity and friction of the sides of the tank on the water"),
     ("sides", "water that came in less what left, with the pressure on inflows and seas"),
-    ("openings", 'what closes narrow openings on the water (`water.openings`)'),
+    ("openings", "what closes narrow openings on the water (`water.openings`)"),
     ("solids", "fixed solids on the water"),
     ("held_blocks", "held and driven blocks on water and free blocks"),
     ("ground", "ground and tank on free blocks by contact"),

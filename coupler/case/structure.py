@@ -191,6 +191,63 @@ class Rubble(Section):
     material: Name = Field("block", description="a name that contact.pair may go by")
 
 
+class TownRule(Section):
+    """What holds for the footprints with a certain attribute; of several rules that fit, the last counts."""
+
+    attribute: str = Field(description="name of an attribute of the file", examples=["built"])
+    equals: str | int | float | bool = Field(description="its value", examples=["brick"])
+    storeys: Annotated[int, Field(strict=True, ge=1, le=100)] | None = Field(
+        None, description="absent, like all below: that of the town"
+    )
+    storey_height: PositiveLength | None = Field(None, description="from floor to floor")
+    wall_thickness: PositiveLength | None = Field(None, description="thickness of the walls")
+    floor_thickness: PositiveLength | None = Field(None, description="thickness of floors and roof")
+    block: tuple[PositiveLength, PositiveLength] | None = Field(
+        None, description="wanted length and height of the blocks"
+    )
+    density: Density | None = Field(None, description="mass per volume")
+    material: Name | None = Field(None, description="a name that contact.pair and joints.pair may go by")
+
+
+class Town(Section):
+    """Houses on the terrain from a file of footprints: each is a building with four walls, floors and a roof on its
+    smallest rectangle. They are called NAME-0, NAME-1, ... in the order of the file, or by name_from."""
+
+    name: Name = Field("town", description="beginning of the names of its houses")
+    path: Annotated[str, Field(min_length=1)] = Field(
+        description="polygons in coordinates of the terrain file: GeoJSON, or with the extra terrain Shapefile or "
+        "GeoPackage; from the directory of the case",
+        examples=["houses.geojson"],
+    )
+    crs: str | None = Field(
+        None,
+        description="coordinate system of the footprints, where it is not that of the terrain (which then must be told "
+        "by terrain.reproject or terrain.crs); needs the extra terrain",
+        examples=["EPSG:4326"],
+    )
+    name_from: str | None = Field(None, description="attribute that names each house")
+    storeys_from: str | None = Field(None, description="attribute with the number of storeys")
+    storeys: Annotated[int, Field(strict=True, ge=1, le=100)] = Field(1, description="number of storeys")
+    storey_height: PositiveLength = Field(3.0, description="from floor to floor")
+    above_ground: quantity("m", ge=0) = Field(
+        0.0, description="height of the lowest floor above the highest ground under the house"
+    )
+    wall_thickness: PositiveLength = Field(description="thickness of the walls", examples=["0.5 m"])
+    floor_thickness: PositiveLength | None = Field(
+        None, description="thickness of floors and roof; absent: wall_thickness"
+    )
+    block: tuple[PositiveLength, PositiveLength] = Field(
+        description="wanted length and height of the blocks; changed so that whole numbers fit",
+        examples=[["2 m", "1.5 m"]],
+    )
+    density: Density | None = Field(None, description="mass per volume; absent: structure.density")
+    material: Name = Field("block", description="a name that contact.pair and joints.pair may go by")
+    least_area: quantity("m2", ge=0) = Field(
+        0.0, description="smaller footprints, sheds and bins, are left out"
+    )
+    rule: tuple[TownRule, ...] = Field((), description="what differs, by attributes of the file")
+
+
 class BlockFile(Section):
     """Blocks from a mesh: each cell (tetrahedron, pyramid, wedge, hexahedron) or each closed convex surface is one."""
 
@@ -286,6 +343,7 @@ class Structure(Section):
     rubble: tuple[Rubble, ...] = Field((), description="loose random blocks")
     file: tuple[BlockFile, ...] = Field((), description="blocks from files")
     drawing: tuple[Drawing, ...] = Field((), description="buildings from drawings, cut into blocks")
+    town: tuple[Town, ...] = Field((), description="houses on the terrain from files of footprints")
     ground: Ground | None = Field(None, description="flat ground under the blocks")
     start: Literal["settled", "sudden", "ramp"] = Field(
         "settled",

@@ -23,6 +23,7 @@ from coupler.checks.water import water_problems, water_remarks
 from coupler.geometry.parts import PARTS, Part, parts_of, recipes
 from coupler.geometry.solids import refused_solids
 from coupler.geometry.tank_mesh import is_measured, mesh_remarks
+from coupler.geometry.town import town_problems
 from coupler.program.errors import did_you_mean
 from coupler.verdict.divisions import member, storey
 
@@ -37,7 +38,7 @@ WEAKEST = 1.0
 
 def problems(case: Case) -> list[Problem]:
     """Everything that is wrong with a case whose sections are valid one by one."""
-    wrong_frames = [*frame_problems(case), *refused_solids(case)]
+    wrong_frames = [*frame_problems(case), *refused_solids(case), *town_problems(case)]
     found = [*_sections(case), *_study(case), *wrong_frames]
     if wrong_frames or (case.tank is not None and not is_measured(case.tank)):
         return found  # without a direction or a tank the rest would report nonsense

@@ -142,8 +142,8 @@ def _place_files(table: dict, directory: Path) -> list[tuple[KeyPath, str]]:
 
 def _named_files(table: dict) -> Iterator[tuple[KeyPath, dict]]:
     """The tables of a case that may name a file under `path`, with their places."""
-    places = (("structure", "file"), ("structure", "drawing"), ("water", "inflow"), ("study", "quantity"))
-    for above, name in (*places, (None, "solid")):
+    of_structure = (("structure", name) for name in ("file", "drawing", "town"))
+    for above, name in (*of_structure, ("water", "inflow"), ("study", "quantity"), (None, "solid")):
         section = table if above is None else table.get(above)
         entries = section.get(name) if isinstance(section, dict) else None
         for i, entry in enumerate(entries if isinstance(entries, list) else ()):

@@ -9,7 +9,7 @@ import numpy as np
 from coupler.case.case import Case
 from coupler.geometry.parts import Part, parts_of
 
-STANDING = ("wall", "building", "column", "arch")
+STANDING = ("wall", "building", "column", "arch", "town")
 """Parts whose lower blocks carry those above."""
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -38,7 +39,7 @@ def parts_of(case: Case) -> tuple[Part, ...]:
 
     Kept for the next call: a case is checked, forecast and built from the same blocks, unless a file changed.
     """
-    files = (*case.structure.file, *case.structure.drawing) if case.structure else ()
+    files = (*case.structure.file, *case.structure.drawing, *case.structure.town) if case.structure else ()
     stamps = tuple(stamp(spec.path) for spec in files)
     return _made(case, stamps)
 
@@ -66,6 +67,8 @@ def recipes(case: Case) -> Iterator[Recipe]:
                 spec.name,
                 lambda spec=spec, make=make: _made_from(case, spec, make, driven),
             )
+    for path, spec in town_houses(case):
+        yield Recipe(path, spec.name, lambda spec=spec: _made_from(case, spec, _building, driven))
 
 
 def standing_on_terrain(case: Case) -> Iterator[tuple[KeyPath, object]]:
@@ -74,6 +77,20 @@ def standing_on_terrain(case: Case) -> Iterator[tuple[KeyPath, object]]:
         for i, spec in enumerate(getattr(case.structure, kind) if case.structure else ()):
             if spec.on is not None:
                 yield ("structure", kind, i), spec
+    yield from town_houses(case)
+
+
+def town_houses(case: Case) -> Iterator[tuple[KeyPath, object]]:
+    """Places and tables of the houses of all towns; none without the ground that they stand on."""
+    if case.structure is None or not case.structure.town or case.tank is None or case.tank.ground is None:
+        return
+    from coupler.geometry.footprints import FootprintError
+    from coupler.geometry.town import houses_of
+
+    for i, town in enumerate(case.structure.town):
+        with suppress(FootprintError):  # told with its reason by the checks, before anything is built
+            for house in houses_of(case, town):
+                yield ("structure", "town", i), house
 
 
 def _made_from(case: Case, spec, make, driven: dict) -> list:

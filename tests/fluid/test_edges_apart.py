@@ -58,7 +58,9 @@ def test_the_film_between_blocks_belongs_to_the_water_around():
         of_water = part == part[np.argmax(domain.face_centroid[:, 2])]
         below = of_water & (domain.face_normal[:, 2] < -0.9) & (domain.face_body == 1)
         area = domain.face_area[below].sum()
-        assert area == pytest.approx(size[0] * size[1], rel=1e-6) if wetted else area < 0.9 * size[0] * size[1]
+        assert (
+            area == pytest.approx(size[0] * size[1], rel=1e-6) if wetted else area < 0.9 * size[0] * size[1]
+        )
 
 
 def test_cutting_again_around_moved_bodies_gives_the_same():

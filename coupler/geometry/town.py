@@ -1,0 +1,216 @@
+"""From a file of footprints to the buildings of a town: rectangles, sizes and materials by attributes."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from coupler.case.case import Case
+from coupler.case.structure import Building
+from coupler.case.types import Rotation
+from coupler.geometry.footprints import Footprint, FootprintError, best_rectangle, read_footprints
+
+Array = np.ndarray
+
+FILLED = 0.7
+"""Least share of its rectangle that a footprint must fill to be built on it."""
+
+
+OVERLAP = 1e-5
+"""Share of its width by which a house may be in another: the digits of a file."""
+
+
+def houses_of(case: Case, town) -> tuple[Building, ...]:
+    """The buildings of a table [[structure.town]] in the order of the file. Raises FootprintError.
+
+    Footprints outside of the tank are left out: a file of a whole city serves a part of it."""
+    path = Path(town.path)
+    there = path.stat() if path.is_file() else None
+    return _houses(town, case.tank, case.terrain, there and (there.st_mtime_ns, there.st_size))
+
+
+@lru_cache(maxsize=8)
+def _houses(town, tank, terrain, _stamp) -> tuple[Building, ...]:
+    path = Path(town.path)
+    if not path.is_file():
+        raise FootprintError(f"{path}: no such file")
+    change = None
+    if town.crs is not None:
+        target = terrain.reproject or terrain.crs
+        if target is None:
+            raise FootprintError(
+                f"{path.name}: in {town.crs}; say the system of the terrain (terrain.crs) to change it"
+            )
+        change = (town.crs, target)
+    found, names = [], set()
+    for footprint in read_footprints(path, change):
+        corners = np.column_stack(tank.ground.in_tank(*(terrain.scale * footprint.corners).T))
+        if _is_here(path.name, footprint, corners, tank):
+            house = _house(path.name, town, footprint, corners)
+            if house is None:
+                continue
+            if house.name in names:
+                raise FootprintError(
+                    f"{path.name}: two houses called '{house.name}'; name_from must tell them apart"
+                )
+            names.add(house.name)
+            found.append(house)
+    if not found:
+        low, high = tank.lower, tank.upper
+        raise FootprintError(
+            f"{path.name}: none of its footprints lies in the tank (x {low[0]:g} to {high[0]:g}, y {low[1]:g} to "
+            f"{high[1]:g} m); they are taken in coordinates of the terrain file: check terrain.origin and town.crs"
+        )
+    return tuple(found)
+
+
+def _is_here(name: str, footprint: Footprint, corners: Array, tank) -> bool:
+    """Whether a footprint lies in the tank; one across its side is refused."""
+    inside = ((corners >= tank.lower[:2]) & (corners <= tank.upper[:2])).all(axis=1)
+    if inside.any() and not inside.all():
+        x, y = corners[~inside][0]
+        raise FootprintError(
+            f"{name}: feature {footprint.number} lies across the side of the tank, at ({x:.5g}, {y:.5g}) m; "
+            "move the side, or take the footprint out"
+        )
+    return bool(inside.all())
+
+
+def _house(name: str, town, footprint: Footprint, corners: Array) -> Building | None:
+    """One building; None for what is smaller than a house."""
+    from coupler.geometry.footprints import area_of
+
+    if area_of(corners) < town.least_area:
+        return None
+    middle, size, turn, share = best_rectangle(corners)
+    if share < FILLED:
+        x, y = middle
+        raise FootprintError(
+            f"{name}: feature {footprint.number} at ({x:.5g}, {y:.5g}) m fills {share:.0%} of its rectangle; "
+            f"only shapes that fill {FILLED:.0%} are built on it: cut it into rectangles"
+        )
+    told = _by_rules(town, footprint.attributes)
+    storeys = _storeys(name, town, footprint, told["storeys"])
+    return Building(
+        name=_name(name, town, footprint),
+        on="terrain",
+        lower=(*(middle - 0.5 * size).tolist(), town.above_ground),
+        size=(*size.tolist(), storeys * told["storey_height"]),
+        turn=turn,
+        storeys=storeys,
+        wall_thickness=told["wall_thickness"],
+        floor_thickness=told["floor_thickness"],
+        block=told["block"],
+        density=told["density"],
+        material=told["material"],
+    )
+
+
+CHANGED = ("storeys", "storey_height", "wall_thickness", "floor_thickness", "block", "density", "material")
+"""Names that a rule may change."""
+
+
+def _by_rules(town, attributes: dict) -> dict:
+    found = {name: getattr(town, name) for name in CHANGED}
+    for rule in town.rule:
+        if attributes.get(rule.attribute) == rule.equals:
+            found |= {name: getattr(rule, name) for name in CHANGED if getattr(rule, name) is not None}
+    return found
+
+
+def _storeys(name: str, town, footprint: Footprint, otherwise: int) -> int:
+    if town.storeys_from is None:
+        return otherwise
+    value = footprint.attributes.get(town.storeys_from)
+    if value is None:
+        return otherwise
+    try:
+        storeys = int(float(value))
+    except (TypeError, ValueError):
+        storeys = 0
+    if not 1 <= storeys <= 100:
+        raise FootprintError(
+            f"{name}: feature {footprint.number}: {town.storeys_from} = {value!r} is no number of storeys"
+        )
+    return storeys
+
+
+def _name(name: str, town, footprint: Footprint) -> str:
+    if town.name_from is None:
+        return f"{town.name}-{footprint.number}"
+    value = str(footprint.attributes.get(town.name_from, ""))
+    word = re.sub(r"[^A-Za-z0-9_-]+", "-", value).strip("-")
+    if not word:
+        raise FootprintError(f"{name}: feature {footprint.number} has no {town.name_from} to be named after")
+    return word if word[0].isalpha() else f"{town.name}-{word}"
+
+
+def town_problems(case: Case) -> Iterator[tuple[tuple, str]]:
+    """Towns without terrain, files that cannot be used, rules that fit nothing, and houses that stand in the sea."""
+    for i, town in enumerate(case.structure.town if case.structure else ()):
+        path = ("structure", "town", i)
+        if case.terrain is None or case.tank is None or case.tank.ground is None:
+            if case.terrain is None:
+                yield path, "houses from footprints stand on the terrain; write a section [terrain]"
+            continue
+        try:
+            houses_of(case, town)
+        except FootprintError as error:
+            yield (*path, "path"), str(error)
+            continue
+        yield from _idle_rules(path, town)
+        yield from _overlapping(case, path, town)
+        yield from _in_water(case, path, town)
+
+
+def _idle_rules(path, town) -> Iterator[tuple[tuple, str]]:
+    known = [f.attributes for f in read_footprints(Path(town.path))] if town.crs is None and town.rule else []
+    for k, rule in enumerate(town.rule):
+        if known and not any(rule.attribute in attributes for attributes in known):
+            there = ", ".join(sorted({str(name) for attributes in known for name in attributes})) or "none"
+            yield (*path, "rule", k, "attribute"), f"no footprint has '{rule.attribute}'; there are {there}"
+
+
+def _overlapping(case: Case, path, town) -> Iterator[tuple[tuple, str]]:
+    """Two houses that share ground."""
+    from coupler.geometry.bodies import Body, overlap_depth, turned
+
+    houses = houses_of(case, town)
+    bodies = []
+    for house in houses:
+        centre = np.array([*np.add(house.lower[:2], 0.5 * np.array(house.size[:2])), 0.0])
+        turn = turned(Rotation(axis=(0.0, 0.0, 1.0), angle=house.turn))
+        bodies.append(Body.box(centre, [*house.size[:2], 1e3], turn))
+    for j, other in enumerate(bodies):
+        for i in range(j):
+            depth = overlap_depth(bodies[i], other, 0.0)
+            if depth > OVERLAP * min(houses[i].size[:2]):
+                x, y = other.vertices.mean(axis=0)[:2]
+                yield (
+                    path,
+                    f"'{houses[j].name}' at ({x:.5g}, {y:.5g}) m overlaps '{houses[i].name}' by {depth:.3g} m "
+                    "(rectangles around the footprints): take one of them out, or join them",
+                )
+                return
+
+
+def _in_water(case: Case, path, town) -> Iterator[tuple[tuple, str]]:
+    """Houses whose foot the still water would cover at the start: most likely a wrong datum or place."""
+    from coupler.geometry.terrain.standing import on_ground
+
+    for house in houses_of(case, town):
+        x, y, foot = on_ground(case, house).lower
+        middle = np.array([x + 0.5 * house.size[0], y + 0.5 * house.size[1]])
+        for fill in case.water.fill if case.water else ():
+            over = (middle >= fill.lower[:2]).all() and (middle <= fill.upper[:2]).all()
+            if over and fill.lower[2] <= foot < fill.upper[2]:
+                yield (
+                    path,
+                    f"'{house.name}' stands at z = {foot:.4g} m under {fill.upper[2] - foot:.3g} m of the water that a "
+                    f"[[water.fill]] puts at ({middle[0]:.5g}, {middle[1]:.5g}) m: check the datum, or take it out",
+                )
+                return

@@ -1,0 +1,163 @@
+"""Houses from footprints: rectangles, rules, and what is refused."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+
+from coupler.checks.read_case import load
+from coupler.geometry.footprints import best_rectangle, read_footprints
+from coupler.geometry.parts import parts_of
+from coupler.geometry.solids import solids_of
+from coupler.program.errors import BadCase
+
+CASE = """
+[case]
+title = "town"
+[time]
+end = "1 s"
+[tank]
+lower = [0, 0, -2]
+upper = [40, 30, 14]
+cell = "2 m"
+[terrain]
+path = "ground.csv"
+origin = [1000, 2000]
+[water]
+[[water.fill]]
+lower = [0, 0, -2]
+upper = [20, 30, 0]
+[structure]
+[[structure.town]]
+path = "houses.geojson"
+name_from = "id"
+storeys_from = "levels"
+wall_thickness = "0.4 m"
+block = ["3 m", "3 m"]
+[[structure.town.rule]]
+attribute = "built"
+equals = "timber"
+material = "timber"
+density = 500
+storey_height = "2.5 m"
+[contact]
+[joints]
+strength = "1 MPa"
+opening_at_failure = "2 mm"
+"""
+
+
+def ring(middle, size, degrees=0.0, at=(1000.0, 2000.0)):
+    a = np.radians(degrees)
+    turn = np.array([[np.cos(a), -np.sin(a)], [np.sin(a), np.cos(a)]])
+    corners = np.array(middle) + 0.5 * np.array(size) * [[-1, -1], [1, -1], [1, 1], [-1, 1]] @ turn.T + at
+    return [*corners.tolist(), corners[0].tolist()]
+
+
+def feature(points, **properties):
+    return {
+        "type": "Feature",
+        "properties": properties,
+        "geometry": {"type": "Polygon", "coordinates": [points]},
+    }
+
+
+HOUSES = [
+    feature(ring((30, 8), (9, 7), 20), id="a", built="brick", levels=2),
+    feature(ring((30, 22), (8, 6), -30), id="b", built="timber", levels=1),
+]
+
+
+def loaded(tmp_path, *sets, houses=HOUSES):
+    rows = [f"{1000 + x},{2000 + y},{0.1 * (x - 20)}" for x in range(0, 41, 2) for y in range(0, 31, 2)]
+    (tmp_path / "ground.csv").write_text("x,y,z\n" + "\n".join(rows) + "\n")
+    (tmp_path / "houses.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": houses}))
+    (tmp_path / "case.toml").write_text(CASE)
+    return load(tmp_path, sets).case
+
+
+@pytest.mark.parametrize("degrees", [0.0, 20.0, -44.0, 89.0])
+def test_rectangle_of_a_turned_footprint(degrees):
+    middle, size, turn, share = best_rectangle(np.array(ring((3, 4), (9, 7), degrees, at=(0, 0))[:-1]))
+    np.testing.assert_allclose(middle, (3, 4), atol=1e-9)
+    assert share == pytest.approx(1.0)
+    assert abs(turn) <= np.pi / 4 + 1e-9
+    along = np.array([np.cos(turn), np.sin(turn)])
+    wanted = np.radians(degrees)
+    same = abs(along @ [np.cos(wanted), np.sin(wanted)]) > 0.99
+    np.testing.assert_allclose(size, (9, 7) if same else (7, 9), atol=1e-9)
+
+
+def test_corners_that_are_none_and_double_ones_are_dropped(tmp_path):
+    points = [[0, 0], [5, 0], [10, 0], [10, 0], [10, 6], [0, 6], [0, 0]]
+    (tmp_path / "h.geojson").write_text(json.dumps({"features": [feature(points[::-1])]}))
+    (found,) = read_footprints(tmp_path / "h.geojson")
+    assert len(found.corners) == 4
+    assert found.area == pytest.approx(60.0)
+
+
+def test_houses_stand_where_the_file_has_them_with_what_the_rules_say(tmp_path):
+    case = loaded(tmp_path)
+    a, b = parts_of(case)
+    assert (a.name, b.name) == ("a", "b")
+    for part, middle in ((a, (30, 8)), (b, (30, 22))):
+        mass = np.array([block.mass for block in part.blocks])
+        centre = mass @ np.array([block.centre for block in part.blocks]) / mass.sum()
+        np.testing.assert_allclose(centre[:2], middle, atol=1e-6)
+    tops = [max(block.world_vertices()[:, 2].max() for block in part.blocks) for part in (a, b)]
+    feet = [min(block.world_vertices()[:, 2].min() for block in part.blocks) for part in (a, b)]
+    np.testing.assert_allclose(np.subtract(tops, feet), (6.0, 2.5))
+    assert {block.material for block in b.blocks} == {"timber"}
+    assert {block.density for block in b.blocks} == {500.0}
+    assert [solid.name for solid in solids_of(case)] == ["a-footing", "b-footing"]
+
+
+ELL = [[0, 0], [10, 0], [10, 3], [3, 3], [3, 10], [0, 10], [0, 0]]
+
+
+@pytest.mark.parametrize(
+    ("houses", "sets", "told"),
+    [
+        (
+            [feature(ring((60, 8), (9, 7)))],
+            ["structure.town[0].name_from=absent"],
+            "none of its footprints lies in the tank",
+        ),
+        (
+            [feature(ring((39, 8), (9, 7)), id="a")],
+            [],
+            r"feature 0 lies across the side of the tank, at \(43.5",
+        ),
+        ([feature(ring((10, 8), (6, 6)), id="a")], [], r"'a' stands at z = -0.7 m under 0.7 m of the water"),
+        ([*HOUSES, feature(ring((33, 9), (6, 6)), id="c")], [], r"'c' at \(33, 9\) m overlaps 'a' by"),
+        ([HOUSES[0], HOUSES[0]], [], "two houses called 'a'"),
+        ([feature(np.add(ELL, (1025, 2010)).tolist(), id="a")], [], "fills 51% of its rectangle"),
+        (
+            [feature(ring((30, 8), (9, 7)), id="a", levels="two")],
+            [],
+            "levels = 'two' is no number of storeys",
+        ),
+        (
+            HOUSES,
+            ["structure.town[0].rule[0].attribute=bilt"],
+            "no footprint has 'bilt'; there are built, id, levels",
+        ),
+        (
+            [{"type": "Feature", "geometry": {"type": "Point"}}],
+            [],
+            "feature 0 is a Point; footprints are polygons",
+        ),
+        (
+            HOUSES,
+            ["terrain=absent"],
+            r"houses from footprints stand on the terrain; write a section \[terrain\]",
+        ),
+        (HOUSES, ["structure.town[0].path=houses.shape"], "no footprints are read from .shape"),
+    ],
+)
+def test_footprints_that_cannot_be_houses_are_refused(houses, sets, told, tmp_path):
+    (tmp_path / "houses.shape").write_text("")
+    with pytest.raises(BadCase) as error:
+        loaded(tmp_path, *sets, houses=houses)
+    assert re.search(told, "\n".join(error.value.lines)), error.value.lines
