@@ -16,6 +16,7 @@ from coupler.case.study import Study
 from coupler.case.sweep import Sweep
 from coupler.case.terrain import Terrain
 from coupler.case.types import (
+    Length,
     Name,
     Point,
     PositiveLength,
@@ -62,6 +63,47 @@ class Time(Section):
     )
 
 
+class Stretch(Section):
+    """A part of one axis with bricks of another length: a tank long and coarse in one direction, or a fine layer."""
+
+    along: Literal["x", "y", "z"] = Field(
+        description="the axis along which these cells are shorter or longer"
+    )
+    lower: Length | None = Field(None, description="where it begins; absent: at the lower end of the tank")
+    upper: Length | None = Field(None, description="where it ends; absent: at the upper end of the tank")
+    cell: PositiveLength = Field(
+        description="wanted length of the bricks along this axis", examples=["0.25 m"]
+    )
+    growth: quantity("", gt=1, le=2) = Field(
+        1.2, description="largest ratio of the lengths of bricks one after the other beyond its ends"
+    )
+
+
+class Refine(Section):
+    """Finer cells in a part of the tank: in a box (lower, upper), or around bodies and the ground (around). A level
+    halves the cells in every direction; sizes change gradually, and cells share whole faces."""
+
+    lower: Point | None = Field(None, description="corner of a box with the smallest coordinates")
+    upper: Point | None = Field(None, description="corner of a box with the largest coordinates")
+    around: tuple[Name, ...] = Field(
+        (),
+        description="what they are finer around, instead of a box: names of solids, blocks, groups or parts where they "
+        'stand at the start, or "solids", "blocks" and "terrain" for all of a kind',
+        examples=[["pier", "house"]],
+    )
+    margin: PositiveLength | None = Field(
+        None,
+        description="how far around: from the faces of bodies, and up from the ground; twice as far they are finer by "
+        "one level less, and so on; absent: twice the size of the finest cells",
+    )
+    between: tuple[Length, Length] | None = Field(
+        None, description='with around = ["terrain"]: only where the ground lies between these levels z'
+    )
+    levels: int = Field(
+        1, ge=1, le=6, strict=True, description="how often cells are halved: 1, 2, 3: half, quarter, eighth"
+    )
+
+
 class Tank(Section):
     """Where water may be: a fixed mesh of tetrahedra, of a box (lower, upper, cell) or from a file (mesh). Closed sides
     are walls for blocks too."""
@@ -92,6 +134,13 @@ class Tank(Section):
     )
     scale: PositiveLength = Field(1.0, description="length of one unit of mesh", examples=["1 mm"])
     offset: Point = Field((0.0, 0.0, 0.0), description="added to all places of mesh, after the scale")
+    stretch: tuple[Stretch, ...] = Field(
+        (),
+        description="parts of an axis with shorter or longer bricks; not with mesh, along z not with [terrain]",
+    )
+    refine: tuple[Refine, ...] = Field(
+        (), description="parts of the tank with finer cells; with mesh and [terrain] too"
+    )
     open: tuple[Side, ...] = Field(
         ("z+",), description="sides through which air and water may leave; the others are walls"
     )
@@ -101,6 +150,7 @@ class Tank(Section):
     )
 
     _ground: object = PrivateAttr(None)
+    _regions: object = PrivateAttr(None)
 
     @property
     def ground(self):
@@ -111,6 +161,17 @@ class Tank(Section):
     def is_box(self) -> bool:
         """Whether its water may be everywhere between lower and upper."""
         return self.mesh is None and self._ground is None
+
+    @property
+    def regions(self):
+        """`geometry.tank_regions.Regions` that the tables of `refine` stand for; None without any."""
+        return self._regions
+
+    def with_regions(self, regions) -> Tank:
+        """The same tank with these regions."""
+        other = self.model_copy()
+        other._regions = regions
+        return other
 
     def standing_on(self, ground) -> Tank:
         """The same tank over a height map."""

@@ -22,7 +22,7 @@ from coupler.checks.tables import table_problems
 from coupler.checks.water import water_problems, water_remarks
 from coupler.geometry.parts import PARTS, Part, parts_of, recipes
 from coupler.geometry.solids import refused_solids
-from coupler.geometry.tank_mesh import is_measured, mesh_remarks
+from coupler.geometry.tank_mesh import finest_cell, is_measured, mesh_remarks
 from coupler.geometry.town import town_problems
 from coupler.program.errors import did_you_mean
 from coupler.verdict.divisions import member, storey
@@ -80,11 +80,11 @@ def remarks(case: Case) -> list[str]:
 def _thin_remarks(case: Case) -> Iterator[str]:
     if case.tank is None or case.water is None or case.water.covers != "single":
         return
-    thin = [(name, width) for name, width in _widths(case) if width < case.tank.cell]
+    thin = [(name, width) for name, width in _widths(case) if width < finest_cell(case.tank)]
     if thin:
         name, width = min(thin, key=lambda item: item[1])
         yield (
-            f"{name} is {width:g} m thick, thinner than a cell ({case.tank.cell:g} m): with single covers "
+            f"{name} is {width:g} m thick, thinner than a cell ({finest_cell(case.tank):.3g} m): with single covers "
             "the water on its two sides is one field there and the load comes out too small"
         )
 

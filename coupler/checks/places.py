@@ -14,6 +14,7 @@ from coupler.geometry.bodies import Body, overlap_depth
 from coupler.geometry.parts import Part, standing_on_terrain
 from coupler.geometry.solids import solids_of
 from coupler.geometry.tank_mesh import beside_mesh, is_measured, mesh_of, tank_places, what_of
+from coupler.geometry.tank_regions import BYTES_PER_CELL
 
 KeyPath = tuple[str | int, ...]
 Problem = tuple[KeyPath, str]
@@ -21,13 +22,11 @@ Placed = tuple[KeyPath, str, Body]
 
 TOUCH = 1e-5
 """Overlap below this share of the smallest width is contact, not overlap (rounding of decimals and of files)."""
-BYTES_PER_CELL = 1100
-"""Resident memory that a cell of the mesh takes in a run of water alone: topology, moments and fields."""
 
 
 def mesh_size(tank) -> tuple[int, int]:
     """Cells and nodes of the mesh of a tank: those of its file, or six tetrahedra a box of about the wanted edge."""
-    if not tank.is_box:
+    if not tank.is_box or tank.regions is not None or tank.stretch:
         mesh = mesh_of(tank)
         return len(mesh.cells), len(mesh.nodes)
     edges = np.subtract(tank.upper, tank.lower)

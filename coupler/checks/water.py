@@ -9,7 +9,7 @@ import numpy as np
 
 from coupler.case.case import Case
 from coupler.case.inflow_records import RecordError, record_columns
-from coupler.geometry.tank_mesh import floor_along, is_measured, mean_bed
+from coupler.geometry.tank_mesh import finest_cell, floor_along, is_measured, mean_bed
 from coupler.scene.build_water import SLACK, bore_velocity, fills_beside, level_at_start
 
 KeyPath = tuple[str | int, ...]
@@ -81,7 +81,7 @@ def water_remarks(case: Case) -> Iterator[str]:
 
 def _thin_water(case: Case) -> Iterator[str]:
     """Boxes of water, inflows and seas that are thinner than a few cells; walls and other water lengthen a box."""
-    tank, cell = case.tank, case.tank.cell
+    tank, cell = case.tank, finest_cell(case.tank)
     found = []
     if tank.is_box:
         for i, fill in enumerate(case.water.fill):

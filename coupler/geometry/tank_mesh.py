@@ -14,7 +14,9 @@ import numpy as np
 from coupler.case.case import Case, Tank
 from coupler.geometry.mesh_files import MeshFileError
 from coupler.geometry.parts import stamp
+from coupler.geometry.tank_regions import axes_of, graded, regions_of, stretch_problems, too_many
 from coupler.geometry.tetrahedra import read_tetrahedra, shown
+from coupler.program.errors import SurgebreakError
 
 Array = np.ndarray
 KeyPath = tuple[str | int, ...]
@@ -47,12 +49,24 @@ def measured(case: Case) -> tuple[Case, list[Problem]]:
     wrong = list(_wrong_keys(tank))
     if case.terrain is not None and tank.mesh is not None:
         wrong.append((("tank", "mesh"), "with [terrain] the mesh is made on it; leave one of them out"))
-    if not wrong and case.terrain is not None:
-        return _on_terrain(case)
     if wrong and tank.mesh is not None:  # which of both is meant is not known: nothing of it is looked at
         return case.model_copy(update={"tank": tank.model_copy(update={"lower": None})}), wrong
-    if wrong or tank.mesh is None:
+    if wrong:
         return case, wrong
+    if tank.mesh is None:
+        wrong = list(stretch_problems(case))
+    if wrong:
+        return case.model_copy(update={"tank": tank.model_copy(update={"lower": None})}), wrong
+    if case.terrain is not None:
+        case, wrong = _on_terrain(case)
+    elif tank.mesh is not None:
+        case, wrong = _of_file(case)
+    return (case, wrong) if wrong else _with_finer_parts(case)
+
+
+def _of_file(case: Case) -> tuple[Case, list[Problem]]:
+    """The case with lower, upper and cell of its tank from the file of it, and why that cannot be."""
+    tank = case.tank
     try:
         mesh = mesh_of(tank)
     except MeshFileError as error:
@@ -60,6 +74,23 @@ def measured(case: Case) -> tuple[Case, list[Problem]]:
     lower, upper = (tuple(corner) for corner in mesh.bounds.tolist())
     found = {"lower": lower, "upper": upper, "cell": mesh.spacing}
     return case.model_copy(update={"tank": tank.model_copy(update=found)}), []
+
+
+def _with_finer_parts(case: Case) -> tuple[Case, list[Problem]]:
+    """The case with the regions of `[[tank.refine]]`, and what is wrong with them; bodies that cannot be made are left
+    to the checks of their own tables."""
+    if not case.tank.refine:
+        return case, []
+    try:
+        regions, wrong = regions_of(case)
+    except (ValueError, OSError, SurgebreakError):
+        return case, []
+    heavy = None if wrong else too_many(case.tank, regions)
+    if heavy is not None:
+        wrong = [(("tank", "refine"), heavy)]
+    if wrong:
+        return case, wrong
+    return case.model_copy(update={"tank": case.tank.with_regions(regions)}), wrong
 
 
 def is_measured(tank: Tank) -> bool:
@@ -71,6 +102,9 @@ def mesh_of(tank: Tank):
     """The `Background` of a tank; a file is read once unless it changes. Raises MeshFileError."""
     from fluid.mesh.background import box_mesh
 
+    if tank.regions is not None or tank.stretch:
+        there = stamp(tank.mesh) if tank.mesh is not None and Path(tank.mesh).is_file() else None
+        return _in_parts(tank, tank.regions, tank.ground, there)
     if tank.ground is not None:
         return fitted_of(tank).mesh
     if tank.mesh is None:
@@ -79,9 +113,14 @@ def mesh_of(tank: Tank):
     return _kept(Path(tank.mesh), tank.scale, tank.offset, there)
 
 
+def finest_cell(tank: Tank) -> float:
+    """Size [m] of the smallest cells of a tank; of a box without finer parts the wanted edge."""
+    return tank.cell if tank.regions is None and not tank.stretch else mesh_of(tank).finest
+
+
 def fitted_of(tank: Tank):
     """The `FittedMesh` of a tank over a terrain, made once. Raises MeshError."""
-    return _fitted(tank.lower, tank.upper, tank.cell, tank.split, tank.ground)
+    return _fitted(tank.lower, tank.upper, tank.cell, tank.split, tank.ground, tank.stretch)
 
 
 def bed_along(tank: Tank, side: str) -> Array:
@@ -246,7 +285,7 @@ def _wrong_keys(tank: Tank) -> Iterator[Problem]:
             if name in tank.model_fields_set:
                 yield ("tank", name), "is for tank.mesh, and there is none; leave it out"
         return
-    for name in (*OF_BOX, "split"):
+    for name in (*OF_BOX, "split", "stretch"):
         if name in tank.model_fields_set:
             yield ("tank", name), "follows from tank.mesh, which is given as well; leave one of them out"
 
@@ -276,10 +315,31 @@ def _within(points: Array, box) -> Array:
 
 
 @lru_cache(maxsize=1)
-def _fitted(lower, upper, cell: float, split: str, ground):
+def _fitted(lower, upper, cell: float, split: str, ground, stretch: tuple):
     from fluid.mesh.fitted_mesh import fitted_mesh
 
-    return fitted_mesh(lower, upper, cell, ground, split=split)
+    axes = None
+    if stretch:
+        ends = zip(lower[:2], upper[:2], "xy")
+        axes = [
+            graded(low, high, cell, [s for s in stretch if s.along == along]) for low, high, along in ends
+        ]
+    return fitted_mesh(lower, upper, cell, ground, axes=axes, split=split)
+
+
+@lru_cache(maxsize=1)
+def _in_parts(tank: Tank, regions, ground, _stamp):
+    """The mesh of a tank with stretches or regions of finer cells; ground: that of the tank, by which tanks differ."""
+    from fluid.mesh.background import box_mesh
+    from fluid.mesh.fitted_mesh import refined_fitted
+    from fluid.mesh.refinement import refined_mesh
+
+    found = () if regions is None else regions.found
+    if ground is not None:
+        return refined_fitted(fitted_of(tank), found, ground)
+    if tank.mesh is not None:
+        return refined_mesh(_kept(Path(tank.mesh), tank.scale, tank.offset, _stamp), found)
+    return refined_mesh(box_mesh(None, None, axes=axes_of(tank), split=tank.split), found)
 
 
 @lru_cache(maxsize=1)

@@ -19,7 +19,7 @@ from coupler.case.case import Case
 from coupler.case.inflow_records import record_columns
 from coupler.case.schedule import Schedule, checkpoint_interval
 from coupler.checks.places import BYTES_PER_CELL, mesh_size
-from coupler.geometry.tank_mesh import water_in
+from coupler.geometry.tank_mesh import finest_cell, water_in
 from coupler.program.terminal import Row, lines
 from coupler.step.observe import joint_counts
 
@@ -127,7 +127,7 @@ def _water_rows(case: Case, interval: float, rows: list[Row]) -> float:
     if not case.tank.is_box:
         volume = water_in(case.tank, case.water.fill)
     height = _highest(case) - case.tank.lower[2]
-    g, h = case.case.gravity, case.tank.cell
+    g, h = case.case.gravity, finest_cell(case.tank)
     fastest = math.sqrt(2.0 * g * height)
     limits = {
         "time.step_max": case.time.step_max,
@@ -136,7 +136,7 @@ def _water_rows(case: Case, interval: float, rows: list[Row]) -> float:
         "the cell size at rest": LONGEST_REST_STEP * math.sqrt(h / g) if g > 0.0 else math.inf,
     }
     reason = min(limits, key=limits.get)
-    rows.append(Row("mesh", cells, "cells", f"{nodes} nodes, edge {h:g} m"))
+    rows.append(Row("mesh", cells, "cells", f"{nodes} nodes, edge {h:.4g} m"))
     rows.append(Row("water", volume, "m3", "in the fill boxes, solids not taken off"))
     rows.append(Row("step", 1e3 * limits[reason], "ms", f"set by {reason}"))
     return limits[reason]

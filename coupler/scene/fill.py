@@ -39,11 +39,12 @@ def start_level(boxes, tank, mesh, domain) -> Array:
     edge = _cell_edge(mesh)
     boxes = merged(boxes, SEAM * edge)
     whole_low, whole_high = _reach(mesh.nodes, mesh.cells, *_extent(mesh.nodes[mesh.cells]))
-    cut_low = low - whole_low[domain.parent_node] > MISSING * edge
-    cut_high = whole_high[domain.parent_node] - high > MISSING * edge
+    edges = edge * _relative_size(mesh)[domain.parent_node]
+    cut_low = low - whole_low[domain.parent_node] > MISSING * edges[:, None]
+    cut_high = whole_high[domain.parent_node] - high > MISSING * edges[:, None]
     faced_low, faced_high = _facing(domain)
     stars = (domain.nodes, low, high, cut_low & faced_low, cut_high & faced_high)
-    level = np.min([_box_level(box, tank, stars, edge) for box in boxes], axis=0)
+    level = np.min([_box_level(box, tank, stars, edges) for box in boxes], axis=0)
     return _without_seams(level, boxes, tank, domain.nodes, edge)
 
 
@@ -134,7 +135,7 @@ def _in_box(box, tank, points, slack: float = 0.0) -> Array:
     return np.all((points > low) & (points < high), axis=1)
 
 
-def _box_level(box, tank, stars, edge: float) -> Array:
+def _box_level(box, tank, stars, edge: Array) -> Array:
     """Signed distance (N,) of one box, its sides at solids and tank walls left out."""
     nodes, low, high, cut_low, cut_high = stars
     (box_low, box_high), (tank_low, tank_high) = box, tank
@@ -157,7 +158,7 @@ def _box_level(box, tank, stars, edge: float) -> Array:
     return np.maximum(level, -far)
 
 
-def _side(s, s_low, s_high, cut_inner, cut_outer, edge: float) -> Array:
+def _side(s, s_low, s_high, cut_inner, cut_outer, edge: Array) -> Array:
     """Distance to one side (N,), pushed away from the solids that stand there."""
     touch = TOUCHES * edge
     # a star below the surface, cut short by a slanting solid, keeps its distance
@@ -173,6 +174,11 @@ def _cell_edge(mesh) -> float:
     """Longest side of the bounding boxes of the cells, the typical one [m]."""
     corners = mesh.nodes[mesh.cells]
     return float(np.median(np.ptp(corners, axis=1).max(axis=1)))
+
+
+def _relative_size(mesh) -> Array:
+    """Size of the cells at each node (N,) over the typical one: 1 in a box of equal bricks."""
+    return mesh.node_size / np.median(mesh.local_size)
 
 
 def _extent(points) -> tuple[Array, Array]:

@@ -15,6 +15,8 @@ from fluid.mesh.bisection import MOST_LEVELS, Tetrahedra, refined
 
 MOST_ENTRIES = 6
 """Bins that a cell may be listed in, on average."""
+SAMPLED = 200
+"""Places along each side of a tank at which a bed is looked up to tell how large a region is."""
 TOUCH = 1e-9
 """Share of a cell within which one that only touches a region does not belong to it."""
 
@@ -32,6 +34,10 @@ class InBox:
         low, high = _boxes_of(mesh)
         touch = TOUCH * (high - low)
         return ((low + touch < self.upper) & (high - touch > self.lower)).all(axis=1)
+
+    def volume_in(self, lower, upper) -> float:
+        """About how much [m³] of it lies in the box from lower to upper."""
+        return _common(self.lower, self.upper, lower, upper)
 
 
 @dataclass(frozen=True)
@@ -67,6 +73,11 @@ class NearBodies:
             margin,
         )
 
+    def volume_in(self, lower, upper) -> float:
+        """About how much [m³] of it lies in the box from lower to upper."""
+        m = self.margin
+        return sum(_common(low - m, high + m, lower, upper) for low, high in zip(self.lower, self.upper))
+
 
 @dataclass(frozen=True)
 class OnBed:
@@ -86,6 +97,29 @@ class OnBed:
         z = np.asarray(self.bed(x[:, 0], x[:, 1]), float)
         here = (z >= self.lowest) & (z <= self.highest) & (x[:, 2] - z <= self.height * (1.0 + TOUCH))
         return here[mesh.cells].any(axis=1)
+
+    def volume_in(self, lower, upper) -> float:
+        """About how much [m³] of it lies in the box from lower to upper."""
+        x, y = np.meshgrid(*(np.linspace(lower[k], upper[k], SAMPLED) for k in range(2)))
+        z = np.asarray(self.bed(x.ravel(), y.ravel()), float)
+        share = ((z >= self.lowest) & (z <= self.highest)).mean()
+        return float(share * self.height * (upper[0] - lower[0]) * (upper[1] - lower[1]))
+
+
+@dataclass(frozen=True)
+class Either:
+    """Cells of any of some regions, halved `levels` times."""
+
+    regions: tuple
+    levels: int
+
+    def cells(self, mesh: Tetrahedra, level: int) -> np.ndarray:
+        """(M,) bool: cells of the mesh that are to have this level."""
+        return np.any([region.cells(mesh, level) for region in self.regions], axis=0)
+
+    def volume_in(self, lower, upper) -> float:
+        """About how much [m³] of it lies in the box from lower to upper."""
+        return sum(region.volume_in(lower, upper) for region in self.regions)
 
 
 def refined_mesh(mesh: Background, regions, lattice=None) -> Background:
@@ -117,6 +151,10 @@ def refined_with_parents(mesh: Background, regions, lattice=None) -> tuple[Backg
     return Background.from_arrays(
         cells.nodes, cells.cells, _bin_walls(mesh.axes, cells), straddling=True
     ), cells
+
+
+def _common(low, high, lower, upper) -> float:
+    return float(np.prod(np.maximum(np.minimum(high, upper) - np.maximum(low, lower), 0.0)))
 
 
 def _lattice(mesh: Background):
