@@ -331,12 +331,12 @@ def _fitted(lower, upper, cell: float, split: str, ground, stretch: tuple):
 def _in_parts(tank: Tank, regions, ground, _stamp):
     """The mesh of a tank with stretches or regions of finer cells; ground: that of the tank, by which tanks differ."""
     from fluid.mesh.background import box_mesh
-    from fluid.mesh.fitted_mesh import refined_fitted
     from fluid.mesh.refinement import refined_mesh
 
     found = () if regions is None else regions.found
     if ground is not None:
-        return refined_fitted(fitted_of(tank), found, ground)
+        fitted = fitted_of(tank)
+        return refined_mesh(fitted.mesh, found, fitted.lattice)
     if tank.mesh is not None:
         return refined_mesh(_kept(Path(tank.mesh), tank.scale, tank.offset, _stamp), found)
     return refined_mesh(box_mesh(None, None, axes=axes_of(tank), split=tank.split), found)

@@ -26,28 +26,19 @@ MOST_LEVELS = 8
 @dataclass(frozen=True)
 class Tetrahedra:
     """nodes (N, 3) [m] · lattice (N, 3), their places in bricks of edge 1 · cells (M, 4) · depth (M,) bisections that
-    each cell comes from · parent (N, 2): ends of the edge that a node halves, twice its own number for the first nodes.
-    """
+    each cell comes from."""
 
     nodes: np.ndarray
     lattice: np.ndarray
     cells: np.ndarray
     depth: np.ndarray
-    parent: np.ndarray
 
     @classmethod
     def coarse(cls, nodes, cells, lattice) -> Tetrahedra:
         """Before any bisection; lattice (N, 3) or None: the places themselves decide which edge is long."""
         nodes = np.ascontiguousarray(nodes, float)
         lattice = nodes if lattice is None else np.ascontiguousarray(lattice, float)
-        own = np.arange(len(nodes))
-        return cls(
-            nodes,
-            lattice,
-            np.ascontiguousarray(cells, np.int64),
-            np.zeros(len(cells), np.int64),
-            np.column_stack([own, own]),
-        )
+        return cls(nodes, lattice, np.ascontiguousarray(cells, np.int64), np.zeros(len(cells), np.int64))
 
 
 def refined(mesh: Tetrahedra, chosen: Callable[[Tetrahedra, int], np.ndarray], levels: int) -> Tetrahedra:
@@ -68,14 +59,14 @@ def refined(mesh: Tetrahedra, chosen: Callable[[Tetrahedra, int], np.ndarray], l
 
 def _halved(mesh: Tetrahedra, wanted, depth: int) -> Tetrahedra:
     """The wanted cells (M,) bool brought to a depth, and what has to follow."""
-    found = _bisect(mesh.nodes, mesh.lattice, mesh.cells, mesh.depth, mesh.parent, wanted, depth)
-    nodes, lattice, cells, reached, parent, root = found
+    found = _bisect(mesh.nodes, mesh.lattice, mesh.cells, mesh.depth, wanted, depth)
+    nodes, lattice, cells, reached, root = found
     order = np.argsort(root, kind="stable")
     cells, reached = cells[order], reached[order]
     first = _first_seen(cells, len(nodes))
     number = np.empty(len(nodes), np.int64)
     number[first] = np.arange(len(nodes))
-    return Tetrahedra(nodes[first], lattice[first], number[cells], reached, number[parent[first]])
+    return Tetrahedra(nodes[first], lattice[first], number[cells], reached)
 
 
 @njit(cache=True)
@@ -93,7 +84,9 @@ def _first_seen(cells, n):
 
 
 @njit(cache=True)
-def _bisect(nodes, lattice, cells, depth, parent, wanted, deep):
+def _bisect(nodes, lattice, cells, depth, wanted, deep):
+    """Nodes, lattice, cells and depth after all cells that are wanted and less deep, and what follows; the first cell (M,)
+    that each one comes from."""
     n_nodes, n = nodes.shape[0], cells.shape[0]
     root = np.arange(n)
     wanted = wanted.copy()
@@ -112,11 +105,10 @@ def _bisect(nodes, lattice, cells, depth, parent, wanted, deep):
                 if keys[at] < 0:
                     if n_nodes == nodes.shape[0]:
                         nodes, lattice = _grown(nodes), _grown(lattice)
-                        parent, touched = _grown_ints(parent), _grown_flags(touched)
+                        touched = _grown_flags(touched)
                     for k in range(3):
                         nodes[n_nodes, k] = 0.5 * (nodes[i, k] + nodes[j, k])
                         lattice[n_nodes, k] = 0.5 * (lattice[i, k] + lattice[j, k])
-                    parent[n_nodes, 0], parent[n_nodes, 1] = i, j
                     touched[i] = touched[j] = True
                     keys[at], middle[at] = (i << 32) + j, n_nodes
                     n_nodes += 1
@@ -141,7 +133,6 @@ def _bisect(nodes, lattice, cells, depth, parent, wanted, deep):
         lattice[:n_nodes].copy(),
         cells[:n].copy(),
         depth[:n].copy(),
-        parent[:n_nodes].copy(),
         root[:n].copy(),
     )
 

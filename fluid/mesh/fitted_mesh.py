@@ -27,15 +27,11 @@ import numpy as np
 from numba import njit
 
 from fluid.mesh.background import Background, MeshError
-from fluid.mesh.bisection import MOST_LEVELS, PER_LEVEL
-from fluid.mesh.refinement import refined_with_parents
 
 FOLLOW = 0.5
 """Steepest slope that layers follow: sheared bricks have dihedral angles of at most 124 degrees there."""
 NEAREST = 0.5
 """Least height of a cell at bed or lid, in layers."""
-LEAST_LEFT = 0.3
-"""Least share of its volume that a cell keeps when nodes of it are moved to the bed."""
 STEEPEST = 3.0
 """Rise of the bed from one column to the next over their distance beyond which it is refused."""
 MOST_SLENDER_BRICK = 8.0
@@ -122,47 +118,6 @@ def fitted_mesh(
         int((above & used).sum()),
         columns.lattice(),
     )
-
-
-def refined_fitted(fitted: FittedMesh, regions, bed) -> Background:
-    """The mesh of a `FittedMesh` with finer cells in regions of `refinement.py`, its new nodes on the bed moved there.
-
-    bed(x, y) → z [m] as in `fitted_mesh`. A node stays where the cells around it halved the bed if moved it would leave
-    one of them less than LEAST_LEFT of its volume: where the bed has steps between the columns."""
-    mesh, cells = refined_with_parents(fitted.mesh, regions, fitted.lattice)
-    if mesh is fitted.mesh:
-        return mesh
-    on_bed = np.zeros(len(mesh.nodes), bool)
-    own = cells.parent[:, 0] == cells.parent[:, 1]
-    on_bed[own] = np.isin(_rows(mesh.nodes[own]), _rows(fitted.mesh.nodes[fitted.on_bed]))
-    for _ in range(PER_LEVEL * MOST_LEVELS):
-        found = on_bed | (~own & on_bed[cells.parent].all(axis=1))
-        if (found == on_bed).all():
-            break
-        on_bed = found
-    new = on_bed & ~own
-    nodes = mesh.nodes.copy()
-    nodes[new, 2] = bed(nodes[new, 0], nodes[new, 1])
-    nodes = _kept_whole(mesh, nodes)
-    return Background.from_arrays(nodes, mesh.cells, mesh.axes, straddling=True)
-
-
-def _rows(places):
-    """Places (n, 3) as one number each, to compare them as wholes."""
-    return np.ascontiguousarray(places).view(np.dtype((np.void, 24))).ravel()
-
-
-def _kept_whole(mesh, nodes):
-    """The moved nodes (N, 3), back where they were around cells of which too little would be left."""
-    moved = nodes.copy()
-    while True:
-        x = moved[mesh.cells]
-        left = np.linalg.det(x[:, 1:] - x[:, :1]) / 6.0
-        bad = left < LEAST_LEFT * mesh.cell_volume
-        if not bad.any():
-            return moved
-        back = mesh.cells[bad].ravel()
-        moved[back] = mesh.nodes[back]
 
 
 @dataclass(frozen=True)

@@ -127,11 +127,6 @@ def refined_mesh(mesh: Background, regions, lattice=None) -> Background:
 
     lattice (N, 3): places of the nodes in bricks of edge 1, None: of a box or of any tetrahedra, found here.
     Raises MeshError for levels out of 1 to MOST_LEVELS."""
-    return refined_with_parents(mesh, regions, lattice)[0]
-
-
-def refined_with_parents(mesh: Background, regions, lattice=None) -> tuple[Background, Tetrahedra]:
-    """`refined_mesh`, and the cells with what they come from."""
     regions = list(regions)
     levels = max((region.levels for region in regions), default=0)
     if any(not 1 <= region.levels <= MOST_LEVELS for region in regions):
@@ -147,10 +142,8 @@ def refined_with_parents(mesh: Background, regions, lattice=None) -> tuple[Backg
 
     cells = refined(start, chosen, levels)
     if len(cells.cells) == len(mesh.cells):
-        return mesh, start
-    return Background.from_arrays(
-        cells.nodes, cells.cells, _bin_walls(mesh.axes, cells), straddling=True
-    ), cells
+        return mesh
+    return Background.from_arrays(cells.nodes, cells.cells, _bin_walls(mesh.axes, cells), straddling=True)
 
 
 def _common(low, high, lower, upper) -> float:
