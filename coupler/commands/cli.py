@@ -178,6 +178,28 @@ def report(
 
 
 @app.command()
+def export(
+    run: Annotated[
+        Path, typer.Argument(metavar="RUN", help="a run directory, finished or still being written")
+    ],
+    format_: Annotated[
+        str,
+        typer.Option("--format", metavar="A,B,...", help="vtk (ParaView), netcdf (xarray), gltf (Blender)"),
+    ] = "vtk,netcdf",
+    to: Annotated[Path | None, typer.Option(metavar="DIR", help="where to write; else RUN/export")] = None,
+    begin: Annotated[float, typer.Option("--from", metavar="S", help="first time [s]")] = 0.0,
+    end: Annotated[float, typer.Option("--until", metavar="S", help="last time [s]")] = float("inf"),
+) -> None:
+    """Write results for other programs.
+
+    .pvd for ParaView by a double click, NetCDF for xarray, .glb for Blender. While a run goes on it adds what is new.
+    """
+    from coupler.commands.export.command import export as write
+
+    write(run, [name.strip() for name in format_.split(",") if name.strip()], to, begin, end)
+
+
+@app.command()
 def doctor() -> None:
     """Check that YADE and the rest work here."""
     one_thread()
