@@ -17,7 +17,7 @@ from coupler.program.provenance import ROOT
 PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md"), *(ROOT / "cases").glob("*/README.md")])
 KNOWN = {key.path for key in keys()}
 SECTIONS = {path.split(".")[0] for path in KNOWN}
-FILES = ("py", "toml", "md", "json", "csv", "vtu")
+FILES = ("py", "toml", "md", "json", "csv", "vtu", "pvd")
 COMMANDS = get_command(app).commands
 each_page = pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 
