@@ -3,6 +3,7 @@
 `history/energy.csv`   energy               `history/momentum.csv`, `angular_momentum.csv`  the books of momentum
 `history/coupling.csv` how each step went   `history/water.csv`     volume
 `history/gauges.csv`   the gauges           `history/structure.csv` joints, fastest block
+`maps/*.asc`           of a flood over terrain
 `history/loads_*.csv`  loads by what they come from, where a case asks for them
 `cracks.csv`, `blocks.csv`  what became of each joint and block, with the verdict in run.json
 """
@@ -33,11 +34,11 @@ class Recorder:
     directory: of the run · coupling: CoupledStepper · gauges: list of Gauge
     solids: [(vertices, faces)] that never move, with a structure its last blocks ·
     tank: (lower, upper) or None · kept: what `save` gave, to continue the files from there · watch: of the verdict,
-    None without a structure. Raises CannotContinue.
+    None without a structure · maps: of a flood over terrain, or None. Raises CannotContinue.
     """
 
-    def __init__(self, directory, coupling, gauges, solids, tank, kept=None, watch=None):
-        self.coupling, self.gauges, self.watch = coupling, gauges, watch
+    def __init__(self, directory, coupling, gauges, solids, tank, kept=None, watch=None, maps=None):
+        self.coupling, self.gauges, self.watch, self.maps = coupling, gauges, watch, maps
         self.history = directory / "history"
         self.history.mkdir(exist_ok=True)
         self.cracks = directory / "cracks.csv"
@@ -101,6 +102,8 @@ class Recorder:
                 gauge.windows.restore(_below(f"gauge_{k}_", kept))
         if self.watch is not None:
             self.watch.restore(_below("watch_", kept))
+        if self.maps is not None:
+            self.maps.restore(_below("maps_", kept))
         self._write_tables()
 
     def _gauge_memory(self) -> dict[str, np.ndarray]:
@@ -119,6 +122,7 @@ class Recorder:
             places
             | self._gauge_memory()
             | {f"watch_{name}": a for name, a in (self.watch.save() if self.watch else {}).items()}
+            | {f"maps_{name}": a for name, a in (self.maps.save() if self.maps else {}).items()}
             | {
                 "outputs": np.array(self._written),
                 "impulse": self.impulse.copy(),
@@ -179,6 +183,8 @@ class Recorder:
                 table.append(**row)
         if self.watch is not None:
             self.watch.step(c, record)
+        if self.maps is not None:
+            self.maps.step(c.water, record.time)
 
     def _append_momentum(self, record) -> None:
         m = record.momentum
@@ -244,6 +250,8 @@ class Recorder:
             self._blocks.append(time, s.centre()[: self._n_blocks], s.rotation()[: self._n_blocks], data)
         if self.watch is not None and c.water is not None:
             self.watch.look(c.water, time)
+        if self.maps is not None:
+            self.maps.write(self.history.parent / "maps")
         self._write_tables()
         self._written += 1
 

@@ -118,7 +118,9 @@ def _steps(
     limits = limits_of(case)
     schedule = checkpoint.schedule(case.time.end) if checkpoint else Schedule.of(case)
     kept = checkpoint.part("recorder") if checkpoint else None
-    recorder = Recorder(directory.path, coupling, scene.gauges, scene.solids, scene.tank, kept, scene.watch)
+    recorder = Recorder(
+        directory.path, coupling, scene.gauges, scene.solids, scene.tank, kept, scene.watch, scene.maps
+    )
     checkpoints = _checkpoints(case, scene, directory, recorder, schedule)
     way_on = f"; `surgebreak resume {quote(str(directory.path))}` goes on" if checkpoints is not None else ""
     long = _long_steps(coupling, limits, reporter, clock, figures, checkpoints)

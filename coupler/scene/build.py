@@ -21,6 +21,7 @@ from coupler.step.coupled_step import CoupledStepper
 from coupler.step.limits import Limits
 
 if TYPE_CHECKING:
+    from coupler.results.maps import Maps
     from coupler.verdict.watch import Watch
 
 PRESSURE_RTOL = 1e-8
@@ -36,6 +37,8 @@ class Scene:
     tank: tuple | None
     watch: Watch | None = None
     """What the verdict is made from; None without a structure."""
+    maps: Maps | None = None
+    """Of the flood over a terrain; None without one, or without water."""
 
 
 def build(case: Case, clock, from_start: bool = True) -> Scene:
@@ -52,7 +55,18 @@ def build(case: Case, clock, from_start: bool = True) -> Scene:
         on_failure.pop_all()
     tank = (case.tank.lower, case.tank.upper) if case.tank else None
     watch = None if structure is None else watch_of(case, structure)
-    return Scene(coupling=coupling, gauges=_gauges(case), solids=solids, tank=tank, watch=watch)
+    maps = _maps(case, coupling.water)
+    return Scene(coupling=coupling, gauges=_gauges(case), solids=solids, tank=tank, watch=watch, maps=maps)
+
+
+def _maps(case: Case, water) -> Maps | None:
+    """Maps of the flood, where there is ground for it."""
+    if water is None or case.tank.ground is None:
+        return None
+    from coupler.geometry.tank_mesh import fitted_of
+    from coupler.results.maps import Maps
+
+    return Maps(water, fitted_of(case.tank), case.tank.ground)
 
 
 def watch_of(case: Case, structure) -> Watch:

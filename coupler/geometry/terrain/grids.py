@@ -52,12 +52,15 @@ def read_grid(path: Path, variable: str | None = None) -> Grid:
 def _esri(path: Path, _variable) -> Grid:
     """The ASCII grid of ESRI (ArcInfo): six lines of head, rows from north to south."""
     head, rest = _esri_head(path)
+    if "dx" in head and "dy" in head:
+        head.setdefault("cellsize", head["dx"])
     for name in ("ncols", "nrows", "cellsize"):
         if name not in head:
             raise TerrainError(f"{path.name}: its head has no {name}; an ESRI ASCII grid begins with one")
-    nx, ny, size = int(head["ncols"]), int(head["nrows"]), head["cellsize"]
-    if nx < 1 or ny < 1 or not size > 0.0:
-        raise TerrainError(f"{path.name}: ncols {nx}, nrows {ny} and cellsize {size:g} must be positive")
+    nx, ny = int(head["ncols"]), int(head["nrows"])
+    size = {"x": head.get("dx", head["cellsize"]), "y": head.get("dy", head["cellsize"])}
+    if nx < 1 or ny < 1 or not min(size.values()) > 0.0:
+        raise TerrainError(f"{path.name}: ncols {nx}, nrows {ny} and cellsize {size['x']:g} must be positive")
     values = np.array(_floats(path, rest))
     if len(values) != nx * ny:
         raise TerrainError(
@@ -65,10 +68,10 @@ def _esri(path: Path, _variable) -> Grid:
         )
     z = values.reshape(ny, nx)[::-1].T.copy()
     z[z == head.get("nodata_value", -9999.0)] = np.nan
-    half = {name: 0.5 * size if f"{name}llcorner" in head else 0.0 for name in "xy"}
+    half = {name: 0.5 * size[name] if f"{name}llcorner" in head else 0.0 for name in "xy"}
     x0 = head.get("xllcorner", head.get("xllcenter", 0.0)) + half["x"]
     y0 = head.get("yllcorner", head.get("yllcenter", 0.0)) + half["y"]
-    return Grid(x0 + size * np.arange(nx), y0 + size * np.arange(ny), z, crs=_sidecar(path))
+    return Grid(x0 + size["x"] * np.arange(nx), y0 + size["y"] * np.arange(ny), z, crs=_sidecar(path))
 
 
 def _esri_head(path: Path) -> tuple[dict[str, float], str]:

@@ -1,0 +1,136 @@
+"""Maps of a flood over terrain: largest depth, speed and h v², and when the water came, at the columns of the mesh.
+
+    h: wet length of a column · v: mean of its horizontal velocity over h · arrival: h passes FILM where it was dry
+
+Written as ESRI ASCII grids, `maps/depth.asc`, `speed.asc`, `flux.asc` (h v²), `arrival.asc`, `bed.asc`, in the
+coordinates of the terrain file where the tank is not turned against it, else of the tank.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+Array = np.ndarray
+
+FILM = 0.1
+"""Depth from which a place counts as wet, in layers of the mesh: thinner films have no speed to speak of."""
+UNKNOWN = -9999.0
+KEPT = ("depth", "speed", "flux", "arrival")
+
+
+class Maps:
+    """Maps of a run. fitted: `FittedMesh` that the water is on · ground: `HeightMap` that it ends on."""
+
+    def __init__(self, water, fitted, ground):
+        self.fitted, self.ground = fitted, ground
+        self.film = FILM * fitted.layer
+        self._shape = fitted.bed.shape
+        self._low, self._high, self._length, self._column = _pairs(water.mesh.nodes, fitted)
+        self._node = np.arange(len(water.mesh.nodes))
+        size = int(np.prod(self._shape))
+        self.depth, self.speed, self.flux = (np.zeros(size) for _ in range(3))
+        self.arrival = np.full(size, np.nan)
+        self._dry = self._now(water)[0] <= self.film
+        """Columns that were dry at the start."""
+
+    def _now(self, water) -> tuple[Array, Array]:
+        """Depth [m] and speed [m/s] of all columns."""
+        phi, u = self._on_mesh(water)
+        a, b = phi[self._low], phi[self._high]
+        wet = np.where((a < 0.0) & (b < 0.0), 1.0, 0.0)
+        parted = (a < 0.0) != (b < 0.0)
+        both = np.abs(a[parted]) + np.abs(b[parted])
+        wet[parted] = np.maximum(-np.minimum(a[parted], b[parted]), 0.0) / np.where(both > 0.0, both, 1.0)
+        wet *= self._length
+        size = len(self.depth)
+        depth = np.bincount(self._column, wet, size)
+        lower, upper = u[self._low], u[self._high]
+        mean = np.where((b < 0.0)[:, None], 0.5 * (lower + upper), lower)
+        flow = [np.bincount(self._column, wet * mean[:, k], size) for k in range(2)]
+        speed = np.hypot(*flow) / np.where(depth > self.film, depth, np.inf)
+        return depth, speed
+
+    def _on_mesh(self, water) -> tuple[Array, Array]:
+        """Level set (N,), dry where there is no water to be, and horizontal velocity (N, 2) at the nodes of the mesh;
+        of several copies of a node the wettest."""
+        phi, u = np.full(len(self._node), np.inf), np.zeros((len(self._node), 2))
+        parent = water.domain.parent_node
+        own = np.where(water.topology.active, water.level_set, np.inf)
+        order = np.argsort(-own, kind="stable")
+        phi[parent[order]], u[parent[order]] = own[order], water.velocity[order, :2]
+        return np.where(np.isfinite(phi), phi, 1e300), u
+
+    def step(self, water, time: float) -> None:
+        """Take the water as it is now."""
+        depth, speed = self._now(water)
+        np.maximum(self.depth, depth, out=self.depth)
+        np.maximum(self.speed, speed, out=self.speed)
+        np.maximum(self.flux, depth * speed**2, out=self.flux)
+        self.arrival[self._dry & np.isnan(self.arrival) & (depth > self.film)] = time
+
+    def save(self) -> dict[str, Array]:
+        """Copies of what has been gathered."""
+        return {name: getattr(self, name).copy() for name in KEPT} | {"dry": self._dry.copy()}
+
+    def restore(self, saved: dict[str, Array]) -> None:
+        """Back to what was saved."""
+        for name in KEPT:
+            setattr(self, name, saved[name].copy())
+        self._dry = saved["dry"].copy()
+
+    def write(self, directory: Path) -> None:
+        """All maps, each file in place of the one before."""
+        directory.mkdir(exist_ok=True)
+        land = ~np.isfinite(self.fitted.bed)
+        wet = (self.depth > self.film).reshape(self._shape)
+        shown = {
+            "bed": (np.where(land, np.nan, self.fitted.bed), "bed of the water [m]"),
+            "depth": (np.where(wet, self._grid("depth"), np.nan), "largest depth [m]"),
+            "speed": (np.where(wet, self._grid("speed"), np.nan), "largest speed, mean over the depth [m/s]"),
+            "flux": (np.where(wet, self._grid("flux"), np.nan), "largest h v2 [m3/s2]"),
+            "arrival": (self._grid("arrival"), "time of arrival where it was dry [s]"),
+        }
+        for name, (values, what) in shown.items():
+            self._write(directory / f"{name}.asc", values, what)
+
+    def _grid(self, name: str) -> Array:
+        return getattr(self, name).reshape(self._shape)
+
+    def _write(self, path: Path, z: Array, what: str) -> None:
+        x, y = self.fitted.column_x, self.fitted.column_y
+        frame = "the tank"
+        x0, y0 = x[0], y[0]
+        if self.ground.turn == 0.0:
+            (x0, y0), frame = self.ground.in_file(x0, y0), "the terrain file, in metres"
+        dx, dy = x[1] - x[0], y[1] - y[0]
+        even = abs(dx - dy) <= 1e-6 * dx
+        size = [f"cellsize {dx:.10g}"] if even else [f"dx {dx:.10g}", f"dy {dy:.10g}"]
+        head = [f"# {what}; coordinates of {frame}", f"ncols {len(x)}", f"nrows {len(y)}"]
+        head += [f"xllcenter {x0:.10g}", f"yllcenter {y0:.10g}", *size, f"NODATA_value {UNKNOWN:g}"]
+        rows = np.where(np.isfinite(z), z, UNKNOWN).T[::-1]
+        lines = [" ".join(f"{value:.4g}" for value in row) for row in rows]
+        new = path.with_suffix(".new")
+        new.write_text("\n".join([*head, *lines]) + "\n", encoding="utf-8")
+        new.replace(path)
+
+
+def _pairs(nodes: Array, fitted) -> tuple[Array, Array, Array, Array]:
+    """Nodes one above the other in the columns of the lattice: lower (p,), upper (p,), distance (p,) [m] and number of
+    the column (p,). Nodes between the columns, of a mesh that is finer in parts, are left out."""
+    X, Y = fitted.column_x, fitted.column_y
+    i, j = (_nearest(axis, nodes[:, k]) for k, axis in enumerate((X, Y)))
+    slack = 1e-6 * min(np.diff(X).min(), np.diff(Y).min())
+    on = np.flatnonzero((np.abs(X[i] - nodes[:, 0]) < slack) & (np.abs(Y[j] - nodes[:, 1]) < slack))
+    column = i[on] * len(Y) + j[on]
+    order = np.lexsort((nodes[on, 2], column))
+    on, column = on[order], column[order]
+    same = np.flatnonzero(column[1:] == column[:-1])
+    low, high = on[same], on[same + 1]
+    return low, high, nodes[high, 2] - nodes[low, 2], column[same]
+
+
+def _nearest(axis: Array, value: Array) -> Array:
+    at = np.clip(np.searchsorted(axis, value), 1, len(axis) - 1)
+    return np.where(value - axis[at - 1] < axis[at] - value, at - 1, at)

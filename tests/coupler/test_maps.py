@@ -1,0 +1,84 @@
+"""Maps of a flood over terrain: exact for level water, kept over a restart, readable as terrain."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from coupler.checks.read_case import load
+from coupler.geometry.tank_mesh import fitted_of
+from coupler.geometry.terrain.grids import read_grid
+from coupler.results.maps import Maps
+from coupler.scene.build_water import water_of
+
+CASE = """
+[case]
+title = "flood"
+[time]
+end = "1 s"
+[tank]
+lower = [0, 0, -3]
+upper = [20, 8, 3]
+cell = "1 m"
+[terrain]
+path = "ground.csv"
+origin = [500, 700]
+[water]
+[[water.fill]]
+lower = [0, 0, -3]
+upper = [20, 8, 0.3]
+"""
+
+
+@pytest.fixture
+def flood(tmp_path):
+    rows = [f"{500 + x},{700 + y},{0.2 * (x - 10) + 0.1 * np.sin(y)}" for x in range(21) for y in range(9)]
+    (tmp_path / "ground.csv").write_text("x,y,z\n" + "\n".join(rows) + "\n")
+    (tmp_path / "case.toml").write_text(CASE)
+    case = load(tmp_path).case
+    water, _ = water_of(case, None, [])
+    return water, Maps(water, fitted_of(case.tank), case.tank.ground)
+
+
+def test_depth_of_level_water_is_that_over_the_bed(flood):
+    water, maps = flood
+    maps.step(water, 0.0)
+    bed = maps.fitted.bed
+    wanted = np.maximum(0.3 - bed, 0.0)
+    deep = wanted > 1.0  # in the cells that the water line cuts the level set is no plane
+    np.testing.assert_allclose(maps.depth.reshape(bed.shape)[deep], wanted[deep], atol=1e-9)
+    assert np.isnan(maps.arrival).all()
+    np.testing.assert_allclose(maps.speed, 0.0, atol=1e-12)
+
+
+def test_arrival_speed_and_flux_of_water_that_rises_and_runs(flood):
+    water, maps = flood
+    maps.step(water, 0.5)
+    water.level_set[:] = water.topology.nodes[:, 2] - 0.9
+    water.velocity[:] = (3.0, -4.0, 1.0)
+    maps.step(water, 0.75)
+    bed = maps.fitted.bed
+    newly = (bed > 0.45) & (bed < 0.75)
+    assert newly.sum() > 8
+    np.testing.assert_array_equal(maps.arrival.reshape(bed.shape)[newly], 0.75)
+    assert np.isnan(maps.arrival.reshape(bed.shape)[bed < 0.1]).all(), "it was wet before"
+    deep = bed < -0.5
+    np.testing.assert_allclose(maps.speed.reshape(bed.shape)[deep], 5.0)
+    np.testing.assert_allclose(maps.flux.reshape(bed.shape)[deep], 25.0 * maps.depth.reshape(bed.shape)[deep])
+
+
+def test_what_was_gathered_goes_into_checkpoints_and_files(flood, tmp_path):
+    water, maps = flood
+    water.level_set[:] = water.topology.nodes[:, 2] - 0.9
+    maps.step(water, 0.75)
+    again = Maps(water, maps.fitted, maps.ground)
+    again.restore(maps.save())
+    for name, array in maps.save().items():
+        np.testing.assert_array_equal(again.save()[name], array)
+    maps.write(tmp_path / "maps")
+    assert sorted(p.name for p in Path(tmp_path / "maps").iterdir()) == [
+        "arrival.asc", "bed.asc", "depth.asc", "flux.asc", "speed.asc",
+    ]  # fmt: skip
+    grid = read_grid(tmp_path / "maps" / "bed.asc")
+    np.testing.assert_allclose(grid.x, 500.0 + maps.fitted.column_x)
+    np.testing.assert_allclose(grid.z, maps.fitted.bed, rtol=1e-3, atol=1e-4)
