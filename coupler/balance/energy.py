@@ -4,6 +4,7 @@ Structure:  Δ(kinetic + gravity + joints stored + contacts stored) + dissipated
 Interface:  W_given − W_received = r_i,  W_given = Σ dt F·V with the velocities V of the pressure solve,
             W_received = work of the same loads over the motion that the discrete elements made
 Water:      Δ(kinetic + potential) + W_given + D_shear + D_vapour + D = E_sides − E_left
+            U_air: energy of trapped air that the water can get back, and what of it was lost with air that got away;
             D_vapour: spent on parting water from its vapour, whose pressure lies below that of the air;
             D_shear: taken by viscosity and by friction of walls; D: what is missing, the dissipation of the numerics;
             E_sides: energy of the water that came in through inflows and seas, with the work of its pressure;
@@ -42,6 +43,7 @@ class Balance:
     numerical_dissipation: float = 0.0
     shear_dissipation: float = 0.0
     parting_work: float = 0.0
+    air_energy: float = 0.0
     entered: float = 0.0
     left: float = 0.0
     work_given: float = 0.0
@@ -72,6 +74,8 @@ class Ledger:
     """Energy of the water that fell out through open sides so far [J]."""
     shear: float = 0.0
     """Energy that viscosity and friction of walls took out of the water so far [J]."""
+    air: float = 0.0
+    """Energy that trapped air holds now and has lost so far [J]."""
     parting: float = 0.0
     """Energy spent so far on parting water from its vapour [J]."""
     _water_start: tuple[float, float] | None = None
@@ -119,7 +123,7 @@ class Ledger:
         dissipation, potential_now = 0.0, potential
         if water is not None:
             change = kinetic + potential - sum(self._water_start)
-            taken = self.work_given + self.shear + self.parting
+            taken = self.work_given + self.shear + self.parting + self.air
             dissipation = self.entered - self.left - change - taken
         received = residual = 0.0
         if structure is not None:
@@ -129,7 +133,7 @@ class Ledger:
             self._input = max(self._input, structure["kinetic"], abs(driven))
             potential_now = potential + structure["gravity"]
         released = self._potential_start - potential_now
-        self._input = max(self._input, abs(released), kinetic, abs(self.entered))
+        self._input = max(self._input, abs(released), kinetic, abs(self.entered), abs(self.air))
         interface = self.work_given - received if water is not None and structure is not None else 0.0
         now = (residual, interface, dissipation + self.left)
         share, step = (self._share(*rows) for rows in (now, np.subtract(now, self._before).tolist()))
@@ -140,6 +144,7 @@ class Ledger:
             numerical_dissipation=dissipation,
             shear_dissipation=self.shear,
             parting_work=self.parting,
+            air_energy=self.air,
             entered=self.entered,
             left=self.left,
             work_given=self.work_given,

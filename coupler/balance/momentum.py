@@ -8,6 +8,7 @@ A line is what it has added since the start, so weight is negative in z and the 
     tank, tank_shear                 sides of the tank on the water: pressure; viscosity and friction
     sides                            water that came in through open sides, inflows and seas, with the pressure there
     openings                         what closes narrow openings (`openings = "wide"`) on the water
+    air                              trapped air on water and bodies: what the sides of the tank do to it
     solids                           fixed solids on the water (with a structure they are held blocks)
     held_blocks                      blocks of prescribed motion on the water and on free blocks
     ground, ground_joints            ground and tank on free blocks: by contact, and through joints
@@ -34,6 +35,7 @@ LINES = (
     ("tank_shear", "viscosity and friction of the sides of the tank on the water"),
     ("sides", "water that came in less what left, with the pressure on inflows and seas"),
     ("openings", "what closes narrow openings on the water (`water.openings`)"),
+    ("air", "trapped air on the water and on bodies, which the sides of the tank carry"),
     ("solids", "fixed solids on the water"),
     ("held_blocks", "held and driven blocks on water and free blocks"),
     ("ground", "ground and tank on free blocks by contact"),
@@ -157,9 +159,9 @@ class WaterStep:
         is_held = np.append(~free, np.zeros(len(load) - n, bool))
         is_solid = np.arange(len(load)) >= n
         own = change.lines
-        lines = {name: own[name] for name in ("tank", "tank_shear", "sides", "openings", *NUMERICAL)}
+        lines = {name: own[name] for name in ("tank", "tank_shear", "sides", "openings", "air", *NUMERICAL)}
         lines |= {"water_weight": own["weight"], "solids": -told(is_solid), "held_blocks": -told(is_held)}
-        acting = [own[name][:3] for name in ("weight", "tank", "tank_shear", "sides", "openings")]
+        acting = [own[name][:3] for name in ("weight", "tank", "tank_shear", "sides", "openings", "air")]
         exchanged = sum(np.linalg.norm(a) for a in acting) + dt * np.linalg.norm(load[:, :3], axis=1).sum()
         return cls(change, lines, told(is_free), float(exchanged))
 

@@ -374,6 +374,9 @@ class RunLimits(Section):
         description="depth to which a block may be in another, the ground or a side of the tank, over the thickness "
         "of the thinner one: twice the distance of its nearest face from its centre of mass",
     )
+    air_pressure: quantity("Pa", gt=0) = Field(
+        1e6, description="pressure of trapped air, relative to the open air"
+    )
     cpu_seconds: PositiveTime | None = Field(
         None, description="processor time that the run may take; a resumed run has as much again"
     )
@@ -412,6 +415,7 @@ def modules(case: Case) -> dict[str, bool]:
         "stabilised transport": water and case.water.advection == "supg",
         "viscosity": water and case.water.viscosity > 0.0,
         "wall friction": water and case.water.walls == "friction",
+        "trapped air": water and case.water.air.model == "trapped",
         "inflow": water and bool(case.water.inflow or case.water.sea),
         "structure": structure,
         "coupling": water and structure,

@@ -61,6 +61,16 @@ class PatchGauge(Section):
     mean_over: PositiveTime | None = MEAN_OVER
 
 
+class AirGauge(Section):
+    """Pressure and volume of a pocket of trapped air; empty while there is none."""
+
+    kind: Literal["air"] = Field(description="what it measures: a pocket of trapped air")
+    name: Name = Field(description="columns of the history")
+    at: Point = Field(
+        description="point (x, y, z); the pocket that is there first is followed wherever it goes"
+    )
+
+
 class VelocityGauge(Section):
     """Velocity of the water at a point."""
 
@@ -168,6 +178,7 @@ Gauge = Annotated[
     LevelGauge
     | PressureGauge
     | PatchGauge
+    | AirGauge
     | VelocityGauge
     | FluxGauge
     | VolumeGauge

@@ -93,6 +93,35 @@ class Sea(Section):
     level: Length = Field(description="height z of the still sea")
 
 
+class Vent(Section):
+    """An orifice through which air leaves a pocket to the open air, or comes in."""
+
+    at: Point = Field(
+        description="a place in the air of the pocket, a cell away from walls; with block: where it is at the start"
+    )
+    area: quantity("m2", gt=0) = Field(description="area of the opening", examples=["10 cm2"])
+    discharge: quantity("", gt=0, le=1) = Field(0.6, description="share of the area that the stream fills")
+    block: Name | None = Field(
+        None, description="block that the orifice moves with; absent: it is fixed in space"
+    )
+
+
+class Air(Section):
+    """The air above and between the water. Absent: open, it comes and goes everywhere."""
+
+    model: Literal["open", "trapped"] = Field(
+        "open",
+        description="open: all air has the pressure of the atmosphere; trapped: air that reaches no open side of the "
+        "tank is squeezed and acts on water, blocks and solids by its pressure",
+    )
+    gamma: quantity("", ge=1, le=1.4) = Field(
+        1.4,
+        description="exponent of p V^gamma of trapped air: 1.4 without exchange of heat, 1 at one temperature",
+    )
+    atmospheric: quantity("Pa", gt=0) = Field(101_325.0, description="absolute pressure of the open air")
+    vent: tuple[Vent, ...] = Field((), description="orifices of pockets")
+
+
 class Water(Section):
     """The water. Absent: no water, and nothing of the flow solver is loaded."""
 
@@ -131,6 +160,7 @@ class Water(Section):
     vapour_pressure: quantity("Pa", lt=0) = Field(
         -98e3, description="pressure of the vapour of the water, relative to the air", examples=["-98 kPa"]
     )
+    air: Air = Field(default_factory=Air, description="what the air does")
     covers: Literal["single", "multiple"] = Field(
         "single",
         description="one set of unknowns per node, or one per part of the water that a thin wall separates",

@@ -14,6 +14,7 @@ from coupler.case.case import Case
 from coupler.case.schedule import MOST_OUTPUTS
 from coupler.case.toml_lines import shown
 from coupler.case.verdict import Verdict
+from coupler.checks.air import air_problems
 from coupler.checks.joints import joint_problems, pair_problems
 from coupler.checks.motion import motion_problems
 from coupler.checks.places import frame_problems, opening_problems, place_problems, solid_bodies
@@ -47,6 +48,7 @@ def problems(case: Case) -> list[Problem]:
     found += [*shapes, *refused, *_unique_names(case, parts), *_known_names(case, parts), *_pairs(case)]
     found += [*_law(case), *place_problems(case, parts), *table_problems(case)]
     found += pair_problems(case, parts)
+    found += air_problems(case, [block.name for part in parts for block in part.blocks])
     if case.structure is not None:
         found += motion_problems(case, parts)
     return found if found else list(joint_problems(case, parts))

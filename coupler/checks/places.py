@@ -273,7 +273,9 @@ def _gauges(case: Case, held: list[Placed]) -> Iterator[Problem]:
             yield (*path, "kind"), f"a {gauge.kind} gauge measures water; write a section [water]"
         elif gauge.kind == "volume":
             yield from _corners_in_order(path, gauge)
-        elif gauge.kind in ("level", "pressure", "patch", "velocity", "flux") and case.tank is not None:
+        elif (
+            gauge.kind in ("level", "pressure", "patch", "air", "velocity", "flux") and case.tank is not None
+        ):
             yield from _gauge_place(case, path, gauge, held)
             yield from _patch(path, gauge)
 

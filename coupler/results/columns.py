@@ -11,6 +11,11 @@ ENERGY = (
     ("numerical_dissipation", "J", "energy the numerics took out of the water so far; negative: put in"),
     ("shear_dissipation", "J", "energy that viscosity and friction of walls took out of the water so far"),
     ("parting_work", "J", "energy spent so far on parting water from its vapour"),
+    (
+        "air_energy",
+        "J",
+        "energy that trapped air holds, and what of it was lost with air that got away so far",
+    ),
     ("entered", "J", "energy that came with water through inflows and seas so far, less what left there"),
     ("left", "J", "energy of the water that fell out through open sides so far"),
     ("work_given", "J", "work of the water on the blocks so far, with the velocities of the pressure solve"),
@@ -65,6 +70,17 @@ WATER = (
     ("momentum_x", "N s", "momentum of the water"),
     ("momentum_y", "N s", "momentum of the water"),
     ("momentum_z", "N s", "momentum of the water"),
+)
+AIR = (
+    ("time", "s", "time"),
+    ("pockets", "1", "pockets of trapped air"),
+    ("volume", "m3", "volume of all pockets"),
+    ("reference", "m3", "volume that their air would have at the pressure of the atmosphere"),
+    ("largest_pressure", "Pa", "largest pressure of a pocket over the step, relative to the open air"),
+    ("lowest_pressure", "Pa", "lowest pressure of a pocket over the step, relative to the open air"),
+    ("lost", "J", "energy of air that got away or was mixed with other air so far"),
+    ("entrained", "m3", "reference volume of pockets that opened within the water so far"),
+    ("filled", "1", "pockets that water filled so far"),
 )
 STRUCTURE = (
     ("time", "s", "time"),

@@ -25,7 +25,7 @@ class Gauge:
 
     columns: tuple[tuple[str, str, str], ...]
     read: Callable
-    windows: Windows | GroupLoads | BlockLoads | None = None
+    windows: Windows | GroupLoads | BlockLoads | Followed | None = None
     table: str | None = None
 
 
@@ -62,6 +62,7 @@ def make_gauge(spec, rows_of: dict[str, np.ndarray]) -> Gauge:
         "level": _level,
         "pressure": _pressure,
         "patch": _patch,
+        "air": _air,
         "velocity": _velocity,
         "flux": _flux,
         "volume": _volume,
@@ -132,6 +133,46 @@ def _patch(spec, rows_of) -> Gauge:
         return _measured(columns, [mean, covered, *windows.add(record.time, record.dt, mean)])
 
     return Gauge(columns, read, windows)
+
+
+def _air(spec, rows_of) -> Gauge:
+    columns = (
+        (f"{spec.name}_pressure", "Pa", f"pressure of the pocket of air at {spec.at} over the step"),
+        (f"{spec.name}_volume", "m3", f"volume of the pocket of air at {spec.at}"),
+    )
+    followed = Followed()
+
+    def read(coupling, record):
+        return _measured(columns, followed.read(coupling.water, np.array(spec.at, float)))
+
+    return Gauge(columns, read, followed)
+
+
+class Followed:
+    """The pocket of air that was at a place first, wherever it goes."""
+
+    def __init__(self):
+        self.name = 0
+
+    def read(self, water, place) -> tuple[float, float]:
+        """Pressure [Pa] over the last step and volume [m³] of the pocket; NaN while there is none."""
+        from fluid.readings.gauges import pocket_at
+
+        air = water.air
+        if self.name == 0 and (found := pocket_at(water, place)) is not None:
+            self.name = int(air.name[found])
+        there = np.flatnonzero(air.name == self.name)
+        if self.name == 0 or len(there) == 0:
+            return np.nan, np.nan
+        return float(air.mean_pressure[there[0]]), float(water.pocket_volumes()[there[0]])
+
+    def save(self) -> dict[str, np.ndarray]:
+        """What `restore` takes."""
+        return {"name": np.array(self.name)}
+
+    def restore(self, saved: dict[str, np.ndarray]) -> None:
+        """Back to what was saved."""
+        self.name = int(saved["name"])
 
 
 def free_mean(values) -> tuple[float, float]:

@@ -4,6 +4,7 @@
 `history/coupling.csv` how each step went   `history/water.csv`     volume
 `history/gauges.csv`   the gauges           `history/structure.csv` joints, fastest block
 `maps/*.asc`           of a flood over terrain
+`history/air.csv`      pockets, where air is trapped
 `history/loads_*.csv`  loads by what they come from, where a case asks for them
 `cracks.csv`, `blocks.csv`  what became of each joint and block, with the verdict in run.json
 """
@@ -14,6 +15,7 @@ import numpy as np
 
 from coupler.geometry.tank_mesh import basin_edges
 from coupler.results.columns import (
+    AIR,
     COUPLING,
     ENERGY,
     MOMENTUM_TITLE,
@@ -60,6 +62,7 @@ class Recorder:
             "angular_momentum", momentum_columns("N m s", of), f"angular {MOMENTUM_TITLE}"
         )
         self._water = self._table("water", WATER) if water else None
+        self._air = self._table("air", AIR) if water and water.air is not None else None
         self._structure = self._table("structure", STRUCTURE) if structure else None
         self._gauges = self._table("gauges", self._gauge_columns()) if self._together() else None
         self._own = [(gauge, self._table(gauge.table, gauge.columns)) for gauge in gauges if gauge.table]
@@ -153,6 +156,7 @@ class Recorder:
             numerical_dissipation=b.numerical_dissipation,
             shear_dissipation=b.shear_dissipation,
             parting_work=b.parting_work,
+            air_energy=b.air_energy,
             entered=b.entered,
             left=b.left,
             work_given=b.work_given,
@@ -170,6 +174,8 @@ class Recorder:
         self._append_momentum(record)
         if self._water:
             self._append_water(record)
+        if self._air:
+            self._append_air(record)
         if self._structure:
             self._append_structure(record)
         if self._gauges:
@@ -214,6 +220,21 @@ class Recorder:
             wall_at_bound=w.report.bound.wall,
             parted=self.parted,
             **_xyz("momentum", w.momentum()),
+        )
+
+    def _append_air(self, record) -> None:
+        air = self.coupling.water.air
+        pressure = air.mean_pressure
+        self._air.append(
+            time=record.time,
+            pockets=len(air),
+            volume=float(self.coupling.water.pocket_volumes().sum()),
+            reference=float(air.reference.sum()),
+            largest_pressure=float(pressure.max(initial=0.0)),
+            lowest_pressure=float(pressure.min(initial=0.0)),
+            lost=air.lost,
+            entrained=air.entrained,
+            filled=air.gone,
         )
 
     def _append_structure(self, record) -> None:

@@ -17,7 +17,7 @@ from coupler.run.clock import Clock
 from coupler.run.left_out import imports, note_work
 from coupler.run.within_step import LongSteps, StepLeft
 from coupler.scene.build import Scene, build, limits_of
-from coupler.step.limits import LimitReached, Limits, Stopped, check_defect, check_overlap
+from coupler.step.limits import LimitReached, Limits, Stopped, check_air, check_defect, check_overlap
 from coupler.step.observe import joint_counts, size
 from coupler.step.step_limits import check_step
 
@@ -88,6 +88,8 @@ def _describe(scene: Scene, reporter) -> None:
             f"water: {len(c.water.mesh.cells)} cells in the mesh, {len(d.cells)} outside the solids "
             f"({int(d.is_cut.sum())} cut), {c.water.volume():.6g} m3"
         )
+    if c.water is not None and c.water.air is not None:
+        reporter.message(described_air(c.water))
     if c.structure is not None:
         limit, substep = c.structure.substep_limit(), c.structure.substep()
         joints = joint_counts(c.structure).intact
@@ -99,6 +101,19 @@ def _describe(scene: Scene, reporter) -> None:
             reporter.message(f"note: {limit.remark(substep)}")
         for what, law in laws_of(c.structure).items():
             reporter.message(f"{what}: {law}")
+
+
+def described_air(water) -> str:
+    """The pockets of trapped air at the start, in words, with the weight that they could carry."""
+    volume = water.pocket_volumes()
+    if len(volume) == 0:
+        return "air: no pocket is closed off yet; those that the water closes are followed"
+    p = water.parameters
+    lift = p.density * p.gravity * float(volume.sum())
+    pockets = (
+        "one pocket" if len(volume) == 1 else f"{len(volume)} pockets, the largest of {volume.max():.4g} m3,"
+    )
+    return f"air: {pockets} of {volume.sum():.4g} m3 in all closed off, which under water would lift {lift:.4g} N"
 
 
 def laws_of(structure) -> dict[str, str]:
@@ -143,6 +158,7 @@ def _steps(
             if coupling.structure is not None:
                 depth = case.limits.overlap
                 check_overlap(coupling.time, deepest_overlap(coupling.structure, depth), depth)
+            check_air(coupling.time, coupling.water, case.limits.air_pressure)
             if _reached(coupling.time, target):
                 with clock("output"):
                     recorder.fields(coupling.time)

@@ -47,11 +47,36 @@ def water_of(case: Case, structure, solids):
         velocity = start_velocity(boxes, [fill.velocity for fill in w.fill], immersion.domain.nodes)
     opened, smooth = sides_named(case.tank.open, mesh), sides_named(case.tank.smooth, mesh)
     water = Water(
-        mesh, immersion.domain, level, parameters, opened, smooth, _flows(case, mesh), velocity=velocity
+        mesh,
+        immersion.domain,
+        level,
+        parameters,
+        opened,
+        smooth,
+        _flows(case, mesh),
+        velocity=velocity,
+        **_trapped_air(w.air, structure, immersion.domain),
     )
     if immersion.cracks is not None and immersion.cracks.lumped:
         water.set_cracks(immersion.cracks.cracks())
     return water, immersion
+
+
+def _trapped_air(air, structure, domain) -> dict:
+    """What `Water` wants of the air; nothing where it is open, and then its code is not loaded."""
+    if air.model == "open":
+        return {}
+    from fluid.air.gas import Gas
+    from fluid.air.leaks import Vent
+
+    bodies, vents = domain.memory.bodies, []
+    for spec in air.vent:
+        body, place = -1, np.array(spec.at, float)
+        if spec.block is not None:
+            body = structure.names.index(spec.block)
+            place = bodies.rotation[body].T @ (place - bodies.centre[body])
+        vents.append(Vent(place, spec.area, spec.discharge, body))
+    return {"gas": Gas(air.gamma, air.atmospheric), "vents": tuple(vents)}
 
 
 def _reaching(tank, fill) -> tuple:

@@ -230,6 +230,8 @@ class CoupledStepper:
         self._check_finite()
         if self.water is not None and self.water.sides is not None:
             self.ledger.entered = self.water.energy_through_sides()
+        if self.water is not None:
+            self.ledger.air = self.water.air_energy()
         energies = self._structure_energies()
         record.energies = energies or {}
         record.balance = self.ledger.balance(self._water_energy(), energies)
@@ -259,6 +261,7 @@ class CoupledStepper:
         with self._placed(problem):
             problem, found, moved, assumed = self._exchange(problem, record, start)
         self.water.farther = dt * (self._padded(moved) - self.water.pushed_by)
+        self.water.moved_by_end = self.water.moved_on + dt * self._padded(moved)
         self.water.pushed_by = found.velocity
         with self.clock("water"):
             self.water.correct(problem, found.x, found.parting)

@@ -111,6 +111,24 @@ def check_overlap(time: float, found, limit: float) -> None:
     )
 
 
+def check_air(time: float, water, limit: float) -> None:
+    """Stop where trapped air is squeezed, or drawn out, beyond what its law is good for. Raises Diverged."""
+    if water is None or water.air is None or len(water.air) == 0:
+        return
+    k = int(np.abs(water.air.mean_pressure).argmax())
+    found = water.air.mean_pressure[k]
+    if abs(found) <= limit:
+        return
+    low, high = water.pocket_bounds(k)
+    volume = water.pocket_volumes()[k]
+    box = f"({', '.join(f'{x:.3g}' for x in low)}) to ({', '.join(f'{x:.3g}' for x in high)})"
+    raise Diverged(
+        f"a pocket of trapped air between {box} m, {volume:.3g} m3, has {found:.4g} Pa at t = {time:.4g} s; limit "
+        f"{limit:g} Pa (limits.air_pressure). Give it a way out ([[water.air.vent]]), use a larger tank.cell if it is "
+        "smaller than a few cells, or raise the limit if such a pressure is what the scene is about."
+    )
+
+
 HIGHEST_PRESSURE = 1e8
 """[Pa] beyond any impact: water hammer at 70 m/s."""
 

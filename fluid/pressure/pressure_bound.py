@@ -16,15 +16,18 @@ from numba import njit
 from fluid.numerics.bounded import at_air
 
 
-def lowest_pressure(water, graph, dofs, phi) -> np.ndarray | None:
-    """Bound (n,) [Pa] of the pressure at the wet nodes dofs (n,) of the level set φ (N,) [m]; None: there is none."""
+def lowest_pressure(water, graph, dofs, phi, of_air: float = 0.0) -> np.ndarray | None:
+    """Bound (n,) [Pa] of the pressure at the wet nodes dofs (n,) of the level set φ (N,) [m]; None: there is none.
+
+    of_air [Pa]: lowest pressure of any air. Water that a cushion slows down has less than its pressure beside it, and
+    water that a pocket of low pressure draws on has less than that of the open air: it is all air that bounds it."""
     p = water.parameters
     if p.suction != "bounded":
         return None
     vented = _beside_air(
         dofs, graph.row, graph.start, graph.neighbour, phi, water.open_to_air, water.ventilated
     )
-    return np.where(vented, 0.0, p.vapour_pressure)
+    return np.where(vented, max(of_air, p.vapour_pressure), p.vapour_pressure)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,12 +63,13 @@ class BoundMet:
             )
         vented = x == problem.air  # also where air came to within the step
         met = vented | (x <= problem.lower)
-        open_ = at_air(x, problem.air) & (vented | (problem.bound == 0.0))
+        open_ = at_air(x, problem.air) & (vented | (problem.bound == problem.of_open_air))
         at_bound[problem.dofs[met]] = True
         ventilated[problem.dofs[open_]] = True
         rate = 0.0 if parting is None else parting
         opened = problem.dt * float(np.sum(rate))
-        work = -problem.dt * float(np.sum(rate * np.where(vented, 0.0, problem.bound)))
+        parted_at = problem.of_water(np.where(vented, problem.of_open_air, problem.bound))
+        work = -problem.dt * float(np.sum(problem.of_water(rate) * parted_at)) if opened else 0.0
         wall = 0.0
         if met.any():
             area = wall_area(water.mesh, water.domain)

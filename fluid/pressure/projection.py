@@ -56,6 +56,10 @@ class PressureProblem:
     """What the water keeps between predict and correct."""
     bound: np.ndarray | None = None
     at_bound: np.ndarray | None = None
+    of_open_air: float = 0.0
+    """Bound [Pa] where air can reach: that of the air outside, or of trapped air that has less."""
+    pockets: int = 0
+    """How many of the last unknowns are those of trapped air (`fluid.air.cushions`)."""
 
     @property
     def lower(self) -> np.ndarray | None:
@@ -64,8 +68,20 @@ class PressureProblem:
 
     @property
     def air(self) -> np.ndarray | None:
-        """Bound of x (n,) [Pa] where air is."""
-        return None if self.bound is None else 0.0 - self.known
+        """Bound of x (n,) [Pa] where air is; none for what is air itself."""
+        if self.bound is None:
+            return None
+        air = self.of_open_air - self.known
+        air[len(air) - self.pockets :] = -np.inf
+        return air
+
+    def of_water(self, values) -> np.ndarray:
+        """values (n, ...) of the unknowns, without those of trapped air."""
+        return values[: values.shape[0] - self.pockets]
+
+    def of_air(self, values) -> np.ndarray:
+        """values (n, ...) of the unknowns of trapped air."""
+        return values[values.shape[0] - self.pockets :]
 
 
 @njit(cache=True)
@@ -210,10 +226,10 @@ def inflow(cell_list, u_cell, cells, parent, g, volume, n_nodes):
 
 
 @njit(cache=True)
-def with_ghosts(pressure, wet, open_node, phi, cell_list, cells):
-    """Pressure (N,) continued to the dry corners of the listed cells through the zero at the surface:
+def with_ghosts(pressure, air, wet, open_node, phi, cell_list, cells):
+    """Pressure (N,) continued to the dry corners of the listed cells through that of the air (N,) at the surface:
 
-    p_j = φ_j Σ_i p_i φ_i / Σ_i φ_i² over the wet corners i beside j (weighted by the cells they share)."""
+    p_j = a_j + φ_j Σ_i (p_i - a_j) φ_i / Σ_i φ_i²,    over the wet corners i beside j, once for each shared cell."""
     up, down = np.zeros(pressure.shape[0]), np.zeros(pressure.shape[0])
     for s in range(cell_list.shape[0]):
         e = cell_list[s]
@@ -224,12 +240,12 @@ def with_ghosts(pressure, wet, open_node, phi, cell_list, cells):
             for b in range(4):
                 i = cells[e, b]
                 if wet[i] and not open_node[i]:
-                    up[j] += pressure[i] * phi[i]
+                    up[j] += (pressure[i] - air[j]) * phi[i]
                     down[j] += phi[i] * phi[i]
     out = pressure.copy()
     for j in range(pressure.shape[0]):
         if not wet[j]:
-            out[j] = phi[j] * up[j] / down[j] if down[j] > 0.0 else 0.0
+            out[j] = air[j] + (phi[j] * up[j] / down[j] if down[j] > 0.0 else 0.0)
     return out
 
 

@@ -26,11 +26,13 @@ from fluid.domain.physical_domain import hat_values
 from fluid.pressure.projection import with_ghosts
 
 
-def waterline_load(domain, faces, left_out, phi, wet, pressure, open_node) -> np.ndarray:
+def waterline_load(domain, faces, left_out, phi, wet, pressure, open_node, air=None) -> np.ndarray:
     """R of (2): force and moment on every body (n_bodies, 6) [N, N m].
 
-    faces (k,) rows of the polygons of G · left_out (l,) rows of those that are not in G though their cells hold water ·
-    phi (N,) [m] · wet (N,) bool · pressure (N,) [Pa], read on wet nodes · open_node (N,) bool: p = 0."""
+    faces (k,) rows of the polygons of G · left_out (l,) rows of those not in G though their cells hold water ·
+    phi (N,) [m] · wet (N,) bool · pressure (N,) [Pa], read on wet nodes · open_node (N,) bool: p = 0 · air (N,) [Pa]:
+    pressure of trapped air at dry nodes, None: there is none. It acts on both sides of the surface, so that the
+    correction is that of the pressure above it."""
     load = np.zeros((domain.n_bodies, 6))
     count = wet[domain.cells[domain.face_cell[faces]]].sum(axis=1)
     mixed = faces[(count > 0) & (count < 4)]
@@ -42,9 +44,14 @@ def waterline_load(domain, faces, left_out, phi, wet, pressure, open_node) -> np
     reached = np.zeros(len(phi), bool)
     reached[corners] = True
     beside = cells_touching(reached, domain.cells)
-    ghosts = with_ghosts(p, wet, open_node, phi, beside, domain.cells)
+    outside = np.zeros(len(phi)) if air is None else air
+    ghosts = with_ghosts(p, outside, wet, open_node, phi, beside, domain.cells)
     hats = hat_values(domain.nodes[corners], domain.face_corners[at])
-    height, full, acting = (np.einsum("kqa,ka->kq", hats, f[corners]) for f in (phi, ghosts, p))
+    full, acting = ghosts[corners], p[corners]
+    if air is not None:
+        above = outside[corners][np.arange(len(at)), np.abs(outside[corners]).argmax(axis=1)][:, None]
+        full, acting = full - above, np.where(wet[corners] & ~open_node[corners], acting - above, 0.0)
+    height, full, acting = (np.einsum("kqa,ka->kq", hats, f) for f in (phi[corners], full, acting))
     acting[len(mixed) :] = 0.0
     body = domain.face_body[at]
     arm = domain.face_corners[at] - domain.body_centre[body][:, None]

@@ -40,10 +40,23 @@ def levels(water, places) -> np.ndarray:
 
 
 def pressure(water, points):
-    """Pressure [Pa] at points (m, 3) or (3,) [m] → (m,) or a number; 0 in the air, NaN inside a solid."""
+    """Pressure [Pa] at points (m, 3) or (3,) [m] → (m,) or a number; in the air 0 or that of the pocket, NaN inside a
+    solid."""
     places = Places.of(water, points)
-    p = np.where(places.read(water.level_set) >= 0.0, 0.0, places.read(water.pressure))
+    in_air = places.read(water.level_set) >= 0.0
+    p = np.where(in_air, 0.0, places.read(water.pressure))
+    if water.air is not None:
+        of_air = water.air.nodal(water.air.mean_pressure)[places.corners]
+        p = np.where(in_air, of_air[np.arange(len(p)), np.abs(of_air).argmax(axis=1)], p)
     return p if np.ndim(points) == 2 else float(p[0])
+
+
+def pocket_at(water, point) -> int | None:
+    """The pocket of trapped air, 0 ... K-1, at a point (3,) [m]; None where there is none."""
+    from fluid.air.leaks import pockets_at
+
+    k = int(pockets_at(water, np.atleast_2d(point))[0]) - 1
+    return None if k < 0 else k
 
 
 def velocity(water, points):

@@ -72,6 +72,10 @@ def corrected(water, problem, x, parting) -> Corrected:
     if kept.held is not None:
         unknown += kept.held
         pressure += kept.held / kept.theta
+    if kept.cushions is not None:
+        in_pocket = kept.cushions.air.label > 0
+        unknown[in_pocket] = kept.cushions.air.nodal(problem.of_air(x))[in_pocket]
+        pressure[in_pocket] = kept.cushions.air.nodal(problem.of_air(x + problem.known))[in_pocket]
     gradient = _pressure_gradient(water, kept, unknown, dt / problem.density)
     u, mean = _projected(t, kept, gradient)
     a = np.where(kept.wet[:, None], (u - kept.advected) / (kept.theta * dt), 0.0)
@@ -115,7 +119,7 @@ def _given_by_films(water, problem):
     """(N,) [m³/s] that films take from their rims as the bodies move."""
     found, given = np.zeros(len(problem.predicted.wet)), problem.predicted.given_by_films
     if given is not None:
-        found[problem.dofs] = given @ water.pushed_by.ravel()
+        found[problem.of_water(problem.dofs)] = given @ water.pushed_by.ravel()
     return found
 
 
@@ -123,7 +127,8 @@ def _pressure_gradient(water, kept, pressure, scale):
     """(dt/ρ) ∇x of the wet cells (n, 3) [m/s]."""
     t = water.topology
     unheld = water.walls.open_node if kept.held is None else water.walls.open_node & (kept.held == 0.0)
-    full = with_ghosts(pressure, kept.wet, unheld, kept.level_set, kept.wet_cells, t.cells)
+    air = np.zeros(len(pressure)) if kept.cushions is None else np.where(kept.wet, 0.0, pressure)
+    full = with_ghosts(pressure, air, kept.wet, unheld, kept.level_set, kept.wet_cells, t.cells)
     return scale * cell_gradient(kept.wet_cells, full, t.cells, t.parent, t.gradients)
 
 

@@ -43,7 +43,7 @@ NUMERICAL = (
     "shear_solve",
 )
 """Lines of the scheme, in the order of the step."""
-PHYSICAL = ("weight", "tank", "tank_shear", "sides", "openings", "bodies")
+PHYSICAL = ("weight", "tank", "tank_shear", "sides", "openings", "air", "bodies")
 """Lines of what acts on the water."""
 
 
@@ -87,6 +87,7 @@ def momentum_change(water, problem, unknown, pressure, stages: Stages) -> Moment
     cells, tank, held = _reactions(water, kept, x, p, dt)
     openings = _at_closed_openings(water, kept, p, dt)
     told, shear_told, tank_shear = _loads(water, problem, p)
+    of_air, air_told = _of_air(water, problem, unknown, pressure)
     through, side_pressure = _through(water, kept), -dt * _pressure_on_sides(water, p)
     weight = dt * at["weight"]
     lines = {
@@ -95,13 +96,15 @@ def momentum_change(water, problem, unknown, pressure, stages: Stages) -> Moment
         "tank_shear": tank_shear,
         "sides": through + side_pressure,
         "openings": openings,
-        "bodies": -told,
+        "air": of_air[0] + of_air[1] + air_told,
+        "bodies": -told - air_told,
         "transport": at["carried"] - at["kicked"] - through,
         "volume_correction": at["advected"] - at["carried"],
-        "carried": at["kicked"] - at["before"] + at["star"] - at["sheared"] - weight - cells[1],
+        "carried": at["kicked"] - at["before"] + at["star"] - at["sheared"] - weight - cells[1] - of_air[1],
         "surface": at["projected"]
         - at["star"]
         - cells[0]
+        - of_air[0]
         + at["end"]
         - at["slipping"]
         + told
@@ -169,6 +172,23 @@ def _at_closed_openings(water, kept, p, dt):
     return -dt * (total + _on_bodies(water, np.where(beside, p, 0.0)))
 
 
+def _of_air(water, problem, unknown, pressure):
+    """Impulses of trapped air: on the water, by x and by p - x of its nodes (2, 6), and on the bodies (6,).
+
+    The sides of the tank carry what it does to both of them."""
+    kept, dt, t = problem.predicted, problem.dt, water.topology
+    if kept.cushions is None:
+        return np.zeros((2, 6)), np.zeros(6)
+    in_pocket = kept.cushions.air.label > 0
+    x, p = np.where(in_pocket, unknown, 0.0), np.where(in_pocket, pressure, 0.0)
+    cells = np.concatenate([kept.wet_cells, kept.void])
+    mesh = (t.nodes, t.cells, t.parent, t.gradients, t.volume, t.share)
+    of_x, of_p, _ = hat_forces(cells, x, p, np.zeros(len(x), bool), water.reference, *mesh)
+    acting = problem.of_air(problem.coupling).T @ kept.cushions.air.at_pockets(pressure)
+    told = -dt * about(water.reference, acting, water.domain.body_centre)
+    return -dt * np.array([of_x, of_p - of_x]), told
+
+
 def _on_bodies(water, p):
     """Gᵀ p about the reference (6,) [N, N m]."""
     return about(water.reference, water.coupling.T @ p, water.domain.body_centre)
@@ -177,7 +197,7 @@ def _on_bodies(water, p):
 def _loads(water, problem, p):
     """Impulses: told to the bodies, of it the wall shear, and that of the sides of the tank on the water by shear."""
     centre, dt, shear = water.domain.body_centre, problem.dt, problem.predicted.shear
-    told = problem.other_load - (problem.coupling.T @ p[problem.dofs]).reshape(-1, 6)
+    told = problem.other_load - (problem.coupling.T @ p[problem.dofs]).reshape(-1, 6)  # p is 0 in the air
     told = dt * about(water.reference, told, centre)
     if shear is None:
         return told, np.zeros(6), np.zeros(6)

@@ -46,7 +46,8 @@ class Predicted:
     volume correction, shear: ViscousChange by viscosity and friction, None without; end [s]: time at the end of the
     step; left: what leaves through open sides, None if nothing; through (N,) [m³] that comes in through sides,
     None without any; held (N,) [Pa]: unknown part of the pressure on the nodes of seas, None without any side;
-    displaced (N,) [m³]: part of nodal_water that the bodies take in this step; given_by_films: `films.Handed.given`."""
+    displaced (N,) [m³]: part of nodal_water that the bodies take in this step; given_by_films: `films.Handed.given`;
+    cushions: trapped air (`fluid.air.cushions`), None without any."""
 
     level_set: np.ndarray
     nodal_water: np.ndarray
@@ -68,6 +69,7 @@ class Predicted:
     through: np.ndarray | None
     held: np.ndarray | None
     displaced: np.ndarray
+    cushions: object | None = None
     given_by_films: object | None = None
 
 
@@ -230,6 +232,13 @@ def _problem(
     if water.slits is not None:
         lumped, drive = water.slits.pressure_terms(dofs, known, water.parameters.weight, dt, density)
         matrix, extra = matrix + lumped, extra + drive
+    cushions = None
+    if water.air is not None:
+        from fluid.air.cushions import Cushions
+
+        taken = water.coupling @ water.moved_on.ravel()
+        cushions = Cushions.of(water.air, t, water.level_set, phi, water.open_to_air, taken)
+        cushions = cushions.beside(graph, phi, dofs, theta, kick, dt / density)
     kept = Predicted(
         level_set=phi,
         nodal_water=surface.nodal_water,
@@ -251,9 +260,12 @@ def _problem(
         through=through,
         held=held,
         displaced=displaced,
+        cushions=cushions,
     )
     acted = _known_pressure(water, water.pressure, phi)
-    other = waterline_load(water.domain, faces, left_out, phi, wet, acted, water.walls.open_node)
+    air = None if cushions is None else cushions.air.nodal(cushions.pressure)
+    least = 0.0 if cushions is None else cushions.lowest(dt)
+    other = waterline_load(water.domain, faces, left_out, phi, wet, acted, water.walls.open_node, air)
     if shear is not None:
         other += shear.load
     problem = PressureProblem(
@@ -267,10 +279,13 @@ def _problem(
         density=density,
         other_load=other,
         predicted=kept,
-        bound=lowest_pressure(water, graph, dofs, phi),
+        bound=lowest_pressure(water, graph, dofs, phi, least),
         at_bound=water.at_bound[dofs],
+        of_open_air=least,
     )
-    return problem if water.films is None else water.films.handed_on(water, problem)
+    if water.films is not None:
+        problem = water.films.handed_on(water, problem)
+    return problem if cushions is None else cushions.within(problem, rhs, coupling, part.void, water.domain)
 
 
 def _known_pressure(water, pressure, phi):

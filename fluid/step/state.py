@@ -6,6 +6,8 @@ What follows from the mesh and from the solids is left out: whoever restores mak
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from fluid.domain.topology import Graph
@@ -34,6 +36,19 @@ NUMBERS = {
     "_domain_is_new": bool,
 }
 SIDES = ("entered", "left", "energy")
+OF_AIR = (
+    "label",
+    "reference",
+    "rate",
+    "end_pressure",
+    "mean_pressure",
+    "turned",
+    "name",
+    "names",
+    "lost",
+    "entrained",
+    "gone",
+)
 
 
 class NotAfterAStep(RuntimeError):
@@ -53,6 +68,8 @@ def save(water) -> dict[str, np.ndarray]:
     arrays |= {"graph_nodes": water.flux.graph.nodes, "flux_nodes": water.flux.nodes, "flux": water.flux.rate}
     if water.sides is not None:
         arrays |= {name: np.array(getattr(water.sides, name)) for name in SIDES}
+    if water.air is not None:
+        arrays |= {f"air_{name}": np.array(getattr(water.air, name)) for name in OF_AIR}
     if water.slits is not None:
         arrays |= {"slit_name": water.slits.name, "slit_flow": water.slits.flow}
     return arrays
@@ -60,7 +77,7 @@ def save(water) -> dict[str, np.ndarray]:
 
 def restore(water, domain, arrays) -> None:
     """Back to a saved state on `domain`, the same as the one that it was saved on.  Raises OtherWater."""
-    _check(domain, arrays, water.sides)
+    _check(domain, arrays, water.sides, water.air)
     water.set_domain(domain)
     for name in (*NODAL, *OF_CELLS, *OF_BODIES, "listed", "layer_start"):
         setattr(water, name, np.array(arrays[name]))
@@ -78,13 +95,16 @@ def restore(water, domain, arrays) -> None:
     if water.sides is not None:
         for name in SIDES:
             setattr(water.sides, name, float(arrays[name]))
+    if water.air is not None:
+        held = {name: np.array(arrays[f"air_{name}"]) for name in OF_AIR}
+        water.air = replace(water.air, **{name: v if v.ndim else v.item() for name, v in held.items()})
     if "slit_name" in arrays:
         from fluid.pressure.slits import Slits
 
         water.slits = Slits.remembered(np.array(arrays["slit_name"]), np.array(arrays["slit_flow"]))
 
 
-def _check(domain, arrays, sides) -> None:
+def _check(domain, arrays, sides, air) -> None:
     wanted = {
         *NODAL,
         *OF_CELLS,
@@ -96,7 +116,9 @@ def _check(domain, arrays, sides) -> None:
         "flux_nodes",
         "flux",
     }
-    missing = sorted((wanted | (set(SIDES) if sides is not None else set())) - set(arrays))
+    wanted |= set(SIDES) if sides is not None else set()
+    wanted |= {f"air_{name}" for name in OF_AIR} if air is not None else set()
+    missing = sorted(wanted - set(arrays))
     if missing:
         raise OtherWater(f"not the state of this water: {', '.join(missing)} missing")
     nodes, cells = len(arrays["level_set"]), len(arrays["remainder"])

@@ -46,7 +46,8 @@ class Water:
     in the water, or the level set (N,) itself · is_open: (normals (B, 3), centres (B, 3)) → bool (B,), sides of
     the tank that let water out; None: all closed · is_smooth: the same, sides that stay smooth whatever
     `parameters.walls` says · sides: `inflow.Sides`, where water is led in or a sea stands; None: nowhere ·
-    velocity (N, 3) [m/s] at the nodes of the domain at the start; None: at rest.
+    velocity (N, 3) [m/s] at the nodes of the domain at the start; None: at rest · gas: `fluid.air.gas.Gas` of the air
+    that cannot leave; None: the air is open everywhere · vents: `fluid.air.leaks.Vent` of its pockets.
 
     State at the nodes of the domain: level_set (N,) [m], velocity (N, 3) [m/s], acceleration (N, 3) [m/s²],
     pressure (N,) [Pa] that acted over the last step, end_pressure (N,) [Pa] that goes with the acceleration at its end
@@ -68,6 +69,8 @@ class Water:
         is_smooth: Callable | None = None,
         sides=None,
         velocity=None,
+        gas=None,
+        vents=(),
     ):
         self.mesh, self.parameters = mesh, parameters or WaterParameters()
         self.time, self.steps = 0.0, 0
@@ -92,6 +95,9 @@ class Water:
         self.farther = np.zeros((domain.n_bodies, 6))
         """How much farther (n_bodies, 6) [m, rad] they moved in the last step than `displacement` took for granted: the
         water that this takes has yet to rise to the surface. Set after a step, for the potential energy."""
+        self.moved_by_end = np.zeros((domain.n_bodies, 6))
+        """How far (n_bodies, 6) [m, rad] they stand at the end of the step from where the cells are cut: set before
+        `correct`, for the volume of trapped air."""
         self.free_bodies = None
         """`viscosity.FreeBodies` that answer to shear within the step; None: all keep their velocity."""
         self.set_domain(domain)
@@ -104,6 +110,11 @@ class Water:
             redistance(self.topology, level, self.topology.node_size, rescale=False), self.topology.node_size
         )
         self.velocity, self.acceleration = np.zeros((n, 3)), np.zeros((n, 3))
+        self.air, self.vents = None, tuple(vents)
+        if gas is not None:
+            from fluid.air.cushions import Air
+
+            self.air = Air.at_start(gas, self.topology, self.level_set, self.open_to_air)
         self.pressure = self._pressure_at_rest()
         self.end_pressure = self.pressure.copy()
         self.at_bound, self.ventilated = np.zeros(n, bool), np.zeros(n, bool)
@@ -224,13 +235,17 @@ class Water:
         self.listed, self.layer_start = new.listed, new.layer_start
         self.at_bound, self.ventilated = new.at_bound, new.ventilated
         self.given_by_films = new.given_by_films
+        if self.air is not None:
+            kept = problem.predicted
+            self.air = kept.cushions.after(problem.of_air(x), kept.theta, problem.dt)
+            self._let_air_out(problem.dt)
         self.conserved_volume = problem.predicted.conserved_volume
         if self.sides is not None:
             self.sides.book(problem.predicted.through, self.head())
         if self.slits is not None:
             p = self.parameters
-            pressure = x + problem.known
-            self.slits = self.slits.advanced(problem.dofs, pressure, p.weight, problem.dt, p.density)
+            pressure, dofs = problem.of_water(x + problem.known), problem.of_water(problem.dofs)
+            self.slits = self.slits.advanced(dofs, pressure, p.weight, problem.dt, p.density)
         self.report = new.report
         share = 1.0 - self.calm(problem.dt) if self.pushed_by.any() else 1.0
         self._surface_lag = 0.5 * problem.dt * share
@@ -317,6 +332,9 @@ class Water:
         self.pressure, self.end_pressure = moved[0][:, 1].copy(), moved[0][:, 2].copy()
         self.velocity, self.acceleration = moved[1], moved[2]
         self.at_bound, self.ventilated = known & self.at_bound[source], known & self.ventilated[source]
+        if self.air is not None:
+            self.air = self.air.carried(source, known)
+            self.moved_by_end = np.zeros_like(self.moved_by_end)
         self.hold(self.velocity, self.time)
 
     def _carry_cells(self, old: Topology):
@@ -470,6 +488,28 @@ class Water:
             return 0.0
         rate = sum(side.rate(self.level_set, self.velocity) for side in self.sides.now)
         return self.sides.energy + self._surface_lag * float(rate @ self.pressure)
+
+    def air_energy(self) -> float:
+        """What the water can get back from trapped air, and what of it was lost so far [J]; 0 without any."""
+        if self.air is None:
+            return 0.0
+        return self.air.lost + float(self.air.gas.energy(self.air.reference, self.pocket_volumes()).sum())
+
+    def pocket_volumes(self) -> np.ndarray:
+        """Volume (K,) [m³] of the pockets of trapped air at the end of the last step."""
+        return self.air.volumes(self.topology, self.level_set, self.coupling @ self.moved_by_end.ravel())
+
+    def pocket_bounds(self, pocket: int) -> np.ndarray:
+        """Lower and upper corner (2, 3) [m] of the box around the nodes of a pocket, 0 ... K-1."""
+        nodes = self.topology.nodes[self.air.label == pocket + 1]
+        return np.array([nodes.min(axis=0), nodes.max(axis=0)])
+
+    def _let_air_out(self, dt: float) -> None:
+        """What leaves the pockets through vents and narrow cracks in dt [s]."""
+        if self.vents or (self.slits is not None and len(self.slits)):
+            from fluid.air.leaks import leaked
+
+            self.air = leaked(self, self.vents, self.pocket_volumes(), dt)
 
     def _surface_potential(self) -> float:
         """g·x [m²/s²] of the surface, mean over the nodes within half a cell of it; 0 where there is none."""

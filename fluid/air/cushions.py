@@ -1,0 +1,296 @@
+"""The air of a step: pockets take part in the pressure solve, each with one unknown.
+
+All nodes of a pocket have its pressure, so their hats add up to one: N_k = Σ N_j over its nodes.  Tested with it, the
+mass balance of the water (`fluid.pressure.projection`) gives the rate [m³/s] at which water and bodies squeeze it,
+
+    R_k = ∫ u*·∇N_k dV + (G V)_k - (dt/ρ) Σ_i k_ij (X_k - x_i)/ϑ_ij,        G_k = Σ_j G_j,                    (1)
+
+and its pressure over the step is that of its gas (`gas.py`), linear about the volume at the beginning:
+
+    X_k + known_k = P^n + θ_k dt S ((1-θ_k) R^n + θ_k R_k),        S = -dP/dV.                                (2)
+
+With C = 1/(θ_k² S dt) that is a row like all others, symmetric and positive, in which the pressure of the pocket enters
+at the crossing of every edge to its nodes as zero does where the air is open:
+
+    (C + Σ s) X_k - Σ s x_i = ∫ u*·∇N_k dV + (G V)_k + C (P^n - known_k) + R^n (1-θ_k)/θ_k,                (3)
+
+with s = (dt/ρ) k_ij/ϑ_ij.  So neither a stiff cushion nor a soft one limits the step, and a body feels a pocket as it
+feels water.  θ_k is 1/2, which keeps the energy of a cushion that the steps resolve; where R changed its sign from one
+step to the next it is 1 for a step, so that a cushion too stiff for that comes to rest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import scipy.sparse as sp
+from numba import njit
+
+from fluid.air.gas import Gas
+from fluid.air.pockets import OPEN_AIR, Descent, labelled, volumes
+from fluid.domain.coupling_matrix import wetted_coupling
+from fluid.pressure.projection import SMALLEST_CUT
+
+RESOLVED, SETTLING = 0.5, 1.0
+"""θ_k of (2)."""
+
+
+@dataclass(frozen=True)
+class Air:
+    """What the pockets hold between two steps. K pockets, numbered as their labels.
+
+    gas · label (N,) of the air at each node (`pockets.py`) · reference (K,) [m³] of the gas · rate (K,) [m³/s], R of
+    the last step · end_pressure (K,) [Pa] that goes with the acceleration at its end · turned (K,) bool: R changed its
+    sign, or there is none of a step before · mean_pressure (K,) [Pa] over the last step ·
+    name (K,): number for life, from 1 · names: how many were given · lost [J]: energy of air that got away or was
+    mixed, so far · entrained [m³]: reference volume of pockets that opened within the water so far · gone: pockets that
+    the water filled so far."""
+
+    gas: Gas
+    label: np.ndarray
+    reference: np.ndarray
+    rate: np.ndarray
+    end_pressure: np.ndarray
+    mean_pressure: np.ndarray
+    turned: np.ndarray
+    name: np.ndarray
+    names: int = 0
+    lost: float = 0.0
+    entrained: float = 0.0
+    gone: int = 0
+
+    @classmethod
+    def at_start(cls, gas: Gas, topology, phi, open_to_air) -> Air:
+        """Air at the pressure of the atmosphere everywhere; phi (N,) [m] of the water."""
+        label, count = labelled(topology, phi, open_to_air)
+        nothing = np.zeros(count)
+        reference = volumes(topology, phi, label, count)
+        return cls(
+            gas,
+            label,
+            reference,
+            nothing,
+            nothing.copy(),
+            nothing.copy(),
+            np.ones(count, bool),
+            1 + np.arange(count),
+            names=count,
+        )
+
+    def __len__(self) -> int:
+        return len(self.reference)
+
+    def volumes(self, topology, phi, taken) -> np.ndarray:
+        """Volume (K,) [m³] of the pockets; taken (N,) [m³] that bodies took from the nodes since the cells were cut."""
+        found = volumes(topology, phi, self.label, len(self))
+        there = self.label > OPEN_AIR
+        return found - np.bincount(self.label[there] - 1, taken[there], minlength=len(self))[: len(self)]
+
+    def carried(self, source, known) -> Air:
+        """On new nodes; source (N,) old node of each, known (N,) bool: whether there is one."""
+        return replace(self, label=np.where(known, self.label[source], -1))
+
+    def at_pockets(self, nodal) -> np.ndarray:
+        """Values (K,) of the pockets from those at the nodes (N,), the same at all nodes of one."""
+        out = np.zeros(len(self))
+        there = np.flatnonzero(self.label > OPEN_AIR)
+        out[self.label[there] - 1] = nodal[there]
+        return out
+
+    def nodal(self, values) -> np.ndarray:
+        """values (K,) at the nodes of their pockets, zero elsewhere, (N,)."""
+        out = np.zeros(len(self.label))
+        there = self.label > OPEN_AIR
+        out[there] = values[self.label[there] - 1]
+        return out
+
+
+@dataclass(frozen=True)
+class Cushions:
+    """The pockets of a step; K of them.
+
+    air: what they hold, with the labels of the new surface · pressure (K,) [Pa] P^n · stiffness (K,) [Pa/m³] S ·
+    theta (K,) · known (K,) [Pa] part of the pressure that is not sought · links csr (n, K) s of (3) [m³/(s Pa)]."""
+
+    air: Air
+    pressure: np.ndarray
+    stiffness: np.ndarray
+    theta: np.ndarray
+    known: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    links: sp.csr_array | None = None
+
+    @classmethod
+    def of(cls, air: Air, topology, before, phi, open_to_air, taken) -> Cushions:
+        """Pockets below the new surface phi (N,) [m] from those below `before` (N,) [m].
+
+        taken (N,) [m³]: as in `Air.volumes`; the old pockets are measured with it."""
+        t, gas = topology, air.gas
+        label, count = labelled(t, phi, open_to_air)
+        before_volume = air.volumes(t, before, taken)
+        descent = Descent.of(air.label, len(air), label, count, t.node_volume)
+        same = descent.only >= 0
+        reference = descent.share.T @ air.reference + descent.fresh
+        volume = descent.share.T @ before_volume + descent.fresh
+        anew = descent.share.sum(axis=0) == 0.0
+        if anew.any():  # closed off from the atmosphere, or opened within the water
+            volume[anew] = reference[anew] = volumes(t, phi, label, count)[anew]
+        out_of_water = anew & (descent.fresh == 0.0)
+        name, names = _names(air, descent)
+        pressure = gas.pressure(reference, volume)
+        set_free = gas.energy(air.reference, before_volume).sum() - gas.energy(reference, volume).sum()
+        now = replace(
+            air,
+            label=label,
+            reference=reference,
+            rate=descent.share.T @ air.rate,
+            end_pressure=np.where(same, _of_parent(air.end_pressure, descent.only), pressure),
+            mean_pressure=pressure,
+            turned=_of_parent(air.turned, descent.only) | ~same,
+            name=name,
+            names=names,
+            lost=air.lost + float(set_free),
+            entrained=air.entrained + float(reference[out_of_water].sum()),
+            gone=air.gone + int(descent.gone.sum()),
+        )
+        theta = np.where(now.turned, SETTLING, RESOLVED)
+        return cls(now, pressure, gas.stiffness(reference, volume), theta)
+
+    def __len__(self) -> int:
+        return len(self.pressure)
+
+    def beside(self, graph, phi, dofs, theta: float, kick, scale: float) -> Cushions:
+        """With the links to the wet nodes dofs (n,), and what is known of the pressure.
+
+        graph, phi: as in `pressure_matrix`, scale = dt/ρ · kick (N,): share of the last acceleration that is carried
+        over, of which the pressure of the pocket is a part."""
+        g = graph
+        column = np.full(len(phi), -1, np.int64)
+        column[dofs] = np.arange(len(dofs))
+        row, pocket, value = _links(
+            dofs, column, g.row, g.start, g.neighbour, g.stiffness, phi, self.air.label, scale
+        )
+        links = sp.csr_array((value, (row, pocket)), shape=(len(dofs), len(self)))
+        total = links.sum(axis=0)
+        there = np.abs(total) > 0.0
+        carried = np.where(there, (links.T @ kick[dofs]) / np.where(there, total, 1.0), 1.0)
+        known = (1.0 - theta) * np.clip(carried, 0.0, 1.0) * self.air.end_pressure
+        return replace(self, known=known, links=links)
+
+    def lowest(self, dt: float) -> float:
+        """Lowest pressure [Pa] of any air in the step, the open one included; what pockets lose in it counts twice."""
+        ahead = self.pressure + 2.0 * self.stiffness * dt * np.minimum(self.air.rate, 0.0)
+        return float(min(ahead.min(initial=0.0), 0.0))
+
+    def compliance(self, dt: float) -> np.ndarray:
+        """C (K,) [m³/(s Pa)] of (3)."""
+        return 1.0 / (self.theta**2 * self.stiffness * dt)
+
+    def source(self, dt: float) -> np.ndarray:
+        """Right hand side (K,) [m³/s] of (3) but for the flow of the water and the bodies."""
+        return self.compliance(dt) * (self.pressure - self.known) + self._carried_rate()
+
+    def _carried_rate(self):
+        return self.air.rate * (1.0 - self.theta) / self.theta
+
+    def matrix(self, matrix, dt: float):
+        """The matrix (n, n) of the water with the rows of the pockets behind it, csr (n + K, n + K)."""
+        total = np.asarray(self.links.sum(axis=0)).ravel()
+        own = sp.diags_array(self.compliance(dt) + total)
+        return sp.csr_array(sp.block_array([[matrix, -self.links], [-self.links.T, own]], format="csr"))
+
+    def within(self, problem, rhs, coupling, void, domain):
+        """The PressureProblem of the water with the pockets as its last unknowns.
+
+        rhs (N,) [m³/s]: ∫ u*·∇N_j dV of all nodes · coupling csr (N, m): G without the polygons of the void cells
+        (v,), which lie in the air whole."""
+        dt, none = problem.dt, np.full(len(self), -np.inf)
+        rows = sp.csr_array(self.sums(coupling))
+        label = self.air.label[domain.cells[void]].max(axis=1) if len(void) else np.zeros(0, np.int64)
+        for k in np.unique(label[label > OPEN_AIR]) - 1:
+            polygons = np.isin(domain.face_cell, void[label == k + 1])
+            all_hats = sp.csr_array(wetted_coupling(domain, polygons)).sum(axis=0).reshape(1, -1)
+            one = sp.csr_array(([1.0], ([k], [0])), shape=(len(self), 1))
+            rows = sp.csr_array(rows + one @ sp.csr_array(all_hats))
+        return replace(
+            problem,
+            matrix=self.matrix(problem.matrix, dt),
+            rhs=np.concatenate([problem.rhs, self.sums(rhs) + self.source(dt)]),
+            coupling=sp.csr_array(sp.vstack([problem.coupling, rows], format="csr")),
+            known=np.concatenate([problem.known, self.known]),
+            guess=np.concatenate([problem.guess, self.pressure - self.known]),
+            dofs=np.concatenate([problem.dofs, self.nodes()]),
+            bound=None if problem.bound is None else np.concatenate([problem.bound, none]),
+            at_bound=np.concatenate([problem.at_bound, np.zeros(len(self), bool)]),
+            pockets=len(self),
+        )
+
+    def sums(self, nodal):
+        """Σ over the nodes of each pocket of nodal (N,) or sparse (N, m): (K,) or csr (K, m)."""
+        return self._summing @ nodal
+
+    @property
+    def _summing(self):
+        label = self.air.label
+        there = np.flatnonzero(label > OPEN_AIR)
+        return sp.csr_array((np.ones(len(there)), (label[there] - 1, there)), shape=(len(self), len(label)))
+
+    def nodes(self) -> np.ndarray:
+        """A node (K,) of each pocket."""
+        label = self.air.label
+        there = np.flatnonzero(label > OPEN_AIR)[::-1]
+        node = np.zeros(len(self), np.int64)
+        node[label[there] - 1] = there
+        return node
+
+    def after(self, x, theta: float, dt: float) -> Air:
+        """What they hold after a step with the unknown part x (K,) [Pa] of their pressure."""
+        rate = self.compliance(dt) * (x + self.known - self.pressure) - self._carried_rate()
+        turned = (rate * self.air.rate < 0.0) & ~self.air.turned
+        return replace(
+            self.air, rate=rate, end_pressure=x / theta, mean_pressure=x + self.known, turned=turned
+        )
+
+
+def _of_parent(values, only):
+    """values (O,) of the old pocket of each new one, (K,); of the first where there is none."""
+    return values[only] if len(values) else np.zeros(len(only), values.dtype)
+
+
+def _names(air: Air, descent: Descent) -> tuple[np.ndarray, int]:
+    """Names (K,) of the pockets: that of the old one with most air in each unless it is taken, else a new one."""
+    taken, names = set(), air.names
+    name = np.zeros(descent.share.shape[1], np.int64)
+    for k in range(len(name)):
+        amount = descent.share[:, k] * air.reference
+        parent = int(amount.argmax()) if len(amount) and amount.max() > 0.0 else -1
+        if parent >= 0 and parent not in taken:
+            taken.add(parent)
+            name[k] = air.name[parent]
+        else:
+            names += 1
+            name[k] = names
+    return name, names
+
+
+@njit(cache=True)
+def _links(dofs, column, graph_row, start, neighbour, stiffness, phi, label, scale):
+    """Row, pocket and s of (3) of the edges from wet nodes to nodes of pockets."""
+    capacity, n = 1024, 0
+    row_of, pocket, value = np.empty(capacity, np.int64), np.empty(capacity, np.int64), np.empty(capacity)
+    for r in range(dofs.shape[0]):
+        i = dofs[r]
+        row = graph_row[i]
+        for s in range(start[row], start[row + 1]):
+            j = neighbour[s]
+            if column[j] >= 0 or phi[j] < 0.0 or label[j] <= 0:
+                continue
+            if n == capacity:
+                capacity *= 2
+                row_of = np.concatenate((row_of, np.empty_like(row_of)))
+                pocket = np.concatenate((pocket, np.empty_like(pocket)))
+                value = np.concatenate((value, np.empty_like(value)))
+            cut = max(phi[i] / (phi[i] - phi[j]), SMALLEST_CUT)
+            row_of[n], pocket[n], value[n] = r, label[j] - 1, -scale * stiffness[s] / cut
+            n += 1
+    return row_of[:n].copy(), pocket[:n].copy(), value[:n].copy()

@@ -1,0 +1,75 @@
+"""The gas in a pocket, and its way out through an orifice.
+
+A pocket holds as much air as would fill the *reference volume* V_a at the pressure p_a of the atmosphere.  Squeezed
+without exchange of heat (or, with γ = 1, at one temperature) to V it has the gauge pressure
+
+    P = p_a ((V_a/V)^γ - 1),        -dP/dV = γ (P + p_a)/V,                                                (1)
+
+and the energy, which the water can get back, of the work against the atmosphere outside:
+
+    U = ∫_V^V_a P dV = p_a (V_a^γ V^(1-γ) - V_a)/(γ - 1) - p_a (V_a - V),                                  (2)
+
+with p_a V_a ln(V_a/V) as its first term for γ = 1.
+
+Through an orifice of area A and discharge C_d it loses the mass (Saint-Venant and Wantzel; r the lower pressure over
+the higher one, both absolute, ρ the density on the side of the higher one, r not below the value r* of choked flow)
+
+    ṁ = C_d A (γ ρ p)^½ (2/(γ-1) (r^(2/γ) - r^((γ+1)/γ)))^½,        r* = (2/(γ+1))^(γ/(γ-1)).                (3)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+AIR_DENSITY = 1.2
+"""Density [kg/m³] of air at the pressure of the atmosphere (20 °C)."""
+SMALLEST_VOLUME = 1e-12
+"""Volume [m³] below which the law of the gas is not followed, so that one that vanishes keeps a finite pressure."""
+NEARLY_ISOTHERMAL = 1e-6
+"""γ - 1 below which the limit of γ = 1 is taken."""
+
+
+@dataclass(frozen=True)
+class Gas:
+    """gamma: 1 (isothermal) to 1.4 (adiabatic) · atmospheric [Pa]: absolute pressure of the air outside."""
+
+    gamma: float = 1.4
+    atmospheric: float = 101_325.0
+
+    def pressure(self, reference, volume) -> np.ndarray:
+        """Gauge pressure (K,) [Pa] of (1); reference V_a and volume V (K,) [m³]."""
+        v = np.maximum(volume, SMALLEST_VOLUME)
+        return self.atmospheric * ((np.asarray(reference) / v) ** self.gamma - 1.0)
+
+    def stiffness(self, reference, volume) -> np.ndarray:
+        """-dP/dV (K,) [Pa/m³] of (1)."""
+        v = np.maximum(volume, SMALLEST_VOLUME)
+        return self.gamma * (self.pressure(reference, v) + self.atmospheric) / v
+
+    def energy(self, reference, volume) -> np.ndarray:
+        """U (K,) [J] of (2)."""
+        a, v = np.asarray(reference, float), np.maximum(volume, SMALLEST_VOLUME)
+        outside = self.atmospheric * (a - v)
+        there = np.maximum(a, 1e-300)
+        if self.gamma - 1.0 < NEARLY_ISOTHERMAL:
+            return self.atmospheric * a * np.log(there / v) - outside
+        inner = self.atmospheric * (there**self.gamma * v ** (1.0 - self.gamma) - a) / (self.gamma - 1.0)
+        return inner - outside
+
+    def leaked(self, reference: float, volume: float, outside: float, area: float, dt: float) -> float:
+        """Change [m³] of the reference volume in dt [s] through an effective area C_d A [m²], at a gauge pressure
+        `outside` [Pa] beyond it. The flow ends where the pressures are even."""
+        inside = float(self.pressure(reference, volume))
+        higher, lower = max(inside, outside) + self.atmospheric, min(inside, outside) + self.atmospheric
+        if higher <= lower or area == 0.0:
+            return 0.0
+        gamma = max(self.gamma, 1.0 + NEARLY_ISOTHERMAL)
+        choked = (2.0 / (gamma + 1.0)) ** (gamma / (gamma - 1.0))
+        r = max(lower / higher, choked)
+        speed = 2.0 / (gamma - 1.0) * (r ** (2.0 / gamma) - r ** ((gamma + 1.0) / gamma))
+        density = AIR_DENSITY * (higher / self.atmospheric) ** (1.0 / gamma)
+        rate = area * np.sqrt(gamma * density * higher * max(speed, 0.0)) / AIR_DENSITY
+        even = volume * (1.0 + outside / self.atmospheric) ** (1.0 / self.gamma) - reference
+        return float(np.sign(even) * min(rate * dt, abs(even)))

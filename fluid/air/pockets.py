@@ -1,0 +1,122 @@
+"""Pockets: connected parts of the air that reach no open side of the tank.
+
+Two dry nodes of one cell have air in common.  Nodes inside a solid hand it on only to the nodes of their own cells, so
+that a wall of a cell and more parts the air; thinner ones do so with multiple covers.  The volume of a pocket is what
+the surface φ = 0 leaves of the fluid parts of its cells: exact for a φ that is linear in each cell.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from fluid.domain.moments import wet_fraction
+
+NO_AIR, OPEN_AIR = -1, 0
+"""Labels of nodes without air and of those that air from outside reaches; pockets count from 1."""
+
+
+def labelled(topology, phi, open_to_air) -> tuple[np.ndarray, int]:
+    """Label (N,) of the air at the nodes below the level set φ (N,) [m], and the number of pockets K.
+
+    open_to_air (N,) bool: nodes on open sides. Pockets are numbered by their first node."""
+    t = topology
+    dry = (phi >= 0.0) & t.active
+    root = _components(dry, t.covered, t.cells)
+    label = np.full(len(phi), NO_AIR, np.int64)
+    roots, first, place = np.unique(root[dry], return_index=True, return_inverse=True)
+    outside = np.zeros(len(roots), bool)
+    outside[place[open_to_air[dry]]] = True
+    number = np.zeros(len(roots), np.int64)
+    closed = np.flatnonzero(~outside)
+    number[closed[np.argsort(first[closed])]] = 1 + np.arange(len(closed))
+    label[dry] = number[place]
+    return label, len(closed)
+
+
+@njit(cache=True)
+def _components(dry, covered, cells):
+    """Root (N,) of the component of every dry node: nodes outside of solids joined across cells, then each of the
+    others to the air of the first cell that it has in common with them, and to one another where there is none."""
+    root, given = np.arange(dry.shape[0]), np.zeros(dry.shape[0], np.bool_)
+    for inside in range(3):
+        for e in range(cells.shape[0]):
+            first = -1
+            for a in range(4):
+                i = cells[e, a]
+                if dry[i] and (not covered[i] or inside == 2) and first < 0:
+                    first = np.int64(i)
+            if first < 0:
+                continue
+            for a in range(4):
+                i = np.int64(cells[e, a])
+                if not dry[i] or i == first:
+                    continue
+                if inside == 0 and not covered[i]:
+                    _join(root, first, i)
+                elif inside > 0 and covered[i] and not given[i]:
+                    _join(root, first, i)
+                    given[i] = True
+    for i in range(root.shape[0]):
+        root[i] = _root_of(root, i)
+    return root
+
+
+@njit(cache=True)
+def _root_of(root, i):
+    while root[i] != i:
+        root[i] = root[root[i]]
+        i = root[i]
+    return i
+
+
+@njit(cache=True)
+def _join(root, i, j):
+    a, b = _root_of(root, i), _root_of(root, j)
+    if a < b:
+        root[b] = a
+    else:
+        root[a] = b
+
+
+def volumes(topology, phi, label, count: int) -> np.ndarray:
+    """Volume (K,) [m³] of the pockets: what φ (N,) [m] leaves of the cells at their nodes."""
+    t = topology
+    cells = t.cells_around(label > OPEN_AIR)
+    pocket = label[t.cells[cells]].max(axis=1)
+    free = t.volume[cells] * (1.0 - wet_fraction(cells, phi, t.parts))
+    return np.bincount(pocket - 1, free, minlength=count)[:count]
+
+
+@dataclass(frozen=True)
+class Descent:
+    """From which pockets of before (O) the pockets of now (K) come.
+
+    share (O, K): share of the air of each old one that each new one has · fresh (K,) [m³]: room that air of the
+    atmosphere had · only (K,): the one old pocket that became this one whole and without any other air, -1: there is
+    none · opened (O,): share that the atmosphere reaches now · gone (O,) bool: without any room left."""
+
+    share: np.ndarray
+    fresh: np.ndarray
+    only: np.ndarray
+    opened: np.ndarray
+    gone: np.ndarray
+
+    @classmethod
+    def of(cls, before, n_before: int, now, n_now: int, node_volume) -> Descent:
+        """before, now (N,): labels on the same nodes; node_volume (N,) [m³]."""
+        both = (before >= OPEN_AIR) & (now >= OPEN_AIR)
+        common = np.zeros((n_before + 1, n_now + 1))
+        np.add.at(common, (before[both], now[both]), node_volume[both])
+        total = common.sum(axis=1)
+        share = common[1:] / np.maximum(total[1:], 1e-300)[:, None]
+        gone = total[1:] == 0.0
+        fresh = common[0, 1:]
+        sole = (share > 0.0).sum(axis=0)
+        parent = share.argmax(axis=0) if n_before else np.zeros(n_now + 1, np.int64)
+        whole = np.array([n_before > 0 and share[parent[c], c] == 1.0 for c in range(n_now + 1)], bool)
+        only = np.where((sole == 1) & whole, parent, -1)[1:]
+        only[fresh > 0.0] = -1
+        return cls(share[:, 1:], fresh, only, share[:, 0], gone)

@@ -1,0 +1,309 @@
+"""Air that cannot leave: its gas, its pockets, and what they do to water and bodies."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import quad, solve_ivp
+
+from fluid.air.gas import AIR_DENSITY, Gas
+from fluid.air.leaks import Vent, pockets_at
+from fluid.air.pockets import NO_AIR, OPEN_AIR, Descent, labelled, volumes
+from fluid.cut.bodies import ConvexBodies
+from fluid.domain.physical_domain import cut_domain
+from fluid.mesh.background import box_mesh
+from fluid.numerics.bounded import solve_pressure
+from fluid.readings.gauges import pressure
+from fluid.step import state
+from fluid.step.parameters import WaterParameters
+from fluid.step.water import Water
+from tests.fluid.scenes import load
+
+WEIGHT = 9810.0
+OUTER = 101_325.0
+
+
+def upwards(normals, centres):
+    return normals[:, 2] > 0.5
+
+
+def step(water, dt, rtol=1e-10, body_velocity=None):
+    problem = water.predict(dt)
+    moved = 0.0 if body_velocity is None else problem.coupling @ np.ravel(body_velocity)
+    found = solve_pressure(problem, rtol, moved)
+    if body_velocity is not None:
+        water.pushed_by = np.reshape(body_velocity, (-1, 6))
+    water.correct(problem, found.x, found.parting)
+    return problem, found.x
+
+
+# ---- the gas
+
+
+@pytest.mark.parametrize("gamma", [1.0, 1.2, 1.4])
+@pytest.mark.parametrize("volume", [0.02, 0.4, 0.5, 2.0])
+def test_the_energy_of_a_pocket_is_the_work_of_its_gauge_pressure(gamma, volume):
+    gas, reference = Gas(gamma), 0.5
+    work, _ = quad(lambda v: float(gas.pressure(reference, v)), volume, reference)
+    np.testing.assert_allclose(gas.energy(reference, volume), work, rtol=1e-7, atol=1e-7)
+    slope = (gas.pressure(reference, volume * 1.00001) - gas.pressure(reference, volume * 0.99999)) / (
+        2e-5 * volume
+    )
+    np.testing.assert_allclose(gas.stiffness(reference, volume), -slope, rtol=1e-5)
+
+
+def test_an_orifice_passes_what_bernoulli_says_at_small_differences_and_is_choked_at_large_ones():
+    gas, area, dt, volume = Gas(), 1e-4, 1e-6, 1.0
+    reference = volume * (1.0 + 50.0 / OUTER) ** (1 / 1.4)
+    lost = -gas.leaked(reference, volume, 0.0, area, dt) / dt
+    np.testing.assert_allclose(lost, area * np.sqrt(2.0 * 50.0 / AIR_DENSITY), rtol=1e-3)
+    for held in (3.0, 6.0):  # times the pressure outside, beyond 1.893: the mass goes with p √ρ
+        full = volume * held ** (1 / 1.4)
+        choked = -gas.leaked(full, volume, 0.0, area, dt) / dt
+        density = AIR_DENSITY * held ** (1 / 1.4)
+        exact = area * 0.684731 * np.sqrt(held * OUTER * density) / AIR_DENSITY
+        np.testing.assert_allclose(choked, exact, rtol=1e-5)
+    assert gas.leaked(0.5, 1.0, 0.0, area, dt) > 0.0  # air comes in where the pocket has less
+
+
+def test_an_orifice_evens_the_pressure_out_and_never_beyond():
+    gas = Gas()
+    assert gas.leaked(1.3, 1.0, 0.0, 1.0, 1e3) == pytest.approx(-0.3)
+    assert gas.leaked(1.0, 1.0, 0.0, 1.0, 1e3) == 0.0
+
+
+# ---- pockets
+
+
+def two_chambers(level_left, level_right, covers="multiple", thickness=0.13):
+    """A closed tank, 2 m long, with a wall in the middle that leaves the lowest 0.3 m open."""
+    mesh = box_mesh(np.zeros(3), (2.0, 0.5, 1.0), 0.125)
+    wall = ConvexBodies.boxes([[1.01, 0.25, 0.65]], [[thickness, 0.5, 0.7]])
+    domain = cut_domain(mesh, wall, covers)
+    water = Water(mesh, domain, lambda x: x[:, 2] - 0.35, WaterParameters(), gas=Gas())
+    # above the gap the chambers have no node in common; which one a node is in, its label says
+    side, _ = labelled(water.topology, np.where(domain.nodes[:, 2] > 0.36, 1.0, -1.0), water.open_to_air)
+    first = side[np.flatnonzero((domain.nodes[:, 2] > 0.9) & (domain.nodes[:, 0] < 0.5))[0]]
+    level = np.where(side == first, level_left, level_right)
+    return mesh, domain, domain.nodes[:, 2] - level
+
+
+@pytest.mark.parametrize(("left", "right"), [(0.47, 0.71), (0.62, 0.62)])
+def test_chambers_beside_a_thin_wall_are_two_pockets_with_exact_volumes(left, right):
+    mesh, domain, level = two_chambers(left, right)
+    water = Water(mesh, domain, level, WaterParameters(), gas=Gas())
+    length = 1.01 - 0.065, 2.0 - 1.01 - 0.065
+    wanted = sorted(0.5 * size * (1.0 - top) for size, top in zip(length, (left, right)))
+    np.testing.assert_allclose(sorted(water.pocket_volumes()), wanted, rtol=1e-9)
+    np.testing.assert_array_equal(water.air.reference, water.pocket_volumes())
+
+
+def test_air_below_an_open_top_is_no_pocket(tmp_path):
+    mesh = box_mesh(np.zeros(3), (1.0, 0.5, 1.0), 0.25)
+    domain = cut_domain(mesh, ConvexBodies.empty(), "single")
+    water = Water(mesh, domain, lambda x: x[:, 2] - 0.4, WaterParameters(), upwards, gas=Gas())
+    assert len(water.air) == 0
+    assert set(water.air.label) == {NO_AIR, OPEN_AIR}
+    closed = Water(mesh, domain, lambda x: x[:, 2] - 0.4, WaterParameters(), gas=Gas())
+    np.testing.assert_allclose(closed.pocket_volumes(), [0.3])
+
+
+def test_pockets_hand_on_their_air_by_shares_when_they_part_and_together_when_they_join():
+    """The amounts of air add up, whatever becomes of the pockets; what meets the atmosphere is open."""
+    node_volume = np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0])
+    before = np.array([1, 1, 1, 2, 0, -1])
+    parted = Descent.of(before, 2, np.array([1, 1, 2, 2, 0, -1]), 2, node_volume)
+    np.testing.assert_allclose(parted.share, [[0.5, 0.5], [0.0, 1.0]])
+    np.testing.assert_allclose(parted.share.sum(axis=1), 1.0)
+    assert parted.only.tolist() == [-1, -1]
+    opened = Descent.of(before, 2, np.array([0, 0, 1, 2, 0, -1]), 2, node_volume)
+    np.testing.assert_allclose(opened.share.sum(axis=1) + opened.opened, 1.0)
+    np.testing.assert_allclose(opened.opened, [0.5, 0.0])
+    closed_off = Descent.of(before, 2, np.array([1, 1, 1, 2, 3, -1]), 3, node_volume)
+    np.testing.assert_allclose(closed_off.fresh, [0.0, 0.0, 5.0])
+    assert closed_off.only.tolist() == [0, 1, -1]
+    filled = Descent.of(before, 2, np.array([1, 1, 1, -1, 0, -1]), 1, node_volume)
+    assert filled.gone.tolist() == [False, True]
+
+
+# ---- at rest
+
+
+def bell(thickness, inside, outside):
+    """A bell of five plates under water, open below, with air that holds the water in it at a level of its own."""
+    low, high, top, rim = 0.51, 1.47, 1.63, 0.47
+    width, middle, height = high - low + 2.0 * thickness, 0.5 * (low + high), top - rim
+    centre, size = [[middle, middle, top + 0.5 * thickness]], [[width, width, thickness]]
+    for x in (low - 0.5 * thickness, high + 0.5 * thickness):
+        centre += [[x, middle, rim + 0.5 * height], [middle, x, rim + 0.5 * height]]
+        size += [[thickness, high - low, height], [width, thickness, height]]
+    mesh = box_mesh(np.zeros(3), (2.0, 2.0, 2.0), 0.2)
+    domain = cut_domain(mesh, ConvexBodies.boxes(centre, size), "multiple")
+
+    def made(level):
+        return Water(mesh, domain, level, WaterParameters(), upwards, gas=Gas())
+
+    whole = made(domain.nodes[:, 2] - outside)
+    within, _ = labelled(whole.topology, np.where(domain.nodes[:, 2] > 0.62, 1.0, -1.0), whole.open_to_air)
+    water = made(domain.nodes[:, 2] - np.where(within > 0, inside, outside))
+    volume = water.pocket_volumes()
+    held = WEIGHT * (outside - inside)
+    water.air = replace(water.air, reference=volume * (1.0 + held / OUTER) ** (1 / 1.4))
+    lifted = WEIGHT * (width**2 * (min(outside, top) - rim) - (high - low) ** 2 * (inside - rim))
+    return water, held, volume, lifted
+
+
+@pytest.mark.parametrize("thickness", [0.3, 0.1])
+def test_water_in_and_around_a_bell_stays_at_rest_and_lifts_it_as_archimedes_says(thickness):
+    """Thicker than a cell or thinner: the air holds up the difference of the levels to round-off."""
+    water, held, volume, lifted = bell(thickness, 0.93, 1.37)
+    np.testing.assert_allclose(volume, 0.96**2 * (1.63 - 0.93), rtol=1e-9)
+    for _ in range(30):
+        problem, x = step(water, 5e-3)
+    assert np.abs(water.velocity[water.level_set < 0.0]).max() < 1e-7
+    np.testing.assert_allclose(water.air.mean_pressure, held, rtol=1e-7)
+    force = load(problem, x)[:, :3].sum(axis=0)
+    np.testing.assert_allclose(force, [0.0, 0.0, lifted], rtol=1e-6, atol=1e-4 * lifted)
+    assert np.abs(water.report.momentum.pressure_closure).max() < 1e-9 * lifted
+    np.testing.assert_allclose(pressure(water, [0.99, 0.99, 1.5]), held, rtol=1e-7)
+    np.testing.assert_allclose(pressure(water, [0.99, 0.99, 0.7]), held + WEIGHT * 0.23, rtol=1e-6)
+    assert pressure(water, [0.2, 0.2, 1.9]) == 0.0
+
+
+def test_a_body_in_a_closed_tank_full_of_air_and_water_feels_no_force_from_the_pressure_level():
+    """The hats of water and pockets add up to one, so that the same pressure everywhere pushes nothing."""
+    mesh = box_mesh(np.zeros(3), (1.0, 1.0, 1.0), 0.2)
+    body = ConvexBodies.boxes([[0.47, 0.52, 0.45]], [[0.33, 0.41, 0.38]])
+    domain = cut_domain(mesh, body, "multiple")
+    water = Water(mesh, domain, lambda x: x[:, 2] - 0.43, WaterParameters(), gas=Gas())
+    problem = water.predict(5e-3)
+    area = problem.coupling.T @ np.ones(problem.coupling.shape[0])
+    np.testing.assert_allclose(area[:3], 0.0, atol=1e-12)
+    compliance = problem.matrix @ np.ones(len(problem.rhs))
+    np.testing.assert_allclose(problem.of_water(compliance), 0.0, atol=1e-12 * abs(problem.matrix).max())
+    difference = abs(problem.matrix - problem.matrix.T)
+    assert difference.max() <= 1e-14 * abs(problem.matrix).max()
+
+
+# ---- in motion
+
+
+def slug(thickness, length, speed, cells, dt, steps, gamma=1.4, columns=1):
+    """Water that flies along a tube onto a cushion of air; rows (time, thickness, pressure, speed) and exact ones."""
+    h = thickness / cells
+    size = (columns * h, columns * h, thickness + length + 3.0 * h)
+    mesh = box_mesh(np.zeros(3), size, h)
+    domain = cut_domain(mesh, ConvexBodies.empty(), "single")
+    velocity = np.zeros((len(domain.nodes), 3))
+    velocity[:, 2] = -speed
+    # without a weight; what is carried over of an acceleration is not limited by g then
+    parameters = WaterParameters(gravity=1e-6, kick_limit=1e12)
+
+    def fill(x):
+        return np.maximum(thickness - x[:, 2], x[:, 2] - thickness - length)
+
+    water = Water(mesh, domain, fill, parameters, upwards, velocity=velocity, gas=Gas(gamma))
+    energy = water.kinetic_energy() + water.air_energy()
+    rows = []
+    for _ in range(steps):
+        step(water, dt, 1e-9)
+        mass = 1000.0 * size[0] * size[1] * length
+        rows.append(
+            (
+                water.time,
+                water.pocket_volumes()[0] / (size[0] * size[1]),
+                water.air.mean_pressure[0],
+                water.momentum()[2] / mass,
+                (water.kinetic_energy() + water.air_energy()) / energy,
+            )
+        )
+
+    def rate(_, y):
+        return [y[1], OUTER * ((thickness / y[0]) ** gamma - 1.0) / (1000.0 * length)]
+
+    rows = np.array(rows)
+    exact = solve_ivp(
+        rate, (0, rows[-1, 0]), [thickness, -speed], rtol=1e-10, atol=1e-12, t_eval=rows[:, 0]
+    ).y
+    return rows, exact, water
+
+
+@pytest.mark.parametrize("gamma", [1.0, 1.4])
+def test_a_column_bounces_on_its_cushion_as_the_differential_equation_says(gamma):
+    """One period: place, speed and pressure, in compression and below the pressure of the atmosphere."""
+    rows, exact, water = slug(1.0, 2.0, 0.5, 4, 4e-3, int(0.75 * np.sqrt(1.4 / gamma) / 4e-3), gamma, 2)
+    swing = np.ptp(exact[0])
+    np.testing.assert_allclose(rows[:, 1], exact[0], atol=2e-3 * swing)
+    np.testing.assert_allclose(rows[:, 3], exact[1], atol=0.01)
+    expected = OUTER * ((1.0 / exact[0]) ** gamma - 1.0)
+    np.testing.assert_allclose(rows[5:, 2], expected[5:], atol=0.02 * np.ptp(expected))
+    np.testing.assert_allclose(rows[-1, 4], 1.0, atol=0.01)
+    assert water.air.name.tolist() == [1]
+
+
+@pytest.mark.parametrize(("scale", "limit"), [(0.1, 0.01), (1.0, 0.01), (10.0, 0.04)])
+def test_an_impact_on_trapped_air_has_the_peak_of_bagnolds_piston_at_every_size(scale, limit):
+    """Froude's law does not hold for it: ten times larger, ten times the pressure would be wrong by a factor of two."""
+    speed = 2.0 * np.sqrt(scale)
+    thickness = 0.2 * scale
+    dt = 0.05 * thickness / 3.0 / speed
+    rows, exact, _ = slug(thickness, 1.0 * scale, speed, 3, dt, 100)
+    peak = OUTER * ((thickness / exact[0].min()) ** 1.4 - 1.0)
+    np.testing.assert_allclose(rows[:, 2].max(), peak, rtol=limit)
+
+
+def test_a_cushion_too_stiff_for_the_step_comes_to_rest_instead_of_ringing():
+    """A gap of 2 mm: its period is a sixth of the step. No limit of the step for it, no growth."""
+    rows, _, _ = slug(2e-3, 0.5, 0.05, 1, 5e-4, 60)
+    assert np.isfinite(rows).all()
+    assert rows[:, 4].max() < 1.5
+    assert np.abs(rows[-20:, 3]).max() < 0.06
+
+
+def test_restart_goes_on_bit_for_bit():
+    def fresh():
+        return slug(1.0, 2.0, 0.5, 4, 4e-3, 6)[2]
+
+    water, again = fresh(), fresh()
+    saved = state.save(water)
+    for _ in range(3):
+        step(again, 4e-3)
+    state.restore(again, again.domain, saved)
+    for w in (water, again):
+        for _ in range(4):
+            step(w, 4e-3, 1e-9)
+    for name in ("velocity", "pressure", "level_set"):
+        np.testing.assert_array_equal(getattr(water, name), getattr(again, name))
+    np.testing.assert_array_equal(water.air.reference, again.air.reference)
+    np.testing.assert_array_equal(water.air.rate, again.air.rate)
+
+
+# ---- leaks
+
+
+def test_a_chamber_empties_through_its_vent_in_the_time_of_the_orifice():
+    """Closed tank with still water: air goes out until the pressures are even, as the equation of the vent says."""
+    mesh = box_mesh(np.zeros(3), (0.5, 0.5, 1.0), 0.25)
+    domain = cut_domain(mesh, ConvexBodies.empty(), "single")
+    vent = Vent(np.array([0.25, 0.25, 0.9]), 1e-4)
+    water = Water(mesh, domain, lambda x: x[:, 2] - 0.5, WaterParameters(), gas=Gas(), vents=[vent])
+    gas, volume = water.air.gas, water.pocket_volumes()[0]
+    water.air = replace(water.air, reference=water.air.reference * 1.1)
+    assert pockets_at(water, np.array([[0.25, 0.25, 0.9]])).tolist() == [1]
+    for _ in range(40):
+        step(water, 2e-3)
+
+    def rate(_, a):
+        return [gas.leaked(a[0], volume, 0.0, 0.6e-4, 1e-9) / 1e-9]
+
+    exact = solve_ivp(rate, (0, water.time), [volume * 1.1], rtol=1e-9, atol=1e-12).y[0, -1]
+    np.testing.assert_allclose(water.air.reference[0] - volume, exact - volume, rtol=0.02)
+    assert water.air.lost > 0.0
+
+
+def test_volumes_do_not_count_what_the_water_fills():
+    mesh = box_mesh(np.zeros(3), (1.0, 1.0, 1.0), 0.25)
+    domain = cut_domain(mesh, ConvexBodies.empty(), "single")
+    water = Water(mesh, domain, lambda x: x[:, 2] - 0.61, WaterParameters(), gas=Gas())
+    label, count = labelled(water.topology, water.level_set, water.open_to_air)
+    np.testing.assert_allclose(volumes(water.topology, water.level_set, label, count), [0.39])
