@@ -85,8 +85,8 @@ def _first_seen(cells, n):
 
 @njit(cache=True)
 def _bisect(nodes, lattice, cells, depth, wanted, deep):
-    """Nodes, lattice, cells and depth after all cells that are wanted and less deep, and what follows; the first cell (M,)
-    that each one comes from."""
+    """Nodes, lattice, cells and depth after all cells that are wanted and less deep, and what follows; the first cell
+    (M,) that each one comes from."""
     n_nodes, n = nodes.shape[0], cells.shape[0]
     root = np.arange(n)
     wanted = wanted.copy()

@@ -57,8 +57,8 @@ def test_distance_to_a_triangle_against_sampling(p, corners):
 
 
 def test_rescaling_leaves_the_water_of_a_drop_of_one_cell(cube):
-    """Slopes on the two sides of a sheet of one layer of nodes are 0.2 and 1: divided by them node by node, a third of its
-    water was gone at once."""
+    """Slopes on the two sides of a sheet of one layer of nodes are 0.2 and 1: divided by them node by node, a third of
+    its water was gone at once."""
     z = cube.nodes[:, 2]
     phi = np.maximum(z - (0.5 + 0.15 * H), np.where(z < 0.5 - 0.5 * H, 0.05 * H, -H))
     phi = np.maximum(phi, np.abs(cube.nodes[:, 0] - 0.5) - 0.26)
