@@ -86,6 +86,9 @@ def run(
     ] = None,
     end: Annotated[str | None, typer.Option(metavar="TIME", help="short for --set time.end=...")] = None,
     dry: Annotated[bool, typer.Option("--dry", help="only read the case; nothing is run")] = False,
+    watch: Annotated[
+        bool, typer.Option("--watch", help="with a page in the browser of this machine")
+    ] = False,
 ) -> None:
     """Run a case. Ctrl-C or a file named `stop` in the run directory ends it cleanly."""
     one_thread()
@@ -98,7 +101,33 @@ def run(
     from coupler.run.directory import RunDirectory
     from coupler.run.execute import carry_out
 
-    raise typer.Exit(int(carry_out(file, RunDirectory.create(file, output))))
+    directory = RunDirectory.create(file, output)
+    if not watch:
+        raise typer.Exit(int(carry_out(file, directory)))
+    from coupler.commands.watch.command import beside
+
+    with beside(directory.path):
+        code = carry_out(file, directory)
+    raise typer.Exit(int(code))
+
+
+@app.command(name="watch")
+def watch_runs(
+    places: Annotated[
+        list[Path], typer.Argument(metavar="RUN...", help="runs, sweeps, or folders with runs")
+    ],
+    port: Annotated[int, typer.Option(min=0, max=65535, help="of the page; 0: any that is free")] = 0,
+    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="open it")] = False,
+    pictures: Annotated[bool, typer.Option("--pictures/--no-pictures", help="draw now and then")] = True,
+) -> None:
+    """Show runs in the browser while they go on.
+
+    Progress, time left, histories, newest picture, verdict so far, limits, and a button that stops a run. Of this
+    machine alone, behind a secret address.
+    """
+    from coupler.commands.watch.command import watch as serve
+
+    serve(places, port, browser, pictures)
 
 
 @app.command()

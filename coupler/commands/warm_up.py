@@ -59,6 +59,9 @@ class Silent:
     def step(self, time, figures) -> None:
         return None
 
+    def expect(self, calm: bool) -> None:
+        return None
+
     def message(self, text: str) -> None:
         return None
 

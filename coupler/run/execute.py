@@ -26,7 +26,7 @@ def carry_out(
     each: see `run` · wish: asked after every step why the run is to end, None to go on · quiet: tells the log alone.
     """
     # here, because `check` describes a case without what a run loads
-    from coupler.run.progress import reporter
+    from coupler.run.progress import ProgressFile, reporter
     from coupler.run.run import run
     from coupler.run.stop import StopRequest
 
@@ -35,7 +35,8 @@ def carry_out(
         with reporter(file.case.time.end, directory.log, asked, quiet) as tell:
             describe(file, tell.message)
             tell_laws(file, directory, tell.message)
-            code = ExitCode(run(file.case, directory, tell, checkpoint, each))
+            on_file = ProgressFile(tell, directory.path)
+            code = ExitCode(run(file.case, directory, on_file, checkpoint, each))
             compare(file, directory, tell.message)
         directory.finish(code, "reached the end" if code == ExitCode.DONE else "see log.txt")
     if not quiet:

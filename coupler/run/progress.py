@@ -6,12 +6,17 @@ The loop knows only the protocol `Reporter`; figures are ordered name -> text, f
 
 from __future__ import annotations
 
+import contextlib
 import io
+import json
+import math
+import os
 import time as clock
 from collections.abc import Callable, Mapping
 from typing import Protocol, TextIO
 
 from coupler.program.terminal import console, duration
+from coupler.run.pace import Pace
 
 
 class Reporter(Protocol):
@@ -20,6 +25,9 @@ class Reporter(Protocol):
     def step(self, time: float, figures: Mapping[str, str]) -> None:
         """After each coupled step: the time reached [s] and the figures that matter."""
 
+    def expect(self, calm: bool) -> None:
+        """Before a step is told: whether worse is to come (`coupler/run/pace.py`)."""
+
     def message(self, text: str) -> None:
         """A sentence for the user and the log (modules on and off, remarks, written files)."""
 
@@ -27,13 +35,51 @@ class Reporter(Protocol):
         """Why the user wants the run to end, or None; asked once a step."""
 
 
+PROGRESS = "progress.json"
+"""In the run directory: how far a run is, for those who look on."""
+EVERY = 1.0
+"""[s] between two of its versions."""
+
+
+class ProgressFile:
+    """Hands on to another reporter, and keeps PROGRESS in the run directory up to date."""
+
+    def __init__(self, inner, path):
+        self.inner, self.path = inner, path / PROGRESS
+        self.message, self.stop_requested, self.expect = inner.message, inner.stop_requested, inner.expect
+        self._written = -math.inf
+
+    def step(self, time: float, figures: Mapping[str, str]) -> None:
+        self.inner.step(time, figures)
+        if clock.monotonic() - self._written >= EVERY or time >= self.inner.end:
+            self._written = clock.monotonic()
+            self._write(
+                {
+                    "time": time,
+                    "end": self.inner.end,
+                    "left": self.inner.pace.left(),
+                    "figures": dict(figures),
+                }
+            )
+
+    def _write(self, told: dict) -> None:
+        """As a whole; a full disk ends no run for this."""
+        beside = self.path.with_name(f".{PROGRESS}.part")
+        with contextlib.suppress(OSError):
+            beside.write_text(json.dumps(told | {"written": clock.time()}), encoding="utf-8")
+            os.replace(beside, self.path)
+
+
 class _Base:
     """What both reporters share: the log, the wish to stop and the clock."""
 
     def __init__(self, end: float, log: Callable[[str], None], stop: Callable[[], str | None]):
         self.end, self.log, self.stop_requested = end, log, stop
-        self._first: tuple[float, float] | None = None
+        self.pace = Pace(end)
         self._tenth = 0
+
+    def expect(self, calm: bool) -> None:
+        self.pace.calm = calm
 
     def _line(self, time: float, figures: Mapping[str, str]) -> str:
         share = min(1.0, time / self.end)
@@ -41,15 +87,12 @@ class _Base:
         return f"{share:4.0%}  t {time:.3f} of {self.end:g} s  {told}  {self._left(time)}".rstrip()
 
     def _left(self, time: float) -> str:
-        """Time to go at the pace since the first step, which had to load and compile what it uses."""
-        began, started = self._first
-        if time <= began:
-            return ""
-        return f"left {duration((clock.monotonic() - started) * max(self.end - time, 0.0) / (time - began))}"
+        """Time to go, as it is told."""
+        left = self.pace.left()
+        return "" if left is None else f"left {duration(left)}"
 
     def _new_tenth(self, time: float) -> bool:
-        if self._first is None:
-            self._first = (time, clock.monotonic())
+        self.pace.add(time, clock.monotonic())
         tenth = int(10.0 * time / self.end + 1e-9)
         new, self._tenth = tenth > self._tenth, max(tenth, self._tenth)
         return new
@@ -84,15 +127,13 @@ class BarReporter(_Base):
 
     def __init__(self, end, log, stop):
         super().__init__(end, log, stop)
-        from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+        from rich.progress import BarColumn, Progress, TextColumn
 
         self._bar = Progress(
             BarColumn(bar_width=24),
             TextColumn("{task.percentage:3.0f} %  {task.description}"),
-            TimeRemainingColumn(elapsed_when_finished=True),
             console=console(),
             auto_refresh=False,
-            speed_estimate_period=120.0,
         )
         self._drawn = 0.0
         self._task = self._bar.add_task("starting", total=end)
@@ -109,7 +150,11 @@ class BarReporter(_Base):
         if self._new_tenth(time):
             self.log(self._line(time, figures))
         told = "  ".join(f"{name} {text}" for name, text in figures.items())
-        self._bar.update(self._task, completed=min(time, self.end), description=f"t {time:.3f} s  {told}")
+        self._bar.update(
+            self._task,
+            completed=min(time, self.end),
+            description=f"t {time:.3f} s  {told}  {self._left(time)}",
+        )
         if clock.monotonic() - self._drawn > 0.2:  # redrawn here, because a thread would starve in long calls
             self._drawn = clock.monotonic()
             self._bar.refresh()

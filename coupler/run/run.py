@@ -15,6 +15,7 @@ from coupler.program.terminal import newtons
 from coupler.results.recorder import Recorder
 from coupler.run.clock import Clock
 from coupler.run.left_out import imports, note_work
+from coupler.run.pace import Calm
 from coupler.run.within_step import LongSteps, StepLeft
 from coupler.scene.build import Scene, build, limits_of
 from coupler.step.limits import LimitReached, Limits, Stopped, check_air, check_defect, check_overlap
@@ -139,6 +140,7 @@ def _steps(
     checkpoints = _checkpoints(case, scene, directory, recorder, schedule)
     way_on = f"; `surgebreak resume {quote(str(directory.path))}` goes on" if checkpoints is not None else ""
     long = _long_steps(coupling, limits, reporter, clock, figures, checkpoints)
+    calm = Calm()
     try:
         if checkpoint is None:
             with clock("output"):
@@ -150,6 +152,7 @@ def _steps(
             with clock("output"):
                 recorder.step(record)
             _note(coupling, record, figures)
+            reporter.expect(_is_calm(calm, coupling, record))
             reporter.step(coupling.time, _told(coupling, record))
             if each is not None:
                 each(coupling, record, figures, recorder.readings)
@@ -257,6 +260,14 @@ def _note(coupling, record, figures: dict) -> None:
         largest("defect", record.defect)
         largest("opening_rate", record.opening_rate)
     note_work(figures.setdefault("work", {}), coupling, record, joints, figures["steps"])
+
+
+def _is_calm(calm: Calm, coupling, record) -> bool:
+    """Whether the run is still before what will make it slow."""
+    if not coupling.coupled:
+        return False
+    joints = joint_counts(coupling.structure)
+    return calm.now(coupling.time, record.wetted, joints.intact, joints.broken)
 
 
 def _told(coupling, record) -> dict[str, str]:

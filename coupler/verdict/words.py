@@ -98,9 +98,9 @@ def _displaced(told: dict) -> Iterator[str]:
 def _hits(hits: dict) -> Iterator[str]:
     if not hits["pairs"]:
         return
-    hard = hits["list"][0]
+    hard, count = hits["list"][0], "once" if hits["pairs"] == 1 else f"{hits['pairs']} times"
     yield (
-        f"debris hit something {hits['pairs']} times; hardest: {hard['block']} on {hard['other']} at t = "
+        f"debris hit something {count}; hardest: {hard['block']} on {hard['other']} at t = "
         f"{moment_of(hard['time'])}, at {point(hard['place'])}, losing {quantity(hard['speed'], 'm/s')}, "
         f"{quantity(hard['impulse'], 'N s')}"
     )

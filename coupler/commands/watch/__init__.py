@@ -1,0 +1,1 @@
+"""A page that lives: runs and sweeps while they go on, in the browser of this machine."""

@@ -1,0 +1,230 @@
+"""The page that lives: what it knows of runs, who may ask it, and how it behaves in a real browser."""
+
+import json
+import signal
+import subprocess
+import sys
+import time
+import urllib.error
+import urllib.request
+
+import pytest
+
+from coupler.commands.watch.command import serving
+from coupler.commands.watch.state import Watched, runs_in
+from coupler.program.process import environment
+from coupler.results.history import HistoryTable
+from coupler.run.pace import GROWTH, Calm, Pace
+from tests.coupler.browser import CHROMIUM, Browser
+from tests.coupler.fake_runs import SUMMARY
+from tests.coupler.resumed import DRY
+
+CASE = {"case": {"title": "made up"}, "time": {"end": 4.0}, "limits": {"volume_error": 0.02}}
+
+
+def make_run(path, process, status="running", time_reached=1.0, **more):
+    """A run directory as a run leaves it while it goes on."""
+    (path / "history").mkdir(parents=True)
+    figures = {"time": time_reached, "largest_volume_error": 0.01}
+    told = {"status": status, "exit_code": None, "exit_reason": None, "ended": None, "process": process}
+    (path / "run.json").write_text(json.dumps(SUMMARY | told | {"figures": figures, "case": CASE} | more))
+    with HistoryTable(path / "history" / "gauges.csv", [("time", "s", "t"), ("force_x", "N", "f")]) as table:
+        for k in range(11):
+            table.append(time=0.1 * k, force_x=1e6 * k)
+    (path / "progress.json").write_text(
+        json.dumps({"time": time_reached, "end": 4.0, "left": 65.0, "figures": {}, "written": time.time()})
+    )
+    return path
+
+
+@pytest.fixture
+def sleeper():
+    """A process that stands for that of a run."""
+    process = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"])
+    yield process
+    process.kill()
+    process.wait()
+
+
+def test_a_running_run_says_how_far_it_is_and_how_near_its_limits(tmp_path, sleeper):
+    state = Watched(make_run(tmp_path / "run", sleeper.pid)).state()
+    assert (state["status"], state["running"], state["share"], state["left"]) == ("running", True, 0.25, 65.0)
+    assert state["limits"] == [
+        {"what": "volume of water that the books miss", "share": 0.5, "key": "limits.volume_error"}
+    ]
+    (curve,) = state["curves"]
+    assert (curve["name"], curve["unit"], curve["y"][-1]) == ("force x", "N", 1e7)
+
+
+def test_a_killed_run_is_seen_to_be_gone(tmp_path, sleeper):
+    watched = Watched(make_run(tmp_path / "run", sleeper.pid))
+    sleeper.kill()
+    sleeper.wait()
+    state = watched.state()
+    assert (state["status"], state["running"], state["left"]) == ("killed", False, None)
+    assert "surgebreak resume" in state["reason"]
+
+
+def test_a_torn_summary_does_not_take_the_page_down(tmp_path, sleeper):
+    path = make_run(tmp_path / "run", sleeper.pid)
+    (path / "run.json").write_text("{")
+    assert Watched(path).state()["status"] == "unreadable"
+
+
+def test_runs_of_a_case_and_of_a_sweep_are_found(tmp_path, sleeper):
+    one = make_run(tmp_path / "case" / "runs" / "a", sleeper.pid)
+    two = make_run(tmp_path / "sweep" / "runs" / "b", sleeper.pid)
+    assert set(runs_in([tmp_path])) == {one, two}
+    assert runs_in([one]) == [one]
+
+
+def ask(address, method="GET", **headers):
+    """Status and body of an answer."""
+    request = urllib.request.Request(
+        address, method=method, headers=headers, data=b"" if method == "POST" else None
+    )
+    try:
+        with urllib.request.urlopen(request, timeout=30) as answer:
+            return answer.status, answer.read()
+    except urllib.error.HTTPError as error:
+        return error.code, b""
+
+
+def test_only_who_knows_the_address_may_look_and_stop(tmp_path, sleeper):
+    """A wrong secret, a foreign host name (DNS rebinding) and a stop that nobody confirmed are refused."""
+    run = make_run(tmp_path / "run", sleeper.pid)
+    with serving([run], pictures=False) as address:
+        assert address.startswith("http://127.0.0.1:")
+        status, page = ask(address)
+        assert (status, b"<title>surgebreak" in page) == (200, True)
+        assert ask(address.rsplit("/", 2)[0] + "/guess/")[0] == 403
+        assert ask(address, Host="evil.example")[0] == 403
+        assert ask(address + "nothing")[0] == 404
+        next(urllib.request.urlopen(address + "events", timeout=30))  # the runs are numbered now
+        assert ask(address + "stop/0", "POST")[0] == 400
+        assert ask(address + "stop/7", "POST", **{"X-Confirmed": "yes"})[0] == 404
+        assert not (run / "stop").exists()
+        assert ask(address + "stop/0", "POST", **{"X-Confirmed": "yes"})[0] == 200
+        assert (run / "stop").exists()
+
+
+def test_the_page_asks_nothing_from_outside():
+    from coupler.commands.watch.server import PAGE
+
+    text = PAGE.read_text(encoding="utf-8").replace("http://www.w3.org/2000/svg", "")
+    assert "http:" not in text
+    assert "https:" not in text
+    assert "//" not in text.replace("</", "")
+
+
+# ---------------------------------------------------------------- time to go
+
+
+def test_the_time_to_go_follows_a_pace_that_changes():
+    """1 s of the clock for each 0.1 s until t = 2, then 4 s: at t = 3 another 40 s are left; the mean pace says 20."""
+    pace = Pace(4.0)
+    now = 0.0
+    for k in range(1, 31):
+        now += 1.0 if k <= 20 else 4.0
+        pace.add(0.1 * k, now)
+    assert 0.67 < pace.left() / 40.0 < 1.33
+
+
+def test_calm_ends_with_the_first_break_or_some_time_after_the_water():
+    calm = Calm()
+    assert calm.now(0.5, wet=False, joints=9, broken=0)
+    assert calm.now(1.0, wet=True, joints=9, broken=0)
+    assert calm.now(1.4, wet=True, joints=9, broken=0)
+    assert not calm.now(1.6, wet=True, joints=9, broken=0)
+    assert not calm.now(1.2, wet=True, joints=8, broken=1)
+    assert not Calm().now(0.1, wet=False, joints=0, broken=0)
+    pace = Pace(2.0)
+    for k in (1, 2, 3):
+        pace.add(0.1 * k, float(k))
+    plain = pace.left()
+    pace.calm = True
+    assert pace.left() == pytest.approx(GROWTH * plain)
+
+
+# ---------------------------------------------------------------- in a real browser
+
+in_browser = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium is installed")
+
+
+@in_browser
+def test_keys_and_the_confirmation_of_a_stop(tmp_path, sleeper):
+    """j goes to the next run, s asks, one button lets it be, one stops it; a phone needs no sideways scrolling."""
+    pytest.importorskip("tornado")
+    first = make_run(tmp_path / "a", sleeper.pid)
+    second = make_run(tmp_path / "b", sleeper.pid)
+    with serving([first, second], pictures=False) as address, Browser(tmp_path / "profile", 390, 800) as page:
+        page.open(address)
+        page.until("document.querySelectorAll('article').length == 2")
+        assert page.value("document.getElementById('link').textContent") == "live"
+        assert "about 1 min 05 s left" in page.value("document.body.innerText")
+        assert page.value("document.querySelectorAll('svg path').length") == 2
+        assert page.value("document.documentElement.scrollWidth <= window.innerWidth")
+        page.key("j")
+        page.key("j")
+        assert page.value("document.activeElement.id") == "run1"
+        page.key("s")
+        page.until("document.getElementById('ask').open")
+        page.value("document.querySelector('dialog button[value=no]').click()")
+        assert not (second / "stop").exists()
+        page.value("document.querySelectorAll('article')[1].focus()")
+        page.key("s")
+        page.until("document.getElementById('ask').open")
+        page.value("document.querySelector('dialog button[value=yes]').click()")
+        Browser.wait(lambda: True if (second / "stop").exists() else None)
+        assert not (first / "stop").exists()
+        page.until("document.body.innerText.includes('stopping')")
+
+
+@in_browser
+def test_the_page_is_dark_where_the_system_is(tmp_path, sleeper):
+    pytest.importorskip("tornado")
+    run = make_run(tmp_path / "a", sleeper.pid)
+    with serving([run], pictures=False) as address, Browser(tmp_path / "profile") as page:
+        page.open(address)
+        page.until("document.querySelectorAll('article').length == 1")
+        look = "getComputedStyle(document.body).backgroundColor"
+        colours = []
+        for scheme in ("light", "dark"):
+            page.call(
+                "Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}]
+            )
+            colours.append(page.value(look))
+        assert colours == ["rgb(255, 255, 255)", "rgb(20, 24, 30)"]
+
+
+def surgebreak(*words):
+    return subprocess.Popen(
+        [sys.executable, "-m", "coupler.cli", *map(str, words)],
+        env=environment(), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+    )  # fmt: skip
+
+
+@pytest.mark.nightly
+@in_browser
+def test_a_run_that_is_killed_and_goes_on(tmp_path):
+    """A real run: the page sees it go, sees that it was killed, and sees it resumed and done with its verdict."""
+    pytest.importorskip("tornado")
+    (tmp_path / "case.toml").write_text(DRY.replace('end = "0.1 s"', 'end = "1 s"'))
+    run = tmp_path / "run"
+    process = surgebreak("run", tmp_path, "--output", run)
+    Browser.PATIENCE = 600.0
+    with serving([run.parent], pictures=False) as address, Browser(tmp_path / "profile") as page:
+        page.open(address)
+        page.until(
+            "document.querySelector('.status') && document.querySelector('.status').textContent == 'running'"
+        )
+        page.until("document.querySelector('progress') && document.querySelector('progress').value > 0.2")
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+        page.until("document.querySelector('.status').textContent == 'killed'")
+        surgebreak("resume", run, "--any-version").wait()
+        page.until("document.querySelector('.status').textContent == 'done'")
+        text = page.value("document.body.innerText")
+        assert "resumed 1 times" in text
+        assert "100 %" in text
+        assert "DAMAGED" in text or "COLLAPSED" in text
