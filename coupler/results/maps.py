@@ -17,6 +17,8 @@ Array = np.ndarray
 FILM = 0.1
 """Depth from which a place counts as wet, in layers of the mesh: thinner films have no speed to speak of."""
 UNKNOWN = -9999.0
+NEVER = -1.0
+"""In place of a time of arrival: checkpoints hold finite numbers."""
 KEPT = ("depth", "speed", "flux", "arrival")
 
 
@@ -31,7 +33,7 @@ class Maps:
         self._node = np.arange(len(water.mesh.nodes))
         size = int(np.prod(self._shape))
         self.depth, self.speed, self.flux = (np.zeros(size) for _ in range(3))
-        self.arrival = np.full(size, np.nan)
+        self.arrival = np.full(size, NEVER)
         self._dry = self._now(water)[0] <= self.film
         """Columns that were dry at the start."""
 
@@ -68,7 +70,7 @@ class Maps:
         np.maximum(self.depth, depth, out=self.depth)
         np.maximum(self.speed, speed, out=self.speed)
         np.maximum(self.flux, depth * speed**2, out=self.flux)
-        self.arrival[self._dry & np.isnan(self.arrival) & (depth > self.film)] = time
+        self.arrival[self._dry & (self.arrival == NEVER) & (depth > self.film)] = time
 
     def save(self) -> dict[str, Array]:
         """Copies of what has been gathered."""
@@ -90,7 +92,10 @@ class Maps:
             "depth": (np.where(wet, self._grid("depth"), np.nan), "largest depth [m]"),
             "speed": (np.where(wet, self._grid("speed"), np.nan), "largest speed, mean over the depth [m/s]"),
             "flux": (np.where(wet, self._grid("flux"), np.nan), "largest h v2 [m3/s2]"),
-            "arrival": (self._grid("arrival"), "time of arrival where it was dry [s]"),
+            "arrival": (
+                np.where(self._grid("arrival") == NEVER, np.nan, self._grid("arrival")),
+                "time of arrival where it was dry [s]",
+            ),
         }
         for name, (values, what) in shown.items():
             self._write(directory / f"{name}.asc", values, what)

@@ -283,6 +283,10 @@ class Recorder:
             from coupler.results.damage_table import write_blocks
 
             write_blocks(self.each_block, structure, self.watch)
+        if self.watch is not None and self.maps is not None:
+            from coupler.results.buildings_table import write_buildings
+
+            write_buildings(self.each_block.with_name("buildings.csv"), structure, self.watch, self.maps)
         cracks = crack_columns(structure) if structure else {}
         if cracks:
             write_cracks(self.cracks, cracks)

@@ -88,7 +88,7 @@ class Watch:
         self.left_at = np.full(n, np.nan)
         self.pressure = Peaks.none(n)
         self.force, self.moment = Peaks.none(bodies + 1), Peaks.none(bodies + 1)
-        self.direction = np.zeros((bodies + 1, 3))
+        self.direction, self.impulse = np.zeros((bodies + 1, 3)), np.zeros((bodies + 1, 3))
         self.depth = Peaks.none(bodies)
         self.depth_at = np.full((bodies, 2), np.nan)
         self._before = structure.velocity()[:, :3]
@@ -128,6 +128,7 @@ class Watch:
         label = self.divisions.bodies.label
         of_body = np.array([label == k for k in range(len(self.divisions.bodies.names))] + [self.judged])
         force = of_body @ load[:, :3]
+        self.impulse += record.dt * force
         larger = self.force.take(np.linalg.norm(force, axis=1), record.time)
         self.direction[larger] = force[larger]
         about_zero = of_body @ (load[:, 3:] + np.cross(centre, load[:, :3]))
@@ -203,7 +204,7 @@ class Watch:
         self._hits = {(int(row[1]), int(row[2])): tuple(row.tolist()) for row in saved["hits"]}
 
 
-_OWN = ("moved", "left_at", "direction", "depth_at")
+_OWN = ("moved", "left_at", "direction", "impulse", "depth_at")
 
 
 def joined(structure) -> Array:

@@ -1,0 +1,87 @@
+"""`buildings.csv`: a row per body on the terrain, what the flood did around it and to it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from coupler.results.history import Column, write_table
+from coupler.results.maps import NEVER, Maps
+from coupler.verdict.judge import verdict
+from coupler.verdict.watch import Watch
+
+Array = np.ndarray
+
+AROUND = 1.5
+"""Cells around its footprint within which the flood counts as that of a body."""
+
+COLUMNS = tuple(
+    Column(*c)
+    for c in (
+        ("name", "", "body: building, wall or group"),
+        ("x", "m", "middle of its foot"),
+        ("y", "m", "middle of its foot"),
+        ("z", "m", "its foot"),
+        ("state", "", "stands, damaged or collapsed, by the rules of [verdict]"),
+        ("joints", "1", "its joints"),
+        ("joints_broken", "1", "those that broke"),
+        ("area_broken", "1", "share of its joined area that broke"),
+        ("weight_moved", "1", "share of its weight that left its place"),
+        ("first_break", "s", "when the first joint broke; empty if none did"),
+        ("walls", "", "walls and floors with broken joints, the first to break first: name broken/joints"),
+        ("force", "N", "largest force of the water"),
+        ("force_time", "s", "when that was"),
+        ("impulse_x", "N s", "force of the water added up over the run"),
+        ("impulse_y", "N s", "force of the water added up over the run"),
+        ("moment", "N m", "largest overturning moment of the water about the middle of its foot"),
+        ("moment_time", "s", "when that was"),
+        ("depth", "m", "largest depth around it"),
+        ("speed", "m/s", "largest speed around it, mean over the depth"),
+        ("flux", "m3/s2", "largest h v2 around it"),
+        ("arrival", "s", "when the water came; empty where it was wet or stayed dry"),
+    )
+)
+
+
+def write_buildings(path, structure, watch: Watch, maps: Maps) -> None:
+    """Write the table as a whole, in place of the one before."""
+    told = verdict(structure, watch)
+    rows = [_row(body, told["members"], watch, maps) for body in told["bodies"]]
+    columns = [list(values) for values in zip(*rows)] if rows else [[] for _ in COLUMNS]
+    write_table(path, "buildings: the flood around each, and its damage", COLUMNS, columns)
+
+
+def _row(body: dict, members: list[dict], watch: Watch, maps: Maps) -> tuple:
+    k = watch.divisions.bodies.names.index(body["name"])
+    largest, first = body["largest"], body["first_break"]
+    force, moment = largest["force"] or {}, largest["moment"] or {}
+    flood = _around(maps, watch, watch.divisions.bodies.rows(k))
+    nan = float("nan")
+    return (
+        body["name"], *watch.foot[k].tolist(), body["state"], body["joints"], body["joints_broken"],
+        body["area_broken"], body["weight_moved"], first["time"] if first else nan, _walls(body["name"], members),
+        force.get("value", 0.0), force.get("time", nan), *watch.impulse[k, :2].tolist(), moment.get("value", 0.0),
+        moment.get("time", nan), *flood,
+    )  # fmt: skip
+
+
+def _walls(body: str, members: list[dict]) -> str:
+    """Its members that broke, in the order in which they began to."""
+    own = [m for m in members if m["name"].startswith(f"{body}-") and m["joints_broken"]]
+    own.sort(key=lambda m: m["first_break"]["time"])
+    return " ".join(f"{m['name'][len(body) + 1 :]} {m['joints_broken']}/{m['joints']}" for m in own)
+
+
+def _around(maps: Maps, watch: Watch, rows: Array) -> tuple[float, float, float, float]:
+    """Largest depth, speed, h v² and first arrival at the columns around the blocks of a body."""
+    fitted, f = maps.fitted, watch.facts
+    X, Y = fitted.column_x, fitted.column_y
+    reach = AROUND * max(X[1] - X[0], Y[1] - Y[0])
+    low, high = f.lower[rows].min(axis=0)[:2] - reach, f.upper[rows].max(axis=0)[:2] + reach
+    near = ((low[0] <= X) & (high[0] >= X))[:, None] & ((low[1] <= Y) & (high[1] >= Y))
+    near = near.ravel()
+    arrival = maps.arrival[near][maps.arrival[near] != NEVER]
+    first = float(arrival.min()) if len(arrival) else float("nan")
+    return (
+        *(float(getattr(maps, name)[near].max(initial=0.0)) for name in ("depth", "speed", "flux")),
+        first,
+    )
