@@ -16,6 +16,7 @@ from coupler.case.types import (
     Rotation,
     Section,
     Size,
+    Switch,
     Velocity,
     Wall,
 )
@@ -34,6 +35,13 @@ class Fill(Section):
     )
 
 
+ABSORBS = Field(
+    False,
+    description="true: what runs against it goes out, long waves wholly, short and oblique ones in part; false: it "
+    "comes back as from a wall that moves",
+)
+
+
 class SteadyInflow(Section):
     """A stream of constant level and velocity."""
 
@@ -41,6 +49,7 @@ class SteadyInflow(Section):
     side: Wall = Field(description="the side of the tank, across its whole width")
     level: Length = Field(description="height z of its surface")
     velocity: Velocity = Field(description="velocity into the tank, the same over the depth")
+    absorbs: Switch = ABSORBS
 
 
 class RecordInflow(Section):
@@ -53,6 +62,7 @@ class RecordInflow(Section):
         "of the case; lines that begin with # are skipped",
         examples=["wave.csv"],
     )
+    absorbs: Switch = ABSORBS
 
 
 class BoreInflow(Section):
@@ -66,6 +76,7 @@ class BoreInflow(Section):
         description="height z of the still water; absent: the ground is dry, and water of depth h at the side comes in "
         "at sqrt(g h)",
     )
+    absorbs: Switch = ABSORBS
     level: Length = Field(description="height z of the surface behind the front")
 
 
@@ -81,9 +92,26 @@ class SolitaryInflow(Section):
         "grimshaw",
         description="first order, with a uniform velocity that carries the volume of the wave, or third order",
     )
+    absorbs: Switch = ABSORBS
 
 
-Inflow = Annotated[SteadyInflow | RecordInflow | BoreInflow | SolitaryInflow, Field(discriminator="kind")]
+class NWaveInflow(Section):
+    """One N-wave: a trough and a crest of one height, as tsunamis come ashore."""
+
+    kind: Literal["n-wave"] = Field(description="what comes in: an N-wave")
+    side: Wall = Field(description="the side of the tank, across its whole width")
+    level: Length = Field(description="height z of the still water")
+    height: PositiveLength = Field(description="height of the crest above, and depth of the trough below it")
+    middle: PositiveTime = Field(
+        description="time at which the middle between trough and crest passes the side"
+    )
+    leading: Literal["depression", "elevation"] = Field("depression", description="what comes first")
+    absorbs: Switch = ABSORBS
+
+
+Inflow = Annotated[
+    SteadyInflow | RecordInflow | BoreInflow | SolitaryInflow | NWaveInflow, Field(discriminator="kind")
+]
 
 
 class Sea(Section):
@@ -91,6 +119,11 @@ class Sea(Section):
 
     side: Wall = Field(description="the side of the tank, across its whole width")
     level: Length = Field(description="height z of the still sea")
+    absorbs: Switch = Field(
+        False,
+        description="true: waves run out of it, long ones wholly, short and oblique ones in part; false: its level "
+        "stands, so that waves come back turned over",
+    )
 
 
 class Vent(Section):

@@ -68,7 +68,7 @@ def water_remarks(case: Case) -> Iterator[str]:
     if case.water and case.tank:
         yield from _thin_water(case)
     for spec in case.water.inflow if case.water and case.tank else ():
-        if spec.kind == "solitary" or getattr(spec, "ahead", None) is not None:
+        if spec.kind in ("solitary", "n-wave") or getattr(spec, "ahead", None) is not None:
             yield from _still_water(case, spec)
         if spec.kind == "solitary":
             share = _share_at_start(spec, _depth(case, spec), case.case.gravity)
@@ -135,7 +135,7 @@ def _still_water(case: Case, spec) -> Iterator[str]:
     there = max([fill.upper[2] for fill in fills_beside(case, spec.side)], default=case.tank.lower[2])
     if abs(there - wanted) > STILL * case.tank.cell:
         yield (
-            f"the {'bore' if spec.kind == 'bore' else 'solitary wave'} at {spec.side} runs into still water up to "
+            f"the {spec.kind.replace('solitary', 'solitary wave')} at {spec.side} runs into still water up to "
             f"z = {wanted:g} m, but [[water.fill]] reaches z = {there:g} m beside it: that difference falls at once"
         )
 
@@ -230,7 +230,7 @@ def _depth_behind(ahead: float, speed: float, gravity: float) -> float:
 def _brought(case: Case, spec) -> float:
     """Volume a metre of width [m2] that an inflow brings until the end of the run, what it takes back not counted."""
     bed, end = floor_along(case.tank, spec.side), case.time.end
-    if spec.kind == "solitary":
+    if spec.kind in ("solitary", "n-wave"):
         return 0.0
     if spec.kind == "record":
         time, level, velocity = record_columns(spec.path)
@@ -276,7 +276,7 @@ def _levels(case: Case, path: KeyPath, spec) -> Iterator[Problem]:
             f"z = {spec.ahead:g} m must lie above the floor ({bed:g} m) and below the level behind ({spec.level:g} m); "
             "onto dry ground leave it out",
         )
-    elif _kind(spec) == "solitary" and spec.height > HIGHEST_WAVE * _depth(case, spec):
+    elif _kind(spec) in ("solitary", "n-wave") and spec.height > HIGHEST_WAVE * _depth(case, spec):
         yield (
             (*path, "height"),
             f"{spec.height:g} m breaks at once on a depth of {_depth(case, spec):.4g} m; "

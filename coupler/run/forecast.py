@@ -149,7 +149,7 @@ def _highest(case: Case) -> float:
         if spec.kind == "record":
             found.append(float(record_columns(spec.path)[1].max()))
         else:
-            found.append(spec.level + (spec.height if spec.kind == "solitary" else 0.0))
+            found.append(spec.level + (spec.height if spec.kind in ("solitary", "n-wave") else 0.0))
     return min(max(found), case.tank.upper[2])
 
 

@@ -8,8 +8,10 @@ import numpy as np
 
 from coupler.case.case import Case
 from coupler.case.inflow_records import record_columns
-from coupler.geometry.tank_mesh import floor_along, mean_bed, mesh_of, on_side
+from coupler.geometry.tank_mesh import bed_along, floor_along, mean_bed, mesh_of, on_side
 
+HEARD = 16
+"""Places along a side at which the water is read that it lets go."""
 SLACK = 1e-3
 """Share of a cell within which a box of water reaches a side of the tank."""
 
@@ -158,12 +160,37 @@ def _flows(case: Case, mesh):
     """Inflows and seas; None without any, and then their code is not loaded."""
     if not (case.water.inflow or case.water.sea):
         return None
+    from fluid.sides import waves
     from fluid.sides.inflow import Side, Sides
 
-    sides = [Side.of(mesh, sides_named([i.side], mesh), flow_of(case, i)) for i in case.water.inflow]
+    sides = []
+    for spec in case.water.inflow:
+        flow = flow_of(case, spec)
+        flow = _absorbing(case, spec, flow, mesh) if spec.absorbs else flow
+        sides.append(Side.of(mesh, sides_named([spec.side], mesh), flow))
     for sea in case.water.sea:
+        if sea.absorbs:
+            flow = _absorbing(case, sea, waves.steady(-_outward(sea.side), sea.level, 0.0), mesh)
+            sides.append(Side.of(mesh, sides_named([sea.side], mesh), flow))
+            continue
         sides.append(Side.of(mesh, sides_named([sea.side], mesh), level=lambda time, level=sea.level: level))
     return Sides(sides)
+
+
+def _absorbing(case: Case, spec, flow, mesh):
+    """The flow of a side that lets go what runs against it: the water is read a cell inside, at columns of the mesh."""
+    from fluid.sides.absorbing import Absorber
+
+    axis = "xyz".index(spec.side[0])
+    along = bed_along(case.tank, spec.side)
+    if len(along) == 2:  # of a box: its floor is level
+        along = np.column_stack([np.linspace(*along[:, 0], HEARD + 2), np.full(HEARD + 2, along[0, 1])])
+    along = along[1:-1][:: max(1, (len(along) - 2) // HEARD)]
+    places = np.empty((len(along), 2))
+    inside = -_outward(spec.side)[axis] * mesh.spacing
+    places[:, axis] = mesh.bounds[int(spec.side[1] == "+"), axis] + inside
+    places[:, 1 - axis] = along[:, 0]
+    return Absorber(flow, -_outward(spec.side), places, along[:, 1], case.case.gravity).as_flow()
 
 
 def flow_of(case: Case, spec):
@@ -176,6 +203,9 @@ def flow_of(case: Case, spec):
     bed = mean_bed(case.tank, spec.side, spec.level) if spec.kind != "record" else 0.0
     if spec.kind == "bore":
         return waves.steady(inward, spec.level, bore_velocity(case, spec))
+    if spec.kind == "n-wave":
+        sign = 1.0 if spec.leading == "depression" else -1.0
+        return waves.n_wave(inward, bed, spec.level - bed, spec.height, gravity, spec.middle, sign)
     if spec.kind == "solitary":
         order = 1 if spec.theory == "goring" else 3
         wave = waves.SolitaryWave(spec.level - bed, spec.height, gravity, spec.crest, order)

@@ -35,6 +35,8 @@ class Flow:
 
     level: Callable
     velocity: Callable
+    absorber: object = None
+    """`Absorber` that the flow follows, None for one that is given for ever."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -215,6 +217,10 @@ class Sides:
         self.every = tuple(sides)
         self.now = self.every
         self.entered = self.left = self.energy = 0.0
+
+    def absorbers(self) -> list:
+        """Those of the sides that let go what comes back."""
+        return [s.flow.absorber for s in self.every if s.flow is not None and s.flow.absorber is not None]
 
     def place(self, domain, active) -> None:
         """Follow a domain; active (N,) bool: its nodes with fluid around."""

@@ -41,6 +41,28 @@ def dry_bore_speed(depth: float, gravity: float) -> float:
     return float(np.sqrt(gravity * depth))
 
 
+def n_wave(
+    inward, bed: float, depth: float, height: float, gravity: float, middle: float, sign: float = 1.0
+) -> Flow:
+    """An N-wave with trough and crest of one height over a depth [m]; its middle passes the side at time `middle` [s].
+
+    η = 3 sqrt(3)/2 H sech²θ tanh θ,  θ = γ c (t - middle),  γ d = 3/2 sqrt(sqrt(3/4) H/d),  c = sqrt(g d)
+    (Tadepalli and Synolakis, Proc. R. Soc. Lond. A 445 (1994) 99), u = c η/(d + η), which carries its volume.
+    sign: 1 trough first, -1 crest first."""
+    inward, c = np.asarray(inward, float), np.sqrt(gravity * depth)
+    rate = 1.5 * np.sqrt(np.sqrt(0.75) * height / depth) * c / depth
+
+    def elevation(time: float) -> float:
+        phase = np.clip(rate * (time - middle), -300.0, 300.0)
+        return float(sign * 1.5 * np.sqrt(3.0) * height * np.tanh(phase) / np.cosh(phase) ** 2)
+
+    def velocity(points, time):
+        eta = elevation(time)
+        return np.broadcast_to(inward * c * eta / (depth + eta), (len(points), 3))
+
+    return Flow(lambda time: bed + depth + elevation(time), velocity)
+
+
 class SolitaryWave:
     """A solitary wave of height H on depth d; crest at the side at time `crest` [s].
 

@@ -220,7 +220,16 @@ class Water:
 
     def predict(self, dt: float) -> PressureProblem:
         """Advection, volume and gravity over dt [s], and the system for the pressure."""
+        self._hear()
         return predicted(self, dt)
+
+    def _hear(self) -> None:
+        """Read the water beside the sides that absorb; as their memory is what they read, a restart finds it again."""
+        for absorber in () if self.sides is None else self.sides.absorbers():
+            from fluid.readings.gauges import levels, velocity
+
+            depths = levels(self, absorber.places)
+            absorber.hear(depths, velocity(self, absorber.points(depths)), self.time)
 
     def correct(self, problem: PressureProblem, x, parting=None) -> None:
         """Take over the pressure x (n,) [Pa] of the problem and end the step; parting (n,) [m³/s]: rate at which the
