@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from coupler.case.keys import Key, find, keys
+from coupler.case.materials import PRESETS, described
 from coupler.case.types import Section
 from coupler.program.errors import SurgebreakError, UnknownName, did_you_mean
 from coupler.program.provenance import ROOT
@@ -24,6 +25,8 @@ def explanation(name: str | None) -> str:
     """
     if not name:
         return "\n".join(_entry(key) for key in keys() if "." not in key.path)
+    if name in PRESETS:
+        return described(name)
     plain = name.strip("[]").replace("[]", "")
     key = find(tuple(plain.split(".")))
     if key is None:

@@ -21,6 +21,7 @@ from pydantic import ValidationError
 
 from coupler.case.case import Case
 from coupler.case.keys import find, keys
+from coupler.case.materials import with_presets
 from coupler.case.messages import explain_error
 from coupler.case.paths import BadPath, place_of, read_text
 from coupler.case.promises import mistakes_in
@@ -360,7 +361,7 @@ def _validate(table: dict, places: _Places, nowhere: list) -> tuple[Case | None,
         mistakes += [*refused, *problems(case)]
     mistakes.sort(key=lambda mistake: places.line(mistake[0]))
     lines = [_line(path, text, places) for path, text in mistakes]
-    return (case if not mistakes else None), list(dict.fromkeys(lines))
+    return (None if mistakes or case is None else with_presets(case)), list(dict.fromkeys(lines))
 
 
 def _without_unknown(table: dict, found: list) -> Case | None:
