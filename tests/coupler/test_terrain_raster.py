@@ -1,0 +1,79 @@
+"""GeoTIFF, Shapefile and changes of the coordinate system: by the extra `terrain`, in processes of their own."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from coupler.case.terrain import Terrain
+from coupler.geometry.footprints import read_footprints
+from coupler.geometry.terrain.grids import TerrainError
+from coupler.geometry.terrain.site import KEPT, terrain_of
+from coupler.program.extras import absent
+
+pytestmark = pytest.mark.skipif(bool(absent("terrain")), reason="needs the extra terrain")
+
+WRITE = """
+import sys, numpy as np, rasterio
+from rasterio.transform import from_origin
+path, crs, x0, y0, step = sys.argv[1], sys.argv[2], *map(float, sys.argv[3:6])
+x = x0 + step * (np.arange(30) + 0.5)
+y = y0 - step * (np.arange(20) + 0.5)
+z = (2.0 + 0.3 * np.arange(30)[None, :] - 0.2 * np.arange(20)[:, None]).astype("float32")
+z[0, 0] = -9999
+with rasterio.open(path, "w", driver="GTiff", width=30, height=20, count=1, dtype="float32", crs=crs,
+                   transform=from_origin(x0, y0, step, step), nodata=-9999) as file:
+    file.write(z, 1)
+"""
+
+
+def write(path, crs, x0, y0, step):
+    words = [sys.executable, "-c", WRITE, path, crs, *map(str, (x0, y0, step))]
+    subprocess.run(words, check=True, capture_output=True)
+
+
+def test_geotiff_is_read_once_and_kept_beside_it(tmp_path):
+    write(tmp_path / "site.tif", "EPSG:32654", 388200.0, 4253000.0, 2.0)
+    spec = Terrain(path=str(tmp_path / "site.tif"), origin=(388200.0, 4252960.0))
+    found = terrain_of(spec)
+    np.testing.assert_allclose(found(np.array([11.0]), np.array([39.0])), 2.0 + 0.3 * 5, atol=1e-6)
+    np.testing.assert_allclose(found(np.array([3.0]), np.array([1.0])), 2.0 + 0.3 - 0.2 * 19, atol=1e-6)
+    assert np.isnan(found(np.array([1.0]), np.array([39.0]))).all(), "no data"
+    kept = list((tmp_path / KEPT).iterdir())
+    assert len(kept) == 1
+    kept[0].write_bytes(b"torn")
+    again = terrain_of(Terrain(path=str(tmp_path / "site.tif"), origin=(388200.0, 4252960.0), turn=0.1))
+    np.testing.assert_array_equal(again.z, found.z)
+
+
+def test_degrees_are_refused_and_reprojected(tmp_path):
+    """0.0001 degrees of latitude are 11.1 m; a plane stays one."""
+    write(tmp_path / "site.tif", "EPSG:4326", 141.7, 38.4, 1e-4)
+    with pytest.raises(TerrainError, match=r"degrees.*EPSG:32654"):
+        terrain_of(Terrain(path=str(tmp_path / "site.tif")))
+    found = terrain_of(Terrain(path=str(tmp_path / "site.tif"), reproject="EPSG:32654"))
+    assert found.spacing[0] == pytest.approx(9.9, abs=0.5)
+    assert np.ptp(found.y) == pytest.approx(20 * 11.1, rel=0.06)
+    inner = found.slopes[np.isfinite(found.slopes)]
+    east, north = 0.3 / (1e-4 * 111320 * np.cos(np.radians(38.4))), 0.2 / (1e-4 * 110996)
+    np.testing.assert_allclose(np.median(inner), np.hypot(east, north), rtol=0.02)
+
+
+def test_unknown_system_is_told_in_a_line(tmp_path):
+    write(tmp_path / "site.tif", "EPSG:32654", 0.0, 0.0, 2.0)
+    with pytest.raises(TerrainError, match=r"site.tif: no such coordinate system"):
+        terrain_of(Terrain(path=str(tmp_path / "site.tif"), reproject="EPSG:999999"))
+
+
+def test_footprints_of_a_geopackage_in_degrees(tmp_path):
+    script = """
+import sys, numpy as np, shapely, pyogrio.raw
+ring = [[141.7, 38.4], [141.7002, 38.4], [141.7002, 38.4001], [141.7, 38.4001], [141.7, 38.4]]
+pyogrio.raw.write(sys.argv[1], shapely.to_wkb(np.array([shapely.polygons(ring)])), [np.array([2])], ["levels"],
+                  geometry_type="Polygon", crs="EPSG:4326", driver="GPKG")
+"""
+    subprocess.run([sys.executable, "-c", script, tmp_path / "h.gpkg"], check=True, capture_output=True)
+    (house,) = read_footprints(tmp_path / "h.gpkg", ("EPSG:4326", "EPSG:32654"))
+    assert house.attributes == {"levels": 2}
+    assert house.area == pytest.approx(2e-4 * 111320 * np.cos(np.radians(38.4)) * 1e-4 * 110996, rel=0.01)
