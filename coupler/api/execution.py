@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from coupler.api.step import Step
 from coupler.checks.read_case import CaseFile
@@ -14,6 +14,10 @@ from coupler.program.errors import ExitCode, SurgebreakError
 from coupler.run.directory import RunDirectory
 from coupler.run.execute import carry_out
 from coupler.step.limits import Stopped
+
+if TYPE_CHECKING:
+    from coupler.step.coupled_step import CoupledStepper
+    from coupler.step.record import StepRecord
 
 Callback = Callable[[Step], object]
 _one_at_a_time = threading.Lock()
@@ -43,11 +47,13 @@ def execute(
 class _Watch:
     """What callback and stop of a script say, step by step."""
 
-    def __init__(self, callback: Callback | None, stop: Callable[[Step], object] | None):
+    def __init__(self, callback: Callback | None, stop: Callable[[Step], object] | None) -> None:
         self._callback, self._stop = callback, stop
         self.reason: str | None = None
 
-    def step(self, coupling, record, figures, readings) -> None:
+    def step(
+        self, coupling: CoupledStepper, record: StepRecord, figures: dict[str, Any], readings: dict[str, Any]
+    ) -> None:
         step = Step(coupling, record, figures, readings)
         if self._callback is not None:
             self._callback(step)

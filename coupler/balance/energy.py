@@ -121,12 +121,12 @@ class Ledger:
         """The ledger now."""
         kinetic, potential = water or (0.0, 0.0)
         dissipation, potential_now = 0.0, potential
-        if water is not None:
+        if water is not None and self._water_start is not None:
             change = kinetic + potential - sum(self._water_start)
             taken = self.work_given + self.shear + self.parting + self.air
             dissipation = self.entered - self.left - change - taken
         received = residual = 0.0
-        if structure is not None:
+        if structure is not None and self._structure_start is not None:
             received = structure["load_work"] + self.behind
             driven = structure["driving_work"]
             residual = _structure_total(structure) - self._structure_start - structure["load_work"] - driven

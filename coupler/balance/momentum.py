@@ -23,8 +23,17 @@ lines miss, is round-off in every step; `error` is its size over the impulses ex
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from coupler.step.coupled_step import CoupledStepper
+    from coupler.step.record import StepRecord
+    from fluid.step.momentum import MomentumChange
+    from fluid.step.water import Water
+    from yade_scripts.dynamics.impulses import Impulses
+    from yade_scripts.dynamics.structure import Structure
 
 Array = np.ndarray
 
@@ -78,7 +87,7 @@ class MomentumLedger:
     """Accumulates the lines of a run. about (3,) [m]: point of the moments · reach [m]: arm that makes moments of
     impulses comparable with impulses."""
 
-    def __init__(self, about: Array, reach: float):
+    def __init__(self, about: Array, reach: float) -> None:
         self.about, self.reach = np.array(about, float), float(reach)
         self.lines = {name: np.zeros(6) for name, _ in LINES}
         self.residual, self.exchanged = np.zeros(6), 0.0
@@ -103,7 +112,8 @@ class MomentumLedger:
 
     def book(self, water: WaterStep | None, blocks: BlocksStep | None) -> MomentumBalance:
         """Take a step of either side; they agree on which bodies are free blocks."""
-        before, found, exchanged, given = self.water + self.blocks, {}, 0.0, np.zeros(6)
+        before, exchanged, given = self.water + self.blocks, 0.0, np.zeros(6)
+        found: dict[str, Array] = {}
         if water is not None:
             found |= water.lines | {"recut": water.change.before - self.water}
             exchanged, given, self.water = water.exchanged, water.given, water.change.after
@@ -138,21 +148,22 @@ class MomentumLedger:
 class WaterStep:
     """change: MomentumChange of the step · lines: as in LINES · given (6,): to free blocks · exchanged [N s]"""
 
-    change: object
+    change: MomentumChange
     lines: dict[str, Array]
     given: Array
     exchanged: float
 
     @classmethod
-    def of(cls, water, load: Array, dt: float, free: Array) -> WaterStep:
+    def of(cls, water: Water, load: Array, dt: float, free: Array) -> WaterStep:
         """After a step: load (n_bodies, 6) that was told to the bodies, blocks first; free (n_blocks,) bool."""
         from fluid.numerics.sums import about
         from fluid.step.momentum import NUMERICAL
 
+        assert water.report is not None  # there was a step
         change, n = water.report.momentum, len(free)
         centre = water.domain.body_centre
 
-        def told(rows):
+        def told(rows: Array) -> Array:
             return dt * about(water.reference, load[rows], centre[rows])
 
         is_free = np.append(free, np.zeros(len(load) - n, bool))
@@ -178,7 +189,7 @@ class BlocksStep:
     exchanged: float
 
     @classmethod
-    def of(cls, structure, impulses, load: Array, about: Array) -> BlocksStep:
+    def of(cls, structure: Structure, impulses: Impulses, load: Array, about: Array) -> BlocksStep:
         """After a step under the load (n, 6) with its Impulses."""
         free = ~structure.fixed
         contact, joint = (impulses.about(about, which) for which in (impulses.contact, impulses.joint))
@@ -201,14 +212,16 @@ class BlocksStep:
         )
 
 
-def momentum_ledger(water, structure) -> MomentumLedger:
+def momentum_ledger(water: Water | None, structure: Structure | None) -> MomentumLedger:
     """The books of a scene that starts: moments about the middle of the tank, or of the blocks; either may be None."""
     if water is not None:
-        about, reach = water.reference, 0.5 * np.linalg.norm(np.ptp(water.mesh.bounds, axis=0))
+        about, reach = water.reference, 0.5 * float(np.linalg.norm(np.ptp(water.mesh.bounds, axis=0)))
     else:
+        assert structure is not None  # a scene has one side at least
         about = structure.centre().mean(axis=0).round(6)
         away = np.linalg.norm(structure.centre() - about, axis=1)
-        reach = (away + [np.linalg.norm(v, axis=1).max() for v in structure.shape_vertices]).max()
+        radius = np.array([np.linalg.norm(v, axis=1).max() for v in structure.shape_vertices])
+        reach = float((away + radius).max())
     ledger = MomentumLedger(about, reach)
     ledger.start(
         None if water is None else momentum_of_water(water),
@@ -217,21 +230,21 @@ def momentum_ledger(water, structure) -> MomentumLedger:
     return ledger
 
 
-def momentum_of_water(water) -> Array:
+def momentum_of_water(water: Water) -> Array:
     """P, L (6,) of the water now."""
     from fluid.step.momentum import momentum
 
     return momentum(water)
 
 
-def book_step(coupling, record) -> MomentumBalance:
+def book_step(coupling: CoupledStepper, record: StepRecord) -> MomentumBalance:
     """Book the step that has just ended in `coupling.momentum`."""
     ledger, structure = coupling.momentum, coupling.structure
     free = np.zeros(0, bool) if structure is None else ~structure.fixed
     water = blocks = None
     if coupling.water is not None:
         water = WaterStep.of(coupling.water, record.load, record.dt, free)
-    if structure is not None:
+    if structure is not None and record.impulses is not None:
         load = record.load[: structure.n] if len(record.load) else np.zeros((structure.n, 6))
         blocks = BlocksStep.of(structure, record.impulses, load, ledger.about)
     return ledger.book(water, blocks)

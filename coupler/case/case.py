@@ -6,7 +6,7 @@ A section that is absent switches its module off (`modules`). Unknown names are 
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, PrivateAttr, model_validator
 
@@ -26,7 +26,7 @@ from coupler.case.types import (
     Switch,
     VelocityVector,
 )
-from coupler.case.units import quantity
+from coupler.case.units import InSI
 from coupler.case.verdict import Verdict
 from coupler.case.water import Solid, Water
 
@@ -36,7 +36,7 @@ class About(Section):
 
     title: str = Field(description="one line for people")
     description: str = Field("", description="what happens, where it comes from, what to look at")
-    gravity: quantity("m/s2", ge=0) = Field(
+    gravity: Annotated[float, InSI("m/s2", ge=0)] = Field(
         9.81, description="acceleration of gravity, along -z; z points up"
     )
 
@@ -46,7 +46,7 @@ class Time(Section):
 
     end: PositiveTime = Field(description="the run ends at this time", examples=["4 s"])
     step_max: PositiveTime = Field(0.05, description="largest step of the coupled scheme")
-    cfl: quantity("", gt=0, le=10) = Field(
+    cfl: Annotated[float, InSI("", gt=0, le=10)] = Field(
         1.0,
         description="cells that the fastest water may cross in one step; sets the step up to step_max. Spray, the "
         "hundredth of the water that is more than a third faster than all the rest, may cross twice as many",
@@ -56,7 +56,7 @@ class Time(Section):
         description="time between two written states; a step ends at each of them, so none is longer than this; "
         "absent: a hundredth of the end time",
     )
-    checkpoint_every: quantity("s", ge=0) | None = Field(
+    checkpoint_every: Annotated[float, InSI("s", ge=0)] | None = Field(
         None,
         description="time between two checkpoints, from which `surgebreak resume` goes on; absent: a tenth of the end "
         "time; 0: none, also when the run is stopped",
@@ -74,7 +74,7 @@ class Stretch(Section):
     cell: PositiveLength = Field(
         description="wanted length of the bricks along this axis", examples=["0.25 m"]
     )
-    growth: quantity("", gt=1, le=2) = Field(
+    growth: Annotated[float, InSI("", gt=1, le=2)] = Field(
         1.2, description="largest ratio of the lengths of bricks one after the other beyond its ends"
     )
 
@@ -153,7 +153,7 @@ class Tank(Section):
     _regions: object = PrivateAttr(None)
 
     @property
-    def ground(self):
+    def ground(self) -> Any:
         """Height map that the mesh ends on, of a case with [terrain]; None without."""
         return self._ground
 
@@ -163,24 +163,24 @@ class Tank(Section):
         return self.mesh is None and self._ground is None
 
     @property
-    def regions(self):
+    def regions(self) -> Any:
         """`geometry.tank_regions.Regions` that the tables of `refine` stand for; None without any."""
         return self._regions
 
-    def with_regions(self, regions) -> Tank:
+    def with_regions(self, regions: Any) -> Tank:
         """The same tank with these regions."""
         other = self.model_copy()
         other._regions = regions
         return other
 
-    def standing_on(self, ground) -> Tank:
+    def standing_on(self, ground: Any) -> Tank:
         """The same tank over a height map."""
         other = self.model_copy()
         other._ground = ground
         return other
 
 
-def _checked_uplift(section):
+def _checked_uplift(section: Any) -> Any:
     """A share where uplift = "share", and nowhere else."""
     if (section.uplift == "share") != (section.uplift_share is not None):
         raise ValueError(
@@ -196,36 +196,40 @@ class ContactPair(Section):
         description="names that blocks, ground (ground) or tank sides (tank) give as their material",
         examples=[["brick", "ground"]],
     )
-    friction: quantity("", ge=0) | None = Field(
+    friction: Annotated[float, InSI("", ge=0)] | None = Field(
         None, description="mu of this pair; absent: that of [contact]"
     )
     uplift: Literal["full", "none", "share"] | None = Field(
         None, description="as in [contact]; absent: what is given there"
     )
-    uplift_share: quantity("", ge=0, le=1) | None = Field(None, description="needed with uplift = share")
+    uplift_share: Annotated[float, InSI("", ge=0, le=1)] | None = Field(
+        None, description="needed with uplift = share"
+    )
 
     @model_validator(mode="after")
-    def _share_is_known(self):
+    def _share_is_known(self) -> Self:
         return _checked_uplift(self)
 
 
 class Contact(Section):
     """Spring, dashpot and friction between touching faces."""
 
-    stiffness: quantity("N/m", gt=0) | None = Field(
+    stiffness: Annotated[float, InSI("N/m", gt=0)] | None = Field(
         None,
         description="K of a whole face in contact; absent: that of the joints in closing, so that a face whose joint "
         "breaks goes on as it was",
         examples=["1 GN/m"],
     )
-    restitution: quantity("", gt=0, le=1) = Field(
+    restitution: Annotated[float, InSI("", gt=0, le=1)] = Field(
         0.3, description="e, velocity after a normal impact over the velocity before"
     )
-    friction: quantity("", ge=0) = Field(0.5, description="mu, largest tangential over normal force")
-    shear_ratio: quantity("", gt=0, le=10) = Field(
+    friction: Annotated[float, InSI("", ge=0)] = Field(
+        0.5, description="mu, largest tangential over normal force"
+    )
+    shear_ratio: Annotated[float, InSI("", gt=0, le=10)] = Field(
         1.0, description="tangential over normal stiffness, K_t/K_n"
     )
-    tangential_restitution: quantity("", gt=0, le=1) | None = Field(
+    tangential_restitution: Annotated[float, InSI("", gt=0, le=1)] | None = Field(
         None,
         description="the same as restitution along the face; absent: the dashpot goes with the stiffness",
     )
@@ -242,7 +246,7 @@ class Contact(Section):
         "lie on one another, on the ground or on the floor of the tank: that of the water around them, none (the faces "
         "keep the water out), or uplift_share of it",
     )
-    uplift_share: quantity("", ge=0, le=1) | None = Field(
+    uplift_share: Annotated[float, InSI("", ge=0, le=1)] | None = Field(
         None, description="share of the pressure around that acts, needed with uplift = share", examples=[0.5]
     )
     pair: tuple[ContactPair, ...] = Field(
@@ -250,7 +254,7 @@ class Contact(Section):
     )
 
     @model_validator(mode="after")
-    def _share_is_known(self):
+    def _share_is_known(self) -> Self:
         return _checked_uplift(self)
 
 
@@ -262,7 +266,7 @@ class JointPair(Section):
         examples=[["wall", "ground"]],
     )
     joined: Switch = Field(True, description="false: no joint, whatever else is said")
-    strength: quantity("Pa", gt=0) | None = Field(
+    strength: Annotated[float, InSI("Pa", gt=0)] | None = Field(
         None, description="absent, like all below: that of [joints]"
     )
     opening_at_failure: PositiveLength | None = Field(
@@ -271,12 +275,12 @@ class JointPair(Section):
     law: Name | None = Field(
         None, description="as in [joints]; with a law of its own, its peak is that law's"
     )
-    peak: quantity("", gt=0, lt=1) | None = Field(
+    peak: Annotated[float, InSI("", gt=0, lt=1)] | None = Field(
         None, description="opening at T_max over opening_at_failure"
     )
     mixed_mode: Literal["effective", "needleman"] | None = Field(None, description="as in [joints]")
-    shear_ratio: quantity("", gt=0) | None = Field(None, description="beta")
-    closing_ratio: quantity("", gt=0) | None = Field(
+    shear_ratio: Annotated[float, InSI("", gt=0)] | None = Field(None, description="beta")
+    closing_ratio: Annotated[float, InSI("", gt=0)] | None = Field(
         None, description="stiffness in compression over the first in tension"
     )
 
@@ -284,7 +288,9 @@ class JointPair(Section):
 class Joints(Section):
     """Cohesion between touching faces, by default T = 27/4 T_max d (1 - d)^2, d = opening/opening_at_failure."""
 
-    strength: quantity("Pa", gt=0) = Field(description="T_max, largest traction", examples=["0.5 MPa"])
+    strength: Annotated[float, InSI("Pa", gt=0)] = Field(
+        description="T_max, largest traction", examples=["0.5 MPa"]
+    )
     opening_at_failure: PositiveLength = Field(
         description="opening at which nothing holds any more", examples=["5 mm"]
     )
@@ -292,7 +298,7 @@ class Joints(Section):
         "polynomial",
         description="polynomial, bilinear, exponential, or the name of another file in yade_scripts/joints/laws",
     )
-    peak: quantity("", gt=0, lt=1) | None = Field(
+    peak: Annotated[float, InSI("", gt=0, lt=1)] | None = Field(
         None,
         description="opening at T_max over opening_at_failure; absent: 1/3 polynomial (fixed), 0.1 bilinear "
         "(0.01 to 0.9) and exponential (0.01 to 0.2)",
@@ -302,15 +308,15 @@ class Joints(Section):
         description="effective: one history for opening and sliding; needleman: his potential of 1987, polynomial "
         "law only, shear does not soften without opening",
     )
-    shear_ratio: quantity("", gt=0) = Field(
+    shear_ratio: Annotated[float, InSI("", gt=0)] = Field(
         1.0,
         description="beta, weight of sliding in the effective opening and in the shear traction; needleman: "
         "square root of alpha",
     )
-    closing_ratio: quantity("", gt=0) = Field(
+    closing_ratio: Annotated[float, InSI("", gt=0)] = Field(
         1.0, description="stiffness in compression over the first stiffness in tension"
     )
-    damping: quantity("", ge=0, lt=1) = Field(
+    damping: Annotated[float, InSI("", ge=0, lt=1)] = Field(
         0.02, description="share of critical damping, proportional to the stiffness of the joint"
     )
     points: Literal["auto"] | Annotated[int, Field(strict=True, ge=2, le=12)] = Field(
@@ -327,7 +333,7 @@ class Joints(Section):
         description="strengths are random, joint by joint, with strength as their mean; opening_at_failure stays, so "
         "stiffness and work of separation go along; absent: all alike",
     )
-    variation: quantity("", ge=0.001, le=1) | None = Field(
+    variation: Annotated[float, InSI("", ge=0.001, le=1)] | None = Field(
         None, description="standard deviation of the strengths over their mean, needed with distribution"
     )
     seed: Annotated[int, Field(strict=True, ge=0)] = Field(
@@ -351,7 +357,7 @@ class Coupling(Section):
         description="most pressure solves in a step: the blocks' stiffness is in the first; with what the blocks then "
         "did, the step is taken again while the defect is above the tolerance",
     )
-    tolerance: quantity("", gt=0, le=1) = Field(
+    tolerance: Annotated[float, InSI("", gt=0, le=1)] = Field(
         0.02, description="defect of a step above which another pass is made"
     )
 
@@ -359,22 +365,26 @@ class Coupling(Section):
 class RunLimits(Section):
     """When a run stops early because its numbers are not to be trusted, or have cost enough."""
 
-    volume_error: quantity("", gt=0) = Field(0.02, description="lost or gained share of the water")
-    energy_error: quantity("", gt=0) = Field(0.05, description="unbalanced share of the energy put in")
-    momentum_error: quantity("", gt=0) = Field(
+    volume_error: Annotated[float, InSI("", gt=0)] = Field(
+        0.02, description="lost or gained share of the water"
+    )
+    energy_error: Annotated[float, InSI("", gt=0)] = Field(
+        0.05, description="unbalanced share of the energy put in"
+    )
+    momentum_error: Annotated[float, InSI("", gt=0)] = Field(
         1e-8, description="share of the impulses of a step by which the books of momentum miss"
     )
-    defect: quantity("", gt=0) = Field(
+    defect: Annotated[float, InSI("", gt=0)] = Field(
         0.5,
         description="share by which the blocks may miss the motion that the water was told, on the mean of the last "
         "twenty steps; a single step that misses by more than 0.6 of it is halved and taken again",
     )
-    overlap: quantity("", gt=0) = Field(
+    overlap: Annotated[float, InSI("", gt=0)] = Field(
         0.25,
         description="depth to which a block may be in another, the ground or a side of the tank, over the thickness "
         "of the thinner one: twice the distance of its nearest face from its centre of mass",
     )
-    air_pressure: quantity("Pa", gt=0) = Field(
+    air_pressure: Annotated[float, InSI("Pa", gt=0)] = Field(
         1e6, description="pressure of trapped air, relative to the open air"
     )
     cpu_seconds: PositiveTime | None = Field(
@@ -408,15 +418,15 @@ class Case(Section):
 def modules(case: Case) -> dict[str, bool]:
     """Which parts of the program a case switches on, by name, in the order in which they are told."""
     structure = case.structure is not None
-    water = case.water is not None
+    w, water = case.water, case.water is not None
     return {
         "terrain": case.terrain is not None,
         "water": water,
-        "stabilised transport": water and case.water.advection == "supg",
-        "viscosity": water and case.water.viscosity > 0.0,
-        "wall friction": water and case.water.walls == "friction",
-        "trapped air": water and case.water.air.model == "trapped",
-        "inflow": water and bool(case.water.inflow or case.water.sea),
+        "stabilised transport": w is not None and w.advection == "supg",
+        "viscosity": w is not None and w.viscosity > 0.0,
+        "wall friction": w is not None and w.walls == "friction",
+        "trapped air": w is not None and w.air.model == "trapped",
+        "inflow": w is not None and bool(w.inflow or w.sea),
         "structure": structure,
         "coupling": water and structure,
         "fixed solids": bool(case.solid),

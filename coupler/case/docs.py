@@ -8,10 +8,12 @@ from __future__ import annotations
 import inspect
 from collections.abc import Iterator
 from pathlib import Path
+from typing import get_args
+
+from pydantic import BaseModel
 
 from coupler.case.keys import Key, find, keys
 from coupler.case.materials import PRESETS, described
-from coupler.case.types import Section
 from coupler.program.errors import SurgebreakError, UnknownName, did_you_mean
 from coupler.program.provenance import ROOT
 
@@ -107,11 +109,11 @@ def _tables() -> Iterator[str]:
             yield from _table(section, key)
 
 
-def _table(section: type[Section], key: Key) -> Iterator[str]:
+def _table(section: type[BaseModel], key: Key) -> Iterator[str]:
     title = inspect.getdoc(section) or ""
     kind = section.model_fields.get("kind")
     if kind is not None:
-        yield f'`kind = "{kind.annotation.__args__[0]}"`: {title}'
+        yield f'`kind = "{get_args(kind.annotation)[0]}"`: {title}'
     else:
         yield f"`{_header(key)}`: {title}"
     yield ""

@@ -7,9 +7,9 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from coupler.case.types import Length, Name, Number, Point, PositiveLength, PositiveTime, Section, Switch
-from coupler.case.units import quantity
+from coupler.case.units import InSI
 
-Time = quantity("s", ge=0)
+Time = Annotated[float, InSI("s", ge=0)]
 Edges = tuple[Point, Point]
 Window = tuple[Time, Time]
 

@@ -12,7 +12,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from coupler.case.case import Case
-from coupler.case.units import Unit
+from coupler.case.units import InSI
 
 REQUIRED = "required"
 
@@ -74,7 +74,7 @@ def names_in(path: tuple[str | int, ...]) -> list[str]:
 
 def _key(path: str, field: FieldInfo) -> Key:
     parts = list(_leaves(field.annotation)) + list(field.metadata)
-    unit = next((part.symbol for part in parts if isinstance(part, Unit)), "")
+    unit = next((part.unit for part in parts if isinstance(part, InSI)), "")
     return Key(
         path=path,
         description=field.description or "",
@@ -90,7 +90,7 @@ def _key(path: str, field: FieldInfo) -> Key:
 def _leaves(annotation: object) -> Iterator[object]:
     """The metadata of every Annotated inside a type (field infos taken apart)."""
     if typing.get_origin(annotation) is typing.Annotated:
-        for item in annotation.__metadata__:
+        for item in typing.get_args(annotation)[1:]:
             yield from item.metadata if isinstance(item, FieldInfo) else (item,)
     for inner in typing.get_args(annotation):
         if not isinstance(inner, str | int | float):
@@ -106,8 +106,9 @@ def _limits(field: FieldInfo, parts: list) -> str:
         return " | ".join(choices)
     found = []
     for part in parts:
-        if isinstance(part, annotated_types.BaseMetadata) and not isinstance(part, Unit):
-            text = [f"{sign}{getattr(part, name):g}" for name, sign in _SIGNS.items() if hasattr(part, name)]
+        if isinstance(part, annotated_types.BaseMetadata | InSI):
+            given = ((sign, getattr(part, name, None)) for name, sign in _SIGNS.items())
+            text = [f"{sign}{limit:g}" for sign, limit in given if limit is not None]
             found += [item for item in text if item not in found]
     return ", ".join(found)
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sized
 from typing import get_args
 
 from coupler.case.gauges import Gauge
 from coupler.case.keys import Key, find, keys, names_in, sections_of
+from coupler.case.types import KeyPath
 from coupler.case.water import Inflow
 from coupler.program.errors import briefly, did_you_mean
-
-KeyPath = tuple[str | int, ...]
 
 
 def _kinds_of(tables: object) -> tuple[str, ...]:
@@ -115,9 +115,9 @@ def _shape(kind: str, value: object, context: dict, key: Key | None, message: st
         return f"{briefly(value)} is not a list of numbers; {_is(key)}"
     if kind in ("model_type", "model_attributes_type", "dict_type"):
         return f"{briefly(value)} is not a section; {_is(key)}"
-    if kind == "too_long":
+    if kind == "too_long" and isinstance(value, Sized):
         return f"{len(value)} values where {context['max_length']} belong; {_is(key)}"
-    if kind == "too_short":
+    if kind == "too_short" and isinstance(value, Sized):
         return f"{len(value)} values where at least {context['min_length']} belong; {_is(key)}"
     if kind == "string_too_short":
         return f"{briefly(value)} is empty; {_is(key)}"

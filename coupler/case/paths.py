@@ -76,3 +76,9 @@ def _nearest(path: Path) -> str:
     except OSError:
         return ""
     return did_you_mean(path.name, beside)
+
+
+def stamp(path: str) -> tuple[int, int]:
+    """Time of the last change [ns] and size [B] of a file: by these it is read again or not."""
+    there = os.stat(path)
+    return there.st_mtime_ns, there.st_size

@@ -6,8 +6,9 @@ The meaning of the entries stands where they are used: `expected.py`, `view/over
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
@@ -46,7 +47,7 @@ class Expect(_Entry):
     source: str = ""
 
     @model_validator(mode="after")
-    def _whole(self):
+    def _whole(self) -> Self:
         bounds = self.at_least is not None or self.at_most is not None
         if (self.value is None) == (not bounds) or (self.value is None) != (self.tolerance is None):
             raise ValueError("give value and tolerance, or at_least, at_most or both of these")
@@ -54,8 +55,9 @@ class Expect(_Entry):
         missing = [name for name in NEEDS.get(self.take, ()) if name not in given]
         if missing:
             raise ValueError(f"take = '{self.take}' needs {' and '.join(missing)}")
-        if self.take == "integral" and not self.from_ < self.to:
-            raise ValueError(f"from ({self.from_:g}) must be less than to ({self.to:g})")
+        start, end = self.from_, self.to
+        if self.take == "integral" and start is not None and end is not None and not start < end:
+            raise ValueError(f"from ({start:g}) must be less than to ({end:g})")
         return self
 
 
@@ -72,7 +74,7 @@ class Reference(_Entry):
     y_scale: Number = 1.0
 
     @model_validator(mode="after")
-    def _whole(self):
+    def _whole(self) -> Self:
         if (self.y is None) == (self.low is None) or (self.low is None) != (self.high is None):
             raise ValueError("give y, or low and high")
         return self
@@ -97,7 +99,7 @@ class Curve(_Entry):
     references: tuple[Reference, ...] = ()
 
     @model_validator(mode="after")
-    def _whole(self):
+    def _whole(self) -> Self:
         if (self.column is None) == (self.columns is None):
             raise ValueError("give column, or columns with places and above")
         if self.columns and (self.above is None or len(self.places or ()) != len(self.columns)):
@@ -131,7 +133,7 @@ def mistakes_in(directory: Path) -> list[str]:
     return []
 
 
-def _line(path: Path, error: dict, lines: dict) -> str:
+def _line(path: Path, error: Mapping[str, Any], lines: dict) -> str:
     place = error["loc"]
     number = line_of(place, lines)
     where = f"{path}:{number}" if number else str(path)

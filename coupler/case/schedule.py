@@ -31,8 +31,9 @@ class Schedule:
         """That of a new run: with the interval of the case if it divides the end, else with one near it that does."""
         end, every = case.time.end, case.time.output_every
         count = max(1, round(end / every)) if every else OUTPUTS
-        divides = every is not None and abs(every * count - end) < ROUNDING * every
-        return cls(every, 1, end) if divides else cls(end, count, end)
+        if every is not None and abs(every * count - end) < ROUNDING * every:
+            return cls(every, 1, end)
+        return cls(end, count, end)
 
     @property
     def interval(self) -> float:

@@ -21,7 +21,7 @@ from coupler.case.types import (
     VelocityVector,
     Wall,
 )
-from coupler.case.units import quantity
+from coupler.case.units import InSI
 
 
 class Block(Section):
@@ -86,7 +86,7 @@ class Building(Section):
         description="terrain: it stands on a footing in the ground, a held box NAME-footing, and the z of lower counts "
         "from the highest ground under it",
     )
-    turn: quantity("rad") = Field(
+    turn: Annotated[float, InSI("rad")] = Field(
         0.0,
         description="turn about the upright axis through its middle, counter-clockwise",
         examples=["30 deg"],
@@ -115,7 +115,7 @@ class MasonryWall(Section):
         description="terrain: it stands on a footing in the ground, a held box NAME-footing, and the z of lower counts "
         "from the highest ground under it",
     )
-    turn: quantity("rad") = Field(
+    turn: Annotated[float, InSI("rad")] = Field(
         0.0,
         description="turn about the upright axis through its middle, counter-clockwise",
         examples=["30 deg"],
@@ -229,7 +229,7 @@ class Town(Section):
     storeys_from: str | None = Field(None, description="attribute with the number of storeys")
     storeys: Annotated[int, Field(strict=True, ge=1, le=100)] = Field(1, description="number of storeys")
     storey_height: PositiveLength = Field(3.0, description="from floor to floor")
-    above_ground: quantity("m", ge=0) = Field(
+    above_ground: Annotated[float, InSI("m", ge=0)] = Field(
         0.0, description="height of the lowest floor above the highest ground under the house"
     )
     wall_thickness: PositiveLength = Field(description="thickness of the walls", examples=["0.5 m"])
@@ -242,7 +242,7 @@ class Town(Section):
     )
     density: Density | None = Field(None, description="mass per volume; absent: structure.density")
     material: Name = Field("block", description="a name that contact.pair and joints.pair may go by")
-    least_area: quantity("m2", ge=0) = Field(
+    least_area: Annotated[float, InSI("m2", ge=0)] = Field(
         0.0, description="smaller footprints, sheds and bins, are left out"
     )
     rule: tuple[TownRule, ...] = Field((), description="what differs, by attributes of the file")

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from collections.abc import Iterator
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
 from coupler.case.types import Name, Number, PositiveTime, Section
-from coupler.case.units import quantity
+from coupler.case.units import InSI
 
 Value = bool | int | float | str | tuple[bool | int | float | str, ...]
 Override = Annotated[str, Field(pattern=r"^[^=\s]+\s*=.*\S")]
-Time = quantity("s", ge=0)
+Time = Annotated[float, InSI("s", ge=0)]
 Count = Annotated[int, Field(strict=True, ge=1, le=100)]
 
 
@@ -73,14 +74,14 @@ class Quantity(Section):
     source: str = Field("", description="where the reference comes from")
 
     @model_validator(mode="after")
-    def _whole(self):
+    def _whole(self) -> Self:
         wrong = [*_reading_problems(self), *_reference_problems(self)]
         if wrong:
             raise ValueError("; ".join(wrong))
         return self
 
 
-def _reading_problems(q: Quantity):
+def _reading_problems(q: Quantity) -> Iterator[str]:
     if (q.figure is None) == (q.table is None and q.column is None) or (q.table is None) != (
         q.column is None
     ):
@@ -95,7 +96,7 @@ def _reading_problems(q: Quantity):
         yield f"a figure of run.json is one number; take = '{q.take}' is for columns"
 
 
-def _reference_problems(q: Quantity):
+def _reference_problems(q: Quantity) -> Iterator[str]:
     """One kind of reference a quantity: an error against a measurement is none against an exact answer."""
     given = [n for n in ("value", "path") if getattr(q, n) is not None]
     scatter = [n for n in ("band", "band_columns") if getattr(q, n) is not None]
@@ -137,7 +138,7 @@ class Ladder(Section):
     labels: tuple[str, ...] = Field(
         (), description="what the runs are called in figures; absent: their values"
     )
-    sizes: tuple[quantity("", gt=0), ...] = Field(
+    sizes: tuple[Annotated[float, InSI("", gt=0)], ...] = Field(
         (),
         description="lengths, times or other measures of the runs for the order of convergence; absent: the values, "
         "where they have a unit",
@@ -154,14 +155,14 @@ class Ladder(Section):
     )
 
     @model_validator(mode="after")
-    def _whole(self):
+    def _whole(self) -> Self:
         wrong = list(_law_problems(self) if self.laws or self.substeps else _ladder_problems(self))
         if wrong:
             raise ValueError("; ".join(wrong))
         return self
 
 
-def _law_problems(ladder: Ladder):
+def _law_problems(ladder: Ladder) -> Iterator[str]:
     if not (ladder.laws and ladder.substeps):
         yield "laws and substeps go together"
     others = [n for n in ("key", "values", "larger", "labels", "sizes", "across") if getattr(ladder, n)]
@@ -169,7 +170,7 @@ def _law_problems(ladder: Ladder):
         yield f"laws and {', '.join(others)}: a ladder has either laws or a key"
 
 
-def _ladder_problems(ladder: Ladder):
+def _ladder_problems(ladder: Ladder) -> Iterator[str]:
     if ladder.key is None or not ladder.values:
         yield "give key and values, or laws and substeps"
         return

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
+from typing import Any
+
 from coupler.case.keys import keys
 from coupler.case.study import Ladder, Study
+from coupler.case.types import KeyPath
 from coupler.program.errors import did_you_mean
 
 
@@ -12,7 +16,7 @@ def without_places(name: str) -> tuple[str, ...]:
     return tuple(part.partition("[")[0] for part in name.split("."))
 
 
-def study_problems(study: Study):
+def study_problems(study: Study) -> Iterator[tuple[KeyPath, str]]:
     """(key path, message) of names in [study] that are not there."""
     yield from _taken("quantity", study.quantity)
     yield from _taken("ladder", study.ladder)
@@ -32,7 +36,7 @@ def study_problems(study: Study):
             )
 
 
-def _taken(kind: str, tables):
+def _taken(kind: str, tables: Iterable[Any]) -> Iterator[tuple[KeyPath, str]]:
     seen: dict[str, int] = {}
     for i, table in enumerate(tables):
         first = seen.setdefault(table.name, i)
@@ -40,7 +44,7 @@ def _taken(kind: str, tables):
             yield ("study", kind, i, "name"), f"'{table.name}' is taken by study.{kind}[{first}]"
 
 
-def _ladder_names(ladder: Ladder, path: tuple, study: Study):
+def _ladder_names(ladder: Ladder, path: tuple, study: Study) -> Iterator[tuple[KeyPath, str]]:
     known = [key.path for key in keys()]
     for name in (ladder.key,) if isinstance(ladder.key, str) else ladder.key or ():
         plain = ".".join(without_places(name))

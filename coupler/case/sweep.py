@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from collections.abc import Iterator
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
 from coupler.case.study import Count, Override, Time, Value
 from coupler.case.types import Length, Name, Number, PositiveTime, Section, Switch
-from coupler.case.units import quantity
+from coupler.case.units import InSI
 
 Amount = float | str
 """A number in SI or text with a unit; the key that it is for says which units fit."""
 Many = Annotated[int, Field(strict=True, ge=1, le=1_000_000)]
 Seed = Annotated[int, Field(strict=True, ge=0, le=2**31 - 1)]
-Share = quantity("", gt=0, lt=1)
+Share = Annotated[float, InSI("", gt=0, lt=1)]
 
 NEEDS = {
     "uniform": (("low", "high"),),
@@ -54,12 +55,14 @@ class Varied(Section):
     mean: Amount | None = Field(None, description="mean")
     median: Amount | None = Field(None, description="value that half of the samples are below")
     deviation: Amount | None = Field(None, description="standard deviation")
-    variation: quantity("", gt=0) | None = Field(None, description="standard deviation over the mean")
-    dispersion: quantity("", gt=0) | None = Field(
+    variation: Annotated[float, InSI("", gt=0)] | None = Field(
+        None, description="standard deviation over the mean"
+    )
+    dispersion: Annotated[float, InSI("", gt=0)] | None = Field(
         None, description="standard deviation of the natural logarithm"
     )
     scale: Amount | None = Field(None, description="of weibull: value that 63 % of the samples are below")
-    shape: quantity("", gt=0) | None = Field(None, description="of weibull: its exponent")
+    shape: Annotated[float, InSI("", gt=0)] | None = Field(None, description="of weibull: its exponent")
     lower: Amount | None = Field(None, description="the distribution is cut off below; absent: it is not")
     upper: Amount | None = Field(None, description="the distribution is cut off above; absent: it is not")
     whole: Switch = Field(
@@ -67,7 +70,7 @@ class Varied(Section):
     )
 
     @model_validator(mode="after")
-    def _whole(self):
+    def _whole(self) -> Self:
         wrong = list(_varied_problems(self))
         if wrong:
             raise ValueError("; ".join(wrong))
@@ -84,7 +87,7 @@ class Varied(Section):
         return self.name or self.keys[0].rpartition(".")[2].partition("[")[0]
 
 
-def _varied_problems(v: Varied):
+def _varied_problems(v: Varied) -> Iterator[str]:
     if v.key is None and v.name is None:
         yield "give key, or the name by which formulas of sweep.link know it"
     if v.key is not None and v.unit:
@@ -100,7 +103,7 @@ def _varied_problems(v: Varied):
         return
     kind = given[0]
     set_here = [n for n in PARAMETERS if getattr(v, n) is not None]
-    if kind == "distribution":
+    if kind == "distribution" and v.distribution is not None:
         pairs = NEEDS[v.distribution]
         if set(set_here) not in [set(pair) for pair in pairs]:
             ways = ", or ".join(" and ".join(pair) for pair in pairs)
@@ -169,14 +172,14 @@ class SweepQuantity(Section):
     )
 
     @model_validator(mode="after")
-    def _whole(self):
+    def _whole(self) -> Self:
         wrong = list(_quantity_problems(self))
         if wrong:
             raise ValueError("; ".join(wrong))
         return self
 
 
-def _quantity_problems(q: SweepQuantity):
+def _quantity_problems(q: SweepQuantity) -> Iterator[str]:
     of_table = q.table is not None and (q.column is not None) != (q.formula is not None)
     kinds = {
         "table with column or formula": of_table,

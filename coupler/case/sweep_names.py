@@ -49,7 +49,9 @@ def design_problems(sweep: Sweep) -> Iterator[Problem]:
 
 
 def _keys(sweep: Sweep) -> Iterator[Problem]:
-    named = [(("vary", i, "key"), key) for i, v in enumerate(sweep.vary) for key in v.keys]
+    named: list[tuple[tuple[str | int, ...], str]] = [
+        (("vary", i, "key"), key) for i, v in enumerate(sweep.vary) for key in v.keys
+    ]
     named += [(("link", i, "key"), link.key) for i, link in enumerate(sweep.link)]
     named += [(("seeds", i), key) for i, key in enumerate(sweep.seeds)]
     seen: dict[str, tuple] = {}
@@ -90,7 +92,7 @@ def _columns(sweep: Sweep) -> Iterator[Problem]:
     seen |= dict.fromkeys(OWN, "a column of every table")
     for kind, tables in (("vary", sweep.vary), ("quantity", sweep.quantity)):
         for i, table in enumerate(tables):
-            name = table.column if isinstance(table, Varied) else table.name
+            name = table.column if isinstance(table, Varied) else table.name  # type: ignore[attr-defined]
             if name in seen:
                 yield ("sweep", kind, i, "name"), f"'{name}' is taken by {seen[name]}; give another name"
             seen.setdefault(name, f"sweep.{kind}[{i}]")
@@ -145,6 +147,6 @@ def amount(v: Varied, name: str) -> float:
     return in_si(value, "" if pure else unit(v))
 
 
-def in_si(value, unit: str) -> float:
+def in_si(value: object, unit: str) -> float:
     """A number, or text with a unit of that kind; of an unknown kind a plain number. Raises UnitError."""
     return to_si(value, unit if unit in DIMENSIONS else "")

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from coupler.case.types import Length, Name, Number, Point, PositiveLength, Section, Switch
-from coupler.case.units import quantity
+from coupler.case.units import InSI
 
 
 class Terrain(Section):
@@ -46,7 +46,7 @@ class Terrain(Section):
         None,
         description="x, y of the file that come to lie at offset; absent: its corner with the lowest ones",
     )
-    turn: quantity("rad") = Field(
+    turn: Annotated[float, InSI("rad")] = Field(
         0.0, description="turn about origin, counter-clockwise", examples=["30 deg"]
     )
     offset: Point = Field(
@@ -56,6 +56,6 @@ class Terrain(Section):
     smooth: PositiveLength | None = Field(
         None, description="length over which heights are averaged (standard deviation of a Gauss curve)"
     )
-    steepest: quantity("rad", gt=0, lt=1.5) | None = Field(
+    steepest: Annotated[float, InSI("rad", gt=0, lt=1.5)] | None = Field(
         None, description="steepest slope left; cliffs are cut back from their foot", examples=["60 deg"]
     )

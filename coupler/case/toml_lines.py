@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_left
+from typing import cast
 
 Path = tuple[str | int, ...]
 
@@ -69,7 +70,7 @@ class _Scan:
         while True:
             self._skip(_BLANK)
             quoted = _STRING.match(self.text, self.at)
-            match = quoted or _BARE.match(self.text, self.at)
+            match = cast("re.Match[str]", quoted or _BARE.match(self.text, self.at))  # tomllib has read it
             names.append(match[0][1:-1] if quoted else match[0])
             self.at = match.end()
             self._skip(_BLANK)
@@ -117,6 +118,7 @@ class _Scan:
             self._several(path, "]" if first == "[" else "}")
             return
         match = _STRING.match(self.text, self.at) or re.compile(r"[^,\]}\n#]*").match(self.text, self.at)
+        assert match is not None  # the second pattern takes an empty text too
         self.at = match.end()
 
     def _several(self, path: Path, closing: str) -> None:

@@ -6,15 +6,18 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from coupler.case.units import quantity
+from coupler.case.units import InSI
 
-Number = quantity("")
-Length = quantity("m")
-PositiveLength = quantity("m", gt=0)
-Velocity = quantity("m/s")
-Spin = quantity("rad/s")
-Density = quantity("kg/m3", gt=0)
-PositiveTime = quantity("s", gt=0)
+KeyPath = tuple[str | int, ...]
+"""Place in a case: names of tables and keys, numbers of entries of lists."""
+
+Number = Annotated[float, InSI("")]
+Length = Annotated[float, InSI("m")]
+PositiveLength = Annotated[float, InSI("m", gt=0)]
+Velocity = Annotated[float, InSI("m/s")]
+Spin = Annotated[float, InSI("rad/s")]
+Density = Annotated[float, InSI("kg/m3", gt=0)]
+PositiveTime = Annotated[float, InSI("s", gt=0)]
 
 Point = tuple[Length, Length, Length]
 Size = tuple[PositiveLength, PositiveLength, PositiveLength]
@@ -37,4 +40,4 @@ class Rotation(Section):
     """A turn about an axis through the centre, by the right-hand rule."""
 
     axis: tuple[Number, Number, Number] = Field(description="direction of the axis; any length but zero")
-    angle: quantity("rad") = Field(description="angle of the turn", examples=["30 deg"])
+    angle: Annotated[float, InSI("rad")] = Field(description="angle of the turn", examples=["30 deg"])

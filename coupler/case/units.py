@@ -10,11 +10,13 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache, partial
-from typing import Annotated
+from typing import Any
 
-from pydantic import BeforeValidator, Field
+from annotated_types import Ge, GroupedMetadata, Gt, Le, Lt
+from pydantic import BeforeValidator
 
 from coupler.program.errors import UnitError, briefly
 
@@ -57,15 +59,21 @@ _POWER = re.compile(r"(?<=[A-Za-z])(-?\d+)")
 
 
 @dataclass(frozen=True)
-class Unit:
-    """Marks a field of the case with the SI unit of its value."""
+class InSI(GroupedMetadata):
+    """Annotated[float, InSI("Pa", gt=0)]: a float in SI `unit`, or text with any unit of its kind, within limits."""
 
-    symbol: str
+    unit: str
+    gt: float | None = None
+    ge: float | None = None
+    lt: float | None = None
+    le: float | None = None
 
-
-def quantity(unit: str, **limits: float):
-    """The type of a case field: a float in SI `unit` or text with any unit of its kind."""
-    return Annotated[float, BeforeValidator(partial(to_si, unit=unit)), Field(**limits), Unit(unit)]
+    def __iter__(self) -> Iterator[object]:
+        """What pydantic does with it: read the text, then compare."""
+        yield BeforeValidator(partial(to_si, unit=self.unit))
+        for kind, limit in ((Gt, self.gt), (Ge, self.ge), (Lt, self.lt), (Le, self.le)):
+            if limit is not None:
+                yield kind(limit)
 
 
 def to_si(value: object, unit: str) -> float:
@@ -127,24 +135,24 @@ def _near(given: str) -> str:
     return f"; did you mean '{right}'?" if right and right != given else ""
 
 
-def _is_angle(source) -> bool:
+def _is_angle(source: Any) -> bool:
     """Pint counts angles as plain numbers; a friction of "30 deg" is a mistake all the same."""
     return any(name == "radian" for name, _ in source.to_root_units().unit_items())
 
 
 @lru_cache(maxsize=1)
-def _registry():
+def _registry() -> Any:
     import pint
 
     return pint.UnitRegistry()
 
 
-def _si(unit: str):
+def _si(unit: str) -> Any:
     text = _POWER.sub(r"^\1", unit).replace("1/", "dimensionless/")
     return 1.0 * _registry().parse_units(text)
 
 
-def _kind(source) -> str:
+def _kind(source: Any) -> str:
     """The name of the dimension of a pint quantity, in words where it has one here."""
     for unit, name in DIMENSIONS.items():
         known = _si(unit)

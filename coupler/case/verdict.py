@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 from pydantic import Field
 
 from coupler.case.types import Name, Section
-from coupler.case.units import quantity
+from coupler.case.units import InSI
 
 
 class Verdict(Section):
@@ -17,20 +19,20 @@ class Verdict(Section):
         "blocks that are glued at the start, or, where none is, all that can move",
         examples=[["house"]],
     )
-    moved: quantity("", gt=0, le=10) = Field(
+    moved: Annotated[float, InSI("", gt=0, le=10)] = Field(
         0.1, description="a block has left its place when its centre has moved by this share of its thickness"
     )
-    damaged_joints: quantity("", ge=0, le=1) = Field(
+    damaged_joints: Annotated[float, InSI("", ge=0, le=1)] = Field(
         0.0,
         description="damaged from more than this share of the joined area broken, or a block out of its place",
     )
-    collapsed_weight: quantity("", gt=0, le=1) = Field(
+    collapsed_weight: Annotated[float, InSI("", gt=0, le=1)] = Field(
         0.2, description="collapsed when this share of the weight has left its place"
     )
-    collapsed_joints: quantity("", gt=0, le=1) | None = Field(
+    collapsed_joints: Annotated[float, InSI("", gt=0, le=1)] | None = Field(
         None, description="collapsed also when this share of the joined area is broken; absent: not by joints"
     )
-    hit_speed: quantity("m/s", gt=0) | None = Field(
+    hit_speed: Annotated[float, InSI("m/s", gt=0)] | None = Field(
         None,
         description="debris hits what it loses at least this speed to within a step; absent: the speed of a fall "
         "from a tenth of its thickness",

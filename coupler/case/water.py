@@ -20,7 +20,7 @@ from coupler.case.types import (
     Velocity,
     Wall,
 )
-from coupler.case.units import quantity
+from coupler.case.units import InSI
 
 File = Annotated[str, Field(min_length=1)]
 
@@ -132,8 +132,10 @@ class Vent(Section):
     at: Point = Field(
         description="a place in the air of the pocket, a cell away from walls; with block: where it is at the start"
     )
-    area: quantity("m2", gt=0) = Field(description="area of the opening", examples=["10 cm2"])
-    discharge: quantity("", gt=0, le=1) = Field(0.6, description="share of the area that the stream fills")
+    area: Annotated[float, InSI("m2", gt=0)] = Field(description="area of the opening", examples=["10 cm2"])
+    discharge: Annotated[float, InSI("", gt=0, le=1)] = Field(
+        0.6, description="share of the area that the stream fills"
+    )
     block: Name | None = Field(
         None, description="block that the orifice moves with; absent: it is fixed in space"
     )
@@ -147,11 +149,13 @@ class Air(Section):
         description="open: all air has the pressure of the atmosphere; trapped: air that reaches no open side of the "
         "tank is squeezed and acts on water, blocks and solids by its pressure",
     )
-    gamma: quantity("", ge=1, le=1.4) = Field(
+    gamma: Annotated[float, InSI("", ge=1, le=1.4)] = Field(
         1.4,
         description="exponent of p V^gamma of trapped air: 1.4 without exchange of heat, 1 at one temperature",
     )
-    atmospheric: quantity("Pa", gt=0) = Field(101_325.0, description="absolute pressure of the open air")
+    atmospheric: Annotated[float, InSI("Pa", gt=0)] = Field(
+        101_325.0, description="absolute pressure of the open air"
+    )
     vent: tuple[Vent, ...] = Field((), description="orifices of pockets")
 
 
@@ -159,7 +163,7 @@ class Water(Section):
     """The water. Absent: no water, and nothing of the flow solver is loaded."""
 
     density: Density = Field(1000.0, description="mass per volume")
-    viscosity: quantity("Pa s", ge=0) = Field(
+    viscosity: Annotated[float, InSI("Pa s", ge=0)] = Field(
         0.0,
         description="dynamic viscosity; 0: the term is left out",
         examples=["1 mPa s"],
@@ -172,7 +176,7 @@ class Water(Section):
     roughness: PositiveLength | None = Field(
         None, description="sand roughness k_s of all walls, for friction by the log law", examples=["3 mm"]
     )
-    manning: quantity("", gt=0, le=1) | None = Field(
+    manning: Annotated[float, InSI("", gt=0, le=1)] | None = Field(
         None,
         description="Manning's n [s/m^(1/3)] of the floor and of faces that look up, for friction of a bed",
         examples=[0.025],
@@ -182,7 +186,7 @@ class Water(Section):
         description="how the flow carries velocity and surface: along paths, or by stabilised finite elements, the "
         "reference, which costs four to seven times as much a step",
     )
-    theta: quantity("", ge=0.5, le=1) = Field(
+    theta: Annotated[float, InSI("", ge=0.5, le=1)] = Field(
         0.6, description="weight of the new pressure in the projection; 0.5 damps least, 1 most"
     )
     suction: Literal["bounded", "unlimited"] = Field(
@@ -190,7 +194,7 @@ class Water(Section):
         description="how far the pressure may fall: to that of the air where air can reach the water, and to "
         "vapour_pressure elsewhere, where the water parts; or without any bound, for comparison",
     )
-    vapour_pressure: quantity("Pa", lt=0) = Field(
+    vapour_pressure: Annotated[float, InSI("Pa", lt=0)] = Field(
         -98e3, description="pressure of the vapour of the water, relative to the air", examples=["-98 kPa"]
     )
     air: Air = Field(default_factory=Air, description="what the air does")

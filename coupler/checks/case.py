@@ -13,6 +13,7 @@ import numpy as np
 from coupler.case.case import Case
 from coupler.case.schedule import MOST_OUTPUTS
 from coupler.case.toml_lines import shown
+from coupler.case.types import KeyPath
 from coupler.case.verdict import Verdict
 from coupler.checks.air import air_problems
 from coupler.checks.joints import joint_problems, pair_problems
@@ -28,7 +29,6 @@ from coupler.geometry.town import town_problems
 from coupler.program.errors import did_you_mean
 from coupler.verdict.divisions import member, storey
 
-KeyPath = tuple[str | int, ...]
 Problem = tuple[KeyPath, str]
 
 LIGHTEST, HEAVIEST = 5.0, 25e3

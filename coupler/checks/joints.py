@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from coupler.case.case import Case
+from coupler.case.types import KeyPath
 from coupler.geometry.parts import Part
 from coupler.program.errors import did_you_mean
 
-KeyPath = tuple[str | int, ...]
 Problem = tuple[KeyPath, str]
 
 

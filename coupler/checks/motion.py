@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from coupler.case.case import Case
+from coupler.case.types import KeyPath
 from coupler.geometry.bodies import Body
 from coupler.geometry.parts import Part
 
-KeyPath = tuple[str | int, ...]
 Problem = tuple[KeyPath, str]
 
 THROUGH = 1e-3

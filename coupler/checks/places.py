@@ -10,13 +10,13 @@ import numpy as np
 
 from coupler.case.case import Case
 from coupler.case.structure import Building
+from coupler.case.types import KeyPath
 from coupler.geometry.bodies import Body, overlap_depth
 from coupler.geometry.parts import Part, standing_on_terrain
 from coupler.geometry.solids import solids_of
 from coupler.geometry.tank_mesh import beside_mesh, is_measured, mesh_of, tank_places, what_of
 from coupler.geometry.tank_regions import BYTES_PER_CELL
 
-KeyPath = tuple[str | int, ...]
 Problem = tuple[KeyPath, str]
 Placed = tuple[KeyPath, str, Body]
 

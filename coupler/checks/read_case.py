@@ -27,11 +27,11 @@ from coupler.case.paths import BadPath, place_of, read_text
 from coupler.case.promises import mistakes_in
 from coupler.case.records import find_record
 from coupler.case.toml_lines import key_lines, line_of, shown
+from coupler.case.types import KeyPath
 from coupler.checks.case import problems
 from coupler.geometry.tank_mesh import measured
 from coupler.program.errors import BadCase, briefly, did_you_mean
 
-KeyPath = tuple[str | int, ...]
 DEEPEST = 20
 """Tables and lists inside of one another; the schema has six."""
 MOST_BITS = 10_000

@@ -9,9 +9,9 @@ import numpy as np
 
 from coupler.case.case import Case
 from coupler.case.toml_lines import shown
+from coupler.case.types import KeyPath
 from coupler.results.gauges import make_gauge
 
-KeyPath = tuple[str | int, ...]
 Problem = tuple[KeyPath, str]
 
 

@@ -9,10 +9,10 @@ import numpy as np
 
 from coupler.case.case import Case
 from coupler.case.inflow_records import RecordError, record_columns
+from coupler.case.types import KeyPath
 from coupler.geometry.tank_mesh import finest_cell, floor_along, is_measured, mean_bed
 from coupler.scene.build_water import SLACK, bore_velocity, fills_beside, level_at_start
 
-KeyPath = tuple[str | int, ...]
 Problem = tuple[KeyPath, str]
 
 HIGHEST_WAVE = 0.78

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
@@ -11,9 +10,9 @@ from functools import lru_cache
 import numpy as np
 
 from coupler.case.case import Case
+from coupler.case.paths import stamp
+from coupler.case.types import KeyPath
 from coupler.geometry.bodies import turned
-
-KeyPath = tuple[str | int, ...]
 
 
 @dataclass(frozen=True)
@@ -47,12 +46,6 @@ def parts_of(case: Case) -> tuple[Part, ...]:
 @lru_cache(maxsize=1)
 def _made(case: Case, stamps: tuple) -> tuple[Part, ...]:
     return tuple(Part(r.path, r.name, tuple(r.make())) for r in recipes(case))
-
-
-def stamp(path: str) -> tuple[int, int]:
-    """Time of the last change [ns] and size [B] of a file: by these it is read again or not."""
-    there = os.stat(path)
-    return there.st_mtime_ns, there.st_size
 
 
 def recipes(case: Case) -> Iterator[Recipe]:

@@ -12,11 +12,10 @@ from functools import lru_cache
 import numpy as np
 
 from coupler.case.case import Case
-from coupler.case.types import Rotation
+from coupler.case.paths import stamp
+from coupler.case.types import KeyPath, Rotation
 from coupler.geometry.bodies import Body, turned
-from coupler.geometry.parts import stamp
 
-KeyPath = tuple[str | int, ...]
 BOX_CORNERS = np.array(
     [[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]],
     float,

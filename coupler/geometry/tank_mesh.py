@@ -12,14 +12,16 @@ from pathlib import Path
 import numpy as np
 
 from coupler.case.case import Case, Tank
+from coupler.case.paths import stamp
+from coupler.case.types import KeyPath
 from coupler.geometry.mesh_files import MeshFileError
-from coupler.geometry.parts import stamp
-from coupler.geometry.tank_regions import axes_of, graded, regions_of, stretch_problems, too_many
+from coupler.geometry.stretches import axes_of
+from coupler.geometry.tank_regions import regions_of, stretch_problems, too_many
+from coupler.geometry.terrain.bed_mesh import fitted_of
 from coupler.geometry.tetrahedra import read_tetrahedra, shown
 from coupler.program.errors import SurgebreakError
 
 Array = np.ndarray
-KeyPath = tuple[str | int, ...]
 Problem = tuple[KeyPath, str]
 
 OF_BOX = {
@@ -116,11 +118,6 @@ def mesh_of(tank: Tank):
 def finest_cell(tank: Tank) -> float:
     """Size [m] of the smallest cells of a tank; of a box without finer parts the wanted edge."""
     return tank.cell if tank.regions is None and not tank.stretch else mesh_of(tank).finest
-
-
-def fitted_of(tank: Tank):
-    """The `FittedMesh` of a tank over a terrain, made once. Raises MeshError."""
-    return _fitted(tank.lower, tank.upper, tank.cell, tank.split, tank.ground, tank.stretch)
 
 
 def bed_along(tank: Tank, side: str) -> Array:
@@ -312,19 +309,6 @@ def _sides(case: Case, mesh) -> Iterator[Problem]:
 
 def _within(points: Array, box) -> Array:
     return np.all((points >= box.lower) & (points <= box.upper), axis=1)
-
-
-@lru_cache(maxsize=1)
-def _fitted(lower, upper, cell: float, split: str, ground, stretch: tuple):
-    from fluid.mesh.fitted_mesh import fitted_mesh
-
-    axes = None
-    if stretch:
-        ends = zip(lower[:2], upper[:2], "xy")
-        axes = [
-            graded(low, high, cell, [s for s in stretch if s.along == along]) for low, high, along in ends
-        ]
-    return fitted_mesh(lower, upper, cell, ground, axes=axes, split=split)
 
 
 @lru_cache(maxsize=1)

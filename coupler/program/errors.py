@@ -33,7 +33,7 @@ class BadCase(SurgebreakError):
 
     exit_code = ExitCode.BAD_CASE
 
-    def __init__(self, lines: Iterable[str]):
+    def __init__(self, lines: Iterable[str]) -> None:
         self.lines = list(lines)
         super().__init__("\n".join(self.lines))
 
@@ -69,7 +69,7 @@ class CannotWrite(SurgebreakError):
 class _Briefly(reprlib.Repr):
     """Values as they were written, cut where they are long: a message is for reading."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         super().__init__()
         self.maxstring = self.maxother = 80
         self.maxlist = self.maxtuple = self.maxdict = 8

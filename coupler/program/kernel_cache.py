@@ -43,7 +43,7 @@ def use_kernel_cache() -> None:
     among the temporary files, and that is told. Raises NoCache."""
     if "NUMBA_CACHE_DIR" in os.environ:
         return
-    tried = []
+    tried: list[Path] = []
     for home in _homes():
         place = home / "surgebreak" / "kernels"
         if _is_usable(place, home):
@@ -66,7 +66,7 @@ class ByContent:
         self._folder = folder
 
     @classmethod
-    def from_function(cls, py_func, py_file: str) -> ByContent | None:
+    def from_function(cls, py_func: object, py_file: str) -> ByContent | None:
         """The locator of a function that is defined in a file; None for a file outside of the packages of kernels."""
         folder = _folder(py_file, Path(os.environ["NUMBA_CACHE_DIR"]))
         return None if folder is None else cls(folder)

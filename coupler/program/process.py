@@ -11,6 +11,7 @@ import os
 import platform
 import subprocess
 import sys
+from typing import Any
 
 from coupler.program.provenance import ROOT
 
@@ -18,7 +19,7 @@ LAST_LINES = 3
 """Of what a process told, in a message about how it ended."""
 
 
-def run_module(module: str, *words: object, **options) -> subprocess.CompletedProcess:
+def run_module(module: str, *words: object, **options: Any) -> subprocess.CompletedProcess:
     """`python -m module words...` of this very program; options of subprocess.run, of which check is False."""
     command = [sys.executable, "-m", module, *map(str, words)]
     return subprocess.run(command, **{"check": False, "env": environment(), **options})

@@ -5,7 +5,10 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterable
 from functools import lru_cache
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 
 class Row(NamedTuple):
@@ -18,7 +21,7 @@ class Row(NamedTuple):
 
 
 @lru_cache(maxsize=1)
-def console():
+def console() -> Console:
     """The terminal for results and progress (standard output)."""
     from rich.console import Console
 
@@ -39,8 +42,8 @@ def table(title: str, rows: Iterable[Row]) -> None:
     from rich.table import Table
 
     grid = Table(title=title, title_justify="left", box=None, pad_edge=False)
-    for name, justify in (("", "left"), ("", "right"), ("", "left"), ("", "left")):
-        grid.add_column(name, justify=justify)
+    for is_number in (False, True, False, False):
+        grid.add_column(justify="right" if is_number else "left")
     for row in rows:
         grid.add_row(row.name, number(row.value), row.unit, row.remark)
     console().print(grid)

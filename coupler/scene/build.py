@@ -63,7 +63,7 @@ def _maps(case: Case, water) -> Maps | None:
     """Maps of the flood, where there is ground for it."""
     if water is None or case.tank.ground is None:
         return None
-    from coupler.geometry.tank_mesh import fitted_of
+    from coupler.geometry.terrain.bed_mesh import fitted_of
     from coupler.results.maps import Maps
 
     return Maps(water, fitted_of(case.tank), case.tank.ground)

@@ -8,20 +8,31 @@ A scene may lack either side: without water the structure runs alone, without a 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import replace
 from functools import partial
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from coupler.balance.energy import Balance, Ledger
-from coupler.balance.momentum import MomentumBalance, book_step, momentum_ledger
+from coupler.balance.energy import Ledger
+from coupler.balance.momentum import book_step, momentum_ledger
 from coupler.step.limits import Diverged, Limits, check_finite, check_pressure, no_room
 from coupler.step.observe import fastest_points
+from coupler.step.record import StepRecord
 from coupler.step.residual import RETRIES, Defects
 from coupler.step.step_limits import Attempt, attempt_of, best_of, volume_error
 from coupler.step.step_start import StepStart
+
+if TYPE_CHECKING:
+    import scipy.sparse as sp
+
+    from coupler.step.immersion import Immersion
+    from coupler.step.pressure_with_structure import CoupledSolution, StructureResponse
+    from fluid.pressure.projection import PressureProblem
+    from fluid.step.water import Water
+    from yade_scripts.dynamics.structure import Structure
 
 Array = np.ndarray
 
@@ -29,42 +40,6 @@ BLOCK_COURANT = 0.5
 """Share of a cell that the fastest block may cross in one step: its cells are cut once a step."""
 STANDS_STILL = 1e-3
 """Share of the energy of the scene below which the motion of the structure is no measure of the defect."""
-
-
-@dataclass(kw_only=True)
-class StepRecord:
-    """What one step did, for the histories. Absent sides leave zeros."""
-
-    time: float
-    dt: float
-    iterations: int = 0
-    passes: int = 0
-    defect: float = 0.0
-    substeps: int = 0
-    substep: float = 0.0
-    opening_rate: float = 0.0
-    """Largest v dt_s / d_f of a substep: 1 and more means that a joint opened within one substep."""
-    unknowns: int = 0
-    bodies_cut: int = 0
-    retries: int = 0
-    """Times that the step was halved, and dt with it, because it failed or broke a limit."""
-    bad: bool = False
-    """Whether it stays although it breaks a limit, since shorter ones do so too."""
-    wetted: bool = False
-    """Whether water touched a body in this step."""
-    load: Array = field(default_factory=lambda: np.zeros((0, 6)))
-    shear_load: Array = field(default_factory=lambda: np.zeros((0, 6)))
-    """The part of `load` that walls of bodies take by viscosity and friction."""
-    surface_load: Array = field(default_factory=lambda: np.zeros((0, 6)))
-    """The part of `load` that corrects the pressure where the surface passes through the cells of a body."""
-    missed_work: Array = field(default_factory=lambda: np.zeros(0))
-    """Work of the load on each block (n,) [J] that the blocks got less than the water gave."""
-    impulses: object = None
-    """What contacts and joints gave to the blocks; None without a structure."""
-    balance: Balance = field(default_factory=Balance)
-    momentum: MomentumBalance | None = None
-    energies: dict[str, float] = field(default_factory=dict)
-    """Of the structure [J], by name (`Structure.energies`); empty without one."""
 
 
 class CoupledStepper:
@@ -80,35 +55,37 @@ class CoupledStepper:
 
     def __init__(
         self,
-        water,
-        structure,
-        immersion,
+        water: Water | None,
+        structure: Structure | None,
+        immersion: Immersion | None,
         *,
         rtol: float,
         step_max: float,
-        clock,
+        clock: Callable[[str], AbstractContextManager[None]],
         passes: int = 1,
         tolerance: float = 0.02,
         most_defect: float = 0.5,
         limits: Limits | None = None,
         expected: float = 0.0,
-    ):
+    ) -> None:
         self.passes, self.tolerance = passes, tolerance
         self.pause: Callable[[], None] | None = None
         """Called between the parts of a step, where the run may be ended by an exception."""
         self.defects = Defects(most_defect)
         self.limits = limits
-        self.water, self.structure, self.immersion = water, structure, immersion
+        # None where the scene lacks that side; what needs one is called only where there is one.
+        self.water, self.structure = cast("Water", water), cast("Structure", structure)
+        self.immersion = cast("Immersion", immersion)
         self.rtol, self.step_max, self.clock = rtol, step_max, clock
         self.radius = np.zeros(0)
         if structure is not None:
-            self.radius = np.array([np.linalg.norm(v, axis=1).max() for v in structure.shape_vertices])
+            self.radius = np.array([np.linalg.norm(v, axis=1).max() for v in self.structure.shape_vertices])
         self.time = 0.0
         self.sheared = None
-        if self.coupled and water.viscous is not None and water.parameters.walls == "no-slip":
+        if self.coupled and self.water.viscous is not None and self.water.parameters.walls == "no-slip":
             from coupler.step.shear import ShearedBlocks
 
-            self.sheared = ShearedBlocks(structure, immersion.n_solids)
+            self.sheared = ShearedBlocks(self.structure, self.immersion.n_solids)
         self.ledger = Ledger()
         if water is not None:
             self.ledger.available = water.available_energy() + expected
@@ -254,7 +231,7 @@ class CoupledStepper:
         if self.sheared is not None:
             self.water.free_bodies = self.sheared.now()
 
-    def _coupled_step(self, dt: float, record: StepRecord, start: StepStart) -> None:
+    def _coupled_step(self, dt: float, record: StepRecord, start: StepStart | None) -> None:
         n, before = self.structure.n, self.structure.velocity()
         with self.clock("water"):
             problem = self.water.predict(dt)
@@ -273,17 +250,21 @@ class CoupledStepper:
         record.missed_work = dt * np.sum(given - found.load[:n] * moved, axis=1)
         self._note_loads(problem, record, self._padded(assumed))
 
-    def _note_loads(self, problem, record: StepRecord, velocity: Array) -> None:
+    def _note_loads(self, problem: PressureProblem, record: StepRecord, velocity: Array) -> None:
         """The parts of the load, and the energy that shear and outflow take; velocity (n_bodies, 6) of the bodies."""
         shear = problem.predicted.shear
         record.shear_load = np.zeros_like(record.load) if shear is None else shear.load
         record.surface_load = problem.other_load - record.shear_load
         if shear is not None:
             self.ledger.shear -= shear.energy + record.dt * float(np.sum(shear.load * velocity))
-        self.ledger.left += self.water.report.left_energy
-        self.ledger.parting += self.water.report.bound.work
+        report = self.water.report
+        assert report is not None  # the water has just been corrected
+        self.ledger.left += report.left_energy
+        self.ledger.parting += report.bound.work
 
-    def _exchange(self, problem, record: StepRecord, start: StepStart):
+    def _exchange(
+        self, problem: PressureProblem, record: StepRecord, start: StepStart | None
+    ) -> tuple[PressureProblem, CoupledSolution, Array, Array]:
         """Pressure with the structure inside, then the structure under it, as often as the passes allow. One pass where
         no block is wetted.
 
@@ -300,13 +281,14 @@ class CoupledStepper:
             wetting = Wetting.of(problem.coupling)
         record.wetted = problem.coupling.nnz > 0
         before = self._padded(structure.velocity())
-        found, most = None, self.passes if record.wetted else 1
+        found: CoupledSolution | None = None
+        most = self.passes if record.wetted else 1
         for record.passes in range(1, most + 1):
             self._pause()
             with self.clock("pressure"):
                 found = solve_coupled(problem, response, v_free, solve, self.rtol, found, wetting)
             with self.clock("structure"):
-                if record.passes > 1:
+                if record.passes > 1 and start is not None and start.structure is not None:
                     structure.restore(start.structure)
                 structure.set_load(found.load[: structure.n])
                 report = structure.advance(problem.dt)
@@ -320,6 +302,7 @@ class CoupledStepper:
                 break
             after = self._padded(report.mean_velocity) + lead
             v_free = corrected_free_velocity(response, after, found.x, problem.coupling)
+        assert found is not None  # there is one pass at least
         record.substep, record.opening_rate = report.dt_s, report.opening_rate
         record.impulses = report.impulses
         if found.restoring.any():
@@ -330,7 +313,9 @@ class CoupledStepper:
         if self.pause is not None:
             self.pause()
 
-    def _response(self, problem, afloat: Array | None):
+    def _response(
+        self, problem: PressureProblem, afloat: Array | None
+    ) -> tuple[sp.csr_array, StructureResponse, Array]:
         """Mass of the blocks, the answer of all bodies to forces, and V_free of the first pass."""
         from coupler.step.pressure_with_structure import StructureResponse, mass_matrix, water_load
 
@@ -338,18 +323,21 @@ class CoupledStepper:
         mass = mass_matrix(structure.mass, structure.inertia())
         velocity = self._padded(structure.velocity())
         driven = np.append(structure.fixed, np.ones(self.immersion.n_solids, bool))
+        of_bodies, stiffness, damping = self._with_solids(mass, *structure.tangent())
         response = StructureResponse(
-            *self._with_solids(mass, *structure.tangent()),
-            problem.dt,
-            driven,
-            velocity,
-            afloat,
+            mass=of_bodies,
+            stiffness=stiffness,
+            damping=damping,
+            dt=problem.dt,
+            driven=driven,
+            driven_velocity=velocity,
+            afloat=afloat,
         )
         known = water_load(problem, 0.0)
         force = structure.weight_now() + structure.internal_force()
         return mass, response, response.free_velocity(velocity, self._padded(force) + known)
 
-    def _afloat(self, problem):
+    def _afloat(self, problem: PressureProblem) -> tuple[PressureProblem, Array | None]:
         """The problem with the bodies where they stand, not where their cells were cut, and how still water resists the
         free ones that its surface cuts, (n, 3, 3); None where there is none."""
         from fluid.pressure.waterline import hydrostatic_stiffness
@@ -387,7 +375,7 @@ class CoupledStepper:
         """Rows of zeros appended for the fixed solids: (n, 6) → (n + m, 6)."""
         return np.concatenate([values, np.zeros((self.immersion.n_solids, 6))])
 
-    def _with_solids(self, *matrices):
+    def _with_solids(self, *matrices: sp.csr_array) -> Sequence[sp.csr_array]:
         """Sparse (6n, 6n) matrices with empty rows for the fixed solids."""
         import scipy.sparse as sp
 
@@ -410,7 +398,7 @@ class CoupledStepper:
         return self.structure is not None and not self.structure.fixed.all(), self.water.sides is not None
 
     @contextmanager
-    def _placed(self, problem):
+    def _placed(self, problem: PressureProblem) -> Iterator[None]:
         """A pressure of the problem that is not found is told with its place and what may be the cause."""
         from fluid.numerics.solve import NotConverged
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse as sp
 from numba import njit
 
 Array = np.ndarray
@@ -28,7 +29,7 @@ class Wetting:
     own_rows: Array
 
     @classmethod
-    def of(cls, coupling) -> Wetting:
+    def of(cls, coupling: sp.csr_matrix) -> Wetting:
         """From csr (n_dofs, 6 n_bodies)."""
         dof, body, rows = _pairs(coupling.indptr, coupling.indices, coupling.data)
         by_body = _by_body(dof, body, rows, coupling.shape[1] // 6)
@@ -44,7 +45,7 @@ class Wetting:
 
 
 @njit(cache=True)
-def _pairs(indptr, indices, data):
+def _pairs(indptr: Array, indices: Array, data: Array) -> tuple[Array, Array, Array]:
     """dof, body (k,), rows (k, 6) of the entries. Each body is sought among the few that its row had before."""
     dof, body = np.empty(len(indices), np.int64), np.empty(len(indices), np.int64)
     rows = np.zeros((len(indices), 6))
@@ -65,7 +66,7 @@ def _pairs(indptr, indices, data):
 
 
 @njit(cache=True)
-def _by_body(dof, body, rows, n_bodies):
+def _by_body(dof: Array, body: Array, rows: Array, n_bodies: int) -> tuple[Array, Array, Array]:
     """start (n_bodies + 1,), dof (k,) and rows (k, 6) of the pairs, body by body."""
     start = np.zeros(n_bodies + 1, np.int64)
     for b in body:
@@ -81,7 +82,7 @@ def _by_body(dof, body, rows, n_bodies):
 
 
 @njit(cache=True)
-def _gather(start, dof, rows, p):
+def _gather(start: Array, dof: Array, rows: Array, p: Array) -> Array:
     out = np.zeros((len(start) - 1, 6))
     for b in range(len(start) - 1):
         f0 = f1 = f2 = f3 = f4 = f5 = 0.0  # six sums in registers: an array costs twice as much
@@ -98,7 +99,7 @@ def _gather(start, dof, rows, p):
 
 
 @njit(cache=True)
-def _scatter(dof, body, rows, velocity, n_dofs):
+def _scatter(dof: Array, body: Array, rows: Array, velocity: Array, n_dofs: int) -> Array:
     out = np.zeros(n_dofs)
     for k in range(len(dof)):
         total = 0.0

@@ -9,10 +9,14 @@ is left out (`closed`) or lumped (`slit`, see fluid/pressure/slits.py). Wider on
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fluid.pressure.slits import Cracks
+
+if TYPE_CHECKING:
+    from yade_scripts.dynamics.structure import Structure
 
 Array = np.ndarray
 
@@ -30,7 +34,7 @@ class NarrowCracks:
     structure: blocks with joints · lumped: water flows through them ·
     spacing [m]: size of the cells at each joint, or one for all."""
 
-    def __init__(self, structure, spacing, lumped: bool):
+    def __init__(self, structure: Structure, spacing: Array | float, lumped: bool) -> None:
         self.structure, self.lumped = structure, lumped
         corners, start = structure.joint_polygons()
         self.spacing = np.broadcast_to(np.asarray(spacing, float), len(start) - 1)

@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, cast
+
 import numpy as np
 
 from fluid.cut.bodies import ConvexBodies
 from fluid.domain.physical_domain import cut_domain
+
+if TYPE_CHECKING:
+    from fluid.mesh.background import Background
+    from yade_scripts.dynamics.structure import Structure
 
 Array = np.ndarray
 
@@ -33,13 +40,24 @@ class Immersion:
     cracks: `NarrowCracks` of the structure, or None: broken joints are open · connection: thresholds of the covers.
     """
 
-    def __init__(self, mesh, structure, solids, covers: str, cracks=None, connection=None):
-        self.mesh, self.structure, self.covers, self.cracks = mesh, structure, covers, cracks
+    def __init__(
+        self,
+        mesh: Background,
+        structure: Structure | None,
+        solids: Sequence[tuple[Array, Array]],
+        covers: str,
+        cracks: Any = None,
+        connection: Any = None,
+    ) -> None:
+        self.mesh, self.covers, self.cracks = mesh, covers, cracks
+        self.structure = cast("Structure", structure)  # None without blocks: then nothing asks for theirs
         self.connection = connection
         self.n_blocks = 0 if structure is None else structure.n
         self.n_solids = len(solids)
         self._solid_centre = np.array([v.mean(axis=0) for v, _ in solids]).reshape(-1, 3)
-        shapes = [] if structure is None else list(zip(structure.shape_vertices, structure.shape_faces))
+        shapes: list[tuple[Array, Any]] = (
+            [] if structure is None else list(zip(self.structure.shape_vertices, structure.shape_faces))
+        )
         shapes += [(v - c, f) for (v, f), c in zip(solids, self._solid_centre)]
         self._reference = (
             ConvexBodies.from_polyhedra(shapes, centre=np.zeros((len(shapes), 3)))
@@ -157,7 +175,8 @@ class Immersion:
         joined = self.structure.joined_planes()
         if self.cracks is None:
             return joined
-        return tuple(np.concatenate(two) for two in zip(joined, self.cracks.faces()))
+        block, face, half = (np.concatenate(two) for two in zip(joined, self.cracks.faces()))
+        return block, face, half
 
     def _films(self, loose: Array) -> Array:
         """How far each plane (P,) [m] is drawn in for the contacts of the loose blocks (n,) bool."""

@@ -4,10 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from coupler.program.errors import ExitCode, SurgebreakError
+
+if TYPE_CHECKING:
+    from coupler.geometry.overlaps import Overlap
+    from fluid.step.water import Water
+
+Array = np.ndarray
 
 
 class Diverged(SurgebreakError):
@@ -95,7 +102,7 @@ def check_misses(time: float, defects: list[float], most: int, limit: float, dt:
     )
 
 
-def check_overlap(time: float, found, limit: float) -> None:
+def check_overlap(time: float, found: Overlap | None, limit: float) -> None:
     """Stop where blocks are in one another, or in the ground, deeper than contact between solids can be.
 
     found: Overlap (`coupler.geometry.overlaps`) or None. Raises Diverged.
@@ -111,7 +118,7 @@ def check_overlap(time: float, found, limit: float) -> None:
     )
 
 
-def check_air(time: float, water, limit: float) -> None:
+def check_air(time: float, water: Water | None, limit: float) -> None:
     """Stop where trapped air is squeezed, or drawn out, beyond what its law is good for. Raises Diverged."""
     if water is None or water.air is None or len(water.air) == 0:
         return
@@ -133,7 +140,7 @@ HIGHEST_PRESSURE = 1e8
 """[Pa] beyond any impact: water hammer at 70 m/s."""
 
 
-def no_room(place, blocks: bool, sides: bool) -> str:
+def no_room(place: Array, blocks: bool, sides: bool) -> str:
     """Where water finds no pressure, place (3,) [m], and what of a scene may be the cause: blocks that move, sides that
     water comes through, or neither."""
     causes = ["a block closes or makes smaller"] * blocks + ["an inflow or a sea fills"] * sides
@@ -148,7 +155,7 @@ def no_room(place, blocks: bool, sides: bool) -> str:
     return f"Water has no room to go at ({at}) m: {remedy}."
 
 
-def check_pressure(time: float, pressure, nodes, blocks: bool, sides: bool) -> None:
+def check_pressure(time: float, pressure: Array, nodes: Array, blocks: bool, sides: bool) -> None:
     """Stop where water has no room: a chamber without a free surface that something driven makes smaller.
 
     pressure (N,) [Pa] at nodes (N, 3) [m]; blocks, sides as in `no_room`. Raises Diverged.
@@ -162,7 +169,7 @@ def check_pressure(time: float, pressure, nodes, blocks: bool, sides: bool) -> N
     )
 
 
-def check_finite(time: float, what: str, values, item: str) -> None:
+def check_finite(time: float, what: str, values: Array, item: str) -> None:
     """Stop at the first NaN or infinity, naming the quantity and the item (node, block) that holds it.
 
     Raises Diverged.

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from coupler.step.coupled_step import CoupledStepper
+    from yade_scripts.dynamics.structure import Structure
 
 Array = np.ndarray
 
@@ -17,13 +21,13 @@ class JointCounts(NamedTuple):
     largest_damage: float
 
 
-def joint_counts(structure) -> JointCounts:
+def joint_counts(structure: Structure) -> JointCounts:
     """The counts now; zeros without joints."""
     damage, alive = structure.joint_damage()
     return JointCounts(int(alive.sum()), int((~alive).sum()), float(damage[alive].max(initial=0.0)))
 
 
-def size(coupling) -> dict[str, int]:
+def size(coupling: CoupledStepper) -> dict[str, int]:
     """How large the scene is now: cells outside solids, those cut by them, those with water; blocks, joints.
 
     Absent sides are left out."""
@@ -39,11 +43,12 @@ def size(coupling) -> dict[str, int]:
     return found
 
 
-def block_damage(structure) -> Array:
+def block_damage(structure: Structure) -> Array:
     """(n,) area-weighted mean damage of the joints that each block had at the start; 0 for blocks without.
 
     structure: with joints."""
     table = structure.joint_table()
+    assert table is not None, "a structure without joints has no damage"
     damage, area = np.zeros(structure.n), np.zeros(structure.n)
     weighted = np.where(table.alive, table.mean_damage, 1.0) * table.area
     for side in (table.a, table.b):

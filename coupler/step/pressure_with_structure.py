@@ -37,6 +37,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
@@ -44,6 +45,9 @@ from numba import njit
 from scipy.sparse.linalg import splu
 
 from coupler.step.coupling_rows import Wetting
+
+if TYPE_CHECKING:
+    from fluid.pressure.projection import PressureProblem
 
 Array = np.ndarray
 
@@ -67,14 +71,14 @@ class StructureResponse:
 
     def __init__(
         self,
-        mass,
-        stiffness,
-        damping,
+        mass: sp.csr_array,
+        stiffness: sp.csr_array,
+        damping: sp.csr_array,
         dt: float,
         driven: Array,
         driven_velocity: Array,
         afloat: Array | None = None,
-    ):
+    ) -> None:
         self.dt = dt
         self.mass = mass
         self.imposed = np.where(driven[:, None], driven_velocity, 0.0).ravel()
@@ -149,7 +153,7 @@ def _of_heave(blocks: Array, mass: Array) -> sp.csr_array:
 
 
 @njit(cache=True)
-def _own_blocks(indptr, indices, data, n):
+def _own_blocks(indptr: Array, indices: Array, data: Array, n: int) -> tuple[Array, Array]:
     """Diagonal blocks (n, 6, 6) of a csr matrix (6n, 6n), and (n,) bool: bodies with entries in the rows of others."""
     blocks, tied = np.zeros((n, 6, 6)), np.zeros(n, np.bool_)
     for row in range(6 * n):
@@ -163,7 +167,7 @@ def _own_blocks(indptr, indices, data, n):
 
 
 @njit(cache=True)
-def _answer(bodies, inverse, force, velocity):
+def _answer(bodies: Array, inverse: Array, force: Array, velocity: Array) -> None:
     """Rows of `bodies` (k,) of velocity (6n,) from force (6n,) and inverse (k, 6, 6), in place."""
     for k in range(len(bodies)):
         first = 6 * bodies[k]
@@ -190,13 +194,13 @@ class CoupledSolution:
     lower: Array
 
 
-def water_load(problem, x: Array) -> Array:
+def water_load(problem: PressureProblem, x: Array | float) -> Array:
     """−Gᵀ (x + known) + other_load: force and moment of the water on each body, (n_bodies, 6) [N, N m]."""
     return problem.other_load - (problem.coupling.T @ (x + problem.known)).reshape(-1, 6)
 
 
 def solve_coupled(
-    problem,
+    problem: PressureProblem,
     response: StructureResponse,
     v_free: Array,
     solve: Callable,
@@ -238,12 +242,14 @@ def solve_coupled(
     )
 
 
-def corrected_free_velocity(response: StructureResponse, mean_velocity: Array, x: Array, coupling) -> Array:
+def corrected_free_velocity(
+    response: StructureResponse, mean_velocity: Array, x: Array, coupling: sp.csr_matrix
+) -> Array:
     """V_free of a second pass from what the bodies did, mean_velocity (n, 6), under the pressure x."""
     return mean_velocity.ravel() + response.compliance(coupling.T @ x)
 
 
-def defect(mass, assumed: Array, found: Array, floor: float = 0.0) -> float:
+def defect(mass: sp.csr_array, assumed: Array, found: Array, floor: float = 0.0) -> float:
     """How far the bodies missed the motion that the water was told, velocities (n, 6) found and assumed:
 
         sqrt( E(found − assumed) / max(E(found), E(assumed), floor) ),   E(V) = ½ V·M V
@@ -255,5 +261,5 @@ def defect(mass, assumed: Array, found: Array, floor: float = 0.0) -> float:
     return float(np.sqrt(energy[0] / scale)) if scale > 0.0 else 0.0
 
 
-def _kinetic(mass, velocity: Array) -> float:
+def _kinetic(mass: sp.csr_array, velocity: Array) -> float:
     return 0.5 * float(velocity.ravel() @ (mass @ velocity.ravel()))

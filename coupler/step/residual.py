@@ -8,10 +8,14 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from coupler.step.limits import check_misses
+
+if TYPE_CHECKING:
+    from coupler.step.record import StepRecord
 
 DEFECT_STEPS = 20
 """Steps over which the defect is averaged: a breaking joint may spoil one of them."""
@@ -35,7 +39,7 @@ class Defects:
     for; never less than RETRIES halvings leave, however many steps in a row are bad
     """
 
-    def __init__(self, most: float):
+    def __init__(self, most: float) -> None:
         self.most = most
         self.share = 1.0
         self._last: deque[float] = deque(maxlen=DEFECT_STEPS)
@@ -54,7 +58,7 @@ class Defects:
         """Whether a step with this defect is halved and taken again."""
         return not defect <= RETRY_AT * self.most
 
-    def note(self, time: float, record) -> None:
+    def note(self, time: float, record: StepRecord) -> None:
         """A step was taken, `StepRecord`, at `time` [s]. Raises Diverged where bad ones keep missing."""
         self._last.append(record.defect)
         if record.retries > 0:

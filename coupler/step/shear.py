@@ -11,9 +11,14 @@ So a block that falls at a steady speed does so at any step, and the impulse of 
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from fluid.viscous.viscosity import FreeBodies
+
+if TYPE_CHECKING:
+    from yade_scripts.dynamics.structure import Structure
 
 Array = np.ndarray
 
@@ -21,7 +26,7 @@ Array = np.ndarray
 class ShearedBlocks:
     """n blocks of the structure, then fixed solids; remembers the last two accelerations without shear (2, n, 6)."""
 
-    def __init__(self, structure, n_solids: int):
+    def __init__(self, structure: Structure, n_solids: int) -> None:
         self.structure, self.n_solids = structure, n_solids
         self.accelerations = np.zeros((2, structure.n, 6))
 

@@ -3,6 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from coupler.step.coupled_step import CoupledStepper
+    from yade_scripts.dynamics.state import StructureState
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -11,12 +16,12 @@ class StepStart:
 
     time: float
     water: dict | None
-    structure: object | None
+    structure: StructureState | None
     ledger: dict
     momentum: dict | None
 
     @classmethod
-    def of(cls, coupling) -> StepStart:
+    def of(cls, coupling: CoupledStepper) -> StepStart:
         """Before a step. References, not copies, where a step replaces what it changes."""
         water, structure, momentum = coupling.water, coupling.structure, coupling.momentum
         return cls(
@@ -27,7 +32,7 @@ class StepStart:
             momentum=None if momentum is None else vars(momentum) | {"lines": dict(momentum.lines)},
         )
 
-    def restore(self, coupling) -> None:
+    def restore(self, coupling: CoupledStepper) -> None:
         """Back to the start of the step."""
         coupling.time = self.time
         if self.water is not None:

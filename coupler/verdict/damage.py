@@ -146,7 +146,9 @@ def _labels_of(label: Array, rows: Array) -> Array:
     )
 
 
-def _of_group(name, rows, own, blocks: Blocks, joints: Joints, left: Array, rules: Rules) -> Damage:
+def _of_group(
+    name: str, rows: Array, own: Array, blocks: Blocks, joints: Joints, left: Array, rules: Rules
+) -> Damage:
     """rows: of its blocks · own: rows of its joints."""
     broken = own[np.isfinite(joints.broken[own])]
     first = broken[np.argmin(joints.broken[broken])] if len(broken) else -1

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from coupler.verdict.divisions import Division
+
+if TYPE_CHECKING:
+    from fluid.step.water import Water
 
 Array = np.ndarray
 
@@ -12,7 +17,7 @@ OUTSIDE = 1.5
 """Cells between a body and where its depth is read: the cells that it cuts lie between."""
 
 
-def depths_around(water, bodies: Division, lower: Array, upper: Array) -> tuple[Array, Array]:
+def depths_around(water: Water, bodies: Division, lower: Array, upper: Array) -> tuple[Array, Array]:
     """The largest depth [m] beside each body now (k,), and where (k, 2) [m]; 0 and NaN where there is no room.
 
     lower, upper (n, 3) [m]: of the blocks at the start."""

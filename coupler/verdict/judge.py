@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import asdict
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from coupler.verdict.damage import Blocks, Damage, Joints, damage
 from coupler.verdict.divisions import Division
-from coupler.verdict.watch import HIT_COLUMNS, Watch
+from coupler.verdict.watch import HIT_COLUMNS, Peaks, Watch
+
+if TYPE_CHECKING:
+    from yade_scripts.dynamics.structure import Structure
 
 Array = np.ndarray
 MOST_LISTED = 25
 """Blocks that left their place, and hits, that are listed one by one; tables hold them all."""
 
 
-def verdict(structure, watch: Watch) -> dict:
+def verdict(structure: Structure, watch: Watch) -> dict:
     """Everything that the verdict tells; times in s, places in m, forces in N, SI throughout; None where nothing was.
 
     structure: with its joint table as it is now."""
@@ -45,7 +49,7 @@ def verdict(structure, watch: Watch) -> dict:
     }
 
 
-def joints_of(structure) -> Joints:
+def joints_of(structure: Structure) -> Joints:
     """The joints as `damage` wants them: gone when they carry nothing any more."""
     table = structure.joint_table()
     if table is None:
@@ -53,7 +57,7 @@ def joints_of(structure) -> Joints:
     return Joints(table.a, table.b, table.area, np.where(table.alive, np.nan, table.failure_time))
 
 
-def places_of(structure) -> Array:
+def places_of(structure: Structure) -> Array:
     """Centre of each joint at the start (J, 3) [m]."""
     corners, start = structure.joint_polygons(at_start=True)
     count = np.diff(start)
@@ -61,7 +65,7 @@ def places_of(structure) -> Array:
     return sums / count[:, None]
 
 
-def _told(found: Damage, structure, places: Array) -> dict:
+def _told(found: Damage, structure: Structure, places: Array) -> dict:
     first = None
     if found.first_joint >= 0:
         first = {"time": found.first_break, "place": places[found.first_joint].tolist()}
@@ -83,7 +87,8 @@ def _told(found: Damage, structure, places: Array) -> dict:
     }
 
 
-def _pair(structure, joint: int) -> list[str]:
+def _pair(structure: Structure, joint: int) -> list[str]:
+    assert structure.joints is not None  # one of them broke
     a, b = int(structure.joints.a[joint]), int(structure.joints.b[joint])
     return [structure.names[a], structure.names[b] if b >= 0 else "ground"]
 
@@ -114,13 +119,13 @@ def _largest(watch: Watch, k: int, judged: bool = False) -> dict:
     return {"force": force, "moment": moment, "depth": depth}
 
 
-def _peak(peaks, k: int) -> dict | None:
+def _peak(peaks: Peaks, k: int) -> dict | None:
     if not peaks.value[k] > 0.0:
         return None
     return {"value": float(peaks.value[k]), "time": float(peaks.time[k])}
 
 
-def _displaced(structure, watch: Watch) -> dict:
+def _displaced(structure: Structure, watch: Watch) -> dict:
     """Blocks that left their place, those that went farthest first."""
     gone = np.flatnonzero(~np.isnan(watch.left_at) & watch.judged)
     order = gone[np.argsort(-watch.moved[gone], kind="stable")]
@@ -135,7 +140,7 @@ def _displaced(structure, watch: Watch) -> dict:
     }
 
 
-def _hits(structure, watch: Watch) -> dict:
+def _hits(structure: Structure, watch: Watch) -> dict:
     found = [dict(zip(HIT_COLUMNS, row)) for row in watch.hits.tolist()]
     told = [
         {

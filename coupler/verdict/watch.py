@@ -7,11 +7,19 @@ the same verdict.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from coupler.verdict.damage import Rules
 from coupler.verdict.divisions import Divisions
+
+if TYPE_CHECKING:
+    from coupler.step.coupled_step import CoupledStepper
+    from coupler.step.record import StepRecord
+    from fluid.step.water import Water
+    from yade_scripts.blocks.block import Block
+    from yade_scripts.dynamics.structure import Structure
 
 Array = np.ndarray
 
@@ -55,7 +63,7 @@ class Facts:
     upper: Array = field(repr=False)
 
     @classmethod
-    def of(cls, blocks) -> Facts:
+    def of(cls, blocks: list[Block]) -> Facts:
         """blocks: yade_scripts Block."""
         world = [block.world_vertices() for block in blocks]
         normals, offsets = zip(*(block.planes for block in blocks))
@@ -78,8 +86,13 @@ class Watch:
     that it is about · hit_speed [m/s] or None"""
 
     def __init__(
-        self, structure, divisions: Divisions, rules: Rules, judged: Array, hit_speed: float | None = None
-    ):
+        self,
+        structure: Structure,
+        divisions: Divisions,
+        rules: Rules,
+        judged: Array,
+        hit_speed: float | None = None,
+    ) -> None:
         self.divisions, self.rules, self.judged = divisions, rules, np.asarray(judged, bool)
         n, bodies = structure.n, len(divisions.bodies.names)
         self.facts = Facts.of(structure.blocks)
@@ -106,7 +119,7 @@ class Watch:
 
     # ---- every step
 
-    def step(self, coupling, record) -> None:
+    def step(self, coupling: CoupledStepper, record: StepRecord) -> None:
         """After a coupled step."""
         s = coupling.structure
         velocity = s.velocity()[:, :3]
@@ -119,7 +132,7 @@ class Watch:
             self._loads(coupling, record, np.isnan(self.left_at))
         self._before = velocity
 
-    def _loads(self, coupling, record, in_place: Array) -> None:
+    def _loads(self, coupling: CoupledStepper, record: StepRecord, in_place: Array) -> None:
         """Force and overturning moment of the water on each body; pressure across blocks that are in their place."""
         n = coupling.structure.n
         load, centre = record.load[:n], coupling.water.domain.body_centre[:n]
@@ -135,7 +148,7 @@ class Watch:
         overturning = about_zero - np.cross(self.foot, force)
         self.moment.take(np.linalg.norm(overturning[:, :2], axis=1), record.time)
 
-    def _hit(self, s, record, velocity: Array, in_place: Array) -> None:
+    def _hit(self, s: Structure, record: StepRecord, velocity: Array, in_place: Array) -> None:
         """Debris that lost speed to a contact in this step, and what it met."""
         if record.impulses is None:
             return
@@ -147,20 +160,22 @@ class Watch:
             np.einsum("ni,ni->n", velocity[debris] - self._before[debris], J[debris]) / size[debris]
         )
         hits = np.flatnonzero(debris & (lost >= self._hit_speed) & (size >= s.mass * self._hit_speed))
-        x = s.centre() if len(hits) else None
-        for i in hits:
+        x = s.centre() if len(hits) else np.zeros((0, 3))
+        for i in hits.tolist():
             near = np.linalg.norm(x - x[i], axis=1) <= self.facts.radius + self.facts.radius[i]
             answer = np.where(near, -(J @ J[i]) / size[i], 0.0)
             answer[i] = 0.0
             j = int(np.argmax(answer))
             if answer[j] >= ANSWERS * size[i] and (in_place[j] or self._other_body(i, j)):
-                self._note_hit(int(i), j, record, float(lost[i]), float(size[i]), x[i])
+                self._note_hit(i, j, record, float(lost[i]), float(size[i]), x[i])
 
     def _other_body(self, i: int, j: int) -> bool:
         label = self.divisions.bodies.label
         return label[i] != label[j]
 
-    def _note_hit(self, i: int, j: int, record, speed: float, impulse: float, place: Array) -> None:
+    def _note_hit(
+        self, i: int, j: int, record: StepRecord, speed: float, impulse: float, place: Array
+    ) -> None:
         """Of the hits of a pair the hardest stays."""
         old = self._hits.get((i, j))
         if old is None or impulse > old[4]:
@@ -174,7 +189,7 @@ class Watch:
 
     # ---- at the written states
 
-    def look(self, water, time: float) -> None:
+    def look(self, water: Water, time: float) -> None:
         """The depth of the water around each body."""
         from coupler.verdict.depths import depths_around
 
@@ -207,7 +222,7 @@ class Watch:
 _OWN = ("moved", "left_at", "direction", "impulse", "depth_at")
 
 
-def joined(structure) -> Array:
+def joined(structure: Structure) -> Array:
     """(n,) bool: blocks that were glued to anything at the start."""
     found = np.zeros(structure.n, bool)
     if structure.joints is not None:

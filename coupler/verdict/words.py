@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from coupler.program.quantities import length, moment_of, quantity
 from coupler.verdict.divisions import in_words
@@ -31,7 +31,7 @@ def name_of(told: dict, name: str) -> str:
     return in_words(name, len(told["bodies"]) < 2)
 
 
-def point(place) -> str:
+def point(place: Sequence[float]) -> str:
     """(30.00, 9.00, 2.20) m"""
     return "({}) m".format(", ".join(f"{x + 0.0:.2f}" for x in place))
 

@@ -47,7 +47,7 @@ def find_contacts(
         searched, mesh.nodes, mesh.cells, mesh.neighbours, part, start, order, open_start, cuts.open_start,
         cuts.open_x, CLIP * mesh.spacing, enough, workspace(1, 0, 0), *fresh,
     )  # fmt: skip
-    return fresh if again is None else _merged(old, searched, fresh)
+    return fresh if again is None or old is None else _merged(old, searched, fresh)
 
 
 def _merged(old: Contacts, searched, fresh: Contacts) -> Contacts:

@@ -20,6 +20,7 @@ water in it must not push (growth of 0.1 a step otherwise).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -52,7 +53,7 @@ class PressureProblem:
     dt: float
     density: float
     other_load: np.ndarray
-    predicted: object = None
+    predicted: Any = None
     """What the water keeps between predict and correct."""
     bound: np.ndarray | None = None
     at_bound: np.ndarray | None = None

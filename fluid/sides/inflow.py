@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 from numba import njit
@@ -76,7 +77,7 @@ class Side:
         return cls(
             chosen=chosen,
             flow=flow,
-            level=flow.level if flow else level,
+            level=flow.level if flow else cast("Callable", level),
             cell=cell,
             corner=np.argmin(beside, axis=1),
             faces=mesh.cells[cell][beside].reshape(-1, 3),

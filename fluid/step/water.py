@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numba import njit
@@ -31,6 +32,9 @@ from fluid.surface.level_set import FAR, redistance, without_films
 from fluid.surface.volume import edge_flux, nodal_volume, renumbering
 from fluid.transport.surface_momentum import Carried
 from fluid.transport.volume_transport import carry_volume
+
+if TYPE_CHECKING:
+    from fluid.viscous.viscosity import FreeBodies
 
 LEVEL_HALVINGS = 40
 LONGEST_STEP = 0.3
@@ -98,7 +102,7 @@ class Water:
         self.moved_by_end = np.zeros((domain.n_bodies, 6))
         """How far (n_bodies, 6) [m, rad] they stand at the end of the step from where the cells are cut: set before
         `correct`, for the volume of trapped air."""
-        self.free_bodies = None
+        self.free_bodies: FreeBodies | None = None
         """`viscosity.FreeBodies` that answer to shear within the step; None: all keep their velocity."""
         self.set_domain(domain)
         n = len(self.topology.nodes)

@@ -253,7 +253,7 @@ def redistance(topology, phi, spacing, rescale: bool):
     order, start = layers_around(front, LAYERS, *t.around)
     triangles, owner = surface_triangles(cut, phi, t.nodes, t.cells)
     exact = EXACT_LAYERS if t.is_obtuse else 0
-    distance = _closest_in_layers(
+    distance = _closest_in_layers(  # type: ignore[call-arg]  # counts the two of t.around for more
         order, start, triangles, owner, t.nodes, t.cells, *t.around, exact, t.node_start, t.node_cells
     )
     listed = order[start[1] :]

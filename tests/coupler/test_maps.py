@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from coupler.checks.read_case import load
-from coupler.geometry.tank_mesh import fitted_of
+from coupler.geometry.terrain.bed_mesh import fitted_of
 from coupler.geometry.terrain.grids import read_grid
 from coupler.results.maps import NEVER, Maps
 from coupler.scene.build_water import water_of

@@ -6,7 +6,7 @@ import pytest
 from coupler.checks.read_case import load
 from coupler.geometry.parts import parts_of
 from coupler.geometry.solids import solids_of
-from coupler.geometry.tank_mesh import fitted_of
+from coupler.geometry.terrain.bed_mesh import fitted_of
 from coupler.geometry.terrain.standing import corners_of, ground_surface, ground_under
 from coupler.program.errors import BadCase
 from yade_scripts.contact.ground import surface_at

@@ -42,6 +42,9 @@ class Pipe:
     def stable_step(self):
         return 1.0
 
+    def air_energy(self):
+        return 0.0
+
     def set_films(self, loose, share):
         """There are none."""
 

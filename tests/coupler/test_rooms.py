@@ -96,8 +96,12 @@ def test_no_module_imports_itself_by_way_of_others():
 
 
 def named(path, modules):
-    """What a file imports of these modules, as a whole or a thing in it."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    """What a file imports of these modules, as a whole or a thing in it; names of types alone are no imports."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    tree.body = [
+        n for n in tree.body if not (isinstance(n, ast.If) and ast.unparse(n.test) == "TYPE_CHECKING")
+    ]
+    for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             yield from (name.name for name in node.names)
         elif isinstance(node, ast.ImportFrom):

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from coupler.checks.read_case import load
+from coupler.geometry.stretches import graded
 from coupler.geometry.tank_mesh import finest_cell, mesh_of
-from coupler.geometry.tank_regions import graded
 from coupler.program.errors import BadCase
 from coupler.run.checkpoint import FOLDER, listed
 from coupler.run.forecast import forecast

@@ -7,7 +7,8 @@ import pytest
 
 from coupler.case.terrain import Terrain
 from coupler.checks.read_case import load
-from coupler.geometry.tank_mesh import bed_along, fitted_of, mean_bed
+from coupler.geometry.tank_mesh import bed_along, mean_bed
+from coupler.geometry.terrain.bed_mesh import fitted_of
 from coupler.geometry.terrain.grid import TerrainError
 from coupler.geometry.terrain.grids import read_grid
 from coupler.geometry.terrain.site import filled, flattened, smoothed, terrain_of

@@ -130,7 +130,7 @@ class Structure(StructureReadings):
         self.volume = np.array([b.volume for b in blocks])
         self.fixed = np.array([b.fixed or b.driven for b in blocks], bool)
         """Blocks whose motion is prescribed: still, or driven at their velocity."""
-        self.shape_vertices = [b.vertices for b in blocks]
+        self.shape_vertices: list[Array] = [np.asarray(b.vertices) for b in blocks]
         self.shape_faces = [[list(f) for f in b.faces] for b in blocks]
         self.gravity = np.asarray(gravity, float)
         inertia = np.array([b.inertia for b in blocks]).reshape(-1, 3, 3)

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from coupler.case.types import KeyPath
 from coupler.geometry.terrain.height_map import HeightMap
 
-KeyPath = tuple[str | int, ...]
 Problem = tuple[KeyPath, str]
 
 FINE = 200

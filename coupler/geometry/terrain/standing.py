@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from coupler.geometry.tank_mesh import fitted_of
+from coupler.geometry.terrain.bed_mesh import fitted_of
 
 Array = np.ndarray
 
