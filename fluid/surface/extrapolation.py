@@ -16,7 +16,7 @@ from fluid.numerics.jit import inner
 
 LINEAR_LAYERS = 2
 SWEEPS = 3
-"""Averages of the slope that the velocity is continued with, in calm water."""
+"""Averages of the slope that the velocity is continued with, in calm water; one more takes off what they flatten."""
 BAND = 5
 """Layers of nodes outside the water that carry a velocity."""
 WAVE_SLACK = 0.05
@@ -141,7 +141,10 @@ def mean_gradients(cell_list, marked, f, cells, parent, g, volume, n_nodes):
 def smoothed_slope(topology, cell_list, marked, u, calm: float):
     """∇u (N, m, 3) of `mean_gradients`, averaged over the corners of the listed cells, each cell counts: at the nodes
     beside cells that are not all marked, from which values are continued (elsewhere it is not to be read).  Once in
-    fast water, calm = 0; SWEEPS times at rest, calm = 1; between, in between.
+    fast water, calm = 0; (SWEEPS + 1) Aⁿ - SWEEPS Aⁿ⁺¹ at rest, calm = 1, with the average A and n = SWEEPS; between,
+    in between.  A wave of many cells passes with an error of the second order of what an average takes off it, one of a
+    few cells as little as through Aⁿ, which alone took the slope a cell too deep: 2.5 % of the energy of waves of 14
+    cells a period.
 
     Only nodes of cells whose corners are all marked have a field, the averages run over these.  Waves of a few cells,
     whose slope the continuation carries to the surface many times too large, grow without it: by 0.01 to 0.02 a step
@@ -150,15 +153,17 @@ def smoothed_slope(topology, cell_list, marked, u, calm: float):
     t = topology
     has, beside = _with_field(cell_list, marked, t.cells)
     reach = [beside]
-    for _ in range(SWEEPS if calm > 0.0 else 1):
+    for _ in range(SWEEPS + 1 if calm > 0.0 else 1):
         # each sweep reads one layer of nodes farther in than it is to be right on
         reach.append(_one_layer_more(cell_list, reach[-1], t.cells))
     near = touching_among(cell_list, reach.pop(), t.cells)
     slope = mean_gradients(near, marked, u, t.cells, t.parent, t.gradients, t.volume, len(u))
-    once = slope = _averaged(near, reach.pop(), has, slope, t.cells)
+    once = before = slope = _averaged(near, reach.pop(), has, slope, t.cells)
     while reach:
-        slope = _averaged(near, reach.pop(), has, slope, t.cells)
-    return once + calm * (slope - once) if slope is not once else once
+        before, slope = slope, _averaged(near, reach.pop(), has, slope, t.cells)
+    if slope is once:
+        return once
+    return once + calm * (before + SWEEPS * (before - slope) - once)
 
 
 @njit(cache=True)

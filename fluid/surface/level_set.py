@@ -2,9 +2,8 @@
 
 Nodes of cells that the surface passes through keep φ: their zero is the surface, and moving them by the true
 closest point pulls the surface off the walls (0.2 m/s in a tilted tank at rest).  Only where the mean |∇φ| around
-such a node has left [0.9, 1.1] is φ divided by it, and only where that leaves the zero in place (MOST_MOVED).  All
-other nodes take the distance to the closest polygon of the surface, handed from layer to layer; beyond the layers
-φ = ±FAR h.
+such a node has left [0.9, 1.1] is φ divided by it.  All other nodes take the distance to the closest polygon of
+the surface, handed from layer to layer; beyond the layers φ = ±FAR h.
 
 What is handed on is the closest polygon of a neighbour.  Where the cells are obtuse that may be some polygons away from
 the node's own, φ too large by 0.02 h to 0.15 h there, and its slope in the cells above and below the surface so far
@@ -25,9 +24,6 @@ LAYERS = 6
 EXACT_LAYERS = 2
 """Layers that look for their own closest polygon on meshes with obtuse cells: those next to the surface."""
 FAR = 7.0
-MOST_MOVED = 0.05
-"""Share of an edge by which a rescaling may move the zero on it. Within a drop or a sheet of a cell slopes differ so
-much from node to node that it took a third of the water, which came back elsewhere with 12 % of the energy."""
 FILM = 1e-7
 
 
@@ -261,28 +257,6 @@ def redistance(topology, phi, spacing, rescale: bool):
     far[front] = phi[front]
     if rescale:
         slope = _mean_slope(cut, phi, t.cells, t.parent, t.gradients, len(phi))
-        slope[~front | (slope == 0.0) | ((slope >= 0.9) & (slope <= 1.1))] = 1.0
-        _leave_the_zero(cut, phi, t.cells, MOST_MOVED, slope)
-        far /= slope
+        off = front & ((slope > 1.1) | (slope < 0.9)) & (slope > 0.0)
+        far[off] /= slope[off]
     return far
-
-
-@njit(cache=True)
-def _leave_the_zero(cut, phi, cells, most, slope):
-    """Set the divisor `slope` (N,) of φ to 1 in place at both ends of the edges whose zero it would move by more than
-    `most` of their length, until none is left."""
-    found = True
-    while found:
-        found = False
-        for s in range(cut.shape[0]):
-            e = cut[s]
-            for a in range(3):
-                for b in range(a + 1, 4):
-                    i, j = cells[e, a], cells[e, b]
-                    if (phi[i] < 0.0) == (phi[j] < 0.0) or slope[i] == slope[j]:
-                        continue
-                    now = phi[i] / (phi[i] - phi[j])
-                    then = phi[i] / slope[i] / (phi[i] / slope[i] - phi[j] / slope[j])
-                    if abs(then - now) > most:
-                        slope[i] = slope[j] = 1.0
-                        found = True

@@ -111,10 +111,10 @@ def test_water_up_to_the_brim_sinks_as_it_leaves():
 
 
 def test_a_drop_that_the_cells_cannot_hold_is_refused():
-    """With air on both sides and under a cell and a half; a layer on the floor and a slice between walls are not."""
+    """With air on both sides and under two and a half cells; a layer on the floor and a slice between walls are not."""
     for low, high, wrong in (
-        ([0.5, 0, 0.5], [1.0, 0.2, 0.61], True),
-        ([0.5, 0, 0.5], [1.0, 0.2, 0.66], False),
+        ([0.5, 0, 0.5], [1.0, 0.2, 0.74], True),
+        ([0.5, 0, 0.5], [1.0, 0.2, 0.76], False),
         ([0, 0, 0], [2, 0.2, 0.11], False),
         ([0.5, 0, 0], [0.6, 0.2, 0.5], True),
     ):

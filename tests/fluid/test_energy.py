@@ -64,3 +64,19 @@ def test_shear_takes_no_more_than_a_thick_liquid_loses():
         taken -= water.report.energy_change["viscosity and friction"]
     lost = start - water.kinetic_energy() - water.potential_energy()
     assert 0.5 * lost < taken < 1.05 * lost
+
+
+def test_a_wave_of_fourteen_cells_keeps_most_of_its_energy():
+    """A standing wave of 2 mm in a pool of half its length, ten cells deep: 4.8 % of its energy a period. With the
+    slope of the velocity taken a cell too deep where it goes on into the air, 7.5 %."""
+    length, depth, height, dt = 0.35, 0.525, 2e-3, 0.02
+    k = np.pi / length
+    period = 2.0 * np.pi / np.sqrt(9.81 * k * np.tanh(k * depth))
+    water = tank([length, 0.05, 0.8], 0.05, lambda x: x[:, 2] - depth - height * np.cos(k * x[:, 0]))
+    held, time, energy = 500.0 * 9.81 * 0.05 * length * height**2 / 2.0, [], []
+    while water.time < 4.0 * period + dt:
+        advance(water, dt, rtol=1e-10)
+        time.append(water.time)
+        energy.append((water.kinetic_energy() + water.potential_energy()) / held)
+    first, last = np.interp([period, 4.0 * period], time, energy)
+    assert 0.0 < (first - last) / 3.0 < 0.06

@@ -54,15 +54,3 @@ def test_distance_to_a_triangle_against_sampling(p, corners):
     found = np.sqrt(squared_distance(p, t))
     assert found <= nearest + 1e-7
     assert found >= nearest - 0.13
-
-
-def test_rescaling_leaves_the_water_of_a_drop_of_one_cell(cube):
-    """Slopes on the two sides of a sheet of one layer of nodes are 0.2 and 1: divided by them node by node, a third of
-    its water was gone at once."""
-    z = cube.nodes[:, 2]
-    phi = np.maximum(z - (0.5 + 0.15 * H), np.where(z < 0.5 - 0.5 * H, 0.05 * H, -H))
-    phi = np.maximum(phi, np.abs(cube.nodes[:, 0] - 0.5) - 0.26)
-    before = nodal_volume(cube, phi).sum()
-    after = nodal_volume(cube, redistance(cube, phi, H, rescale=True)).sum()
-    assert before > 0.0
-    assert after == pytest.approx(before, rel=0.03)
