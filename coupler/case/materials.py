@@ -8,7 +8,9 @@ short: joints this stiff need short substeps.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 from coupler.case.case import Case, ContactPair, JointPair
 
@@ -65,7 +67,7 @@ def with_presets(case: Case) -> Case:
     }
     if not used:
         return case
-    update = {"structure": case.structure.model_copy(update=changes)}
+    update: dict[str, Any] = {"structure": case.structure.model_copy(update=changes)}
     if case.joints is not None:
         update["joints"] = case.joints.model_copy(update={"pair": (*_joints(case, used), *case.joints.pair)})
     if case.contact is not None:
@@ -73,12 +75,12 @@ def with_presets(case: Case) -> Case:
     return case.model_copy(update=update)
 
 
-def _with_density(table, used: dict[str, Material]):
+def _with_density(table: Any, used: dict[str, Material]) -> Any:
     """A table with the density of its preset, and its rules with theirs; presets met are added to `used`."""
-    change = {}
+    change: dict[str, Any] = {}
     if hasattr(table, "rule"):
         change["rule"] = tuple(_with_density(rule, used) for rule in table.rule)
-    preset = PRESETS.get(getattr(table, "material", None))
+    preset = PRESETS.get(getattr(table, "material", None) or "")
     if preset is not None:
         used[table.material] = preset
         if table.density is None:
@@ -86,8 +88,9 @@ def _with_density(table, used: dict[str, Material]):
     return table.model_copy(update=change) if change else table
 
 
-def _joints(case: Case, used: dict[str, Material]):
-    with_ground = case.structure.ground is not None or case.terrain is not None
+def _joints(case: Case, used: dict[str, Material]) -> Iterator[JointPair]:
+    on_ground = case.structure is not None and case.structure.ground is not None
+    with_ground = on_ground or case.terrain is not None
     for name, preset in used.items():
         for other in (name, "ground") if with_ground else (name,):
             yield JointPair(
