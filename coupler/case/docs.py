@@ -1,4 +1,4 @@
-"""Texts made from the schema: `surgebreak explain`, the page docs/case_file.md, and the first case of `init`.
+"""Texts made from the schema: `surgebreak explain`, the page docs/case_file.md, and words that people use.
 
 `python -m coupler.case.docs` writes the page anew; a test compares it with the schema.
 """
@@ -14,7 +14,7 @@ from pydantic import BaseModel
 
 from coupler.case.keys import Key, find, keys
 from coupler.case.materials import PRESETS, described
-from coupler.program.errors import SurgebreakError, UnknownName, did_you_mean
+from coupler.program.errors import UnknownName, did_you_mean
 from coupler.program.provenance import ROOT
 
 PAGE = ROOT / "docs" / "case_file.md"
@@ -32,12 +32,67 @@ def explanation(name: str | None) -> str:
     plain = name.strip("[]").replace("[]", "")
     key = find(tuple(plain.split(".")))
     if key is None:
-        raise UnknownName(f"{name}: no such name in a case file{_near(plain)}")
+        found = meant(plain)
+        if not found:
+            raise UnknownName(f"{name}: no such name in a case file{_near(plain)}")
+        return "\n".join(
+            [f"'{name}' is no name of a case file; perhaps one of these is meant:", *map(_entry, found)]
+        )
     told = [_entry(key)]
     for section in key.sections:
         told += ["", inspect.getdoc(section) or ""]
         told += [f"  {_entry(inner)}" for inner in keys(section, f"{key.path}.") if _depth(inner, key) == 1]
     return "\n".join(told)
+
+
+WORDS = {
+    "wave": ("water.inflow", "water.inflow.kind", "water.sea", "water.fill"),
+    "tsunami": ("water.inflow", "water.inflow.kind", "water.sea"),
+    "flood": ("water.inflow", "water.sea", "water.fill"),
+    "surge": ("water.inflow", "water.fill"),
+    "river": ("water.inflow", "terrain"),
+    "dam": ("water.fill", "structure.wall"),
+    "ground": ("structure.ground", "terrain", "joints.ground"),
+    "concrete": ("joints", "joints.strength", "joints.opening_at_failure", "structure.density"),
+    "brick": ("structure.wall", "joints.strength", "structure.density"),
+    "mortar": ("joints", "joints.strength", "joints.pair"),
+    "glue": ("joints",),
+    "house": ("structure.building", "structure.drawing", "structure.town"),
+    "drawing": ("structure.drawing", "structure.file"),
+    "container": ("structure.block",),
+    "debris": ("structure.rubble", "verdict.hit_speed"),
+    "roof": ("structure.building.roof",),
+    "window": ("structure.building.opening",),
+    "door": ("structure.building.opening",),
+    "mesh": ("tank.cell", "tank.mesh"),
+    "resolution": ("tank.cell",),
+    "timestep": ("time.step_max", "time.cfl", "structure.substep"),
+    "output": ("time.output_every", "gauge"),
+    "failure": ("verdict", "joints"),
+    "damage": ("verdict", "joints"),
+    "collapse": ("verdict",),
+    "crack": ("joints", "verdict.damaged_joints"),
+    "sensor": ("gauge",),
+    "probe": ("gauge",),
+    "gravity": ("case.gravity",),
+    "bathymetry": ("terrain",),
+    "dem": ("terrain", "structure"),
+    "sand": ("water.walls", "structure.rubble"),
+    "impact": ("contact", "gauge.mean_over"),
+    "stop": ("limits", "limits.cpu_seconds"),
+}
+"""Words that people use, and the names that say what they mean."""
+MOST_MEANT = 8
+
+
+def meant(word: str) -> list[Key]:
+    """Names that a common word stands for, that end in it, or whose description holds it; at most MOST_MEANT."""
+    known = {key.path: key for key in keys()}
+    plain = word.lower().rstrip("s") if word.lower() not in WORDS else word.lower()
+    asked = [known[path] for path in WORDS.get(plain, ()) if path in known]
+    ends = [key for path, key in known.items() if path.rsplit(".", 1)[-1] == plain]
+    told = [key for key in known.values() if len(plain) > 3 and plain in key.description.lower()]
+    return list({key.path: key for key in [*asked, *ends, *told]}.values())[:MOST_MEANT]
 
 
 def _near(name: str) -> str:
@@ -140,69 +195,6 @@ def _shown_default(key: Key) -> str:
 
 
 # ---------------------------------------------------------------- the first case
-
-FIRST_CASE = """\
-# A column of water falls against a light box.
-# surgebreak explain          lists the sections;   surgebreak explain water.fill   says what is in one
-# Plain numbers are SI (m, s, kg, Pa); text may carry any unit of the right kind.
-
-[case]
-title = "Water against a light box"
-
-[time]
-end = "1.5 s"
-output_every = "50 ms"
-
-[tank]                      # the water's fixed mesh; closed but for the top
-lower = [0, 0, 0]
-upper = [4, 1, 2]
-cell = "20 cm"
-
-[[water.fill]]              # full of water at the start
-lower = [0, 0, 0]
-upper = [1, 1, 1]
-
-[structure]                 # leave this section and [contact] out for water alone
-density = "600 kg/m3"
-
-[[structure.block]]
-name = "box"
-size = ["40 cm", "40 cm", "40 cm"]
-centre = [2.5, 0.5, 0.2]
-
-[contact]
-stiffness = "1 MN/m"
-restitution = 0.3
-friction = 0.4
-
-# [joints]                  # glue between touching faces, which may break
-# strength = "0.5 MPa"
-# opening_at_failure = "1 mm"
-
-[[gauge]]
-kind = "level"
-name = "in_front"
-at = [2.2, 0.5]
-
-[[gauge]]
-kind = "force"
-name = "box"
-on = "box"
-"""
-
-
-def write_first_case(directory: Path) -> Path:
-    """Write a small case into a new or empty directory; raises SurgebreakError when there is one already."""
-    path = directory / "case.toml"
-    if path.exists():
-        raise SurgebreakError(f"{path}: exists and is left as it is; name another directory")
-    try:
-        directory.mkdir(parents=True, exist_ok=True)
-        path.write_text(FIRST_CASE, encoding="utf-8")
-    except OSError as error:
-        raise SurgebreakError(f"{path}: cannot be written ({error.strerror})") from error
-    return path
-
 
 if __name__ == "__main__":
     PAGE.write_text(page(), encoding="utf-8")

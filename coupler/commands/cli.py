@@ -328,11 +328,22 @@ def terrain(
 
 
 @app.command()
-def init(directory: Annotated[Path, typer.Argument(metavar="DIR", help="the new case directory")]) -> None:
+def init(
+    directory: Annotated[Path, typer.Argument(metavar="DIR", help="the new case directory")],
+    template: Annotated[
+        str, typer.Option(metavar="NAME", help="tank, wall, house, quay, column, terrain, town or dry")
+    ] = "tank",
+    ask: Annotated[
+        bool, typer.Option("--ask", help="ask for what the case is about, at most six questions")
+    ] = False,
+) -> None:
     """Write a small commented case that runs."""
-    from coupler.case.docs import write_first_case
+    from coupler.case.first_cases import write_first_case
 
-    path, word = write_first_case(directory), quote(str(directory))
+    def answer(question: str, usual: str) -> str:
+        return typer.prompt(question, default=usual)
+
+    path, word = write_first_case(directory, template, answer if ask else None), quote(str(directory))
     print(f"wrote {path}; next: surgebreak check {word}, surgebreak run {word}")
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from coupler.case.docs import FIRST_CASE
+from coupler.case.first_cases import text_of
 from coupler.commands import cli
 from coupler.program.provenance import ROOT, version
 
@@ -187,7 +187,7 @@ def test_a_case_with_blocks_tells_its_modules(tmp_path):
 
 
 def test_the_first_case_is_commented():
-    assert FIRST_CASE.count("#") > 5
+    assert text_of("tank").count("#") > 5
 
 
 @pytest.mark.parametrize("words", [("explain",), ("verify", "--list"), ("check", "cases/joint_pulled")])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import surgebreak
-from coupler.case.docs import FIRST_CASE
+from coupler.case.first_cases import text_of
 from coupler.program.provenance import ROOT
 from coupler.results.history import read_history
 
@@ -94,11 +94,11 @@ def test_what_is_saved_is_read_back_as_the_same_case(tmp_path):
 
 
 def test_mistakes_of_a_loaded_case_have_the_lines_of_its_file(tmp_path):
-    (tmp_path / "case.toml").write_text(FIRST_CASE, encoding="utf-8")
+    (tmp_path / "case.toml").write_text(text_of("tank"), encoding="utf-8")
     case = surgebreak.load(tmp_path).set("structure.block[0].centre", [9.0, 0.5, 0.2])
     with pytest.raises(surgebreak.BadCase, match=r"structure\.block"):
         case.file()
-    (tmp_path / "case.toml").write_text(FIRST_CASE.replace("density", "densty"), encoding="utf-8")
+    (tmp_path / "case.toml").write_text(text_of("tank").replace("density", "densty"), encoding="utf-8")
     with pytest.raises(surgebreak.BadCase, match=r"case\.toml:\d+: structure\.densty"):
         surgebreak.load(tmp_path)
 

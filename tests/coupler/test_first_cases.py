@@ -1,0 +1,79 @@
+"""First cases of `init`: each is a case without a mistake; words that people use are understood."""
+
+import pytest
+from typer.testing import CliRunner
+
+from coupler.case.docs import WORDS, explanation, keys
+from coupler.case.first_cases import FIRST_CASES, CannotBegin, text_of, write_first_case
+from coupler.checks.read_case import load
+from coupler.commands.cli import app
+from coupler.program.errors import UnknownName
+
+
+@pytest.mark.parametrize("name", FIRST_CASES)
+def test_every_first_case_is_a_case(tmp_path, name):
+    write_first_case(tmp_path / name, name)
+    case = load(tmp_path / name).case
+    assert case.time.end > 0.0
+    assert len(FIRST_CASES[name].questions) <= 6
+
+
+def test_answers_stand_in_the_case_with_their_units(tmp_path):
+    said = {"Height of the wall": "250 cm", "Tensile strength": "1 MPa", "Thickness": "0.5"}
+
+    def ask(question, usual):
+        return next((answer for start, answer in said.items() if question.startswith(start)), "")
+
+    write_first_case(tmp_path, "wall", ask)
+    case = load(tmp_path).case
+    (wall,) = case.structure.wall
+    assert (wall.size[2], wall.size[0], case.joints.strength) == (2.5, 0.5, 1e6)
+    assert case.water.fill[0].upper[2] == 3.0
+
+
+def test_an_answer_of_the_wrong_kind_is_asked_again():
+    heard = []
+
+    def ask(question, usual):
+        heard.append(question)
+        return "3 kg" if len(heard) == 1 else usual
+
+    text_of("wall", ask)
+    assert "3 kg" in heard[1]
+    assert len(heard) == 7
+
+
+def test_an_unknown_first_case_names_those_that_there_are(tmp_path):
+    with pytest.raises(CannotBegin, match=r"hous: there is none; did you mean 'house'\?.*quay: containers"):
+        write_first_case(tmp_path, "hous")
+
+
+def test_the_wizard_on_the_command_line(tmp_path):
+    done = CliRunner().invoke(
+        app, ["init", str(tmp_path / "q"), "--template", "quay", "--ask"], input="2 m\n\n\n\n\n"
+    )
+    assert done.exit_code == 0, done.output
+    assert load(tmp_path / "q").case.water.fill[0].upper[2] == 5.0
+
+
+@pytest.mark.parametrize(
+    ("word", "name"),
+    [
+        ("wave", "water.inflow"),
+        ("tsunami", "water.sea"),
+        ("concrete", "joints.strength"),
+        ("houses", "structure.building"),
+    ],
+)
+def test_words_that_people_use_are_understood(word, name):
+    assert f"[{name}]" in explanation(word) or f"\n{name} " in explanation(word)
+
+
+def test_words_lead_to_names_that_there_are():
+    known = {key.path for key in keys()}
+    assert {path for paths in WORDS.values() for path in paths} - known == set()
+
+
+def test_nonsense_is_still_an_unknown_name():
+    with pytest.raises(UnknownName, match=r"joint\.strenth: no such name"):
+        explanation("joint.strenth")
