@@ -53,7 +53,6 @@ WORDS = {
     "river": ("water.inflow", "terrain"),
     "dam": ("water.fill", "structure.wall"),
     "ground": ("structure.ground", "terrain", "joints.ground"),
-    "concrete": ("joints", "joints.strength", "joints.opening_at_failure", "structure.density"),
     "brick": ("structure.wall", "joints.strength", "structure.density"),
     "mortar": ("joints", "joints.strength", "joints.pair"),
     "glue": ("joints",),

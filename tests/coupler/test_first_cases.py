@@ -61,7 +61,7 @@ def test_the_wizard_on_the_command_line(tmp_path):
     [
         ("wave", "water.inflow"),
         ("tsunami", "water.sea"),
-        ("concrete", "joints.strength"),
+        ("glue", "joints"),
         ("houses", "structure.building"),
     ],
 )
