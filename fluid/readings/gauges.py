@@ -10,6 +10,8 @@ from fluid.readings.clip import clipped, volumes
 from fluid.sides.inflow import wet_shares
 
 SAMPLES_PER_CELL = 4
+HALVINGS = 10
+"""Of a sample's distance, to find where a solid or the bed begins."""
 
 
 def level(water, xy) -> float:
@@ -33,10 +35,32 @@ def levels(water, places) -> np.ndarray:
     length = np.abs(np.diff(phi, axis=1))
     share = np.divide(np.abs(np.diff(wet, axis=1)), length, out=(wet[:, 1:] > 0.0) * 1.0, where=length > 0.0)
     both = (phi[:, 1:] < 0.0) & (phi[:, :-1] < 0.0)
-    open_water = np.isfinite(phi[:, 1:]) & np.isfinite(phi[:, :-1])
-    return np.array(
+    is_open = np.isfinite(phi)
+    open_water = is_open[:, 1:] & is_open[:, :-1]
+    depth = np.array(
         [(z[1] - z[0]) * row[here].sum() for row, here in zip(np.where(both, 1.0, share), open_water)]
     )
+    return depth + _beside_solids(water, places, z, phi, is_open)
+
+
+def _beside_solids(water, places, z, phi, is_open) -> np.ndarray:
+    """Wet length (m,) [m] between the last sample in a solid, or below the bed, and the first in the open; where the
+    solid ends is found by halving."""
+    found = np.zeros(len(places))
+    row, k = np.nonzero(is_open[:, 1:] != is_open[:, :-1])
+    inner = np.where(is_open[row, k], k, k + 1)
+    wet = phi[row, inner] < 0.0
+    row, k, inner = row[wet], k[wet], inner[wet]
+    if len(row) == 0:
+        return found
+    inside, outside = z[inner], z[np.where(inner == k, k + 1, k)]
+    for _ in range(HALVINGS):
+        middle = 0.5 * (inside + outside)
+        points = np.column_stack([places[row], middle])
+        free = np.isfinite(Places.of(water, points, beyond=True).read(water.level_set))
+        inside, outside = np.where(free, middle, inside), np.where(free, outside, middle)
+    np.add.at(found, row, np.abs(0.5 * (inside + outside) - z[inner]))
+    return found
 
 
 def pressure(water, points):

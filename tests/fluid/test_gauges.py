@@ -44,6 +44,22 @@ def test_velocity_at_rest(pool):
     assert np.abs(gauges.velocity(pool, [[0.3, 0.4, 0.1]])).max() < 1e-9
 
 
+def test_depth_over_a_sloping_bed_reaches_down_to_it():
+    """Between the samples too: without, up to a sample's distance of it was missing."""
+    from coupler.step.immersion import Immersion
+    from fluid.mesh.fitted_mesh import fitted_mesh
+    from fluid.step.parameters import WaterParameters
+    from fluid.step.water import Water
+
+    mesh = fitted_mesh((0, 0, -1), (4, 2, 1), 0.5, lambda x, y: 0.37 * x - 0.93).mesh
+    water = Water(
+        mesh, Immersion(mesh, None, [], "single").domain, lambda x: x[:, 2] - 0.31, WaterParameters()
+    )
+    places = np.random.default_rng(1).uniform((0.1, 0.1), (2.5, 1.9), (40, 2))
+    depth = gauges.levels(water, places)
+    np.testing.assert_allclose(depth, 0.31 - (0.37 * places[:, 0] - 0.93), atol=3e-4)
+
+
 def test_level_is_the_wet_length():
     """A sheet of water in the air over a pool counts with its thickness, not with its height."""
     water = tank([1, 1, 1], 0.125, lambda x: np.minimum(x[:, 2] - 0.3, np.abs(x[:, 2] - 0.75) - 0.19))
