@@ -104,10 +104,10 @@ def _without_seams(level, boxes, tank, nodes, edge: float) -> Array:
     """The level (N,) with water where boxes touch: the distance to both is zero on the face that they share."""
     step = SEAM * edge
     at = np.flatnonzero(np.abs(level) < step)
-    inside = np.ones(len(at), bool)
-    for offset in product((-step, step), repeat=3):
-        inside &= np.any([_in_box(box, tank, nodes[at] + offset) for box in boxes], axis=0)
-    at = at[inside]
+    around = [nodes[at] + offset for offset in product((-step, step), repeat=3)]
+    held = np.array([[_in_box(box, tank, points) for points in around] for box in boxes])
+    # within one box there is no seam: zero is what a copy of the node beyond a wall has from its own box
+    at = at[held.any(axis=0).all(axis=0) & ~held.all(axis=1).any(axis=0)]
     if len(at) > 0:
         ways = [_reach_of(boxes, tank, nodes[at], k, sign, step) for k in range(3) for sign in (-1, 1)]
         level[at] = -np.min(ways, axis=0)

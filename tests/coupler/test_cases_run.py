@@ -17,16 +17,8 @@ LONG = {
 """More than a dozen processor seconds each."""
 
 
-MISSED = {
-    "still_water_thin_wall": "the lower level swings by 1 % where the surface lies in the nodes of the mesh"
-}
-"""Promises that are not kept, and why: a case that keeps them again fails here until it is taken out."""
-
-
 def marked(place):
     marks = [pytest.mark.nightly] if place.name in LONG else []
-    if place.name in MISSED:
-        marks.append(pytest.mark.xfail(strict=True, reason=MISSED[place.name]))
     return pytest.param(place, id=place.name, marks=marks)
 
 

@@ -67,3 +67,21 @@ def test_water_starts_with_the_velocity_of_the_box_that_it_is_in():
     np.testing.assert_array_equal(found[:, 0], [3.0, 0.0, 3.0, 0.0, 3.0])
     np.testing.assert_array_equal(found[:, 2], [-1.0, 0.0, -1.0, 0.0, -1.0])
     assert start_velocity(boxes, [(0.0, 0.0, 0.0)], nodes) is None
+
+
+def test_pools_on_both_sides_of_a_thin_wall_stay_at_levels_in_the_nodes():
+    """The lower surface passes through nodes that lie, on the other side of the wall, deep in the higher pool: their
+    copies on the low side counted as a seam of the fills, wet up to the higher level, and the low pool rose by 1 %."""
+    low, high, wall = 2 * CELL, 3 * CELL, 0.55
+    solid = ConvexBodies.boxes(np.array([[wall, 0.25, 0.25]]), np.array([[0.02, 0.502, 0.6]]))
+    mesh = box_mesh(*TANK, CELL)
+    domain = cut_domain(mesh, solid, "multiple")
+    boxes = [((0.0, 0.0, 0.0), (wall, 0.5, high)), ((wall, 0.0, 0.0), (1.0, 0.5, low))]
+    level = start_level(boxes, TANK, mesh, domain)
+    at = np.flatnonzero(np.isclose(domain.nodes[:, 2], low))
+    copies = at[np.isin(domain.parent_node[at], domain.parent_node[at][np.abs(level[at]) < 1e-12])]
+    assert set(np.round(level[copies], 9)) == {0.0, round(low - high, 9)}
+    water = Water(mesh, domain, level, WaterParameters())
+    for _ in range(10):
+        advance(water)
+    assert np.abs(water.velocity).max() < 1e-7
