@@ -156,6 +156,11 @@ class Air(Section):
     atmospheric: Annotated[float, InSI("Pa", gt=0)] = Field(
         101_325.0, description="absolute pressure of the open air"
     )
+    smallest: Annotated[float, InSI("", ge=1)] = Field(
+        8.0,
+        description="bricks of the mesh (tank.cell each way) that the air of a pocket fills at least at the pressure "
+        "of the open air; smaller bubbles are let go",
+    )
     vent: tuple[Vent, ...] = Field((), description="orifices of pockets")
 
 

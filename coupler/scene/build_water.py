@@ -78,7 +78,7 @@ def _trapped_air(air, structure, domain) -> dict:
             body = structure.names.index(spec.block)
             place = bodies.rotation[body].T @ (place - bodies.centre[body])
         vents.append(Vent(place, spec.area, spec.discharge, body))
-    return {"gas": Gas(air.gamma, air.atmospheric), "vents": tuple(vents)}
+    return {"gas": Gas(air.gamma, air.atmospheric, air.smallest), "vents": tuple(vents)}
 
 
 def _reaching(tank, fill) -> tuple:

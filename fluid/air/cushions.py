@@ -28,7 +28,7 @@ import scipy.sparse as sp
 from numba import njit
 
 from fluid.air.gas import Gas
-from fluid.air.pockets import OPEN_AIR, Descent, labelled, volumes
+from fluid.air.pockets import OPEN_AIR, Descent, bricks, labelled, volumes, without
 from fluid.domain.coupling_matrix import wetted_coupling
 from fluid.pressure.projection import SMALLEST_CUT
 
@@ -41,11 +41,11 @@ class Air:
     """What the pockets hold between two steps. K pockets, numbered as their labels.
 
     gas · label (N,) of the air at each node (`pockets.py`) · reference (K,) [m³] of the gas · rate (K,) [m³/s], R of
-    the last step · end_pressure (K,) [Pa] that goes with the acceleration at its end · turned (K,) bool: R changed its
-    sign, or there is none of a step before · mean_pressure (K,) [Pa] over the last step ·
-    name (K,): number for life, from 1 · names: how many were given · lost [J]: energy of air that got away or was
-    mixed, so far · entrained [m³]: reference volume of pockets that opened within the water so far · gone: pockets that
-    the water filled so far."""
+    the last step · end_pressure (K,) [Pa] that goes with the acceleration at its end · mean_pressure (K,) [Pa] over
+    it · turned (K,) bool: R changed its sign, or there is none of a step before · name (K,): number for life, from 1 ·
+    names: how many were given · lost [J]: energy of air that got away or was mixed, or of bubbles that were let go, so
+    far · entrained [m³]: reference volume of pockets that opened within the water so far · gone: pockets that the water
+    filled so far."""
 
     gas: Gas
     label: np.ndarray
@@ -64,8 +64,10 @@ class Air:
     def at_start(cls, gas: Gas, topology, phi, open_to_air) -> Air:
         """Air at the pressure of the atmosphere everywhere; phi (N,) [m] of the water."""
         label, count = labelled(topology, phi, open_to_air)
-        nothing = np.zeros(count)
         reference = volumes(topology, phi, label, count)
+        small = reference < gas.smallest * bricks(topology, label, count)
+        (label, count), reference = without(label, small), reference[~small]
+        nothing = np.zeros(count)
         return cls(
             gas,
             label,
@@ -126,15 +128,14 @@ class Cushions:
 
         taken (N,) [m³]: as in `Air.volumes`; the old pockets are measured with it."""
         t, gas = topology, air.gas
-        label, count = labelled(t, phi, open_to_air)
         before_volume = air.volumes(t, before, taken)
-        descent = Descent.of(air.label, len(air), label, count, t.node_volume)
-        same = descent.only >= 0
-        reference = descent.share.T @ air.reference + descent.fresh
-        volume = descent.share.T @ before_volume + descent.fresh
-        anew = descent.share.sum(axis=0) == 0.0
-        if anew.any():  # closed off from the atmosphere, or opened within the water
-            volume[anew] = reference[anew] = volumes(t, phi, label, count)[anew]
+        label, count = labelled(t, phi, open_to_air)
+        descent, reference, volume = _handed_on(air, before_volume, t, phi, label, count)
+        small = reference < gas.smallest * bricks(t, label, count)
+        if small.any():
+            label, count = without(label, small)
+            descent, reference, volume = _handed_on(air, before_volume, t, phi, label, count)
+        same, anew = descent.only >= 0, descent.share.sum(axis=0) == 0.0
         out_of_water = anew & (descent.fresh == 0.0)
         name, names = _names(air, descent)
         pressure = gas.pressure(reference, volume)
@@ -250,6 +251,20 @@ class Cushions:
         return replace(
             self.air, rate=rate, end_pressure=x / theta, mean_pressure=x + self.known, turned=turned
         )
+
+
+def _handed_on(air: Air, before, topology, phi, label, count: int):
+    """The Descent of the pockets labelled now (N,), their reference volumes and their volumes (K,) [m³] at the
+    beginning of the step.
+
+    before (O,) [m³]: volumes of the old ones. What the water has just closed off has the pressure of the open air."""
+    descent = Descent.of(air.label, len(air), label, count, topology.node_volume)
+    reference = descent.share.T @ air.reference + descent.fresh
+    volume = descent.share.T @ before + descent.fresh
+    anew = descent.share.sum(axis=0) == 0.0
+    if anew.any():
+        volume[anew] = reference[anew] = volumes(topology, phi, label, count)[anew]
+    return descent, reference, volume
 
 
 def _of_parent(values, only):

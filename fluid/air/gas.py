@@ -33,10 +33,12 @@ NEARLY_ISOTHERMAL = 1e-6
 
 @dataclass(frozen=True)
 class Gas:
-    """gamma: 1 (isothermal) to 1.4 (adiabatic) · atmospheric [Pa]: absolute pressure of the air outside."""
+    """gamma: 1 (isothermal) to 1.4 (adiabatic) · atmospheric [Pa]: absolute pressure of the air outside · smallest:
+    pockets with a reference volume of fewer bricks of the mesh are bubbles that it does not see, and let go."""
 
     gamma: float = 1.4
     atmospheric: float = 101_325.0
+    smallest: float = 8.0
 
     def pressure(self, reference, volume) -> np.ndarray:
         """Gauge pressure (K,) [Pa] of (1); reference V_a and volume V (K,) [m³]."""

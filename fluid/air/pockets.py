@@ -16,6 +16,8 @@ from fluid.domain.moments import wet_fraction
 
 NO_AIR, OPEN_AIR = -1, 0
 """Labels of nodes without air and of those that air from outside reaches; pockets count from 1."""
+SLIVER = 0.1
+"""Share of the room of a pocket below which what it has in common with another one, or with the open air, is none."""
 
 
 def labelled(topology, phi, open_to_air) -> tuple[np.ndarray, int]:
@@ -90,6 +92,21 @@ def volumes(topology, phi, label, count: int) -> np.ndarray:
     return np.bincount(pocket - 1, free, minlength=count)[:count]
 
 
+def bricks(topology, label, count: int) -> np.ndarray:
+    """Mean volume (K,) [m³] of the bricks, of six cells each, around the nodes of the pockets."""
+    t = topology
+    cells = t.cells_around(label > OPEN_AIR)
+    pocket = label[t.cells[cells]].max(axis=1) - 1
+    total = np.bincount(pocket, t.size[cells] ** 3, minlength=count)[:count]
+    return total / np.maximum(np.bincount(pocket, minlength=count)[:count], 1)
+
+
+def without(label, small) -> tuple[np.ndarray, int]:
+    """Labels (N,) and number of the pockets that are left when those of small (K,) bool count as open air."""
+    number = np.concatenate([[OPEN_AIR], np.where(small, OPEN_AIR, np.cumsum(~small))])
+    return np.where(label > OPEN_AIR, number[np.maximum(label, 0)], label), int((~small).sum())
+
+
 @dataclass(frozen=True)
 class Descent:
     """From which pockets of before (O) the pockets of now (K) come.
@@ -110,6 +127,11 @@ class Descent:
         both = (before >= OPEN_AIR) & (now >= OPEN_AIR)
         common = np.zeros((n_before + 1, n_now + 1))
         np.add.at(common, (before[both], now[both]), node_volume[both])
+        # cells that a moving wall cuts anew may have nodes of its other side: no air goes that way
+        of_old, of_new = common.sum(axis=1, keepdims=True), common.sum(axis=0, keepdims=True)
+        common[(common < SLIVER * of_old) & (common < SLIVER * of_new)] = 0.0
+        common[1:, 0][common[1:, 0] < SLIVER * of_old[1:, 0]] = 0.0
+        common[0, 1:][common[0, 1:] < SLIVER * of_new[0, 1:]] = 0.0
         total = common.sum(axis=1)
         share = common[1:] / np.maximum(total[1:], 1e-300)[:, None]
         gone = total[1:] == 0.0

@@ -13,7 +13,7 @@ from typing import Literal
 
 MODULES = (
     "contact", "joints", "bending", "stock", "coupled", "wall", "spheres", "cubes", "stability",
-    "rest", "water", "collapse", "viscous", "dam_breaks", "jets", "bores", "run_up", "isolated_building",
+    "rest", "water", "collapse", "viscous", "dam_breaks", "jets", "air", "bores", "run_up", "isolated_building",
 )  # fmt: skip
 """Files of this package that hold cases; their names are the groups."""
 
