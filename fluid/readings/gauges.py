@@ -56,8 +56,9 @@ def _beside_solids(water, places, z, phi, is_open) -> np.ndarray:
     inside, outside = z[inner], z[np.where(inner == k, k + 1, k)]
     for _ in range(HALVINGS):
         middle = 0.5 * (inside + outside)
-        points = np.column_stack([places[row], middle])
-        free = np.isfinite(Places.of(water, points, beyond=True).read(water.level_set))
+        # with the samples in the open: of points that are all beside the mesh nothing would be looked up
+        points = np.column_stack([np.tile(places[row], (2, 1)), np.concatenate([middle, z[inner]])])
+        free = np.isfinite(Places.of(water, points, beyond=True).read(water.level_set)[: len(row)])
         inside, outside = np.where(free, middle, inside), np.where(free, outside, middle)
     np.add.at(found, row, np.abs(0.5 * (inside + outside) - z[inner]))
     return found

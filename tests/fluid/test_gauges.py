@@ -58,6 +58,8 @@ def test_depth_over_a_sloping_bed_reaches_down_to_it():
     places = np.random.default_rng(1).uniform((0.1, 0.1), (2.5, 1.9), (40, 2))
     depth = gauges.levels(water, places)
     np.testing.assert_allclose(depth, 0.31 - (0.37 * places[:, 0] - 0.93), atol=3e-4)
+    for xy, wanted in zip(places[:5], depth):
+        assert gauges.level(water, xy) == pytest.approx(wanted, abs=1e-12), "alone as among others"
 
 
 def test_level_is_the_wet_length():
