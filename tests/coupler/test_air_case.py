@@ -1,0 +1,82 @@
+"""Trapped air of a case: what is refused, what is measured, and that open air loads none of it."""
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from coupler.program.errors import SurgebreakError
+from coupler.run.run import described_air
+from coupler.scene.build import build
+from coupler.step.limits import Diverged, check_air
+from tests.fakes import no_clock
+
+from .test_water_case import FILL, case, run, told
+
+CLOSED = {"lower": [0, 0, 0], "upper": [2, 0.2, 1], "cell": 0.1, "smooth": ["y-", "y+"], "open": []}
+TRAPPED = {"air": {"model": "trapped"}}
+SOLID = [{"centre": [1.0, 0.1, 0.5], "size": [0.2, 0.2, 0.2]}]
+
+
+@pytest.mark.parametrize(
+    ("water", "more", "message"),
+    [
+        (
+            {"air": {"vent": [{"at": [1, 0.1, 0.9], "area": "1 cm2"}]}},
+            {},
+            "water.air.vent: open air needs no orifices",
+        ),
+        (TRAPPED, {"solid": SOLID}, 'write water.covers = "multiple"'),
+        (
+            {"air": {"model": "trapped", "vent": [{"at": [1, 0.1, 1.9], "area": "1 cm2"}]}},
+            {},
+            "water.air.vent.0.at.2: z = 1.9 m lies outside of the tank (0 to 1 m)",
+        ),
+        (
+            {"air": {"model": "trapped", "vent": [{"at": [1, 0.1, 0.9], "area": "1 cm2", "block": "roof"}]}},
+            {},
+            "there is no block 'roof'",
+        ),
+        (
+            {},
+            {"gauge": [{"kind": "air", "name": "a", "at": [1, 0.1, 0.9]}]},
+            "an air gauge measures trapped air",
+        ),
+    ],
+)
+def test_wrong_air_is_refused_with_its_place(water, more, message):
+    assert any(message in line for line in told(water, **more)), told(water, **more)
+
+
+def test_a_gauge_reads_the_pocket_and_the_books_hold_its_energy():
+    """A closed tank that water falls into: the air keeps its volume, for water has none to give, and its amount."""
+    gauge = [{"kind": "air", "name": "above", "at": [1.5, 0.1, 0.9]}]
+    fill = [{"lower": [0, 0, 0], "upper": [0.5, 0.2, 0.8]}]
+    found = case(TRAPPED | {"fill": fill}, tank=CLOSED, gauge=gauge)
+    coupling, record, rows = run(found, 0.3)
+    volume = np.array([row["above_volume"] for row in rows])
+    np.testing.assert_allclose(volume, 0.4 - 0.08, rtol=2e-5)
+    assert np.abs([row["above_pressure"] for row in rows]).max() < 50.0
+    assert abs(record.balance.air_energy) < 0.01
+    assert record.balance.energy_error < 0.02
+    assert record.momentum.error < 1e-10
+    assert "one pocket of 0.32 m3" in described_air(build(found, no_clock).coupling.water)
+    assert issubclass(Diverged, SurgebreakError)
+    with pytest.raises(Diverged, match=r"a pocket of trapped air between .* \(limits.air_pressure\).*vent"):
+        check_air(0.3, coupling.water, 1e-9)
+
+
+def test_open_air_loads_nothing_of_it():
+    code = (
+        "import sys\n"
+        "from tests.coupler.test_water_case import case, run\n"
+        f"run(case({{'fill': {FILL!r}}}), 0.02)\n"
+        "assert 'fluid.step.water' in sys.modules\n"
+        "assert not [name for name in sys.modules if name.startswith('fluid.air')]\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, env=os.environ, check=False
+    )
+    assert done.returncode == 0, done.stderr
