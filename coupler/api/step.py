@@ -63,7 +63,7 @@ class Step:
 
     @property
     def water_volume(self) -> float:
-        """[m3]"""
+        """Volume of the water [m3]."""
         return 0.0 if self._coupling.water is None else float(self._coupling.water.volume())
 
     @property

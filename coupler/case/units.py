@@ -74,6 +74,20 @@ class InSI(GroupedMetadata):
         for kind, limit in ((Gt, self.gt), (Ge, self.ge), (Lt, self.lt), (Le, self.le)):
             if limit is not None:
                 yield kind(limit)
+        yield _ForEditors(self.unit)
+
+
+@dataclass(frozen=True)
+class _ForEditors:
+    """What a quantity is in the JSON Schema: a number, or a text that begins with one."""
+
+    unit: str
+
+    def __get_pydantic_json_schema__(self, core: Any, handler: Any) -> dict[str, Any]:
+        """The choice of the two, around the limits of the number."""
+        text = {"type": "string", "pattern": r"^\s*[-+]?(\d|\.\d)"}
+        told = f"a number in {self.unit}, or text with a unit" if self.unit else "a plain number"
+        return {"title": told, "anyOf": [handler(core), text]}
 
 
 def to_si(value: object, unit: str) -> float:

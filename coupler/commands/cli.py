@@ -32,7 +32,6 @@ app = typer.Typer(
     name="surgebreak",
     help="How a structure breaks when water hits it, and how its debris then changes the flow.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -325,6 +324,34 @@ def terrain(
     from coupler.commands.terrain import show
 
     show(place, set or [], map_)
+
+
+@app.command()
+def schema(
+    to: Annotated[
+        Path | None, typer.Option("--to", metavar="FILE", help="write it there; else to standard output")
+    ] = None,
+) -> None:
+    """Print the JSON Schema of case.toml, for editors.
+
+    They complete and check names with it; docs/editor.md says how to tell yours.
+    """
+    from coupler.case.editor_schema import write
+
+    write(to)
+
+
+@app.command()
+def docs(
+    build: Annotated[
+        Path | None,
+        typer.Option("--build", metavar="DIR", help="only build the site into this folder, open nothing"),
+    ] = None,
+) -> None:
+    """Build the site of the documentation and open it."""
+    from coupler.commands.site.command import docs as make_site
+
+    raise typer.Exit(int(make_site(build)))
 
 
 @app.command()

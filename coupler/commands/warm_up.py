@@ -1,20 +1,23 @@
-"""Compile the numba kernels once, by a run of two steps that uses all of them; the results are thrown away.
+"""Compile numba kernels by runs of two steps whose results are thrown away: `python -m coupler.commands.warm_up PART`.
 
-Numba keeps what it compiled beside the sources, so later runs start at once. Without this the first run of a
-user pays for it.
+Numba keeps what it compiled, so later runs start at once. `coupler.run.compile_ahead` starts a process for each part
+that a case needs; the parts have few kernels in common. Without a part, one small scene that uses all of them is run.
 """
 
 from __future__ import annotations
 
+import sys
 import tempfile
 from pathlib import Path
 
-CASE = """\
+TIME = """\
 [case]
 title = "warm-up"
 [time]
 end = "20 ms"
 step_max = "10 ms"
+"""
+WATER = """\
 [tank]
 lower = [0, 0, 0]
 upper = [2, 1, 1]
@@ -22,9 +25,13 @@ cell = 0.25
 [[water.fill]]
 lower = [0, 0, 0]
 upper = [1.2, 1, 0.6]
+"""
+SOLID = """\
 [[solid]]
-centre = [1.8, 0.9, 0.1]
+centre = [1.1, 0.9, 0.1]
 size = [0.2, 0.2, 0.3]
+"""
+STRUCTURE = """\
 [structure]
 [[structure.block]]
 name = "floating"
@@ -42,6 +49,8 @@ stiffness = "1 MN/m"
 [joints]
 strength = "100 kPa"
 opening_at_failure = "1 mm"
+"""
+GAUGES = """\
 [[gauge]]
 kind = "level"
 name = "level"
@@ -51,6 +60,8 @@ kind = "pressure"
 name = "pressure"
 at = [0.5, 0.1, 0.1]
 """
+CASE = TIME + WATER + SOLID + STRUCTURE + GAUGES
+PARTS = {"water": TIME + WATER, "solids": TIME + WATER + SOLID, "structure": TIME + STRUCTURE, "all": CASE}
 
 
 class Silent:
@@ -69,15 +80,14 @@ class Silent:
         return None
 
 
-def warm_up() -> None:
-    """Run the small case in a temporary directory."""
-    from coupler.checks.read_case import load
+def warm_up(part: str = "all") -> None:
+    """Run the small case of a part in a temporary directory."""
+    from coupler.checks.read_case import from_text
     from coupler.run.directory import RunDirectory
     from coupler.run.run import run
 
     with tempfile.TemporaryDirectory() as folder:
-        (Path(folder) / "case.toml").write_text(CASE, encoding="utf-8")
-        file = load(folder)
+        file = from_text(PARTS[part], "warm-up", Path(folder))
         with RunDirectory.create(file) as directory:
             run(file.case, directory, Silent())
 
@@ -86,4 +96,4 @@ if __name__ == "__main__":
     from coupler.program.start import one_thread
 
     one_thread()
-    warm_up()
+    warm_up(*sys.argv[1:2])

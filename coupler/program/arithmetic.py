@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import os
 import platform
+import sys
 from collections.abc import MutableMapping
 from pathlib import Path
 
@@ -31,11 +32,31 @@ ONE_INSTRUCTION_SET = {
 }
 
 
+_too_late: list[str] = []
+
+
 def fix_arithmetic(environment: MutableMapping[str, str] = os.environ) -> None:
     """Set the variables above that are not set; the instruction set where the processor has it."""
     settings = ONE_THREAD if missing() else ONE_THREAD | ONE_INSTRUCTION_SET
+    if any(name not in environment for name in settings):
+        _too_late[:] = [name for name in ("numpy", "numba") if name in sys.modules]
     for name, value in settings.items():
         environment.setdefault(name, value)
+
+
+def _remark_on_order() -> str:
+    """What a script should know that loaded a library before this program set it up, where that matters."""
+    if not _too_late or not _has_more():
+        return ""
+    return (
+        f"{' and '.join(_too_late)} was loaded before surgebreak, and takes the instructions of this processor: the last "
+        "digits, and what grows from them, may differ from those elsewhere; import surgebreak first"
+    )
+
+
+def _has_more(cpuinfo: Path = Path("/proc/cpuinfo")) -> bool:
+    """Whether the processor has instructions beyond the baseline that these libraries would take."""
+    return "avx512f" in cpuinfo.read_text(encoding="utf-8")
 
 
 def missing(cpuinfo: Path = Path("/proc/cpuinfo")) -> list[str]:
@@ -53,7 +74,7 @@ def remark() -> str:
     """What a user of an older processor should know; empty on others."""
     absent = missing()
     if not absent:
-        return ""
+        return _remark_on_order()
     return (
         f"this processor has no {', '.join(absent)} ({BASELINE}): the last digits, and what grows from them, differ "
         "from those on processors since 2013"

@@ -18,9 +18,10 @@ EXTRAS = {
     "dask": ("dask-jobqueue",),
     "test": ("pytest", "hypothesis", "manifold3d", "trimesh", "pyamg"),
     "pandas": ("pandas",),
+    "docs": ("mkdocs-material", "latex2mathml"),
 }
 """Packages of an extra; of those that tests need, without the tools that read the code."""
-COMMANDS = {"view": "render", "benchmark": "benchmark", "sweep": "sweep", "test": "test"}
+COMMANDS = {"view": "render", "benchmark": "benchmark", "sweep": "sweep", "test": "test", "docs": "docs"}
 """Command of the launcher that installs the extra; others are installed by pip."""
 
 

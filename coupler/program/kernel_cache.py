@@ -68,7 +68,7 @@ class ByContent:
     @classmethod
     def from_function(cls, py_func: object, py_file: str) -> ByContent | None:
         """The locator of a function that is defined in a file; None for a file outside of the packages of kernels."""
-        folder = _folder(py_file, Path(os.environ["NUMBA_CACHE_DIR"]))
+        folder = folder_of(Path(py_file), Path(os.environ["NUMBA_CACHE_DIR"]))
         return None if folder is None else cls(folder)
 
     def ensure_cache_path(self) -> None:
@@ -90,8 +90,9 @@ class ByContent:
 
 
 @functools.cache
-def _folder(py_file: str, place: Path) -> Path | None:
-    source = Path(py_file).resolve()
+def folder_of(py_file: Path, place: Path) -> Path | None:
+    """Where kernels of a module are kept below a place; None for a file outside of the packages of kernels."""
+    source = py_file.resolve()
     if not (source.is_relative_to(ROOT) and source.relative_to(ROOT).parts[0] in ROOMS):
         return None
     digest = hashlib.sha256()

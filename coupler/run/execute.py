@@ -10,6 +10,7 @@ from coupler.checks.read_case import CaseFile
 from coupler.program import arithmetic
 from coupler.program.errors import ExitCode
 from coupler.results.expected import verdicts
+from coupler.run.compile_ahead import compile_ahead
 from coupler.run.directory import RunDirectory
 
 
@@ -35,6 +36,7 @@ def carry_out(
         with reporter(file.case.time.end, directory.log, asked, quiet) as tell:
             describe(file, tell.message)
             tell_laws(file, directory, tell.message)
+            compile_ahead(file.case, tell.message)
             on_file = ProgressFile(tell, directory.path)
             code = ExitCode(run(file.case, directory, on_file, checkpoint, each))
             compare(file, directory, tell.message)

@@ -81,12 +81,12 @@ def checkout(tmp_path, monkeypatch):
             (root / file).parent.mkdir(parents=True, exist_ok=True)
             (root / file).write_text(text)
         monkeypatch.setattr(kernel_cache, "ROOT", root)
-        kernel_cache._folder.cache_clear()
+        kernel_cache.folder_of.cache_clear()
         kernel_cache._imports.cache_clear()
         return lambda file: ByContent.from_function(None, str(root / file)).get_cache_path()
 
     yield make
-    kernel_cache._folder.cache_clear()
+    kernel_cache.folder_of.cache_clear()
     kernel_cache._imports.cache_clear()
 
 

@@ -134,6 +134,14 @@ def test_an_unknown_mixed_mode_is_refused_with_the_nearest_one():
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "add_a_law.md"
 
+
+def law_of_the_page():
+    """The file that the page shows."""
+    found = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    (source,) = (text for text in found if "LAW = " in text)
+    return source
+
+
 TORN = """
 import sys
 import numpy as np
@@ -161,7 +169,7 @@ print(stats.cache_path)
 def test_the_law_of_the_page_runs_from_its_one_file_and_is_compiled_once(tmp_path):
     """Peak T_max, work G_c = (3/2 - 0.05)/2 T_max δ_f, joint broken. The second process compiles nothing anew; a
     changed file does not get the kernels of the old one."""
-    (source,) = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    source = law_of_the_page()
     source += f"# of the test run {os.getpid()} at {time.time_ns()}: its kernels are not yet on disk\n"
 
     def torn(text):
@@ -184,7 +192,7 @@ def test_the_law_of_the_page_runs_from_its_one_file_and_is_compiled_once(tmp_pat
 
 
 def test_the_law_of_the_page_holds_what_a_law_must(tmp_path, monkeypatch):
-    (source,) = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    source = law_of_the_page()
     (tmp_path / "trapezoidal.py").write_text(source, encoding="utf-8")
     monkeypatch.setattr(laws, "__path__", [*laws.__path__, str(tmp_path)])
     try:

@@ -17,8 +17,8 @@ class CannotDraw(SurgebreakError):
     """The system has nothing to draw with."""
 
 
-def arguments(given):
-    """The command line; without a choice of what to make, all is made."""
+def command_line():
+    """The parser of its options."""
     parser = argparse.ArgumentParser(prog="surgebreak render", description=__doc__.partition(":")[2].strip())
     parser.add_argument(
         "run", type=Path, metavar="RUN", help="a run directory, finished or still being written"
@@ -47,7 +47,12 @@ def arguments(given):
         "--letters", type=letters, default=1.0, metavar="TIMES", help="the usual size, for a small picture"
     )
     parser.add_argument("--to", type=Path, metavar="FOLDER", help="where to write; default RUN/pictures")
-    options = parser.parse_args(given)
+    return parser
+
+
+def arguments(given):
+    """The command line; without a choice of what to make, all is made."""
+    options = command_line().parse_args(given)
     if not (options.still or options.film or options.plots):
         options.still = options.film = options.plots = True
     return options
