@@ -88,6 +88,8 @@ def _python() -> Iterator[str]:
             yield what + _text(made.__doc__)
         elif inspect.isclass(thing):
             yield from _class(name, thing)
+        elif inspect.ismodule(thing):
+            yield from _module(name, thing)
         else:
             yield from (
                 "",
@@ -97,6 +99,13 @@ def _python() -> Iterator[str]:
                 "",
                 _text(thing.__doc__),
             )
+
+
+def _module(name: str, thing: Any) -> Iterator[str]:
+    yield from ("", f"## {name}", "", _text(thing.__doc__), "", "| | |", "|---|---|")
+    for own in thing.__all__:
+        function = getattr(thing, own)
+        yield f"| `{name}.{own}{_signature(function)}` | {_cell(_text(function.__doc__))} |"
 
 
 def _class(name: str, thing: type) -> Iterator[str]:
@@ -159,7 +168,7 @@ def histories_page() -> str:
 
 def _histories() -> Iterator[str]:
     from coupler.results import columns
-    from coupler.results.history import CRACK_COLUMNS
+    from coupler.results.cracks import CRACK_COLUMNS
 
     yield from ("# Columns of the histories", "", MADE, "")
     yield "One table a subject under `history/` of a run, a row a step; the head of each file says the same. Gauges"

@@ -45,12 +45,12 @@ def fix_arithmetic(environment: MutableMapping[str, str] = os.environ) -> None:
 
 
 def _remark_on_order() -> str:
-    """What a script should know that loaded a library before this program set it up, where that matters."""
+    """What a script should know that loaded a library before this program could set it up, where that matters."""
     if not _too_late or not _has_more():
         return ""
     return (
-        f"{' and '.join(_too_late)} was loaded before surgebreak, and takes the instructions of this processor: the last "
-        "digits, and what grows from them, may differ from those elsewhere; import surgebreak first"
+        f"{' and '.join(_too_late)} was loaded before surgebreak, and takes the instructions of this processor: the "
+        "last digits, and what grows from them, may differ from those elsewhere; import surgebreak first"
     )
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import re
+import resource
 import subprocess
 import sys
 import time
@@ -36,11 +37,19 @@ def compile_ahead(case: Case, tell: Callable[[str], object]) -> None:
         f"compiling the numerical kernels ({', '.join(wanted)}), once for this version of the program: "
         f"{len(wanted)} processes on {cores} cores, about a minute"
     )
-    began = time.monotonic()
+    began, before = time.monotonic(), _children_seconds()
     failed = _compile(wanted)
     if failed:
         tell(f"note: {', '.join(failed)}: not compiled ahead; the run compiles what it needs itself")
-    tell(f"compiled in {time.monotonic() - began:.0f} s")
+    tell(
+        f"compiled in {time.monotonic() - began:.0f} s ({_children_seconds() - before:.0f} s of processor time)"
+    )
+
+
+def _children_seconds() -> float:
+    """Processor time [s] of the processes that this one has waited for."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
 def needed(case: Case) -> list[str]:

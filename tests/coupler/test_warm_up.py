@@ -1,18 +1,71 @@
-"""The warm-up must touch every kernel, or the first real run compiles after all."""
+"""Kernels compiled ahead: the small scenes touch every part, and a case gets the parts that it needs and lacks."""
+
+import pytest
 
 from coupler.case.case import modules
-from coupler.checks.read_case import load
-from coupler.commands.warm_up import CASE
+from coupler.checks.read_case import from_text, load
+from coupler.commands.warm_up import CASE, PARTS
+from coupler.run import compile_ahead as ahead
 
 
 def test_the_warm_up_case_switches_on_both_sides_and_what_joins_them(tmp_path):
     (tmp_path / "case.toml").write_text(CASE, encoding="utf-8")
     on = modules(load(tmp_path).case)
-    rare = {
-        "prescribed motion",
-        "stabilised transport",
-        "viscosity",
-        "wall friction",
-        "inflow",
-    }  # these compile when they are asked for
-    assert {name for name, switched in on.items() if not switched} == rare
+    usual = {"water", "structure", "coupling", "fixed solids", "contact", "joints", "gauges"}
+    assert {
+        name for name, switched in on.items() if switched
+    } == usual  # others compile when they are asked for
+
+
+@pytest.fixture
+def told(monkeypatch):
+    """Runs compile_ahead of a warm-up case: what is told, and the parts that would have been compiled."""
+
+    def run(part, there=(), cores=2, failed=()):
+        lines, asked = [], []
+        monkeypatch.setattr(ahead, "is_compiled", lambda name: name in there)
+        monkeypatch.setattr(ahead.os, "sched_getaffinity", lambda _: set(range(cores)))
+        monkeypatch.setattr(
+            ahead, "_compile", lambda parts: asked.extend(parts) or [p for p in parts if p in failed]
+        )
+        ahead.compile_ahead(from_text(PARTS[part], "case", ahead.ROOT).case, lines.append)
+        return asked, " ".join(lines)
+
+    return run
+
+
+def test_a_case_gets_the_parts_that_it_needs_and_lacks(told):
+    assert told("all")[0] == ["solids", "water", "structure"]
+    assert told("solids")[0] == ["solids", "water"]
+    assert told("all", there=("structure",))[0] == ["solids", "water"]
+    assert told("all", there=("solids", "water", "structure")) == ([], "")
+
+
+def test_where_nothing_is_gained_the_run_compiles_as_it_goes(told):
+    """One core, or one part: a process more would only load everything twice."""
+    assert told("all", cores=1) == ([], "")
+    assert told("structure") == ([], "")
+    assert told("all", there=("solids", "water")) == ([], "")
+
+
+def test_a_failure_is_told_and_left_to_the_run(told):
+    asked, lines = told("all", failed=("water",))
+    assert "water" in asked
+    assert "note: water: not compiled ahead; the run compiles what it needs itself" in lines
+
+
+def test_every_part_has_modules_with_kernels_and_an_empty_cache_has_none(monkeypatch, tmp_path):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    monkeypatch.setenv("NUMBA_CACHE_LOCATOR_CLASSES", "ByContent")
+    ahead.folder_of.cache_clear()
+    for part in ahead.MODULES:
+        assert len(ahead._modules(part)) > 5
+        assert not ahead.is_compiled(part)
+        for module in ahead._modules(part):
+            folder = ahead.folder_of(module, tmp_path)
+            folder.mkdir(parents=True, exist_ok=True)
+            (folder / "kernel.nbi").touch()
+        assert ahead.is_compiled(part)
+    monkeypatch.delenv("NUMBA_CACHE_LOCATOR_CLASSES")
+    ahead.folder_of.cache_clear()
+    assert ahead.is_compiled("water"), "a cache of the user's own is left alone"

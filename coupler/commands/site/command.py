@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-import sys
+import shutil
 import tempfile
 import webbrowser
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 from coupler.program.errors import ExitCode, SurgebreakError
@@ -18,7 +20,8 @@ class NoPages(SurgebreakError):
 
 
 def docs(folder: Path | None) -> ExitCode:
-    """Build the site into a folder, which is replaced; None: into a temporary one, which is opened in a browser.
+    """Build the site into a folder, which is replaced; None: into a temporary one, which is served
+    to this machine and opened in a browser until Ctrl-C.
 
     Raises NoPages for an installation without a checkout, and where mkdocs fails or warns.
     """
@@ -37,11 +40,34 @@ def docs(folder: Path | None) -> ExitCode:
     if done.returncode:
         wrong = [line for line in done.stderr.splitlines() if not line.startswith("INFO")]
         raise NoPages("\n".join(["the site has mistakes:", *wrong]))
-    first = place / "index.html"
-    print(f"site: {first}")
-    if folder is None and not webbrowser.open(first.as_uri()):
-        print("no browser was found; open that file in one", file=sys.stderr)
+    if folder is None:
+        _show(place)
+    else:
+        print(f"site: {place / 'index.html'}")
     return ExitCode.DONE
+
+
+def _show(place: Path) -> None:
+    """Serve a folder to this machine alone until Ctrl-C, and open it in a browser."""
+    handler = partial(_Quiet, directory=str(place))
+    with ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+        address = f"http://127.0.0.1:{server.server_address[1]}/"
+        print(f"the site is at {address} until Ctrl-C", flush=True)
+        if not webbrowser.open(address):
+            print("no browser was found; open that address in one", flush=True)
+        try:
+            server.serve_forever()
+        except KeyboardInterrupt:
+            print()
+        finally:
+            shutil.rmtree(place, ignore_errors=True)
+
+
+class _Quiet(SimpleHTTPRequestHandler):
+    """Tells nothing of what is fetched."""
+
+    def log_message(self, *_: object) -> None:
+        return None
 
 
 def _is_site(folder: Path) -> bool:

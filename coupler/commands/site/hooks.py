@@ -78,20 +78,32 @@ def _math(text: str, display: str) -> str:
 
 
 def _spaced(markdown: str) -> str:
-    """With a blank line before each list and table: Python's Markdown takes them for text without it."""
+    """With blank lines before lists and tables and around equations, and what goes on with an item of a list indented
+    by four: Python's Markdown takes them for text without."""
     found: list[str] = []
-    fenced = False
+    fenced = equation = item = loose = False
     for line in markdown.split("\n"):
         before = found[-1] if found else ""
-        fenced ^= line.lstrip().startswith("```")
-        if not fenced and before.strip() and _kind(line) in ("list", "table") and _kind(before) == "text":
-            found.append("")
+        fence = line.lstrip().startswith("```")
+        begins = line.startswith("$$") and not (fenced or equation)
+        kind = _kind(line)
+        item = not fenced and (kind == "list" or (item and (kind == "inside" or begins or equation)))
+        if not (fenced or equation) and before.strip():
+            block = kind in ("list", "table") and (_kind(before) == "text" or (kind == "list" and loose))
+            if block or begins or before.endswith("$$"):
+                found.append("")
+        loose = item and kind != "list" and (loose or begins)  # an item of several paragraphs
+        if begins or equation:
+            equation = not line.rstrip().endswith("$$") or (begins and line.strip() == "$$")
+        if item and kind != "list":
+            line = "    " + line.lstrip()
+        fenced ^= fence
         found.append(line)
     return "\n".join(found)
 
 
 def _kind(line: str) -> str:
-    """What a line begins or belongs to; what is indented goes on with a list."""
+    """What a line begins or belongs to; what is indented goes on with an item."""
     if re.match(r"([-*]|\d+\.) ", line):
         return "list"
     if line.startswith("|"):
