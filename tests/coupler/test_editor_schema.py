@@ -36,15 +36,16 @@ def test_every_case_that_comes_along_passes(place):
     [
         (("[tank]", "[tanc]"), "tanc"),
         (("cell = ", "cel = "), "cel"),
-        (('cell = "20 cm"', "cell = -1"), "-1"),
-        (('cell = "20 cm"', 'cell = "wide"'), "wide"),
+        (('cell = "0.2 m"', "cell = -1"), "-1"),
+        (('cell = "0.2 m"', 'cell = "wide"'), "wide"),
         (('kind = "level"', 'kind = "depth"'), "depth"),
     ],
 )
 def test_slips_are_found(place, tmp_path, change, told):
-    from coupler.case.docs import FIRST_CASE
+    from coupler.case.first_cases import text_of
 
-    (tmp_path / "case.toml").write_text(FIRST_CASE.replace(*change), encoding="utf-8")
+    assert change[0] in text_of("tank")
+    (tmp_path / "case.toml").write_text(text_of("tank").replace(*change), encoding="utf-8")
     done = lint(place, tmp_path / "case.toml")
     assert done.returncode != 0
     assert told in done.stderr
