@@ -13,10 +13,10 @@ Water:      Δ(kinetic + potential) + W_given + D_shear + D_vapour + D = E_sides
 A scheme that gains energy shows D < 0; dissipation D > 0 is damping of the water by the numerics and is reported, not
 counted as an error. The energy error is (|r_s| + |r_i| + max(0, −D − E_left)) / E_in: the head of water at an open
 side is not that of the water which the volume correction then takes off, within five cells of the side, so a gain is
-told from an outflow only beyond it. E_in is the energy that the scene puts in, whichever is the largest so far: the
-potential energy of the water above its level state and what inflows and seas can bring, the potential energy that water
-and blocks have given up together, kinetic energy, or work of imposed motions. What a body that floats gives to the
-water and gets back is not in it, so the error of a small swing is measured by the energy of the swing.
+distinguished from an outflow only beyond it. E_in is the energy that the scene puts in, whichever is the largest so
+far: the potential energy of the water above its level state and what inflows and seas can bring, the potential energy
+that water and blocks have given up together, kinetic energy, or work of imposed motions. What a body that floats gives
+to the water and gets back is not in it, so the error of a small swing is measured by the energy of the swing.
 """
 
 from __future__ import annotations

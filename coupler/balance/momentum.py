@@ -155,7 +155,7 @@ class WaterStep:
 
     @classmethod
     def of(cls, water: Water, load: Array, dt: float, free: Array) -> WaterStep:
-        """After a step: load (n_bodies, 6) that was told to the bodies, blocks first; free (n_blocks,) bool."""
+        """After a step: load (n_bodies, 6) that acts on the bodies, blocks first; free (n_blocks,) bool."""
         from fluid.numerics.sums import about
         from fluid.step.momentum import NUMERICAL
 

@@ -376,8 +376,8 @@ class RunLimits(Section):
     )
     defect: Annotated[float, InSI("", gt=0)] = Field(
         0.5,
-        description="share by which the blocks may miss the motion that the water was told, on the mean of the last "
-        "twenty steps; a single step that misses by more than 0.6 of it is halved and taken again",
+        description="share by which the blocks may miss the motion that the pressure solve assumed, on the mean of "
+        "the last twenty steps; a single step that misses by more than 0.6 of it is halved and taken again",
     )
     overlap: Annotated[float, InSI("", gt=0)] = Field(
         0.25,
@@ -416,7 +416,7 @@ class Case(Section):
 
 
 def modules(case: Case) -> dict[str, bool]:
-    """Which parts of the program a case switches on, by name, in the order in which they are told."""
+    """Which parts of the program a case switches on, by name, in the order in which they are listed."""
     structure = case.structure is not None
     w, water = case.water, case.water is not None
     return {

@@ -138,9 +138,9 @@ def _opening() -> Iterator[str]:
     yield ""
     yield "A case is a directory with a `case.toml` ([TOML](https://toml.io)). Plain numbers are SI; text may carry"
     yield 'any unit of the right kind (`"5 MN/mm"`, `"2.4 t/m3"`, `"30 deg"`). z points up. A section that is absent'
-    yield "switches its part of the program off. Unknown names are refused, and all mistakes are told at once."
+    yield "switches its part of the program off. Unknown names are refused, and all mistakes are reported at once."
     yield ""
-    yield "`surgebreak check CASE` checks a case, `surgebreak explain NAME` tells what is below for one name, and"
+    yield "`surgebreak check CASE` checks a case, `surgebreak explain NAME` shows what is below for one name, and"
     yield "`--set NAME=VALUE` changes a value for one run (`--set structure.block[0].density=600`); `--set NAME=absent`"
     yield "leaves the name out (`--set joints=absent`)."
     yield ""

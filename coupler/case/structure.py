@@ -221,8 +221,8 @@ class Town(Section):
     )
     crs: str | None = Field(
         None,
-        description="coordinate system of the footprints, where it is not that of the terrain (which then must be told "
-        "by terrain.reproject or terrain.crs); needs the extra terrain",
+        description="coordinate system of the footprints, where it is not that of the terrain (which must then be "
+        "given by terrain.reproject or terrain.crs); needs the extra terrain",
         examples=["EPSG:4326"],
     )
     name_from: str | None = Field(None, description="attribute that names each house")

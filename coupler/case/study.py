@@ -205,7 +205,7 @@ class Study(Section):
     )
     repeat: Count = Field(1, description="times that each run is made; the cheapest one tells its cost")
     cpu_seconds: PositiveTime = Field(
-        3600.0, description="processor time after which a run is given up and told as failed"
+        3600.0, description="processor time after which a run is given up and reported as failed"
     )
     quantity: tuple[Quantity, ...] = Field(min_length=1, description="what is measured")
     ladder: tuple[Ladder, ...] = Field(min_length=1, description="what is varied")

@@ -250,7 +250,7 @@ class Sweep(Section):
         (), description="changes of all runs of the sweep, KEY=VALUE", examples=[["time.end=1 s"]]
     )
     cpu_seconds: PositiveTime = Field(
-        3600.0, description="processor time after which a run is given up and told as failed"
+        3600.0, description="processor time after which a run is given up and reported as failed"
     )
     table: str | None = Field(
         None,
@@ -288,6 +288,6 @@ class Sweep(Section):
     fragility: tuple[Fragility, ...] = Field((), description="fragility curves")
     sensitivity: tuple[Name, ...] = Field(
         (),
-        description="quantities whose dependence on the distributions is told: Sobol indices where sample is saltelli, "
-        "else rank correlations",
+        description="quantities whose dependence on the distributions is reported: Sobol indices where sample is "
+        "saltelli, else rank correlations",
     )

@@ -45,7 +45,7 @@ def design_problems(sweep: Sweep) -> Iterator[Problem]:
     if sweep.sample == "saltelli" and (len(drawn) < 2 or len(drawn) < len(sweep.vary) or sweep.table):
         yield ("sweep", "sample"), "saltelli needs two distributions or more, and neither lists nor grids"
     if sweep.sensitivity and not drawn:
-        yield ("sweep", "sensitivity"), "no distribution in sweep.vary whose share could be told"
+        yield ("sweep", "sensitivity"), "no distribution in sweep.vary whose share could be computed"
 
 
 def _keys(sweep: Sweep) -> Iterator[Problem]:

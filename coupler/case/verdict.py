@@ -11,7 +11,7 @@ from coupler.case.units import InSI
 
 
 class Verdict(Section):
-    """When a structure counts as damaged or collapsed, told at the end of every run with a structure."""
+    """When a structure counts as damaged or collapsed, reported at the end of every run with a structure."""
 
     on: tuple[Name, ...] = Field(
         (),

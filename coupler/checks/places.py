@@ -168,7 +168,7 @@ def _which_blocks(case: Case, path: KeyPath, name: str, blocks: list[Placed], na
 
 
 def _outlines(bodies: list[Placed]) -> list[tuple[KeyPath, str, np.ndarray]]:
-    """Bounds (2, 3) [m] of all bodies of each part, so that a building is told once."""
+    """Bounds (2, 3) [m] of all bodies of each part, so that a building is reported once."""
     parts: dict[tuple[KeyPath, str], list[np.ndarray]] = {}
     for path, name, body in bodies:
         parts.setdefault((path, name), []).append(np.array(body.bounds()))
@@ -179,7 +179,7 @@ def _outlines(bodies: list[Placed]) -> list[tuple[KeyPath, str, np.ndarray]]:
 
 
 def _overlaps(solids: list[Placed], blocks: list[Placed], block_names: list[str]) -> Iterator[Problem]:
-    """Bodies of different parts, and blocks of one file, that share a volume; told once for two parts, the deepest."""
+    """Bodies of different parts, and blocks of one file, that share a volume; of two parts the deepest only."""
     if not blocks:
         return
     from yade_scripts.blocks.faces import touching_bounds

@@ -1,4 +1,4 @@
-"""From a case directory to a checked case: TOML, `--set`, schema, geometry. All mistakes are told at once.
+"""From a case directory to a checked case: TOML, `--set`, schema, geometry. All mistakes are reported at once.
 
 A message has the form `PLACE: KEY: what is wrong; what to do`, where PLACE is `path/case.toml:LINE` or
 `--set KEY=VALUE`.

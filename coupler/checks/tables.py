@@ -22,7 +22,7 @@ def table_problems(case: Case) -> Iterator[Problem]:
     for i, gauge in enumerate(case.gauge):
         path = ("gauge", i)
         if (gauge.kind, gauge.name) in kinds:
-            continue  # the same kind and name, which is told as such
+            continue  # the same kind and name, which is reported as such
         kinds.add((gauge.kind, gauge.name))
         for place in _places(gauge):
             first = taken.setdefault(place, path)

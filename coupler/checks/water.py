@@ -107,7 +107,7 @@ def _drops(case: Case) -> Iterator[Problem]:
             yield (
                 ("water", "fill", i),
                 f"{edge:.3g} m thin, {edge / case.tank.cell:.2g} cells, with air on both sides: under {LEAST_DROP:g} "
-                f"cells the two surfaces are not told apart; take tank.cell = {edge / 3:.2g} m, or more water",
+                f"cells the two surfaces cannot be distinguished; take tank.cell = {edge / 3:.2g} m, or more water",
             )
 
 

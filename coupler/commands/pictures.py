@@ -40,7 +40,7 @@ def study_figures(study: Path) -> str:
 
 
 def draw(module: str, folder: Path) -> None:
-    """Figures of a comparison or a study beside its tables; where the extra is absent, that is told instead."""
+    """Figures of a comparison or a study beside its tables; where the extra is absent, a line says so instead."""
     absent = missing()
     if absent:
         print(f"no figures: {absent}")

@@ -81,7 +81,7 @@ def town_houses(case: Case) -> Iterator[tuple[KeyPath, object]]:
     from coupler.geometry.town import houses_of
 
     for i, town in enumerate(case.structure.town):
-        with suppress(FootprintError):  # told with its reason by the checks, before anything is built
+        with suppress(FootprintError):  # reported with its reason by the checks, before anything is built
             for house in houses_of(case, town):
                 yield ("structure", "town", i), house
 

@@ -40,7 +40,7 @@ def read_tetrahedra(path: Path, scale: float, offset):
 
 
 def shown(place) -> str:
-    """A place (3,) as it is told."""
+    """A place (3,) as text."""
     return "(" + ", ".join(f"{c:.4g}" for c in place) + ")"
 
 

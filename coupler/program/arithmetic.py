@@ -2,7 +2,7 @@
 
 NumPy, OpenBLAS and Numba choose their code by the processor they find: with AVX-512 products of matrices, hyperbolic
 functions and sorting of equal numbers come out otherwise than with AVX2, first in the last digit, then in where drops
-and debris go. Here all are told to take what processors since 2013 (Intel) and 2015 (AMD) have. The C library chooses
+and debris go. Here all are set to take what processors since 2013 (Intel) and 2015 (AMD) have. The C library chooses
 between code with and without fused multiply-add, the same on all of these. On an older processor each part takes what
 it finds, and `missing` says what is not there. Only the variables of the process are set, and only those which the
 user has not, so it must happen before numpy or numba is imported; processes that are started later take them over.

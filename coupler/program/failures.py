@@ -1,6 +1,6 @@
-"""How a command ends when something goes wrong: which exit code, and what the user and the log are told.
+"""How a command ends when something goes wrong: which exit code, and what the user and the log read.
 
-Errors of this program carry a message that says everything. A full disk is told as such. Whatever else
+Errors of this program carry a message that says everything. A full disk is reported as such. Whatever else
 happens is a mistake in the program: its traceback belongs to the log (or to standard error without a run).
 """
 
@@ -131,5 +131,5 @@ def _tell_mistakes(lines: list[str]) -> None:
 
 
 def _is_click(error: BaseException) -> bool:
-    """Wrong options and early exits are told by the command line library itself."""
+    """Wrong options and early exits are reported by the command line library itself."""
     return type(error).__module__.split(".")[0] in ("click", "typer")

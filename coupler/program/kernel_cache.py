@@ -40,7 +40,7 @@ def use_kernel_cache() -> None:
     """Have numba keep kernels by their content, unless NUMBA_CACHE_DIR is set; before numba is imported.
 
     The place is below XDG_CACHE_HOME or ~/.cache; where nothing can be written there, in a folder of the user's own
-    among the temporary files, and that is told. Raises NoCache."""
+    among the temporary files, and a line says so. Raises NoCache."""
     if "NUMBA_CACHE_DIR" in os.environ:
         return
     tried: list[Path] = []

@@ -16,7 +16,7 @@ from typing import Any
 from coupler.program.provenance import ROOT
 
 LAST_LINES = 3
-"""Of what a process told, in a message about how it ended."""
+"""Of what a process printed, in a message about how it ended."""
 
 
 def run_module(module: str, *words: object, **options: Any) -> subprocess.CompletedProcess:
@@ -26,7 +26,7 @@ def run_module(module: str, *words: object, **options: Any) -> subprocess.Comple
 
 
 def trouble(exit_code: int, told: str) -> str:
-    """How a process ended that did not end well, with the last lines of what it told."""
+    """How a process ended that did not end well, with the last lines of what it printed."""
     last = " | ".join(told.strip().splitlines()[-LAST_LINES:])
     return f"its process ended with {exit_code}: {last}"
 

@@ -48,7 +48,11 @@ COUPLING = (
     ("retries", "1", "times that the step was halved and taken again"),
     ("substeps", "1", "YADE substeps"),
     ("substep", "s", "length of a substep"),
-    ("defect", "1", "share by which the blocks' mean motion missed what the water was told"),
+    (
+        "defect",
+        "1",
+        "share by which the blocks' mean motion missed the motion that the pressure solve assumed",
+    ),
     ("opening_rate", "1", "largest opening in a substep over the opening at failure"),
 )
 WATER = (

@@ -1,7 +1,7 @@
 """The directory of one run: made once, never overwritten, readable at any moment.
 
     case.toml       copy of the case        run.json    summary for machines, replaced as a whole
-    effective.json  every value, in SI      log.txt     what was told, and tracebacks
+    effective.json  every value, in SI      log.txt     messages and tracebacks
     history/*.csv  fields.vtkhdf  blocks.vtkhdf  solids.vtkhdf  cracks.csv  checkpoints/  pictures/
 
 `run.json` says "running" until the run ends; after a kill it still does, with the process number that it had.

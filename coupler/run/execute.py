@@ -1,4 +1,4 @@
-"""A run from its case to its end, as the commands `run` and `resume` make it: told, compared, ended with its code."""
+"""A run from its case to its end, as the commands `run` and `resume` make it: reported, compared, its exit code."""
 
 from __future__ import annotations
 

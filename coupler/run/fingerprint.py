@@ -1,4 +1,4 @@
-"""What a scene is made of and which program ran it, short enough to be told: to refuse a restart of something else."""
+"""What a scene is made of and which program ran it, as short digests, to refuse a restart of something else."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def case_differences(then: dict, now: dict) -> list[str]:
 
 
 def _as_written(case: dict) -> dict:
-    """Without what a tank has from its mesh file: a change of that is told with the mesh itself."""
+    """Without what a tank has from its mesh file: a change of that is reported with the mesh itself."""
     tank = case.get("tank") or {}
     if "mesh" not in tank:
         return case

@@ -49,7 +49,7 @@ SECONDS_OF_A_START = 5.0
 
 @dataclass(frozen=True)
 class Forecast:
-    """rows: (name, value, unit, remark), in the order in which they are told · remarks: what else is worth knowing."""
+    """rows: (name, value, unit, remark), in the order of the list · remarks: what else is worth knowing."""
 
     rows: list[Row]
     remarks: tuple[str, ...] = ()

@@ -26,7 +26,7 @@ class Reporter(Protocol):
         """After each coupled step: the time reached [s] and the figures that matter."""
 
     def expect(self, calm: bool) -> None:
-        """Before a step is told: whether worse is to come (`coupler/run/pace.py`)."""
+        """Before a step is reported: whether worse is to come (`coupler/run/pace.py`)."""
 
     def message(self, text: str) -> None:
         """A sentence for the user and the log (modules on and off, remarks, written files)."""
@@ -87,7 +87,7 @@ class _Base:
         return f"{share:4.0%}  t {time:.3f} of {self.end:g} s  {told}  {self._left(time)}".rstrip()
 
     def _left(self, time: float) -> str:
-        """Time to go, as it is told."""
+        """Time to go, as text."""
         left = self.pace.left()
         return "" if left is None else f"left {duration(left)}"
 

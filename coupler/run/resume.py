@@ -1,6 +1,6 @@
 """Going on with a run that stopped: which checkpoint, and whether it still belongs to the case and the program.
 
-The newest checkpoint that is whole and whose result files still reach that far is taken; newer ones are told and
+The newest checkpoint that is whole and whose result files still reach that far is taken; newer ones are reported and
 removed. The case is the run's own copy; only what does not change the scene may be given anew (`fingerprint.FREE`).
 """
 

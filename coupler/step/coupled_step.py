@@ -399,7 +399,7 @@ class CoupledStepper:
 
     @contextmanager
     def _placed(self, problem: PressureProblem) -> Iterator[None]:
-        """A pressure of the problem that is not found is told with its place and what may be the cause."""
+        """A pressure of the problem that is not found is reported with its place and what may be the cause."""
         from fluid.numerics.solve import NotConverged
 
         try:

@@ -82,9 +82,9 @@ def check_defect(time: float, mean_defect: float, limit: float) -> None:
     """
     if not math.isfinite(mean_defect) or mean_defect > limit:
         raise Diverged(
-            f"the blocks miss the motion that the water was told by {100 * mean_defect:.3g} % on the mean of the last "
-            f"steps, t = {time:.4g} s; limit {100 * limit:.3g} % (limits.defect). Reduce time.step_max to a tenth of "
-            "the period of the structure, raise coupling.passes to 2, or raise joints.damping."
+            f"the blocks miss the motion that the pressure solve assumed by {100 * mean_defect:.3g} % on the mean of "
+            f"the last steps, t = {time:.4g} s; limit {100 * limit:.3g} % (limits.defect). Reduce time.step_max to a "
+            "tenth of the period of the structure, raise coupling.passes to 2, or raise joints.damping."
         )
 
 
@@ -96,8 +96,8 @@ def check_misses(time: float, defects: list[float], most: int, limit: float, dt:
     if len(defects) < most or min(defects) <= limit:
         return
     raise Diverged(
-        f"the blocks miss the motion that the water was told by {100 * defects[-1]:.3g} % at t = {time:.4g} s, in "
-        f"{most} steps in a row, the last of {dt:.3g} s; limit {100 * limit:.3g} % (limits.defect). A shorter step "
+        f"the blocks miss the motion that the pressure solve assumed by {100 * defects[-1]:.3g} % at t = {time:.4g} s, "
+        f"in {most} steps in a row, the last of {dt:.3g} s; limit {100 * limit:.3g} % (limits.defect). A shorter step "
         "does not help: raise coupling.passes or joints.damping, or use a larger tank.cell or heavier blocks."
     )
 

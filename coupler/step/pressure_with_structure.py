@@ -250,7 +250,8 @@ def corrected_free_velocity(
 
 
 def defect(mass: sp.csr_array, assumed: Array, found: Array, floor: float = 0.0) -> float:
-    """How far the bodies missed the motion that the water was told, velocities (n, 6) found and assumed:
+    """Coupling residual: how far the bodies missed the motion that the pressure solve assumed, from velocities (n, 6)
+    found and assumed:
 
         sqrt( E(found − assumed) / max(E(found), E(assumed), floor) ),   E(V) = ½ V·M V
 

@@ -1,4 +1,4 @@
-"""What a coupled run remembers of steps in which the blocks missed the motion that the water was told.
+"""What a coupled run remembers of steps in which the blocks missed the motion that the pressure solve assumed.
 
 Such a step is halved and taken again; the steps after it stay short and grow back, and where they keep missing the run
 ends.

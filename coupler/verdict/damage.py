@@ -35,7 +35,7 @@ class State(IntEnum):
 
     @property
     def word(self) -> str:
-        """As it is told."""
+        """Its name in reports."""
         return self.name.lower()
 
 

@@ -8,7 +8,7 @@ from coupler.program.quantities import length, moment_of, quantity
 from coupler.verdict.divisions import in_words
 
 MOST_IN_ORDER = 12
-"""Walls and floors whose first break is told in a line; the table has all."""
+"""Walls and floors whose first break is reported in a line; the table has all."""
 
 
 def headline(told: dict) -> str:

@@ -195,7 +195,7 @@ def _on_bodies(water, p):
 
 
 def _loads(water, problem, p):
-    """Impulses: told to the bodies, of it the wall shear, and that of the sides of the tank on the water by shear."""
+    """Impulses: given to the bodies, of it the wall shear, and that of the sides of the tank on the water by shear."""
     centre, dt, shear = water.domain.body_centre, problem.dt, problem.predicted.shear
     told = problem.other_load - (problem.coupling.T @ p[problem.dofs]).reshape(-1, 6)  # p is 0 in the air
     told = dt * about(water.reference, told, centre)

@@ -81,7 +81,7 @@ class Pipe:
 
 
 class Piston(FreeBody):
-    """Misses what the water was told in steps longer than `misses_above`: it runs the other way."""
+    """Misses the motion that the pressure solve assumed in steps longer than `misses_above`: it runs the other way."""
 
     def __init__(self, misses_above=np.inf):
         super().__init__((1, 1, 1), (0, 0, 0), 500.0, 0.0)

@@ -73,10 +73,10 @@ def test_a_case_of_the_law_runs_in_its_own_process(capsys):
 
 def test_what_is_only_told_is_not_counted_as_kept():
     """A case that promises nothing would else raise the share of figures that pass."""
-    told = Result("P43", "rms of G1 (told, not judged)", 0.04, 0.0, 0.04, 0.1, False, True, 1.0)
+    told = Result("P43", "rms of G1 (reported, not judged)", 0.04, 0.0, 0.04, 0.1, False, True, 1.0)
     kept = Result("P43", "volume", 0.0, 0.0, 0.0, 0.1, False, True, 1.0)
     assert "1 of 1 figures" in report.totals([told, kept])
-    assert " told " in report.line(told)
+    assert " reported " in report.line(told)
     assert "1 of 1 |" in page.page([told, kept])
 
 

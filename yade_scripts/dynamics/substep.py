@@ -2,7 +2,7 @@
 
     v⁺ = v + dt F(x)/m,   x⁺ = x + dt v⁺
 
-so that a load F held over substeps of any length gives the momentum F dt exactly, as the water is told. Energies are
+so that a load F held over substeps of any length gives the momentum F dt exactly, as the water counts it. Energies are
 taken at the time of the velocities, half a substep before the places.
 """
 

@@ -12,7 +12,7 @@ from yade_scripts.joints.cohesion import JointParameters
 from yade_scripts.joints.laws import find
 
 CLOSE = 0.01
-"""Relative difference of stiffness that is told."""
+"""Relative difference of stiffness that is reported."""
 
 
 def matched(reference: JointParameters, law: str) -> tuple[JointParameters, tuple[str, ...]]:

@@ -159,7 +159,7 @@ LIMITS = (
     ("volume_error", "largest_volume_error", "volume of water that the books miss"),
     ("energy_error", "largest_energy_error", "energy that the books miss, of the input"),
     ("momentum_error", "largest_momentum_error", "impulse that the books miss, of those of a step"),
-    ("defect", "largest_defect", "motion of the blocks that the water was not told, of a step"),
+    ("defect", "largest_defect", "coupling residual of a step"),
 )
 """Name in [limits], figure of run.json, what it is."""
 

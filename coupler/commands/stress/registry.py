@@ -25,7 +25,7 @@ Verdict = Literal["passed", "refused", "failed"]
 
 @dataclass(frozen=True)
 class Measure:
-    """A figure and the most that it may be; `unit` "1" for shares. limit None: only told, not judged."""
+    """A figure and the most that it may be; `unit` "1" for shares. limit None: only reported, not judged."""
 
     quantity: str
     value: float

@@ -51,7 +51,7 @@ def evaluate(formula: str | float, case: dict) -> float:
 
 def evaluate_columns(formula: str, columns: Mapping[str, np.ndarray]) -> np.ndarray:
     """The column (n,) that a formula of columns (n,) has, row by row; with abs as well. Raises BadFormula."""
-    with np.errstate(all="ignore"):  # a root of a negative number is NaN there, and told by who reads it
+    with np.errstate(all="ignore"):  # a root of a negative number is NaN there, and reported by who reads it
         found = _evaluated(formula, dict(columns), _OF_COLUMNS)
     size = len(next(iter(columns.values())))
     return np.broadcast_to(np.asarray(found, float), (size,))

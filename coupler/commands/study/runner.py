@@ -177,7 +177,7 @@ class Runs:
 
 
 def log_of(place: Path) -> Path:
-    """What the process of a run told."""
+    """What the process of a run printed."""
     return place.with_suffix(".log")
 
 

@@ -1,7 +1,7 @@
 """Runs on the workers of a dask cluster: PBS, SGE, LSF, OAR, HTCondor, Slurm through dask-jobqueue, or processes here.
 
-The scheduler is this process: it must stay until the runs are done. A run whose worker dies is told as lost, and the
-next call goes on with it.
+The scheduler is this process: it must stay until the runs are done. A run whose worker dies is reported as lost, and
+the next call goes on with it.
 """
 
 from __future__ import annotations

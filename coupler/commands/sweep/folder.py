@@ -1,7 +1,7 @@
 """The directory of a sweep.
 
 sweep.json         what is varied and measured, every row and run, as the last call planned it
-runs/ID/           run directory of a run            runs/ID.log   what its process told
+runs/ID/           run directory of a run            runs/ID.log   what its process printed
 runs/ID.json       how it ended, what it cost, its numbers; there when it would end the same way again
 runs/ID.open.json  the same of a run that was stopped, killed or crashed: the next call goes on with it
 table.csv, table.parquet, fragility.json, sensitivity.json, report.html, figures

@@ -1,6 +1,6 @@
 """What a sweep will take: from its runs that are done, or from the first steps of the first one.
 
-Processor time is that of a run times the runs that are left; a run of which only some steps were made is told as
+Processor time is that of a run times the runs that are left; a run of which only some steps were made is given as
 (set-up) + (steps) (end time / time that they reached). Runs may differ: it is a forecast, no bound.
 """
 

@@ -29,7 +29,7 @@ BARS = 10
 LEAST_FOUND = 0.9
 """Share of the samples of a bootstrap that must have a fit, else their band would leave out the rest."""
 CONVERGENCE = (0.125, 0.25, 0.5, 0.75, 1.0)
-"""Shares of the runs for which the width of the band is told."""
+"""Shares of the runs for which the width of the band is reported."""
 ORDERS = 5
 """Random orders of the runs over which that is averaged."""
 AGREES = 1e-2

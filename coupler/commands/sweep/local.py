@@ -117,7 +117,7 @@ def _ask(worker: subprocess.Popen, id: str) -> dict | None:
 
 
 def _lost(id: str, code: int) -> dict:
-    """What is told of a run whose worker died: the run itself may go on, and its next call finds out."""
+    """What is reported of a run whose worker died: the run itself may go on, and its next call finds out."""
     return {
         "id": id,
         "outcome": "crashed",

@@ -104,7 +104,7 @@ def _record(spec: Spec, row: Row, found: dict[str, dict]) -> dict:
 
 
 def _quantities(spec: Spec, row: Row, found: dict, record: dict, reasons: list[str]) -> dict[str, float]:
-    """Quantities of a row; why a run that is done lacks one is told in its reasons."""
+    """Quantities of a row; why a run that is done lacks one stands in its reasons."""
     values: dict[str, float] = {}
     case = None
     for q in asked(spec.sweep):

@@ -1,9 +1,9 @@
 """Runs as jobs of Slurm, through submitit: an array of them, each making one run or a few one after the other.
 
-A job that reaches its time limit is told `signal_delay_s` before; its run then writes a checkpoint, the job is put into
-the queue again, and goes on from there. So does a job that Slurm itself puts back (`scontrol requeue`, a lost node).
-How a run ended stands in the files of the sweep; Slurm is only asked which jobs are in its queue, so no accounting is
-needed. jobs.json holds the job of each run: a call that was left and made again waits for them.
+A job that reaches its time limit gets a signal `signal_delay_s` before; its run then writes a checkpoint, the job is
+put into the queue again, and goes on from there. So does a job that Slurm itself puts back (`scontrol requeue`, a lost
+node). How a run ended stands in the files of the sweep; Slurm is only asked which jobs are in its queue, so no
+accounting is needed. jobs.json holds the job of each run: a call that was left and made again waits for them.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ Tell = Callable[[dict], None]
 POLL = 2.0
 """Seconds between two looks at the queue."""
 PATIENCE = 3
-"""Looks that a job may be missing from the queue before its run is told as lost: files take a while to be seen."""
+"""Looks that a job may be missing from the queue before its run is reported as lost: files take a while to be seen."""
 MINUTES = 60
 """Time limit of a job unless --option time=... says otherwise."""
 REQUEUES = 100
@@ -131,7 +131,7 @@ class Slurm:
                 time.sleep(POLL)
 
     def _left(self, id: str, job: str) -> dict:
-        """What is told of a run whose job is gone: how its last process ended, or that nobody knows."""
+        """What is reported of a run whose job is gone: how its last process ended, or that nobody knows."""
         told = figures(self.spec, id)
         if told is not None and told["job"] and told["outcome"] != "lost":
             return told

@@ -12,8 +12,8 @@ from coupler.commands.verify.registry import Finding
 NUMBERS = (0.5, 1.0, 2.0, 4.0)
 """Courant numbers; the first is what the others are measured by."""
 WITHIN = 0.20
-"""Tolerance of means and impulses for loads; peaks are told, not judged."""
-WHAT = ("peak (told, not judged)", "largest mean over {:g}", "impulse")
+"""Tolerance of means and impulses for loads; peaks are reported, not judged."""
+WHAT = ("peak (reported, not judged)", "largest mean over {:g}", "impulse")
 
 
 def findings(runs: dict[float, tuple], window: float, end: float) -> Iterator[Finding]:

@@ -23,7 +23,7 @@ EDGE, RESERVOIR, DEPTH = 0.15, 3.5, 0.4
 
 @check("P56", "three stacked cubes in a dam break", "Canelas et al. 2016 (experiment), digitised", "M")
 def stacked_cubes():
-    """The gate is gone at t = 0; in the experiment it takes its time, and is not told."""
+    """The gate is gone at t = 0; in the experiment it takes a time that is not reported."""
     table = columns("canelas_three_cubes_x")
     t, place = cubes(EDGE / 3.0, 1.65)
     for at, measured in ((1.2, 1.900), (1.4, 2.074), (1.6, 2.334)):

@@ -140,7 +140,7 @@ def _impact_figure(rubbed: Impact, slipping: Impact, table, sph) -> Figure:
 LENGTH = 3.22
 """Tank of SPHERIC test 2 [m]; x runs from the wall of the reservoir here, from the other end in the records."""
 ANY = 10.0
-"""Tolerance of what is told, not judged."""
+"""Tolerance of what is reported, not judged."""
 ANY_PRESSURE = 98e3
 """[Pa] how far the pressure may fall where no air has come yet."""
 PROBES = {"H1": 1.488, "H2": 0.992, "H3": 0.496, "H4": 2.638}

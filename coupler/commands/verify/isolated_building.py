@@ -1,4 +1,4 @@
-"""Dam break against an isolated building in a channel (Soares-Frazao and Zech): depths at six gauges, told only."""
+"""Dam break against an isolated building in a channel (Soares-Frazao and Zech): depths at six gauges, reported only."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ GAUGES = {
 }  # fmt: skip
 UNTIL = 10.0
 FOUND = 0.10
-"""[m] told with each gauge; the case is not judged."""
+"""[m] given with each gauge; the case is not judged."""
 
 
 @check(
@@ -45,7 +45,7 @@ def isolated_building():
         own = np.interp(t[shown], run["t"], run[name])
         rms = float(np.sqrt(np.mean((own - table[name][shown]) ** 2)))
         yield Finding(
-            f"rms difference of {name} to {UNTIL:g} s [m] (told, not judged)", rms, 0.0, FOUND, False
+            f"rms difference of {name} to {UNTIL:g} s [m] (reported, not judged)", rms, 0.0, FOUND, False
         )
         curves = (
             Curve("measured", "measured", t[shown], 100 * table[name][shown]),

@@ -33,7 +33,7 @@ LIMITS = {8: 0.05, 4: 0.10, 2: 0.15, 1: 0.20}
 """Relative error of the force allowed, by cells over D."""
 SHEET_LIMITS = {8: 0.05, 4: 0.05, 2: 0.05, 1: 0.10}
 ANY = 10.0
-"""Tolerance of what is told, not judged."""
+"""Tolerance of what is reported, not judged."""
 
 
 @dataclass(frozen=True)

@@ -52,7 +52,7 @@ def page(results: list[Result]) -> str:
         "processor time that the case took; the figures of a case come from one run, booked to the first of them.",
         f"{_machine()}",
         f"{passed} of {len(cases)} cases pass, {len(judged) - len(failed)} of {len(judged)} figures, "
-        f"{len(results) - len(judged)} more are told and not judged; "
+        f"{len(results) - len(judged)} more are reported and not judged; "
         f"{sum(r.cpu_s for r in results):.0f} CPU s. A case passes if all of its figures do.",
         _overview(results, cases),
         *(_case(id, [r for r in results if r.id == id]) for id in cases),
@@ -109,7 +109,7 @@ def _row(r: Result) -> str:
     error, limit = (f"{100 * v:.3g} %" if r.relative else f"{v:.3g}" for v in (r.error, r.tolerance))
     verdict = "yes" if r.passed else "**no**"
     if not r.judged:
-        quantity, limit, verdict = quantity.replace(f" {TOLD}", ""), "–", "told"
+        quantity, limit, verdict = quantity.replace(f" {TOLD}", ""), "–", "reported"
     return (
         f"| {quantity} | {r.value:.6g} | {r.expected:.6g} | {error} | {limit} | {verdict} | {r.cpu_s:.1f} |"
     )

@@ -53,7 +53,7 @@ class Check:
     run: Callable[[], Iterator[Finding]]
 
 
-TOLD = "(told, not judged)"
+TOLD = "(reported, not judged)"
 """In the name of a quantity that is reported beside those that are judged."""
 
 
@@ -74,7 +74,7 @@ class Result:
 
     @property
     def judged(self) -> bool:
-        """Whether it counts: what is only told neither passes nor fails."""
+        """Whether it counts: what is only reported neither passes nor fails."""
         return TOLD not in self.quantity
 
     @classmethod

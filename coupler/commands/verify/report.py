@@ -13,7 +13,7 @@ from coupler.program.errors import ExitCode
 from coupler.program.process import run_module
 
 HEAD = ("case", "quantity", "value", "expected", "error", "limit", "", "cpu s")
-FORM = "{:5} {:73} {:>12} {:>12} {:>9} {:>8} {:4} {:>7}"
+FORM = "{:5} {:73} {:>12} {:>12} {:>9} {:>8} {:8} {:>7}"
 
 
 def verify(
@@ -56,7 +56,7 @@ def head() -> str:
 
 def line(result: Result) -> str:
     """One row; a case that broke off says why instead of its figures."""
-    verdict = "told" if not result.judged else "ok" if result.passed else "FAIL"
+    verdict = "reported" if not result.judged else "ok" if result.passed else "FAIL"
     if result.value is None:
         return f"{result.id:5} {verdict}: {result.reason}"
     error, limit = (_share(v) if result.relative else f"{v:.3g}" for v in (result.error, result.tolerance))

@@ -4,8 +4,8 @@
 passes.
 
 The load comes on at once and the wall swings far below damage. A coupling that holds the stiffness of the structure
-over the step is not stable by that alone: the blocks answer with their mean motion over the step, the water was told
-the implicit one. What grows is small (some ten thousandths a step), so it takes hundreds of steps to see.
+over the step is not stable by that alone: the blocks answer with their mean motion over the step, the pressure solve
+assumed the implicit one. What grows is small (some ten thousandths a step), so it takes hundreds of steps to see.
 """
 
 from __future__ import annotations

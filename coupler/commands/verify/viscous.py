@@ -165,7 +165,7 @@ def cylinder():
     drag, lift, difference = _cylinder(0.005, 3.0)
     yield Finding("drag coefficient, D/20", drag, 5.57953523384, 0.05)
     yield Finding("pressure difference [Pa]", difference, 0.11752016697, 0.05)
-    yield Finding("lift coefficient (told, not judged)", lift, 0.010618948146, 0.1, False)
+    yield Finding("lift coefficient (reported, not judged)", lift, 0.010618948146, 0.1, False)
 
 
 def _cylinder(h: float, end: float) -> tuple[float, float, float]:

@@ -26,7 +26,7 @@ BAND = "#d9d9d9"
 OWN = LINES
 """Computed curves, in their order."""
 DASHES = ("-", (0, (6, 1.2)), (0, (1.5, 0.9)), (0, (6, 1.2, 1.5, 1.2)))
-"""Of the computed curves, so that they are told apart in grey print."""
+"""Of the computed curves, so that they can be distinguished in grey print."""
 EXACT = ("--", (0, (1, 1.5)), "-.")
 """Of the exact curves."""
 LEGEND_ROW = 0.16

@@ -1,7 +1,7 @@
 """Colours: two scales whose lightness falls evenly with the value, so that they also read in grey print.
 
 Each scale runs straight through the CIELAB space between a light and a dark colour (equal steps look equally large).
-Water is blue and blocks are sand to red: the pair is told apart with any common colour blindness.
+Water is blue and blocks are sand to red: the pair can be distinguished with any common colour blindness.
 """
 
 import numpy as np

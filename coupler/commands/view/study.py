@@ -21,11 +21,11 @@ SIZE = (5.2, 3.5)
 """[inch] one and a half columns of a journal."""
 MARKS = "osD^vP*X"
 DASHES = ("-", (0, (5, 1.2)), (0, (1.2, 1)), "-.", (0, (3, 1, 1, 1, 1, 1)))
-"""Of the curves in their order, so that they are told apart in grey print."""
+"""Of the curves in their order, so that they can be distinguished in grey print."""
 DARKER = 0.75
 """Of a curve's colour, for the texts at its points: thin letters look paler than lines."""
 LEVELS = (0.01, 0.05, 0.10)
-"""Errors for which the cheapest setting is told: thin lines."""
+"""Errors for which the cheapest setting is reported: thin lines."""
 LOWEST = 1e-6
 """Errors below this are drawn here: they are round-off."""
 SHORTEST = 1e-5

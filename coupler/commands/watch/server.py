@@ -114,7 +114,7 @@ class _Handler(BaseHTTPRequestHandler):
         self._send(b"{}", "application/json")
 
     def _words(self) -> list[str] | None:
-        """The address behind the secret; None where the request is not for us, which it is told."""
+        """The address behind the secret; None where the request is not for us; the answer says so."""
         own = {f"{name}:{self.server.server_port}" for name in (ADDRESS, "localhost")}
         _, _, rest = self.path.partition("?")[0].partition("/")
         secret, slash, behind = rest.partition("/")

@@ -42,7 +42,7 @@ def blocks_from_drawing(spec, **common) -> list[Block]:
 
 
 def cut_drawing(spec, **common) -> Cut:
-    """The same, with what is to be told of it."""
+    """The same, with what is to be reported of it."""
     path = Path(spec.path)
     layers, tolerance = read_layers(path, spec.scale, spec.offset, spec.up, spec.weld)
     _check_layers(path, spec, layers)

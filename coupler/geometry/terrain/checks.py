@@ -19,7 +19,7 @@ def terrain_problems(case, ground: HeightMap) -> Iterator[Problem]:
     """What is wrong with the ground below the box of a tank; case: with a tank that has lower, upper and cell."""
     lower, upper = case.tank.lower, case.tank.upper
     if any(low >= high for low, high in zip(lower, upper)):
-        return  # told with the tank
+        return  # reported with the tank
     x, y = (
         np.linspace(lower[k], upper[k], max(FINE, round((upper[k] - lower[k]) / case.tank.cell)) + 1)
         for k in (0, 1)

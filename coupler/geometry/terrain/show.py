@@ -46,7 +46,7 @@ def _file_rows(grid: Grid) -> list[Row]:
             "coordinate system",
             crs,
             "",
-            "heights: no datum is told by these files; z = 0 is what terrain.zero says",
+            "heights: these files give no datum; z = 0 is what terrain.zero says",
         ),
         Row("without height", float(np.isnan(grid.z).mean() * 100), "%", "holes; terrain.fill closes them"),
     ]

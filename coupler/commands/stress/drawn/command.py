@@ -73,7 +73,7 @@ def stress_drawn(
 
 
 def _shown(found: Outcome) -> str:
-    """The whole outcome of a failure, else its row and what was told."""
+    """The whole outcome of a failure, else its row and what was printed."""
     if found.verdict == "failed":
         return shown(found)
     return shown(

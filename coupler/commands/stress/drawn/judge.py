@@ -95,7 +95,7 @@ def _water(water: dict, case: Case) -> Iterator[Measure]:
     held = water["volume"] + water["left"] - water["entered"]
     scale = np.maximum(held[:1] + np.maximum(water["entered"], 0.0), 1e-300)
     yield Measure("error of the volume", _largest(np.abs(held - held[:1]) / scale), VOLUME)
-    yield Measure("error of the volume as told", _largest(np.abs(water["volume_error"])), VOLUME)
+    yield Measure("error of the volume as reported", _largest(np.abs(water["volume_error"])), VOLUME)
     tank = np.prod(np.subtract(case.tank.upper, case.tank.lower))
     yield Measure("water over the room in the tank", _largest(water["volume"]) / float(tank), 1.0 + 1e-9)
     yield Measure("pull over that of vapour", _largest(water["lowest_pressure"] / VAPOUR), 1.0 + PULL_SLACK)

@@ -31,7 +31,7 @@ contact may take its stiffness from joints of such a strength."""
 
 @dataclass(frozen=True)
 class Trial:
-    """What came of one run: verdict, what was told, figures, processor and wall seconds, time reached [s]."""
+    """What came of one run: verdict, what was printed, figures, processor and wall seconds, time reached [s]."""
 
     verdict: Verdict
     told: str
@@ -85,7 +85,7 @@ def asked_too_much(told: str, case: dict) -> bool:
 
 
 def _refusal(stderr: str) -> tuple[Verdict, str]:
-    """Whether all that was told of a case says where and why."""
+    """Whether all that was printed about a case says where and why."""
     lines = [line for line in stderr.splitlines() if line.strip()]
     mistakes = [line for line in lines if not line.startswith("surgebreak: ")]
     right = bool(mistakes) and all(MISTAKE.search(line) for line in mistakes)
