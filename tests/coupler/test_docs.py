@@ -14,7 +14,9 @@ from coupler.commands.verify.registry import Result
 from coupler.commands.verify.report import json_line
 from coupler.program.provenance import ROOT
 
-PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md"), *(ROOT / "cases").glob("*/README.md")])
+PAGES = sorted(
+    [*ROOT.glob("[ACR]*.md"), *(ROOT / "docs").glob("*.md"), *(ROOT / "cases").glob("*/README.md")]
+)
 KNOWN = {key.path for key in keys()}
 SECTIONS = {path.split(".")[0] for path in KNOWN}
 FILES = ("py", "toml", "md", "json", "csv", "vtu", "pvd")

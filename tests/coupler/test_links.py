@@ -7,7 +7,9 @@ import pytest
 from coupler.program.provenance import ROOT
 
 LINK = re.compile(r"\]\(([^)\s]+)\)")
-PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md"), *(ROOT / "cases").glob("*/README.md")])
+PAGES = sorted(
+    [*ROOT.glob("[ACR]*.md"), *(ROOT / "docs").glob("*.md"), *(ROOT / "cases").glob("*/README.md")]
+)
 
 
 def anchors(page):
@@ -43,3 +45,12 @@ def test_every_page_can_be_reached_from_the_readme():
             if place.is_file():
                 left.append(place)
     assert {page.name for page in PAGES if page.parent.name == "docs"} <= {page.name for page in seen}
+
+
+@pytest.mark.parametrize("name", ["ARCHITECTURE.md", "CONTRIBUTING.md"])
+def test_files_that_recipes_name_are_there(name):
+    """Whoever follows a recipe opens them."""
+    text = (ROOT / name).read_text(encoding="utf-8")
+    named = re.findall(r"`((?:coupler|fluid|yade_scripts|tests|docs|cases)/[\w/.]*)`", text)
+    assert named
+    assert [path for path in named if not (ROOT / path.replace("NAME", "__init__")).exists()] == []

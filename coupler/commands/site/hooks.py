@@ -24,6 +24,15 @@ PROJECT = {
 """Pages at the top of the checkout, and what they are called in the site."""
 
 
+def on_config(config: Any) -> Any:
+    """Pages of docs/ that mkdocs.yml does not place are ways to do something."""
+    placed = str(config["nav"])
+    rest = [page.name for page in sorted((ROOT / "docs").glob("*.md")) if page.name not in placed]
+    for section in config["nav"]:
+        section.get("How to", []).extend(rest)
+    return config
+
+
 def on_files(files: Files, config: Any) -> Files:
     """Pages from outside of docs/: the cases with their files, the notebooks, those of the project."""
     docs = ROOT / "docs"
