@@ -1,4 +1,4 @@
-"""The books of momentum: linear and angular, of the water and of the blocks that move freely, over the whole scene.
+"""The balance of momentum: linear and angular, of the water and of the blocks that move freely, over the whole scene.
 
     P = P_water + P_blocks = Σ lines,     each (6,): [N s] and, about one fixed point, [N m s]
 
@@ -213,7 +213,7 @@ class BlocksStep:
 
 
 def momentum_ledger(water: Water | None, structure: Structure | None) -> MomentumLedger:
-    """The books of a scene that starts: moments about the middle of the tank, or of the blocks; either may be None."""
+    """The balance of a scene that starts: moments about the middle of the tank, or of the blocks; one may be None."""
     if water is not None:
         about, reach = water.reference, 0.5 * float(np.linalg.norm(np.ptp(water.mesh.bounds, axis=0)))
     else:

@@ -372,7 +372,7 @@ class RunLimits(Section):
         0.05, description="unbalanced share of the energy put in"
     )
     momentum_error: Annotated[float, InSI("", gt=0)] = Field(
-        1e-8, description="share of the impulses of a step by which the books of momentum miss"
+        1e-8, description="share of the impulses of a step by which the balance of momentum misses"
     )
     defect: Annotated[float, InSI("", gt=0)] = Field(
         0.5,

@@ -17,7 +17,7 @@ def quantity(value: float | None, unit: str) -> str:
 
 
 def in_one_unit(value: float, power: int) -> str:
-    """A number of a book whose lines all have the unit with this power of 1000, so that they can be compared."""
+    """A number of a balance whose lines all have the unit with this power of 1000, so that they can be compared."""
     return _digits(value / 1000.0**power)
 
 

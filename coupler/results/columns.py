@@ -115,7 +115,7 @@ MOMENTUM_TITLE = "momentum: each line is what it has added to water and free blo
 
 
 def momentum_columns(unit: str, of: str) -> tuple[tuple[str, str, str], ...]:
-    """Columns of the books of momentum; of: what a vector is, behind the name of its line."""
+    """Columns of the balance of momentum; of: what a vector is, behind the name of its line."""
     sums = (
         ("water", f"{of} of the water"),
         ("blocks", f"{of} of the blocks that move freely"),

@@ -1,6 +1,6 @@
 """What a run leaves behind: histories every step, fields at the output times, the crack table.
 
-`history/energy.csv`   energy               `history/momentum.csv`, `angular_momentum.csv`  the books of momentum
+`history/energy.csv`   energy               `history/momentum.csv`, `angular_momentum.csv`  the balance of momentum
 `history/coupling.csv` how each step went   `history/water.csv`     volume
 `history/gauges.csv`   the gauges           `history/structure.csv` joints, fastest block
 `maps/*.asc`           of a flood over terrain

@@ -194,7 +194,7 @@ class CoupledStepper:
         return attempt_of(self, record, self.limits, volume_before)
 
     def _take(self, record: StepRecord, start: StepStart | None) -> None:
-        """One step of record.dt on both sides and in the books. Raises what the solvers say, and Diverged."""
+        """One step of record.dt on both sides and in the balances. Raises what the solvers say, and Diverged."""
         dt = record.dt
         if self.coupled:
             self._coupled_step(dt, record, start)

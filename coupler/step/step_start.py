@@ -1,4 +1,4 @@
-"""Both sides and their books as they stood before a step, so that a step can be taken again."""
+"""Both sides and their balances as they stood before a step, so that a step can be taken again."""
 
 from __future__ import annotations
 

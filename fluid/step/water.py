@@ -282,7 +282,7 @@ class Water:
 
     def move_solids(self, domain) -> None:
         """Go over to the domain that the solids leave now: every field is carried, newly wet nodes are continued
-        from their neighbours.  The volume of water in the books does not change; the next step lifts the surface
+        from their neighbours.  The volume of water in the balance does not change; the next step lifts the surface
         by what the solids displaced."""
         old, old_topology = self.domain, self.topology
         source = carry(old, domain)

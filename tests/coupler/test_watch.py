@@ -50,7 +50,7 @@ def test_a_running_run_says_how_far_it_is_and_how_near_its_limits(tmp_path, slee
     state = Watched(make_run(tmp_path / "run", sleeper.pid)).state()
     assert (state["status"], state["running"], state["share"], state["left"]) == ("running", True, 0.25, 65.0)
     assert state["limits"] == [
-        {"what": "volume of water that the books miss", "share": 0.5, "key": "limits.volume_error"}
+        {"what": "volume of water missing in the balance", "share": 0.5, "key": "limits.volume_error"}
     ]
     (curve,) = state["curves"]
     assert (curve["name"], curve["unit"], curve["y"][-1]) == ("force x", "N", 1e7)

@@ -1,4 +1,4 @@
-"""Tables of a run's report, from its histories: the books of energy, volume and momentum; cracks; limits."""
+"""Tables of a run's report, from its histories: the balances of energy, volume and momentum; cracks; limits."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from coupler.results.history import History, read_history
 MOST_CRACKS = 25
 """Broken joints that are listed one by one."""
 NEGLIGIBLE = 1e-12
-"""Share of the largest line of a book below which a line is round-off and left out."""
+"""Share of the largest line of a balance below which a line is round-off and left out."""
 
 
 def history(run: Path, name: str) -> History | None:
@@ -41,7 +41,7 @@ def volume(run: Path) -> str:
     if found is None:
         return ""
     error = _share(float(found["volume_error"][-1]))
-    return _book("volume", found, "m3") + note(f"Volume that the books miss at the end: {error}.")
+    return _book("volume", found, "m3") + note(f"Volume missing in the balance at the end: {error}.")
 
 
 def _book(title: str, found: History, unit: str) -> str:
@@ -65,7 +65,7 @@ def _book(title: str, found: History, unit: str) -> str:
 
 
 def _ends(values: np.ndarray, largest: float) -> list[float]:
-    """First, last and change; 0 for what is round-off beside the largest of the book."""
+    """First, last and change; 0 for what is round-off beside the largest of the balance."""
     return [_no_noise(v, largest) for v in (values[0], values[-1], values[-1] - values[0])]
 
 
@@ -74,7 +74,7 @@ def _no_noise(value: float, largest: float) -> float:
 
 
 def momentum(run: Path, name: str) -> str:
-    """A book of momentum at the end: what each line has added, x, y, z; lines of round-off are left out."""
+    """The balance of momentum at the end: what each line has added, x, y, z; lines of round-off are left out."""
     found = history(run, name)
     if found is None:
         return ""
@@ -156,9 +156,9 @@ def _largest(values: np.ndarray) -> str:
 LITTLE = 1e-4
 """Share of a limit below which its digits say nothing."""
 LIMITS = (
-    ("volume_error", "largest_volume_error", "volume of water that the books miss"),
-    ("energy_error", "largest_energy_error", "energy that the books miss, of the input"),
-    ("momentum_error", "largest_momentum_error", "impulse that the books miss, of those of a step"),
+    ("volume_error", "largest_volume_error", "volume of water missing in the balance"),
+    ("energy_error", "largest_energy_error", "energy missing in the balance, of the input"),
+    ("momentum_error", "largest_momentum_error", "impulse missing in the balance, of those of a step"),
     ("defect", "largest_defect", "coupling residual of a step"),
 )
 """Name in [limits], figure of run.json, what it is."""

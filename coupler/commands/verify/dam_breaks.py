@@ -69,7 +69,7 @@ def wall_impact():
 
 
 def _cells_figure(runs: dict[int, Impact], table) -> Figure:
-    """Sensor 2 with rubbed walls on different cells."""
+    """Sensor 2 with rough walls on different cells."""
     some = slice(None, None, 10)
     t = table["tstar"][some]
     curves = [Curve("measured, 2.5 to 97.5 %", "band", t, table["p2p5"][some], table["p97p5"][some])]
