@@ -14,9 +14,10 @@ from coupler.commands.verify.registry import Result
 from coupler.commands.verify.report import json_line
 from coupler.program.provenance import ROOT
 
-PAGES = sorted(
-    [*ROOT.glob("[ACR]*.md"), *(ROOT / "docs").glob("*.md"), *(ROOT / "cases").glob("*/README.md")]
-)
+TOP = [
+    ROOT / name for name in ("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md")
+]  # the changelog has old names
+PAGES = sorted([*TOP, *(ROOT / "docs").glob("*.md"), *(ROOT / "cases").glob("*/README.md")])
 KNOWN = {key.path for key in keys()}
 SECTIONS = {path.split(".")[0] for path in KNOWN}
 FILES = ("py", "toml", "md", "json", "csv", "vtu", "pvd")

@@ -174,6 +174,17 @@ def test_a_run_installs_no_extra_and_compiles_nothing_by_itself(machine):
     assert machine("run", "x")[2] == ["surgebreak run x"]
 
 
+@pytest.mark.parametrize("command", ["run", "render", "report", "benchmark", "sweep", "docs", "test"])
+@pytest.mark.parametrize("word", ["--help", "-h"])
+def test_help_of_a_command_installs_none_of_its_extras(machine, command, word):
+    """850 MB of pictures for a page of help was what the first user got."""
+    machine.ready()
+    machine("doctor")
+    code, told, calls = machine(command, word)
+    assert (code, calls) == (0, [f"surgebreak {command} {word}"])
+    assert "installing" not in told
+
+
 def test_the_tab_key_installs_nothing(machine):
     """The shell asks for completions by a variable; an installation that is not there completes nothing."""
     done = subprocess.run(
