@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coupler.commands.view import palette
-from coupler.commands.view.camera import frame
+from coupler.commands.view.camera import SIDES, VIEWS, frame, side_of
 
 MARGIN = (0.04, 0.1, 0.17, 0.05)
 
@@ -53,3 +53,22 @@ def test_lightness_falls_evenly_along_a_scale(ends):
     luminance = linear @ np.array([0.2126729, 0.7151522, 0.0721750])  # IEC 61966-2-1
     lightness = 116 * np.cbrt(luminance) - 16
     np.testing.assert_allclose(lightness, np.linspace(ends[0][0], ends[1][0], 65), atol=0.1)
+
+
+@pytest.mark.parametrize(
+    ("where", "azimuth"), [((1, -1), -62.0), ((-1, -1), -118.0), ((-1, 1), 118.0), ((1, 1), 62.0)]
+)
+def test_the_camera_stands_on_the_side_where_things_happen(where, azimuth):
+    assert side_of(np.array(where, float)) == azimuth
+
+
+def test_without_a_side_the_camera_stands_where_it_always_did():
+    assert side_of(np.zeros(2)) == SIDES[0]
+    assert side_of(np.array([0.0, -1.0])) == SIDES[0]  # two are as good
+
+
+def test_a_plan_has_x_to_the_right_and_y_upwards():
+    camera = frame([0, 0, 0], [4, 2, 1], 1.5, *VIEWS["plan"])
+    np.testing.assert_allclose(camera.up, [0, 1, 0], atol=1e-9)
+    assert camera.position[2] > 1.0
+    np.testing.assert_allclose(camera.position[:2], [2, 1], atol=1e-6)

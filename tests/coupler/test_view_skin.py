@@ -81,3 +81,29 @@ def test_no_water_has_no_skin():
     found = skin(NODES, CELLS, np.ones(len(NODES)))
     assert found.of(NODES).shape == (0, 3, 3)
     assert shading_normals(found, NODES, CELLS, np.ones(len(NODES))).shape == (0, 3, 3)
+
+
+def test_faces_of_cut_cells_are_no_skin_unless_they_lie_in_a_side_of_the_tank():
+    """A full box; one cell in its middle has a body in it, so the cells beside it end there: those ends are no water
+    that is seen. The sides of the tank are, also where a cell at them is cut."""
+    nodes, cells = tank_mesh((3.0, 3.0, 3.0), 1.0)
+    middle = nodes[cells].mean(axis=1)
+    inside = (np.abs(middle - 1.5) < 0.5).all(axis=1)
+    near = (np.abs(middle - 1.5) < 1.5).all(axis=1)
+    fraction = np.where(near, 0.9, 1.0)[~inside]
+    tank = np.array([[0.0, 0, 0], [3.0, 3, 3]])
+    wet = np.full(len(nodes), -1.0)
+    plain, clean = (
+        area(skin(nodes, cells[~inside], wet, *more).of(nodes)) for more in ((), (fraction, tank))
+    )
+    assert plain == pytest.approx(6 * 9.0 + 6 * 1.0)
+    assert clean == pytest.approx(6 * 9.0)
+
+
+def area(triangles):
+    return (
+        0.5
+        * np.linalg.norm(
+            np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=1
+        ).sum()
+    )

@@ -8,6 +8,7 @@ import sys
 import time
 from pathlib import Path
 
+from coupler.commands.view.camera import VIEWS
 from coupler.program.errors import FULL, ExitCode, SurgebreakError
 from coupler.program.extras import need
 from coupler.program.process import was_killed
@@ -38,10 +39,20 @@ def command_line():
     )
     parser.add_argument("--fps", type=rate, default=20.0, help="frames a second of the film (default 20)")
     parser.add_argument(
-        "--azimuth", type=float, default=-62.0, help="of the camera, degrees from +x towards +y"
+        "--azimuth",
+        type=float,
+        help="of the camera, degrees from +x towards +y; default: the side on which things break",
     )
     parser.add_argument(
         "--elevation", type=angle, default=22.0, help="of the camera above the ground, degrees"
+    )
+    parser.add_argument(
+        "--view",
+        choices=list(VIEWS),
+        help="plan, or an elevation from y- (south), x+ (east), y+ (north), x- (west)",
+    )
+    parser.add_argument(
+        "--cut", type=section, metavar="x=M", help="a section: what lies before x, y or z = M [m] is left out"
     )
     parser.add_argument(
         "--letters", type=letters, default=1.0, metavar="TIMES", help="the usual size, for a small picture"
@@ -77,6 +88,14 @@ def rate(text):
 def angle(text):
     """Elevation of the camera [degree]; from straight above, up would have no meaning."""
     return within(text, -5.0, 85.0, "degrees")
+
+
+def section(text):
+    """(axis, place [m]) of "x=2.5"."""
+    name, _, place = text.partition("=")
+    if name.strip() not in ("x", "y", "z"):
+        raise argparse.ArgumentTypeError(f"'{text}' is no section; write it like x=2.5")
+    return "xyz".index(name.strip()), within(place, -1e9, 1e9, "m")
 
 
 def letters(text):
@@ -116,7 +135,8 @@ def make(options):
         print(f"note: the run was killed; shown is what it wrote, until t = {run.times[-1]:g} s", flush=True)
     folder = options.to or options.run / "pictures"
     folder.mkdir(parents=True, exist_ok=True)
-    camera = {"azimuth": options.azimuth, "elevation": options.elevation, "letters": options.letters}
+    azimuth, elevation = VIEWS[options.view] if options.view else (options.azimuth, options.elevation)
+    camera = {"azimuth": azimuth, "elevation": elevation, "letters": options.letters, "cut": options.cut}
     if options.still:
         from coupler.commands.view.pictures import still
 

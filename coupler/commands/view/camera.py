@@ -5,6 +5,25 @@ from dataclasses import dataclass
 
 import numpy as np
 
+STRAIGHT_ABOVE = 89.9
+"""Elevation [degree] from which x points to the right of the picture, since up has no direction any more."""
+VIEWS = {
+    "plan": (-90.0, 90.0), "south": (-90.0, 0.0), "east": (0.0, 0.0), "north": (90.0, 0.0), "west": (180.0, 0.0),
+}  # fmt: skip
+"""Azimuth and elevation [degree] of a view by name: from above, and from the side at y-, x+, y+ and x-."""
+SIDES = (-62.0, -118.0, 118.0, 62.0)
+"""Azimuths [degree] of which `side_of` takes one."""
+
+
+def side_of(where, usual=SIDES[0]):
+    """The azimuth [degree] of SIDES at which a direction (2,) in plan points to the camera; without one, the usual."""
+    size = np.linalg.norm(where)
+    if not size > 0.0:
+        return usual
+    turns = np.radians(SIDES)
+    facing = np.cos(turns) * where[0] / size + np.sin(turns) * where[1] / size
+    return SIDES[int(np.flatnonzero(facing >= facing.max() - 1e-3)[0])]
+
 
 @dataclass(frozen=True)
 class Camera:
@@ -33,7 +52,7 @@ def frame(
     """
     corners = np.array(list(itertools.product(*zip(lower, upper))), dtype=float)
     back = direction(azimuth, elevation)
-    right = np.cross([0.0, 0.0, 1.0], back)
+    right = np.cross([0.0, 0.0, 1.0], back) if elevation < STRAIGHT_ABOVE else np.array([1.0, 0.0, 0.0])
     right /= np.linalg.norm(right)
     up = np.cross(back, right)
     tangent = np.tan(np.radians(view_angle) / 2)

@@ -25,12 +25,14 @@ class NothingToShow(SurgebreakError):
 
 @dataclass(frozen=True)
 class Water:
-    """The water at one time: nodes (n, 3) [m], cells (m, 4), level_set (n,) [m], velocity (n, 3) [m/s]."""
+    """The water at one time: nodes (n, 3) [m], cells (m, 4), level_set (n,) [m], velocity (n, 3) [m/s], fraction (m,)
+    of each cell outside solids."""
 
     nodes: np.ndarray
     cells: np.ndarray
     level_set: np.ndarray
     velocity: np.ndarray
+    fraction: np.ndarray
 
 
 class Series:
@@ -51,10 +53,11 @@ class WaterSeries(Series):
     def at(self, time):
         """Water of the step nearest to `time` [s]."""
         k = self.step(time)
-        nodes, values, _ = patiently(vtkhdf.read_step, self.path, k)
+        nodes, values, of_cells = patiently(vtkhdf.read_step, self.path, k)
         cells = patiently(vtkhdf.read_tetrahedra, self.path, k).astype(np.int64)
         velocity = values.get("velocity", np.zeros_like(nodes))
-        return Water(nodes.astype(float), cells, values["level_set"].astype(float), velocity)
+        fraction = of_cells.get("fluid_fraction", np.ones(len(cells)))
+        return Water(nodes.astype(float), cells, values["level_set"].astype(float), velocity, fraction)
 
 
 class BlockSeries(Series):

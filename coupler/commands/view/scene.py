@@ -1,5 +1,6 @@
 """The picture of one instant: water as a volume coloured by speed, blocks by damage, solids grey, on white paper."""
 
+import json
 import os
 from pathlib import Path
 
@@ -12,7 +13,7 @@ import pyvista as pv
 from matplotlib.colors import ListedColormap
 
 from coupler.commands.view import palette
-from coupler.commands.view.camera import frame
+from coupler.commands.view.camera import frame, side_of
 from coupler.commands.view.water_surface import shading_normals, skin
 
 WATER_OPACITY = 0.78
@@ -27,15 +28,19 @@ BAR = 0.075  # height of a colour bar with its text, as a share of that of the p
 class Scene:
     """Draws the steps of a run into one window with one camera and fixed colour scales, so that pictures compare."""
 
-    def __init__(self, run, size=(1280, 720), azimuth=-62.0, elevation=22.0, soft=True, letters=1.0):
-        """run: RunFiles · size: (width, height) in pixels · azimuth, elevation of the camera in degrees ·
+    def __init__(self, run, size=(1280, 720), azimuth=None, elevation=22.0, soft=True, letters=1.0, cut=None):
+        """run: RunFiles · size: (width, height) in pixels · azimuth, elevation of the camera in degrees, azimuth None:
+        the side on which things happen · cut: (axis, place [m]), None for none: what lies before it is left out ·
         soft: darken corners where little light comes (costs three times as much as all the rest) ·
         letters: times the usual size, for a picture that is shown small."""
         self.run = run
+        azimuth = side_of(where_it_happens(run)) if azimuth is None else azimuth
         self.size, self.letters = size, letters
+        self.cut = None if cut is None else cut_of(cut, azimuth)
         self.lower, self.upper = bounds(run)
         self.fastest = nice_ceiling(fastest_water(run)) if run.water else 0.0
         self.light, self.fill = turned(SUN, azimuth + 90.0), turned(FILL, azimuth + 90.0)
+        self.caption = caption_of(run)
         self.ground = ground(self.lower, self.upper, run.tank is None)
         self.plotter = pv.Plotter(off_screen=True, window_size=size, lighting="none")
         self.plotter.set_background(palette.PAPER)
@@ -48,7 +53,7 @@ class Scene:
         """Put the stored step nearest to `time` [s] into the window; return its time [s]."""
         time = self.run.nearest(time)
         if self.run.blocks:
-            self._draw_blocks(self.run.blocks.at(time))
+            self._draw_blocks(self._behind_cut(self.run.blocks.at(time)))
         if self.run.water:
             self._draw_water(self.run.water.at(time))
         self._draw_time(time)
@@ -75,6 +80,11 @@ class Scene:
             color=palette.INK, render=False,
         )  # fmt: skip
         lettered(text.prop)
+        caption = self.plotter.add_text(
+            self.caption, name="caption", position=(0.985 - 0.0052 * self.letters * len(self.caption), 0.012),
+            viewport=True, font_size=self._points(7), color=palette.TANK, render=False,
+        )  # fmt: skip
+        lettered(caption.prop)
 
     def _set_lights(self):
         """One sun, a weak light from the right and one from the camera: soft, and no face is black."""
@@ -155,7 +165,8 @@ class Scene:
             self._draw_bar("blocks", "damage of blocks [–]", 0.35 if self.run.water else 0.03)
 
     def _draw_water(self, grid):
-        surface = water_surface(grid, np.array(self.plotter.camera.position))
+        surface = water_surface(grid, np.array(self.plotter.camera.position), self._sides())
+        surface = self._behind_cut(surface)
         if surface.n_cells == 0:
             self.plotter.remove_actor("water", reset_camera=False, render=False)
             return
@@ -166,6 +177,17 @@ class Scene:
         )  # fmt: skip
         behind(actor.mapper)
         self._draw_bar("water", "speed of water [m/s]", 0.03)
+
+    def _sides(self):
+        """Corners of a tank whose sides are all flat; None of a basin of another shape."""
+        return self.run.tank if self.run.basin is None else None
+
+    def _behind_cut(self, mesh):
+        """The part of a mesh behind the cut."""
+        if self.cut is None or mesh.n_cells == 0:
+            return mesh
+        normal, origin = self.cut
+        return mesh.clip(normal=normal, origin=origin, crinkle=False)
 
     def _draw_bar(self, actor, title, left):
         """A colour bar under the scene for the named actor, once."""
@@ -195,12 +217,65 @@ class Scene:
             )
 
 
-def water_surface(water, eye):
+LONGEST_TITLE = 60
+
+
+def caption_of(run):
+    """Title of the case, number of cells and blocks."""
+    title = _told(run, "case", "case", "title") or run.directory.name
+    parts = [title if len(title) <= LONGEST_TITLE else title[: LONGEST_TITLE - 1] + "…"]
+    if run.water:
+        parts.append(f"{len(run.water.at(run.water.times[0]).cells)} cells")
+    if run.blocks:
+        parts.append(f"{int(run.blocks.at(run.blocks.times[0])['block'].max()) + 1} blocks")
+    return ", ".join(parts)
+
+
+def cut_of(cut, azimuth):
+    """Normal and point of a cut across an axis, the normal towards the camera."""
+    axis, place = cut
+    normal, origin = np.zeros(3), np.zeros(3)
+    origin[axis] = place
+    towards = [np.cos(np.radians(azimuth)), np.sin(np.radians(azimuth)), 1.0][axis]
+    normal[axis] = 1.0 if towards >= 0.0 else -1.0
+    return normal, origin
+
+
+def where_it_happens(run):
+    """Direction (2,) in plan from the middle of the blocks to the first joint that broke, else to the water at
+    the start; zero without blocks."""
+    if not run.blocks:
+        return np.zeros(2)
+    low, high = corners(run.blocks.at(run.blocks.times[0]))
+    middle = 0.5 * (low + high)[:2]
+    place = _told(run, "figures", "verdict", "first_break", "place")
+    if place:
+        return np.array(place[:2], float) - middle
+    if not run.water:
+        return np.zeros(2)
+    water = run.water.at(run.water.times[0])
+    wet = water.nodes[water.level_set < 0.0]
+    return wet[:, :2].mean(axis=0) - middle if len(wet) else np.zeros(2)
+
+
+def _told(run, *names):
+    """What run.json says under these names, one in the other; None where it does not, as of a run that was torn."""
+    path = run.directory / "run.json"
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    for name in names:
+        found = found.get(name) if isinstance(found, dict) else None
+    return found
+
+
+def water_surface(water, eye, tank=None):
     """The skin of the water as a mesh with "speed" [m/s] and shading normals at its points.
 
     The triangles farthest from the eye (3,) come first: each is then seen through those before it, where otherwise
     the order of the cells would decide which of two layers shows, triangle by triangle."""
-    found = skin(water.nodes, water.cells, water.level_set)
+    found = skin(water.nodes, water.cells, water.level_set, water.fraction, tank)
     corners = found.of(water.nodes)
     far_first = np.argsort(-np.linalg.norm(corners.mean(axis=1) - eye, axis=1), kind="stable")
     normals = shading_normals(found, water.nodes, water.cells, water.level_set)
@@ -252,14 +327,17 @@ def sampled(times):
 
 
 def fastest_water(run):
-    """Speed [m/s] that 99 % of the wet nodes stay below, at the step where that is largest."""
-    speeds = [0.0]
+    """Speed [m/s] that 98 % of the nodes at the surface stay below over the run: what is inside is not seen, and spray
+    is not what the colours are for."""
+    speeds = [np.zeros(1)]
     for time in sampled(run.water.times):
         water = run.water.at(time)
-        wet = water.level_set < 0
-        if wet.any():
-            speeds.append(np.percentile(np.linalg.norm(water.velocity[wet], axis=1), 99))
-    return max(speeds)
+        wet = water.level_set[water.cells] < 0
+        seen = np.unique(water.cells[wet.any(axis=1) & ~wet.all(axis=1)])
+        seen = seen[water.level_set[seen] < 0]
+        if len(seen):
+            speeds.append(np.linalg.norm(water.velocity[seen], axis=1))
+    return float(np.percentile(np.concatenate(speeds), 98))
 
 
 def nice_ceiling(value):

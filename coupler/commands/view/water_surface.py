@@ -32,12 +32,18 @@ class Skin:
         return (1 - w) * values[self.pair[..., 0]] + w * values[self.pair[..., 1]]
 
 
-def skin(nodes, cells, level_set):
-    """Skin of {level set < 0} on nodes (n, 3), tetrahedra cells (m, 4), level_set (n,) [m]."""
-    wet = cells[np.any(level_set[cells] < 0, axis=1)]
-    wet = right_handed(nodes, wet)
+def skin(nodes, cells, level_set, fraction=None, tank=None):
+    """Skin of {level set < 0} on nodes (n, 3), tetrahedra cells (m, 4), level_set (n,) [m].
+
+    fraction (m,): share of each cell outside solids, and tank (2, 3) [m]: with both, faces of cut cells that do not lie
+    on a side of the tank are left out: they are inside of a body, or stick out of one that is thinner than a cell."""
+    kept = np.any(level_set[cells] < 0, axis=1)
+    wet = right_handed(nodes, cells[kept])
     free = free_triangles(wet, level_set)
-    pair = np.concatenate([free, clipped(outer_faces(wet, len(nodes)), level_set)])
+    outer, owner = outer_faces(wet, len(nodes))
+    if fraction is not None and tank is not None:
+        outer = outer[(fraction[kept][owner] > WHOLE) | on_sides(nodes, outer, tank)]
+    pair = np.concatenate([free, clipped(outer, level_set)])
     i, j = level_set[pair[..., 0]], level_set[pair[..., 1]]
     share = np.where(pair[..., 0] == pair[..., 1], 0.0, i / np.where(i == j, 1.0, i - j))
     return Skin(pair, share, len(free))
@@ -77,8 +83,20 @@ def clipped(triangles, level_set):
     return np.concatenate([whole, one, _pairs((a, b), (b, b), (c, c)), _pairs((a, b), (c, c), (a, c))])
 
 
+WHOLE = 1.0 - 1e-6
+"""Share of a cell outside solids from which no solid cuts it."""
+
+
+def on_sides(nodes, faces, tank):
+    """(k,) bool: faces (k, 3) that lie in a side of the tank (2, 3) [m]."""
+    x = nodes[faces]
+    near = 1e-5 * np.ptp(tank, axis=0).max()
+    return np.any([(np.abs(x - corner) <= near).all(axis=1) for corner in tank], axis=0).any(axis=1)
+
+
 def outer_faces(cells, n_nodes):
-    """Faces (k, 3) that belong to one of the right-handed tetrahedra only, counter-clockwise from outside."""
+    """Faces (k, 3) that belong to one of the right-handed tetrahedra only, counter-clockwise from outside, and the
+    tetrahedron of each (k,)."""
     faces = cells[:, FACES].reshape(-1, 3)
     low, middle, high = np.sort(faces, axis=1).T
     key = (low * n_nodes + middle) * n_nodes + high
@@ -86,7 +104,8 @@ def outer_faces(cells, n_nodes):
     key = key[order]
     new = np.ones(len(key) + 1, dtype=bool)
     new[1:-1] = key[1:] != key[:-1]
-    return faces[order[new[:-1] & new[1:]]] if len(key) else faces
+    alone = order[new[:-1] & new[1:]] if len(key) else order
+    return faces[alone], alone // 4
 
 
 def nodal_slope(nodes, cells, values):
