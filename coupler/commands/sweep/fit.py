@@ -33,13 +33,15 @@ class Fits:
 
     @property
     def dispersion(self) -> Array:
-        """β (s,)"""
-        return 1.0 / self.slope
+        """β (s,); not finite where there is no fit"""
+        with np.errstate(all="ignore"):
+            return 1.0 / self.slope
 
     @property
     def median(self) -> Array:
-        """θ (s, K), in the unit of the intensity"""
-        return np.exp(self.cut / self.slope[:, None])
+        """θ (s, K), in the unit of the intensity; not finite where there is no fit"""
+        with np.errstate(all="ignore"):
+            return np.exp(self.cut / self.slope[:, None])
 
     def probability(self, x: Array) -> Array:
         """P(state ≥ k | x) (s, K, len(x)) at intensities x (n,)."""

@@ -61,7 +61,11 @@ def _page(spec: Spec, results: Results) -> str:
             section("On what the results depend", *_sensitivities(spec)),
             section(
                 "Results over what was varied",
-                *_figure(spec, "results", "Every run a point; crosses: runs that failed."),
+                *_figure(
+                    spec,
+                    "results",
+                    "Every run a point. Crosses: runs that failed; triangles on the edge: those that could not stand.",
+                ),
             ),
             section("Runs that did not reach their end", _failed(spec, results)),
             section("All runs", *_rows(spec, results)),
@@ -159,7 +163,11 @@ def _fragilities(spec: Spec) -> Iterator[str]:
             *told,
             note(_counted(f)),
             note(f.get("note", "")),
-            *(_figure(spec, f"convergence_{f['name']}", slower, wide=False) if f["convergence"] else ()),
+            *(
+                _figure(spec, f"convergence_{f['name']}", slower, wide=False)
+                if len(f["convergence"]) > 1
+                else ()
+            ),
         )
 
 

@@ -48,7 +48,7 @@ def draw(folder):
         for f in _read(folder / "fragility.json"):
             if f["runs"]:
                 written.append(fragility(folder, f))
-            if f["convergence"]:
+            if len(f["convergence"]) > 1:
                 written.append(convergence(folder, f))
         found = [s for s in _read(folder / "sensitivity.json") if s["rows"]]
         if found:
@@ -220,6 +220,12 @@ def _cloud(axis, table, key, name, units, failed):
     y = table[name] / 1000.0 ** _power(table[name], units[name])
     axis.plot(x[~failed], y[~failed], "o", ms=2.2, mew=0, alpha=0.6, color=LINES[0])
     axis.plot(x[failed], y[failed], "x", ms=3, color=LINES[1])
+    without = ~np.isfinite(y) & (table["outcome"] != "not yet")  # on the upper edge: no number, but a place
+    for own, mark, colour in ((without & ~failed, "^", LINES[2]), (without & failed, "x", LINES[1])):
+        edge = axis.get_xaxis_transform()
+        axis.plot(
+            x[own], np.ones(own.sum()), mark, ms=2.8, mew=0.7, color=colour, transform=edge, clip_on=False
+        )
 
 
 def _power(values, unit):
