@@ -18,7 +18,7 @@ from coupler.case.records import NoSuchData, read_record
 from coupler.case.sweep import DamageState, Fragility
 from coupler.commands.sweep.fit import Fits, bootstrap, check, fit, separation
 from coupler.commands.sweep.folder import Spec
-from coupler.commands.sweep.results import Results
+from coupler.commands.sweep.results import FREE, Results
 
 Array = np.ndarray
 POINTS = 121
@@ -55,7 +55,7 @@ def curves(spec: Spec, results: Results, f: Fragility) -> dict:
     told = {
         "name": f.name,
         "what": f.what,
-        "measure": {"name": f.measure, "what": column.meaning.partition(": sets")[0], "unit": column.unit},
+        "measure": {"name": f.measure, "what": plain_meaning(column.meaning), "unit": column.unit},
         "confidence": f.confidence,
         "states": [{"name": s.name, "what": s.what or s.name, "rule": _rule(s)} for s in f.state],
         "runs": len(runs.x),
@@ -88,6 +88,11 @@ def curves(spec: Spec, results: Results, f: Fragility) -> dict:
             "convergence": convergence(runs.x, state, len(kept), f, seed),
         }
     )
+
+
+def plain_meaning(meaning: str) -> str:
+    """What a column is, without what it sets and where it is from."""
+    return meaning.partition(": sets")[0].removesuffix(FREE)
 
 
 def read_runs(results: Results, f: Fragility) -> Runs:

@@ -22,6 +22,8 @@ from coupler.results.history import Column, header, line
 from coupler.results.history import number as shortest
 from coupler.run.summary import read_summary
 
+FREE = " (free field)"
+"""Behind the meaning of a quantity of the run without structure."""
 NOT_YET = "not yet"
 """Outcome of a row whose run has not been made."""
 
@@ -60,7 +62,7 @@ def _columns(spec: Spec) -> Iterator[Column]:
     for key in spec.sweep.seeds:
         yield Column(seed_column(key), "1", f"seed: sets {key}")
     for q in asked(spec.sweep):
-        free = " (free field)" if q.source == "free field" else ""
+        free = FREE if q.source == "free field" else ""
         yield Column(q.name, q.unit or "1", f"{q.what or q.name.replace('_', ' ')}{free}")
     yield Column(
         "outcome",

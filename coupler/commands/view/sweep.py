@@ -7,7 +7,9 @@ results           every quantity over everything that was varied
 """
 
 import json
+import re
 import sys
+import textwrap
 from pathlib import Path
 
 import numpy as np
@@ -186,7 +188,7 @@ def results(folder):
     told = json.loads((folder / "sweep.json").read_text(encoding="utf-8"))
     table = read_history(folder / "table.csv")
     units = {c.name: c.unit for c in table.columns}
-    meaning = {c.name: c.meaning.partition(": sets")[0] for c in table.columns}
+    meaning = {c.name: c.meaning.partition(": sets")[0].removesuffix(" (free field)") for c in table.columns}
     varied = [
         c["name"] for c in told["columns"] if units[c["name"]] and np.ptp(_finite(table, c["name"])) > 0
     ][:MOST]
@@ -203,9 +205,9 @@ def results(folder):
         for column, key in enumerate(varied):
             _cloud(axes[row, column], table, key, name, units, failed)
     for column, key in enumerate(varied):
-        axes[-1, column].set_xlabel(_axis(meaning[key], units[key], _power(table[key], units[key])))
+        axes[-1, column].set_xlabel(_axis(meaning[key], units[key], _power(table[key], units[key]), 26))
     for row, name in enumerate(names):
-        axes[row, 0].set_ylabel(_axis(meaning[name], units[name], _power(table[name], units[name])))
+        axes[row, 0].set_ylabel(_axis(meaning[name], units[name], _power(table[name], units[name]), 20))
     drawing.align_ylabels()
     return _save(drawing, folder, "results")
 
@@ -238,9 +240,11 @@ def _power(values, unit):
     )
 
 
-def _axis(what, unit, power):
-    text = UNIT_TEXT.get(unit, unit)
-    return f"{what} [{PREFIXES[power]}{text}]" if unit not in ("", "1") else what
+def _axis(what, unit, power, letters=42):
+    """A label with its unit, in lines of so many letters."""
+    text = UNIT_TEXT.get(unit, re.sub(r"(?<=[a-zA-Z])([23])", lambda found: "²³"[int(found[1]) - 2], unit))
+    told = f"{what} [{PREFIXES[power]}{text}]" if unit not in ("", "1") else what
+    return "\n".join(textwrap.wrap(told, letters))
 
 
 if __name__ == "__main__":
