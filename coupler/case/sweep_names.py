@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import lru_cache
 
-from coupler.case.keys import find, keys
+from coupler.case.keys import keys
 from coupler.case.study_names import without_places
 from coupler.case.sweep import PARAMETERS, Sweep, Varied
 from coupler.case.units import DIMENSIONS, to_si
@@ -66,12 +67,18 @@ def _keys(sweep: Sweep) -> Iterator[Problem]:
 def key_problem(name: str) -> str:
     """Why a name cannot be varied; empty where it can."""
     plain = ".".join(without_places(name))
-    known = [key.path for key in keys() if not key.sections]
+    known = _settable()
     if plain not in known:
         return f"'{name}': no such name in a case file{did_you_mean(plain, known)}"
     if plain.partition(".")[0] in ("study", "sweep"):
         return f"'{name}': a run takes no notice of [{plain.partition('.')[0]}]"
     return ""
+
+
+@lru_cache(maxsize=1)
+def _settable() -> dict[str, str]:
+    """Unit of every name of the case that holds a value."""
+    return {key.path: key.unit for key in keys() if not key.sections}
 
 
 def _amounts(sweep: Sweep) -> Iterator[Problem]:
@@ -131,8 +138,7 @@ def _nowhere(name: str, known: list[str]) -> str:
 
 def unit_of(key: str) -> str:
     """SI unit of a name of the case; empty where it has none."""
-    found = find(without_places(key))
-    return found.unit if found is not None else ""
+    return _settable().get(".".join(without_places(key)), "")
 
 
 def unit(v: Varied) -> str:

@@ -23,7 +23,7 @@ from .fake_runs import SUMMARY
 
 SWEEP = """
 [sweep]
-samples = 12
+samples = 6
 keep = "{keep}"
 sensitivity = ["peak"]
 [[sweep.vary]]
@@ -31,7 +31,7 @@ name = "load"
 key = "structure.block[1].velocity[0]"
 low = 0.5
 high = 2
-steps = 6
+steps = 4
 [[sweep.vary]]
 key = "joints.strength"
 distribution = "lognormal"
@@ -135,7 +135,7 @@ def test_the_table_holds_keys_units_quantities_and_how_runs_ended(made):
     write_tables(spec, results)
     table = read_history(spec.folder / "table.csv")
     assert {c.name: c.unit for c in table.columns}["strength"] == "Pa"
-    assert len(table["load"]) == 72
+    assert len(table["load"]) == 24
     assert table["outcome"][1] == "diverged"
     assert table["reason"][1] == "energy error 7 %"
     assert table["peak"] == pytest.approx(table["load"])
@@ -152,7 +152,7 @@ def test_pandas_reads_the_same_table_with_units(made):
     frame, stored = open_sweep(spec.folder), pd.read_parquet(spec.folder / "table.parquet")
     pd.testing.assert_frame_equal(frame, stored)
     assert frame.attrs["units"]["strength"] == stored.attrs["units"]["strength"] == "Pa"
-    assert frame.groupby("load").size().tolist() == [12] * 6
+    assert frame.groupby("load").size().tolist() == [6] * 4
 
 
 @pytest.mark.parametrize(
@@ -234,12 +234,12 @@ def test_curves_have_bands_bars_and_medians(made):
     told = curves(spec, results, spec.sweep.fragility[0])
     assert told["refused"] == ""
     medians = [c["median"] for c in told["curves"]]
-    assert medians == pytest.approx([1.0, 1.3], rel=0.1)  # ratio = load/strength: exact for very many runs
-    assert told["dispersion"] == pytest.approx(0.4, rel=0.3)
+    assert medians == pytest.approx([1.0, 1.3], rel=0.25)  # ratio = load/strength: exact for very many runs
+    assert told["dispersion"] == pytest.approx(0.4, rel=0.6)
     for curve in told["curves"]:
         p, low, high = (np.array(curve[n]) for n in ("p", "low", "high"))
         assert ((low <= p + 1e-9) & (p <= high + 1e-9)).all()
-    assert [bar["runs"] for bar in told["bars"][0]] == [12] * 6
+    assert [bar["runs"] for bar in told["bars"][0]] == [6] * 4
     assert told["convergence"][-1]["width"] < told["convergence"][0]["width"]
 
 
@@ -253,7 +253,7 @@ def test_runs_that_cannot_stand_are_in_the_state_and_failed_ones_are_unknown(mad
     runs = read_runs(collect(spec), spec.sweep.fragility[0])
     assert runs.state[0] == 2
     assert runs.unknown == 1  # the second one had not reached the heaviest state
-    assert len(runs.x) == 71
+    assert len(runs.x) == 23
 
 
 def test_runs_that_differ_in_the_load_alone_are_refused_with_the_reason(made):
@@ -261,7 +261,7 @@ def test_runs_that_differ_in_the_load_alone_are_refused_with_the_reason(made):
     alike = SWEEP.replace(
         'distribution = "lognormal"\nmedian = "1 MPa"\ndispersion = 0.4', 'values = ["1 MPa"]'
     )
-    alike = alike.replace("samples = 12\n", "").replace('sensitivity = ["peak"]\n', "")
+    alike = alike.replace("samples = 6\n", "").replace('sensitivity = ["peak"]\n', "")
     spec, _ = made(sweep=alike)
     told = curves(spec, collect(spec), spec.sweep.fragility[0])
     assert told["curves"] == []
@@ -273,7 +273,7 @@ def test_a_state_that_nobody_reached_is_left_out_and_told(made):
     spec, _ = made(sweep=SWEEP.replace("at_least = 1.3", "at_least = 99"))
     told = curves(spec, collect(spec), spec.sweep.fragility[0])
     assert [c["state"] for c in told["curves"]] == ["cracked"]
-    assert told["left_out"] == ["broken: none of 72 runs reached it"]
+    assert told["left_out"] == ["broken: none of 24 runs reached it"]
 
 
 def test_the_report_says_all_on_one_page_with_links_to_the_runs(made):
@@ -283,7 +283,7 @@ def test_the_report_says_all_on_one_page_with_links_to_the_runs(made):
     analyse(spec, results)
     text = write(spec, results).read_text(encoding="utf-8")
     for wanted in (
-        "72 runs: 71 done, 1 diverged",
+        "24 runs: 23 done, 1 diverged",
         "energy error 7 %",
         "cracked",
         "partial rank correlations",
