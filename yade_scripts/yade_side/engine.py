@@ -92,8 +92,8 @@ def load_yade(threads: int = 1) -> Engine:
 
 
 def find_yade() -> Path:
-    """Folder that contains the `yade` package of the distribution."""
-    for pattern in PACKAGED:
+    """Folder that contains the `yade` package of the distribution, or of where SURGEBREAK_YADE says that it is."""
+    for pattern in (*os.environ.get("SURGEBREAK_YADE", "").split(), *PACKAGED):
         for place in sorted(glob.glob(pattern)):
             package = Path(place).resolve()
             if (
