@@ -31,7 +31,7 @@ name = "load"
 key = "structure.block[1].velocity[0]"
 low = 0.5
 high = 2
-steps = 4
+steps = 8
 [[sweep.vary]]
 key = "joints.strength"
 distribution = "lognormal"
@@ -135,7 +135,7 @@ def test_the_table_holds_keys_units_quantities_and_how_runs_ended(made):
     write_tables(spec, results)
     table = read_history(spec.folder / "table.csv")
     assert {c.name: c.unit for c in table.columns}["strength"] == "Pa"
-    assert len(table["load"]) == 24
+    assert len(table["load"]) == 48
     assert table["outcome"][1] == "diverged"
     assert table["reason"][1] == "energy error 7 %"
     assert table["peak"] == pytest.approx(table["load"])
@@ -152,7 +152,7 @@ def test_pandas_reads_the_same_table_with_units(made):
     frame, stored = open_sweep(spec.folder), pd.read_parquet(spec.folder / "table.parquet")
     pd.testing.assert_frame_equal(frame, stored)
     assert frame.attrs["units"]["strength"] == stored.attrs["units"]["strength"] == "Pa"
-    assert frame.groupby("load").size().tolist() == [6] * 4
+    assert frame.groupby("load").size().tolist() == [6] * 8
 
 
 @pytest.mark.parametrize(
@@ -239,7 +239,7 @@ def test_curves_have_bands_bars_and_medians(made):
     for curve in told["curves"]:
         p, low, high = (np.array(curve[n]) for n in ("p", "low", "high"))
         assert ((low <= p + 1e-9) & (p <= high + 1e-9)).all()
-    assert [bar["runs"] for bar in told["bars"][0]] == [6] * 4
+    assert [bar["runs"] for bar in told["bars"][0]] == [6] * 8
     assert told["convergence"][-1]["width"] < told["convergence"][0]["width"]
 
 
@@ -253,7 +253,7 @@ def test_runs_that_cannot_stand_are_in_the_state_and_failed_ones_are_unknown(mad
     runs = read_runs(collect(spec), spec.sweep.fragility[0])
     assert runs.state[0] == 2
     assert runs.unknown == 1  # the second one had not reached the heaviest state
-    assert len(runs.x) == 23
+    assert len(runs.x) == 47
 
 
 def test_runs_that_differ_in_the_load_alone_are_refused_with_the_reason(made):
@@ -273,7 +273,7 @@ def test_a_state_that_nobody_reached_is_left_out_and_told(made):
     spec, _ = made(sweep=SWEEP.replace("at_least = 1.6", "at_least = 99"))
     told = curves(spec, collect(spec), spec.sweep.fragility[0])
     assert [c["state"] for c in told["curves"]] == ["cracked"]
-    assert told["left_out"] == ["broken: none of 24 runs reached it"]
+    assert told["left_out"] == ["broken: none of 48 runs reached it"]
 
 
 def test_the_report_says_all_on_one_page_with_links_to_the_runs(made):
@@ -283,7 +283,7 @@ def test_the_report_says_all_on_one_page_with_links_to_the_runs(made):
     analyse(spec, results)
     text = write(spec, results).read_text(encoding="utf-8")
     for wanted in (
-        "24 runs: 23 done, 1 diverged",
+        "48 runs: 47 done, 1 diverged",
         "energy error 7 %",
         "cracked",
         "partial rank correlations",

@@ -224,10 +224,11 @@ def _cloud(axis, table, key, name, units, failed):
     axis.plot(x[failed], y[failed], "x", ms=3, color=LINES[1])
     without = ~np.isfinite(y) & (table["outcome"] != "not yet")  # on the upper edge: no number, but a place
     for own, mark, colour in ((without & ~failed, "^", LINES[2]), (without & failed, "x", LINES[1])):
-        edge = axis.get_xaxis_transform()
-        axis.plot(
-            x[own], np.ones(own.sum()), mark, ms=2.8, mew=0.7, color=colour, transform=edge, clip_on=False
-        )
+        if own.any():
+            edge = axis.get_xaxis_transform()
+            found = axis.plot(x[own], np.ones(own.sum()), mark, ms=2.4, mew=0.6, color=colour, transform=edge)
+            found[0].set_clip_on(False)
+            found[0].set_in_layout(False)
 
 
 def _power(values, unit):
