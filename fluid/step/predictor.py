@@ -295,7 +295,7 @@ def _known_pressure(water, pressure, phi):
 
 def _definite(water, graph, phi, cells, dofs, scale, theta):
     """The matrix, rows beside p = 0, and what rows behind obtuse angles at the surface add to the right hand side."""
-    open_node = water.walls.open_node
+    open_node = water.held_open(phi)
     if not water.topology.is_obtuse:
         matrix, anchored, _ = pressure_matrix(graph, phi, dofs, open_node, scale, np.zeros(len(phi)))
         return matrix, anchored, 0.0

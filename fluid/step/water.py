@@ -423,6 +423,16 @@ class Water:
         """Water at the start and what came in since [m³]: the scale of volume errors."""
         return self.initial_volume + (0.0 if self.sides is None else self.sides.entered)
 
+    def held_open(self, phi):
+        """Nodes (N,) bool on open sides that have the pressure of the side: wet ones, φ (N,) < 0, and all of seas.
+
+        At a dry node of an open side the surface lies below it; the weight beyond a sea goes on above its level."""
+        held = self.walls.open_node & (phi < 0.0)
+        for side in self.sides.now if self.sides is not None else ():
+            if side.is_sea:
+                held[side.nodes] = self.walls.open_node[side.nodes]
+        return held
+
     def held_by_sides(self):
         """Nodes (n,) on the sides of the tank and projectors (n, 3, 3) onto what friction and viscosity may change."""
         return self.walls.restriction()

@@ -147,3 +147,16 @@ def test_predict_changes_nothing(theta):
     again = water.predict(0.01)
     np.testing.assert_array_equal(first.rhs, again.rhs)
     np.testing.assert_array_equal(first.matrix.data, again.matrix.data)
+
+
+@pytest.mark.parametrize("level", [0.91, 0.95, 0.9999])
+def test_water_in_the_last_cell_below_an_open_top_stays(level):
+    """The pressure is that of the air at the surface, not at the open top above it: held there, the weight of the cell
+    in between set still water moving with 0.1 m/s."""
+    water = tank(
+        [0.4, 0.2, 1.0], 0.1, lambda x: x[:, 2] - level, is_open=lambda normal, _: normal[:, 2] > 0.5
+    )
+    for _ in range(10):
+        advance(water, 0.02)
+    assert np.abs(water.velocity[water.level_set < 0.0]).max() < 1e-8
+    assert water.volume() == pytest.approx(0.08 * level, rel=1e-6)
