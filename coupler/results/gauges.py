@@ -278,7 +278,7 @@ def _rotation_vector(R) -> np.ndarray:
 
 FORCE_PARTS = {
     "pressure": "pressure, taken over all of every cell that water reaches",
-    "surface": "correction of it where the surface of the water passes through the cells",
+    "surface": "correction of it where the surface of the water passes through the cells; weight of films",
     "friction": "viscosity and friction along the faces",
 }
 

@@ -41,7 +41,8 @@ class StepRecord:
     shear_load: Array = field(default_factory=lambda: np.zeros((0, 6)))
     """The part of `load` that walls of bodies take by viscosity and friction."""
     surface_load: Array = field(default_factory=lambda: np.zeros((0, 6)))
-    """The part of `load` that corrects the pressure where the surface passes through the cells of a body."""
+    """The part of `load` that corrects the pressure where the surface passes through the cells of a body, and the
+    weight of the films of water beside it (`fluid.pressure.films`)."""
     missed_work: Array = field(default_factory=lambda: np.zeros(0))
     """Work of the load on each block (n,) [J] that the blocks got less than the water gave."""
     impulses: Impulses | None = None
