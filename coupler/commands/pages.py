@@ -79,7 +79,7 @@ def _python() -> Iterator[str]:
 
     yield from ("# Python reference", "", MADE, "")
     yield "What `import surgebreak` offers; [how it goes together](python.md)."
-    for name in surgebreak.__all__:
+    for name in sorted(surgebreak.__all__, key=_place):
         thing = getattr(surgebreak, name)
         if name in ("load", "open"):
             made = thing if name == "load" else thing.__init__
@@ -99,6 +99,19 @@ def _python() -> Iterator[str]:
                 "",
                 _text(thing.__doc__),
             )
+
+
+FIRST = ("load", "open", "Case", "Run", "Step", "Blocks", "WaterState", "BlockState", "History", "Forecast")
+
+
+def _place(name: str) -> tuple[int, str]:
+    """What a reader meets first comes first, errors last."""
+    import surgebreak
+
+    thing = getattr(surgebreak, name)
+    if name in FIRST:
+        return FIRST.index(name), name
+    return len(FIRST) + (inspect.isclass(thing) and issubclass(thing, BaseException)), name
 
 
 def _module(name: str, thing: Any) -> Iterator[str]:
