@@ -13,15 +13,20 @@ from pydantic import ValidationError
 
 from coupler.case.case import Case
 from coupler.case.messages import explain_error
+from coupler.geometry.bodies import Body
 from coupler.geometry.drawing.drawing import Cut, cut_drawing
 from coupler.geometry.drawing.reading import BadDrawing
+from coupler.geometry.parts import parts_of
+from coupler.geometry.solids import solids_of
 from coupler.program import terminal
 from coupler.program.errors import BadCase
 from coupler.program.extras import missing
 from coupler.program.process import run_module, trouble
 from coupler.program.quantities import quantity
-from yade_scripts.blocks.polyhedra import fans, shown
+from yade_scripts.blocks.polyhedra import fans, hull_faces, shown
 
+WATER = "water"
+"""The part of a picture that is seen through."""
 APART = 0.12
 """Of their size by which blocks are pulled apart in a picture."""
 
@@ -161,6 +166,27 @@ def _draw_blocks(cut: Cut, name: str, picture: Path) -> None:
         np.concatenate(edges),
         np.zeros((0, 2, 3)),
     )
+
+
+def draw_case(case: Case, picture: Path) -> None:
+    """Blocks by their groups, fixed solids and the boxes of water of a case, as they are at the start."""
+    bodies = [(b.group, b.world_vertices(), b.faces) for part in parts_of(case) for b in part.blocks]
+    bodies += [("solid", solid.vertices, solid.faces) for solid in solids_of(case)]
+    for fill in case.water.fill if case.water else ():
+        bodies.append((WATER, Body.between(fill.lower, fill.upper).vertices, None))
+    names = sorted({name for name, *_ in bodies} - {WATER}) + [WATER] * any(
+        name == WATER for name, *_ in bodies
+    )
+    triangles, part, edges = [], [], []
+    for name, x, faces in bodies:
+        own = fans(faces if faces is not None else hull_faces(name, x, 1e-9))[0]
+        triangles.append(x[own])
+        part.append(np.full(len(own), names.index(name)))
+        if faces is not None:
+            pairs = {tuple(sorted(edge)) for face in faces for edge in zip(face, (*face[1:], face[0]))}
+            edges.append(x[np.array(sorted(pairs))])
+    lines = np.concatenate(edges) if edges else np.zeros((0, 2, 3))
+    _draw(picture, np.concatenate(triangles), np.concatenate(part), names, lines, np.zeros((0, 2, 3)))
 
 
 def _draw_trouble(error: BadDrawing, picture: Path) -> None:

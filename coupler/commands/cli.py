@@ -167,8 +167,11 @@ def check(
     exact: Annotated[
         bool, typer.Option("--exact", help="solve for the exact frequency of the joints as well")
     ] = False,
+    picture: Annotated[
+        Path | None, typer.Option(metavar="PNG", help="draw blocks, solids and water as they start")
+    ] = None,
 ) -> None:
-    """Check a case, and forecast steps, memory and disk.
+    """Check a case, and forecast steps, time, memory and disk.
 
     Nothing is run; with a structure YADE is asked for the substep.
     """
@@ -178,8 +181,15 @@ def check(
     from coupler.program import terminal
     from coupler.run.execute import describe
 
+    if picture is not None:
+        need("view")
     found = Case.load(case, set or [])
     describe(found.file(), print)
+    if picture is not None:
+        from coupler.commands.blocks import draw_case
+
+        draw_case(found.file().case, picture)
+        print(f"picture: {picture}")
     terminal.table("forecast", found.check(exact).rows)
 
 

@@ -77,3 +77,16 @@ def test_words_lead_to_names_that_there_are():
 def test_nonsense_is_still_an_unknown_name():
     with pytest.raises(UnknownName, match=r"joint\.strenth: no such name"):
         explanation("joint.strenth")
+
+
+def test_a_case_is_drawn_before_it_is_run(tmp_path):
+    """Containers, quay and water of the first case of a quay: the picture has the colours of all of them."""
+    pytest.importorskip("PIL")
+    from PIL import Image
+
+    from coupler.commands.blocks import draw_case
+
+    write_first_case(tmp_path, "quay")
+    draw_case(load(tmp_path).case, tmp_path / "quay.png")
+    picture = Image.open(tmp_path / "quay.png")
+    assert len(set(picture.convert("RGB").getdata())) > 20
