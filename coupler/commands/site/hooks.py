@@ -54,8 +54,10 @@ def on_files(files: Files, config: Any) -> Files:
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
     """Links of the checkout as those of the site, and blank lines where GitHub needs none."""
     up = "../" * page.file.src_uri.count("/")
-    markdown = re.sub(r"\]\((?:\.\./)*cases/(\w+)/README\.md", rf"]({up}cases/\1.md", markdown)
-    markdown = re.sub(r"\]\((?:\.\./)*cases/(\w+)/?\)", rf"]({up}cases/\1.md)", markdown)
+    markdown = re.sub(
+        r"\]\((?:\.\./)*cases/(\w+)(?:/README\.md)?/?(#[\w-]+)?\)", rf"]({up}cases/\1.md\2)", markdown
+    )
+    markdown = re.sub(r"\]\((?:\.\./)*cases/(\w+)/[\w.]+\)", rf"]({up}cases/\1.md)", markdown)
     markdown = re.sub(r"\]\((?:\.\./)*cases/?\)", rf"]({up}cases/index.md)", markdown)
     markdown = re.sub(r"(\]\((?:\.\./)?(?:notebooks/)?\w+)\.ipynb", r"\1.md", markdown)
     for name, place in PROJECT.items():
