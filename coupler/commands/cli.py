@@ -317,7 +317,10 @@ DRAWN_AS_USUAL = (("bond", "stack"), ("scale", "1 m"), ("up", "z"))
 @app.command()
 def terrain(
     place: Annotated[
-        Path, typer.Argument(metavar="FILE|CASE", help="a terrain file, or a case with a section [terrain]")
+        Path,
+        typer.Argument(
+            metavar="FILE|CASE|RUN", help="a terrain file, a case with a section [terrain], or a run of one"
+        ),
     ],
     set: Annotated[
         list[str] | None,
@@ -327,7 +330,10 @@ def terrain(
         Path | None, typer.Option("--map", metavar="PNG", help="draw a map; needs the extra `view`")
     ] = None,
 ) -> None:
-    """Show a terrain: extent, heights, slopes, and what cells of a size make of it."""
+    """Show a terrain: extent, heights, slopes, and what cells of a size make of it.
+
+    Of a run: the maps of its flood, with --map in one picture with the buildings by their state.
+    """
     one_thread()
     if map_ is not None:
         need("view")

@@ -19,7 +19,11 @@ from coupler.program.process import run_module, trouble
 
 
 def show(place: Path, sets: list[str], picture: Path | None) -> None:
-    """Tables about a terrain file or the terrain of a case, and a map. Raises TerrainError, BadCase."""
+    """Tables about a terrain file or the terrain of a case, and a map; of a run the maps of its flood. Raises
+    TerrainError, BadCase."""
+    if (place / "maps").is_dir():
+        _show_flood(place, picture)
+        return
     path, options = (
         _of_case(place, sets) if place.is_dir() or place.suffix == ".toml" else (place, _options(sets))
     )
@@ -28,6 +32,19 @@ def show(place: Path, sets: list[str], picture: Path | None) -> None:
     terminal.table("what a mesh makes of it", resolved(ground))
     if picture is not None:
         _draw(ground, path.name, picture)
+        print(f"map: {picture}")
+
+
+def _show_flood(run: Path, picture: Path | None) -> None:
+    """Names of the maps of a run, and all of them in one picture, with the buildings by their state."""
+    for path in sorted((run / "maps").glob("*.asc")):
+        print(path)
+    if picture is not None:
+        done = run_module(
+            "coupler.commands.view.flood_map", run, picture, run.name, capture_output=True, text=True
+        )
+        if done.returncode != 0:
+            raise TerrainError(f"no map: {trouble(done.returncode, done.stderr)}")
         print(f"map: {picture}")
 
 

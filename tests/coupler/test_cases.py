@@ -14,9 +14,16 @@ from coupler.scene.build import build_structure
 CASES = sorted(path.parent for path in (ROOT / "cases").glob("*/case.toml"))
 
 
+DRAFTS = {"tsunami_town": ["thinner than a cell", "under 3 cells water is not resolved"]}
+"""Cases that are coarser than their remarks want, and say so in their README: what they may be remarked for."""
+
+
 @pytest.mark.parametrize("place", CASES, ids=lambda place: place.name)
 def test_a_case_of_the_checkout(place):
-    assert remarks(load(place).case) == []
+    allowed = DRAFTS.get(place.name, [])
+    found = remarks(load(place).case)
+    assert len(found) == len(allowed)
+    assert all(part in remark for part, remark in zip(allowed, found))
     readme = (place / "README.md").read_text(encoding="utf-8")
     for heading in ("Physics", "Source", "Cost", "Picture", "Numbers to expect"):
         assert f"**{heading}" in readme

@@ -13,11 +13,14 @@ from typing import Literal
 
 MODULES = (
     "contact", "joints", "bending", "stock", "coupled", "wall", "spheres", "cubes", "stability",
-    "rest", "water", "collapse", "viscous", "dam_breaks", "jets", "air", "bores", "run_up", "isolated_building",
+    "rest", "water", "collapse", "viscous", "dam_breaks", "jets", "air", "bores", "run_up", "coasts",
+    "isolated_building",
 )  # fmt: skip
 """Files of this package that hold cases; their names are the groups."""
 
-NOT_COVERED = {}
+NOT_COVERED = {
+    "P61": "conical island: on cells of 0.36 x 0.36 x 0.066 m the run-up was 32 % low in front and 69 % low in the lee",
+}
 """Reference cases without a check, and why."""
 
 Cost = Literal["S", "M", "L"]

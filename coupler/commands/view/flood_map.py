@@ -1,0 +1,95 @@
+"""Maps of a flood from a run directory: largest depth, speed and h v², arrival, and the buildings by their state.
+
+python -m coupler.commands.view.flood_map RUN PICTURE.png TITLE
+"""
+
+from __future__ import annotations
+
+import csv
+import sys
+from pathlib import Path
+
+import numpy as np
+
+MAPS = (
+    ("depth", "largest depth [m]", "Blues"),
+    ("speed", "largest speed [m/s]", "viridis"),
+    ("flux", "largest $h v^2$ [m$^3$/s$^2$]", "magma_r"),
+    ("arrival", "arrival [s]", "cividis"),
+)
+STATES = {"stands": "#2a9d5c", "damaged": "#f2a73b", "collapsed": "#c8322b"}
+
+
+def read_map(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """x (nx,), y (ny,) [m] from its lower left corner, and z (ny, nx), NaN without data, of a grid of a run."""
+    head, rows = {}, []
+    for line in path.read_text(encoding="utf-8").splitlines():
+        if line.startswith("#"):
+            continue
+        words = line.split()
+        if words[0][0].isalpha():
+            head[words[0].lower()] = float(words[1])
+        else:
+            rows.append(words)
+    z = np.array(rows, float)[::-1]
+    z[z == head["nodata_value"]] = np.nan
+    dx, dy = head.get("dx", head.get("cellsize")), head.get("dy", head.get("cellsize"))
+    return dx * np.arange(z.shape[1]), dy * np.arange(z.shape[0]), z
+
+
+def draw(run: Path, picture: Path, title: str) -> None:
+    """The four maps with the buildings, as one PNG."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    x, y, bed = read_map(run / "maps" / "bed.asc")
+    houses = _buildings(run)
+    tall = np.ptp(y) / np.ptp(x)
+    figure, axes = plt.subplots(2, 2, figsize=(12.0, 1.4 + 11.0 * min(tall, 1.2)), layout="constrained")
+    for axis, (name, label, colours) in zip(axes.flat, MAPS):
+        _, _, z = read_map(run / "maps" / f"{name}.asc")
+        axis.contourf(x, y, bed, levels=12, cmap="Greys", alpha=0.35)
+        highest = np.nanpercentile(z, 99.5) if np.isfinite(z).any() else 1.0
+        image = axis.pcolormesh(
+            x, y, z, cmap=colours, vmin=0.0 if name != "arrival" else None, vmax=highest, shading="nearest"
+        )
+        axis.contour(x, y, bed, levels=[0.0], colors="k", linewidths=0.8)
+        for state, colour in STATES.items():
+            of_state = [h for h in houses if h["state"] == state]
+            places = np.array([(float(h["x"]), float(h["y"])) for h in of_state]).reshape(-1, 2)
+            axis.scatter(
+                *places.T,
+                s=42,
+                marker="s",
+                c=colour,
+                edgecolors="k",
+                linewidths=0.6,
+                label=f"{state}: {len(places)}",
+            )
+        axis.set(
+            title=label,
+            aspect="equal",
+            xlabel="x [m]",
+            ylabel="y [m]",
+            xlim=(x[0], x[-1]),
+            ylim=(y[0], y[-1]),
+        )
+        figure.colorbar(image, ax=axis, shrink=0.85)
+    if houses:
+        axes[0, 0].legend(loc="upper left", fontsize=8)
+    figure.suptitle(title)
+    figure.savefig(picture, dpi=110)
+
+
+def _buildings(run: Path) -> list[dict]:
+    path = run / "buildings.csv"
+    if not path.is_file():
+        return []
+    lines = [line for line in path.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
+    return list(csv.DictReader(lines))
+
+
+if __name__ == "__main__":
+    draw(Path(sys.argv[1]), Path(sys.argv[2]), sys.argv[3])
