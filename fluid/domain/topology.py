@@ -30,7 +30,7 @@ class Topology:
     node_volume (N,) [m³] ∫ N_i · covered (N,) bool: nodes inside a solid · beside_solid (N,) bool: nodes of
     cut cells · parts: what of the cells water can fill · obtuse (M,) bool: cells with obtuse dihedral
     angles, is_obtuse: the mesh has such · upright (rows of `gradients`,) bool: `Background.upright` ·
-    node_size (N,) [m]: `Background.node_size` · spacing [m] of the mesh."""
+    node_size (N,) [m]: `Background.node_size`, slanting (N,) bool: `Background.slanting` · spacing [m] of the mesh."""
 
     nodes: np.ndarray
     cells: np.ndarray
@@ -54,6 +54,7 @@ class Topology:
     is_obtuse: bool
     upright: np.ndarray
     node_size: np.ndarray
+    slanting: np.ndarray
     spacing: float
 
     @classmethod
@@ -92,6 +93,7 @@ class Topology:
             is_obtuse=mesh.is_obtuse,
             upright=shapes.upright,
             node_size=mesh.node_size[domain.parent_node],
+            slanting=mesh.slanting[domain.parent_node],
             spacing=mesh.spacing,
         )
 

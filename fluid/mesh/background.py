@@ -26,6 +26,8 @@ MOST_SLENDER = 2.5
 """Longest over shortest edge of a cell, 1.73 in a split cube, up to which its volume goes through upright borders."""
 SAME_SIZE = 1e-9
 """Difference of sizes over the spacing that is round-off."""
+ALONG = 1e-9
+"""Largest 1 - |n·e| of a face that lies along an axis: round-off."""
 MOST_BRICKS = 3e8
 """Of a box: the numbers of the tetrahedra of more, six a brick, pass 32 bits."""
 
@@ -125,6 +127,14 @@ class Background:
         """(m,) [m] `local_size` of the cells that hold points (m, 3) [m]; the least of all outside."""
         cell = self.locate(points)
         return np.where(cell >= 0, self.local_size[cell], self.finest)
+
+    @cached_property
+    def slanting(self) -> np.ndarray:
+        """(N,) bool: nodes of faces of the boundary that lie along no axis, as those of a bed."""
+        along = np.abs(self.boundary_normal).max(axis=1) > 1.0 - ALONG
+        found = np.zeros(len(self.nodes), bool)
+        found[self.boundary_faces[~along]] = True
+        return found
 
     @cached_property
     def finest(self) -> float:

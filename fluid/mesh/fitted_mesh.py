@@ -6,8 +6,8 @@ Layers.  The nodes of a column lie at the heights f + k dz, k = 0, 1, ..., betwe
 f is the largest function not above the bed whose slope along x and y is at most `follow`: where the bed is no
 steeper, f = b and the layers follow it, bricks as high as everywhere, only sheared; a steeper bed runs through the
 layers, and the lowest cell of each column is made 0.5 to 1.5 dz high.  So no cell is ever flatter than half a brick,
-however shallow the water: layers squeezed between bed and lid (0.13 dz at the shore of a beach of 1:20) stopped the
-pressure solver.  follow = 0 gives level layers.
+however shallow the water.  follow = 0 gives level layers.  With `thinnest` below 1 the layers are squeezed between bed
+and lid, down to that share of dz: as many over the shore as over deep water, for run-up a few cells high.
 
 Cells.  Over each triangle of the lattice a surface of one node a column climbs from the bed to the lid; every time
 it takes one column one node up, the space passed is a tetrahedron.  The column whose next edge has the lowest middle
@@ -28,8 +28,9 @@ from numba import njit
 
 from fluid.mesh.background import Background, MeshError
 
-FOLLOW = 0.5
-"""Steepest slope that layers follow: sheared bricks have dihedral angles of at most 124 degrees there."""
+FOLLOW = 0.2
+"""Steepest slope that layers follow: one in five. Cells sheared more let still water at a shore grow restless (0.01 a
+step at one in two)."""
 NEAREST = 0.5
 """Least height of a cell at bed or lid, in layers."""
 STEEPEST = 3.0
@@ -60,15 +61,22 @@ class FittedMesh:
 
 
 def fitted_mesh(
-    lower, upper, cell_size, bed, axes=None, follow: float = FOLLOW, split: str = "kuhn"
+    lower,
+    upper,
+    cell_size,
+    bed,
+    axes=None,
+    follow: float = FOLLOW,
+    split: str = "kuhn",
+    thinnest: float = 1.0,
 ) -> FittedMesh:
     """Mesh of the space between a bed and the upper side of a box.
 
     lower, upper (3,) [m]: corners of the box; the bed may lie below or above lower[2], which is not used ·
     cell_size [m], one number or (3,): wanted edges of the bricks, changed so that whole numbers fit ·
     bed(x, y) → z [m], elevation at coordinates (n,), (n,) [m] → (n,), or the elevations (nx, ny) of the columns ·
-    axes: (x, y), two increasing arrays [m] of the columns instead of even ones · follow, split: see above
-    and `bricks.py`.
+    axes: (x, y), two increasing arrays [m] of the columns instead of even ones · follow, thinnest, split:
+    see above and `bricks.py`.
 
     Raises MeshError: for a bed that is not finite, steeper than STEEPEST between two columns (with the place), or
     nowhere below the lid; for bricks more slender than MOST_SLENDER_BRICK; for extents that are not positive."""
@@ -80,14 +88,14 @@ def fitted_mesh(
         raise MeshError(f"split {split!r} of the bricks: must be one of kuhn, mirrored")
     x, y = _columns(lower, upper, size) if axes is None else (np.asarray(a, float) for a in axes)
     heights = _heights(bed, x, y)
-    lid = float(upper[2])
-    if not heights.min() < lid - NEAREST * size[2]:
+    lid, thin = float(upper[2]), thinnest * size[2]
+    if not heights.min() < lid - NEAREST * thin:
         raise MeshError(
-            f"the bed is nowhere lower than {lid - NEAREST * size[2]:g} m, half a cell below the upper side at "
+            f"the bed is nowhere lower than {lid - NEAREST * thin:g} m, half a cell below the upper side at "
             f"{lid:g} m: raise upper, or check the datum and the units of the bed"
         )
-    above = heights > lid - NEAREST * size[2]
-    lowered = np.minimum(heights, lid - size[2])
+    above = heights > lid - NEAREST * thin
+    lowered = np.minimum(heights, lid - thin)
     kept = np.where(above, lowered, heights)
     used = _used_columns(above)
     steepest, place = _steepest(kept, used, x, y)
@@ -97,11 +105,13 @@ def fitted_mesh(
             f"{STEEPEST:g} a mesh can follow it: smooth it, or make what is steeper a solid"
         )
     layer = _layer(kept[used].min(), lid, size[2])
-    _refuse_slender(x, y, layer)
     base = _envelope(np.where(used, kept, np.inf), x, y, follow)
-    columns = _Columns.of(kept, base, lid, layer, used, x, y)
+    layers = np.where(used, _squeezed(base, lid, kept[used].min(), layer, thinnest), layer)
+    _refuse_slender(x, y, layers)
+    columns = _Columns.of(kept, base, lid, layers, used, x, y)
     cells = _cells(*columns.of_cells(), ~above, split == "mirrored")
-    mesh = Background.from_arrays(columns.nodes, cells)
+    z = np.linspace(kept[used].min(), lid, round((lid - kept[used].min()) / layer) + 1)
+    mesh = Background.from_arrays(columns.nodes, cells, (x, y, z), straddling=True)
     on_bed = np.zeros(len(columns.nodes), bool)
     on_bed[columns.start[:-1][used.ravel()]] = True
     bed_face = on_bed[mesh.boundary_faces].all(axis=1)
@@ -145,7 +155,7 @@ class _Columns:
         height = np.where(rank == 0, low.ravel()[column], height)
         is_lid = rank == count[column] - 1
         height = np.where(is_lid, high.ravel()[column], height)
-        z = base.ravel()[column] + layer * height
+        z = base.ravel()[column] + layer.ravel()[column] * height
         z = np.where(rank == 0, bed.ravel()[column], np.where(is_lid, lid, z))
         nodes = np.column_stack([x[column // len(y)], y[column % len(y)], z])
         height = np.where(np.abs(height - np.rint(height)) < 1e-9, np.rint(height), height)
@@ -211,13 +221,23 @@ def _layer(lowest, lid, wanted):
     return (lid - lowest) / max(1.0, np.rint((lid - lowest) / wanted))
 
 
-def _refuse_slender(x, y, layer):
-    dx, dy = np.diff(x), np.diff(y)
-    shortest, longest = min(dx.min(), dy.min(), layer), max(dx.max(), dy.max(), layer)
-    if longest > MOST_SLENDER_BRICK * shortest:
+def _squeezed(base, lid, lowest, layer, thinnest):
+    """Heights (nx, ny) [m] of the layers over each column."""
+    count = np.rint((lid - lowest) / layer)
+    return np.clip((lid - base) / count, thinnest * layer, layer)
+
+
+def _refuse_slender(x, y, layers):
+    """Bricks too slender anywhere; layers (nx, ny) [m]."""
+    dx, dy = np.meshgrid(np.diff(x), np.diff(y), indexing="ij")
+    dz = [layers[i : i + len(x) - 1, j : j + len(y) - 1] for i in (0, 1) for j in (0, 1)]
+    edges = np.array([dx, dy, *dz])
+    ratio = edges.max(axis=0) / edges.min(axis=0)
+    i, j = np.unravel_index(ratio.argmax(), ratio.shape)
+    if ratio[i, j] > MOST_SLENDER_BRICK:
         raise MeshError(
-            f"bricks of {dx.max():.3g} x {dy.max():.3g} x {layer:.3g} m are more slender than "
-            f"{MOST_SLENDER_BRICK:g} to 1: choose cell sizes that are more alike"
+            f"bricks of {dx[i, j]:.3g} x {dy[i, j]:.3g} x {edges[2:, i, j].min():.3g} m at ({x[i]:.4g}, {y[j]:.4g}) m "
+            f"are more slender than {MOST_SLENDER_BRICK:g} to 1: choose cell sizes that are more alike"
         )
 
 

@@ -38,6 +38,9 @@ WATERLINE_DAMPING, WATERLINE_DEPTH = 0.5, 1.0
 """c of `damp_waterline` in calm water, and how far below the surface it acts (in cell sizes). Noise on a slope of 1:20
 grows by 0.03 a step without, and not with 0.5. Less in faster water, none where it crosses a cell in a step: there it
 would take what is real."""
+AT_REST = (0.002, 0.01)
+"""Speeds in √(g h) between which the damping along water lines on slanting sides of the mesh, a bed, ends: at full
+strength it takes a tenth of the run-up of a wave (P42), and what is to be kept still is far slower."""
 KINK_DAMPING, KINK_DEPTH, SURFACE_DAMPING = 1.0 / 8.0, 2.0, 0.025
 """On meshes with obtuse cells, in calm water: c of `damp_kinks` and how far below the surface it acts (cells of the
 surface reach 1.6 cell sizes down), and c of `damp_waterline` along the whole surface, for cells not wholly wet."""
@@ -216,11 +219,22 @@ def _damp_surface(water, kept, u) -> None:
         damp_waterline(list_, weight * calm, *level, where, deep, u, t.cells, t.volume, kept.wet_share)
 
     even_out(WATERLINE_DAMPING, t.beside_solid)
+    if t.slanting.any():
+        even_out(WATERLINE_DAMPING * _hardly_moving(water, u)[:, None], t.slanting)
     if t.is_obtuse:
         mesh = (t.cells, t.parent, t.gradients, t.volume, t.neighbours)
         beside = np.where(t.near_obtuse, wet[1], -np.inf)
         damp_kinks(wet[0], beside, wet[2], KINK_DAMPING * calm, -KINK_DEPTH * h, u, *mesh)
         even_out(SURFACE_DAMPING, t.near_obtuse)
+
+
+def _hardly_moving(water, u):
+    """(N,): 1 where the velocity u (N, 3) [m/s] is next to nothing beside the shallow wave of one cell, 0 where it is
+    more than that."""
+    celerity = np.sqrt(water.parameters.gravity * water.topology.node_size)
+    share = np.sqrt((u * u).sum(axis=1)) / np.maximum(celerity, 1e-300)
+    low, high = AT_REST
+    return np.clip((high - share) / (high - low), 0.0, 1.0)
 
 
 def _limit_speed(water, u, a) -> int:

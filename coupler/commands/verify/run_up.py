@@ -1,4 +1,4 @@
-"""Run-up of a solitary wave on a plane beach that cuts the cells (Synolakis)."""
+"""Run-up of a solitary wave on a plane beach that cuts the cells, or on which the mesh ends (Synolakis)."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from coupler.run.clock import Clock
 from coupler.step.coupled_step import CoupledStepper
 from coupler.step.immersion import Immersion
 from fluid.mesh.background import box_mesh
+from fluid.mesh.fitted_mesh import fitted_mesh
 from fluid.readings import gauges
 from fluid.sides.inflow import Side, Sides
 from fluid.sides.waves import SolitaryWave
@@ -31,6 +32,9 @@ CELLS, STRETCH = 24, 2
 """Cells over the depth, and length of a cell over its height."""
 FILM = 0.1
 """Height over the beach at which it counts as wet, in cells: the experiment saw the tip of the water."""
+LAYERS, THINNEST, FLATTEST, LONGEST = 8, 0.2, 4.0, 0.25
+"""Of the mesh that fits the bed: layers between bed and lid, least height of one over that in deep water, length of a
+cell over its height, and its largest length in depths."""
 REST = 2.0
 """[s] over which still water is watched."""
 
@@ -55,6 +59,10 @@ def run_up():
     run = _beach(_end())
     yield Finding("largest run-up R/d at H/d = 0.0185", float(run.R.max()), exact, 0.10)
     yield from run.losses.findings()
+    on_bed = _on_bed(_end())
+    yield Finding(
+        f"the same on a mesh that fits the bed, {LAYERS} layers", float(on_bed.R.max()), exact, 0.10
+    )
     lab = columns("synolakis_runup_lab")
     heights = np.geomspace(0.005, 0.05, 40)
     law = 2.831 * np.sqrt(SLOPE) * heights**1.25
@@ -66,6 +74,7 @@ def run_up():
     line = (
         Curve("largest of the law", "exact", run.t[[0, -1]], np.full(2, exact)),
         Curve(f"computed, cells d/{CELLS}", "computed", run.t, run.R),
+        Curve(f"computed, {LAYERS} layers over the bed", "other", on_bed.t, on_bed.R),
     )
     panels = (
         Panel("time $t\\sqrt{g/d}$ [–]", "height of the water line $R/d$ [–]", line),
@@ -86,13 +95,44 @@ def _beach(until: float, waves: bool = True) -> RunUp:
     length = np.round((FLAT + SLOPE * (1.0 + 0.8 * ABOVE)) / dx) * dx
     mesh = box_mesh(np.zeros(3), [length, 2 * dx, 1.0 + ABOVE], [dx, dx, 1.0 / CELLS])
     immersion = Immersion(mesh, None, [_ramp(length + 1.0, 2 * dx)], "single")
+    return _run(until, waves, mesh, immersion, FILM / CELLS)
+
+
+def _on_bed(until: float) -> RunUp:
+    """The same slice on columns of LAYERS cells from the bed to the lid, shorter and flatter towards the shore."""
+    lid = 1.0 + ABOVE
+    layer = lid / LAYERS
+    x = _columns(FLAT + SLOPE * (1.0 + 0.8 * ABOVE), lid, layer)
+    width = layer * THINNEST * FLATTEST
+    upper, across = [x[-1], 2 * width, lid], np.array([0.0, width, 2 * width])
+    fitted = fitted_mesh(np.zeros(3), upper, layer, _bed, axes=(x, across), thinnest=THINNEST)
+    immersion = Immersion(fitted.mesh, None, [], "single")
+    return _run(until, True, fitted.mesh, immersion, FILM * THINNEST * layer)
+
+
+def _bed(x, _):
+    return np.maximum(0.0, (x - FLAT) / SLOPE)
+
+
+def _columns(length: float, lid: float, layer: float):
+    """Coordinates of columns as far from each other as FLATTEST times the height of their cells, LONGEST at most."""
+    at = np.linspace(0.0, length, 20001)
+    size = np.minimum(FLATTEST * np.clip((lid - _bed(at, 0.0)) / LAYERS, THINNEST * layer, layer), LONGEST)
+    passed = np.concatenate([[0.0], np.cumsum(np.diff(at) / (0.5 * (size[1:] + size[:-1])))])
+    x = np.interp(np.linspace(0.0, passed[-1], int(np.rint(passed[-1])) + 1), passed, at)
+    x[-1] = length
+    return x
+
+
+def _run(until: float, waves: bool, mesh, immersion, film: float) -> RunUp:
+    """Water of the depth 1 m in a slice, with or without the wave; film [m] over the beach from which it is wet."""
     sides = Sides([Side.of(mesh, lambda normal, _: normal[:, 0] < -0.5, _wave())]) if waves else None
     settings = WaterParameters(density=DENSITY, gravity=G)
     water = Water(mesh, immersion.domain, lambda x: x[:, 2] - 1.0, settings, None, None, sides)
     c = CoupledStepper(water, None, immersion, rtol=1e-7, step_max=1.0, clock=Clock())
-    x = np.linspace(FLAT + 0.8 * SLOPE, length - 1e-6, 2000)
+    x = np.linspace(FLAT + 0.8 * SLOPE, mesh.bounds[1, 0] - 1e-6, 2000)
     bed = (x - FLAT) / SLOPE
-    line = np.column_stack([x, np.full_like(x, dx), bed + FILM / CELLS])
+    line = np.column_stack([x, np.full_like(x, 0.5 * mesh.bounds[1, 1]), bed + film])
     t, R, losses = [0.0], [0.0], Losses(water)
     while c.time < until:
         c.step(water.stable_step())
