@@ -83,3 +83,24 @@ def test_what_was_gathered_goes_into_checkpoints_and_files(flood, tmp_path):
     grid = read_grid(tmp_path / "maps" / "bed.asc")
     np.testing.assert_allclose(grid.x, 500.0 + maps.fitted.column_x)
     np.testing.assert_allclose(grid.z, maps.fitted.bed, rtol=1e-3, atol=1e-4)
+
+
+def test_row_of_a_building_has_the_flood_around_it_and_its_walls_in_the_order_of_their_breaks(flood):
+    from types import SimpleNamespace
+
+    from coupler.results.buildings_table import _around, _walls
+
+    water, maps = flood
+    water.level_set[:] = water.topology.nodes[:, 2] - 0.9
+    water.velocity[:] = (2.0, 0.0, 0.0)
+    maps.step(water, 0.75)
+    facts = SimpleNamespace(lower=np.array([[11.2, 3.2, 0.0]]), upper=np.array([[12.8, 4.8, 2.0]]))
+    depth, speed, flux, arrival = _around(maps, SimpleNamespace(facts=facts), np.array([0]))
+    X, Y = maps.fitted.column_x, maps.fitted.column_y
+    near = ((X > 9.6) & (X < 14.4))[:, None] & ((Y > 1.6) & (Y < 6.4))
+    assert depth == maps.depth.reshape(near.shape)[near].max()
+    assert (speed, arrival) == (pytest.approx(2.0), 0.75)
+    assert flux == pytest.approx(4.0 * depth)
+    broken = [("h-wall0x-", 2, 3.0), ("h-roof0", 1, 1.5), ("h-wall0y+", 0, 9.0), ("hut-wall0x-", 5, 0.1)]
+    members = [{"name": n, "joints": 7, "joints_broken": k, "first_break": {"time": t}} for n, k, t in broken]
+    assert _walls("h", members) == "roof0 1/7 wall0x- 2/7"
