@@ -505,12 +505,13 @@ class Water:
     def energy_through_sides(self) -> float:
         """Energy [J] that came in through inflows and seas, less what left, at the time of the velocity.
 
-        The water that a pressure sets in motion moves in the next step; what the pressure of the sides has done for it
-        by now is missing in what they brought, as the fall of the surface is in `potential_energy`."""
+        The water that the pressure of a sea sets in motion moves in the next step; what that pressure has done for it
+        by now is missing in what the sea brought, as the fall of the surface is in `potential_energy`. An inflow brings
+        its own in every step."""
         if self.sides is None:
             return 0.0
-        rate = sum(side.rate(self.level_set, self.velocity) for side in self.sides.now)
-        return self.sides.energy + self._surface_lag * float(rate @ self.pressure)
+        seas = [side.rate(self.level_set, self.velocity) for side in self.sides.now if side.is_sea]
+        return self.sides.energy + self._surface_lag * sum(float(rate @ self.pressure) for rate in seas)
 
     def air_energy(self) -> float:
         """What the water can get back from trapped air, and what of it was lost so far [J]; 0 without any."""
