@@ -100,3 +100,16 @@ def test_a_ramp_reaches_the_structure(tmp_path):
     text = case_text(structure='start = "ramp"\nramp = "2 s"')
     with build_structure(load(write(tmp_path, text)).case) as s:
         assert np.abs(s.weight_now()).max() == 0.0
+
+
+def test_what_lies_on_a_joined_block_without_a_joint_rests_there_from_the_start(tmp_path):
+    """A house that stands on footings glued to the ground, but is not glued to them, must not fall through them until
+    it has left its place."""
+    third = '[[structure.block]]\nname = "top"\ncentre = [0, 0, 2.5]\nsize = [1, 1, 1]\n[contact]'
+    pair = '[[joints.pair]]\nbetween = ["low", "high"]\njoined = false'
+    text = case_text(pair, 'start = "sudden"').replace("[contact]", third)
+    with build_structure(load(write(tmp_path, text)).case) as s:
+        weight = 9.81 * s.mass[1:].sum()
+        s.advance(0.02)
+        sunk = 1.5 - s.centre()[1, 2]
+        assert 0.0 < sunk < 4.0 * weight / 1e9

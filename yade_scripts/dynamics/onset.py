@@ -1,8 +1,9 @@
 """Where contact sets in: which blocks are loose.
 
 Two blocks with a live joint do not meet: the joint carries them, in compression too. When it fails, contact goes on
-with the depth there is. Other pairs meet as soon as one of them is loose: it has lost a joint, moves on its own, or has
-left its place. So most of a building costs no contact at all before it is hit. Fixed planes meet all blocks.
+with the depth there is. Other pairs meet as soon as one of them is loose: it has lost a joint, moves on its own, lies
+on another without one (`joints.pair`), or has left its place. So most of a building costs no contact at all before it
+is hit. Fixed planes meet all blocks.
 """
 
 from __future__ import annotations

@@ -111,6 +111,7 @@ class Structure(StructureReadings):
         self._contacts = self._contact_forces(local, local_planes)
         loose = loose_at_start(blocks, self.joints)
         loose[[row for row in faces.held_rows if not moves(blocks[row])]] = False
+        loose[faces.resting_rows] = True  # contact carries them from the start
         self._onset = ContactOnset(
             self._scene, self._motion, self.joints, self._contacts, self._radius, loose
         )
@@ -388,21 +389,22 @@ def _materials(blocks, planes, face: TouchingFaces) -> tuple[str, str]:
 @dataclass(frozen=True)
 class _Faces:
     """Touching faces: those that get a joint, those that only keep water out, those that get a share of its pressure,
-    and blocks held at others that are held."""
+    blocks held at others that are held, and blocks that rest on others without a joint."""
 
     joined: list[TouchingFaces]
     laws: list[JointParameters]
     sealed: list[TouchingFaces]
     partly: list[tuple[TouchingFaces, float]]
     held_rows: list[int]
+    resting_rows: list[int]
 
     @classmethod
     def of(cls, blocks, planes, rules: JointRules | None, contact: ContactLaw | None) -> _Faces:
         if rules is None and (contact is None or not contact.keeps_water_out):
-            return cls([], [], [], [], [])
+            return cls([], [], [], [], [], [])
         faces = touching_faces(blocks, planes)
         laws = [None] * len(faces) if rules is None else rules.of_faces(faces, blocks, planes)
-        joined, sealed, partly, held_rows = [], [], [], set()
+        joined, sealed, partly, held_rows, resting = [], [], [], set(), set()
         for face, law in zip(faces, laws):
             held = both_held(blocks, face)
             uplift = 1.0 if contact is None else contact.uplift_between(*_materials(blocks, planes, face))
@@ -412,9 +414,18 @@ class _Faces:
                 sealed.append(face)
             elif uplift < 1.0:
                 partly.append((face, uplift))
-            held_rows.update(row for row in (face.a, face.b) if row >= 0 and law is not None and held)
+            rows = [row for row in (face.a, face.b) if row >= 0]
+            if law is not None and held:
+                held_rows.update(rows)
+            elif law is None and len(rows) == 2:
+                resting.update(rows)
         return cls(
-            [face for face, _ in joined], [law for _, law in joined], sealed, partly, sorted(held_rows)
+            [face for face, _ in joined],
+            [law for _, law in joined],
+            sealed,
+            partly,
+            sorted(held_rows),
+            sorted(resting),
         )
 
     def joints(self, blocks, rules: JointRules | None) -> Joints | None:
