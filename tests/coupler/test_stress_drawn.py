@@ -27,8 +27,7 @@ from coupler.run.execute import carry_out
 from coupler.step.limits import Diverged, check_overlap
 
 SEED = 2
-NUMBERS = (*range(3), *range(4, 21))
-"""Scene 3 has wide openings only: its momentum does not close at thin walls."""
+NUMBERS = range(20)
 SHORT = 0.4
 """[CPU s] that a scene is sized for here."""
 
