@@ -201,15 +201,23 @@ def render(context: typer.Context) -> None:
 
 @app.command()
 def report(
-    place: Annotated[Path, typer.Argument(metavar="RUN|STUDY", help="the directory of a run or of a study")],
+    place: Annotated[
+        Path, typer.Argument(metavar="RUN|STUDY|SWEEP", help="the directory of a run, a study or a sweep")
+    ],
     pictures: Annotated[
         bool, typer.Option("--pictures/--no-pictures", help="with stills and figures of a run")
     ] = True,
 ) -> None:
-    """Write one HTML page about a run or a study.
+    """Write one HTML page about a run, a study or a sweep.
 
     report.html in the directory: pictures, figures and tables in one file, for screen and paper.
     """
+    if (place / "sweep.json").is_file():
+        from coupler.commands.sweep.command import finish
+        from coupler.commands.sweep.folder import read_spec
+
+        finish(read_spec(place), stopped=False)
+        return
     from coupler.commands.report.command import report as write
 
     print(f"report: {write(place, pictures)}")

@@ -90,7 +90,7 @@ def sweep(case: Path, wish: Wish) -> ExitCode:
         return ExitCode.DONE
     with _alone(folder):
         stopped = _make(spec, wish)
-    return _finish(spec, stopped)
+    return finish(spec, stopped)
 
 
 def _check(wish: Wish) -> None:
@@ -223,8 +223,8 @@ def _show(plan: Plan) -> None:
         print("  ".join(cell.rjust(width) for cell, width in zip(line, widths)))
 
 
-def _finish(spec: Spec, stopped: bool) -> ExitCode:
-    """Tables, curves, report, and the exit code."""
+def finish(spec: Spec, stopped: bool) -> ExitCode:
+    """Write tables, curves and report of what has ended by now; the exit code."""
     results = collect(spec)
     for path in write_tables(spec, results):
         print(f"table: {path}")
