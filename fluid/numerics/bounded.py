@@ -5,9 +5,9 @@
 Where x lies above its bound the mass balance A x = b holds; where it is at the bound, A x - b [m³/s] is the rate at
 which the water parts there, from itself or from a wall.  For a symmetric positive definite A there is one solution.
 It is found by block principal pivoting: solve with the unknowns of a set held at their bound, exchange all that
-have the wrong sign, repeat; where that does not lessen their number for some rounds, one at a time (the last one),
-which ends after finitely many rounds (Murty's rule; Judice and Pires, Comput. Oper. Res. 21 (1994) 587).  With the
-set of the step before it takes one to three rounds.
+have the wrong sign, repeat; where that does not lessen their number for some rounds, one at a time for a while (the last
+one, which alone would end after finitely many rounds: Murty's rule; Judice and Pires, Comput. Oper. Res. 21 (1994) 587).
+With the set of the step before it takes one to three rounds.
 """
 
 from __future__ import annotations
@@ -30,6 +30,9 @@ REACH = 8
 """Cells that air goes on within a step: it is faster than any water."""
 PATIENCE = 5
 """Rounds without fewer wrong signs after which single unknowns are exchanged."""
+SINGLES = 10
+"""Single exchanges after which all that are wrong are tried again: the first rounds, loosely solved, may have shown few
+of them, and hundreds of single ones would be needed to come below that."""
 MOST_ROUNDS = 100
 
 
@@ -169,7 +172,7 @@ class _Signs:
     """Which unknowns have the wrong sign, and which of them to exchange."""
 
     def __init__(self, lower):
-        self.lower, self.fewest, self.patience = lower, len(lower) + 1, PATIENCE
+        self.lower, self.fewest, self.patience, self.singles = lower, len(lower) + 1, PATIENCE, 0
 
     def _below(self, x, held, share: float):
         return ~held & (x < self.lower - share * np.abs(x).max(initial=0.0))
@@ -186,9 +189,10 @@ class _Signs:
     def exchanged(self, held, wrong):
         """The next set (n,) bool."""
         count = int(wrong.sum())
-        if count < self.fewest:
-            self.fewest, self.patience = count, PATIENCE
+        if count < self.fewest or self.singles == SINGLES:
+            self.fewest, self.patience, self.singles = count, PATIENCE, 0
         elif self.patience == 0:
+            self.singles += 1
             last = np.flatnonzero(wrong)[-1]
             wrong = np.zeros(len(held), bool)
             wrong[last] = True
