@@ -5,9 +5,9 @@
 Where x lies above its bound the mass balance A x = b holds; where it is at the bound, A x - b [m³/s] is the rate at
 which the water parts there, from itself or from a wall.  For a symmetric positive definite A there is one solution.
 It is found by block principal pivoting: solve with the unknowns of a set held at their bound, exchange all that
-have the wrong sign, repeat; where that does not lessen their number for some rounds, one at a time for a while (the last
-one, which alone would end after finitely many rounds: Murty's rule; Judice and Pires, Comput. Oper. Res. 21 (1994) 587).
-With the set of the step before it takes one to three rounds.
+have the wrong sign, repeat; where that does not lessen their number for some rounds, one at a time for a while (the
+last one, which alone would end after finitely many rounds: Murty's rule; Judice and Pires, Comput. Oper. Res. 21
+(1994) 587).  With the set of the step before it takes one to three rounds.
 """
 
 from __future__ import annotations
