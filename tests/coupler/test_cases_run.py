@@ -12,7 +12,7 @@ from tests.coupler.test_cases import CASES
 
 LONG = {
     "beam_bent", "bore_on_pier", "dam_break_box", "dam_break_building", "floating_box", "house_from_file",
-    "house_lifted", "lobovsky_wall", "rubble_drop",
+    "house_lifted", "lobovsky_wall", "rubble_drop", "tsunami_town",
 }  # fmt: skip
 """More than a dozen processor seconds each."""
 
