@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import tempfile
 import tomllib
 from pathlib import Path
@@ -35,13 +36,21 @@ def show(place: Path, sets: list[str], picture: Path | None) -> None:
         print(f"map: {picture}")
 
 
+def _title(run: Path) -> str:
+    """Title of the case of a run; the name of its directory where it has none to read."""
+    try:
+        return str(json.loads((run / "effective.json").read_text(encoding="utf-8"))["case"]["title"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return run.name
+
+
 def _show_flood(run: Path, picture: Path | None) -> None:
     """Names of the maps of a run, and all of them in one picture, with the buildings by their state."""
     for path in sorted((run / "maps").glob("*.asc")):
         print(path)
     if picture is not None:
         done = run_module(
-            "coupler.commands.view.flood_map", run, picture, run.name, capture_output=True, text=True
+            "coupler.commands.view.flood_map", run, picture, _title(run), capture_output=True, text=True
         )
         if done.returncode != 0:
             raise TerrainError(f"no map: {trouble(done.returncode, done.stderr)}")
