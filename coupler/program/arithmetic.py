@@ -38,7 +38,7 @@ _too_late: list[str] = []
 def fix_arithmetic(environment: MutableMapping[str, str] = os.environ) -> None:
     """Set the variables above that are not set; the instruction set where the processor has it."""
     settings = ONE_THREAD if missing() else ONE_THREAD | ONE_INSTRUCTION_SET
-    if any(name not in environment for name in settings):
+    if environment is os.environ and any(name not in environment for name in settings):
         _too_late[:] = [name for name in ("numpy", "numba") if name in sys.modules]
     for name, value in settings.items():
         environment.setdefault(name, value)

@@ -54,8 +54,9 @@ def test_all_extras_are_here_and_are_those_of_pyproject():
     import tomllib
 
     declared = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    assert set(extras.EXTRAS) == set(extras.COMMANDS) == set(declared["optional-dependencies"])
-    assert not any(extras.missing(extra) for extra in extras.EXTRAS)
+    assert set(extras.COMMANDS) < set(extras.EXTRAS) == set(declared["optional-dependencies"])
+    of_the_tests = ("view", "benchmark", "drawing", "pandas", "docs", "test")
+    assert not any(extras.missing(extra) for extra in of_the_tests)
 
 
 def test_a_benchmark_without_its_solvers_is_refused_before_it_measures(monkeypatch):

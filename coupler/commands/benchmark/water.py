@@ -14,25 +14,25 @@ STEPS = 8
 BEFORE = 0.35
 """Seconds of the dam break before the steps that are measured."""
 STAGES = {
-    "transport": (("predictor", "transport"),),
-    "distance": (("predictor", "redistance"),),
+    "transport": (("step.predictor", "transport"),),
+    "distance": (("step.predictor", "redistance"),),
     "volume": (
-        ("surface_momentum", "carry_volume"),
-        ("surface_momentum", "_jumps"),
-        ("surface_momentum", "_pass_on"),
-        ("predictor", "correct_volume"),
-        ("corrector", "edge_flux"),
+        ("transport.surface_momentum", "carry_volume"),
+        ("transport.surface_momentum", "_jumps"),
+        ("transport.surface_momentum", "_pass_on"),
+        ("step.predictor", "correct_volume"),
+        ("step.corrector", "edge_flux"),
     ),
-    "pressure matrix": (("predictor", "_problem"),),
-    "solver, set-up": (("solve", "Multigrid"),),
-    "solver, iterations": (("bounded", "solve_bounded"),),
+    "pressure matrix": (("step.predictor", "_problem"),),
+    "solver, set-up": (("numerics.solve", "Multigrid"),),
+    "solver, iterations": (("numerics.bounded", "solve_bounded"),),
     "correction": (
-        ("corrector", "_projected"),
-        ("corrector", "_remainders"),
-        ("corrector", "_limit_and_damp"),
+        ("step.corrector", "_projected"),
+        ("step.corrector", "_remainders"),
+        ("step.corrector", "_limit_and_damp"),
     ),
-    "continuation": (("corrector", "extend_velocity"),),
-    "accounts": (("corrector", "momentum_change"), ("corrector", "_report")),
+    "continuation": (("step.corrector", "extend_velocity"),),
+    "accounts": (("step.corrector", "momentum_change"), ("step.corrector", "_report")),
 }
 """Stage → functions of `fluid` that it consists of, without what they call of another stage."""
 
