@@ -1,12 +1,20 @@
 """One thread, one instruction set and the kernel cache of the present sources, before anything imports numpy, numba or
 YADE; what needs VTK first, since it cannot be imported any more once YADE is."""
 
+import signal
+
 import pytest
 from hypothesis import HealthCheck, settings
 
 from coupler.program.start import one_thread
 
 one_thread()
+
+# under nohup, or as a background job of a script, these are ignored, and so by the runs that tests start
+for number, usual in ((signal.SIGHUP, signal.SIG_DFL), (signal.SIGINT, signal.default_int_handler)):
+    if signal.getsignal(number) is signal.SIG_IGN:
+        signal.signal(number, usual)
+
 settings.register_profile("any machine", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("any machine")  # a busy machine is no fault of the scenes drawn
 
