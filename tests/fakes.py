@@ -2,6 +2,7 @@
 
 from contextlib import contextmanager
 from dataclasses import dataclass
+from types import SimpleNamespace
 
 import numpy as np
 import scipy.sparse as sp
@@ -92,6 +93,7 @@ class FreeBody:
         ]
         self.mass = np.array([density * np.prod(size)])
         self.fixed = np.array([False])
+        self.blocks = [SimpleNamespace(fixed=False)]
         self._g = np.array([0, 0, -gravity])
         self._x, self._v = np.array([centre], float), np.zeros((1, 6))
         self._load, self._work = np.zeros((1, 6)), 0.0
@@ -99,6 +101,10 @@ class FreeBody:
     @classmethod
     def cube(cls, side, centre, density, gravity):
         return cls((side, side, side), centre, density, gravity)
+
+    def uplift_shares(self):
+        """The water has all of its faces."""
+        return np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0)
 
     def centre(self):
         return self._x.copy()

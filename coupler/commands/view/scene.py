@@ -81,10 +81,11 @@ class Scene:
         )  # fmt: skip
         lettered(text.prop)
         caption = self.plotter.add_text(
-            self.caption, name="caption", position=(0.985 - 0.0052 * self.letters * len(self.caption), 0.012),
+            self.caption, name="caption", position=(0.985, 0.012),
             viewport=True, font_size=self._points(7), color=palette.TANK, render=False,
         )  # fmt: skip
         lettered(caption.prop)
+        caption.prop.justification_horizontal = "right"
 
     def _set_lights(self):
         """One sun, a weak light from the right and one from the camera: soft, and no face is black."""
