@@ -151,6 +151,19 @@ def test_calm_ends_with_the_first_break_or_some_time_after_the_water():
 in_browser = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium is installed")
 
 
+def asked(page) -> None:
+    """Press s on the second run until it asks: a page that is drawn anew in between has lost the focus."""
+
+    def ask():
+        if page.value("document.getElementById('ask').open"):
+            return True
+        page.value("document.querySelectorAll('article')[1].focus()")
+        page.key("s")
+        return None
+
+    Browser.wait(ask)
+
+
 @in_browser
 def test_keys_and_the_confirmation_of_a_stop(tmp_path, sleeper):
     """j goes to the next run, s asks, one button lets it be, one stops it; a phone needs no sideways scrolling."""
@@ -167,13 +180,10 @@ def test_keys_and_the_confirmation_of_a_stop(tmp_path, sleeper):
         page.key("j")
         page.key("j")
         assert page.value("document.activeElement.id") == "run1"
-        page.key("s")
-        page.until("document.getElementById('ask').open")
+        asked(page)
         page.value("document.querySelector('dialog button[value=no]').click()")
         assert not (second / "stop").exists()
-        page.value("document.querySelectorAll('article')[1].focus()")
-        page.key("s")
-        page.until("document.getElementById('ask').open")
+        asked(page)
         page.value("document.querySelector('dialog button[value=yes]').click()")
         Browser.wait(lambda: True if (second / "stop").exists() else None)
         assert not (first / "stop").exists()
