@@ -1,6 +1,7 @@
 """Air that cannot leave (docs/theory.md, 2.6): pockets, what is in them, and how they answer the water.
 
 Loaded only where the case asks for it (`water.air`). `pockets` finds connected parts of the air and hands on what they
-hold, `gas` is the law of a pocket and of an orifice, `cushions` the rows that pockets add to the pressure of a step.
-Imports `domain` and `numerics`; the step calls it, it knows nothing of the step.
+hold, `gas` is the law of a pocket and of an orifice, `cushions` the rows that pockets add to the pressure of a step,
+`leaks` the ways out that the mesh does not see.
+Imports `domain` and `pressure`; the step calls it, it knows nothing of the step.
 """

@@ -36,7 +36,7 @@ RESOLVED, SETTLING = 0.5, 1.0
 """θ_k of (2)."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Air:
     """What the pockets hold between two steps. K pockets, numbered as their labels.
 
@@ -67,16 +67,15 @@ class Air:
         reference = volumes(topology, phi, label, count)
         small = reference < gas.smallest * bricks(topology, label, count)
         (label, count), reference = without(label, small), reference[~small]
-        nothing = np.zeros(count)
         return cls(
-            gas,
-            label,
-            reference,
-            nothing,
-            nothing.copy(),
-            nothing.copy(),
-            np.ones(count, bool),
-            1 + np.arange(count),
+            gas=gas,
+            label=label,
+            reference=reference,
+            rate=np.zeros(count),
+            end_pressure=np.zeros(count),
+            mean_pressure=np.zeros(count),
+            turned=np.ones(count, bool),
+            name=1 + np.arange(count),
             names=count,
         )
 
@@ -108,7 +107,7 @@ class Air:
         return out
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Cushions:
     """The pockets of a step; K of them.
 
@@ -155,7 +154,8 @@ class Cushions:
             gone=air.gone + int(descent.gone.sum()),
         )
         theta = np.where(now.turned, SETTLING, RESOLVED)
-        return cls(now, pressure, gas.stiffness(reference, volume), theta)
+        stiffness = gas.stiffness(reference, volume)
+        return cls(air=now, pressure=pressure, stiffness=stiffness, theta=theta)
 
     def __len__(self) -> int:
         return len(self.pressure)

@@ -12,9 +12,7 @@ import numpy as np
 
 from fluid.air.pockets import OPEN_AIR
 from fluid.domain.point_location import Places
-
-DISCHARGE = 0.6
-"""C_d of a sharp opening."""
+from fluid.pressure.slits import DISCHARGE
 
 
 @dataclass(frozen=True)

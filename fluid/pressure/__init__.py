@@ -6,6 +6,7 @@ indefinite_cells        obtuse cells at the surface that would make the matrix i
 pressure_bound          how far the pressure may fall: to that of the air, to vapour pressure elsewhere
 waterline               the load on solids where the surface passes through their cells
 slits                   cracks narrower than the mesh, as conductances
+films                   water under blocks that hands on the pressure of its rim
 
 Imports `domain` and the chapters below it, never a step.
 """

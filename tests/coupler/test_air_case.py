@@ -7,7 +7,6 @@ import sys
 import numpy as np
 import pytest
 
-from coupler.program.errors import SurgebreakError
 from coupler.run.run import described_air
 from coupler.scene.build import build
 from coupler.step.limits import Diverged, check_air
@@ -63,7 +62,6 @@ def test_a_gauge_reads_the_pocket_and_the_books_hold_its_energy():
     assert record.balance.energy_error < 0.02
     assert record.momentum.error < 1e-10
     assert "one pocket of 0.32 m3" in described_air(build(found, no_clock).coupling.water)
-    assert issubclass(Diverged, SurgebreakError)
     with pytest.raises(Diverged, match=r"a pocket of trapped air between .* \(limits.air_pressure\).*vent"):
         check_air(0.3, coupling.water, 1e-9)
 
