@@ -3,7 +3,9 @@
 #   docker run --rm -it -v "$PWD:/work" --entrypoint bash surgebreak
 FROM debian:bookworm-slim
 
-# The packages first: they change less often than the program.
+# The packages first: they change less often than the program. Without their versions: Debian keeps only the newest
+# version of each package of a release, so that a pinned one cannot be installed any more after its next correction.
+# hadolint ignore=DL3008
 RUN apt-get update -q \
     && DEBIAN_FRONTEND=noninteractive apt-get install -q -y --no-install-recommends yade python3-venv git \
     && rm -rf /var/lib/apt/lists/*
