@@ -163,7 +163,7 @@ class WaterStep:
         change, n = water.report.momentum, len(free)
         centre = water.domain.body_centre
 
-        def told(rows: Array) -> Array:
+        def about_point(rows: Array) -> Array:
             return dt * about(water.reference, load[rows], centre[rows])
 
         is_free = np.append(free, np.zeros(len(load) - n, bool))
@@ -171,10 +171,14 @@ class WaterStep:
         is_solid = np.arange(len(load)) >= n
         own = change.lines
         lines = {name: own[name] for name in ("tank", "tank_shear", "sides", "openings", "air", *NUMERICAL)}
-        lines |= {"water_weight": own["weight"], "solids": -told(is_solid), "held_blocks": -told(is_held)}
+        lines |= {
+            "water_weight": own["weight"],
+            "solids": -about_point(is_solid),
+            "held_blocks": -about_point(is_held),
+        }
         acting = [own[name][:3] for name in ("weight", "tank", "tank_shear", "sides", "openings", "air")]
         exchanged = sum(np.linalg.norm(a) for a in acting) + dt * np.linalg.norm(load[:, :3], axis=1).sum()
-        return cls(change, lines, told(is_free), float(exchanged))
+        return cls(change, lines, about_point(is_free), float(exchanged))
 
 
 @dataclass(frozen=True, kw_only=True)

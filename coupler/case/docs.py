@@ -37,11 +37,13 @@ def explanation(name: str | None) -> str:
         return "\n".join(
             [f"'{name}' is no name of a case file; perhaps one of these is meant:", *map(_entry, found)]
         )
-    told = [_entry(key)]
+    entries = [_entry(key)]
     for section in key.sections:
-        told += ["", inspect.getdoc(section) or ""]
-        told += [f"  {_entry(inner)}" for inner in keys(section, f"{key.path}.") if _depth(inner, key) == 1]
-    return "\n".join(told)
+        entries += ["", inspect.getdoc(section) or ""]
+        entries += [
+            f"  {_entry(inner)}" for inner in keys(section, f"{key.path}.") if _depth(inner, key) == 1
+        ]
+    return "\n".join(entries)
 
 
 WORDS = {
@@ -89,8 +91,8 @@ def meant(word: str) -> list[Key]:
     plain = word.lower().rstrip("s") if word.lower() not in WORDS else word.lower()
     asked = [known[path] for path in WORDS.get(plain, ()) if path in known]
     ends = [key for path, key in known.items() if path.rsplit(".", 1)[-1] == plain]
-    told = [key for key in known.values() if len(plain) > 3 and plain in key.description.lower()]
-    return list({key.path: key for key in [*asked, *ends, *told]}.values())[:MOST_MEANT]
+    entries = [key for key in known.values() if len(plain) > 3 and plain in key.description.lower()]
+    return list({key.path: key for key in [*asked, *ends, *entries]}.values())[:MOST_MEANT]
 
 
 def _near(name: str) -> str:
@@ -107,8 +109,8 @@ def _entry(key: Key) -> str:
     """joints.strength [Pa] (> 0; required; for instance "0.5 MPa"): what it is."""
     unit = f" [{key.unit}]" if key.unit else ""
     facts = [key.limits, _default(key), f"for instance {key.example}" if key.example else ""]
-    told = "; ".join(fact for fact in facts if fact)
-    return f"{_header(key)}{unit}" + (f" ({told})" if told else "") + f": {key.description}"
+    entries = "; ".join(fact for fact in facts if fact)
+    return f"{_header(key)}{unit}" + (f" ({entries})" if entries else "") + f": {key.description}"
 
 
 def _header(key: Key) -> str:

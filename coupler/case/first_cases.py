@@ -40,9 +40,9 @@ DEPTH = Question("Height of the water that the surge comes from", "3 m")
 
 @dataclass(frozen=True)
 class FirstCase:
-    """told: what it is, in a line · questions by $name · derived: $names that follow · files: what is written beside"""
+    """summary: one line · questions by $name · derived: $names that follow · files: what is written beside the case"""
 
-    told: str
+    summary: str
     questions: dict[str, Question]
     derived: Callable[[dict[str, str]], dict[str, str]] = lambda answers: {}
     files: dict[str, Callable[[], str]] = field(default_factory=dict)
@@ -185,7 +185,7 @@ def write_first_case(
     ask(question, usual) gives the answers, None: the usual ones. Raises CannotBegin."""
     if name not in FIRST_CASES:
         raise CannotBegin(
-            f"--template {name}: there is none{did_you_mean(name, list(FIRST_CASES))}: {told_of_all()}"
+            f"--template {name}: there is none{did_you_mean(name, list(FIRST_CASES))}: {all_summaries()}"
         )
     path = directory / "case.toml"
     if path.exists():
@@ -232,6 +232,6 @@ def _checked(given: str, unit: str) -> str:
     return f"{number:g} {unit}".strip()
 
 
-def told_of_all() -> str:
+def all_summaries() -> str:
     """Names and what they are, for messages and help."""
-    return "; ".join(f"{name}: {first.told}" for name, first in FIRST_CASES.items())
+    return "; ".join(f"{name}: {first.summary}" for name, first in FIRST_CASES.items())

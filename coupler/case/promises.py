@@ -143,5 +143,5 @@ def _line(path: Path, error: Mapping[str, Any], lines: dict) -> str:
         return f"{where}: {shown(place)}: missing"
     if error["type"] == "value_error":
         return f"{where}: {shown(place)}: {error['ctx']['error']}"
-    told = error["msg"]
-    return f"{where}: {shown(place)}: {briefly(error['input'])}: {told[:1].lower()}{told[1:]}"
+    message = error["msg"]
+    return f"{where}: {shown(place)}: {briefly(error['input'])}: {message[:1].lower()}{message[1:]}"

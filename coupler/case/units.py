@@ -86,8 +86,8 @@ class _ForEditors:
     def __get_pydantic_json_schema__(self, core: Any, handler: Any) -> dict[str, Any]:
         """The choice of the two, around the limits of the number."""
         text = {"type": "string", "pattern": r"^\s*[-+]?(\d|\.\d)"}
-        told = f"a number in {self.unit}, or text with a unit" if self.unit else "a plain number"
-        return {"title": told, "anyOf": [handler(core), text]}
+        title = f"a number in {self.unit}, or text with a unit" if self.unit else "a plain number"
+        return {"title": title, "anyOf": [handler(core), text]}
 
 
 def to_si(value: object, unit: str) -> float:

@@ -54,9 +54,9 @@ def blocks(path: Path, options: dict, joints: dict, picture: Path | None, to: Pa
     if to is not None:
         write_bodies(to, cut)
         print(f"blocks: {to}")
-    told = missing("view")
-    if told:
-        print(f"no picture: {told}")
+    problems = missing("view")
+    if problems:
+        print(f"no picture: {problems}")
     else:
         _draw_blocks(cut, spec.name, picture)
         print(f"picture: {picture}")
@@ -83,8 +83,8 @@ def _case(path: Path, options: dict, joints: dict) -> Case:
     try:
         return Case.model_validate(table)
     except ValidationError as error:
-        told = [explain_error(item) for item in error.errors()]
-        raise BadCase([f"--{place[-1]}: {text}" for place, text in told]) from error
+        problems = [explain_error(item) for item in error.errors()]
+        raise BadCase([f"--{place[-1]}: {text}" for place, text in problems]) from error
 
 
 def _rows(cut: Cut) -> Iterable[terminal.Row]:

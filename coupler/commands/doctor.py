@@ -44,9 +44,9 @@ def examine() -> ExitCode:
 def _python() -> Finding:
     system = os.path.realpath("/usr/bin/python3")
     mine = os.path.realpath(sys.executable)
-    told = f"{sys.version.split()[0]}, surgebreak {version()}"
+    output = f"{sys.version.split()[0]}, surgebreak {version()}"
     return Finding(
-        "Python", told, mine == system,
+        "Python", output, mine == system,
         f"this is {mine}, YADE is built for {system}; remove .venv and call ./surgebreak again",
     )  # fmt: skip
 
@@ -98,10 +98,10 @@ print(json.dumps({"version": str(engine.version), "z": O.bodies[0].state.vel[2]}
 
 def _yade_run() -> Finding:
     """Ten steps of a falling sphere: v = g t."""
-    status, told = _in_process(_FALLING_SPHERE)
+    status, output = _in_process(_FALLING_SPHERE)
     if status != 0:
-        return Finding("ten steps of YADE", _last(told), False, "apt install --reinstall yade")
-    result = json.loads(told.splitlines()[-1])
+        return Finding("ten steps of YADE", _last(output), False, "apt install --reinstall yade")
+    result = json.loads(output.splitlines()[-1])
     good = abs(result["z"] + 9.81 * 0.01) < 1e-12
     return Finding(
         "ten steps of YADE", f"version {result['version']}, v = {result['z']:.6f} m/s after 10 ms", good,
@@ -156,13 +156,13 @@ def _files() -> Finding:
     """h5py writes a tetrahedron, VTK (when installed) reads it; never in one process with YADE."""
     with tempfile.TemporaryDirectory() as folder:
         path = os.path.join(folder, "one.vtkhdf")
-        status, told = _in_process(_WRITE, path)
+        status, output = _in_process(_WRITE, path)
         if status == 0 and find_spec("vtkmodules") is None:
             return Finding("result files", "written; VTK is not installed (`render` brings it)", True)
         if status == 0:
-            status, told = _in_process(_READ, path)
+            status, output = _in_process(_READ, path)
     return Finding(
-        "result files", "written by h5py, read by VTK" if status == 0 else _last(told), status == 0,
+        "result files", "written by h5py, read by VTK" if status == 0 else _last(output), status == 0,
         "h5py and VTK do not fit together; install with -c constraints.txt",
     )  # fmt: skip
 
@@ -180,9 +180,9 @@ assert len({tuple(p) for p in picture.reshape(-1, 3)}) > 2, "the picture is empt
 def _pictures() -> Finding:
     if find_spec("pyvista") is None:
         return Finding("pictures", "not installed (`render` brings what it needs)", True)
-    status, told = _in_process(_DRAW, VTK_DEFAULT_OPENGL_WINDOW="vtkEGLRenderWindow")
+    status, output = _in_process(_DRAW, VTK_DEFAULT_OPENGL_WINDOW="vtkEGLRenderWindow")
     return Finding(
-        "pictures", "drawn without a screen" if status == 0 else _last(told), status == 0,
+        "pictures", "drawn without a screen" if status == 0 else _last(output), status == 0,
         "apt install libegl1 libgl1-mesa-dri",
     )  # fmt: skip
 
@@ -206,8 +206,8 @@ def _in_process(code: str, *arguments: str, **environment: str) -> tuple[int, st
     return done.returncode, (done.stdout or done.stderr) if done.returncode == 0 else done.stderr
 
 
-def _last(told: str) -> str:
-    lines = told.strip().splitlines()
+def _last(output: str) -> str:
+    lines = output.strip().splitlines()
     return lines[-1][:200] if lines else "no output"
 
 

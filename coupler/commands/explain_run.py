@@ -163,13 +163,13 @@ def _work(summary: dict) -> list[str]:
 
 def in_words(row: Skipped, paid: float) -> str:
     """One line: how many were skipped, how many not, and what the skipped ones would have cost."""
-    told = f"{row.what}: {_count(row.skipped)} of {_count(row.skipped + row.done)} a step"
+    line = f"{row.what}: {_count(row.skipped)} of {_count(row.skipped + row.done)} a step"
     if row.what == "cells inside solids":
-        told = f"{row.what}: {_count(row.skipped)} a step"
+        line = f"{row.what}: {_count(row.skipped)} a step"
     if row.seconds is None:
-        return told + "; no estimate, the run holds no measure of one"
+        return line + "; no estimate, the run holds no measure of one"
     names = " and ".join(row.parts)
-    return told + f"; {row.how_sure} {row.seconds:.2g} s more, beside {paid:.2g} s that {names} took"
+    return line + f"; {row.how_sure} {row.seconds:.2g} s more, beside {paid:.2g} s that {names} took"
 
 
 def _count(value: float) -> str:

@@ -55,10 +55,10 @@ def _option(parameter: Any) -> tuple[str, str]:
     names = "/".join([parameter.opts[0], *parameter.secondary_opts])
     value = "" if parameter.is_flag else f" {parameter.metavar or parameter.name.upper()}"
     default = parameter.default
-    told = (
+    standard = (
         "" if parameter.is_flag or default in (None, "", ()) or callable(default) else f"; default {default}"
     )
-    return names + value, f"{parameter.help or ''}{told}"
+    return names + value, f"{parameter.help or ''}{standard}"
 
 
 def _of_argparse(action: Any) -> tuple[str, str]:

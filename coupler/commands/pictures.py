@@ -52,5 +52,5 @@ def _view(module: str, *words: object) -> str:
     done = run_module(module, *words, capture_output=True, text=True)
     if done.returncode == 0:
         return ""
-    told = done.stderr.strip().splitlines()
-    return told[-1] if told else f"{module} ended with {done.returncode}"
+    lines = done.stderr.strip().splitlines()
+    return lines[-1] if lines else f"{module} ended with {done.returncode}"

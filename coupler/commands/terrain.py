@@ -79,8 +79,8 @@ def _options(sets: list[str]) -> dict:
     try:
         spec = Terrain.model_validate(table)
     except ValidationError as error:
-        told = [explain_error(item | {"loc": ("terrain", *item["loc"])}) for item in error.errors()]
-        raise BadCase([f"--set {'.'.join(map(str, path))}: {text}" for path, text in told]) from error
+        mistakes = [explain_error(item | {"loc": ("terrain", *item["loc"])}) for item in error.errors()]
+        raise BadCase([f"--set {'.'.join(map(str, path))}: {text}" for path, text in mistakes]) from error
     return {name: getattr(spec, name) for name in spec.model_fields_set if name != "path"}
 
 

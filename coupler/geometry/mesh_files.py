@@ -60,11 +60,11 @@ def read_mesh(path: Path) -> tuple[Array, dict[str, Array], bool]:
         check_file(path)
     except BadPath as error:
         raise MeshFileError(f"{path}: {error}") from error
-    told = io.StringIO()
+    printed = io.StringIO()
     try:
         with (
-            contextlib.redirect_stdout(told),
-            contextlib.redirect_stderr(told),
+            contextlib.redirect_stdout(printed),
+            contextlib.redirect_stderr(printed),
             warnings.catch_warnings(),
             _patience(PATIENCE + PER_MEGABYTE * 1e-6 * path.stat().st_size),
         ):
@@ -72,7 +72,7 @@ def read_mesh(path: Path) -> tuple[Array, dict[str, Array], bool]:
             mesh = meshio.read(path)
     except (*UNREADABLE, meshio.ReadError) as error:
         raise MeshFileError(
-            f"{path.name}: meshio cannot read it ({_first_line(error, told)}); it reads {', '.join(readable())}"
+            f"{path.name}: meshio cannot read it ({_first_line(error, printed)}); it reads {', '.join(readable())}"
         ) from error
     points = mesh.points
     if points.ndim != 2 or points.shape[1] != 3 or not len(points) or not np.isfinite(points).all():
@@ -127,6 +127,6 @@ def _patience(seconds: float) -> Iterator[None]:
         signal.signal(signal.SIGPROF, before)
 
 
-def _first_line(error: BaseException, told: io.StringIO) -> str:
-    text = " ".join((told.getvalue() or str(error) or type(error).__name__).split())
+def _first_line(error: BaseException, printed: io.StringIO) -> str:
+    text = " ".join((printed.getvalue() or str(error) or type(error).__name__).split())
     return text[:120]

@@ -93,20 +93,20 @@ def _house(name: str, town, footprint: Footprint, corners: Array) -> Building | 
             f"{name}: feature {footprint.number} at ({x:.5g}, {y:.5g}) m fills {share:.0%} of its rectangle; "
             f"only shapes that fill {FILLED:.0%} are built on it: cut it into rectangles"
         )
-    told = _by_rules(town, footprint.attributes)
-    storeys = _storeys(name, town, footprint, told["storeys"])
+    rules = _by_rules(town, footprint.attributes)
+    storeys = _storeys(name, town, footprint, rules["storeys"])
     return Building(
         name=_name(name, town, footprint),
         on="terrain",
         lower=(*(middle - 0.5 * size).tolist(), town.above_ground),
-        size=(*size.tolist(), storeys * told["storey_height"]),
+        size=(*size.tolist(), storeys * rules["storey_height"]),
         turn=turn,
         storeys=storeys,
-        wall_thickness=told["wall_thickness"],
-        floor_thickness=told["floor_thickness"],
-        block=told["block"],
-        density=told["density"],
-        material=told["material"],
+        wall_thickness=rules["wall_thickness"],
+        floor_thickness=rules["floor_thickness"],
+        block=rules["block"],
+        density=rules["density"],
+        material=rules["material"],
     )
 
 

@@ -60,6 +60,6 @@ def missing(extra: str) -> str:
 
 def need(extra: str) -> None:
     """Raise NotInstalled, with the way out, where a package of the extra is absent."""
-    told = missing(extra)
-    if told:
-        raise NotInstalled(told)
+    message = missing(extra)
+    if message:
+        raise NotInstalled(message)

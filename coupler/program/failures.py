@@ -53,8 +53,8 @@ class Failure:
             code = ExitCode.DIVERGED if isinstance(error, ArithmeticError) else ExitCode.CRASHED
         if code is not None:
             return cls(ExitCode(code), str(error))
-        told = "".join(traceback.format_exception(error))
-        return cls(ExitCode.CRASHED, f"unexpected {type(error).__name__}: {error}", told)
+        trace = "".join(traceback.format_exception(error))
+        return cls(ExitCode.CRASHED, f"unexpected {type(error).__name__}: {error}", trace)
 
 
 def _full(error: OSError) -> str:

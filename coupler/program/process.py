@@ -25,9 +25,9 @@ def run_module(module: str, *words: object, **options: Any) -> subprocess.Comple
     return subprocess.run(command, **{"check": False, "env": environment(), **options})
 
 
-def trouble(exit_code: int, told: str) -> str:
+def trouble(exit_code: int, output: str) -> str:
     """How a process ended that did not end well, with the last lines of what it printed."""
-    last = " | ".join(told.strip().splitlines()[-LAST_LINES:])
+    last = " | ".join(output.strip().splitlines()[-LAST_LINES:])
     return f"its process ended with {exit_code}: {last}"
 
 

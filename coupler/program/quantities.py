@@ -12,8 +12,8 @@ def quantity(value: float | None, unit: str) -> str:
     if value is None or value != value:
         return "–"
     power = power_of(value, unit)
-    told = f"{_digits(value / 1000.0**power)}"
-    return f"{told} {unit_text(unit, power)}".strip()
+    digits = f"{_digits(value / 1000.0**power)}"
+    return f"{digits} {unit_text(unit, power)}".strip()
 
 
 def in_one_unit(value: float, power: int) -> str:

@@ -44,8 +44,8 @@ COLUMNS = tuple(
 
 def write_buildings(path, structure, watch: Watch, maps: Maps) -> None:
     """Write the table as a whole, in place of the one before."""
-    told = verdict(structure, watch)
-    rows = [_row(body, told["members"], watch, maps) for body in told["bodies"]]
+    judged = verdict(structure, watch)
+    rows = [_row(body, judged["members"], watch, maps) for body in judged["bodies"]]
     columns = [list(values) for values in zip(*rows)] if rows else [[] for _ in COLUMNS]
     write_table(path, "buildings: the flood around each, and its damage", COLUMNS, columns)
 

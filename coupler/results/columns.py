@@ -121,5 +121,5 @@ def momentum_columns(unit: str, of: str) -> tuple[tuple[str, str, str], ...]:
         ("blocks", f"{of} of the blocks that move freely"),
         ("residual", "what the lines miss so far: round-off"),
     )
-    told = (*sums[:2], *LINES, sums[2])
-    return (("time", "s", "time"), *((f"{n}_{a}", unit, m) for n, m in told for a in "xyz"))
+    sources = (*sums[:2], *LINES, sums[2])
+    return (("time", "s", "time"), *((f"{n}_{a}", unit, m) for n, m in sources for a in "xyz"))

@@ -45,13 +45,13 @@ def verdicts(run: Path, expected: Path) -> list[Verdict]:
 def _judge(entry: dict, run: Path) -> Verdict:
     exact = "value" in entry
     low, high = entry.get("at_least", -np.inf), entry.get("at_most", np.inf)
-    told = f"{entry['value']:g} ± {entry['tolerance']:g}" if exact else f"{low:g} to {high:g}"
+    range_text = f"{entry['value']:g} ± {entry['tolerance']:g}" if exact else f"{low:g} to {high:g}"
     columns, reason = _columns(entry, run)
     if reason:
-        return Verdict(entry["what"], float("nan"), told, False, reason)
+        return Verdict(entry["what"], float("nan"), range_text, False, reason)
     found = float(TAKE[entry["take"]](columns["time"], columns[entry["column"]], entry))
     kept = abs(found - entry["value"]) <= entry["tolerance"] if exact else low <= found <= high
-    return Verdict(entry["what"], found, told, bool(kept))
+    return Verdict(entry["what"], found, range_text, bool(kept))
 
 
 def _columns(entry: dict, run: Path) -> tuple[dict, str]:

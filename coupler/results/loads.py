@@ -82,11 +82,11 @@ class GroupLoads:
     def columns(self) -> list[tuple[str, str, str]]:
         """Name, unit, meaning of what `read` gives, time first."""
         about = "({:g}, {:g}, {:g})".format(*self.point)
-        told = [("time", "s", "time at the end of the step; forces are means over the step")]
+        listed = [("time", "s", "time at the end of the step; forces are means over the step")]
         for name in self.names:
-            told += _vectors(name, PARTS.get(name, "all parts"), about)
-            told += self.windows[name].columns(name, "N", ("_x", "_y", "_z"))
-        return told
+            listed += _vectors(name, PARTS.get(name, "all parts"), about)
+            listed += self.windows[name].columns(name, "N", ("_x", "_y", "_z"))
+        return listed
 
     def read(self, coupling, record) -> list[dict[str, float]]:
         """The row of this step."""
@@ -134,11 +134,11 @@ class BlockLoads:
 
     def columns(self) -> list[tuple[str, str, str]]:
         """Name, unit, meaning of what `read` gives, time first."""
-        told = [("time", "s", "time at the end of the interval"), ("block", "", "name of the block")]
-        told.append(("over", "s", "length of the interval that the means are over"))
+        listed = [("time", "s", "time at the end of the interval"), ("block", "", "name of the block")]
+        listed.append(("over", "s", "length of the interval that the means are over"))
         for name in self.parts:
-            told += _vectors(name, PARTS[name], "the centre of the block at the start")
-        return told
+            listed += _vectors(name, PARTS[name], "the centre of the block at the start")
+        return listed
 
     def read(self, coupling, record) -> list[dict]:
         """The rows that are due, none or one a block."""

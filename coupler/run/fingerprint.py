@@ -17,19 +17,19 @@ def scene_parts(coupling) -> dict[str, str]:
     parts = {}
     if coupling.water is not None:
         mesh = coupling.water.mesh
-        parts["mesh"] = _told(f"{len(mesh.nodes)} nodes, {len(mesh.cells)} cells", mesh.nodes, mesh.cells)
+        parts["mesh"] = _reported(f"{len(mesh.nodes)} nodes, {len(mesh.cells)} cells", mesh.nodes, mesh.cells)
     structure = coupling.structure
     if structure is not None:
         shapes = np.concatenate([np.zeros((0, 3)), *structure.shape_vertices])
-        parts["blocks"] = _told(f"{structure.n} blocks", shapes, structure.mass, structure.fixed)
+        parts["blocks"] = _reported(f"{structure.n} blocks", shapes, structure.mass, structure.fixed)
         joints = structure.joints
         if joints is not None:
             arrays = (joints.a, joints.b, joints.xi_a, joints.xi_b, joints.weight, joints.law)
-            parts["joints"] = _told(f"{len(joints)} joints", *arrays)
+            parts["joints"] = _reported(f"{len(joints)} joints", *arrays)
     return parts
 
 
-def _told(count: str, *arrays) -> str:
+def _reported(count: str, *arrays) -> str:
     digest = hashlib.blake2b(digest_size=4)
     for array in arrays:
         digest.update(np.ascontiguousarray(array).tobytes())

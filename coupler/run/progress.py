@@ -62,11 +62,11 @@ class ProgressFile:
                 }
             )
 
-    def _write(self, told: dict) -> None:
+    def _write(self, reported: dict) -> None:
         """As a whole; a full disk ends no run for this."""
         beside = self.path.with_name(f".{PROGRESS}.part")
         with contextlib.suppress(OSError):
-            beside.write_text(json.dumps(told | {"written": clock.time()}), encoding="utf-8")
+            beside.write_text(json.dumps(reported | {"written": clock.time()}), encoding="utf-8")
             os.replace(beside, self.path)
 
 
@@ -83,8 +83,8 @@ class _Base:
 
     def _line(self, time: float, figures: Mapping[str, str]) -> str:
         share = min(1.0, time / self.end)
-        told = "  ".join(f"{name} {text}" for name, text in figures.items())
-        return f"{share:4.0%}  t {time:.3f} of {self.end:g} s  {told}  {self._left(time)}".rstrip()
+        reported = "  ".join(f"{name} {text}" for name, text in figures.items())
+        return f"{share:4.0%}  t {time:.3f} of {self.end:g} s  {reported}  {self._left(time)}".rstrip()
 
     def _left(self, time: float) -> str:
         """Time to go, as text."""
@@ -149,11 +149,11 @@ class BarReporter(_Base):
     def step(self, time: float, figures: Mapping[str, str]) -> None:
         if self._new_tenth(time):
             self.log(self._line(time, figures))
-        told = "  ".join(f"{name} {text}" for name, text in figures.items())
+        reported = "  ".join(f"{name} {text}" for name, text in figures.items())
         self._bar.update(
             self._task,
             completed=min(time, self.end),
-            description=f"t {time:.3f} s  {told}  {self._left(time)}",
+            description=f"t {time:.3f} s  {reported}  {self._left(time)}",
         )
         if clock.monotonic() - self._drawn > 0.2:  # redrawn here, because a thread would starve in long calls
             self._drawn = clock.monotonic()

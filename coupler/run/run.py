@@ -153,7 +153,7 @@ def _steps(
                 recorder.step(record)
             _note(coupling, record, figures)
             reporter.expect(_is_calm(calm, coupling, record))
-            reporter.step(coupling.time, _told(coupling, record))
+            reporter.step(coupling.time, _reported(coupling, record))
             if each is not None:
                 each(coupling, record, figures, recorder.readings)
             check_step(coupling, record, limits)
@@ -184,13 +184,13 @@ def _steps(
 
 def _tell_verdict(recorder: Recorder, directory, reporter) -> None:
     """Into run.json and the log, however the run ends."""
-    told = recorder.verdict()
-    if told is None:
+    reported = recorder.verdict()
+    if reported is None:
         return
     from coupler.verdict.words import sentences
 
-    directory.record(verdict=told)
-    for line in sentences(told):
+    directory.record(verdict=reported)
+    for line in sentences(reported):
         reporter.message(line)
 
 
@@ -270,19 +270,19 @@ def _is_calm(calm: Calm, coupling, record) -> bool:
     return calm.now(coupling.time, record.wetted, joints.intact, joints.broken)
 
 
-def _told(coupling, record) -> dict[str, str]:
-    told = {"dt": f"{1e3 * record.dt:.3g} ms"}
+def _reported(coupling, record) -> dict[str, str]:
+    reported = {"dt": f"{1e3 * record.dt:.3g} ms"}
     if coupling.structure is not None:
         joints = joint_counts(coupling.structure)
-        told["broken"] = f"{joints.broken}/{joints.intact + joints.broken}"
+        reported["broken"] = f"{joints.broken}/{joints.intact + joints.broken}"
     if coupling.water is not None:
         if len(record.load):
-            told["force"] = newtons(float(np.linalg.norm(record.load[:, :3].sum(axis=0))))
-        told["volume"] = f"{_volume_error(coupling):+.2%}"
+            reported["force"] = newtons(float(np.linalg.norm(record.load[:, :3].sum(axis=0))))
+        reported["volume"] = f"{_volume_error(coupling):+.2%}"
     if coupling.coupled:
-        told["defect"] = f"{record.defect:.1e}"
-    told["energy"] = f"{record.balance.energy_error:.2%}"
-    return told
+        reported["defect"] = f"{record.defect:.1e}"
+    reported["energy"] = f"{record.balance.energy_error:.2%}"
+    return reported
 
 
 def _volume_error(coupling) -> float:

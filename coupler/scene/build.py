@@ -76,17 +76,19 @@ def watch_of(case: Case, structure) -> Watch:
     from coupler.verdict.divisions import Divisions
     from coupler.verdict.watch import Watch, joined
 
-    told = case.verdict
+    reported = case.verdict
     divisions = Divisions.of(parts_of(case), structure.n)
     judged = np.zeros(structure.n, bool)
-    for name in told.on:
+    for name in reported.on:
         judged[rows_by_name(case, parts_of(case)).get(name, divisions.rows_of(name))] = True
-    if not told.on:
+    if not reported.on:
         movable = ~structure.fixed & (divisions.bodies.label >= 0)
         glued = movable & joined(structure)
         judged = glued if glued.any() else movable
-    rules = Rules(told.moved, told.damaged_joints, told.collapsed_weight, told.collapsed_joints)
-    return Watch(structure, divisions, rules, judged, told.hit_speed)
+    rules = Rules(
+        reported.moved, reported.damaged_joints, reported.collapsed_weight, reported.collapsed_joints
+    )
+    return Watch(structure, divisions, rules, judged, reported.hit_speed)
 
 
 def _coupling(case: Case, structure, solids, clock, from_start: bool) -> CoupledStepper:

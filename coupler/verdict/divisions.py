@@ -93,8 +93,10 @@ def in_words(name: str, one_body: bool = True) -> str:
     if found is None:
         return name
     number, which = int(found["storey"]) + 1, f" {found['which']}" if found["which"] else ""
-    told = f"storey {number}" if found["kind"] == "storey" else f"{found['kind']}{which} of storey {number}"
-    return told if one_body else f"{told} ({found['body']})"
+    reported = (
+        f"storey {number}" if found["kind"] == "storey" else f"{found['kind']}{which} of storey {number}"
+    )
+    return reported if one_body else f"{reported} ({found['body']})"
 
 
 def named(names: Sequence[str]) -> Callable[[str], str]:

@@ -30,14 +30,14 @@ def verdict(structure: Structure, watch: Watch) -> dict:
     def of(division: Division) -> list[dict]:
         label = np.where(structure.fixed, -1, division.label)
         found = damage(label, division.names, blocks, joints, watch.rules)
-        return [_told(d, structure, places) for d in found if d.blocks]
+        return [_reported(d, structure, places) for d in found if d.blocks]
 
     judged = np.where(watch.judged, 0, -1)
     (whole,) = damage(judged, ["structure"], blocks, joints, watch.rules)
     bodies = of(watch.divisions.bodies)
     _add_loads(bodies, watch)
     members = of(watch.divisions.members)
-    return _told(whole, structure, places) | {
+    return _reported(whole, structure, places) | {
         "rules": asdict(watch.rules),
         "largest": _largest(watch, len(watch.divisions.bodies.names), judged=True),
         "bodies": bodies,
@@ -65,7 +65,7 @@ def places_of(structure: Structure) -> Array:
     return sums / count[:, None]
 
 
-def _told(found: Damage, structure: Structure, places: Array) -> dict:
+def _reported(found: Damage, structure: Structure, places: Array) -> dict:
     first = None
     if found.first_joint >= 0:
         first = {"time": found.first_break, "place": places[found.first_joint].tolist()}
@@ -129,20 +129,20 @@ def _displaced(structure: Structure, watch: Watch) -> dict:
     """Blocks that left their place, those that went farthest first."""
     gone = np.flatnonzero(~np.isnan(watch.left_at) & watch.judged)
     order = gone[np.argsort(-watch.moved[gone], kind="stable")]
-    told = [
+    reported = [
         {"block": structure.names[i], "way": float(watch.moved[i]), "left_at": float(watch.left_at[i])}
         for i in order[:MOST_LISTED]
     ]
     return {
         "blocks": len(gone),
         "first": float(watch.left_at[gone].min()) if len(gone) else None,
-        "list": told,
+        "list": reported,
     }
 
 
 def _hits(structure: Structure, watch: Watch) -> dict:
     found = [dict(zip(HIT_COLUMNS, row)) for row in watch.hits.tolist()]
-    told = [
+    reported = [
         {
             "time": hit["time"],
             "block": structure.names[int(hit["block"])],
@@ -152,4 +152,4 @@ def _hits(structure: Structure, watch: Watch) -> dict:
         }
         for hit in found
     ]
-    return {"pairs": len(told), "list": told[:MOST_LISTED]}
+    return {"pairs": len(reported), "list": reported[:MOST_LISTED]}

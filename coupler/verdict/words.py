@@ -11,24 +11,24 @@ MOST_IN_ORDER = 12
 """Walls and floors whose first break is reported in a line; the table has all."""
 
 
-def headline(told: dict) -> str:
+def headline(reported: dict) -> str:
     """The answer in one line: COLLAPSED: 63% of its weight left its place (...)."""
-    return f"{told['word'].upper()}: {told['rule']}"
+    return f"{reported['word'].upper()}: {reported['rule']}"
 
 
-def sentences(told: dict) -> Iterator[str]:
-    """Line by line; told: `judge.verdict`."""
-    yield headline(told)
-    yield from _first_break(told)
-    yield from _order(told)
-    yield from _loads(told["largest"])
-    yield from _displaced(told)
-    yield from _hits(told["hits"])
+def sentences(reported: dict) -> Iterator[str]:
+    """The verdict line by line; its argument is what `judge.verdict` returns."""
+    yield headline(reported)
+    yield from _first_break(reported)
+    yield from _order(reported)
+    yield from _loads(reported["largest"])
+    yield from _displaced(reported)
+    yield from _hits(reported["hits"])
 
 
-def name_of(told: dict, name: str) -> str:
+def name_of(reported: dict, name: str) -> str:
     """A wall, floor or storey in words."""
-    return in_words(name, len(told["bodies"]) < 2)
+    return in_words(name, len(reported["bodies"]) < 2)
 
 
 def point(place: Sequence[float]) -> str:
@@ -36,29 +36,29 @@ def point(place: Sequence[float]) -> str:
     return "({}) m".format(", ".join(f"{x + 0.0:.2f}" for x in place))
 
 
-def _first_break(told: dict) -> Iterator[str]:
-    if not told["joints"]:
+def _first_break(reported: dict) -> Iterator[str]:
+    if not reported["joints"]:
         return
-    first = told["first_break"]
+    first = reported["first_break"]
     if first is None:
-        yield f"no joint of {told['joints']} broke"
+        yield f"no joint of {reported['joints']} broke"
         return
     yield (
         f"first break at t = {moment_of(first['time'])} at {point(first['place'])}, between {first['blocks'][0]} "
-        f"and {first['blocks'][1]}; {told['joints_broken']} of {told['joints']} joints broke, "
-        f"{told['area_broken']:.0%} of the joined area"
+        f"and {first['blocks'][1]}; {reported['joints_broken']} of {reported['joints']} joints broke, "
+        f"{reported['area_broken']:.0%} of the joined area"
     )
 
 
-def _order(told: dict) -> Iterator[str]:
+def _order(reported: dict) -> Iterator[str]:
     """Which wall, floor and storey broke first, and which after it."""
     for what, key in (("walls and floors", "members"), ("storeys", "storeys")):
-        found = [group for group in told[key] if group["first_break"]]
+        found = [group for group in reported[key] if group["first_break"]]
         found.sort(key=lambda group: group["first_break"]["time"])
-        if len(told[key]) < 2 or not found:
+        if len(reported[key]) < 2 or not found:
             continue
         listed = [
-            f"{name_of(told, group['name'])} {moment_of(group['first_break']['time'])}"
+            f"{name_of(reported, group['name'])} {moment_of(group['first_break']['time'])}"
             for group in found[:MOST_IN_ORDER]
         ]
         more = len(found) - len(listed)
@@ -83,14 +83,14 @@ def at(peak: dict, unit: str) -> str:
     return f"{quantity(peak['value'], unit)} at {moment_of(peak['time'])}"
 
 
-def _displaced(told: dict) -> Iterator[str]:
-    found = told["displaced"]
+def _displaced(reported: dict) -> Iterator[str]:
+    found = reported["displaced"]
     if not found["blocks"]:
-        yield f"no block left its place; the farthest moved by {length(told['farthest']['way'])}"
+        yield f"no block left its place; the farthest moved by {length(reported['farthest']['way'])}"
         return
     farthest = found["list"][0]
     yield (
-        f"{found['blocks']} of {told['blocks']} blocks left their place, the first at t = "
+        f"{found['blocks']} of {reported['blocks']} blocks left their place, the first at t = "
         f"{moment_of(found['first'])}; the farthest is {farthest['block']}, by {length(farthest['way'])}"
     )
 

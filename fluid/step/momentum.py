@@ -86,8 +86,8 @@ def momentum_change(water, problem, unknown, pressure, stages: Stages) -> Moment
     at = _momenta(water, kept, dt, stages)
     cells, tank, held = _reactions(water, kept, x, p, dt)
     openings = _at_closed_openings(water, kept, p, dt)
-    told, shear_told, tank_shear = _loads(water, problem, p)
-    of_air, air_told = _of_air(water, problem, unknown, pressure)
+    on_bodies, shear_on_bodies, tank_shear = _loads(water, problem, p)
+    of_air, air_on_bodies = _of_air(water, problem, unknown, pressure)
     through, side_pressure = _through(water, kept), -dt * _pressure_on_sides(water, p)
     weight = dt * at["weight"]
     lines = {
@@ -96,8 +96,8 @@ def momentum_change(water, problem, unknown, pressure, stages: Stages) -> Moment
         "tank_shear": tank_shear,
         "sides": through + side_pressure,
         "openings": openings,
-        "air": of_air[0] + of_air[1] + air_told,
-        "bodies": -told - air_told,
+        "air": of_air[0] + of_air[1] + air_on_bodies,
+        "bodies": -on_bodies - air_on_bodies,
         "transport": at["carried"] - at["kicked"] - through,
         "volume_correction": at["advected"] - at["carried"],
         "carried": at["kicked"] - at["before"] + at["star"] - at["sheared"] - weight - cells[1] - of_air[1],
@@ -107,13 +107,13 @@ def momentum_change(water, problem, unknown, pressure, stages: Stages) -> Moment
         - of_air[0]
         + at["end"]
         - at["slipping"]
-        + told
+        + on_bodies
         + held
-        - shear_told,
+        - shear_on_bodies,
         "damping": at["damped"] - at["limited"],
         "limit": at["limited"] - at["projected"],
         "slip": at["slipping"] - at["damped"],
-        "shear_solve": at["sheared"] - at["advected"] + shear_told - tank_shear,
+        "shear_solve": at["sheared"] - at["advected"] + shear_on_bodies - tank_shear,
     }
     return MomentumChange(
         before=at["before"],
@@ -185,8 +185,8 @@ def _of_air(water, problem, unknown, pressure):
     mesh = (t.nodes, t.cells, t.parent, t.gradients, t.volume, t.share)
     of_x, of_p, _ = hat_forces(cells, x, p, np.zeros(len(x), bool), water.reference, *mesh)
     acting = problem.of_air(problem.coupling).T @ kept.cushions.air.at_pockets(pressure)
-    told = -dt * about(water.reference, acting, water.domain.body_centre)
-    return -dt * np.array([of_x, of_p - of_x]), told
+    on_bodies = -dt * about(water.reference, acting, water.domain.body_centre)
+    return -dt * np.array([of_x, of_p - of_x]), on_bodies
 
 
 def _on_bodies(water, p):
@@ -197,11 +197,13 @@ def _on_bodies(water, p):
 def _loads(water, problem, p):
     """Impulses: given to the bodies, of it the wall shear, and that of the sides of the tank on the water by shear."""
     centre, dt, shear = water.domain.body_centre, problem.dt, problem.predicted.shear
-    told = problem.other_load - (problem.coupling.T @ p[problem.dofs]).reshape(-1, 6)  # p is 0 in the air
-    told = dt * about(water.reference, told, centre)
+    on_bodies = problem.other_load - (problem.coupling.T @ p[problem.dofs]).reshape(
+        -1, 6
+    )  # p is 0 in the air
+    on_bodies = dt * about(water.reference, on_bodies, centre)
     if shear is None:
-        return told, np.zeros(6), np.zeros(6)
-    return told, dt * about(water.reference, shear.load, centre), dt * shear.tank
+        return on_bodies, np.zeros(6), np.zeros(6)
+    return on_bodies, dt * about(water.reference, shear.load, centre), dt * shear.tank
 
 
 def _through(water, kept):

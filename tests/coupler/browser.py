@@ -52,9 +52,9 @@ class Browser:
                 json.dumps({"id": self.number, "method": method, "params": params})
             )
             while True:
-                told = json.loads(await self.socket.read_message())
-                if told.get("id") == self.number:
-                    return told
+                reported = json.loads(await self.socket.read_message())
+                if reported.get("id") == self.number:
+                    return reported
 
         return self.loop.run_until_complete(asyncio.wait_for(ask(), PATIENCE))["result"]
 

@@ -56,9 +56,9 @@ def begin(place, text, output, *overrides, reporter=None):
     return directory.path
 
 
-def go_on(path, *overrides, told=None, any_version=True):
+def go_on(path, *overrides, reported=None, any_version=True):
     """Resume in this process. any_version: a commit between the two runs of a test does not matter."""
-    found = prepare(path, overrides, any_version, (told if told is not None else []).append)
+    found = prepare(path, overrides, any_version, (reported if reported is not None else []).append)
     with found.directory:
         run(found.file.case, found.directory, Silent(), found.checkpoint)
     return found
@@ -73,8 +73,10 @@ def check_same(one, two):
     for name in ("fields.vtkhdf", "blocks.vtkhdf"):
         if (one / name).exists():
             check_same_steps(one / name, two / name)
-    told = [json.loads((place / "run.json").read_text())["figures"].get("verdict") for place in (one, two)]
-    assert told[0] == told[1]
+    reported = [
+        json.loads((place / "run.json").read_text())["figures"].get("verdict") for place in (one, two)
+    ]
+    assert reported[0] == reported[1]
     a, b = (Checkpoint.read(listed(place / FOLDER)[0]) for place in (one, two))
     assert a.path.name == b.path.name
     assert set(a.arrays) == set(b.arrays)

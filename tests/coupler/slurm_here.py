@@ -110,7 +110,7 @@ class Slurm:
         self._until(munge.exists, "munged has no socket")
         self._daemon("slurmctld", "-D")
         self._daemon("slurmd", "-D", "-d", str(self.folder / "bin" / "slurmstepd"))
-        self._until(lambda: "idle" in self.told("sinfo", "-h", "-o", "%T"), "the node is not idle")
+        self._until(lambda: "idle" in self.output_of("sinfo", "-h", "-o", "%T"), "the node is not idle")
         return self
 
     def _daemon(self, name: str, *words: str) -> None:
@@ -132,13 +132,13 @@ class Slurm:
                 raise RuntimeError(f"{what}\n" + "\n".join(logs))
             time.sleep(0.5)
 
-    def told(self, *words: str) -> str:
+    def output_of(self, *words: str) -> str:
         """What a command of Slurm prints."""
         variables = os.environ | self.variables
         return subprocess.run(words, capture_output=True, text=True, check=False, env=variables).stdout
 
     def __exit__(self, *_) -> None:
-        self.told("scancel", "--user=root")
+        self.output_of("scancel", "--user=root")
         for daemon in reversed(self.daemons):
             daemon.terminate()
         for daemon in self.daemons:

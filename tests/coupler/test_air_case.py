@@ -12,7 +12,7 @@ from coupler.scene.build import build
 from coupler.step.limits import Diverged, check_air
 from tests.fakes import no_clock
 
-from .test_water_case import FILL, case, run, told
+from .test_water_case import FILL, case, reported, run
 
 CLOSED = {"lower": [0, 0, 0], "upper": [2, 0.2, 1], "cell": 0.1, "smooth": ["y-", "y+"], "open": []}
 TRAPPED = {"air": {"model": "trapped"}}
@@ -46,7 +46,7 @@ SOLID = [{"centre": [1.0, 0.1, 0.5], "size": [0.2, 0.2, 0.2]}]
     ],
 )
 def test_wrong_air_is_refused_with_its_place(water, more, message):
-    assert any(message in line for line in told(water, **more)), told(water, **more)
+    assert any(message in line for line in reported(water, **more)), reported(water, **more)
 
 
 def test_a_gauge_reads_the_pocket_and_the_books_hold_its_energy():

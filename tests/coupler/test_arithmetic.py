@@ -63,7 +63,7 @@ print(b"".join([*rows, *(a.tobytes() for a in ends)]).hex())
 """
 
 
-def told_by(code: str, without=(), **variables: str) -> str:
+def printed_by(code: str, without=(), **variables: str) -> str:
     """Output of some Python in a process with the variables of this one, but `without`, and those given."""
     given = {name: value for name, value in environment().items() if name not in without}
     command = [sys.executable, "-c", code]
@@ -74,13 +74,13 @@ def told_by(code: str, without=(), **variables: str) -> str:
 
 @needs_baseline
 def test_numpy_blas_and_numba_take_the_baseline():
-    found = json.loads(told_by(IN_FORCE, without=arithmetic.ONE_INSTRUCTION_SET))
+    found = json.loads(printed_by(IN_FORCE, without=arithmetic.ONE_INSTRUCTION_SET))
     assert found == {"numpy": ["X86_V3"], "blas": ["Haswell"], "numba": [arithmetic.BASELINE, ""]}
 
 
 @needs_baseline
 def test_kernels_give_the_same_bits_with_and_without_fused_and_wide_instructions():
-    assert told_by(KERNELS) == told_by(KERNELS, NUMBA_CPU_NAME="x86-64-v2", NUMBA_CPU_FEATURES="")
+    assert printed_by(KERNELS) == printed_by(KERNELS, NUMBA_CPU_NAME="x86-64-v2", NUMBA_CPU_FEATURES="")
 
 
 @needs_baseline
@@ -94,7 +94,7 @@ def test_a_scene_has_the_same_bits_with_kernels_of_another_baseline(name):
     )
     with_host += "arithmetic.ONE_INSTRUCTION_SET.pop('NUMBA_CPU_FEATURES')\n"
     numba = ("NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES")
-    assert told_by(SCENE) == told_by(SCENE if name else with_host + SCENE, without=numba, **other)
+    assert printed_by(SCENE) == printed_by(SCENE if name else with_host + SCENE, without=numba, **other)
 
 
 def test_an_older_processor_takes_what_it_has_and_says_so(tmp_path, monkeypatch):

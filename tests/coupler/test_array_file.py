@@ -35,7 +35,7 @@ def test_what_is_read_is_what_was_written(path):
         np.testing.assert_array_equal(arrays[name], array, strict=True)
 
 
-def test_a_torn_file_is_told(path):
+def test_a_torn_file_is_reported(path):
     """Whatever length it was cut to."""
     whole = path.read_bytes()
     for size in np.linspace(0, len(whole) - 1, 25).astype(int):
@@ -70,7 +70,7 @@ def test_nothing_that_is_not_finite_is_written_and_what_was_there_stays(path):
     assert list(path.parent.iterdir()) == [path]
 
 
-def test_a_full_disk_is_told_and_what_was_there_stays(path):
+def test_a_full_disk_is_reported_and_what_was_there_stays(path):
     """A limit on the size of files stands for the disk."""
     before = path.read_bytes()
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)

@@ -25,7 +25,7 @@ LONG = "9" * 400
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "reported"),
     [
         (
             f"[structure]\ndensity = {LONG}\n" + BLOCK,
@@ -64,15 +64,15 @@ LONG = "9" * 400
         ),
     ],
 )
-def test_values_and_paths_that_no_reader_can_hold(tmp_path, text, told):
+def test_values_and_paths_that_no_reader_can_hold(tmp_path, text, reported):
     (tmp_path / "circle").symlink_to("circle")
     lines = [line.replace(str(tmp_path), "FOLDER") for line in mistakes(tmp_path, DRY + text)]
-    assert any(told in line for line in lines), lines
+    assert any(reported in line for line in lines), lines
     assert all(len(line) < 1000 for line in lines)
 
 
 @pytest.mark.parametrize(
-    ("override", "told"),
+    ("override", "reported"),
     [
         (f"time.end={LONG}", "time.end: a whole number of about 40"),
         (f"time.end={'[' * 900}{']' * 900}", "more than 20 lists or sections"),
@@ -82,9 +82,9 @@ def test_values_and_paths_that_no_reader_can_hold(tmp_path, text, told):
     ],
     ids=range(5),
 )
-def test_overrides_that_no_reader_can_hold(tmp_path, override, told):
+def test_overrides_that_no_reader_can_hold(tmp_path, override, reported):
     lines = mistakes(tmp_path, WATER, override)
-    assert any(told in line for line in lines), lines
+    assert any(reported in line for line in lines), lines
 
 
 def test_a_place_that_is_no_utf_8_is_refused(tmp_path):
@@ -108,7 +108,7 @@ def test_long_values_are_cut_in_messages():
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "reported"),
     [
         (
             "wall]]\nlower = [0, 0, 0]\nsize = [1, 1, 1]\nblock = [1e-10, 1, 1e-10]\n",
@@ -128,10 +128,10 @@ def test_long_values_are_cut_in_messages():
         ),
     ],
 )
-def test_more_blocks_than_a_scene_can_have_are_refused_before_they_are_made(tmp_path, text, told):
+def test_more_blocks_than_a_scene_can_have_are_refused_before_they_are_made(tmp_path, text, reported):
     start = time.process_time()
     lines = mistakes(tmp_path, f"{DRY}[[structure.{text}")
-    assert any(told in line for line in lines), lines
+    assert any(reported in line for line in lines), lines
     assert time.process_time() - start < 5.0
 
 
@@ -200,18 +200,18 @@ def test_only_formats_that_can_be_read_here_are_listed():
 
 
 @pytest.mark.parametrize(
-    ("rows", "told"),
+    ("rows", "reported"),
     [
         ("5,1,0\n6,1,0\n", "its times go from 5 to 6 s, all after the run (0 to 2 s); shift them"),
         ("-5,1,0\n-4,1,0\n", "its times go from -5 to -4 s, all before the run"),
         ("0,1,0\n1e400,1,0\n", "is not finite"),
     ],
 )
-def test_records_beside_the_run(tmp_path, rows, told):
+def test_records_beside_the_run(tmp_path, rows, reported):
     (tmp_path / "r.csv").write_text("time,level,velocity\n" + rows, encoding="utf-8")
     inflow = '[[water.inflow]]\nkind = "record"\nside = "x-"\npath = "r.csv"\n'
     (line,) = mistakes(tmp_path, WATER + inflow)
-    assert told in line
+    assert reported in line
 
 
 def test_columns_of_one_name(tmp_path):
@@ -252,7 +252,7 @@ def gauge(kind, name, **more):
 
 
 @pytest.mark.parametrize(
-    ("gauges", "told"),
+    ("gauges", "reported"),
     [
         (
             gauge("loads", "a", on='"a"', each_block="true") + gauge("loads", "a_blocks", on='"a"'),
@@ -274,9 +274,9 @@ def gauge(kind, name, **more):
         (gauge("level", "g", at="[1, 1]") + gauge("level", "g", at="[1, 1]"), "'g' is taken by gauge[0]"),
     ],
 )
-def test_gauges_that_would_fill_the_same_place(tmp_path, gauges, told):
+def test_gauges_that_would_fill_the_same_place(tmp_path, gauges, reported):
     (line,) = mistakes(tmp_path, WATER + BLOCKS + gauges)
-    assert told in line
+    assert reported in line
 
 
 def test_gauges_of_different_columns_may_share_a_name(tmp_path):
@@ -315,7 +315,7 @@ def driven(velocity, *more):
 
 
 @pytest.mark.parametrize(
-    ("velocity", "told"),
+    ("velocity", "reported"),
     [
         (
             "[-1, 0, 0]",
@@ -324,9 +324,9 @@ def driven(velocity, *more):
         ("[0, 0, -0.1]", "'a' reaches the closed side z- of the tank (z = 0 m) at t = 0 s"),
     ],
 )
-def test_a_driven_block_that_would_pass_through_a_wall(tmp_path, velocity, told):
+def test_a_driven_block_that_would_pass_through_a_wall(tmp_path, velocity, reported):
     (line,) = mistakes(tmp_path, driven(velocity))
-    assert f"case.toml:23: motion[0].velocity: {told}" in line
+    assert f"case.toml:23: motion[0].velocity: {reported}" in line
 
 
 @pytest.mark.parametrize("velocity", ["[0.74, 0, 0]", "[0, 0, 5]", "[0, 0.25, 0]"])
@@ -353,7 +353,7 @@ def test_a_solid_is_the_hull_of_its_points(tmp_path):
     assert "span no volume" in mistakes(tmp_path, WATER + f"[[solid]]\nvertices = {flat}\n")[0]
 
 
-def test_a_block_that_was_driven_out_already_is_told_once(tmp_path):
+def test_a_block_that_was_driven_out_already_is_reported_once(tmp_path):
     """Its velocity along an axis may be zero."""
     lines = mistakes(tmp_path, driven("[0, 0, 0]").replace("centre = [2, 1, 0.5]", "centre = [20, 1, 0.5]"))
     assert ["reaches 16.5 m beyond the side x+" in line for line in lines] == [True]

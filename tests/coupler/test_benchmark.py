@@ -43,11 +43,11 @@ def test_a_wall_is_taken_apart_to_the_last_joint(monkeypatch):
     assert min(found["cost"]) > 0.0
 
 
-def test_a_line_without_target_is_kept_and_a_missed_one_is_told():
+def test_a_line_without_target_is_kept_and_a_missed_one_is_reported():
     assert Line("x", 1, 1, 5.0, "a joint").kept
     missed = Line("x", 1, 1, 5.0, "a joint", 1.0)
     assert not missed.kept
-    assert "MISSED" in command._told(missed)
+    assert "MISSED" in command._reported(missed)
 
 
 def test_cutting_is_measured_per_cell_that_lost_something(monkeypatch):
@@ -67,9 +67,9 @@ def test_cutting_is_measured_per_cell_that_lost_something(monkeypatch):
 def test_json_is_one_object_and_a_missed_target_is_the_exit_code(monkeypatch, capsys):
     monkeypatch.setattr(command, "GROUPS", {"joints": lambda sizes: [Line("a", 1, 1, 5.0, "a joint", 1.0)]})
     assert command.benchmark(quick=True, as_json=True) == ExitCode.DIVERGED
-    told = json.loads(capsys.readouterr().out)
-    assert told["lines"][0]["kept"] is False
-    assert {"machine", "versions"} <= told.keys()
+    reported = json.loads(capsys.readouterr().out)
+    assert reported["lines"][0]["kept"] is False
+    assert {"machine", "versions"} <= reported.keys()
 
 
 def test_debris_is_apart_and_as_many_as_asked_for():
@@ -81,13 +81,13 @@ def test_debris_is_apart_and_as_many_as_asked_for():
     assert apart.min() >= 2.0 > 2.0 * max(b.radius for b in blocks)
 
 
-def test_the_costs_of_debris_are_told_part_by_part():
+def test_the_costs_of_debris_are_reported_part_by_part():
     """The share is that of one solve, structure included."""
     bare = dict.fromkeys(debris.PARTS, 1.0) | {"unknowns": 10, "iterations": 5.0, "passes": 1.0}
     full = dict.fromkeys(debris.PARTS, 3.0) | {"unknowns": 10, "iterations": 5.0, "passes": 2.0}
     found = debris.Costs(bare, bare | {"pressure": 2.0}, full)
     assert found.shares == pytest.approx((3.0, 1.5))
-    shown = debris.told(found, 30)
+    shown = debris.summary_line(found, 30)
     assert all(what in shown for what in debris.PARTS.values())
 
 

@@ -50,7 +50,7 @@ def refused(path, **options):
 @pytest.mark.parametrize(
     "name", ["b.stl", "b-binary.stl", "b.obj", "b.ply", "b.vtk", "b.vtu", "b.msh", "b.off"]
 )
-def test_touching_bricks_of_a_surface_mesh_are_told_apart_in_every_format(tmp_path, name):
+def test_touching_bricks_of_a_surface_mesh_are_distinguished_in_every_format(tmp_path, name):
     """Where bricks share an edge, four polygons and more meet; each brick must get its own twelve. All 20 joints of
     the heap are found, with their exact areas."""
     points, cells = joined([brick(b) for b in BRICKS], TRIANGLES)
@@ -121,9 +121,9 @@ def test_map_coordinates_keep_their_digits_in_double_precision(tmp_path):
 
 def test_map_coordinates_in_single_precision_are_refused_with_the_remedy(tmp_path):
     points, cells = joined([brick(b) + np.array([5.1e6, 4.2e5, 0.0]) for b in BRICKS], TRIANGLES)
-    told = refused(write(tmp_path, "b-binary.stl", points, triangle=cells))
-    assert "resolve 0.61 m only" in told
-    assert "give the shift as offset" in told
+    reported = refused(write(tmp_path, "b-binary.stl", points, triangle=cells))
+    assert "resolve 0.61 m only" in reported
+    assert "give the shift as offset" in reported
 
 
 def test_scale_and_offset(tmp_path):
@@ -180,9 +180,9 @@ WARPED = brick((0, 0, 0)) + np.eye(8)[:, [6]] * [0, 0, 0.05]
 )  # fmt: skip
 def test_what_is_no_convex_block_is_refused_with_its_place(tmp_path, points, cells, says):
     cells = {kind: [list(row) for row in rows] for kind, rows in cells.items()}
-    told = refused(write(tmp_path, "b.vtu", points, **cells))
-    assert told.startswith("b.vtu: ")
-    assert says in told
+    reported = refused(write(tmp_path, "b.vtu", points, **cells))
+    assert reported.startswith("b.vtu: ")
+    assert says in reported
 
 
 def test_a_file_that_is_not_there_or_not_what_it_says(tmp_path):
@@ -211,7 +211,7 @@ stiffness = "1 MN/m"
 
 
 def test_a_case_finds_its_file_beside_it_and_refuses_it_with_the_line(tmp_path, capsys):
-    """Exit code 2, the line of the path, and what is wrong in the file; overlaps inside a file are told as well."""
+    """Exit code 2, the line of the path, and what is wrong in the file; overlaps inside a file are reported as well."""
     from coupler.commands.cli import main
 
     (tmp_path / "case.toml").write_text(CASE, encoding="utf-8")

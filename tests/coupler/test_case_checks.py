@@ -107,65 +107,65 @@ def structure(*blocks, **more):
     }
 
 
-def told(case):
+def reported(case):
     return [".".join(map(str, path)) + ": " + text for path, text in problems(case)]
 
 
 def test_overlapping_blocks_are_named_both_with_the_overlap():
-    found = told(case(**structure({"centre": [7, 5, 0.5]}, {"centre": [7.8, 5, 0.5]})))
+    found = reported(case(**structure({"centre": [7, 5, 0.5]}, {"centre": [7.8, 5, 0.5]})))
     assert found == ["structure.block.1: 'b1' overlaps 'b0' by 0.2 m; move one of them by that much"]
 
 
 def test_a_pressure_gauge_inside_a_block_that_stands_fast_is_refused():
     gauge = [{"kind": "pressure", "name": "g", "at": [7, 5, 0.5]}]
-    (found,) = told(case(gauge=gauge, **structure({"centre": [7, 5, 0.5], "fixed": True})))
+    (found,) = reported(case(gauge=gauge, **structure({"centre": [7, 5, 0.5], "fixed": True})))
     assert found == "gauge.0.at: 'g' lies 0.5 m inside 'b0'; put it on the face"
 
 
 def test_touching_blocks_do_not_overlap():
     """Decimal fractions are not exact in binary: 0.1 + 0.2 against 0.3 must count as touching."""
     a, b = {"centre": [7, 5, 0.15], "size": [1, 1, 0.3]}, {"centre": [7, 5, 0.1 + 0.2 + 0.5]}
-    assert told(case(**structure(a, b))) == []
+    assert reported(case(**structure(a, b))) == []
 
 
 def test_a_block_in_a_solid_is_an_overlap():
     solid = [{"name": "pier", "centre": [7, 5, 1], "size": [2, 2, 2]}]
-    assert told(case(solid=solid, **structure({"centre": [7, 5, 0.5]}))) == [
+    assert reported(case(solid=solid, **structure({"centre": [7, 5, 0.5]}))) == [
         "structure.block.0: 'b0' overlaps 'pier' by 1 m; move one of them by that much"
     ]
 
 
 def test_a_block_in_the_water_is_a_floating_or_sunken_body_and_allowed():
-    assert told(case(**structure({"centre": [2, 5, 4.5]}))) == []
+    assert reported(case(**structure({"centre": [2, 5, 4.5]}))) == []
 
 
 def test_a_fill_swallowed_by_a_solid_is_no_water():
-    found = told(case(solid=[{"centre": [2.5, 5, 2.5], "size": [5, 10, 5]}]))
+    found = reported(case(solid=[{"centre": [2.5, 5, 2.5], "size": [5, 10, 5]}]))
     assert found == ["water.fill.0: this water lies wholly inside 'solid', so there is none"]
 
 
-def test_a_block_beyond_the_tank_is_told_with_the_side_and_the_distance():
-    (found,) = told(case(**structure({"centre": [9.7, 5, 0.5]})))
+def test_a_block_beyond_the_tank_is_reported_with_the_side_and_the_distance():
+    (found,) = reported(case(**structure({"centre": [9.7, 5, 0.5]})))
     assert "reaches 0.2 m beyond the side x+ of the tank (x = 10 m)" in found
 
 
 def test_a_turned_block_reaches_further_than_its_edges():
     """A cube turned by 45 degrees about z is √2 wide: half of that is 0.707 m from its centre."""
     turned = {"centre": [9.4, 5, 0.5], "rotation": {"axis": [0, 0, 2], "angle": np.pi / 4}}
-    (found,) = told(case(**structure(turned)))
+    (found,) = reported(case(**structure(turned)))
     assert "reaches 0.1071 m beyond the side x+" in found
 
 
 def test_a_block_below_the_ground():
     dry = structure({"centre": [0, 0, 0.3]}, ground={"level": 0})
-    assert told(case(tank=None, water=None, **dry)) == [
+    assert reported(case(tank=None, water=None, **dry)) == [
         "structure.block.0: 'b0' reaches 0.2 m below the ground (z = 0 m); raise it"
     ]
 
 
 def test_an_axis_without_direction():
     turned = {"centre": [7, 5, 0.5], "rotation": {"axis": [0, 0, 0], "angle": 1}}
-    assert told(case(**structure(turned))) == [
+    assert reported(case(**structure(turned))) == [
         "structure.block.0.rotation.axis: [0, 0, 0] is no direction; write for instance [0, 0, 1]"
     ]
 
@@ -177,7 +177,7 @@ def building(**changes):
 
 
 def test_a_building_fits():
-    assert told(building(opening=[{"wall": "x-", "lower": [2, 0], "size": [1, 2]}])) == []
+    assert reported(building(opening=[{"wall": "x-", "lower": [2, 0], "size": [1, 2]}])) == []
 
 
 @pytest.mark.parametrize(
@@ -197,15 +197,15 @@ def test_a_building_fits():
     ],
 )
 def test_buildings_that_cannot_be(changes, says):
-    (found,) = told(building(**changes))
+    (found,) = reported(building(**changes))
     assert says in found
 
 
 def test_a_block_in_a_room_is_free_and_one_in_the_wall_is_not():
     house = {"lower": [4, 2, 0], "size": [6, 6, 8], "wall_thickness": 0.5, "block": [1, 1]}
     joints = {"strength": 1e5, "opening_at_failure": 1e-3}
-    assert told(case(**structure({"centre": [7, 5, 0.5]}, building=[house]), joints=joints)) == []
-    (found,) = told(case(**structure({"centre": [4.8, 5, 0.5]}, building=[house]), joints=joints))
+    assert reported(case(**structure({"centre": [7, 5, 0.5]}, building=[house]), joints=joints)) == []
+    (found,) = reported(case(**structure({"centre": [4.8, 5, 0.5]}, building=[house]), joints=joints))
     assert "'building' overlaps 'b0' by 0.2 m" in found
 
 
@@ -224,17 +224,19 @@ def test_a_block_in_a_room_is_free_and_one_in_the_wall_is_not():
 )
 def test_gauges_that_measure_nothing(gauge, says):
     solid = [{"name": "pier", "centre": [7, 5, 1], "size": [2, 2, 2]}]
-    (found,) = told(case(solid=solid, gauge=[{"name": "g", **gauge}], **structure({"centre": [2, 2, 0.5]})))
+    (found,) = reported(
+        case(solid=solid, gauge=[{"name": "g", **gauge}], **structure({"centre": [2, 2, 0.5]}))
+    )
     assert says in found
 
 
 def test_a_gauge_on_the_face_of_a_solid_is_where_it_belongs():
     solid = [{"name": "pier", "centre": [7, 5, 1], "size": [2, 2, 2]}]
-    assert told(case(solid=solid, gauge=[{"name": "g", "kind": "pressure", "at": [6, 5, 1]}])) == []
+    assert reported(case(solid=solid, gauge=[{"name": "g", "kind": "pressure", "at": [6, 5, 1]}])) == []
 
 
 def test_names_are_unique():
-    found = told(case(**structure({"centre": [7, 5, 0.5]}, {"centre": [2, 5, 0.5], "name": "b0"})))
+    found = reported(case(**structure({"centre": [7, 5, 0.5]}, {"centre": [2, 5, 0.5], "name": "b0"})))
     assert found == [
         "structure.block.1.name: 'b0' is taken by structure.block[0]; give every body its own name"
     ]
@@ -243,14 +245,16 @@ def test_names_are_unique():
 def test_blocks_without_joints_need_a_contact_stiffness():
     """With joints the contact takes over their stiffness; without, there is none to take."""
     loose = structure({"centre": [7, 5, 0.5]}) | {"contact": {}}
-    assert told(case(**loose)) == [
+    assert reported(case(**loose)) == [
         "contact: stiffness: missing; without [joints] there is nothing to take it from"
     ]
-    assert told(case(joints={"strength": 1e5, "opening_at_failure": 1e-3}, **loose)) == []
+    assert reported(case(joints={"strength": 1e5, "opening_at_failure": 1e-3}, **loose)) == []
 
 
 def test_a_motion_needs_its_block():
-    found = told(case(motion=[{"block": "b00", "velocity": [0, 0, 1]}], **structure({"centre": [7, 5, 0.5]})))
+    found = reported(
+        case(motion=[{"block": "b00", "velocity": [0, 0, 1]}], **structure({"centre": [7, 5, 0.5]}))
+    )
     assert found == ["motion.0.block: there is no block 'b00'; did you mean 'b0'?"]
 
 
@@ -320,7 +324,7 @@ def test_a_law_that_does_not_exist_or_has_no_potential_is_refused():
         ),
     ],
 )
-def test_values_that_look_like_a_wrong_unit_are_told(sections, says):
+def test_values_that_look_like_a_wrong_unit_are_reported(sections, says):
     """Allowed, since somebody may mean it: g/cm3 as a plain number, mPa for MPa, m for mm, a window after the end."""
     assert any(says in remark for remark in remarks(case(**sections)))
-    assert told(case(**sections)) == []
+    assert reported(case(**sections)) == []

@@ -52,9 +52,9 @@ def test_a_good_case_is_in_si(tmp_path):
 def test_the_effective_case_is_complete_and_reads_back_as_the_same_case(tmp_path):
     """What is stored with the results must be enough to run them again: every default written out, nothing lost."""
     case = load(write(tmp_path, WATER + BLOCKS)).case
-    told = effective(case)
-    assert told["contact"]["friction"] == case.contact.friction
-    assert Case.model_validate(told) == case
+    reported = effective(case)
+    assert reported["contact"]["friction"] == case.contact.friction
+    assert Case.model_validate(reported) == case
 
 
 def test_absent_sections_switch_modules_off(tmp_path):
@@ -151,7 +151,7 @@ def test_one_mistake_one_line(tmp_path, wrong, right, message):
     assert lines[0].startswith(message)
 
 
-def test_all_mistakes_are_told_at_once_in_the_order_of_the_file(tmp_path):
+def test_all_mistakes_are_reported_at_once_in_the_order_of_the_file(tmp_path):
     """An unknown name does not hide the geometry behind it."""
     text = WATER.replace("density", "densty") + BLOCKS.replace("centre = [2, 1, 0.5]", "centre = [2, 1, 0.3]")
     lines = mistakes(tmp_path, text)
@@ -207,7 +207,7 @@ def test_overrides_change_values_like_the_file(tmp_path):
         ("time.end.x=1", "--set time.end.x=1: 'x' is below a value"),
     ],
 )
-def test_a_bad_override_is_told_with_its_place(tmp_path, override, message):
+def test_a_bad_override_is_reported_with_its_place(tmp_path, override, message):
     (line,) = mistakes(tmp_path, WATER + BLOCKS, override)
     assert line.startswith(message)
 
@@ -226,13 +226,13 @@ def test_a_directory_without_a_case_says_how_to_get_one(tmp_path):
         load(tmp_path)
 
 
-def test_what_is_no_toml_is_told_with_its_line(tmp_path):
+def test_what_is_no_toml_is_reported_with_its_line(tmp_path):
     assert mistakes(tmp_path, WATER.replace("cell = ", "cell "))[0].startswith(
         "case.toml:8: not valid TOML: "
     )
 
 
-def test_what_is_no_text_is_told(tmp_path):
+def test_what_is_no_text_is_reported(tmp_path):
     (tmp_path / "case.toml").write_bytes(b"title = '\xff'")
     with pytest.raises(BadCase, match="not a text in UTF-8"):
         load(tmp_path)

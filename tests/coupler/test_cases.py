@@ -57,7 +57,7 @@ def test_a_dry_case_starts_and_keeps_its_energy(place):
     )
 
 
-def test_the_exact_frequency_of_the_joints_is_told_on_request():
+def test_the_exact_frequency_of_the_joints_is_reported_on_request():
     """The bound that sets the substep lies between it and √2 of it."""
     case = load(ROOT / "cases" / "bonded_wall_pulled").case
     name = "frequency of the joints, exact"

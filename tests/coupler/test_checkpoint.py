@@ -36,12 +36,12 @@ def damage_empty(path):
 
 
 @pytest.mark.parametrize("damage", [damage_tear, damage_byte, damage_empty])
-def test_a_damaged_checkpoint_is_told_and_the_older_one_taken(dry, copy, damage):
+def test_a_damaged_checkpoint_is_reported_and_the_older_one_taken(dry, copy, damage):
     newest, older = listed(copy / FOLDER)
     damage(newest)
-    told = []
-    assert go_on(copy, told=told).checkpoint.path == older
-    assert any(line.startswith("note: ") and newest.name in line and "left out" in line for line in told)
+    reported = []
+    assert go_on(copy, reported=reported).checkpoint.path == older
+    assert any(line.startswith("note: ") and newest.name in line and "left out" in line for line in reported)
     check_same(dry, copy)
 
 
@@ -49,9 +49,9 @@ def test_a_history_that_ends_before_the_checkpoint_sends_back_to_the_older_one(d
     """A machine that lost power may have lost the last rows, though the checkpoint was forced to the disk."""
     table = copy / "history" / "energy.csv"
     table.write_bytes(table.read_bytes()[:-10])
-    told = []
-    assert go_on(copy, told=told).checkpoint.time == pytest.approx(0.08)
-    assert any("energy.csv ends before it" in line for line in told)
+    reported = []
+    assert go_on(copy, reported=reported).checkpoint.time == pytest.approx(0.08)
+    assert any("energy.csv ends before it" in line for line in reported)
     check_same(dry, copy)
 
 

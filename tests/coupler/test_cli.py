@@ -46,11 +46,11 @@ def test_ctrl_c_ends_any_command_with_a_word(monkeypatch, capsys):
 
 def test_help_names_every_command_and_loads_nothing_that_takes_time():
     done = surgebreak("--help", PYTHONPROFILEIMPORTTIME="1")
-    told, loaded = done.stdout, {line.split("|")[-1].strip() for line in done.stderr.splitlines()}
+    reported, loaded = done.stdout, {line.split("|")[-1].strip() for line in done.stderr.splitlines()}
     assert "coupler.commands.cli" in loaded
     assert not loaded & {"numpy", "numba", "pydantic", "pint", "h5py", "skfem", "yade"}
     for command in ("run", "resume", "check", "render", "doctor", "explain", "init", "test"):
-        assert f"\n  {command} " in told
+        assert f"\n  {command} " in reported
 
 
 def test_a_bad_case_ends_with_two_and_one_line_for_each_mistake(tmp_path):
@@ -87,8 +87,10 @@ def test_an_unknown_option_is_refused(tmp_path):
 
 
 def test_explain_tells_unit_limits_and_example():
-    told = surgebreak("explain", "joints.strength").stdout
-    assert told == 'joints.strength [Pa] (> 0; required; for instance "0.5 MPa"): T_max, largest traction\n'
+    reported = surgebreak("explain", "joints.strength").stdout
+    assert (
+        reported == 'joints.strength [Pa] (> 0; required; for instance "0.5 MPa"): T_max, largest traction\n'
+    )
 
 
 def test_explain_offers_the_nearest_name():
@@ -112,7 +114,7 @@ def test_init_writes_a_case_that_passes_and_never_overwrites(tmp_path):
     assert (place / "case.toml").read_text(encoding="utf-8") == "mine"
 
 
-def test_without_the_optional_packages_the_way_to_get_them_is_told(tmp_path):
+def test_without_the_optional_packages_the_way_to_get_them_is_reported(tmp_path):
     """Called past the launcher, nothing may be installed behind the user's back."""
     code = (
         "import sys, coupler.commands.cli as cli, coupler.program.extras as extras\n"
@@ -206,8 +208,8 @@ def test_a_run_that_nobody_reads_says_so_in_its_files(tmp_path):
     words = [COMMAND, "run", "cases/joint_pulled", "--output", tmp_path / "run"]
     with subprocess.Popen(words, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as run:
         run.stdout.close()
-        told = run.stderr.read()
+        reported = run.stderr.read()
     log = (tmp_path / "run" / "log.txt").read_text(encoding="utf-8")
     assert "nobody reads the output any more" in log
-    assert "Traceback" not in log + told
+    assert "Traceback" not in log + reported
     assert json.loads((tmp_path / "run" / "run.json").read_text(encoding="utf-8"))["exit_code"] == 4

@@ -28,13 +28,13 @@ needs_yade = pytest.mark.skipif(shutil.which("yade") is None, reason="the comman
 
 @given(strength=st.floats(1e3, 1e8), failure=st.floats(1e-6, 1e-1))
 def test_another_law_of_ours_gets_strength_and_work_of_the_reference(strength, failure):
-    """And its stiffness where the law has a free place of its peak: bilinear; else it is told."""
+    """And its stiffness where the law has a free place of its peak: bilinear; else a remark says so."""
     reference = JointParameters(strength, failure, damping=0.0)
-    for law, told in (("bilinear", False), ("exponential", True)):
+    for law, reported in (("bilinear", False), ("exponential", True)):
         made, not_matched = matched(reference, law)
         assert made.strength == strength
         assert made.work_of_separation == pytest.approx(reference.work_of_separation)
-        assert any("stiffness" in text for text in not_matched) is told
+        assert any("stiffness" in text for text in not_matched) is reported
     assert matched(reference, "bilinear")[0].stiffness == pytest.approx(reference.stiffness, rel=1e-6)
 
 
@@ -51,17 +51,17 @@ def test_without_names_all_of_ours_and_the_usual_ones_of_yade_are_taken():
 
 
 def test_unknown_laws_are_refused_all_at_once_with_the_nearest():
-    with pytest.raises(BadCase) as told:
+    with pytest.raises(BadCase) as reported:
         make_plan(PULLED, [], ["cohfric", "mortor"], [1], 100)
-    assert "did you mean 'cohfrict'?" in told.value.lines[0]
-    assert "did you mean 'mortar'?" in told.value.lines[1]
+    assert "did you mean 'cohfrict'?" in reported.value.lines[0]
+    assert "did you mean 'mortar'?" in reported.value.lines[1]
 
 
 def test_a_case_with_water_is_refused_with_a_way_out():
     """Stock scenes know no water: each law would see another load."""
-    with pytest.raises(BadCase, match="the stock scenes know no water") as told:
+    with pytest.raises(BadCase, match="the stock scenes know no water") as reported:
         make_plan(ROOT / "cases" / "dam_break_building", [], [], [1], 100)
-    assert "--set joints.law=" in str(told.value)
+    assert "--set joints.law=" in str(reported.value)
 
 
 def test_a_case_without_joints_is_refused(tmp_path):
@@ -75,9 +75,9 @@ def test_a_case_without_joints_is_refused(tmp_path):
 def test_what_no_stock_scene_matches_follows_from_the_case():
     assert not any("dashpot of the joints" in text for text in general_limits(load(PULLED)))
     damped = load(PULLED, ["joints.damping=0.02", "joints.closing_ratio=10"])
-    told = " | ".join(general_limits(damped))
-    assert "dashpot of the joints" in told
-    assert "not 10 times it" in told
+    reported = " | ".join(general_limits(damped))
+    assert "dashpot of the joints" in reported
+    assert "not 10 times it" in reported
 
 
 @pytest.mark.parametrize("text", ["0", "1,x", "", "1,-2", "101"])
@@ -127,10 +127,10 @@ def test_errors_are_against_the_exact_answer_and_else_against_the_reference():
         outcome("cohfrict", [0.0, 6.0, 0.0], lost=250.0),
     )
     exact = {"peak_force": Exact(10.0, "known")}
-    told = errors(other, reference, exact)
-    assert told["peak_force"] == pytest.approx(0.4)
-    assert told["dissipated"] == pytest.approx(0.5)
-    assert told["largest"] == told["peak_force"]
+    reported = errors(other, reference, exact)
+    assert reported["peak_force"] == pytest.approx(0.4)
+    assert reported["dissipated"] == pytest.approx(0.5)
+    assert reported["largest"] == reported["peak_force"]
     assert errors(other, reference, {})["largest"] == errors(other, reference, {})["curve"]
 
 
@@ -151,24 +151,24 @@ def test_table_csv_and_json_say_the_same(tmp_path):
     about = json.loads((tmp_path / "comparison.json").read_text(encoding="utf-8"))
     assert [row["peak_force"] for row in about["laws"]] == [1e6, 9e5]
     assert [row["stock"] for row in about["laws"]] == [False, True]
-    told = table(plan, outcomes, found, exact)
-    assert "G_c: T_max²/(2 K_0)" in told
-    assert "against 1e+06 (T_max A)" in told
+    reported = table(plan, outcomes, found, exact)
+    assert "G_c: T_max²/(2 K_0)" in reported
+    assert "against 1e+06 (T_max A)" in reported
 
 
 def test_errors_against_nothing_are_not_shown(tmp_path):
     """Where nothing is driven the reference has no force, and an error against it would be NaN or absurd."""
     plan = make_plan(PULLED, [], ["cohfrict"], [1], 100)
     outcomes = [outcome("polynomial", [0.0, 0.0], lost=1e-12), outcome("cohfrict", [0.0, 0.0], lost=1.0)]
-    told = table(plan, outcomes, rows(outcomes, {}), {}).splitlines()
-    assert told[2].split()[1:6] == ["0", "-", "1", "-", "-"]
+    reported = table(plan, outcomes, rows(outcomes, {}), {}).splitlines()
+    assert reported[2].split()[1:6] == ["0", "-", "1", "-", "-"]
 
 
 def test_all_laws_are_listed_with_their_class_in_yade(capsys):
     show_laws()
-    told = capsys.readouterr().out
-    assert "polynomial: ours" in told
-    assert "Law2_ScGeom_MortarPhys_Lourenco" in told
+    reported = capsys.readouterr().out
+    assert "polynomial: ours" in reported
+    assert "Law2_ScGeom_MortarPhys_Lourenco" in reported
 
 
 @needs_yade

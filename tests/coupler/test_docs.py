@@ -61,8 +61,8 @@ def test_names_of_the_case_file_exist(page):
 @each_page
 def test_toml_that_is_shown_is_valid(page):
     for block in blocks(page.read_text(encoding="utf-8"), "toml"):
-        told = tomllib.loads(block)
-        assert {path for path in paths(told) if path not in KNOWN} == set()
+        reported = tomllib.loads(block)
+        assert {path for path in paths(reported) if path not in KNOWN} == set()
 
 
 @each_page

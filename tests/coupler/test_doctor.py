@@ -16,9 +16,9 @@ def test_a_failure_comes_with_its_remedy(monkeypatch, capsys):
     broken = doctor.Finding("YADE", "not usable", False, "apt install yade")
     monkeypatch.setattr(doctor, "CHECKS", (lambda: broken,))
     assert doctor.examine() == 1
-    told = capsys.readouterr().out
-    assert "BAD  YADE" in told
-    assert "-> apt install yade" in told
+    reported = capsys.readouterr().out
+    assert "BAD  YADE" in reported
+    assert "-> apt install yade" in reported
 
 
 @pytest.mark.parametrize(
@@ -26,12 +26,12 @@ def test_a_failure_comes_with_its_remedy(monkeypatch, capsys):
 )
 def test_a_crash_in_another_process_is_a_finding(code, says):
     """VTK and YADE can end a process with a signal; the doctor must survive that."""
-    status, told = doctor._in_process(code)
+    status, reported = doctor._in_process(code)
     assert status != 0
-    assert says in doctor._last(told)
+    assert says in doctor._last(reported)
 
 
-def test_yade_not_found_is_told_with_the_way_out(monkeypatch, tmp_path):
+def test_yade_not_found_is_reported_with_the_way_out(monkeypatch, tmp_path):
     from yade_scripts.yade_side import engine
 
     monkeypatch.setattr(engine, "PACKAGED", (str(tmp_path / "nowhere"),))
@@ -40,7 +40,7 @@ def test_yade_not_found_is_told_with_the_way_out(monkeypatch, tmp_path):
     assert "apt install yade" in finding.remedy
 
 
-def test_the_wrong_yade_package_is_told(monkeypatch, tmp_path):
+def test_the_wrong_yade_package_is_reported(monkeypatch, tmp_path):
     """Another project on the package index is called yade; it must be named, not imported."""
     from yade_scripts.yade_side import engine
 

@@ -108,7 +108,7 @@ def test_running_bond_shifts_every_other_course(tmp_path):
 
 def test_slivers_go_to_a_neighbour(tmp_path):
     """A window 3 cm from a corner leaves a strip of 3 cm beside it, which no block can be; with the parapet above and
-    below it is no strip. The one beside the window stays and is told."""
+    below it is no strip. The one beside the window stays and is reported."""
     body = box((0, 0, 0), (4, 0.3, 3)) - box((0.03, -1, 1), (1.2, 1, 2))
     found = cut(write(tmp_path / "strip.obj", wall=body))
     check_whole(found, body)

@@ -32,7 +32,7 @@ def test_every_case_that_comes_along_passes(place):
 
 
 @pytest.mark.parametrize(
-    ("change", "told"),
+    ("change", "reported"),
     [
         (("[tank]", "[tanc]"), "tanc"),
         (("cell = ", "cel = "), "cel"),
@@ -41,14 +41,14 @@ def test_every_case_that_comes_along_passes(place):
         (('kind = "level"', 'kind = "depth"'), "depth"),
     ],
 )
-def test_slips_are_found(place, tmp_path, change, told):
+def test_slips_are_found(place, tmp_path, change, reported):
     from coupler.case.first_cases import text_of
 
     assert change[0] in text_of("tank")
     (tmp_path / "case.toml").write_text(text_of("tank").replace(*change), encoding="utf-8")
     done = lint(place, tmp_path / "case.toml")
     assert done.returncode != 0
-    assert told in done.stderr
+    assert reported in done.stderr
 
 
 def test_every_name_has_its_meaning_and_every_quantity_its_unit():

@@ -58,21 +58,21 @@ def test_verdicts(tmp_path, bound, kept):
 
 
 @pytest.mark.parametrize(
-    ("right", "wrong", "told"),
+    ("right", "wrong", "reported"),
     [
         ('column = "x"', 'column = "tim"', "history/a.csv has no column 'tim'; did you mean 'time'?"),
         ("a.csv", "b.csv", "the run has no table history/b.csv"),
     ],
 )
-def test_a_promise_about_what_the_run_has_not_is_not_kept(tmp_path, right, wrong, told):
+def test_a_promise_about_what_the_run_has_not_is_not_kept(tmp_path, right, wrong, reported):
     """The run is done by then: its results must not be lost for a slip in the promise."""
     (verdict,) = write_run(tmp_path, ONE.replace(right, wrong) + "at_least = 0")
     assert not verdict.kept
-    assert str(verdict) == f"x: {told}, expected 0 to inf"
+    assert str(verdict) == f"x: {reported}, expected 0 to inf"
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "reported"),
     [
         (ONE, "expected.toml:1: expect[0]: give value and tolerance, or at_least, at_most or both of these"),
         (ONE + "value = 1", "give value and tolerance"),
@@ -97,9 +97,9 @@ def test_a_promise_about_what_the_run_has_not_is_not_kept(tmp_path, right, wrong
         ),
     ],
 )
-def test_a_wrong_file_is_told_before_the_run(tmp_path, text, told):
+def test_a_wrong_file_is_reported_before_the_run(tmp_path, text, reported):
     (tmp_path / "expected.toml").write_text(text, encoding="utf-8")
-    (line,) = [line for line in mistakes_in(tmp_path) if told in line]
+    (line,) = [line for line in mistakes_in(tmp_path) if reported in line]
     assert line.startswith(str(tmp_path))
 
 

@@ -33,8 +33,8 @@ WATER = {"mesh_cells": 120, "cells": 100, "wet_cells": 25, "bodies": 5, "bodies_
 STRUCTURE = {"blocks": 4, "loose_blocks": 1, "joints": 6, "live_joints": 4, "contacts": 4}
 
 
-def found(told):
-    return {row.what: row for row in skipped(told)}
+def found(reported):
+    return {row.what: row for row in skipped(reported)}
 
 
 def test_the_estimate_is_cost_of_a_unit_times_units_skipped():
@@ -70,10 +70,10 @@ def test_parts_that_were_not_loaded():
 
 def test_the_words_say_what_is_an_estimate(tmp_path):
     (tmp_path / "run.json").write_text(json.dumps(summary(**WATER, **STRUCTURE)), encoding="utf-8")
-    told = explanation_of_run(tmp_path)
-    assert "costs are estimates" in told
-    assert "cells without water: 75 of 100 a step; about 6 s more" in told
-    assert "off in this case: viscosity" in told
+    reported = explanation_of_run(tmp_path)
+    assert "costs are estimates" in reported
+    assert "cells without water: 75 of 100 a step; about 6 s more" in reported
+    assert "off in this case: viscosity" in reported
 
 
 def test_a_directory_without_a_run_is_refused(tmp_path):

@@ -24,13 +24,13 @@ from tests.coupler.synthetic_run import write_run
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
     path = write_run(tmp_path_factory.mktemp("run") / "run", cell=4.0, times=np.linspace(0.0, 2.0, 4))
-    told = {
+    reported = {
         "status": "done",
         "exit_reason": "reached the end",
         "figures": {},
         "case": {"case": {"title": "made up"}},
     }
-    (path / "run.json").write_text(json.dumps(SUMMARY | told))
+    (path / "run.json").write_text(json.dumps(SUMMARY | reported))
     return path
 
 
@@ -70,10 +70,10 @@ def test_blocks_keep_their_numbers_though_their_faces_are_sorted_by_corners(run,
 
 
 def test_exporting_again_adds_only_what_is_new(run, tmp_path):
-    told = []
-    export(run, ["vtk"], tmp_path, 0.0, 1.0, tell=told.append)
+    reported = []
+    export(run, ["vtk"], tmp_path, 0.0, 1.0, tell=reported.append)
     old = {path: path.stat().st_mtime_ns for path in tmp_path.glob("*.vtu")}
-    export(run, ["vtk"], tmp_path, 0.0, np.inf, tell=told.append)
+    export(run, ["vtk"], tmp_path, 0.0, np.inf, tell=reported.append)
     assert {path: path.stat().st_mtime_ns for path in old} == old
     assert len(files_of(tmp_path / "water.pvd")) == 4
     assert not list(tmp_path.glob(".*.part"))

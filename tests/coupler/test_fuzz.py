@@ -215,11 +215,11 @@ def runs(count, seed, folder, dry):
     def one(rng):
         run = fuzz.fresh(dry, folder / "run")
         spoilt = fuzz.spoil(run, rng)
-        told = []
+        reported = []
         for read in (lambda: prepare(run, ["time.end='0.2 s'"], True, [].append), lambda: explanation_of_run(run),
                      lambda: report(run, False)):  # fmt: skip
             try:
-                told.append(fuzz.verdict(read))
+                reported.append(fuzz.verdict(read))
             except Exception as error:
                 error.add_note(spoilt)
                 raise

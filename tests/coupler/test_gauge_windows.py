@@ -12,11 +12,11 @@ STEPS = st.lists(st.tuples(st.floats(1e-3, 0.5), st.floats(-10, 10)), min_size=1
 
 
 def run(windows, steps):
-    time, told = 0.0, None
+    time, reported = 0.0, None
     for dt, value in steps:
         time += dt
-        told = windows.add(time, dt, value)
-    return time, told
+        reported = windows.add(time, dt, value)
+    return time, reported
 
 
 @given(STEPS)
@@ -35,8 +35,8 @@ def test_halving_every_step_changes_nothing(steps):
 
 def test_mean_of_a_jump_rises_linearly_and_its_peak_stays():
     windows = Windows(None, 0.4)
-    told = [windows.add(0.1 * (k + 1), 0.1, 0.0 if k < 10 else 2.0 if k < 30 else 0.0) for k in range(40)]
-    mean, peak = np.array(told).T
+    reported = [windows.add(0.1 * (k + 1), 0.1, 0.0 if k < 10 else 2.0 if k < 30 else 0.0) for k in range(40)]
+    mean, peak = np.array(reported).T
     np.testing.assert_allclose(mean[9:15], [0.0, 0.5, 1.0, 1.5, 2.0, 2.0], atol=1e-12)
     assert mean[-1] == pytest.approx(0.0, abs=1e-12)
     assert peak[-1] == pytest.approx(2.0)
@@ -45,10 +45,10 @@ def test_mean_of_a_jump_rises_linearly_and_its_peak_stays():
 def test_vectors_have_a_column_for_each_component_and_the_peak_of_their_length():
     windows = Windows((0.0, 1.0), 0.1)
     names = [name for name, *_ in windows.columns("g", "N", ("_x", "_y", "_z"))]
-    told = dict(zip(names, windows.add(0.5, 0.5, [3.0, 0.0, 4.0])))
-    assert told["g_impulse_x"] == pytest.approx(1.5)
-    assert told["g_mean_z"] == pytest.approx(4.0)
-    assert told["g_peak"] == pytest.approx(5.0)
+    reported = dict(zip(names, windows.add(0.5, 0.5, [3.0, 0.0, 4.0])))
+    assert reported["g_impulse_x"] == pytest.approx(1.5)
+    assert reported["g_mean_z"] == pytest.approx(4.0)
+    assert reported["g_peak"] == pytest.approx(5.0)
 
 
 def test_points_of_a_disc_have_its_moments():
@@ -77,10 +77,10 @@ def test_steps_without_a_value_leave_sums_means_and_peaks_alone():
     NaN where that is nothing, and impulse and peak go on from what they were."""
     windows = Windows((0.0, 1.0), 0.2)
     values = [1.0, 3.0, np.nan, np.nan, np.nan, np.nan, 2.0]
-    told = np.array([windows.add(0.1 * (k + 1), 0.1, v) for k, v in enumerate(values)])
-    np.testing.assert_allclose(told[:, 0], [0.1, 0.4, 0.4, 0.4, 0.4, 0.4, 0.6])
-    np.testing.assert_allclose(told[:, 1], [1.0, 2.0, 3.0, np.nan, np.nan, np.nan, 2.0])
-    np.testing.assert_allclose(told[:, 2], [1.0, 2.0, 3.0, 3.0, 3.0, 3.0, 3.0])
+    reported = np.array([windows.add(0.1 * (k + 1), 0.1, v) for k, v in enumerate(values)])
+    np.testing.assert_allclose(reported[:, 0], [0.1, 0.4, 0.4, 0.4, 0.4, 0.4, 0.6])
+    np.testing.assert_allclose(reported[:, 1], [1.0, 2.0, 3.0, np.nan, np.nan, np.nan, 2.0])
+    np.testing.assert_allclose(reported[:, 2], [1.0, 2.0, 3.0, 3.0, 3.0, 3.0, 3.0])
     assert np.isfinite(windows.save()["steps"]).all()  # checkpoints hold numbers only
 
 

@@ -118,22 +118,22 @@ def pip_installs(calls):
 def test_the_first_call_on_a_fresh_machine_sets_everything_up(machine):
     """apt for YADE and venv, a .venv, the pinned packages, then the command itself."""
     case = str(machine.root)
-    code, told, calls = machine("run", case, "--end", "1 s")
+    code, reported, calls = machine("run", case, "--end", "1 s")
     assert code == 0
     assert "apt-get install -q -y --no-install-recommends -o Dpkg::Use-Pty=0 yade python3-venv" in calls
     assert any(call.startswith("system-python -m venv") for call in calls)
     assert pip_installs(calls) == [""]
     assert any("-c " + str(machine.root / "constraints.txt") in call for call in calls)
     assert calls[-1] == f"surgebreak run {case} --end 1 s"
-    assert "installing yade python3-venv from apt" in told
-    assert "set up in " in told
+    assert "installing yade python3-venv from apt" in reported
+    assert "set up in " in reported
 
 
 def test_later_calls_start_at_once(machine):
     """No apt, no pip, no word: one process, the command itself."""
     machine("run", str(machine.root))
-    code, told, calls = machine("run", "x")
-    assert (code, told, calls) == (0, "", ["surgebreak run x"])
+    code, reported, calls = machine("run", "x")
+    assert (code, reported, calls) == (0, "", ["surgebreak run x"])
 
 
 def test_an_existing_yade_is_honoured(machine):
@@ -180,9 +180,9 @@ def test_help_of_a_command_installs_none_of_its_extras(machine, command, word):
     """850 MB of pictures for a page of help was what the first user got."""
     machine.ready()
     machine("doctor")
-    code, told, calls = machine(command, word)
+    code, reported, calls = machine(command, word)
     assert (code, calls) == (0, [f"surgebreak {command} {word}"])
-    assert "installing" not in told
+    assert "installing" not in reported
 
 
 def test_the_tab_key_installs_nothing(machine):
@@ -202,9 +202,9 @@ def test_the_tab_key_installs_nothing(machine):
     "words", [("run",), ("run", "--set"), ("run", "--set", "a=1"), ("check", "--end", "1 s")]
 )
 def test_nothing_is_set_up_without_a_case(machine, words):
-    code, told, calls = machine(*words)
+    code, reported, calls = machine(*words)
     assert (code, calls) == (2, [])
-    assert f"{words[0]}: which case? Write surgebreak {words[0]} CASE" in told
+    assert f"{words[0]}: which case? Write surgebreak {words[0]} CASE" in reported
 
 
 @pytest.mark.parametrize(
@@ -212,14 +212,14 @@ def test_nothing_is_set_up_without_a_case(machine, words):
 )
 def test_help_installs_nothing(machine, words):
     """Before the set-up the launcher says what there is; after it the program does, without the extras."""
-    code, told, calls = machine(*words)
-    assert (code, told, calls) == (0, "", [])
+    code, reported, calls = machine(*words)
+    assert (code, reported, calls) == (0, "", [])
     machine.ready()("doctor")
     assert machine(*words)[::2] == (0, ["surgebreak " + " ".join(words)])
 
 
 def test_help_names_the_commands_of_the_program(machine):
-    told = subprocess.run(
+    reported = subprocess.run(
         [machine.root / "surgebreak", "-h"],
         capture_output=True,
         text=True,
@@ -227,16 +227,16 @@ def test_help_names_the_commands_of_the_program(machine):
         env=machine.environment,
     ).stdout
     names = [command.name or command.callback.__name__ for command in app.registered_commands]
-    listed = told.partition("Commands: ")[2].partition("\n\n")[0].replace("\n", " ")
+    listed = reported.partition("Commands: ")[2].partition("\n\n")[0].replace("\n", " ")
     assert sorted(listed.split(", ")) == sorted(names)
 
 
 @pytest.mark.parametrize("options", [(), ("--set", "time.end=1 s", "--output", "there")])
 def test_nothing_is_set_up_for_a_case_that_does_not_exist(machine, options):
     """A slip of the pen should not cost an installation."""
-    code, told, calls = machine("run", *options, "nowhere/x")
+    code, reported, calls = machine("run", *options, "nowhere/x")
     assert (code, calls) == (2, [])
-    assert "nowhere/x: no such case" in told
+    assert "nowhere/x: no such case" in reported
 
 
 def test_changed_pins_are_installed_again(machine):
@@ -252,8 +252,8 @@ def test_through_a_link_and_from_another_directory(machine, tmp_path):
     (tmp_path / "link").symlink_to("checkout/surgebreak")
     (tmp_path / "elsewhere" / "again").symlink_to("../link")
     for program in (tmp_path / "link", tmp_path / "elsewhere" / "again", "../checkout/surgebreak"):
-        code, told, calls = machine("--version", program=program, cwd=tmp_path / "elsewhere")
-        assert (code, told, calls) == (0, "", ["surgebreak --version"])
+        code, reported, calls = machine("--version", program=program, cwd=tmp_path / "elsewhere")
+        assert (code, reported, calls) == (0, "", ["surgebreak --version"])
 
 
 def test_arguments_arrive_as_they_were_given(machine):
@@ -287,58 +287,58 @@ def test_sudo_is_used_by_ordinary_users(machine):
 def test_neither_root_nor_sudo_says_what_to_ask_for(machine, sudo):
     if sudo:
         machine.stub("sudo", sudo)
-    code, told, calls = machine("doctor", USER_NUMBER="1000")
+    code, reported, calls = machine("doctor", USER_NUMBER="1000")
     assert code == 1
-    assert "    apt-get install --no-install-recommends yade python3-venv" in told
-    assert "sudo is absent or refused" in told
+    assert "    apt-get install --no-install-recommends yade python3-venv" in reported
+    assert "sudo is absent or refused" in reported
     assert not any(call.startswith("apt-get") for call in calls)
 
 
 def test_without_apt(machine):
     (machine.stubs / "apt-get").unlink()
-    code, told, _ = machine("doctor")
+    code, reported, _ = machine("doctor")
     assert code == 1
     assert (
         "Debian GNU/Linux 12 (bookworm) has no apt-get; surgebreak takes the engine YADE from the packages"
-        in told
+        in reported
     )
 
 
 def test_another_system(machine):
     machine.stub("uname", "#!/bin/sh\necho Darwin\n")
-    code, told, _ = machine("doctor")
+    code, reported, _ = machine("doctor")
     assert code == 1
-    assert "this system is Darwin; surgebreak needs Debian 12 or a derivative" in told
+    assert "this system is Darwin; surgebreak needs Debian 12 or a derivative" in reported
 
 
 def test_a_derivative_without_the_package(machine):
-    code, told, _ = machine("doctor", NO_PACKAGE="1")
+    code, reported, _ = machine("doctor", NO_PACKAGE="1")
     assert code == 1
-    assert "offers no package 'yade'" in told
+    assert "offers no package 'yade'" in reported
 
 
 def test_a_python_that_is_too_old(machine):
-    code, told, _ = machine.ready()("doctor", OLD_PYTHON="1")
+    code, reported, _ = machine.ready()("doctor", OLD_PYTHON="1")
     assert code == 1
-    assert "needs the system's Python 3.11 or later" in told
+    assert "needs the system's Python 3.11 or later" in reported
 
 
-def test_a_failing_apt_is_told_and_repeated(machine):
-    code, told, calls = machine("doctor", APT_FAILS="1")
+def test_a_failing_apt_is_reported_and_repeated(machine):
+    code, reported, calls = machine("doctor", APT_FAILS="1")
     assert code == 1
-    assert "apt-get could not install yade python3-venv" in told
+    assert "apt-get could not install yade python3-venv" in reported
     assert not any("venv" in call for call in calls if call.startswith("system-python -m"))
     assert machine("doctor")[0] == 0
 
 
-def test_a_failing_pip_is_told_and_repeated_without_starting_over(machine):
+def test_a_failing_pip_is_reported_and_repeated_without_starting_over(machine):
     """Without network nothing has been written yet: the next call goes on where this one stopped."""
     machine.ready()
-    code, told, calls = machine("doctor", PIP_FAILS="1")
+    code, reported, calls = machine("doctor", PIP_FAILS="1")
     assert code == 1
-    assert "pip could not install the packages" in told
+    assert "pip could not install the packages" in reported
     assert not any(call.startswith("surgebreak") for call in calls)
-    code, told, calls = machine("doctor")
+    code, reported, calls = machine("doctor")
     assert (code, calls[-1]) == (0, "surgebreak doctor")
     assert not any(call.startswith("system-python -m venv") for call in calls)
 
@@ -350,9 +350,9 @@ def test_packages_half_written_by_an_interrupted_set_up_are_thrown_away(machine)
     (stamps / "unfinished").write_text("view\n", encoding="utf-8")
     (stamps / "view.log").write_text("Installing collected packages: numpy\n", encoding="utf-8")
     (machine.root / ".venv" / "half").touch()
-    code, told, calls = machine("doctor")
+    code, reported, calls = machine("doctor")
     assert code == 0
-    assert "an earlier set-up was interrupted; starting it again" in told
+    assert "an earlier set-up was interrupted; starting it again" in reported
     assert not (machine.root / ".venv" / "half").exists()
     assert any(call.startswith("system-python -m venv") for call in calls)
 
@@ -372,9 +372,9 @@ def test_ctrl_c_during_the_set_up_leaves_a_state_that_the_next_call_mends(machin
         assert time.monotonic() < until
         time.sleep(0.02)
     os.killpg(child.pid, signal.SIGINT)
-    _, told = child.communicate(timeout=20)
+    _, reported = child.communicate(timeout=20)
     assert child.returncode == 130
-    assert "interrupted; the next call starts this part again" in told
+    assert "interrupted; the next call starts this part again" in reported
     machine.stub("slow", "#!/bin/sh\n")
     code, _, calls = machine("doctor")
     assert (code, calls[-1]) == (0, "surgebreak doctor")
@@ -418,18 +418,18 @@ def test_a_path_with_an_umlaut_in_a_locale_without(tmp_path, folder, locale, pas
 
 
 @pytest.mark.parametrize(
-    ("log", "told"),
+    ("log", "reported"),
     [
         ("OSError: [Errno 28] No space left on device", "The disk is full"),
         ("Connection to pypi.org timed out", "look at network and proxy"),
         ("ERROR: Invalid requirement: 'schöner'", "The last lines say why"),
     ],
 )
-def test_pip_fails_for_the_reason_that_its_log_tells(machine, log, told):
+def test_pip_fails_for_the_reason_that_its_log_tells(machine, log, reported):
     machine.stub("make-venv", VENV.replace('[ -z "$PIP_FAILS" ]', f'echo "{log}"; exit 1'))
     code, said, _ = machine.ready()("doctor")
     assert code == 1
-    assert f"{told}" in said.splitlines()[-1]
+    assert f"{reported}" in said.splitlines()[-1]
 
 
 def as_a_user_who_may_only_read(machine, *words, **environment):
@@ -455,10 +455,10 @@ def as_a_user_who_may_only_read(machine, *words, **environment):
 
 def test_a_checkout_that_one_may_only_read(machine):
     """Either another place for the packages, or a word about it; never half an installation."""
-    code, told, calls = as_a_user_who_may_only_read(machine.ready(), "doctor")
+    code, reported, calls = as_a_user_who_may_only_read(machine.ready(), "doctor")
     assert (code, calls) == (1, [])
-    assert f"cannot write to {machine.root}/.venv, where the packages go" in told
-    assert "SURGEBREAK_VENV=$HOME/surgebreak-venv" in told
+    assert f"cannot write to {machine.root}/.venv, where the packages go" in reported
+    assert "SURGEBREAK_VENV=$HOME/surgebreak-venv" in reported
 
 
 def test_the_packages_may_go_elsewhere(machine):
@@ -472,15 +472,15 @@ def test_the_packages_may_go_elsewhere(machine):
 def test_the_installation_of_somebody_else_is_used_as_it_is(machine):
     """Its kernels are compiled into a cache of each user's own."""
     machine.ready()("doctor")
-    code, told, calls = as_a_user_who_may_only_read(machine, "run", "x")
-    assert (code, told, calls[-1]) == (0, "", "surgebreak run x")
+    code, reported, calls = as_a_user_who_may_only_read(machine, "run", "x")
+    assert (code, reported, calls[-1]) == (0, "", "surgebreak run x")
 
 
 def test_a_folder_that_cannot_be_written(machine):
     (machine.root / ".venv").write_text("", encoding="utf-8")
-    code, told, _ = machine.ready()("doctor")
+    code, reported, _ = machine.ready()("doctor")
     assert code == 1
-    assert "cannot write to " in told
+    assert "cannot write to " in reported
 
 
 def test_the_launcher_is_plain_posix():

@@ -47,11 +47,11 @@ def test_a_dry_case_loads_neither_the_water_nor_pictures(tmp_path):
     packages = loaded(DRY, "--end", "2 ms", "--output", tmp_path / "run")
     assert "yade" in packages
     assert packages & {"skfem", "fluid", "vtkmodules", "pyvista", "matplotlib"} == set()
-    told = figures(tmp_path / "run")
-    assert {name for name, is_loaded in told["imports"].items() if is_loaded} == packages & set(HEAVY)
-    assert told["cpu_seconds"].keys() == {"set-up", "structure", "output", "other"}
-    assert told["work"].keys() == {"blocks", "loose_blocks", "joints", "live_joints", "contacts"}
-    assert told["work"]["joints"] == told["joints"]
+    reported = figures(tmp_path / "run")
+    assert {name for name, is_loaded in reported["imports"].items() if is_loaded} == packages & set(HEAVY)
+    assert reported["cpu_seconds"].keys() == {"set-up", "structure", "output", "other"}
+    assert reported["work"].keys() == {"blocks", "loose_blocks", "joints", "live_joints", "contacts"}
+    assert reported["work"]["joints"] == reported["joints"]
     assert not (tmp_path / "run" / "history" / "water.csv").exists()
 
 
@@ -59,10 +59,10 @@ def test_a_case_of_water_alone_never_loads_yade_or_pictures(tmp_path):
     packages = loaded(write(tmp_path, WATER), "--end", "20 ms", "--output", tmp_path / "run")
     assert "fluid" in packages
     assert packages & {"yade", "yade_scripts", "vtkmodules", "pyvista", "matplotlib"} == set()
-    told = figures(tmp_path / "run")
-    assert told["cpu_seconds"].keys() == {"set-up", "water", "pressure", "output", "other"}
-    assert told["work"].keys() == {"mesh_cells", "cells", "wet_cells", "bodies", "bodies_cut", "passes"}
-    assert 0 < told["work"]["wet_cells"] < told["work"]["cells"] == told["work"]["mesh_cells"]
+    reported = figures(tmp_path / "run")
+    assert reported["cpu_seconds"].keys() == {"set-up", "water", "pressure", "output", "other"}
+    assert reported["work"].keys() == {"mesh_cells", "cells", "wet_cells", "bodies", "bodies_cut", "passes"}
+    assert 0 < reported["work"]["wet_cells"] < reported["work"]["cells"] == reported["work"]["mesh_cells"]
     assert not (tmp_path / "run" / "history" / "structure.csv").exists()
 
 
@@ -99,8 +99,8 @@ def test_a_wish_to_stop_ends_a_run_cleanly(tmp_path, ask):
         assert child.poll() is None, child.stderr.read()
         time.sleep(0.05)
     ask(child, place)
-    _, told = child.communicate(timeout=60)
-    assert child.returncode == 4, told
+    _, reported = child.communicate(timeout=60)
+    assert child.returncode == 4, reported
     summary = json.loads((place / "run.json").read_text(encoding="utf-8"))
     assert (summary["status"], summary["exit_code"]) == ("stopped", 4)
     history = read_history(table)

@@ -104,13 +104,13 @@ def test_rows_of_each_block_hold_the_impulses_of_the_group():
     parts = ["pressure", "friction", "contact", "joint", "weight"]
     group = GroupLoads(rows, np.zeros(3), parts)
     each_block = BlockLoads(rows, names, np.zeros((3, 3)), parts, every=0.05)
-    told = []
+    reported = []
 
     def each(coupling, record):
-        told.append((group.read(coupling, record)[0], each_block.read(coupling, record)))
+        reported.append((group.read(coupling, record)[0], each_block.read(coupling, record)))
 
     run(scene(), 0.2, each)
-    sums, written = told[-1][0], [row for _, rows_now in told for row in rows_now]
+    sums, written = reported[-1][0], [row for _, rows_now in reported for row in rows_now]
     assert len(written) == 3 * 4
     assert [row["block"] for row in written[:3]] == names
     for part in parts:

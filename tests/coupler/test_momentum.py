@@ -53,7 +53,7 @@ def test_debris_in_a_dam_break_closes_every_step(covers):
     """Water, free blocks, a pier, a held block, ground contact, rough walls and joints that break: linear and angular.
 
     Fields are handed on between cuts only where nodes have several covers."""
-    errors, told = [], {name: 0.0 for name, _ in LINES}
+    errors, reported = [], {name: 0.0 for name, _ in LINES}
 
     def each(coupling, record):
         m = record.momentum
@@ -61,7 +61,7 @@ def test_debris_in_a_dam_break_closes_every_step(covers):
         total = sum(m.lines.values()) + m.residual
         np.testing.assert_allclose(m.water + m.blocks, total, atol=1e-11 * m.exchanged)  # from rest
         for name, line in m.lines.items():
-            told[name] = max(told[name], np.abs(line).max())
+            reported[name] = max(reported[name], np.abs(line).max())
 
     fill = [{"lower": [0, 0, 0], "upper": [0.5, 0.5, 0.4]}]
     water = {"fill": fill, "covers": covers, "walls": "friction", "roughness": 0.002}
@@ -70,7 +70,7 @@ def test_debris_in_a_dam_break_closes_every_step(covers):
     assert not coupling.structure.joints.alive.all(), "no joint broke"
     acting = ["tank", "tank_shear", "held_blocks", "ground", "ground_joints", "lag", "transport"]
     for name in acting + ["recut"] * (covers == "multiple"):
-        assert told[name] > 1e-6, f"nothing happened in {name}: the scene does not show that it closes"
+        assert reported[name] > 1e-6, f"nothing happened in {name}: the scene does not show that it closes"
 
 
 def test_a_pier_that_water_alone_strikes_has_a_line_of_its_own():
@@ -87,7 +87,7 @@ def test_a_pier_that_water_alone_strikes_has_a_line_of_its_own():
 
 
 def test_water_gives_what_blocks_receive():
-    """Impulse told to the structure = impulse on the water, to round-off."""
+    """Impulse handed to the structure = impulse on the water, to round-off."""
 
     def each(coupling, record):
         n, s = coupling.structure.n, coupling.structure

@@ -40,8 +40,8 @@ stiffness = {stiffness}
 def test_a_soft_contact_is_remarked_and_ends_the_run(tmp_path, stiffness, soft):
     """200 kg from 0.2 m: v sqrt(m/K) is 0.9 of the plate, or 0.03 of it."""
     path = write(tmp_path, SOFT.format(stiffness=stiffness))
-    told = [text for text in remarks(load(path).case) if "too soft" in text]
-    assert [("'plate', 0.1 m thick" in text) for text in told] == ([True] if soft else [])
+    reported = [text for text in remarks(load(path).case) if "too soft" in text]
+    assert [("'plate', 0.1 m thick" in text) for text in reported] == ([True] if soft else [])
     program = "import sys; sys.argv[0] = 'surgebreak'; from coupler.commands.cli import main; main()"
     command = [sys.executable, "-c", program, "run", str(path), "--output", str(tmp_path / "out")]
     done = subprocess.run(command, capture_output=True, text=True, check=False)

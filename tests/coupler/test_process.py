@@ -1,4 +1,4 @@
-"""What a command starts must be the program that was called, or figures would be told of another version."""
+"""What a command starts must be the program that was called, or figures of another version would be reported."""
 
 import os
 import shutil

@@ -34,11 +34,11 @@ def test_time_left_does_not_count_the_first_step(monkeypatch):
     """The first step compiles: it took 100 s here, the others 1 s each; after two of ten steps 8 s are left."""
     now = iter([100.0, 101.0])
     monkeypatch.setattr("coupler.run.progress.clock.monotonic", lambda: next(now))
-    told = io.StringIO()
-    tell = LineReporter(10.0, lambda line: None, lambda: None, told)
+    reported = io.StringIO()
+    tell = LineReporter(10.0, lambda line: None, lambda: None, reported)
     tell.step(1.0, {})
     tell.step(2.0, {})
-    assert told.getvalue().splitlines()[-1].endswith("left 8 s")
+    assert reported.getvalue().splitlines()[-1].endswith("left 8 s")
 
 
 def test_few_long_steps_give_a_line_each():

@@ -36,7 +36,7 @@ def dry():
 
 
 @pytest.mark.parametrize(
-    ("key", "value", "told"),
+    ("key", "value", "reported"),
     [
         ("joints.strenght", 1, r"joints\.strenght: unknown name; did you mean 'strength'\?"),
         ("joints.strength", "1 mm", r"joints\.strength: '1 mm' is a length, needs a pressure"),
@@ -50,11 +50,11 @@ def dry():
         ("time[+]", 1, r"\[\+\] adds to a list"),
     ],
 )
-def test_a_wrong_change_is_refused_at_once_and_changes_nothing(key, value, told):
+def test_a_wrong_change_is_refused_at_once_and_changes_nothing(key, value, reported):
     """The words are those of the case file, and the case stays what it was."""
     case = dry()
     before = case.effective
-    with pytest.raises(surgebreak.BadCase, match=told):
+    with pytest.raises(surgebreak.BadCase, match=reported):
         case.set(key, value)
     assert case.changes == ()
     assert case.effective == before
@@ -159,15 +159,15 @@ def test_a_second_run_in_a_process_gives_the_same_bytes(ran, tmp_path):
 
 
 def test_a_run_within_a_run_is_refused(tmp_path):
-    told = []
+    reported = []
 
     def inner(step):
         with pytest.raises(surgebreak.RunInRun, match="one scene a process"):
             dry().run(tmp_path / "inner")
-        told.append(step.number)
+        reported.append(step.number)
 
     dry().set("time.end", "4 ms").run(tmp_path / "outer", callback=inner)
-    assert told == [1]
+    assert reported == [1]
     assert not (tmp_path / "inner").exists()
     dry().check()  # and after it, all is free again
 

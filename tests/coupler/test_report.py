@@ -88,24 +88,24 @@ def read(path):
 
 
 def test_the_page_of_a_run_is_whole_and_alone(run):
-    told = read(report(run, with_pictures=False))
-    assert "diverged (exit code 3): the water volume is off by &lt;5 %" in told
-    assert "Water &amp; a &lt;wall&gt;" in told
-    assert "&lt;b&gt;" in told
+    reported = read(report(run, with_pictures=False))
+    assert "diverged (exit code 3): the water volume is off by &lt;5 %" in reported
+    assert "Water &amp; a &lt;wall&gt;" in reported
+    assert "&lt;b&gt;" in reported
     for title in ("What was run", "Ledger", "Cracks", "Limits", "Processor time, and what was left out"):
-        assert f"<h2>{title}</h2>" in told
-    assert "NOT KEPT" in told
-    assert "time.end=2 s" in told
+        assert f"<h2>{title}</h2>" in reported
+    assert "NOT KEPT" in reported
+    assert "time.end=2 s" in reported
 
 
 def test_numbers_have_their_units(run):
-    told = read(report(run, with_pictures=False))
-    assert "12.5 kN" in told
-    assert "4000 s" in told
-    assert "energy [kJ]" in told
-    assert re.search(r"1\.5<.*>3<.*>1\.5<", told)
-    assert "1 of 2 joints broke" in told
-    assert "dissipated 2.5 kJ" in told
+    reported = read(report(run, with_pictures=False))
+    assert "12.5 kN" in reported
+    assert "4000 s" in reported
+    assert "energy [kJ]" in reported
+    assert re.search(r"1\.5<.*>3<.*>1\.5<", reported)
+    assert "1 of 2 joints broke" in reported
+    assert "dissipated 2.5 kJ" in reported
 
 
 def test_a_limit_that_was_passed_is_marked(run):
@@ -137,14 +137,14 @@ def test_the_report_leaves_yade_and_pictures_alone(run):
 
 
 @pytest.mark.parametrize(
-    ("value", "unit", "told"),
+    ("value", "unit", "reported"),
     [
         (1234.5, "J", "1.234 kJ"), (0.0, "N", "0 N"), (-2.5e-5, "m", "-25 µm"), (3600.0, "s", "3600 s"),
         (0.02, "s", "20 ms"), (12.0, "m3", "12 m³"), (0.25, "1", "0.25"), (None, "J", "–"), (float("nan"), "J", "–"),
     ],
 )  # fmt: skip
-def test_quantities_are_short_and_have_units(value, unit, told):
-    assert quantity(value, unit) == told
+def test_quantities_are_short_and_have_units(value, unit, reported):
+    assert quantity(value, unit) == reported
 
 
 def test_a_figure_is_in_the_page(tmp_path):
@@ -161,17 +161,17 @@ def test_a_table_without_rows_is_not_there():
 
 def test_markdown_of_a_study(tmp_path):
     (tmp_path / "q.png").write_bytes(PIXEL)
-    told = to_html(
+    reported = to_html(
         "# T & U\n\n**bold** and `a < b`\n\n![what](q.png)\n\n![gone](r.png)\n\n"
         "| run | set-up |\n|---|--:|\n| a | 1 |\n\n- one\n- two\n",
         tmp_path,
     )
-    assert "<h1>T &amp; U</h1>" in told
-    assert "<strong>bold</strong> and <code>a &lt; b</code>" in told
-    assert told.count("<img") == 1
-    assert "r.png was not drawn" in told
-    assert "set-up s" in told
-    assert "<li>one</li><li>two</li>" in told
+    assert "<h1>T &amp; U</h1>" in reported
+    assert "<strong>bold</strong> and <code>a &lt; b</code>" in reported
+    assert reported.count("<img") == 1
+    assert "r.png was not drawn" in reported
+    assert "set-up s" in reported
+    assert "<li>one</li><li>two</li>" in reported
 
 
 def test_the_page_of_a_study_holds_its_tables_and_figures(tmp_path, monkeypatch):
@@ -182,10 +182,10 @@ def test_the_page_of_a_study_holds_its_tables_and_figures(tmp_path, monkeypatch)
     monkeypatch.setattr(runner, "measure", processes)
     monkeypatch.setattr(command, "draw", lambda module, folder: None)
     command.study(tmp_path, [], None, tmp_path / "out", False, False)
-    told = read(report(tmp_path / "out"))
-    assert told.count("<img") == 3
-    assert "Cheapest setting for an error" in told
-    assert "the water volume is off" in told
+    reported = read(report(tmp_path / "out"))
+    assert reported.count("<img") == 3
+    assert "Cheapest setting for an error" in reported
+    assert "the water volume is off" in reported
 
 
 def test_a_small_film_is_in_the_page_and_a_large_one_linked(run, monkeypatch):
@@ -194,20 +194,23 @@ def test_a_small_film_is_in_the_page_and_a_large_one_linked(run, monkeypatch):
     (run / "pictures" / "film.mp4").write_bytes(b"0" * 3000)
     assert "<video controls" in read(report(run, with_pictures=False))
     monkeypatch.setattr(html, "LARGEST_FILM", 2000)
-    told = report(run, with_pictures=False).read_text(encoding="utf-8")
-    assert '<a href="pictures/film.mp4">' in told
-    assert "(3 kB)" in told
+    reported = report(run, with_pictures=False).read_text(encoding="utf-8")
+    assert '<a href="pictures/film.mp4">' in reported
+    assert "(3 kB)" in reported
 
 
-def test_a_killed_run_is_told_from_one_that_goes_on(run):
+def test_a_killed_run_is_reported_from_one_that_goes_on(run):
     """Both left the same run.json; one has no process any more. What it took is not known, so no times."""
     with subprocess.Popen([sys.executable, "-c", ""]) as ended:
         ended.wait()
-    for process, told in ((ended.pid, "killed: its process is gone"), (os.getpid(), "running: this is what")):
+    for process, reported in (
+        (ended.pid, "killed: its process is gone"),
+        (os.getpid(), "running: this is what"),
+    ):
         going = SUMMARY | {"status": "running", "exit_code": None, "exit_reason": None, "ended": None}
         (run / "run.json").write_text(json.dumps(going | {"process": process}), encoding="utf-8")
         page = read(report(run, with_pictures=False))
-        assert told in page
+        assert reported in page
         assert "wall time" not in page
 
 
@@ -220,8 +223,8 @@ def test_a_resumed_run_tells_from_where(run):
         "changed": ["a=1"],
     }
     (run / "run.json").write_text(json.dumps(SUMMARY | {"resumed": [again]}), encoding="utf-8")
-    told = read(report(run, with_pictures=False))
-    assert "2026-01-01 00:00:30 UTC, from the checkpoint at t = 100 ms; a=1" in told
+    reported = read(report(run, with_pictures=False))
+    assert "2026-01-01 00:00:30 UTC, from the checkpoint at t = 100 ms; a=1" in reported
 
 
 def test_round_off_in_a_book_is_zero(run):

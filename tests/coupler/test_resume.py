@@ -170,8 +170,8 @@ def test_a_block_that_water_sticks_to_goes_on_bit_for_bit(tmp_path):
 
 
 def test_a_dry_run_goes_on_bit_for_bit(dry, stopped):
-    told = []
-    found = go_on(stopped, told=told)
+    reported = []
+    found = go_on(stopped, reported=reported)
     assert found.checkpoint.time == pytest.approx(0.08)
     check_same(dry, stopped)
     summary = json.loads((stopped / "run.json").read_text(encoding="utf-8"))
@@ -221,12 +221,12 @@ def test_a_file_named_stop_is_served_once(stopped):
 def test_a_run_goes_on_past_its_end(dry, tmp_path):
     """Run to 0.06 s and on to 0.1 s: the same as to 0.1 s at once, for the interval of outputs is the case's own."""
     path = begin(tmp_path / "case", DRY, tmp_path / "run", "time.end='60 ms'")
-    told = []
+    reported = []
     with pytest.raises(
         CannotResume, match=r"has reached t = 0.06 s, its end is 0.06 s; give a later one with --end"
     ):
-        prepare(path, tell=told.append)
-    found = go_on(path, "time.end='0.1 s'", told=told)
+        prepare(path, tell=reported.append)
+    found = go_on(path, "time.end='0.1 s'", reported=reported)
     assert found.checkpoint.time == pytest.approx(0.06)
     check_same(dry, path)
     assert json.loads((path / "effective.json").read_text(encoding="utf-8"))["time"]["end"] == 0.1

@@ -1,4 +1,4 @@
-"""What does not fit a run is refused before anything of it is touched, and the difference is told."""
+"""What does not fit a run is refused before anything of it is touched, and the difference is named."""
 
 import json
 import subprocess
@@ -15,7 +15,7 @@ from coupler.run.resume import CannotResume, prepare
 from tests.coupler.resumed import command, go_on
 
 
-def test_what_is_no_run_is_told(tmp_path):
+def test_what_is_no_run_is_reported(tmp_path):
     with pytest.raises(NoRun, match="not the directory of a run"):
         prepare(tmp_path)
 
@@ -55,9 +55,9 @@ def test_another_program_is_refused_with_the_difference(stopped):
     rewritten(path, program=program | {"surgebreak": "0.0.1", "commit": "abc"})
     with pytest.raises(CannotResume, match=r"surgebreak: was 0\.0\.1, is .*commit: was abc.*--any-version"):
         prepare(stopped)
-    told = []
-    go_on(stopped, told=told, any_version=True)
-    assert any("written by another program: surgebreak: was 0.0.1" in line for line in told)
+    reported = []
+    go_on(stopped, reported=reported, any_version=True)
+    assert any("written by another program: surgebreak: was 0.0.1" in line for line in reported)
 
 
 def test_another_layout_is_refused(stopped):

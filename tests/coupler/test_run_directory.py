@@ -31,16 +31,16 @@ def summary(run):
 def test_everything_needed_to_know_what_was_run(file):
     """Case, effective case, versions, machine and git state are there before the first step."""
     run = RunDirectory.create(file)
-    told = summary(run)
+    reported = summary(run)
     assert (run.path / "case.toml").read_text(encoding="utf-8") == WATER
     assert json.loads((run.path / "effective.json").read_text(encoding="utf-8"))["time"]["end"] == 3.0
-    assert told["status"] == "running"
-    assert told["process"] == os.getpid()
-    assert told["overrides"] == ["time.end=3"]
-    assert told["versions"]["numpy"] == np.__version__
-    assert {"system", "processor", "cores", "threads"} <= set(told["machine"])
-    assert "git" in told
-    assert told["modules"]["water"]
+    assert reported["status"] == "running"
+    assert reported["process"] == os.getpid()
+    assert reported["overrides"] == ["time.end=3"]
+    assert reported["versions"]["numpy"] == np.__version__
+    assert {"system", "processor", "cores", "threads"} <= set(reported["machine"])
+    assert "git" in reported
+    assert reported["modules"]["water"]
 
 
 def test_the_place_is_beside_the_case_with_time_and_hash(file):
@@ -75,7 +75,7 @@ def test_an_existing_directory_is_never_touched(file, tmp_path):
     assert (place / "run.json").read_text(encoding="utf-8") == "old"
 
 
-def test_a_file_in_the_way_is_told(file, tmp_path):
+def test_a_file_in_the_way_is_reported(file, tmp_path):
     (tmp_path / "results").write_text("", encoding="utf-8")
     with pytest.raises(RunDirectoryExists):
         RunDirectory.create(file, tmp_path / "results")
@@ -87,9 +87,9 @@ def test_the_end_is_written_once(file):
     with RunDirectory.create(file) as run:
         run.record(steps=np.int64(12), force=np.array([1.0, 2.0]))
         run.finish(ExitCode.STOPPED, "limit")
-    told = summary(run)
-    assert (told["status"], told["exit_code"], told["exit_reason"]) == ("stopped", 4, "limit")
-    assert told["figures"] == {"steps": 12, "force": [1.0, 2.0]}
+    reported = summary(run)
+    assert (reported["status"], reported["exit_code"], reported["exit_reason"]) == ("stopped", 4, "limit")
+    assert reported["figures"] == {"steps": 12, "force": [1.0, 2.0]}
     assert not (run.path / ".reserve").exists()
 
 
@@ -117,10 +117,10 @@ def test_an_error_is_in_the_summary_and_the_log(file, error, code, says):
     run.record(steps=3)
     with pytest.raises(type(error)), run:
         raise error
-    told = summary(run)
-    assert told["exit_code"] == code
-    assert told["exit_reason"].startswith(says)
-    assert told["figures"] == {"steps": 3}
+    reported = summary(run)
+    assert reported["exit_code"] == code
+    assert reported["exit_reason"].startswith(says)
+    assert reported["figures"] == {"steps": 3}
     log = run.log_path.read_text(encoding="utf-8")
     assert says in log
     assert ("Traceback" in log) == says.startswith("unexpected")
@@ -131,14 +131,14 @@ def test_a_command_leaves_with_the_code_of_the_error(file, capsys):
     with pytest.raises(SystemExit) as leaving, Failures(), run:
         raise ZeroDivisionError("division by zero")
     assert leaving.value.code == 1
-    told = capsys.readouterr().err
-    assert "surgebreak: unexpected ZeroDivisionError: division by zero" in told
-    assert f"the traceback is in {run.log_path}" in told
-    assert "Traceback" not in told
+    reported = capsys.readouterr().err
+    assert "surgebreak: unexpected ZeroDivisionError: division by zero" in reported
+    assert f"the traceback is in {run.log_path}" in reported
+    assert "Traceback" not in reported
 
 
 def test_errors_of_the_rooms_are_messages_without_traceback():
-    """fluid and yade_scripts know nothing of exit codes; their named errors are told as they are."""
+    """fluid and yade_scripts know nothing of exit codes; their named errors reach the user unchanged."""
     from yade_scripts.yade_side.engine import YadeMissing
 
     failure = Failure.of(YadeMissing("YADE is not installed"))
@@ -172,9 +172,9 @@ def test_a_really_full_disk(file, tmp_path):
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == ExitCode.STOPPED, done.stderr
     assert "no room for the results" in done.stderr
-    told = json.loads((tmp_path / "copy" / "run.json").read_text(encoding="utf-8"))
-    assert told["exit_code"] == ExitCode.STOPPED
-    assert told["figures"] == {"steps": 1}
+    reported = json.loads((tmp_path / "copy" / "run.json").read_text(encoding="utf-8"))
+    assert reported["exit_code"] == ExitCode.STOPPED
+    assert reported["figures"] == {"steps": 1}
 
 
 KILLED = """
@@ -199,8 +199,12 @@ def test_a_killed_run_is_readable_and_says_that_it_was_running(file):
     child.wait()
     child.stdout.close()
     with open(f"{path}/run.json", encoding="utf-8") as stream:
-        told = json.load(stream)
-    assert (told["status"], told["process"], told["figures"]) == ("running", child.pid, {"steps": 7})
+        reported = json.load(stream)
+    assert (reported["status"], reported["process"], reported["figures"]) == (
+        "running",
+        child.pid,
+        {"steps": 7},
+    )
 
 
 def test_a_nan_among_the_figures_does_not_hide_why_the_run_ended(tmp_path):

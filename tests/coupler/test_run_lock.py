@@ -95,9 +95,9 @@ def test_a_run_whose_terminal_closes_ends_as_a_stopped_one(tmp_path):
     run, main = run_in_a_terminal(tmp_path)
     os.close(main)
     assert run.wait(timeout=30) == ExitCode.STOPPED
-    told = json.loads((tmp_path / "run" / "run.json").read_text(encoding="utf-8"))
-    assert told["status"] == "stopped"
-    assert "stopped by the end of its terminal (SIGHUP)" in told["exit_reason"]
+    reported = json.loads((tmp_path / "run" / "run.json").read_text(encoding="utf-8"))
+    assert reported["status"] == "stopped"
+    assert "stopped by the end of its terminal (SIGHUP)" in reported["exit_reason"]
     assert list((tmp_path / "run" / "checkpoints").glob("*.h5"))
 
 
@@ -108,7 +108,7 @@ def test_the_end_of_a_session_comes_twice_and_stops_once(tmp_path):
         assert "SIGHUP" in stop.requested()
 
 
-def test_a_session_that_was_told_to_go_on_is_not_stopped(tmp_path):
+def test_a_session_that_was_reported_to_go_on_is_not_stopped(tmp_path):
     """nohup: the signal is ignored when the program starts."""
     before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
     try:

@@ -1,4 +1,4 @@
-"""Verdicts of the stress scenes, and how they are told. The scenes themselves run by `surgebreak stress`."""
+"""Verdicts of the stress scenes, and how they are reported. The scenes themselves run by `surgebreak stress`."""
 
 import json
 
@@ -17,7 +17,7 @@ def made(run, refusal="never"):
 
 def good():
     yield Measure("gain", 0.5, 1.0)
-    yield Measure("told only", 9.0, None)
+    yield Measure("not judged", 9.0, None)
 
 
 def bad():
@@ -45,7 +45,7 @@ def test_a_refusal_counts_as_the_scene_says():
     assert outcome(made(refuses)).verdict == "failed"
     for refusal in ("may", "must"):
         found = outcome(made(refuses, refusal))
-        assert (found.verdict, "contact.stiffness" in found.told) == ("refused", True)
+        assert (found.verdict, "contact.stiffness" in found.message) == ("refused", True)
     assert outcome(made(good, "must")).verdict == "failed"
     with pytest.raises(ZeroDivisionError):
         outcome(made(lambda: iter([Measure("x", 1 / 0, None)])))
@@ -65,7 +65,7 @@ def test_a_scene_in_its_own_process(capsys):
     assert report.stress(["S43"], quick=False, as_json=True, only_list=False) == ExitCode.DONE
     row = json.loads(capsys.readouterr().out)
     assert (row["id"], row["verdict"]) == ("S43", "refused")
-    assert "contact.stiffness = nan" in row["told"]
+    assert "contact.stiffness = nan" in row["message"]
 
 
 def test_a_failed_scene_fails_the_command(monkeypatch, capsys):

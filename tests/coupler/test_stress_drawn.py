@@ -241,23 +241,23 @@ def test_a_failure_that_does_not_come_again_stays_as_it_was():
     assert shrunk(table, lambda t: None, 1.0) == table
 
 
-def told(text):
+def reported(text):
     return Trial("failed", text, [], 1.0, 1.0, 0.5)
 
 
 def test_failures_are_the_same_whatever_their_numbers():
-    first = told("the water volume is off by -20.94% at t = 0.5772 s; limit 2.00% (limits.volume_error).")
-    second = told("the water volume is off by +3.1% at t = 1e-05 s; limit 2.00% (limits.volume_error).")
+    first = reported("the water volume is off by -20.94% at t = 0.5772 s; limit 2.00% (limits.volume_error).")
+    second = reported("the water volume is off by +3.1% at t = 1e-05 s; limit 2.00% (limits.volume_error).")
     assert first.kind == second.kind == "the water volume is off by at t"
-    assert first.kind != told("the energy balance is off by 19.80% of the input energy").kind
+    assert first.kind != reported("the energy balance is off by 19.80% of the input energy").kind
 
 
 def test_a_scene_may_ask_too_much_of_its_joints_but_not_of_its_contact():
     with pytest.raises(Diverged) as error:
         check_overlap(1.0, Overlap("a", "'b'", 0.1, 0.2), 0.1)
-    told = str(error.value)
-    assert asked_too_much(told, {"contact": {"friction": 0.5}})
-    assert not asked_too_much(told, {"contact": {"stiffness": 1e6}})
+    reported = str(error.value)
+    assert asked_too_much(reported, {"contact": {"friction": 0.5}})
+    assert not asked_too_much(reported, {"contact": {"stiffness": 1e6}})
     assert not asked_too_much("the energy balance is off by 6 %", {})
 
 
@@ -274,7 +274,7 @@ def test_a_failure_is_kept_as_a_case_with_its_story(tmp_path, monkeypatch):
     found = command.outcome(drawn, tmp_path, seconds=100.0)
     small = tomllib.loads((tmp_path / drawn.id / "small" / "case.toml").read_text())
     assert found.verdict == "failed"
-    assert str(tmp_path / drawn.id) in found.told
+    assert str(tmp_path / drawn.id) in found.message
     assert (small["joints"], "contact" in small, "structure" in small) == ({}, False, False)
     assert "error of the volume 0.5, at most 0.02" in (tmp_path / drawn.id / "found.txt").read_text()
     (row,) = command.named([drawn.id])

@@ -40,9 +40,9 @@ def made(case, *, ladders=(), repeat=None, larger=False, any_version=False):
 
 def test_errors_are_those_of_the_formula(fake, case):
     """value = 2 (1 + h²): h² from the exact answer 2; against 2.02 it is |h² - 0.01|/1.01."""
-    code, told = made(case)
+    code, reported = made(case)
     assert code == ExitCode.DONE
-    for point, h in zip(told["points"], (0.4, 0.2, 0.1)):
+    for point, h in zip(reported["points"], (0.4, 0.2, 0.1)):
         found = point["readings"]
         assert found["exact"]["error"] == pytest.approx(h**2)
         assert found["measured"]["error"] == pytest.approx(abs(h**2 - 0.01) / 1.01, abs=1e-12)
@@ -55,8 +55,8 @@ def test_errors_are_those_of_the_formula(fake, case):
 
 def test_the_order_is_that_of_the_formula_whatever_the_reference(fake, case):
     """2 from the errors, and from three runs without knowing the limit; a law has no size and no order."""
-    _, told = made(case)
-    orders = {(o["quantity"], o["ladder"]): o for o in told["orders"]}
+    _, reported = made(case)
+    orders = {(o["quantity"], o["ladder"]): o for o in reported["orders"]}
     assert orders["exact", "dt"]["overall"] == pytest.approx(2.0)
     assert orders["exact", "dt"]["finest"] == pytest.approx(2.0)
     assert orders["finest", "dt"]["finest"] == pytest.approx(2.0)
@@ -66,8 +66,8 @@ def test_the_order_is_that_of_the_formula_whatever_the_reference(fake, case):
 
 def test_cost_is_that_of_the_steps_with_start_set_up_and_compilation_apart(fake, case):
     """1/h + 0.25 s of steps in a process of 3 + 1/h s, 0.75 s of them set-up."""
-    _, told = made(case, ladders=["dt"])
-    run = told["runs"][told["points"][0]["setting"]]
+    _, reported = made(case, ladders=["dt"])
+    run = reported["runs"][reported["points"][0]["setting"]]
     assert run["cpu_seconds"] == pytest.approx(1 / 0.4 + 0.25)
     assert run["set_up_seconds"] == pytest.approx(0.75)
     assert run["start_seconds"] == pytest.approx(3.0 - 0.25 - 0.75)
@@ -77,18 +77,18 @@ def test_cost_is_that_of_the_steps_with_start_set_up_and_compilation_apart(fake,
 def test_a_run_that_had_to_compile_is_made_again(fake, case):
     """Kernels that the warm-up did not need are compiled by the first run; its cost is not that of the setting."""
     fake.compiling = 2.0
-    _, told = made(case, ladders=["dt"])
+    _, reported = made(case, ladders=["dt"])
     assert len(fake.calls) == 4
-    assert {run["compile_seconds"] for run in told["runs"].values()} == {0.0}
+    assert {run["compile_seconds"] for run in reported["runs"].values()} == {0.0}
 
 
 def test_the_cheapest_setting_is_found_and_what_a_part_costs(fake, case):
     """Errors 16, 4 and 1 %: 5 % needs h = 0.2; friction costs a quarter of a second of 10.25."""
-    _, told = made(case)
-    found = {(c["quantity"], c["level"]): c["rung"] for c in told["cheapest"] if not c["curve"]}
+    _, reported = made(case)
+    found = {(c["quantity"], c["level"]): c["rung"] for c in reported["cheapest"] if not c["curve"]}
     assert found["exact", 0.05]["label"] == "0.2"
     assert found["exact", 0.10]["label"] == "0.2"
-    (part,) = told["parts"]
+    (part,) = reported["parts"]
     assert part["name"] == "friction"
     assert part["cpu_seconds"] == pytest.approx(0.25)
     assert part["share"] == pytest.approx(0.25 / 10.25)
@@ -106,11 +106,11 @@ def test_a_study_that_was_stopped_says_so_and_goes_on(fake, case, capsys):
     assert "the same command goes on" in capsys.readouterr().out
     assert len(fake.calls) == 2
     fake.stop_after = None
-    _, told = made(case)
+    _, reported = made(case)
     assert len(fake.calls) == 5
     made(case)
     assert len(fake.calls) == 5  # nothing is left to do
-    assert len(told["points"]) == 5
+    assert len(reported["points"]) == 5
 
 
 def test_a_half_written_run_is_made_again(fake, case):
@@ -126,14 +126,14 @@ def test_a_half_written_run_is_made_again(fake, case):
 
 def test_larger_rungs_are_added_to_what_is_there(fake, case):
     made(case)
-    _, told = made(case, larger=True)
+    _, reported = made(case, larger=True)
     assert len(fake.calls) == 6
-    assert [p["label"] for p in told["points"]] == ["0.4", "0.2", "100 ms", "0.05", "exact", "paper"]
+    assert [p["label"] for p in reported["points"]] == ["0.4", "0.2", "100 ms", "0.05", "exact", "paper"]
     # the finest run is another one now, and is named
-    assert told["quantities"][2]["finest"] == {"ladder": "dt", "label": "0.05"}
+    assert reported["quantities"][2]["finest"] == {"ladder": "dt", "label": "0.05"}
 
 
-def test_runs_of_another_version_are_made_again_unless_told_otherwise(fake, case, monkeypatch):
+def test_runs_of_another_version_are_made_again_unless_reported_otherwise(fake, case, monkeypatch):
     made(case)
     monkeypatch.setattr(runner, "program", lambda: {"surgebreak": "another"})
     made(case, any_version=True)
@@ -143,20 +143,20 @@ def test_runs_of_another_version_are_made_again_unless_told_otherwise(fake, case
 
 
 def test_repeats_tell_the_cheapest_run_and_whether_they_agree(fake, case):
-    _, told = made(case, ladders=["dt"], repeat=3)
+    _, reported = made(case, ladders=["dt"], repeat=3)
     assert len(fake.calls) == 9
-    run = next(iter(told["runs"].values()))
+    run = next(iter(reported["runs"].values()))
     assert len(run["repeats"]) == 3
     assert run["same"] is True
 
 
-def test_a_failed_run_is_told_with_its_reason_and_is_no_reference(fake, case, capsys):
+def test_a_failed_run_is_reported_with_its_reason_and_is_no_reference(fake, case, capsys):
     """The finest run fails: errors against it are absent, never taken against the next finest."""
     fake.broken = {0.1: "the energy balance is off by 9 %"}
-    code, told = made(case, ladders=["dt"])
+    code, reported = made(case, ladders=["dt"])
     assert code == ExitCode.DIVERGED
-    assert [p["reason"] for p in told["points"]] == ["", "", "the energy balance is off by 9 %"]
-    assert told["points"][0]["readings"]["finest"]["error"] is None
+    assert [p["reason"] for p in reported["points"]] == ["", "", "the energy balance is off by 9 %"]
+    assert reported["points"][0]["readings"]["finest"]["error"] is None
     assert "off by 9 %" in capsys.readouterr().out
     assert len(fake.calls) == 3
     made(case, ladders=["dt"])
@@ -189,9 +189,9 @@ def test_laws_of_yade_have_points_and_a_figure_of_their_own(fake, case, with_fig
     text = CASE.replace('against = "exact"', 'against = "exact"\ncompared = "peak_force"') + LAWS
     (case / "case.toml").write_text(text, encoding="utf-8")
     for _ in range(2):
-        _, told = made(case, ladders=["laws"])
+        _, reported = made(case, ladders=["laws"])
         assert len(fake.calls) == 1
-    errors = {(row["law"], row["multiple"]): row["readings"]["exact"]["error"] for row in told["laws"]}
+    errors = {(row["law"], row["multiple"]): row["readings"]["exact"]["error"] for row in reported["laws"]}
     assert errors["polynomial", 2] == pytest.approx(0.02)
     assert errors["cohfrict", 1] == pytest.approx(0.04)
     assert (case / "out" / "exact_laws.png").exists()
@@ -209,9 +209,9 @@ def test_laws_of_yade_have_points_and_a_figure_of_their_own(fake, case, with_fig
 def test_a_wrong_name_ends_the_study_at_the_first_run(fake, case, old, new, says):
     """Columns are known only from a run; the study does not spend the time of all of them first."""
     (case / "case.toml").write_text(CASE.replace(old, new, 1), encoding="utf-8")
-    with pytest.raises((BadCase, BadFormula)) as told:
+    with pytest.raises((BadCase, BadFormula)) as reported:
         made(case)
-    assert says in str(told.value)
+    assert says in str(reported.value)
     assert len(fake.calls) == 1
 
 
@@ -272,12 +272,12 @@ def test_a_real_study_of_a_falling_block(tmp_path):
     """Processes as a user runs them. The velocity of a step moves the block through it, so the way of a fall from rest
     is off by the share that the step has of the fall, whose error is of first order."""
     (tmp_path / "case.toml").write_text(REAL)
-    code, told = made(tmp_path)
+    code, reported = made(tmp_path)
     assert code == ExitCode.DONE
-    errors = [point["readings"]["way"]["error"] for point in told["points"]]
+    errors = [point["readings"]["way"]["error"] for point in reported["points"]]
     assert errors == pytest.approx([0.2, 0.1], rel=0.02)
-    assert told["orders"][0]["overall"] == pytest.approx(1.0, abs=0.05)
-    for run in told["runs"].values():
+    assert reported["orders"][0]["overall"] == pytest.approx(1.0, abs=0.05)
+    for run in reported["runs"].values():
         assert run["size"] == {"blocks": 1, "joints": 0}
         assert run["peak_memory"] > 50e6
         assert run["cpu_seconds"] > 0.0

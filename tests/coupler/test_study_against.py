@@ -31,9 +31,9 @@ BEFORE = {
 
 
 def compared(tmp_path, now, error=1.1, cpu=1.2):
-    for name, told in (("a", BEFORE), ("b", now)):
+    for name, reported in (("a", BEFORE), ("b", now)):
         (tmp_path / name).mkdir()
-        (tmp_path / name / "study.json").write_text(json.dumps(told), encoding="utf-8")
+        (tmp_path / name / "study.json").write_text(json.dumps(reported), encoding="utf-8")
     return compare(tmp_path / "a", tmp_path / "b", error, cpu)
 
 
@@ -87,7 +87,7 @@ def test_studies_without_a_common_run_are_refused(tmp_path):
         compared(tmp_path, now)
 
 
-def test_a_place_without_a_study_is_told(tmp_path):
+def test_a_place_without_a_study_is_reported(tmp_path):
     with pytest.raises(BadCase, match="not the result of a study"):
         compare(tmp_path, tmp_path, 1.1, 1.2)
 

@@ -15,9 +15,9 @@ from .fake_runs import CASE
 
 def messages(tmp_path, text):
     (tmp_path / "case.toml").write_text(text, encoding="utf-8")
-    with pytest.raises(BadCase) as told:
+    with pytest.raises(BadCase) as reported:
         load(tmp_path)
-    return "\n".join(told.value.lines)
+    return "\n".join(reported.value.lines)
 
 
 @pytest.mark.parametrize(
@@ -42,7 +42,7 @@ def messages(tmp_path, text):
         ('set = ["contact.friction=0"]', 'set = ["contact.friction"]', "contact.friction"),
     ],
 )
-def test_mistakes_in_a_study_are_told_with_a_way_out(tmp_path, old, new, says):
+def test_mistakes_in_a_study_are_reported_with_a_way_out(tmp_path, old, new, says):
     assert old in CASE
     assert says in messages(tmp_path, CASE.replace(old, new, 1))
 

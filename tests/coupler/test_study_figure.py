@@ -51,11 +51,11 @@ def test_a_curve_is_a_ladder_without_its_failed_runs():
 def test_a_run_that_took_no_time_that_counts_is_drawn_all_the_same(tmp_path):
     """All of it was spent in the compiler: zero seconds have no place on a logarithmic axis."""
     q = {"name": "force", "what": "force", "against": "exact"}
-    told = TOLD | {"points": [point("h", "10 cm", 0.0, 0.2), point("h", "5 cm", 0.5, 0.1)]}
-    assert figure(tmp_path / "force", q, ladder_curves(told, "force"), [], "CPU time [s]").exists()
+    reported = TOLD | {"points": [point("h", "10 cm", 0.0, 0.2), point("h", "5 cm", 0.5, 0.1)]}
+    assert figure(tmp_path / "force", q, ladder_curves(reported, "force"), [], "CPU time [s]").exists()
 
 
-def test_failed_runs_are_told_below_with_their_reason():
+def test_failed_runs_are_reported_below_with_their_reason():
     failed = [p for p in TOLD["points"] if p["reason"]]
     assert footnotes(failed) == ["× 1  failed: h 2 cm: the water volume is off by 3 %"]
 
@@ -64,7 +64,7 @@ def test_the_axis_says_what_the_error_is_against():
     assert ylabel({"what": "force", "against": "measured"}).endswith("against the measurement")
 
 
-def test_a_place_shared_by_two_ladders_has_one_text_with_both_settings_and_round_off_is_told():
+def test_a_place_shared_by_two_ladders_has_one_text_with_both_settings_and_round_off_is_reported():
     texts = [text for *_, text, _ in labels(ladder_curves(TOLD, "force"))]
     assert "10 cm / 20 ms" in texts
     assert "2 ms (< 0.0001 %)" in texts

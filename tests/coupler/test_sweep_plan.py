@@ -1,4 +1,4 @@
-"""From [sweep] to its runs: grids, tables, samples, repeats, links, and every mistake told before the first run."""
+"""From [sweep] to its runs: grids, tables, samples, repeats, links, and every mistake reported before the first run."""
 
 import numpy as np
 import pytest
@@ -190,7 +190,7 @@ source = "free field"
         assert [gauge.name for gauge in found.gauge] == ["front"]
 
 
-def test_rows_that_are_no_case_are_told_and_the_rest_is_run(case):
+def test_rows_that_are_no_case_are_reported_and_the_rest_is_run(case):
     plan = make_plan(case('[[sweep.vary]]\nkey = "time.end"\nvalues = [0.01, -1]\n'))
     assert [bool(row.wrong) for row in plan.rows] == [False, True]
     assert "time.end" in plan.rows[1].wrong
@@ -249,12 +249,12 @@ def test_nothing_varied_is_refused(case):
         ('[sweep]\nkeep = "some"', "keep"),
     ],
 )
-def test_mistakes_are_told_with_file_and_key(case, sweep, says):
-    with pytest.raises(BadCase) as told:
+def test_mistakes_are_reported_with_file_and_key(case, sweep, says):
+    with pytest.raises(BadCase) as reported:
         make_plan(case("\n" + sweep))
-    assert says in str(told.value)
-    assert "sweep" in str(told.value)
-    assert "case.toml" in str(told.value)
+    assert says in str(reported.value)
+    assert "sweep" in str(reported.value)
+    assert "case.toml" in str(reported.value)
 
 
 @pytest.mark.parametrize(
@@ -268,9 +268,9 @@ def test_mistakes_are_told_with_file_and_key(case, sweep, says):
     ],
 )
 def test_mistakes_of_vary_name_it(case, vary, says):
-    with pytest.raises(BadCase) as told:
+    with pytest.raises(BadCase) as reported:
         make_plan(case(), [vary])
-    assert says in str(told.value)
+    assert says in str(reported.value)
 
 
 @pytest.mark.parametrize(
@@ -284,9 +284,9 @@ def test_mistakes_of_vary_name_it(case, vary, says):
     ],
 )
 def test_mistakes_in_a_table_name_its_line(case, text, says):
-    with pytest.raises(BadCase) as told:
+    with pytest.raises(BadCase) as reported:
         make_plan(case('[sweep]\ntable = "points.csv"\n', files={"points.csv": text}))
-    assert says in str(told.value)
+    assert says in str(reported.value)
 
 
 def test_a_run_takes_no_notice_of_the_section(case):

@@ -76,7 +76,7 @@ class Fake:
         from coupler.checks.read_case import load
 
         self.calls.append(words)
-        log.write_text("what it told\nlast line\n", encoding="utf-8")
+        log.write_text("some output\nlast line\n", encoding="utf-8")
         from pathlib import Path
 
         if words[0] == "resume":
@@ -180,8 +180,8 @@ def test_a_run_that_was_killed_goes_on_and_one_that_ended_is_left_alone(made):
     for other in spec.runs:
         make(spec, other, fake)
     assert [call[0] for call in fake.calls] == ["resume"]
-    told = figures(spec, id)
-    assert (told["outcome"], told["attempts"], told["cpu_seconds"]) == ("done", 2, 2.0)
+    reported = figures(spec, id)
+    assert (reported["outcome"], reported["attempts"], reported["cpu_seconds"]) == ("done", 2, 2.0)
 
 
 def test_a_run_given_up_at_its_limit_goes_on_when_the_limit_is_higher(made, tmp_path):
@@ -231,16 +231,16 @@ def test_how_a_run_ended_follows_from_its_exit_code_and_reason(code, summary, ou
 def test_curves_have_bands_bars_and_medians(made):
     spec, _ = made()
     results = collect(spec)
-    told = curves(spec, results, spec.sweep.fragility[0])
-    assert told["refused"] == ""
-    medians = [c["median"] for c in told["curves"]]
+    reported = curves(spec, results, spec.sweep.fragility[0])
+    assert reported["refused"] == ""
+    medians = [c["median"] for c in reported["curves"]]
     assert medians == pytest.approx([1.0, 1.6], rel=0.25)  # ratio = load/strength: exact for very many runs
-    assert told["dispersion"] == pytest.approx(0.4, rel=0.6)
-    for curve in told["curves"]:
+    assert reported["dispersion"] == pytest.approx(0.4, rel=0.6)
+    for curve in reported["curves"]:
         p, low, high = (np.array(curve[n]) for n in ("p", "low", "high"))
         assert ((low <= p + 1e-9) & (p <= high + 1e-9)).all()
-    assert [bar["runs"] for bar in told["bars"][0]] == [6] * 8
-    assert told["convergence"][-1]["width"] < told["convergence"][0]["width"]
+    assert [bar["runs"] for bar in reported["bars"][0]] == [6] * 8
+    assert reported["convergence"][-1]["width"] < reported["convergence"][0]["width"]
 
 
 def test_runs_that_cannot_stand_are_in_the_state_and_failed_ones_are_unknown(made):
@@ -263,17 +263,17 @@ def test_runs_that_differ_in_the_load_alone_are_refused_with_the_reason(made):
     )
     alike = alike.replace("samples = 6\n", "").replace('sensitivity = ["peak"]\n', "")
     spec, _ = made(sweep=alike)
-    told = curves(spec, collect(spec), spec.sweep.fragility[0])
-    assert told["curves"] == []
-    assert "perfectly separated" in told["refused"]
-    assert "draw strengths" in told["refused"]
+    reported = curves(spec, collect(spec), spec.sweep.fragility[0])
+    assert reported["curves"] == []
+    assert "perfectly separated" in reported["refused"]
+    assert "draw strengths" in reported["refused"]
 
 
-def test_a_state_that_nobody_reached_is_left_out_and_told(made):
+def test_a_state_that_nobody_reached_is_left_out_and_reported(made):
     spec, _ = made(sweep=SWEEP.replace("at_least = 1.6", "at_least = 99"))
-    told = curves(spec, collect(spec), spec.sweep.fragility[0])
-    assert [c["state"] for c in told["curves"]] == ["cracked"]
-    assert told["left_out"] == ["broken: none of 48 runs reached it"]
+    reported = curves(spec, collect(spec), spec.sweep.fragility[0])
+    assert [c["state"] for c in reported["curves"]] == ["cracked"]
+    assert reported["left_out"] == ["broken: none of 48 runs reached it"]
 
 
 def test_the_report_says_all_on_one_page_with_links_to_the_runs(made):
@@ -355,11 +355,11 @@ def test_the_snakefile_makes_every_run_by_its_id(made):
 def test_options_that_no_engine_knows_are_refused(tmp_path):
     from coupler.commands.sweep.command import Wish, sweep
 
-    with pytest.raises(BadCase) as told:
+    with pytest.raises(BadCase) as reported:
         sweep(tmp_path, Wish(engine="slurn", export="make", options=("time",)))
-    assert "--engine slurn: there are local, slurm" in str(told.value)
-    assert "--export make" in str(told.value)
-    assert "--option time: write KEY=VALUE" in str(told.value)
+    assert "--engine slurn: there are local, slurm" in str(reported.value)
+    assert "--export make" in str(reported.value)
+    assert "--option time: write KEY=VALUE" in str(reported.value)
 
 
 def test_a_folder_that_holds_no_sweep_is_refused(tmp_path):

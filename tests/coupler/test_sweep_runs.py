@@ -45,17 +45,17 @@ def test_a_forked_run_has_the_bits_of_a_run_of_its_own(tmp_path):
         assert table.read_bytes() == (forked / "history" / table.name).read_bytes(), table.name
     with h5py.File(forked / "blocks.vtkhdf") as a, h5py.File(tmp_path / "alone" / "blocks.vtkhdf") as b:
         assert np.array_equal(a["VTKHDF/Points"], b["VTKHDF/Points"])
-    told = json.loads((forked / "run.json").read_text())["figures"]
+    reported = json.loads((forked / "run.json").read_text())["figures"]
     alone = json.loads((tmp_path / "alone" / "run.json").read_text())["figures"]
     for name in ("steps", "substeps", "energy_error", "largest_opening_rate"):
-        assert told[name] == alone[name]
+        assert reported[name] == alone[name]
 
 
 def _sets(overrides):
     return [word for override in overrides for word in ("--set", override)]
 
 
-def test_a_worker_that_dies_is_told_and_its_runs_are_made_by_another(tmp_path, monkeypatch):
+def test_a_worker_that_dies_is_reported_and_its_runs_are_made_by_another(tmp_path, monkeypatch):
     """The first worker is killed before it answers; the rest goes to a second one."""
     from coupler.commands.sweep import local
 
@@ -69,10 +69,10 @@ def test_a_worker_that_dies_is_told_and_its_runs_are_made_by_another(tmp_path, m
     class Spec:
         folder, threads = tmp_path, 1
 
-    told = []
-    local.Local(Spec, 1).make(["a", "b"], told.append)
-    assert [(found["id"], found["outcome"]) for found in told] == [("a", "crashed"), ("b", "done")]
-    assert "ended with 7" in told[0]["reason"]
+    reported = []
+    local.Local(Spec, 1).make(["a", "b"], reported.append)
+    assert [(found["id"], found["outcome"]) for found in reported] == [("a", "crashed"), ("b", "done")]
+    assert "ended with 7" in reported[0]["reason"]
 
 
 ANSWER = """

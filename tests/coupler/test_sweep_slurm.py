@@ -76,10 +76,10 @@ def test_jobs_that_end_before_their_time_go_on(tmp_path):
             until(lambda row=row: any((spec.place(ids[row]) / "checkpoints").glob("*")))
         assert surgebreak("sweep", case, "--cancel", CANCELLED, variables=slurm.variables).returncode == 0
         os.kill(json.loads((spec.place(ids[KILLED]) / "run.json").read_text())["process"], 9)
-        slurm.told("scontrol", "requeue", jobs[ids[REQUEUED]])
-        slurm.told("scancel", "--signal=USR2", jobs[ids[WARNED]])
-        until(lambda: jobs[ids[CANCELLED]] not in slurm.told("squeue", "-h", "-r", "-o", "%i").split())
-        until(lambda: jobs[ids[KILLED]] not in slurm.told("squeue", "-h", "-r", "-o", "%i").split())
+        slurm.output_of("scontrol", "requeue", jobs[ids[REQUEUED]])
+        slurm.output_of("scancel", "--signal=USR2", jobs[ids[WARNED]])
+        until(lambda: jobs[ids[CANCELLED]] not in slurm.output_of("squeue", "-h", "-r", "-o", "%i").split())
+        until(lambda: jobs[ids[KILLED]] not in slurm.output_of("squeue", "-h", "-r", "-o", "%i").split())
         done = surgebreak(*sweep, variables=slurm.variables)
         assert done.returncode == 0
         again = surgebreak(*sweep, variables=slurm.variables)

@@ -21,23 +21,23 @@ JUNK = ["[]", "{}", "null", "1", '"x"', "", "\0", "{", '{"status": 1}', "[" * 10
 
 def refusals(run):
     """What resume, explain and report say of a run that none of them can use."""
-    told = []
+    reported = []
     for use in (lambda: prepare(run), lambda: explanation_of_run(run), lambda: report(run, False)):
         with pytest.raises(SurgebreakError) as refusal:
             use()
         assert refusal.value.exit_code == ExitCode.BAD_CASE
-        told.append(str(refusal.value))
-    return told
+        reported.append(str(refusal.value))
+    return reported
 
 
 @pytest.mark.parametrize("content", JUNK, ids=range(len(JUNK)))
 def test_a_summary_that_no_run_wrote(copy, content):
     (copy / "run.json").write_text(content, encoding="utf-8")
-    assert all("run.json" in told for told in refusals(copy))
+    assert all("run.json" in reported for reported in refusals(copy))
 
 
 @pytest.mark.parametrize(
-    ("path", "value", "told"),
+    ("path", "value", "reported"),
     [
         (("figures", "cpu_seconds"), [1], "figures.cpu_seconds"),
         (("figures", "work"), {"cells": 1}, "figures.work: Value error, mesh_cells is missing"),
@@ -49,7 +49,7 @@ def test_a_summary_that_no_run_wrote(copy, content):
         (("modules", "water"), "no", "modules.water"),
     ],
 )
-def test_a_summary_that_was_edited(copy, path, value, told):
+def test_a_summary_that_was_edited(copy, path, value, reported):
     summary = json.loads((copy / "run.json").read_text(encoding="utf-8"))
     holder = summary
     for name in path[:-1]:
@@ -58,13 +58,13 @@ def test_a_summary_that_was_edited(copy, path, value, told):
     (copy / "run.json").write_text(json.dumps(summary), encoding="utf-8")
     with pytest.raises(NoRun, match="not what a run writes") as refusal:
         explanation_of_run(copy)
-    assert told in str(refusal.value)
+    assert reported in str(refusal.value)
 
 
 def test_a_folder_instead_of_a_summary(copy):
     (copy / "run.json").unlink()
     (copy / "run.json").mkdir()
-    assert all("is a directory" in told or "neither a run" in told for told in refusals(copy))
+    assert all("is a directory" in reported or "neither a run" in reported for reported in refusals(copy))
 
 
 def edited(path, arrays=None, **about):
@@ -125,7 +125,7 @@ def test_tables_that_no_run_wrote(copy, content):
         report(copy, False)
 
 
-def test_a_column_that_is_missing_is_told(copy):
+def test_a_column_that_is_missing_is_reported(copy):
     path = copy / "history" / "energy.csv"
     path.write_text("# energy\n# time [s]: t\ntime\n1\n", encoding="utf-8")
     with pytest.raises(BadTable, match="the table 'energy' has no column 'energy_error'"):

@@ -240,7 +240,7 @@ def flat():
 
 
 @pytest.mark.parametrize(
-    ("made", "told"),
+    ("made", "reported"),
     [
         (hanging, r"cells meet at \(0.5, .*without sharing a face, and at \d+ more places: hanging nodes"),
         (doubled, r"cells \d+ and \d+ at \(.*overlap, or share a face with a third one; remove doubled"),
@@ -249,24 +249,24 @@ def flat():
         (flat, r"cell \d+ at \(.*is flat, and \d+ more; mesh again"),
     ],
 )
-def test_cells_that_do_not_hang_together_are_refused(tmp_path, made, told):
+def test_cells_that_do_not_hang_together_are_refused(tmp_path, made, reported):
     nodes, cells = made()
     write(tmp_path / "box.vtu", nodes, tetra=cells)
     said = refusals(tmp_path)
-    assert re.search(r"case.toml:9: tank.mesh: box.vtu: " + told, said), said
+    assert re.search(r"case.toml:9: tank.mesh: box.vtu: " + reported, said), said
 
 
 @pytest.mark.parametrize(
-    ("points", "cells", "told"),
+    ("points", "cells", "reported"),
     [
         (prism(), {"wedge": [range(6)]}, "1 cells of kind 'wedge'; the water takes linear tetrahedra only: mesh with"),
         (prism(), {"triangle": [range(3)]}, "no tetrahedra among its cells (1 of kind 'triangle'); mesh the volume"),
         (np.random.default_rng(0).random((10, 3)), {"tetra10": [range(10)]}, "'tetra10'; the water takes linear"),
     ],
 )  # fmt: skip
-def test_other_cells_are_refused_by_name(tmp_path, points, cells, told):
+def test_other_cells_are_refused_by_name(tmp_path, points, cells, reported):
     write(tmp_path / "box.vtu", points, **{kind: [list(row) for row in rows] for kind, rows in cells.items()})
-    assert told in refusals(tmp_path)
+    assert reported in refusals(tmp_path)
 
 
 def test_a_file_that_is_not_there_or_no_mesh(tmp_path):
@@ -279,7 +279,7 @@ def test_a_file_that_is_not_there_or_no_mesh(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("tank", "told"),
+    ("tank", "reported"),
     [
         ("lower = [0, 0, 0]\nupper = [1, 1, 1]", ["tank.cell: missing; wanted edge"]),
         ('mesh = "box.vtu"\ncell = 0.1', ["tank.cell: follows from tank.mesh, which is given as well"]),
@@ -291,11 +291,11 @@ def test_a_file_that_is_not_there_or_no_mesh(tmp_path):
         ('mesh = ""', ["tank.mesh: "]),
     ],
 )
-def test_a_box_or_a_file(tmp_path, tank, told):
+def test_a_box_or_a_file(tmp_path, tank, reported):
     write(tmp_path / "box.vtu", *bricks()[:1], tetra=bricks()[1])
     said = refusals(tmp_path, case_text(tank))
-    assert len(said.splitlines()) == len(told)
-    for line in told:
+    assert len(said.splitlines()) == len(reported)
+    for line in reported:
         assert line in said
 
 
@@ -359,10 +359,10 @@ def test_check_tells_the_true_mesh_and_its_thin_cells(tmp_path):
 
 
 def test_meshio_is_loaded_for_a_file_only():
-    told = "import sys; from coupler.checks.read_case import load; load(sys.argv[1]); print('meshio' in sys.modules)"
+    code = "import sys; from coupler.checks.read_case import load; load(sys.argv[1]); print('meshio' in sys.modules)"
     for case, loads in (("sloshing", "False"), ("sloshing_cylinder", "True")):
         run = subprocess.run(
-            [sys.executable, "-c", told, str(ROOT / "cases" / case)],
+            [sys.executable, "-c", code, str(ROOT / "cases" / case)],
             capture_output=True,
             text=True,
             check=True,

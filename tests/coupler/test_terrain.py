@@ -146,7 +146,7 @@ def test_cliffs_are_cut_back_to_the_slope_and_nothing_else():
 
 
 @pytest.mark.parametrize(
-    ("name", "text", "told"),
+    ("name", "text", "reported"),
     [
         ("g.asc", "ncols 3\nnrows 2\ncellsize 1\n1 2 3\n4 5\n", "5 heights, but its head says 3 x 2"),
         ("g.asc", "ncols 3\nnrows 2\n1 2 3\n", "no cellsize"),
@@ -157,9 +157,9 @@ def test_cliffs_are_cut_back_to_the_slope_and_nothing_else():
         ("g.nc", "1", "cannot be read as NetCDF"),
     ],
 )
-def test_files_that_are_no_terrain_are_refused_with_the_reason(name, text, told, tmp_path):
+def test_files_that_are_no_terrain_are_refused_with_the_reason(name, text, reported, tmp_path):
     (tmp_path / name).write_text(text)
-    with pytest.raises(TerrainError, match=told):
+    with pytest.raises(TerrainError, match=reported):
         read_grid(tmp_path / name)
 
 
@@ -226,7 +226,7 @@ def test_surge_onto_dry_ground_is_a_dam_break(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("sets", "told"),
+    ("sets", "reported"),
     [
         (["tank.upper=[25, 12, 4]"], r"terrain: 19.9% of the tank lies beside it.*covers x 0 to 20"),
         (["terrain.height_scale=100"], r"falls to z = -275 m at \(0, 12\) m, below the floor of the tank"),
@@ -239,10 +239,10 @@ def test_surge_onto_dry_ground_is_a_dam_break(tmp_path):
         (["water.inflow[0].level=-2.8"], r"not between the floor \(-2.75 m\)"),
     ],
 )  # fmt: skip
-def test_terrain_that_does_not_fit_is_refused(sets, told, tmp_path):
+def test_terrain_that_does_not_fit_is_refused(sets, reported, tmp_path):
     with pytest.raises(BadCase) as error:
         made(tmp_path, *sets)
-    assert re.search(told, "\n".join(error.value.lines)), error.value.lines
+    assert re.search(reported, "\n".join(error.value.lines)), error.value.lines
 
 
 def test_hole_under_the_tank_is_refused_with_its_place(tmp_path):

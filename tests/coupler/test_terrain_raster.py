@@ -60,7 +60,7 @@ def test_degrees_are_refused_and_reprojected(tmp_path):
     np.testing.assert_allclose(np.median(inner), np.hypot(east, north), rtol=0.02)
 
 
-def test_unknown_system_is_told_in_a_line(tmp_path):
+def test_unknown_system_is_reported_in_a_line(tmp_path):
     write(tmp_path / "site.tif", "EPSG:32654", 0.0, 0.0, 2.0)
     with pytest.raises(TerrainError, match=r"site.tif: no such coordinate system"):
         terrain_of(Terrain(path=str(tmp_path / "site.tif"), reproject="EPSG:999999"))

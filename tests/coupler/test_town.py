@@ -117,7 +117,7 @@ ELL = [[0, 0], [10, 0], [10, 3], [3, 3], [3, 10], [0, 10], [0, 0]]
 
 
 @pytest.mark.parametrize(
-    ("houses", "sets", "told"),
+    ("houses", "sets", "reported"),
     [
         (
             [feature(ring((60, 8), (9, 7)))],
@@ -156,8 +156,8 @@ ELL = [[0, 0], [10, 0], [10, 3], [3, 3], [3, 10], [0, 10], [0, 0]]
         (HOUSES, ["structure.town[0].path=houses.shape"], "no footprints are read from .shape"),
     ],
 )
-def test_footprints_that_cannot_be_houses_are_refused(houses, sets, told, tmp_path):
+def test_footprints_that_cannot_be_houses_are_refused(houses, sets, reported, tmp_path):
     (tmp_path / "houses.shape").write_text("")
     with pytest.raises(BadCase) as error:
         loaded(tmp_path, *sets, houses=houses)
-    assert re.search(told, "\n".join(error.value.lines)), error.value.lines
+    assert re.search(reported, "\n".join(error.value.lines)), error.value.lines

@@ -1,4 +1,4 @@
-"""The verdict of a run: how blocks are divided, what is watched while it goes, and in which words it is told."""
+"""The verdict of a run: how blocks are divided, what is watched while it goes, and in which words it is reported."""
 
 from types import SimpleNamespace
 
@@ -106,10 +106,14 @@ def record(time, contact=None, load=None):
 def test_nothing_happened(scene):
     s, watch, coupling = scene
     watch.step(coupling, record(0.1))
-    told = verdict(s, watch)
-    assert (told["state"], told["first_break"], told["displaced"]["blocks"]) == ("stands", None, 0)
-    assert told["largest"]["force"] is None
-    assert "no joint of 2 broke" in list(sentences(told))
+    reported = verdict(s, watch)
+    assert (reported["state"], reported["first_break"], reported["displaced"]["blocks"]) == (
+        "stands",
+        None,
+        0,
+    )
+    assert reported["largest"]["force"] is None
+    assert "no joint of 2 broke" in list(sentences(reported))
 
 
 def test_the_largest_load_stays_with_its_time_and_the_moment_is_about_the_foot(scene):
@@ -132,9 +136,9 @@ def test_a_block_that_comes_back_has_left_its_place_all_the_same(scene):
     watch.step(coupling, record(0.4))
     s.x = s.x - np.array([[0, 0, 0], [0.3, 0, 0], [0, 0, 0]])
     watch.step(coupling, record(0.5))
-    told = verdict(s, watch)
-    assert told["displaced"]["list"] == [{"block": "wall-1", "way": pytest.approx(0.3), "left_at": 0.4}]
-    assert told["state"] == "collapsed"  # half of the weight of what is judged
+    reported = verdict(s, watch)
+    assert reported["displaced"]["list"] == [{"block": "wall-1", "way": pytest.approx(0.3), "left_at": 0.4}]
+    assert reported["state"] == "collapsed"  # half of the weight of what is judged
 
 
 def test_pressure_counts_only_while_a_block_is_in_its_place(scene):
@@ -190,27 +194,27 @@ def test_a_run_that_goes_on_tells_the_same(scene):
 def test_the_order_of_failure_goes_by_the_first_break(scene):
     s, watch, _ = scene
     s.broke[:] = (0.9, 0.4)
-    told = verdict(s, watch)
-    assert told["first_break"]["blocks"] == ["wall-1", "wall-0"]
-    assert told["first_break"]["place"] == pytest.approx([5.0, 0.0, 1.0])
-    assert told["order"] == ["wall"]
+    reported = verdict(s, watch)
+    assert reported["first_break"]["blocks"] == ["wall-1", "wall-0"]
+    assert reported["first_break"]["place"] == pytest.approx([5.0, 0.0, 1.0])
+    assert reported["order"] == ["wall"]
 
 
 def test_a_run_tells_that_a_shot_broke_a_column(tmp_path):
     """A block of 300 kg at 12 m/s on the upper half of a column of three drums: it breaks a joint at once, and what the
     column gave back is what the shot lost."""
     run = begin(tmp_path / "case", DRY, tmp_path / "run", "time.checkpoint_every=0")
-    told = read_summary(run)["figures"]["verdict"]
-    assert told["state"] == "damaged"
-    assert 0.0 < told["first_break"]["time"] < 0.1
-    assert told["joints"] == 3
-    (hit,) = [hit for hit in told["hits"]["list"] if hit["block"] == "shot"]
+    reported = read_summary(run)["figures"]["verdict"]
+    assert reported["state"] == "damaged"
+    assert 0.0 < reported["first_break"]["time"] < 0.1
+    assert reported["joints"] == 3
+    (hit,) = [hit for hit in reported["hits"]["list"] if hit["block"] == "shot"]
     assert hit["other"] == "column-1"
     assert hit["impulse"] == pytest.approx(300.0 * hit["speed"], rel=0.02)
     assert hit["speed"] > 10.0
     rows = read_history(run / "blocks.csv")
     assert list(rows["member"]) == ["shot", "column", "column", "column"]
-    assert np.nanmin(rows["first_break"][1:]) == told["first_break"]["time"]
+    assert np.nanmin(rows["first_break"][1:]) == reported["first_break"]["time"]
     assert stands(run, read_summary(run), tmp_path)[0].startswith('<p class="verdict state-damaged">DAMAGED')
 
 

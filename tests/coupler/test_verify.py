@@ -40,7 +40,7 @@ def test_references_name_their_source():
     assert named_values("dem_simple_closed_forms")["drop 0.5 m: impact speed"] == pytest.approx(3.132092)
 
 
-def test_unknown_and_absent_cases_are_told_apart(monkeypatch):
+def test_unknown_and_absent_cases_are_distinguished(monkeypatch):
     with pytest.raises(BadCase, match="did you mean"):
         runner.chosen(["P2O"], quick=False)
     monkeypatch.setitem(registry.NOT_COVERED, "P99", "a reference that nobody has")
@@ -71,18 +71,18 @@ def test_a_case_of_the_law_runs_in_its_own_process(capsys):
     assert all(row["pass"] for row in rows)
 
 
-def test_what_is_only_told_is_not_counted_as_kept():
+def test_what_is_only_reported_is_not_counted_as_kept():
     """A case that promises nothing would else raise the share of figures that pass."""
-    told = Result("P43", "rms of G1 (reported, not judged)", 0.04, 0.0, 0.04, 0.1, False, True, 1.0)
+    reported = Result("P43", "rms of G1 (reported, not judged)", 0.04, 0.0, 0.04, 0.1, False, True, 1.0)
     kept = Result("P43", "volume", 0.0, 0.0, 0.0, 0.1, False, True, 1.0)
-    assert "1 of 1 figures" in report.totals([told, kept])
-    assert " reported " in report.line(told)
-    assert "1 of 1 |" in page.page([told, kept])
+    assert "1 of 1 figures" in report.totals([reported, kept])
+    assert " reported " in report.line(reported)
+    assert "1 of 1 |" in page.page([reported, kept])
 
 
 def test_a_failure_is_counted_and_named():
     good = Result.of("P01", Finding("a", 1.0, 1.0, 0.1), 1.0)
     bad = Result.of("P02", Finding("b", 2.0, 1.0, 0.1), 2.0)
-    told = report.totals([good, bad])
-    assert "1 of 2 cases pass" in told
-    assert "not: P02" in told
+    reported = report.totals([good, bad])
+    assert "1 of 2 cases pass" in reported
+    assert "not: P02" in reported

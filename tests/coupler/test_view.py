@@ -60,9 +60,12 @@ def test_film_and_figures(tmp_path):
     assert sorted(p.name for p in pictures.iterdir()) == sorted(
         ["film.mp4", *(f"{name}.{end}" for name in ("energy", "load") for end in ("pdf", "png", "svg"))]
     )
-    told = "import imageio_ffmpeg, json, sys; r = imageio_ffmpeg.read_frames(sys.argv[1]); print(json.dumps(next(r)))"
+    code = "import imageio_ffmpeg, json, sys; r = imageio_ffmpeg.read_frames(sys.argv[1]); print(json.dumps(next(r)))"
     about = subprocess.run(
-        [sys.executable, "-c", told, str(pictures / "film.mp4")], capture_output=True, text=True, check=True
+        [sys.executable, "-c", code, str(pictures / "film.mp4")],
+        capture_output=True,
+        text=True,
+        check=True,
     )
     film = json.loads(about.stdout)
     assert film["codec"] == "h264"
@@ -154,9 +157,9 @@ def test_missing_extra_is_named_with_the_command_that_adds_it(tmp_path, monkeypa
     """Without VTK the solver still works; only pictures say what they need."""
     monkeypatch.setitem(extras.EXTRAS, "view", ("a_package_that_is_nowhere",))
     assert main([str(tmp_path)]) == 1
-    told = capsys.readouterr().err
-    assert "a_package_that_is_nowhere is not installed" in told
-    assert "./surgebreak render" in told
+    reported = capsys.readouterr().err
+    assert "a_package_that_is_nowhere is not installed" in reported
+    assert "./surgebreak render" in reported
 
 
 @pytest.mark.parametrize(

@@ -18,8 +18,8 @@ def test_the_warm_up_case_switches_on_both_sides_and_what_joins_them(tmp_path):
 
 
 @pytest.fixture
-def told(monkeypatch):
-    """Runs compile_ahead of a warm-up case: what is told, and the parts that would have been compiled."""
+def reported(monkeypatch):
+    """Runs compile_ahead of a warm-up case: what is printed, and the parts that would have been compiled."""
 
     def run(part, there=(), cores=2, failed=()):
         lines, asked = [], []
@@ -34,22 +34,22 @@ def told(monkeypatch):
     return run
 
 
-def test_a_case_gets_the_parts_that_it_needs_and_lacks(told):
-    assert told("all")[0] == ["solids", "water", "structure"]
-    assert told("solids")[0] == ["solids", "water"]
-    assert told("all", there=("structure",))[0] == ["solids", "water"]
-    assert told("all", there=("solids", "water", "structure")) == ([], "")
+def test_a_case_gets_the_parts_that_it_needs_and_lacks(reported):
+    assert reported("all")[0] == ["solids", "water", "structure"]
+    assert reported("solids")[0] == ["solids", "water"]
+    assert reported("all", there=("structure",))[0] == ["solids", "water"]
+    assert reported("all", there=("solids", "water", "structure")) == ([], "")
 
 
-def test_where_nothing_is_gained_the_run_compiles_as_it_goes(told):
+def test_where_nothing_is_gained_the_run_compiles_as_it_goes(reported):
     """One core, or one part: a process more would only load everything twice."""
-    assert told("all", cores=1) == ([], "")
-    assert told("structure") == ([], "")
-    assert told("all", there=("solids", "water")) == ([], "")
+    assert reported("all", cores=1) == ([], "")
+    assert reported("structure") == ([], "")
+    assert reported("all", there=("solids", "water")) == ([], "")
 
 
-def test_a_failure_is_told_and_left_to_the_run(told):
-    asked, lines = told("all", failed=("water",))
+def test_a_failure_is_reported_and_left_to_the_run(reported):
+    asked, lines = reported("all", failed=("water",))
     assert "water" in asked
     assert "note: water: not compiled ahead; the run compiles what it needs itself" in lines
 

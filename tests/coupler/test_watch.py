@@ -26,8 +26,8 @@ def make_run(path, process, status="running", time_reached=1.0, **more):
     """A run directory as a run leaves it while it goes on."""
     (path / "history").mkdir(parents=True)
     figures = {"time": time_reached, "largest_volume_error": 0.01}
-    told = {"status": status, "exit_code": None, "exit_reason": None, "ended": None, "process": process}
-    (path / "run.json").write_text(json.dumps(SUMMARY | told | {"figures": figures, "case": CASE} | more))
+    reported = {"status": status, "exit_code": None, "exit_reason": None, "ended": None, "process": process}
+    (path / "run.json").write_text(json.dumps(SUMMARY | reported | {"figures": figures, "case": CASE} | more))
     with HistoryTable(path / "history" / "gauges.csv", [("time", "s", "t"), ("force_x", "N", "f")]) as table:
         for k in range(11):
             table.append(time=0.1 * k, force_x=1e6 * k)

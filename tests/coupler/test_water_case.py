@@ -28,7 +28,7 @@ def case(water=None, **more):
     return Case.model_validate(sections | more)
 
 
-def told(*args, **kwargs):
+def reported(*args, **kwargs):
     return [f"{'.'.join(map(str, path))}: {text}" for path, text in problems(case(*args, **kwargs))]
 
 
@@ -68,7 +68,7 @@ def run(found, end):
     ],
 )
 def test_what_cannot_be_is_refused_with_its_place(water, message):
-    assert any(message in line for line in told(water)), told(water)
+    assert any(message in line for line in reported(water)), reported(water)
 
 
 def test_a_tank_that_its_inflow_fills_is_refused():
@@ -175,7 +175,8 @@ def test_a_wave_that_has_begun_before_the_start_is_remarked():
 
 def test_a_dry_start_is_allowed_where_water_comes_in():
     assert (
-        told({"fill": [], "inflow": [{"kind": "steady", "side": "x-", "level": 0.3, "velocity": 1.0}]}) == []
+        reported({"fill": [], "inflow": [{"kind": "steady", "side": "x-", "level": 0.3, "velocity": 1.0}]})
+        == []
     )
 
 
@@ -258,7 +259,7 @@ def test_a_record_that_rises_above_the_tank_is_refused(tmp_path):
     path = tmp_path / "r.csv"
     path.write_text("time,level,velocity\n0,0.1,0\n1,50,0\n", encoding="utf-8")
     inflow = {"kind": "record", "side": "x-", "path": str(path)}
-    assert any("above the top of the tank" in line for line in told({"inflow": [inflow]}))
+    assert any("above the top of the tank" in line for line in reported({"inflow": [inflow]}))
 
 
 def test_columns_of_a_record_may_stand_in_any_order(tmp_path):
@@ -279,7 +280,7 @@ def test_columns_of_a_record_may_stand_in_any_order(tmp_path):
     ],
 )
 def test_solids_that_are_none_are_refused(solid):
-    assert any(line.startswith("solid.0") for line in told(solid=[solid]))
+    assert any(line.startswith("solid.0") for line in reported(solid=[solid]))
 
 
 def test_water_at_rest_lifts_a_hull_and_a_box_of_one_shape_alike():
@@ -385,8 +386,8 @@ def test_a_stone_that_covers_gauges_leaves_their_cells_empty():
         ({"sea": [{"side": "x+", "level": 0.5}]}, "a full chamber that an inflow or a sea fills"),
     ],
 )
-def test_a_pressure_that_is_not_found_is_told_with_its_place_and_cause(monkeypatch, water, cause):
-    """Words of moving solids were told where there are none."""
+def test_a_pressure_that_is_not_found_is_reported_with_its_place_and_cause(monkeypatch, water, cause):
+    """The message once blamed moving solids where there are none."""
     coupling = build(case(water), no_clock).coupling
 
     def fails(problem, rtol):
@@ -402,7 +403,7 @@ def test_a_pressure_that_is_not_found_is_told_with_its_place_and_cause(monkeypat
     assert cause in str(error.value)
 
 
-def test_a_pressure_beyond_all_bounds_is_told_with_its_place_and_cause():
+def test_a_pressure_beyond_all_bounds_is_reported_with_its_place_and_cause():
     pressure, nodes = np.array([0.0, -2e9]), np.array([[0.0, 0, 0], [1.0, 2, 3.5]])
     check_pressure(1.0, pressure[:1], nodes, blocks=True, sides=True)
     with pytest.raises(

@@ -16,7 +16,7 @@ def test_a_box_has_six_shapes_with_the_gradients_of_its_cells():
     np.testing.assert_array_equal(shapes.upright[shapes.row], mesh.upright)
 
 
-def test_bricks_of_two_sizes_are_told_apart():
+def test_bricks_of_two_sizes_are_distinguished():
     """A graded box: twelve shapes, and no cell gets the gradients of the other half."""
     x = np.concatenate([np.linspace(0.0, 1.0, 6), np.linspace(1.1, 2.0, 10)])
     mesh = box_mesh(None, None, axes=(x, np.linspace(0, 1, 6), np.linspace(0, 1, 6)))

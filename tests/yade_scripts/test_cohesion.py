@@ -22,7 +22,9 @@ def test_impossible_parameters_are_refused_by_name(wrong):
 
 
 def test_the_description_tells_what_the_strength_depends_on():
-    told = JointParameters(1e6, 1e-3, closing_ratio=10.0, law="bilinear", peak=0.2, damping=0.0).described()
-    assert told == (
+    reported = JointParameters(
+        1e6, 1e-3, closing_ratio=10.0, law="bilinear", peak=0.2, damping=0.0
+    ).described()
+    assert reported == (
         "bilinear law with its peak at 0.2 δ_f, mixed mode effective, kc/K0 10, 8 points an edge, G_c 500 J/m²"
     )

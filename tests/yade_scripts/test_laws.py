@@ -111,7 +111,7 @@ def test_an_unknown_law_is_refused_with_the_nearest_one():
 
 
 @pytest.mark.parametrize(
-    ("wrong", "told"),
+    ("wrong", "reported"),
     [
         ({"law": "polynomial", "peak": 0.2}, "joints.peak = 0.2.*0.3333 δ_f, leave it out"),
         ({"law": "exponential", "peak": 0.5}, "joints.peak = 0.5.*0.01 to 0.2 δ_f"),
@@ -119,8 +119,8 @@ def test_an_unknown_law_is_refused_with_the_nearest_one():
         ({"points": 40}, "joints.points = 40.*'auto' or lie in 1..12"),
     ],
 )
-def test_what_a_law_cannot_do_is_refused_by_name(wrong, told):
-    with pytest.raises(JointParameterError, match=told):
+def test_what_a_law_cannot_do_is_refused_by_name(wrong, reported):
+    with pytest.raises(JointParameterError, match=reported):
         JointParameters(1e6, 1e-3, damping=0.0, **wrong)
 
 

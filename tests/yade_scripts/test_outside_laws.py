@@ -83,7 +83,7 @@ def test_plain_functions_of_a_script_are_compiled(forgotten):
 
 
 @pytest.mark.parametrize(
-    ("law", "told"),
+    ("law", "reported"),
     [
         (triangle(secant=lambda r, peak: 1.0), "s r is 1 at most and 0.01 at the peak"),
         (triangle(secant=lambda r, peak: r), "secant rises at r = 0"),
@@ -92,9 +92,9 @@ def test_plain_functions_of_a_script_are_compiled(forgotten):
         (triangle(peak=0.6), "lowest_peak <= peak <= highest_peak"),
     ],
 )
-def test_a_law_that_the_solver_cannot_rely_on_is_refused(forgotten, law, told):
+def test_a_law_that_the_solver_cannot_rely_on_is_refused(forgotten, law, reported):
     """Time step and pressure solve rely on a secant that only falls, the balance of energy on the work."""
-    with pytest.raises(outside_laws.BadLaw, match=told):
+    with pytest.raises(outside_laws.BadLaw, match=reported):
         surgebreak.register_law(law, "wrong")
     assert "wrong" not in laws.names()
 

@@ -141,7 +141,7 @@ def test_what_is_no_convex_block_is_refused(vertices, faces, says):
     assert says in str(refusal.value)
 
 
-def test_the_place_of_a_dent_is_told_in_the_coordinates_of_the_world():
+def test_the_place_of_a_dent_is_reported_in_the_coordinates_of_the_world():
     dented = BOX_CORNERS.copy()
     dented[6] = 0.1
     place = np.array([10.0, 20.0, 30.0])

@@ -1,4 +1,4 @@
-"""Substeps that are forced: refused beyond the explicit limit, with the pair; told where only accuracy suffers."""
+"""Substeps that are forced: refused beyond the explicit limit, with the pair; reported where only accuracy suffers."""
 
 from dataclasses import replace
 
@@ -34,7 +34,7 @@ def test_a_substep_beyond_the_explicit_limit_is_refused_with_the_pair():
         Structure(two_cubes(), None, JOINT, gravity=STILL, substep=1.01 * limit.stable)
 
 
-def test_a_substep_that_is_only_inaccurate_is_told():
+def test_a_substep_that_is_only_inaccurate_is_reported():
     with Structure(two_cubes(), ContactLaw(1e8), gravity=STILL) as s:
         limit = s.substep_limit()
         assert limit.remark(limit.dt) == ""

@@ -71,7 +71,7 @@ def benchmark(quick: bool, as_json: bool, only: str | None = None) -> ExitCode:
         for line in GROUPS[name](sizes):
             lines.append(line)
             if not as_json:
-                print(_told(line), flush=True)
+                print(_reported(line), flush=True)
     if as_json:
         about = {"machine": provenance.machine(), "versions": provenance.versions()}
         print(json.dumps(about | {"lines": [asdict(line) | {"kept": line.kept} for line in lines]}, indent=1))
@@ -87,7 +87,7 @@ def _heading() -> str:
     return f"{machine['processor']}, {machine['cores']} cores, one thread; {named}\n{columns}"
 
 
-def _told(line: Line) -> str:
+def _reported(line: Line) -> str:
     target = "" if line.target is None else f"  target {line.target:g}: {'kept' if line.kept else 'MISSED'}"
     us = f"{line.us:.0f}" if line.us >= 1000.0 else f"{line.us:.3g}"
     return f"{line.what:58}{line.blocks:8}{line.joints:8}{us:>10} {line.of}{target}"

@@ -116,7 +116,7 @@ def costs(count: int = BLOCKS) -> Costs:
     return Costs(bare, held, multiple | {"covers": covers, "cut": multiple["cut"] - covers})
 
 
-def told(found: Costs, count: int) -> str:
+def summary_line(found: Costs, count: int) -> str:
     """A table."""
     tables = (found.bare, found.held, found.full)
     lines = [f"{'CPU ms a step':44}{'no blocks':>12}{f'{count} held':>12}{f'{count} free':>12}"]
@@ -143,7 +143,7 @@ def main() -> None:
     words = sys.argv[1:]
     if len(words) < 2:
         count = int(words[0]) if words else BLOCKS
-        print(told(costs(count), count))
+        print(summary_line(costs(count), count))
         return
     print(json.dumps(measured(int(words[0]), words[1], words[2])))
 

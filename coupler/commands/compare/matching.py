@@ -27,8 +27,8 @@ def matched(reference: JointParameters, law: str) -> tuple[JointParameters, tupl
     failure = reference.work_of_separation / (reference.strength * unit.work_of_separation)
     made = replace(reference, law=law, peak=peak, opening_at_failure=failure, mixed_mode="effective")
     ratio = made.stiffness / reference.stiffness
-    told = () if abs(ratio - 1.0) < CLOSE else (f"stiffness: {ratio:.2f} times",)
-    return made, (*told, "shape of the softening curve")
+    unmatched = () if abs(ratio - 1.0) < CLOSE else (f"stiffness: {ratio:.2f} times",)
+    return made, (*unmatched, "shape of the softening curve")
 
 
 def _peak_for(wanted: float, law: str, low: float, high: float) -> float:

@@ -93,9 +93,9 @@ def errors(found: Outcome, reference: Outcome, exact: dict[str, Exact]) -> dict[
     """Errors by kind against the exact answer, or the reference where there is none; `curve`; `largest` of the exact
     kinds, or of the curve."""
     against = {kind: exact[kind].value if kind in exact else getattr(reference, kind) for kind in KINDS}
-    told = {
+    misses = {
         kind: error(getattr(found, kind), value) if value else float("nan") for kind, value in against.items()
     }
-    told["curve"] = curve_error(found, reference)
-    told["largest"] = max((told[kind] for kind in exact), default=told["curve"])
-    return told
+    misses["curve"] = curve_error(found, reference)
+    misses["largest"] = max((misses[kind] for kind in exact), default=misses["curve"])
+    return misses

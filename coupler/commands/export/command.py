@@ -29,7 +29,7 @@ def export(run: Path, formats: list[str], to: Path | None, begin: float, end: fl
     folder = to or run / "export"
     folder.mkdir(parents=True, exist_ok=True)
     for name in formats:
-        _told(name, _writer(name, run, folder, title, lambda t: begin <= t <= end), folder, tell)
+        _reported(name, _writer(name, run, folder, title, lambda t: begin <= t <= end), folder, tell)
 
 
 def _writer(name: str, run: Path, to: Path, title: str, chosen: Callable[[float], bool]) -> Iterable[Path]:
@@ -46,7 +46,7 @@ def _writer(name: str, run: Path, to: Path, title: str, chosen: Callable[[float]
     return write_gltf(run, to, chosen)
 
 
-def _told(name: str, made: Iterable[Path], folder: Path, tell) -> None:
+def _reported(name: str, made: Iterable[Path], folder: Path, tell) -> None:
     """Carry out, and tell how many files, how large, how long."""
     start, written = clock.process_time(), []
     try:

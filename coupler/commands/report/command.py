@@ -76,8 +76,8 @@ def study_report(study: Path) -> str:
     from coupler.commands.study.page import page
 
     try:
-        told = json.loads(read_text(study / "study.json"))
-        title, text = told["title"], page(told)
+        content = json.loads(read_text(study / "study.json"))
+        title, text = content["title"], page(content)
     except BadPath as error:
         raise NoRun(f"{study / 'study.json'}: {error}") from error
     except (LookupError, ValueError, TypeError, AttributeError, RecursionError) as error:

@@ -49,7 +49,7 @@ def _figure(path: Path, caption: str) -> str:
 
 
 def _inline(text: str) -> str:
-    told = escape(text, quote=False).replace("  \n", "<br>\n")
+    marked = escape(text, quote=False).replace("  \n", "<br>\n")
     for mark, tag in MARKS:
-        told = mark.sub(tag, told)
-    return told
+        marked = mark.sub(tag, marked)
+    return marked

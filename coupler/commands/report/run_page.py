@@ -87,14 +87,14 @@ def run_page(run: Path, summary: dict, pictures: Path, remarks: list[str]) -> st
 def _verdict(run: Path, summary: dict) -> str:
     killed = was_killed(summary)
     bad = killed or summary["exit_code"] not in (0, None)
-    told = summary["status"]
+    shown = summary["status"]
     if summary["exit_reason"]:
-        told += f" (exit code {summary['exit_code']}): {summary['exit_reason']}"
+        shown += f" (exit code {summary['exit_code']}): {summary['exit_reason']}"
     elif killed:
-        told = f"killed: its process is gone and could not say why; this is what it has written{_until(run)}"
+        shown = f"killed: its process is gone and could not say why; this is what it has written{_until(run)}"
     elif summary["status"] == "running":
-        told += f": this is what the run has written so far{_until(run)}"
-    return f'<p class="verdict{" bad" if bad else ""}">{escape(told)}</p>'
+        shown += f": this is what the run has written so far{_until(run)}"
+    return f'<p class="verdict{" bad" if bad else ""}">{escape(shown)}</p>'
 
 
 def _until(run: Path) -> str:
@@ -156,12 +156,12 @@ def _size(size: dict) -> str:
 
 def _stills(run: Path, pictures: Path) -> str:
     found = sorted(pictures.glob("still_*s.png"), key=_time_of)
-    told = [figure(p, f"t = {_time_of(p):.4g} s") for p in found]
-    told = [f'<div class="stills">{"".join(told)}</div>'] if told else []
+    shown = [figure(p, f"t = {_time_of(p):.4g} s") for p in found]
+    shown = [f'<div class="stills">{"".join(shown)}</div>'] if shown else []
     made = run / "pictures" / "film.mp4"
     if made.exists():
-        told.append(film(made, "pictures/film.mp4"))
-    return "\n".join(told)
+        shown.append(film(made, "pictures/film.mp4"))
+    return "\n".join(shown)
 
 
 def _time_of(still: Path) -> float:
@@ -235,7 +235,7 @@ def _left_out(summary: dict) -> str:
         if row.done + row.skipped > 0.0
     ]  # fmt: skip
     head = ["skipped in the steps", "done", "skipped", "would have cost", "paid", "for"]
-    told = [f"{part} ({', '.join(names)})" for part, names in not_loaded(summary).items()]
+    shown = [f"{part} ({', '.join(names)})" for part, names in not_loaded(summary).items()]
     return "\n".join(
         [
             table(head, rows, (0, 5)),
@@ -245,7 +245,7 @@ def _left_out(summary: dict) -> str:
                 if rows
                 else "This run has counted nothing of what it skipped."
             ),
-            paragraph(f"Not loaded at all: {', '.join(told)}." if told else ""),
+            paragraph(f"Not loaded at all: {', '.join(shown)}." if shown else ""),
         ]
     )
 

@@ -21,25 +21,25 @@ MOST = 30
 
 def stands(run: Path, summary: dict, pictures: Path) -> list[str]:
     """Pieces of the section; none for a run without a structure."""
-    told = summary["figures"].get("verdict")
-    if not told:
+    judged = summary["figures"].get("verdict")
+    if not judged:
         return []
-    first, *rest = sentences(told)
+    first, *rest = sentences(judged)
     shown = [
         figure(pictures / f"{name}.png", words)
         for name, words in FIGURES.items()
         if _is_there(pictures, name)
     ]
     return [
-        f'<p class="verdict state-{escape(told["state"])}">{escape(first)}</p>',
+        f'<p class="verdict state-{escape(judged["state"])}">{escape(first)}</p>',
         f"<ul>{''.join(f'<li>{escape(line)}</li>' for line in rest)}</ul>",
-        *_groups("body", told["bodies"] if len(told["bodies"]) > 1 else [], told, loads=True),
-        *_groups("storey", told["storeys"] if len(told["storeys"]) > 1 else [], told),
-        *_groups("wall, floor or part", told["members"] if len(told["members"]) > 1 else [], told),
+        *_groups("body", judged["bodies"] if len(judged["bodies"]) > 1 else [], judged, loads=True),
+        *_groups("storey", judged["storeys"] if len(judged["storeys"]) > 1 else [], judged),
+        *_groups("wall, floor or part", judged["members"] if len(judged["members"]) > 1 else [], judged),
         *shown,
-        _displaced(told),
-        _hits(told),
-        note(_rules(told)),
+        _displaced(judged),
+        _hits(judged),
+        note(_rules(judged)),
     ]
 
 
@@ -47,22 +47,22 @@ def _is_there(pictures: Path, name: str) -> bool:
     return (pictures / f"{name}.png").exists()
 
 
-def _groups(what: str, groups: list[dict], told: dict, loads: bool = False) -> list[str]:
+def _groups(what: str, groups: list[dict], judged: dict, loads: bool = False) -> list[str]:
     """A table of groups, those that broke first come first."""
     if not groups:
         return []
     ranked = sorted(groups, key=lambda g: g["first_break"]["time"] if g["first_break"] else float("inf"))
     head = [what, "state", "first break", "joints broken", "of the joined area", "blocks moved", "farthest"]
     head += ["largest force", "at", "largest depth"] if loads else []
-    rows = [_group(group, told, loads) for group in ranked[:MOST]]
+    rows = [_group(group, judged, loads) for group in ranked[:MOST]]
     left = len(ranked) - len(rows)
     return [table(head, rows, (0, 1)), note(f"and {left} more in run.json" if left else "")]
 
 
-def _group(group: dict, told: dict, loads: bool) -> list[str]:
+def _group(group: dict, judged: dict, loads: bool) -> list[str]:
     first = group["first_break"]
     row = [
-        name_of(told, group["name"]),
+        name_of(judged, group["name"]),
         group["word"],
         moment_of(first["time"]) if first else "–",
         f"{group['joints_broken']} of {group['joints']}" if group["joints"] else "–",
@@ -80,8 +80,8 @@ def _group(group: dict, told: dict, loads: bool) -> list[str]:
     return row
 
 
-def _displaced(told: dict) -> str:
-    found = told["displaced"]
+def _displaced(judged: dict) -> str:
+    found = judged["displaced"]
     rows = [[b["block"], length(b["way"]), moment_of(b["left_at"])] for b in found["list"]]
     left = found["blocks"] - len(rows)
     return table(["block that left its place", "moved by", "left at"], rows) + note(
@@ -89,13 +89,13 @@ def _displaced(told: dict) -> str:
     )
 
 
-def _hits(told: dict) -> str:
+def _hits(judged: dict) -> str:
     rows = [
         [
             hit["block"], hit["other"], moment_of(hit["time"]), point(hit["place"]), quantity(hit["speed"], "m/s"),
             quantity(hit["impulse"], "N s"), quantity(hit["force"], "N"),
         ]
-        for hit in told["hits"]["list"]
+        for hit in judged["hits"]["list"]
     ]  # fmt: skip
     head = ["debris", "hit", "at", "place", "speed lost", "impulse", "mean force of the step"]
     return table(head, rows, (0, 1)) + note(
@@ -105,8 +105,8 @@ def _hits(told: dict) -> str:
     )
 
 
-def _rules(told: dict) -> str:
-    r = told["rules"]
+def _rules(judged: dict) -> str:
+    r = judged["rules"]
     by_joints = r["collapsed_joints"]
     return (
         f"Rules: a block has left its place when its centre has moved by more than {percent(r['moved'])} of its "

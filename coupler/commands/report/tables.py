@@ -31,8 +31,8 @@ def energy(run: Path) -> str:
     if found is None:
         return ""
     error = _share(float(found["energy_error"][-1]))
-    told = f"What the lines miss at the end, over the energy that the scene has put in: {error}."
-    return _book("energy", found, "J") + note(told)
+    note_text = f"What the lines miss at the end, over the energy that the scene has put in: {error}."
+    return _book("energy", found, "J") + note(note_text)
 
 
 def volume(run: Path) -> str:
@@ -109,7 +109,7 @@ def cracks(run: Path) -> str:
     if not len(broken):
         return paragraph(f"None of {total} joints broke; the largest damage is {_largest(found['damage'])}.")
     order = broken[np.argsort(found["time"][broken])]
-    told = (
+    note_text = (
         f"{len(broken)} of {total} joints broke, between t = {quantity(found['time'][order[0]], 's')} and "
         f"{quantity(found['time'][order[-1]], 's')}, over {quantity(found['area'][broken].sum(), 'm2')}. They "
         f"dissipated {quantity(found['dissipated'][broken].sum(), 'J')}; all joints together "
@@ -130,7 +130,7 @@ def cracks(run: Path) -> str:
         "dissipated",
     ]
     left = len(order) - len(rows)
-    return paragraph(told) + table(head, rows) + note(f"and {left} more in cracks.csv" if left else "")
+    return paragraph(note_text) + table(head, rows) + note(f"and {left} more in cracks.csv" if left else "")
 
 
 def _crack(found: History, i: int, digits: int) -> list[str]:

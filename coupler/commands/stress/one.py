@@ -46,7 +46,7 @@ def main() -> None:
 
         found = outcome(scenes()[id], keep)
         print(
-            json.dumps({"outcome": [found.verdict, found.told, found.cpu_s, found.wall_s]}),
+            json.dumps({"outcome": [found.verdict, found.message, found.cpu_s, found.wall_s]}),
             file=file,
             flush=True,
         )

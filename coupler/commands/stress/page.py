@@ -18,10 +18,10 @@ def tables(rows: list[dict]) -> str:
 def _group(name: str, rows: list[dict]) -> str:
     spent = sum(row["cpu_s"] for row in rows)
     counts = {v: sum(row["verdict"] == v for row in rows) for v in ("passed", "refused", "failed")}
-    told = ", ".join(f"{number} {verdict}" for verdict, number in counts.items() if number)
+    message = ", ".join(f"{number} {verdict}" for verdict, number in counts.items() if number)
     lines = "\n".join(_row(row) for row in rows)
     below = "\n".join(line for row in rows for line in _below(row))
-    return f"### {name}\n{told}; {spent:.0f} CPU s.\n\n{HEAD}\n{lines}" + (f"\n\n{below}" if below else "")
+    return f"### {name}\n{message}; {spent:.0f} CPU s.\n\n{HEAD}\n{lines}" + (f"\n\n{below}" if below else "")
 
 
 def _row(row: dict) -> str:
@@ -32,8 +32,8 @@ def _row(row: dict) -> str:
 def _below(row: dict) -> Iterable[str]:
     missed = [m for m in row["measures"] if not m["kept"]]
     said = [f"{m['quantity']} {m['value']:.2g}, limit {m['limit']:.2g}" for m in missed]
-    if row["verdict"] == "refused" or (row["verdict"] == "failed" and row["told"]):
-        said.append(f"“{row['told']}”")
+    if row["verdict"] == "refused" or (row["verdict"] == "failed" and row["message"]):
+        said.append(f"“{row['message']}”")
     if row["verdict"] != "passed" and said:
         yield f"- {row['id']}: {'; '.join(said)}"
 

@@ -58,7 +58,7 @@ class Outcome:
     group: str
     title: str
     verdict: Verdict
-    told: str = ""
+    message: str = ""
     measures: list[Measure] = field(default_factory=list)
     cpu_s: float = 0.0
     wall_s: float = 0.0
@@ -77,8 +77,8 @@ def judged(scene: Scene, measures: list[Measure], refused: str, cpu_s: float, wa
     verdict: Verdict = "failed"
     if kept and allowed:
         verdict = "refused" if refused else "passed"
-    told = refused or ("should have been refused" if not allowed else "")
-    return Outcome(scene.id, scene.group, scene.title, verdict, told, measures, cpu_s, wall_s)
+    message = refused or ("should have been refused" if not allowed else "")
+    return Outcome(scene.id, scene.group, scene.title, verdict, message, measures, cpu_s, wall_s)
 
 
 _registered: dict[str, Scene] = {}

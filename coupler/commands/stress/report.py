@@ -34,7 +34,7 @@ def shown(outcome: Outcome) -> str:
     o = outcome
     verdict = o.verdict if o.verdict != "failed" else "FAILED"
     head = FORM.format(o.id, o.group, o.title, verdict, f"{o.cpu_s:.1f}", f"{o.wall_s:.1f}")
-    below = [_measure(m) for m in o.measures] + ([f"      {o.told}"] if o.told else [])
+    below = [_measure(m) for m in o.measures] + ([f"      {o.message}"] if o.message else [])
     return "\n".join([head, *below])
 
 
@@ -47,9 +47,11 @@ def _measure(m: Measure) -> str:
 def totals(outcomes: list[Outcome]) -> str:
     """How many of each verdict, and the time."""
     count = {v: sum(o.verdict == v for o in outcomes) for v in ("passed", "refused", "failed")}
-    told = ", ".join(f"{number} {verdict}" for verdict, number in count.items())
+    message = ", ".join(f"{number} {verdict}" for verdict, number in count.items())
     failed = [o.id for o in outcomes if o.verdict == "failed"]
-    return f"{told}{': ' + ', '.join(failed) if failed else ''}; {sum(o.cpu_s for o in outcomes):.1f} CPU s"
+    return (
+        f"{message}{': ' + ', '.join(failed) if failed else ''}; {sum(o.cpu_s for o in outcomes):.1f} CPU s"
+    )
 
 
 def listing(scenes: list[Scene]) -> str:

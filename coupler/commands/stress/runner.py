@@ -45,8 +45,8 @@ def run(scene: Scene) -> Outcome:
     ended = next((row["outcome"] for row in rows if "outcome" in row), None)
     if trouble or ended is None:
         ended = ("failed", trouble or "its process gave no outcome", 0.0, time.perf_counter() - began)
-    verdict, told, cpu, wall = ended
-    return Outcome(scene.id, scene.group, scene.title, verdict, told, measures, cpu, wall)
+    verdict, message, cpu, wall = ended
+    return Outcome(scene.id, scene.group, scene.title, verdict, message, measures, cpu, wall)
 
 
 def _trouble(scene: Scene, path: Path) -> str:

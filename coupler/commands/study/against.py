@@ -32,7 +32,7 @@ class Worse:
 
 def compare(first: Path, second: Path, error: float, cpu: float) -> ExitCode:
     """Tell what got worse; leaves with DIVERGED if anything did. Raises BadCase for studies that do not compare."""
-    before, now = told(first), told(second)
+    before, now = read_study(first), read_study(second)
     refuse(before, now)
     if before["machine"]["processor"] != now["machine"]["processor"]:
         print(
@@ -47,7 +47,7 @@ def compare(first: Path, second: Path, error: float, cpu: float) -> ExitCode:
     return ExitCode.DIVERGED if found else ExitCode.DONE
 
 
-def told(folder: Path) -> dict:
+def read_study(folder: Path) -> dict:
     """What study.json says. Raises BadCase."""
     path = folder / "study.json" if folder.is_dir() else folder
     try:

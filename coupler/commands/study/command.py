@@ -32,14 +32,14 @@ def study(
     runs = Runs(plan, folder, any_version, lambda text: print(text, flush=True))
     try:
         found = collect(plan, runs, repeat or plan.study.repeat)
-        told = content(plan, runs, found, law_points(plan, runs))
+        found_study = content(plan, runs, found, law_points(plan, runs))
     except KeyboardInterrupt:
         print(
             f"stopped by Ctrl-C; the runs that were done are kept in {folder}, and the same command goes on"
         )
         return ExitCode.STOPPED
-    write(folder, told)
-    print(page(told))
+    write(folder, found_study)
+    print(page(found_study))
     draw("coupler.commands.view.study", folder)
     print(f"results in {folder}")
     return ExitCode.DIVERGED if any(outcome.run.failed for outcome in found.values()) else ExitCode.DONE

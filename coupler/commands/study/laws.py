@@ -44,7 +44,7 @@ def law_points(plan: Plan, runs: Runs) -> list[LawPoint]:
 
 
 def _points(plan: Plan, ladder: Ladder, runs: Runs) -> list[LawPoint]:
-    told = json.loads(_comparison(plan, ladder, runs).read_text(encoding="utf-8"))
+    comparison = json.loads(_comparison(plan, ladder, runs).read_text(encoding="utf-8"))
     case = plan.settings[plan.base].case
     wanted = [q for q in plan.study.quantity if q.compared and q.against != "finest"]
     return [
@@ -57,7 +57,7 @@ def _points(plan: Plan, ladder: Ladder, runs: Runs) -> list[LawPoint]:
             row["cpu_seconds"],
             {q.name: _reading(plan, q, row, case) for q in wanted},
         )
-        for row in told["laws"]
+        for row in comparison["laws"]
     ]
 
 
@@ -82,8 +82,10 @@ def _comparison(plan: Plan, ladder: Ladder, runs: Runs) -> Path:
         [sys.executable, "-m", "coupler.commands.cli", "compare", str(plan.file.path), *options, *sets], log
     )
     if cost.exit_code:
-        told = log.read_text(encoding="utf-8", errors="replace")
-        raise ComparisonFailed(f"ladder {ladder.name}: surgebreak compare: {trouble(cost.exit_code, told)}")
+        comparison = log.read_text(encoding="utf-8", errors="replace")
+        raise ComparisonFailed(
+            f"ladder {ladder.name}: surgebreak compare: {trouble(cost.exit_code, comparison)}"
+        )
     runs.tell(f"ladder {ladder.name}: {len(ladder.laws)} laws compared, {cost.cpu_seconds:.3g} CPU s in all")
     write_json(made_by, runs.program)
     return found

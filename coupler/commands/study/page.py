@@ -16,41 +16,41 @@ ROUND_OFF = 1e-6
 TIMES = ("cpu_seconds", "set_up_seconds", "start_seconds", "compile_seconds", "wall_seconds")
 
 
-def page(told: dict, level: int = 1, pictures: str = "") -> str:
+def page(study: dict, level: int = 1, pictures: str = "") -> str:
     """One study; pictures: where its figures are, from the page."""
     mark = "#" * level
     parts = [
-        f"{mark} {told['title']}",
-        *([told["note"]] if told["note"] else []),
-        _where(told),
-        *(_quantity(told, q, mark, pictures) for q in told["quantities"]),
-        f"{mark}# Runs\n\n{_ladders(told)}\n\n{_runs(told)}",
-        f"{mark}# Cheapest setting for an error\n\n{_cheapest(told)}",
+        f"{mark} {study['title']}",
+        *([study["note"]] if study["note"] else []),
+        _where(study),
+        *(_quantity(study, q, mark, pictures) for q in study["quantities"]),
+        f"{mark}# Runs\n\n{_ladders(study)}\n\n{_runs(study)}",
+        f"{mark}# Cheapest setting for an error\n\n{_cheapest(study)}",
     ]
-    if told["orders"]:
-        parts.append(f"{mark}# Observed order of convergence\n\n{_orders(told)}")
-    if told["laws"]:
-        parts.append(f"{mark}# Laws of YADE and ours\n\n{_laws(told, pictures)}")
-    if told["parts"]:
-        parts.append(f"{mark}# What parts of the program cost\n\n{_parts(told)}")
-    failed = _failed(told)
+    if study["orders"]:
+        parts.append(f"{mark}# Observed order of convergence\n\n{_orders(study)}")
+    if study["laws"]:
+        parts.append(f"{mark}# Laws of YADE and ours\n\n{_laws(study, pictures)}")
+    if study["parts"]:
+        parts.append(f"{mark}# What parts of the program cost\n\n{_parts(study)}")
+    failed = _failed(study)
     if failed:
         parts.append(f"{mark}# Runs that failed\n\n{failed}")
     return "\n\n".join(parts) + "\n"
 
 
-def _where(told: dict) -> str:
-    machine, versions = told["machine"], told["versions"]
+def _where(study: dict) -> str:
+    machine, versions = study["machine"], study["versions"]
     packages = ", ".join(f"{name} {number}" for name, number in versions.items())
-    commit = f", commit {told['git']['commit'][:12]}" if told["git"] else ""
+    commit = f", commit {study['git']['commit'][:12]}" if study["git"] else ""
     return (
-        f"`{shlex.join(told['command'])}`  \n{machine['processor']}, {machine['cores']} cores, one thread; "
-        f"{packages}{commit}.{_first_step(told)}"
+        f"`{shlex.join(study['command'])}`  \n{machine['processor']}, {machine['cores']} cores, one thread; "
+        f"{packages}{commit}.{_first_step(study)}"
     )
 
 
-def _first_step(told: dict) -> str:
-    first = told["first_step"]
+def _first_step(study: dict) -> str:
+    first = study["first_step"]
     if first is None:
         return ""
     return (
@@ -59,17 +59,17 @@ def _first_step(told: dict) -> str:
     )
 
 
-def _quantity(told: dict, q: dict, mark: str, pictures: str) -> str:
+def _quantity(study: dict, q: dict, mark: str, pictures: str) -> str:
     against = AGAINST[q["against"]]
     if q["finest"]:
         against += f" ({q['finest']['ladder']} {q['finest']['label']})"
     source = f": {q['source']}" if q["source"] else ""
-    figure = f"\n\n![{q['what']}]({pictures}{q['name']}.png)" if _drawn(told, q) else ""
+    figure = f"\n\n![{q['what']}]({pictures}{q['name']}.png)" if _drawn(study, q) else ""
     return f"**{q['what']}**, error against {against}{source}.{figure}"
 
 
-def _drawn(told: dict, q: dict) -> bool:
-    readings = [point["readings"].get(q["name"], {}) for point in told["points"]]
+def _drawn(study: dict, q: dict) -> bool:
+    readings = [point["readings"].get(q["name"], {}) for point in study["points"]]
     return any(reading.get("error") for reading in readings)
 
 
@@ -96,14 +96,14 @@ def _number(value) -> bool:
     return isinstance(value, int | float) and math.isfinite(value)
 
 
-def _ladders(told: dict) -> str:
+def _ladders(study: dict) -> str:
     """What is varied, so that the short names in the tables can be read."""
-    run = {point["ladder"] for point in told["points"]}
-    return "; ".join(f"`{la['name']}`: {la['what']}" for la in told["ladders"] if la["name"] in run) + "."
+    run = {point["ladder"] for point in study["points"]}
+    return "; ".join(f"`{la['name']}`: {la['what']}" for la in study["ladders"] if la["name"] in run) + "."
 
 
-def _runs(told: dict) -> str:
-    quantities = told["quantities"]
+def _runs(study: dict) -> str:
+    quantities = study["quantities"]
     head = ["run", *(f"error: {q['name']}" for q in quantities)]
     head += [
         "CPU s",
@@ -118,13 +118,13 @@ def _runs(told: dict) -> str:
         "steps",
         "passes",
     ]
-    rows = [_run_row(told, point, quantities) for point in told["points"]]
+    rows = [_run_row(study, point, quantities) for point in study["points"]]
     said = [k for k in range(len(head)) if any(row[k] != "–" for row in rows)]
     return table([head[k] for k in said], [[row[k] for k in said] for row in rows])
 
 
-def _run_row(told: dict, point: dict, quantities: list[dict]) -> list[str]:
-    run = told["runs"][point["setting"]]
+def _run_row(study: dict, point: dict, quantities: list[dict]) -> list[str]:
+    run = study["runs"][point["setting"]]
     size = run["size"]
     errors = [percent(point["readings"].get(q["name"], {}).get("error")) for q in quantities]
     if point["reason"]:
@@ -140,15 +140,15 @@ def _run_row(told: dict, point: dict, quantities: list[dict]) -> list[str]:
     ]
 
 
-def _cheapest(told: dict) -> str:
+def _cheapest(study: dict) -> str:
     """A row a quantity (and value across its ladders), a column a level: setting, its error, its CPU seconds."""
-    what = {q["name"]: q["what"] for q in told["quantities"]}
+    what = {q["name"]: q["what"] for q in study["quantities"]}
     rows: dict[str, dict[float, str]] = {}
-    for e in told["cheapest"]:
-        setting, error, cpu = cheapest_cells(told, e)
+    for e in study["cheapest"]:
+        setting, error, cpu = cheapest_cells(study, e)
         cell = f"{setting} ({error}, {cpu} s)" if e["rung"] else setting
         rows.setdefault(f"{what[e['quantity']]}{curve_of(e)}", {})[e["level"]] = cell
-    levels = sorted({e["level"] for e in told["cheapest"]})
+    levels = sorted({e["level"] for e in study["cheapest"]})
     cells = [[name, *(found[level] for level in levels)] for name, found in rows.items()]
     return table(["quantity", *(f"error of {100 * level:g} %" for level in levels)], cells, words=True)
 
@@ -158,52 +158,57 @@ def curve_of(entry: dict) -> str:
     return f" ({entry['curve']})" if entry["curve"] else ""
 
 
-def cheapest_cells(told: dict, entry: dict) -> list[str]:
+def cheapest_cells(study: dict, entry: dict) -> list[str]:
     """Setting with what its ladder holds fixed, its error and its cost."""
     rung = entry["rung"]
     if rung is None:
         return ["none of these", "–", "–"]
-    what = next(ladder["what"] for ladder in told["ladders"] if ladder["name"] == rung["ladder"])
+    what = next(ladder["what"] for ladder in study["ladders"] if ladder["name"] == rung["ladder"])
     return [f"{what}: {rung['label']}", percent(entry["error"]), f"{entry['cpu_seconds']:.3g}"]
 
 
-def _orders(told: dict) -> str:
+def _orders(study: dict) -> str:
     def shown(value) -> str:
         return f"{value + 0.0:.2f}".replace("-0.00", "0.00") if _number(value) else "–"
 
     rows = [
         [f"{o['quantity']}, {o['ladder']}{curve_of(o)}", shown(o["overall"]),
          shown(o["finest"]), o["how"]]
-        for o in told["orders"]
+        for o in study["orders"]
     ]  # fmt: skip
     return table(["quantity, ladder", "all runs", "finest runs", "from"], rows)
 
 
-def _laws(told: dict, pictures: str) -> str:
-    names = list(told["laws"][0]["readings"])
+def _laws(study: dict, pictures: str) -> str:
+    names = list(study["laws"][0]["readings"])
     rows = [
         [f"{row['law']}{' (YADE)' if row['stock'] else ''}, {row['multiple']} x substep",
          *(percent(row["readings"][name]["error"]) for name in names), f"{row['cpu_seconds']:.3g}"]
-        for row in told["laws"]
+        for row in study["laws"]
     ]  # fmt: skip
     head = ["law", *(f"error: {name}" for name in names), "CPU s of stepping"]
     figures = "".join(f"\n\n![{name}, laws]({pictures}{name}_laws.png)" for name in names)
     return table(head, rows) + figures
 
 
-def _parts(told: dict) -> str:
+def _parts(study: dict) -> str:
     rows = [
         [part["name"], part["reason"] or f"{part['cpu_seconds']:.3g}", percent(part["share"]),
          f"{round(part['memory'] / 1e6)}"]
-        for part in told["parts"]
+        for part in study["parts"]
     ]  # fmt: skip
-    whole = told["runs"][told["base"]]["cpu_seconds"]
+    whole = study["runs"][study["base"]]["cpu_seconds"]
     rows.append(
-        ["the whole case", f"{whole:.3g}", "100 %", f"{told['runs'][told['base']]['peak_memory'] / 1e6:.0f}"]
+        [
+            "the whole case",
+            f"{whole:.3g}",
+            "100 %",
+            f"{study['runs'][study['base']]['peak_memory'] / 1e6:.0f}",
+        ]
     )
     return table(["part", "CPU s", "share", "MB"], rows)
 
 
-def _failed(told: dict) -> str:
-    lines = [f"- {point_name(point)}: {point['reason']}" for point in told["points"] if point["reason"]]
+def _failed(study: dict) -> str:
+    lines = [f"- {point_name(point)}: {point['reason']}" for point in study["points"] if point["reason"]]
     return "\n".join(dict.fromkeys(lines))

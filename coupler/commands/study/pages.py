@@ -42,11 +42,11 @@ COLOURS = 96
 def summary(studies: list[dict]) -> str:
     """The settings for 5 % of all studies."""
     rows: list[list[str]] = []
-    for told in studies:
-        what = {q["name"]: f"{q['what']}, {AGAINST[q['against']]}" for q in told["quantities"]}
+    for content in studies:
+        what = {q["name"]: f"{q['what']}, {AGAINST[q['against']]}" for q in content["quantities"]}
         rows += [
-            [told["title"] + curve_of(entry), what[entry["quantity"]], *cheapest_cells(told, entry)]
-            for entry in told["cheapest"]
+            [content["title"] + curve_of(entry), what[entry["quantity"]], *cheapest_cells(content, entry)]
+            for entry in content["cheapest"]
             if entry["level"] == 0.05
         ]
     head = ["case", "quantity", "setting", "its error", "CPU s"]
@@ -71,17 +71,17 @@ def main() -> None:
     pictures.mkdir(parents=True, exist_ok=True)
     studies, pages = [], []
     for folder in folders:
-        told = json.loads((folder / "study.json").read_text(encoding="utf-8"))
-        case = Path(told["case"]).parent.name
-        told["command"] = [
+        content = json.loads((folder / "study.json").read_text(encoding="utf-8"))
+        case = Path(content["case"]).parent.name
+        content["command"] = [
             "surgebreak",
             "study",
             f"cases/{case}",
         ]  # as from the checkout, wherever it was made
         for figure in sorted(folder.glob("*.png")):
             _copy(figure, pictures / f"{case}_{figure.name}")
-        studies.append(told)
-        pages.append(page(told, level=2, pictures=f"pictures/studies/{case}_"))
+        studies.append(content)
+        pages.append(page(content, level=2, pictures=f"pictures/studies/{case}_"))
     (ROOT / "docs" / "studies.md").write_text(
         "\n".join([OPENING, summary(studies), "", *pages]), encoding="utf-8"
     )

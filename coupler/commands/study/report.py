@@ -85,18 +85,20 @@ def _point(rung, outcome: Outcome) -> dict:
     }
 
 
-def write(folder: Path, told: dict) -> None:
+def write(folder: Path, study: dict) -> None:
     """study.json, study.csv and study.md in the folder of a study."""
-    write_json(folder / "study.json", told)
+    write_json(folder / "study.json", study)
     with (folder / "study.csv").open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow([f"{name} [{unit}]" if unit else name for name, unit in COLUMNS])
-        for point in told["points"]:
-            for q in told["quantities"]:
-                writer.writerow([_csv(point, q, told["runs"][point["setting"]], name) for name, _ in COLUMNS])
+        for point in study["points"]:
+            for q in study["quantities"]:
+                writer.writerow(
+                    [_csv(point, q, study["runs"][point["setting"]], name) for name, _ in COLUMNS]
+                )
     from coupler.commands.study.page import page
 
-    (folder / "study.md").write_text(page(told), encoding="utf-8")
+    (folder / "study.md").write_text(page(study), encoding="utf-8")
 
 
 def _csv(point: dict, q: dict, run: dict, name: str) -> str:

@@ -125,14 +125,14 @@ def _against_finest(plan: Plan, found: dict[str, Outcome]) -> dict[str, Outcome]
 def orders(plan: Plan, found: dict[str, Outcome]) -> list[Order]:
     """Observed orders of every quantity on every curve whose runs have sizes."""
     curves = list(dict.fromkeys((rung.ladder, rung.curve) for rung in plan.rungs))
-    told = []
+    observed = []
     for q in plan.study.quantity:
         for ladder, name in curves:
             rungs = [r for r in plan.rungs if (r.ladder, r.curve) == (ladder, name) and r.size is not None]
             rungs = [r for r in rungs if q.name in found[r.setting].readings]
             if len({r.size for r in rungs}) > 1:
-                told.append(_order(q, ladder, name, rungs, found))
-    return told
+                observed.append(_order(q, ladder, name, rungs, found))
+    return observed
 
 
 def _order(q: Quantity, ladder: str, name: str, rungs: list[Rung], found: dict[str, Outcome]) -> Order:

@@ -116,11 +116,11 @@ class Runs:
         path = self._figures(setting.id, number)
         if not path.exists():
             return None
-        told = json.loads(path.read_text(encoding="utf-8"))
+        stored = json.loads(path.read_text(encoding="utf-8"))
         # of an older program, or crashed: memory, a full disk, a mistake that may be mended
-        if told.keys() != Measured.__dataclass_fields__.keys() or told["exit_code"] not in ENDED:
+        if stored.keys() != Measured.__dataclass_fields__.keys() or stored["exit_code"] not in ENDED:
             return None
-        found = Measured(**told)
+        found = Measured(**stored)
         changed = differences(found.program, self.program)
         if changed and not self.any_version:
             self.tell(

@@ -128,9 +128,9 @@ def _make(spec: Spec, wish: Wish) -> bool:
     print(f"{rows} rows, {len(spec.runs)} runs, {len(ids)} to make; results in {spec.folder}", flush=True)
     if not ids:
         return False
-    told = _Progress(spec, len(ids))
+    summary = _Progress(spec, len(ids))
     try:
-        _engine(spec, wish).make(ids, told)
+        _engine(spec, wish).make(ids, summary)
     except KeyboardInterrupt:
         print("stopped by Ctrl-C; what was done is kept, and the same command goes on", flush=True)
         return True
@@ -248,6 +248,6 @@ def _summary(results: Results) -> str:
     counts: dict[str, int] = {}
     for outcome in results.column("outcome"):
         counts[outcome] = counts.get(outcome, 0) + 1
-    cpu = sum(told["cpu_seconds"] for told in results.figures.values())
-    told = ", ".join(f"{count} {outcome}" for outcome, count in counts.items())
-    return f"{told}; {terminal.duration(cpu)} of processor time"
+    cpu = sum(summary["cpu_seconds"] for summary in results.figures.values())
+    summary = ", ".join(f"{count} {outcome}" for outcome, count in counts.items())
+    return f"{summary}; {terminal.duration(cpu)} of processor time"

@@ -69,18 +69,18 @@ def read_spec(folder: Path) -> Spec:
     """What a sweep in a directory is.  Raises NoRun."""
     path = folder / NAME
     try:
-        told = json.loads(read_text(path))
+        stored = json.loads(read_text(path))
         return Spec(
             folder.resolve(),
-            told["title"],
-            Path(told["case_file"]),
-            Sweep.model_validate(told["sweep"]),
-            tuple(Column(**{**c, "keys": tuple(c["keys"])}) for c in told["columns"]),
-            tuple(Row(**row) for row in told["rows"]),
-            {id: tuple(overrides) for id, overrides in told["runs"].items()},
-            tuple(told["remarks"]),
-            told["threads"],
-            told["case"],
+            stored["title"],
+            Path(stored["case_file"]),
+            Sweep.model_validate(stored["sweep"]),
+            tuple(Column(**{**c, "keys": tuple(c["keys"])}) for c in stored["columns"]),
+            tuple(Row(**row) for row in stored["rows"]),
+            {id: tuple(overrides) for id, overrides in stored["runs"].items()},
+            tuple(stored["remarks"]),
+            stored["threads"],
+            stored["case"],
         )
     except BadPath as error:
         raise NoRun(f"{folder}: not the directory of a sweep: {error}") from error

@@ -26,11 +26,11 @@ TRIALS = 5
 
 def forecast(spec: Spec, jobs: int) -> list[Row]:
     """Rows for the terminal; makes the trial where no run is done. Raises BadCase where that does not run."""
-    done = [told for id in spec.runs if (told := ended(spec, id)) is not None]
+    done = [measured for id in spec.runs if (measured := ended(spec, id)) is not None]
     left = len(spec.runs) - len(done)
     if done:
         cpu, memory, disk = (
-            sum(told[n] for told in done) / len(done) for n in ("cpu_seconds", "memory", "disk")
+            sum(measured[n] for measured in done) / len(done) for n in ("cpu_seconds", "memory", "disk")
         )
         source = f"mean of {len(done)} runs that are done"
     else:
@@ -53,13 +53,13 @@ def _free(spec: Spec) -> str:
 
 def _trial(spec: Spec) -> tuple[float, float, float]:
     """CPU seconds, memory [B] and disk [B] of the first run that begins, from its first steps."""
-    told = ""
+    measured = ""
     for id in list(spec.runs)[:TRIALS]:
         found = _first_steps(spec, id)
         if not isinstance(found, str):
             return found
-        told = told or found
-    raise BadCase([f"the first steps of the first run: {told}"])
+        measured = measured or found
+    raise BadCase([f"the first steps of the first run: {measured}"])
 
 
 def _first_steps(spec: Spec, id: str) -> tuple[float, float, float] | str:

@@ -52,7 +52,7 @@ def curves(spec: Spec, results: Results, f: Fragility) -> dict:
     """Everything about one table of [[sweep.fragility]], as plain data."""
     runs = read_runs(results, f)
     column = next(c for c in results.columns if c.name == f.measure)
-    told = {
+    result = {
         "name": f.name,
         "what": f.what,
         "measure": {"name": f.measure, "what": plain_meaning(column.meaning), "unit": column.unit},
@@ -70,19 +70,19 @@ def curves(spec: Spec, results: Results, f: Fragility) -> dict:
         "exact": _exact(spec, f),
     }
     kept, left_out = usable(runs, [s.name for s in f.state])
-    told["left_out"] = left_out
+    result["left_out"] = left_out
     why = refusal(runs, kept, [s.name for s in f.state])
     if why:
-        return told | {"refused": why}
+        return result | {"refused": why}
     state = _renumbered(runs.state, kept)
     best = fit(runs.x, state, len(kept))
     if not best.found[0] or best.slope[0] <= 0.0:
-        return told | {"refused": _no_growth(best, f)}
+        return result | {"refused": _no_growth(best, f)}
     _agree(best, runs.x, state)
     seed = spec.sweep.seed
     samples = bootstrap(runs.x, state, len(kept), f.bootstrap, seed)
     return (
-        told
+        result
         | _fitted(runs, f, kept, best, samples)
         | {
             "convergence": convergence(runs.x, state, len(kept), f, seed),

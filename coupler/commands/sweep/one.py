@@ -104,7 +104,7 @@ def make(spec: Spec, id: str, execute: Execute) -> dict:
         before = {}
         sets = [word for override in (*spec.runs[id], limit) for word in ("--set", override)]
         cost = execute(["run", str(spec.case_file), *sets, "--output", str(place)], log)
-    found = _told(spec, id, cost, before)
+    found = _record(spec, id, cost, before)
     write_figures(spec, id, found, found["outcome"] in FINAL)
     if found["outcome"] in FINAL and found["outcome"] != "gave up":
         _tidy(place, spec.sweep.keep)
@@ -116,7 +116,7 @@ def _may_go_on(spec: Spec, known: dict) -> bool:
     return known["outcome"] == "gave up" and spec.sweep.cpu_seconds > known["cpu_limit"]
 
 
-def _told(spec: Spec, id: str, cost: Cost, before: dict) -> dict:
+def _record(spec: Spec, id: str, cost: Cost, before: dict) -> dict:
     place = spec.place(id)
     try:
         summary = read_summary(place)

@@ -78,15 +78,15 @@ def _verdict(results: Results) -> str:
     for outcome in results.column("outcome"):
         counts[outcome] = counts.get(outcome, 0) + 1
     bad = any(outcome in counts for outcome in (*FAILED, NOT_YET))
-    told = ", ".join(f"{count} {outcome}" for outcome, count in counts.items())
-    return f'<p class="verdict{" bad" if bad else ""}">{len(results.records)} runs: {escape(told)}</p>'
+    ended_runs = ", ".join(f"{count} {outcome}" for outcome, count in counts.items())
+    return f'<p class="verdict{" bad" if bad else ""}">{len(results.records)} runs: {escape(ended_runs)}</p>'
 
 
 def _what(spec: Spec, results: Results) -> str:
-    sweep, told = spec.sweep, results.figures.values()
-    cpu, wall = (sum(t[name] for t in told) for name in ("cpu_seconds", "wall_seconds"))
+    sweep, ended_runs = spec.sweep, results.figures.values()
+    cpu, wall = (sum(t[name] for t in ended_runs) for name in ("cpu_seconds", "wall_seconds"))
     versions = sorted(
-        {t["program"].get("surgebreak", "") + " " + t["program"].get("commit", "") for t in told}
+        {t["program"].get("surgebreak", "") + " " + t["program"].get("commit", "") for t in ended_runs}
     )
     drawn = any(v.distribution for v in sweep.vary)
     rows = [
@@ -105,13 +105,13 @@ def _what(spec: Spec, results: Results) -> str:
         ("seeds", ", ".join(sweep.seeds)),
         (
             "runs",
-            f"{len(spec.runs)} for {len(spec.rows)} rows; hosts {', '.join(sorted({t['host'] for t in told}))}",
+            f"{len(spec.runs)} for {len(spec.rows)} rows; hosts {', '.join(sorted({t['host'] for t in ended_runs}))}",
         ),
         (
             "processor time",
-            f"{duration(cpu)}, {cpu / max(len(told), 1):.3g} s a run; {duration(wall)} of wall time in all",
+            f"{duration(cpu)}, {cpu / max(len(ended_runs), 1):.3g} s a run; {duration(wall)} of wall time in all",
         ),
-        ("largest memory", quantity(max((t["memory"] for t in told), default=None), "B")),
+        ("largest memory", quantity(max((t["memory"] for t in ended_runs), default=None), "B")),
         ("surgebreak", ", ".join(versions)),
     ]
     return facts(rows)
@@ -149,7 +149,7 @@ def _json(spec: Spec, name: str) -> list[dict]:
 
 def _fragilities(spec: Spec) -> Iterator[str]:
     for f in _json(spec, "fragility.json"):
-        told = [paragraph(f"No curve: {f['refused']}.")] if f["refused"] else [_medians(f)]
+        ended_runs = [paragraph(f"No curve: {f['refused']}.")] if f["refused"] else [_medians(f)]
         share = f"{f['confidence']:.0%}"
         caption = (
             f"Probability to reach each state; shaded: {share} band of the curve (bootstrap over the runs); points: "
@@ -160,7 +160,7 @@ def _fragilities(spec: Spec) -> Iterator[str]:
         yield section(
             f["what"] or f"Fragility: {f['name']}",
             *_figure(spec, f"fragility_{f['name']}", caption, wide=False),
-            *told,
+            *ended_runs,
             note(_counted(f)),
             note(f.get("note", "")),
             *(
@@ -191,8 +191,8 @@ def _medians(f: dict) -> str:
 
 
 def _with_band(value: float, band: list[float] | None, unit: str) -> str:
-    told = quantity(value, unit)
-    return f"{told} ({quantity(band[0], unit)} to {quantity(band[1], unit)})" if band else told
+    ended_runs = quantity(value, unit)
+    return f"{ended_runs} ({quantity(band[0], unit)} to {quantity(band[1], unit)})" if band else ended_runs
 
 
 def _counted(f: dict) -> str:
@@ -281,10 +281,12 @@ def _link(spec: Spec, record: dict):
         page = place / "report.html"
         if not page.exists() or page.stat().st_mtime < (place / "run.json").stat().st_mtime:
             try:
-                told = run_page(place, read_summary(place), place, ["`surgebreak report RUN` adds pictures."])
+                ended_runs = run_page(
+                    place, read_summary(place), place, ["`surgebreak report RUN` adds pictures."]
+                )
             except NoRun:
                 return text
-            page.write_text(told, encoding="utf-8")
+            page.write_text(ended_runs, encoding="utf-8")
         return link(text, f"runs/{record['id']}/report.html")
     log = place.with_suffix(".log")
     return link(text, f"runs/{log.name}") if log.exists() else text

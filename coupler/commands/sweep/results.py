@@ -43,7 +43,7 @@ class Results:
 
 def collect(spec: Spec) -> Results:
     """What all rows of a sweep have come to so far."""
-    found = {id: told for id in _ids(spec) if (told := figures(spec, id)) is not None}
+    found = {id: ended_run for id in _ids(spec) if (ended_run := figures(spec, id)) is not None}
     records = tuple(_record(spec, row, found) for row in spec.rows)
     return Results(tuple(_columns(spec)), records, found)
 
@@ -87,20 +87,20 @@ def seed_column(key: str) -> str:
 
 
 def _record(spec: Spec, row: Row, found: dict[str, dict]) -> dict:
-    told = found.get(row.id, {})
-    outcome = "refused" if row.wrong else told.get("outcome", NOT_YET)
+    ended_run = found.get(row.id, {})
+    outcome = "refused" if row.wrong else ended_run.get("outcome", NOT_YET)
     record = {"run": row.number, "point": row.point, "sample": row.sample, "repeat": row.repeat}
     record |= {column.name: row.values[column.name] for column in spec.columns}
     record |= {seed_column(key): value for key, value in row.seeds.items()}
-    reasons = [row.wrong or told.get("reason", "")]
+    reasons = [row.wrong or ended_run.get("reason", "")]
     record |= _quantities(spec, row, found, record, reasons)
     return record | {
         "outcome": outcome,
         "reason": "; ".join(filter(None, dict.fromkeys(reasons))),
-        "cpu_seconds": number(told.get("cpu_seconds")),
-        "wall_seconds": number(told.get("wall_seconds")),
-        "memory": number(told.get("memory")),
-        "attempts": told.get("attempts", 0),
+        "cpu_seconds": number(ended_run.get("cpu_seconds")),
+        "wall_seconds": number(ended_run.get("wall_seconds")),
+        "memory": number(ended_run.get("memory")),
+        "attempts": ended_run.get("attempts", 0),
         "id": row.id,
     }
 
@@ -111,28 +111,28 @@ def _quantities(spec: Spec, row: Row, found: dict, record: dict, reasons: list[s
     case = None
     for q in asked(spec.sweep):
         id = row.free if q.source == "free field" else row.id
-        told = found.get(id)
-        if told is None or row.wrong:
+        ended_run = found.get(id)
+        if ended_run is None or row.wrong:
             values[q.name] = math.nan
         elif is_derived(q):
             case = _case(spec, row.id) if case is None else case
             numbers = {k: v for k, v in record.items() if isinstance(v, int | float)}
             values[q.name] = _derived(q.formula, case | numbers | values)
         else:
-            values[q.name], why = _reading(spec, q, id, told)
-            if why and told["outcome"] == "done" and spec.sweep.quantity:
+            values[q.name], why = _reading(spec, q, id, ended_run)
+            if why and ended_run["outcome"] == "done" and spec.sweep.quantity:
                 reasons.append(f"{q.name}: {why}")
-            elif id == row.free and told["outcome"] != "done":
-                reasons.append(f"free field: {told['reason']}")
+            elif id == row.free and ended_run["outcome"] != "done":
+                reasons.append(f"free field: {ended_run['reason']}")
     return values
 
 
-def _reading(spec: Spec, q, id: str, told: dict) -> tuple[float, str]:
+def _reading(spec: Spec, q, id: str, ended_run: dict) -> tuple[float, str]:
     """Value and why there is none: as it was read when the run ended, or anew if it is defined otherwise now."""
-    known = told["readings"].get(q.name)
+    known = ended_run["readings"].get(q.name)
     if known is not None and known["of"] == definition(q):
         return number(known["value"]), known["why"]
-    if told["outcome"] in ("refused", "cannot stand"):
+    if ended_run["outcome"] in ("refused", "cannot stand"):
         return math.nan, ""
     found = read_quantity(spec.place(id), q)
     return (

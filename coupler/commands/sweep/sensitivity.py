@@ -32,7 +32,7 @@ def _of(spec: Spec, results: Results, name: str) -> dict:
     y = np.array(results.column(name), float)
     x = np.array([results.column(d) for d in drawn], float).T
     sobol = spec.sweep.sample == "saltelli"
-    told = {
+    result = {
         "quantity": name,
         "how": "Sobol indices" if sobol else "partial rank correlations",
         "rows": [],
@@ -40,7 +40,7 @@ def _of(spec: Spec, results: Results, name: str) -> dict:
     }
     found = sobol_rows if sobol else rank_rows
     rows = found(x, y, drawn, spec)
-    return told | ({"refused": rows} if isinstance(rows, str) else {"rows": rows})
+    return result | ({"refused": rows} if isinstance(rows, str) else {"rows": rows})
 
 
 def rank_rows(x: Array, y: Array, names: list[str], spec: Spec) -> list[dict] | str:

@@ -120,22 +120,22 @@ class Slurm:
         while waiting:
             queue = in_queue(set(waiting.values()))
             for id, job in list(waiting.items()):
-                told = ended(self.spec, id)
-                if told is None and job not in queue:
+                record = ended(self.spec, id)
+                if record is None and job not in queue:
                     missing[id] += 1
-                    told = self._left(id, job) if missing[id] >= PATIENCE else None
-                if told is not None:
+                    record = self._left(id, job) if missing[id] >= PATIENCE else None
+                if record is not None:
                     del waiting[id]
-                    tell(told)
+                    tell(record)
             if waiting:
                 time.sleep(POLL)
 
     def _left(self, id: str, job: str) -> dict:
         """What is reported of a run whose job is gone: how its last process ended, or that nobody knows."""
-        told = figures(self.spec, id)
-        if told is not None and told["job"] and told["outcome"] != "lost":
-            return told
-        found = (told or _nothing(id)) | {
+        record = figures(self.spec, id)
+        if record is not None and record["job"] and record["outcome"] != "lost":
+            return record
+        found = (record or _nothing(id)) | {
             "outcome": "lost",
             "reason": f"job {job} is no longer in the queue and left no result: cancelled, killed, or out of memory; "
             f"what it printed is in {self.spec.folder / 'jobs'}",
@@ -163,10 +163,12 @@ def in_queue(jobs: set[str]) -> set[str]:
     if not jobs:
         return set()
     words = ["squeue", "--me", "--noheader", "--array", "--format=%i"]
-    told = subprocess.run(words, capture_output=True, text=True, check=False)
-    if told.returncode:
-        raise NoSlurm(f"squeue: {told.stderr.strip()}; the jobs go on, the same command waits for them again")
-    return jobs & set(told.stdout.split())
+    record = subprocess.run(words, capture_output=True, text=True, check=False)
+    if record.returncode:
+        raise NoSlurm(
+            f"squeue: {record.stderr.strip()}; the jobs go on, the same command waits for them again"
+        )
+    return jobs & set(record.stdout.split())
 
 
 def cancel(spec: Spec, which: tuple[str, ...]) -> str:
@@ -183,7 +185,7 @@ def cancel(spec: Spec, which: tuple[str, ...]) -> str:
     jobs = sorted(in_queue({known[id] for id in ids if id in known}))
     if not jobs:
         return "none of these rows is in the queue"
-    told = subprocess.run(["scancel", *jobs], capture_output=True, text=True, check=False)
-    if told.returncode:
-        raise NoSlurm(f"scancel: {told.stderr.strip()}")
+    record = subprocess.run(["scancel", *jobs], capture_output=True, text=True, check=False)
+    if record.returncode:
+        raise NoSlurm(f"scancel: {record.stderr.strip()}")
     return f"cancelled {', '.join(jobs)}; what had begun has a checkpoint, and `surgebreak sweep` goes on with it"

@@ -51,7 +51,7 @@ def read_table(path: Path) -> InputTable:
     if len(rows) < 2:
         raise BadCase([f"{path}: a line of names and a line for each point of the grid are needed"])
     heads = tuple(_head(cell) for cell in rows[0][1])
-    wrong = [f"{path}:{rows[0][0]}: {told}" for told in _wrong_heads(heads)]
+    wrong = [f"{path}:{rows[0][0]}: {mistake}" for mistake in _wrong_heads(heads)]
     wrong += [
         f"{path}:{k}: {len(row)} cells under {len(heads)} names"
         for k, row in rows[1:]

@@ -76,10 +76,10 @@ def totals(results: list[Result]) -> str:
     failed = sorted({r.id for r in results if not r.passed})
     cases = len({r.id for r in results})
     judged = [r for r in results if r.judged]
-    told = f"{cases - len(failed)} of {cases} cases pass, {sum(r.passed for r in judged)} of {len(judged)} figures"
+    summary = f"{cases - len(failed)} of {cases} cases pass, {sum(r.passed for r in judged)} of {len(judged)} figures"
     if failed:
-        told += f"; not: {', '.join(failed)}"
-    return f"{told}; {sum(r.cpu_s for r in results):.1f} CPU s"
+        summary += f"; not: {', '.join(failed)}"
+    return f"{summary}; {sum(r.cpu_s for r in results):.1f} CPU s"
 
 
 def listing(cases: list[Check]) -> str:

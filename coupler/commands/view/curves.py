@@ -49,7 +49,7 @@ def draw(figure, folder):
             handles, names = axes[0, 0].get_legend_handles_labels()
             drawing.legend(handles, names, loc="outside upper left", ncols=min(4, len(names)))
             drawing.set_figheight(drawing.get_figheight() - LEGEND_ROW * (rows - 1))
-        _axes_told_once(axes, panels, columns)
+        _label_axes_once(axes, panels, columns)
         stem = Path(folder) / figure["name"]
         for ending in FORMATS:
             drawing.savefig(stem.with_suffix("." + ending), metadata=_undated(ending))
@@ -62,7 +62,7 @@ def _named(panel):
     return tuple((curve["kind"], curve["label"]) for curve in panel["curves"] if curve["label"])
 
 
-def _axes_told_once(axes, panels, columns):
+def _label_axes_once(axes, panels, columns):
     """The name of an axis that all panels of a column share stands below the last one only."""
     for column in range(columns):
         same = panels[column::columns]

@@ -37,8 +37,8 @@ def directory_of_case(run):
     summary = run / "run.json"
     if not summary.exists():
         return None
-    told = json.loads(summary.read_text(encoding="utf-8")).get("case_file")
-    place = Path(told).parent if told else None
+    recorded = json.loads(summary.read_text(encoding="utf-8")).get("case_file")
+    place = Path(recorded).parent if recorded else None
     return place if place is not None and place.is_dir() else None
 
 

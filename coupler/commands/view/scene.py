@@ -223,7 +223,7 @@ LONGEST_TITLE = 60
 
 def caption_of(run):
     """Title of the case, number of cells and blocks."""
-    title = _told(run, "case", "case", "title") or run.directory.name
+    title = _entry(run, "case", "case", "title") or run.directory.name
     parts = [title if len(title) <= LONGEST_TITLE else title[: LONGEST_TITLE - 1] + "…"]
     if run.water:
         parts.append(f"{len(run.water.at(run.water.times[0]).cells)} cells")
@@ -249,7 +249,7 @@ def where_it_happens(run):
         return np.zeros(2)
     low, high = corners(run.blocks.at(run.blocks.times[0]))
     middle = 0.5 * (low + high)[:2]
-    place = _told(run, "figures", "verdict", "first_break", "place")
+    place = _entry(run, "figures", "verdict", "first_break", "place")
     if place:
         return np.array(place[:2], float) - middle
     if not run.water:
@@ -259,7 +259,7 @@ def where_it_happens(run):
     return wet[:, :2].mean(axis=0) - middle if len(wet) else np.zeros(2)
 
 
-def _told(run, *names):
+def _entry(run, *names):
     """What run.json says under these names, one in the other; None where it does not, as of a run that was torn."""
     path = run.directory / "run.json"
     try:

@@ -38,14 +38,14 @@ NOTE_WIDTH = 105
 
 def draw(folder):
     """NAME.png, .pdf and .svg for every quantity with an error, NAME_laws.* where laws were compared; their paths."""
-    told = json.loads((folder / "study.json").read_text(encoding="utf-8"))
+    study = json.loads((folder / "study.json").read_text(encoding="utf-8"))
     written = []
-    for q in told["quantities"]:
-        curves = ladder_curves(told, q["name"])
+    for q in study["quantities"]:
+        curves = ladder_curves(study, q["name"])
         if any(points for _, points in curves):
-            failed = [point for point in told["points"] if point["reason"]]
+            failed = [point for point in study["points"] if point["reason"]]
             written.append(figure(folder / q["name"], q, curves, failed, "CPU time of the run [s]"))
-        laws = law_curves(told, q["name"])
+        laws = law_curves(study, q["name"])
         if laws:
             written.append(
                 figure(folder / f"{q['name']}_laws", q, laws, [], "CPU time of stepping alone [s]")
@@ -53,11 +53,11 @@ def draw(folder):
     return written
 
 
-def ladder_curves(told, name):
+def ladder_curves(study, name):
     """[(legend, [(CPU s, error, label, band)])] of a quantity, a curve for each ladder and value across it."""
-    what = {ladder["name"]: ladder["what"] for ladder in told["ladders"]}
+    what = {ladder["name"]: ladder["what"] for ladder in study["ladders"]}
     curves = {}
-    for point in told["points"]:
+    for point in study["points"]:
         legend = what[point["ladder"]] + (f", {point['curve']}" if point["curve"] else "")
         points = curves.setdefault(legend, [])
         reading = point["readings"].get(name)
@@ -67,10 +67,10 @@ def ladder_curves(told, name):
     return list(curves.items())
 
 
-def law_curves(told, name):
+def law_curves(study, name):
     """The same for laws of YADE and ours, a curve a law, a point a substep."""
     curves = {}
-    for row in told["laws"]:
+    for row in study["laws"]:
         if name in row["readings"]:
             reading = row["readings"][name]
             legend = f"{row['law']} (YADE)" if row["stock"] else row["law"]
@@ -145,8 +145,8 @@ def labels(curves):
 
 
 def _settings(error, texts):
-    told = " / ".join(dict.fromkeys(filter(None, texts)))
-    return told if error > LOWEST else f"{told} (< {share(LOWEST)})".strip()
+    study = " / ".join(dict.fromkeys(filter(None, texts)))
+    return study if error > LOWEST else f"{study} (< {share(LOWEST)})".strip()
 
 
 def text_colour(number):

@@ -185,14 +185,14 @@ def sensitivity(folder, found):
 
 def results(folder):
     """Panels of quantities (down) over what was varied (across); None without numbers for either."""
-    told = json.loads((folder / "sweep.json").read_text(encoding="utf-8"))
+    stored = json.loads((folder / "sweep.json").read_text(encoding="utf-8"))
     table = read_history(folder / "table.csv")
     units = {c.name: c.unit for c in table.columns}
     meaning = {c.name: c.meaning.partition(": sets")[0].removesuffix(" (free field)") for c in table.columns}
     varied = [
-        c["name"] for c in told["columns"] if units[c["name"]] and np.ptp(_finite(table, c["name"])) > 0
+        c["name"] for c in stored["columns"] if units[c["name"]] and np.ptp(_finite(table, c["name"])) > 0
     ][:MOST]
-    first = len(told["columns"]) + len(told["sweep"]["seeds"]) + 4
+    first = len(stored["columns"]) + len(stored["sweep"]["seeds"]) + 4
     names = [c.name for c in table.columns[first:] if c.name not in OWN and c.unit]
     names = [n for n in names if len(_finite(table, n)) and np.ptp(_finite(table, n)) > 0][:MOST]
     if not varied or not names:
@@ -244,8 +244,8 @@ def _power(values, unit):
 def _axis(what, unit, power, letters=42):
     """A label with its unit, in lines of so many letters."""
     text = UNIT_TEXT.get(unit, re.sub(r"(?<=[a-zA-Z])([23])", lambda found: "²³"[int(found[1]) - 2], unit))
-    told = f"{what} [{PREFIXES[power]}{text}]" if unit not in ("", "1") else what
-    return "\n".join(textwrap.wrap(told, letters))
+    stored = f"{what} [{PREFIXES[power]}{text}]" if unit not in ("", "1") else what
+    return "\n".join(textwrap.wrap(stored, letters))
 
 
 if __name__ == "__main__":

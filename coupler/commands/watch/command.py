@@ -39,8 +39,8 @@ def watch(places: list[Path], port: int, browser: bool, pictures: bool) -> None:
 
 @contextlib.contextmanager
 def beside(run: Path) -> Iterator[None]:
-    """The page of a run in a process of its own, so that looking on takes nothing from the run; told, and kept until
-    the page has heard how the run ended."""
+    """Serve the page of a run from a process of its own, so that watching does not slow the run down. The address is
+    printed, and the page is kept until it has received how the run ended."""
     process = subprocess.Popen(
         [sys.executable, "-m", "coupler.commands.watch", str(run)],
         env=environment(), stdout=subprocess.PIPE, text=True, start_new_session=True,

@@ -44,10 +44,10 @@ class Site:
         self._known: dict[Path, Watched] = {}
         self._searched = -LOOK
         self._lock = threading.Lock()
-        self._told = "[]"
+        self._message = "[]"
         self._read = -EVERY
 
-    def told(self) -> str:
+    def message(self) -> str:
         """The state of all runs as JSON, not older than EVERY."""
         with self._lock:
             now = clock.monotonic()
@@ -57,10 +57,10 @@ class Site:
             if now - self._read >= EVERY:
                 self._read = now
                 states = [run.state() for run in self.runs]
-                self._told = json.dumps(states, ensure_ascii=False)
+                self._message = json.dumps(states, ensure_ascii=False)
                 if self.pictures is not None:
                     self.pictures.consider(self.runs, states)
-            return self._told
+            return self._message
 
     def run(self, number: str) -> Watched | None:
         """The run of a number in an address."""
@@ -153,10 +153,10 @@ class _Handler(BaseHTTPRequestHandler):
         before = None
         with contextlib.suppress(OSError):
             while True:
-                told = self.site.told()
-                self.wfile.write(b": here\n\n" if told == before else f"data: {told}\n\n".encode())
+                message = self.site.message()
+                self.wfile.write(b": here\n\n" if message == before else f"data: {message}\n\n".encode())
                 self.wfile.flush()
-                before = told
+                before = message
                 clock.sleep(EVERY)
 
     def log_message(self, *_) -> None:

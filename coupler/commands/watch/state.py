@@ -131,11 +131,11 @@ def _reason(path: Path, summary: dict, killed: bool) -> str:
 
 
 def _verdict(summary: dict, running: bool) -> dict | None:
-    told = summary["figures"].get("verdict")
-    if not told:
+    judged = summary["figures"].get("verdict")
+    if not judged:
         return None
-    first, *rest = sentences(told)
-    return {"state": told["state"], "headline": ("so far: " if running else "") + first, "lines": rest}
+    first, *rest = sentences(judged)
+    return {"state": judged["state"], "headline": ("so far: " if running else "") + first, "lines": rest}
 
 
 def _limits(summary: dict) -> list[dict]:

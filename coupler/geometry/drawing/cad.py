@@ -27,13 +27,13 @@ def read(path: Path) -> dict[str, tuple[Array, Array]]:
     found = _of_ifc(path) if path.suffix.lower() == ".ifc" else _of_step(path)
     bodies: dict[str, tuple[Array, Array]] = {}
     for name, points, triangles in found:
-        told = re.sub(r"[^A-Za-z0-9_-]+", "_", name).strip("_-") or "body"
-        told = told[:50] if told[0].isalpha() else f"layer_{told[:44]}"
-        if told in bodies:
-            before = bodies[told]
+        valid = re.sub(r"[^A-Za-z0-9_-]+", "_", name).strip("_-") or "body"
+        valid = valid[:50] if valid[0].isalpha() else f"layer_{valid[:44]}"
+        if valid in bodies:
+            before = bodies[valid]
             points = np.concatenate([before[0], points])
             triangles = np.concatenate([before[1], triangles + len(before[0])])
-        bodies[told] = points, triangles
+        bodies[valid] = points, triangles
     if not bodies:
         raise MeshFileError(f"{path.name}: holds no solids; write closed bodies")
     return bodies

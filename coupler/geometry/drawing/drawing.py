@@ -64,8 +64,8 @@ def cut_drawing(spec, **common) -> Cut:
     whole = sum(layer.body.volume() for layer in layers)
     _check_volume(path, blocks, whole, tolerance, layers)
     counts = Counter(layer.name for layer, _, found in pieces for _ in found)
-    told = {layer.name: (layer.body.volume(), counts[layer.name]) for layer in layers}
-    return Cut(tuple(blocks), whole, told, tuple(slivers))
+    given_values = {layer.name: (layer.body.volume(), counts[layer.name]) for layer in layers}
+    return Cut(tuple(blocks), whole, given_values, tuple(slivers))
 
 
 def _size(spec, rule) -> tuple[float, float]:
@@ -141,8 +141,8 @@ def _of_layer(rule, common: dict) -> dict:
     """What a layer says for its blocks."""
     if rule is None:
         return {}
-    told = {"material": rule.material, "density": rule.density}
-    return {name: value for name, value in told.items() if value is not None} | {
+    given_values = {"material": rule.material, "density": rule.density}
+    return {name: value for name, value in given_values.items() if value is not None} | {
         "fixed": rule.fixed or common.get("fixed", False)
     }
 

@@ -86,7 +86,7 @@ def _levels(kinds, spans, parts, middles) -> Array:
 
 def _planes(kinds, axes, middles, tolerance: float) -> list[str]:
     """Which of the walls each wall is in: x-, x+, y-, y+, or the axis and a number, d for oblique ones."""
-    told = [""] * len(kinds)
+    names = [""] * len(kinds)
     groups: dict[tuple, dict[float, list[int]]] = {}
     for k, kind in enumerate(kinds):
         if kind == "wall":
@@ -105,5 +105,5 @@ def _planes(kinds, axes, middles, tolerance: float) -> list[str]:
                 numbers[axis] = numbers.get(axis, 0) + 1
                 which = f"{axis}{numbers[axis]}"
             for k in planes[offset]:
-                told[k] = which
-    return told
+                names[k] = which
+    return names

@@ -145,18 +145,18 @@ def _order(path: Path) -> dict[str, int]:
 
 def _plain(name: str, path: Path, taken) -> str:
     """The name of a layer as a case may write it: letters, digits, _ and -, beginning with a letter."""
-    told = re.sub(r"[^A-Za-z0-9_-]+", "_", str(name)).strip("_-")
-    told = (
+    valid = re.sub(r"[^A-Za-z0-9_-]+", "_", str(name)).strip("_-")
+    valid = (
         "all"
-        if not told
-        or told.lower() in (path.name.lower(), path.stem.lower(), path.name.replace(".", "_").lower())
-        else told
+        if not valid
+        or valid.lower() in (path.name.lower(), path.stem.lower(), path.name.replace(".", "_").lower())
+        else valid
     )
-    told = told if told[0].isalpha() else f"layer_{told}"
-    first, number = told[:50], 2
-    while told in taken:
-        told, number = f"{first}_{number}", number + 1
-    return told
+    valid = valid if valid[0].isalpha() else f"layer_{valid}"
+    first, number = valid[:50], 2
+    while valid in taken:
+        valid, number = f"{first}_{number}", number + 1
+    return valid
 
 
 def _body(path: Path, name: str, points: Array, triangles: Array, tolerance: float):

@@ -55,8 +55,8 @@ def _call(name: str, *words: str) -> None:
         raise TerrainError(f"{name}: needs rasterio: {absent}")
     done = run_module("coupler.geometry.terrain.raster", *words, capture_output=True, text=True)
     if done.returncode != 0:
-        told = (done.stderr.strip().splitlines() or ["no message"])[-1]
-        raise TerrainError(f"{name}: {told}")
+        last_line = (done.stderr.strip().splitlines() or ["no message"])[-1]
+        raise TerrainError(f"{name}: {last_line}")
 
 
 def _read(path: str, out: str) -> None:

@@ -37,7 +37,7 @@ def of_file(path: Path, more: dict) -> tuple[HeightMap, list[Row]]:
 def _file_rows(grid: Grid) -> list[Row]:
     nx, ny = grid.z.shape
     dx, dy = grid.x[1] - grid.x[0], grid.y[1] - grid.y[0]
-    crs = grid.crs[:60] if grid.crs else "none told"
+    crs = grid.crs[:60] if grid.crs else "none given"
     rows = [
         Row("points", f"{nx} x {ny}", "", f"every {dx:.6g} x {dy:.6g} units of the file"),
         Row("x", f"{grid.x[0]:.10g} to {grid.x[-1]:.10g}", "", "units of the file"),

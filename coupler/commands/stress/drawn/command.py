@@ -77,7 +77,9 @@ def _shown(found: Outcome) -> str:
     if found.verdict == "failed":
         return shown(found)
     return shown(
-        Outcome(found.id, found.group, found.title, found.verdict, found.told, [], found.cpu_s, found.wall_s)
+        Outcome(
+            found.id, found.group, found.title, found.verdict, found.message, [], found.cpu_s, found.wall_s
+        )
     )
 
 
@@ -85,12 +87,12 @@ def outcome(drawn: Drawn, keep: Path, seconds: float) -> Outcome:
     """Run a scene; a failure is made small, for so much processor time, and kept."""
     with tempfile.TemporaryDirectory() as folder:
         found = _run(drawn, drawn.table, Path(folder))
-    told = found.told
+    message = found.message
     if found.verdict == "failed":
         place = _kept(drawn, found, keep, seconds)
-        told = f"{told}; kept in {place}" if told else f"kept in {place}"
+        message = f"{message}; kept in {place}" if message else f"kept in {place}"
     return Outcome(
-        drawn.id, drawn.group, drawn.title, found.verdict, told, found.measures, found.cpu_s, found.wall_s
+        drawn.id, drawn.group, drawn.title, found.verdict, message, found.measures, found.cpu_s, found.wall_s
     )
 
 
@@ -128,4 +130,4 @@ def _kept(drawn: Drawn, found: Trial, keep: Path, seconds: float) -> Path:
 
 def _story(found: Trial) -> str:
     missed = [f"{m.quantity} {m.value:.3g}, at most {m.limit:.3g}" for m in found.measures if not m.kept]
-    return "; ".join([text for text in (found.told, *missed) if text])
+    return "; ".join([text for text in (found.message, *missed) if text])

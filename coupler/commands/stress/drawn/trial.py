@@ -34,7 +34,7 @@ class Trial:
     """What came of one run: verdict, what was printed, figures, processor and wall seconds, time reached [s]."""
 
     verdict: Verdict
-    told: str
+    message: str
     measures: list[Measure]
     cpu_s: float
     wall_s: float
@@ -46,7 +46,7 @@ class Trial:
         missed = [m.quantity.split(" (")[0] for m in self.measures if not m.kept]
         if missed:
             return "not kept: " + missed[0]
-        words = re.sub(r"[^A-Za-z ]+", " ", re.sub(r"'[^']*'|\([^)]*\)|\S*\d\S*", " ", self.told))
+        words = re.sub(r"[^A-Za-z ]+", " ", re.sub(r"'[^']*'|\([^)]*\)|\S*\d\S*", " ", self.message))
         return " ".join(words.split()[:8])
 
 
@@ -75,13 +75,15 @@ def trial(case: Path, output: Path, still: bool) -> Trial:
         found = list(measures(output, still))
         verdict: Verdict = "passed" if all(m.kept for m in found) else "failed"
         return Trial(verdict, "" if done.returncode == 0 else "stopped at its processor time", found, *spent)
-    told = summary.get("exit_reason") or trouble(done.returncode, done.stderr)
-    return Trial("refused" if asked_too_much(told, summary.get("case", {})) else "failed", told, [], *spent)
+    message = summary.get("exit_reason") or trouble(done.returncode, done.stderr)
+    return Trial(
+        "refused" if asked_too_much(message, summary.get("case", {})) else "failed", message, [], *spent
+    )
 
 
-def asked_too_much(told: str, case: dict) -> bool:
+def asked_too_much(message: str, case: dict) -> bool:
     """Whether a run was refused for what a drawn scene may ask; contact with a stiffness of its own is stiff enough."""
-    return TOO_WEAK in told or (TOO_SOFT in told and "stiffness" not in case.get("contact", {}))
+    return TOO_WEAK in message or (TOO_SOFT in message and "stiffness" not in case.get("contact", {}))
 
 
 def _refusal(stderr: str) -> tuple[Verdict, str]:

@@ -105,17 +105,19 @@ def wedge() -> Iterator[Measure]:
             early = s.centre()[0].copy()
             watch.advance(1.0, looks=50)
             c = s.contacts()
-            told = f"half angle {half:g} degrees, friction {friction:g}"
+            setting = f"half angle {half:g} degrees, friction {friction:g}"
             lift = -(c.normal_force + c.shear_force)[:, 2].sum() / (block.mass * G)
-            yield Measure(f"carried, off its weight, {told}", lift - 1.0, 1e-4)
+            yield Measure(f"carried, off its weight, {setting}", lift - 1.0, 1e-4)
             if friction == 0.0:
                 normal = np.linalg.norm(c.normal_force, axis=1).sum() * np.sin(a) / (block.mass * G)
-                yield Measure(f"normal forces, off W/sin, {told}", normal - 1.0, 1e-4)
+                yield Measure(f"normal forces, off W/sin, {setting}", normal - 1.0, 1e-4)
             yield Measure(
-                f"creep in the last second, {told}", np.linalg.norm(s.centre()[0] - early), 1e-8, "m"
+                f"creep in the last second, {setting}", np.linalg.norm(s.centre()[0] - early), 1e-8, "m"
             )
-            yield Measure(f"moved from its place, {told}", np.linalg.norm(s.centre()[0] - start), 0.01, "m")
-        yield from watch.measures(told)
+            yield Measure(
+                f"moved from its place, {setting}", np.linalg.norm(s.centre()[0] - start), 0.01, "m"
+            )
+        yield from watch.measures(setting)
 
 
 @scene("S15", "thin plate (aspect ratio 50) spins on the floor")

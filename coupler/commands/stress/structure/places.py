@@ -27,16 +27,16 @@ def dropped(size: float) -> Iterator[Measure]:
     with Structure([block], ContactLaw(stiffness, 0.3, 0.5), ground=0.0) as s:
         watch = Watch(s, weight * size)
         watch.advance(12.0 * np.sqrt(size / G), looks=100)
-        told = f"{size:g} m"
+        setting = f"{size:g} m"
         yield Measure(
-            f"depth below the floor over weight/K, {told}", max(0.0, -lowest(s)) * stiffness / weight, 1.1
+            f"depth below the floor over weight/K, {setting}", max(0.0, -lowest(s)) * stiffness / weight, 1.1
         )
         yield Measure(
-            f"speed at the end over √(g L), {told}",
+            f"speed at the end over √(g L), {setting}",
             np.abs(s.velocity()[0, :3]).max() / np.sqrt(G * size),
             1e-4,
         )
-    yield from watch.measures(told)
+    yield from watch.measures(setting)
 
 
 @scene("S30", "cubes of 1 mm and of 100 m dropped")

@@ -32,9 +32,9 @@ def at_the_limit() -> Iterator[Measure]:
             watch = Watch(s, 0.5 * DENSITY * 2.0 * velocity**2)
             step = 0.9 * s.substep_limit().stable
             watch.advance(2000 * step, looks=100, substep=step)
-            told = f"{velocity:g} m/s, damage {s.joint_table().damage.max():.2g}"
-        yield Measure(f"energy gained, {told}", watch.gain / watch.scale, limit)
-        yield Measure(f"balance of energy, {told}", watch.drift / watch.scale, 0.03 if limit else None)
+            setting = f"{velocity:g} m/s, damage {s.joint_table().damage.max():.2g}"
+        yield Measure(f"energy gained, {setting}", watch.gain / watch.scale, limit)
+        yield Measure(f"balance of energy, {setting}", watch.drift / watch.scale, 0.03 if limit else None)
 
 
 @scene("S41", "bounces at 0.9 of the explicit limit of the contact")

@@ -105,12 +105,12 @@ def at_strength() -> Iterator[Measure]:
     """Load grown over many periods; below it holds, above it fails, at it only the energy is asked."""
     for share, holds in ((0.995, 1.0), (1.0, None), (1.005, 0.0)):
         alive, watch = pulled(share)
-        told = f"at {100 * share:g} % of the strength"
+        setting = f"at {100 * share:g} % of the strength"
         if holds is None:
-            yield Measure(f"holds, {told}", alive, None)
+            yield Measure(f"holds, {setting}", alive, None)
         else:
-            yield Measure(f"holds, off what it must, {told}", alive - holds, 0.0)
-        yield from watch.measures(told)
+            yield Measure(f"holds, off what it must, {setting}", alive - holds, 0.0)
+        yield from watch.measures(setting)
 
 
 def pulled(share: float) -> tuple[float, Watch]:
