@@ -10,6 +10,31 @@ from coupler.case.types import Length, Name, Number, Point, PositiveLength, Sect
 from coupler.case.units import InSI
 
 
+class LandUse(Section):
+    """A kind of ground: its code in the map, and its friction by the law that [water] has."""
+
+    code: int = Field(description="its number in the map", examples=[41])
+    name: str = Field("", description="for people", examples=["forest"])
+    manning: Annotated[float, InSI("", gt=0, le=1)] | None = Field(
+        None, description="Manning's n [s/m^(1/3)], for water.manning", examples=[0.1]
+    )
+    roughness: PositiveLength | None = Field(None, description="sand roughness k_s, for water.roughness")
+
+
+class Land(Section):
+    """The friction of the ground by a map: codes of land use with a table `use` for each, or the numbers themselves.
+    The nearest point of the map counts. Beside the map and in its holes water.manning or water.roughness holds."""
+
+    path: Annotated[str, Field(min_length=1)] = Field(
+        description="a raster as terrain.path, in the same coordinates (after reproject)",
+        examples=["land_use.asc"],
+    )
+    variable: Name | None = Field(None, description="of a NetCDF file with several")
+    use: tuple[LandUse, ...] = Field(
+        (), description="kinds of ground by their codes; absent: the map holds n, or k_s in metres"
+    )
+
+
 class Terrain(Section):
     """The ground as a height over every place, from a file. The mesh of the tank ends on it: it is the bed of the water
     and dry land; buildings may stand on it. Heights come out in metres, z up; `surgebreak terrain` shows them."""
@@ -58,4 +83,7 @@ class Terrain(Section):
     )
     steepest: Annotated[float, InSI("rad", gt=0, lt=1.5)] | None = Field(
         None, description="steepest slope left; cliffs are cut back from their foot", examples=["60 deg"]
+    )
+    land: Land | None = Field(
+        None, description='friction of the ground by a map, with water.walls = "friction"'
     )

@@ -25,6 +25,7 @@ from coupler.checks.water import water_problems, water_remarks
 from coupler.geometry.parts import PARTS, Part, parts_of, recipes
 from coupler.geometry.solids import refused_solids
 from coupler.geometry.tank_mesh import finest_cell, is_measured, mesh_remarks
+from coupler.geometry.terrain.land import land_problems
 from coupler.geometry.town import town_problems
 from coupler.program.errors import did_you_mean
 from coupler.verdict.divisions import member, storey
@@ -39,7 +40,7 @@ WEAKEST = 1.0
 
 def problems(case: Case) -> list[Problem]:
     """Everything that is wrong with a case whose sections are valid one by one."""
-    wrong_frames = [*frame_problems(case), *refused_solids(case), *town_problems(case)]
+    wrong_frames = [*frame_problems(case), *refused_solids(case), *town_problems(case), *land_problems(case)]
     found = [*_sections(case), *_study(case), *wrong_frames]
     if wrong_frames or (case.tank is not None and not is_measured(case.tank)):
         return found  # without a direction or a tank the rest would report nonsense

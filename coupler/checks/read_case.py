@@ -130,6 +130,8 @@ def _place_files(table: dict, directory: Path) -> list[tuple[KeyPath, str]]:
         found.append((("tank", "mesh"), table["tank"], "mesh"))
     if isinstance(table.get("terrain"), dict):
         found.append((("terrain", "path"), table["terrain"], "path"))
+        if isinstance(table["terrain"].get("land"), dict):
+            found.append((("terrain", "land", "path"), table["terrain"]["land"], "path"))
     nowhere = []
     for path, entry, key in found:
         if isinstance(entry.get(key), str) and entry[key]:

@@ -9,6 +9,7 @@ import numpy as np
 from coupler.case.case import Case
 from coupler.case.inflow_records import record_columns
 from coupler.geometry.tank_mesh import bed_along, floor_along, mean_bed, mesh_of, on_side
+from coupler.geometry.terrain.land import friction_of
 
 HEARD = 16
 """Places along a side at which the water is read that it lets go."""
@@ -36,8 +37,7 @@ def water_of(case: Case, structure, solids):
         courant=case.time.cfl,
         viscosity=w.viscosity,
         walls=w.walls,
-        roughness=w.roughness,
-        manning=w.manning,
+        **friction_of(case),
         suction=w.suction,
         vapour_pressure=w.vapour_pressure,
     )

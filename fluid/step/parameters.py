@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,7 +24,8 @@ class WaterParameters:
     advection: "semi-lagrangian", or "supg" for stabilised finite elements (the reference; slower).
     viscosity: dynamic viscosity [Pa s]; 0 leaves the term out.
     walls: what sides of the tank and solids do to the water along them: "slip", "no-slip" (needs viscosity) or
-    "friction" with either roughness k_s [m] (log law) or manning n [s/m^(1/3)] (bed).
+    "friction" with either roughness k_s [m] (log law) or manning n [s/m^(1/3)] (bed), numbers or functions of places
+        x, y (n,) [m].
     suction: "bounded": the pressure does not fall below the air's where air can reach, nor below vapour_pressure [Pa],
         relative to the air, elsewhere (`pressure_bound.py`); "unlimited": water may pull as hard as it likes.
     """
@@ -43,8 +45,8 @@ class WaterParameters:
     advection: str = "semi-lagrangian"
     viscosity: float = 0.0
     walls: str = "slip"
-    roughness: float | None = None
-    manning: float | None = None
+    roughness: float | Callable | None = None
+    manning: float | Callable | None = None
     suction: str = "bounded"
     vapour_pressure: float = -98e3
     pocket_compliance: float = 1e-8

@@ -91,6 +91,10 @@ class WettedWalls:
         size = d.memory.mesh.local_size[d.parent_cell[d.face_cell]]
         self.per_volume = wetted / np.maximum(d.volume[d.face_cell], wetted * size / STEEPEST)
 
+    def centre(self):
+        """Middles (S, 3) [m] of the polygons."""
+        return self.domain.face_points.mean(axis=1)
+
     def at_points(self, f, cells):
         """P1 values (S, 3) or (S, 3, k) of nodal f (N,) or (N, k) at the points of the polygons."""
         return np.einsum("sqa,sa...->sq...", self.hat, f[cells[self.cell]])
@@ -113,7 +117,7 @@ class Viscosity:
 
         Raises NotConverged."""
         mass = self.parameters.density * nodal_water
-        terms = self._terms(water, phi, mass, w)
+        terms = self._terms(water, phi, mass, w, dt)
         V, bodies = water.body_velocity, water.free_bodies or FreeBodies.none(len(water.body_velocity))
         change, lead = dt * bodies.acceleration, (1.0 - GAMMA) / GAMMA
         half_way, V_half_way = water.velocity + GAMMA * (w - water.velocity), V + GAMMA * change
@@ -143,7 +147,7 @@ class Viscosity:
             )
         return d, D, count
 
-    def _terms(self, water, phi, mass, w):
+    def _terms(self, water, phi, mass, w, dt):
         t, p = water.topology, self.parameters
         if self.walls is None or self.walls.domain is not water.domain:
             self.walls = WettedWalls(water.domain)
@@ -152,12 +156,17 @@ class Viscosity:
         share = wet_fraction(cells, phi, t.parts)
         cells, share = cells[share > 0.0], share[share > 0.0]
         idle = mass <= 0.0
-        drag = np.zeros(len(phi)) if self.friction is None else self.friction.of_nodes(water, phi, w)
-        weight = 2.0 * p.viscosity * share * t.volume[cells]
+        drag, columns, viscosity = np.zeros(len(phi)), None, p.viscosity
+        if self.friction is not None:
+            columns = self.friction.columns(water, phi, w, p.theta * dt)
+            drag = self.friction.of_nodes(water, phi, columns, w)
+            if columns is not None:
+                viscosity = p.viscosity + p.density * self.friction.mixing(water, columns, cells)
+        weight = 2.0 * viscosity * share * t.volume[cells]
         return (
             cells,
             weight,
-            self._wall_terms(water, phi, w, cells, share),
+            self._wall_terms(water, phi, columns, w, cells, share),
             p.viscosity,
             drag,
             *water.held_by_sides(),
@@ -168,7 +177,7 @@ class Viscosity:
             *edges_of(cells, weight, t.cells, len(phi)),
         )
 
-    def _wall_terms(self, water, phi, w, wet_cells, share):
+    def _wall_terms(self, water, phi, columns, w, wet_cells, share):
         """The polygons that the water touches, with λ and C; λ rises as the surface takes water off a cell."""
         p, k, cells = self.parameters, self.walls, water.topology.cells
         water_share = np.ones(len(cells))
@@ -177,7 +186,7 @@ class Viscosity:
         area = np.where(wet, k.area[:, None] / 3.0, 0.0)
         nothing = np.zeros(len(k.cell))
         nitsche = 4.0 * p.viscosity * k.per_volume / water_share[k.cell] if p.walls == "no-slip" else nothing
-        drag = nothing if self.friction is None else self.friction.of_faces(water, k, phi, w)
+        drag = nothing if self.friction is None else self.friction.of_faces(water, k, columns, w)
         row = np.full(len(cells), -1, np.int64)
         row[wet_cells] = np.arange(len(wet_cells))
         use = (area > 0.0).any(axis=1) & ((nitsche > 0.0) | (drag > 0.0))

@@ -7,17 +7,27 @@ Log law of a wall with sand roughness k_s (Nikuradse):
 The velocity beside the wall is no point of the profile: the value of a node on a wall stands for the water of its hat.
 The mean of u = u*/κ ln(y/z₀) over it, 2/h ∫ (1 - y/h) u dy = u*/κ [ln(h/z₀) - 3/2], is the profile at y = e^(-3/2) h.
 
-Manning, for beds under water of depth d (the stress of uniform flow, τ = ρ g n² |u| u / d^(1/3)):
+Manning, for beds under water of depth d, with the mean velocity U over the depth (the stress of uniform flow):
 
-    C_f = g n² / d^(1/3)                                                                          (2)
+    τ = ρ C_f |U| U,   C_f = g n² / d^(1/3)                                                       (2)
 
-on the floor and on faces of solids that look up (n_z > 0.5); d is the water in the column of cells, at least one cell.
-Both are linear in u_t once |u_t| is taken from before the stage, so the step stays symmetric.
+on the floor and on faces of solids that look up (n_z > 0.5); d and U are those of the water in the column of cells, d
+at least one cell.  The stress acts on the water at the bed, and the turbulence that it makes carries it up:
+
+    ν_t = u_* d max(κ/6, 2/3 sqrt(C_f)),   u_* = sqrt(C_f) |U|                                    (3)
+
+the mean over the depth of κ u_* z (1 - z/d), which belongs to the logarithmic profile (Fischer, List, Koh, Imberger,
+Brooks, Mixing in Inland and Coastal Waters, 1979, 5.1.1); its second part keeps half of U at the bed where the bed is
+so rough that (1) would leave less.  Without it the water above the lowest cells runs down a slope ever faster.
+Both laws are linear in u_t once their factors are taken from before the stage, so the step stays symmetric.
+
+Roughness and n are numbers, or functions of x and y (n,) [m] → (n,) for beds of several kinds.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -28,14 +38,17 @@ KARMAN = 0.41
 OFF_WALL = np.exp(-1.5)
 """Where the profile has its mean over the hat of a node on the wall, in cells."""
 LOOKS_UP = 0.5
+"""Least upward part of the unit normal of a bed."""
+SLOWEST = 0.25
+"""Share of the mean velocity that the water at the bed is taken to have at least, for a factor that is bounded."""
 
 
 @dataclass(frozen=True)
 class WallFriction:
     """roughness k_s [m] or manning n [s/m^(1/3)], the other None · density [kg/m³] · gravity [m/s²]."""
 
-    roughness: float | None
-    manning: float | None
+    roughness: float | Callable | None
+    manning: float | Callable | None
     density: float
     gravity: float
 
@@ -49,41 +62,84 @@ class WallFriction:
             )
         return cls(p.roughness, p.manning, p.density, p.gravity)
 
-    def of_faces(self, water, walls, phi, u):
+    def columns(self, water, phi, u, dt: float) -> Columns | None:
+        """What the columns of water are like, for Manning's law; None for the log law. u (N, 3) [m/s], before the
+        friction of the step dt [s]: the factors take what it leaves, U + C_f dt U²/d = |u|, or a steady stream would
+        depend on the step."""
+        if self.manning is None:
+            return None
+        c = Columns.of(water, phi, u)
+        depth = np.maximum(c.depth, water.mesh.finest)
+        k = dt * self._factor(depth, c.centre) / depth
+        speed = np.linalg.norm(c.velocity, axis=1)
+        left = 2.0 / (1.0 + np.sqrt(1.0 + 4.0 * k * speed))
+        return replace(c, velocity=left[:, None] * c.velocity, left=left)
+
+    def of_faces(self, water, walls, columns, u):
         """C (S,) [kg/(m² s)] of the polygons of cut walls (WettedWalls); u (N, 3) [m/s]."""
         t = water.topology
-        slip = walls.at_points(u, t.cells).mean(axis=1) - _rigid_velocity(water, walls)
-        across = np.einsum("sk,sk->s", slip, walls.normal)
-        speed = np.linalg.norm(slip - across[:, None] * walls.normal, axis=1)
-        if self.manning is None:
-            return self.density * log_law(OFF_WALL * t.size[walls.cell], self.roughness) * speed
-        depth = column_depth(water, phi, walls.cell)
+        body = _rigid_velocity(water, walls)
+        slip = np.linalg.norm(_along(walls.at_points(u, t.cells).mean(axis=1) - body, walls.normal), axis=1)
+        if columns is None:
+            centre = walls.centre()
+            return self.density * log_law(OFF_WALL * t.size[walls.cell], _at(self.roughness, centre)) * slip
+        at = columns.over(walls.cell)
+        mean = np.linalg.norm(_along(columns.velocity[at] - body, walls.normal), axis=1)
         bed = walls.normal[:, 2] > LOOKS_UP
         least = water.mesh.local_size[t.background[walls.cell]]
-        return np.where(bed, self.density * self._bed(depth, least) * speed, 0.0)
+        factor = self._bed(columns.depth[at], least, walls.centre(), mean, columns.left[at] * slip)
+        return np.where(bed, self.density * factor, 0.0)
 
-    def of_nodes(self, water, phi, u):
+    def of_nodes(self, water, phi, columns, u):
         """Drag (N,) [kg/s] of the nodes on closed sides of the tank: C times the wet area of each."""
         t, (faces, area, cell) = water.topology, water.rough_faces()
         size = np.linalg.norm(area, axis=1)
         unit = area / size[:, None]
-        if self.manning is not None:
+        if columns is not None:
             floor = unit[:, 2] < -LOOKS_UP
             faces, size, cell, unit = faces[floor], size[floor], cell[floor], unit[floor]
-            factor = self._bed(column_depth(water, phi, cell), water.mesh.local_size[t.background[cell]])
-        else:
-            factor = log_law(OFF_WALL * t.size[cell], self.roughness)
+            at = columns.over(cell)
+            depth, left = columns.depth[at], columns.left[at]
+            mean = np.linalg.norm(_along(columns.velocity[at], unit), axis=1)
+        centre = t.nodes[faces].mean(axis=1)
         size = size * t.fraction[cell]  # what solids stand on does not slide
         drag = np.zeros(len(phi))
         for corner in range(3):
             node = faces[:, corner]
-            across = np.einsum("fk,fk->f", u[node], unit)
-            speed = np.linalg.norm(u[node] - across[:, None] * unit, axis=1)
-            np.add.at(drag, node, np.where(phi[node] < 0.0, self.density * factor * speed * size / 3.0, 0.0))
+            speed = np.linalg.norm(_along(u[node], unit), axis=1)
+            if columns is None:
+                factor = log_law(OFF_WALL * t.size[cell], _at(self.roughness, centre)) * speed
+            else:
+                least = water.mesh.local_size[t.background[cell]]
+                factor = self._bed(depth, least, centre, mean, left * speed)
+            np.add.at(drag, node, np.where(phi[node] < 0.0, self.density * factor * size / 3.0, 0.0))
         return drag
 
-    def _bed(self, depth, least):
-        return self.gravity * self.manning**2 / cube_root(np.maximum(depth, least))
+    def mixing(self, water, columns, cells):
+        """ν_t (n,) [m²/s] of equation (3) in cells (n,) of the domain."""
+        t, at = water.topology, columns.over(cells)
+        depth = np.maximum(columns.depth[at], water.mesh.local_size[t.background[cells]])
+        friction = self._factor(depth, t.nodes[t.cells[cells]].mean(axis=1))
+        speed = np.linalg.norm(columns.velocity[at, :2], axis=1)
+        return np.sqrt(friction) * speed * depth * np.maximum(KARMAN / 6.0, 2.0 / 3.0 * np.sqrt(friction))
+
+    def _bed(self, depth, least, place, mean, there):
+        """C_f |U|² / |u| (n,) [m/s]: mean (n,) [m/s] is |U|, there (n,) [m/s] the velocity at the bed."""
+        slowed = mean**2 / np.maximum(np.maximum(there, SLOWEST * mean), 1e-300)
+        return self._factor(np.maximum(depth, least), place) * slowed
+
+    def _factor(self, depth, place):
+        return self.gravity * _at(self.manning, place) ** 2 / cube_root(depth)
+
+
+def _at(value, place):
+    """A number, or what the function gives at places (n, 3) [m]."""
+    return value(place[:, 0], place[:, 1]) if callable(value) else value
+
+
+def _along(u, normal):
+    """The part of u (n, 3) along faces with unit normals (n, 3)."""
+    return u - np.einsum("nk,nk->n", u, normal)[:, None] * normal
 
 
 def log_law(distance, roughness: float):
@@ -91,15 +147,35 @@ def log_law(distance, roughness: float):
     return (KARMAN / np.log1p(30.0 * distance / roughness)) ** 2
 
 
-def column_depth(water, phi, cells):
-    """Depth of water (n,) [m] in the columns of bins over the cells (n,): their water over the area of the bin."""
-    t, (x, y, _) = water.topology, water.mesh.axes
-    wet = t.cells_around(phi < 0.0)
-    area = np.outer(np.diff(x), np.diff(y)).ravel()
-    volume = np.bincount(
-        _column(water, wet), t.volume[wet] * wet_fraction(wet, phi, t.parts), minlength=len(area)
-    )
-    return (volume / area)[_column(water, cells)]
+@dataclass(frozen=True)
+class Columns:
+    """Water over the bins of the plan: depth (c,) [m], its volume over their area · velocity (c, 3) [m/s], its mean ·
+    left (c,): share of the velocity before that this is · centre (c, 2) [m] · of_water: the Water they belong to."""
+
+    depth: np.ndarray
+    velocity: np.ndarray
+    left: np.ndarray
+    centre: np.ndarray
+    of_water: object
+
+    @classmethod
+    def of(cls, water, phi, u) -> Columns:
+        """Surface phi (N,), velocity u (N, 3) [m/s]."""
+        t, (x, y, _) = water.topology, water.mesh.axes
+        wet = t.cells_around(phi < 0.0)
+        area = np.outer(np.diff(x), np.diff(y)).ravel()
+        own, held = _column(water, wet), t.volume[wet] * wet_fraction(wet, phi, t.parts)
+        flow = held[:, None] * u[t.cells[wet]].mean(axis=1)
+        volume = np.bincount(own, held, minlength=len(area))
+        total = np.column_stack([np.bincount(own, flow[:, k], minlength=len(area)) for k in range(3)])
+        middle = np.meshgrid(0.5 * (x[1:] + x[:-1]), 0.5 * (y[1:] + y[:-1]), indexing="ij")
+        centre = np.column_stack([a.ravel() for a in middle])
+        mean = total / np.maximum(volume, 1e-300)[:, None]
+        return cls(volume / area, mean, np.ones(len(area)), centre, water)
+
+    def over(self, cells):
+        """Number of the column (n,) of cells (n,) of the domain."""
+        return _column(self.of_water, cells)
 
 
 def _column(water, cells):

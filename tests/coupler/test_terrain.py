@@ -11,6 +11,7 @@ from coupler.geometry.tank_mesh import bed_along, mean_bed
 from coupler.geometry.terrain.bed_mesh import fitted_of
 from coupler.geometry.terrain.grid import TerrainError
 from coupler.geometry.terrain.grids import read_grid
+from coupler.geometry.terrain.land import friction_of
 from coupler.geometry.terrain.site import filled, flattened, smoothed, terrain_of
 from coupler.program.errors import BadCase
 
@@ -252,3 +253,54 @@ def test_hole_under_the_tank_is_refused_with_its_place(tmp_path):
         made(tmp_path, z=z)
     assert "holes (no data) under" in error.value.lines[0]
     assert made(tmp_path, "terrain.fill=true", z=z).tank.ground is not None
+
+
+# ---------------------------------------------------------------- land
+
+
+RUBBED = ('water.walls="friction"', "water.manning=0.02")
+USES = "terrain.land={path='land.asc', use=[{code=1, manning=0.03}, {code=2, name='forest', manning=0.1}]}"
+
+
+def with_land(tmp_path, codes, *sets):
+    write_esri(tmp_path / "land.asc", codes)
+    return made(tmp_path, *RUBBED, *sets)
+
+
+def test_friction_of_the_ground_by_codes_of_land_use(tmp_path):
+    """The nearest point of the map counts, moved with the terrain; in its holes the number of the water does."""
+    codes = np.where(np.arange(Z.shape[0])[:, None] < 10, 1, 2) * np.ones(Z.shape)
+    codes[:, 0] = -9999
+    case = with_land(tmp_path, codes, USES)
+    n = friction_of(case)["manning"]
+    x, y = np.array([4.0, 9.4, 9.6, 15.0, 15.0, 300.0]), np.array([5.0, 5.0, 5.0, 5.0, 0.4, 5.0])
+    np.testing.assert_allclose(n(x, y), [0.03, 0.03, 0.1, 0.1, 0.02, 0.02])
+    moved = with_land(tmp_path, codes, USES, "terrain.origin=[101, 50]", "tank.upper=[18, 12, 4]")
+    np.testing.assert_allclose(friction_of(moved)["manning"](x[:3] - 1.0, y[:3]), [0.03, 0.03, 0.1])
+
+
+def test_friction_of_the_ground_reaches_the_water(tmp_path):
+    from coupler.run.clock import Clock
+    from coupler.scene.build import build
+
+    case = with_land(tmp_path, np.where(Z > -2.0, 0.05, 0.02), "terrain.land={path='land.asc'}")
+    friction = build(case, Clock()).coupling.water.viscous.friction
+    assert set(np.unique(friction.manning(*np.meshgrid(np.arange(21.0), np.arange(13.0))))) == {0.02, 0.05}
+
+
+@pytest.mark.parametrize(
+    ("codes", "sets", "told"),
+    [
+        (Z, ["terrain.land={path='land.asc'}"], r"has -.* in the tank, but manning lies above 0 .*codes of land use"),
+        (np.full(Z.shape, 7), [USES], r"land.asc has codes in the tank that no .*use.* has: 7"),
+        (np.ones(Z.shape), [USES, "terrain.land.use[1].code=1"], r"1 is the code of use\[0\] already"),
+        (np.ones(Z.shape), [USES, "terrain.land.use[0].manning=absent"], "manning: missing"),
+        (np.ones(Z.shape), [USES, "terrain.land.use[0].roughness='1 cm'"], "leave roughness out"),
+        (np.ones(Z.shape), [USES, "water.walls=slip", "water.manning=absent"], "land: is for friction"),
+        (np.ones(Z.shape), [USES, "terrain.land.path='lend.asc'"], "did you mean 'land.asc'"),
+    ],
+)  # fmt: skip
+def test_map_of_the_land_that_cannot_be_used_is_refused(codes, sets, told, tmp_path):
+    with pytest.raises(BadCase) as error:
+        with_land(tmp_path, codes, *sets)
+    assert re.search(told, "\n".join(error.value.lines)), error.value.lines

@@ -15,7 +15,7 @@ from fluid.step.water import Water
 from fluid.surface.extrapolation import extend_velocity
 from fluid.viscous.kernels import momentum_rate
 from fluid.viscous.viscosity import Viscosity
-from fluid.viscous.wall_friction import WallFriction, column_depth, log_law
+from fluid.viscous.wall_friction import Columns, WallFriction, log_law
 from tests.fluid.scenes import advance, rotation, tank
 
 DENSITY = 1000.0
@@ -114,7 +114,7 @@ def test_what_the_water_loses_the_body_gets(walls, more):
     """Force and moment, to round-off, at random velocities: rigid motions have no stress and the hats sum to one."""
     water, u = turned_box(walls, **more)
     stage = Viscosity(water.parameters)
-    terms = stage._terms(water, water.level_set, DENSITY * water.nodal_water, u)
+    terms = stage._terms(water, water.level_set, DENSITY * water.nodal_water, u, 0.1)
     free = (*terms[:5], np.zeros(0, np.int64), np.zeros((0, 3, 3)), np.zeros(len(u), bool), *terms[8:])
     rate, load = momentum_rate(free, u, water.body_velocity)
     arm = water.topology.nodes - water.domain.body_centre[0]
@@ -127,7 +127,7 @@ def test_the_form_is_positive_on_any_cut():
     """Viscous and wall stress only take energy, for any velocity and on slivers: -u·r(u) > 0 where the body rests."""
     water, u = turned_box("no-slip", viscosity=20.0)
     water.body_velocity[:] = 0.0
-    terms = Viscosity(water.parameters)._terms(water, water.level_set, DENSITY * water.nodal_water, u)
+    terms = Viscosity(water.parameters)._terms(water, water.level_set, DENSITY * water.nodal_water, u, 0.1)
     for seed in range(20):
         u = np.random.default_rng(seed).normal(0, 1, u.shape)
         rate, _ = momentum_rate(terms, u, water.body_velocity)
@@ -180,8 +180,7 @@ def test_bed_of_manning_slows_a_uniform_stream_as_its_law_says():
     change = water.viscous.change(water, water.level_set, water.nodal_water, u, dt)
     mean = (water.nodal_water @ change.change)[0] / water.nodal_water.sum()
     assert mean == pytest.approx(-dt * 9.81 * n**2 * u0**2 / depth ** (4 / 3), rel=0.02)
-    every = np.arange(len(water.topology.cells))
-    np.testing.assert_allclose(column_depth(water, water.level_set, every), depth, rtol=1e-4)
+    np.testing.assert_allclose(Columns.of(water, water.level_set, u).depth, depth, rtol=1e-4)
 
 
 def test_mannings_law_is_that_of_the_bed_alone():
@@ -189,7 +188,7 @@ def test_mannings_law_is_that_of_the_bed_alone():
     water = tank([1, 0.25, 1], 0.125, lambda x: x[:, 2] - 0.5)
     friction = WallFriction.of(WaterParameters(walls="friction", manning=0.03))
     u = np.tile([1.0, 0.0, 1.0], (len(water.topology.nodes), 1))
-    drag = friction.of_nodes(water, water.level_set, u)
+    drag = friction.of_nodes(water, water.level_set, friction.columns(water, water.level_set, u, 0.0), u)
     floor = water.topology.nodes[:, 2] < 1e-9
     assert drag[floor].min() > 0.0
     assert np.abs(drag[~floor]).max() == 0.0

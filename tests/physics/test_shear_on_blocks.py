@@ -77,7 +77,7 @@ def test_a_coarse_sphere_that_spins_feels_the_moment_of_stokes(cells, limit):
     )
     spin = np.array([[0.0, 0.0, 0.0, 0.0, 0.0, 1.0]])
     weightless = np.full(len(water.velocity), 1e-9)  # of no inertia: the steady flow at once
-    terms = Viscosity(water.parameters)._terms(water, water.level_set, weightless, water.velocity)
+    terms = Viscosity(water.parameters)._terms(water, water.level_set, weightless, water.velocity, 0.1)
     rate, _ = momentum_rate(terms, water.velocity, spin)
     driven = (np.zeros((1, 6, 6)), np.zeros(1, bool))
     u, _, _, left = implicit_change(terms, weightless, 1.0, rate, driven, np.zeros((1, 6)), 1e-6, 2000)

@@ -28,8 +28,8 @@ KEPT = ".terrain"
 FORMAT = 1
 """Changes when the steps below do: what was kept before is made anew."""
 FEET = re.compile(r'UNIT\["[^"]*f(?:oo|ee)t', re.IGNORECASE)
-PLACED = ("origin", "turn", "offset")
-"""Options that only say where the terrain is: nothing is kept anew for them."""
+PLACED = ("origin", "turn", "offset", "land")
+"""Options that only say where the terrain is, or what grows on it: nothing is kept anew for them."""
 
 
 def terrain_of(spec) -> HeightMap:

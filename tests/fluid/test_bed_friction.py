@@ -1,0 +1,90 @@
+"""Manning's friction: streams find depth and velocity of his formula, U = d^(2/3) S^(1/2) / n, by themselves."""
+
+import numpy as np
+import pytest
+
+from fluid.cut.bodies import ConvexBodies
+from fluid.domain.physical_domain import cut_domain
+from fluid.mesh.background import box_mesh
+from fluid.mesh.fitted_mesh import fitted_mesh
+from fluid.sides.inflow import Side, Sides
+from fluid.sides.waves import steady
+from fluid.step.parameters import WaterParameters
+from fluid.step.water import Water
+from fluid.viscous.wall_friction import Columns
+from tests.fluid.scenes import advance
+
+DRY = ConvexBodies.empty()
+
+
+def is_across(normal, _):
+    return np.abs(normal[:, 1]) > 0.5
+
+
+def means(water, columns_across=2):
+    """Depth and velocity (nx, 3) over the columns along x."""
+    c = Columns.of(water, water.level_set, water.velocity)
+    return c.depth.reshape(-1, columns_across).mean(axis=1), c.velocity.reshape(-1, columns_across, 3).mean(
+        axis=1
+    )
+
+
+@pytest.mark.parametrize("cells", [4, 8])
+def test_drive_along_the_bed_ends_at_the_velocity_of_the_formula(cells):
+    """A full channel of depth 1 whose weight points along it with 0.05 g. Without mixing the water above the lowest
+    cells gets faster and faster (it ran into the cap of the speed, 1.4 times this)."""
+    n, drive = 0.5, 1.0
+    mesh = box_mesh(np.zeros(3), [0.5, 1 / cells, 1.0], 1 / cells)
+    settings = WaterParameters(
+        walls="friction", manning=n, gravity=drive, down=(1, 0, 0), suction="unlimited"
+    )
+    ends = lambda normal, _: np.abs(normal[:, 0]) > 0.5  # noqa: E731
+    water = Water(mesh, cut_domain(mesh, DRY), lambda x: x[:, 2] - 100.0, settings, ends, is_across)
+    for _ in range(120):
+        advance(water, 0.1)
+    _, u = means(water, 1)
+    np.testing.assert_allclose(u[:, 0], 1.0 / n, rtol=0.02)
+
+
+def stream(start, until, manning, slope=0.1, cell=0.25, length=16.0):
+    """Water that comes onto a plane with the depth 1/start and leaves it freely: velocity of the formula for the depth
+    1 at n = 0.06 times `start`, so that its discharge is the same."""
+    u = np.sqrt(slope) / 0.06
+    fitted = fitted_mesh((0, 0, -slope * length), (length, 2 * cell, 1.6), cell, lambda x, _: -slope * x)
+    mesh = fitted.mesh
+    side = Side.of(mesh, lambda normal, _: normal[:, 0] < -0.5, steady((1, 0, 0), 1.0 / start, start * u))
+    settings = WaterParameters(walls="friction", manning=manning)
+    leaves = lambda normal, _: (normal[:, 2] > 0.999) | (normal[:, 0] > 0.5)  # noqa: E731
+    fill = lambda x: x[:, 2] + slope * x[:, 0] - 1.0 / start  # noqa: E731
+    water = Water(mesh, cut_domain(mesh, DRY), fill, settings, leaves, is_across, Sides([side]))
+    water.velocity[:] = np.where(
+        water.level_set[:, None] < 2 * cell, [[start * u, 0, -slope * start * u]], 0.0
+    )
+    time = 0.0
+    while time < until:
+        dt = min(water.stable_step(), 0.1)
+        advance(water, dt)
+        time += dt
+    return *means(water), u
+
+
+def test_stream_down_a_plane_runs_at_normal_depth():
+    """On a mesh that fits the plane; Froude number 1.7, so what it does is not said at its end. Without friction it
+    has 1.27 times this velocity there after 3 s, and goes on."""
+    depth, u, formula = stream(0.9, 5.0, 0.06)
+    there = slice(-12, -4)
+    assert depth[there].mean() == pytest.approx(1.0, rel=0.03)
+    assert u[there, 0].mean() == pytest.approx(formula, rel=0.03)
+
+
+def test_beds_of_several_kinds_rub_where_they_are():
+    """n as a function of the place: half of the bed rough, the other half smooth."""
+    mesh = box_mesh(np.zeros(3), [2, 0.25, 1], 0.125)
+    settings = WaterParameters(walls="friction", manning=lambda x, y: np.where(x < 1.0, 0.06, 0.03))
+    water = Water(mesh, cut_domain(mesh, DRY), lambda x: x[:, 2] - 0.5, settings)
+    u = np.tile([1.0, 0.0, 0.0], (len(water.topology.nodes), 1))
+    friction = water.viscous.friction
+    drag = friction.of_nodes(water, water.level_set, friction.columns(water, water.level_set, u, 0.0), u)
+    x = water.topology.nodes[:, 0]
+    rough, smooth = drag[x < 0.9].sum() / 0.9, drag[x > 1.1].sum() / 0.9
+    assert rough == pytest.approx(4.0 * smooth, rel=0.1)
