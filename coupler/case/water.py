@@ -53,14 +53,28 @@ class SteadyInflow(Section):
 
 
 class RecordInflow(Section):
-    """Level and velocity from a table, straight lines between its times."""
+    """Level and velocity from a table or from a gauge of another model, straight lines between its times."""
 
     kind: Literal["record"] = Field(description="what comes in: a record")
     side: Wall = Field(description="the side of the tank, across its whole width")
     path: File = Field(
-        description="CSV with the columns time [s], level (z) [m], velocity (into the tank) [m/s], from the directory "
-        "of the case; lines that begin with # are skipped",
+        description="CSV with the columns time [s], level (z) [m], velocity (into the tank) [m/s]; with a column "
+        "along (place on the side, y or x) [m] a line for each time and place, and perhaps sideways (velocity along "
+        "the side); lines that begin with # are skipped. Or a gauge of GeoClaw (gaugeNNNNN.txt) or Thetis "
+        "(diagnostic_*.hdf5), whose velocities are along the axes of the terrain file. From the directory of the case",
         examples=["wave.csv"],
+    )
+    gauge: str | None = Field(None, description="of a file of Thetis with several detectors: its name")
+    start: Annotated[float, InSI("s")] = Field(0.0, description="time of the record at which the run begins")
+    zero: Length = Field(0.0, description="level of the record that is z = 0")
+    velocity: Literal["given", "long-wave"] = Field(
+        "given",
+        description="where the velocity comes from: the record, or of a record of levels alone that of a long wave "
+        "into still water, 2 (sqrt(g h) - sqrt(g d)) over the mean bed along the side",
+    )
+    still: Length | None = Field(
+        None,
+        description="with long-wave: height z of the still water; absent: the level at which the run begins",
     )
     absorbs: Switch = ABSORBS
 
@@ -114,11 +128,29 @@ Inflow = Annotated[
 ]
 
 
+class Tide(Section):
+    """How the level of a sea changes, slowly: a harmonic, or a table."""
+
+    amplitude: PositiveLength | None = Field(None, description="half of the height from low to high water")
+    period: PositiveTime | None = Field(
+        None, description="from one high water to the next", examples=["12.42 h"]
+    )
+    high: Annotated[float, InSI("s")] = Field(0.0, description="time of a high water")
+    path: File | None = Field(
+        None,
+        description="instead: CSV with the columns time [s] and level (z) [m], from the directory of the case",
+        examples=["tide.csv"],
+    )
+
+
 class Sea(Section):
     """A side beyond which the water stands still at a level; water goes in and out there as it likes."""
 
     side: Wall = Field(description="the side of the tank, across its whole width")
-    level: Length = Field(description="height z of the still sea")
+    level: Length = Field(
+        description="height z of the still sea; with a tide its mean, with one from a table that at the start"
+    )
+    tide: Tide | None = Field(None, description="how the level changes")
     absorbs: Switch = Field(
         False,
         description="true: waves run out of it, long ones wholly, short and oblique ones in part; false: its level "

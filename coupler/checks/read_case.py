@@ -126,6 +126,7 @@ def _place_files(table: dict, directory: Path) -> list[tuple[KeyPath, str]]:
     """Paths in the case are meant from its directory: those that lead nowhere, and why; what is no path is refused
     later."""
     found = [((*path, "path"), entry, "path") for path, entry in _named_files(table)]
+    found += [((*path, "tide", "path"), tide, "path") for path, tide in _tides(table)]
     if isinstance(table.get("tank"), dict):
         found.append((("tank", "mesh"), table["tank"], "mesh"))
     if isinstance(table.get("terrain"), dict):
@@ -152,6 +153,14 @@ def _named_files(table: dict) -> Iterator[tuple[KeyPath, dict]]:
         for i, entry in enumerate(entries if isinstance(entries, list) else ()):
             if isinstance(entry, dict):
                 yield (name, i) if above is None else (above, name, i), entry
+
+
+def _tides(table: dict) -> Iterator[tuple[KeyPath, dict]]:
+    """The tides of seas, with the places of the seas."""
+    seas = table["water"].get("sea") if isinstance(table.get("water"), dict) else None
+    for i, sea in enumerate(seas if isinstance(seas, list) else ()):
+        if isinstance(sea, dict) and isinstance(sea.get("tide"), dict):
+            yield ("water", "sea", i), sea["tide"]
 
 
 class _Places:

@@ -8,10 +8,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from coupler.case.case import Case
-from coupler.case.inflow_records import RecordError, record_columns
+from coupler.case.inflow_records import RecordError, record_of
 from coupler.case.types import KeyPath
 from coupler.geometry.tank_mesh import finest_cell, floor_along, is_measured, mean_bed
-from coupler.scene.build_water import SLACK, bore_velocity, fills_beside, level_at_start
+from coupler.scene.build_water import SLACK, bore_velocity, fills_beside, level_at_start, sea_level
 
 Problem = tuple[KeyPath, str]
 
@@ -233,8 +233,9 @@ def _brought(case: Case, spec) -> float:
     if spec.kind in ("solitary", "n-wave"):
         return 0.0
     if spec.kind == "record":
-        time, level, velocity = record_columns(spec.path)
-        return float(np.trapezoid(np.maximum((level - bed) * velocity, 0.0)[time <= end], time[time <= end]))
+        found = record_of(spec, 0.0, bed, case.case.gravity)
+        inward = np.maximum((found.level - bed) * found.velocity, 0.0).mean(axis=1)
+        return float(np.trapezoid(inward[found.time <= end], found.time[found.time <= end]))
     depth = spec.level - bed
     if spec.kind == "steady":
         return max(spec.velocity, 0.0) * depth * end
@@ -258,7 +259,10 @@ def _sides(case: Case) -> Iterator[Problem]:
 def _levels(case: Case, path: KeyPath, spec) -> Iterator[Problem]:
     bed, top = floor_along(case.tank, spec.side), case.tank.upper[2]
     if _kind(spec) == "record":
-        yield from _record(path, spec, bed, top, case.time.end)
+        yield from _record(case, path, spec, bed, top)
+        return
+    if getattr(spec, "tide", None) is not None:
+        yield from _tide(case, path, spec, bed, top)
         return
     if not bed < spec.level <= top:
         yield (
@@ -284,17 +288,55 @@ def _levels(case: Case, path: KeyPath, spec) -> Iterator[Problem]:
         )
 
 
-def _record(path: KeyPath, spec, bed: float, top: float, end: float) -> Iterator[Problem]:
+def _tide(case: Case, path: KeyPath, sea, bed: float, top: float) -> Iterator[Problem]:
+    """A tide that is neither a harmonic nor a table, and levels beside the tank."""
+    tide, place = sea.tide, (*path, "tide")
+    harmonic = [name for name in ("amplitude", "period") if getattr(tide, name) is not None]
+    if (tide.path is None) != (len(harmonic) == 2) or (tide.path is not None and harmonic):
+        yield place, "write amplitude and period, or path, a table of levels; not both"
+        return
     try:
-        time, level, _ = record_columns(spec.path)
+        level = sea_level(sea)
+    except RecordError as error:
+        yield (*place, "path"), str(error)
+        return
+    found = np.array([level(time) for time in np.linspace(0.0, case.time.end, 201)])
+    if tide.path is not None and abs(level(0.0) - sea.level) > STILL * case.tank.cell:
+        yield (
+            (*path, "level"),
+            f"z = {sea.level:g} m, but its tide begins at z = {level(0.0):g} m: write that level",
+        )
+    if found.min() <= bed or found.max() > top:
+        yield (
+            place,
+            f"its level goes from z = {found.min():.4g} to {found.max():.4g} m in the run, which is not between the "
+            f"floor ({bed:g} m) and the top ({top:g} m)",
+        )
+
+
+def _record(case: Case, path: KeyPath, spec, bed: float, top: float) -> Iterator[Problem]:
+    end = case.time.end
+    try:
+        found = record_of(spec)
     except RecordError as error:
         yield (*path, "path"), str(error)
         return
+    time, level = found.time, found.level
+    if spec.still is not None and spec.velocity == "given":
+        yield (*path, "still"), 'is for velocity = "long-wave"; leave it out'
     if time[0] >= end or time[-1] < 0.0:
         yield (
             (*path, "path"),
             f"its times go from {time[0]:g} to {time[-1]:g} s, all {'after' if time[0] >= end else 'before'} the run "
-            f"(0 to {end:g} s); shift them",
+            f"(0 to {end:g} s); move them by start",
+        )
+    axis = 1 - "xy".index(spec.side[0])
+    low, high = case.tank.lower[axis], case.tank.upper[axis]
+    if found.varies and (found.along[0] > high or found.along[-1] < low):
+        yield (
+            (*path, "path"),
+            f"its places along the side go from {found.along[0]:g} to {found.along[-1]:g} m, all beside it "
+            f"({low:g} to {high:g} m)",
         )
     if level.min() < bed:
         yield (

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from coupler.case.case import Case
-from coupler.case.inflow_records import record_columns
+from coupler.case.inflow_records import record_of
 from coupler.case.schedule import Schedule, checkpoint_interval
 from coupler.checks.places import BYTES_PER_CELL, mesh_size
 from coupler.geometry.tank_mesh import finest_cell, water_in
@@ -144,10 +144,11 @@ def _water_rows(case: Case, interval: float, rows: list[Row]) -> float:
 
 def _highest(case: Case) -> float:
     """Height z [m] of the highest water: in the boxes at the start, of a sea, or that comes in."""
-    found = [box.upper[2] for box in case.water.fill] + [sea.level for sea in case.water.sea]
+    found = [box.upper[2] for box in case.water.fill]
+    found += [sea.level + (sea.tide.amplitude or 0.0 if sea.tide else 0.0) for sea in case.water.sea]
     for spec in case.water.inflow:
         if spec.kind == "record":
-            found.append(float(record_columns(spec.path)[1].max()))
+            found.append(float(record_of(spec).level.max()))
         else:
             found.append(spec.level + (spec.height if spec.kind in ("solitary", "n-wave") else 0.0))
     return min(max(found), case.tank.upper[2])

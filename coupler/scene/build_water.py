@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from coupler.case.case import Case
-from coupler.case.inflow_records import record_columns
+from coupler.case.inflow_records import levels_of, record_of
 from coupler.geometry.tank_mesh import bed_along, floor_along, mean_bed, mesh_of, on_side
 from coupler.geometry.terrain.land import friction_of
 
@@ -117,7 +117,9 @@ def _strips(case: Case) -> list[tuple]:
 def level_at_start(spec) -> float:
     """Height z [m] of the surface that an inflow or a sea has at the start, ahead of any wave."""
     if getattr(spec, "kind", "sea") == "record":
-        return float(record_columns(spec.path)[1][0])
+        return record_of(spec).level_at(0.0)
+    if getattr(spec, "tide", None) is not None:
+        return sea_level(spec)(0.0)
     return spec.ahead if getattr(spec, "ahead", None) is not None else spec.level
 
 
@@ -170,11 +172,24 @@ def _flows(case: Case, mesh):
         sides.append(Side.of(mesh, sides_named([spec.side], mesh), flow))
     for sea in case.water.sea:
         if sea.absorbs:
-            flow = _absorbing(case, sea, waves.steady(-_outward(sea.side), sea.level, 0.0), mesh)
+            flow = _absorbing(case, sea, waves.tide(-_outward(sea.side), sea_level(sea)), mesh)
             sides.append(Side.of(mesh, sides_named([sea.side], mesh), flow))
             continue
-        sides.append(Side.of(mesh, sides_named([sea.side], mesh), level=lambda time, level=sea.level: level))
+        sides.append(Side.of(mesh, sides_named([sea.side], mesh), level=sea_level(sea)))
     return Sides(sides)
+
+
+def sea_level(sea):
+    """Height z [m] of a sea as a function of the time [s]. Raises RecordError."""
+    tide = sea.tide
+    if tide is None:
+        return lambda time: sea.level
+    if tide.path is not None:
+        times, levels = levels_of(tide.path)
+        return lambda time: float(np.interp(time, times, levels))
+    return lambda time: (
+        sea.level + tide.amplitude * float(np.cos(2.0 * np.pi * (time - tide.high) / tide.period))
+    )
 
 
 def _absorbing(case: Case, spec, flow, mesh):
@@ -210,7 +225,17 @@ def flow_of(case: Case, spec):
         order = 1 if spec.theory == "goring" else 3
         wave = waves.SolitaryWave(spec.level - bed, spec.height, gravity, spec.crest, order)
         return wave.flow(inward, bed)
-    return waves.record(inward, *record_columns(spec.path))
+    found = record_of(spec, _turn(case), mean_bed(case.tank, spec.side, level_at_start(spec)), gravity)
+    if found.varies or found.sideways.any():
+        return waves.record_along(
+            inward, found.time, found.along, found.level, found.velocity, found.sideways
+        )
+    return waves.record(inward, found.time, found.level[:, 0], found.velocity[:, 0])
+
+
+def _turn(case: Case) -> float:
+    """By which the axes of files are turned in the tank [rad]."""
+    return case.terrain.turn if case.terrain is not None else 0.0
 
 
 def bore_velocity(case: Case, spec) -> float:

@@ -6,7 +6,7 @@ import numpy as np
 
 from coupler.case.case import Case
 from coupler.geometry.tank_mesh import floor_along
-from coupler.scene.build_water import fills_beside, flow_of
+from coupler.scene.build_water import fills_beside, flow_of, sea_level
 
 TIMES = 101
 """Instants of a run at which an inflow is looked at."""
@@ -19,7 +19,10 @@ def side_energy(case: Case) -> float:
     b [m] width of the side, h [m] largest depth there, Δz [m] largest difference from the water at the start, v [m/s]
     largest speed, each over the whole run."""
     times = np.linspace(0.0, case.time.end, TIMES)
-    found = sum(_energy(case, sea.side, np.array([sea.level]), 0.0) for sea in case.water.sea)
+    found = 0.0
+    for sea in case.water.sea:
+        level = sea_level(sea)
+        found += _energy(case, sea.side, np.array([level(time) for time in times]), 0.0)
     for spec in case.water.inflow:
         flow = flow_of(case, spec)
         level = np.array([flow.level(time) for time in times])

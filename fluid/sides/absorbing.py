@@ -43,7 +43,11 @@ class Absorber:
         def velocity(points, time):
             return self.flow.velocity(points, time) + self.speed * self.inward
 
-        return Flow(lambda time: self.flow.level(time) + self.height, velocity, self)
+        def varying(points, time):
+            return self.flow.level_at(points, time) + self.height
+
+        along = None if self.flow.varying is None else varying
+        return Flow(lambda time: self.flow.level(time) + self.height, velocity, self, along)
 
     def points(self, depths) -> Array:
         """Where the velocity is asked, (k, 3) [m]: half way up the water of depths (k,) [m]."""
@@ -51,7 +55,7 @@ class Absorber:
 
     def hear(self, depths, velocities, time: float) -> None:
         """Follow equation (1) with the depths (k,) [m] and velocities (k, 3) [m/s] at the places."""
-        level = self.flow.level(time)
+        level = self.flow.level_at(np.column_stack([self.places, self.bed]), time)
         given = np.maximum(level - self.bed, 0.0)
         wet = (given > 0.0) | (depths > 0.0)
         if not wet.any():

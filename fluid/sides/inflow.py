@@ -38,6 +38,12 @@ class Flow:
     velocity: Callable
     absorber: object = None
     """`Absorber` that the flow follows, None for one that is given for ever."""
+    varying: Callable | None = None
+    """Levels at points (n, 3) [m] and a time → (n,) [m], where they differ along the side; `level` is their mean."""
+
+    def level_at(self, points, time: float):
+        """z [m] of the surface over points (n, 3) [m]: one number, or (n,)."""
+        return self.level(time) if self.varying is None else self.varying(points, time)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -125,7 +131,8 @@ class Side:
 
     def surface(self, phi, time: float) -> None:
         """φ (N,) of the given level on the nodes, in place."""
-        phi[self.nodes] = self.place[:, 2] - self.level(time)
+        level = self.level(time) if self.flow is None else self.flow.level_at(self.place, time)
+        phi[self.nodes] = self.place[:, 2] - level
 
     def pressure(self, density: float, gravity: float, u, time: float):
         """Equation (2) at the nodes (n,) [Pa], u (N, 3) [m/s]; the weight goes on above the level: exact at rest."""

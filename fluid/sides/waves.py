@@ -25,6 +25,34 @@ def record(inward, times, levels, speeds) -> Flow:
     return Flow(lambda time: float(np.interp(time, times, levels)), velocity)
 
 
+def record_along(inward, times, places, levels, speeds, sideways) -> Flow:
+    """A record that differs along its side: levels [m], speeds inwards and sideways [m/s] (t, k) at times (t,) [s] and
+    places (k,) [m] along the side, straight lines between both, the ends kept beyond."""
+    inward, times = np.asarray(inward, float), np.asarray(times, float)
+    axis = 1 if abs(inward[0]) > 0.5 else 0
+    along = np.zeros(3)
+    along[axis] = 1.0
+
+    def at(table, points, time):
+        now = np.array([np.interp(time, times, column) for column in np.asarray(table, float).T])
+        return np.interp(points[:, axis], places, now)
+
+    def level(time: float) -> float:
+        return float(np.mean([np.interp(time, times, column) for column in np.asarray(levels, float).T]))
+
+    def velocity(points, time):
+        across = at(speeds, points, time)[:, None] * inward
+        return across + at(sideways, points, time)[:, None] * along
+
+    return Flow(level, velocity, varying=lambda points, time: at(levels, points, time))
+
+
+def tide(inward, level) -> Flow:
+    """A still sea whose level(time) [m] changes slowly; what moves is left to the side that absorbs."""
+    still = np.zeros_like(np.asarray(inward, float))
+    return Flow(level, lambda points, time: np.broadcast_to(still, (len(points), 3)))
+
+
 def bore_speed(ahead: float, behind: float, gravity: float) -> tuple[float, float]:
     """Speeds (front, water behind it) [m/s] of a bore from depth `behind` into still water of depth `ahead`:
 

@@ -10,8 +10,9 @@ import meshio
 import numpy as np
 import pytest
 
-from coupler.case.inflow_records import RecordError, record_columns
+from coupler.case.inflow_records import RecordError, levels_of, record_of
 from coupler.case.structure import BlockFile
+from coupler.case.water import RecordInflow
 from coupler.checks.case import remarks
 from coupler.checks.read_case import load
 from coupler.commands.explain_run import explanation_of_run
@@ -164,7 +165,8 @@ def records(count, seed, folder):
     def one(rng):
         path.write_bytes(fuzz.torn(RECORD, rng))
         try:
-            record_columns(str(path))
+            record_of(RecordInflow(kind="record", side="x-", path=str(path)))
+            levels_of(str(path))
         except RecordError as error:
             error.exit_code = 2  # `check` tells it with the key of the case
             raise

@@ -216,3 +216,50 @@ def test_records_are_straight_lines_between_their_times():
     assert flow.level(0.5) == 1.5
     np.testing.assert_allclose(flow.velocity(np.zeros((2, 3)), 1.0), [[0, -2, 0]] * 2)
     assert flow.level(9.0) == 3.0
+
+
+def pulse(place, time, height=0.002, depth=0.25, length=6.0, angle=0.5):
+    """Level over the still water and velocity (n, 3) of a long wave of one crest that runs at an angle to x."""
+    c = np.sqrt(9.81 * depth)
+    way = np.array([np.cos(angle), np.sin(angle)])
+    phase = (
+        place[:, :2] @ way + 0.5 * length - c * time
+    ) / length  # 0 to 1 from the end of the crest to its head
+    level = np.where((phase > -1.0) & (phase < 0.0), height * np.sin(np.pi * phase) ** 2, 0.0)
+    return level, np.column_stack([(c * level / (depth + level))[:, None] * way, np.zeros(len(place))])
+
+
+def test_wave_that_comes_through_four_sides_at_an_angle_is_the_same_inside():
+    """As from a model of the sea around: a record along each side, whose places say when the crest is where."""
+    size, times = 6.0, np.linspace(0.0, 9.0, 361)
+    mesh = box_mesh(np.zeros(3), [size, size, 0.375], [0.5, 0.5, 0.125])
+    places, sides = np.linspace(0.0, size, 13), []
+    for axis in (0, 1):
+        for end, sign in ((0.0, 1.0), (size, -1.0)):
+            points = np.zeros((len(places), 3))
+            points[:, axis], points[:, 1 - axis] = end, places
+            inward = sign * np.eye(3)[axis]
+            told = [pulse(points, t) for t in times]
+            level = np.array([a for a, _ in told]) + 0.25
+            speed, sideways = (np.array([u[:, k] for _, u in told]) for k in (axis, 1 - axis))
+            flow = waves.record_along(inward, times, places, level, sign * speed, sideways)
+            sides.append(Side.of(mesh, lambda n, _, inward=inward: n @ inward < -0.5, flow))
+    water = Water(
+        mesh,
+        cut_domain(mesh, ConvexBodies.empty()),
+        lambda x: x[:, 2] - 0.25,
+        WaterParameters(),
+        lambda n, _: n[:, 2] > 0.5,
+        None,
+        Sides(sides),
+    )
+    middle, rows = np.array([[3.0, 3.0, 0.1]]), []
+    while water.time < 6.8:
+        advance(water, min(water.stable_step(), 0.1), rtol=1e-6)
+        (u, v, _), level = gauges.velocity(water, middle)[0], gauges.level(water, middle[0, :2])
+        rows.append((water.time, level - 0.25, pulse(middle, water.time)[0][0], np.arctan2(v, u)))
+    time, found, wanted, angle = np.array(rows).T
+    crest = found.argmax()
+    assert found[crest] == pytest.approx(wanted.max(), rel=0.1)
+    assert time[crest] == pytest.approx(time[wanted.argmax()], abs=0.2)
+    assert angle[crest] == pytest.approx(0.5, abs=0.05)
