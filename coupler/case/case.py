@@ -216,8 +216,8 @@ class Contact(Section):
 
     stiffness: Annotated[float, InSI("N/m", gt=0)] | None = Field(
         None,
-        description="K of a whole face in contact; absent: that of the joints in closing, so that a face whose joint "
-        "breaks goes on as it was",
+        description="K of two faces of which the smaller lies on the other, whatever their sizes, and of one on the "
+        "ground; absent: that of the joints in closing, so that a face whose joint breaks goes on as it was",
         examples=["1 GN/m"],
     )
     restitution: Annotated[float, InSI("", gt=0, le=1)] = Field(

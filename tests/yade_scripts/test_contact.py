@@ -101,6 +101,19 @@ def test_ledger_of_a_block_that_drops_bounces_and_slides_to_rest():
     assert end["dashpot"] > 0.05 * given
 
 
+@pytest.mark.parametrize("at", [(0.0, 0.0), (0.9, 0.7)])
+@pytest.mark.parametrize("below", [1.0, 1.3, 3.0])
+def test_a_cube_sinks_by_its_weight_over_k_whatever_is_below_it(below, at):
+    """On a face of its own size, somewhat larger and three times larger, over its nodes and between them: the
+    stiffness is the one that was asked for. (Only the nodes of the small face are in contact then.)"""
+    low = Block("low", (0, 0, -0.5), size=(below, below, 1), density=2000.0, fixed=True)
+    high = Block("high", (*(0.5 * (below - 1.0) * np.array(at)), 0.5), size=1.0, density=2000.0)
+    with Structure([low, high], ContactLaw(stiffness=K, restitution=0.3)) as s:
+        s.advance(0.4)
+        assert 0.5 - s.centre()[1, 2] == pytest.approx(2000.0 * G / K, rel=3e-3)  # one node off the middle
+        assert s.contacts().kn.sum() == pytest.approx(K)
+
+
 def test_a_stack_stays_where_it_was_put():
     """Three offset blocks at rest: no drift, no spin; the lowest carries all the weight."""
     blocks = [Block(f"b{i}", (0.1 * i, 0.05 * i, i + 0.5), size=1.0, density=2000.0) for i in range(3)]

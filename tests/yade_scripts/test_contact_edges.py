@@ -57,6 +57,34 @@ def test_an_edge_that_lands_on_an_edge_returns_e():
         assert np.abs(np.delete(v, 2)).max() < 1e-9
 
 
+@pytest.mark.parametrize("off", [0.0, 0.1, 0.15, 0.25])
+def test_a_beam_across_another_is_held_by_the_corners_where_their_edges_cross(off):
+    """A beam of 4 x 0.4 x 0.4 m, its middle `off` beside that of the beam under it, on which it lies where that one has
+    no node: it stands for as long as its middle is above the other (0.2 m), whose edges no node is near, and falls
+    beyond. Only the nodes of its own middle would be in contact, in one line about which it would rock."""
+    low = Block("low", (0.5, 0, -0.2), size=(4, 0.4, 0.4), density=DENSITY, fixed=True)
+    high = Block("high", (0, off, 0.2), size=(0.4, 4, 0.4), density=DENSITY)
+    with Structure([low, high], ContactLaw(1e8, 0.3, 0.5)) as s:
+        s.advance(0.5)
+        tilt = s.rotation()[1][1, 2]
+        assert abs(tilt) > 0.02 if off > 0.2 else abs(tilt) < 1e-3
+        if off < 0.2:
+            assert 0.2 - s.centre()[1, 2] < 2.0 * s.mass[1] * 9.81 / 1e8
+
+
+def test_beams_that_cross_where_neither_has_a_node_carry_each_other():
+    """No node of either is near: pressed together, the four corners of what lies on one another carry K in all."""
+    low = Block("low", (0.5, 0, -0.2), size=(4, 0.4, 0.4), density=DENSITY, fixed=True)
+    high = Block("high", (0, 0.7, 0.2), size=(0.4, 4, 0.4), density=DENSITY, velocity=(0, 0, -0.01))
+    with Structure([low, high], ContactLaw(1e8, 1.0, 0.0), gravity=STILL) as s:
+        s.advance(2e-4)
+        contacts = s.contacts()
+        corners = [(x, y) for x in (-0.2, 0.2) for y in (-0.2, 0.2)]
+        assert sorted(map(tuple, contacts.point[:, :2].round(5))) == sorted(corners)
+        assert contacts.kn.sum() == pytest.approx(1e8)
+        assert np.allclose(contacts.depth, 2e-6, rtol=0.02)
+
+
 def overlap(blocks, centres, rotations):
     """Least overlap of two convex blocks over all axes that could part them [m]; negative where one does."""
     a, b = (x + k.vertices @ R.T for k, x, R in zip(blocks, centres, rotations))

@@ -10,6 +10,8 @@ Array = np.ndarray
 
 BEGINS = -1.0
 """In place of the last normal force of a contact that has not pushed yet."""
+CROSSINGS = 4
+"""Edges of a block that may cross edges of another at a time: the corners of beams that lie on one another."""
 
 
 class Bodies(NamedTuple):
@@ -25,17 +27,20 @@ class Bodies(NamedTuple):
 
 
 class Law(NamedTuple):
-    """shear: k_t/k_n · zeta, zeta_t: damping ratios (zeta_t < 0: c_t = sqrt(shear) c_n) · friction (m, m) μ."""
+    """shear: k_t/k_n · zeta, zeta_t: damping ratios (zeta_t < 0: c_t = sqrt(shear) c_n) · friction (m, m) μ
+    whole: K is that of two faces of which the smaller lies on the other, whatever its size; else it goes with the area.
+    """
 
     shear: float
     zeta: float
     zeta_t: float
     friction: Array
+    whole: bool
 
 
 class Pairs(NamedTuple):
     """a < b (p,) bodies; b may be a plane · start (p+1,) first slot: the nodes of a, those of b, then
-    one for edges that cross
+    `CROSSINGS` for edges that cross
 
     fresh (p,): contact begins with the depth there is, what held the two until now having this share of its stiffness;
     0: it does not · touching (p,) bool: had contacts last time · calm (p,) [m]: way that the two must move before they

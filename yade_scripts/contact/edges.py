@@ -1,4 +1,4 @@
-"""Edges that cross between contact nodes: one contact of edge against edge for a pair of blocks.
+"""Edges that cross between contact nodes: contacts of edges against edges for a pair of blocks.
 
 Two convex bodies are apart if a plane along a face or along an edge of each parts them (separating axes: Gottschalk,
 Lin and Manocha, SIGGRAPH 1996). Where no node is in contact or contact begins, no such plane is left, and the smallest
@@ -7,6 +7,8 @@ overlap is that of two edges with directions d_a and d_b, these carry:
     n = ± d_a x d_b / |d_a x d_b|, out of b,   depth δ = n·(p_b - p_a),   p: nearest points of the two lines
 
 with the force of a node contact. The edges are kept until they part, become parallel or leave each other past an end.
+Where faces lie on one another, as of beams that cross, other edges cross beside these with the same normal, each with
+a depth of its own (`next_beside`).
 """
 
 from __future__ import annotations
@@ -20,7 +22,11 @@ PARALLEL = 0.05
 """Sine of the angle below which two edges do not cross."""
 SUPPORT = 1e-6
 """Share of the radius by which an edge may be off the outermost point of its block."""
-SCRATCH = 8
+FLAT = 0.99875
+"""Cosine of the angle of two normals from which edges cross beside others: sine 0.05."""
+ENDS = 0.01
+"""Share of an edge at its ends where the node of its vertex does for a crossing beside others."""
+SCRATCH = 9
 """Rows of the work space of a pair before those for the vertices of both blocks."""
 
 
@@ -80,7 +86,7 @@ def find_crossing(shapes, a, b, x, R, deepest, scratch):
 
 @inner
 def crossing(shapes, a, b, number, x, R, plane, point, scratch):
-    """Depth of a pair of edges [m], and whether they still meet between their ends.
+    """Depth of a pair of edges [m], and the share of an edge that they meet before the nearest end, negative past it.
 
     plane, point (3,): set to the normal out of b and to the point of a, both in the frame of a; scratch (8, 3), of
     which rows 4 and 5 are not used."""
@@ -92,7 +98,7 @@ def crossing(shapes, a, b, number, x, R, plane, point, scratch):
     for k in range(3):
         pb[k] += x[b, k] - x[a, k]
     if not _normal(da, db, n):
-        return 0.0, False
+        return 0.0, -1.0
     for k in range(3):
         for j in range(3):
             outward += n[k] * (R[b, k, j] * shapes.edge_out[eb, j] - R[a, k, j] * shapes.edge_out[ea, j])
@@ -105,7 +111,47 @@ def crossing(shapes, a, b, number, x, R, plane, point, scratch):
         point[k] = 0.0
         for j in range(3):
             point[k] += R[a, j, k] * (pa[j] + s * da[j])
-    return depth, 0.0 <= s <= 1.0 and 0.0 <= t <= 1.0
+    return depth, min(min(s, 1.0 - s), min(t, 1.0 - t))
+
+
+@inner
+def next_beside(shapes, a, b, n, number, leading, level, x, R, plane, point, scratch):
+    """The next pair of edges after `number` that cross between their ends in faces across n (3,), out of b, or that
+    is `leading`; level: whether there are such faces.
+
+    plane, point, scratch: as of `crossing`   →   (number of the pair or -1, depth [m], negative where they are apart)
+    """
+    count_b = shapes.edge_start[b + 1] - shapes.edge_start[b]
+    count_a = shapes.edge_start[a + 1] - shapes.edge_start[a]
+    start = number + 1
+    for i in range(start // count_b, count_a):
+        if not _across(shapes, a, shapes.edge_start[a] + i, R, n, -1.0):
+            continue
+        for j in range(max(start - i * count_b, 0), count_b):
+            if not _across(shapes, b, shapes.edge_start[b] + j, R, n, 1.0):
+                continue
+            depth, within = crossing(shapes, a, b, i * count_b + j, x, R, plane, point, scratch)
+            along = 0.0
+            for k in range(3):
+                along += n[k] * (R[a, k, 0] * plane[0] + R[a, k, 1] * plane[1] + R[a, k, 2] * plane[2])
+            if i * count_b + j == leading or (level and within > ENDS and along > FLAT):
+                return i * count_b + j, depth
+    return -1, 0.0
+
+
+@inner
+def _across(shapes, a, edge, R, n, sign):
+    """Whether an edge of a is nearly across n (3,) and its faces look along sign n."""
+    begin = shapes.node_start[a]
+    first, second = begin + shapes.edge[edge, 0], begin + shapes.edge[edge, 1]
+    along = size = outward = 0.0
+    for j in range(3):
+        m = R[a, 0, j] * n[0] + R[a, 1, j] * n[1] + R[a, 2, j] * n[2]
+        d = shapes.node[second, j] - shapes.node[first, j]
+        along += m * d
+        size += d * d
+        outward += m * shapes.edge_out[edge, j]
+    return sign * outward > 0.0 and along * along < PARALLEL * PARALLEL * size
 
 
 @inner

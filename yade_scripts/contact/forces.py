@@ -8,7 +8,7 @@ import numpy as np
 
 from yade_scripts.blocks.block import Block
 from yade_scripts.blocks.faces import FixedPlane
-from yade_scripts.contact.arrays import Bodies, Law, Pairs, Slots, empty_rows
+from yade_scripts.contact.arrays import CROSSINGS, Bodies, Law, Pairs, Slots, empty_rows
 from yade_scripts.contact.ground import NO_GROUND, GroundSurface
 from yade_scripts.contact.kernel import carry_slots, contact_forces
 from yade_scripts.contact.law import ContactLaw
@@ -54,7 +54,11 @@ class ContactForces:
         rows = np.array([materials.index(name) for name in names], np.int64)
         self._bodies = _bodies(blocks, len(planes), face_stiffness, free, rows)
         self._law = Law(
-            law.shear_ratio, law.damping_ratio, law.tangential_damping_ratio, law.friction_table(materials)
+            law.shear_ratio,
+            law.damping_ratio,
+            law.tangential_damping_ratio,
+            law.friction_table(materials),
+            law.stiffness is not None,
         )
         self._closing = np.concatenate([closing, np.full(len(planes), np.inf)])
         self._free = np.concatenate([free, np.zeros(len(planes), bool)])
@@ -109,7 +113,7 @@ class ContactForces:
         """Pairs (p, 2) in order; what known pairs remember goes on. Others begin with the depth there is where a joint
         has parted (keys `parted`) or as_deep."""
         a, b = pairs.T.copy()
-        size = self._nodes[a] + self._nodes[b] + 1
+        size = self._nodes[a] + self._nodes[b] + CROSSINGS
         start = np.concatenate([[0], np.cumsum(size)]).astype(np.int64)
         total = int(start[-1])
         slots = Slots.empty(total)

@@ -10,13 +10,17 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from yade_scripts.contact.arrays import CROSSINGS
 from yade_scripts.contact.edges import pair_scratch
 from yade_scripts.contact.ground import scan_ground
-from yade_scripts.contact.search import closing_bound, cross, planes_seen_from, scan, separation
+from yade_scripts.contact.search import closing_bound, cross, lie_flat, planes_seen_from, scan, separation
 from yade_scripts.contact.springs import Mode, apply, set_dashpots
 
 CROSSING = 0.5
 """Overlap of crossing edges over that of faces below which nodes that touch leave the contact to the edges as well."""
+SAME = 1.0 + 1e-6
+"""Overlap of crossing edges over that of faces up to which edges carry where no node does: that of flat beams is the
+same."""
 
 
 @njit(cache=True)
@@ -51,24 +55,33 @@ def contact_forces(shapes, bodies, law, pairs, slots, ground, x, v, R, dt, last_
             gap, nearest = separation(shapes.node, begin, shapes.vertex_end[node_body], planes, faces)
             apart = max(apart, gap)
             if gap <= margin or pairs.touching[p]:
-                slot = pairs.start[p] if node_body == a else pairs.start[p + 1] - 1 - (end - begin)
+                slot = pairs.start[p] if node_body == a else pairs.start[p + 1] - CROSSINGS - (end - begin)
                 count, lost = scan(
-                    shapes, bodies, law.shear, slots, slot, pairs.fresh[p], node_body, face_body, planes, faces,
+                    shapes, bodies, law, slots, slot, pairs.fresh[p], node_body, face_body, planes, faces,
                     nearest, margin, x, v, R, last_dt, rows, count, lost, scratch,
                 )  # fmt: skip
-        last = pairs.start[p + 1] - 1
-        if slots.face[last] >= 0 or (
-            apart < 0.0 and b < len(F) and (count == first or not pairs.touching[p])
-        ):
-            deepest = -apart if count == first else -CROSSING * apart
+        base, nodes = pairs.start[p + 1] - CROSSINGS, count
+        known = False
+        for s in range(base, base + CROSSINGS):
+            known = known or slots.face[s] >= 0
+        meets = apart < 0.0 and b < len(F)
+        leads = meets and (count == first or not pairs.touching[p])
+        flat = meets and count > first and not known and lie_flat(shapes, slots, a, b, R, rows, first, count)
+        if known or leads or flat:
+            deepest = 0.0
+            if leads:
+                deepest = -SAME * apart if count == first else -CROSSING * apart
             count, lost, parted = cross(
-                shapes, bodies, law.shear, slots, last, pairs.fresh[p], a, b, deepest, x, v, R, last_dt, rows, count,
-                lost, scratch,
+                shapes, bodies, law.shear, slots, base, pairs.fresh[p], a, b, deepest, flat, x, v, R, last_dt, rows,
+                first, count, lost, scratch,
             )  # fmt: skip
             apart = max(apart, parted)
         pairs.overlap[p] = max(0.0, -apart)
-        if slots.face[last] >= 0:
-            pairs.overlap[p] = min(pairs.overlap[p], rows.depth[count - 1] + slots.rest[last])
+        if count > nodes:
+            deepest = 0.0
+            for c in range(nodes, count):
+                deepest = max(deepest, rows.depth[c] + slots.rest[rows.slot[c]])
+            pairs.overlap[p] = min(pairs.overlap[p], deepest)
         pairs.fresh[p], pairs.touching[p] = 0.0, count > first
         if count > first:
             yields, K = set_dashpots(bodies, law, a, b, R, rows, first, count, scratch)

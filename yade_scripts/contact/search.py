@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from yade_scripts.contact.arrays import BEGINS
-from yade_scripts.contact.edges import crossing, find_crossing
+from yade_scripts.contact.arrays import BEGINS, CROSSINGS
+from yade_scripts.contact.edges import FLAT, PARALLEL, crossing, find_crossing, next_beside
 from yade_scripts.contact.jit import inner
+from yade_scripts.contact.overlap import share_of_overlap
 from yade_scripts.contact.springs import ARRIVED, let_go, stiffness_together, take_over, way_of
 
 ALIGNED = 0.02
@@ -69,7 +70,7 @@ def separation(node, begin, end, planes, faces):
 def scan(
     shapes,
     bodies,
-    shear,
+    law,
     slots,
     slot,
     fresh,
@@ -105,7 +106,7 @@ def scan(
             depth = _behind(planes, g, xi0, xi1, xi2)
             if depth <= 0.0 or smallest < -margin:
                 way_of(v, R, x, a, b, xi0, xi1, xi2, planes[g], last_dt, scratch, way)
-                lost += let_go(slots, s, shear, depth, way, R, b)
+                lost += let_go(slots, s, law.shear, depth, way, R, b)
                 continue
         elif smallest < -margin:
             continue
@@ -118,6 +119,8 @@ def scan(
             depth = _behind(planes, g, xi0, xi1, xi2)
             slots.face[s] = base + g
             slots.k[s] = stiffness_together(bodies.stiffness[a], bodies.stiffness[b]) / shapes.face_nodes[own]
+            if law.whole:
+                slots.k[s] *= share_of_overlap(shapes, a, own, b, g, planes, faces, margin, x, R)
             slots.spread[s] = shapes.face_spread[own]
             slots.shear[s, 0] = slots.shear[s, 1] = slots.shear[s, 2] = 0.0
             slots.push[s] = BEGINS
@@ -135,35 +138,121 @@ def scan(
 
 @inner
 def cross(
-    shapes, bodies, shear, slots, s, fresh, a, b, deepest, x, v, R, last_dt, rows, count, lost, scratch
+    shapes, bodies, shear, slots, base, fresh, a, b, deepest, flat, x, v, R, last_dt, rows, first, count, lost, scratch
 ):  # fmt: skip
-    """Contact of an edge of a with one of b, known or new; the third result parts the blocks if it is positive [m]."""
-    plane, xi, way = scratch[4], scratch[5], scratch[6:8]
-    known = slots.face[s] >= 0
-    if not known:
-        slots.face[s], parted = find_crossing(shapes, a, b, x, R, deepest, scratch)
-        if slots.face[s] < 0:
-            return count, lost, parted
-    depth, meet = crossing(shapes, a, b, slots.face[s], x, R, plane, xi, scratch)
-    if not meet or depth <= 0.0:
-        if known:
+    """Contacts of edges of a with edges of b, known or new; the third result parts the blocks if it is positive [m].
+
+    rows first .. count: contacts of nodes of the pair · deepest [m]: least overlap of edges that leads to a contact,
+    0: none does · flat: edges may cross in the faces of these nodes."""
+    nodes, parted, leading = count - first, -1.0, -1
+    plane, xi, way, n = scratch[4], scratch[5], scratch[6:8], scratch[8]
+    for s in range(base, base + CROSSINGS):
+        if slots.face[s] >= 0:
+            depth, within = crossing(shapes, a, b, slots.face[s], x, R, plane, xi, scratch)
+            if within < 0.0 or depth <= 0.0:
+                way_of(v, R, x, a, b, xi[0], xi[1], xi[2], plane, last_dt, scratch, way)
+                lost += let_go(slots, s, shear, depth, way, R, b)
+            else:
+                count = _write_crossing(slots, s, a, b, plane, depth, xi, x, R, rows, count)
+    if count - first == nodes and deepest > 0.0:
+        leading, parted = find_crossing(shapes, a, b, x, R, deepest, scratch)
+    if leading >= 0:
+        crossing(shapes, a, b, leading, x, R, plane, xi, scratch)
+        for k in range(3):
+            n[k] = R[a, k, 0] * plane[0] + R[a, k, 1] * plane[1] + R[a, k, 2] * plane[2]
+    elif count - first > nodes or flat:
+        for k in range(3):
+            n[k] = rows.normal[count - 1, k] if rows.a[count - 1] == a else -rows.normal[count - 1, k]
+    else:
+        return count, lost, parted
+    level = _has_face(shapes, a, n, R) and _has_face(shapes, b, n, R)
+    there, number = 0, -1
+    while True:
+        number, _ = next_beside(shapes, a, b, n, number, leading, level, x, R, plane, xi, scratch)
+        if number < 0:
+            break
+        there += 1
+    k = 2.0 * stiffness_together(bodies.stiffness[a], bodies.stiffness[b]) / (max(there, 2) + nodes)
+    while True:
+        number, depth = next_beside(shapes, a, b, n, number, leading, level, x, R, plane, xi, scratch)
+        if number < 0:
+            return count, lost, -1.0
+        s = _free_slot(slots, base, number)
+        if depth > 0.0 and s >= 0:
+            slots.face[s], slots.k[s], slots.spread[s] = number, k, 1.0
+            slots.shear[s, 0] = slots.shear[s, 1] = slots.shear[s, 2] = 0.0
+            slots.push[s] = BEGINS
             way_of(v, R, x, a, b, xi[0], xi[1], xi[2], plane, last_dt, scratch, way)
-            lost += let_go(slots, s, shear, depth, way, R, b)
-        slots.face[s] = -1
-        return count, lost, -1.0
-    if not known:
-        slots.k[s], slots.spread[s] = stiffness_together(bodies.stiffness[a], bodies.stiffness[b]), 1.0
-        slots.shear[s, 0] = slots.shear[s, 1] = slots.shear[s, 2] = 0.0
-        slots.push[s] = BEGINS
-        way_of(v, R, x, a, b, xi[0], xi[1], xi[2], plane, last_dt, scratch, way)
-        if fresh > 0.0:
-            lost += take_over(slots, s, fresh, depth, way[1, 0])
-        else:
-            slots.rest[s] = max(0.0, depth - ARRIVED * max(way[1, 0], 0.0))
+            if fresh > 0.0:
+                lost += take_over(slots, s, fresh, depth, way[1, 0])
+            else:
+                slots.rest[s] = max(0.0, depth - ARRIVED * max(way[1, 0], 0.0))
+            count = _write_crossing(slots, s, a, b, plane, depth, xi, x, R, rows, count)
+
+
+@inner
+def _free_slot(slots, base, number):
+    """Where a pair of edges is to be remembered; -1: it is already, or there is no room."""
+    free = -1
+    for s in range(base, base + CROSSINGS):
+        if slots.face[s] == number:
+            return -1
+        if slots.face[s] < 0 and free < 0:
+            free = s
+    return free
+
+
+@inner
+def _write_crossing(slots, s, a, b, plane, depth, xi, x, R, rows, count):
+    """The row of a contact of edges; → number of rows."""
     slots.rest[s] = min(slots.rest[s], depth)
     write_row(rows, count, a, b, s, plane, depth, xi[0], xi[1], xi[2], x, R)
     rows.depth[count], rows.kn[count] = depth - slots.rest[s], slots.k[s]
-    return count + 1, lost, -1.0
+    return count + 1
+
+
+@inner
+def lie_flat(shapes, slots, a, b, R, rows, first, count):
+    """Whether nodes of a pair have just come into contact in one line only, with a face of each nearly flat on the
+    other: beams that cross would rock about that line."""
+    begins = False
+    for c in range(first, count):
+        begins = begins or slots.push[rows.slot[c]] == BEGINS
+    if not begins:
+        return False
+    longest, u0, u1, u2 = 0.0, 0.0, 0.0, 0.0
+    for c in range(first + 1, count):
+        d0, d1, d2 = _apart(rows, first, c)
+        if d0 * d0 + d1 * d1 + d2 * d2 > longest:
+            longest, u0, u1, u2 = d0 * d0 + d1 * d1 + d2 * d2, d0, d1, d2
+    for c in range(first + 1, count):
+        d0, d1, d2 = _apart(rows, first, c)
+        along = d0 * u0 + d1 * u1 + d2 * u2
+        if (d0 * d0 + d1 * d1 + d2 * d2) * longest - along * along > (PARALLEL * longest) ** 2:
+            return False
+    return _has_face(shapes, a, rows.normal[first], R) and _has_face(shapes, b, rows.normal[first], R)
+
+
+@inner
+def _apart(rows, first, c):
+    """Way from one contact to another, three floats."""
+    return (
+        rows.point[c, 0] - rows.point[first, 0],
+        rows.point[c, 1] - rows.point[first, 1],
+        rows.point[c, 2] - rows.point[first, 2],
+    )
+
+
+@inner
+def _has_face(shapes, a, n, R):
+    """Whether a face of a is nearly across n (3,)."""
+    for f in range(shapes.face_start[a], shapes.face_start[a + 1]):
+        along = 0.0
+        for j in range(3):
+            along += shapes.normal[f, j] * (R[a, 0, j] * n[0] + R[a, 1, j] * n[1] + R[a, 2, j] * n[2])
+        if abs(along) > FLAT:
+            return True
+    return False
 
 
 @inner
