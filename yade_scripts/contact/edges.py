@@ -20,6 +20,8 @@ from yade_scripts.contact.jit import inner
 
 PARALLEL = 0.05
 """Sine of the angle below which two edges do not cross."""
+ROUND_OFF = 1e-9
+"""Sine of the angle below which two edges have no common normal."""
 SUPPORT = 1e-6
 """Share of the radius by which an edge may be off the outermost point of its block."""
 FLAT = 0.99875
@@ -67,7 +69,7 @@ def find_crossing(shapes, a, b, x, R, deepest, scratch):
             b0, b1 = shapes.edge[first_b + j, 0], shapes.edge[first_b + j, 1]
             for k in range(3):
                 db[k] = B[b1, k] - B[b0, k]
-            if not _normal(da, db, n):
+            if _normal(da, db, n) < PARALLEL:
                 continue
             if n[0] * d[0] + n[1] * d[1] + n[2] * d[2] < 0.0:
                 for k in range(3):
@@ -86,10 +88,11 @@ def find_crossing(shapes, a, b, x, R, deepest, scratch):
 
 @inner
 def crossing(shapes, a, b, number, x, R, plane, point, scratch):
-    """Depth of a pair of edges [m], and the share of an edge that they meet before the nearest end, negative past it.
+    """Depth of a pair of edges [m], and the share of an edge that they meet before the nearest end, negative past it or
+    where they no longer cross.
 
-    plane, point (3,): set to the normal out of b and to the point of a, both in the frame of a; scratch (8, 3), of
-    which rows 4 and 5 are not used."""
+    plane, point (3,): set to the normal out of b and to the point of a, both in the frame of a, also where the edges no
+    longer cross: what the springs held is known by them; scratch (8, 3), of which rows 4 and 5 are not used."""
     count_b = shapes.edge_start[b + 1] - shapes.edge_start[b]
     ea, eb = shapes.edge_start[a] + number // count_b, shapes.edge_start[b] + number % count_b
     pa, da, pb, db, n, outward = scratch[0], scratch[1], scratch[2], scratch[3], scratch[6], 0.0
@@ -97,7 +100,10 @@ def crossing(shapes, a, b, number, x, R, plane, point, scratch):
     _line(shapes, b, eb, R, pb, db)
     for k in range(3):
         pb[k] += x[b, k] - x[a, k]
-    if not _normal(da, db, n):
+    sine = _normal(da, db, n)
+    if sine == 0.0:
+        for k in range(3):
+            plane[k] = point[k] = 0.0
         return 0.0, -1.0
     for k in range(3):
         for j in range(3):
@@ -111,7 +117,7 @@ def crossing(shapes, a, b, number, x, R, plane, point, scratch):
         point[k] = 0.0
         for j in range(3):
             point[k] += R[a, j, k] * (pa[j] + s * da[j])
-    return depth, min(min(s, 1.0 - s), min(t, 1.0 - t))
+    return depth, min(min(s, 1.0 - s), min(t, 1.0 - t)) if sine >= PARALLEL else -1.0
 
 
 @inner
@@ -179,16 +185,17 @@ def _vertices(shapes, a, shift, R, out):
 
 @inner
 def _normal(da, db, n):
-    """Unit normal of two directions in n; False where they are nearly parallel."""
+    """Set n (3,) to the unit normal of two directions; → sine of the angle between them, 0 where n has no direction."""
     n[0] = da[1] * db[2] - da[2] * db[1]
     n[1] = da[2] * db[0] - da[0] * db[2]
     n[2] = da[0] * db[1] - da[1] * db[0]
     size = np.sqrt(n[0] ** 2 + n[1] ** 2 + n[2] ** 2)
-    if size < PARALLEL * np.sqrt(_dot(da, da) * _dot(db, db)):
-        return False
+    sine = size / np.sqrt(_dot(da, da) * _dot(db, db))
+    if sine < ROUND_OFF:
+        return 0.0
     for k in range(3):
         n[k] /= size
-    return True
+    return sine
 
 
 @inner
