@@ -351,6 +351,23 @@ def terrain(
 
 
 @app.command()
+def offshore(
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="an offshore.toml, or the directory that holds one")
+    ],
+) -> None:
+    """Run the sea before a coast by ANUGA and write a record for a side of a case.
+
+    One way: a wide and coarse sea from a source or a record, what passes the side of the tank as a CSV file. Needs the
+    extra `offshore`; docs/terrain.md says what the file may say.
+    """
+    one_thread()
+    from coupler.commands.offshore.command import offshore as make
+
+    print(f"record: {make(file)}")
+
+
+@app.command()
 def schema(
     to: Annotated[
         Path | None, typer.Option("--to", metavar="FILE", help="write it there; else to standard output")

@@ -13,6 +13,7 @@ EXTRAS = {
     "cad": ("gmsh",),
     "ifc": ("ifcopenshell",),
     "terrain": ("rasterio", "pyproj", "pyogrio"),
+    "offshore": ("anuga",),
     "sweep": ("pandas", "pyarrow", "statsmodels", "matplotlib"),
     "slurm": ("submitit",),
     "dask": ("dask-jobqueue",),
