@@ -1,6 +1,7 @@
 """One thread, one instruction set and the kernel cache of the present sources, before anything imports numpy, numba or
 YADE; what needs VTK first, since it cannot be imported any more once YADE is."""
 
+import os
 import signal
 
 import pytest
@@ -9,6 +10,9 @@ from hypothesis import HealthCheck, settings
 from coupler.program.start import one_thread
 
 one_thread()
+os.environ.setdefault(
+    "SURGEBREAK_THREADS", "1"
+)  # of the runs that tests start, two of which share the machine
 
 # under nohup, or as a background job of a script, these are ignored, and so by the runs that tests start
 for number, usual in ((signal.SIGHUP, signal.SIG_DFL), (signal.SIGINT, signal.default_int_handler)):

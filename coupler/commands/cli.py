@@ -14,6 +14,7 @@ from coupler.program.extras import need
 from coupler.program.failures import Failures
 from coupler.program.process import run_module
 from coupler.program.start import one_thread
+from coupler.program.threads import take_threads
 
 
 class Commands(TyperGroup):
@@ -43,6 +44,15 @@ Overrides = Annotated[
     list[str] | None,
     typer.Option(
         "--set", metavar="KEY=VALUE", help="change a value of the case, for instance time.end='2 s'"
+    ),
+]
+Threads = Annotated[
+    int | None,
+    typer.Option(
+        metavar="N",
+        help="threads that share the work, with the same results to the last digit; else SURGEBREAK_THREADS, else all "
+        "cores of the process",
+        show_default=False,
     ),
 ]
 Laws = Annotated[
@@ -85,12 +95,14 @@ def run(
     ] = None,
     end: Annotated[str | None, typer.Option(metavar="TIME", help="short for --set time.end=...")] = None,
     dry: Annotated[bool, typer.Option("--dry", help="only read the case; nothing is run")] = False,
+    threads: Threads = None,
     watch: Annotated[
         bool, typer.Option("--watch", help="with a page in the browser of this machine")
     ] = False,
 ) -> None:
     """Run a case. Ctrl-C or a file named `stop` in the run directory ends it cleanly."""
     one_thread()
+    take_threads(threads)
     take_laws(law)
     from coupler.api.case import Case
 
@@ -145,12 +157,14 @@ def resume(
     any_version: Annotated[
         bool, typer.Option("--any-version", help="go on although the program has changed since")
     ] = False,
+    threads: Threads = None,
 ) -> None:
     """Go on with a run that was stopped or killed.
 
     From its newest checkpoint, to the last digit as if it had never stopped.
     """
     one_thread()
+    take_threads(threads)
     take_laws(law)
     from coupler.run.execute import carry_out
     from coupler.run.resume import prepare

@@ -15,6 +15,7 @@ from coupler.program import terminal
 from coupler.program.arithmetic import BASELINE, missing, remark
 from coupler.program.errors import ExitCode
 from coupler.program.provenance import version, versions
+from coupler.program.threads import VARIABLE, cores
 
 
 class Finding(NamedTuple):
@@ -110,14 +111,13 @@ def _yade_run() -> Finding:
 
 
 def _threads() -> Finding:
-    asked = os.environ.get("OMP_NUM_THREADS", "not set")
-    cores = len(os.sched_getaffinity(0))
-    good = asked.isdigit() and 1 <= int(asked) <= cores
+    asked, most = os.environ.get(VARIABLE, str(cores())), cores()
+    good = asked.isdigit() and 1 <= int(asked) <= most
     return Finding(
         "threads",
-        f"{asked} of {cores} cores",
+        f"{asked} of {most} cores",
         good,
-        "unset OMP_NUM_THREADS (one thread) or set at most that many",
+        f"unset {VARIABLE} (all cores of the process) or set at most that many",
     )
 
 

@@ -1,7 +1,8 @@
 """What a command needs whatever it computes: errors and exit codes, child processes, versions, text for people.
 
 errors, failures        what can go wrong, and how a command ends then
-start, arithmetic       threads and instruction set, fixed before NumPy is loaded, so that results have the same bits
+start, arithmetic       libraries and instruction set, fixed before NumPy is loaded, so that results have the same bits
+threads                 how many threads a run works with
 kernel_cache            where compiled kernels are kept
 process, provenance     child processes of this very program; program, packages and machine of a result
 extras, terminal        optional packages; what is printed

@@ -1,4 +1,4 @@
-"""The same last digits on every processor: one thread, and the instructions of one baseline, x86-64-v3.
+"""The same last digits on every processor: one thread in the libraries, and the instructions of x86-64-v3.
 
 NumPy, OpenBLAS and Numba choose their code by the processor they find: with AVX-512 products of matrices, hyperbolic
 functions and sorting of equal numbers come out otherwise than with AVX2, first in the last digit, then in where drops

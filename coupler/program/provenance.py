@@ -9,6 +9,7 @@ from importlib import metadata
 from pathlib import Path
 
 from coupler.program.arithmetic import missing
+from coupler.program.threads import threads
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 PACKAGES = ("numpy", "scipy", "scikit-fem", "meshio", "h5py", "numba", "pydantic")
@@ -40,7 +41,7 @@ def machine() -> dict[str, str | int]:
         "processor": _processor(),
         "instructions": "its own" if missing() else os.environ.get("NUMBA_CPU_NAME", "its own"),
         "cores": os.cpu_count() or 1,
-        "threads": os.environ.get("OMP_NUM_THREADS", "not set"),
+        "threads": threads(),
         "host": platform.node(),
     }
 

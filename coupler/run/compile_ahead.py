@@ -22,7 +22,7 @@ from coupler.program.provenance import ROOT
 
 MODULES = {"solids": "fluid/cut", "water": "fluid", "structure": "yade_scripts"}
 """Where the kernels of each part are; those of fluid/cut count for solids alone. The longest first."""
-KERNEL = re.compile(r"^@(njit|inner|plain)", re.MULTILINE)
+KERNEL = re.compile(r"^@(njit|inner|plain|ranged|released)", re.MULTILINE)
 ENOUGH = 0.5
 """Share of the modules of a part with kernels in the cache, from which it counts as compiled."""
 

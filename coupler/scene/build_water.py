@@ -10,6 +10,7 @@ from coupler.case.case import Case
 from coupler.case.inflow_records import levels_of, record_of
 from coupler.geometry.tank_mesh import bed_along, floor_along, mean_bed, mesh_of, on_side
 from coupler.geometry.terrain.land import friction_of
+from coupler.program.threads import threads
 
 HEARD = 16
 """Places along a side at which the water is read that it lets go."""
@@ -22,9 +23,11 @@ def water_of(case: Case, structure, solids):
     from coupler.scene.fill import start_level, start_velocity
     from coupler.step.immersion import Immersion
     from fluid.domain.covers import OPENINGS
+    from fluid.numerics.threads import use
     from fluid.step.parameters import WaterParameters
     from fluid.step.water import Water
 
+    use(threads())
     w = case.water
     mesh = mesh_of(case.tank)
     cracks = _narrow_cracks(w.cracks, structure, mesh)

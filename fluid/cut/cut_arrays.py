@@ -88,6 +88,24 @@ class Cuts(NamedTuple):
         )
 
 
+def behind(parts: list[Cuts]) -> Cuts:
+    """Cuts of cells that follow each other, as one."""
+    if len(parts) == 1:
+        return parts[0]
+    rows = np.cumsum([0, *(len(cuts.part_cell) for cuts in parts)])
+    corners = np.cumsum([0, *(len(cuts.open_x) for cuts in parts)])
+    moved = [
+        cuts._replace(
+            wet_part=cuts.wet_part + row,
+            open_part=cuts.open_part + row,
+            open_start=cuts.open_start[min(1, k) :] + corner,
+            tet_part=cuts.tet_part + row,
+        )
+        for k, (cuts, row, corner) in enumerate(zip(parts, rows, corners))
+    ]
+    return Cuts(*(np.concatenate(arrays) for arrays in zip(*moved)))
+
+
 def doubled(out, at) -> Output:
     """Arrays of twice the length with the rows that were filled; at (5,) as in `trimmed`."""
     filled = _filled(out, at)

@@ -15,9 +15,8 @@ vertices made by splitting only round-off is snapped (see `pieces.py`).
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from fluid.cut.cut_arrays import Cuts, doubled, output, trimmed
+from fluid.cut.cut_arrays import Cuts, behind, doubled, output, trimmed
 from fluid.cut.fans import fan
 from fluid.cut.parts_of_cell import label_parts
 from fluid.cut.pieces import (
@@ -35,12 +34,15 @@ from fluid.cut.pieces import (
     workspace,
 )
 from fluid.cut.wetted_polygons import wetted
-from fluid.numerics.jit import inner
+from fluid.numerics.jit import inner, released
+from fluid.numerics.threads import over
 
 # A piece too thin for its cross-section to close goes to one side whole; thicker ones are an error.
 THIN = 1e-6
 # Wetted polygons below this share of h^2 are round-off.
 NO_AREA = 1e-15
+# Cutting a cell takes as long as so many visits of a node.
+WORK = 500
 
 
 class CutFailed(RuntimeError):
@@ -216,15 +218,17 @@ def _emit(w, cell, origin, count, n_near, whole, normals, round_off, least, link
     return DONE
 
 
-@njit(cache=True)
+@released
 def _cut_cells(
-    nodes, cells, chosen, body_start, bodies, normals, offsets, plane_start, tolerance, spacing, link_area,
+    last, nodes, cells, chosen, body_start, bodies, normals, offsets, plane_start, tolerance, spacing, link_area,
     w, out, at,
 ):  # fmt: skip
-    """Cut the cells `chosen` from at[0] on; at (5,) <- cells, parts, wetted polygons, openings, tetrahedra done."""
+    """Cut the cells `chosen` from at[0] to before `last`.
+
+    at (5,) <- cells, parts, wetted polygons, openings, tetrahedra done."""
     x = np.empty((4, 3))
     round_off, thin, least = ROUND_OFF * spacing, THIN * spacing, NO_AREA * spacing * spacing
-    for row in range(at[0], len(chosen)):
+    for row in range(at[0], last):
         for k in range(4):
             for c in range(3):
                 x[k, c] = nodes[cells[chosen[row], k], c]
@@ -265,22 +269,33 @@ def cut_cells(nodes, cells, chosen, body_start, bodies, solids, tolerance, spaci
     link_area [m2], one or (C,): pieces of a cell are one part where they touch over more than this; < 0: all pieces of
     a cell are one part and no openings are listed.
     Raises CutFailed where the cross-section of a piece that is not thin cannot be closed."""
-    at = np.zeros(5, dtype=np.int64)
     link_area = np.broadcast_to(np.asarray(link_area, float), len(chosen)).copy()
+    mesh, which = (nodes, cells), (chosen, body_start, bodies)
+    return behind(
+        over(_cut_range, len(chosen), mesh, which, solids, tolerance, spacing, link_area, weight=WORK)
+    )
+
+
+def _cut_range(first, last, mesh, which, solids, tolerance, spacing, link_area) -> Cuts:
+    """Those of the chosen cells from `first` to before `last`; arguments of `cut_cells`."""
+    at = np.array([first, 0, 0, 0, 0])
+    chosen, body_start, bodies = which
     scale = 1
-    most_bodies = int(np.diff(body_start).max()) if len(chosen) else 0
+    most_bodies = int(np.diff(body_start[first : last + 1]).max()) if last > first else 0
     most_planes = int(np.diff(solids.plane_start).max()) if len(solids) else 0
     w = workspace(scale, most_bodies, most_bodies * most_planes)
-    out = output(len(chosen) * 4 + 64, len(chosen) * 32 + 256, bool((link_area >= 0).all()))
+    count = last - first
+    out = output(count * 4 + 64, count * 32 + 256, bool((link_area >= 0).all()))
     offsets = solids.cut_offsets()
     while True:
         state = _cut_cells(
-            nodes, cells, chosen, body_start, bodies, solids.normals, offsets, solids.plane_start,
+            last, *mesh, chosen, body_start, bodies, solids.normals, offsets, solids.plane_start,
             tolerance, spacing, link_area, w, out, at,
         )  # fmt: skip
         if state == DONE:
             return _with_volume(trimmed(out, at))
         if state == BROKEN_CAP:
+            nodes, cells = mesh
             raise CutFailed(_failure(cells, nodes, chosen, body_start, bodies, int(at[0])))
         if state == WORKSPACE_FULL:
             scale *= 2

@@ -13,10 +13,13 @@ from numba import njit
 
 from fluid.cut.pieces import workspace
 from fluid.cut.polygons import shared_area
-from fluid.numerics.jit import inner
+from fluid.numerics.jit import inner, released
+from fluid.numerics.threads import over
 
 CLIP = 1e-12
 """Tolerance for clipping the open polygons, as a share of h."""
+WORK = 20
+"""The contacts of a cell take as long as so many visits of a node."""
 
 
 class Contacts(NamedTuple):
@@ -41,13 +44,22 @@ def find_contacts(
     near = _with_parts(part, start) if again is None else again
     searched = _beside(mesh.neighbours, near)
     order, open_start = _openings_by_face(cuts.open_part, cuts.open_face, len(cuts.part_cell))
-    count = _count(searched, mesh.neighbours, part, start)
+    state = (mesh, part, start, order, open_start, cuts, enough)
+    found = over(_in_range, len(searched), searched, *state, weight=WORK)
+    fresh = found[0] if len(found) == 1 else Contacts(*(np.concatenate(arrays) for arrays in zip(*found)))
+    return fresh if again is None or old is None else _merged(old, searched, fresh)
+
+
+def _in_range(first, last, searched, mesh, part, start, order, open_start, cuts, enough) -> Contacts:
+    """Contacts of the searched cells from `first` to before `last`."""
+    chosen = searched[first:last]
+    count = _count(chosen, mesh.neighbours, part, start)
     fresh = Contacts(np.empty(count, np.int64), np.empty(count), np.empty(count))
     _find(
-        searched, mesh.nodes, mesh.cells, mesh.neighbours, part, start, order, open_start, cuts.open_start,
+        chosen, mesh.nodes, mesh.cells, mesh.neighbours, part, start, order, open_start, cuts.open_start,
         cuts.open_x, CLIP * mesh.spacing, enough, workspace(1, 0, 0), *fresh,
     )  # fmt: skip
-    return fresh if again is None or old is None else _merged(old, searched, fresh)
+    return fresh
 
 
 def _merged(old: Contacts, searched, fresh: Contacts) -> Contacts:
@@ -102,7 +114,7 @@ def _openings_by_face(open_part, open_face, n_parts):
     return order, start
 
 
-@njit(cache=True)
+@released
 def _count(searched, neighbours, part, start):
     n = 0
     for one in searched:
@@ -116,7 +128,7 @@ def _count(searched, neighbours, part, start):
     return n
 
 
-@njit(cache=True)
+@released
 def _find(
     searched, nodes, cells, neighbours, part, start, order, open_start, polygon_start, polygon_x, tolerance,
     enough, w, cell, area, full,

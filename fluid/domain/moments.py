@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from fluid.numerics.jit import inner, plain
+from fluid.numerics.jit import inner, plain, released
+from fluid.numerics.threads import found_over, over, owning, reach_of_cells
 
 
 @plain
@@ -116,35 +117,48 @@ def part_moments(e, phi, parts, total, local, out):
                 total[a] += weight * parts.corners[t, q, a]
 
 
-@njit(cache=True)
 def nodal_water(cell_list, shift, phi, parts, n_nodes):
     """∫_{φ+shift<0} N_i dV (N,) [m³] over the listed cells of the FluidParts; phi (N,) [m]."""
     water = np.zeros(n_nodes)
-    at, total, local, out = np.empty(4), np.empty(4), np.empty(4), np.empty(4)
-    cells, volume, share = parts.cells, parts.volume, parts.share
-    for s in range(cell_list.shape[0]):
-        e = cell_list[s]
-        n_wet = 0
-        for a in range(4):
-            at[a] = phi[cells[e, a]] + shift
-            n_wet += at[a] < 0.0
-        if n_wet == 4:  # most cells: not worth a call
-            for a in range(4):
-                water[cells[e, a]] += volume[e] * share[e, a]
-        elif n_wet > 0:
-            part_moments(e, at, parts, total, local, out)
-            for a in range(4):
-                water[cells[e, a]] += total[a]
+    reach = reach_of_cells(cell_list, parts.cells)
+    owning(_nodal_water, n_nodes, reach, len(cell_list), cell_list, shift, phi, parts, water)
     return water
 
 
-@njit(cache=True)
+@released
+def _nodal_water(first, last, runs, cell_list, shift, phi, parts, water):
+    at, total, local, out = np.empty(4), np.empty(4), np.empty(4), np.empty(4)
+    cells, volume, share = parts.cells, parts.volume, parts.share
+    for run in range(runs.shape[0]):
+        for s in range(runs[run, 0], runs[run, 1]):
+            e = cell_list[s]
+            n_wet = 0
+            for a in range(4):
+                at[a] = phi[cells[e, a]] + shift
+                n_wet += at[a] < 0.0
+            if n_wet == 4:  # most cells: not worth a call
+                for a in range(4):
+                    if first <= cells[e, a] < last:
+                        water[cells[e, a]] += volume[e] * share[e, a]
+            elif n_wet > 0:
+                part_moments(e, at, parts, total, local, out)
+                for a in range(4):
+                    if first <= cells[e, a] < last:
+                        water[cells[e, a]] += total[a]
+
+
 def wet_fraction(cell_list, phi, parts):
     """Share of the fluid part of each listed cell with φ < 0, (n,)."""
-    share = np.empty(cell_list.shape[0])
+    share = np.empty(len(cell_list))
+    over(_wet_fraction, len(cell_list), cell_list, phi, parts, share)
+    return share
+
+
+@released
+def _wet_fraction(first, last, cell_list, phi, parts, share):
     at, total, local, out = np.empty(4), np.empty(4), np.empty(4), np.empty(4)
     cells, start = parts.cells, parts.start
-    for s in range(cell_list.shape[0]):
+    for s in range(first, last):
         e = cell_list[s]
         n_wet = 0
         for a in range(4):
@@ -155,7 +169,6 @@ def wet_fraction(cell_list, phi, parts):
             continue
         part_moments(e, at, parts, total, local, out)
         share[s] = min((total[0] + total[1] + total[2] + total[3]) / parts.volume[e], 1.0)
-    return share
 
 
 @njit(cache=True)
@@ -170,12 +183,17 @@ def cells_touching(marked, cells):
     return found[:n].copy()
 
 
-@njit(cache=True)
 def touching_among(cell_list, marked, cells):
     """Those of the listed cells (k,) with at least one marked corner, in their order; marked (N,) bool."""
-    found = np.empty(cell_list.shape[0], np.int64)
+    return found_over(_touching_among, len(cell_list), cell_list, marked, cells)
+
+
+@released
+def _touching_among(first, last, cell_list, marked, cells):
+    found = np.empty(last - first, np.int64)
     n = 0
-    for e in cell_list:
+    for s in range(first, last):
+        e = cell_list[s]
         if marked[cells[e, 0]] or marked[cells[e, 1]] or marked[cells[e, 2]] or marked[cells[e, 3]]:
             found[n] = e
             n += 1

@@ -18,6 +18,8 @@ from numba import njit
 from fluid.domain.coupling_matrix import polygons_of_nodes
 from fluid.domain.moments import FluidParts
 from fluid.mesh.background import Background
+from fluid.numerics.jit import ranged, released
+from fluid.numerics.threads import over
 
 
 @dataclass(frozen=True)
@@ -139,7 +141,9 @@ class Topology:
     @cached_property
     def around_by_cells(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """`around`, and how many cells each of these neighbours shares with the node."""
-        return _nodes_around(self.cells, self.node_start, self.node_cells)
+        n = len(self.nodes)
+        rows = (self.cells, self.node_start, self.node_cells)
+        return _one_behind_the_other(over(_nodes_around, n, *rows, weight=WORK))
 
     @cached_property
     def near_solids(self) -> np.ndarray:
@@ -151,7 +155,9 @@ class Topology:
     def cells_around(self, nodes) -> np.ndarray:
         """Numbers of the cells with at least one of these nodes (N,) bool, in order; cost grows with their number only,
         but for a byte a cell."""
-        return np.flatnonzero(_touched(nodes, self.node_start, self.node_cells, len(self.cells)))
+        touched = np.zeros(len(self.cells), bool)
+        over(_touched, len(nodes), nodes, self.node_start, self.node_cells, touched)
+        return np.flatnonzero(touched)
 
     @property
     def active(self) -> np.ndarray:
@@ -268,15 +274,26 @@ def _neighbours(parent_neighbours, cells, parent, n_parents):
     return found
 
 
-@njit(cache=True)
-def _nodes_around(cells, node_start, node_cells):
-    """start (N + 1,), neighbours: nodes that share a cell with each node, in the order of its cells; how many cells."""
-    n = node_start.shape[0] - 1
+def _one_behind_the_other(parts):
+    """start (n + 1,) of rows that come in parts, with what the rows hold: of each part (start, what, what)."""
+    if len(parts) == 1:
+        return parts[0]
+    starts, first, second = zip(*parts)
+    before = np.cumsum([0, *(start[-1] for start in starts)])
+    start = np.concatenate([starts[0][:1], *(s[1:] + b for s, b in zip(starts, before))])
+    return start.astype(np.uint32), np.concatenate(first), np.concatenate(second)
+
+
+@released
+def _nodes_around(first, last, cells, node_start, node_cells):
+    """start (n + 1,), neighbours: nodes that share a cell with each node, in the order of its cells; how many cells."""
+    n = last - first
     start = np.zeros(n + 1, np.uint32)
-    slot = np.full(n, -1, np.int64)
+    slot = np.full(node_start.shape[0] - 1, -1, np.int64)
     around, shared = np.empty(16 * n + 64, np.uint32), np.empty(16 * n + 64, np.uint8)
     count = 0
-    for i in range(n):
+    for i in range(first, last):
+        row_start = count
         most = 3 * int(node_start[i + 1] - node_start[i])
         if count + most > around.shape[0]:
             around = np.concatenate((around, np.empty(around.shape[0] + most, np.uint32)))
@@ -286,24 +303,22 @@ def _nodes_around(cells, node_start, node_cells):
                 j = cells[node_cells[t], a]
                 if j == i:
                     continue
-                if slot[j] < start[i]:
+                if slot[j] < row_start:
                     slot[j] = count
                     around[count], shared[count] = j, 0
                     count += 1
                 shared[slot[j]] += 1
-        start[i + 1] = count
+        start[i - first + 1] = count
     return start, around[:count].copy(), shared[:count].copy()
 
 
-@njit(cache=True)
-def _touched(nodes, node_start, node_cells, n_cells):
-    """(n_cells,) bool: cells around these nodes (N,) bool."""
-    touched = np.zeros(n_cells, np.bool_)
-    for i in range(nodes.shape[0]):
+@ranged
+def _touched(first, last, nodes, node_start, node_cells, touched):
+    """(M,) bool: cells around these nodes (N,) bool; several threads may say so of one cell."""
+    for i in range(first, last):
         if nodes[i]:
             for t in range(node_start[i], node_start[i + 1]):
                 touched[node_cells[t]] = True
-    return touched
 
 
 @njit(cache=True)
@@ -356,8 +371,9 @@ class Graph:
         t = topology
         row = np.full(len(t.nodes), -1, np.int64)
         row[nodes] = np.arange(len(nodes))
-        start, neighbour, stiffness = _edges(
-            nodes, t.cells, t.parent, t.products, t.volume, t.node_start, t.node_cells
+        mesh = (t.cells, t.parent, t.products, t.volume, t.node_start, t.node_cells)
+        start, neighbour, stiffness = _one_behind_the_other(
+            over(_edges, len(nodes), nodes, *mesh, weight=WORK)
         )
         return cls(nodes, row, start, neighbour, stiffness)
 
@@ -380,6 +396,8 @@ class Graph:
         return replace(self, stiffness=stiffness)
 
 
+WORK = 10
+"""To find the edges of a node takes as long as so many visits."""
 _PAIR = np.array([[-1, 0, 1, 2], [0, -1, 3, 4], [1, 3, -1, 5], [2, 4, 5, -1]])
 """Column of Background.products that holds the corners a, b."""
 
@@ -397,16 +415,17 @@ def _take_out(cell_list, cells, parent, products, volume, row, start, neighbour,
                         stiffness[s] -= volume[e] * products[parent[e], _PAIR[a, b]]
 
 
-@njit(cache=True)
-def _edges(rows, cells, parent, products, volume, node_start, node_cells):
+@released
+def _edges(first, last, rows, cells, parent, products, volume, node_start, node_cells):
+    n = last - first
     slot = np.full(node_start.shape[0] - 1, -1, np.int64)
-    start = np.zeros(rows.shape[0] + 1, np.uint32)
-    capacity = 16 * rows.shape[0] + 64
+    start = np.zeros(n + 1, np.uint32)
+    capacity = 16 * n + 64
     neighbour = np.empty(capacity, np.uint32)
     stiffness = np.empty(capacity)
     count = 0
-    for r in range(rows.shape[0]):
-        i = rows[r]
+    for r in range(n):
+        i = rows[first + r]
         most = 3 * int(node_start[i + 1] - node_start[i])
         if count + most > capacity:
             capacity = 2 * capacity + most

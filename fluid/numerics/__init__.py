@@ -5,6 +5,7 @@ bounded               the same with a lower bound on the unknowns (theory 2.2)
 sums                  momentum, kinetic energy and loads of many points
 cube_root             with the same bits on every processor
 jit                   how small kernels are compiled
+threads               kernels on several threads, with the same bits at any number of them
 
 Imports nothing of the project.
 """

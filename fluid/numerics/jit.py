@@ -27,3 +27,14 @@ def plain(function):
 def inner(function):
     """The same for functions that only other kernels call: without a Python entry they compile a third faster."""
     return _numbers(njit(cache=True, no_cpython_wrapper=True, no_cfunc_wrapper=True, _nrt=False)(function))
+
+
+def ranged(function):
+    """For functions that `threads.over` and its like run on several threads: they take a range first, make no arrays,
+    and let other threads of Python run meanwhile."""
+    return _numbers(njit(cache=True, nogil=True, _nrt=False)(function))
+
+
+def released(function):
+    """The same for functions that make arrays, for work space or for what they return."""
+    return _numbers(njit(cache=True, nogil=True)(function))

@@ -11,9 +11,10 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from numba import njit
 
+from fluid.numerics.jit import ranged
 from fluid.numerics.multigrid import Multigrid, unsigned
+from fluid.numerics.threads import over
 
 MULTIGRID_FROM = 1_000
 MULTIGRID_FROM_WITH_EXTRA = 300
@@ -117,16 +118,20 @@ def _without(held, v):
     return v
 
 
-@njit(cache=True)
 def _product(indptr, indices, data, v):
     """A v (n,): for small systems scipy spends most of its time before it multiplies."""
     out = np.empty(len(v))
-    for i in range(len(v)):
+    over(_rows, len(v), indptr, indices, data, v, out)
+    return out
+
+
+@ranged
+def _rows(first, last, indptr, indices, data, v, out):
+    for i in range(first, last):
         total = 0.0
         for s in range(indptr[i], indptr[i + 1]):
             total += data[s] * v[indices[s]]
         out[i] = total
-    return out
 
 
 def _preconditioner(A, multigrid_from: int) -> Callable:

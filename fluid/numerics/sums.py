@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from fluid.numerics.jit import ranged
+from fluid.numerics.threads import CHUNK, summed
 
 
 def momentum_of(weight, u, place) -> np.ndarray:
@@ -11,21 +13,26 @@ def momentum_of(weight, u, place) -> np.ndarray:
     return momentum_of_rows(np.arange(len(weight)), 1.0, weight, u, place, np.zeros(3))
 
 
-@njit(cache=True)
 def momentum_of_rows(rows, density, volume, u, nodes, reference):
     """ρ Σ W_i [u_i; (x_i - x_0) × u_i] (6,) over `rows`; volume W (n,) [m³], nodes x (n, 3), reference x_0 (3,)."""
-    out = np.zeros(6)
-    for i in rows:
-        m = density * volume[i]
-        r0, r1, r2 = nodes[i, 0] - reference[0], nodes[i, 1] - reference[1], nodes[i, 2] - reference[2]
-        p0, p1, p2 = m * u[i, 0], m * u[i, 1], m * u[i, 2]
-        out[0] += p0
-        out[1] += p1
-        out[2] += p2
-        out[3] += r1 * p2 - r2 * p1
-        out[4] += r2 * p0 - r0 * p2
-        out[5] += r0 * p1 - r1 * p0
-    return out
+    return summed(_momentum, len(rows), (6,), rows, density, volume, u, nodes, reference)
+
+
+@ranged
+def _momentum(first, last, rows, density, volume, u, nodes, reference, partial):
+    for c in range(first, last):
+        out = partial[c]
+        for s in range(c * CHUNK, min((c + 1) * CHUNK, rows.shape[0])):
+            i = rows[s]
+            m = density * volume[i]
+            r0, r1, r2 = nodes[i, 0] - reference[0], nodes[i, 1] - reference[1], nodes[i, 2] - reference[2]
+            p0, p1, p2 = m * u[i, 0], m * u[i, 1], m * u[i, 2]
+            out[0] += p0
+            out[1] += p1
+            out[2] += p2
+            out[3] += r1 * p2 - r2 * p1
+            out[4] += r2 * p0 - r0 * p2
+            out[5] += r0 * p1 - r1 * p0
 
 
 def about(point, load, centre) -> np.ndarray:
@@ -34,12 +41,17 @@ def about(point, load, centre) -> np.ndarray:
     return np.concatenate([load[:, :3].sum(axis=0), (load[:, 3:] + np.cross(arm, load[:, :3])).sum(axis=0)])
 
 
-@njit(cache=True)
-def kinetic_energy(density, nodal_water, velocity):
+def kinetic_energy(density, nodal_water, velocity) -> float:
     """½ ρ Σ W_i |u_i|² [J]; nodal_water (N,) [m³], velocity (N, 3) [m/s]."""
-    total = 0.0
-    for i in range(nodal_water.shape[0]):
-        if nodal_water[i] != 0.0:  # most of a tank is dry: its velocities are not even read
-            u = velocity[i]
-            total += nodal_water[i] * (u[0] * u[0] + u[1] * u[1] + u[2] * u[2])
-    return 0.5 * density * total
+    return 0.5 * density * float(summed(_square_of, len(nodal_water), (1,), nodal_water, velocity)[0])
+
+
+@ranged
+def _square_of(first, last, nodal_water, velocity, partial):
+    for c in range(first, last):
+        total = 0.0
+        for i in range(c * CHUNK, min((c + 1) * CHUNK, nodal_water.shape[0])):
+            if nodal_water[i] != 0.0:  # most of a tank is dry: its velocities are not even read
+                u = velocity[i]
+                total += nodal_water[i] * (u[0] * u[0] + u[1] * u[1] + u[2] * u[2])
+        partial[c, 0] = total

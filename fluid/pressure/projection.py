@@ -26,6 +26,9 @@ import numpy as np
 import scipy.sparse as sp
 from numba import njit
 
+from fluid.numerics.jit import ranged, released
+from fluid.numerics.threads import found_over, over, owning, reach_of_cells
+
 SMALLEST_CUT = 1e-7
 SMALLEST_WET_SHARE = 1e-6
 LEAST_RESERVE = 0.05
@@ -85,20 +88,22 @@ class PressureProblem:
         return values[values.shape[0] - self.pockets :]
 
 
-@njit(cache=True)
-def _wet_matrix(dofs, column, graph_row, start, neighbour, stiffness, phi, open_node, scale, reserve):
-    n = dofs.shape[0]
-    indptr = np.zeros(n + 1, np.int32)
-    for r in range(n):
+@ranged
+def _row_lengths(first, last, dofs, column, graph_row, start, neighbour, length):
+    for r in range(first, last):
         row = graph_row[dofs[r]]
         count = 1
         for s in range(start[row], start[row + 1]):
             count += column[neighbour[s]] >= 0
-        indptr[r + 1] = indptr[r] + count
-    indices = np.empty(indptr[n], np.int32)
-    entries = np.empty(indptr[n])
-    anchored, turned = np.zeros(n, np.bool_), np.zeros(n)
-    for r in range(n):
+        length[r] = count
+
+
+@ranged
+def _wet_rows(
+    first, last, dofs, column, graph_row, start, neighbour, stiffness, phi, open_node, scale, reserve, indptr, indices,
+    entries, anchored, turned,
+):  # fmt: skip
+    for r in range(first, last):
         i = dofs[r]
         row = graph_row[i]
         at = indptr[r]
@@ -124,7 +129,6 @@ def _wet_matrix(dofs, column, graph_row, start, neighbour, stiffness, phi, open_
             diagonal += turned[r]
         indices[indptr[r]] = r
         entries[indptr[r]] = diagonal
-    return indptr, indices, entries, anchored, turned
 
 
 def pressure_matrix(graph, phi, dofs, open_node, scale: float, reserve):
@@ -136,11 +140,16 @@ def pressure_matrix(graph, phi, dofs, open_node, scale: float, reserve):
     """
     column = np.full(len(phi), -1, np.int64)
     column[dofs] = np.arange(len(dofs))
-    g = graph
-    indptr, indices, entries, anchored, turned = _wet_matrix(
-        dofs, column, g.row, g.start, g.neighbour, g.stiffness, phi, open_node, scale, reserve
-    )
-    matrix = sp.csr_array((entries, indices, indptr), shape=(len(dofs),) * 2)
+    g, n = graph, len(dofs)
+    indptr = np.zeros(n + 1, np.int32)
+    over(_row_lengths, n, dofs, column, g.row, g.start, g.neighbour, indptr[1:])
+    np.cumsum(indptr, out=indptr)
+    indices, entries = np.empty(indptr[n], np.int32), np.empty(indptr[n])
+    anchored, turned = np.zeros(n, bool), np.zeros(n)
+    edges = (g.row, g.start, g.neighbour, g.stiffness)
+    made = (indptr, indices, entries, anchored, turned)
+    over(_wet_rows, n, dofs, column, *edges, phi, open_node, scale, reserve, *made)
+    matrix = sp.csr_array((entries, indices, indptr), shape=(n, n))
     return matrix, anchored, turned
 
 
@@ -196,119 +205,166 @@ def _reached(indptr, indices, seed):
     return reached
 
 
-@njit(cache=True)
 def cell_velocity(cell_list, u, remainder, cells, share):
     """u at the centroid of the fluid part of the listed cells plus the remainder of the cell, (n, 3).
 
     remainder (M, 3), or (0, 3) for none."""
-    out = np.zeros((cell_list.shape[0], 3))
-    for s in range(cell_list.shape[0]):
-        e = cell_list[s]
-        for k in range(3):
-            if remainder.shape[0] > 0:
-                out[s, k] = remainder[e, k]
-            for a in range(4):
-                out[s, k] += share[e, a] * u[cells[e, a], k]
+    out = np.empty((len(cell_list), 3))
+    over(_cell_velocity, len(cell_list), cell_list, u, remainder, cells, share, out)
     return out
 
 
-@njit(cache=True)
+@ranged
+def _cell_velocity(first, last, cell_list, u, remainder, cells, share, out):
+    for s in range(first, last):
+        e = cell_list[s]
+        for k in range(3):
+            out[s, k] = remainder[e, k] if remainder.shape[0] > 0 else 0.0
+            for a in range(4):
+                out[s, k] += share[e, a] * u[cells[e, a], k]
+
+
 def inflow(cell_list, u_cell, cells, parent, g, volume, n_nodes):
     """∫ u·∇N_i dV (N,) [m³/s] over the listed cells, u_cell (n, 3) one velocity each: exact for P1 velocities."""
     out = np.zeros(n_nodes)
-    for s in range(cell_list.shape[0]):
-        e = cell_list[s]
-        p = parent[e]
-        for a in range(4):
-            out[cells[e, a]] += volume[e] * (
-                u_cell[s, 0] * g[p, a, 0] + u_cell[s, 1] * g[p, a, 1] + u_cell[s, 2] * g[p, a, 2]
-            )
+    reach = reach_of_cells(cell_list, cells)
+    owning(_inflow, n_nodes, reach, len(cell_list), cell_list, u_cell, cells, parent, g, volume, out)
     return out
 
 
-@njit(cache=True)
+@ranged
+def _inflow(first, last, runs, cell_list, u_cell, cells, parent, g, volume, out):
+    for run in range(runs.shape[0]):
+        for s in range(runs[run, 0], runs[run, 1]):
+            e = cell_list[s]
+            p = parent[e]
+            for a in range(4):
+                if first <= cells[e, a] < last:
+                    out[cells[e, a]] += volume[e] * (
+                        u_cell[s, 0] * g[p, a, 0] + u_cell[s, 1] * g[p, a, 1] + u_cell[s, 2] * g[p, a, 2]
+                    )
+
+
 def with_ghosts(pressure, air, wet, open_node, phi, cell_list, cells):
     """Pressure (N,) continued to the dry corners of the listed cells through that of the air (N,) at the surface:
 
     p_j = a_j + φ_j Σ_i (p_i - a_j) φ_i / Σ_i φ_i²,    over the wet corners i beside j, once for each shared cell."""
-    up, down = np.zeros(pressure.shape[0]), np.zeros(pressure.shape[0])
-    for s in range(cell_list.shape[0]):
-        e = cell_list[s]
-        for a in range(4):
-            j = cells[e, a]
-            if wet[j]:
-                continue
-            for b in range(4):
-                i = cells[e, b]
-                if wet[i] and not open_node[i]:
-                    up[j] += (pressure[i] - air[j]) * phi[i]
-                    down[j] += phi[i] * phi[i]
-    out = pressure.copy()
-    for j in range(pressure.shape[0]):
-        if not wet[j]:
-            out[j] = air[j] + (phi[j] * up[j] / down[j] if down[j] > 0.0 else 0.0)
+    n = len(pressure)
+    out, up, down = pressure.copy(), np.zeros(n), np.zeros(n)
+    state = (pressure, air, wet, open_node, phi)
+    reach = reach_of_cells(cell_list, cells)
+    owning(_with_ghosts, n, reach, len(cell_list), cell_list, *state, cells, up, down, out)
     return out
 
 
-@njit(cache=True)
+@ranged
+def _with_ghosts(first, last, runs, cell_list, pressure, air, wet, open_node, phi, cells, up, down, out):
+    for run in range(runs.shape[0]):
+        for s in range(runs[run, 0], runs[run, 1]):
+            e = cell_list[s]
+            for a in range(4):
+                j = cells[e, a]
+                if wet[j] or not first <= j < last:
+                    continue
+                for b in range(4):
+                    i = cells[e, b]
+                    if wet[i] and not open_node[i]:
+                        up[j] += (pressure[i] - air[j]) * phi[i]
+                        down[j] += phi[i] * phi[i]
+    for j in range(first, last):
+        if not wet[j]:
+            out[j] = air[j] + (phi[j] * up[j] / down[j] if down[j] > 0.0 else 0.0)
+
+
 def cell_gradient(cell_list, f, cells, parent, g):
     """∇f (n, 3) of nodal f (N,) in the listed cells."""
-    out = np.zeros((cell_list.shape[0], 3))
-    for s in range(cell_list.shape[0]):
+    out = np.empty((len(cell_list), 3))
+    over(_cell_gradient, len(cell_list), cell_list, f, cells, parent, g, out)
+    return out
+
+
+@ranged
+def _cell_gradient(first, last, cell_list, f, cells, parent, g, out):
+    for s in range(first, last):
         e = cell_list[s]
+        for k in range(3):
+            out[s, k] = 0.0
         for a in range(4):
             for k in range(3):
                 out[s, k] += f[cells[e, a]] * g[parent[e], a, k]
+
+
+def nodal_mean(cell_list, value, wet_share, cells, share, volume, n_nodes):
+    """Σ_e w_e value_e / Σ_e w_e (N, 3), w_e = volume_e share_ea wet_e; value (n, 3), wet_share (n,) of the cells."""
+    out, weight = np.zeros((n_nodes, 3)), np.zeros(n_nodes)
+    reach = reach_of_cells(cell_list, cells)
+    own = (cell_list, value, wet_share, cells, share, volume, weight, out)
+    owning(_nodal_mean, n_nodes, reach, len(cell_list), *own)
     return out
 
 
-@njit(cache=True)
-def nodal_mean(cell_list, value, wet_share, cells, share, volume, n_nodes):
-    """Σ_e w_e value_e / Σ_e w_e (N, 3), w_e = volume_e share_ea wet_e; value (n, 3), wet_share (n,) of the cells."""
-    out = np.zeros((n_nodes, 3))
-    weight = np.zeros(n_nodes)
-    for s in range(cell_list.shape[0]):
-        e = cell_list[s]
-        w = volume[e] * max(wet_share[s], 1e-6)
-        for a in range(4):
-            i = cells[e, a]
-            wa = w * max(share[e, a], 1e-9)
-            weight[i] += wa
-            for k in range(3):
-                out[i, k] += wa * value[s, k]
-    for i in range(n_nodes):
+@ranged
+def _nodal_mean(first, last, runs, cell_list, value, wet_share, cells, share, volume, weight, out):
+    for run in range(runs.shape[0]):
+        for s in range(runs[run, 0], runs[run, 1]):
+            e = cell_list[s]
+            w = volume[e] * max(wet_share[s], 1e-6)
+            for a in range(4):
+                i = cells[e, a]
+                if first <= i < last:
+                    wa = w * max(share[e, a], 1e-9)
+                    weight[i] += wa
+                    for k in range(3):
+                        out[i, k] += wa * value[s, k]
+    for i in range(first, last):
         if weight[i] > 0.0:
             for k in range(3):
                 out[i, k] /= weight[i]
-    return out
 
 
-@njit(cache=True)
 def damp_divergence(cell_list, weight, phi, beside_solid, deep, u, cells, parent, g, volume, size, wet_share):
     """u_i -= c_L Σ_e |e| l_e² (div u)_e ∇N_i / m_i over wholly wet cells, in place on wet nodes (LSIC).
 
     Equal-order elements leave divergence that the pressure cannot see; without this sloshing gains energy.
     Deep cells (φ < deep) beside solids are left out: there the remainder of the cells, not the nodes, holds the
     balance, and damping would let the added mass of a body drift (26 % in 25 steps)."""
-    mass = np.zeros(u.shape[0])
-    push = np.zeros((u.shape[0], 3))
-    for s in range(cell_list.shape[0]):
-        e = cell_list[s]
-        p = parent[e]
-        highest, beside, divergence = -np.inf, False, 0.0
-        for a in range(4):
-            i = cells[e, a]
-            mass[i] += 0.25 * volume[e] * max(wet_share[s], 1e-6)
-            highest = max(highest, phi[i])
-            beside = beside or beside_solid[i]
-            for k in range(3):
-                divergence += u[i, k] * g[p, a, k]
-        if highest < 0.0 and not (beside and highest < deep):
-            c = weight * volume[e] * size[e] * size[e] * divergence
+    n = len(u)
+    mass, push = np.zeros(n), np.zeros((n, 3))
+    state = (weight, phi, beside_solid, deep, u, cells, parent, g, volume, size, wet_share)
+    reach = reach_of_cells(cell_list, cells)
+    owning(_push_of_divergence, n, reach, len(cell_list), cell_list, *state, mass, push)
+    over(_pushed, n, phi, mass, push, u)
+
+
+@ranged
+def _push_of_divergence(
+    first, last, runs, cell_list, weight, phi, beside_solid, deep, u, cells, parent, g, volume, size, wet_share, mass,
+    push,
+):  # fmt: skip
+    for run in range(runs.shape[0]):
+        for s in range(runs[run, 0], runs[run, 1]):
+            e = cell_list[s]
+            p = parent[e]
+            highest, beside, divergence = -np.inf, False, 0.0
             for a in range(4):
+                i = cells[e, a]
+                if first <= i < last:
+                    mass[i] += 0.25 * volume[e] * max(wet_share[s], 1e-6)
+                highest = max(highest, phi[i])
+                beside = beside or beside_solid[i]
                 for k in range(3):
-                    push[cells[e, a], k] += c * g[p, a, k]
-    for i in range(u.shape[0]):
+                    divergence += u[i, k] * g[p, a, k]
+            if highest < 0.0 and not (beside and highest < deep):
+                c = weight * volume[e] * size[e] * size[e] * divergence
+                for a in range(4):
+                    if first <= cells[e, a] < last:
+                        for k in range(3):
+                            push[cells[e, a], k] += c * g[p, a, k]
+
+
+@ranged
+def _pushed(first, last, phi, mass, push, u):
+    for i in range(first, last):
         if phi[i] < 0.0 and mass[i] > 0.0:
             for k in range(3):
                 u[i, k] -= push[i, k] / mass[i]
@@ -328,11 +384,17 @@ def damp_waterline(cell_list, weight, phi, wet, beside_solid, deep, u, cells, vo
     u -= weight * _unlike_neighbours(cell_list, phi, wet, beside_solid, deep, one, cells, volume, wet_share)
 
 
-@njit(cache=True)
 def _around_waterline(cell_list, phi, beside_solid, deep, cells):
     """Places in the list of the cells beside solids that reach up to φ > deep, and of all that touch them."""
-    reached = np.zeros(phi.shape[0], np.bool_)
-    for e in cell_list:
+    reached = np.zeros(len(phi), bool)
+    over(_mark_waterline, len(cell_list), cell_list, phi, beside_solid, deep, cells, reached)
+    return found_over(_places_beside, len(cell_list), cell_list, reached, cells)
+
+
+@ranged
+def _mark_waterline(first, last, cell_list, phi, beside_solid, deep, cells, reached):
+    for s in range(first, last):
+        e = cell_list[s]
         beside, highest = False, -np.inf
         for a in range(4):
             beside = beside or beside_solid[cells[e, a]]
@@ -340,8 +402,12 @@ def _around_waterline(cell_list, phi, beside_solid, deep, cells):
         if beside and highest > deep:
             for a in range(4):
                 reached[cells[e, a]] = True
-    found, n = np.empty(cell_list.shape[0], np.int64), 0
-    for s in range(cell_list.shape[0]):
+
+
+@released
+def _places_beside(first, last, cell_list, reached, cells):
+    found, n = np.empty(last - first, np.int64), 0
+    for s in range(first, last):
         e = cell_list[s]
         if reached[cells[e, 0]] or reached[cells[e, 1]] or reached[cells[e, 2]] or reached[cells[e, 3]]:
             found[n] = s

@@ -14,7 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
+from fluid.numerics.jit import ranged, released
 from fluid.numerics.sums import kinetic_energy
+from fluid.numerics.threads import found_over, over
 from fluid.pressure.pressure_bound import BoundMet
 from fluid.pressure.projection import (
     cell_gradient,
@@ -147,17 +149,19 @@ def _remainders(water, kept, gradient, mean, dt):
     remainder, rate = np.zeros(water.remainder.shape), np.zeros(water.remainder.shape)
     if water.parameters.subscale_memory:
         depth = kept.level_set * t.finer
-        whole = _all_below(kept.wet_cells, depth, -MEMORY_DEPTH * water.mesh.spacing, t.cells)
-        time = kept.theta * dt
-        _leave(whole, kept.wet_cells, mean, gradient, kept.remainder, time, t.cells, t.share, remainder, rate)
+        cells, deep, time = kept.wet_cells, -MEMORY_DEPTH * water.mesh.spacing, kept.theta * dt
+        whole = found_over(_all_below, len(cells), cells, depth, deep, t.cells)
+        state = (mean, gradient, kept.remainder, time, t.cells, t.share)
+        over(_leave, len(whole), whole, cells, *state, remainder, rate)
     return remainder, rate
 
 
-@njit(cache=True)
-def _leave(places, cell_list, mean, gradient, before, time, cells, share, remainder, rate):
+@ranged
+def _leave(first, last, places, cell_list, mean, gradient, before, time, cells, share, remainder, rate):
     """What the nodes do not hold of the gradient, Π∇x - ∇x [m/s], in the cells at these places of the list: added to
     the remainder before, and over a time [s] as its rate."""
-    for s in places:
+    for place in range(first, last):
+        s = places[place]
         e = cell_list[s]
         for k in range(3):
             left = 0.0
@@ -168,12 +172,12 @@ def _leave(places, cell_list, mean, gradient, before, time, cells, share, remain
             rate[e, k] = left / time
 
 
-@njit(cache=True)
-def _all_below(cell_list, phi, deep, cells):
+@released
+def _all_below(first, last, cell_list, phi, deep, cells):
     """Places in the list of the cells with φ < deep at all corners."""
-    found = np.empty(cell_list.shape[0], np.int64)
+    found = np.empty(last - first, np.int64)
     n = 0
-    for s in range(cell_list.shape[0]):
+    for s in range(first, last):
         e = cell_list[s]
         highest = max(max(phi[cells[e, 0]], phi[cells[e, 1]]), max(phi[cells[e, 2]], phi[cells[e, 3]]))
         if highest < deep:
@@ -285,23 +289,32 @@ def _flux(water, kept, listed, start, u, u_cell):
     )
 
 
-@njit(cache=True)
 def put(rows, values, field):
     """field[rows] = values, of (n, 3) in (M, 3), in place: a quarter of the time that indexing by a list takes."""
-    for s in range(rows.shape[0]):
+    over(_put, len(rows), rows, values, field)
+
+
+@ranged
+def _put(first, last, rows, values, field):
+    for s in range(first, last):
         for k in range(3):
             field[rows[s], k] = values[s, k]
 
 
-@njit(cache=True)
 def to_middle(cell_list, now, before):
     """1.5 u - 0.5 u_before (M, 3) in the listed cells: the velocity half a step ahead; u where none was before."""
     out = np.empty(now.shape)
-    for e in cell_list:
+    over(_to_middle, len(cell_list), cell_list, now, before, out)
+    return out
+
+
+@ranged
+def _to_middle(first, last, cell_list, now, before, out):
+    for s in range(first, last):
+        e = cell_list[s]
         known = before[e, 0] != 0.0 or before[e, 1] != 0.0 or before[e, 2] != 0.0
         for k in range(3):
             out[e, k] = 1.5 * now[e, k] - 0.5 * before[e, k] if known else now[e, k]
-    return out
 
 
 def _report(water, problem, x, projected, u, clipped, momentum, bound):

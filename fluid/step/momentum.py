@@ -27,9 +27,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from fluid.numerics.jit import released
 from fluid.numerics.sums import about, momentum_of, momentum_of_rows
+from fluid.numerics.threads import CHUNK, summed
 from fluid.step.predictor import kick_factor
 
 NUMERICAL = (
@@ -235,38 +236,45 @@ def _pressure_on_sides(water, p):
     return total
 
 
-@njit(cache=True)
 def hat_forces(cell_list, x, p, at_side, reference, nodes, cells, parent, g, volume, share):
     """Σ_e |e| [∇f; (c_e - x_0) × ∇f] (3, 6) over the listed cells for f = x, p, and p on the nodes at_side (N,) only.
 
     c_e: centroid of the fluid part; exact for linear f."""
-    out = np.zeros((3, 6))
+    state = (x, p, at_side, reference, nodes, cells, parent, g, volume, share)
+    return summed(_hat_forces, len(cell_list), (3, 6), cell_list, *state)
+
+
+@released
+def _hat_forces(
+    first, last, cell_list, x, p, at_side, reference, nodes, cells, parent, g, volume, share, partial
+):
     arm, beside = np.empty(3), np.empty(4, np.bool_)
-    for e in cell_list:
-        q = parent[e]
-        for k in range(3):
-            arm[k] = -reference[k]
-        at_any = False
-        for a in range(4):
-            i = cells[e, a]
-            beside[a] = at_side[i]
-            at_any = at_any or beside[a]
+    for c in range(first, last):
+        for s in range(c * CHUNK, min((c + 1) * CHUNK, cell_list.shape[0])):
+            e = cell_list[s]
+            q = parent[e]
             for k in range(3):
-                arm[k] += share[e, a] * nodes[i, k]
-        for m in range(3 if at_any else 2):
-            f0, f1, f2 = 0.0, 0.0, 0.0
+                arm[k] = -reference[k]
+            at_any = False
             for a in range(4):
-                if m == 2 and not beside[a]:
-                    continue
-                value = x[cells[e, a]] if m == 0 else p[cells[e, a]]
-                f0 += value * g[q, a, 0]
-                f1 += value * g[q, a, 1]
-                f2 += value * g[q, a, 2]
-            f0, f1, f2 = volume[e] * f0, volume[e] * f1, volume[e] * f2
-            out[m, 0] += f0
-            out[m, 1] += f1
-            out[m, 2] += f2
-            out[m, 3] += arm[1] * f2 - arm[2] * f1
-            out[m, 4] += arm[2] * f0 - arm[0] * f2
-            out[m, 5] += arm[0] * f1 - arm[1] * f0
-    return out
+                i = cells[e, a]
+                beside[a] = at_side[i]
+                at_any = at_any or beside[a]
+                for k in range(3):
+                    arm[k] += share[e, a] * nodes[i, k]
+            for m in range(3 if at_any else 2):
+                f0, f1, f2 = 0.0, 0.0, 0.0
+                for a in range(4):
+                    if m == 2 and not beside[a]:
+                        continue
+                    value = x[cells[e, a]] if m == 0 else p[cells[e, a]]
+                    f0 += value * g[q, a, 0]
+                    f1 += value * g[q, a, 1]
+                    f2 += value * g[q, a, 2]
+                f0, f1, f2 = volume[e] * f0, volume[e] * f1, volume[e] * f2
+                partial[c, m, 0] += f0
+                partial[c, m, 1] += f1
+                partial[c, m, 2] += f2
+                partial[c, m, 3] += arm[1] * f2 - arm[2] * f1
+                partial[c, m, 4] += arm[2] * f0 - arm[0] * f2
+                partial[c, m, 5] += arm[0] * f1 - arm[1] * f0

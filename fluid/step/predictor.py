@@ -12,9 +12,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from fluid.domain.coupling_matrix import wetted_coupling
+from fluid.numerics.jit import ranged
+from fluid.numerics.threads import over
 from fluid.pressure.active_cells import WetPart
 from fluid.pressure.indefinite_cells import about, reserve
 from fluid.pressure.pressure_bound import lowest_pressure
@@ -150,16 +151,16 @@ def _sheared(water, dt, theta, kick, surface, u_adv):
 
 def kick_factor(acceleration, most):
     """f = min(1, most / |a|) (N,), most (N,) [m/s²]: see `Water.largest_kick`."""
-    return _factor(acceleration, most)
+    out = np.empty(len(acceleration))
+    over(_factor, len(out), acceleration, most, out)
+    return out
 
 
-@njit(cache=True)
-def _factor(a, limit):
-    out = np.empty(a.shape[0])
-    for i in range(a.shape[0]):
+@ranged
+def _factor(first, last, a, limit, out):
+    for i in range(first, last):
         size = np.sqrt(a[i, 0] * a[i, 0] + a[i, 1] * a[i, 1] + a[i, 2] * a[i, 2])
         out[i] = min(1.0, limit[i] / max(size, 1e-300))
-    return out
 
 
 def _transported(water, dt, theta, kick):
@@ -333,16 +334,21 @@ def _carried_remainder(water, dt, theta, cells):
     rate = (1.0 - theta) * dt
     out = np.zeros(water.remainder.shape)  # pages that nobody writes to are never touched
     nu = p.viscosity / p.density
-    carry_remainder(
-        cells, water.remainder, water.kick_remainder, rate, water.velocity, dt, nu, t.cells, t.size, out
-    )
+    state = (water.remainder, water.kick_remainder, rate, water.velocity, dt, nu, t.cells, t.size)
+    carry_remainder(cells, *state, out)
     return out
 
 
-@njit(cache=True)
 def carry_remainder(cell_list, remainder, kick, kick_time, u, dt, nu, cells, size, out):
     """β (u' + kick_time r) (M, 3) in the listed cells of `out`; nu: kinematic viscosity [m²/s]."""
-    for e in cell_list:
+    state = (remainder, kick, kick_time, u, dt, nu, cells, size)
+    over(_carry_remainder, len(cell_list), cell_list, *state, out)
+
+
+@ranged
+def _carry_remainder(first, last, cell_list, remainder, kick, kick_time, u, dt, nu, cells, size, out):
+    for place in range(first, last):
+        e = cell_list[place]
         square = 0.0
         for k in range(3):
             mean = 0.25 * (u[cells[e, 0], k] + u[cells[e, 1], k] + u[cells[e, 2], k] + u[cells[e, 3], k])

@@ -12,7 +12,8 @@ from numba import njit
 
 from fluid.domain.moments import touching_among
 from fluid.domain.topology import layers_around
-from fluid.numerics.jit import inner
+from fluid.numerics.jit import inner, ranged, released
+from fluid.numerics.threads import over, owning, reach_of_cells
 
 LINEAR_LAYERS = 2
 SWEEPS = 3
@@ -25,58 +26,75 @@ WAVE_SLACK = 0.05
 _NO_LIMIT = np.zeros(0)
 
 
-@njit(cache=True)
 def continue_outward(order, layer_start, linear_layers, f, gradient, nodes, around, done, least):
     """Fill f (N, m) in place on layers 1.. of `order` from layer 0; gradient (N, m, 3) read where linear.
 
     around: `Topology.around_by_cells` · done (N,) bool: nodes whose f is known; extended in place, layer by layer.
     least (N,): no filled |f| is larger than the largest of its known neighbours and its own `least`; of length 0: no
     limit."""
+    for layer in range(1, len(layer_start) - 1):
+        nodes_of_it = order[layer_start[layer] : layer_start[layer + 1]]
+        linear = layer <= linear_layers
+        over(_one_layer, len(nodes_of_it), nodes_of_it, linear, f, gradient, nodes, *around, done, least)
+        done[nodes_of_it] = True
+
+
+@released
+def _one_layer(first, last, layer, linear, f, gradient, nodes, start, around, shared, done, least):
     _continue(
-        order, layer_start, linear_layers, f, gradient, nodes, *around, done, least, np.empty(f.shape[1])
+        first,
+        last,
+        layer,
+        linear,
+        f,
+        gradient,
+        nodes,
+        start,
+        around,
+        shared,
+        done,
+        least,
+        np.empty(f.shape[1]),
     )
 
 
 @inner
 def _continue(
-    order, layer_start, linear_layers, f, gradient, nodes, start, around, shared, done, least, total
+    first, last, layer, linear, f, gradient, nodes, start, around, shared, done, least, total
 ):  # fmt: skip
-    """The loop of `continue_outward`; total (m,): work space."""
+    """The loop of `continue_outward` over the nodes of a layer; total (m,): work space."""
     m = f.shape[1]
-    for layer in range(1, layer_start.shape[0] - 1):
-        for s in range(layer_start[layer], layer_start[layer + 1]):
-            i = order[s]
-            weight, most = 0.0, 0.0
-            for k in range(m):
-                total[k] = 0.0
-            for t in range(start[i], start[i + 1]):
-                j = around[t]
-                if not done[j]:
-                    continue
-                if least.shape[0] > 0:
-                    most = max(most, _square(f[j]))
-                dx = nodes[i, 0] - nodes[j, 0]
-                dy = nodes[i, 1] - nodes[j, 1]
-                dz = nodes[i, 2] - nodes[j, 2]
-                w = shared[t] / (dx * dx + dy * dy + dz * dz)
-                weight += w
-                for k in range(m):
-                    value = f[j, k]
-                    if layer <= linear_layers:
-                        value += gradient[j, k, 0] * dx + gradient[j, k, 1] * dy + gradient[j, k, 2] * dz
-                    total[k] += w * value
-            for k in range(m):
-                # nothing known around: a side where water is yet to come in
-                f[i, k] = total[k] / weight if weight > 0.0 else 0.0
+    for s in range(first, last):
+        i = layer[s]
+        weight, most = 0.0, 0.0
+        for k in range(m):
+            total[k] = 0.0
+        for t in range(start[i], start[i + 1]):
+            j = around[t]
+            if not done[j]:
+                continue
             if least.shape[0] > 0:
-                most = max(most, least[i] * least[i])
-                factor = np.sqrt(min(1.0, most / max(_square(f[i]), 1e-300)))
-                for k in range(m):
-                    f[i, k] *= factor
-            if layer <= linear_layers:
-                _pass_gradient(i, m, gradient, start, around, shared, done)
-        for s in range(layer_start[layer], layer_start[layer + 1]):
-            done[order[s]] = True
+                most = max(most, _square(f[j]))
+            dx = nodes[i, 0] - nodes[j, 0]
+            dy = nodes[i, 1] - nodes[j, 1]
+            dz = nodes[i, 2] - nodes[j, 2]
+            w = shared[t] / (dx * dx + dy * dy + dz * dz)
+            weight += w
+            for k in range(m):
+                value = f[j, k]
+                if linear:
+                    value += gradient[j, k, 0] * dx + gradient[j, k, 1] * dy + gradient[j, k, 2] * dz
+                total[k] += w * value
+        for k in range(m):
+            # nothing known around: a side where water is yet to come in
+            f[i, k] = total[k] / weight if weight > 0.0 else 0.0
+        if least.shape[0] > 0:
+            most = max(most, least[i] * least[i])
+            factor = np.sqrt(min(1.0, most / max(_square(f[i]), 1e-300)))
+            for k in range(m):
+                f[i, k] *= factor
+        if linear:
+            _pass_gradient(i, m, gradient, start, around, shared, done)
 
 
 @inner
@@ -107,35 +125,44 @@ def _pass_gradient(i, m, gradient, start, around, shared, done):
             gradient[i, k, d] /= max(count, 1)
 
 
-@njit(cache=True)
 def mean_gradients(cell_list, marked, f, cells, parent, g, volume, n_nodes):
     """Volume-weighted mean of ∇f over the cells around each node whose corners are all marked, (N, m, 3).
 
     f (N, m), marked (N,) bool; zero where there is no such cell."""
+    gradient, weight = np.zeros((n_nodes, f.shape[1], 3)), np.zeros(n_nodes)
+    reach = reach_of_cells(cell_list, cells)
+    state = (marked, f, cells, parent, g, volume)
+    owning(_mean_gradients, n_nodes, reach, len(cell_list), cell_list, *state, weight, gradient)
+    return gradient
+
+
+@released
+def _mean_gradients(first, last, runs, cell_list, marked, f, cells, parent, g, volume, weight, gradient):
     m = f.shape[1]
-    gradient = np.zeros((n_nodes, m, 3))
-    weight = np.zeros(n_nodes)
     local = np.empty((m, 3))
-    for s in range(cell_list.shape[0]):
-        e = cell_list[s]
-        if not (marked[cells[e, 0]] and marked[cells[e, 1]] and marked[cells[e, 2]] and marked[cells[e, 3]]):
-            continue
-        local[:] = 0.0
-        for a in range(4):
-            for k in range(m):
-                for d in range(3):
-                    local[k, d] += f[cells[e, a], k] * g[parent[e], a, d]
-        for a in range(4):
-            weight[cells[e, a]] += volume[e]
-            for k in range(m):
-                for d in range(3):
-                    gradient[cells[e, a], k, d] += volume[e] * local[k, d]
-    for i in range(n_nodes):
+    for run in range(runs.shape[0]):
+        for s in range(runs[run, 0], runs[run, 1]):
+            e = cell_list[s]
+            if not (
+                marked[cells[e, 0]] and marked[cells[e, 1]] and marked[cells[e, 2]] and marked[cells[e, 3]]
+            ):
+                continue
+            local[:] = 0.0
+            for a in range(4):
+                for k in range(m):
+                    for d in range(3):
+                        local[k, d] += f[cells[e, a], k] * g[parent[e], a, d]
+            for a in range(4):
+                if first <= cells[e, a] < last:
+                    weight[cells[e, a]] += volume[e]
+                    for k in range(m):
+                        for d in range(3):
+                            gradient[cells[e, a], k, d] += volume[e] * local[k, d]
+    for i in range(first, last):
         if weight[i] > 0.0:
             for k in range(m):
                 for d in range(3):
                     gradient[i, k, d] /= weight[i]
-    return gradient
 
 
 def smoothed_slope(topology, cell_list, marked, u, calm: float):
@@ -166,59 +193,77 @@ def smoothed_slope(topology, cell_list, marked, u, calm: float):
     return once + calm * (before + SWEEPS * (before - slope) - once)
 
 
-@njit(cache=True)
 def _with_field(cell_list, marked, cells):
     """Nodes (N,) bool of listed cells whose corners are all marked, and of the others."""
-    has, beside = np.zeros(marked.shape[0], np.bool_), np.zeros(marked.shape[0], np.bool_)
-    for e in cell_list:
+    has, beside = np.zeros(len(marked), bool), np.zeros(len(marked), bool)
+    over(_mark_field, len(cell_list), cell_list, marked, cells, has, beside)
+    return has, beside
+
+
+@ranged
+def _mark_field(first, last, cell_list, marked, cells, has, beside):
+    for s in range(first, last):
+        e = cell_list[s]
         inside = marked[cells[e, 0]] and marked[cells[e, 1]] and marked[cells[e, 2]] and marked[cells[e, 3]]
         for a in range(4):
             if inside:
                 has[cells[e, a]] = True
             else:
                 beside[cells[e, a]] = True
-    return has, beside
 
 
-@njit(cache=True)
 def _one_layer_more(cell_list, nodes, cells):
     """The marked nodes (N,) bool and all that share a listed cell with them."""
     wider = nodes.copy()
-    for e in cell_list:
-        if nodes[cells[e, 0]] or nodes[cells[e, 1]] or nodes[cells[e, 2]] or nodes[cells[e, 3]]:
-            for a in range(4):
-                wider[cells[e, a]] = True
+    over(_mark_layer, len(cell_list), cell_list, nodes, cells, wider)
     return wider
 
 
-@njit(cache=True)
+@ranged
+def _mark_layer(first, last, cell_list, nodes, cells, wider):
+    for s in range(first, last):
+        e = cell_list[s]
+        if nodes[cells[e, 0]] or nodes[cells[e, 1]] or nodes[cells[e, 2]] or nodes[cells[e, 3]]:
+            for a in range(4):
+                wider[cells[e, a]] = True
+
+
 def _averaged(cell_list, reach, has, field, cells):
     """Mean of the field (N, m, 3) over the corners that have one, of the listed cells around the nodes in reach."""
-    mean, total, count = np.zeros_like(field), np.empty(field.shape[1:]), np.zeros(field.shape[0])
-    for e in cell_list:
-        if not (reach[cells[e, 0]] or reach[cells[e, 1]] or reach[cells[e, 2]] or reach[cells[e, 3]]):
-            continue
-        total[:] = 0.0
-        known = 0
-        # written out entry by entry: sums of array slices take four times as long
-        for a in range(4):
-            if has[cells[e, a]]:
-                known += 1
-                for k in range(field.shape[1]):
-                    for d in range(field.shape[2]):
-                        total[k, d] += field[cells[e, a], k, d]
-        for a in range(4):
-            if has[cells[e, a]]:
-                count[cells[e, a]] += known
-                for k in range(field.shape[1]):
-                    for d in range(field.shape[2]):
-                        mean[cells[e, a], k, d] += total[k, d]
-    for i in range(field.shape[0]):
+    mean, count = np.zeros_like(field), np.zeros(len(field))
+    listed = reach_of_cells(cell_list, cells)
+    owning(_average, len(field), listed, len(cell_list), cell_list, reach, has, field, cells, count, mean)
+    return mean
+
+
+@released
+def _average(first, last, runs, cell_list, reach, has, field, cells, count, mean):
+    total = np.empty(field.shape[1:])
+    for run in range(runs.shape[0]):
+        for s in range(runs[run, 0], runs[run, 1]):
+            e = cell_list[s]
+            if not (reach[cells[e, 0]] or reach[cells[e, 1]] or reach[cells[e, 2]] or reach[cells[e, 3]]):
+                continue
+            total[:] = 0.0
+            known = 0
+            # written out entry by entry: sums of array slices take four times as long
+            for a in range(4):
+                if has[cells[e, a]]:
+                    known += 1
+                    for k in range(field.shape[1]):
+                        for d in range(field.shape[2]):
+                            total[k, d] += field[cells[e, a], k, d]
+            for a in range(4):
+                if has[cells[e, a]] and first <= cells[e, a] < last:
+                    count[cells[e, a]] += known
+                    for k in range(field.shape[1]):
+                        for d in range(field.shape[2]):
+                            mean[cells[e, a], k, d] += total[k, d]
+    for i in range(first, last):
         if count[i] > 0.0:
             for k in range(field.shape[1]):
                 for d in range(field.shape[2]):
                     mean[i, k, d] /= count[i]
-    return mean
 
 
 @njit(cache=True)

@@ -18,7 +18,8 @@ import numpy as np
 from numba import njit
 
 from fluid.domain.topology import layers_around
-from fluid.numerics.jit import inner, plain
+from fluid.numerics.jit import inner, plain, released
+from fluid.numerics.threads import found_over, over
 
 LAYERS = 6
 EXACT_LAYERS = 2
@@ -34,12 +35,17 @@ def without_films(phi, spacing):
     return np.where((phi < 0.0) & (phi > -FILM * spacing), 0.0, phi)
 
 
-@njit(cache=True)
 def surface_cells(phi, cell_list, cells):
     """Those of the listed cells with water on one corner and air on another."""
-    found = np.empty(cell_list.shape[0], np.int64)
+    return found_over(_surface_cells, len(cell_list), phi, cell_list, cells)
+
+
+@released
+def _surface_cells(first, last, phi, cell_list, cells):
+    found = np.empty(last - first, np.int64)
     n = 0
-    for e in cell_list:
+    for s in range(first, last):
+        e = cell_list[s]
         wet = 0
         for a in range(4):
             wet += phi[cells[e, a]] < 0.0
@@ -49,15 +55,20 @@ def surface_cells(phi, cell_list, cells):
     return found[:n].copy()
 
 
-@njit(cache=True)
 def surface_triangles(cut, phi, nodes, cells):
     """φ = 0 in the cut cells as triangles (T, 3, 3) [m] and the cell of each (T,)."""
-    triangles = np.empty((2 * cut.shape[0], 3, 3))
-    owner = np.empty(2 * cut.shape[0], np.int64)
+    triangles, owner = zip(*over(_surface_triangles, len(cut), cut, phi, nodes, cells))
+    return np.concatenate(triangles), np.concatenate(owner)
+
+
+@released
+def _surface_triangles(first, last, cut, phi, nodes, cells):
+    triangles = np.empty((2 * (last - first), 3, 3))
+    owner = np.empty(2 * (last - first), np.int64)
     crossing = np.empty((4, 3))
     wet, dry = np.empty(4, np.int64), np.empty(4, np.int64)
     n = 0
-    for s in range(cut.shape[0]):
+    for s in range(first, last):
         e = cut[s]
         n_wet, n_dry = 0, 0
         for a in range(4):

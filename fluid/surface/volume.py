@@ -31,6 +31,8 @@ from numba import njit
 
 from fluid.domain.moments import nodal_water
 from fluid.domain.topology import Graph
+from fluid.numerics.jit import released
+from fluid.numerics.threads import over
 from fluid.surface.level_set import without_films
 
 BAND_WIDTH = 3.0
@@ -57,14 +59,14 @@ class Flux:
     capacity: np.ndarray
 
 
-@njit(cache=True)
+@released
 def _edge_rates(
-    listed, graph_row, start, neighbour, u_cell, nodes, cells, parent, g, upright, volume, around
-):
-    rate = np.zeros(neighbour.shape[0])
+    first, last, listed, graph_row, start, neighbour, u_cell, nodes, cells, parent, g, upright, volume, around, rate
+):  # fmt: skip
     slot = np.empty(nodes.shape[0], np.int64)
     node_start, node_cells = around
-    for i in listed:
+    for place in range(first, last):
+        i = listed[place]
         r = graph_row[i]
         for s in range(start[r], start[r + 1]):
             slot[neighbour[s]] = s
@@ -89,7 +91,6 @@ def _edge_rates(
                             + (nodes[j, 1] - nodes[i, 1]) * y
                             + (nodes[j, 2] - nodes[i, 2]) * z
                         )
-    return rate
 
 
 def edge_flux(topology, graph, listed, u_cell, water) -> Flux:
@@ -97,7 +98,8 @@ def edge_flux(topology, graph, listed, u_cell, water) -> Flux:
     water (N,) [m³] volume at the nodes."""
     t, g = topology, graph
     mesh = (t.nodes, t.cells, t.parent, t.gradients, t.upright, t.volume, (t.node_start, t.node_cells))
-    rate = _edge_rates(listed, g.row, g.start, g.neighbour, u_cell, *mesh)
+    rate = np.zeros(len(g.neighbour))
+    over(_edge_rates, len(listed), listed, g.row, g.start, g.neighbour, u_cell, *mesh, rate)
     return Flux(nodes=listed, graph=g, rate=rate, water=water, capacity=t.node_volume)
 
 

@@ -15,9 +15,9 @@ through a wall, however thin, because a wall has no neighbour on its other side.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from fluid.numerics.jit import inner
+from fluid.numerics.jit import inner, ranged, released
+from fluid.numerics.threads import over
 
 _LONGEST_WALK = 100
 
@@ -72,7 +72,6 @@ def _to_face(x, lam, g):
     return True
 
 
-@njit(cache=True)
 def feet(listed, sense, dt, sweeps, u_m, nodes, cells, parent, g, neighbours, node_start, node_cells):
     """Where the paths through the listed nodes begin (sense -1) or end (sense +1): cell (n,), weights (n, 4).
 
@@ -80,17 +79,28 @@ def feet(listed, sense, dt, sweeps, u_m, nodes, cells, parent, g, neighbours, no
     n = listed.shape[0]
     cell, weight = np.empty(n, np.int64), np.empty((n, 4))
     mesh = (nodes, cells, parent, g, neighbours)
-    _trace(listed, sense * dt, sweeps, u_m, *mesh, node_start, node_cells, np.empty((3, 4)), cell, weight)
+    over(_feet, n, listed, sense * dt, sweeps, u_m, *mesh, node_start, node_cells, cell, weight)
     return cell, weight
+
+
+@released
+def _feet(
+    first, last, listed, dt, sweeps, u_m, nodes, cells, parent, g, neighbours, node_start, node_cells, cell, weight
+):  # fmt: skip
+    mesh = (nodes, cells, parent, g, neighbours)
+    _trace(
+        first, last, listed, dt, sweeps, u_m, *mesh, node_start, node_cells, np.empty((3, 4)), cell, weight
+    )
 
 
 @inner
 def _trace(
-    listed, dt, sweeps, u_m, nodes, cells, parent, g, neighbours, node_start, node_cells, scratch, cell, weight
+    first, last, listed, dt, sweeps, u_m, nodes, cells, parent, g, neighbours, node_start, node_cells, scratch, cell,
+    weight,
 ):  # fmt: skip
     """The loop of `feet`; scratch (3, 4): work space."""
     x, lam, u = scratch[0], scratch[1], scratch[2]
-    for s in range(listed.shape[0]):
+    for s in range(first, last):
         i = listed[s]
         for k in range(3):
             u[k] = u_m[i, k]
@@ -109,11 +119,18 @@ def _trace(
             weight[s, a] = lam[a]
 
 
-@njit(cache=True)
 def interpolate(cell, weight, cells, f):
     """Σ_a weight_a f_a (n, m) at points given by cell (n,) and weights (n, 4); f (N, m)."""
-    out = np.zeros((cell.shape[0], f.shape[1]))
-    for s in range(cell.shape[0]):
+    out = np.empty((len(cell), f.shape[1]))
+    over(_interpolate, len(cell), cell, weight, cells, f, out)
+    return out
+
+
+@ranged
+def _interpolate(first, last, cell, weight, cells, f, out):
+    for s in range(first, last):
+        for k in range(f.shape[1]):
+            out[s, k] = 0.0
         for a in range(4):
             j = cells[cell[s], a]
             for k in range(f.shape[1]):
@@ -121,13 +138,12 @@ def interpolate(cell, weight, cells, f):
     return out
 
 
-@njit(cache=True)
-def _limited(listed, on_open_side, back_cell, back_weight, f, f1, f1_ahead, cells):
-    """f2 where it stays within the range of f over the cell of the foot, f1 elsewhere and on open sides, (n, m).
+@ranged
+def _limited(first, last, listed, on_open_side, back_cell, back_weight, f, f1, f1_ahead, cells, out):
+    """out (n, m) <- f2 where it stays within the range of f over the cell of the foot, f1 elsewhere and on open sides.
 
     Only corners with weight count: a foot on a face must not depend on the side it was found from."""
-    out = np.empty_like(f1)
-    for s in range(listed.shape[0]):
+    for s in range(first, last):
         e = back_cell[s]
         for k in range(f.shape[1]):
             low, high = np.inf, -np.inf
@@ -136,7 +152,6 @@ def _limited(listed, on_open_side, back_cell, back_weight, f, f1, f1_ahead, cell
                     low, high = min(low, f[cells[e, a], k]), max(high, f[cells[e, a], k])
             f2 = f1[s, k] + 0.5 * (f[listed[s], k] - f1_ahead[s, k])
             out[s, k] = f2 if low <= f2 <= high and not on_open_side[listed[s]] else f1[s, k]
-    return out
 
 
 def transport(topology, listed, dt: float, u_m, f, on_open_side):
@@ -151,4 +166,6 @@ def transport(topology, listed, dt: float, u_m, f, on_open_side):
     moved[listed] = f1
     ahead, ahead_weight = feet(listed, 1.0, dt, 0, u_m, *mesh)
     f1_ahead = interpolate(ahead, ahead_weight, t.cells, moved)
-    return _limited(listed, on_open_side, cell, weight, f, f1, f1_ahead, t.cells)
+    out = np.empty_like(f1)
+    over(_limited, len(listed), listed, on_open_side, cell, weight, f, f1, f1_ahead, t.cells, out)
+    return out

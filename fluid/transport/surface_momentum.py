@@ -39,6 +39,8 @@ import numpy as np
 from numba import njit
 
 from fluid.domain.topology import Graph, Topology
+from fluid.numerics.jit import ranged, released
+from fluid.numerics.threads import over
 from fluid.surface.volume import Flux, Shift
 from fluid.transport.velocity_transport import carry_velocity
 from fluid.transport.volume_transport import carry_volume
@@ -68,13 +70,15 @@ class Carried:
         [m]: size of the cells."""
         g = flux.graph
         along = (flux.nodes, g.row, g.start, g.neighbour)
-        weight = _jumps(
-            *along, flux.rate, flux.water, flux.capacity, velocity, acceleration, gravity, spacing
-        )
+        n, size = len(flux.nodes), len(velocity)
+        weight, fast = np.zeros(size), np.zeros(size)
+        state = (flux.rate, flux.water, flux.capacity, velocity, acceleration, gravity, spacing)
+        over(_jumps, n, *along, *state, weight)
         if weight.any():
             for _ in range(RINGS):
-                weight = _wider(*along, weight)
-        fast = _fast(flux.nodes, velocity, np.sqrt(gravity * spacing), FAST)
+                before, weight = weight, weight.copy()
+                over(_wider, n, *along, before, weight)
+        over(_fast, n, flux.nodes, velocity, np.sqrt(gravity * spacing), FAST, fast)
         if not weight.any() and not fast.any():
             return cls(carry_volume(flux, dt))
         u = velocity.copy()
@@ -109,20 +113,18 @@ class Carried:
 def _pass_on(graph: Graph, shift: Shift, water, u) -> None:
     """Velocity u (N, 3) [m/s] carried along with the volumes (2), in place; water (N,) [m³] before them."""
     along = (shift.band, graph.row, graph.start, graph.neighbour)
-    moved = _corrected(*along, graph.stiffness, shift.value, shift.kappa, water)
+    psi, inside, moved = np.zeros(len(water)), np.zeros(len(water), bool), np.zeros(len(graph.neighbour))
+    psi[shift.band], inside[shift.band] = shift.value, water[shift.band] > 0.0
+    over(_corrected, len(shift.band), *along, graph.stiffness, psi, inside, shift.kappa, water, moved)
     carry_velocity(*along, moved, water, u)
 
 
-@njit(cache=True)
-def _corrected(band, graph_row, start, neighbour, stiffness, value, kappa, water):
+@ranged
+def _corrected(first, last, band, graph_row, start, neighbour, stiffness, psi, inside, kappa, water, moved):
     """v_ij (edges,) [m³] of (2) out of each node of the band, κ (N,), where both hold water; none gives more than it
-    holds."""
-    psi, inside = np.zeros(water.shape[0]), np.zeros(water.shape[0], np.bool_)
-    for r in range(band.shape[0]):
-        psi[band[r]] = value[r]
-        inside[band[r]] = water[band[r]] > 0.0
-    moved = np.zeros(neighbour.shape[0])
-    for i in band:
+    holds. ψ (N,), inside (N,): where the band holds water."""
+    for place in range(first, last):
+        i = band[place]
         if not inside[i]:
             continue
         row = graph_row[i]
@@ -137,15 +139,16 @@ def _corrected(band, graph_row, start, neighbour, stiffness, value, kappa, water
         if total > water[i]:
             for s in range(start[row], start[row + 1]):
                 moved[s] *= water[i] / total
-    return moved
 
 
-@njit(cache=True)
-def _jumps(nodes, graph_row, start, neighbour, rate, water, capacity, u, a, gravity, spacing):
+@released
+def _jumps(
+    first, last, nodes, graph_row, start, neighbour, rate, water, capacity, u, a, gravity, spacing, weight
+):
     """Equation (3), (N,); zero at nodes that nothing flows into."""
-    weight = np.zeros(water.shape[0])
     up, push = np.empty(3), np.empty(3)
-    for i in nodes:
+    for place in range(first, last):
+        i = nodes[place]
         r = graph_row[i]
         came = 0.0
         up[:] = 0.0
@@ -165,27 +168,24 @@ def _jumps(nodes, graph_row, start, neighbour, rate, water, capacity, u, a, grav
                 work = (up[0] * push[0] + up[1] * push[1] + up[2] * push[2]) / (came * came * speed)
                 lost = 1.0 + (spacing[i] * work - own * own) / (speed * speed)
                 weight[i] = drop * _ramp(lost, LOST) * _ramp(water[i] / max(capacity[i], 1e-300), FULL)
-    return weight
 
 
-@njit(cache=True)
-def _fast(nodes, u, celerity, ends):
+@ranged
+def _fast(first, last, nodes, u, celerity, ends, weight):
     """(N,): w of fast water at the listed nodes; celerity √(g h) (N,) [m/s]."""
-    weight = np.zeros(u.shape[0])
-    for i in nodes:
+    for s in range(first, last):
+        i = nodes[s]
         weight[i] = _ramp(_size(u[i]) / celerity[i], ends)
-    return weight
 
 
-@njit(cache=True)
-def _wider(nodes, graph_row, start, neighbour, weight):
+@ranged
+def _wider(first, last, nodes, graph_row, start, neighbour, weight, wider):
     """The largest weight (N,) of each node and those around it."""
-    wider = weight.copy()
-    for i in nodes:
+    for place in range(first, last):
+        i = nodes[place]
         r = graph_row[i]
         for s in range(start[r], start[r + 1]):
             wider[i] = max(wider[i], weight[neighbour[s]])
-    return wider
 
 
 @njit(cache=True)

@@ -15,60 +15,85 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from fluid.numerics.jit import ranged
+from fluid.numerics.threads import over, owning, reach_of_rows
 
-@njit(cache=True)
+
 def carry_velocity(nodes, graph_row, start, neighbour, moved, water, u):
     """Equation (1): u (N, 3) [m/s] after the volumes moved (edges,) [m³] left the listed nodes, in place.
 
     water (N,) [m³] before they are handed over, no node gives more than it holds."""
-    up = _what_comes(nodes, graph_row, start, neighbour, moved, u)
-    change, volume = _exchange(nodes, graph_row, start, neighbour, moved, water, u, up)
-    for i in nodes:
+    along = (nodes, graph_row, start, neighbour)
+    size, reach = len(water), reach_of_rows(*along)
+    up, came = np.zeros(u.shape), np.zeros(size)
+    change, volume = np.zeros(u.shape), np.zeros(size)
+    owning(_what_comes, size, reach, len(nodes), *along, moved, u, up, came)
+    over(_mean_of_it, len(nodes), nodes, came, u, up)
+    owning(_exchange, size, reach, len(nodes), *along, moved, water, u, up, change, volume)
+    over(_new_velocity, len(nodes), nodes, water, change, volume, u)
+
+
+@ranged
+def _new_velocity(first, last, nodes, water, change, volume, u):
+    for s in range(first, last):
+        i = nodes[s]
         if volume[i] > 1e-9 * water[i] and volume[i] > 0.0:
             for k in range(3):
                 u[i, k] = (max(water[i], 0.0) * u[i, k] + change[i, k]) / volume[i]
 
 
-@njit(cache=True)
-def _what_comes(nodes, graph_row, start, neighbour, moved, u):
-    """u_up (N, 3) [m/s]: mean velocity of what flows into a node; its own where nothing does."""
-    up, came = np.zeros(u.shape), np.zeros(u.shape[0])
-    for i in nodes:
-        for s in range(start[graph_row[i]], start[graph_row[i] + 1]):
-            if moved[s] > 0.0:
+@ranged
+def _what_comes(first, last, runs, nodes, graph_row, start, neighbour, moved, u, up, came):
+    """Σ w u (N, 3) [m⁴/s] and Σ w (N,) [m³] of what flows into a node."""
+    for run in range(runs.shape[0]):
+        for place in range(runs[run, 0], runs[run, 1]):
+            i = nodes[place]
+            for s in range(start[graph_row[i]], start[graph_row[i] + 1]):
                 j = neighbour[s]
-                came[j] += moved[s]
-                for k in range(3):
-                    up[j, k] += moved[s] * u[i, k]
-    for i in nodes:
+                if moved[s] > 0.0 and first <= j < last:
+                    came[j] += moved[s]
+                    for k in range(3):
+                        up[j, k] += moved[s] * u[i, k]
+
+
+@ranged
+def _mean_of_it(first, last, nodes, came, u, up):
+    """u_up (N, 3) [m/s]: mean velocity of what flows into a node; its own where nothing does."""
+    for s in range(first, last):
+        i = nodes[s]
         for k in range(3):
             up[i, k] = up[i, k] / came[i] if came[i] > 0.0 else u[i, k]
-    return up
 
 
-@njit(cache=True)
-def _exchange(nodes, graph_row, start, neighbour, moved, water, u, up):
+@ranged
+def _exchange(first, last, runs, nodes, graph_row, start, neighbour, moved, water, u, up, change, volume):
     """Change of Σ W u (N, 3) [m⁴/s] and the volume afterwards (N,) [m³]."""
-    change, volume = np.zeros(u.shape), np.zeros(u.shape[0])
-    for i in nodes:
-        r = graph_row[i]
-        out = 0.0
-        for s in range(start[r], start[r + 1]):
-            out += moved[s]
-        volume[i] += max(water[i], 0.0) - out
-        if out <= 0.0:
-            continue
-        second = 0.5 * max(1.0 - out / water[i], 0.0)
-        for s in range(start[r], start[r + 1]):
-            if moved[s] > 0.0:
+    for run in range(runs.shape[0]):
+        for place in range(runs[run, 0], runs[run, 1]):
+            i = nodes[place]
+            r = graph_row[i]
+            out = 0.0
+            for s in range(start[r], start[r + 1]):
+                out += moved[s]
+            own = first <= i < last
+            if own:
+                volume[i] += max(water[i], 0.0) - out
+            if out <= 0.0:
+                continue
+            second = 0.5 * max(1.0 - out / water[i], 0.0)
+            for s in range(start[r], start[r + 1]):
                 j = neighbour[s]
-                volume[j] += moved[s]
-                for k in range(3):
-                    limited = _van_leer(u[j, k] - u[i, k], u[i, k] - up[i, k])
-                    momentum = moved[s] * (u[i, k] + second * limited)
-                    change[i, k] -= momentum
-                    change[j, k] += momentum
-    return change, volume
+                theirs = first <= j < last
+                if moved[s] > 0.0 and (own or theirs):
+                    if theirs:
+                        volume[j] += moved[s]
+                    for k in range(3):
+                        limited = _van_leer(u[j, k] - u[i, k], u[i, k] - up[i, k])
+                        momentum = moved[s] * (u[i, k] + second * limited)
+                        if own:
+                            change[i, k] -= momentum
+                        if theirs:
+                            change[j, k] += momentum
 
 
 @njit(cache=True)

@@ -16,6 +16,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from fluid.numerics.jit import ranged, released
+from fluid.numerics.threads import over, owning, reach_of_rows
 from fluid.surface.volume import Flux
 from fluid.transport.velocity_transport import carry_velocity
 
@@ -32,22 +34,28 @@ def carry_volume(flux: Flux, dt: float, u=None):
     capacity = np.maximum(flux.capacity, 1e-300)
     least = LEAST_COUNTED * np.median(capacity[flux.nodes]) if len(flux.nodes) else 0.0
     g = flux.graph
-    turnover = _largest_turnover(flux.nodes, g.row, g.start, flux.rate, capacity, least)
+    count = len(flux.nodes)
+    turnover = max(over(_largest_turnover, count, flux.nodes, g.row, g.start, flux.rate, capacity, least))
     n_sub = int(np.ceil(dt * turnover / LARGEST_COURANT)) or 1
     along = (flux.nodes, g.row, g.start, g.neighbour)
+    share = np.zeros(len(water))
     for _ in range(n_sub):
-        moved = _moved(*along, flux.rate, water, capacity, dt / n_sub)
+        moved, change = np.zeros(len(flux.rate)), np.zeros(len(water))
+        over(_share, count, flux.nodes, water, capacity, share)
+        over(_moved, count, *along, flux.rate, water, capacity, share, dt / n_sub, moved)
         if u is not None:
             carry_velocity(*along, moved, water, u)
-        _hand_over(*along, moved, water)
+        owning(_hand_over, len(water), reach_of_rows(*along), count, *along, moved, change)
+        water += change
     return water
 
 
-@njit(cache=True)
-def _largest_turnover(nodes, graph_row, start, rate, capacity, least):
+@released
+def _largest_turnover(first, last, nodes, graph_row, start, rate, capacity, least):
     """max_i Σ out / V_i [1/s] over nodes of some size."""
     largest = 0.0
-    for i in nodes:
+    for place in range(first, last):
+        i = nodes[place]
         if capacity[i] > least:
             largest = max(largest, _out(graph_row[i], start, rate) / capacity[i])
     return largest
@@ -62,13 +70,19 @@ def _out(r, start, rate):
     return out
 
 
-@njit(cache=True)
-def _moved(nodes, graph_row, start, neighbour, rate, water, capacity, h):
-    """w_ij (edges,) [m³]: what leaves the listed nodes within h [s] by (1); no node gives more than it holds."""
-    share, moved = np.zeros(water.shape[0]), np.zeros(rate.shape[0])
-    for i in nodes:
+@ranged
+def _share(first, last, nodes, water, capacity, share):
+    """s (N,) at the listed nodes."""
+    for place in range(first, last):
+        i = nodes[place]
         share[i] = min(max(water[i], 0.0) / capacity[i], 1.0)
-    for i in nodes:
+
+
+@ranged
+def _moved(first, last, nodes, graph_row, start, neighbour, rate, water, capacity, share, h, moved):
+    """w_ij (edges,) [m³]: what leaves the listed nodes within h [s] by (1); no node gives more than it holds."""
+    for place in range(first, last):
+        i = nodes[place]
         r = graph_row[i]
         out = h * _out(r, start, rate)
         if out <= 0.0 or water[i] <= 0.0:
@@ -83,19 +97,21 @@ def _moved(nodes, graph_row, start, neighbour, rate, water, capacity, h):
         if total > water[i]:
             for s in range(start[r], start[r + 1]):
                 moved[s] *= water[i] / total
-    return moved
 
 
-@njit(cache=True)
-def _hand_over(nodes, graph_row, start, neighbour, moved, water):
-    """The volumes moved (edges,) [m³] off the one node and on to the other, in place."""
-    change = np.zeros(water.shape[0])
-    for i in nodes:
-        r = graph_row[i]
-        for s in range(start[r], start[r + 1]):
-            change[i] -= moved[s]
-            change[neighbour[s]] += moved[s]
-    water += change
+@ranged
+def _hand_over(first, last, runs, nodes, graph_row, start, neighbour, moved, change):
+    """The volumes moved (edges,) [m³] off the one node and on to the other (N,) [m³]."""
+    for run in range(runs.shape[0]):
+        for place in range(runs[run, 0], runs[run, 1]):
+            i = nodes[place]
+            r = graph_row[i]
+            own = first <= i < last
+            for s in range(start[r], start[r + 1]):
+                if own:
+                    change[i] -= moved[s]
+                if first <= neighbour[s] < last:
+                    change[neighbour[s]] += moved[s]
 
 
 @njit(cache=True)

@@ -7,7 +7,7 @@ import tempfile
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from coupler.commands.benchmark import cutting, debris, scenes
+from coupler.commands.benchmark import cutting, debris, scenes, threads
 from coupler.commands.benchmark.part import LAW
 from coupler.program import provenance
 from coupler.program.errors import ExitCode, SurgebreakError
@@ -26,6 +26,11 @@ VISITS = 2_000_000
 """Bonds times substeps of a stock measurement, in RECORDS parts of which the cheapest counts."""
 RECORDS = 5
 WATER_NODES, WATER_QUICK = (30_000, 100_000), (10_000,)
+THREADS_NODES, THREADS_QUICK = (30_000, 205_000), (10_000,)
+MOST_ON_TWO, MOST_SERIAL = 1.0 / 1.7, 0.07
+"""Targets at 1.2 million cells: time on two threads over that on one, share of the step that one thread does alone."""
+LEAST_TOLD = 0.01
+"""Share of a step from which a kernel is listed."""
 SOLVER_UNKNOWNS, SOLVER_QUICK = (10_000, 100_000, 300_000), (10_000,)
 MOST_PER_100K_CELLS = 30_000.0
 """Target [us]: a step of the water at 100 000 nodes, a fifth of the tank wet."""
@@ -216,6 +221,54 @@ def _stock_line(name: str, scene: dict, blocks: int, joints: int, points: int) -
     return Line(what, blocks, joints, 1e6 * figures["cheapest_substep"] / joints, "a joint, whole substep")
 
 
+def _threads(sizes):
+    """A step of the water on the wall's clock by number of threads, its serial share, Amdahl's law."""
+    for nodes in THREADS_QUICK if sizes == QUICK_SIZES else THREADS_NODES:
+        found = _part("threads", nodes)
+        n, one = found["nodes"], found["wall"]["1"]
+        for number, seconds in found["wall"].items():
+            yield Line(f"step of the water, {number} threads", n, 0, 1e6 * seconds, "a step, wall clock")
+            if number != "1":
+                goal = MOST_ON_TWO if number == "2" and nodes == THREADS_NODES[-1] else None
+                yield Line(
+                    f"  speed-up {one / seconds:.2f}; time over that of one",
+                    n,
+                    0,
+                    seconds / one,
+                    "times",
+                    goal,
+                )
+        goal = MOST_SERIAL if nodes == THREADS_NODES[-1] else None
+        yield Line("  serial share of one thread's processor time", n, 0, found["serial"], "of all", goal)
+        for cores in threads.MORE:
+            yield Line(
+                f"  {cores} cores by Amdahl's law",
+                n,
+                0,
+                threads.amdahl(found["serial"], cores),
+                "times as fast",
+            )
+
+
+def _roofline(sizes):
+    """Kernels of the water: what they move at least, and how fast that is beside a triad."""
+    for nodes in THREADS_QUICK if sizes == QUICK_SIZES else WATER_NODES[-1:]:
+        found = _part("roofline", nodes)
+        n, best, share = found["nodes"], found["bandwidth"], 1e6 * 1e5 / found["cells"]
+        yield Line("memory, triad of one thread", n, 0, best / 1e9, "GB/s")
+        yield Line("step of the water", n, 0, share * found["step"], "a 100k cells")
+        kernels = sorted(found["kernels"].items(), key=lambda item: -item[1][0])
+        for name, (seconds, moved) in kernels:
+            if seconds > LEAST_TOLD * found["step"]:
+                rate = moved / seconds
+                what = f"  {name.strip('_')}: {rate / 1e9:.3g} GB/s, {rate / best:.0%} of memory's"
+                yield Line(what, n, 0, share * seconds, "a 100k cells")
+        shared = sum(seconds for _, (seconds, _) in kernels)
+        moved = sum(moved for _, (_, moved) in kernels)
+        yield Line("  all of these loops", n, 0, share * shared, "a 100k cells")
+        yield Line("  the same at the bandwidth of memory", n, 0, share * moved / best, "a 100k cells")
+
+
 GROUPS = {
     "joints": _engine,
     "scenes": _scenes,
@@ -224,6 +277,8 @@ GROUPS = {
     "debris": _debris,
     "water": _water,
     "solver": _solver,
+    "threads": _threads,
+    "roofline": _roofline,
     "stock": _stock,
 }
 """Measurements by the name that --only takes."""

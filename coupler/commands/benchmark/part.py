@@ -123,6 +123,20 @@ def solver(size: int) -> dict:
     return {"alone": measured(size), "wall": measured(size, wall=True)}
 
 
+def threads(size: int) -> dict:
+    """A step of the water on one thread and on more."""
+    from coupler.commands.benchmark.threads import threads as measured
+
+    return measured(size)
+
+
+def roofline(size: int) -> dict:
+    """Kernels of the water against the bandwidth of memory."""
+    from coupler.commands.benchmark.threads import roofline as measured
+
+    return measured(size)
+
+
 KINDS = {
     "joints": joints,
     "building": building,
@@ -131,6 +145,8 @@ KINDS = {
     "cutting": cutting,
     "water": water,
     "solver": solver,
+    "threads": threads,
+    "roofline": roofline,
 }
 
 

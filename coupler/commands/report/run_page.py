@@ -122,7 +122,7 @@ def _what(run: Path, summary: dict) -> str:
         ("size at the start", _size(summary["figures"].get("size", {}))),
         (
             "machine",
-            f"{machine['processor']}, {machine['cores']} cores, OMP_NUM_THREADS {machine['threads']}; "
+            f"{machine['processor']}, {machine['cores']} cores, threads {machine['threads']}; "
             f"{machine['system']}",
         ),
         ("versions", ", ".join(f"{name} {number}" for name, number in summary["versions"].items())),

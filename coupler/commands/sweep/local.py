@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable
 
 from coupler.commands.sweep.folder import Spec
 from coupler.program.process import environment
+from coupler.program.threads import VARIABLE, cores
 
 Tell = Callable[[dict], None]
 
@@ -90,7 +91,7 @@ class Local:
         """A worker in a session of its own: Ctrl-C of the terminal reaches it through `stop` alone."""
         log = (self.spec.folder / "runs" / "worker.log").open("a", encoding="utf-8")
         words = [sys.executable, "-m", "coupler.commands.sweep_worker", str(self.spec.folder)]
-        variables = environment() | {"OMP_NUM_THREADS": str(self.spec.threads)}
+        variables = environment() | {VARIABLE: str(self.spec.threads)}
         with log:
             worker = subprocess.Popen(
                 [*words, *(["--cold"] if cold else [])],
@@ -128,4 +129,4 @@ def _lost(id: str, code: int) -> dict:
 
 def free_cores(threads: int) -> int:
     """Runs of so many threads that this machine has cores for."""
-    return max(1, len(os.sched_getaffinity(0)) // threads)
+    return max(1, cores() // threads)

@@ -24,6 +24,7 @@ from coupler.commands.sweep.folder import Spec, ended, figures, read_spec, write
 from coupler.commands.sweep.quantities import asked, is_derived, middles, read_quantity
 from coupler.program.errors import ExitCode, NoRun
 from coupler.program.process import environment, trouble
+from coupler.program.threads import VARIABLE
 from coupler.run.checkpoint import FOLDER as CHECKPOINTS
 from coupler.run.fingerprint import program
 from coupler.run.summary import read_summary
@@ -60,7 +61,7 @@ class Process:
     def __call__(self, words: Sequence[str], log: Path) -> Cost:
         """Run the command; user and system time and peak memory are those of the process and what it started."""
         began = time.perf_counter()
-        variables = environment() | {"OMP_NUM_THREADS": str(self.threads)}
+        variables = environment() | {VARIABLE: str(self.threads)}
         command = [sys.executable, "-m", "coupler.cli", *words]
         with log.open("a", encoding="utf-8") as stream:
             self.child = subprocess.Popen(

@@ -1,0 +1,173 @@
+"""What threads bring to a step of the water, and how far its kernels are from memory: `part.py threads NODES`, and
+`part.py roofline NODES`.
+
+Speed-ups are of the clock on the wall, the least of REPEATS with the numbers of threads in turn, all from one state.
+The serial share is what of the processor time of one thread passes outside of the kernels that threads share; with it
+Amdahl's law says what more cores could bring. Bytes are those that a kernel must read and write at least, each once,
+as far as it touches its arrays; bandwidth is that of a triad a = b + s c in the same process.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+
+from coupler.commands.benchmark.water import BEFORE, dam_break, step
+from coupler.program.threads import cores
+
+REPEATS, STEPS = 5, 3
+MORE = (8, 16, 64)
+TRIAD = 8_000_000
+"""Numbers in each array of the triad: far more than caches hold."""
+ROWS_OF_CELLS = ("_nodal_water", "_wet_fraction", "_cell_velocity", "_inflow", "_with_ghosts", "_cell_gradient",
+    "_nodal_mean", "_push_of_divergence", "_mean_gradients", "_average", "_hat_forces", "_all_below", "_leave",
+    "_carry_remainder", "_put", "_to_middle", "_surface_cells", "_touching_among")  # fmt: skip
+"""Kernels that go over cells; the others go over nodes."""
+SUMS = ("_hat_forces", "_momentum", "_square_of")
+"""Kernels whose range is one of chunks."""
+
+
+def amdahl(serial: float, n: int) -> float:
+    """Speed-up on n cores where a share is serial."""
+    return 1.0 / (serial + (1.0 - serial) / n)
+
+
+def numbers() -> list[int]:
+    """Threads that are tried: 1, 2, 4 ... and all cores of this process."""
+    most = cores()
+    return sorted({n for n in (1, 2, 4, 8, 16, 32, 64) if n < most} | {1, most})
+
+
+def started(nodes: int):
+    """The dam break while the water runs through the tank."""
+    from fluid.numerics.threads import use
+
+    use(cores())
+    scene = dam_break(nodes)
+    while scene.time < BEFORE:
+        step(scene)
+    return scene
+
+
+def threads(nodes: int) -> dict:
+    """Seconds of a step on the wall by number of threads, the serial share, and the size of the scene."""
+    from fluid.numerics.threads import use, watched
+
+    scene = started(nodes)
+    start, wall = scene.remember(), {n: np.inf for n in numbers()}
+    for _ in range(REPEATS):
+        for n in wall:
+            use(n)
+            began = time.perf_counter()
+            _steps(scene, start)
+            wall[n] = min(wall[n], (time.perf_counter() - began) / STEPS)
+    use(1)
+    with watched() as calls:
+        began = time.process_time()
+        _steps(scene, start)
+        spent = time.process_time() - began
+    return {
+        "nodes": len(scene.mesh.nodes),
+        "cells": len(scene.mesh.cells),
+        "wall": {str(n): seconds for n, seconds in wall.items()},
+        "step": spent / STEPS,
+        "serial": 1.0 - sum(call.seconds for call in calls) / spent,
+    }
+
+
+def _steps(scene, start) -> None:
+    scene.go_back(start)
+    for _ in range(STEPS):
+        step(scene)
+
+
+def bandwidth() -> float:
+    """Bytes a second of a triad of one thread, the best of REPEATS."""
+    from numba import njit
+
+    @njit
+    def triad(a, b, c, s):
+        for i in range(a.shape[0]):
+            a[i] = b[i] + s * c[i]
+
+    a, b, c = (np.full(TRIAD, float(k)) for k in range(3))
+    triad(a, b, c, 1.5)
+    best = np.inf
+    for _ in range(REPEATS):
+        began = time.process_time()
+        triad(a, b, c, 1.5)
+        best = min(best, time.process_time() - began)
+    return 3.0 * a.nbytes / best
+
+
+def roofline(nodes: int) -> dict:
+    """Bandwidth [B/s]; by kernel: seconds and bytes a step; seconds of a step."""
+    from fluid.numerics.threads import use
+
+    scene = started(nodes)
+    use(1)
+    start, t = scene.remember(), scene.topology
+    least: dict[str, list[float]] = {}
+    spent = np.inf
+    for _ in range(REPEATS):
+        with _traffic(len(t.nodes), len(t.cells)) as found:
+            began = time.process_time()
+            _steps(scene, start)
+            spent = min(spent, (time.process_time() - began) / STEPS)
+        for name, (seconds, moved) in found.items():
+            before = least.get(name, [np.inf, 0.0])[0]
+            least[name] = [min(before, seconds / STEPS), moved / STEPS]
+    return {
+        "cells": len(t.cells),
+        "nodes": len(t.nodes),
+        "bandwidth": bandwidth(),
+        "step": spent,
+        "kernels": least,
+    }
+
+
+@contextmanager
+def _traffic(nodes: int, cells: int) -> Iterator[dict[str, list[float]]]:
+    """Seconds and bytes of every shared kernel that runs meanwhile, by its name."""
+    from fluid.numerics import threads as team
+
+    found: dict[str, list[float]] = {}
+    given = team._alone
+
+    def alone(kernel, count, args):
+        began = time.process_time()
+        result = given(kernel, count, args)
+        sums = found.setdefault(kernel.__name__, [0.0, 0.0])
+        sums[0] += time.process_time() - began
+        sums[1] += _bytes(kernel.__name__, args, nodes, cells)
+        return result
+
+    team._alone = alone
+    try:
+        yield found
+    finally:
+        team._alone = given
+
+
+def _bytes(name: str, args, nodes: int, cells: int) -> float:
+    """Bytes of the arrays among the arguments, of those of the whole mesh the share that the rows are of it."""
+    arrays = [
+        a for arg in args for a in (arg if isinstance(arg, tuple) else (arg,)) if isinstance(a, np.ndarray)
+    ]
+    rows = _rows(name, args)
+    whole = cells if name in ROWS_OF_CELLS else nodes
+    share = min(1.0, rows / whole)
+    return float(sum(a.nbytes * (1.0 if len(a) <= rows else share) for a in arrays))
+
+
+def _rows(name: str, args) -> int:
+    """How many rows a kernel goes over: those of its range, of its runs, or of the chunks that it sums."""
+    third = args[2]
+    if name in SUMS:
+        return len(third)
+    if isinstance(third, np.ndarray) and third.shape[1:] == (2,):
+        return int(third[:, 1].max())
+    return args[1] - args[0]

@@ -1,0 +1,73 @@
+"""How many threads a run works with: what the command says, or SURGEBREAK_THREADS, or the cores of this process.
+
+The results are the same bits at any number (`fluid/numerics/threads.py`). The variable is what a run and the processes
+that it starts see; without it, in scripts and tests, one thread works.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from pathlib import Path
+
+from coupler.program.errors import ExitCode, SurgebreakError
+
+VARIABLE = "SURGEBREAK_THREADS"
+CGROUPS = Path("/sys/fs/cgroup")
+OWN_GROUP = Path("/proc/self/cgroup")
+
+
+class BadThreads(SurgebreakError):
+    """A number of threads that is none."""
+
+    exit_code = ExitCode.BAD_CASE
+
+
+def cores() -> int:
+    """Cores that this process may use: those it is bound to, fewer where its control group gets less of their time."""
+    bound = len(os.sched_getaffinity(0))
+    quota = _quota(CGROUPS, OWN_GROUP)
+    return bound if quota is None else max(1, min(bound, math.floor(quota + 1e-9)))
+
+
+def threads() -> int:
+    """Threads of the runs of this process: SURGEBREAK_THREADS, else one. Raises BadThreads."""
+    text = os.environ.get(VARIABLE, "1")
+    if not text.isdigit() or int(text) < 1:
+        raise BadThreads(f"{VARIABLE}={text}: a whole number of threads, at least 1")
+    return int(text)
+
+
+def take_threads(asked: int | None) -> None:
+    """Take what the command says over the variable, that over all cores. Raises BadThreads."""
+    if asked is not None and asked < 1:
+        raise BadThreads(
+            f"--threads {asked}: at least 1; without it all {cores()} cores of this process work"
+        )
+    if asked is not None or VARIABLE not in os.environ:
+        os.environ[VARIABLE] = str(cores() if asked is None else asked)
+    threads()
+
+
+def _quota(root: Path, own: Path) -> float | None:
+    """Cores' worth of time that the control groups of this process give it, None: no limit."""
+    found = []
+    for group in _groups(root, own):
+        try:
+            most, period = (group / "cpu.max").read_text(encoding="ascii").split()
+        except (OSError, ValueError):
+            continue
+        if most != "max":
+            found.append(int(most) / int(period))
+    return min(found, default=None)
+
+
+def _groups(root: Path, own: Path) -> list[Path]:
+    """The folders of the group of this process (version 2) and of those around it."""
+    try:
+        lines = own.read_text(encoding="ascii").splitlines()
+    except OSError:
+        return [root]
+    paths = [line.partition("::")[2] for line in lines if line.startswith("0::")]
+    place = root / paths[0].lstrip("/") if paths else root
+    return [place, *(p for p in place.parents if p.is_relative_to(root))]

@@ -1,0 +1,294 @@
+"""Kernels on several threads, with the same bits at any number of them.
+
+A kernel of this kind takes a range as its first arguments, releases the interpreter (`jit.ranged`) and writes to what
+belongs to the range only. Each thread gets one range; a single thread gets all of it and runs the loop as it stands.
+What a row comes to must not depend on where the ranges end. There are two forms:
+
+- `over`: rows that read what they like and write their own.
+- `owning`: sums over cells, or along edges, into nodes. The range is one of nodes: every thread goes through the cells
+  that have a node in its range, in their order, and adds to those nodes alone. So each node gets the same summands in
+  the same order as from one loop, without a list of the cells around it; cells at the border of two ranges are visited
+  twice. Runs of the list that reach no node of a range are left out, which is most of it where numbers are near where
+  places are.
+
+Numba's own `prange` would take three times as long to compile and bring a second pool beside that of YADE's OpenMP.
+The threads here are those of Python, wait without using the processor, and start when they are first needed; a process
+that is forked off starts its own.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+
+from fluid.numerics.jit import ranged
+
+LEAST_ROWS = 2_000
+"""Rows of a range that are worth a thread: to wake one takes as long as some hundred of them."""
+BLOCK = 256
+"""Entries of a list that are left out, or not, together."""
+CHUNK = 16_384
+"""Entries that are summed as one; shorter sums run through."""
+KEPT = 8
+"""Lists whose reach is remembered: those of one step."""
+
+
+class _Worker:
+    """A thread that waits for work."""
+
+    def __init__(self) -> None:
+        self._given, self._done = threading.Lock(), threading.Lock()
+        self._given.acquire()
+        self._done.acquire()
+        self._job: Callable[[], Any] = _nothing
+        self._result: Any = None
+        self._failure: BaseException | None = None
+        threading.Thread(target=self._work, daemon=True, name="surgebreak-kernels").start()
+
+    def _work(self) -> None:
+        while True:
+            self._given.acquire()
+            try:
+                self._result, self._failure = self._job(), None
+            except BaseException as failure:
+                self._result, self._failure = None, failure
+            self._job = _nothing
+            self._done.release()
+
+    def begin(self, job: Callable[[], Any]) -> None:
+        self._job = job
+        self._given.release()
+
+    def end(self) -> tuple[Any, BaseException | None]:
+        """What the job returned, or raised; waits for it even where Ctrl-C comes in between."""
+        interruption = None
+        while True:
+            try:
+                self._done.acquire()
+                break
+            except BaseException as caught:
+                interruption = caught
+        found, self._result = (self._result, interruption or self._failure), None
+        return found
+
+
+def _nothing() -> None:
+    return None
+
+
+class _Team:
+    """The threads of this process; one caller at a time has them, others do their work alone."""
+
+    def __init__(self) -> None:
+        self.size, self.least = 1, LEAST_ROWS
+        self.calls: list[Call] | None = None
+        self.forget()
+
+    def forget(self) -> None:
+        """Without threads, as a process is that has just been forked off."""
+        self.workers: list[_Worker] = []
+        self.at_work = threading.Lock()
+
+    def together(self, jobs: Sequence[Callable[[], Any]]) -> list:
+        """What the jobs return, one on this thread and the others beside it."""
+        if len(jobs) == 1 or not self.at_work.acquire(blocking=False):
+            return [job() for job in jobs]
+        try:
+            while len(self.workers) < len(jobs) - 1:
+                self.workers.append(_Worker())
+            return self._run(jobs)
+        finally:
+            self.at_work.release()
+
+    def _run(self, jobs) -> list:
+        busy = self.workers[: len(jobs) - 1]
+        for worker, job in zip(busy, jobs[1:]):
+            worker.begin(job)
+        own, failure = None, None
+        try:
+            own = jobs[0]()
+        except BaseException as caught:
+            failure = caught
+        ended = [worker.end() for worker in busy]
+        failure = failure or next((raised for _, raised in ended if raised is not None), None)
+        if failure is not None:
+            raise failure
+        return [own, *(result for result, _ in ended)]
+
+
+_team = _Team()
+os.register_at_fork(after_in_child=_team.forget)
+
+
+def use(threads: int, least: int = LEAST_ROWS) -> None:
+    """Run kernels on so many threads from now on, in this process; one at the start. least: rows that a range has at
+    least."""
+    if threads < 1:
+        raise ValueError(f"threads {threads}: at least 1")
+    _team.size, _team.least = threads, least
+
+
+def in_use() -> int:
+    """How many threads kernels run on."""
+    return _team.size
+
+
+class Call(NamedTuple):
+    """A kernel that more threads would share, its rows, and the processor time [s] that it took on one."""
+
+    name: str
+    rows: int
+    seconds: float
+
+
+@contextmanager
+def watched() -> Iterator[list[Call]]:
+    """Calls of kernels that more threads would share, while one does all the work: a list that grows."""
+    _team.calls = []
+    try:
+        yield _team.calls
+    finally:
+        _team.calls = None
+
+
+def over(kernel: Callable, count: int, *args, weight: int = 1) -> list:
+    """kernel(first, last, *args) on ranges that together are 0 ... count; what they return, in order.
+
+    weight: how many rows of the usual kind, which take some ten nanoseconds, one of these is worth."""
+    parts = min(_parts(count * weight), max(count, 1))
+    if parts == 1:
+        return [_alone(kernel, count * weight, (0, count, *args))]
+    ends = [count * k // parts for k in range(parts + 1)]
+    return _team.together([_call(kernel, (first, last), args) for first, last in pairwise(ends)])
+
+
+def found_over(kernel: Callable, count: int, *args) -> np.ndarray:
+    """The arrays that `over` gives, one behind the other."""
+    found = over(kernel, count, *args)
+    return found[0] if len(found) == 1 else np.concatenate(found)
+
+
+def owning(kernel: Callable, nodes: int, reach: Callable, count: int, *args) -> None:
+    """kernel(first, last, runs, *args) on ranges that together are the nodes 0 ... `nodes`.
+
+    runs (k, 2): from where to where in a list of `count` entries there can be something that has a node of the range.
+    reach: () → lowest and highest node (B,) of each BLOCK of the list; asked on several threads only."""
+    parts = _parts(count)
+    if parts == 1:
+        _alone(kernel, count, (0, nodes, np.array([[0, count]]), *args))
+        return
+    low, high = reach()
+    middle = np.sort(low)[[len(low) * k // parts for k in range(1, parts)]]
+    ends = [0, *(int(end) for end in middle), nodes]
+    _team.together(
+        [
+            _call(kernel, (first, last, _runs(low, high, first, last, count)), args)
+            for first, last in pairwise(ends)
+        ]
+    )
+
+
+def summed(kernel: Callable, count: int, shape: tuple[int, ...], *args) -> np.ndarray:
+    """Σ over 0 ... `count` of what kernel(first, last, *args, partial) adds to partial[c] (*shape) in each CHUNK c from
+    `first` to before `last`: the sums of chunks, which do not depend on the threads, are added in their order."""
+    chunks = max(1, -(-count // CHUNK))
+    partial = np.zeros((chunks, *shape))
+    over(kernel, chunks, *args, partial, weight=CHUNK)
+    total = partial[0]
+    for part in partial[1:]:
+        total += part
+    return total
+
+
+def _parts(count: int) -> int:
+    return max(1, min(_team.size, count // _team.least))
+
+
+def _alone(kernel, count, args):
+    """kernel(*args) on this thread."""
+    if _team.calls is None or count < 2 * _team.least:
+        return kernel(*args)
+    began = time.process_time()
+    found = kernel(*args)
+    _team.calls.append(Call(kernel.__name__, count, time.process_time() - began))
+    return found
+
+
+def _call(kernel, span, args):
+    return lambda: kernel(*span, *args)
+
+
+_reaches: list[tuple[tuple, tuple[np.ndarray, np.ndarray]]] = []
+
+
+def reach_of_cells(cell_list, cells) -> Callable:
+    """For `owning`: the nodes that the listed cells (n,) have."""
+    return lambda: _remembered((cell_list, cells), _cell_reach, len(cell_list), cell_list, cells)
+
+
+def reach_of_rows(nodes, row, start, neighbour) -> Callable:
+    """For `owning`: the listed nodes (n,) and those at the other ends of their edges; row, start, neighbour: of a
+    `topology.Graph`."""
+    key = (nodes, row, start, neighbour)
+    return lambda: _remembered(key, _row_reach, len(nodes), *key)
+
+
+def _remembered(key, kernel, count, *args):
+    """The reach of a list, made once for the same arrays."""
+    for arrays, known in _reaches:
+        if len(arrays) == len(key) and all(a is b for a, b in zip(arrays, key)):
+            return known
+    blocks = -(-count // BLOCK)
+    low, high = np.empty(blocks, np.int64), np.empty(blocks, np.int64)
+    over(kernel, blocks, *args, low, high, weight=BLOCK)
+    _reaches.insert(0, (key, (low, high)))
+    del _reaches[KEPT:]
+    return low, high
+
+
+@ranged
+def _cell_reach(first, last, cell_list, cells, low, high):
+    for b in range(first, last):
+        least, most = np.int64(cells[cell_list[b * BLOCK], 0]), np.int64(0)
+        for s in range(b * BLOCK, min((b + 1) * BLOCK, cell_list.shape[0])):
+            for a in range(4):
+                i = np.int64(cells[cell_list[s], a])
+                least, most = min(least, i), max(most, i)
+        low[b], high[b] = least, most
+
+
+@ranged
+def _row_reach(first, last, nodes, row, start, neighbour, low, high):
+    for b in range(first, last):
+        least, most = np.int64(nodes[b * BLOCK]), np.int64(0)
+        for s in range(b * BLOCK, min((b + 1) * BLOCK, nodes.shape[0])):
+            i = np.int64(nodes[s])
+            least, most = min(least, i), max(most, i)
+            for t in range(start[row[i]], start[row[i] + 1]):
+                j = np.int64(neighbour[t])
+                least, most = min(least, j), max(most, j)
+        low[b], high[b] = least, most
+
+
+@njit(cache=True)
+def _runs(low, high, first, last, count):
+    """Joined blocks with a node from `first` to before `last`, (k, 2): where each run begins and ends."""
+    runs, k = np.empty((low.shape[0] + 1, 2), np.int64), 0
+    for b in range(low.shape[0]):
+        if low[b] >= last or high[b] < first:
+            continue
+        begin, end = b * BLOCK, min((b + 1) * BLOCK, count)
+        if k > 0 and runs[k - 1, 1] == begin:
+            runs[k - 1, 1] = end
+        else:
+            runs[k, 0], runs[k, 1] = begin, end
+            k += 1
+    return runs[:k].copy()
