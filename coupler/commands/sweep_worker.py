@@ -23,6 +23,7 @@ from coupler.commands.cli import one_thread
 from coupler.commands.study.runner import Cost
 from coupler.commands.sweep.folder import Spec, read_spec
 from coupler.commands.sweep.one import make
+from coupler.program.process import end_with
 
 
 class Forked:
@@ -35,9 +36,10 @@ class Forked:
         """Run the command in a fork; see `one.Process`."""
         began = time.perf_counter()
         sys.stdout.flush()
+        parent = os.getpid()
         self.child = os.fork()
         if self.child == 0:
-            _be(words, log)
+            _be(words, log, parent)
         _, status, used = os.wait4(self.child, 0)
         self.child = 0
         wall = time.perf_counter() - began
@@ -52,12 +54,13 @@ class Forked:
             os._exit(0)
 
 
-def _be(words: Sequence[str], log: Path) -> None:
+def _be(words: Sequence[str], log: Path, parent: int) -> None:
     """Become `surgebreak WORDS`; never returns."""
     code = 1
     try:
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
         signal.signal(signal.SIGINT, signal.default_int_handler)
+        end_with(parent)
         descriptor = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
         os.dup2(descriptor, 1)
         os.dup2(descriptor, 2)

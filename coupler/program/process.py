@@ -7,14 +7,20 @@ checkout would then be checked, measured or drawn with than the one that was cal
 
 from __future__ import annotations
 
+import ctypes
 import os
 import platform
+import signal
 import subprocess
 import sys
 from typing import Any
 
 from coupler.program.provenance import ROOT
 
+_LIBC = ctypes.CDLL(None)
+"""Looked up here, since a fork should not."""
+PR_SET_PDEATHSIG = 1
+"""prctl(2)"""
 LAST_LINES = 3
 """Of what a process printed, in a message about how it ended."""
 
@@ -23,6 +29,14 @@ def run_module(module: str, *words: object, **options: Any) -> subprocess.Comple
     """`python -m module words...` of this very program; options of subprocess.run, of which check is False."""
     command = [sys.executable, "-m", module, *map(str, words)]
     return subprocess.run(command, **{"check": False, "env": environment(), **options})
+
+
+def end_with(parent: int, number: int = signal.SIGTERM) -> None:
+    """Called in a child: it gets the signal when the thread that started it ends, however that ends. parent: process id
+    of who started it, which may be gone already."""
+    _LIBC.prctl(PR_SET_PDEATHSIG, number)
+    if os.getppid() != parent:
+        os.kill(os.getpid(), number)
 
 
 def trouble(exit_code: int, output: str) -> str:

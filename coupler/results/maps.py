@@ -8,6 +8,7 @@ coordinates of the terrain file where the tank is not turned against it, else of
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -119,6 +120,40 @@ class Maps:
         new = path.with_suffix(".new")
         new.write_text("\n".join([*head, *lines]) + "\n", encoding="utf-8")
         new.replace(path)
+
+
+@dataclass(frozen=True)
+class Map:
+    """x (nx,), y (ny,) [m] in the coordinates of `frame` · z (ny, nx), from south to north, NaN where there is no value
+    · what: its meaning, without the unit"""
+
+    x: Array
+    y: Array
+    z: Array
+    what: str
+    frame: str
+
+
+def read_map(path: Path) -> Map:
+    """A map of a run. Raises OSError, ValueError or LookupError of a file that is not what `Maps` writes."""
+    head, rows, what = {}, [], ""
+    for line in path.read_text(encoding="utf-8").splitlines():
+        if line.startswith("#"):
+            what = line[1:].strip()
+            continue
+        words = line.split()
+        if words[0][0].isalpha():
+            head[words[0].lower()] = float(words[1])
+        else:
+            rows.append(words)
+    z = np.array(rows, float)[::-1]
+    z[z == head["nodata_value"]] = np.nan
+    dx, dy = head.get("dx", head.get("cellsize")), head.get("dy", head.get("cellsize"))
+    x, y = (
+        head[f"{a}llcenter"] + d * np.arange(n) for a, d, n in (("x", dx, z.shape[1]), ("y", dy, z.shape[0]))
+    )
+    what, _, frame = what.partition("; coordinates of ")
+    return Map(x, y, z, what.rpartition(" [")[0], frame)
 
 
 def _pairs(nodes: Array, fitted) -> tuple[Array, Array, Array, Array]:

@@ -16,6 +16,7 @@ from pathlib import Path
 from coupler.program.errors import ExitCode, SurgebreakError
 
 HELD = (errno.EAGAIN, errno.EACCES)
+LOG = "log.txt"
 NO_LOCKS = (errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS)
 """Numbers of an OSError of file systems that know no locks."""
 
@@ -26,12 +27,13 @@ class Busy(SurgebreakError):
     exit_code = ExitCode.BAD_CASE
 
 
-class RunLock:
-    """Holds a run directory until `release`, or until this process ends in any way."""
+class FileLock:
+    """Holds a file until `release`, or until this process and those forked from it end in any way."""
 
-    def __init__(self, path: Path):
-        """Raises Busy where another process holds it; `known` is False where the file system has no locks."""
-        handle = os.open(path / "log.txt", os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o644)
+    def __init__(self, file: Path, busy: str):
+        """busy: what is said where another process holds it (Busy). `known` is False where the file system has no
+        locks."""
+        handle = os.open(file, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o644)
         self._close = weakref.finalize(self, os.close, handle)
         self.known = True
         try:
@@ -39,10 +41,7 @@ class RunLock:
         except OSError as error:
             if error.errno in HELD:
                 self._close()
-                raise Busy(
-                    f"{path}: another process runs or resumes it at this moment; wait for its end, or end it with "
-                    f"Ctrl-C or `touch {path / 'stop'}`"
-                ) from error
+                raise Busy(busy) from error
             if error.errno not in NO_LOCKS:
                 raise
             self.known = False
@@ -51,3 +50,14 @@ class RunLock:
         """Let others in; may be called twice."""
         with contextlib.suppress(OSError):
             self._close()
+
+
+class RunLock(FileLock):
+    """Holds a run directory."""
+
+    def __init__(self, path: Path):
+        super().__init__(
+            path / LOG,
+            f"{path}: another process runs or resumes it at this moment; wait for its end, or end it with Ctrl-C or "
+            f"`touch {path / 'stop'}`",
+        )

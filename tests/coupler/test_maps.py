@@ -4,11 +4,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.io import netcdf_file
 
 from coupler.checks.read_case import load
+from coupler.commands.export.netcdf import write_netcdf
 from coupler.geometry.terrain.bed_mesh import fitted_of
 from coupler.geometry.terrain.grids import read_grid
-from coupler.results.maps import NEVER, Maps
+from coupler.results.maps import NEVER, Maps, read_map
 from coupler.scene.build_water import water_of
 
 CASE = """
@@ -83,6 +85,29 @@ def test_what_was_gathered_goes_into_checkpoints_and_files(flood, tmp_path):
     grid = read_grid(tmp_path / "maps" / "bed.asc")
     np.testing.assert_allclose(grid.x, 500.0 + maps.fitted.column_x)
     np.testing.assert_allclose(grid.z, maps.fitted.bed, rtol=1e-3, atol=1e-4)
+
+
+def test_maps_as_netcdf_hold_their_place_units_and_holes(flood, tmp_path):
+    """What xarray needs: coordinates named as the dimensions, units, and _FillValue where nothing came."""
+    water, maps = flood
+    water.level_set[:] = water.topology.nodes[:, 2] - 0.9
+    maps.step(water, 0.75)
+    maps.write(tmp_path / "maps")
+    (made,) = write_netcdf(tmp_path, tmp_path, "a flood")
+    assert made == tmp_path / "maps.nc"
+    with netcdf_file(made, mmap=False) as file:
+        np.testing.assert_allclose(file.variables["x"][:], 500.0 + maps.fitted.column_x)
+        np.testing.assert_allclose(file.variables["y"][:], 700.0 + maps.fitted.column_y)
+        assert file.comment == b"coordinates of the terrain file, in metres"
+        for name, unit in (("depth", b"m"), ("arrival", b"s"), ("flux", b"m3 s-2")):
+            variable = file.variables[name]
+            assert (variable.dimensions, variable.units) == (("y", "x"), unit)
+            shown = np.where(variable[:] == variable._FillValue, np.nan, variable[:])
+            np.testing.assert_array_equal(shown, read_map(tmp_path / "maps" / f"{name}.asc").z)
+        depth = file.variables["depth"][:]
+        wet = maps.film < maps.depth.reshape(maps.fitted.bed.shape).T
+        np.testing.assert_array_equal(depth < 1e30, wet)
+        np.testing.assert_allclose(depth[wet], maps.depth.reshape(maps.fitted.bed.shape).T[wet], rtol=1e-3)
 
 
 def test_row_of_a_building_has_the_flood_around_it_and_its_walls_in_the_order_of_their_breaks(flood):

@@ -1,4 +1,5 @@
-"""Histories as NetCDF by the CF conventions: `xarray.open_dataset` gives gauges with their units and meanings.
+"""Histories and maps of a flood as NetCDF by the CF conventions: `xarray.open_dataset` gives them with their units and
+meanings.
 
 Classic NetCDF (64-bit offsets), which scipy writes and everything reads.
 """
@@ -9,13 +10,22 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
+
 from coupler.results.history import History, read_history
+from coupler.results.maps import Map, read_map
 
 CONVENTIONS = "CF-1.10"
 
 
+FILL = 9.969209968386869e36
+"""Of places without a value: what NetCDF itself takes for doubles."""
+UNITS = {"bed": "m", "depth": "m", "speed": "m s-1", "flux": "m3 s-2", "arrival": "s"}
+"""Of the maps, as CF writes them."""
+
+
 def write_netcdf(run: Path, to: Path, title: str) -> Iterator[Path]:
-    """One file for each table of `history/`."""
+    """One file for each table of `history/`, and `maps.nc` where there are maps."""
     for source in sorted((run / "history").glob("*.csv")):
         table = read_history(source)
         if len(table["time"]):
@@ -24,6 +34,35 @@ def write_netcdf(run: Path, to: Path, title: str) -> Iterator[Path]:
             _write(beside, table, title)
             os.replace(beside, path)
             yield path
+    maps = {name: run / "maps" / f"{name}.asc" for name in UNITS}
+    if all(path.is_file() for path in maps.values()):
+        beside = to / ".maps.nc.part"
+        _write_maps(beside, {name: read_map(path) for name, path in maps.items()}, title)
+        os.replace(beside, to / "maps.nc")
+        yield to / "maps.nc"
+
+
+def _write_maps(path: Path, maps: dict[str, Map], title: str) -> None:
+    """All maps of a run over (y, x), from south to north."""
+    from scipy.io import netcdf_file
+
+    bed = maps["bed"]
+    with netcdf_file(path, "w", version=2) as file:
+        file.Conventions = CONVENTIONS
+        file.title = f"{title}: maps of the flood".encode()
+        file.source = b"surgebreak"
+        file.comment = f"coordinates of {bed.frame}".encode()
+        for name, values in (("y", bed.y), ("x", bed.x)):
+            file.createDimension(name, len(values))
+            made = file.createVariable(name, "f8", (name,))
+            made[:] = values
+            made.units, made.axis = b"m", name.upper().encode()
+            made.long_name = f"{name} of {bed.frame}".encode()
+        for name, one in maps.items():
+            made = file.createVariable(name, "f8", ("y", "x"))
+            made._FillValue = FILL
+            made[:] = np.where(np.isfinite(one.z), one.z, FILL)
+            made.units, made.long_name = UNITS[name].encode(), one.what.encode()
 
 
 def _write(path: Path, table: History, title: str) -> None:

@@ -140,14 +140,13 @@ def _make(spec: Spec, wish: Wish) -> bool:
 def _engine(spec: Spec, wish: Wish):
     if wish.engine == "local":
         return Local(spec, wish.jobs or free_cores(spec.threads))
-    options = dict(option.split("=", 1) for option in wish.options)
     if wish.engine == "slurm":
         from coupler.commands.sweep.slurm import Slurm
 
-        return Slurm(spec, wish.jobs or 100, wish.chunk, options, wish.detach)
+        return Slurm(spec, wish.jobs or 100, wish.chunk, wish.options, wish.detach)
     from coupler.commands.sweep.dask import Dask
 
-    return Dask(spec, wish.engine.removeprefix("dask-"), wish.jobs or 10, options)
+    return Dask(spec, wish.engine.removeprefix("dask-"), wish.jobs or 10, wish.options)
 
 
 def _to_make(spec: Spec, any_version: bool) -> list[str]:

@@ -7,6 +7,7 @@ runs have ended in a way that would be the same again (done, or failed with a re
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import platform
@@ -15,18 +16,20 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from pathlib import Path
 
 from coupler.commands.study.runner import Cost
 from coupler.commands.sweep.folder import Spec, ended, figures, read_spec, write_figures
 from coupler.commands.sweep.quantities import asked, is_derived, middles, read_quantity
 from coupler.program.errors import ExitCode, NoRun
-from coupler.program.process import environment, trouble
+from coupler.program.process import end_with, environment, trouble
 from coupler.program.threads import VARIABLE
 from coupler.run.checkpoint import FOLDER as CHECKPOINTS
 from coupler.run.fingerprint import program
+from coupler.run.lock import Busy, FileLock, RunLock
 from coupler.run.summary import read_summary
 
 Execute = Callable[[Sequence[str], Path], Cost]
@@ -47,6 +50,8 @@ LEFT = {
 """What stays in a run directory that is done."""
 FINAL = ("done", "cannot stand", "refused", "diverged", "gave up")
 """Outcomes that would be the same again."""
+PATIENCE = 60.0
+"""Seconds to wait for another process that makes the same run."""
 OPEN = ("stopped", "killed", "crashed", "lost")
 """Outcomes after which the next call goes on with the run."""
 
@@ -69,7 +74,7 @@ class Process:
                 stdout=stream,
                 stderr=subprocess.STDOUT,
                 env=variables,
-                preexec_fn=_ignore_warning,
+                preexec_fn=partial(_begin, os.getpid()),
             )
             _, status, used = os.wait4(self.child.pid, 0)
         self.child.returncode = os.waitstatus_to_exitcode(status)
@@ -82,13 +87,49 @@ class Process:
             self.child.send_signal(signal.SIGTERM)
 
 
-def _ignore_warning() -> None:
-    """Slurm warns all processes of a job of its end by SIGUSR2; it is this one that stops the run then."""
+def _begin(parent: int) -> None:
+    """What a run does before it is one: it stops when the process that is to read it is gone. Slurm warns all processes
+    of a job of its end by SIGUSR2; it is the parent that stops the run then."""
     signal.signal(signal.SIGUSR2, signal.SIG_IGN)
+    end_with(parent)
 
 
 def make(spec: Spec, id: str, execute: Execute) -> dict:
     """How a run of a sweep ended; it is made, or goes on, unless it has ended for good."""
+    try:
+        with _alone(spec, id):
+            return _make(spec, id, execute)
+    except Busy as error:
+        return {"id": id, "outcome": "lost", "reason": str(error), "cpu_seconds": 0.0, "time": None}
+
+
+@contextlib.contextmanager
+def _alone(spec: Spec, id: str) -> Iterator[None]:
+    """One process at a time makes a run: what a killed sweep has left behind may still be at it. Raises Busy when that
+    does not end within PATIENCE."""
+    log, place = spec.folder / "runs" / f"{id}.log", spec.place(id)
+    busy = f"{place}: a process of an earlier call still makes this run; call again when it is done, or end that one"
+    lock = _patient(lambda: FileLock(log, busy))
+    try:
+        if place.is_dir():  # a run whose maker was killed alone ends at its next step
+            _patient(lambda: RunLock(place)).release()
+        yield
+    finally:
+        lock.release()
+
+
+def _patient(lock: Callable[[], FileLock]) -> FileLock:
+    end = time.monotonic() + PATIENCE
+    while True:
+        try:
+            return lock()
+        except Busy:
+            if time.monotonic() > end:
+                raise
+        time.sleep(0.2)
+
+
+def _make(spec: Spec, id: str, execute: Execute) -> dict:
     known = ended(spec, id)
     if known is not None and not _may_go_on(spec, known):
         return known
@@ -101,7 +142,7 @@ def make(spec: Spec, id: str, execute: Execute) -> dict:
         cost = None if cost.exit_code == ExitCode.BAD_CASE else cost  # a torn checkpoint: from the start
     if cost is None:
         shutil.rmtree(place, ignore_errors=True)
-        log.unlink(missing_ok=True)
+        log.write_bytes(b"")  # which is locked, so not removed
         before = {}
         sets = [word for override in (*spec.runs[id], limit) for word in ("--set", override)]
         cost = execute(["run", str(spec.case_file), *sets, "--output", str(place)], log)

@@ -18,6 +18,7 @@ from pathlib import Path
 
 from coupler.commands.sweep.folder import Spec, ended, figures, read_spec, write_figures
 from coupler.commands.sweep.one import Process, make
+from coupler.commands.sweep.options import keywords
 from coupler.program.errors import BadCase, SurgebreakError
 from coupler.program.extras import need
 from coupler.program.process import environment
@@ -30,6 +31,8 @@ PATIENCE = 3
 """Looks that a job may be missing from the queue before its run is reported as lost: files take a while to be seen."""
 MINUTES = 60
 """Time limit of a job unless --option time=... says otherwise."""
+LISTS = ("setup", "teardown", "srun_args")
+"""Options that may be given again and again."""
 REQUEUES = 100
 """Times that a job may reach its time limit and go on."""
 
@@ -63,9 +66,9 @@ class Work:
 
 
 class Slurm:
-    """Submits jobs and waits for them. jobs: at a time; chunk: runs of a job; options: as submitit names them"""
+    """Submits jobs and waits for them. jobs: at a time; chunk: runs of a job; options: KEY=VALUE, named by submitit"""
 
-    def __init__(self, spec: Spec, jobs: int, chunk: int, options: dict[str, str], detach: bool):
+    def __init__(self, spec: Spec, jobs: int, chunk: int, options: Iterable[str], detach: bool):
         need("slurm")
         missing = [name for name in ("sbatch", "srun", "squeue", "scancel") if shutil.which(name) is None]
         if missing:
@@ -73,7 +76,7 @@ class Slurm:
                 f"--engine slurm: no {', '.join(missing)} on this machine's PATH; call it where sbatch works"
             )
         self.spec, self.jobs, self.chunk, self.detach = spec, jobs, chunk, detach
-        self.options = {name: int(text) if text.isdecimal() else text for name, text in options.items()}
+        self.options = keywords(options, LISTS)
 
     def make(self, ids: Iterable[str], tell: Tell) -> None:
         """Submit the runs that are in no job yet, and tell how each ended, unless the user wants to leave."""

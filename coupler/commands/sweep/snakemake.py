@@ -17,6 +17,7 @@ TEXT = """\
 # Runs of a sweep of surgebreak, one a job. Written by `surgebreak sweep CASE --export snakemake`.
 #   snakemake --cores 4                              here
 #   snakemake --executor slurm --jobs 100            on a cluster (plug-in of that name)
+# After a kill: `snakemake --unlock`, then the same again; runs go on from their checkpoints.
 # Then `surgebreak sweep CASE --output` with this directory makes table, curves and report.
 import json
 
@@ -38,7 +39,7 @@ rule all:
 
 rule run:
     input:
-        "sweep.json",
+        ancient("sweep.json"),  # written by every call of `surgebreak sweep`: no reason to make a run again
     output:
         "runs/{{run}}.json",
     log:
@@ -47,10 +48,8 @@ rule run:
     resources:
         mem_mb=config["mem_mb"],
         runtime=config["minutes"],
-    params:
-        python=config["python"],
     shell:
-        "{{params.python}} -m coupler.commands.sweep.one . {{wildcards.run}} > {{log}} 2>&1"
+        "{{config[python]}} -m coupler.commands.sweep.one . {{wildcards.run}} > {{log}} 2>&1"
 """
 
 

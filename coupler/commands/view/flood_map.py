@@ -11,6 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
+from coupler.results.maps import read_map
+
 MAPS = (
     ("depth", "largest depth [m]", "Blues"),
     ("speed", "largest speed [m/s]", "viridis"),
@@ -20,23 +22,6 @@ MAPS = (
 STATES = {"stands": "#2a9d5c", "damaged": "#f2a73b", "collapsed": "#c8322b"}
 
 
-def read_map(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """x (nx,), y (ny,) [m] from its lower left corner, and z (ny, nx), NaN without data, of a grid of a run."""
-    head, rows = {}, []
-    for line in path.read_text(encoding="utf-8").splitlines():
-        if line.startswith("#"):
-            continue
-        words = line.split()
-        if words[0][0].isalpha():
-            head[words[0].lower()] = float(words[1])
-        else:
-            rows.append(words)
-    z = np.array(rows, float)[::-1]
-    z[z == head["nodata_value"]] = np.nan
-    dx, dy = head.get("dx", head.get("cellsize")), head.get("dy", head.get("cellsize"))
-    return dx * np.arange(z.shape[1]), dy * np.arange(z.shape[0]), z
-
-
 def draw(run: Path, picture: Path, title: str) -> None:
     """The four maps with the buildings, as one PNG."""
     import matplotlib
@@ -44,12 +29,13 @@ def draw(run: Path, picture: Path, title: str) -> None:
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
-    x, y, bed = read_map(run / "maps" / "bed.asc")
+    found = read_map(run / "maps" / "bed.asc")
+    x, y, bed = found.x - found.x[0], found.y - found.y[0], found.z  # from the lower left corner
     houses = _buildings(run)
     tall = np.ptp(y) / np.ptp(x)
     figure, axes = plt.subplots(2, 2, figsize=(12.0, 1.4 + 11.0 * min(tall, 1.2)), layout="constrained")
     for axis, (name, label, colours) in zip(axes.flat, MAPS):
-        _, _, z = read_map(run / "maps" / f"{name}.asc")
+        z = read_map(run / "maps" / f"{name}.asc").z
         axis.contourf(x, y, bed, levels=12, cmap="Greys", alpha=0.35)
         highest = np.nanpercentile(z, 99.5) if np.isfinite(z).any() else 1.0
         image = axis.pcolormesh(
