@@ -331,6 +331,21 @@ class Ground(Section):
     material: Name = Field("ground", description="a name that contact.pair may go by")
 
 
+class Sleep(Section):
+    """Buildings whose loads do not change take no substeps. Absent: every block takes every substep. What is asleep
+    stands still; it wakes before the load acts on it where this would change a traction in its joints by more than
+    `share` of their strength, or where something loose comes near. Only blocks that joints hold to the ground or to
+    held blocks, with nothing loose among them, fall asleep: at the start, or after a period of their slowest swing at
+    rest."""
+
+    share: Annotated[float, InSI("", gt=0, le=0.5)] = Field(
+        0.02,
+        description="largest error of a traction in a joint while it sleeps, over the strength of the joint; as much "
+        "again comes on when it wakes",
+        examples=["2 %"],
+    )
+
+
 class Structure(Section):
     """Rigid blocks. Absent: nothing moves but water, and YADE is never loaded."""
 
@@ -362,3 +377,4 @@ class Structure(Section):
         description="longest step of the motion of the blocks; absent: the one at which energy is accurate. Longer "
         "ones are taken up to the limit of stability, with a note, and refused beyond",
     )
+    sleep: Sleep | None = Field(None, description="buildings that nothing happens to cost nothing")

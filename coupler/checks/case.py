@@ -213,6 +213,8 @@ def _structure_sections(case: Case) -> Iterator[Problem]:
             if ramp is None
             else f"is for start = 'ramp', not '{start}'; leave one of them out",
         )
+    if case.structure.sleep is not None and case.joints is None:
+        yield ("structure", "sleep"), "needs [joints]: only blocks that joints hold fall asleep; leave it out"
     if case.contact is None and case.joints is None:
         yield ("structure",), "blocks need a section [contact] with stiffness, restitution and friction"
     elif case.contact is not None and case.contact.stiffness is None and case.joints is None:

@@ -98,6 +98,8 @@ def _describe(scene: Scene, reporter) -> None:
         reporter.message(
             f"structure: {c.structure.n} blocks{held}, {joints} joints, substep {substep:.3g} s ({limit.what})"
         )
+        if c.structure.sleeps is not None:
+            reporter.message(f"sleep: {c.structure.sleeps.described()}")
         if limit.remark(substep):
             reporter.message(f"note: {limit.remark(substep)}")
         for what, law in laws_of(c.structure).items():
@@ -258,6 +260,8 @@ def _note(coupling, record, figures: dict) -> None:
         joints = joint_counts(coupling.structure)
         figures["joints"], figures["joints_broken"] = joints.intact + joints.broken, joints.broken
         largest("defect", record.defect)
+        if coupling.structure.sleeps is not None:
+            figures["sleep"] = coupling.structure.sleeps.figures()
         largest("opening_rate", record.opening_rate)
     note_work(figures.setdefault("work", {}), coupling, record, joints, figures["steps"])
 

@@ -181,6 +181,7 @@ def build_structure(case: Case):
         gravity,
         substep=case.structure.substep,
         ramp=case.structure.ramp or 0.0,
+        sleep=case.structure.sleep and case.structure.sleep.share,
     )
 
 

@@ -322,7 +322,7 @@ class CoupledStepper:
         structure = self.structure
         mass = mass_matrix(structure.mass, structure.inertia())
         velocity = self._padded(structure.velocity())
-        driven = np.append(structure.fixed, np.ones(self.immersion.n_solids, bool))
+        driven = np.append(structure.still, np.ones(self.immersion.n_solids, bool))
         of_bodies, stiffness, damping = self._with_solids(mass, *structure.tangent())
         response = StructureResponse(
             mass=of_bodies,
@@ -342,7 +342,7 @@ class CoupledStepper:
         free ones that its surface cuts, (n, 3, 3); None where there is none."""
         from fluid.pressure.waterline import hydrostatic_stiffness
 
-        driven = np.append(self.structure.fixed, np.ones(self.immersion.n_solids, bool))
+        driven = np.append(self.structure.still, np.ones(self.immersion.n_solids, bool))
         stiffness = hydrostatic_stiffness(self.water, problem.predicted.level_set, ~driven)
         if stiffness is None:
             return problem, None

@@ -38,6 +38,7 @@ def standing_wall(
     settled=True,
     step_max=0.01,
     passes=2,
+    sleep=None,
 ):
     """A wall of full-width courses, joined to one another and to the ground, with still water of `depth` [m] on its
     upstream face x = `face` and air behind it. Close its `structure` after use."""
@@ -50,7 +51,7 @@ def standing_wall(
         group="wall",
     )
     joints = JointParameters(strength=strength, opening_at_failure=opening, damping=damping)
-    structure = Structure(blocks, None, joints, ground=0.0)
+    structure = Structure(blocks, None, joints, ground=0.0, sleep=sleep)
     tank = ((0.0, 0.0, 0.0), (2.5, SLICE, 2.5))
     mesh = box_mesh(*tank, cell)
     water, immersion = _still_water(structure, mesh, tank, (face, SLICE, depth), covers)

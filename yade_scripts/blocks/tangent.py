@@ -115,9 +115,10 @@ def _sparse(blocks: Array, row_a: Array, row_b: Array, n: int) -> sp.csr_array:
     return sp.csr_array((values.ravel(), (i.ravel(), j.ravel())), shape=(6 * n, 6 * n))
 
 
-def joint_springs(joints, x: Array, R: Array) -> Springs:
-    """Springs of the live joints at places x (n, 3), R (n, 3, 3): secant k_s where open, k_c where closed."""
-    index = np.flatnonzero(joints.alive[joints.joint_of])
+def joint_springs(joints, x: Array, R: Array, index: Array | None = None) -> Springs:
+    """Springs of the points `index` of joints, by default of all that are alive and do not rest, at places x (n, 3),
+    R (n, 3, 3): secant k_s where open, k_c where closed."""
+    index = joints.visited_points() if index is None else index
     arm, normal, k = np.zeros((2, len(index), 3)), np.zeros((len(index), 3)), np.zeros((2, len(index)))
     for kernels, own, arrays in joints.of_points(index):
         arms, normals, stiffness = arm[:, own], normal[own], k[:, own]  # copies
@@ -138,12 +139,13 @@ def joint_springs(joints, x: Array, R: Array) -> Springs:
     )
 
 
-def joint_tangent(joints, x: Array, R: Array, n: int) -> sp.csr_array:
-    """Tangent stiffness (6n, 6n) of the live joints while they open further; softening makes it indefinite.
+def joint_tangent(joints, x: Array, R: Array, n: int, index: Array | None = None) -> sp.csr_array:
+    """Tangent stiffness (6n, 6n) of the points `index` of joints, by default of all that are alive and do not rest,
+    while they open further; softening makes it indefinite.
 
     The turning of the normals with the blocks is left out: it is of the order of the tractions times the openings."""
-    springs = joint_springs(joints, x, R)
-    index = np.flatnonzero(joints.alive[joints.joint_of])
+    index = joints.visited_points() if index is None else index
+    springs = joint_springs(joints, x, R, index)
     D = np.zeros((len(index), 3, 3))
     for kernels, own, arrays in joints.of_points(index):
         found = D[own]  # a copy

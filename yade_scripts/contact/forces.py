@@ -64,6 +64,10 @@ class ContactForces:
         self._free = np.concatenate([free, np.zeros(len(planes), bool)])
         self._nodes = np.diff(self._shapes.node_start)
         self._on = np.zeros(self._n, bool)
+        self._asleep = np.zeros(len(self._free), bool)
+        self._boxes = np.zeros((0, 2, 3))
+        self.roused = np.zeros(0, bool)
+        """Groups of blocks asleep that something loose had come near to when the pairs were last renewed."""
         self._joined = np.zeros(0, np.int64)
         self._set_pairs(np.zeros((0, 2), np.int64))
         self._count, self._read = 0, None
@@ -80,7 +84,7 @@ class ContactForces:
         """Pairs (p, 2) that live joints hold, in compression too; pairs that were among them before and are no more go
         on by contact, with the depth there is."""
         keys = np.unique(self._key(*np.sort(joined, axis=1).T))
-        parted = np.setdiff1d(self._joined, keys)
+        parted = self._joined[~_among(self._joined, keys)]
         self._joined = keys
         if len(parted):
             self.search(True, parted)
@@ -97,7 +101,36 @@ class ContactForces:
         near = self._neighbours(now)
         near = np.concatenate([near[self._on[near].any(axis=1)], self._near_planes()])
         near = np.sort(near[self._free[near].any(axis=1)], axis=1)
-        return near[~np.isin(self._key(*near.T), self._joined)]
+        if self._asleep.any():
+            near = self._awake(near)
+        return near[~_among(self._key(*near.T), self._joined)]
+
+    def _awake(self, near: Array) -> Array:
+        """The pairs in which something can move; which groups of those asleep something comes near to is noted."""
+        moves = self._free[: self._n] | self._motion.v.any(axis=1)
+        on = np.flatnonzero(self._on & moves & ~self._asleep[: self._n])
+        reach = self._shapes.radius[on, None] + 2.0 * self._reach
+        low, high = self._motion.x[on] - reach, self._motion.x[on] + reach
+        meets = (low[:, None] <= self._boxes[None, :, 1]) & (high[:, None] >= self._boxes[None, :, 0])
+        self.roused = meets.all(axis=2).any(axis=0)
+        return near[(self._free & ~self._asleep)[near].any(axis=1)]
+
+    def let_rest(self, asleep: Array, groups: list[Array]) -> None:
+        """asleep (n,) bool: blocks that stand still and meet nothing from now on; rows of each group of them."""
+        self._asleep[: self._n] = asleep
+        radius, x = self._shapes.radius[:, None], self._motion.x
+        self._boxes = np.array(
+            [[(x[g] - radius[g]).min(axis=0), (x[g] + radius[g]).max(axis=0)] for g in groups]
+        ).reshape(-1, 2, 3)
+        self.roused = np.zeros(len(groups), bool)
+        self.search(True)
+
+    def busy(self) -> Array:
+        """(n,) bool: blocks that touch something by contact, or have another one near that can move too."""
+        pairs, found = self._pairs, np.zeros(len(self._free), bool)
+        near = pairs.touching | (self._free[pairs.a] & self._free[pairs.b])
+        found[pairs.a[near]] = found[pairs.b[near]] = True
+        return found[: self._n]
 
     def _near_planes(self) -> Array:
         """Blocks that may reach a plane before the next search, (k, 2)."""
@@ -222,6 +255,13 @@ class ContactForces:
             getattr(self._slots, name)[slot] = saved[name]
         self.dashpot, self.friction, self.driving = saved["sums"].tolist()
         self._read = None
+
+
+def _among(keys: Array, of: Array) -> Array:
+    """(k,) bool: which of the numbers `keys` (k,) are in `of`, sorted."""
+    if not len(of):
+        return np.zeros(len(keys), bool)
+    return of[np.minimum(np.searchsorted(of, keys), len(of) - 1)] == keys
 
 
 def _in_order(pairs: Array) -> Array:

@@ -1,4 +1,4 @@
-"""The structure in motion: substeps, their length, energies, the state at rest (theory 1.3, 1.4).
+"""The structure in motion: substeps, their length, energies, the state at rest (theory 1.3 to 1.5).
 
 structure, readings       what others set up and move; what they read of it
 description               what is checked and derived from the list of blocks before it is built
@@ -6,6 +6,7 @@ substep, spin             one substep; free rotation of bodies with unequal iner
 timestep                  how long a substep may be
 onset                     when a joint dies, contact takes over
 equilibrium               displacements and joint forces at rest under the load of the start
+sleep                     islands of blocks that nothing happens to; loaded where it is asked for
 energy, impulses          what acted on the blocks, and the energy and momentum it changed
 state                     saved and restored, bit for bit
 

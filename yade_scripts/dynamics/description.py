@@ -55,9 +55,10 @@ def matched_stiffness(blocks: list[Block], joints: Joints | None) -> Array:
                 faces[row, face] = float(
                     np.linalg.norm(polygon_area_vector(blocks[row].vertices[list(blocks[row].faces[face])]))
                 )
+    areas: dict[int, list[float]] = {}
+    for (row, _), area in faces.items():
+        areas.setdefault(row, []).append(area)
     K = np.full(len(blocks), np.nan)
-    for row in range(len(blocks)):
-        areas = [area for (r, _), area in faces.items() if r == row]
-        if areas:
-            K[row] = np.mean(closing[row]) * np.mean(areas)
+    for row, own in areas.items():
+        K[row] = np.mean(closing[row]) * np.mean(own)
     return np.where(np.isnan(K), np.nanmean(K), K)

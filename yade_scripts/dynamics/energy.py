@@ -54,6 +54,8 @@ class Accounts:
     ):
         self._masses, self._motion, self._joints, self._contacts = masses, motion, joints, contacts
         self.load_work = self.joint_work = self.driving_work = self.handed_over = 0.0
+        self.stored_asleep = 0.0
+        """[J] in joints that rest."""
         self.weight = np.zeros((len(masses.mass), 6))
         """Of the blocks whose motion is not prescribed, (n, 6) [N, N m]."""
         self.weight[masses.free, :3] = masses.mass[masses.free, None] * masses.gravity
@@ -127,8 +129,17 @@ class Accounts:
         """Springs of the live joints half a substep ago [J]."""
         if self._joints is None or not len(self._joints.live):
             return 0.0
+        m, j = self._motion, self._joints
+        return float(j.stored_between(m.x, m.R, *m.before(), which=j.visited).sum()) + self.stored_asleep
+
+    def of_motion(self, rows: Array) -> float:
+        """Kinetic energy [J] of the blocks `rows`, and what their gravity does over the half substep between their
+        velocities and their places."""
         m = self._motion
-        return float(self._joints.stored_between(m.x, m.R, *m.before()).sum())
+        v, w, mass = m.v[rows, :3], m.v[rows, 3:], self._masses.mass[rows]
+        spin = np.einsum("ni,nij,nj->", w, self._masses.inertia(m.R)[rows], w)
+        fall = 0.5 * m.dt * float(mass @ (v @ self._masses.gravity))
+        return float(0.5 * (mass @ (v**2).sum(axis=1) + spin)) + fall
 
     def contact_stored(self) -> float:
         """Springs of the contacts half a substep ago: 1/2 k u(t) u(t - dt) [J]."""

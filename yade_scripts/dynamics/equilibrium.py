@@ -84,9 +84,9 @@ class Search:
 
     def direction(self, residual: Array) -> Array:
         """Newton's step where the tangent is positive definite, else the step of the secant stiffness."""
-        tangent = _factors(self._part(self._structure.opening_tangent()))
+        tangent = factors(self._part(self._structure.opening_tangent()))
         if tangent is None:
-            tangent = _factors(self._part(self._structure.tangent()[0]))
+            tangent = factors(self._part(self._structure.tangent()[0]))
         if tangent is None:
             raise CannotStand(_message(self._structure, "joints have lost their stiffness"))
         return tangent.solve(residual)
@@ -125,7 +125,7 @@ class Search:
         return csc_matrix(matrix[self._dofs, :][:, self._dofs])
 
 
-def _factors(matrix):
+def factors(matrix):
     """Factors of a symmetric matrix if it is positive definite, else None.
 
     Pivots stay on the diagonal, so by Sylvester's law their signs are those of the eigenvalues."""

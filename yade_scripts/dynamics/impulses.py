@@ -89,6 +89,10 @@ class ImpulseSums:
         _add(dt, x, joint, before, whole, s.joint, s.contact, s.place)
         self._dt += dt
 
+    def give(self, rows: Array, impulse: Array) -> None:
+        """What joints gave to the blocks `rows` (k,) besides: impulse (k, 9), as in `Impulses`."""
+        self._sums.joint[rows] += impulse
+
     def taken(self) -> Impulses:
         """Those since `start`."""
         s = self._sums

@@ -6,6 +6,8 @@ World coordinates and SI units; one row a block; motions and forces are six numb
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import scipy.sparse as sp
 
@@ -20,6 +22,9 @@ from yade_scripts.joints.joints import Joints, JointTable
 from yade_scripts.joints.seals import Seals
 from yade_scripts.yade_side.motion import Motion
 from yade_scripts.yade_side.scene import Scene
+
+if TYPE_CHECKING:
+    from yade_scripts.dynamics.sleep import Sleep
 
 Array = np.ndarray
 
@@ -45,6 +50,7 @@ class StructureReadings:
     _shares: Array
     _accounts: Accounts
     _substepper: Substepper
+    _sleep: Sleep | None
 
     def centre(self) -> Array:
         """(n, 3) [m]"""
@@ -63,6 +69,8 @@ class StructureReadings:
 
         Of the velocities, half a substep before the places; with these it changes by the impulses to round-off."""
         free = self._accounts.free
+        if self._sleep is not None:
+            free = free[~self._sleep.asleep[free]]
         p = self.mass[free, None] * self._motion.v[free, :3]
         orbital = np.cross(self._motion.x[free] + (self._origin - np.asarray(about)), p)
         spin = self._scene.angular_momentum(free) - self._spin.save()[free]
@@ -100,7 +108,22 @@ class StructureReadings:
         F = sum_on_blocks(contacts, force, m.x)
         if self.joints is not None:
             self.joints.forces(m.x, m.v, m.R, F, eta=None if viscous else 0.0)
-        return F
+        return F if self._sleep is None else F + self._sleep.force
+
+    @property
+    def sleeps(self) -> Sleep | None:
+        """Who sleeps; None where nobody may."""
+        return self._sleep
+
+    @property
+    def asleep(self) -> Array:
+        """(n,) bool: blocks that take no substeps, since what acts on them is in balance (`sleep.py`)."""
+        return np.zeros(self.n, bool) if self._sleep is None else self._sleep.asleep.copy()
+
+    @property
+    def still(self) -> Array:
+        """(n,) bool: blocks that no force moves now: of prescribed motion, or asleep."""
+        return self.fixed if self._sleep is None else self.fixed | self._sleep.asleep
 
     def reaction(self) -> Array:
         """(n, 6): what holds the blocks of prescribed motion, minus every force on them; zero for the others."""
@@ -108,7 +131,7 @@ class StructureReadings:
         return np.where(self.fixed[:, None], -total, 0.0)
 
     def tangent(self) -> tuple[sp.csr_array, sp.csr_array]:
-        """(K, C), each (6n, 6n): secant stiffness and damping of live joints and of contacts."""
+        """(K, C), each (6n, 6n): secant stiffness and damping of live joints and of contacts; none of blocks asleep."""
         springs = self.contacts().springs(self._motion.x)
         if self.joints is not None:
             springs = springs.and_(tangent.joint_springs(self.joints, self._motion.x, self._motion.R))

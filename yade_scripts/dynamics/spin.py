@@ -39,6 +39,10 @@ class SpinCorrection:
         """Add the correcting torques of the blocks `rows` to F (n, 6), which holds all other moments on them."""
         _correct(rows, R, v, self._inertia, self._inverse, dt, last_dt, self._lent, F)
 
+    def forget(self, rows: Array) -> None:
+        """Blocks that stand still: nothing is lent to them."""
+        self._lent[rows] = 0.0
+
     def save(self) -> Array:
         """What was lent in the last substep, (n, 3) [N m s]."""
         return self._lent.copy()

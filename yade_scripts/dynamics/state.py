@@ -8,7 +8,7 @@ import numpy as np
 
 Array = np.ndarray
 
-_OPTIONAL = ("joints", "contacts")
+_OPTIONAL = ("joints", "contacts", "sleep")
 
 
 class OtherStructure(ValueError):
@@ -21,7 +21,8 @@ class StructureState:
 
     motion (n, 16): position 3, orientation 4, velocity 3, spin 3, angular momentum 3 of each block, of half a substep
     before the positions · time [s] · dt [s] of the last substep · load (n, 6) that is held · lent_spin (n, 3)
-    onset: loose blocks and places they stood in · sums [J] · joints, contacts: their histories, None without
+    onset: loose blocks and places they stood in · sums [J] · joints, contacts: their histories, sleep: who sleeps, None
+    without
     """
 
     motion: Array
@@ -33,6 +34,7 @@ class StructureState:
     sums: dict[str, float]
     joints: dict[str, Array] | None
     contacts: dict[str, Array] | None
+    sleep: dict[str, Array] | None = None
 
     def arrays(self) -> dict[str, Array]:
         """Flat, for any file of named arrays: `numpy.savez(path, **state.arrays())`."""
@@ -65,6 +67,7 @@ class StructureState:
             sums={name: float(value) for name, value in parts["sums"].items()},
             joints=parts["joints"] or None,
             contacts=parts["contacts"] or None,
+            sleep=parts["sleep"] or None,
         )
 
 
@@ -73,8 +76,9 @@ def _below(name: str, arrays: dict[str, Array]) -> dict[str, Array]:
     return {key[len(name) + 1 :]: value for key, value in arrays.items() if key.startswith(name + "/")}
 
 
-def check_belongs(state: StructureState, blocks: int, points: int | None, meets: bool) -> None:
-    """Raise OtherStructure unless the state has so many blocks and points of joints (None: no joints), and contact."""
+def check_belongs(state: StructureState, blocks: int, points: int | None, meets: bool, sleeps: bool) -> None:
+    """Raise OtherStructure unless the state has so many blocks and points of joints (None: no joints), contact, and
+    sleep."""
     found = None if state.joints is None else len(state.joints["largest"])
     wrong = [
         f"{what}: {theirs or 'none'} in the state, {ours or 'none'} here"
@@ -82,6 +86,7 @@ def check_belongs(state: StructureState, blocks: int, points: int | None, meets:
             ("blocks", len(state.motion), blocks),
             ("points of joints", found, points),
             ("contact", state.contacts is not None, meets),
+            ("sleep", state.sleep is not None, sleeps),
         )
         if theirs != ours
     ]

@@ -66,6 +66,8 @@ class Structure(StructureReadings):
     joints: one law for all touching faces, or rules by pairs and scatter
     substep: used in place of the one that `substep_limit` finds accurate, None: that one
     ramp [s]: time over which the weight of the blocks comes on
+    sleep: share of the strength of joints by which their tractions may be off while islands of blocks sleep
+    (`sleep.py`), None: all blocks take all substeps
     Faces that touch at the start without a joint and get none of the pressure of the water around (`contact.uplift`)
     count as sealed while they do (`joined_planes`).
 
@@ -86,7 +88,9 @@ class Structure(StructureReadings):
         threads: int = 1,
         substep: float | None = None,
         ramp: float = 0.0,
+        sleep: float | None = None,
     ):
+        self._sleep = None
         self._describe(blocks, gravity)
         self.contact = contact
         self.planes = _with_ground(ground, planes)
@@ -116,6 +120,8 @@ class Structure(StructureReadings):
             self._scene, self._motion, self.joints, self._contacts, self._radius, loose
         )
         self._start_accounts(ramp)
+        if sleep is not None and self.joints is not None:
+            self._set_sleep(sleep)
 
     # ---- setting up -----------------------------------------------------------------------------------------
 
@@ -197,7 +203,31 @@ class Structure(StructureReadings):
             self._impulses,
             ramp,
         )
-        self._substepper.list_bodies(self._onset.loose)
+        self._list_bodies()
+
+    def _set_sleep(self, share: float) -> None:
+        from yade_scripts.dynamics.sleep import Sleep
+
+        self._sleep = Sleep(
+            share,
+            self._scene,
+            self._motion,
+            self.joints,
+            self._contacts,
+            self._onset,
+            self._spin,
+            self._masses,
+            self._accounts,
+            self._impulses,
+            self._who_sleeps_changed,
+        )
+
+    def _who_sleeps_changed(self) -> None:
+        self._limit = None
+        self._list_bodies()
+
+    def _list_bodies(self) -> None:
+        self._substepper.list_bodies(self._onset.loose, None if self._sleep is None else self._sleep.asleep)
 
     # ---- moving on ------------------------------------------------------------------------------------------
 
@@ -207,7 +237,7 @@ class Structure(StructureReadings):
         if F.shape != (self.n, 6) or not np.isfinite(F).all():
             raise NotFinite(f"load of shape {F.shape} for {self.n} blocks, finite: {np.isfinite(F).all()}")
         self._substepper.load = F.copy()
-        self._substepper.list_bodies(self._onset.loose)
+        self._list_bodies()
 
     def drive(self, name: str, velocity=(0.0, 0.0, 0.0), spin=(0.0, 0.0, 0.0)) -> None:
         """New prescribed motion of a driven block: velocity (3,) [m/s], spin (3,) [rad/s]."""
@@ -227,7 +257,8 @@ class Structure(StructureReadings):
             stiffness = self.face_stiffness if self.contact is not None else None
             damping = 0.0 if self.joints is None else self.joints.parameters.damping
             contact_damping = 0.0 if self.contact is None else self.contact.damping_ratio
-            self._limit = substep_limit(self.blocks, self.joints, stiffness, damping, contact_damping)
+            asleep = None if self._sleep is None else self._sleep.asleep
+            self._limit = substep_limit(self.blocks, self.joints, stiffness, damping, contact_damping, asleep)
         return self._limit
 
     def stable_substep(self) -> tuple[float, str]:
@@ -242,18 +273,20 @@ class Structure(StructureReadings):
     def advance(self, dt: float, substep: float | None = None) -> AdvanceReport:
         """Move on by dt [s] under the load of `set_load`, in equal substeps no longer than `substep`, by default that
         of the structure. Raises SubstepTooLong where the motion would be unstable."""
-        limit = self.substep() if substep is None else substep
-        self.substep_limit().check(min(limit, dt))
-        count = max(1, int(np.ceil(dt / limit * (1.0 - 1e-12)))) if np.isfinite(limit) else 1
         m = self._motion
         self._turn_on_contacts()
+        if self._sleep is not None:
+            self._sleep.begin(self.weight_now() + self._substepper.load, self.time, self._substepper.ramp)
+        count = self._count(dt, substep)
         x0, R0, half, spin = m.x.copy(), m.R.copy(), m.half_step_back(), m.v[:, 3:].copy()
         self._substepper.fastest = 0.0
         self._impulses.start()
-        broken = [self._one_substep(dt / count) for _ in range(count)]
+        broken, count = self._substeps(dt, count, substep)
         m.read()
         self._check_finite()
         turn = m.turned_since(R0)
+        if self._sleep is not None:
+            self._sleep.end(self.time)
         work = self._accounts.take_load(self._substepper.load, x0, half, turn, spin)
         mean = np.concatenate([m.x - x0, turn], axis=1) / dt
         failed = np.concatenate(broken).astype(np.int64)
@@ -267,6 +300,28 @@ class Structure(StructureReadings):
             impulses=self._impulses.taken(),
         )
 
+    def _count(self, dt: float, substep: float | None) -> int:
+        """Equal substeps that a time dt [s] takes."""
+        limit = self.substep() if substep is None else substep
+        self.substep_limit().check(min(limit, dt))
+        if self._sleep is not None and self.still.all() and not self._motion.v.any():
+            return 1
+        return max(1, int(np.ceil(dt / limit * (1.0 - 1e-12)))) if np.isfinite(limit) else 1
+
+    def _substeps(self, dt: float, count: int, substep: float | None) -> tuple[list[Array], int]:
+        """Take dt [s] in `count` substeps, or in others from where a block woke: joints that failed in each, and how
+        many there were."""
+        broken: list[Array] = []
+        left, length = count, dt / count
+        while left:
+            broken.append(self._one_substep(length))
+            left -= 1
+            if self._sleep is not None and self._sleep.reached(self.time) and left:
+                rest = left * length
+                left = self._count(rest, substep)
+                length = rest / left
+        return broken, len(broken)
+
     def _turn_on_contacts(self) -> None:
         """Before a step: for pieces that left their place."""
         if self.contact is None:
@@ -275,7 +330,7 @@ class Structure(StructureReadings):
         if len(moved):
             self._motion.read()
             self._onset.loosen(moved)
-            self._substepper.list_bodies(self._onset.loose)
+            self._list_bodies()
 
     def _one_substep(self, dt: float) -> Array:
         """Joints that failed, rows of the table."""
@@ -298,7 +353,9 @@ class Structure(StructureReadings):
         self._onset.loosen(self._onset.of_failed(broken))
         self._onset.leave_out_joined()
         self._accounts.handed_over += stored - self._accounts.joint_stored()
-        self._substepper.list_bodies(self._onset.loose)
+        if self._sleep is not None:
+            self._sleep.joints_failed()
+        self._list_bodies()
 
     def _check_finite(self) -> None:
         wrong = np.flatnonzero(~np.isfinite(self._motion.x).all(axis=1))
@@ -311,6 +368,8 @@ class Structure(StructureReadings):
         """Move blocks at once: shift (m, 3) [m], turn (m, 3, 3) about their centres; the joints take note of what
         opens, velocities stay, and the energy accounts start anew from here."""
         m = self._motion
+        if self._sleep is not None:
+            self._sleep.wake_all(self.time)
         self._scene.displace(rows, shift, turn)
         m.read()
         if self.joints is not None:
@@ -335,6 +394,7 @@ class Structure(StructureReadings):
             sums=self._accounts.sums(),
             joints=self.joints.history() if self.joints is not None else None,
             contacts=self._contacts.save() if self._contacts is not None else None,
+            sleep=self._sleep.save() if self._sleep is not None else None,
         )
 
     def restore(self, saved: StructureState) -> None:
@@ -342,8 +402,13 @@ class Structure(StructureReadings):
 
         Raises OtherStructure if the state has other blocks or joints."""
         points = None if self.joints is None else len(self.joints.largest)
-        check_belongs(saved, self.n, points, self._contacts is not None)
+        check_belongs(saved, self.n, points, self._contacts is not None, self._sleep is not None)
         self.time, self._motion.dt, self._limit = saved.time, saved.dt, None
+        if self._sleep is not None and saved.sleep is not None:
+            asleep = saved.sleep["asleep"].astype(bool)
+            self._scene.hold_again(asleep)
+            self._motion.rest(asleep)
+            self._motion.put(np.flatnonzero(asleep), saved.motion)
         self._scene.restore(saved.motion)
         self._take_driven(saved.motion)
         self._motion.read()
@@ -354,6 +419,8 @@ class Structure(StructureReadings):
             self.joints.restore(saved.joints)
         if self._contacts is not None:
             self._contacts.restore(saved.contacts)
+        if self._sleep is not None:
+            self._sleep.restore(saved.sleep)
         self.set_load(saved.load)
 
     def _take_driven(self, motion: Array) -> None:

@@ -51,8 +51,9 @@ class Substepper:
         self._lift = np.zeros_like(self.load)
         self.list_bodies(np.ones(len(scene.ids), bool))
 
-    def list_bodies(self, loose: Array) -> None:
-        """Find the bodies to read and push: after joints failed, the load changed or blocks became loose (n,) bool.
+    def list_bodies(self, loose: Array, asleep: Array | None = None) -> None:
+        """Find the bodies to read and push: after joints failed, the load changed, blocks became loose (n,) bool, woke
+        or fell asleep (n,) bool, None: none does.
 
         Read are those with a live joint, in reach of contact, or free to move; pushed also those under load."""
         none = np.zeros(0, np.int64)
@@ -60,8 +61,12 @@ class Substepper:
         self._turning = np.flatnonzero(self._spin.unequal)
         meeting = np.flatnonzero(loose) if self._contacts is not None else none
         watched = np.union1d(np.union1d(self._joined, meeting), self._accounts.free)
+        pushed = np.union1d(watched, np.flatnonzero(self.load.any(axis=1)))
+        if asleep is not None and asleep.any():
+            self._turning = self._turning[~asleep[self._turning]]
+            watched, pushed = watched[~asleep[watched]], pushed[~asleep[pushed]]
         self._motion.watch(watched)
-        self._pushed = np.union1d(watched, np.flatnonzero(self.load.any(axis=1)))
+        self._pushed = pushed
         self._pushed_ids = [self._scene.ids[r] for r in self._pushed]
 
     def missing_weight(self, time: float) -> float:

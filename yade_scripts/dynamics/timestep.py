@@ -68,15 +68,17 @@ class SubstepLimit:
 
 def joint_frequency(blocks: list[Block], joints) -> tuple[float, int]:
     """Upper bound of ω_max [rad/s], at most √2 of it, and the joint that gives most to it (-1 without joints)."""
-    if joints is None or len(joints.live) == 0:
+    if joints is None or len(joints.visited) == 0:
         return 0.0, -1
     if joints.stiffness_on is None:
         joints.stiffness_on = _stiffness_on_blocks(blocks, joints)
-    live = joints.live
+    live = joints.visited
     K = np.zeros((len(blocks) + 1, 6, 6))  # the last one stands for the ground
     for side, row in zip(joints.stiffness_on, (joints.a, joints.b)):
         np.add.at(K, row[live], side[live])
-    largest = np.linalg.eigvalsh(K)[:, -1]
+    rows = np.unique(np.concatenate([joints.a[live], joints.b[live] % len(K)]))
+    largest = np.zeros(len(K))
+    largest[rows] = np.linalg.eigvalsh(K[rows])[:, -1]
     worst = int(np.argmax(largest))
     share = [
         np.where(row[live] % len(K) == worst, np.trace(side[live], axis1=1, axis2=2), 0.0)
@@ -170,10 +172,11 @@ def substep_limit(
     face_stiffness: Array | None,
     damping: float = 0.0,
     contact_damping: float = 0.0,
+    asleep: Array | None = None,
 ) -> SubstepLimit:
     """The substep that joints and contacts allow, and the explicit limit.
 
-    face_stiffness (n,) [N/m], None without contact
+    face_stiffness (n,) [N/m], None without contact · asleep (n,) bool: blocks that do not count, None: all do
     damping, contact_damping: ζ of joints and contacts; a dashpot in parallel shortens the limit of the explicit
     scheme by √(1 + ζ²) - ζ."""
     best = SubstepLimit(dt=np.inf, what="nothing limits the substep (no joints, no contact)", omega=0.0)
@@ -184,7 +187,8 @@ def substep_limit(
         text = f"joint {blocks[joints.a[j]].name} - {other}, ω ≤ {omega:.4g} rad/s"
         best = SubstepLimit(dt=JOINT_SHARE * stable, what=text, omega=omega, stable=stable, stable_what=text)
     if face_stiffness is not None and len(blocks):
-        mass = np.array([np.inf if b.fixed or b.driven else b.mass for b in blocks])
+        passed = np.zeros(len(blocks), bool) if asleep is None else asleep
+        mass = np.array([np.inf if b.fixed or b.driven or p else b.mass for b, p in zip(blocks, passed)])
         limit = _dashpot_share(contact_damping) * np.sqrt(mass / face_stiffness)
         i = int(np.argmin(limit))
         text = f"contact of block {blocks[i].name}: m = {mass[i]:.4g} kg, K = {face_stiffness[i]:.4g} N/m"
@@ -204,9 +208,9 @@ def _driven_limit(blocks: list[Block], joints, best: SubstepLimit) -> SubstepLim
     """A driven block opens no joint by more than DRIVEN_SHARE δ_f a substep."""
     if joints is None:
         return best
-    for block in blocks:
+    for block in (b for b in blocks if b.driven):
         speed = np.linalg.norm(block.velocity) + np.linalg.norm(block.spin) * block.radius
-        if block.driven and speed * best.dt > DRIVEN_SHARE * joints.df.min():
+        if speed * best.dt > DRIVEN_SHARE * joints.df.min():
             dt = DRIVEN_SHARE * joints.df.min() / speed
             text = f"prescribed motion of block {block.name}, {speed:.4g} m/s"
             best = replace(best, dt=float(dt), what=text)

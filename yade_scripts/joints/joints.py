@@ -100,6 +100,10 @@ class Joints:
         """What each joint adds to the stiffness of its blocks (J, 6, 6), kept by `timestep.joint_frequency`."""
         self.alive = np.ones(n, bool)
         self.live = np.arange(n)
+        self.resting = np.zeros(n, bool)
+        """Joints of blocks that sleep: substeps pass them by."""
+        self.visited = self.live
+        """Live joints that are not resting."""
         self.largest = np.zeros(len(self.weight))
         self.paid = np.zeros((len(self.weight), 2))
         self.paid[:, PULL] = NOT_GROWING
@@ -115,32 +119,44 @@ class Joints:
     def __len__(self) -> int:
         return len(self.a)
 
-    def forces(self, x, v, R, F, dt: float = 0.0, advance: bool = False, eta: float | None = None) -> float:
-        """Add the joint forces on the blocks to F (n, 6); see `joint_forces.joint_forces`."""
+    def forces(
+        self,
+        x,
+        v,
+        R,
+        F,
+        dt: float = 0.0,
+        advance: bool = False,
+        eta: float | None = None,
+        which: Array | None = None,
+    ) -> float:
+        """Add the forces of the joints `which`, by default of all live ones that do not rest, on the blocks to F
+        (n, 6); see `joint_forces.joint_forces`."""
         eta, fastest = self.eta if eta is None else eta, 0.0
-        for kernels, arrays in self._live_families():
+        for kernels, arrays in self._families_of(self.visited if which is None else which):
             growth = kernels.joint_forces(
                 *arrays, self.paid, self.rub, eta, x, v, R, dt, advance, F, self.damped, self.rubbed
             )
             fastest = max(fastest, growth)
         return fastest
 
-    def _live_families(self) -> Iterator[tuple[JointKernels, tuple]]:
-        """Kernels of each law with live joints, and what they read of these, in their order."""
+    def _families_of(self, joints: Array) -> Iterator[tuple[JointKernels, tuple]]:
+        """Kernels of each law, and what they read of the live `joints` of that law, in their order."""
         for number, (kernels, peak) in enumerate(self.families):
-            live = self.live if len(self.families) == 1 else self.live[self.family[self.live] == number]
+            own = joints if len(self.families) == 1 else joints[self.family[joints] == number]
             yield (
                 kernels,
                 (
-                    live, self.a, self.b, self.start, self.xi_a, self.xi_b, self.weight, self.normal, self.law,
+                    own, self.a, self.b, self.start, self.xi_a, self.xi_b, self.weight, self.normal, self.law,
                     peak, self.largest,
                 ),
             )  # fmt: skip
 
-    def stored_between(self, x: Array, R: Array, x0: Array, R0: Array) -> Array:
-        """Elastic energy of each joint between two places of the blocks, (J,) [J]."""
+    def stored_between(self, x: Array, R: Array, x0: Array, R0: Array, which: Array | None = None) -> Array:
+        """Elastic energy of the joints `which`, by default of all live ones, between two places of the blocks; zero for
+        the others, (J,) [J]."""
         out = np.zeros(len(self))
-        for kernels, arrays in self._live_families():
+        for kernels, arrays in self._families_of(self.live if which is None else which):
             kernels.stored_between(*arrays, self.rub, x, R, x0, R0, out)
         return out
 
@@ -169,7 +185,19 @@ class Joints:
 
     def broken_now(self) -> Array:
         """Live joints that have failed since the last call of `retire`."""
-        return self.live[kernel.broken(self.live, self.start, self.largest, self.df)]
+        return self.visited[kernel.broken(self.visited, self.start, self.largest, self.df)]
+
+    def let_rest(self, resting: Array) -> None:
+        """(J,) bool: joints that substeps pass by from now on."""
+        self.resting = resting
+        self._list_visited()
+
+    def _list_visited(self) -> None:
+        self.visited = self.live[~self.resting[self.live]] if self.resting.any() else self.live
+
+    def visited_points(self) -> Array:
+        """Points of the joints that are alive and do not rest."""
+        return np.flatnonzero((self.alive & ~self.resting)[self.joint_of])
 
     def set_friction(self, friction: Array) -> None:
         """μ (J,) of points that have failed and are pressed, while the rest of their joint holds."""
@@ -179,9 +207,9 @@ class Joints:
         """Friction of `joints` ends at the places x (n, 3), R (n, 3, 3): it takes what its springs hold, which is
         returned [J]."""
         friction = self.law[joints, MU]
-        whole = self.stored_between(x, R, x, R)[joints]
+        whole = self.stored_between(x, R, x, R, which=joints)[joints]
         self.law[joints, MU] = 0.0
-        held = whole - self.stored_between(x, R, x, R)[joints]
+        held = whole - self.stored_between(x, R, x, R, which=joints)[joints]
         self.law[joints, MU] = friction
         self.rubbed[joints] += held
         return float(held.sum())
@@ -192,6 +220,7 @@ class Joints:
         self.alive[joints] = False
         self.failure_time[joints] = time
         self.live = self.live[self.alive[self.live]]
+        self._list_visited()
 
     def joined_pairs(self, n: int) -> Array:
         """Pairs of bodies (p, 2) with a live joint; fixed planes are bodies n, n + 1, ..."""
@@ -227,8 +256,8 @@ class Joints:
         )
 
     def rows(self) -> Array:
-        """Blocks with a live joint, sorted."""
-        ends = np.concatenate([self.a[self.live], self.b[self.live]])
+        """Blocks with a live joint that does not rest, sorted."""
+        ends = np.concatenate([self.a[self.visited], self.b[self.visited]])
         return np.unique(ends[ends >= 0])
 
     def damaged_blocks(self, n: int) -> Array:
@@ -310,6 +339,7 @@ class Joints:
         """Back to a `history`."""
         for name, value in history.items():
             setattr(self, name, value.copy())
+        self._list_visited()
 
 
 def _numbers(law: JointParameters) -> tuple[float, ...]:

@@ -32,6 +32,18 @@ class Motion:
         self.dt = 0.0
         self._all = _Rows(np.arange(n), scene.ids)
         self._watched = _Rows(np.zeros(0, np.int64), scene.ids)
+        self._awake: Array | None = None
+
+    def rest(self, asleep: Array) -> None:
+        """asleep (n,) bool: blocks that stand still from now on, where they were read last."""
+        awake = np.flatnonzero(~asleep)
+        self._awake = None if len(awake) == len(asleep) else awake
+        self._all = _Rows(awake, self._scene.ids)
+
+    def put(self, rows: Array, states: Array) -> None:
+        """The blocks `rows` are where states (n, 16) as of `Scene.save` say, whether the scene holds them or not."""
+        order = [*range(3), *range(7, 13), *range(4, 7), 3]
+        scatter(states[np.ix_(rows, order)], rows, self._scene.frame, self.x, self.v, self.R)
 
     def watch(self, rows: Array) -> None:
         """Rows that `read_watched` reads."""
@@ -52,8 +64,12 @@ class Motion:
 
     def before(self) -> tuple[Array, Array]:
         """Places (x, R) one substep ago."""
-        back = Rotation.from_rotvec(-self.dt * self.v[:, 3:]).as_matrix()
-        return self.x - self.dt * self.v[:, :3], back @ self.R
+        x = self.x - self.dt * self.v[:, :3]
+        if self._awake is None:
+            return x, Rotation.from_rotvec(-self.dt * self.v[:, 3:]).as_matrix() @ self.R
+        R = self.R.copy()
+        R[self._awake] = Rotation.from_rotvec(-self.dt * self.v[self._awake, 3:]).as_matrix() @ R[self._awake]
+        return x, R
 
     def half_step_back(self) -> Array:
         """Centres (n, 3) at the time of the velocities."""

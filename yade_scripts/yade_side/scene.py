@@ -51,6 +51,13 @@ class Scene:
         self.ids: list[int] = []
         self.frame = np.tile(np.eye(3), (len(blocks), 1, 1))
         self.margin = VERLET * min((2.0 * b.planes[1].min() for b in blocks), default=1.0)
+        self.driven = np.array([b.driven for b in blocks], bool)
+        self._still = np.zeros(len(blocks), bool)
+        self._still_states = np.zeros((len(blocks), 16))
+        self._bodies: list = []
+        """Those of all rows. The bodies of blocks that are held still are taken out of YADE's scene: its loops and its
+        search for neighbours pass them by."""
+        self._loose = np.zeros(len(blocks), bool)
         self._subdomain = engine.wrapper.Subdomain()
         self._searched = -1
         self._set_engines(gravity, meets)
@@ -62,6 +69,7 @@ class Scene:
     def _add_block(self, row: int, block: Block) -> None:
         body = self._shape(block)
         self.ids.append(self.O.bodies.append(body))
+        self._bodies.append(body)
         state = body.state
         axes = np.eye(3)
         if not block.is_box:
@@ -121,8 +129,7 @@ class Scene:
 
     def angular_momentum(self, rows: Array) -> Array:
         """About their own centres, as the integrator keeps it, of the blocks `rows` (k,) → (k, 3) [N m s]."""
-        bodies = self.O.bodies
-        return np.array([tuple(bodies[self.ids[r]].state.angMom) for r in rows], float).reshape(-1, 3)
+        return np.array([tuple(self._bodies[r].state.angMom) for r in rows], float).reshape(-1, 3)
 
     def step(self, dt: float, ids: list[int], F: Array) -> None:
         """Move on by dt [s] under the forces and moments F (k, 6) on the bodies `ids`.
@@ -136,13 +143,42 @@ class Scene:
 
     def set_motion(self, row: int, motion: Array) -> None:
         """Velocity and spin (6,) of a block whose motion is prescribed."""
-        state = self.O.bodies[self.ids[row]].state
+        state = self._bodies[row].state
         state.vel, state.angVel = self._v(motion[:3]), self._v(motion[3:])
 
     def set_loose(self, loose: Array) -> None:
         """loose (n,) bool: blocks that may meet any other; two that are not do not meet."""
-        for i, free in zip(self.ids, loose.tolist()):
-            self.O.bodies[i].mask = LOOSE if free else STANDING
+        for row in np.flatnonzero(loose != self._loose).tolist():
+            self._bodies[row].mask = LOOSE if loose[row] else STANDING
+        self._loose[:] = loose
+
+    def hold(self, rows: Array) -> None:
+        """Blocks of no prescribed motion stand still from now on, and are no neighbours of others."""
+        states = self._states(rows.tolist())
+        states[:, 7:] = 0.0
+        self._write(rows, states)
+        for row in rows.tolist():
+            self._fix(row, True)
+        self._still[rows], self._still_states[rows] = True, states
+
+    def let_go(self, rows: Array) -> None:
+        """Blocks that were held are free again, where they were left."""
+        self._write(rows, self._still_states[rows])
+        for row in rows.tolist():
+            self._fix(row, False)
+        self._still[rows] = False
+
+    def hold_again(self, still: Array) -> None:
+        """still (n,) bool: those that are held; `restore` says where."""
+        for row in np.flatnonzero(self._still != still).tolist():
+            self._fix(row, bool(still[row]))
+        self._still[:] = still
+
+    def _fix(self, row: int, still: bool) -> None:
+        if still:
+            self.O.bodies.erase(self.ids[row])
+        else:
+            self.O.bodies.insertAtId(self._bodies[row], self.ids[row])
 
     def neighbours(self, now: bool) -> Array:
         """Pairs of rows (p, 2) whose bounding boxes are within the margin; now: looked for at the present places, after
@@ -160,7 +196,7 @@ class Scene:
     def displace(self, rows: Array, shift: Array, turn: Array) -> None:
         """Move the blocks `rows` by shift (m, 3) and turn (m, 3, 3) about their centres."""
         for row, move, Q in zip(rows, shift, turn):
-            state = self.O.bodies[self.ids[row]].state
+            state = self._bodies[row].state
             state.pos = self._v(np.array(state.pos) + move)
             state.ori = self._q(Q @ _matrix(state.ori))
 
@@ -168,7 +204,15 @@ class Scene:
 
     def save(self) -> Array:
         """Position 3, orientation 4 (w x y z), velocity 3, spin 3 and angular momentum 3 of each block, (n, 16)."""
-        states = [self.O.bodies[i].state for i in self.ids]
+        if not self._still.any():
+            return self._states(range(len(self.ids)))
+        found = self._still_states.copy()
+        found[~self._still] = self._states(np.flatnonzero(~self._still).tolist())
+        return found
+
+    def _states(self, of) -> Array:
+        """The same of the rows `of`, (k, 16)."""
+        states = [self._bodies[row].state for row in of]
         rows = [
             (*s.pos, s.ori[3], s.ori[0], s.ori[1], s.ori[2], *s.vel, *s.angVel, *s.angMom) for s in states
         ]
@@ -176,14 +220,22 @@ class Scene:
 
     def restore(self, saved: Array) -> None:
         """Back to a saved state, bit for bit."""
+        stay = self._still & (self._still_states == saved).all(axis=1)
+        rows = np.flatnonzero(~stay)
+        self._write(rows, saved[rows])
+        self._still_states[rows] = saved[rows]
+
+    def _write(self, rows: Array, saved: Array) -> None:
+        """States (k, 16) of the blocks `rows`."""
         V, Q = self.engine.Vector3, self.engine.Quaternion
-        for i, row in zip(self.ids, saved.tolist()):
-            state = self.O.bodies[i].state
+        for i, row in zip(rows.tolist(), saved.tolist()):
+            state = self._bodies[i].state
             state.pos, state.ori = V(*row[:3]), Q(*row[3:7])
             state.vel, state.angVel, state.angMom = V(*row[7:10]), V(*row[10:13]), V(*row[13:])
 
     def close(self) -> None:
         """Give the scene back; the structure cannot be used afterwards."""
+        self._bodies.clear()
         if Scene._owner is self:
             self.O.reset()
             Scene._owner = None

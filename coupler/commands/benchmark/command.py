@@ -34,6 +34,8 @@ LEAST_TOLD = 0.01
 SOLVER_UNKNOWNS, SOLVER_QUICK = (10_000, 100_000, 300_000), (10_000,)
 MOST_PER_100K_CELLS = 30_000.0
 """Target [us]: a step of the water at 100 000 nodes, a fifth of the tank wet."""
+HOUSES, MOST_ASLEEP = 20, 1.5
+"""Target [times]: so many buildings of which one is hit, over one alone."""
 MOST_PER_JOINT, MOST_PER_BUILDING = 1.0, 1000.0
 """Targets [us]: the joint engine a joint and substep at AT joints, an intact building of 500 blocks a substep."""
 
@@ -151,6 +153,20 @@ def _dead(sizes):
             target,
         )
     yield Line("  the same blocks without joints", m["blocks"], 0, bare, "in all")
+
+
+def _sleep(sizes):
+    """Buildings that nothing happens to: many of which one is hit, beside one alone that is."""
+    one, many = _part("town", 1), _part("town", HOUSES)
+    if one["broken"] != many["broken"]:
+        raise PartFailed(
+            f"benchmark town: {one['broken']} joints broke of one, {many['broken']} among {HOUSES}"
+        )
+    for m, what in ((one, "one building, hit"), (many, f"{HOUSES} buildings, one hit, the others asleep")):
+        yield Line(what, m["blocks"], m["joints"], 1e6 * m["hit"], "0.2 s of the hit")
+    yield Line(
+        "  many over one", many["blocks"], many["joints"], many["hit"] / one["hit"], "times", MOST_ASLEEP
+    )
 
 
 def _cutting(sizes):
@@ -273,6 +289,7 @@ GROUPS = {
     "joints": _engine,
     "scenes": _scenes,
     "dead": _dead,
+    "sleep": _sleep,
     "cutting": _cutting,
     "debris": _debris,
     "water": _water,

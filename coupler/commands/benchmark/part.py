@@ -15,6 +15,7 @@ import numpy as np
 from coupler.commands.benchmark import scenes
 from coupler.commands.benchmark.cutting import cutting
 from yade_scripts.contact.law import ContactLaw
+from yade_scripts.dynamics.equilibrium import settle
 from yade_scripts.dynamics.structure import Structure
 from yade_scripts.joints.cohesion import JointParameters
 
@@ -23,6 +24,12 @@ STILL = (0.0, 0.0, 0.0)
 LAW = JointParameters(1e6, 1e-3, points=3, damping=0.0)
 CONTACT = ContactLaw(restitution=0.3, friction=0.5)
 STIFF = ContactLaw(stiffness=1e9, restitution=0.3, friction=0.5)
+HOUSE_LAW = JointParameters(0.15e6, 0.01)
+HOUSE_CONTACT = ContactLaw(restitution=0.2, friction=0.5)
+SHARE = 0.02
+"""Of the strength, by which sleeping joints may be off."""
+PUSH, HIT, HIT_STEP = 1e6, 0.2, 0.01
+"""Force on each block of the front of the first house [N], for how long, and in which steps [s]."""
 SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Of the blocks that are taken away, with all their joints."""
 
@@ -85,6 +92,22 @@ def pile(size: int) -> dict:
         return {"blocks": s.n, "joints": 0, "substep": substep(s), "contacts": len(s.contacts().a)}
 
 
+def town(size: int) -> dict:
+    """`size` buildings that stand settled, the first hit from the front: CPU seconds of HIT in steps of HIT_STEP."""
+    with Structure(scenes.houses(size), HOUSE_CONTACT, HOUSE_LAW, ground=0.0, sleep=SHARE) as s:
+        settle(s)
+        front = np.flatnonzero(s.centre()[: s.n // size, 0] < 1.0)
+        load = np.zeros((s.n, 6))
+        s.advance(HIT_STEP)  # compiles what is not, and falls asleep
+        began, broken = time.process_time(), 0
+        load[front, 0] = PUSH
+        for _ in range(round(HIT / HIT_STEP)):
+            s.set_load(load)
+            broken += len(s.advance(HIT_STEP).broken)
+        spent = time.process_time() - began
+        return {"blocks": s.n, "joints": len(s.joints), "hit": spent, "broken": broken}
+
+
 def dead(size: int) -> dict:
     """A wall whose blocks are taken away share by share, which breaks their joints."""
     cost, alive = [], []
@@ -141,6 +164,7 @@ KINDS = {
     "joints": joints,
     "building": building,
     "pile": pile,
+    "town": town,
     "dead": dead,
     "cutting": cutting,
     "water": water,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from yade_scripts.blocks.block import Block
-from yade_scripts.blocks.generators.building import Building, building_blocks
+from yade_scripts.blocks.generators.building import Building, Opening, building_blocks
 
 RATTLE = 1e-7
 """Speed [m/s] of blocks in random directions: joints open and close, none is damaged."""
@@ -33,6 +33,23 @@ def building() -> list[Block]:
     return building_blocks(
         Building((0.0, 0.0), (21.0, 8.0), height=12.0, thickness=0.5, block=1.6, course=1.2, storeys=3)
     )
+
+
+def houses(count: int) -> list[Block]:
+    """`count` buildings of 215 blocks, 40 m by 30 m apart; the first are the rows 0 .. 214."""
+    blocks: list[Block] = []
+    for number in range(count):
+        x, y = 40.0 * (number % 5), 30.0 * (number // 5)
+        holes = [(0, 3, 0, 1, 5, 2.2), (0, 1, 4.4, 1, 3, 6.6), (0, 7, 4.4, 1, 9, 6.6)]
+        holes += [(u, v, 4.4, u + 2, v + 1, 6.6) for u in (5, 13) for v in (0, 9)]
+        openings = [Opening((x + a, y + b, c), (x + d, y + e, f)) for a, b, c, d, e, f in holes]
+        blocks += building_blocks(
+            Building(
+                (x, y), (x + 20.0, y + 10.0), height=12.0, thickness=1.0, block=2.0, density=1500.0,
+                name=f"house{number}", openings=openings,
+            )
+        )  # fmt: skip
+    return blocks
 
 
 def pile(edge: int = 8) -> list[Block]:
