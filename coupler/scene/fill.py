@@ -10,6 +10,9 @@ count as wet. So a side of a box counts at a node only where water and air can m
     one cuts them short on the inner side, s_low > -t       →  s ← max(s, +2 c)     dry from the solid on
 
 c: cell edge, t = TOUCHES c. Elsewhere s stays, so that a level surface stays a plane up to the wall.
+
+Sides that follow an outer edge of a solid cut no cells short at a node beside that edge; but where no fluid part of the
+cells around a node is dry for lying beyond a side alone, this is no surface there either (`_hidden_sides`).
 """
 
 from __future__ import annotations
@@ -26,6 +29,8 @@ TOUCHES = 0.1
 """Share of a cell edge within which the side of a box counts as the face of the solid."""
 MISSING = 0.05
 """Share of a cell edge that a solid must take off the cells around a node to count."""
+FLUSH = 0.01
+"""Share of a cell edge by which a solid may stand beyond the end of a box that is meant to reach up to it."""
 SEAM = 1e-6
 """Share of a cell edge within which two boxes touch."""
 
@@ -44,8 +49,69 @@ def start_level(boxes, tank, mesh, domain) -> Array:
     cut_high = whole_high[domain.parent_node] - high > MISSING * edges[:, None]
     faced_low, faced_high = _facing(domain)
     stars = (domain.nodes, low, high, cut_low & faced_low, cut_high & faced_high)
-    level = np.min([_box_level(box, tank, stars, edges) for box in boxes], axis=0)
+    hidden = _hidden_sides(boxes, tank, domain, FLUSH * edge)
+    levels = np.array([_box_level(box, tank, stars, edges, *of) for box, of in zip(boxes, hidden)])
+    level = levels.min(axis=0)
+    inner = np.array([_goes_on(box, tank, *of) for box, of in zip(boxes, hidden)])
+    others = np.where(inner, np.inf, levels).min(axis=0)  # a surface near the node is one of theirs
+    deep = inner.any(axis=0)
+    level[deep] = np.where(others < 0.0, np.maximum(others, -edges), -edges)[deep]
     return _without_seams(level, boxes, tank, domain.nodes, edge)
+
+
+class _Corners:
+    """Corners of the fluid parts of the cells: their nodes that no solid covers, and those of its wetted polygons."""
+
+    def __init__(self, domain) -> None:
+        self._domain, d = domain, domain
+        self._shown = ~_behind(d, d.nodes[d.cells])
+        self.points = np.concatenate([d.nodes, d.face_corners.reshape(-1, 3)])
+        self.beside = np.zeros(len(d.nodes), bool)
+        self.beside[d.cells[d.is_cut]] = True
+        """(N,) bool: nodes of cut cells."""
+
+    def around(self, found) -> Array:
+        """Nodes (N,) bool with one of the points `found` (bool) in a cell around them, or around their neighbours: a
+        plane is one in the nodes that a solid covers, too."""
+        d, n = self._domain, len(self._domain.nodes)
+        within = (found[:n][d.cells] & self._shown).any(axis=1)
+        np.logical_or.at(within, d.face_cell, found[n:].reshape(len(d.face_cell), -1).any(axis=1))
+        for _ in range(2):
+            nodes = np.zeros(n, bool)
+            nodes[d.cells[within]] = True
+            within = nodes[d.cells].any(axis=1)
+        return nodes
+
+
+def _hidden_sides(boxes, tank, domain, slack: float) -> list[tuple[Array, Array]]:
+    """Of each box the lower and upper sides, (N, 3) bool each, that are no surface near a node of a cut cell: no corner
+    of the fluid parts near it is dry for lying beyond this side alone, give or take slack [m], while some are in the
+    box."""
+    none = np.zeros((len(domain.nodes), 3), bool)
+    if not domain.is_cut.any():
+        return [(none, none)] * len(boxes)
+    corners, (tank_low, tank_high) = _Corners(domain), tank
+    dry = ~np.any([_in_box(box, tank, corners.points, slack) for box in boxes], axis=0)
+    hidden = []
+    for low, high in boxes:
+        below = (corners.points < np.array(low) - slack) & (np.array(low) > tank_low)
+        above = (corners.points > np.array(high) + slack) & (np.array(high) < tank_high)
+        beyond = below.sum(axis=1) + above.sum(axis=1)
+        meets = corners.beside & corners.around(beyond == 0)
+        sides = []
+        for past in (below, above):
+            seen = [corners.around(past[:, k] & dry & (beyond == 1)) for k in range(3)]
+            sides.append(meets[:, None] & ~np.stack(seen, axis=1))
+        hidden.append((sides[0], sides[1]))
+    return hidden
+
+
+def _behind(domain, corners) -> Array:
+    """Corners (M, 4) bool of cells (M, 4, 3) that a solid covers."""
+    d, behind = domain, np.zeros(domain.cells.shape, bool)
+    to_corner = corners[d.face_cell] - d.face_centroid[:, None]
+    np.logical_or.at(behind, d.face_cell, np.einsum("sak,sk->sa", to_corner, d.face_normal) < 0.0)
+    return behind
 
 
 def merged(boxes, slack: float) -> list:
@@ -135,8 +201,8 @@ def _in_box(box, tank, points, slack: float = 0.0) -> Array:
     return np.all((points > low) & (points < high), axis=1)
 
 
-def _box_level(box, tank, stars, edge: Array) -> Array:
-    """Signed distance (N,) of one box, its sides at solids and tank walls left out."""
+def _box_level(box, tank, stars, edge: Array, hidden_low: Array, hidden_high: Array) -> Array:
+    """Signed distance (N,) of one box, its sides at solids and tank walls left out, hidden ones a cell off at least."""
     nodes, low, high, cut_low, cut_high = stars
     (box_low, box_high), (tank_low, tank_high) = box, tank
     level = np.full(len(nodes), -np.inf)
@@ -147,15 +213,25 @@ def _box_level(box, tank, stars, edge: Array) -> Array:
             side = _side(
                 x - plane, low[:, k] - plane, high[:, k] - plane, cut_low[:, k], cut_high[:, k], edge
             )
-            level = np.maximum(level, side)
+            level = np.maximum(level, np.where(hidden_high[:, k], np.minimum(side, -edge), side))
         if box_low[k] > tank_low[k]:
             plane = box_low[k]
             side = _side(
                 plane - x, plane - high[:, k], plane - low[:, k], cut_high[:, k], cut_low[:, k], edge
             )
-            level = np.maximum(level, side)
+            level = np.maximum(level, np.where(hidden_low[:, k], np.minimum(side, -edge), side))
     far = np.ptp(nodes, axis=0).max()  # a distance that no surface reaches
     return np.maximum(level, -far)
+
+
+def _goes_on(box, tank, hidden_low: Array, hidden_high: Array) -> Array:
+    """Nodes (N,) bool at which no side of a box is a surface."""
+    sides_low, sides_high = np.array(box[0]) > tank[0], np.array(box[1]) < tank[1]
+    return (
+        (hidden_low | ~sides_low).all(axis=1)
+        & (hidden_high | ~sides_high).all(axis=1)
+        & (hidden_low | hidden_high).any(axis=1)
+    )
 
 
 def _side(s, s_low, s_high, cut_inner, cut_outer, edge: Array) -> Array:
@@ -191,9 +267,7 @@ def _fluid_extent(domain) -> tuple[Array, Array]:
     d = domain
     corners = d.nodes[d.cells]
     low, high = _extent(corners)
-    behind = np.zeros(d.cells.shape, bool)
-    to_corner = corners[d.face_cell] - d.face_centroid[:, None]
-    np.logical_or.at(behind, d.face_cell, np.einsum("sak,sk->sa", to_corner, d.face_normal) < 0.0)
+    behind = _behind(d, corners)
     cut = np.flatnonzero(d.is_cut)
     points = part_points(corners[cut], d.volume[cut], d.centroid[cut], d.second[cut])
     part_low, part_high = np.full(low.shape, np.inf), np.full(low.shape, -np.inf)

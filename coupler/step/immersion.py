@@ -18,6 +18,8 @@ Array = np.ndarray
 
 STILL = 1e-3
 """Share of a cell edge that a block may move before its cells are cut again."""
+STEPS = 4
+"""Steps of that in which sealed faces grow with the gap of their joint."""
 FILM = 1e-4
 """Share of a cell edge by which loose blocks are drawn in, so that water reaches a face that rests on another:
 sealed or open must follow from the joints, not from the micrometres of a contact (a sealed face takes the
@@ -162,10 +164,11 @@ class Immersion:
         loose[block] = False
         growth -= self._films(loose)
         rows = self._reference.plane_start[block] + plane
-        steps = (
-            np.ceil(2.0 * np.maximum(half_gap, 0.0) / self._tolerance) + 1.0
-        )  # the other side may be a step behind
-        np.maximum.at(growth, rows, steps * self._tolerance)
+        # Both blocks may stand off by the tolerance from where they are cut. A step comes where the gap has opened by
+        # one, not where it opens by anything at all: a whole face grows by it, of which the joint may be a small part,
+        # and lifts the water around a block that stands still.
+        steps = np.floor(STEPS * np.maximum(2.0 * half_gap, 0.0) / self._tolerance) + 1.0
+        np.maximum.at(growth, rows, (1.0 + steps / STEPS) * self._tolerance)
         growth[rows] = np.maximum(growth[rows], before[rows])
         growth[self._closing_planes()] = 2.0 * SPANS * self.mesh.finest
         return growth

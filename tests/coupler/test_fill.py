@@ -85,3 +85,26 @@ def test_pools_on_both_sides_of_a_thin_wall_stay_at_levels_in_the_nodes():
     for _ in range(10):
         advance(water)
     assert np.abs(water.velocity).max() < 1e-7
+
+
+@pytest.mark.parametrize("covers", ["single", "multiple"])
+def test_water_around_a_hull_is_at_rest_at_its_lower_edges_too(covers):
+    """Four boxes around a hull and one under it end at its faces. Beside its lower edges no side of a box cuts a cell
+    short, but nothing in the cells there is dry: taken as surfaces, these sides took a fifth of its buoyancy away."""
+    low, high, top = np.array([0.257, 0.154, 0.152]), np.array([0.643, 0.371, 0.6]), 0.33
+    solid = ConvexBodies.boxes(0.5 * (low + high)[None], (high - low)[None])
+    mesh = box_mesh(*TANK, CELL)
+    domain = cut_domain(mesh, solid, covers)
+    boxes = [
+        ((0.0, 0.0, 0.0), (1.0, 0.5, low[2])),
+        ((0.0, 0.0, 0.0), (low[0], 0.5, top)),
+        ((high[0], 0.0, 0.0), (1.0, 0.5, top)),
+        ((0.0, 0.0, 0.0), (1.0, low[1], top)),
+        ((0.0, high[1], 0.0), (1.0, 0.5, top)),
+    ]
+    water = Water(mesh, domain, start_level(boxes, TANK, mesh, domain), WaterParameters())
+    plane = Water(mesh, domain, domain.nodes[:, 2] - top, WaterParameters())
+    np.testing.assert_allclose(water.nodal_water, plane.nodal_water, rtol=1e-12, atol=1e-18)
+    for _ in range(5):
+        advance(water)
+    assert np.abs(water.velocity).max() < 1e-8
