@@ -85,6 +85,7 @@ AIR = (
     ("lost", "J", "energy of air that got away or was mixed with other air so far"),
     ("entrained", "m3", "reference volume of pockets that opened within the water so far"),
     ("filled", "1", "pockets that water filled so far"),
+    ("let_go", "1", "pockets that became smaller than water.air.smallest so far, and are open air since"),
 )
 STRUCTURE = (
     ("time", "s", "time"),

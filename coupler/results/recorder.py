@@ -235,6 +235,7 @@ class Recorder:
             lost=air.lost,
             entrained=air.entrained,
             filled=air.gone,
+            let_go=air.let_go,
         )
 
     def _append_structure(self, record) -> None:
@@ -260,7 +261,8 @@ class Recorder:
                 time,
                 w.domain.nodes,
                 w.domain.cells,
-                {"level_set": w.level_set, "velocity": w.velocity, "pressure": w.pressure},
+                {"level_set": w.level_set, "velocity": w.velocity, "pressure": w.pressure}
+                | ({} if w.air is None else {"pocket": w.air.nodal(w.air.name)}),
                 {"fluid_fraction": w.topology.fraction},
             )
         if self._blocks:

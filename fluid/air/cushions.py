@@ -45,7 +45,7 @@ class Air:
     it · turned (K,) bool: R changed its sign, or there is none of a step before · name (K,): number for life, from 1 ·
     names: how many were given · lost [J]: energy of air that got away or was mixed, or of bubbles that were let go, so
     far · entrained [m³]: reference volume of pockets that opened within the water so far · gone: pockets that the water
-    filled so far."""
+    filled so far · let_go: those that became too small (`Gas.smallest`) so far."""
 
     gas: Gas
     label: np.ndarray
@@ -59,6 +59,7 @@ class Air:
     lost: float = 0.0
     entrained: float = 0.0
     gone: int = 0
+    let_go: int = 0
 
     @classmethod
     def at_start(cls, gas: Gas, topology, phi, open_to_air) -> Air:
@@ -131,7 +132,9 @@ class Cushions:
         label, count = labelled(t, phi, open_to_air)
         descent, reference, volume = _handed_on(air, before_volume, t, phi, label, count)
         small = reference < gas.smallest * bricks(t, label, count)
+        let_go = air.let_go
         if small.any():
+            let_go += int((descent.share[:, small] > 0.0).any(axis=0).sum())
             label, count = without(label, small)
             descent, reference, volume = _handed_on(air, before_volume, t, phi, label, count)
         same, anew = descent.only >= 0, descent.share.sum(axis=0) == 0.0
@@ -152,6 +155,7 @@ class Cushions:
             lost=air.lost + float(set_free),
             entrained=air.entrained + float(reference[out_of_water].sum()),
             gone=air.gone + int(descent.gone.sum()),
+            let_go=let_go,
         )
         theta = np.where(now.turned, SETTLING, RESOLVED)
         stiffness = gas.stiffness(reference, volume)

@@ -302,8 +302,9 @@ def _put(first, last, rows, values, field):
 
 
 def to_middle(cell_list, now, before):
-    """1.5 u - 0.5 u_before (M, 3) in the listed cells: the velocity half a step ahead; u where none was before."""
-    out = np.empty(now.shape)
+    """1.5 u - 0.5 u_before (M, 3) in the listed cells: the velocity half a step ahead; u where none was before. Zero in
+    the others."""
+    out = np.zeros(now.shape)
     over(_to_middle, len(cell_list), cell_list, now, before, out)
     return out
 

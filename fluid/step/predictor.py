@@ -80,7 +80,7 @@ def predicted(water, dt: float) -> PressureProblem:
     kick = kick_factor(water.acceleration, water.largest_kick())
     u_adv, phi = _transported(water, dt, theta, kick)
     found = water.carried(dt, theta)
-    carried = found.water
+    carried = found.water + found.swept
     conserved, left = water.conserved_volume, Outflow.of(water, dt, carried)
     if left is not None:
         carried -= left.volume

@@ -48,6 +48,7 @@ OF_AIR = (
     "lost",
     "entrained",
     "gone",
+    "let_go",
 )
 
 
@@ -66,6 +67,7 @@ def save(water) -> dict[str, np.ndarray]:
     arrays = {name: np.array(getattr(water, name)) for name in (*NODAL, *OF_CELLS, *OF_BODIES, *NUMBERS)}
     arrays |= {"listed": water.listed, "layer_start": water.layer_start}
     arrays |= {"graph_nodes": water.flux.graph.nodes, "flux_nodes": water.flux.nodes, "flux": water.flux.rate}
+    arrays["flux_velocity"] = water.flux.velocity
     if water.sides is not None:
         arrays |= {name: np.array(getattr(water.sides, name)) for name in SIDES}
     if water.air is not None:
@@ -89,6 +91,7 @@ def restore(water, domain, arrays) -> None:
         nodes=np.array(arrays["flux_nodes"]),
         graph=water.graph,
         rate=np.array(arrays["flux"]),
+        velocity=np.array(arrays["flux_velocity"]),
         water=water.nodal_water - water.displaced,
         capacity=water.topology.node_volume,
     )
@@ -115,6 +118,7 @@ def _check(domain, arrays, sides, air) -> None:
         "graph_nodes",
         "flux_nodes",
         "flux",
+        "flux_velocity",
     }
     wanted |= set(SIDES) if sides is not None else set()
     wanted |= {f"air_{name}" for name in OF_AIR} if air is not None else set()

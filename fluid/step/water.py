@@ -31,6 +31,7 @@ from fluid.surface.extrapolation import BAND, fill_missing
 from fluid.surface.level_set import FAR, redistance, without_films
 from fluid.surface.volume import edge_flux, nodal_volume, renumbering
 from fluid.transport.surface_momentum import Carried
+from fluid.transport.swept_volume import swept
 from fluid.transport.volume_transport import carry_volume
 
 if TYPE_CHECKING:
@@ -289,7 +290,7 @@ class Water:
         self.set_domain(domain)
         known = (source >= 0) & old_topology.active[source]
         if self.left_behind is None:
-            self.left_behind = (self.velocity, self.acceleration, old_topology.node_size)
+            self.left_behind = (self.velocity, self.acceleration, self.level_set, old_topology)
         self._carry_nodes(source, known)
         self._carry_cells(old_topology)
         self._find_band()
@@ -329,12 +330,19 @@ class Water:
         return replace(carried, water=carried.water + self.slits.carried(dt))
 
     def _carried(self, dt: float, theta: float) -> Carried:
-        if self.parameters.advection == "supg":
-            return Carried(carry_volume(self.flux, dt))
-        u, a, size = self.left_behind or (self.velocity, self.acceleration, self.topology.node_size)
-        kick = (1.0 - theta) * dt * kick_factor(a, self._largest_kick(size))
-        u_hat = u + kick[:, None] * a
-        return Carried.by(self.flux, dt, u_hat, a, self.parameters.gravity, size)
+        p, flux = self.parameters, self.flux
+        u, a, phi, t = self.left_behind or (self.velocity, self.acceleration, self.level_set, self.topology)
+        kick = dt * kick_factor(a, self._largest_kick(t.node_size))[:, None] * a
+        total = np.zeros(len(flux.rate))
+        if p.advection == "supg":
+            found = Carried(carry_volume(flux, dt, total=total))
+        else:
+            u_hat = u + (1.0 - theta) * kick
+            found = Carried.by(flux, dt, u_hat, a, p.gravity, t.node_size, total)
+        if t.is_obtuse:
+            return replace(found, swept=np.zeros(len(phi)))
+        u_m = u + 0.5 * kick if p.theta < 1.0 else u
+        return replace(found, swept=swept(t, flux, phi, u_m, total, dt))
 
     def _carry_nodes(self, source, known):
         scalars = np.column_stack([self.level_set, self.pressure, self.end_pressure])

@@ -50,11 +50,13 @@ relative tolerance."""
 @dataclass(frozen=True, kw_only=True)
 class Flux:
     """Volume flux along the edges of the listed nodes (n,): rate [m³/s] out of each, on the edges of `graph`;
-    water (N,) and capacity (N,) [m³]: what every node holds and could hold on the same domain."""
+    velocity (M, 3) [m/s] of the cells that it comes from; water (N,) and capacity (N,) [m³]: what every node holds and
+    could hold on the same domain."""
 
     nodes: np.ndarray
     graph: Graph
     rate: np.ndarray
+    velocity: np.ndarray
     water: np.ndarray
     capacity: np.ndarray
 
@@ -96,11 +98,19 @@ def _edge_rates(
 def edge_flux(topology, graph, listed, u_cell, water) -> Flux:
     """Equation (1) on the edges of the listed nodes (n,); u_cell (M, 3) [m/s] projected velocity of the cells,
     water (N,) [m³] volume at the nodes."""
+    rate = edge_rates(topology, graph, listed, u_cell)
+    return Flux(
+        nodes=listed, graph=graph, rate=rate, velocity=u_cell, water=water, capacity=topology.node_volume
+    )
+
+
+def edge_rates(topology, graph, listed, u_cell):
+    """q (edges,) [m³/s] of (1) out of the listed nodes (n,) along the edges of the graph; u_cell (M, 3) [m/s]."""
     t, g = topology, graph
     mesh = (t.nodes, t.cells, t.parent, t.gradients, t.upright, t.volume, (t.node_start, t.node_cells))
     rate = np.zeros(len(g.neighbour))
     over(_edge_rates, len(listed), listed, g.row, g.start, g.neighbour, u_cell, *mesh, rate)
-    return Flux(nodes=listed, graph=g, rate=rate, water=water, capacity=t.node_volume)
+    return rate
 
 
 @njit(cache=True)

@@ -56,18 +56,20 @@ DROP, LOST, FULL = (0.1, 0.3), (0.5, 0.9), (0.25, 0.75)
 
 @dataclass(frozen=True)
 class Carried:
-    """What the fluxes make of the nodes in a step: water (N,) [m³]; velocity (N, 3) [m/s], the weight w (N,) of it
+    """What the fluxes make of the nodes in a step: water (N,) [m³], that of the fluxes along the edges, and swept (N,)
+    [m³] what the surface brings beyond that (`swept_volume.py`); velocity (N, 3) [m/s], the weight w (N,) of it
     around jumps before it is cut off at depth, and that in fast water (N,); None where there is neither."""
 
     water: np.ndarray
     velocity: np.ndarray | None = None
     weight: np.ndarray | None = None
     fast: np.ndarray | None = None
+    swept: np.ndarray | None = None
 
     @classmethod
-    def by(cls, flux: Flux, dt: float, velocity, acceleration, gravity: float, spacing) -> Carried:
+    def by(cls, flux: Flux, dt: float, velocity, acceleration, gravity: float, spacing, total) -> Carried:
         """After dt [s] by the flux; velocity (N, 3) [m/s] before, acceleration (N, 3) [m/s²] then, spacing (N,)
-        [m]: size of the cells."""
+        [m]: size of the cells; total (edges,) [m³] as in `carry_volume`."""
         g = flux.graph
         along = (flux.nodes, g.row, g.start, g.neighbour)
         n, size = len(flux.nodes), len(velocity)
@@ -80,19 +82,19 @@ class Carried:
                 over(_wider, n, *along, before, weight)
         over(_fast, n, flux.nodes, velocity, np.sqrt(gravity * spacing), FAST, fast)
         if not weight.any() and not fast.any():
-            return cls(carry_volume(flux, dt))
+            return cls(carry_volume(flux, dt, total=total))
         u = velocity.copy()
-        return cls(carry_volume(flux, dt, u), u, weight, fast)
+        return cls(carry_volume(flux, dt, u, total), u, weight, fast)
 
     def handed_on(self, heirs) -> Carried:
         """The same on another numbering, heirs (N_new, N) of `volume.renumbering`."""
-        water = heirs @ self.water
+        water, swept = heirs @ self.water, heirs @ self.swept
         if self.velocity is None:
-            return Carried(water)
+            return Carried(water, swept=swept)
         held = np.maximum(self.water, 0.0)[:, None]
         fields = np.column_stack([self.velocity, self.weight, self.fast])
         fields = (heirs @ (held * fields)) / np.maximum(heirs @ held, 1e-300)
-        return Carried(water, fields[:, :3].copy(), fields[:, 3].copy(), fields[:, 4].copy())
+        return Carried(water, fields[:, :3].copy(), fields[:, 3].copy(), fields[:, 4].copy(), swept)
 
     def into(self, u, nodes, phi, spacing, graph: Graph, shift: Shift, t: Topology, on_open_side) -> None:
         """Equations (1) and (2) for u (N, 3) [m/s] at the listed nodes (n,) that hold water, in place; φ (N,) [m].

@@ -26,10 +26,11 @@ LEAST_COUNTED = 0.3
 """Courant number of a substep, and nodes that set it: those of at least this share of the median volume."""
 
 
-def carry_volume(flux: Flux, dt: float, u=None):
+def carry_volume(flux: Flux, dt: float, u=None, total=None):
     """W (N,) [m³] after dt [s] by the flux; Σ W is kept to round-off.
 
-    u (N, 3) [m/s], if given, goes along (`velocity_transport.py`), in place; nodes without water keep theirs."""
+    u (N, 3) [m/s], if given, goes along (`velocity_transport.py`), in place; nodes without water keep theirs.
+    total (edges,) [m³], if given, gets what went out along each edge on top, in place."""
     water = flux.water.copy()
     capacity = np.maximum(flux.capacity, 1e-300)
     least = LEAST_COUNTED * np.median(capacity[flux.nodes]) if len(flux.nodes) else 0.0
@@ -47,6 +48,8 @@ def carry_volume(flux: Flux, dt: float, u=None):
             carry_velocity(*along, moved, water, u)
         owning(_hand_over, len(water), reach_of_rows(*along), count, *along, moved, change)
         water += change
+        if total is not None:
+            total += moved
     return water
 
 

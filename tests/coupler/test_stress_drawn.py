@@ -85,6 +85,9 @@ def test_scenes_cover_the_case_format():
         "viscosity",
         'covers = "multiple"',
         'openings = "wide"',
+        'model = "trapped"',
+        "[[water.air.vent]]",
+        'kind = "air"',
     ]
     wanted += [
         'cracks = "slit"',
@@ -120,6 +123,7 @@ FACES = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [
 ENERGY = (
     "water_kinetic",
     "water_potential",
+    "air_energy",
     "blocks_kinetic",
     "blocks_gravity",
     "joint_stored",

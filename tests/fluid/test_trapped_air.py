@@ -335,6 +335,18 @@ def test_bubbles_that_the_mesh_does_not_see_are_let_go():
     assert pockets(0.3, Gas()) == 1
 
 
+def test_a_pocket_that_becomes_too_small_is_counted_and_its_energy_booked():
+    mesh = box_mesh(np.zeros(3), (0.5, 0.5, 1.0), 0.125)
+    domain = cut_domain(mesh, ConvexBodies.empty(), "single")
+    water = Water(mesh, domain, lambda x: x[:, 2] - 0.75, WaterParameters(), gas=Gas())
+    squeezed = water.air.reference * 1.2
+    water.air = replace(water.air, reference=squeezed, gas=Gas(smallest=1e3))
+    held = Gas().energy(squeezed, water.pocket_volumes()).sum()
+    step(water, 1e-3)
+    assert (len(water.air), water.air.let_go, water.air.gone) == (0, 1, 0)
+    assert water.air.lost == pytest.approx(held, rel=1e-9)
+
+
 def test_volumes_do_not_count_what_the_water_fills():
     mesh = box_mesh(np.zeros(3), (1.0, 1.0, 1.0), 0.25)
     domain = cut_domain(mesh, ConvexBodies.empty(), "single")

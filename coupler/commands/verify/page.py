@@ -35,8 +35,6 @@ NOTES = {
     "over the width of a cube, 44 N from 0.8 to 1.0 s, is right there, but a held column of that width gets 20 and "
     "31 N with edge/3 and 4.5: too few nodes under the surface to turn the sheet aside. Cubes sealed or wetted from "
     "below move alike. The stack slides from 28 N on; its lowest cube leaves it from 52 N on.",
-    "P65": "The air pushes water, so that its surface is unstable (Rayleigh and Taylor); what grows there takes the "
-    "energy of the large swing: 0.6 % in five periods with cells of half the size.",
     "P52": "The period is measured over few swings and moves by 1 to 2 % with the substep and the number of passes.",
 }
 """What is known about cases that miss a tolerance."""

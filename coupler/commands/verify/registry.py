@@ -13,7 +13,7 @@ from typing import Literal
 
 MODULES = (
     "contact", "joints", "bending", "stock", "coupled", "wall", "spheres", "cubes", "stability",
-    "rest", "water", "collapse", "viscous", "dam_breaks", "jets", "air", "bores", "run_up", "coasts",
+    "rest", "water", "collapse", "viscous", "dam_breaks", "jets", "air", "plates", "bores", "run_up", "coasts",
     "isolated_building",
 )  # fmt: skip
 """Files of this package that hold cases; their names are the groups."""

@@ -26,13 +26,16 @@ class NothingToShow(SurgebreakError):
 @dataclass(frozen=True)
 class Water:
     """The water at one time: nodes (n, 3) [m], cells (m, 4), level_set (n,) [m], velocity (n, 3) [m/s], fraction (m,)
-    of each cell outside solids."""
+    of each cell outside solids; pocket (n,) number of the trapped air at the nodes, 0: none, with its pressure (n,)
+    [Pa] there."""
 
     nodes: np.ndarray
     cells: np.ndarray
     level_set: np.ndarray
     velocity: np.ndarray
     fraction: np.ndarray
+    pocket: np.ndarray
+    pressure: np.ndarray
 
 
 class Series:
@@ -57,7 +60,16 @@ class WaterSeries(Series):
         cells = patiently(vtkhdf.read_tetrahedra, self.path, k).astype(np.int64)
         velocity = values.get("velocity", np.zeros_like(nodes))
         fraction = of_cells.get("fluid_fraction", np.ones(len(cells)))
-        return Water(nodes.astype(float), cells, values["level_set"].astype(float), velocity, fraction)
+        none = np.zeros(len(nodes))
+        return Water(
+            nodes=nodes.astype(float),
+            cells=cells,
+            level_set=values["level_set"].astype(float),
+            velocity=velocity,
+            fraction=fraction,
+            pocket=values.get("pocket", none).astype(int),
+            pressure=values.get("pressure", none),
+        )
 
 
 class BlockSeries(Series):

@@ -22,6 +22,10 @@ FILL = np.array([1.0, -0.2, 0.25])
 LETTERS = Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"
 VTK_FONT_FILE = 4  # vtkTextProperty: use the font file
 SAMPLED_STEPS = 25
+SEEN_THROUGH = 0.35
+"""Opacity of blocks in a run with trapped air, which is behind them."""
+MOST_POCKETS = 6
+"""Named in the corner of a picture, those with most surface first."""
 BAR = 0.075  # height of a colour bar with its text, as a share of that of the picture
 
 
@@ -40,8 +44,12 @@ class Scene:
         self.lower, self.upper = bounds(run)
         self.fastest = nice_ceiling(fastest_water(run)) if run.water else 0.0
         self.light, self.fill = turned(SUN, azimuth + 90.0), turned(FILL, azimuth + 90.0)
+        self.traps_air = bool(run.water) and any(
+            run.water.at(time).pocket.any() for time in sampled(run.water.times)
+        )
         self.caption = caption_of(run)
         self.ground = ground(self.lower, self.upper, run.tank is None)
+        self._pockets_drawn = 0
         self.plotter = pv.Plotter(off_screen=True, window_size=size, lighting="none")
         self.plotter.set_background(palette.PAPER)
         self._set_lights()
@@ -55,7 +63,9 @@ class Scene:
         if self.run.blocks:
             self._draw_blocks(self._behind_cut(self.run.blocks.at(time)))
         if self.run.water:
-            self._draw_water(self.run.water.at(time))
+            water = self.run.water.at(time)
+            self._draw_water(water)
+            self._draw_pockets(water)
         self._draw_time(time)
         self.plotter.reset_camera_clipping_range()
         return time
@@ -159,7 +169,7 @@ class Scene:
         self.plotter.add_mesh(
             blocks, name="blocks", cmap=ListedColormap(palette.scale(palette.DAMAGE_ENDS)), show_edges=True,
             edge_color="#5b4a3a", line_width=self._line(0.7), ambient=0.3, show_scalar_bar=False,
-            reset_camera=False, render=False, **options,
+            reset_camera=False, render=False, opacity=SEEN_THROUGH if self.traps_air else 1.0, **options,
         )  # fmt: skip
         self._draw_shadow(blocks, "block_shadow")
         if "damage" in blocks.cell_data:
@@ -178,6 +188,37 @@ class Scene:
         )  # fmt: skip
         behind(actor.mapper)
         self._draw_bar("water", "speed of water [m/s]", 0.03)
+
+    def _draw_pockets(self, water):
+        """The surface below each pocket of trapped air in a colour of its own, and its pressure in the corner."""
+        for k in range(self._pockets_drawn):
+            self.plotter.remove_actor(f"pocket{k}", reset_camera=False, render=False)
+            self.plotter.remove_actor(f"pocket{k}_told", reset_camera=False, render=False)
+        drawn = pockets(water)
+        self._pockets_drawn = min(len(drawn), MOST_POCKETS) + 1
+        for k, (number, pressure, triangles) in enumerate(drawn):
+            colour = palette.POCKETS[(number - 1) % len(palette.POCKETS)]
+            mesh = pv.PolyData.from_regular_faces(
+                triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3)
+            )
+            mesh = self._behind_cut(mesh)
+            if k < MOST_POCKETS:
+                self._tell(k, f"air {number}: {pressure / 1000.0:.3g} kPa", colour)
+                if mesh.n_cells:
+                    self.plotter.add_mesh(
+                        mesh, name=f"pocket{k}", color=colour, ambient=0.5, reset_camera=False, render=False
+                    )
+        if len(drawn) > MOST_POCKETS:
+            self._tell(MOST_POCKETS, f"and {len(drawn) - MOST_POCKETS} more", palette.INK)
+
+    def _tell(self, line, words, colour):
+        """A line in the upper right corner."""
+        text = self.plotter.add_text(
+            words, name=f"pocket{line}_told", position=(0.985, 0.935 - 0.042 * self.letters * line),
+            viewport=True, font_size=self._points(11), color=colour, render=False,
+        )  # fmt: skip
+        lettered(text.prop)
+        text.prop.justification_horizontal = "right"
 
     def _sides(self):
         """Corners of a tank whose sides are all flat; None of a basin of another shape."""
@@ -288,6 +329,19 @@ def water_surface(water, eye, tank=None):
     mesh["normals"] = normals[far_first].reshape(-1, 3)
     mesh.point_data.active_normals_name = "normals"
     return mesh
+
+
+def pockets(water):
+    """Number, gauge pressure [Pa] and triangles (t, 3, 3) [m] of the water's surface below each pocket of trapped air,
+    the largest surface first; none where all air is open."""
+    if not water.pocket.any():
+        return []
+    found = skin(water.nodes, water.cells, water.level_set)
+    number = water.pocket[found.pair[: found.free]].max(axis=(1, 2))
+    corners = found.of(water.nodes)[: found.free]
+    known = [int(k) for k in np.unique(number) if k > 0]
+    known.sort(key=lambda k: -int((number == k).sum()))
+    return [(k, float(water.pressure[water.pocket == k].max()), corners[number == k]) for k in known]
 
 
 def ground(lower, upper, room_for_shadows):

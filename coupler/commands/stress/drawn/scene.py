@@ -56,9 +56,35 @@ def draw(seed: int, number: int, seconds: float = WANTED) -> Drawn:
     if gravity != 9.81:
         about["gravity"] = gravity
     table = {"case": about, **_tables(dice, place, flow, found, gravity, seconds)}
+    if flow is not None:
+        _air(dice, place, found, table)
     still = flow is not None and flow.still and not found.tables
     files = place.files | found.files | (flow.files if flow else {})
     return Drawn(f"R{seed}-{number}", group, title, table, files, still)
+
+
+def _air(dice: Dice, place: Basin, found: Bodies, table: dict) -> None:
+    """Trapped air in some scenes, most of them below a closed lid; drawn last, so that all others stay the same."""
+    if not dice.chance(0.15):
+        return
+    water = table["water"]
+    water["air"] = air = {"model": "trapped"}
+    if found.solids or found.tables:
+        water["covers"] = "multiple"
+    if dice.chance(0.3):
+        air["gamma"] = dice.one([1.0, 1.2])
+    if "inflow" not in water and dice.chance(0.7):
+        place.table["open"] = [side for side in place.table.get("open", ["z+"]) if side != "z+"]
+    if dice.chance(0.4):
+        at = [
+            rounded(float(place.lower[k] + share * place.size[k]), 8)
+            for k, share in enumerate((0.5, 0.5, 0.9))
+        ]
+        air["vent"] = [{"at": at, "area": rounded(place.cell**2 * dice.decades(1e-4, 0.1))}]
+    if dice.chance(0.5):
+        at = [rounded(float(place.lower[k] + dice.between(0.2, 0.8) * place.size[k]), 8) for k in range(2)]
+        at.append(rounded(float(place.lower[2] + 0.9 * place.size[2]), 8))
+        table.setdefault("gauge", []).append({"kind": "air", "name": "air", "at": at})
 
 
 def group_of(dice: Dice) -> str:
