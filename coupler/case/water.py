@@ -159,7 +159,7 @@ class Sea(Section):
 
 
 class Vent(Section):
-    """An orifice through which air leaves a pocket to the open air, or comes in."""
+    """An orifice through which air leaves a pocket to the open air, or comes in; water does not pass."""
 
     at: Point = Field(
         description="a place in the air of the pocket, a cell away from walls; with block: where it is at the start"

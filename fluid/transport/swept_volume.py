@@ -11,8 +11,10 @@ each corner of a brick.  Within the tank these add up to one profile for all nod
 correction of the level set tilted every surface that moved by 2 % of its way there, up and down in the same direction:
 a column that bounced on air lost 7 % of its energy in ten periods, and sloshing a quarter more of its height.
 
-Mean over the step by Simpson's rule, with φ carried on by its mean slope at the nodes.  The fluxes stay what they are
-around solids, whose faces cut the profiles anyhow, on meshes with obtuse cells, and deeper than the surface gets.
+Mean over the step by Simpson's rule, with φ carried on by its mean slope at the nodes, which is good for a part of a
+cell: in water that crosses half of one in a step the shares count alone (fronts of dam breaks came 0.2 % later and the
+wave that comes back in P39 8 ms).  The fluxes stay what they are around solids, whose faces cut the profiles anyhow, on
+meshes with obtuse cells, and deeper than the surface gets.
 """
 
 from __future__ import annotations
@@ -27,6 +29,8 @@ from fluid.surface.volume import Flux, edge_rates
 
 NEAR = 3.0
 """|φ| in cell sizes beyond which no surface arrives in a step."""
+SLOW = (0.25, 0.5)
+"""Cells crossed in a step between which the fluxes by shares take over again."""
 
 
 def swept(topology, flux: Flux, phi, u, moved, dt: float) -> np.ndarray:
@@ -60,7 +64,10 @@ def swept(topology, flux: Flux, phi, u, moved, dt: float) -> np.ndarray:
     )
     velocity[cells] = share[:, None] * flux.velocity[cells]
     rate = edge_rates(t, g, nodes, velocity)
-    return _difference(nodes, reached, t.near_solids, g.row, g.start, g.neighbour, dt * rate, moved)
+    crossed = dt * np.sqrt((u * u).sum(axis=1)) / t.node_size
+    weight = np.clip((SLOW[1] - crossed) / (SLOW[1] - SLOW[0]), 0.0, 1.0)
+    weight[t.near_solids] = 0.0
+    return _difference(nodes, reached, weight, g.row, g.start, g.neighbour, dt * rate, moved)
 
 
 @ranged
@@ -79,24 +86,24 @@ def _growth(first, last, nodes, phi, u, cells, parent, g, volume, node_start, no
 
 
 @njit(cache=True)
-def _difference(nodes, reached, left_out, graph_row, start, neighbour, swept, moved):
+def _difference(nodes, reached, weight, graph_row, start, neighbour, swept, moved):
     """Volume (N,) [m³] that the listed nodes and their neighbours get if `swept` (edges,) [m³] leaves along the edges
-    instead of `moved`; edges to nodes left out keep theirs."""
+    instead of `moved`, by the lesser weight (N,) of both ends."""
     out = np.zeros(reached.shape[0])
     for i in nodes:
-        if left_out[i]:
+        if weight[i] == 0.0:
             continue
         r = graph_row[i]
         for s in range(start[r], start[r + 1]):
             j = neighbour[s]
             back = graph_row[j]
-            if left_out[j] or back < 0:
+            if weight[j] == 0.0 or back < 0:
                 continue
             came = 0.0
             for b in range(start[back], start[back + 1]):
                 if neighbour[b] == i:
                     came = moved[b]
-            more = swept[s] - (moved[s] - came)
+            more = min(weight[i], weight[j]) * (swept[s] - (moved[s] - came))
             out[i] -= more
             if not reached[j]:
                 out[j] += more

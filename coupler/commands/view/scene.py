@@ -22,7 +22,7 @@ FILL = np.array([1.0, -0.2, 0.25])
 LETTERS = Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"
 VTK_FONT_FILE = 4  # vtkTextProperty: use the font file
 SAMPLED_STEPS = 25
-SEEN_THROUGH = 0.35
+SEEN_THROUGH = 0.55
 """Opacity of blocks in a run with trapped air, which is behind them."""
 MOST_POCKETS = 6
 """Named in the corner of a picture, those with most surface first."""
