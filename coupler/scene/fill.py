@@ -269,7 +269,7 @@ def _fluid_extent(domain) -> tuple[Array, Array]:
     low, high = _extent(corners)
     behind = _behind(d, corners)
     cut = np.flatnonzero(d.is_cut)
-    points = part_points(corners[cut], d.volume[cut], d.centroid[cut], d.second[cut])
+    points = part_points(corners[cut], d.volume[cut], d.centroid[cut], d.second_of(cut))
     part_low, part_high = np.full(low.shape, np.inf), np.full(low.shape, -np.inf)
     part_low[cut], part_high[cut] = _extent(points)
     np.minimum.at(part_low, d.face_cell, d.face_corners.min(axis=1))

@@ -14,6 +14,7 @@ A step that moves few bodies cuts again only the cells near their old or new pos
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numba import njit
@@ -43,11 +44,10 @@ YY = np.array([0, 1, 2, 1, 2, 2])
 
 @dataclass(frozen=True)
 class WholeCells:
-    """Moments of the uncut background cells: volume (M,), centroid (M, 3), second (M, 6)."""
+    """Moments of the uncut background cells: volume (M,), centroid (M, 3)."""
 
     volume: np.ndarray
     centroid: np.ndarray
-    second: np.ndarray
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,8 +82,8 @@ class PhysicalDomain:
     """The part of the background tetrahedra outside the solids: N nodes, M cells, S wetted polygons.
 
     nodes (N, 3) [m] · cells (M, 4) · parent_node (N,), parent_cell (M,) in the background
-    volume (M,) [m3], centroid (M, 3) [m], second (M, 6) [m5] (xx, yy, zz, xy, xz, yz): of the fluid part
-    is_cut (M,): something was removed from the cell
+    volume (M,) [m3], centroid (M, 3) [m]: of the fluid part
+    part (M,) row of what is left of the cell among the parts of `memory.cuts`, -1 where nothing was removed
     fan_start (M + 1,), fan_volume (T,) [m3], fan_corners (T, 4, 4): tetrahedra that fill the cut cells (`fans.py`)
     face_cell (S,) row of `cells` · face_body (S,) · face_area (S,) [m2] · face_centroid (S, 3) [m]
     face_normal (S, 3) out of the body · face_points (S, 3, 3) [m] three points, weight area / 3, degree 2
@@ -97,8 +97,7 @@ class PhysicalDomain:
     parent_cell: np.ndarray
     volume: np.ndarray
     centroid: np.ndarray
-    second: np.ndarray
-    is_cut: np.ndarray
+    part: np.ndarray
     fan_start: np.ndarray
     fan_volume: np.ndarray
     fan_corners: np.ndarray
@@ -113,6 +112,19 @@ class PhysicalDomain:
     body_centre: np.ndarray
     covers: str
     memory: Memory = field(repr=False, compare=False)
+
+    @cached_property
+    def is_cut(self) -> np.ndarray:
+        """(M,) bool: something was removed from the cell."""
+        return self.part >= 0
+
+    def second_of(self, rows) -> np.ndarray:
+        """Second moments (n, 6) [m5] (xx, yy, zz, xy, xz, yz) of the fluid part of cells (n,). They are not held: a
+        fifth of the memory of a cell, and asked for at cut cells."""
+        found, part = _whole_second(self.memory.mesh, self.parent_cell[rows]), self.part[rows]
+        cut = part >= 0
+        found[cut] = self.memory.cuts.moments[part[cut], 4:10]
+        return found
 
 
 def cut_domain(
@@ -156,12 +168,19 @@ def changed_bodies(old: ConvexBodies, new: ConvexBodies) -> np.ndarray:
 
 
 def whole_cells(mesh) -> WholeCells:
-    """Moments of the full tetrahedra: S = V/20 sum_a (x_a - c)(x_a - c)^T."""
-    x = mesh.nodes[mesh.cells]
-    centroid = (x[:, 0] + x[:, 1] + x[:, 2] + x[:, 3]) / 4
-    d = x - centroid[:, None]
-    second = (d[:, :, XX] * d[:, :, YY]).sum(axis=1) * (mesh.cell_volume / 20)[:, None]
-    return WholeCells(mesh.cell_volume, centroid, second)
+    """Moments of the full tetrahedra."""
+    centroid = mesh.nodes[mesh.cells[:, 0]]
+    for a in range(1, 4):
+        centroid += mesh.nodes[mesh.cells[:, a]]
+    centroid /= 4
+    return WholeCells(mesh.cell_volume, centroid)
+
+
+def _whole_second(mesh, cells):
+    """Second moments (n, 6) [m5] of full tetrahedra: S = V/20 sum_a (x_a - c)(x_a - c)^T."""
+    x = mesh.nodes[mesh.cells[cells]]
+    d = x - ((x[:, 0] + x[:, 1] + x[:, 2] + x[:, 3]) / 4)[:, None]
+    return (d[:, :, XX] * d[:, :, YY]).sum(axis=1) * (mesh.cell_volume[cells] / 20)[:, None]
 
 
 def hat_values(corners, points) -> np.ndarray:
@@ -308,7 +327,7 @@ def _assembled(memory: Memory, elements: Elements, covers: str) -> PhysicalDomai
         of_part = np.where(keep[of_part], renumbered[of_part], -1)
         parent, part, volume = parent[keep], part[keep], volume[keep]
     fan_start, fan_volume, fan_corners = fans(cuts.tet_part, cuts.tet, of_part, len(parent))
-    centroid, second = _moments(parent, part, memory.whole.centroid, memory.whole.second, cuts.moments)
+    centroid = _centroids(parent, part, memory.whole.centroid, cuts.moments)
     return PhysicalDomain(
         nodes=mesh.nodes if covers == "single" else mesh.nodes[parent_node],
         cells=cells,
@@ -316,8 +335,7 @@ def _assembled(memory: Memory, elements: Elements, covers: str) -> PhysicalDomai
         parent_cell=parent,
         volume=volume,
         centroid=centroid,
-        second=second,
-        is_cut=part >= 0,
+        part=part,
         fan_start=fan_start,
         fan_volume=fan_volume,
         fan_corners=fan_corners,
@@ -344,21 +362,13 @@ def _volume(memory, elements):
 
 
 @njit(cache=True)
-def _moments(parent, part, centroid, second, moments):
-    """Centroid (M, 3) [m] and second moments (M, 6) [m5] of the elements: of the whole cell, or of the part."""
-    c, s = np.empty((len(parent), 3)), np.empty((len(parent), 6))
+def _centroids(parent, part, centroid, moments):
+    """Centroid (M, 3) [m] of the elements: of the whole cell, or of the part."""
+    c = np.empty((len(parent), 3))
     for e in range(len(parent)):
-        if part[e] >= 0:
-            for k in range(3):
-                c[e, k] = moments[part[e], 1 + k]
-            for k in range(6):
-                s[e, k] = moments[part[e], 4 + k]
-        else:
-            for k in range(3):
-                c[e, k] = centroid[parent[e], k]
-            for k in range(6):
-                s[e, k] = second[parent[e], k]
-    return c, s
+        for k in range(3):
+            c[e, k] = moments[part[e], 1 + k] if part[e] >= 0 else centroid[parent[e], k]
+    return c
 
 
 @njit(cache=True)

@@ -36,7 +36,7 @@ def quadrature_rule(domain) -> tuple[np.ndarray, np.ndarray]:
     cut = np.flatnonzero(domain.is_cut)
     corners = domain.nodes[domain.cells[cut]]
     edges = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
-    points = part_points(corners, domain.volume[cut], domain.centroid[cut], domain.second[cut])
+    points = part_points(corners, domain.volume[cut], domain.centroid[cut], domain.second_of(cut))
     offset = np.swapaxes(points - corners[:, :1], 1, 2)
     barycentric[cut] = np.swapaxes(np.linalg.solve(edges, offset), 1, 2)
     weight[cut] = (domain.volume[cut] / np.abs(np.linalg.det(edges)) / 4)[:, None]

@@ -159,7 +159,11 @@ class Topology:
         over(_touched, len(nodes), nodes, self.node_start, self.node_cells, touched)
         return np.flatnonzero(touched)
 
-    @property
+    def in_cells(self, length) -> np.ndarray:
+        """Lengths (N,) [m] times `finer`: as they are where all cells are equal."""
+        return length if self.is_uniform else length * self.finer
+
+    @cached_property
     def active(self) -> np.ndarray:
         """(N,) bool: nodes that belong to a cell with fluid volume."""
         return np.diff(self.node_start) > 0

@@ -147,7 +147,7 @@ class Background:
         x = self.nodes[self.boundary_faces]
         return 0.5 * np.linalg.norm(np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), axis=1)
 
-    @cached_property
+    @property
     def products(self) -> np.ndarray:
         """∇N_a·∇N_b (M, 6) [1/m²] of the pairs ab = 01, 02, 03, 12, 13, 23."""
         return _products(self.gradients)

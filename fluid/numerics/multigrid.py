@@ -6,6 +6,9 @@ never across a thin wall, since nothing couples its two sides. With the piecewis
 coarser level is s Pᵀ A P. Constants overestimate the energy of smooth functions by about two; s < 1 makes up for it
 (Braess, Computing 55 (1995) 379). One cycle: a forward Gauss-Seidel sweep, the coarser level, a backward sweep. It is
 symmetric and positive definite, and the same in every run.
+
+Sweeps of large levels go by blocks, which threads share: within a block as ever, with the values before the sweep from
+other blocks. The blocks depend on the number of unknowns alone, so the result does not depend on the threads.
 """
 
 from __future__ import annotations
@@ -14,6 +17,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
+
+from fluid.numerics.jit import ranged
+from fluid.numerics.threads import over
 
 PAIRINGS = 3
 """Pairs of pairs of pairs: about eight unknowns become one."""
@@ -25,6 +31,8 @@ LEAST_GAIN = 0.8
 """A level is the last one where the next would keep more than this share of its unknowns."""
 SWEEPS = 4
 """Double sweeps on a last level that is too large for its inverse."""
+BLOCK, MOST_BLOCKS = 4096, 64
+"""Least number of unknowns in a block of a sweep, and how many blocks there are at most."""
 SAME = 0.99
 """Share of the strongest coupling from which one counts as equally strong: round-off must not choose the pairs."""
 
@@ -43,6 +51,12 @@ class Level:
     diagonal: np.ndarray
     inverse: np.ndarray
     aggregate: np.ndarray
+
+    def blocks(self) -> np.ndarray:
+        """Where the blocks of its sweeps begin and end (b + 1,)."""
+        n = len(self.diagonal)
+        count = max(1, min(MOST_BLOCKS, n // BLOCK))
+        return np.array([n * k // count for k in range(count + 1)])
 
 
 def unsigned(A) -> tuple[np.ndarray, np.ndarray]:
@@ -75,11 +89,24 @@ class Multigrid:
             return self._at_the_bottom(r)
         at = self.levels[depth]
         below = self.levels[depth + 1] if depth + 1 < len(self.levels) else self._last
-        x, coarse = _down(
-            at.start, at.middle, at.column, at.entry, at.inverse, at.aggregate, len(below.diagonal), r
-        )
-        coarse = self._cycle(depth + 1, coarse)
-        _up(at.start, at.column, at.entry, at.inverse, at.aggregate, coarse, r, x)
+        if len(at.diagonal) < 2 * BLOCK:
+            x, coarse = _down(
+                at.start, at.middle, at.column, at.entry, at.inverse, at.aggregate, len(below.diagonal), r
+            )
+            coarse = self._cycle(depth + 1, coarse)
+            _up(at.start, at.column, at.entry, at.inverse, at.aggregate, coarse, r, x)
+            return x
+        return self._by_blocks(depth, at, len(below.diagonal), r)
+
+    def _by_blocks(self, depth: int, at: Level, n_coarse: int, r):
+        """`_cycle` on a large level."""
+        bounds, x, left = at.blocks(), np.empty(len(r)), np.empty(len(r))
+        rows, count, work = (at.start, at.middle, at.column, at.entry), len(bounds) - 1, BLOCK
+        over(_down_blocks, count, bounds, *rows, at.inverse, r, x, weight=work)
+        over(_left_over, count, bounds, *rows, x, left, weight=work)
+        coarse = self._cycle(depth + 1, _restricted(at.aggregate, left, n_coarse))
+        over(_add, len(r), at.aggregate, coarse, x)
+        over(_up_blocks, count, bounds, *rows, at.inverse, r, x.copy(), x, weight=work)
         return x
 
     def _at_the_bottom(self, r):
@@ -229,6 +256,65 @@ def _up(start, column, entry, inverse, aggregate, coarse, r, x):
         if aggregate[i] >= 0:
             x[i] += coarse[aggregate[i]]
     _backward(start, column, entry, inverse, r, x)
+
+
+@ranged
+def _down_blocks(first, last, bounds, start, middle, column, entry, inverse, r, x):
+    """Forward sweeps of blocks from zero → x."""
+    for b in range(first, last):
+        low = bounds[b]
+        for i in range(low, bounds[b + 1]):
+            total = r[i]
+            for s in range(start[i], middle[i]):
+                if column[s] >= low:
+                    total -= entry[s] * x[column[s]]
+            x[i] = total * inverse[i]
+
+
+@ranged
+def _left_over(first, last, bounds, start, middle, column, entry, x, left):
+    """r - A x after `_down_blocks`: of what is left of the diagonal only the other blocks count."""
+    for b in range(first, last):
+        low = bounds[b]
+        for i in range(low, bounds[b + 1]):
+            total = 0.0
+            for s in range(start[i], middle[i]):
+                if column[s] < low:
+                    total -= entry[s] * x[column[s]]
+            for s in range(middle[i], start[i + 1]):
+                total -= entry[s] * x[column[s]]
+            left[i] = total
+
+
+@njit(cache=True)
+def _restricted(aggregate, left, n_coarse):
+    """Pᵀ left."""
+    coarse = np.zeros(n_coarse)
+    for i in range(len(aggregate)):
+        if aggregate[i] >= 0:
+            coarse[aggregate[i]] += left[i]
+    return coarse
+
+
+@ranged
+def _add(first, last, aggregate, coarse, x):
+    """x + P coarse in place."""
+    for i in range(first, last):
+        if aggregate[i] >= 0:
+            x[i] += coarse[aggregate[i]]
+
+
+@ranged
+def _up_blocks(first, last, bounds, start, middle, column, entry, inverse, r, before, x):
+    """Backward sweeps of blocks in place; before (n,): x before them, which other blocks see."""
+    for b in range(first, last):
+        low, high = bounds[b], bounds[b + 1]
+        for i in range(high - 1, low - 1, -1):
+            total = r[i]
+            for s in range(start[i], start[i + 1]):
+                j = column[s]
+                total -= entry[s] * (x[j] if low <= j < high else before[j])
+            x[i] = total * inverse[i]
 
 
 @njit(cache=True)

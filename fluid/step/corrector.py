@@ -12,7 +12,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from fluid.numerics.jit import ranged, released
 from fluid.numerics.sums import kinetic_energy
@@ -82,15 +81,14 @@ def corrected(water, problem, x, parting) -> Corrected:
         unknown[in_pocket] = kept.cushions.air.nodal(problem.of_air(x))[in_pocket]
         pressure[in_pocket] = kept.cushions.air.nodal(problem.of_air(x + problem.known))[in_pocket]
     gradient = _pressure_gradient(water, kept, unknown, dt / problem.density)
-    u, mean = _projected(t, kept, gradient)
-    a = np.where(kept.wet[:, None], (u - kept.advected) / (kept.theta * dt), 0.0)
+    u, a, forced, mean = _projected(t, kept, gradient, dt)
     remainder, kick_remainder = _remainders(water, kept, gradient, mean, dt)
     u_cell = kept.cell_star - gradient
     projected = u.copy()
     clipped, limited, damped = _limit_and_damp(water, kept, u, a)
     slipping = u.copy()
     listed, start = water.layers(kept.wet)
-    _continue(water, kept, listed, start, u, a, kept.u_star - mean)
+    _continue(water, kept, listed, start, u, a, forced)
     cell_field, flux = _flux(water, kept, listed, start, u, u_cell)
     momentum = momentum_change(
         water,
@@ -134,13 +132,31 @@ def _pressure_gradient(water, kept, pressure, scale):
     unheld = water.walls.open_node if kept.held is None else water.walls.open_node & (kept.held == 0.0)
     air = np.zeros(len(pressure)) if kept.cushions is None else np.where(kept.wet, 0.0, pressure)
     full = with_ghosts(pressure, air, kept.wet, unheld, kept.level_set, kept.wet_cells, t.cells)
-    return scale * cell_gradient(kept.wet_cells, full, t.cells, t.parent, t.gradients)
+    gradient = cell_gradient(kept.wet_cells, full, t.cells, t.parent, t.gradients)
+    gradient *= scale
+    return gradient
 
 
-def _projected(t, kept, gradient):
-    """u (N, 3) after the pressure, and Π of the gradient (N, 3)."""
-    mean = nodal_mean(kept.wet_cells, gradient, kept.wet_share, t.cells, t.share, t.volume, len(kept.wet))
-    return np.where(kept.wet[:, None], kept.u_star - mean, kept.u_star), mean
+def _projected(t, kept, gradient, dt):
+    """u (N, 3) after the pressure, its acceleration a (N, 3), what the forces alone make of it (N, 3), and Π of the
+    gradient (N, 3)."""
+    n = len(kept.wet)
+    mean = nodal_mean(kept.wet_cells, gradient, kept.wet_share, t.cells, t.share, t.volume, n)
+    u, a, forced = np.empty((n, 3)), np.zeros((n, 3)), np.empty((n, 3))
+    over(_after_pressure, n, kept.wet, kept.u_star, mean, kept.advected, kept.theta * dt, u, a, forced)
+    return u, a, forced, mean
+
+
+@ranged
+def _after_pressure(first, last, wet, u_star, mean, advected, time, u, a, forced):
+    """u and a of wet nodes, u* of the others; u* - Π∇x of all."""
+    for i in range(first, last):
+        for k in range(3):
+            forced[i, k] = u_star[i, k] - mean[i, k]
+            u[i, k] = u_star[i, k]
+            if wet[i]:
+                u[i, k] = forced[i, k]
+                a[i, k] = (forced[i, k] - advected[i, k]) / time
 
 
 def _remainders(water, kept, gradient, mean, dt):
@@ -148,7 +164,7 @@ def _remainders(water, kept, gradient, mean, dt):
     t = water.topology
     remainder, rate = np.zeros(water.remainder.shape), np.zeros(water.remainder.shape)
     if water.parameters.subscale_memory:
-        depth = kept.level_set * t.finer
+        depth = t.in_cells(kept.level_set)
         cells, deep, time = kept.wet_cells, -MEMORY_DEPTH * water.mesh.spacing, kept.theta * dt
         whole = found_over(_all_below, len(cells), cells, depth, deep, t.cells)
         state = (mean, gradient, kept.remainder, time, t.cells, t.share)
@@ -195,7 +211,7 @@ def _limit_and_damp(water, kept, u, a):
     damp_divergence(
         kept.wet_cells,
         parameters.divergence_damping,
-        kept.level_set * t.finer,
+        t.in_cells(kept.level_set),
         t.beside_solid,
         -MEMORY_DEPTH * water.mesh.spacing,
         u,
@@ -215,7 +231,7 @@ def _limit_and_damp(water, kept, u, a):
 def _damp_surface(water, kept, u) -> None:
     """`damp_waterline`, and `damp_kinks` where there are obtuse cells, in calm water, in place."""
     t, h, calm = water.topology, water.mesh.spacing, water.calm(kept.end - water.time)
-    wet = (kept.wet_cells, kept.level_set * t.finer, kept.wet)
+    wet = (kept.wet_cells, t.in_cells(kept.level_set), kept.wet)
 
     def even_out(weight, where):
         list_, *level = wet
@@ -243,13 +259,13 @@ def _hardly_moving(water, u):
 
 def _limit_speed(water, u, a) -> int:
     """|u| ≤ `Water.speed_cap` in place; clipped nodes go on in free fall."""
-    return _clip(u, a, water.speed_cap(), water.parameters.weight)
+    return sum(over(_clip, len(u), u, a, water.speed_cap(), water.parameters.weight))
 
 
-@njit(cache=True)
-def _clip(u, a, limit, weight):
+@ranged
+def _clip(first, last, u, a, limit, weight):
     count = 0
-    for i in range(u.shape[0]):
+    for i in range(first, last):
         speed = np.sqrt(u[i, 0] * u[i, 0] + u[i, 1] * u[i, 1] + u[i, 2] * u[i, 2])
         if speed > limit:
             count += 1
@@ -320,7 +336,7 @@ def _to_middle(first, last, cell_list, now, before, out):
 
 def _report(water, problem, x, projected, u, clipped, momentum, bound):
     kept, p = problem.predicted, water.parameters
-    g_x = water.below_floor(water.topology.nodes)
+    g_x = water.nodes_below_floor
 
     def energy(volume, velocity):
         return kinetic_energy(p.density, volume, velocity) - p.density * float(volume @ g_x)

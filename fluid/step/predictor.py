@@ -123,8 +123,8 @@ def predicted(water, dt: float) -> PressureProblem:
     if water.viscous is not None:
         shear = _sheared(water, dt, theta, kick, surface, u_adv)
         u_adv = u_adv + shear.change
-    u_star = u_adv + theta * dt * parameters.weight
-    u_star[water.topology.node_start[1:] == water.topology.node_start[:-1]] = 0.0
+    u_star = np.empty_like(u_adv)
+    over(_fallen, len(u_adv), u_adv, theta * dt * parameters.weight, water.topology.active, u_star)
     return _problem(
         water,
         dt,
@@ -149,6 +149,14 @@ def _sheared(water, dt, theta, kick, surface, u_adv):
     return water.viscous.change(water, surface.level_set, surface.nodal_water, w, dt)
 
 
+@ranged
+def _fallen(first, last, u, gained, active, out):
+    """u + gained (N, 3) at active nodes, zero elsewhere."""
+    for i in range(first, last):
+        for k in range(3):
+            out[i, k] = u[i, k] + gained[k] if active[i] else 0.0
+
+
 def kick_factor(acceleration, most):
     """f = min(1, most / |a|) (N,), most (N,) [m/s²]: see `Water.largest_kick`."""
     out = np.empty(len(acceleration))
@@ -165,9 +173,10 @@ def _factor(first, last, a, limit, out):
 
 def _transported(water, dt, theta, kick):
     """u_adv (N, 3) and φ̃ (N,); nodes outside the list keep û and φ."""
-    a = kick[:, None] * water.acceleration
-    u_hat = water.velocity + (1.0 - theta) * dt * a
-    u_m = water.velocity + (0.5 * dt * a if water.parameters.theta < 1.0 else 0.0)
+    u_hat, u_m = np.empty_like(water.velocity), np.empty_like(water.velocity)
+    to_middle = 0.5 * dt if water.parameters.theta < 1.0 else 0.0
+    state = (water.velocity, water.acceleration, kick)
+    over(_kicked, len(u_hat), *state, (1.0 - theta) * dt, to_middle, u_hat, u_m)
     for u in (u_hat, u_m):
         water.hold(u, water.time + dt)
     fields = np.column_stack([u_hat, water.level_set])
@@ -183,11 +192,21 @@ def _transported(water, dt, theta, kick):
             water.topology, water.listed, dt, u_m, phi, water.topology.node_size
         )
         moved[places, 3] = levels
-    near = np.abs((phi * water.topology.finer)[water.listed]) < TRANSPORT_WIDTH * water.mesh.spacing
+    near = np.abs(water.topology.in_cells(phi)[water.listed]) < TRANSPORT_WIDTH * water.mesh.spacing
     phi[water.listed[near]] = moved[near, 3]
     water.walls.let_air_in(phi, u_m, dt, water.topology.node_size)
     water.hold(u_adv, water.time + dt)
     return u_adv, phi
+
+
+@ranged
+def _kicked(first, last, velocity, acceleration, kick, whole, middle, u_hat, u_m):
+    """Velocity (N, 3) [m/s] after the times `whole` and `middle` [s] at the limited acceleration."""
+    for i in range(first, last):
+        for k in range(3):
+            a = kick[i] * acceleration[i, k]
+            u_hat[i, k] = velocity[i, k] + whole * a
+            u_m[i, k] = velocity[i, k] + middle * a
 
 
 def _new_surface(water, phi, carried, conserved):

@@ -173,13 +173,15 @@ class Water:
         h, t = self.mesh.spacing, self.topology
         at_rest = LONGEST_STEP * np.sqrt(self._finest_surface() / self.parameters.gravity)
         least = LEAST_GATHERED * h**3
-        counted = gathered(self._counted(), self.nodal_water * t.finer**3, least, *t.around)
+        water = self.nodal_water if t.is_uniform else self.nodal_water * t.finer**3
+        counted = gathered(self._counted(), water, least, *t.around)
         speed = pace(self._cells_crossed(), self.nodal_water, counted)
         return float(min(at_rest, self.parameters.courant * h / max(speed, 1e-12)))
 
     def _cells_crossed(self):
         """Velocity (N, 3) [m/s] in which a cell of any size would be crossed in the time of one of the spacing."""
-        return self.velocity * self.topology.finer[:, None]
+        t = self.topology
+        return self.velocity if t.is_uniform else self.velocity * t.finer[:, None]
 
     def _finest_surface(self) -> float:
         """Least size [m] of the cells at the surface or, where there is none, in the water."""
@@ -220,8 +222,7 @@ class Water:
         return float(p.speed_limit * np.sqrt(p.gravity * (high - low)[2] + 0.5 * self._start_speed**2))
 
     def _counted(self):
-        t = self.topology
-        return (self.level_set < 0.0) & (t.node_volume * t.finer**3 > LEAST_COUNTED * self.mesh.spacing**3)
+        return (self.level_set < 0.0) & self._roomy
 
     def predict(self, dt: float) -> PressureProblem:
         """Advection, volume and gravity over dt [s], and the system for the pressure."""
@@ -372,7 +373,11 @@ class Water:
 
     def set_domain(self, domain) -> None:
         self.domain = domain
-        self.topology = Topology.of(self.mesh, domain)
+        self.topology = t = Topology.of(self.mesh, domain)
+        self._roomy = t.node_volume * t.finer**3 > LEAST_COUNTED * self.mesh.spacing**3
+        """(N,) bool: nodes that set the step where they are wet."""
+        self.nodes_below_floor = self.below_floor(t.nodes)
+        """g·x (N,) [m²/s²] of the nodes."""
         self.coupling = wetted_coupling(domain).tocsr()
         self.walls = self._sides.on_copies(domain.parent_node)
         self.on_sides = self._on_sides[domain.parent_node]
@@ -504,10 +509,10 @@ class Water:
         What the volume is off by within the tolerance of its correction counts as if it were put right at the surface:
         a millionth of a deep pool would outweigh a small wave."""
         p, held = self.parameters, self.nodal_water - self.displaced
-        found = -p.density * float(held @ self.below_floor(self.topology.nodes))
+        found = -p.density * float(held @ self.nodes_below_floor)
         found -= self._surface_lag * float(self.momentum() @ p.weight)
         surface, farther = self._surface_potential(), self._taken_by(self.farther)
-        found += p.density * float(farther @ (self.below_floor(self.topology.nodes) - surface))
+        found += p.density * float(farther @ (self.nodes_below_floor - surface))
         return found + p.density * (self.volume() - self.conserved_volume) * surface
 
     def energy_through_sides(self) -> float:
@@ -546,7 +551,7 @@ class Water:
     def _surface_potential(self) -> float:
         """g·x [m²/s²] of the surface, mean over the nodes within half a cell of it; 0 where there is none."""
         near = self.listed[
-            np.abs((self.level_set * self.topology.finer)[self.listed]) < 0.5 * self.mesh.spacing
+            np.abs(self.topology.in_cells(self.level_set)[self.listed]) < 0.5 * self.mesh.spacing
         ]
         return float(self.below_floor(self.topology.nodes[near]).mean()) if len(near) else 0.0
 
@@ -554,7 +559,7 @@ class Water:
         """½ ρ u² - ρ g·x + p (N,) [J/m³] at the nodes."""
         p = self.parameters
         kinetic = 0.5 * p.density * np.einsum("ij,ij->i", self.velocity, self.velocity)
-        return kinetic - p.density * self.below_floor(self.topology.nodes) + self.pressure
+        return kinetic - p.density * self.nodes_below_floor + self.pressure
 
     def below_floor(self, x) -> np.ndarray:
         """g·x (...) [m²/s²] of places x (..., 3) [m], zero at the floor of the tank and negative above it: what leaves
@@ -580,7 +585,7 @@ class Water:
             low, high = (level, high) if held.sum() < self.conserved_volume else (low, level)
         if high > spill:
             held = nodal_volume(t, height - spill)
-        return -p.density * float(held @ self.below_floor(t.nodes))
+        return -p.density * float(held @ self.nodes_below_floor)
 
 
 def _viscosity(parameters: WaterParameters):

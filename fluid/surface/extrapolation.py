@@ -8,7 +8,6 @@ frequency at 32 cells a length), farther ones do not.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from fluid.domain.moments import touching_among
 from fluid.domain.topology import layers_around
@@ -190,7 +189,28 @@ def smoothed_slope(topology, cell_list, marked, u, calm: float):
         before, slope = slope, _averaged(near, reach.pop(), has, slope, t.cells)
     if slope is once:
         return once
-    return once + calm * (before + SWEEPS * (before - slope) - once)
+    there = np.zeros(len(u), bool)
+    over(_mark_nodes, len(near), near, t.cells, there)
+    over(_combined, len(u), there, calm, once, before, slope)
+    return once
+
+
+@ranged
+def _mark_nodes(first, last, cell_list, cells, marked):
+    for s in range(first, last):
+        for a in range(4):
+            marked[cells[cell_list[s], a]] = True
+
+
+@ranged
+def _combined(first, last, there, calm, once, before, slope):
+    """once (N, m, 3) + calm (before + SWEEPS (before - slope) - once) in place at marked nodes; elsewhere all are 0."""
+    for i in range(first, last):
+        if there[i]:
+            for k in range(once.shape[1]):
+                for d in range(3):
+                    ahead = before[i, k, d] + SWEEPS * (before[i, k, d] - slope[i, k, d])
+                    once[i, k, d] = once[i, k, d] + calm * (ahead - once[i, k, d])
 
 
 def _with_field(cell_list, marked, cells):
@@ -230,7 +250,8 @@ def _mark_layer(first, last, cell_list, nodes, cells, wider):
 
 def _averaged(cell_list, reach, has, field, cells):
     """Mean of the field (N, m, 3) over the corners that have one, of the listed cells around the nodes in reach."""
-    mean, count = np.zeros_like(field), np.zeros(len(field))
+    # not zeros_like, which would write to the pages of all nodes
+    mean, count = np.zeros(field.shape), np.zeros(len(field))
     listed = reach_of_cells(cell_list, cells)
     owning(_average, len(field), listed, len(cell_list), cell_list, reach, has, field, cells, count, mean)
     return mean
@@ -266,22 +287,29 @@ def _average(first, last, runs, cell_list, reach, has, field, cells, count, mean
                     mean[i, k, d] /= count[i]
 
 
-@njit(cache=True)
-def _own_speed(order, first, factor, forced):
-    """factor |forced| (N,) at the nodes order[first:], zero elsewhere."""
-    out = np.zeros(forced.shape[0])
-    for i in order[first:]:
-        out[i] = factor * np.sqrt(_square(forced[i]))
+def _own_speed(nodes, factor, forced):
+    """factor |forced| (N,) at the listed nodes, zero elsewhere."""
+    out = np.zeros(len(forced))
+    over(_speed_of, len(nodes), nodes, factor, forced, out)
     return out
 
 
-@njit(cache=True)
+@ranged
+def _speed_of(first, last, nodes, factor, forced, out):
+    for s in range(first, last):
+        out[nodes[s]] = factor * np.sqrt(_square(forced[nodes[s]]))
+
+
 def _clear_outside(order, u, a):
     """u, a (N, 3) ← 0 at the nodes that are not in the list, in place."""
-    listed = np.zeros(u.shape[0], np.bool_)
-    for i in order:
-        listed[i] = True
-    for i in range(u.shape[0]):
+    listed = np.zeros(len(u), bool)
+    listed[order] = True
+    over(_clear, len(u), listed, u, a)
+
+
+@ranged
+def _clear(first, last, listed, u, a):
+    for i in range(first, last):
         if not listed[i]:
             for k in range(3):
                 u[i, k], a[i, k] = 0.0, 0.0
@@ -323,7 +351,7 @@ def extend_velocity(topology, order, start, wet, wet_cells, u, a, calm: float, f
     if rubbed is not None:
         wet_cells = wet_cells[~rubbed[t.cells[wet_cells]].any(axis=1)]
     gradient = smoothed_slope(t, wet_cells, wet, u, calm)
-    least = _own_speed(order, start[1], 1.0 + WAVE_SLACK * calm, forced)
+    least = _own_speed(order[start[1] :], 1.0 + WAVE_SLACK * calm, forced)
     _clear_outside(order, u, a)
     _fill(t, order, start, LINEAR_LAYERS, u, gradient, wet.copy(), least)
     _fill(t, order, start, 0, a, np.zeros((1, 3, 3)), wet.copy(), _NO_LIMIT)

@@ -227,13 +227,19 @@ def correct_volume(topology, graph, listed, phi, carried, target: float, kappa: 
     )
 
 
-@njit(cache=True)
 def _split(cell_list, phi, cells, reach):
     """The listed cells that are all water whatever shift within ±reach (N,) φ takes, and those that a surface can
     reach."""
-    whole, near = np.empty(cell_list.shape[0], np.int64), np.empty(cell_list.shape[0], np.int64)
+    parts = over(_split_range, len(cell_list), cell_list, phi, cells, reach)
+    return parts[0] if len(parts) == 1 else tuple(np.concatenate(lists) for lists in zip(*parts))
+
+
+@released
+def _split_range(first, last, cell_list, phi, cells, reach):
+    whole, near = np.empty(last - first, np.int64), np.empty(last - first, np.int64)
     n_whole, n_near = 0, 0
-    for e in cell_list:
+    for s in range(first, last):
+        e = cell_list[s]
         under, beyond = True, True
         for a in range(4):
             i = cells[e, a]

@@ -64,6 +64,10 @@ class Band:
     second: np.ndarray
     is_cut: np.ndarray
 
+    def second_of(self, rows) -> np.ndarray:
+        """Second moments (k, 6) [m⁵] of cells (k,)."""
+        return self.second[rows]
+
     @classmethod
     def of(cls, domain, listed) -> Band:
         """listed (n,): nodes of the domain."""
@@ -71,8 +75,9 @@ class Band:
         is_listed[listed] = True
         rows = np.flatnonzero(is_listed[domain.cells].all(axis=1))
         members, cells = np.unique(domain.cells[rows], return_inverse=True)
-        of_cells = (getattr(domain, name)[rows] for name in ("volume", "centroid", "second", "is_cut"))
-        return cls(rows, members, domain.nodes[members], cells.reshape(-1, 4), *of_cells)
+        d = domain
+        of_cells = (d.volume[rows], d.centroid[rows], d.second_of(rows), d.is_cut[rows])
+        return cls(rows, members, d.nodes[members], cells.reshape(-1, 4), *of_cells)
 
 
 def midpoint_velocity(topology, band: Band, u_m, dt: float):

@@ -109,7 +109,16 @@ class Carried:
         weight[t.near_solids[nodes]] = 0.0
         weight = np.maximum(weight, np.where(on_open_side[nodes], 0.0, self.fast[nodes]))
         weight[self.water[nodes] <= 0.0] = 0.0
-        u[nodes] += weight[:, None] * (carried[nodes] - u[nodes])
+        over(_mixed, len(nodes), nodes, weight, carried, u)
+
+
+@ranged
+def _mixed(first, last, nodes, weight, carried, u):
+    """Equation (1) in place; weight (n,) of the listed nodes."""
+    for s in range(first, last):
+        i = nodes[s]
+        for k in range(3):
+            u[i, k] += weight[s] * (carried[i, k] - u[i, k])
 
 
 def _pass_on(graph: Graph, shift: Shift, water, u) -> None:

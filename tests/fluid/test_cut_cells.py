@@ -77,7 +77,7 @@ def cut_cell(seed, family):
 
 def second_moment(domain):
     """∫ x xᵀ dV (3, 3) of all cells."""
-    s = domain.second.sum(axis=0)
+    s = domain.second_of(np.arange(len(domain.cells))).sum(axis=0)
     total = np.array([[s[0], s[3], s[4]], [s[3], s[1], s[5]], [s[4], s[5], s[2]]])
     return total + np.einsum("m,mi,mj->ij", domain.volume, domain.centroid, domain.centroid)
 
