@@ -58,11 +58,9 @@ def swept(topology, flux: Flux, phi, u, moved, dt: float) -> np.ndarray:
     reached = np.zeros(len(phi), bool)
     reached[nodes] = True
     around = t.cells_around(reached)
-    velocity = np.zeros_like(flux.velocity)
-    velocity[around] = (
-        np.where((phi[t.cells[around]] < 0.0).all(axis=1), 1.0, 0.0)[:, None] * flux.velocity[around]
-    )
-    velocity[cells] = share[:, None] * flux.velocity[cells]
+    velocity = np.zeros(flux.velocity.shape)
+    over(_where_all_wet, len(around), around, phi, t.cells, flux.velocity, velocity)
+    over(_by_share, len(cells), cells, share, flux.velocity, velocity)
     rate = edge_rates(t, g, nodes, velocity)
     crossed = dt * np.sqrt((u * u).sum(axis=1)) / t.node_size
     weight = np.clip((SLOW[1] - crossed) / (SLOW[1] - SLOW[0]), 0.0, 1.0)
@@ -83,6 +81,25 @@ def _growth(first, last, nodes, phi, u, cells, parent, g, volume, node_start, no
                 for k in range(3):
                     out[s] += volume[e] * phi[cells[e, a]] * g[p, a, k] * u[i, k]
         out[s] /= max(weight, 1e-300)
+
+
+@ranged
+def _where_all_wet(first, last, cell_list, phi, cells, u, out):
+    """u (M, 3) in the listed cells with φ < 0 at all corners."""
+    for s in range(first, last):
+        e = cell_list[s]
+        if max(max(phi[cells[e, 0]], phi[cells[e, 1]]), max(phi[cells[e, 2]], phi[cells[e, 3]])) < 0.0:
+            for k in range(3):
+                out[e, k] = u[e, k]
+
+
+@ranged
+def _by_share(first, last, cell_list, share, u, out):
+    """u (M, 3) times the share (n,) of the listed cells."""
+    for s in range(first, last):
+        e = cell_list[s]
+        for k in range(3):
+            out[e, k] = share[s] * u[e, k]
 
 
 @njit(cache=True)
