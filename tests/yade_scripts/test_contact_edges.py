@@ -145,3 +145,16 @@ def test_random_polyhedra_do_not_sink_into_each_other(seed):
             s.advance(0.006)
             deepest = max(deepest, overlap(blocks, s.centre(), s.rotation()))
         assert deepest < 2.0 * np.sqrt(mass / (0.5 * stiffness / 9))
+
+
+@pytest.mark.parametrize("turn", [1e-9, 3e-9, 1e-8, 1e-7, 1e-5, 1e-3])
+def test_beams_that_are_nearly_parallel_may_lie_on_one_another(turn):
+    """Of the edges that are looked at for where they cross, some are parallel to within round-off: nothing is divided
+    by what is left of the angle between them."""
+    low = Block("low", (0.5, 0, -0.2), size=(4, 0.4, 0.4), density=DENSITY, fixed=True)
+    for start in (0.0, 90.0):
+        R = Rotation.from_euler("z", np.radians(start) + turn).as_matrix()
+        high = Block("high", (0, 0.1, 0.2), size=(0.4, 4, 0.4), density=DENSITY, rotation=R)
+        with Structure([low, high], ContactLaw(1e8, 0.3, 0.5)) as s:
+            s.advance(0.05)
+            assert abs(0.2 - s.centre()[1, 2]) < 5.0 * s.mass[1] * 9.81 / 1e8

@@ -217,5 +217,6 @@ def _nearest(pa, da, pb, db):
     """Where the lines pa + s da and pb + t db are nearest: (s, t)."""
     aa, bb, ab = _dot(da, da), _dot(db, db), _dot(da, db)
     ra, rb = _dot(pb, da) - _dot(pa, da), _dot(pb, db) - _dot(pa, db)
-    size = aa * bb - ab * ab
+    size = (da[1] * db[2] - da[2] * db[1]) ** 2 + (da[2] * db[0] - da[0] * db[2]) ** 2
+    size += (da[0] * db[1] - da[1] * db[0]) ** 2  # aa bb - ab² is round-off where they are nearly parallel
     return (ra * bb - rb * ab) / size, (ra * ab - rb * aa) / size
