@@ -80,6 +80,8 @@ def forecast(case: Case, exact: bool = False, place: Path = Path()) -> Forecast:
         step = _water_rows(case, interval, rows)
         cells, nodes = mesh_size(case.tank)
         disk += DISK_BYTES_PER_NODE * nodes * (outputs + 1)
+        if not case.structure:
+            rows += _air_rows(case, None)
     steps = math.ceil(case.time.end / step)
     rows.append(Row("steps", steps, "", "at least, while the water is fast" if case.water else ""))
     moving = 0.0
@@ -199,9 +201,20 @@ def _structure_rows(case: Case, rows: list[Row], exact: bool) -> tuple[int, floa
         rows.append(Row("substeps", math.ceil(case.time.end / substep), "", ""))
         if case.joints and case.structure.start == "settled":
             _row_at_rest(structure, rows)
+        if case.water:
+            rows += _air_rows(case, structure)
         return structure.n, structure_seconds(structure, math.ceil(case.time.end / substep))
     finally:
         structure.close()
+
+
+def _air_rows(case: Case, structure) -> list[Row]:
+    """What trapped air there is at the start; none where all air is open."""
+    if case.water.air.model == "open":
+        return []
+    from coupler.run.trapped_air import air_row
+
+    return [air_row(case, structure)]
 
 
 def _row_at_rest(structure, rows: list[Row]) -> None:

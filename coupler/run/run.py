@@ -90,6 +90,8 @@ def _describe(scene: Scene, reporter) -> None:
             f"({int(d.is_cut.sum())} cut), {c.water.volume():.6g} m3"
         )
     if c.water is not None and c.water.air is not None:
+        from coupler.run.trapped_air import described_air
+
         reporter.message(described_air(c.water))
     if c.structure is not None:
         limit, substep = c.structure.substep_limit(), c.structure.substep()
@@ -104,19 +106,6 @@ def _describe(scene: Scene, reporter) -> None:
             reporter.message(f"note: {limit.remark(substep)}")
         for what, law in laws_of(c.structure).items():
             reporter.message(f"{what}: {law}")
-
-
-def described_air(water) -> str:
-    """The pockets of trapped air at the start, in words, with the weight that they could carry."""
-    volume = water.pocket_volumes()
-    if len(volume) == 0:
-        return "air: no pocket is closed off yet; those that the water closes are followed"
-    p = water.parameters
-    lift = p.density * p.gravity * float(volume.sum())
-    pockets = (
-        "one pocket" if len(volume) == 1 else f"{len(volume)} pockets, the largest of {volume.max():.4g} m3,"
-    )
-    return f"air: {pockets} of {volume.sum():.4g} m3 in all closed off, which under water would lift {lift:.4g} N"
 
 
 def laws_of(structure) -> dict[str, str]:

@@ -7,7 +7,8 @@ import sys
 import numpy as np
 import pytest
 
-from coupler.run.run import described_air
+from coupler.run.forecast import forecast
+from coupler.run.trapped_air import described_air
 from coupler.scene.build import build
 from coupler.step.limits import Diverged, check_air
 from tests.fakes import no_clock
@@ -61,7 +62,11 @@ def test_a_gauge_reads_the_pocket_and_the_books_hold_its_energy():
     assert abs(record.balance.air_energy) < 0.01
     assert record.balance.energy_error < 0.02
     assert record.momentum.error < 1e-10
-    assert "one pocket of 0.32 m3" in described_air(build(found, no_clock).coupling.water)
+    described = described_air(build(found, no_clock).coupling.water)
+    assert "one pocket, 0.32 m3 in all: wholly under water they would lift 3.139 kN" in described
+    row = next(row for row in forecast(found).rows if row.name == "trapped air")
+    assert row.value == 1
+    assert row.remark in described
     with pytest.raises(Diverged, match=r"a pocket of trapped air between .* \(limits.air_pressure\).*vent"):
         check_air(0.3, coupling.water, 1e-9)
 
