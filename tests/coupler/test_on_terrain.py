@@ -1,11 +1,14 @@
 """Parts that stand on the terrain: their foot, their footing, and the ground as blocks meet it."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from coupler.checks.read_case import load
 from coupler.geometry.parts import parts_of
 from coupler.geometry.solids import solids_of
+from coupler.geometry.terrain import standing
 from coupler.geometry.terrain.bed_mesh import fitted_of
 from coupler.geometry.terrain.standing import corners_of, ground_surface, ground_under
 from coupler.program.errors import BadCase
@@ -126,3 +129,11 @@ def test_standing_on_no_terrain_is_refused(tmp_path):
     with pytest.raises(BadCase) as error:
         loaded(tmp_path, HOUSE, "terrain=absent")
     assert "structure.building[0].on: there is no section [terrain] to stand on" in error.value.lines[0]
+
+
+def test_a_footing_looks_at_the_terrain_between_the_columns_of_the_mesh_too(monkeypatch):
+    """A mound and a hole that no column of the mesh sees: the bed of the mesh is flat, the foot counts from the mound
+    and the footing reaches below the hole."""
+    monkeypatch.setattr(standing, "bed_at", lambda tank, x, y: np.zeros(len(x)))
+    tank = SimpleNamespace(ground=lambda x, y: np.where(x > 0.6, 0.5, np.where(x < 0.2, -0.3, 0.0)))
+    assert ground_under(tank, corners_of((0, 0, 0), (1, 1, 1), 0.0)) == (-0.3, 0.5)

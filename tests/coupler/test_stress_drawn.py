@@ -3,6 +3,8 @@
 Twenty of them are run here, the beginning of each; `surgebreak stress --random` runs whole ones."""
 
 import copy
+import subprocess
+import sys
 import tomllib
 
 import numpy as np
@@ -12,6 +14,7 @@ from coupler.case.case import Case, effective
 from coupler.case.toml_text import document
 from coupler.checks.read_case import load
 from coupler.commands.stress.drawn import command
+from coupler.commands.stress.drawn import trial as trials
 from coupler.commands.stress.drawn.case import write
 from coupler.commands.stress.drawn.judge import measures
 from coupler.commands.stress.drawn.scene import draw
@@ -299,3 +302,15 @@ def test_the_list_names_scenes_without_running_them(tmp_path, capsys):
     asked = command.numbered(SEED, 2, 5, [])
     assert command.stress_drawn(asked, tmp_path, 0.0, as_json=False, only_list=True) == ExitCode.DONE
     assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == [f"R{SEED}-5", f"R{SEED}-6"]
+
+
+def test_a_scene_that_computes_for_ever_is_ended_by_its_processor_time(monkeypatch, tmp_path):
+    """Not by the clock: beside other programs a sound scene of ten seconds took five minutes, and counted as failed."""
+    monkeypatch.setattr(trials, "CPU_SECONDS", 1)
+    monkeypatch.setattr(trials, "run_module", lambda *_, **options: _for_ever(options))
+    found = trials.trial(tmp_path / "case", tmp_path / "out", still=False)
+    assert (found.verdict, found.message) == ("failed", "still computing after 1 s of processor time")
+
+
+def _for_ever(options):
+    return subprocess.run([sys.executable, "-c", "while True: pass"], check=False, **options)

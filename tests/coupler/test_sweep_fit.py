@@ -89,3 +89,9 @@ def test_states_that_nobody_or_everybody_reached_have_no_fit():
     assert not fit(x, np.zeros(20, int), 1).found[0]
     assert not fit(x, np.ones(20, int), 1).found[0]
     assert not fit(np.ones(20), np.arange(20) % 2, 1).found[0]
+
+
+def test_runs_of_one_intensity_that_differ_are_where_a_state_begins():
+    """Separated still: everything below stands, everything above has fallen; at 2 both were seen."""
+    x, reached = np.array([1.0, 2.0, 2.0, 3.0]), np.array([False, False, True, True])
+    assert separation(x, reached) == (2.0, 2.0)

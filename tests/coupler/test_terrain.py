@@ -11,6 +11,7 @@ from coupler.geometry.tank_mesh import bed_along, mean_bed
 from coupler.geometry.terrain.bed_mesh import fitted_of
 from coupler.geometry.terrain.grid import TerrainError
 from coupler.geometry.terrain.grids import read_grid
+from coupler.geometry.terrain.height_map import HeightMap
 from coupler.geometry.terrain.land import friction_of
 from coupler.geometry.terrain.site import filled, flattened, smoothed, terrain_of
 from coupler.program.errors import BadCase
@@ -304,3 +305,9 @@ def test_map_of_the_land_that_cannot_be_used_is_refused(codes, sets, told, tmp_p
     with pytest.raises(BadCase) as error:
         with_land(tmp_path, codes, *sets)
     assert re.search(told, "\n".join(error.value.lines)), error.value.lines
+
+
+def test_slopes_of_a_plane_whose_points_are_not_as_far_apart_along_as_across():
+    x, y = np.arange(4.0), 2.5 * np.arange(3)
+    plane = HeightMap(x, y, 3.0 * x[:, None] + 4.0 * y)
+    np.testing.assert_allclose(plane.slopes, np.full((3, 2), 5.0))

@@ -25,11 +25,12 @@ z[0, 0] = -9999
 with rasterio.open(path, "w", driver="GTiff", width=30, height=20, count=1, dtype="float32", crs=crs,
                    transform=from_origin(x0, y0, step, step), nodata=-9999) as file:
     file.write(z, 1)
+    file.scales, file.offsets = [float(sys.argv[6])], [float(sys.argv[7])]
 """
 
 
-def write(path, crs, x0, y0, step):
-    words = [sys.executable, "-c", WRITE, path, crs, *map(str, (x0, y0, step))]
+def write(path, crs, x0, y0, step, scale=1.0, offset=0.0):
+    words = [sys.executable, "-c", WRITE, path, crs, *map(str, (x0, y0, step, scale, offset))]
     subprocess.run(words, check=True, capture_output=True)
 
 
@@ -47,6 +48,13 @@ def test_geotiff_is_read_once_and_kept_beside_it(tmp_path):
     np.testing.assert_array_equal(again.z, found.z)
 
 
+def test_heights_stored_with_a_scale_and_an_offset(tmp_path):
+    """As whole centimetres above a datum, for instance: height = scale times number + offset."""
+    write(tmp_path / "site.tif", "EPSG:32654", 388200.0, 4253000.0, 2.0, scale=0.01, offset=7.5)
+    found = terrain_of(Terrain(path=str(tmp_path / "site.tif"), origin=(388200.0, 4252960.0)))
+    np.testing.assert_allclose(found(np.array([11.0]), np.array([39.0])), 7.5 + 0.01 * 3.5, atol=1e-6)
+
+
 def test_degrees_are_refused_and_reprojected(tmp_path):
     """0.0001 degrees of latitude are 11.1 m; a plane stays one."""
     write(tmp_path / "site.tif", "EPSG:4326", 141.7, 38.4, 1e-4)
@@ -58,6 +66,22 @@ def test_degrees_are_refused_and_reprojected(tmp_path):
     inner = found.slopes[np.isfinite(found.slopes)]
     east, north = 0.3 / (1e-4 * 111320 * np.cos(np.radians(38.4))), 0.2 / (1e-4 * 110996)
     np.testing.assert_allclose(np.median(inner), np.hypot(east, north), rtol=0.02)
+
+
+def test_a_system_in_feet_comes_out_in_metres(tmp_path):
+    """California zone 3 counts in US survey feet; the points stay ten metres apart."""
+    write(tmp_path / "site.tif", "EPSG:4326", -121.0, 37.5, 1e-4)
+    found = terrain_of(Terrain(path=str(tmp_path / "site.tif"), reproject="EPSG:2227"))
+    assert found.spacing[0] == pytest.approx(9.9, abs=0.5)
+    assert np.ptp(found.y) == pytest.approx(20 * 11.1, rel=0.06)
+
+
+def test_a_plane_stays_where_it_is_when_it_is_reprojected(tmp_path):
+    """Into the system that it has: each height at its own place, not half a pixel beside it."""
+    write(tmp_path / "site.tif", "EPSG:32654", 388200.0, 4253000.0, 2.0)
+    spec = Terrain(path=str(tmp_path / "site.tif"), reproject="EPSG:32654", origin=(388200.0, 4252960.0))
+    found = terrain_of(spec)
+    np.testing.assert_allclose(found(np.array([11.0]), np.array([29.0])), 2.0 + 0.3 * 5 - 0.2 * 5, atol=0.02)
 
 
 def test_unknown_system_is_reported_in_a_line(tmp_path):

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import json
 import re
+import resource
+import signal
 import subprocess
 import time
 from dataclasses import dataclass
@@ -19,8 +21,10 @@ from coupler.commands.stress.registry import Measure, Verdict
 from coupler.program.errors import ExitCode
 from coupler.program.process import run_module, trouble
 
-WALL_SECONDS = 300
-"""After which a scene counts as failed: thirty times its processor time."""
+CPU_SECONDS = 120
+"""Processor time after which a scene that does not end by itself is killed, and counts as failed."""
+WALL_SECONDS = 3600
+"""After which one counts as failed that waits for ever: beside other programs a sound one may take minutes."""
 MISTAKE = re.compile(r"case\.toml(:\d+)?: [a-z][\w.\[\]-]*: .{20,}")
 """A message about a case: file, line, key and a reason."""
 TOO_WEAK = "the structure cannot carry its own weight and the load at the start"
@@ -63,6 +67,7 @@ def trial(case: Path, output: Path, still: bool) -> Trial:
             capture_output=True,
             text=True,
             timeout=WALL_SECONDS,
+            preexec_fn=_within_processor_time,
         )
     except subprocess.TimeoutExpired:
         return Trial("failed", f"not done after {WALL_SECONDS} s", [], 0.0, time.perf_counter() - began, None)
@@ -75,10 +80,17 @@ def trial(case: Path, output: Path, still: bool) -> Trial:
         found = list(measures(output, still))
         verdict: Verdict = "passed" if all(m.kept for m in found) else "failed"
         return Trial(verdict, "" if done.returncode == 0 else "stopped at its processor time", found, *spent)
+    if done.returncode == -signal.SIGXCPU:
+        return Trial("failed", f"still computing after {CPU_SECONDS} s of processor time", [], *spent)
     message = summary.get("exit_reason") or trouble(done.returncode, done.stderr)
     return Trial(
         "refused" if asked_too_much(message, summary.get("case", {})) else "failed", message, [], *spent
     )
+
+
+def _within_processor_time() -> None:
+    """Called in the child: the kernel ends it where it computes for ever."""
+    resource.setrlimit(resource.RLIMIT_CPU, (CPU_SECONDS, CPU_SECONDS + 10))
 
 
 def asked_too_much(message: str, case: dict) -> bool:
