@@ -1,7 +1,7 @@
-"""Compile numba kernels by runs of two steps whose results are thrown away: `python -m coupler.commands.warm_up PART`.
+"""Compile kernels by runs of two steps whose results are thrown away: `python -m coupler.commands.warm_up PART...`.
 
-Numba keeps what it compiled, so later runs start at once. `coupler.run.compile_ahead` starts a process for each part
-that a case needs; the parts have few kernels in common. Without a part, one small scene that uses all of them is run.
+Numba keeps what it compiled, so later runs start at once. `coupler.run.compile_ahead` starts processes for the
+parts that a case needs. Without a part, the scene that has water and a structure is run, which uses the kernels of all.
 """
 
 from __future__ import annotations
@@ -21,7 +21,9 @@ WATER = """\
 [tank]
 lower = [0, 0, 0]
 upper = [2, 1, 1]
-cell = 0.25
+cell = 0.125
+[water]
+covers = "multiple"
 [[water.fill]]
 lower = [0, 0, 0]
 upper = [1.2, 1, 0.6]
@@ -65,7 +67,7 @@ PARTS = {
     "water": TIME + WATER,
     "solids": TIME + WATER + SOLID.replace("1.8,", "1.1,"),
     "structure": TIME + STRUCTURE,
-    "all": CASE,
+    "both": CASE,
 }
 
 
@@ -85,7 +87,7 @@ class Silent:
         return None
 
 
-def warm_up(part: str = "all") -> None:
+def warm_up(part: str = "both") -> None:
     """Run the small case of a part in a temporary directory; solids are only cut, since steps are those of water."""
     from coupler.checks.read_case import from_text
     from coupler.run.clock import Clock
@@ -106,4 +108,5 @@ if __name__ == "__main__":
     from coupler.program.start import one_thread
 
     one_thread()
-    warm_up(*sys.argv[1:2])
+    for part in sys.argv[1:] or ["both"]:
+        warm_up(part)

@@ -1,4 +1,4 @@
-"""Kernels of a case compiled before its run, by processes side by side: one alone takes two minutes on a fresh machine.
+"""Kernels of a case compiled before its run, by two processes side by side: one alone takes almost two minutes.
 
 A part of the program counts as compiled where most of its modules have their folder in the cache; what is missing then,
 after an edit for instance, the run compiles as it comes to it.
@@ -20,9 +20,12 @@ from coupler.program.kernel_cache import folder_of
 from coupler.program.process import environment
 from coupler.program.provenance import ROOT
 
-MODULES = {"solids": "fluid/cut", "water": "fluid", "structure": "yade_scripts"}
-"""Where the kernels of each part are; those of fluid/cut count for solids alone. The longest first."""
-KERNEL = re.compile(r"^@(njit|inner|plain|ranged|released)", re.MULTILINE)
+MODULES = {"solids": "fluid/cut", "water": "fluid", "structure": "yade_scripts", "both": "coupler/step"}
+"""Where the kernels of each part are; those of fluid/cut count for solids alone."""
+CHAINS = (("solids", "water"), ("structure", "both"))
+"""Parts that one process compiles one after the other, since the second uses kernels of the first. Both chains take
+about as long, and share nothing until "both" comes to the water, which the other chain has compiled by then."""
+KERNEL = re.compile(r"^@(kernel|inner|plain|ranged|released)$", re.MULTILINE)
 ENOUGH = 0.5
 """Share of the modules of a part with kernels in the cache, from which it counts as compiled."""
 
@@ -31,14 +34,15 @@ def compile_ahead(case: Case, tell: Callable[[str], object]) -> None:
     """Compile what the case needs and the cache lacks, unless there is one core alone. Failures are left to the run."""
     cores = len(os.sched_getaffinity(0))
     wanted = [part for part in needed(case) if not is_compiled(part)]
-    if cores < 2 or len(wanted) < 2:
+    chains = [own for chain in CHAINS if (own := [part for part in chain if part in wanted])]
+    if cores < 2 or len(chains) < 2:
         return
     tell(
         f"compiling the numerical kernels ({', '.join(wanted)}), once for this version of the program: "
-        f"{len(wanted)} processes on {cores} cores, about a minute"
+        f"{len(chains)} processes on {cores} cores, less than a minute"
     )
     began, before = time.monotonic(), _children_seconds()
-    failed = _compile(wanted)
+    failed = _compile(chains)
     if failed:
         tell(f"note: {', '.join(failed)}: not compiled ahead; the run compiles what it needs itself")
     tell(
@@ -53,9 +57,14 @@ def _children_seconds() -> float:
 
 
 def needed(case: Case) -> list[str]:
-    """Parts of the program that the case runs, the longest to compile first."""
+    """Parts of the program that the case runs."""
     water, structure = case.water is not None, case.structure is not None
-    on = {"solids": water and (structure or bool(case.solid)), "water": water, "structure": structure}
+    on = {
+        "solids": water and (structure or bool(case.solid)),
+        "water": water,
+        "structure": structure,
+        "both": water and structure,
+    }
     return [part for part in MODULES if on[part]]
 
 
@@ -77,15 +86,15 @@ def _modules(part: str) -> list[Path]:
     return [path for path in found if KERNEL.search(path.read_text(encoding="utf-8"))]
 
 
-def _compile(parts: list[str]) -> list[str]:
-    """Run the parts side by side; those that failed."""
+def _compile(chains: list[list[str]]) -> list[str]:
+    """Run the chains side by side; the parts of those that failed."""
     words = [sys.executable, "-m", "coupler.commands.warm_up"]
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "env": environment()}
-    running = {part: subprocess.Popen([*words, part], **quiet) for part in parts}
+    running = [(chain, subprocess.Popen([*words, *chain], **quiet)) for chain in chains]
     try:
-        return [part for part, process in running.items() if process.wait() != 0]
+        return [part for chain, process in running if process.wait() != 0 for part in chain]
     finally:
-        for process in running.values():
+        for _, process in running:
             if process.poll() is None:
                 process.terminate()
                 process.wait()

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from numba import njit
+
+from kernel_decorators import kernel
 
 Array = np.ndarray
 
@@ -44,7 +45,7 @@ class Wetting:
         return _scatter(self.dof, self.body, self.rows, velocity.reshape(-1, 6), self.n_dofs)
 
 
-@njit(cache=True)
+@kernel
 def _pairs(indptr: Array, indices: Array, data: Array) -> tuple[Array, Array, Array]:
     """dof, body (k,), rows (k, 6) of the entries. Each body is sought among the few that its row had before."""
     dof, body = np.empty(len(indices), np.int64), np.empty(len(indices), np.int64)
@@ -65,23 +66,26 @@ def _pairs(indptr: Array, indices: Array, data: Array) -> tuple[Array, Array, Ar
     return dof[:count].copy(), body[:count].copy(), rows[:count].copy()
 
 
-@njit(cache=True)
+@kernel
 def _by_body(dof: Array, body: Array, rows: Array, n_bodies: int) -> tuple[Array, Array, Array]:
     """start (n_bodies + 1,), dof (k,) and rows (k, 6) of the pairs, body by body."""
     start = np.zeros(n_bodies + 1, np.int64)
     for b in body:
         start[b + 1] += 1
-    start = np.cumsum(start)
+    for b in range(n_bodies):
+        start[b + 1] += start[b]
     place = start[:-1].copy()
     own_dof, own_rows = np.empty_like(dof), np.empty_like(rows)
     for k in range(len(dof)):
         at = place[body[k]]
-        own_dof[at], own_rows[at] = dof[k], rows[k]
+        own_dof[at] = dof[k]
+        for c in range(6):
+            own_rows[at, c] = rows[k, c]
         place[body[k]] += 1
     return start, own_dof, own_rows
 
 
-@njit(cache=True)
+@kernel
 def _gather(start: Array, dof: Array, rows: Array, p: Array) -> Array:
     out = np.zeros((len(start) - 1, 6))
     for b in range(len(start) - 1):
@@ -98,7 +102,7 @@ def _gather(start: Array, dof: Array, rows: Array, p: Array) -> Array:
     return out
 
 
-@njit(cache=True)
+@kernel
 def _scatter(dof: Array, body: Array, rows: Array, velocity: Array, n_dofs: int) -> Array:
     out = np.zeros(n_dofs)
     for k in range(len(dof)):

@@ -41,10 +41,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
-from numba import njit
 from scipy.sparse.linalg import splu
 
 from coupler.step.coupling_rows import Wetting
+from kernel_decorators import kernel, plain
 
 if TYPE_CHECKING:
     from fluid.pressure.projection import PressureProblem
@@ -152,7 +152,7 @@ def _of_heave(blocks: Array, mass: Array) -> sp.csr_array:
     return matrix
 
 
-@njit(cache=True)
+@kernel
 def _own_blocks(indptr: Array, indices: Array, data: Array, n: int) -> tuple[Array, Array]:
     """Diagonal blocks (n, 6, 6) of a csr matrix (6n, 6n), and (n,) bool: bodies with entries in the rows of others."""
     blocks, tied = np.zeros((n, 6, 6)), np.zeros(n, np.bool_)
@@ -166,7 +166,7 @@ def _own_blocks(indptr: Array, indices: Array, data: Array, n: int) -> tuple[Arr
     return blocks, tied
 
 
-@njit(cache=True)
+@plain
 def _answer(bodies: Array, inverse: Array, force: Array, velocity: Array) -> None:
     """Rows of `bodies` (k,) of velocity (6n,) from force (6n,) and inverse (k, 6, 6), in place."""
     for k in range(len(bodies)):

@@ -25,12 +25,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy.sparse as sp
-from numba import njit
 
 from fluid.air.gas import Gas
 from fluid.air.pockets import OPEN_AIR, Descent, bricks, labelled, volumes, without
 from fluid.domain.coupling_matrix import wetted_coupling
 from fluid.pressure.projection import SMALLEST_CUT
+from kernel_decorators import kernel
 
 RESOLVED, SETTLING = 0.5, 1.0
 """θ_k of (2)."""
@@ -292,7 +292,7 @@ def _names(air: Air, descent: Descent) -> tuple[np.ndarray, int]:
     return name, names
 
 
-@njit(cache=True)
+@kernel
 def _links(dofs, column, graph_row, start, neighbour, stiffness, phi, label, scale):
     """Row, pocket and s of (3) of the edges from wet nodes to nodes of pockets."""
     capacity, n = 1024, 0

@@ -10,9 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from fluid.domain.moments import wet_fraction
+from kernel_decorators import kernel
 
 NO_AIR, OPEN_AIR = -1, 0
 """Labels of nodes without air and of those that air from outside reaches; pockets count from 1."""
@@ -38,7 +38,7 @@ def labelled(topology, phi, open_to_air) -> tuple[np.ndarray, int]:
     return label, len(closed)
 
 
-@njit(cache=True)
+@kernel
 def _components(dry, covered, cells):
     """Root (N,) of the component of every dry node: nodes outside of solids joined across cells, then each of the
     others to the air of the first cell that it has in common with them, and to one another where there is none."""
@@ -66,7 +66,7 @@ def _components(dry, covered, cells):
     return root
 
 
-@njit(cache=True)
+@kernel
 def _root_of(root, i):
     while root[i] != i:
         root[i] = root[root[i]]
@@ -74,7 +74,7 @@ def _root_of(root, i):
     return i
 
 
-@njit(cache=True)
+@kernel
 def _join(root, i, j):
     a, b = _root_of(root, i), _root_of(root, j)
     if a < b:

@@ -11,8 +11,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numba import njit
 from scipy.spatial import ConvexHull
+
+from kernel_decorators import kernel
 
 # Two facets of a hull belong to one plane below this difference of (normal, offset / size).
 SAME_PLANE = 1e-9
@@ -266,7 +267,7 @@ def _starts(counts):
     return np.concatenate([[0], np.cumsum(counts, dtype=np.int64)]).astype(np.int64)
 
 
-@njit(cache=True)
+@kernel
 def _holder(points, normals, offsets, plane_start, bounds):
     holder = np.full(len(points), -1, dtype=np.int64)
     for i in range(len(points)):

@@ -8,9 +8,9 @@ plane to round-off would lose surface.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from fluid.mesh.background import bin_of
+from kernel_decorators import plain
 
 
 def near_pairs(mesh, solids, chosen, margin) -> tuple[np.ndarray, np.ndarray]:
@@ -37,7 +37,7 @@ def near_pairs(mesh, solids, chosen, margin) -> tuple[np.ndarray, np.ndarray]:
     return key // len(solids), key % len(solids)
 
 
-@njit(cache=True)
+@plain
 def _apart(nodes, cells, e, normals, offsets, first, last, margin):
     """Is the cell wholly beyond one of the planes first:last?"""
     for g in range(first, last):
@@ -53,7 +53,7 @@ def _apart(nodes, cells, e, normals, offsets, first, last, margin):
     return False
 
 
-@njit(cache=True)
+@plain
 def _search(
     nodes, cells, bin_start, bin_cells, ny, nz, chosen, low, high, normals, offsets, plane_start, margin,
     cell, body,

@@ -34,8 +34,8 @@ from fluid.cut.pieces import (
     workspace,
 )
 from fluid.cut.wetted_polygons import wetted
-from fluid.numerics.jit import inner, released
 from fluid.numerics.threads import over
+from kernel_decorators import inner, released
 
 # A piece too thin for its cross-section to close goes to one side whole; thicker ones are an error.
 THIN = 1e-6

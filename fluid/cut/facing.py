@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from kernel_decorators import kernel
 
 
 def facing(bodies, polygons, reach, bounds, loose):
@@ -20,7 +21,7 @@ def facing(bodies, polygons, reach, bounds, loose):
     )  # fmt: skip
 
 
-@njit(cache=True)
+@kernel
 def near_bodies(low, high, loose, reach):
     """start (n + 1,), members: bodies whose bounds low, high (n, 3) [m] come within reach [m] of those of each body,
     pairs with at least one loose one."""
@@ -43,7 +44,7 @@ def near_bodies(low, high, loose, reach):
     return start, members[:count].copy()
 
 
-@njit(cache=True)
+@kernel
 def _facing(
     face_body, centroid, normal, normals, offsets, plane_start, loose, near_start, near, bounds, reach
 ):  # fmt: skip

@@ -7,10 +7,9 @@ in the cell: a field linear in the cell is known there without any geometry.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from fluid.cut.pieces import DONE, OUTPUT_FULL
-from fluid.numerics.jit import inner
+from kernel_decorators import inner, kernel
 
 
 @inner
@@ -58,7 +57,7 @@ def fans(tet_part, tet, element_of_part, n_elements: int):
     return start, np.ascontiguousarray(rows[:, 0]), np.ascontiguousarray(rows[:, 1:]).reshape(-1, 4, 4)
 
 
-@njit(cache=True)
+@kernel
 def _sorted(element, n_elements):
     """start (n_elements + 1,), and the places of the entries (T,) of `element` in its order; those < 0 are left out."""
     start = np.zeros(n_elements + 1, np.int64)

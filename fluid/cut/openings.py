@@ -9,12 +9,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from fluid.cut.pieces import workspace
 from fluid.cut.polygons import shared_area
-from fluid.numerics.jit import inner, released
 from fluid.numerics.threads import over
+from kernel_decorators import inner, kernel, released
 
 CLIP = 1e-12
 """Tolerance for clipping the open polygons, as a share of h."""
@@ -72,7 +71,7 @@ def _merged(old: Contacts, searched, fresh: Contacts) -> Contacts:
     return Contacts(*(a[order] for a in joined))
 
 
-@njit(cache=True)
+@kernel
 def _with_parts(part, start):
     """(cells,) bool: some element of the cell is a cut part."""
     found = np.zeros(len(start) - 1, np.bool_)
@@ -82,7 +81,7 @@ def _with_parts(part, start):
     return found
 
 
-@njit(cache=True)
+@kernel
 def _beside(neighbours, near):
     """Cells (n,) that are `near`, or the lower neighbour of one that is: the lower side of every contact of these."""
     found = np.empty(len(near), np.int64)
@@ -98,7 +97,7 @@ def _beside(neighbours, near):
     return found[:n].copy()
 
 
-@njit(cache=True)
+@kernel
 def _openings_by_face(open_part, open_face, n_parts):
     """Rows of the openings sorted by (part, face), and where each (part, face) starts."""
     start = np.zeros(4 * n_parts + 1, np.int64)

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fluid.numerics.jit import inner
+from kernel_decorators import inner
 
 DONE, OUTPUT_FULL, WORKSPACE_FULL, BROKEN_CAP = 0, 1, 2, 3
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from fluid.cut.cut_arrays import Cuts
+from kernel_decorators import kernel
 
 
 def joined(old: Cuts, again, new: Cuts) -> Cuts:
@@ -31,7 +31,7 @@ def joined(old: Cuts, again, new: Cuts) -> Cuts:
     )
 
 
-@njit(cache=True)
+@kernel
 def _merged(old_cell, new_cell, again):
     """take (n,): row of `old`, or -1 - row of `new`, for every joined part; and the joined place of every part of old
     (-1: gone) and of new. Both are sorted by cell, and no cell is in both."""
@@ -54,7 +54,7 @@ def _merged(old_cell, new_cell, again):
     return take[:n].copy(), kept, fresh
 
 
-@njit(cache=True)
+@kernel
 def _of_parts(kept, fresh, old_part, new_part):
     """The same for rows that belong to parts old_part, new_part, sorted by part."""
     take = np.empty(len(old_part) + len(new_part), np.int64)
@@ -82,7 +82,7 @@ def _rows(take, a, b):
     return _numbers(take, a, b) if a.ndim == 1 else _table(take, a, b)
 
 
-@njit(cache=True)
+@kernel
 def _numbers(take, a, b):
     out = np.empty(len(take), a.dtype)
     for s in range(len(take)):
@@ -90,7 +90,7 @@ def _numbers(take, a, b):
     return out
 
 
-@njit(cache=True)
+@kernel
 def _table(take, a, b):
     out = np.empty((len(take), a.shape[1]), a.dtype)
     for s in range(len(take)):
@@ -100,7 +100,7 @@ def _table(take, a, b):
     return out
 
 
-@njit(cache=True)
+@kernel
 def _ragged(take, old_start, new_start):
     """start (n + 1,) of the taken polygons, and where each of their corners comes from, as in `take`."""
     start = np.zeros(len(take) + 1, np.int64)

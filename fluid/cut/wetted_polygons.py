@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from fluid.cut.pieces import DONE, OUTPUT_FULL, WORKSPACE_FULL, interpolated
 from fluid.cut.polygons import copy_polygon, load_face, polygon_rule, split_polygon
-from fluid.numerics.jit import inner
+from kernel_decorators import inner
 
 
 @inner

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from fluid.numerics.jit import inner
+from kernel_decorators import inner, kernel
 
 
 def pick_old_nodes(old, new) -> np.ndarray:
@@ -37,7 +36,7 @@ def _near_bodies(domain):
     return near
 
 
-@njit(cache=True)
+@kernel
 def _touching(marked, cells):
     """Cells with a marked corner."""
     found = np.empty(len(cells), np.int64)
@@ -49,7 +48,7 @@ def _touching(marked, cells):
     return found[:n].copy()
 
 
-@njit(cache=True)
+@kernel
 def _elected(voters, matched, cells, old_cells, volume, old_volume, parent_node, copies):
     """Winner of the votes for every new node, -1 where nobody voted.
 
@@ -97,7 +96,7 @@ def _wall_of(domain):
     return wall
 
 
-@njit(cache=True)
+@kernel
 def _same_side(
     first, last, point, wall, centroid, old_wall, centre, rotation, new_centre, new_rotation, normals,
     offsets, plane_start,

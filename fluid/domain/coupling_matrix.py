@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.sparse as sp
-from numba import njit
+
+from kernel_decorators import kernel
 
 
 def wetted_coupling(domain, polygons=slice(None)) -> sp.csr_matrix:
@@ -23,12 +24,12 @@ def wetted_coupling(domain, polygons=slice(None)) -> sp.csr_matrix:
         domain.nodes, domain.cells, domain.parent_cell, domain.memory.mesh.gradients,
     )  # fmt: skip
     start, members = polygons_of_nodes(cell, domain.cells, shape[0])
-    row = _distinct(start, members, body)
-    values, columns = _summed(start, members, body, block, row)
+    row = _distinct(start, members, body, domain.n_bodies)
+    values, columns = _summed(start, members, body, block, row, domain.n_bodies)
     return sp.csr_matrix((values.ravel(), columns.ravel(), 6 * row), shape=shape)
 
 
-@njit(cache=True)
+@kernel
 def _blocks(face_cell, face_body, area, normal, points, centre, nodes, cells, parent, g):
     """∫ N_a (n, (x - x_b) x n) dA over every polygon, (S, 4, 6), a the corners of its cell."""
     block = np.zeros((len(face_cell), 4, 6))
@@ -63,7 +64,7 @@ def _blocks(face_cell, face_body, area, normal, points, centre, nodes, cells, pa
     return block
 
 
-@njit(cache=True)
+@kernel
 def polygons_of_nodes(face_cell, cells, n_nodes):
     """4 s + a of every polygon s at every node (its cell's corner a): start (N + 1,), members."""
     start = np.zeros(n_nodes + 1, np.int64)
@@ -81,11 +82,11 @@ def polygons_of_nodes(face_cell, cells, n_nodes):
     return start, members
 
 
-@njit(cache=True)
-def _distinct(start, members, body):
+@kernel
+def _distinct(start, members, body, n_bodies):
     """Row start (N + 1,) of the pairs (node, body)."""
     row = np.zeros(len(start), np.int64)
-    seen = np.full(body.max() + 1, -1, np.int64)
+    seen = np.full(n_bodies, -1, np.int64)
     for i in range(len(start) - 1):
         row[i + 1] = row[i]
         for t in range(start[i], start[i + 1]):
@@ -96,11 +97,11 @@ def _distinct(start, members, body):
     return row
 
 
-@njit(cache=True)
-def _summed(start, members, body, block, row):
+@kernel
+def _summed(start, members, body, block, row, n_bodies):
     """Values and columns (pairs, 6) of the rows, bodies in ascending order."""
     values, columns = np.zeros((row[-1], 6)), np.empty((row[-1], 6), np.int64)
-    place = np.full(body.max() + 1, -1, np.int64)
+    place = np.full(n_bodies, -1, np.int64)
     for i in range(len(start) - 1):
         n = 0
         around = columns[row[i] : row[i + 1], 0]

@@ -16,10 +16,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from fluid.cut.parts_of_cell import root as find
-from fluid.numerics.jit import inner
+from kernel_decorators import inner, kernel
 
 # Areas of contact below this share of h^2 are round-off.
 NO_AREA = 1e-12
@@ -104,7 +103,7 @@ def without_pockets(cells, volume, n_nodes: int, least) -> np.ndarray:
     return keep
 
 
-@njit(cache=True)
+@kernel
 def _nodes_with_choice(cells, part, start, n_nodes):
     """(nodes,) bool: nodes of cells that are cut or solid; only these can have other than one copy."""
     several = np.zeros(n_nodes, np.bool_)
@@ -115,7 +114,7 @@ def _nodes_with_choice(cells, part, start, n_nodes):
     return several
 
 
-@njit(cache=True)
+@kernel
 def _numbered(cells, parent, several, label, n_nodes):
     """Number the copies by background node, then by first element -> cells (M, 4), parent_node (N,)."""
     copies = np.zeros(n_nodes, np.int64)
@@ -144,7 +143,7 @@ def _numbered(cells, parent, several, label, n_nodes):
     return number, parent_node
 
 
-@njit(cache=True)
+@kernel
 def _unite_corners(cells, neighbours, parent, part, start, several, areas, fulls, slit, share, least):
     """Union-find over the corners 4 e + k of the elements, at nodes that may have several copies.
 
@@ -219,7 +218,7 @@ def _unite_face(cells, one, two, f, e, other, several, label):
                 label[max(a, b)] = min(a, b)
 
 
-@njit(cache=True)
+@kernel
 def _small_components(cells, small, keep, n_nodes):
     """Component of each of the small cells (n,) among themselves, and whether each touches a kept cell."""
     beside = np.zeros(n_nodes, np.bool_)
@@ -244,7 +243,7 @@ def _small_components(cells, small, keep, n_nodes):
     return label, kept
 
 
-@njit(cache=True)
+@kernel
 def _components(cells, n_nodes):
     label = np.arange(n_nodes)
     for e in range(len(cells)):

@@ -10,10 +10,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
-from fluid.numerics.jit import inner, plain, released
 from fluid.numerics.threads import found_over, over, owning, reach_of_cells
+from kernel_decorators import inner, kernel, plain, released
 
 
 @plain
@@ -171,7 +170,7 @@ def _wet_fraction(first, last, cell_list, phi, parts, share):
         share[s] = min((total[0] + total[1] + total[2] + total[3]) / parts.volume[e], 1.0)
 
 
-@njit(cache=True)
+@kernel
 def cells_touching(marked, cells):
     """Numbers of the cells with at least one marked corner; marked (N,) bool."""
     found = np.empty(cells.shape[0], np.int64)

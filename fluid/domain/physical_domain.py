@@ -17,7 +17,6 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from numba import njit
 
 from fluid.cut.bodies import ConvexBodies
 from fluid.cut.candidate_pairs import near_pairs
@@ -31,6 +30,7 @@ from fluid.domain.continued_nodes import pick_old_nodes
 from fluid.domain.coupling_matrix import wetted_coupling
 from fluid.domain.covers import Connection, virtual_cells, without_pockets
 from fluid.mesh.background import Background, gradients
+from kernel_decorators import kernel
 
 __all__ = ["PhysicalDomain", "carry", "cut_domain", "gradients", "wetted_coupling"]
 
@@ -361,7 +361,7 @@ def _volume(memory, elements):
     return volume
 
 
-@njit(cache=True)
+@kernel
 def _centroids(parent, part, centroid, moments):
     """Centroid (M, 3) [m] of the elements: of the whole cell, or of the part."""
     c = np.empty((len(parent), 3))
@@ -371,7 +371,7 @@ def _centroids(parent, part, centroid, moments):
     return c
 
 
-@njit(cache=True)
+@kernel
 def _compressed(cells, keep, n_nodes):
     """Nodes (N,) bool of the elements to keep (M,) bool, the new number of each element, and its nodes renumbered."""
     used = np.zeros(n_nodes, np.bool_)
@@ -399,7 +399,7 @@ def _elements(memory) -> Elements:
     return Elements(*_listed(met, cuts.part_cell, cuts.part_whole))
 
 
-@njit(cache=True)
+@kernel
 def _listed(met, part_cell, part_whole):
     """Elements: each cell that no body meets, and each part of the others."""
     most = len(met) + len(part_cell)

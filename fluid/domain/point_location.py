@@ -13,7 +13,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
+
+from kernel_decorators import inner, kernel, plain
 
 SKIN = 0.05
 """Share of a cell edge within which a point inside a body still counts as on its face: blocks creep under load."""
@@ -67,12 +68,12 @@ class Places:
         return value
 
 
-@njit(cache=True)
+@kernel
 def _answering(points, parent, skipped, neighbours, first, count, parts, nodes, near):
     """Cell (m,) of a topology for points (m, 3) in background cells parent (m,), but those skipped (m,) bool; -1 where
     none is found.  Whole cells answer for themselves; else the nearest fluid part does, sought across ever more faces
     until one is nearer than `near` [m]."""
-    answer = np.full(len(points), -1)
+    answer, x, corners = np.full(len(points), -1), np.empty((4, 3)), np.empty((4, 3))
     found = np.empty(4**RINGS * 2, np.int64)
     for i in range(len(points)):
         row = first[parent[i]]
@@ -86,7 +87,7 @@ def _answering(points, parent, skipped, neighbours, first, count, parts, nodes, 
             end = n
             for k in range(begin, end):
                 for row in range(first[found[k]], first[found[k]] + count[found[k]]):
-                    d = _distance(parts, nodes, row, points[i])
+                    d = _distance(parts, nodes, row, points[i], x, corners)
                     if d < nearest:
                         nearest, answer[i] = d, row
                 n = _with_neighbours(neighbours[found[k]], found, n)
@@ -96,7 +97,7 @@ def _answering(points, parent, skipped, neighbours, first, count, parts, nodes, 
     return answer
 
 
-@njit(cache=True)
+@plain
 def _with_neighbours(around, found, n):
     """Add those of `around` (4,) that are there and not among the first n of `found` yet; the new n."""
     for c in around:
@@ -109,30 +110,45 @@ def _with_neighbours(around, found, n):
     return n
 
 
-@njit(cache=True)
-def _distance(parts, nodes, row, point):
-    """d (see above) of a point (3,) from the fluid part of a cell [m]."""
-    x = nodes[parts.cells[row]]
+@inner
+def _distance(parts, nodes, row, point, x, corners):
+    """d (see above) of a point (3,) from the fluid part of a cell [m]; x, corners (4, 3): work space."""
+    for a in range(4):
+        for k in range(3):
+            x[a, k] = nodes[parts.cells[row, a], k]
     if parts.start[row] == parts.start[row + 1]:
         return _beyond(x, point)
     nearest = np.inf
     for t in range(parts.start[row], parts.start[row + 1]):
-        nearest = min(nearest, _beyond(parts.corners[t] @ x, point))
+        for a in range(4):
+            for k in range(3):
+                corners[a, k] = 0.0
+                for b in range(4):
+                    corners[a, k] += parts.corners[t, a, b] * x[b, k]
+        nearest = min(nearest, _beyond(corners, point))
     return nearest
 
 
-@njit(cache=True)
+@inner
 def _beyond(x, point):
     """d of a point (3,) from a tetrahedron with the corners x (4, 3) [m]; planes without an area do not count."""
     largest = 0.0
     for k in range(4):
-        a, b, c = x[(k + 1) % 4], x[(k + 2) % 4], x[(k + 3) % 4]
-        normal = np.cross(b - a, c - a)
-        length = np.sqrt(normal @ normal)
+        a, b, c = (k + 1) % 4, (k + 2) % 4, (k + 3) % 4
+        u0, u1, u2 = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]
+        v0, v1, v2 = x[c, 0] - x[a, 0], x[c, 1] - x[a, 1], x[c, 2] - x[a, 2]
+        n = (u1 * v2 - u2 * v1, u2 * v0 - u0 * v2, u0 * v1 - u1 * v0)
+        length = np.sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2])
         if length > 0.0:
-            inward = 1.0 if normal @ (x[k] - a) > 0.0 else -1.0
-            largest = max(largest, -inward * (normal @ (point - a)) / length)
+            inward = 1.0 if _height(n, x[a], x[k]) > 0.0 else -1.0
+            largest = max(largest, -inward * _height(n, x[a], point) / length)
     return largest
+
+
+@inner
+def _height(normal, a, x):
+    """normal · (x - a)."""
+    return normal[0] * (x[0] - a[0]) + normal[1] * (x[1] - a[1]) + normal[2] * (x[2] - a[2])
 
 
 def _depth(memory, parent, points) -> np.ndarray:

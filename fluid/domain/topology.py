@@ -13,13 +13,12 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numba import njit
 
 from fluid.domain.coupling_matrix import polygons_of_nodes
 from fluid.domain.moments import FluidParts
 from fluid.mesh.background import Background
-from fluid.numerics.jit import ranged, released
 from fluid.numerics.threads import over
+from kernel_decorators import kernel, ranged, released
 
 
 @dataclass(frozen=True)
@@ -177,14 +176,14 @@ def covered_nodes(domain) -> np.ndarray:
     if len(d.face_cell) == 0:
         return np.zeros(len(d.nodes), bool)
     start, members = polygons_of_nodes(d.face_cell, d.cells, len(d.nodes))
-    return _covered(start, members, d.nodes, d.face_body, d.face_centroid, d.face_normal)
+    return _covered(start, members, d.nodes, d.face_body, d.face_centroid, d.face_normal, d.n_bodies)
 
 
-@njit(cache=True)
-def _covered(start, members, nodes, body, centroid, normal):
+@kernel
+def _covered(start, members, nodes, body, centroid, normal, n_bodies):
     covered = np.zeros(len(nodes), np.bool_)
     # marks of the node in hand: a body seen at all, a body with a face that the node is in front of
-    seen, in_front = np.full(body.max() + 1, -1, np.int64), np.full(body.max() + 1, -1, np.int64)
+    seen, in_front = np.full(n_bodies, -1, np.int64), np.full(n_bodies, -1, np.int64)
     for i in range(len(nodes)):
         behind = 0
         for t in range(start[i], start[i + 1]):
@@ -203,7 +202,7 @@ def _covered(start, members, nodes, body, centroid, normal):
     return covered
 
 
-@njit(cache=True)
+@kernel
 def _measures(nodes, cells, parent, g, full, full_size, volume, centroid, is_cut):
     """share (M, 4), fraction (M,), size (M,), node_volume (N,) and beside_solid (N,) of Topology.
 
@@ -225,7 +224,7 @@ def _measures(nodes, cells, parent, g, full, full_size, volume, centroid, is_cut
     return share, fraction, size, node_volume, beside_solid
 
 
-@njit(cache=True)
+@kernel
 def _cells_of_nodes(cells, n):
     start = np.zeros(n + 1, np.uint32)
     for e in range(cells.shape[0]):
@@ -252,7 +251,7 @@ def _neighbours_in(mesh, nodes, cells, parent):
     return row[mesh.neighbours[parent]]
 
 
-@njit(cache=True)
+@kernel
 def _neighbours(parent_neighbours, cells, parent, n_parents):
     """Copies of the parents' neighbours that share the three nodes of the face."""
     start = np.zeros(n_parents + 1, np.int64)
@@ -325,7 +324,7 @@ def _touched(first, last, nodes, node_start, node_cells, touched):
                 touched[node_cells[t]] = True
 
 
-@njit(cache=True)
+@kernel
 def layers_around(seed, depth, start, around):
     """Nodes in order of distance from the seed nodes (bool (N,)): (list, layer_start (depth + 2,)).
 
@@ -406,7 +405,7 @@ _PAIR = np.array([[-1, 0, 1, 2], [0, -1, 3, 4], [1, 3, -1, 5], [2, 4, 5, -1]])
 """Column of Background.products that holds the corners a, b."""
 
 
-@njit(cache=True)
+@kernel
 def _take_out(cell_list, cells, parent, products, volume, row, start, neighbour, stiffness):
     for e in cell_list:
         for a in range(4):

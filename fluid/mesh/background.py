@@ -14,12 +14,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numba import njit
 from skfem import MeshTet
 
 from fluid.mesh.bricks import SPLITS, split_bricks
 from fluid.mesh.shapes import Shapes
 from fluid.numerics.cube_root import cube_root
+from kernel_decorators import inner, kernel
 
 CORNERS_OF_FACE = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])  # outward for a positive cell
 MOST_SLENDER = 2.5
@@ -305,7 +305,7 @@ def _fill_bins(low, high, nx, ny, nz):
     return start, cell[order]
 
 
-@njit(cache=True)
+@kernel
 def _products(g):
     out = np.empty((g.shape[0], 6))
     for e in range(g.shape[0]):
@@ -317,7 +317,7 @@ def _products(g):
     return out
 
 
-@njit(cache=True)
+@kernel
 def _slenderness(x, cells):
     """Longest over shortest edge (M,) of the cells."""
     out = np.empty(cells.shape[0])
@@ -333,7 +333,7 @@ def _slenderness(x, cells):
     return out
 
 
-@njit(cache=True)
+@inner
 def smallest_barycentric(p, e, nodes, cells, g):
     """min_a λ_a of the point p (3,) in cell e: ≥ 0 inside."""
     lowest = 1.0
@@ -347,7 +347,7 @@ def smallest_barycentric(p, e, nodes, cells, g):
     return min(lowest, last)
 
 
-@njit(cache=True)
+@inner
 def _bin_index(axis, x):
     low, high = 0, axis.shape[0] - 1
     while high - low > 1:
@@ -359,7 +359,7 @@ def _bin_index(axis, x):
     return low
 
 
-@njit(cache=True)
+@kernel
 def _locate(points, ax, ay, az, bin_start, bin_cells, nodes, cells, g):
     found = np.full(points.shape[0], -1, np.int64)
     for m in range(points.shape[0]):
@@ -376,13 +376,13 @@ def _locate(points, ax, ay, az, bin_start, bin_cells, nodes, cells, g):
     return found
 
 
-@njit(cache=True)
+@inner
 def _on_wall(axis, i, x):
     """Whether x is on the lower wall of bin i, up to round-off, and there is a bin before it."""
     return i > 0 and x - axis[i] <= 1e-9 * (axis[i] - axis[i - 1])
 
 
-@njit(cache=True)
+@inner
 def _seek(points, m, b, bin_start, bin_cells, nodes, cells, g, found):
     """found[m] <- the cell of bin b that holds point m, if there is one."""
     best = -1e-10  # round-off: a point on a shared face belongs to the first cell that holds it

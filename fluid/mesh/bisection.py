@@ -15,7 +15,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
+
+from kernel_decorators import kernel
 
 PER_LEVEL = 3
 """Bisections that halve all edges of a brick."""
@@ -69,7 +70,7 @@ def _halved(mesh: Tetrahedra, wanted, depth: int) -> Tetrahedra:
     return Tetrahedra(nodes[first], lattice[first], number[cells], reached)
 
 
-@njit(cache=True)
+@kernel
 def _first_seen(cells, n):
     """Nodes (n,) in the order in which the cells name them."""
     out, seen, k = np.empty(n, np.int64), np.zeros(n, np.bool_), 0
@@ -83,7 +84,7 @@ def _first_seen(cells, n):
     return out
 
 
-@njit(cache=True)
+@kernel
 def _bisect(nodes, lattice, cells, depth, wanted, deep):
     """Nodes, lattice, cells and depth after all cells that are wanted and less deep, and what follows; the first cell
     (M,) that each one comes from."""
@@ -137,7 +138,7 @@ def _bisect(nodes, lattice, cells, depth, wanted, deep):
     )
 
 
-@njit(cache=True)
+@kernel
 def _longest(corners, lattice):
     """Corners a, b of the longest edge; of equal ones that with the smallest numbers."""
     best, one, other, low, high = -1.0, 0, 1, 0, 0
@@ -152,7 +153,7 @@ def _longest(corners, lattice):
     return one, other
 
 
-@njit(cache=True)
+@kernel
 def _has_halved(corners, touched, keys, middle):
     """Whether some edge of a cell has a node in its middle."""
     for a in range(4):
@@ -165,7 +166,7 @@ def _has_halved(corners, touched, keys, middle):
     return False
 
 
-@njit(cache=True)
+@kernel
 def _slot(keys, key):
     """Place of a key in the table, or the free one where it belongs."""
     mask = keys.shape[0] - 1
@@ -175,7 +176,7 @@ def _slot(keys, key):
     return at
 
 
-@njit(cache=True)
+@kernel
 def _rehashed(keys, middle):
     wider, values = np.full(2 * keys.shape[0], -1, np.int64), np.empty(2 * keys.shape[0], np.int64)
     for s in range(keys.shape[0]):
@@ -185,28 +186,28 @@ def _rehashed(keys, middle):
     return wider, values
 
 
-@njit(cache=True)
+@kernel
 def _grown(rows):
     out = np.empty((2 * rows.shape[0], rows.shape[1]))
     out[: rows.shape[0]] = rows
     return out
 
 
-@njit(cache=True)
+@kernel
 def _grown_ints(rows):
     out = np.empty((2 * rows.shape[0], rows.shape[1]), np.int64)
     out[: rows.shape[0]] = rows
     return out
 
 
-@njit(cache=True)
+@kernel
 def _grown_numbers(values):
     out = np.empty(2 * values.shape[0], np.int64)
     out[: values.shape[0]] = values
     return out
 
 
-@njit(cache=True)
+@kernel
 def _grown_flags(flags):
     out = np.zeros(2 * flags.shape[0], np.bool_)
     out[: flags.shape[0]] = flags

@@ -24,9 +24,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from fluid.mesh.background import Background, MeshError
+from kernel_decorators import kernel
 
 FOLLOW = 0.2
 """Steepest slope that layers follow: one in five. Cells sheared more let still water at a shore grow restless (0.01 a
@@ -241,7 +241,7 @@ def _refuse_slender(x, y, layers):
         )
 
 
-@njit(cache=True)
+@kernel
 def _envelope(bed, x, y, most):
     """Largest function (nx, ny) ≤ bed whose slopes along x and y are at most `most`, by sweeps."""
     f = bed.copy()
@@ -268,7 +268,7 @@ def _envelope(bed, x, y, most):
     return f
 
 
-@njit(cache=True)
+@kernel
 def _cells(height, start, nx, ny, below, mirrored):
     """Cells (M, 4) over all triangles of the lattice with a corner below the lid, below (nx, ny) bool."""
     cells = np.empty((6 * max(1, height.shape[0]), 4), np.int64)
@@ -292,7 +292,7 @@ def _cells(height, start, nx, ny, below, mirrored):
     return cells[:n].copy()
 
 
-@njit(cache=True)
+@kernel
 def _climb(height, start, corner, rank, mirrored, cells, n):
     """Tetrahedra between the three columns corner (3,), written from row n on; the next row."""
     at, end = np.empty(3, np.int64), np.empty(3, np.int64)

@@ -8,10 +8,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from fluid.mesh.background import Background, MeshError, bin_of
 from fluid.mesh.bisection import MOST_LEVELS, Tetrahedra, refined
+from kernel_decorators import kernel
 
 MOST_ENTRIES = 6
 """Bins that a cell may be listed in, on average."""
@@ -187,7 +187,7 @@ def _divided(axis, low, high, share):
     )
 
 
-@njit(cache=True)
+@kernel
 def _near(nodes, cells, low, high, normals, offsets, start, body_low, body_high, margin):
     """(M,) bool: cells that no plane of some body, moved out by the margin, parts from it, nor its box."""
     found = np.zeros(cells.shape[0], np.bool_)

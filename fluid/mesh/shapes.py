@@ -10,7 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
+
+from kernel_decorators import inner, kernel, plain
 
 MOST_SHAPES = 64
 """Shapes that are compared one by one, 6 kB of gradients: those of a box of bricks."""
@@ -62,21 +63,21 @@ def _odd_numbers(n):
     return np.random.default_rng(7).integers(2**61, 2**62, n) | 1
 
 
-@njit(cache=True)
+@kernel
 def _all_alike(g, first, row, same):
     """Whether the gradients of every cell are those of the first of its shape."""
     found = True
     for e in range(g.shape[0]):
-        found = found and _alike(g[e], g[first[row[e]]], same * np.abs(g[e]).max())
+        found = found and _alike(g[e], g[first[row[e]]], same * _largest(g[e]))
     return found
 
 
-@njit(cache=True)
+@kernel
 def _shapes(g, most, same):
     """Shape (M,) of each cell and first cell (S,) of each shape; without any shape if there are more than `most`."""
     row, first, n = np.empty(g.shape[0], np.uint32), np.empty(most, np.int64), 0
     for e in range(g.shape[0]):
-        size = np.abs(g[e]).max()
+        size = _largest(g[e])
         s = 0
         while s < n and not _alike(g[e], g[first[s]], same * size):
             s += 1
@@ -89,7 +90,17 @@ def _shapes(g, most, same):
     return row, first[:n].copy()
 
 
-@njit(cache=True)
+@inner
+def _largest(g):
+    """Largest entry of g (4, 3) by its size."""
+    largest = 0.0
+    for a in range(4):
+        for k in range(3):
+            largest = max(largest, abs(g[a, k]))
+    return largest
+
+
+@plain
 def _alike(g, other, tolerance):
     for a in range(4):
         for k in range(3):

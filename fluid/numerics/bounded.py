@@ -16,9 +16,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from fluid.numerics.solve import MOST_ITERATIONS, NotConverged, conjugate_gradients, operators, solve
+from kernel_decorators import kernel
 
 LOOSE = 1e-3
 """Residual at which a round ends that has unknowns far below their bound: the next one goes on from there."""
@@ -158,7 +158,7 @@ def _air_goes_on(A, x, lower, air):
     return below & _beside(A.indptr, A.indices, source)
 
 
-@njit(cache=True)
+@kernel
 def _beside(indptr, indices, source):
     """(n,) bool: rows with an entry in the column of a source (n,) bool."""
     found = np.zeros(source.shape[0], np.bool_)

@@ -16,10 +16,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
-from fluid.numerics.jit import ranged
 from fluid.numerics.threads import over
+from kernel_decorators import kernel, plain, ranged
 
 PAIRINGS = 3
 """Pairs of pairs of pairs: about eight unknowns become one."""
@@ -127,7 +126,7 @@ def _dense_inverse(level: Level):
     return np.linalg.inv(A)
 
 
-@njit(cache=True)
+@kernel
 def _split(indptr, indices, data):
     """start, middle, column, entry, diagonal of Level from the rows of a csr matrix."""
     n = len(indptr) - 1
@@ -162,7 +161,7 @@ def _aggregates(parts):
     return aggregate, count
 
 
-@njit(cache=True)
+@kernel
 def _matched(start, middle, column, entry, diagonal):
     """Number of the pair of every unknown (n,), -1 without any coupling, and how many there are. Each unknown in turn
     takes the free one that is coupled to it most strongly, of equals the first, or stays alone."""
@@ -186,7 +185,7 @@ def _matched(start, middle, column, entry, diagonal):
     return pair, count
 
 
-@njit(cache=True)
+@kernel
 def _chained(first, second):
     """second[first] (n,), -1 where either is."""
     out = np.full(len(first), -1, np.int32)
@@ -196,7 +195,7 @@ def _chained(first, second):
     return out
 
 
-@njit(cache=True)
+@kernel
 def _galerkin(start, middle, column, entry, diagonal, aggregate, n, scale):
     """scale Pᵀ A P as csr (indptr, indices, data), the diagonal first in every row."""
     first = np.zeros(n + 1, np.uint32)
@@ -230,7 +229,7 @@ def _galerkin(start, middle, column, entry, diagonal, aggregate, n, scale):
     return indptr, indices[:k].copy(), data[:k].copy()
 
 
-@njit(cache=True)
+@kernel
 def _down(start, middle, column, entry, inverse, aggregate, n_coarse, r):
     """Forward sweep from zero → x, and Pᵀ (r - A x), for which only the entries right of the diagonal count."""
     n = len(r)
@@ -249,7 +248,7 @@ def _down(start, middle, column, entry, inverse, aggregate, n_coarse, r):
     return x, coarse
 
 
-@njit(cache=True)
+@plain
 def _up(start, column, entry, inverse, aggregate, coarse, r, x):
     """x + P coarse, then the backward sweep, in place."""
     for i in range(len(x)):
@@ -286,7 +285,7 @@ def _left_over(first, last, bounds, start, middle, column, entry, x, left):
             left[i] = total
 
 
-@njit(cache=True)
+@kernel
 def _restricted(aggregate, left, n_coarse):
     """Pᵀ left."""
     coarse = np.zeros(n_coarse)
@@ -317,7 +316,7 @@ def _up_blocks(first, last, bounds, start, middle, column, entry, inverse, r, be
             x[i] = total * inverse[i]
 
 
-@njit(cache=True)
+@kernel
 def _forward(start, column, entry, inverse, r, x):
     for i in range(len(r)):
         total = r[i]
@@ -326,7 +325,7 @@ def _forward(start, column, entry, inverse, r, x):
         x[i] = total * inverse[i]
 
 
-@njit(cache=True)
+@plain
 def _backward(start, column, entry, inverse, r, x):
     for i in range(len(r) - 1, -1, -1):
         total = r[i]

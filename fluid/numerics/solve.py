@@ -12,9 +12,9 @@ from functools import partial
 
 import numpy as np
 
-from fluid.numerics.jit import ranged
 from fluid.numerics.multigrid import Multigrid, unsigned
 from fluid.numerics.threads import over
+from kernel_decorators import ranged
 
 MULTIGRID_FROM = 1_000
 MULTIGRID_FROM_WITH_EXTRA = 300

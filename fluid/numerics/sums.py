@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fluid.numerics.jit import ranged
 from fluid.numerics.threads import CHUNK, summed
+from kernel_decorators import ranged
 
 
 def momentum_of(weight, u, place) -> np.ndarray:

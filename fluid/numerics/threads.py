@@ -1,8 +1,8 @@
 """Kernels on several threads, with the same bits at any number of them.
 
-A kernel of this kind takes a range as its first arguments, releases the interpreter (`jit.ranged`) and writes to what
-belongs to the range only. Each thread gets one range; a single thread gets all of it and runs the loop as it stands.
-What a row comes to must not depend on where the ranges end. There are two forms:
+A kernel of this kind takes a range as its first arguments, releases the interpreter (`kernel_decorators.ranged`), and
+writes to what belongs to the range only. Each thread gets one range; a single thread gets all of it and runs the loop
+as it stands. What a row comes to must not depend on where the ranges end. There are two forms:
 
 - `over`: rows that read what they like and write their own.
 - `owning`: sums over cells, or along edges, into nodes. The range is one of nodes: every thread goes through the cells
@@ -27,9 +27,8 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
-from fluid.numerics.jit import ranged
+from kernel_decorators import kernel, ranged
 
 LEAST_ROWS = 2_000
 """Rows of a range that are worth a thread: to wake one takes as long as some hundred of them."""
@@ -278,7 +277,7 @@ def _row_reach(first, last, nodes, row, start, neighbour, low, high):
         low[b], high[b] = least, most
 
 
-@njit(cache=True)
+@kernel
 def _runs(low, high, first, last, count):
     """Joined blocks with a node from `first` to before `last`, (k, 2): where each run begins and ends."""
     runs, k = np.empty((low.shape[0] + 1, 2), np.int64), 0

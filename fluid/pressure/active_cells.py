@@ -11,10 +11,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from fluid.domain.moments import wet_fraction
 from fluid.pressure.indefinite_cells import without_indefinite
+from kernel_decorators import kernel
 
 DRY = 1e-9
 """A fluid part that lies above φ = -DRY h holds no water."""
@@ -57,7 +57,7 @@ def _holding(d, t, phi, dry):
     )
 
 
-@njit(cache=True)
+@kernel
 def _lowest_below(face_cell, corners, nodes, cells, parent, g, covered, phi, dry):
     holds = np.zeros(cells.shape[0], np.bool_)
     slope = np.empty(3)

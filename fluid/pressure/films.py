@@ -29,12 +29,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
-from numba import njit
 from scipy.sparse.csgraph import connected_components
 
 from fluid.cut.facing import facing
 from fluid.domain.coupling_matrix import wetted_coupling
 from fluid.pressure.projection import inflow
+from kernel_decorators import kernel
 
 NARROW = 0.25
 """Widest film, in cells: narrower ones are no channels that the mesh could see."""
@@ -161,7 +161,7 @@ def _one_solved(own, rows, right):
     return sp.linalg.splu(sp.csc_array(block)).solve(right)
 
 
-@njit(cache=True)
+@kernel
 def _film_cells(face_cell, area, in_film, volume, reach):
     """(M,) bool: cells with polygons in films only, and no more water than these have within reach (M,) [m]."""
     n_cells = len(volume)
@@ -177,7 +177,7 @@ def _film_cells(face_cell, area, in_film, volume, reach):
     return found
 
 
-@njit(cache=True)
+@kernel
 def _all_around(node_start, node_cells, chosen):
     """(N,) bool: nodes with cells, all of them chosen (M,) bool."""
     found = np.zeros(node_start.shape[0] - 1, np.bool_)

@@ -26,9 +26,9 @@ surface still holds the pressure near 0 there, and water at rest still balances 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from fluid.pressure.projection import SMALLEST_CUT
+from kernel_decorators import kernel
 
 LEAST = 0.05
 """Least share of a row's positive and negative entries on the diagonal that is to be left."""
@@ -49,7 +49,7 @@ def reserve(topology, cells, unknown):
     return _reserve(cells, unknown, t.cells, t.parent, t.products, t.volume)
 
 
-@njit(cache=True)
+@kernel
 def _reserve(cell_list, unknown, cells, parent, products, volume):
     out = np.zeros(len(unknown))
     own, scaled = np.empty(4), np.empty(3)
@@ -81,7 +81,7 @@ def _reserve(cell_list, unknown, cells, parent, products, volume):
     return out
 
 
-@njit(cache=True)
+@kernel
 def _least_root(off):
     """Least eigenvalue of the symmetric 3 x 3 matrix with zeros on its diagonal and these entries (3,) beside it, from
     below: λ³ - p λ - q = 0 by Newton's method, which comes up from -2 sqrt(p/3) without passing the root."""
@@ -102,7 +102,7 @@ def about(graph, rows, beside, phi, pressure):
     return _about(rows, graph.row, graph.start, graph.neighbour, beside, phi, pressure)
 
 
-@njit(cache=True)
+@kernel
 def _about(rows, graph_row, start, neighbour, beside, phi, pressure):
     out = np.zeros(len(rows))
     for r in range(len(rows)):
@@ -117,7 +117,7 @@ def _about(rows, graph_row, start, neighbour, beside, phi, pressure):
     return out
 
 
-@njit(cache=True)
+@kernel
 def _kept(cell_list, fraction, wet, phi, cells, parent, products, volume):
     kept = np.ones(len(cell_list), np.bool_)
     part, total, size = np.zeros((len(cell_list), 4)), np.zeros(len(phi)), np.zeros(len(phi))
@@ -150,7 +150,7 @@ def _kept(cell_list, fraction, wet, phi, cells, parent, products, volume):
     return kept
 
 
-@njit(cache=True)
+@kernel
 def _cell_matrix(corners, products, wet, phi, matrix):
     """A / |e| in `matrix` (4, 4), rows and columns of dry corners zero; the number of wet corners."""
     matrix[:] = 0.0
@@ -172,13 +172,13 @@ def _cell_matrix(corners, products, wet, phi, matrix):
     return n_wet
 
 
-@njit(cache=True)
+@kernel
 def _crossing(inside, outside):
     """ϑ of the edge from a wet node to one that is not."""
     return max(inside / (inside - outside), SMALLEST_CUT) if outside >= 0.0 else 1.0
 
 
-@njit(cache=True)
+@kernel
 def _is_positive(matrix):
     """Whether elimination (in place) meets no pivot below zero; empty rows are none."""
     largest = max(max(matrix[0, 0], matrix[1, 1]), max(matrix[2, 2], matrix[3, 3]))

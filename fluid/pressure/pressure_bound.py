@@ -11,9 +11,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from fluid.numerics.bounded import at_air
+from kernel_decorators import kernel
 
 
 def lowest_pressure(water, graph, dofs, phi, of_air: float = 0.0) -> np.ndarray | None:
@@ -96,7 +96,7 @@ def wall_area(mesh, domain) -> np.ndarray:
     return of_tank[domain.parent_node] + of_bodies
 
 
-@njit(cache=True)
+@kernel
 def _beside_air(dofs, graph_row, start, neighbour, phi, open_to_air, ventilated):
     """(n,) bool: nodes beside a dry one, on an open side or beside one, in parted water or beside it."""
     found = np.zeros(dofs.shape[0], np.bool_)

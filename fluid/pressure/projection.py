@@ -24,10 +24,9 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from numba import njit
 
-from fluid.numerics.jit import ranged, released
 from fluid.numerics.threads import found_over, over, owning, reach_of_cells
+from kernel_decorators import kernel, ranged, released
 
 SMALLEST_CUT = 1e-7
 SMALLEST_WET_SHARE = 1e-6
@@ -160,7 +159,7 @@ def pull_of_held(graph, dofs, held, scale: float):
     return _pull(dofs, g.row, g.start, g.neighbour, g.stiffness, held, scale)
 
 
-@njit(cache=True)
+@kernel
 def _pull(dofs, graph_row, start, neighbour, stiffness, held, scale):
     out = np.zeros(dofs.shape[0])
     for r in range(dofs.shape[0]):
@@ -183,7 +182,7 @@ def seal_pockets(matrix, anchored, volume, compliance: float, pressure):
     return sp.csr_array(matrix + sp.diags_array(added)), added * pressure
 
 
-@njit(cache=True)
+@kernel
 def _reached(indptr, indices, seed):
     """Rows (n,) bool that the entries of a symmetric matrix connect to a row of the seed (n,) bool."""
     reached = seed.copy()
@@ -415,7 +414,7 @@ def _places_beside(first, last, cell_list, reached, cells):
     return found[:n].copy()
 
 
-@njit(cache=True)
+@kernel
 def _unlike_neighbours(cell_list, phi, wet, beside_solid, deep, u, cells, volume, wet_share):
     """M⁻¹L u (N, 3), zero on dry nodes."""
     mass, out, mean = np.zeros(u.shape[0]), np.zeros((u.shape[0], 3)), np.empty(3)

@@ -29,7 +29,8 @@ from itertools import pairwise
 
 import numpy as np
 import scipy.sparse as sp
-from numba import njit
+
+from kernel_decorators import kernel
 
 DISCHARGE = 0.6
 """C_d of a sharp opening."""
@@ -226,7 +227,7 @@ def _patches(domain, cracks, mouths, spacing):
     )  # fmt: skip
 
 
-@njit(cache=True)
+@kernel
 def _hats(
     crack, length, origin, along, outward, across, bodies, order, start, face_cell, area, normal, points, nodes,
     cells, parent, g, size, facing, nearest,

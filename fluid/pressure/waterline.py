@@ -19,11 +19,11 @@ acceleration is multiplied by ε m_a / (m + m_a) < 1 in every step.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from fluid.domain.moments import cells_touching
 from fluid.domain.physical_domain import hat_values
 from fluid.pressure.projection import with_ghosts
+from kernel_decorators import kernel
 
 
 def waterline_load(domain, faces, left_out, phi, wet, pressure, open_node, air=None) -> np.ndarray:
@@ -94,7 +94,7 @@ def hydrostatic_stiffness(water, phi, bodies) -> np.ndarray | None:
     return stiffness
 
 
-@njit(cache=True)
+@kernel
 def _differences(height, full, acting, arm, area):
     """∫ p_acting - ∫_{height<0} p_full over triangles with corner values (k, 3): (k,), and times the arm: (k, 3)."""
     n = height.shape[0]
@@ -109,7 +109,7 @@ def _differences(height, full, acting, arm, area):
     return force, first
 
 
-@njit(cache=True)
+@kernel
 def _wet_triangles(height, share):
     """Barycentric corners (·, 3, 3) of the part with height < 0, as 0, 1 or 2 triangles → how many."""
     share[:] = 0.0
@@ -140,7 +140,7 @@ def _wet_triangles(height, share):
     return 2
 
 
-@njit(cache=True)
+@kernel
 def _relative_area(part):
     """|det| of barycentric corners (3, 3): the area of the part over that of the triangle."""
     d = part[0, 0] * (part[1, 1] * part[2, 2] - part[1, 2] * part[2, 1])
@@ -149,7 +149,7 @@ def _relative_area(part):
     return abs(d)
 
 
-@njit(cache=True)
+@kernel
 def _add(sign, area, part, p, arm, force, first, s):
     """force[s] += sign ∫ p dA, first[s] += sign ∫ p arm dA over the part with barycentric corners (3, 3).
 

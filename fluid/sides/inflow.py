@@ -22,9 +22,9 @@ from dataclasses import dataclass, replace
 from typing import cast
 
 import numpy as np
-from numba import njit
 
 from fluid.domain.moments import nodal_water
+from kernel_decorators import kernel
 
 ON_FACE = 1e-9
 """Hat value below which a corner of a tetrahedron lies on the face of its cell."""
@@ -190,7 +190,7 @@ def _on_faces(domain, face, element, corner):
     return face[which], element[which], hats, np.abs(np.linalg.det(hats))
 
 
-@njit(cache=True)
+@kernel
 def wet_shares(phi):
     """∫_{φ<0} N_a dA over the area of each triangle (F, 3); φ (F, 3) at its corners."""
     out = np.zeros(phi.shape)

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numba import njit
 
 from fluid.surface.level_set import without_films
+from kernel_decorators import plain
 
 _SAME_DIRECTION = 0.3
 """Normals of one node that span less than this (singular value over the largest) count as one direction."""
@@ -138,7 +138,7 @@ class Walls:
         _project(self.nodes, self.projector, u)
 
 
-@njit(cache=True)
+@plain
 def _project(nodes, projector, u):
     """u_i <- P_i u_i of the listed nodes, in place."""
     for s in range(nodes.shape[0]):

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fluid.numerics.jit import ranged, released
 from fluid.numerics.sums import kinetic_energy
 from fluid.numerics.threads import found_over, over
 from fluid.pressure.pressure_bound import BoundMet
@@ -30,6 +29,7 @@ from fluid.step.report import StepReport
 from fluid.surface.extrapolation import extend_velocity
 from fluid.surface.gradient_jump_damping import damp_kinks
 from fluid.surface.volume import Flux, edge_flux
+from kernel_decorators import ranged, released
 
 FLUX_LAYERS = 3
 """Layers of dry nodes that water may reach within the next step."""

@@ -28,10 +28,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fluid.numerics.jit import released
 from fluid.numerics.sums import about, momentum_of, momentum_of_rows
 from fluid.numerics.threads import CHUNK, summed
 from fluid.step.predictor import kick_factor
+from kernel_decorators import released
 
 NUMERICAL = (
     "transport",

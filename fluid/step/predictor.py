@@ -14,7 +14,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from fluid.domain.coupling_matrix import wetted_coupling
-from fluid.numerics.jit import ranged
 from fluid.numerics.threads import over
 from fluid.pressure.active_cells import WetPart
 from fluid.pressure.indefinite_cells import about, reserve
@@ -33,6 +32,7 @@ from fluid.surface.level_set import redistance
 from fluid.surface.volume import correct_volume
 from fluid.transport.advection import transport
 from fluid.transport.paths_in_solids import levels_in_solids
+from kernel_decorators import ranged
 
 TRANSPORT_WIDTH = 5.0
 """|φ| in cell sizes within which the level set moves; beyond, only its sign matters."""

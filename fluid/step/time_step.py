@@ -20,7 +20,8 @@ of all water.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from kernel_decorators import kernel, plain
 
 SPRAY = 0.01
 """Largest share of the volume of water that is spray, ..."""
@@ -51,7 +52,7 @@ def _bulk(least, u, water, counted) -> float:
     return float(speed[order[rest]]) if rest < len(order) else least
 
 
-@njit(cache=True)
+@kernel
 def gathered(counted, water, least, start, around):
     """The counted nodes (N,) bool that hold at least so much water together with their neighbours; all of them where
     none does.
@@ -68,7 +69,7 @@ def gathered(counted, water, least, start, around):
     return found if n > 0 else counted
 
 
-@njit(cache=True)
+@plain
 def largest_component(u, counted):
     """max |u_ik| over the counted rows of u (N, 3), 0 without any."""
     largest = 0.0
@@ -79,7 +80,7 @@ def largest_component(u, counted):
     return largest
 
 
-@njit(cache=True)
+@kernel
 def _faster_than(least, u, water, counted):
     """Largest component (n,) and volume (n,) of the counted nodes faster than `least`, and the volume of all."""
     speed, volume = np.empty(u.shape[0]), np.empty(u.shape[0])

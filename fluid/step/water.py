@@ -14,7 +14,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numba import njit
 
 from fluid.domain.physical_domain import carry, wetted_coupling
 from fluid.domain.topology import Graph, Topology, layers_around
@@ -33,6 +32,7 @@ from fluid.surface.volume import edge_flux, nodal_volume, renumbering
 from fluid.transport.surface_momentum import Carried
 from fluid.transport.swept_volume import swept
 from fluid.transport.volume_transport import carry_volume
+from kernel_decorators import kernel
 
 if TYPE_CHECKING:
     from fluid.viscous.viscosity import FreeBodies
@@ -597,7 +597,7 @@ def _viscosity(parameters: WaterParameters):
     return Viscosity(parameters)
 
 
-@njit(cache=True)
+@kernel
 def same_cells(old_parent, new_parent, n_parents):
     """Row of the old cell with the same parent for each new one (n,), -1 if none; of several the first."""
     row = np.full(n_parents, -1, np.int64)
@@ -606,7 +606,7 @@ def same_cells(old_parent, new_parent, n_parents):
     return row[new_parent]
 
 
-@njit(cache=True)
+@kernel
 def carried_rows(source, field):
     """field[source] (n, 3), zero where source is -1."""
     out = np.zeros((source.shape[0], 3))

@@ -11,8 +11,8 @@ import numpy as np
 
 from fluid.domain.moments import touching_among
 from fluid.domain.topology import layers_around
-from fluid.numerics.jit import inner, ranged, released
 from fluid.numerics.threads import over, owning, reach_of_cells
+from kernel_decorators import inner, ranged, released
 
 LINEAR_LAYERS = 2
 SWEEPS = 3

@@ -18,10 +18,11 @@ on slivers either.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from kernel_decorators import kernel
 
 
-@njit(cache=True)
+@kernel
 def damp_kinks(cell_list, phi, wet, weight, deep, u, cells, parent, g, volume, neighbours):
     """Equation (1) with c = weight, in place on u (N, 3) [m/s], over the listed cells that reach up to φ > deep [m]."""
     chosen = _whole_near(cell_list, phi, wet, deep, cells)
@@ -42,7 +43,7 @@ def damp_kinks(cell_list, phi, wet, weight, deep, u, cells, parent, g, volume, n
                 u[i, k] -= weight * push[i, k] / mass[i]
 
 
-@njit(cache=True)
+@kernel
 def _whole_near(cell_list, phi, wet, deep, cells):
     """(M,): 2 for wholly wet listed cells that reach up to φ > deep, 1 for deeper ones, 0 for all others."""
     chosen = np.zeros(cells.shape[0], np.int8)
@@ -56,7 +57,7 @@ def _whole_near(cell_list, phi, wet, deep, cells):
     return chosen
 
 
-@njit(cache=True)
+@kernel
 def _push_face(e, f, u, cells, parent, g, water, slope, push):
     """Add V_F [∇u]·[∇N_i] / γ_F of the face between cells e and f to push (N, 3); slope (2, 3, 3): work space."""
     size = 0.0

@@ -15,11 +15,10 @@ over a cell, the closest of all.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from fluid.domain.topology import layers_around
-from fluid.numerics.jit import inner, plain, released
 from fluid.numerics.threads import found_over, over
+from kernel_decorators import inner, kernel, plain, released
 
 LAYERS = 6
 EXACT_LAYERS = 2
@@ -88,11 +87,16 @@ def _surface_triangles(first, last, cut, phi, nodes, cells):
                 for k in range(3):
                     crossing[count, k] = nodes[i, k] + t * (nodes[j, k] - nodes[i, k])
                 count += 1
-        triangles[n] = crossing[:3]
+        for a in range(3):
+            for k in range(3):
+                triangles[n, a, k] = crossing[a, k]
         owner[n] = e
         n += 1
         if count == 4:
-            triangles[n, 0], triangles[n, 1], triangles[n, 2] = crossing[0], crossing[2], crossing[3]
+            for k in range(3):
+                triangles[n, 0, k] = crossing[0, k]
+                triangles[n, 1, k] = crossing[2, k]
+                triangles[n, 2, k] = crossing[3, k]
             owner[n] = e
             n += 1
     return triangles[:n].copy(), owner[:n].copy()
@@ -138,7 +142,7 @@ def _ratio(part, whole):
     return part / whole if whole > 0.0 else 0.0
 
 
-@njit(cache=True)
+@kernel
 def _closest_in_layers(
     order, layer_start, triangles, owner, nodes, cells, start, around, exact, node_start, node_cells
 ):
@@ -162,7 +166,7 @@ def _closest_in_layers(
     return np.sqrt(best)
 
 
-@njit(cache=True)
+@kernel
 def _first_triangles(owner, n_cells):
     """First triangle of each cell (n_cells,), -1 none; those of a cell follow each other."""
     first = np.full(n_cells, -1, np.int64)
@@ -172,7 +176,7 @@ def _first_triangles(owner, n_cells):
     return first
 
 
-@njit(cache=True)
+@inner
 def _descend(x, closest, best, triangles, owner, first, cells, node_start, node_cells):
     """Squared distance [m²] of x (3,) to the closest triangle that can be reached from `closest`, at the squared
     distance `best`, through cells with a common node, always coming closer."""
@@ -225,7 +229,7 @@ def _hand_outward(
                 asked[i] = now
 
 
-@njit(cache=True)
+@kernel
 def _mean_slope(cut, phi, cells, parent, g, n_nodes):
     """Mean |∇φ| over the cut cells around each node, (N,); zero elsewhere."""
     total, count = np.zeros(n_nodes), np.zeros(n_nodes)
@@ -260,7 +264,7 @@ def redistance(topology, phi, spacing, rescale: bool):
     order, start = layers_around(front, LAYERS, *t.around)
     triangles, owner = surface_triangles(cut, phi, t.nodes, t.cells)
     exact = EXACT_LAYERS if t.is_obtuse else 0
-    distance = _closest_in_layers(  # type: ignore[call-arg]  # counts the two of t.around for more
+    distance = _closest_in_layers(
         order, start, triangles, owner, t.nodes, t.cells, *t.around, exact, t.node_start, t.node_cells
     )
     listed = order[start[1] :]

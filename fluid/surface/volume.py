@@ -27,13 +27,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from numba import njit
 
 from fluid.domain.moments import nodal_water
 from fluid.domain.topology import Graph
-from fluid.numerics.jit import released
 from fluid.numerics.threads import over
 from fluid.surface.level_set import without_films
+from kernel_decorators import kernel, released
 
 BAND_WIDTH = 3.0
 LARGEST_SHIFT = 0.3
@@ -113,7 +112,7 @@ def edge_rates(topology, graph, listed, u_cell):
     return rate
 
 
-@njit(cache=True)
+@kernel
 def _diffused_shift(band, place, graph_row, start, neighbour, stiffness, c, residual, kappa, tolerance, most):
     """Equation (2) on the band nodes by conjugate gradients with the diagonal as preconditioner, (n,)."""
     n = band.shape[0]

@@ -16,8 +16,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fluid.numerics.jit import inner, ranged, released
 from fluid.numerics.threads import over
+from kernel_decorators import inner, ranged, released
 
 _LONGEST_WALK = 100
 
@@ -104,7 +104,7 @@ def _trace(
         i = listed[s]
         for k in range(3):
             u[k] = u_m[i, k]
-        e = node_cells[node_start[i]]
+        e = np.int64(node_cells[node_start[i]])
         for sweep in range(sweeps + 1):
             for k in range(3):
                 x[k] = nodes[i, k] + dt * u[k]

@@ -14,9 +14,9 @@ without the MacCormack correction, as the way ahead ends at such a face as well.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from fluid.transport.advection import feet
+from kernel_decorators import kernel
 
 FARTHEST = 0.1
 """Cell sizes that φ is continued by: enough for calm water; a slope says nothing about what is farther."""
@@ -38,7 +38,7 @@ def levels_in_solids(topology, listed, dt: float, u_m, phi, spacing):
     )
 
 
-@njit(cache=True)
+@kernel
 def _continued(inside, cell, weight, dt, farthest, u_m, phi, nodes, cells, parent, g):
     out, missing, slope = np.zeros(inside.shape[0]), np.empty(3), np.empty(3)
     for s in range(inside.shape[0]):

@@ -31,12 +31,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from numba import njit
 from scipy.sparse.linalg import LinearOperator, gmres
 from skfem import asm
 
 from fluid.numerics.solve import NotConverged
 from fluid.transport import forms
+from kernel_decorators import kernel
 
 GHOST_PENALTY = 1e-4
 """Weight γ of the jumps across the faces of cut cells."""
@@ -87,7 +87,7 @@ def midpoint_velocity(topology, band: Band, u_m, dt: float):
     return u_m - 0.5 * dt * _rate_along(band.cells, t.share[rows], t.parent[rows], t.gradients, weight, u_m)
 
 
-@njit(cache=True)
+@kernel
 def _rate_along(cells, share, parent, g, weight, u):
     """(u·∇)u (n, 3) at the nodes: mean over the cells around each by weight (m,), u (n, 3) at their centroids."""
     total, at_node = np.zeros_like(u), np.zeros(u.shape[0])
@@ -214,7 +214,7 @@ def carried_velocity(water, dt: float, u_m, u_hat):
     return moved[water.listed]
 
 
-@njit(cache=True)
+@kernel
 def range_around(cells, f, layers):
     """Least and largest value (n, m), (n, m) of f (n, m) among the nodes up to so many cells (m, 4) away."""
     low, high = f.copy(), f.copy()

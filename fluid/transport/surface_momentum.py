@@ -36,14 +36,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from fluid.domain.topology import Graph, Topology
-from fluid.numerics.jit import ranged, released
 from fluid.numerics.threads import over
 from fluid.surface.volume import Flux, Shift
 from fluid.transport.velocity_transport import carry_velocity
 from fluid.transport.volume_transport import carry_volume
+from kernel_decorators import plain, ranged, released
 
 SHALLOW, DEEP = 2.0, 3.0
 """Depths in cell sizes down to which momentum counts in full, and at all."""
@@ -199,11 +198,11 @@ def _wider(first, last, nodes, graph_row, start, neighbour, weight, wider):
             wider[i] = max(wider[i], weight[neighbour[s]])
 
 
-@njit(cache=True)
+@plain
 def _size(v):
     return np.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
 
 
-@njit(cache=True)
+@plain
 def _ramp(x, ends):
     return min(1.0, max(0.0, (x - ends[0]) / (ends[1] - ends[0])))

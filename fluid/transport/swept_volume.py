@@ -20,12 +20,11 @@ meshes with obtuse cells, and deeper than the surface gets.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from fluid.domain.moments import wet_fraction
-from fluid.numerics.jit import ranged
 from fluid.numerics.threads import over
 from fluid.surface.volume import Flux, edge_rates
+from kernel_decorators import kernel, ranged
 
 NEAR = 3.0
 """|φ| in cell sizes beyond which no surface arrives in a step."""
@@ -102,7 +101,7 @@ def _by_share(first, last, cell_list, share, u, out):
             out[e, k] = share[s] * u[e, k]
 
 
-@njit(cache=True)
+@kernel
 def _difference(nodes, reached, weight, graph_row, start, neighbour, swept, moved):
     """Volume (N,) [m³] that the listed nodes and their neighbours get if `swept` (edges,) [m³] leaves along the edges
     instead of `moved`, by the lesser weight (N,) of both ends."""

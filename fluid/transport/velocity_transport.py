@@ -13,10 +13,9 @@ range around it.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from fluid.numerics.jit import ranged
 from fluid.numerics.threads import over, owning, reach_of_rows
+from kernel_decorators import kernel, ranged
 
 
 def carry_velocity(nodes, graph_row, start, neighbour, moved, water, u):
@@ -96,6 +95,6 @@ def _exchange(first, last, runs, nodes, graph_row, start, neighbour, moved, wate
                             change[j, k] += momentum
 
 
-@njit(cache=True)
+@kernel
 def _van_leer(a, b):
     return 2.0 * a * b / (a + b) if a * b > 0.0 else 0.0

@@ -14,12 +14,11 @@ more, but lets a falling drop of five cells lag by 0.7 %.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from fluid.numerics.jit import ranged, released
 from fluid.numerics.threads import over, owning, reach_of_rows
 from fluid.surface.volume import Flux
 from fluid.transport.velocity_transport import carry_velocity
+from kernel_decorators import inner, ranged, released
 
 LARGEST_COURANT = 0.8
 LEAST_COUNTED = 0.3
@@ -64,7 +63,7 @@ def _largest_turnover(first, last, nodes, graph_row, start, rate, capacity, leas
     return largest
 
 
-@njit(cache=True)
+@inner
 def _out(r, start, rate):
     """Σ of the fluxes [m³/s] that leave the node of row r."""
     out = 0.0
@@ -117,7 +116,7 @@ def _hand_over(first, last, runs, nodes, graph_row, start, neighbour, moved, cha
                     change[neighbour[s]] += moved[s]
 
 
-@njit(cache=True)
+@inner
 def _upstream(r, start, neighbour, rate, share):
     """Mean share of what flows into the node of row r."""
     weight, total = 0.0, 0.0
@@ -128,7 +127,7 @@ def _upstream(r, start, neighbour, rate, share):
     return total / weight if weight < 0.0 else 0.0
 
 
-@njit(cache=True)
+@inner
 def _leaving(own, behind, other, second):
     """s_ij of (1); own s_i, behind s_i - s_up, other s_j, second ½ (1 - C)."""
     ahead = other - own

@@ -14,12 +14,12 @@ The body gets what the hats sum up to, -∫ (t - λ (u - u_Γ) - C (u - u_Γ)_t)
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from fluid.viscous.strain import COLUMN, ROW, add_to_edges, edge_strain, mean_strain, spread_stress
+from kernel_decorators import kernel
 
 
-@njit(cache=True)
+@kernel
 def wall_stress(walls, mu, u, body_velocity, edge, edge_weight, strain, flux, cells, out, load):
     """The terms on Γ: those with hats added to out (N, 3), what the bodies get to load (n_bodies, 6), and those with
     t(N_i) to the strains flux (n_edges, 6), for `spread_stress`.
@@ -62,7 +62,7 @@ def wall_stress(walls, mu, u, body_velocity, edge, edge_weight, strain, flux, ce
             add_to_edges(flux, edge[row[s]], edge_weight, x)
 
 
-@njit(cache=True)
+@kernel
 def _slip_velocity(s, q, e, b, u, hat, arm, V, cells, v):
     """v = u - u_Γ at a point of a polygon, in place."""
     v[0] = -(V[b, 0] + V[b, 4] * arm[s, q, 2] - V[b, 5] * arm[s, q, 1])
@@ -73,7 +73,7 @@ def _slip_velocity(s, q, e, b, u, hat, arm, V, cells, v):
             v[k] += hat[s, q, a] * u[cells[e, a], k]
 
 
-@njit(cache=True)
+@kernel
 def momentum_rate(terms, u, body_velocity):
     """r (N, 3) [N] and load (n_bodies, 6) [N, N m].  terms: see `implicit_change`."""
     node_drag, node, projector, idle = terms[4], terms[5], terms[6], terms[7]
@@ -86,7 +86,7 @@ def momentum_rate(terms, u, body_velocity):
     return r, load
 
 
-@njit(cache=True)
+@kernel
 def unheld_rate(terms, u, body_velocity):
     """The same without the sides of the tank: without drag on their nodes, and as if they held nothing."""
     cell_list, weight, walls, mu, _drag, _node, _projector, _idle, cells, parent, g, edge, edge_weight = terms
@@ -99,7 +99,7 @@ def unheld_rate(terms, u, body_velocity):
     return r, load
 
 
-@njit(cache=True)
+@kernel
 def _restrict(r, node, projector, idle):
     """Only what the sides of the tank leave free, in place."""
     moved = np.empty(3)
@@ -115,7 +115,7 @@ def _restrict(r, node, projector, idle):
                 r[i, k] = 0.0
 
 
-@njit(cache=True)
+@kernel
 def preconditioner(terms, mass, tau):
     """1 / diagonal (N,) of M + τ K, the flux terms left out; 0 on idle nodes."""
     cell_list, weight, walls, _mu, node_drag, _node, _projector, idle, cells, parent, g, _edge, _total = terms
@@ -139,7 +139,7 @@ def preconditioner(terms, mass, tau):
     return inverse
 
 
-@njit(cache=True)
+@kernel
 def body_preconditioner(terms, body_mass, moves, tau):
     """Inverse (n_bodies, 6, 6) of the diagonal blocks of the bodies without the flux terms; 0 where they are driven."""
     _cell, _row, body, normal, _hat, arm, area, nitsche, drag = terms[2]
@@ -166,7 +166,7 @@ def body_preconditioner(terms, body_mass, moves, tau):
     return inverse
 
 
-@njit(cache=True)
+@kernel
 def _slip_of_body(s, q, arm, c):
     """c (3, 6): velocity of a point of a polygon by the six velocities of its body, in place."""
     x, y, z = arm[s, q, 0], arm[s, q, 1], arm[s, q, 2]
@@ -178,7 +178,7 @@ def _slip_of_body(s, q, arm, c):
     c[2, 3], c[2, 4] = y, -x
 
 
-@njit(cache=True)
+@kernel
 def implicit_change(terms, mass, tau, right, bodies, body_right, tolerance, most):
     """d (N, 3) and D (n_bodies, 6) with (M + τ K) (d, D) = (right, body_right) by conjugate gradients: (d, D,
     iterations, residual reached over the first).
@@ -220,7 +220,7 @@ def implicit_change(terms, mass, tau, right, bodies, body_right, tolerance, most
     return d, D, count, np.sqrt(rz / first) if first > 0.0 else 0.0
 
 
-@njit(cache=True)
+@kernel
 def _answers(inverse, R):
     """inverse (n, 6, 6) times R (n, 6), body by body."""
     out = np.zeros_like(R)
@@ -229,7 +229,7 @@ def _answers(inverse, R):
     return out
 
 
-@njit(cache=True)
+@kernel
 def _scaled(factor, r):
     out = np.empty_like(r)
     for i in range(r.shape[0]):

@@ -18,7 +18,8 @@ Strains are (n, 6): xx, yy, zz, yz, xz, xy.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from kernel_decorators import kernel
 
 PAIRS = np.array([(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)])
 """Corners at the ends of the edges of a cell."""
@@ -26,7 +27,7 @@ ROW, COLUMN = np.array([0, 1, 2, 1, 0, 0]), np.array([0, 1, 2, 2, 2, 1])
 """Where the six numbers of a strain stand in its tensor."""
 
 
-@njit(cache=True)
+@kernel
 def edges_of(cell_list, weight, cells, n_nodes):
     """Number of each edge of the listed cells (n, 6) and W (n_edges,); weight (n,)."""
     first = np.full(n_nodes, -1, np.int64)
@@ -50,7 +51,7 @@ def edges_of(cell_list, weight, cells, n_nodes):
     return edge, total[:count].copy()
 
 
-@njit(cache=True)
+@kernel
 def edge_strain(cell_list, weight, edge, edge_weight, u, cells, parent, g):
     """ε̂ (n_edges, 6) [1/s] of u (N, 3)."""
     out = np.zeros((len(edge_weight), 6))
@@ -70,7 +71,7 @@ def edge_strain(cell_list, weight, edge, edge_weight, u, cells, parent, g):
     return out
 
 
-@njit(cache=True)
+@kernel
 def add_to_edges(strain, edges, edge_weight, x):
     """A sixth of x (6,) to each edge of a cell, over its weight, in place."""
     for m in range(6):
@@ -80,7 +81,7 @@ def add_to_edges(strain, edges, edge_weight, x):
                 strain[k, c] += x[c] / (6.0 * edge_weight[k])
 
 
-@njit(cache=True)
+@kernel
 def mean_strain(strain, edges, out):
     """ε̄ (3, 3) of a cell from the strains of its edges, in place."""
     for c in range(6):
@@ -90,7 +91,7 @@ def mean_strain(strain, edges, out):
         out[ROW[c], COLUMN[c]] = out[COLUMN[c], ROW[c]] = total / 6.0
 
 
-@njit(cache=True)
+@kernel
 def spread_stress(cell_list, weight, edge, strain, cells, parent, g, out):
     """out (N, 3) -= Σ_e w_e ε̄_e ∇N_i over the listed cells."""
     mean = np.empty((3, 3))

@@ -12,7 +12,7 @@ import surgebreak
 from coupler.commands.benchmark import threads as measured
 from coupler.commands.warm_up import CASE
 from coupler.program import threads
-from fluid.numerics.jit import ranged
+from kernel_decorators import ranged
 
 SCENE = tomllib.loads(CASE)
 SCENE["time"] = {"end": "0.12 s", "step_max": "20 ms", "output_every": "60 ms"}

@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from kernel_decorators import inner, kernel
 from yade_scripts.blocks.block import Block
 from yade_scripts.blocks.polyhedra import face_areas, polygon_area_vector
 from yade_scripts.blocks.quadrature import Rule, gauss
@@ -133,7 +133,7 @@ def touching_bounds(low: Array, high: Array, slack: float) -> Array:
     return found[np.lexsort((found[:, 1], found[:, 0]))]
 
 
-@njit(cache=True)
+@kernel
 def _swept(low, high, axis):
     """Pairs of boxes that meet, sorted by low[:, axis]."""
     found = np.empty((16, 2), np.int64)
@@ -190,7 +190,7 @@ def _on_plane(world: _WorldFaces, radius: Array, p: int, plane: FixedPlane) -> l
     return found
 
 
-@njit(cache=True)
+@kernel
 def _overlaps(pairs, radius, block_start, corner_start, normals, middles, areas, corners):
     """Rows (a, b, face_a, face_b, start, end) of the overlaps and their corners (·, 3), counted by start and end."""
     rows = np.empty((16, 6), np.int64)
@@ -201,7 +201,7 @@ def _overlaps(pairs, radius, block_start, corner_start, normals, middles, areas,
         gap = GAP * min(radius[a], radius[b])
         for i in range(block_start[a], block_start[a + 1]):
             for j in range(block_start[b], block_start[b + 1]):
-                if not _opposite(normals[i], normals[j], middles[i] - middles[j], gap):
+                if not _opposite(normals[i], normals[j], middles[i], middles[j], gap):
                     continue
                 window = corners[corner_start[j] : corner_start[j + 1]][::-1]
                 overlap = clip(corners[corner_start[i] : corner_start[i + 1]], window, normals[i])
@@ -211,7 +211,9 @@ def _overlaps(pairs, radius, block_start, corner_start, normals, middles, areas,
                     points = np.concatenate((points, np.empty_like(points)))
                 if count == len(rows):
                     rows = np.concatenate((rows, np.empty_like(rows)))
-                points[used : used + len(overlap)] = overlap
+                for corner in range(len(overlap)):
+                    for k in range(3):
+                        points[used + corner, k] = overlap[corner, k]
                 rows[count, 0], rows[count, 1] = a, b
                 rows[count, 2], rows[count, 3] = i - block_start[a], j - block_start[b]
                 rows[count, 4], rows[count, 5] = used, used + len(overlap)
@@ -220,78 +222,97 @@ def _overlaps(pairs, radius, block_start, corner_start, normals, middles, areas,
     return rows[:count], points[:used]
 
 
-@njit(cache=True)
-def _opposite(n, m, apart, gap):
-    """Whether two faces look at each other and lie in one plane; apart: from a point of one to a point of the other."""
+@inner
+def _opposite(n, m, of_n, of_m, gap):
+    """Whether two faces look at each other and lie in one plane; of_n, of_m: a point of each."""
     if n[0] * m[0] + n[1] * m[1] + n[2] * m[2] > -1.0 + PARALLEL:
         return False
-    from_n = abs(n[0] * apart[0] + n[1] * apart[1] + n[2] * apart[2])
-    from_m = abs(m[0] * apart[0] + m[1] * apart[1] + m[2] * apart[2])
+    x, y, z = of_n[0] - of_m[0], of_n[1] - of_m[1], of_n[2] - of_m[2]
+    from_n = abs(n[0] * x + n[1] * y + n[2] * z)
+    from_m = abs(m[0] * x + m[1] * y + m[2] * z)
     return max(from_n, from_m) < gap
 
 
-@njit(cache=True)
+@inner
 def _area(polygon):
     """Area of a plane convex polygon (k, 3) [m²]."""
     x = y = z = 0.0
     for i in range(1, len(polygon) - 1):
-        u, v = polygon[i] - polygon[0], polygon[i + 1] - polygon[0]
-        x += u[1] * v[2] - u[2] * v[1]
-        y += u[2] * v[0] - u[0] * v[2]
-        z += u[0] * v[1] - u[1] * v[0]
+        u0, u1, u2 = _between(polygon, 0, i)
+        v0, v1, v2 = _between(polygon, 0, i + 1)
+        x += u1 * v2 - u2 * v1
+        y += u2 * v0 - u0 * v2
+        z += u0 * v1 - u1 * v0
     return 0.5 * np.sqrt(x * x + y * y + z * z)
 
 
-@njit(cache=True)
+@inner
+def _between(polygon, i, j):
+    """From corner i of a polygon to its corner j."""
+    return polygon[j, 0] - polygon[i, 0], polygon[j, 1] - polygon[i, 1], polygon[j, 2] - polygon[i, 2]
+
+
+@kernel
 def clip(subject, window, normal):
     """Part of the convex polygon `subject` (k, 3) inside `window` (l, 3); one plane, same sense about normal."""
-    origin = window[0].copy()
-    extent = 0.0
-    for corner in subject:
-        extent = max(extent, np.abs(corner - origin).max())
-    kept = subject - origin
+    kept, extent = np.empty((len(subject), 3)), 0.0  # relative to the first corner of the window
+    for i in range(len(subject)):
+        for k in range(3):
+            kept[i, k] = subject[i, k] - window[0, k]
+            extent = max(extent, abs(kept[i, k]))
     for i in range(len(window)):
-        start, along = window[i] - origin, window[(i + 1) % len(window)] - window[i]
-        inward = np.array(
-            [
-                normal[1] * along[2] - normal[2] * along[1],
-                normal[2] * along[0] - normal[0] * along[2],
-                normal[0] * along[1] - normal[1] * along[0],
-            ]
+        u0, u1, u2 = _between(window, i, (i + 1) % len(window))
+        x, y, z = (
+            normal[1] * u2 - normal[2] * u1,
+            normal[2] * u0 - normal[0] * u2,
+            normal[0] * u1 - normal[1] * u0,
         )
-        kept = _keep_inside(kept, start, inward / np.sqrt((inward**2).sum()), DOUBLE * extent)
-    return _without_doubles(kept, DOUBLE * extent) + origin
+        length = np.sqrt(x * x + y * y + z * z)
+        inward = (x / length, y / length, z / length)
+        kept = _keep_inside(kept, _between(window, 0, i), inward, DOUBLE * extent)
+    kept = _without_doubles(kept, DOUBLE * extent)
+    for i in range(len(kept)):
+        for k in range(3):
+            kept[i, k] += window[0, k]
+    return kept
 
 
-@njit(cache=True)
+@kernel
 def _keep_inside(polygon, start, inward, same):
     """Part of a convex polygon where inward·(x - start) ≥ 0; heights below `same` are zero."""
     count = len(polygon)
     height = np.empty(count)
     for i in range(count):
-        h = ((polygon[i] - start) * inward).sum()
+        h = (polygon[i, 0] - start[0]) * inward[0]
+        h += (polygon[i, 1] - start[1]) * inward[1]
+        h += (polygon[i, 2] - start[2]) * inward[2]
         height[i] = 0.0 if abs(h) < same else h
     kept = np.empty((2 * count, 3))
     found = 0
     for i in range(count):
         j = (i + 1) % count
         if height[i] >= 0.0:
-            kept[found] = polygon[i]
+            for k in range(3):
+                kept[found, k] = polygon[i, k]
             found += 1
         if height[i] * height[j] < 0.0:
-            kept[found] = polygon[i] + (polygon[j] - polygon[i]) * (height[i] / (height[i] - height[j]))
+            share = height[i] / (height[i] - height[j])
+            for k in range(3):
+                kept[found, k] = polygon[i, k] + (polygon[j, k] - polygon[i, k]) * share
             found += 1
     return kept[:found]
 
 
-@njit(cache=True)
+@kernel
 def _without_doubles(polygon, same):
-    kept = np.empty_like(polygon)
+    """The corners (k, 3) that lie farther than `same` [m] from the one before."""
+    kept = np.empty((len(polygon), 3))
     found = 0
     for i in range(len(polygon)):
-        before = polygon[i - 1] if i > 0 else polygon[len(polygon) - 1]
-        if np.sqrt(((polygon[i] - before) ** 2).sum()) > same:
-            kept[found] = polygon[i]
+        x, y, z = _between(polygon, i - 1 if i > 0 else len(polygon) - 1, i)
+        if np.sqrt(x * x + y * y + z * z) > same:
+            for k in range(3):
+                kept[found, k] = polygon[i, k]
             found += 1
     return kept[:found]
 

@@ -6,10 +6,11 @@ x (n, 3) [m] centres · R (n, 3, 3) body frame → world · v (n, 6) [v, ω] · 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from kernel_decorators import inner, kernel, plain
 
 
-@njit(cache=True)
+@plain
 def rotation_matrix(q, R):
     """R (3, 3) of the unit quaternion q = (x, y, z, w)."""
     x, y, z, w = q[0], q[1], q[2], q[3]
@@ -18,7 +19,7 @@ def rotation_matrix(q, R):
     R[2, 0], R[2, 1], R[2, 2] = 2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)
 
 
-@njit(cache=True)
+@plain
 def place(row, R, x, local):
     """World position of a body point local (3,), as a tuple; row < 0 stands for the fixed world."""
     if row < 0:
@@ -27,7 +28,7 @@ def place(row, R, x, local):
     return x[row, 0] + r0, x[row, 1] + r1, x[row, 2] + r2
 
 
-@njit(cache=True)
+@plain
 def turned(row, R, local):
     """A direction of the body frame in world axes, as a tuple."""
     return (
@@ -37,19 +38,19 @@ def turned(row, R, local):
     )
 
 
-@njit(cache=True)
+@plain
 def dot(a, b):
     """a·b of two vectors."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@njit(cache=True)
+@plain
 def cross(a, b):
     """a × b of two vectors, as a tuple."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-@njit(cache=True)
+@plain
 def arm(row, x, at):
     """Lever of the world point `at` about the centre of a block, as a tuple; zero for the fixed world."""
     if row < 0:
@@ -57,7 +58,7 @@ def arm(row, x, at):
     return at[0] - x[row, 0], at[1] - x[row, 1], at[2] - x[row, 2]
 
 
-@njit(cache=True)
+@plain
 def parting(ra, rb, x, v, at):
     """Relative velocity of b against a, both taken at the world point `at`, as a tuple; v (n, 6) [v, ω]."""
     a0, a1, a2 = point_velocity(ra, x, v, at)
@@ -65,7 +66,7 @@ def parting(ra, rb, x, v, at):
     return b0 - a0, b1 - a1, b2 - a2
 
 
-@njit(cache=True)
+@inner
 def point_velocity(row, x, v, at):
     """Velocity of the body point now at `at`, as a tuple; v (n, 6) [v, ω]."""
     if row < 0:
@@ -74,7 +75,7 @@ def point_velocity(row, x, v, at):
     return v[row, 0] + c0, v[row, 1] + c1, v[row, 2] + c2
 
 
-@njit(cache=True)
+@plain
 def add_forces(ra, rb, x, force, moment, F):
     """Add a force and its moment about the centre of block a to F (n, 6) of a, and the opposite to block b."""
     if rb >= 0:
@@ -88,7 +89,7 @@ def add_forces(ra, rb, x, force, moment, F):
         F[ra, 3 + k] += moment[k]
 
 
-@njit(cache=True)
+@kernel
 def scatter(states, rows, frame, x, v, R):
     """YADE states (k, 13) of the blocks `rows` (k,) → x (n, 3), v (n, 6), R (n, 3, 3) in the block frames."""
     T = np.empty((3, 3))
@@ -104,7 +105,7 @@ def scatter(states, rows, frame, x, v, R):
                 R[r, k, c] = T[k, 0] * frame[r, 0, c] + T[k, 1] * frame[r, 1, c] + T[k, 2] * frame[r, 2, c]
 
 
-@njit(cache=True)
+@plain
 def work_of(F, v_before, v_after, dt):
     """Work [J] of forces F (n, 6) over a leapfrog substep: F·(v⁻ + v⁺)/2 dt, the exact change of kinetic energy."""
     total = 0.0

@@ -10,7 +10,8 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 import scipy.sparse as sp
-from numba import njit
+
+from kernel_decorators import inner, kernel
 
 Array = np.ndarray
 
@@ -80,7 +81,7 @@ def _assembled(springs: Springs, D: Array, n: int) -> sp.csr_array:
     return _sparse(blocks, keys // (n + 1), keys % (n + 1) - 1, n)
 
 
-@njit(cache=True)
+@kernel
 def _accumulate(pair, swap, arm_a, arm_b, D, out):
     """Sum Bᵀ D B of each spring into its pair's (12, 12) block; its first body has the larger row."""
     B = np.zeros((3, 12))
@@ -93,7 +94,7 @@ def _accumulate(pair, swap, arm_a, arm_b, D, out):
         out[pair[s]] += B.T @ (D[s] @ B)
 
 
-@njit(cache=True)
+@inner
 def _relative(B, column, sign, r):
     """Velocity of the point at arm r: v + ω x r, written into six columns of B."""
     for k in range(3):

@@ -14,9 +14,8 @@ a depth of its own (`next_beside`).
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from yade_scripts.contact.jit import inner
+from kernel_decorators import inner, kernel
 
 PARALLEL = 0.05
 """Sine of the angle below which two edges do not cross."""
@@ -32,7 +31,7 @@ SCRATCH = 9
 """Rows of the work space of a pair before those for the vertices of both blocks."""
 
 
-@njit(cache=True)
+@kernel
 def pair_scratch(shapes):
     """Work space (.., 3) of a pair of blocks."""
     most = 0

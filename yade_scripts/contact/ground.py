@@ -13,11 +13,10 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from kernel_decorators import inner, plain
 from yade_scripts.blocks.faces import FixedPlane
 from yade_scripts.contact.arrays import BEGINS
-from yade_scripts.contact.jit import inner
 from yade_scripts.contact.search import ALIGNED, write_row
 from yade_scripts.contact.springs import ARRIVED, let_go, stiffness_together, take_over, way_of
 
@@ -86,7 +85,7 @@ def _interval(axis, value):
     return low
 
 
-@njit(cache=True)
+@plain
 def surface_at(ground, px, py, normal):
     """Height [m] of the ground at a place counted from its point, and the normal (3,) of the triangle there."""
     i, j = _interval(ground.x, px), _interval(ground.y, py)

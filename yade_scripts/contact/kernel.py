@@ -8,8 +8,8 @@ node in the frame of b. `contact_search` finds them, `contact_springs` says what
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from kernel_decorators import kernel
 from yade_scripts.contact.arrays import CROSSINGS
 from yade_scripts.contact.edges import pair_scratch
 from yade_scripts.contact.ground import scan_ground
@@ -23,7 +23,7 @@ SAME = 1.0 + 1e-6
 same."""
 
 
-@njit(cache=True)
+@kernel
 def contact_forces(shapes, bodies, law, pairs, slots, ground, x, v, R, dt, last_dt, rows, F):
     """Find the contacts at the present places and add their forces to F (n, 6).
 
@@ -31,7 +31,10 @@ def contact_forces(shapes, bodies, law, pairs, slots, ground, x, v, R, dt, last_
     → (contacts, work of friction and of springs that were let go [J])
     """
     count, lost = 0, 0.0
-    planes, scratch = np.empty((np.diff(shapes.face_start).max(), 4)), pair_scratch(shapes)
+    most = 0
+    for body in range(len(shapes.face_start) - 1):
+        most = max(most, shapes.face_start[body + 1] - shapes.face_start[body])
+    planes, scratch = np.empty((most, 4)), pair_scratch(shapes)
     for p in range(len(pairs.a)):
         a, b = pairs.a[p], pairs.b[p]
         if pairs.calm[p] > 0.0:
@@ -91,7 +94,7 @@ def contact_forces(shapes, bodies, law, pairs, slots, ground, x, v, R, dt, last_
     return count, lost
 
 
-@njit(cache=True)
+@kernel
 def carry_slots(old_pairs, old, new_index, old_index, start, new, shear):
     """Copy the memory of pairs old_index to pairs new_index; → energy of contacts in pairs that are no more [J]."""
     kept = np.zeros(len(old_pairs.a), np.bool_)

@@ -10,7 +10,7 @@ which adds up to K times the larger share, and leaves equal faces as they are.
 
 from __future__ import annotations
 
-from yade_scripts.contact.jit import inner
+from kernel_decorators import inner
 
 
 @inner

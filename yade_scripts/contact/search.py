@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from kernel_decorators import inner
 from yade_scripts.contact.arrays import BEGINS, CROSSINGS
 from yade_scripts.contact.edges import FLAT, PARALLEL, crossing, find_crossing, next_beside
-from yade_scripts.contact.jit import inner
 from yade_scripts.contact.overlap import share_of_overlap
 from yade_scripts.contact.springs import ARRIVED, let_go, stiffness_together, take_over, way_of
 

@@ -15,10 +15,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from kernel_decorators import inner, kernel
 from yade_scripts.contact.arrays import BEGINS
-from yade_scripts.contact.jit import inner
 
 SHARP = 1e-3
 """Sum of the normals of a pair below which they have no mean direction."""
@@ -266,7 +265,7 @@ def _add(F, row, sign, force, arm, shear, shift):
     F[row, 5] += arm[0] * f1 - arm[1] * f0 + shift[0] * s1 - shift[1] * s0
 
 
-@njit(cache=True)
+@kernel
 def contact_work(rows, count, v, given, dt):
     """Work of the contacts over the substep that ended with velocities v (n+m, 6): F·(w⁻ + w⁺)/2 dt is the exact change
     of kinetic energy in the leapfrog. given (n+m,) bool: bodies of prescribed motion.

@@ -13,7 +13,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
+
+from kernel_decorators import plain
 
 Array = np.ndarray
 
@@ -107,7 +108,7 @@ class ImpulseSums:
         )
 
 
-@njit(cache=True)
+@plain
 def _add(dt, x, joint, before, whole, joint_sum, contact_sum, place):
     for r in range(len(x)):
         for k in range(3):
@@ -119,7 +120,7 @@ def _add(dt, x, joint, before, whole, joint_sum, contact_sum, place):
         _take(dt, x, r, f0, f1, f2, m0, m1, m2, contact_sum)
 
 
-@njit(cache=True)
+@plain
 def _take(dt, x, r, f0, f1, f2, m0, m1, m2, out):
     out[r, 0] += dt * f0
     out[r, 1] += dt * f1

@@ -11,7 +11,8 @@ turns L⁺ back by as much as the axes are late; it is taken back in the next st
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from kernel_decorators import inner, kernel, plain
 
 Array = np.ndarray
 
@@ -52,7 +53,7 @@ class SpinCorrection:
         self._lent[:] = saved
 
 
-@njit(cache=True)
+@kernel
 def _correct(rows, R, v, inertia, inverse, dt, last_dt, lent, F):
     """See the module text. v (n, 6): velocities half a step before the places R (n, 3, 3)."""
     body, momentum, spin, lend = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
@@ -79,13 +80,13 @@ def _correct(rows, R, v, inertia, inverse, dt, last_dt, lent, F):
             lent[r, k] = lend[k]
 
 
-@njit(cache=True)
+@inner
 def _to_body(R, u, out):
     for k in range(3):
         out[k] = R[0, k] * u[0] + R[1, k] * u[1] + R[2, k] * u[2]
 
 
-@njit(cache=True)
+@plain
 def _to_world(R, u, out):
     for k in range(3):
         out[k] = R[k, 0] * u[0] + R[k, 1] * u[1] + R[k, 2] * u[2]
@@ -95,12 +96,13 @@ _product = _to_world
 """Matrix times vector."""
 
 
-@njit(cache=True)
+@plain
 def _turn(time, spin, u, out):
     """The vector u turned by the rotation vector time * spin (Rodrigues)."""
     speed = np.sqrt(spin[0] ** 2 + spin[1] ** 2 + spin[2] ** 2)
     if speed == 0.0:
-        out[:] = u
+        for k in range(3):
+            out[k] = u[k]
         return
     n0, n1, n2 = spin[0] / speed, spin[1] / speed, spin[2] / speed
     c, s = np.cos(time * speed), np.sin(time * speed)

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numba import njit
 
+from kernel_decorators import plain
 from yade_scripts.blocks.kinematics import add_forces, arm, cross, dot, parting, place, turned
 from yade_scripts.joints import laws, mixed_modes
 from yade_scripts.joints.kernel import split
@@ -40,7 +40,7 @@ SLOW = 0.005
 secant = work = measure = pace = response = stored = None  # given by `kernels_of`
 
 
-@njit(cache=True)
+@plain
 def dashpot(eta, kn, kt, w, n):
     """Traction η (k_n w_n n + k_t w_t) of the relative velocity w as a tuple, and its power [W/m²]."""
     wn = dot(w, n)
@@ -49,7 +49,7 @@ def dashpot(eta, kn, kt, w, n):
     return t, dot(t, w)
 
 
-@njit(cache=True)
+@plain
 def rubbing(s, s0, k, limit, move):
     """Friction of a failed point that is pressed: a spring of k [Pa/m] from where it last stuck, s0, to the sliding s
     now [m], at most `limit` [Pa]; move (3,) [m]: sliding over the last substep.
@@ -64,7 +64,7 @@ def rubbing(s, s0, k, limit, move):
     return (share * S[0], share * S[1], share * S[2]), 0.5 * (limit + before) * (size - limit) / k
 
 
-@njit(cache=True)
+@plain
 def stuck_at(s, S, k, row, R, out):
     """Where a point sticks, s - S/k [m], in the frame of a block."""
     a0, a1, a2 = s[0] - S[0] / k, s[1] - S[1] / k, s[2] - S[2] / k

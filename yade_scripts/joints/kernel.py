@@ -8,12 +8,12 @@ mid point of the pair, so linear and angular momentum are exact. Absolute positi
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from kernel_decorators import kernel, plain
 from yade_scripts.blocks.kinematics import dot, place, turned
 
 
-@njit(cache=True)
+@plain
 def split(pa, pb, n):
     """Separation pb - pa: its part along n, and what is left across n as a tuple."""
     d = (pb[0] - pa[0], pb[1] - pa[1], pb[2] - pa[2])
@@ -21,7 +21,7 @@ def split(pa, pb, n):
     return dn, (d[0] - dn * n[0], d[1] - dn * n[1], d[2] - dn * n[2])
 
 
-@njit(cache=True)
+@kernel
 def broken(live, start, largest, df):
     """Live joints all of whose points have failed."""
     dead = np.zeros(len(live), np.bool_)
@@ -35,7 +35,7 @@ def broken(live, start, largest, df):
     return dead
 
 
-@njit(cache=True)
+@plain
 def joint_openings(live, a, b, start, xi_a, xi_b, weight, normal, x, R, out):
     """Mean normal opening, mean sliding and largest normal opening of joints, out (J, 3) [m]."""
     for j in live:

@@ -1,7 +1,7 @@
 """Cohesive joints: laws, mixed mode, speed of separation.
 
 References: closed forms of the laws (Needleman, J. Appl. Mech. 54 (1987) 525; Hillerborg, Cem. Concr. Res. 6 (1976)
-773; Smith and Ferrante, Phys. Rev. B 34 (1986) 4997); each table says in its header how it was found.
+773; Rose, Ferrante and Smith, Phys. Rev. Lett. 47 (1981) 675); each table says in its header how it was found.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Exponential law (Smith and Ferrante, Phys. Rev. B 34 (1986) 4997; Xu and Needleman, J. Mech. Phys. Solids 42
+"""Exponential law (Rose, Ferrante and Smith, Phys. Rev. Lett. 47 (1981) 675; Xu and Needleman, J. Mech. Phys. Solids 42
 (1994) 1397, pure opening) with the peak at δ = p δ_f, cut at δ_f.
 
     T = T_max (r/p) e^(1 - r/p)  (r < 1),  0 beyond
