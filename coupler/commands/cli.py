@@ -397,6 +397,38 @@ def schema(
 
 
 @app.command()
+def kernels(
+    pack: Annotated[
+        Path | None, typer.Option("--pack", metavar="FILE", help="write those of this version into one file")
+    ] = None,
+    unpack: Annotated[
+        Path | None,
+        typer.Option(
+            "--unpack",
+            metavar="FILE",
+            help="take those of a file into the cache; only from sources you trust",
+        ),
+    ] = None,
+) -> None:
+    """Show, pack or unpack the compiled kernels, so that other machines need not compile them.
+
+    Without an option: where they are, and how many modules of this version have some.
+    """
+    one_thread()
+    from coupler.program import kernel_pack
+
+    with Failures():
+        if pack:
+            print(f"{kernel_pack.pack(pack)} modules packed into {pack} ({pack.stat().st_size / 1e6:.0f} MB)")
+        if unpack:
+            print(f"{kernel_pack.unpack(unpack)} files are new in {os.environ['NUMBA_CACHE_DIR']}")
+        if not pack and not unpack:
+            print(
+                f"{len(kernel_pack.compiled())} modules with kernels of this version in {os.environ['NUMBA_CACHE_DIR']}"
+            )
+
+
+@app.command()
 def docs(
     build: Annotated[
         Path | None,
