@@ -8,11 +8,14 @@ checkout would then be checked, measured or drawn with than the one that was cal
 from __future__ import annotations
 
 import ctypes
+import json
 import os
 import platform
 import signal
 import subprocess
 import sys
+import tempfile
+from pathlib import Path
 from typing import Any
 
 from coupler.program.provenance import ROOT
@@ -37,6 +40,22 @@ def end_with(parent: int, number: int = signal.SIGTERM) -> None:
     _LIBC.prctl(PR_SET_PDEATHSIG, number)
     if os.getppid() != parent:
         os.kill(os.getpid(), number)
+
+
+def rows_of_module(module: str, id: str, limit: float, *words: object) -> tuple[list[dict], str]:
+    """Run `python -m module ID FILE words...`, which writes a line of JSON for each thing that it finds.
+
+    The rows, those before a crash among them, and how the process ended when not well; limit [s] of wall time."""
+    wrong = ""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "rows"
+        try:
+            done = run_module(module, id, path, *words, capture_output=True, text=True, timeout=limit)
+            wrong = "" if done.returncode == 0 else trouble(done.returncode, done.stderr)
+        except subprocess.TimeoutExpired as error:
+            wrong = f"not done after {error.timeout} s"
+        lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
+    return [json.loads(line) for line in lines], wrong
 
 
 def trouble(exit_code: int, output: str) -> str:

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import json
-import subprocess
-import tempfile
 import time
-from pathlib import Path
 
 from coupler.commands.stress.registry import Measure, Outcome, Scene, scenes
 from coupler.program.errors import BadCase, did_you_mean
-from coupler.program.process import run_module, trouble
+from coupler.program.process import rows_of_module
 
 TIME_LIMIT = {"S": 600, "M": 3600}
 """Wall seconds after which a scene counts as failed: far more than its cost."""
@@ -36,26 +32,10 @@ def chosen(ids: list[str], quick: bool) -> list[Scene]:
 def run(scene: Scene) -> Outcome:
     """The outcome of a scene from its own process; a process that breaks off is a failure with what it said."""
     began = time.perf_counter()
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "lines"
-        trouble = _trouble(scene, path)
-        lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
-    rows = [json.loads(line) for line in lines]
+    rows, wrong = rows_of_module("coupler.commands.stress.one", scene.id, TIME_LIMIT[scene.cost])
     measures = [Measure(**row["measure"]) for row in rows if "measure" in row]
     ended = next((row["outcome"] for row in rows if "outcome" in row), None)
-    if trouble or ended is None:
-        ended = ("failed", trouble or "its process gave no outcome", 0.0, time.perf_counter() - began)
+    if wrong or ended is None:
+        ended = ("failed", wrong or "its process gave no outcome", 0.0, time.perf_counter() - began)
     verdict, message, cpu, wall = ended
     return Outcome(scene.id, scene.group, scene.title, verdict, message, measures, cpu, wall)
-
-
-def _trouble(scene: Scene, path: Path) -> str:
-    """Run the process; how it ended, when not well."""
-    limit = TIME_LIMIT[scene.cost]
-    try:
-        done = run_module(
-            "coupler.commands.stress.one", scene.id, path, capture_output=True, text=True, timeout=limit
-        )
-    except subprocess.TimeoutExpired as error:
-        return f"not done after {error.timeout} s"
-    return "" if done.returncode == 0 else trouble(done.returncode, done.stderr)

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import json
-import subprocess
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
 from coupler.commands.verify.registry import NOT_COVERED, Check, Result, checks
 from coupler.program.errors import BadCase, did_you_mean
-from coupler.program.process import run_module, trouble
+from coupler.program.process import rows_of_module
 
 TIME_LIMIT = {"S": 1800, "M": 2 * 3600, "L": 6 * 3600}
 """Wall seconds after which a case counts as failed: far more than its cost, also on a machine with much else to do."""
@@ -36,17 +33,8 @@ def run(case: Check, plots: Path | None = None) -> Iterator[Result]:
     """Results of one case from its own process; how that ended, when not well, is a result too.
 
     plots: an existing folder for the figures of the case, <id>.json; None: it has none to write."""
-    figures = [] if plots is None else [str(plots / f"{case.id}.json")]
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "results"
-        quietly = {"capture_output": True, "text": True, "timeout": TIME_LIMIT[case.cost]}
-        try:
-            done = run_module("coupler.commands.verify.one", case.id, path, *figures, **quietly)
-            wrong = "" if done.returncode == 0 else trouble(done.returncode, done.stderr)
-        except subprocess.TimeoutExpired as error:
-            wrong = f"not done after {error.timeout} s"
-        lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
-    found = [Result(**json.loads(line)) for line in lines]
-    yield from found
-    if wrong or not found:
+    figures = [] if plots is None else [plots / f"{case.id}.json"]
+    rows, wrong = rows_of_module("coupler.commands.verify.one", case.id, TIME_LIMIT[case.cost], *figures)
+    yield from (Result(**row) for row in rows)
+    if wrong or not rows:
         yield Result.failed(case.id, wrong or "the case gave no result", 0.0)
