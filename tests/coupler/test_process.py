@@ -19,7 +19,10 @@ def checkout(folder):
     (folder / "coupler" / "program").mkdir(parents=True)
     for name in (
         "__init__.py",
-        *(f"program/{n}.py" for n in ("__init__", "arithmetic", "process", "provenance", "threads")),
+        *(
+            f"program/{n}.py"
+            for n in ("__init__", "arithmetic", "errors", "process", "provenance", "threads")
+        ),
     ):
         shutil.copy(ROOT / "coupler" / name, folder / "coupler" / name)
     shutil.copy(ROOT / "pyproject.toml", folder)
