@@ -119,7 +119,7 @@ def test_checkouts_with_the_same_sources_share_their_kernels(checkout):
 def test_files_elsewhere_are_left_to_numba(checkout, tmp_path):
     checkout("here")
     assert ByContent.from_function(None, str(tmp_path / "law.py")) is None
-    assert ByContent.from_function(None, str(tmp_path / "here" / "coupler" / "levels.py")) is None
+    assert ByContent.from_function(None, str(tmp_path / "here" / "cases" / "law.py")) is None
 
 
 def test_old_states_are_dropped(checkout, tmp_path):
