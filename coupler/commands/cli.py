@@ -260,12 +260,20 @@ def export(
 
 
 @app.command()
-def doctor() -> None:
+def doctor(
+    mend: Annotated[
+        bool,
+        typer.Option(
+            "--mend",
+            help="put right what can be: torn kernels, locked folders of the cache, missing packages",
+        ),
+    ] = False,
+) -> None:
     """Check that YADE and the rest work here."""
     one_thread()
     from coupler.commands.doctor import examine
 
-    raise typer.Exit(int(examine()))
+    raise typer.Exit(int(examine(mend)))
 
 
 @app.command()

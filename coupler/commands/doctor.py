@@ -2,44 +2,73 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import os
 import subprocess
 import sys
 import tempfile
 from collections.abc import Callable
+from functools import partial
 from importlib.util import find_spec
+from pathlib import Path
 from typing import NamedTuple
 
+from coupler.commands import mend
 from coupler.program import terminal
 from coupler.program.arithmetic import BASELINE, missing, remark
 from coupler.program.errors import ExitCode
+from coupler.program.extras import EXTRAS, absent
 from coupler.program.provenance import version, versions
 from coupler.program.threads import VARIABLE, cores
 
 
 class Finding(NamedTuple):
-    """What was looked at, how it is, whether that is good, and what to do when not."""
+    """What was looked at, how it is, whether that is good, what to do when not, and what does it, where the program
+    itself can."""
 
     what: str
     found: str
     good: bool
     remedy: str = ""
+    mend: Callable[[], str] | None = None
 
 
-def examine() -> ExitCode:
-    """Try every part, print a table, and return 0 when all is well."""
+def examine(mending: bool = False) -> ExitCode:
+    """Try every part, print a table, and return 0 when all is well; mending: put right what can be, and look again."""
     findings = []
     for check in CHECKS:
         found = check()
+        _show(found)
+        if not found.good and found.mend is not None:
+            if mending:
+                found = _mended(found, check)
+            else:
+                print(f"     {'':22} -> `surgebreak doctor --mend` does that", flush=True)
         findings.append(found)
-        mark = "ok " if found.good else "BAD"
-        print(f"{mark}  {found.what:22} {found.found}", flush=True)
-        if not found.good:
-            print(f"     {'':22} -> {found.remedy}", flush=True)
     bad = sum(not finding.good for finding in findings)
     terminal.console().print(f"{bad} of {len(findings)} checks failed" if bad else "everything works")
     return ExitCode.CRASHED if bad else ExitCode.DONE
+
+
+def _show(found: Finding) -> None:
+    print(f"{'ok ' if found.good else 'BAD'}  {found.what:22} {found.found}", flush=True)
+    if not found.good:
+        print(f"     {'':22} -> {found.remedy}", flush=True)
+
+
+def _mended(found: Finding, check: Callable[[], Finding]) -> Finding:
+    """What the check says after its remedy was carried out; the same as before where that failed."""
+    assert found.mend is not None
+    try:
+        print(f"     {'':22} -> {found.mend()}", flush=True)
+    except OSError as error:
+        print(f"     {'':22} -> not mended: {error}", flush=True)
+        return found
+    importlib.invalidate_caches()
+    again = check()
+    _show(again)
+    return again
 
 
 def _python() -> Finding:
@@ -55,20 +84,56 @@ def _python() -> Finding:
 def _packages() -> Finding:
     import_names = {"scikit-fem": "skfem"}
     names = ("numpy", "scipy", "scikit-fem", "meshio", "h5py", "numba", "pydantic", "pint", "rich")
-    absent = [name for name in names if find_spec(import_names.get(name, name)) is None]
+    lacking = [name for name in names if find_spec(import_names.get(name, name)) is None]
     held = ", ".join(f"{name} {number}" for name, number in versions().items() if name in names)
     return Finding(
-        "packages", f"missing: {' '.join(absent)}" if absent else held, not absent,
-        "remove .venv and call ./surgebreak again",
+        "packages", f"missing: {' '.join(lacking)}" if lacking else held, not lacking,
+        f"pip install -c constraints.txt {' '.join(lacking)}", _installer(lacking),
     )  # fmt: skip
+
+
+def _installer(names: list[str]) -> Callable[[], str] | None:
+    """What installs packages; nothing outside of a virtual environment."""
+    return partial(mend.install, names) if mend.can_install() else None
+
+
+def _extras() -> Finding:
+    """What commands can do more; none of it is missing."""
+    lacking = [name for name in EXTRAS if absent(name)]
+    found = f"without {', '.join(lacking)}: pip install -c constraints.txt -e '.[NAME]'" if lacking else "all"
+    return Finding("extras", found, True)
+
+
+def _kernels() -> Finding:
+    """Compiled kernels that are there and whole, in a folder that may be written to."""
+    place = mend.kernel_place()
+    if place is None or not place.is_dir():
+        return Finding("compiled kernels", "none yet; the first run compiles them", True)
+    shut = mend.locked(place)
+    if shut:
+        return Finding(
+            "compiled kernels", f"may not be read or written: {shut[0]}{_and_more(shut)}", False,
+            f"chmod -R u+rwX {place}", partial(mend.unlock, place),
+        )  # fmt: skip
+    broken = mend.torn(place)
+    if broken:
+        return Finding(
+            "compiled kernels", f"cut off: {broken[0]}{_and_more(broken)}", False,
+            "remove their folders; the next run compiles them", partial(mend.drop_torn, place),
+        )  # fmt: skip
+    return Finding("compiled kernels", f"{sum(1 for _ in mend.kernels(place))} whole files in {place}", True)
+
+
+def _and_more(paths: list[Path]) -> str:
+    return f" and {len(paths) - 1} more" if len(paths) > 1 else ""
 
 
 def _yade_packages() -> Finding:
     """YADE imports these without declaring them; without mpmath its error is unreadable."""
-    absent = [name for name in ("future", "IPython", "mpmath") if find_spec(name) is None]
+    lacking = [name.lower() for name in ("future", "IPython", "mpmath") if find_spec(name) is None]
     return Finding(
-        "packages YADE needs", f"missing: {' '.join(absent)}" if absent else "future, ipython, mpmath",
-        not absent, f"pip install {' '.join(absent).lower()}",
+        "packages YADE needs", f"missing: {' '.join(lacking)}" if lacking else "future, ipython, mpmath",
+        not lacking, f"pip install {' '.join(lacking)}", _installer(lacking),
     )  # fmt: skip
 
 
@@ -212,5 +277,5 @@ def _last(output: str) -> str:
 
 
 CHECKS: tuple[Callable[[], Finding], ...] = (
-    _python, _packages, _yade_packages, _yade, _yade_run, _threads, _processor, _files, _pictures,
+    _python, _packages, _extras, _kernels, _yade_packages, _yade, _yade_run, _threads, _processor, _files, _pictures,
 )  # fmt: skip

@@ -39,12 +39,17 @@ CHECKPOINT_BYTES_PER_CELL = 36
 """Of one checkpoint, compressed; blocks take less than a tenth of it."""
 HISTORY_BYTES_PER_STEP = 4000
 """Rows of all histories without gauges."""
-SECONDS_PER_SUBSTEP, SECONDS_PER_POINT = 1.5e-4, 1.7e-7
-"""Processor time of a substep, and more for each Gauss point of a joint: read off the building of 438 joints and a
-house of 48, one thread of an AMD EPYC."""
-SECONDS_PER_CELL = 1.3e-6
-"""Of a step for each cell of the mesh: transport, pressure and results of the same runs, blocks at rest."""
-SECONDS_OF_A_START = 5.0
+SECONDS_PER_SUBSTEP, SECONDS_PER_POINT, SECONDS_PER_LOOSE_BLOCK = 1.2e-4, 1.7e-7, 3e-6
+"""Processor time of a substep, and more for each Gauss point of a joint and for each block without a joint, whose
+contacts must be found."""
+SECONDS_OF_A_START, SECONDS_OF_A_STRUCTURE = 1.0, 0.8
+SECONDS_PER_STEP, SECONDS_PER_WATER_STEP = 5e-3, 5e-3
+"""Of books and histories, and of water however little."""
+SECONDS_PER_CELL, SECONDS_PER_WET_BLOCK = 6e-7, 1.2e-3
+"""Of a step: for each cell of the mesh, and for each block that moves in water (cutting, carrying over, its rows of the
+pressure)."""
+SECONDS_PER_STATE_CELL, SECONDS_PER_STATE_BLOCK = 5e-7, 7e-4
+"""Of a written state. All read off ten of the cases, one thread of an AMD EPYC; see docs/speed.md."""
 
 
 @dataclass(frozen=True)
@@ -84,13 +89,18 @@ def forecast(case: Case, exact: bool = False, place: Path = Path()) -> Forecast:
             rows += _air_rows(case, None)
     steps = math.ceil(case.time.end / step)
     rows.append(Row("steps", steps, "", "at least, while the water is fast" if case.water else ""))
-    moving = 0.0
+    seconds = SECONDS_OF_A_START + steps * SECONDS_PER_STEP
+    if case.water:
+        seconds += steps * (SECONDS_PER_WATER_STEP + SECONDS_PER_CELL * cells)
     if case.structure:
-        blocks, moving = _structure_rows(case, rows, exact)
+        blocks, moving, substeps = _structure_rows(case, rows, exact)
+        seconds += SECONDS_OF_A_STRUCTURE + substeps
+        seconds += SECONDS_PER_WET_BLOCK * moving * steps if case.water else 0.0
         disk += DISK_BYTES_PER_BLOCK * blocks * (outputs + 1)
     disk += HISTORY_BYTES_PER_STEP * steps + _checkpoint_bytes(case)
     rows.append(Row("written states", outputs + 1, "", ""))
-    rows += _time_rows(SECONDS_OF_A_START + SECONDS_PER_CELL * cells * steps + moving)
+    seconds += (outputs + 1) * (SECONDS_PER_STATE_CELL * cells + SECONDS_PER_STATE_BLOCK * blocks)
+    rows += _time_rows(seconds)
     rows.append(Row("memory", memory(case, cells, blocks) / 1e6, "MB", "about"))
     rows.append(Row("disk", disk / 1e6, "MB", _disk_remark(disk, shutil.disk_usage(place).free)))
     return Forecast(rows)
@@ -159,7 +169,9 @@ def _highest(case: Case) -> float:
 def structure_seconds(structure, substeps: int) -> float:
     """Processor time [s] that so many substeps take, about, while joints hold."""
     points = 0 if structure.joints is None else len(structure.joints.weight)
-    return substeps * (SECONDS_PER_SUBSTEP + SECONDS_PER_POINT * points)
+    loose = int(structure.loose().sum())
+    each = SECONDS_PER_SUBSTEP + SECONDS_PER_POINT * points + SECONDS_PER_LOOSE_BLOCK * loose
+    return substeps * each
 
 
 def _time_rows(seconds: float) -> Iterator[Row]:
@@ -176,8 +188,9 @@ def _time_rows(seconds: float) -> Iterator[Row]:
     yield Row("wall time", seconds / share / 60.0, "min", beside)
 
 
-def _structure_rows(case: Case, rows: list[Row], exact: bool) -> tuple[int, float]:
-    """Rows of the structure; the number of its blocks, and the processor time [s] of their motion."""
+def _structure_rows(case: Case, rows: list[Row], exact: bool) -> tuple[int, int, float]:
+    """Rows of the structure; the number of its blocks, of those that can move, and the processor time [s] of their
+    substeps."""
     from coupler.scene.build import build_structure
 
     structure = build_structure(case)
@@ -203,7 +216,8 @@ def _structure_rows(case: Case, rows: list[Row], exact: bool) -> tuple[int, floa
             _row_at_rest(structure, rows)
         if case.water:
             rows += _air_rows(case, structure)
-        return structure.n, structure_seconds(structure, math.ceil(case.time.end / substep))
+        seconds = structure_seconds(structure, math.ceil(case.time.end / substep))
+        return structure.n, int((~structure.fixed).sum()), seconds
     finally:
         structure.close()
 

@@ -1,25 +1,34 @@
 """How long a run has still to go, from its own pace.
 
 A run changes its pace: water that arrives takes shorter steps, blocks that break loose are cut and searched, and a hit
-takes a few steps that cost ten times as much. The pace of the whole run so far lags behind the one, that of the last
-steps overshoots at the other: the time to come is taken at the geometric mean of the paces of the last half and of the
-last tenth. What has not begun yet no pace knows: runs in which water broke a structure were GROWTH times slower
-afterwards. That is expected while nothing is broken and the water has not arrived, and for half as long again once it
-has (`Calm`).
+takes a few steps that cost ten times as much. What is followed is processor time over simulated time: of the last
+quarter of the run so far, with a part of its trend since the quarter before (`TREND`); on the clock that is as much
+more as it was lately, since other programs come and go. What has not begun yet no pace knows: runs in which water
+reached blocks were GROWTH times slower afterwards. That is expected until the water arrives, and while nothing is
+broken for half as long again (`Calm`); the pace before that is then forgotten. TREND, MOST_TREND and GROWTH were chosen
+on fourteen of the shipped cases (docs/speed.md).
 """
 
 from __future__ import annotations
 
-import math
-from collections import deque
+import time as clock
+from bisect import bisect
+from operator import itemgetter
 
-WINDOWS = (0.5, 0.1)
-"""Shares of the simulated time so far whose paces count."""
-GROWTH = 2.0
+WINDOW = 0.5
+"""Share of the simulated time so far that counts: its later half for the pace, both for the trend."""
+TREND, MOST_TREND = 0.3, 1.3
+"""Share of the trend that is taken to go on, and by how much it may change the pace."""
+GROWTH = 2.2
 AFTER_ARRIVAL = 1.5
 """Times the moment at which the water reached the structure: if nothing is broken by then, calm is over."""
+BUSY = 60.0
+"""[s] on the clock over which the share of a core is looked at that the run gets."""
 MOST = 2000
 """Steps that are remembered; of longer runs every other one is dropped."""
+
+Step = tuple[float, float, float]
+"""Time [s] simulated, on the clock, and of the processor."""
 
 
 class Pace:
@@ -27,36 +36,67 @@ class Pace:
 
     def __init__(self, end: float):
         self.end = end
-        self._seen: deque[tuple[float, float]] = deque()
-        self.calm = False
-        """Whether worse is to come (`Calm`)."""
+        self._seen: list[Step] = []
+        self._calm = False
+        self._began = 0.0
 
-    def add(self, time: float, now: float) -> None:
-        """A step has ended: time [s] simulated, now [s] on the clock."""
-        self._seen.append((time, now))
+    @property
+    def calm(self) -> bool:
+        """Whether worse is to come (`Calm`)."""
+        return self._calm
+
+    @calm.setter
+    def calm(self, calm: bool) -> None:
+        if self._calm and not calm and self._seen:
+            self._began = self._seen[-1][0]
+        self._calm = calm
+
+    def add(self, time: float, now: float, used: float | None = None) -> None:
+        """A step has ended: time [s] simulated, now [s] on the clock, used [s] of the processor (absent: of this
+        process)."""
+        self._seen.append((time, now, clock.process_time() if used is None else used))
         if len(self._seen) > MOST:
-            self._seen = deque(list(self._seen)[::2])
+            self._seen = self._seen[::2]
 
     def left(self) -> float | None:
         """Time to go [s] on the clock; None before the second step."""
         if len(self._seen) < 2:
             return None
-        paces = [self._pace(share) for share in WINDOWS]
-        pace = math.prod(paces) ** (1.0 / len(paces)) * (GROWTH if self.calm else 1.0)
-        return pace * max(self.end - self._seen[-1][0], 0.0)
+        time, first = self._seen[-1][0], self._seen[0][0]
+        window = min(WINDOW * (time - first), time - max(self._began, first))
+        to_go = max(self.end - time, 0.0)
+        newer, older = self._pace(time - 0.5 * window, time), self._pace(time - window, time - 0.5 * window)
+        pace = newer
+        if newer and older:
+            ahead = 0.25 * window + 0.5 * min(to_go, 0.5 * window)
+            pace += TREND * (newer - older) / (0.5 * window) * ahead
+            pace = min(max(pace, newer / MOST_TREND), newer * MOST_TREND)
+        return pace * to_go * (GROWTH if self.calm else 1.0) * self._busy()
 
-    def _pace(self, share: float) -> float:
-        """Time on the clock over simulated time, of the last `share` of the latter."""
-        time, now = self._seen[-1]
-        since = time - share * (time - self._seen[0][0])
-        began, started = next(
-            ((t, at) for t, at in reversed(self._seen) if t <= since and t < time), self._seen[0]
-        )
-        return (now - started) / (time - began) if time > began else 0.0
+    def _pace(self, begin: float, end: float) -> float:
+        """Processor time over simulated time between two times [s]; of the last step where they are one."""
+        if end > begin:
+            return (self._used(end) - self._used(begin)) / (end - begin)
+        (before, _, earlier), (after, _, later) = self._seen[-2:]
+        return (later - earlier) / (after - before) if after > before else 0.0
+
+    def _used(self, time: float) -> float:
+        """Processor time at a simulated time [s], linear within a step."""
+        k = min(max(bisect(self._seen, time, key=itemgetter(0)), 1), len(self._seen) - 1)
+        (before, _, earlier), (after, _, later) = self._seen[k - 1 : k + 1]
+        share = (time - before) / (after - before) if after > before else 1.0
+        return earlier + share * (later - earlier)
+
+    def _busy(self) -> float:
+        """Time on the clock over that of the processor, lately."""
+        _, now, used = self._seen[-1]
+        k = min(bisect(self._seen, now - BUSY, key=itemgetter(1)), len(self._seen) - 2)
+        _, then, before = self._seen[k]
+        return (now - then) / (used - before) if used > before else 1.0
 
 
 class Calm:
-    """Whether a run is still before what it is made for: water on its way to a structure that may break."""
+    """Whether a run is still before what it is made for: water on its way to blocks that may break or drift."""
 
     def __init__(self):
         self._arrived: float | None = None
@@ -65,6 +105,6 @@ class Calm:
         """After a step to time [s]; wet: water touches a block · joints that hold · broken ones."""
         if wet and self._arrived is None:
             self._arrived = time
-        if broken or not joints:
+        if broken:
             return False
-        return self._arrived is None or time < AFTER_ARRIVAL * self._arrived
+        return self._arrived is None or (joints > 0 and time < AFTER_ARRIVAL * self._arrived)

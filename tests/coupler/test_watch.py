@@ -121,13 +121,39 @@ def test_the_page_asks_nothing_from_outside():
 
 
 def test_the_time_to_go_follows_a_pace_that_changes():
-    """1 s of the clock for each 0.1 s until t = 2, then 4 s: at t = 3 another 40 s are left; the mean pace says 20."""
+    """1 s of the processor for each 0.1 s until t = 2, then 4 s: at t = 3 another 40 s are to go; the mean says 20."""
     pace = Pace(4.0)
     now = 0.0
     for k in range(1, 31):
         now += 1.0 if k <= 20 else 4.0
-        pace.add(0.1 * k, now)
+        pace.add(0.1 * k, now, now)
     assert 0.67 < pace.left() / 40.0 < 1.33
+
+
+def test_other_programs_that_come_make_the_time_to_go_longer():
+    """The run gets half a core from t = 1 on: what is left takes twice as long on the clock, from a minute later on."""
+    pace = Pace(4.0)
+    now = 0.0
+    for k in range(1, 21):
+        now += 10.0 if k <= 10 else 20.0
+        pace.add(0.1 * k, now, 10.0 * k)
+    assert pace.left() == pytest.approx(2.0 * 200.0)
+
+
+def test_what_was_calm_is_forgotten_when_the_water_arrives():
+    """1 s a tenth before, 3 s after: half a second later 1.4 of 2 s are to go, at 3 s a tenth; before, GROWTH stands
+    for that."""
+    pace, used = Pace(2.0), 0.0
+    pace.calm = True
+    for k in range(1, 11):
+        used += 1.0 if k <= 5 else 3.0
+        if k == 5:
+            pace.add(0.1 * k, used, used)
+            assert pace.left() == pytest.approx(GROWTH * 15.0)
+            pace.calm = False
+            continue
+        pace.add(0.1 * k, used, used)
+    assert pace.left() == pytest.approx(30.0)
 
 
 def test_calm_ends_with_the_first_break_or_some_time_after_the_water():
@@ -137,10 +163,14 @@ def test_calm_ends_with_the_first_break_or_some_time_after_the_water():
     assert calm.now(1.4, wet=True, joints=9, broken=0)
     assert not calm.now(1.6, wet=True, joints=9, broken=0)
     assert not calm.now(1.2, wet=True, joints=8, broken=1)
-    assert not Calm().now(0.1, wet=False, joints=0, broken=0)
+    crates = Calm()
+    assert crates.now(0.1, wet=False, joints=0, broken=0)
+    assert not crates.now(0.2, wet=True, joints=0, broken=0), (
+        "nothing can break: all is known when they are wet"
+    )
     pace = Pace(2.0)
     for k in (1, 2, 3):
-        pace.add(0.1 * k, float(k))
+        pace.add(0.1 * k, float(k), float(k))
     plain = pace.left()
     pace.calm = True
     assert pace.left() == pytest.approx(GROWTH * plain)

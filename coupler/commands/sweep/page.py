@@ -65,6 +65,7 @@ def _page(spec: Spec, results: Results) -> str:
                     spec,
                     "results",
                     "Every run a point. Crosses: runs that failed; triangles on the edge: those that could not stand.",
+                    wide=False,
                 ),
             ),
             section("Runs that did not reach their end", _failed(spec, results)),

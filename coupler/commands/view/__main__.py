@@ -13,6 +13,8 @@ from coupler.program.errors import FULL, ExitCode, SurgebreakError
 from coupler.program.extras import need
 from coupler.program.process import was_killed
 
+INSIDE = "inside"
+
 
 class CannotDraw(SurgebreakError):
     """The system has nothing to draw with."""
@@ -48,12 +50,14 @@ def command_line():
     )
     parser.add_argument(
         "--view",
-        choices=list(VIEWS),
-        help="plan, or an elevation from y- (south), x+ (east), y+ (north), x- (west)",
+        choices=[*VIEWS, INSIDE],
+        help="plan, an elevation from y- (south), x+ (east), y+ (north), x- (west), or from inside of the blocks "
+        "towards --azimuth (default: where things happen)",
     )
     parser.add_argument(
         "--cut", type=section, metavar="x=M", help="a section: what lies before x, y or z = M [m] is left out"
     )
+    parser.add_argument("--foam", action="store_true", help="white where fast water is torn")
     parser.add_argument(
         "--letters", type=letters, default=1.0, metavar="TIMES", help="the usual size, for a small picture"
     )
@@ -135,8 +139,15 @@ def make(options):
         print(f"note: the run was killed; shown is what it wrote, until t = {run.times[-1]:g} s", flush=True)
     folder = options.to or options.run / "pictures"
     folder.mkdir(parents=True, exist_ok=True)
-    azimuth, elevation = VIEWS[options.view] if options.view else (options.azimuth, options.elevation)
-    camera = {"azimuth": azimuth, "elevation": elevation, "letters": options.letters, "cut": options.cut}
+    azimuth, elevation = VIEWS.get(options.view, (options.azimuth, options.elevation))
+    camera = {
+        "azimuth": azimuth,
+        "elevation": elevation,
+        "letters": options.letters,
+        "cut": options.cut,
+        "from_inside": options.view == INSIDE,
+        "foam": options.foam,
+    }
     if options.still:
         from coupler.commands.view.pictures import still
 

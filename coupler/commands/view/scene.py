@@ -14,10 +14,13 @@ from matplotlib.colors import ListedColormap
 
 from coupler.commands.view import palette
 from coupler.commands.view.camera import frame, side_of
+from coupler.commands.view.foam import foam
+from coupler.commands.view.inside import NoInside, inside
 from coupler.commands.view.water_surface import shading_normals, skin
 
 WATER_OPACITY = 0.78
 SUN = np.array([-0.45, -0.75, 1.1])  # from the scene to the light, for a camera at azimuth -90 degree
+HEADLIGHT, LAMP = 0.3, 0.75  # from the camera, outside and where the sun does not come
 FILL = np.array([1.0, -0.2, 0.25])
 LETTERS = Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"
 VTK_FONT_FILE = 4  # vtkTextProperty: use the font file
@@ -32,12 +35,25 @@ BAR = 0.075  # height of a colour bar with its text, as a share of that of the p
 class Scene:
     """Draws the steps of a run into one window with one camera and fixed colour scales, so that pictures compare."""
 
-    def __init__(self, run, size=(1280, 720), azimuth=None, elevation=22.0, soft=True, letters=1.0, cut=None):
+    def __init__(
+        self,
+        run,
+        size=(1280, 720),
+        azimuth=None,
+        elevation=22.0,
+        soft=True,
+        letters=1.0,
+        cut=None,
+        from_inside=False,
+        foam=False,
+    ):
         """run: RunFiles · size: (width, height) in pixels · azimuth, elevation of the camera in degrees, azimuth None:
         the side on which things happen · cut: (axis, place [m]), None for none: what lies before it is left out ·
         soft: darken corners where little light comes (costs three times as much as all the rest) ·
-        letters: times the usual size, for a picture that is shown small."""
-        self.run = run
+        letters: times the usual size, for a picture that is shown small · from_inside: from among the blocks, towards
+        the azimuth · foam: white where fast water is torn."""
+        self.run, self.foam = run, foam
+        eye = camera_inside(run, azimuth) if from_inside else None
         azimuth = side_of(where_it_happens(run)) if azimuth is None else azimuth
         self.size, self.letters = size, letters
         self.cut = None if cut is None else cut_of(cut, azimuth)
@@ -52,9 +68,12 @@ class Scene:
         self._pockets_drawn = 0
         self.plotter = pv.Plotter(off_screen=True, window_size=size, lighting="none")
         self.plotter.set_background(palette.PAPER)
-        self._set_lights()
-        self._draw_still_parts(azimuth)
-        self._set_camera(azimuth, elevation)
+        self._set_lights(LAMP if eye else HEADLIGHT)
+        self._draw_still_parts()
+        if eye is None:
+            self._draw_scale_bar(azimuth)
+            self._draw_north(azimuth)
+        self._set_camera(azimuth, elevation, eye)
         self._smooth(soft)
 
     def draw(self, time):
@@ -97,7 +116,7 @@ class Scene:
         lettered(caption.prop)
         caption.prop.justification_horizontal = "right"
 
-    def _set_lights(self):
+    def _set_lights(self, headlight):
         """One sun, a weak light from the right and one from the camera: soft, and no face is black."""
         span = np.linalg.norm(self.upper - self.lower)
         middle = (self.lower + self.upper) / 2
@@ -105,10 +124,10 @@ class Scene:
             self.plotter.add_light(
                 pv.Light(position=middle + 3 * span * way, focal_point=middle, intensity=intensity)
             )
-        self.plotter.add_light(pv.Light(light_type="headlight", intensity=0.3))
+        self.plotter.add_light(pv.Light(light_type="headlight", intensity=headlight))
 
-    def _set_camera(self, azimuth, elevation):
-        view = frame(
+    def _set_camera(self, azimuth, elevation, eye):
+        view = eye or frame(
             self.lower,
             self.upper,
             self.size[0] / self.size[1],
@@ -131,7 +150,7 @@ class Scene:
         """A line width that keeps its share of the picture's height; smoothing halves it."""
         return 2 * width * self.size[1] / 720
 
-    def _draw_still_parts(self, azimuth):
+    def _draw_still_parts(self):
         self.plotter.add_mesh(self.ground, color=palette.GROUND, lighting=False)
         if self.run.solids is not None:
             self.plotter.add_mesh(
@@ -144,7 +163,27 @@ class Scene:
             else:
                 tank = pv.line_segments_from_points(self.run.basin.reshape(-1, 3))
             self.plotter.add_mesh(tank, color=palette.TANK, line_width=self._line(0.9))
-        self._draw_scale_bar(azimuth)
+
+    def _draw_north(self, azimuth):
+        """Of a terrain, an arrow to the north on the ground, at the end of the edge that faces the camera."""
+        north = north_of(self.run)
+        if north is None:
+            return
+        side = -1 if np.sin(np.radians(azimuth)) < 0 else 1
+        size = 0.09 * (self.upper - self.lower)[:2].max()
+        near = (self.lower if side < 0 else self.upper)[1]
+        middle = np.array([self.upper[0] - size, near + 0.75 * side * size, self.lower[2]])
+        way, across = np.append(north, 0.0), np.array([-north[1], north[0], 0.0])
+        corners = middle + size * np.array(
+            [0.5 * way, -0.5 * way - 0.22 * across, -0.3 * way, -0.5 * way + 0.22 * across]
+        )
+        arrow = pv.PolyData(corners, [3, 0, 1, 2, 3, 0, 2, 3])
+        self.plotter.add_mesh(arrow, color=palette.INK, lighting=False)
+        self.plotter.add_point_labels(
+            [middle + 0.8 * size * way], ["N"], font_size=self._points(15), text_color=palette.INK, shape=None,
+            show_points=False, always_visible=True, font_file=str(LETTERS), bold=False,
+            justification_vertical="center", justification_horizontal="center",
+        )  # fmt: skip
 
     def _draw_scale_bar(self, azimuth):
         """A bar of a round length on the ground along the edge that faces the camera, its length under it."""
@@ -173,21 +212,32 @@ class Scene:
         )  # fmt: skip
         self._draw_shadow(blocks, "block_shadow")
         if "damage" in blocks.cell_data:
-            self._draw_bar("blocks", "damage of blocks [–]", 0.35 if self.run.water else 0.03)
+            self._draw_bar(
+                self.plotter.actors["blocks"].mapper, "damage of blocks [–]", 0.35 if self.run.water else 0.03
+            )
 
     def _draw_water(self, grid):
-        surface = water_surface(grid, np.array(self.plotter.camera.position), self._sides())
+        white = self.fastest if self.foam else None
+        surface = water_surface(grid, np.array(self.plotter.camera.position), self._sides(), white)
         surface = self._behind_cut(surface)
         if surface.n_cells == 0:
             self.plotter.remove_actor("water", reset_camera=False, render=False)
             return
+        scale = ListedColormap(palette.scale(palette.WATER_ENDS))
+        colours = {"scalars": "speed", "clim": (0.0, self.fastest), "opacity": WATER_OPACITY, "cmap": scale}
+        if self.foam:
+            surface["colour"] = foamy(scale(surface["speed"] / self.fastest), surface["foam"])
+            colours = {"scalars": "colour", "rgba": True}
         actor = self.plotter.add_mesh(
-            surface, name="water", scalars="speed", clim=(0.0, self.fastest), opacity=WATER_OPACITY,
-            cmap=ListedColormap(palette.scale(palette.WATER_ENDS)), culling="back",
+            surface, name="water", **colours, culling="back",
             specular=0.3, specular_power=30, ambient=0.3, show_scalar_bar=False, reset_camera=False, render=False,
         )  # fmt: skip
         behind(actor.mapper)
-        self._draw_bar("water", "speed of water [m/s]", 0.03)
+        mapper = actor.mapper
+        if self.foam:
+            mapper = pv.DataSetMapper()
+            mapper.lookup_table = pv.LookupTable(scale, scalar_range=(0.0, self.fastest))
+        self._draw_bar(mapper, "speed of water [m/s]", 0.03)
 
     def _draw_pockets(self, water):
         """The surface below each pocket of trapped air in a colour of its own, and its pressure in the corner."""
@@ -231,12 +281,12 @@ class Scene:
         normal, origin = self.cut
         return mesh.clip(normal=normal, origin=origin, crinkle=False)
 
-    def _draw_bar(self, actor, title, left):
-        """A colour bar under the scene for the named actor, once."""
+    def _draw_bar(self, mapper, title, left):
+        """A colour bar under the scene for the colours of a mapper, once."""
         if title in self.plotter.scalar_bars:
             return
         bar = self.plotter.add_scalar_bar(
-            title=title, mapper=self.plotter.actors[actor].mapper, n_labels=2, fmt="%.3g", vertical=False,
+            title=title, mapper=mapper, n_labels=2, fmt="%.3g", vertical=False,
             width=0.26, height=BAR * self.letters, position_x=left, position_y=0.03, color=palette.INK, render=False,
             title_font_size=self._points(17), label_font_size=self._points(15), unconstrained_font_size=True,
         )  # fmt: skip
@@ -271,6 +321,33 @@ def caption_of(run):
     if run.blocks:
         parts.append(f"{int(run.blocks.at(run.blocks.times[0])['block'].max()) + 1} blocks")
     return ", ".join(parts)
+
+
+def north_of(run):
+    """Direction (2,) in plan that is north: y of the file of the terrain, which may be turned; None without one."""
+    terrain = _entry(run, "case", "terrain")
+    if not isinstance(terrain, dict):
+        return None
+    turn = float(terrain.get("turn") or 0.0)
+    return np.array([-np.sin(turn), np.cos(turn)])
+
+
+def camera_inside(run, azimuth):
+    """The camera among the blocks as they stand at the start, towards where things happen if no azimuth is given."""
+    if not run.blocks:
+        raise NoInside("--view inside: the run has no blocks")
+    where = where_it_happens(run)
+    if azimuth is None:
+        azimuth = float(np.degrees(np.arctan2(where[1], where[0]))) if where.any() else 180.0
+    return inside(run.blocks.at(run.blocks.times[0]), azimuth)
+
+
+def foamy(colours, share):
+    """Colours (n, 4) as bytes of water with a share of foam (n,): white, and less to be seen through."""
+    share = share[:, None]
+    rgb = colours[:, :3] * (1.0 - share) + share
+    opacity = WATER_OPACITY + (1.0 - WATER_OPACITY) * share
+    return np.rint(255 * np.concatenate([rgb, opacity], axis=1)).astype(np.uint8)
 
 
 def cut_of(cut, azimuth):
@@ -312,8 +389,9 @@ def _entry(run, *names):
     return found
 
 
-def water_surface(water, eye, tank=None):
-    """The skin of the water as a mesh with "speed" [m/s] and shading normals at its points.
+def water_surface(water, eye, tank=None, foam_over=None):
+    """The skin of the water as a mesh with "speed" [m/s] and shading normals at its points, and with "foam" (0 to 1)
+    where it is asked for, over that speed [m/s].
 
     The triangles farthest from the eye (3,) come first: each is then seen through those before it, where otherwise
     the order of the cells would decide which of two layers shows, triangle by triangle."""
@@ -326,6 +404,10 @@ def water_surface(water, eye, tank=None):
         corners[far_first].reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3)
     )
     mesh["speed"] = speed[far_first].ravel()
+    if foam_over is not None:
+        white = foam(water.nodes, water.cells, water.level_set, water.velocity, foam_over)
+        share = found.of(white) * (np.arange(len(corners)) < found.free)[:, None]
+        mesh["foam"] = share[far_first].ravel()
     mesh["normals"] = normals[far_first].reshape(-1, 3)
     mesh.point_data.active_normals_name = "normals"
     return mesh

@@ -1,0 +1,108 @@
+"""What `surgebreak doctor --mend` can put right by itself: kernels that were not written to their end, folders of one's
+own that may not be written to, and packages that are missing in the virtual environment.
+
+Nothing outside of the cache and the virtual environment is touched: no system package, no result of a run.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import stat
+import subprocess
+import sys
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+from coupler.program.provenance import ROOT
+
+KERNELS = (".nbi", ".nbc")
+"""Numba's index of a function and its compiled code; both are pickles."""
+STOP = b"."
+"""Last byte of a whole pickle."""
+
+
+def kernel_place() -> Path | None:
+    """The folder of compiled kernels; None where none is set."""
+    place = os.environ.get("NUMBA_CACHE_DIR")
+    return Path(place) if place else None
+
+
+def kernels(place: Path) -> Iterator[Path]:
+    """All files of kernels below a folder."""
+    return (path for path in place.rglob("*") if path.suffix in KERNELS)
+
+
+def torn(place: Path) -> list[Path]:
+    """Kernels that were cut off, by a full disk or a machine that lost power: loading them ends a run."""
+    return sorted(path for path in kernels(place) if not _is_whole(path))
+
+
+def _is_whole(path: Path) -> bool:
+    try:
+        with path.open("rb") as file:
+            file.seek(-1, os.SEEK_END)
+            return file.read() == STOP
+    except FileNotFoundError:  # replaced by another process just now
+        return True
+    except OSError:
+        return False
+
+
+def drop_torn(place: Path) -> str:
+    """Remove the folders of modules with torn kernels, which are compiled again when they are needed."""
+    folders = {path.parent for path in torn(place)}
+    for folder in folders:
+        shutil.rmtree(folder)
+    return f"removed {len(folders)} folders; their kernels are compiled again by the next run"
+
+
+def locked(place: Path) -> list[Path]:
+    """Folders and files of this user below a folder, itself included, that this user may not read or write."""
+    found = []
+    for folder, _, files in os.walk(place):
+        for path in (Path(folder), *(Path(folder) / name for name in files)):
+            if _is_locked(path):
+                found.append(path)
+    return found
+
+
+def _is_locked(path: Path) -> bool:
+    try:
+        about = path.lstat()
+    except FileNotFoundError:
+        return False
+    return about.st_uid == os.getuid() and about.st_mode & _wanted(about.st_mode) != _wanted(about.st_mode)
+
+
+def _wanted(mode: int) -> int:
+    return stat.S_IRWXU if stat.S_ISDIR(mode) else stat.S_IRUSR | stat.S_IWUSR
+
+
+def unlock(place: Path) -> str:
+    """Give this user back what `locked` finds; folders first, since what lies in a locked one is not seen."""
+    count = 0
+    while found := locked(place):
+        for path in found:
+            mode = path.lstat().st_mode
+            path.chmod(stat.S_IMODE(mode) | _wanted(mode))
+        count += len(found)
+    return f"{count} files and folders may be read and written again"
+
+
+def can_install() -> bool:
+    """Whether packages may be put into this Python: that of a virtual environment, never that of the system."""
+    return sys.prefix != sys.base_prefix
+
+
+def install(names: Iterable[str]) -> str:
+    """Install packages with the pins of the checkout. Raises OSError with the last line of pip where that fails."""
+    command = [sys.executable, "-m", "pip", "install", "--quiet", *names]
+    pins = ROOT / "constraints.txt"
+    if pins.is_file():
+        command += ["-c", str(pins)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode:
+        last = (done.stderr or done.stdout).strip().splitlines()
+        raise OSError(f"pip: {last[-1] if last else f'ended with {done.returncode}'}")
+    return f"installed {', '.join(names)}"

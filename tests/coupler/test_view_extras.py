@@ -1,0 +1,85 @@
+"""White water where water is torn, the way to the north, and a camera among the blocks."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from coupler.commands.view.foam import FAST, TORN, differences, foam
+from coupler.program.provenance import ROOT
+from tests.coupler.synthetic_run import tank_mesh
+
+NODES, CELLS = tank_mesh((4.0, 4.0, 4.0), 1.0)
+LEVEL = NODES[:, 2] - 2.3
+
+
+def test_differences_are_those_of_linear_velocities():
+    """u = (3 z, 0, 4 z): |∇u| = 5 in every cell; the six tetrahedra of a cube fill it, so that h is its edge."""
+    z = NODES[:, 2]
+    found, volume = differences(NODES, CELLS[:, [0, 1, 2, 3]], np.stack([3 * z, 0 * z, 4 * z], axis=1))
+    edge = np.cbrt(6.0 * np.abs(volume))
+    np.testing.assert_allclose(found[volume > 0], 5.0 * edge[volume > 0])
+    np.testing.assert_allclose(edge, 1.0)
+
+
+def test_only_fast_water_that_is_torn_is_white():
+    """Still, fast but even, torn but slow, and both; and nothing away from the surface."""
+    fast = np.tile([8.0, 0.0, 0.0], (len(NODES), 1))
+    shear = np.stack([2.0 * NODES[:, 2], 0 * NODES[:, 0], 0 * NODES[:, 0]], axis=1)
+    surface = np.abs(LEVEL) < 1.0
+
+    def of(velocity):
+        return foam(NODES, CELLS, LEVEL, velocity, 10.0)
+
+    assert not of(0.0 * fast).any()
+    assert not of(fast).any()
+    assert not of(0.1 * shear).any(), "a slow eddy"
+    white = of(fast + 3.0 * shear)
+    assert (white[surface] == 1.0).all()
+    assert not white[~surface].any()
+    torn = (2.0 / 10.0 - TORN[0]) / (TORN[1] - TORN[0])
+    assert FAST[1] < 0.8
+    np.testing.assert_allclose(of(fast + shear)[surface], torn)
+
+
+def told(code):
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
+    return done.stdout + done.stderr
+
+
+ROOM = """
+import numpy as np, pyvista as pv
+from coupler.commands.view.inside import inside, NoInside
+box = lambda *b: pv.Box(b).cast_to_unstructured_grid().extract_surface(algorithm=None)
+walls = [box(0, 6, -0.2, 0, 0, 3), box(0, 6, 4, 4.2, 0, 3), box(-0.2, 0, -0.2, 4.2, 0, 3), box(6, 6.2, -0.2, 4.2, 0, 3)]
+"""
+
+
+def test_the_camera_stands_in_the_room_with_its_back_to_the_wall():
+    """A room of 6 m x 4 m without a roof: towards x- it stands on its middle line, a fifth of the way from the wall at
+    x = 6; never outside."""
+    code = ROOM + "c = inside(pv.merge(walls), 180.0); print(*c.position, *(c.focus - c.position))"
+    x, y, z, *ahead = map(float, told(code).split())
+    assert 4.5 < x < 6.0
+    assert y == pytest.approx(2.0, abs=0.5)
+    assert 0.2 < z < 2.0
+    assert ahead[0] < 0.0
+    assert ahead[1:] == pytest.approx([0.0, 0.0], abs=1e-9)
+
+
+def test_a_wall_alone_has_no_inside():
+    assert "no place among the blocks" in told(ROOM + "inside(walls[0], 0.0)")
+
+
+def test_north_turns_with_the_terrain(tmp_path):
+    """The file of a terrain has y to the north; a terrain turned by 90 degrees has it towards x-."""
+    (tmp_path / "run.json").write_text('{"case": {"terrain": {"turn": 1.5707963267948966}}}')
+    code = (
+        "from types import SimpleNamespace as S; from pathlib import Path;"
+        "from coupler.commands.view.scene import north_of;"
+        f"print(*north_of(S(directory=Path({str(tmp_path)!r}))), north_of(S(directory=Path('/nowhere'))))"
+    )
+    x, y, without = told(code).split()
+    assert (float(x), float(y)) == pytest.approx((-1.0, 0.0), abs=1e-12)
+    assert without == "None"
