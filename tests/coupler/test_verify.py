@@ -6,7 +6,7 @@ import math
 import pytest
 
 from coupler.case.records import SHIPPED
-from coupler.commands.verify import page, registry, report, runner
+from coupler.commands.verify import dam_breaks, page, registry, report, runner
 from coupler.commands.verify.figures import columns, named_values
 from coupler.commands.verify.registry import Check, Finding, Result
 from coupler.program.errors import BadCase, ExitCode
@@ -38,6 +38,17 @@ def test_references_name_their_source():
         assert path.read_text(encoding="utf-8").startswith("# ")
     assert columns("coh_mode1_law")["T_over_Tmax"].max() == pytest.approx(1.0, abs=1e-3)
     assert named_values("dem_simple_closed_forms")["drop 0.5 m: impact speed"] == pytest.approx(3.132092)
+
+
+def test_the_clock_of_a_record_is_found_from_the_fall_of_the_reservoir():
+    """A computed level that is the measured one 20 ms later, read by a probe 4 mm off, sets the clock 20 ms ahead; on
+    that clock a pressure that is as late is right, and on its own it is not."""
+    levels, pressures = columns("kleefsman_heights_h1_h4"), columns("kleefsman_pressure_p1_p3_p5_p7")
+    late = {"t": levels["t_s"] + 0.02, "H4": levels["H4_x2638_m"] + 0.004}
+    assert dam_breaks.clock(late) == pytest.approx(0.02, abs=1e-9)
+    late = {"t": pressures["t_s"] + 0.02, "P1": pressures["P1_Pa"]}
+    assert dam_breaks.pressure_rms(late, pressures, "P1", 0.02) < 1.0
+    assert dam_breaks.pressure_rms(late, pressures, "P1", 0.0) > 1000.0
 
 
 def test_unknown_and_absent_cases_are_distinguished(monkeypatch):

@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from coupler.commands.verify.figures import columns
-from coupler.commands.verify.registry import Finding, check
-from coupler.commands.verify.scenes import DENSITY, G, column
+from coupler.commands.verify.registry import TOLD, Finding, check
+from coupler.commands.verify.scenes import DENSITY, G, box, column
 from coupler.run.clock import Clock
 from coupler.step.coupled_step import CoupledStepper
 from coupler.step.immersion import Immersion
 from fluid.mesh.background import box_mesh
+from fluid.mesh.refinement import InBox, refined_mesh
 from fluid.step.parameters import WaterParameters
 from fluid.step.water import Water
 from yade_scripts.blocks.block import Block
@@ -19,6 +20,13 @@ from yade_scripts.contact.law import ContactLaw, PairFriction
 from yade_scripts.dynamics.structure import Structure
 
 EDGE, RESERVOIR, DEPTH = 0.15, 3.5, 0.4
+FINER = InBox((RESERVOIR - 0.1, -1.0, -1.0), (5.9, 2.0, 0.3), 1)
+"""Where cells may be half as large: from the gate on, over the sheet of water and the cubes."""
+STEADY, ARRIVES = (0.8, 1.0), 45.0
+"""Window [s], and the momentum [N] that the sheet brings over the width of a cube in it: ∫ ρ u² dA in the tank without
+cubes, on cells of either size."""
+ANY = 100.0
+"""Tolerance of what is reported, not judged."""
 
 
 @check("P56", "three stacked cubes in a dam break", "Canelas et al. 2016 (experiment), digitised", "M")
@@ -26,22 +34,27 @@ def stacked_cubes():
     """The gate is gone at t = 0; in the experiment it takes a time that is not reported."""
     table = columns("canelas_three_cubes_x")
     t, place = cubes(EDGE / 3.0, 1.65)
+    finer_t, finer = cubes(EDGE / 3.0, 1.65, (FINER,))
     for at, measured in ((1.2, 1.900), (1.4, 2.074), (1.6, 2.334)):
         near = np.abs(np.interp(at, table["t_s"], table["x_m"]) - measured) < 0.03
         assert near, "the figure is that of the record"
         found = float(np.interp(at, t, place[:, 2, 0]))
         yield Finding(f"top cube, x at {at:g} s [m from the gate], edge/h = 3", found, measured, 0.15, False)
+        found = float(np.interp(at, finer_t, finer[:, 2, 0]))
+        what = f"cells of half the size from the gate on: the same at {at:g} s {TOLD}"
+        yield Finding(what, found, measured, ANY, False)
+    for regions, where in (((), "edge/h = 3"), ((FINER,), "cells of half the size from the gate on")):
+        what = f"column held in their place, {where}: force from 0.8 to 1 s [N] {TOLD}"
+        yield Finding(what, held_column(EDGE / 3.0, regions), ARRIVES, ANY, False)
     height = columns("canelas_three_cubes_z")
     landed = height["t_s"][np.argmax(height["z_m"] < 0.15)]
     found = t[np.argmax(place[:, 2, 2] < 0.15)] if (place[:, 2, 2] < 0.15).any() else np.inf
     yield Finding("top cube, time at which its centre is below one edge [s]", found, landed, 0.15, False)
 
 
-def cubes(cell: float, until: float) -> tuple[np.ndarray, np.ndarray]:
-    """(t (n,), centres (n, 3, 3) from the gate) of the cubes, bottom to top."""
-    length, width, height = 6.6, 0.7, 0.7
-    cells = np.round(np.array([length, width, height]) / cell).astype(int)
-    size = cells * cell
+def cubes(cell: float, until: float, finer: tuple = ()) -> tuple[np.ndarray, np.ndarray]:
+    """(t (n,), centres (n, 3, 3) from the gate) of the cubes, bottom to top; finer: regions of `refined_mesh`."""
+    size, mesh = _tank(cell, finer)
     blocks = [
         Block(
             f"cube {i}",
@@ -55,20 +68,44 @@ def cubes(cell: float, until: float) -> tuple[np.ndarray, np.ndarray]:
     contact = ContactLaw(2e5, 0.3, 0.35, pairs=(PairFriction("cube", "cube", 0.45),))
     sides = [FixedPlane((0, y, 0), (0, s, 0), f"side {s}") for y, s in ((0.0, 1.0), (size[1], -1.0))]
     with Structure(blocks, contact, ground=0.0, planes=sides) as s:
-        mesh = box_mesh(np.zeros(3), size, size / cells)
-        immersion = Immersion(mesh, s, [], "single")
-        # the far end lets water out
-        water = Water(
-            mesh,
-            immersion.domain,
-            column(RESERVOIR, DEPTH),
-            WaterParameters(density=DENSITY, gravity=G),
-            lambda normal, centre: normal[:, 0] > 0.5,
-        )
-        c = CoupledStepper(water, s, immersion, rtol=1e-7, step_max=1.0, clock=Clock(), passes=2)
+        c = _stepper(mesh, s, [], 2)
         t, place = [0.0], [s.centre()]
         while t[-1] < until:
             c.step(c.step_size(1.0))
             t.append(c.time)
             place.append(s.centre())
     return np.array(t), np.array(place) - np.array([RESERVOIR, 0.0, 0.0])
+
+
+def held_column(cell: float, finer: tuple = ()) -> float:
+    """Mean force [N] along the stream, over STEADY, on a fixed column in the place of the cubes."""
+    size, mesh = _tank(cell, finer)
+    middle = (RESERVOIR + 1.70 + 0.5 * EDGE, 0.5 * size[1], 1.5 * EDGE)
+    c = _stepper(mesh, None, [box(middle, (EDGE, EDGE, 3.0 * EDGE))], 1)
+    impulse = time = 0.0
+    while c.time < STEADY[1]:
+        c.step(c.water.stable_step())
+        if c.time > STEADY[0]:
+            impulse -= c.water.report.momentum.lines["bodies"][0]
+            time += c.water.report.dt
+    return impulse / time
+
+
+def _tank(cell: float, finer: tuple):
+    """Size (3,) [m] of the tank and its mesh."""
+    cells = np.round(np.array([6.6, 0.7, 0.7]) / cell).astype(int)
+    size = cells * cell
+    return size, refined_mesh(box_mesh(np.zeros(3), size, size / cells), finer)
+
+
+def _stepper(mesh, structure, solids, passes: int) -> CoupledStepper:
+    """The dam break in the tank; its far end lets water out."""
+    immersion = Immersion(mesh, structure, solids, "single")
+    water = Water(
+        mesh,
+        immersion.domain,
+        column(RESERVOIR, DEPTH),
+        WaterParameters(density=DENSITY, gravity=G),
+        lambda normal, centre: normal[:, 0] > 0.5,
+    )
+    return CoupledStepper(water, structure, immersion, rtol=1e-7, step_max=1.0, clock=Clock(), passes=passes)
