@@ -203,7 +203,7 @@ class Study(Section):
     set: tuple[Override, ...] = Field(
         (), description="changes of all runs of the study, KEY=VALUE", examples=[["time.end=1 s"]]
     )
-    repeat: Count = Field(1, description="times that each run is made; the cheapest one tells its cost")
+    repeat: Count = Field(1, description="times that each run is made; its cost is that of the cheapest one")
     cpu_seconds: PositiveTime = Field(
         3600.0, description="processor time after which a run is given up and reported as failed"
     )
