@@ -27,7 +27,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fluid.air.gas import Gas
-from fluid.air.pockets import OPEN_AIR, Descent, bricks, labelled, volumes, without
+from fluid.air.pockets import OPEN_AIR, SLIVER, Descent, bricks, labelled, volumes, without
 from fluid.domain.coupling_matrix import wetted_coupling
 from fluid.pressure.projection import SMALLEST_CUT
 from kernel_decorators import kernel
@@ -134,7 +134,7 @@ class Cushions:
         small = reference < gas.smallest * bricks(t, label, count)
         let_go = air.let_go
         if small.any():
-            let_go += int((descent.share[:, small] > 0.0).any(axis=0).sum())
+            let_go += int((descent.share[:, small] >= SLIVER).any(axis=0).sum())
             label, count = without(label, small)
             descent, reference, volume = _handed_on(air, before_volume, t, phi, label, count)
         same, anew = descent.only >= 0, descent.share.sum(axis=0) == 0.0

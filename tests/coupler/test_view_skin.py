@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coupler.commands.view.water_surface import shading_normals, skin
+from coupler.commands.view.water_surface import shading_normals, skin, surfaces_of_pockets
 from tests.coupler.synthetic_run import tank_mesh
 
 SIZE = (3.0, 2.0, 2.0)
@@ -107,3 +107,17 @@ def area(triangles):
             np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=1
         ).sum()
     )
+
+
+def test_each_pocket_of_air_has_the_surface_below_it_and_its_pressure():
+    """Two chambers of one tank with open air between, the larger one first, and at its ends a part of a cell."""
+    level_set = NODES[:, 2] - 0.8
+    dry = level_set >= 0.0
+    pocket = np.where(dry & (NODES[:, 0] < 0.6), 4, np.where(dry & (NODES[:, 0] > 1.4), 7, 0))
+    pressure = np.select([pocket == 4, pocket == 7], [-250.0, 1500.0], 9e9)
+    found = surfaces_of_pockets(NODES, CELLS, level_set, pocket, pressure)
+    assert [(number, held) for number, held, _ in found] == [(7, 1500.0), (4, -250.0)]
+    area = [np.linalg.norm(area_vectors(corners), axis=1).sum() for *_, corners in found]
+    assert 3.0 <= area[0] <= 4.0
+    assert 1.0 <= area[1] <= 2.0
+    assert surfaces_of_pockets(NODES, CELLS, level_set, 0 * pocket, pressure) == []

@@ -16,7 +16,7 @@ from coupler.commands.view import palette
 from coupler.commands.view.camera import frame, side_of
 from coupler.commands.view.foam import foam
 from coupler.commands.view.inside import NoInside, inside
-from coupler.commands.view.water_surface import shading_normals, skin
+from coupler.commands.view.water_surface import shading_normals, skin, surfaces_of_pockets
 
 WATER_OPACITY = 0.78
 SUN = np.array([-0.45, -0.75, 1.1])  # from the scene to the light, for a camera at azimuth -90 degree
@@ -244,7 +244,7 @@ class Scene:
         for k in range(self._pockets_drawn):
             self.plotter.remove_actor(f"pocket{k}", reset_camera=False, render=False)
             self.plotter.remove_actor(f"pocket{k}_told", reset_camera=False, render=False)
-        drawn = pockets(water)
+        drawn = surfaces_of_pockets(water.nodes, water.cells, water.level_set, water.pocket, water.pressure)
         self._pockets_drawn = min(len(drawn), MOST_POCKETS) + 1
         for k, (number, pressure, triangles) in enumerate(drawn):
             colour = palette.POCKETS[(number - 1) % len(palette.POCKETS)]
@@ -411,19 +411,6 @@ def water_surface(water, eye, tank=None, foam_over=None):
     mesh["normals"] = normals[far_first].reshape(-1, 3)
     mesh.point_data.active_normals_name = "normals"
     return mesh
-
-
-def pockets(water):
-    """Number, gauge pressure [Pa] and triangles (t, 3, 3) [m] of the water's surface below each pocket of trapped air,
-    the largest surface first; none where all air is open."""
-    if not water.pocket.any():
-        return []
-    found = skin(water.nodes, water.cells, water.level_set)
-    number = water.pocket[found.pair[: found.free]].max(axis=(1, 2))
-    corners = found.of(water.nodes)[: found.free]
-    known = [int(k) for k in np.unique(number) if k > 0]
-    known.sort(key=lambda k: -int((number == k).sum()))
-    return [(k, float(water.pressure[water.pocket == k].max()), corners[number == k]) for k in known]
 
 
 def ground(lower, upper, room_for_shadows):

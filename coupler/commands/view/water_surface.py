@@ -49,6 +49,20 @@ def skin(nodes, cells, level_set, fraction=None, tank=None):
     return Skin(pair, share, len(free))
 
 
+def surfaces_of_pockets(nodes, cells, level_set, pocket, pressure):
+    """Number, gauge pressure [Pa] and triangles (t, 3, 3) [m] of the water's surface below each pocket of trapped air,
+    the one of most triangles first; none where all air is open.
+
+    pocket (n,): number of the pocket at each node, 0: none · pressure (n,) [Pa]: at such nodes that of the pocket."""
+    if not pocket.any():
+        return []
+    found = skin(nodes, cells, level_set)
+    number = pocket[found.pair[: found.free]].max(axis=(1, 2))
+    corners = found.of(nodes)[: found.free]
+    known = sorted((int(k) for k in np.unique(number) if k > 0), key=lambda k: -int((number == k).sum()))
+    return [(k, float(pressure[pocket == k][0]), corners[number == k]) for k in known]
+
+
 def right_handed(nodes, cells):
     """The same tetrahedra, with positive volume."""
     a, b, c = np.moveaxis(nodes[cells[:, 1:]] - nodes[cells[:, :1]], 1, 0)
