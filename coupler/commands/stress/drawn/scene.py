@@ -57,13 +57,13 @@ def draw(seed: int, number: int, seconds: float = WANTED) -> Drawn:
         about["gravity"] = gravity
     table = {"case": about, **_tables(dice, place, flow, found, gravity, seconds)}
     if flow is not None:
-        _air(dice, place, found, table)
+        _air(dice, place, flow, found, table)
     still = flow is not None and flow.still and not found.tables
     files = place.files | found.files | (flow.files if flow else {})
     return Drawn(f"R{seed}-{number}", group, title, table, files, still)
 
 
-def _air(dice: Dice, place: Basin, found: Bodies, table: dict) -> None:
+def _air(dice: Dice, place: Basin, flow: Stream, found: Bodies, table: dict) -> None:
     """Trapped air in some scenes, most of them below a closed lid; drawn last, so that all others stay the same."""
     if not dice.chance(0.15):
         return
@@ -73,7 +73,8 @@ def _air(dice: Dice, place: Basin, found: Bodies, table: dict) -> None:
         water["covers"] = "multiple"
     if dice.chance(0.3):
         air["gamma"] = dice.one([1.0, 1.2])
-    if "inflow" not in water and dice.chance(0.7):
+    room = flow.level < 0.95 * place.size[2]
+    if "inflow" not in water and dice.chance(0.7) and room:
         place.table["open"] = [side for side in place.table.get("open", ["z+"]) if side != "z+"]
     if dice.chance(0.4):
         at = [
