@@ -7,9 +7,9 @@ the surface, handed from layer to layer; beyond the layers φ = ±FAR h.
 
 What is handed on is the closest polygon of a neighbour.  Where the cells are obtuse that may be some polygons away from
 the node's own, φ too large by 0.02 h to 0.15 h there, and its slope in the cells above and below the surface so far
-from upright that velocity along still water lifts it (growth of 0.005 a step).  There the nodes of the first layers
-look for their own among the polygons around the one in hand until none is closer: on a surface that is nearly flat
-over a cell, the closest of all.
+from upright that velocity along still water lifts it (growth of 0.005 a step).  There, and up to three layers of nodes
+around (between coarse and fine bricks, not inside them), the nodes of the first layers look for their own among the
+polygons around the one in hand until none is closer: on a surface that is nearly flat over a cell, the closest of all.
 """
 
 from __future__ import annotations
@@ -144,11 +144,11 @@ def _ratio(part, whole):
 
 @kernel
 def _closest_in_layers(
-    order, layer_start, triangles, owner, nodes, cells, start, around, exact, node_start, node_cells
+    order, layer_start, triangles, owner, nodes, cells, start, around, exact, obtuse, node_start, node_cells
 ):
     """Distance (N,) [m] of the nodes of `order` to the triangles, handed outward; two sweeps a layer.
 
-    exact: first layers whose nodes go on to the closest of all (`_descend`)."""
+    exact: first layers whose nodes, where `obtuse` (N,) bool, go on to the closest of all (`_descend`)."""
     n = nodes.shape[0]
     closest, best = np.full(n, -1, np.int64), np.full(n, np.inf)
     tried = np.full(triangles.shape[0], -1, np.int64)
@@ -159,7 +159,7 @@ def _closest_in_layers(
     )
     for s in range(layer_start[1], layer_start[exact + 1]):
         i = order[s]
-        if closest[i] >= 0:
+        if closest[i] >= 0 and obtuse[i]:
             best[i] = _descend(
                 nodes[i], closest[i], best[i], triangles, owner, first, cells, node_start, node_cells
             )
@@ -263,9 +263,9 @@ def redistance(topology, phi, spacing, rescale: bool):
     front[t.cells[cut]] = True
     order, start = layers_around(front, LAYERS, *t.around)
     triangles, owner = surface_triangles(cut, phi, t.nodes, t.cells)
-    exact = EXACT_LAYERS if t.is_obtuse else 0
+    exact, obtuse = (EXACT_LAYERS, t.near_obtuse) if t.is_obtuse else (0, np.zeros(0, bool))
     distance = _closest_in_layers(
-        order, start, triangles, owner, t.nodes, t.cells, *t.around, exact, t.node_start, t.node_cells
+        order, start, triangles, owner, t.nodes, t.cells, *t.around, exact, obtuse, t.node_start, t.node_cells
     )
     listed = order[start[1] :]
     far[listed] = np.copysign(np.minimum(distance[listed], farthest[listed]), phi[listed])

@@ -230,3 +230,25 @@ def test_a_run_goes_on_past_its_end(dry, tmp_path):
     assert found.checkpoint.time == pytest.approx(0.06)
     check_same(dry, path)
     assert json.loads((path / "effective.json").read_text(encoding="utf-8"))["time"]["end"] == 0.1
+
+
+SLEEPS = """\
+[[structure.column]]
+name = "far"
+foot = [6.5, 0.5, 0]
+height = 2
+drums = 2
+size = [1, 1]
+[structure.sleep]
+"""
+
+
+def test_a_run_in_which_one_column_sleeps_and_another_breaks_goes_on_bit_for_bit(tmp_path):
+    whole = begin(tmp_path / "case", DRY + SLEEPS, tmp_path / "whole")
+    stopped = tmp_path / "stopped"
+    with pytest.raises(LimitReached):
+        begin(tmp_path / "case", DRY + SLEEPS, stopped, reporter=StopAt(0.03))
+    go_on(stopped)
+    check_same(whole, stopped)
+    summary = json.loads((whole / "run.json").read_text(encoding="utf-8"))
+    assert summary["figures"]["sleep"]["asleep"] == 2

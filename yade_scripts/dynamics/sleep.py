@@ -44,6 +44,9 @@ Array = np.ndarray
 
 FALLS = 0.5
 """Share of the share up to which openings may change, and forces be out of balance, of what is about to sleep."""
+NEVER, UNKNOWN = 1e30, -1.0
+"""An opening [m] that no joint has, a time [s] that does not come; a period that was not asked for yet. (What is not
+finite cannot be saved.)"""
 ROUNDS = 30
 """Inverse iterations for the slowest mode; modes nearly as slow do no harm."""
 
@@ -102,9 +105,9 @@ class Sleep:
         self.wakes = self.falls = 0
         self.put_to_rest = 0.0
         self._sleepers: list[Sleeper] = []
-        self._reference = np.full((len(joints), 3), np.inf)
+        self._reference = np.full((len(joints), 3), NEVER)
         self._since = np.zeros(len(joints))
-        self._period = np.full(n, np.nan)
+        self._period = np.full(n, UNKNOWN)
         """Of the slowest mode of the island that each block is the first of [s]."""
         self._islands: list[Island] | None = None
         self._seen: Array | None = None
@@ -168,12 +171,12 @@ class Sleep:
     def joints_failed(self) -> None:
         """Islands are to be found anew."""
         self._islands = None
-        self._period[~self.asleep] = np.nan
+        self._period[~self.asleep] = UNKNOWN
 
     def wake_all(self, time: float) -> None:
         """Blocks are about to be moved by hand."""
         self._wake(self._sleepers, time)
-        self._reference[:] = np.inf
+        self._reference[:] = NEVER
 
     # ---- islands --------------------------------------------------------------------------------------------
 
@@ -305,9 +308,9 @@ class Sleep:
         return float(change.max())
 
     def _slowest(self, island: Island) -> float:
-        """Period [s] of its slowest mode, by inverse iteration; inf where it has none."""
+        """Period [s] of its slowest mode, by inverse iteration; NEVER where it has none."""
         first = island.rows[0]
-        if np.isnan(self._period[first]):
+        if self._period[first] == UNKNOWN:
             self._period[first] = self._period_of(island)
         return float(self._period[first])
 
@@ -318,7 +321,7 @@ class Sleep:
         springs = tangent.joint_springs(joints, m.x, m.R, points)
         factor = factors(csc_matrix(tangent.assemble(springs, len(self.asleep))[0][dofs, :][:, dofs]))
         if factor is None:
-            return np.inf
+            return NEVER
         mass, inertia = self._masses.mass[rows, None], self._masses.inertia(m.R)[rows]
         reach = m.x[rows] - m.x[rows].mean(axis=0)
         u = np.concatenate([1.0 + reach[:, ::-1] / max(np.abs(reach).max(), 1e-300), 0.0 * reach], axis=1)
@@ -337,7 +340,7 @@ class Sleep:
             return
         self._hold(sleepers, time)
         for sleeper in sleepers:
-            self._reference[sleeper.island.joints] = np.inf
+            self._reference[sleeper.island.joints] = NEVER
             self._scene.let_go(sleeper.island.rows)
         gone = {id(s) for s in sleepers}
         self._sleepers = [s for s in self._sleepers if id(s) not in gone]

@@ -11,7 +11,7 @@ from skfem.models.poisson import laplace
 
 from coupler.commands.verify.figures import columns
 from coupler.commands.verify.registry import Finding, check
-from coupler.commands.verify.scenes import DENSITY, G, box, level_at, tank
+from coupler.commands.verify.scenes import DENSITY, G, around, box, level_at, tank
 from fluid.mesh.background import box_mesh
 from fluid.numerics.solve import solve
 from yade_scripts.blocks.block import Block
@@ -23,16 +23,25 @@ from yade_scripts.dynamics.structure import Structure
 @check("P50", "a box afloat at its exact draught stays", "Archimedes: draught = s H")
 def draught():
     size, level = np.array([0.3, 0.25, 0.2]), 0.53
-    for s, n in ((0.15, 12), (0.5, 12), (0.85, 12), (0.85, 24)):
+    for s, n, finer in (
+        (0.15, 12, 0),
+        (0.5, 12, 0),
+        (0.85, 12, 0),
+        (0.85, 24, 0),
+        (0.15, 6, 1),
+        (0.85, 6, 1),
+    ):
         z = level - s * size[2] + 0.5 * size[2]
         block = Block("box", (0.49, 0.52, z), size=size, density=s * DENSITY)
         with Structure([block], gravity=(0, 0, -G)) as body:
-            c = tank((1, 1, 1), (n, n, n), level_at(level), body)
+            near = [around(block.centre, size, 0.1)] if finer else []
+            c = tank((1, 1, 1), (n, n, n), level_at(level), body, refined=near)
             depths = []
             while c.time < 1.0:
                 c.step(0.01)
                 depths.append(level - (body.centre()[0, 2] - 0.5 * size[2]))
         what = f"mean draught / H over 1 s, density ratio {s}, h = 1 m/{n}"
+        what += ", halved around the box" if finer else ""
         yield Finding(what, np.mean(depths) / size[2], s, 0.01)
 
 
@@ -44,6 +53,8 @@ def added_mass():
     for is_closed, ca in ((True, exact[0]), (False, exact[1])):
         what = f"{'closed' if is_closed else 'open'} tank, h = a/16, density ratio 0.5"
         yield Finding(what, _added_mass(0.5, 48, is_closed), ca, 0.05)
+    what = "closed tank, h = a/8, a/16 around the cube, density ratio 0.5"
+    yield Finding(what, _added_mass(0.5, 24, True, margin=0.25), exact[0], 0.05)
     coarse = [_added_mass(s, 18, True) for s in (0.01, 0.1, 0.5, 2.5, 7.8)]
     what = "h = a/6 against linear elements on a mesh that follows the cube, density ratio 0.5"
     yield Finding(what, coarse[2], linear_elements(6), 1e-4)
@@ -69,13 +80,17 @@ def linear_elements(cells: int) -> float:
     return float(g[1:] @ potential)
 
 
-def _added_mass(s: float, cells: int, closed: bool, dt: float = 1e-3, steps: int = 1) -> float:
-    """ca = g (1 - s)/a - s from the first acceleration of a unit cube in a tank of side 3 (mean of `steps` steps)."""
+def _added_mass(
+    s: float, cells: int, closed: bool, dt: float = 1e-3, steps: int = 1, margin: float | None = None
+) -> float:
+    """ca = g (1 - s)/a - s from the first acceleration of a unit cube in a tank of side 3 (mean of `steps` steps).
+    margin [m]: cells are halved up to there around the cube, None: none are."""
     block = Block("cube", (1.5, 1.5, 1.5), size=1.0, density=s * DENSITY)
     with Structure([block], gravity=(0, 0, -G)) as body:
         height, extra = (3.0, 0) if closed else (3.0 + 6.0 / cells, 2)
         fill = level_at(10.0) if closed else level_at(3.0)
-        c = tank((3, 3, height), (cells, cells, cells + extra), fill, body, rtol=1e-10)
+        near = [] if margin is None else [around((1.5, 1.5, 1.5), (1, 1, 1), margin)]
+        c = tank((3, 3, height), (cells, cells, cells + extra), fill, body, rtol=1e-10, refined=near)
         for _ in range(steps):
             c.step(dt)
         return G * (1.0 - s) / (body.velocity()[0, 2] / (steps * dt)) - s

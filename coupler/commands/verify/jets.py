@@ -14,6 +14,7 @@ from fluid.cut.bodies import ConvexBodies
 from fluid.domain.covers import WIDE_OPENINGS
 from fluid.domain.physical_domain import cut_domain
 from fluid.mesh.background import box_mesh
+from fluid.mesh.refinement import InBox, refined_mesh
 from fluid.numerics.bounded import solve_pressure
 from fluid.readings.gauges import pressure
 from fluid.step.parameters import WaterParameters
@@ -56,6 +57,10 @@ def finite_plates():
             exact = float(table["F"][row])
             yield Finding(f"force/(ρU²D), L/D = {width:g}, {n} cells over D", run.force, exact, limit)
     for row, width in enumerate(table["L_over_D"][:3]):
+        found, exact = jet(width, 4, finer=1.0).force, float(table["F"][row])
+        what = f"force/(ρU²D), L/D = {width:g}, 4 cells over D, 8 up to D around the plate"
+        yield Finding(what, found, exact, LIMITS[8])
+    for row, width in enumerate(table["L_over_D"][:3]):
         for at, column in ((0.75, "p_075"), (0.9, "p_09")):
             found, exact = float(runs[8, width].pressure[PLACES.index(at)]), float(table[column][row])
             what = f"pressure/(ρU²/2) at {at:g} of the half width, L/D = {width:g}, 8 cells"
@@ -84,16 +89,24 @@ def endless_plates():
             yield Finding(what, jet(12.0, n, angle=angle).force / np.sin(np.radians(angle)), 1.0, limit)
 
 
-def jet(width: float, n: int, angle: float = 90.0, courant: float = 1.0, suction: str = "bounded") -> Jet:
+def jet(
+    width: float,
+    n: int,
+    angle: float = 90.0,
+    courant: float = 1.0,
+    suction: str = "bounded",
+    finer: float = 0.0,
+) -> Jet:
     """A slug of water against a plate of the given width [D], n cells over D, in a slice of one cell.
 
-    angle [degrees] between jet and plate · courant: of the step."""
-    water, front, along = _start(width, n, angle, courant, suction)
+    angle [degrees] between jet and plate · courant: of the step · finer [D]: how far around the plate cells are
+    halved."""
+    water, front, along = _start(width, n, angle, courant, suction, finer)
     normal = np.array([np.sin(np.radians(angle)), 0.0, -np.cos(np.radians(angle))])
     places = np.array([front + s * f * 0.5 * width * along for f in PLACES for s in (1.0, -1.0)])
-    depth, total, forces, pressures, lowest = water.mesh.spacing, 0.0, 0.0, np.zeros(len(PLACES)), 0.0
+    depth, total, forces, pressures, lowest = 1.0 / n, 0.0, 0.0, np.zeros(len(PLACES)), 0.0
     while water.time < STEADY[1]:
-        problem = water.predict(min(water.stable_step(), courant * water.mesh.spacing))
+        problem = water.predict(min(water.stable_step(), courant * water.mesh.finest))
         found = solve_pressure(problem, 1e-9)
         water.correct(problem, found.x, found.parting)
         load = problem.other_load - (problem.coupling.T @ (found.x + problem.known)).reshape(-1, 6)
@@ -106,12 +119,12 @@ def jet(width: float, n: int, angle: float = 90.0, courant: float = 1.0, suction
     return Jet(forces / (total * DENSITY * depth), pressures / (total * head), lowest / head)
 
 
-def _start(width: float, n: int, angle: float, courant: float, suction: str):
+def _start(width: float, n: int, angle: float, courant: float, suction: str, finer: float):
     """The water, the middle (3,) of the front of the plate, and the direction (3,) along the plate."""
     cell, turn = 1.0 / n, np.radians(90.0 - angle)
     reach = np.array([0.5 * width * np.sin(turn), 0.5 * width * np.cos(turn)])
-    # the front of the plate lies 0.3 of a cell beyond a node
-    front = np.array([0.3 * cell, 0.5 * cell, 0.0])
+    # the front of the plate lies 0.3 of a cell, of those there, beyond a node
+    front = np.array([0.3 * cell / (2.0 if finer else 1.0), 0.5 * cell, 0.0])
     margin = 2.5 if width < 8.0 else 1.0
     low = [-(SLUG + 1.5 + reach[0]), 0.0, -(reach[1] + margin)]
     high = [reach[0] + 3.0, cell, reach[1] + margin]
@@ -119,6 +132,9 @@ def _start(width: float, n: int, angle: float, courant: float, suction: str):
         np.sign(e) * np.ceil(np.abs(e) / cell - 1e-9) * cell for e in (np.array(low), np.array(high))
     )
     mesh = box_mesh(low, high, cell)
+    if finer:
+        beside = np.array([finer, cell, 0.5 * width + finer])
+        mesh = refined_mesh(mesh, [InBox(tuple(front - beside), tuple(front + beside), 1)])
     rotation = np.array(
         [[np.cos(turn), 0.0, np.sin(turn)], [0.0, 1.0, 0.0], [-np.sin(turn), 0.0, np.cos(turn)]]
     )

@@ -9,12 +9,16 @@ from scipy.spatial.transform import Rotation
 
 from coupler.commands.verify.registry import Finding, check
 from coupler.commands.verify.scenes import DENSITY, G, box, level_at, tank
+from fluid.mesh.refinement import InBox
 
 WEIGHT = DENSITY * G
 STEPS, STEP = 1000, 0.01
 LARGEST = 1e-7
 """Speed [m/s] that counts as rest."""
 SEEDS = (1, 2)
+AROUND = InBox((0.3, 0.3, 0.3), (0.6, 0.6, 1.0), 1)
+FINER = "cells halved across the block"
+"""Half of the block and of the surface lie in finer cells."""
 
 
 @check("P30", "water at rest in a tank with fixed cut blocks", "Archimedes; p = rho g (h - z)")
@@ -30,14 +34,17 @@ def at_rest():
         sideways = np.abs(record.load[0, [0, 1, 3, 4, 5]]).max() / buoyancy
         yield Finding(f"{name}: other forces and moments / buoyancy", sideways, 0.0, 1e-6, False)
         yield from _stillness(name, c, level)
+        c, record = _rest([box((0.5, 0.45, 0.4), size, turn)], level, "single", 4, [AROUND])
+        yield Finding(f"{name}, {FINER}: lift / buoyancy", record.load[0, 2] / buoyancy, 1.0, 1e-6)
+        yield from _stillness(f"{name}, {FINER}", c, level)
     for covers in ("single", "multiple"):
         for kind in SCENES:
             yield from _anywhere(kind, covers)
 
 
-def _rest(solids, level: float, covers: str, cells: int = 6):
+def _rest(solids, level: float, covers: str, cells: int = 6, refined=()):
     """A tank of 1 m, `cells` along each edge, after STEPS steps; and the record of the last one."""
-    c = tank((1, 1, 1), (cells,) * 3, level_at(level), solids=solids, covers=covers)
+    c = tank((1, 1, 1), (cells,) * 3, level_at(level), solids=solids, covers=covers, refined=refined)
     for _ in range(STEPS):
         record = c.step(STEP)
     return c, record

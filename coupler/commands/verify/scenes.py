@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from coupler.step.coupled_step import CoupledStepper
 from coupler.step.immersion import Immersion
 from fluid.domain.covers import OPENINGS
 from fluid.mesh.background import box_mesh
+from fluid.mesh.refinement import InBox, refined_mesh
 from fluid.step.parameters import WaterParameters
 from fluid.step.water import Water
 
@@ -30,6 +31,12 @@ def box(centre, size, rotation=None) -> tuple[np.ndarray, tuple]:
     return np.asarray(centre) + (0.5 * np.asarray(size) * BOX) @ turn.T, BOX_FACES
 
 
+def around(centre, size, margin: float, levels: int = 1) -> InBox:
+    """Finer cells up to a margin [m] around an upright box."""
+    half = 0.5 * np.asarray(size, float) + margin
+    return InBox(tuple(np.asarray(centre) - half), tuple(np.asarray(centre) + half), levels)
+
+
 def tank(
     size,
     cells,
@@ -42,13 +49,15 @@ def tank(
     covers: str = "single",
     openings: str = "all",
     split: str = "kuhn",
+    refined: Sequence = (),
     **parameters,
 ) -> CoupledStepper:
     """Water in [0, size] on cells (nx, ny, nz) with blocks and fixed solids; is_open, is_smooth: see `Water`;
-    split: see `box_mesh`; openings: of multiple covers, as in a case.
+    split: see `box_mesh`; openings: of multiple covers, as in a case; refined: regions of `fluid.mesh.refinement`.
 
     fill: as in `Water`, or boxes (lower (3,), upper (3,)) filled like those of a case, which end at walls."""
     mesh = box_mesh(np.zeros(3), size, np.asarray(size, float) / np.asarray(cells), split=split)
+    mesh = refined_mesh(mesh, refined) if refined else mesh
     immersion = Immersion(mesh, structure, list(solids), covers, connection=OPENINGS[openings])
     parameters = WaterParameters(**({"density": DENSITY, "gravity": G} | parameters))
     if not callable(fill):

@@ -9,6 +9,7 @@ from coupler.commands.verify.curves import Curve, Figure, Panel
 from coupler.commands.verify.figures import columns
 from coupler.commands.verify.registry import Finding, check
 from coupler.commands.verify.scenes import DENSITY, G, column, tank
+from fluid.mesh.refinement import InBox
 from fluid.readings import gauges
 
 WEIGHT = DENSITY * G
@@ -18,8 +19,12 @@ WEIGHT = DENSITY * G
 def sloshing():
     table = columns("sloshing_linear")
     omega, curves = table["omega"][0], []
-    for name, share in (("default step", 1.0), ("half the default step", 0.5)):
-        t, mode = _slosh(omega, share)
+    for name, share, coarse in (
+        ("default step", 1.0, 1),
+        ("half the default step", 0.5, 1),
+        ("cells twice as large, halved at the surface", 1.0, 2),
+    ):
+        t, mode = _slosh(omega, share, coarse)
         found, damping = _fit(t, mode, omega)
         loss = 1.0 - np.exp(-damping * found * t[-1])
         curves.append(Curve(name, "computed", t, 1e3 * mode))
@@ -34,14 +39,17 @@ AMPLITUDE = 0.005
 """[m]"""
 
 
-def _slosh(omega: float, share: float):
-    """Times (n,) [s] and the amplitude of the first mode (n,) [m] over five periods; steps `share` of the default."""
-    n, amplitude = 32, AMPLITUDE
+def _slosh(omega: float, share: float, coarse: int = 1):
+    """Times (n,) [s] and the amplitude of the first mode (n,) [m] over five periods; steps `share` of the default;
+    coarse: cells are so many times as large below 0.125 m under the surface."""
+    n, amplitude = 32 // coarse, AMPLITUDE
+    high = 21 if coarse == 1 else 11
     c = tank(
-        (1, 2 / n, 21 / n),
-        (n, 2, 21),
+        (1, 2 / n, high / n),
+        (n, 2, high),
         lambda x: x[:, 2] - 0.5 - amplitude * np.cos(np.pi * x[:, 0]),
         rtol=1e-7,
+        refined=[] if coarse == 1 else [InBox((0, 0, 0.375), (1, 2 / n, high / n), 1)],
     )
     end = 5 * 2 * np.pi / omega
     dt = end / np.ceil(end / (share * c.water.stable_step()))
