@@ -91,6 +91,15 @@ class Building(Section):
         description="turn about the upright axis through its middle, counter-clockwise",
         examples=["30 deg"],
     )
+    pad: Annotated[float, InSI("m", ge=0)] = Field(
+        0.0, description='with on = "terrain": how far its footing reaches beyond the walls'
+    )
+    outline: tuple[tuple[Length, Length], ...] | None = Field(
+        None,
+        description="corners of a footprint that is no rectangle, x and y from lower, within size; walls follow it as "
+        "rings of convex strips, named NAME-wall0n0 by storey and edge; without openings",
+        examples=[[[0, 0], [9, 0], [9, 4], [5, 4], [5, 8], [0, 8]]],
+    )
     opening: tuple[Opening, ...] = Field((), description="doors and windows")
 
 
@@ -210,8 +219,8 @@ class TownRule(Section):
 
 
 class Town(Section):
-    """Houses on the terrain from a file of footprints: each is a building with four walls, floors and a roof on its
-    smallest rectangle. They are called NAME-0, NAME-1, ... in the order of the file, or by name_from."""
+    """Houses on the terrain from a file of footprints: each is a building with walls, floors and a roof on its smallest
+    rectangle or along its outline. They are called NAME-0, NAME-1, ... in the order of the file, or by name_from."""
 
     name: Name = Field("town", description="beginning of the names of its houses")
     path: Annotated[str, Field(min_length=1)] = Field(
@@ -242,6 +251,12 @@ class Town(Section):
     )
     density: Density | None = Field(None, description="mass per volume; absent: structure.density")
     material: Name = Field("block", description="a name that contact.pair and joints.pair may go by")
+    pad: Annotated[float, InSI("m", ge=0)] = Field(0.0, description="how far footings reach beyond the walls")
+    shape: Literal["rectangle", "outline"] = Field(
+        "rectangle",
+        description="rectangle: houses stand on the smallest rectangle around their footprint, which must fill 70 % of "
+        "it; outline: those that fill less than 98 % follow their footprint, as rings of convex strips",
+    )
     least_area: Annotated[float, InSI("m2", ge=0)] = Field(
         0.0, description="smaller footprints, sheds and bins, are left out"
     )

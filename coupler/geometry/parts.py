@@ -95,14 +95,14 @@ def _made_from(case: Case, spec, make, driven: dict) -> list:
         spec = on_ground(case, spec)
     blocks = make(spec, common)
     if getattr(spec, "turn", 0.0):
-        blocks = _turned(blocks, np.array(spec.lower) + 0.5 * np.array(spec.size), spec.turn)
+        blocks = turned_about(blocks, np.array(spec.lower) + 0.5 * np.array(spec.size), spec.turn)
     return [
         b.changed(driven=True, fixed=False, velocity=np.array(driven[b.name])) if b.name in driven else b
         for b in blocks
     ]
 
 
-def _turned(blocks: list, middle, angle: float) -> list:
+def turned_about(blocks: list, middle, angle: float) -> list:
     """The blocks turned about the upright axis through a point (3,) [m], counter-clockwise [rad]."""
     c, s = np.cos(angle), np.sin(angle)
     turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
@@ -134,6 +134,8 @@ def _wall(spec, common: dict) -> list:
 
 
 def _building(spec, common: dict) -> list:
+    if spec.outline is not None:
+        return _along_outline(spec, common)
     from yade_scripts.blocks.generators.building import Building, building_blocks
 
     lower, size = np.array(spec.lower), np.array(spec.size)
@@ -154,6 +156,51 @@ def _building(spec, common: dict) -> list:
             **common,
         )
     )
+
+
+def _along_outline(spec, common: dict) -> list:
+    """A building whose walls follow an outline."""
+    from yade_scripts.blocks.generators.ring import Ring, ring_blocks
+
+    return ring_blocks(
+        Ring(
+            outline=outline_of(spec),
+            base=spec.lower[2],
+            height=spec.size[2],
+            thickness=spec.wall_thickness,
+            block=spec.block[0],
+            course=spec.block[1],
+            floor_thickness=spec.floor_thickness or spec.wall_thickness,
+            storeys=spec.storeys,
+            roof=spec.roof,
+            name=spec.name,
+            **common,
+        )
+    )
+
+
+def outline_of(spec) -> np.ndarray:
+    """Corners (k, 2) [m] of the footprint of a building with an outline, counter-clockwise, before its turn. Raises
+    BlockError."""
+    from coupler.geometry.footprints import area_of
+    from yade_scripts.blocks.polyhedra import BlockError
+
+    corners = np.array(spec.outline, float)
+    size = np.array(spec.size[:2])
+    if len(corners) < 3 or not abs(area_of(corners)) > 0.0:
+        raise BlockError(f"building '{spec.name}': outline: {len(corners)} corners without an area")
+    if (corners < -OUTSIDE * size).any() or (corners > (1.0 + OUTSIDE) * size).any():
+        raise BlockError(
+            f"building '{spec.name}': outline: its corners lie between 0 and size ({size[0]:g} x {size[1]:g} m)"
+        )
+    if spec.opening:
+        raise BlockError(f"building '{spec.name}': openings are for rectangles; leave outline or them out")
+    corners = corners if area_of(corners) > 0.0 else corners[::-1]
+    return corners + np.array(spec.lower[:2])
+
+
+OUTSIDE = 1e-6
+"""Share of size by which a corner of an outline may lie beside it: the digits of a file."""
 
 
 def _opening(spec, opening):

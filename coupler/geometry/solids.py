@@ -62,7 +62,15 @@ def _footings(case: Case) -> Iterator[tuple[KeyPath, object]]:
         turn = turned(Rotation(axis=(0.0, 0.0, 1.0), angle=spec.turn))
         name, density = f"{spec.name}-footing", spec.density or case.structure.density
         more = {"density": density, "material": "ground", "group": name, "fixed": True}
-        yield path, Block(name, centre, size=size, rotation=turn, **more)
+        if getattr(spec, "outline", None) is None or spec.pad > 0.0:
+            yield path, Block(name, centre, size=size, rotation=turn, **more)
+            continue
+        from coupler.geometry.parts import outline_of, turned_about
+        from yade_scripts.blocks.generators.ring import prisms
+
+        low, high = centre[2] - 0.5 * size[2], centre[2] + 0.5 * size[2]
+        for block in turned_about(prisms(name, outline_of(spec), low, high, **more), centre, spec.turn):
+            yield path, block
 
 
 def _as_solid(path: KeyPath, block) -> FixedSolid:

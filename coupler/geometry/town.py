@@ -18,6 +18,8 @@ Array = np.ndarray
 
 FILLED = 0.7
 """Least share of its rectangle that a footprint must fill to be built on it."""
+RECTANGLE = 0.98
+"""Share from which a footprint is a rectangle where outlines are asked for."""
 
 
 OVERLAP = 1e-5
@@ -87,26 +89,36 @@ def _house(name: str, town, footprint: Footprint, corners: Array) -> Building | 
     if area_of(corners) < town.least_area:
         return None
     middle, size, turn, share = best_rectangle(corners)
+    if town.shape == "outline" and share < RECTANGLE:
+        low = corners.min(axis=0)
+        outline = tuple(map(tuple, (corners - low).tolist()))
+        return _house_on(name, town, footprint, low, np.ptp(corners, axis=0), outline=outline)
     if share < FILLED:
         x, y = middle
         raise FootprintError(
             f"{name}: feature {footprint.number} at ({x:.5g}, {y:.5g}) m fills {share:.0%} of its rectangle; "
-            f"only shapes that fill {FILLED:.0%} are built on it: cut it into rectangles"
+            f'only shapes that fill {FILLED:.0%} are built on it: write shape = "outline", or cut it into rectangles'
         )
+    return _house_on(name, town, footprint, middle - 0.5 * size, size, turn=turn)
+
+
+def _house_on(name: str, town, footprint: Footprint, lower: Array, size: Array, **more) -> Building:
+    """The building of a footprint in a box, lower (2,) and size (2,) [m]; more: its turn or its outline."""
     rules = _by_rules(town, footprint.attributes)
     storeys = _storeys(name, town, footprint, rules["storeys"])
     return Building(
         name=_name(name, town, footprint),
         on="terrain",
-        lower=(*(middle - 0.5 * size).tolist(), town.above_ground),
+        lower=(*lower.tolist(), town.above_ground),
         size=(*size.tolist(), storeys * rules["storey_height"]),
-        turn=turn,
+        pad=town.pad,
         storeys=storeys,
         wall_thickness=rules["wall_thickness"],
         floor_thickness=rules["floor_thickness"],
         block=rules["block"],
         density=rules["density"],
         material=rules["material"],
+        **more,
     )
 
 
@@ -177,25 +189,39 @@ def _idle_rules(path, town) -> Iterator[tuple[tuple, str]]:
 
 def _overlapping(case: Case, path, town) -> Iterator[tuple[tuple, str]]:
     """Two houses that share ground."""
-    from coupler.geometry.bodies import Body, overlap_depth, turned
+    from coupler.geometry.bodies import overlap_depth
 
     houses = houses_of(case, town)
-    bodies = []
-    for house in houses:
-        centre = np.array([*np.add(house.lower[:2], 0.5 * np.array(house.size[:2])), 0.0])
-        turn = turned(Rotation(axis=(0.0, 0.0, 1.0), angle=house.turn))
-        bodies.append(Body.box(centre, [*house.size[:2], 1e3], turn))
-    for j, other in enumerate(bodies):
+    bodies = [_plan_of(house) for house in houses]
+    for j, others in enumerate(bodies):
         for i in range(j):
-            depth = overlap_depth(bodies[i], other, 0.0)
+            depth, other = max(
+                ((overlap_depth(own, other, 0.0), other) for own in bodies[i] for other in others),
+                key=lambda found: found[0],
+            )
             if depth > OVERLAP * min(houses[i].size[:2]):
                 x, y = other.vertices.mean(axis=0)[:2]
                 yield (
                     path,
                     f"'{houses[j].name}' at ({x:.5g}, {y:.5g}) m overlaps '{houses[i].name}' by {depth:.3g} m "
-                    "(rectangles around the footprints): take one of them out, or join them",
+                    "(rectangles around footprints, or their outlines): take one of them out, or join them",
                 )
                 return
+
+
+def _plan_of(house: Building) -> list:
+    """Tall bodies over the footprint of a house: its box, or convex pieces of its outline."""
+    from coupler.geometry.bodies import Body, turned
+
+    if house.outline is not None:
+        from coupler.geometry.parts import outline_of
+        from yade_scripts.blocks.generators.ring import prisms
+
+        return [Body.of_block(block) for block in prisms(house.name, outline_of(house), -500.0, 500.0)]
+    centre = np.array([*np.add(house.lower[:2], 0.5 * np.array(house.size[:2])), 0.0])
+    return [
+        Body.box(centre, [*house.size[:2], 1e3], turned(Rotation(axis=(0.0, 0.0, 1.0), angle=house.turn)))
+    ]
 
 
 def _in_water(case: Case, path, town) -> Iterator[tuple[tuple, str]]:

@@ -65,14 +65,14 @@ def _halved(mesh: Tetrahedra, wanted, depth: int) -> Tetrahedra:
     order = np.argsort(root, kind="stable")
     cells, reached = cells[order], reached[order]
     first = _first_seen(cells, len(nodes))
-    number = np.empty(len(nodes), np.int64)
-    number[first] = np.arange(len(nodes))
+    number = np.full(len(nodes), -1)
+    number[first] = np.arange(len(first))
     return Tetrahedra(nodes[first], lattice[first], number[cells], reached)
 
 
 @kernel
 def _first_seen(cells, n):
-    """Nodes (n,) in the order in which the cells name them."""
+    """Nodes (k,), of n, in the order in which the cells name them; those of no cell are left out."""
     out, seen, k = np.empty(n, np.int64), np.zeros(n, np.bool_), 0
     for e in range(cells.shape[0]):
         for a in range(4):
@@ -81,7 +81,7 @@ def _first_seen(cells, n):
                 seen[i] = True
                 out[k] = i
                 k += 1
-    return out
+    return out[:k]
 
 
 @kernel

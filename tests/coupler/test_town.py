@@ -5,12 +5,15 @@ import re
 
 import numpy as np
 import pytest
+from scipy.spatial import ConvexHull
 
 from coupler.checks.read_case import load
 from coupler.geometry.footprints import best_rectangle, read_footprints
 from coupler.geometry.parts import parts_of
 from coupler.geometry.solids import solids_of
 from coupler.program.errors import BadCase
+from coupler.run.clock import Clock
+from coupler.scene.build import build
 
 CASE = """
 [case]
@@ -161,3 +164,61 @@ def test_footprints_that_cannot_be_houses_are_refused(houses, sets, reported, tm
     with pytest.raises(BadCase) as error:
         loaded(tmp_path, *sets, houses=houses)
     assert re.search(reported, "\n".join(error.value.lines)), error.value.lines
+
+
+# ---------------------------------------------------------------- outlines and pads
+
+L = np.array([[0, 0], [9, 0], [9, 4], [5, 4], [5, 8], [0, 8]], float)
+
+
+OUTLINE = 'structure.town[0].shape="outline"'
+
+
+def placed(shape, middle=(30.0, 15.0), degrees=0.0):
+    a = np.radians(degrees)
+    turn = np.array([[np.cos(a), -np.sin(a)], [np.sin(a), np.cos(a)]])
+    corners = (np.array(shape) - np.mean(shape, axis=0)) @ turn.T + middle + [1000.0, 2000.0]
+    return [*corners.tolist(), corners[0].tolist()]
+
+
+@pytest.mark.parametrize("degrees", [0.0, 25.0])
+def test_footprint_that_is_no_rectangle_becomes_a_ring_of_walls_and_slabs(tmp_path, degrees):
+    """An L: walls of 0.4 m along its outline, 3 m high with a slab of 0.4 m over all of it; nothing overlaps, and all
+    faces between blocks are joined."""
+    case = loaded(tmp_path, OUTLINE, houses=[feature(placed(L, degrees=degrees), id="L1", built="brick")])
+    blocks = [block for part in parts_of(case) for block in part.blocks]
+    plan, length = 56.0, 34.0
+    wall = plan - (plan - 0.4 * length + 0.16 * 4)  # inside: five corners take t², one gives it back
+    volume = sum(ConvexHull(b.world_vertices()).volume for b in blocks)
+    assert volume == pytest.approx(plan * 0.4 + wall * 2.6, rel=1e-6)
+    assert {re.sub(r"(-\d+)+$", "", b.name) for b in blocks} == {
+        *(f"L1-wall0n{e}" for e in range(6)),
+        "L1-roof0",
+    }
+    footings = [s for s in solids_of(case) if s.name.startswith("L1-footing")]
+    assert sum(ConvexHull(s.vertices[:, :2]).volume for s in footings) == pytest.approx(plan, rel=1e-6)
+    structure = build(case, Clock()).coupling.structure
+    try:
+        assert len(structure.joints) > len(blocks)
+    finally:
+        structure.close()
+
+
+def test_wall_that_leaves_no_room_is_refused_with_the_edge(tmp_path):
+    houses = [feature(placed(L), id="L1", built="brick")]
+    with pytest.raises(BadCase, match="'L1': no room between walls of 3 m at the edge from"):
+        loaded(
+            tmp_path,
+            OUTLINE,
+            "structure.town[0].wall_thickness=3",
+            "structure.town[0].floor_thickness=0.4",
+            houses=houses,
+        )
+
+
+def test_footing_reaches_beyond_the_walls_as_a_pad(tmp_path):
+    case = loaded(
+        tmp_path, "structure.town[0].pad=1.5", houses=[feature(ring((30, 15), (8, 6)), id="a", built="brick")]
+    )
+    (footing,) = solids_of(case)
+    np.testing.assert_allclose(np.ptp(footing.vertices, axis=0)[:2], [11, 9])

@@ -144,3 +144,17 @@ def test_water_at_rest_stays_so_across_levels(covers):
     assert force[0, 2] == pytest.approx(9810.0 * 0.3 * 0.3 * 0.2, rel=1e-6)
     assert force[1, 2] == pytest.approx(9810.0 * 0.03 * 0.5 * (0.43 - 0.15), rel=1e-6)
     assert np.abs(force[:, :2]).max() < 1e-3
+
+
+def test_island_that_rises_through_the_lid_may_have_a_finer_shore():
+    """Columns of land at its rim have nodes and no cells: bisection once took them for nodes of some."""
+
+    def bed(x, y):
+        return 3.0 - np.hypot(x - 6.3, y - 6.1)
+
+    fitted = fitted_mesh((0, 0, 0), (12, 12, 1.5), 1.0, bed)
+    lone = np.setdiff1d(np.arange(len(fitted.mesh.nodes)), fitted.mesh.cells)
+    assert len(lone) > 0, "the test is about nodes without cells"
+    mesh = refined_mesh(fitted.mesh, [OnBed(bed, -0.5, 1.0, 1.0, 1)], fitted.lattice)
+    assert len(mesh.cells) > len(fitted.mesh.cells)
+    assert mesh.cell_volume.sum() == pytest.approx(fitted.mesh.cell_volume.sum())

@@ -59,10 +59,14 @@ def on_ground(case, spec):
 
 def footing_box(case, spec) -> tuple[Array, Array]:
     """Centre (3,) and size (3,) [m] of the footing of a table that stands on the terrain, turned as it is."""
-    low, high = ground_under(case.tank, corners_of(spec.lower, spec.size, spec.turn))
+    pad = getattr(spec, "pad", 0.0)
+    low, _ = ground_under(
+        case.tank, corners_of(np.array(spec.lower[:2]) - pad, np.array(spec.size[:2]) + 2 * pad, spec.turn)
+    )
+    _, high = ground_under(case.tank, corners_of(spec.lower, spec.size, spec.turn))
     top, bottom = high + spec.lower[2], low - INTO_GROUND * case.tank.cell
     centre = [spec.lower[0] + 0.5 * spec.size[0], spec.lower[1] + 0.5 * spec.size[1], 0.5 * (top + bottom)]
-    return np.array(centre), np.array([spec.size[0], spec.size[1], top - bottom])
+    return np.array(centre), np.array([spec.size[0] + 2 * pad, spec.size[1] + 2 * pad, top - bottom])
 
 
 def ground_surface(case):
