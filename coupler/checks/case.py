@@ -199,10 +199,12 @@ def _outputs(case: Case) -> Iterator[Problem]:
 
 
 def _structure_sections(case: Case) -> Iterator[Problem]:
-    if not any(True for _ in recipes(case)):
+    if not case.structure.town and not any(
+        True for _ in recipes(case)
+    ):  # a town without houses says why itself
         yield (
             ("structure",),
-            "no block: write [[structure.block]], .wall, .building, .column, .arch, .rubble, .file or .drawing in "
+            "no block: write [[structure.block]], .wall, .building, .column, .arch, .rubble, .file, .drawing or .town in "
             "double brackets",
         )
     start, ramp = case.structure.start, case.structure.ramp

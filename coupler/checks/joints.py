@@ -80,6 +80,8 @@ def _names(case: Case, parts: list[Part]) -> list[str]:
 
     blocks = [block for part in parts for block in part.blocks] + obstacle_blocks(case)
     found = [name for b in blocks for name in (b.group, b.name, b.material) if name]
+    for town in case.structure.town:  # whose houses may be missing for another reason, reported with it
+        found += [name for name in (town.name, town.material, *(rule.material for rule in town.rule)) if name]
     return list(
         dict.fromkeys([*found, *(n for p in planes_of(case) if p.bonds for n in (p.name, p.material))])
     )

@@ -286,6 +286,12 @@ def _levels(case: Case, path: KeyPath, spec) -> Iterator[Problem]:
             f"{spec.height:g} m breaks at once on a depth of {_depth(case, spec):.4g} m; "
             f"at most {HIGHEST_WAVE:g} of it",
         )
+    elif _kind(spec) in ("solitary", "n-wave") and spec.level + spec.height > top:
+        yield (
+            (*path, "height"),
+            f"its crest reaches z = {spec.level + spec.height:g} m, above the top of the tank ({top:g} m) and "
+            f"of its sides: take tank.upper[2] = {np.ceil(spec.level + 1.5 * spec.height):g}, or a lower wave",
+        )
 
 
 def _tide(case: Case, path: KeyPath, sea, bed: float, top: float) -> Iterator[Problem]:

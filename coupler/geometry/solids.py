@@ -65,7 +65,8 @@ def _footings(case: Case) -> Iterator[tuple[KeyPath, object]]:
         if getattr(spec, "outline", None) is None or spec.pad > 0.0:
             yield path, Block(name, centre, size=size, rotation=turn, **more)
             continue
-        from coupler.geometry.parts import outline_of, turned_about
+        from coupler.geometry.outlines import outline_of
+        from coupler.geometry.parts import turned_about
         from yade_scripts.blocks.generators.ring import prisms
 
         low, high = centre[2] - 0.5 * size[2], centre[2] + 0.5 * size[2]

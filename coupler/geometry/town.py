@@ -214,7 +214,7 @@ def _plan_of(house: Building) -> list:
     from coupler.geometry.bodies import Body, turned
 
     if house.outline is not None:
-        from coupler.geometry.parts import outline_of
+        from coupler.geometry.outlines import outline_of
         from yade_scripts.blocks.generators.ring import prisms
 
         return [Body.of_block(block) for block in prisms(house.name, outline_of(house), -500.0, 500.0)]

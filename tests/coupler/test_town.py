@@ -222,3 +222,14 @@ def test_footing_reaches_beyond_the_walls_as_a_pad(tmp_path):
     )
     (footing,) = solids_of(case)
     np.testing.assert_allclose(np.ptp(footing.vertices, axis=0)[:2], [11, 9])
+
+
+def test_ground_with_a_hole_is_the_only_mistake_that_is_reported(tmp_path):
+    """Without ground there are no houses, but the materials of their rules have names all the same."""
+    loaded(tmp_path, 'joints.pair=[{between=["timber","timber"], strength="1 kPa"}]')
+    rows = (tmp_path / "ground.csv").read_text().splitlines()
+    (tmp_path / "ground.csv").write_text("\n".join([*rows[:100], *rows[101:]]) + "\n")
+    with pytest.raises(BadCase) as error:
+        load(tmp_path, ('joints.pair=[{between=["timber","timber"], strength="1 kPa"}]',))
+    assert len(error.value.lines) == 1
+    assert "holes (no data)" in error.value.lines[0]

@@ -269,6 +269,17 @@ def test_a_record_that_rises_above_the_tank_is_refused(tmp_path):
     assert any("above the top of the tank" in line for line in reported({"inflow": [inflow]}))
 
 
+@pytest.mark.parametrize("kind", [{"kind": "solitary", "crest": 2}, {"kind": "n-wave", "middle": 2}])
+def test_a_wave_higher_than_the_sides_is_refused(kind):
+    """Still water of 0.8 m in a tank of 1 m; half of the depth does not break, but runs over."""
+    wave = {"side": "x-", "level": 0.8, "height": 0.4, **kind}
+    found = reported({"fill": [], "inflow": [wave]})
+    assert any("its crest reaches z = 1.2 m, above the top of the tank (1 m)" in line for line in found), (
+        found
+    )
+    assert not reported({"fill": [], "inflow": [wave | {"height": 0.15}]})
+
+
 def test_columns_of_a_record_may_stand_in_any_order(tmp_path):
     path = tmp_path / "r.csv"
     path.write_text("# a wave\nlevel, velocity, time\n1.0, 2.0, 0\n1.5, 2.5, 3\n", encoding="utf-8")
