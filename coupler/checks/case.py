@@ -204,8 +204,8 @@ def _structure_sections(case: Case) -> Iterator[Problem]:
     ):  # a town without houses says why itself
         yield (
             ("structure",),
-            "no block: write [[structure.block]], .wall, .building, .column, .arch, .rubble, .file, .drawing or .town in "
-            "double brackets",
+            "no block: write [[structure.block]], .wall, .building, .column, .arch, .rubble, .file, .drawing or .town "
+            "in double brackets",
         )
     start, ramp = case.structure.start, case.structure.ramp
     if (start == "ramp") != (ramp is not None):
