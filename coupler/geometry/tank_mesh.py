@@ -180,7 +180,15 @@ def tank_places(case: Case) -> Iterator[Problem]:
 
 
 def mesh_remarks(tank: Tank) -> Iterator[str]:
-    """Cells of a file on which the flow was not tried: thinner, or less alike in size, than in its tests."""
+    """Cells of a file on which the flow was not tried: thinner, or less alike in size, than in its tests; land that
+    rises through the top of the tank."""
+    if tank.ground is not None and fitted_of(tank).lowered:
+        reach = tank.upper[2] - 0.5 * fitted_of(tank).layer
+        yield (
+            f"the ground rises through the top of the tank: where it lies above z = {reach:.4g} m the rim of the mesh "
+            f"is cut down to a cell below the top ({tank.upper[2]:g} m), a moat for water that climbs so high; raise "
+            "tank.upper[2] if it may"
+        )
     if tank.mesh is None:
         return
     from fluid.mesh.background import CORNERS_OF_FACE

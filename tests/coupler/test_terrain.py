@@ -7,7 +7,7 @@ import pytest
 
 from coupler.case.terrain import Terrain
 from coupler.checks.read_case import load
-from coupler.geometry.tank_mesh import bed_along, mean_bed
+from coupler.geometry.tank_mesh import bed_along, mean_bed, mesh_remarks
 from coupler.geometry.terrain.bed_mesh import fitted_of
 from coupler.geometry.terrain.grid import TerrainError
 from coupler.geometry.terrain.grids import read_grid
@@ -245,6 +245,14 @@ def test_terrain_that_does_not_fit_is_refused(sets, reported, tmp_path):
     with pytest.raises(BadCase) as error:
         made(tmp_path, *sets)
     assert re.search(reported, "\n".join(error.value.lines)), error.value.lines
+
+
+def test_land_that_rises_through_the_top_is_remarked_with_the_height_that_water_may_reach(tmp_path):
+    """Its rim has no full cell below the top; water there would find the bed cut down."""
+    assert not list(mesh_remarks(made(tmp_path, "tank.upper=[20, 12, 9]").tank))
+    case = made(tmp_path, "tank.upper=[20, 12, 1]", "water.inflow[0].level=0")
+    (told,) = mesh_remarks(case.tank)
+    assert "rises through the top of the tank: where it lies above z = 0.5" in told
 
 
 def test_hole_under_the_tank_is_refused_with_its_place(tmp_path):
