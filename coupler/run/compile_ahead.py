@@ -39,7 +39,7 @@ def compile_ahead(case: Case, tell: Callable[[str], object]) -> None:
         return
     tell(
         f"compiling the numerical kernels ({', '.join(wanted)}), once for this version of the program: "
-        f"{len(chains)} processes on {cores} cores, less than a minute"
+        f"{len(chains)} processes on {cores} cores, a minute or more"
     )
     began, before = time.monotonic(), _children_seconds()
     failed = _compile(chains)
