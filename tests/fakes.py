@@ -92,7 +92,7 @@ class FreeBody:
             ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
         ]
         self.mass = np.array([density * np.prod(size)])
-        self.fixed = np.array([False])
+        self.fixed = self.still = np.array([False])
         self.blocks = [SimpleNamespace(fixed=False)]
         self._g = np.array([0, 0, -gravity])
         self._x, self._v = np.array([centre], float), np.zeros((1, 6))

@@ -8,6 +8,7 @@ from scipy.io import netcdf_file
 
 from coupler.checks.read_case import load
 from coupler.commands.export.netcdf import write_netcdf
+from coupler.commands.view.flood_map import in_tank
 from coupler.geometry.terrain.bed_mesh import fitted_of
 from coupler.geometry.terrain.grids import read_grid
 from coupler.results.maps import NEVER, Maps, read_map
@@ -40,6 +41,16 @@ def flood(tmp_path):
     case = load(tmp_path).case
     water, _ = water_of(case, None, [])
     return water, Maps(water, fitted_of(case.tank), case.tank.ground)
+
+
+def test_a_picture_of_a_map_is_in_the_coordinates_of_the_tank(flood, tmp_path):
+    """So are the buildings in it; a tank that began at 30 m had its houses 30 m from their places."""
+    _, maps = flood
+    maps.write(tmp_path)
+    (tmp_path / "effective.json").write_text('{"tank": {"lower": [30.0, -5.0, -3.0]}}')
+    x, y = in_tank(tmp_path, read_map(tmp_path / "bed.asc"))
+    np.testing.assert_allclose(x, np.linspace(30.0, 50.0, 21))
+    np.testing.assert_allclose(y, np.linspace(-5.0, 3.0, 9))
 
 
 def test_depth_of_level_water_is_that_over_the_bed(flood):

@@ -85,6 +85,28 @@ def test_beams_that_cross_where_neither_has_a_node_carry_each_other():
         assert np.allclose(contacts.depth, 2e-6, rtol=0.02)
 
 
+def test_an_edge_that_crosses_a_corner_is_held_while_the_vertex_of_that_corner_touches():
+    """A beam lies on its edge across the corner of a block, whose vertex just touches the side of the beam: that holds
+    nothing as the beam slides down along it, and the edges beside it have to."""
+    inwards, sunk = 0.05, 0.0501
+    diagonal = np.array([1.0, 1.0, 0.0]) / np.sqrt(2.0)
+    low = Block("low", (1.0, 1.0, -1.0), size=2.0, density=DENSITY, fixed=True)
+    high = Block(
+        "high",
+        inwards * diagonal + (0.0, 0.0, 0.5 / np.sqrt(2.0) - sunk),
+        size=(4.0, 0.5, 0.5),
+        rotation=turned("z", -45) @ turned("x", 45),
+        density=DENSITY,
+        velocity=0.7071 * diagonal - (0.0, 0.0, 0.7071),
+    )
+    with Structure([low, high], ContactLaw(1e8, 0.3, 0.0)) as s:
+        deepest = 0.0
+        for _ in range(30):
+            s.advance(0.01)
+            deepest = max(deepest, s.deepest()[2].max(initial=0.0))
+        assert sunk < deepest < 1.2 * sunk
+
+
 @pytest.mark.parametrize("spin", [-6.0, 6.0])
 def test_edges_that_turn_parallel_let_go_with_what_their_springs_held(spin):
     """They no longer cross then, and the contact ends by their angle, not by their depth: the books take just what was

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kernel_decorators import kernel
+from kernel_decorators import inner, kernel
 from yade_scripts.contact.arrays import CROSSINGS
 from yade_scripts.contact.edges import pair_scratch
 from yade_scripts.contact.ground import scan_ground
@@ -17,7 +17,11 @@ from yade_scripts.contact.search import closing_bound, cross, lie_flat, planes_s
 from yade_scripts.contact.springs import Mode, apply, set_dashpots
 
 CROSSING = 0.5
-"""Overlap of crossing edges over that of faces below which nodes that touch leave the contact to the edges as well."""
+"""Overlap of crossing edges over that of faces below which nodes that touch leave the contact to the edges as well; and
+depth of nodes over the overlap of faces below which they do not hold the blocks apart: a corner may just touch the side
+of an edge that crosses the edges beside it."""
+SUNK = 0.01
+"""Overlap in radii of the smaller block up to which that is not asked: the search for edges costs more than nodes."""
 SAME = 1.0 + 1e-6
 """Overlap of crossing edges over that of faces up to which edges carry where no node does: that of flat beams is the
 same."""
@@ -68,12 +72,14 @@ def contact_forces(shapes, bodies, law, pairs, slots, ground, x, v, R, dt, last_
         for s in range(base, base + CROSSINGS):
             known = known or slots.face[s] >= 0
         meets = apart < 0.0 and b < len(F)
-        leads = meets and (count == first or not pairs.touching[p])
+        sunk = -apart > SUNK * min(shapes.radius[a], shapes.radius[b])
+        bare = count == first or (sunk and _deepest(slots, rows, first, count) < -CROSSING * apart)
+        leads = meets and (bare or not pairs.touching[p])
         flat = meets and count > first and not known and lie_flat(shapes, slots, a, b, R, rows, first, count)
         if known or leads or flat:
             deepest = 0.0
             if leads:
-                deepest = -SAME * apart if count == first else -CROSSING * apart
+                deepest = -SAME * apart if bare else -CROSSING * apart
             count, lost, parted = cross(
                 shapes, bodies, law.shear, slots, base, pairs.fresh[p], a, b, deepest, flat, x, v, R, last_dt, rows,
                 first, count, lost, scratch,
@@ -81,10 +87,7 @@ def contact_forces(shapes, bodies, law, pairs, slots, ground, x, v, R, dt, last_
             apart = max(apart, parted)
         pairs.overlap[p] = max(0.0, -apart)
         if count > nodes:
-            deepest = 0.0
-            for c in range(nodes, count):
-                deepest = max(deepest, rows.depth[c] + slots.rest[rows.slot[c]])
-            pairs.overlap[p] = min(pairs.overlap[p], deepest)
+            pairs.overlap[p] = min(pairs.overlap[p], _deepest(slots, rows, nodes, count))
         pairs.fresh[p], pairs.touching[p] = 0.0, count > first
         if count > first:
             yields, K = set_dashpots(bodies, law, a, b, R, rows, first, count, scratch)
@@ -92,6 +95,15 @@ def contact_forces(shapes, bodies, law, pairs, slots, ground, x, v, R, dt, last_
             lost += apply(slots, v, R, dt, last_dt, mode, a, rows, first, count, F, scratch)
         pairs.calm[p] = apart if count == first else 0.0
     return count, lost
+
+
+@inner
+def _deepest(slots, rows, first, count):
+    """Largest depth of the contacts first .. count [m], with that at which their springs began."""
+    deepest = 0.0
+    for c in range(first, count):
+        deepest = max(deepest, rows.depth[c] + slots.rest[rows.slot[c]])
+    return deepest
 
 
 @kernel

@@ -6,12 +6,13 @@ python -m coupler.commands.view.flood_map RUN PICTURE.png TITLE
 from __future__ import annotations
 
 import csv
+import json
 import sys
 from pathlib import Path
 
 import numpy as np
 
-from coupler.results.maps import read_map
+from coupler.results.maps import Map, read_map
 
 MAPS = (
     ("depth", "largest depth [m]", "Blues"),
@@ -30,7 +31,7 @@ def draw(run: Path, picture: Path, title: str) -> None:
     import matplotlib.pyplot as plt
 
     found = read_map(run / "maps" / "bed.asc")
-    x, y, bed = found.x - found.x[0], found.y - found.y[0], found.z  # from the lower left corner
+    x, y, bed = *in_tank(run, found), found.z
     houses = _buildings(run)
     tall = np.ptp(y) / np.ptp(x)
     figure, axes = plt.subplots(2, 2, figsize=(12.0, 1.4 + 11.0 * min(tall, 1.2)), layout="constrained")
@@ -67,6 +68,14 @@ def draw(run: Path, picture: Path, title: str) -> None:
         axes[0, 0].legend(loc="upper left", fontsize=8)
     figure.suptitle(title)
     figure.savefig(picture, dpi=110)
+
+
+def in_tank(run: Path, found: Map) -> tuple[np.ndarray, np.ndarray]:
+    """Columns and rows of a map (x,), (y,) [m] in the coordinates of the tank, which are those of the buildings.
+
+    The map itself is in the coordinates of the terrain file; its first column and row are the sides of the tank."""
+    lower = json.loads((run / "effective.json").read_text(encoding="utf-8"))["tank"]["lower"]
+    return found.x - found.x[0] + lower[0], found.y - found.y[0] + lower[1]
 
 
 def _buildings(run: Path) -> list[dict]:
