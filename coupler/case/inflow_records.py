@@ -199,9 +199,10 @@ def _as_record(
 
 def _is_geoclaw(path: Path) -> bool:
     try:
+        check_file(path)  # a pipe would wait for a writer
         with open(path, encoding="utf-8", errors="replace") as stream:
             head = stream.readline(200)
-    except OSError:
+    except (BadPath, OSError):
         return False
     return bool(re.match(r"#+\s*gauge(_id=|\s+name)", head))
 
