@@ -110,7 +110,7 @@ class Scene:
         )  # fmt: skip
         lettered(text.prop)
         caption = self.plotter.add_text(
-            self.caption, name="caption", position=(0.985, 0.012),
+            self.caption, name="caption", position=(0.985, 0.96),
             viewport=True, font_size=self._points(7), color=palette.TANK, render=False,
         )  # fmt: skip
         lettered(caption.prop)
