@@ -295,8 +295,9 @@ class Recorder:
             write_crack_surfaces(self.cracks.with_suffix(".vtu"), *structure.joint_polygons(), cracks)
 
     def verdict(self) -> dict | None:
-        """What the run says about its structure now (coupler/verdict/judge.py); None without one."""
-        if self.watch is None:
+        """What the run says about its structure now (coupler/verdict/judge.py); None without one, or where no block
+        moves freely: what is driven apart does not stand or fall."""
+        if self.watch is None or not self.watch.judged.any():
             return None
         from coupler.verdict.judge import verdict
 

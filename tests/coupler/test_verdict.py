@@ -1,5 +1,6 @@
 """The verdict of a run: how blocks are divided, what is watched while it goes, and in which words it is reported."""
 
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -224,6 +225,15 @@ CASE = {
     "structure": {"wall": [{"lower": [0, 0, 0], "size": [1, 0.2, 1], "block": [0.5, 0.2, 0.5]}]},
     "contact": {"stiffness": 1e6},
 }
+
+
+def test_what_is_driven_apart_neither_stands_nor_falls(tmp_path):
+    """No block of it moves freely, so there is no verdict: the joint that broke is not called whole."""
+    case = Path(__file__).parents[2] / "cases" / "joint_pulled"
+    run = begin(tmp_path / "case", (case / "case.toml").read_text(encoding="utf-8"), tmp_path / "run")
+    figures = read_summary(run)["figures"]
+    assert figures["joints_broken"] == 1
+    assert figures.get("verdict") is None
 
 
 def test_a_name_that_nothing_has_is_refused():
