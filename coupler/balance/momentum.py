@@ -28,8 +28,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from coupler.step.coupled_step import CoupledStepper
-    from coupler.step.record import StepRecord
     from fluid.step.momentum import MomentumChange
     from fluid.step.water import Water
     from yade_scripts.dynamics.impulses import Impulses
@@ -241,14 +239,22 @@ def momentum_of_water(water: Water) -> Array:
     return momentum(water)
 
 
-def book_step(coupling: CoupledStepper, record: StepRecord) -> MomentumBalance:
-    """Book the step that has just ended in `coupling.momentum`."""
-    ledger, structure = coupling.momentum, coupling.structure
+def book_step(
+    ledger: MomentumLedger,
+    water: Water | None,
+    structure: Structure | None,
+    dt: float,
+    load: Array,
+    impulses: Impulses | None,
+) -> MomentumBalance:
+    """Book the step of dt [s] that has just ended on the two sides, either of which may be None.
+
+    load (n_bodies, 6) [N, N m] of the water on the bodies, blocks first; (0, 6) without water · impulses: what contacts
+    and joints gave to the blocks; None without a structure."""
     free = np.zeros(0, bool) if structure is None else ~structure.fixed
-    water = blocks = None
-    if coupling.water is not None:
-        water = WaterStep.of(coupling.water, record.load, record.dt, free)
-    if structure is not None and record.impulses is not None:
-        load = record.load[: structure.n] if len(record.load) else np.zeros((structure.n, 6))
-        blocks = BlocksStep.of(structure, record.impulses, load, ledger.about)
-    return ledger.book(water, blocks)
+    of_water = None if water is None else WaterStep.of(water, load, dt, free)
+    of_blocks = None
+    if structure is not None and impulses is not None:
+        on_blocks = load[: structure.n] if len(load) else np.zeros((structure.n, 6))
+        of_blocks = BlocksStep.of(structure, impulses, on_blocks, ledger.about)
+    return ledger.book(of_water, of_blocks)

@@ -7,6 +7,7 @@ coupling_rows                          the matrix G of theory (10), a short row 
 shear                                  how blocks answer to shear
 residual                               the coupling residual, and what is remembered of it
 step_limits, step_start, limits        when a step is taken again, and when a run ends
+sides                                  what these parts ask of the two sides together
 observe                                what is read off a structure for a step
 
 Imports `balance`, `fluid` and `yade_scripts`; knows no case and writes no file.

@@ -212,7 +212,9 @@ class CoupledStepper:
         energies = self._structure_energies()
         record.energies = energies or {}
         record.balance = self.ledger.balance(self._water_energy(), energies)
-        record.momentum = book_step(self, record)
+        record.momentum = book_step(
+            self.momentum, self.water, self.structure, dt, record.load, record.impulses
+        )
 
     def _cut(self, record: StepRecord) -> None:
         """The domain that the bodies leave now, and what they do to the water besides."""

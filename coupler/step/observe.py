@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 if TYPE_CHECKING:
-    from coupler.step.coupled_step import CoupledStepper
+    from coupler.step.sides import CoupledSides
     from yade_scripts.dynamics.structure import Structure
 
 Array = np.ndarray
@@ -27,7 +27,7 @@ def joint_counts(structure: Structure) -> JointCounts:
     return JointCounts(int(alive.sum()), int((~alive).sum()), float(damage[alive].max(initial=0.0)))
 
 
-def size(coupling: CoupledStepper) -> dict[str, int]:
+def size(coupling: CoupledSides) -> dict[str, int]:
     """How large the scene is now: cells outside solids, those cut by them, those with water; blocks, joints.
 
     Absent sides are left out."""

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING
 from coupler.step.limits import Diverged, Limits, check_balance, check_momentum
 
 if TYPE_CHECKING:
-    from coupler.step.coupled_step import CoupledStepper
     from coupler.step.record import StepRecord
+    from coupler.step.sides import CoupledSides
 
 STEP_SHARE = 0.25
 """Share of `limits.energy_error` that a single step may put out of balance."""
@@ -41,7 +41,7 @@ class Attempt:
 
 
 def attempt_of(
-    coupling: CoupledStepper, record: StepRecord, limits: Limits | None, volume_before: float
+    coupling: CoupledSides, record: StepRecord, limits: Limits | None, volume_before: float
 ) -> Attempt:
     """The step that was just taken; volume_before: error of the volume at its start. Without limits only the defect
     counts."""
@@ -63,7 +63,7 @@ def attempt_of(
     return Attempt(record.retries, measures, frozenset(broken), _ends(coupling, record, limits))
 
 
-def _ends(coupling: CoupledStepper, record: StepRecord, limits: Limits) -> bool:
+def _ends(coupling: CoupledSides, record: StepRecord, limits: Limits) -> bool:
     try:
         check_step(coupling, record, limits)
     except Diverged:
@@ -79,12 +79,12 @@ def best_of(attempts: list[Attempt]) -> Attempt:
     return shortest if helped or (longest.ends and not shortest.ends) else longest
 
 
-def volume_error(coupling: CoupledStepper) -> float:
+def volume_error(coupling: CoupledSides) -> float:
     """That of the water; 0 where there is none."""
     return 0.0 if coupling.water is None else coupling.water.volume_error()
 
 
-def check_step(coupling: CoupledStepper, record: StepRecord, limits: Limits) -> None:
+def check_step(coupling: CoupledSides, record: StepRecord, limits: Limits) -> None:
     """Raises Diverged with the limit that the step broke, or the run with it."""
     where = worst_place(coupling, record)
     check_balance(record.time, volume_error(coupling), record.balance.energy_error, limits, where)
@@ -92,7 +92,7 @@ def check_step(coupling: CoupledStepper, record: StepRecord, limits: Limits) -> 
         check_momentum(record.time, record.momentum.error, limits.momentum_error)
 
 
-def worst_place(coupling: CoupledStepper, record: StepRecord) -> str:
+def worst_place(coupling: CoupledSides, record: StepRecord) -> str:
     """Where to look when the energy does not balance: the block that missed the most work in the last step, and where
     the water is fastest. "" where there is neither."""
     parts = []

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from coupler.step.coupled_step import CoupledStepper
+    from coupler.step.sides import CoupledSides
     from yade_scripts.dynamics.state import StructureState
 
 
@@ -21,7 +21,7 @@ class StepStart:
     momentum: dict | None
 
     @classmethod
-    def of(cls, coupling: CoupledStepper) -> StepStart:
+    def of(cls, coupling: CoupledSides) -> StepStart:
         """Before a step. References, not copies, where a step replaces what it changes."""
         water, structure, momentum = coupling.water, coupling.structure, coupling.momentum
         return cls(
@@ -32,7 +32,7 @@ class StepStart:
             momentum=None if momentum is None else vars(momentum) | {"lines": dict(momentum.lines)},
         )
 
-    def restore(self, coupling: CoupledStepper) -> None:
+    def restore(self, coupling: CoupledSides) -> None:
         """Back to the start of the step."""
         coupling.time = self.time
         if self.water is not None:
