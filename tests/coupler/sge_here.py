@@ -9,8 +9,9 @@ import contextlib
 import os
 import socket
 import subprocess
-import time
 from pathlib import Path
+
+from .until import until
 
 BOOTSTRAP = """\
 admin_user              root
@@ -106,13 +107,21 @@ class GridEngine:
 
     def _begin(self, host):
         self._daemon("sge_qmaster")
-        self._until(lambda: "execd_spool_dir" in self.told("qconf", "-sconf"), "the master does not answer")
-        self.told("qconf", "-ah", host)
-        self.told("qconf", "-as", host)
-        (self.cell / "fast").write_text(_with(self.told("qconf", "-ssconf"), FAST))
+        until(
+            lambda: "execd_spool_dir" in self.output_of("qconf", "-sconf"),
+            "an answer of the master",
+            report=self._logs,
+        )
+        self.output_of("qconf", "-ah", host)
+        self.output_of("qconf", "-as", host)
+        (self.cell / "fast").write_text(_with(self.output_of("qconf", "-ssconf"), FAST))
         self.run("qconf", "-Msconf", str(self.cell / "fast"))
         self._daemon("sge_execd")
-        self._until(lambda: "lx-amd64" in self.told("qhost", "-h", host), "the node does not report")
+        until(
+            lambda: "lx-amd64" in self.output_of("qhost", "-h", host),
+            "a report of the node",
+            report=self._logs,
+        )
         (self.cell / "queue").write_text(
             _with(self._plain_queue(), QUEUE, host=host, slots=self.slots, cell=self.cell)
         )
@@ -124,7 +133,7 @@ class GridEngine:
         editor = self.cell / "editor"
         editor.write_text(f'#!/bin/sh\ncp "$1" {shown}\nexit 1\n')
         editor.chmod(0o755)
-        self.told("qconf", "-aq", "all.q", EDITOR=str(editor))
+        self.output_of("qconf", "-aq", "all.q", EDITOR=str(editor))
         return shown.read_text()
 
     def _daemon(self, name):
@@ -138,7 +147,7 @@ class GridEngine:
         """A program of Grid Engine that must do."""
         subprocess.run([str(PROGRAMS / name), *words], check=True, env=os.environ | self.variables)
 
-    def told(self, name, *words, **variables):
+    def output_of(self, name, *words, **variables):
         """What a command prints."""
         known = os.environ | self.variables | variables
         done = subprocess.run(
@@ -146,17 +155,12 @@ class GridEngine:
         )
         return done.stdout
 
-    def _until(self, there, what, seconds=90.0):
-        end = time.monotonic() + seconds
-        while not there():
-            if time.monotonic() > end:
-                logs = [p.read_text(errors="replace")[-2000:] for p in sorted(self.cell.glob("*.out"))]
-                raise RuntimeError(f"{what}\n" + "\n".join(logs))
-            time.sleep(0.5)
+    def _logs(self):
+        return "\n".join(p.read_text(errors="replace")[-2000:] for p in sorted(self.cell.glob("*.out")))
 
     def __exit__(self, *_):
         with contextlib.suppress(OSError):
-            self.told("qdel", "-f", "-u", "root")
+            self.output_of("qdel", "-f", "-u", "root")
         for daemon in reversed(self.daemons):
             daemon.terminate()
         for daemon in self.daemons:

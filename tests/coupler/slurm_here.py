@@ -10,8 +10,9 @@ import os
 import shutil
 import socket
 import subprocess
-import time
 from pathlib import Path
+
+from .until import until
 
 CONF = """\
 ClusterName=here
@@ -107,10 +108,15 @@ class Slurm:
             "munged", "--foreground", "--force", f"--key-file={key}", f"--socket={munge}", f"--pid-file={logs}/pid",
             f"--log-file={logs}/log", f"--seed-file={logs}/seed", "--num-threads=2",
         )  # fmt: skip
-        self._until(munge.exists, "munged has no socket")
+        until(munge.exists, "a socket of munged", report=self._logs)
         self._daemon("slurmctld", "-D")
         self._daemon("slurmd", "-D", "-d", str(self.folder / "bin" / "slurmstepd"))
-        self._until(lambda: "idle" in self.output_of("sinfo", "-h", "-o", "%T"), "the node is not idle")
+        until(
+            lambda: "idle" in self.output_of("sinfo", "-h", "-o", "%T"),
+            "an idle node",
+            every=0.5,
+            report=self._logs,
+        )
         return self
 
     def _daemon(self, name: str, *words: str) -> None:
@@ -124,13 +130,12 @@ class Slurm:
     def _run(self, name: str, *words: str) -> None:
         subprocess.run([self.program(name), *words], check=True, env=os.environ | self.variables)
 
-    def _until(self, there, what: str, seconds: float = 90.0) -> None:
-        end = time.monotonic() + seconds
-        while not there():
-            if time.monotonic() > end:
-                logs = [p.read_text(errors="replace")[-2000:] for p in sorted(self.folder.glob("*.log"))]
-                raise RuntimeError(f"{what}\n" + "\n".join(logs))
-            time.sleep(0.5)
+    def _logs(self) -> str:
+        return "\n".join(p.read_text(errors="replace")[-2000:] for p in sorted(self.folder.glob("*.log")))
+
+    def queue(self) -> list[str]:
+        """Numbers of the jobs that wait or run."""
+        return self.output_of("squeue", "-h", "-r", "-o", "%i").split()
 
     def output_of(self, *words: str) -> str:
         """What a command of Slurm prints."""

@@ -25,6 +25,7 @@ from coupler.program.process import environment
 
 from .arm import CASE, WEAK
 from .sge_here import GridEngine
+from .until import until
 
 needs_dask = pytest.mark.skipif(bool(absent("dask")), reason="no dask-jobqueue")
 SWEEP = """
@@ -91,14 +92,14 @@ def test_a_job_gets_the_program_the_limit_and_the_lines_of_the_user(tmp_path, mo
     assert "#PBS -m n\n#PBS -l place=excl\n" in written
     body = written[: written.index(sys.executable)]
     shown = 'echo "$SURGEBREAK_YADE|$LD_LIBRARY_PATH|$SURGEBREAK_JOB_ENDS"'
-    told = subprocess.run(
+    printed = subprocess.run(
         ["sh"],
         input=f"module() {{ echo loaded $2; }}\n{body}\n{shown}\n",
         capture_output=True,
         text=True,
         check=True,
     )
-    loaded, variables = told.stdout.splitlines()
+    loaded, variables = printed.stdout.splitlines()
     yade, libraries, ends = variables.split("|")
     assert (loaded, yade, libraries) == ("loaded python", "/home/me/it's here", "/home/me/lib")
     assert float(ends) - time.time() == pytest.approx(600.0 - 90.0, abs=30.0)
@@ -145,13 +146,6 @@ for job in "$@"; do kill -9 -- -${job%.here} 2> /dev/null; done
 """
 
 
-def until(there, seconds=240.0):
-    end = time.monotonic() + seconds
-    while not there():
-        assert time.monotonic() < end
-        time.sleep(0.2)
-
-
 def case_in(folder):
     folder.mkdir()
     (folder / "case.toml").write_text(CASE + SWEEP, encoding="utf-8")
@@ -189,10 +183,10 @@ def hold_until_its_time_is_over(process):
     os.kill(process, signal.SIGCONT)
 
 
-def check(case, told, lives):
+def check(case, printed, lives):
     """All rows are there, and the long run went on from its checkpoints, in so many jobs at least."""
     here = collect(read_spec(case / "runs" / "sweep"))
-    assert here.column("outcome") == ["cannot stand", "done"], told
+    assert here.column("outcome") == ["cannot stand", "done"], printed
     summary = json.loads((place_of(case, LONG) / "run.json").read_text())
     times = [resumed["time"] for resumed in summary["resumed"]]
     assert len(times) >= lives - 1  # more on a busy machine, where jobs do not get far in their time
@@ -218,14 +212,14 @@ def test_a_run_whose_job_is_killed_goes_on_in_another(tmp_path):
     variables = {"PATH": f"{programs}{os.pathsep}{os.environ['PATH']}"}
     sweep = begin(case, "--engine", "dask-pbs", "--jobs", "1", variables=variables)
     try:
-        until(lambda: has_checkpoint(case))
+        until(lambda: has_checkpoint(case), "a checkpoint of the long run")
         os.killpg(int((jobs / "ids").read_text().split()[0]), signal.SIGKILL)
-        told, _ = sweep.communicate(timeout=600)
+        printed, _ = sweep.communicate(timeout=600)
     finally:
         sweep.kill()
-    assert sweep.returncode == 0, told
+    assert sweep.returncode == 0, printed
     assert len((jobs / "ids").read_text().split()) == 2
-    check(case, told, lives=2)
+    check(case, printed, lives=2)
 
 
 @needs_dask
@@ -240,14 +234,14 @@ def test_grid_engine_runs_over_their_time_limit_and_deleted_ones_go_on(tmp_path)
         options = ("--option", "queue=all.q", "--option", "walltime=00:01:20")
         sweep = begin(case, "--engine", "dask-sge", "--jobs", "1", *options, variables=engine.variables)
         try:
-            until(lambda: has_checkpoint(case))
+            until(lambda: has_checkpoint(case), "a checkpoint of the long run")
             first = process_in(case)
-            engine.told("qdel", "-u", "root")
-            until(lambda: process_in(case) not in (first, None))
+            engine.output_of("qdel", "-u", "root")
+            until(lambda: process_in(case) not in (first, None), "the long run in a second job")
             hold_until_its_time_is_over(process_in(case))
-            told, _ = sweep.communicate(timeout=1200)
+            printed, _ = sweep.communicate(timeout=1200)
         finally:
             sweep.kill()
-        assert not engine.told("qstat").strip(), "jobs are left in the queue"
-    assert sweep.returncode == 0, told
-    check(case, told, lives=3)
+        assert not engine.output_of("qstat").strip(), "jobs are left in the queue"
+    assert sweep.returncode == 0, printed
+    check(case, printed, lives=3)

@@ -1,11 +1,12 @@
 """A sweep on a real Slurm: jobs that are cancelled, killed, put back into the queue and warned of their end go on from
 their checkpoints, one that cannot begin is a row with its reason, and the numbers are those of runs made here."""
 
+import contextlib
 import json
 import os
+import signal
 import subprocess
 import sys
-import time
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from coupler.program.process import environment
 
 from .arm import CASE, WEAK
 from .slurm_here import Slurm
+from .until import until
 
 pytestmark = [
     pytest.mark.nightly,
@@ -53,11 +55,27 @@ def surgebreak(*words, variables):
     return done
 
 
-def until(there, seconds=300.0):
-    end = time.monotonic() + seconds
-    while not there():
-        assert time.monotonic() < end
-        time.sleep(0.3)
+class Row:
+    """A run of the sweep in a job of its own."""
+
+    def __init__(self, spec, row, job):
+        self.place, self.job, self.process = spec.place(spec.rows[row].id), job, None
+
+    def held(self):
+        """Stops the process of the run as soon as it has a checkpoint: however busy the machine is, it then neither
+        ends nor gets far before something happens to it."""
+        if self.process is None and self.has_checkpoint():
+            self.process = self.summary()["process"]
+            os.kill(self.process, signal.SIGSTOP)
+            assert self.summary()["status"] == "running", "ended before it could be held: make LONG longer"
+        return self.process is not None
+
+    def has_checkpoint(self):
+        """One that is whole: what is being written has another name."""
+        return any((self.place / "checkpoints").glob("[0-9]*.h5"))
+
+    def summary(self):
+        return json.loads((self.place / "run.json").read_text())
 
 
 def test_jobs_that_end_before_their_time_go_on(tmp_path):
@@ -72,14 +90,17 @@ def test_jobs_that_end_before_their_time_go_on(tmp_path):
         spec = read_spec(folder)
         ids = {row.number: row.id for row in spec.rows}
         jobs = json.loads((folder / "jobs.json").read_text())
-        for row in (CANCELLED, KILLED, REQUEUED, WARNED):
-            until(lambda row=row: any((spec.place(ids[row]) / "checkpoints").glob("*")))
+        rows = {row: Row(spec, row, jobs[ids[row]]) for row in (CANCELLED, KILLED, REQUEUED, WARNED)}
+        until(lambda: all([row.held() for row in rows.values()]), "a checkpoint of each long run", every=0.05)
         assert surgebreak("sweep", case, "--cancel", CANCELLED, variables=slurm.variables).returncode == 0
-        os.kill(json.loads((spec.place(ids[KILLED]) / "run.json").read_text())["process"], 9)
-        slurm.output_of("scontrol", "requeue", jobs[ids[REQUEUED]])
-        slurm.output_of("scancel", "--signal=USR2", jobs[ids[WARNED]])
-        until(lambda: jobs[ids[CANCELLED]] not in slurm.output_of("squeue", "-h", "-r", "-o", "%i").split())
-        until(lambda: jobs[ids[KILLED]] not in slurm.output_of("squeue", "-h", "-r", "-o", "%i").split())
+        os.kill(rows[KILLED].process, signal.SIGKILL)
+        slurm.output_of("scontrol", "requeue", rows[REQUEUED].job)
+        slurm.output_of("scancel", "--signal=USR2", rows[WARNED].job)
+        for row in rows.values():
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(row.process, signal.SIGCONT)
+        for number in (CANCELLED, KILLED):
+            until(lambda job=rows[number].job: job not in slurm.queue(), f"row {number} out of the queue")
         done = surgebreak(*sweep, variables=slurm.variables)
         assert done.returncode == 0
         again = surgebreak(*sweep, variables=slurm.variables)

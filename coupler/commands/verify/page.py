@@ -1,4 +1,4 @@
-"""The page docs/benchmarks.md out of results: `surgebreak verify --json | python -m coupler.commands.verify.page`."""
+"""The page docs/benchmarks.md from results: `surgebreak verify --json | python -m coupler.commands.verify.page`."""
 
 from __future__ import annotations
 
@@ -12,36 +12,44 @@ from coupler.commands.verify.registry import NOT_COVERED, TOLD, Result, checks
 from coupler.program.provenance import machine, versions
 
 NOTES = {
-    "P38": "Without friction the mean pressure is that of published frictionless δ-SPH to 0.03. Friction of smooth "
-    "walls brings it down to the measured one, but by an amount that depends on the cells, as nothing mixes the "
-    "boundary layer; on H/64 sensors 2 and 3 read what was measured: [water](water.md).",
-    "P39": "H3 lies behind the box: water closes the wake from one side too early, because all cells "
-    "are split along the same diagonal; mirrored cells (tank.split) cure it "
-    "([water](water.md#which-way-the-cells-are-split)). When the jet comes down differs from run to run.",
-    "P40": "P3 is 1.2 cells below the edge of the box. With one unknown for both faces of the edge it reads 0.45 to "
-    "0.81 of the measured impulse on cells of 4.2 to 6.3 cm, with unknowns of their own 0.69 to 0.83; what is missing "
-    "then is the first 40 ms. The front comes that late by the record's clock, which runs ahead of a dam that "
-    "vanishes at t = 0, and by the tip of the front, which is under a cell ([water](water.md#against-measurements)).",
-    "P62": "Next to an edge the pressure goes like the square root of the distance; linear cells spread that over two.",
-    "P63": "At 60 degrees the force is 6 to 7 % too large on all cells: the sheet that runs back along the plate is a "
-    "quarter as thick as the jet. By the ledger on 8 cells the scheme's own lines sum to 0.1 % of the "
-    "force: the water loses 4.7 % more momentum across the plate than the jet brings, since its sheets grow thicker "
-    "and so move off the plate, 1.3 % come from the sides of the slice and 0.5 % are weight.",
-    "P42": "The wave is less than half a cell high, its run-up one to two cells of water; where the tongue tears off "
-    "a film decides: 0.064 to 0.099 d on 24 and 48 cells over the depth, with variants of damping and transport; "
-    "round-off alone moves it by 0.004 d.",
-    "P55": "With four cells over the diameter the speed is 5 to 6 % low: linear velocities are too coarse there (spun, "
-    "the sphere feels 1.04 of the moment of Stokes; 1.003 with eight cells). At Re 1.5 the digitised records do not "
-    "agree: the speeds add up to a gap of 4 D at 1.82 s, the record of the gap says 1.94 s, and the largest speed, "
-    "0.0370, is a single point above a plateau of 0.0366 m/s.",
+    "P38": "Without friction the mean pressure agrees with published frictionless δ-SPH to 0.03. Friction of smooth "
+    "walls reduces it to the measured value, but by an amount that depends on the cells, because nothing "
+    "mixes the boundary layer; on cells of H/64 sensors 2 and 3 agree with the measurement: "
+    "[water](water.md).",
+    "P39": "H3 lies behind the box. The water closes the wake from one side too early, because all cells are split "
+    "along the same diagonal; mirrored cells (`tank.split`) cure this "
+    "([water](water.md#which-way-the-cells-are-split)). The moment at which the jet falls differs from run to "
+    "run.",
+    "P40": "P3 is 1.2 cells below the edge of the box. With one unknown for both faces of the edge it gives 0.45 to "
+    "0.81 of the measured impulse on cells of 4.2 to 6.3 cm, and with separate unknowns 0.69 to 0.83; the "
+    "rest is missing in the first 40 ms. The front is late by this time according to the clock of the record, "
+    "which is ahead of a dam that vanishes at t = 0, and because the tip of the front is thinner than a cell "
+    "([water](water.md#against-measurements)).",
+    "P62": "Next to an edge the pressure varies with the square root of the distance; linear cells spread this "
+    "variation over two cells.",
+    "P63": "At 60 degrees the force is 6 to 7 % too large on all cells: the sheet that runs back along the plate is "
+    "a quarter as thick as the jet. According to the momentum balance on 8 cells, the terms of the scheme "
+    "itself sum to 0.1 % of the force. The water loses 4.7 % more momentum normal to the plate than the jet "
+    "supplies, since its sheets grow thicker and therefore move away from the plate; 1.3 % come from the "
+    "sides of the slice and 0.5 % are weight.",
+    "P42": "The wave is less than half a cell high, and its run-up is one to two cells of water. The result depends "
+    "on where the tongue tears off a film: 0.064 to 0.099 d on 24 and 48 cells over the depth, with variants "
+    "of damping and transport; round-off alone changes it by 0.004 d.",
+    "P55": "With four cells over the diameter the speed is 5 to 6 % low, because linear velocities are too coarse "
+    "there (a spinning sphere is subject to 1.04 times the moment of Stokes; 1.003 times with eight cells). "
+    "At Re 1.5 the digitised records contradict each other: the integral of the speed gives a gap of 4 D at "
+    "1.82 s, the record of the gap gives 1.94 s, and the largest speed, 0.0370 m/s, is a single point above a "
+    "plateau of 0.0366 m/s.",
     "P56": "The sheet of water that reaches the cubes is 3 to 5 cm deep, less than a cell of edge/3. Of the momentum "
-    "that it brings over the width of a cube, 45 N from 0.8 to 1.0 s, a held column gets less than half there and two "
-    "thirds on cells of half the size: the rest is lost where the level set is corrected ([water](water.md#weak)). "
-    "Cubes sealed or wetted from below move alike. The stack slides from 28 N on; its lowest cube leaves it from 52 N "
-    "on.",
-    "P52": "The period is measured over few swings and moves by 1 to 2 % with the substep and the number of passes.",
+    "that it carries over the width of a cube, 45 N from 0.8 to 1.0 s, a held column receives less than half "
+    "on these cells and two thirds on cells of half the size; the rest is lost where the level set is "
+    "corrected ([water](water.md#weak)). Cubes whose lower faces are sealed and cubes whose lower faces are "
+    "wet move in the same way. The stack slides at a force of 28 N and more; its lowest cube separates from "
+    "it at 52 N and more.",
+    "P52": "The period is measured over few oscillations and changes by 1 to 2 % with the substep and the number of "
+    "passes.",
 }
-"""What is known about cases that miss a tolerance."""
+"""What is known about cases that exceed a tolerance."""
 
 
 def page(results: list[Result]) -> str:
@@ -52,22 +60,26 @@ def page(results: list[Result]) -> str:
     passed = len(cases) - len(set(failed))
     parts = [
         "# Benchmarks",
-        "Made from `surgebreak verify --json | python -m coupler.commands.verify.page`. Errors are shown with the "
-        "processor time that the case took; the figures of a case come from one run, booked to the first of them.",
+        "This page is made by `surgebreak verify --json | python -m coupler.commands.verify.page`. Errors are shown "
+        "with the processor time of the case; the quantities of a case come from one run, whose time is given with "
+        "the first of them.",
         f"{_machine()}",
-        f"{passed} of {len(cases)} cases pass, {len(judged) - len(failed)} of {len(judged)} figures, "
-        f"{len(results) - len(judged)} more are reported and not judged; "
-        f"{sum(r.cpu_s for r in results):.0f} CPU s. A case passes if all of its figures do.",
+        f"{passed} of {len(cases)} cases pass, and {len(judged) - len(failed)} of {len(judged)} quantities are within "
+        f"their limits; {len(results) - len(judged)} more are reported and not judged. All cases took "
+        f"{sum(r.cpu_s for r in results):.0f} CPU s. A case passes if all of its quantities are within their limits.",
         _overview(results, cases),
         *(_case(id, [r for r in results if r.id == id]) for id in cases),
     ]
     if NOT_COVERED:
-        parts += ["## Not covered", "\n".join(f"- {id}: {why}" for id, why in NOT_COVERED.items())]
+        parts += [
+            "## Checks that are not covered",
+            "\n".join(f"- {id}: {why}" for id, why in NOT_COVERED.items()),
+        ]
     return "\n\n".join(parts) + "\n"
 
 
 def _overview(results: list[Result], cases: list[str]) -> str:
-    """A row a case: how many of its figures keep their limit, the one nearest to it or farthest beyond, its time."""
+    """One row per case: quantities within their limits, the largest error as a share of its limit, CPU time."""
     rows = []
     for id in cases:
         everything = [r for r in results if r.id == id]
@@ -80,8 +92,8 @@ def _overview(results: list[Result], cases: list[str]) -> str:
         rows.append(
             f"| [{id}](#{anchor}) | {title} | {count} | {worst} | {sum(r.cpu_s for r in everything):.0f} |"
         )
-    head = "| case | what | figures kept | largest error, of its limit | CPU s |\n|---|---|--:|--:|--:|"
-    return "\n".join([head, *rows])
+    titles = "| case | subject | quantities within limits | largest error, share of its limit | CPU s |"
+    return "\n".join([titles, "|---|---|--:|--:|--:|", *rows])
 
 
 def _of_limit(r: Result) -> float:
@@ -103,7 +115,7 @@ def _case(id: str, results: list[Result]) -> str:
     missed = not all(r.passed for r in results)
     note = f"\n\n{NOTES[id]}" if missed and id in NOTES else ""
     head = "| quantity | value | expected | error | limit | | CPU s |\n|---|--:|--:|--:|--:|---|--:|"
-    return f"## {id}: {case.title}\nAgainst: {case.source}.\n\n{head}\n{rows}{note}"
+    return f"## {id}: {case.title}\nCompared with: {case.source}.\n\n{head}\n{rows}{note}"
 
 
 def _row(r: Result) -> str:
