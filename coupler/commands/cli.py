@@ -1,4 +1,4 @@
-"""The command `surgebreak`. Commands import what they need when they are called: help must stay quick."""
+"""The command `surgebreak`. Commands import their modules when they are called, so that help is fast."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from coupler.program.threads import take_threads
 
 
 class Commands(TyperGroup):
-    """All commands; Ctrl-C ends each with a word and the code of a stop, where typer would say nothing."""
+    """All commands; Ctrl-C ends each of them with a message and the exit code of a stop."""
 
     def invoke(self, ctx):
         try:
@@ -50,8 +50,8 @@ Threads = Annotated[
     int | None,
     typer.Option(
         metavar="N",
-        help="threads that share the work, with the same results to the last digit; else SURGEBREAK_THREADS, else all "
-        "cores of the process",
+        help="number of threads; the results do not depend on it; default: SURGEBREAK_THREADS, else all cores of the "
+        "process",
         show_default=False,
     ),
 ]
@@ -60,20 +60,20 @@ Laws = Annotated[
     typer.Option(
         "--law",
         metavar="FILE",
-        help="a Python file with a cohesive law of your own, which is run; repeatable",
+        help="a Python file that defines a cohesive law; its code is executed; may be repeated",
     ),
 ]
 
 
 def main() -> None:
-    """Entry point; leaves with 0 done, 1 failure, 2 bad case, 3 diverged or out of balance, 4 stopped."""
+    """Entry point. Exit codes: 0 done, 1 failure, 2 bad case, 3 diverged or out of balance, 4 stopped."""
     with Failures():
         app()
 
 
 @app.callback(invoke_without_command=True)
 def _root(
-    version: Annotated[bool, typer.Option("--version", help="print the version and leave")] = False,
+    version: Annotated[bool, typer.Option("--version", help="print the version and exit")] = False,
 ) -> None:
     if version:
         from coupler.program.provenance import version as number
@@ -90,14 +90,14 @@ def run(
     output: Annotated[
         Path | None,
         typer.Option(
-            metavar="DIR", help="a new directory for the results; else runs/<time>-<hash> beside the case"
+            metavar="DIR", help="a new directory for the results; default: runs/<time>-<hash> beside the case"
         ),
     ] = None,
     end: Annotated[str | None, typer.Option(metavar="TIME", help="short for --set time.end=...")] = None,
-    dry: Annotated[bool, typer.Option("--dry", help="only read the case; nothing is run")] = False,
+    dry: Annotated[bool, typer.Option("--dry", help="only read the case, without running it")] = False,
     threads: Threads = None,
     watch: Annotated[
-        bool, typer.Option("--watch", help="with a page in the browser of this machine")
+        bool, typer.Option("--watch", help="also show the run in the browser of this machine")
     ] = False,
 ) -> None:
     """Run a case. Ctrl-C or a file named `stop` in the run directory ends it cleanly."""
@@ -127,14 +127,16 @@ def watch_runs(
     places: Annotated[
         list[Path], typer.Argument(metavar="RUN...", help="runs, sweeps, or folders with runs")
     ],
-    port: Annotated[int, typer.Option(min=0, max=65535, help="of the page; 0: any that is free")] = 0,
-    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="open it")] = False,
-    pictures: Annotated[bool, typer.Option("--pictures/--no-pictures", help="draw now and then")] = True,
+    port: Annotated[int, typer.Option(min=0, max=65535, help="port of the page; 0 takes any free one")] = 0,
+    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="open the browser")] = False,
+    pictures: Annotated[
+        bool, typer.Option("--pictures/--no-pictures", help="draw a new picture from time to time")
+    ] = True,
 ) -> None:
-    """Show runs in the browser while they go on.
+    """Show runs in the browser while they are in progress.
 
-    Progress, time left, histories, newest picture, verdict so far, limits, and a button that stops a run. Of this
-    machine alone, behind a secret address.
+    The page shows the progress, the time left, histories, the newest picture, the present verdict and the limits, and
+    has a button that stops a run. It is accessible only from this machine, at a secret address.
     """
     from coupler.commands.watch.command import watch as serve
 
@@ -145,7 +147,7 @@ def watch_runs(
 def resume(
     run: Annotated[Path, typer.Argument(metavar="RUN", help="the directory of a run that stopped")],
     end: Annotated[
-        str | None, typer.Option(metavar="TIME", help="another end; short for --set time.end=...")
+        str | None, typer.Option(metavar="TIME", help="new end time; short for --set time.end=...")
     ] = None,
     set: Annotated[
         list[str] | None,
@@ -155,13 +157,13 @@ def resume(
     ] = None,
     law: Laws = None,
     any_version: Annotated[
-        bool, typer.Option("--any-version", help="go on although the program has changed since")
+        bool, typer.Option("--any-version", help="continue although the program has changed since")
     ] = False,
     threads: Threads = None,
 ) -> None:
-    """Go on with a run that was stopped or killed.
+    """Continue a run that was stopped or killed.
 
-    From its newest checkpoint, to the last digit as if it had never stopped.
+    It is continued from its newest checkpoint.
     """
     one_thread()
     take_threads(threads)
@@ -179,15 +181,15 @@ def check(
     set: Overrides = None,
     law: Laws = None,
     exact: Annotated[
-        bool, typer.Option("--exact", help="solve for the exact frequency of the joints as well")
+        bool, typer.Option("--exact", help="also solve for the exact highest frequency of the joints")
     ] = False,
     picture: Annotated[
-        Path | None, typer.Option(metavar="PNG", help="draw blocks, solids and water as they start")
+        Path | None, typer.Option(metavar="PNG", help="draw the blocks, solids and water at the start")
     ] = None,
 ) -> None:
-    """Check a case, and forecast steps, time, memory and disk.
+    """Check a case, and forecast its steps, processor time, memory and disk space.
 
-    Nothing is run; with a structure YADE is asked for the substep.
+    Nothing is run, but YADE is loaded to compute the substep of a structure.
     """
     one_thread()
     take_laws(law)
@@ -219,12 +221,12 @@ def report(
         Path, typer.Argument(metavar="RUN|STUDY|SWEEP", help="the directory of a run, a study or a sweep")
     ],
     pictures: Annotated[
-        bool, typer.Option("--pictures/--no-pictures", help="with stills and figures of a run")
+        bool, typer.Option("--pictures/--no-pictures", help="include stills and figures of a run")
     ] = True,
 ) -> None:
     """Write one HTML page about a run, a study or a sweep.
 
-    report.html in the directory: pictures, figures and tables in one file, for screen and paper.
+    The file report.html in the directory contains pictures, figures and tables, for screen and paper.
     """
     if (place / "sweep.json").is_file():
         from coupler.commands.sweep.command import finish
@@ -246,13 +248,16 @@ def export(
         str,
         typer.Option("--format", metavar="A,B,...", help="vtk (ParaView), netcdf (xarray), gltf (Blender)"),
     ] = "vtk,netcdf",
-    to: Annotated[Path | None, typer.Option(metavar="DIR", help="where to write; else RUN/export")] = None,
+    to: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="directory for the files; default: RUN/export")
+    ] = None,
     begin: Annotated[float, typer.Option("--from", metavar="S", help="first time [s]")] = 0.0,
     end: Annotated[float, typer.Option("--until", metavar="S", help="last time [s]")] = float("inf"),
 ) -> None:
     """Write results for other programs.
 
-    .pvd for ParaView by a double click, NetCDF for xarray, .glb for Blender. While a run goes on it adds what is new.
+    The formats are .pvd for ParaView, NetCDF for xarray and .glb for Blender. While a run is in progress, a repeated
+    export adds only the new steps.
     """
     from coupler.commands.export.command import export as write
 
@@ -265,11 +270,11 @@ def doctor(
         bool,
         typer.Option(
             "--mend",
-            help="put right what can be: torn kernels, locked folders of the cache, missing packages",
+            help="repair what can be repaired: incomplete kernels, locked folders of the cache, missing packages",
         ),
     ] = False,
 ) -> None:
-    """Check that YADE and the rest work here."""
+    """Check that YADE and all other parts work on this machine."""
     one_thread()
     from coupler.commands.doctor import examine
 
@@ -282,13 +287,13 @@ def explain(
         str | None,
         typer.Argument(
             metavar="KEY|RUN",
-            help="a name of the case file, for instance joints.strength, or a run directory",
+            help="a key of the case file, for instance joints.strength, or a run directory",
         ),
     ] = None,
 ) -> None:
-    """Explain a name of the case file, or what a run left out.
+    """Explain a key of the case file, or what a run did not compute.
 
-    Without a name: all sections. Of a run: what it skipped, and what that would have cost.
+    Without an argument it lists all sections. For a run it lists what was skipped, and what that would have cost.
     """
     if key and (os.sep in key or (Path(key) / "run.json").is_file()):
         from coupler.commands.explain_run import explanation_of_run
@@ -303,31 +308,39 @@ def explain(
 @app.command()
 def blocks(
     drawing: Annotated[
-        Path, typer.Argument(metavar="FILE", help="STL, OBJ, PLY, ...; STEP, IFC with extras")
+        Path, typer.Argument(metavar="FILE", help="a drawing: STL, OBJ, PLY, ...; STEP and IFC with extras")
     ],
     size: Annotated[
-        str, typer.Option(metavar="M", help="wanted edge of the blocks along walls and slabs")
+        str, typer.Option(metavar="M", help="intended length of the blocks along walls and slabs")
     ] = "1 m",
     course: Annotated[
-        str | None, typer.Option(metavar="M", help="wanted height in walls; else the size")
+        str | None,
+        typer.Option(metavar="M", help="intended height of the blocks in walls; default: the size"),
     ] = None,
-    bond: Annotated[str, typer.Option(help="stack or running")] = "stack",
+    bond: Annotated[str, typer.Option(help="bond of the blocks in walls: stack or running")] = "stack",
     scale: Annotated[str, typer.Option(help="length of one unit of the file, for instance '1 mm'")] = "1 m",
     up: Annotated[str, typer.Option(help="axis of the file that points up: z or y")] = "z",
-    sliver: Annotated[str | None, typer.Option(metavar="M", help="narrower parts are merged")] = None,
-    density: Annotated[str | None, typer.Option(help="mass per volume, for instance '1800 kg/m3'")] = None,
-    strength: Annotated[str, typer.Option(help="of the joints, for the forecast")] = "0.5 MPa",
-    opening: Annotated[str, typer.Option(help="opening at failure, for the forecast")] = "1 mm",
+    sliver: Annotated[
+        str | None,
+        typer.Option(metavar="M", help="parts narrower than this are merged with their neighbours"),
+    ] = None,
+    density: Annotated[
+        str | None, typer.Option(help="density of the blocks, for instance '1800 kg/m3'")
+    ] = None,
+    strength: Annotated[str, typer.Option(help="strength of the joints, for the forecast")] = "0.5 MPa",
+    opening: Annotated[str, typer.Option(help="opening of the joints at failure, for the forecast")] = "1 mm",
     picture: Annotated[
-        Path | None, typer.Option(metavar="PNG", help="else FILE_blocks.png beside it")
+        Path | None,
+        typer.Option(metavar="PNG", help="file of the picture; default: FILE_blocks.png beside the drawing"),
     ] = None,
     to: Annotated[
-        Path | None, typer.Option(metavar="OBJ", help="write the blocks as closed surfaces")
+        Path | None, typer.Option(metavar="OBJ", help="also write the blocks as closed surfaces")
     ] = None,
 ) -> None:
     """Cut a drawing of a building into blocks.
 
-    Tells how many, what sets the substep and what a second costs, draws them, and says what to write in a case.
+    It reports the number of blocks, what determines the substep and what a second of simulation costs, draws the
+    blocks, and prints the lines for a case.
     """
     one_thread()
     from coupler.commands.blocks import as_number
@@ -341,7 +354,7 @@ def blocks(
 
 
 DRAWN_AS_USUAL = (("bond", "stack"), ("scale", "1 m"), ("up", "z"))
-"""Options that a case need not say."""
+"""Options with the default value of a case."""
 
 
 @app.command()
@@ -354,15 +367,19 @@ def terrain(
     ],
     set: Annotated[
         list[str] | None,
-        typer.Option("--set", metavar="KEY=VALUE", help="of [terrain], for instance terrain.scale='1 ft'"),
+        typer.Option(
+            "--set",
+            metavar="KEY=VALUE",
+            help="change a value of [terrain], for instance terrain.scale='1 ft'",
+        ),
     ] = None,
     map_: Annotated[
         Path | None, typer.Option("--map", metavar="PNG", help="draw a map; needs the extra `view`")
     ] = None,
 ) -> None:
-    """Show a terrain: extent, heights, slopes, and what cells of a size make of it.
+    """Show a terrain: its extent, heights and slopes, and how cells of a given size represent it.
 
-    Of a run: the maps of its flood, with --map in one picture with the buildings by their state.
+    For a run it lists the maps of the flood; --map draws them in one picture with the state of the buildings.
     """
     one_thread()
     if map_ is not None:
@@ -378,10 +395,10 @@ def offshore(
         Path, typer.Argument(metavar="FILE", help="an offshore.toml, or the directory that holds one")
     ],
 ) -> None:
-    """Run the sea before a coast by ANUGA and write a record for a side of a case.
+    """Compute the sea off a coast with ANUGA, and write a record for a side of a case.
 
-    One way: a wide and coarse sea from a source or a record, what passes the side of the tank as a CSV file. Needs the
-    extra `offshore`; docs/terrain.md says what the file may say.
+    The coupling is one-way: a wide and coarse sea is driven by a source or a record, and the flow at the side of the
+    tank is written to a CSV file. Needs the extra `offshore`; docs/terrain.md describes the file.
     """
     one_thread()
     from coupler.commands.offshore.command import offshore as make
@@ -392,12 +409,12 @@ def offshore(
 @app.command()
 def schema(
     to: Annotated[
-        Path | None, typer.Option("--to", metavar="FILE", help="write it there; else to standard output")
+        Path | None, typer.Option("--to", metavar="FILE", help="file to write; default: standard output")
     ] = None,
 ) -> None:
     """Print the JSON Schema of case.toml, for editors.
 
-    They complete and check names with it; docs/editor.md says how to tell yours.
+    Editors complete and check the keys of a case with it; docs/editor.md describes how to set up an editor.
     """
     from coupler.case.editor_schema import write
 
@@ -407,20 +424,21 @@ def schema(
 @app.command()
 def kernels(
     pack: Annotated[
-        Path | None, typer.Option("--pack", metavar="FILE", help="write those of this version into one file")
+        Path | None,
+        typer.Option("--pack", metavar="FILE", help="write the kernels of this version into one file"),
     ] = None,
     unpack: Annotated[
         Path | None,
         typer.Option(
             "--unpack",
             metavar="FILE",
-            help="take those of a file into the cache; only from sources you trust",
+            help="add the kernels of a file to the cache; only from sources that you trust",
         ),
     ] = None,
 ) -> None:
     """Show, pack or unpack the compiled kernels, so that other machines need not compile them.
 
-    Without an option: where they are, and how many modules of this version have some.
+    Without an option it shows where they are, and how many modules of this version have compiled kernels.
     """
     one_thread()
     from coupler.program import kernel_pack
@@ -440,7 +458,7 @@ def kernels(
 def docs(
     build: Annotated[
         Path | None,
-        typer.Option("--build", metavar="DIR", help="only build the site into this folder, open nothing"),
+        typer.Option("--build", metavar="DIR", help="only build the site in this folder, without opening it"),
     ] = None,
 ) -> None:
     """Build the site of the documentation and open it."""
@@ -455,9 +473,7 @@ def init(
     template: Annotated[
         str, typer.Option(metavar="NAME", help="tank, wall, house, quay, column, terrain, town or dry")
     ] = "tank",
-    ask: Annotated[
-        bool, typer.Option("--ask", help="ask for what the case is about, at most six questions")
-    ] = False,
+    ask: Annotated[bool, typer.Option("--ask", help="ask at most six questions about the case")] = False,
 ) -> None:
     """Write a small commented case that runs."""
     from coupler.case.first_cases import write_first_case
@@ -471,20 +487,26 @@ def init(
 
 @app.command()
 def verify(
-    ids: Annotated[list[str] | None, typer.Argument(metavar="ID", help="cases (P01 ...); else all")] = None,
+    ids: Annotated[
+        list[str] | None, typer.Argument(metavar="ID", help="cases (P01 ...); default: all")
+    ] = None,
     quick: Annotated[
-        bool, typer.Option("--quick", help="only the cheap cases, three minutes of processor time in all")
+        bool, typer.Option("--quick", help="only the cheap cases, which take three minutes of processor time")
     ] = False,
-    json: Annotated[bool, typer.Option("--json", help="one JSON object a quantity, one a line")] = False,
-    list_: Annotated[bool, typer.Option("--list", help="list the cases, and those not covered")] = False,
+    json: Annotated[
+        bool, typer.Option("--json", help="print one JSON object per quantity, one per line")
+    ] = False,
+    list_: Annotated[
+        bool, typer.Option("--list", help="list the cases, and the checks that are not covered")
+    ] = False,
     plots: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="a folder for figures: computed curves over measured ones"),
+        typer.Option(metavar="DIR", help="folder for figures of computed and measured curves"),
     ] = None,
 ) -> None:
-    """Compare with exact solutions and measured records.
+    """Compare results with exact solutions and measured records.
 
-    Leaves with 3 if one misses its tolerance.
+    The exit code is 3 if a quantity exceeds its tolerance.
     """
     one_thread()
     if plots is not None:
@@ -499,33 +521,40 @@ def stress(
     scenes: Annotated[
         list[str] | None,
         typer.Argument(
-            metavar="ID", help="scenes (S01 ..., R1-12 ...) or groups: structure, water, coupling; else all"
+            metavar="ID",
+            help="scenes (S01 ..., R1-12 ...) or groups: structure, water, coupling; default: all",
         ),
     ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="only scenes that take less than a minute")] = False,
-    json: Annotated[bool, typer.Option("--json", help="one JSON object a scene, one a line")] = False,
+    json: Annotated[
+        bool, typer.Option("--json", help="print one JSON object per scene, one per line")
+    ] = False,
     list_: Annotated[bool, typer.Option("--list", help="list the scenes")] = False,
     random: Annotated[
-        int | None, typer.Option(min=1, metavar="N", help="N scenes drawn over the whole case format instead")
+        int | None,
+        typer.Option(min=1, metavar="N", help="run N random scenes from the whole case format instead"),
     ] = None,
-    seed: Annotated[
-        int, typer.Option(min=0, help="of the random scenes; the same seed, the same scenes")
-    ] = 1,
-    first: Annotated[int, typer.Option("--from", min=0, metavar="K", help="number of the first one")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="seed of the random scenes")] = 1,
+    first: Annotated[
+        int, typer.Option("--from", min=0, metavar="K", help="number of the first random scene")
+    ] = 0,
     group: Annotated[
-        list[str] | None, typer.Option(metavar="GROUP", help="only of this group; may be given again")
+        list[str] | None, typer.Option(metavar="GROUP", help="only scenes of this group; may be repeated")
     ] = None,
     keep: Annotated[
         Path,
-        typer.Option(metavar="DIR", help="where random scenes that fail are kept, as cases and made small"),
+        typer.Option(
+            metavar="DIR", help="directory for random scenes that fail, as cases, complete and reduced"
+        ),
     ] = Path("stress-failures"),
     shrink: Annotated[
-        float, typer.Option(min=0.0, metavar="SECONDS", help="processor time to make each of them small")
+        float,
+        typer.Option(min=0.0, metavar="SECONDS", help="processor time for the reduction of each of them"),
     ] = 60.0,
 ) -> None:
     """Run stiff and extreme scenes, or random ones.
 
-    Each is passed, refused with a message, or failed; leaves with 3 if one failed.
+    A scene passes, is refused with a message, or fails. The exit code is 3 if one fails.
     """
     one_thread()
     from coupler.commands.stress.drawn.command import is_drawn, named, numbered, stress_drawn
@@ -546,7 +575,7 @@ def compare_laws(
         str,
         typer.Option(
             metavar="A,B,...",
-            help="comma-separated; else all of ours, cohfrict, jcfpm, mortar and cpm; `--list` names them",
+            help="separated by commas; default: all of this program, cohfrict, jcfpm, mortar and cpm; see `--list`",
         ),
     ] = "",
     set: Overrides = None,
@@ -554,23 +583,25 @@ def compare_laws(
     output: Annotated[
         Path | None,
         typer.Option(
-            metavar="DIR", help="a new directory for the results; else runs/compare-<time> beside the case"
+            metavar="DIR",
+            help="a new directory for the results; default: runs/compare-<time> beside the case",
         ),
     ] = None,
     substeps: Annotated[
         str,
         typer.Option(
-            metavar="N,N,...", help="multiples of the case's own substep, for error against run time"
+            metavar="N,N,...", help="multiples of the substep of the case, for the error against run time"
         ),
     ] = "1,2,4,8",
-    records: Annotated[int, typer.Option(min=10, metavar="N", help="rows of the tables")] = 1000,
+    records: Annotated[int, typer.Option(min=10, metavar="N", help="number of rows of the tables")] = 1000,
     list_: Annotated[
-        bool, typer.Option("--list", help="list the laws and what the stock ones do not match")
+        bool,
+        typer.Option("--list", help="list the laws, and the properties that the laws of YADE cannot match"),
     ] = False,
 ) -> None:
-    """Run a dry case under our laws and YADE's own.
+    """Run a dry case with the cohesive laws of this program and with those of YADE.
 
-    Matched as far as they can be; table, figure, CSV, JSON, and the scripts for yade.
+    Their parameters are matched as far as possible. The results are a table, a figure, CSV, JSON, and scripts for YADE.
     """
     one_thread()
     take_laws(law)
@@ -586,31 +617,42 @@ def study(
         typer.Argument(metavar="CASE|compare A B", help="a case with a section [study], or two studies"),
     ],
     ladder: Annotated[
-        str, typer.Option(metavar="A,B,...", help="comma-separated names of ladders; else all of the case")
+        str,
+        typer.Option(
+            metavar="A,B,...", help="names of ladders, separated by commas; default: all of the case"
+        ),
     ] = "",
     repeat: Annotated[
         int | None,
-        typer.Option(min=1, metavar="N", help="times that each run is made; else study.repeat of the case"),
+        typer.Option(
+            min=1,
+            metavar="N",
+            help="number of times that each run is made; default: study.repeat of the case",
+        ),
     ] = None,
     law: Laws = None,
     output: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="directory of the study; else runs/study beside the case"),
+        typer.Option(metavar="DIR", help="directory of the study; default: runs/study beside the case"),
     ] = None,
-    larger: Annotated[bool, typer.Option("--larger", help="with the larger rungs of the ladders")] = False,
+    larger: Annotated[bool, typer.Option("--larger", help="include the larger rungs of the ladders")] = False,
     any_version: Annotated[
         bool, typer.Option("--any-version", help="keep runs that another version of the program made")
     ] = False,
     error: Annotated[
-        float, typer.Option(min=1.0, metavar="RATIO", help="compare: largest ratio of errors, B over A")
+        float,
+        typer.Option(min=1.0, metavar="RATIO", help="compare: largest permitted ratio of errors, B over A"),
     ] = 1.1,
     cpu: Annotated[
-        float, typer.Option(min=1.0, metavar="RATIO", help="compare: largest ratio of CPU seconds")
+        float,
+        typer.Option(
+            min=1.0, metavar="RATIO", help="compare: largest permitted ratio of CPU seconds, B over A"
+        ),
     ] = 1.2,
 ) -> None:
-    """Error against run time over ladders of a case.
+    """Measure errors against run time over the ladders of a case.
 
-    Goes on where it stopped. `study compare A B` leaves with 3 if B is worse than A.
+    A study that was stopped is continued. `study compare A B` ends with exit code 3 if B is worse than A.
     """
     one_thread()
     take_laws(law)
@@ -634,20 +676,21 @@ def sweep(
         typer.Option(
             "--vary",
             metavar="KEY=...",
-            help="A,B,... or FROM:TO:STEPS or 'lognormal(median=..., dispersion=...)'; may be given again; adds to the "
-            "case's [sweep]",
+            help="A,B,... or FROM:TO:STEPS or 'lognormal(median=..., dispersion=...)'; may be repeated; added to the "
+            "section [sweep] of the case",
         ),
     ] = None,
     set: Overrides = None,
     output: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="directory of the sweep; else runs/sweep beside the case"),
+        typer.Option(metavar="DIR", help="directory of the sweep; default: runs/sweep beside the case"),
     ] = None,
     plan: Annotated[bool, typer.Option("--plan", help="only show the table and a forecast of cost")] = False,
     jobs: Annotated[
-        int | None, typer.Option(min=1, metavar="N", help="runs at a time; else as many as there are cores")
+        int | None,
+        typer.Option(min=1, metavar="N", help="number of simultaneous runs; default: the number of cores"),
     ] = None,
-    threads: Annotated[int, typer.Option(min=1, metavar="N", help="threads of each run")] = 1,
+    threads: Annotated[int, typer.Option(min=1, metavar="N", help="number of threads of each run")] = 1,
     engine: Annotated[
         str,
         typer.Option(
@@ -658,28 +701,34 @@ def sweep(
     option: Annotated[
         list[str] | None,
         typer.Option(
-            metavar="KEY=VALUE", help="of a cluster: time=30 (minutes), mem=2GB, partition=...; again"
+            metavar="KEY=VALUE",
+            help="option of a cluster: time=30 (minutes), mem=2GB, partition=...; may be repeated",
         ),
     ] = None,
-    chunk: Annotated[int, typer.Option(min=1, metavar="N", help="slurm: runs that one job makes")] = 1,
+    chunk: Annotated[int, typer.Option(min=1, metavar="N", help="slurm: number of runs in each job")] = 1,
     detach: Annotated[
-        bool, typer.Option("--detach", help="slurm: submit and leave; the same command waits")
+        bool,
+        typer.Option(
+            "--detach", help="slurm: submit the jobs and end; the same command waits for them later"
+        ),
     ] = False,
     cancel: Annotated[
         str | None,
-        typer.Option(metavar="all|ROW,ROW", help="slurm: scancel all jobs of this sweep, or those of rows"),
+        typer.Option(
+            metavar="all|ROW,ROW", help="slurm: cancel all jobs of this sweep, or those of some rows"
+        ),
     ] = None,
     export: Annotated[
         str | None,
-        typer.Option(metavar="snakemake", help="write a Snakefile that makes the runs; nothing is run"),
+        typer.Option(metavar="snakemake", help="only write a Snakefile that makes the runs"),
     ] = None,
     any_version: Annotated[
         bool, typer.Option("--any-version", help="keep runs that another version of the program made")
     ] = False,
 ) -> None:
-    """Many runs of a case: grids, samples, repeats; fragility curves.
+    """Make many runs of a case: grids, samples, repeats; fragility curves.
 
-    What is done is not done again, a killed run goes on. Table, curves and a report on one page.
+    Completed runs are not repeated, and a killed run is continued. The results are a table, curves and a report.
     """
     one_thread()
     from coupler.commands.sweep.command import Wish
@@ -696,16 +745,19 @@ def sweep(
 
 @app.command()
 def benchmark(
-    quick: Annotated[bool, typer.Option("--quick", help="small sizes only")] = False,
-    json: Annotated[bool, typer.Option("--json", help="one JSON object")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="only small sizes")] = False,
+    json: Annotated[bool, typer.Option("--json", help="print one JSON object")] = False,
     only: Annotated[
         str | None,
-        typer.Option(metavar="PART", help="joints, scenes, dead, cutting, debris, water, solver or stock"),
+        typer.Option(
+            metavar="PART",
+            help="joints, scenes, sleep, dead, cutting, debris, water, solver, threads, roofline or stock",
+        ),
     ] = None,
 ) -> None:
-    """Measure what substeps, cuts and solvers cost.
+    """Measure the processor time of substeps, cutting and solvers.
 
-    Leaves with 3 if a target is missed.
+    The exit code is 3 if a target is missed.
     """
     one_thread()
     from coupler.commands.benchmark.command import benchmark as measure
@@ -715,7 +767,7 @@ def benchmark(
 
 @app.command(context_settings=PASS_ON)
 def test(context: typer.Context) -> None:
-    """Run the tests; further words go to pytest."""
+    """Run the tests; further arguments are passed to pytest."""
     need("test")
     one_thread()
     from coupler.program.provenance import ROOT
@@ -724,7 +776,7 @@ def test(context: typer.Context) -> None:
 
 
 def take_laws(files: list[Path] | None) -> None:
-    """Make the laws of files that the user named known, also to processes that this one starts. Raises BadLaw."""
+    """Register the laws of files that the user named, also for child processes. Raises BadLaw."""
     for file in files or []:
         from coupler.api.laws import register_law
 

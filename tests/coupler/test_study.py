@@ -169,7 +169,7 @@ def test_files_say_all_of_it_and_figures_are_drawn(fake, case, with_figures):
     rows = (case / "out" / "study.csv").read_text(encoding="utf-8").splitlines()
     assert len(rows) == 1 + 5 * 3
     text = (case / "out" / "study.md").read_text(encoding="utf-8")
-    for words in ("Cheapest setting", "Observed order", "What parts", "too long a step", "numba"):
+    for words in ("Cheapest setting", "Observed order", "Cost of parts", "too long a step", "numba"):
         assert words in text
     for name in ("exact", "measured", "finest"):
         assert (case / "out" / f"{name}.png").stat().st_size > 10_000

@@ -1,4 +1,4 @@
-"""A study as Markdown: what was run where, errors, cheapest settings, orders, what parts cost."""
+"""A study as Markdown: runs and machine, errors, cheapest settings, orders of convergence, cost of parts."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ import math
 import shlex
 
 AGAINST = {
-    "exact": "the exact answer",
+    "exact": "the exact solution",
     "measured": "the measurement",
     "finest": "the finest run",
 }
 
 ROUND_OFF = 1e-6
-"""Errors below this say nothing; figures draw them here."""
+"""Errors below this value are round-off; figures draw them at this value."""
 TIMES = ("cpu_seconds", "set_up_seconds", "start_seconds", "compile_seconds", "wall_seconds")
 
 
@@ -30,9 +30,9 @@ def page(study: dict, level: int = 1, pictures: str = "") -> str:
     if study["orders"]:
         parts.append(f"{mark}# Observed order of convergence\n\n{_orders(study)}")
     if study["laws"]:
-        parts.append(f"{mark}# Laws of YADE and ours\n\n{_laws(study, pictures)}")
+        parts.append(f"{mark}# Laws of YADE and of this program\n\n{_laws(study, pictures)}")
     if study["parts"]:
-        parts.append(f"{mark}# What parts of the program cost\n\n{_parts(study)}")
+        parts.append(f"{mark}# Cost of parts of the program\n\n{_parts(study)}")
     failed = _failed(study)
     if failed:
         parts.append(f"{mark}# Runs that failed\n\n{failed}")
@@ -54,8 +54,8 @@ def _first_step(study: dict) -> str:
     if first is None:
         return ""
     return (
-        f" A process of one step, apart from the runs: {first['cpu_seconds']:.3g} CPU s, "
-        f"{first['compile_seconds']:.3g} of them to compile."
+        f" A separate process with one step took {first['cpu_seconds']:.3g} CPU s, "
+        f"of which {first['compile_seconds']:.3g} s were compilation."
     )
 
 
@@ -65,7 +65,7 @@ def _quantity(study: dict, q: dict, mark: str, pictures: str) -> str:
         against += f" ({q['finest']['ladder']} {q['finest']['label']})"
     source = f": {q['source']}" if q["source"] else ""
     figure = f"\n\n![{q['what']}]({pictures}{q['name']}.png)" if _drawn(study, q) else ""
-    return f"**{q['what']}**, error against {against}{source}.{figure}"
+    return f"**{q['what']}**, error relative to {against}{source}.{figure}"
 
 
 def _drawn(study: dict, q: dict) -> bool:
@@ -86,7 +86,7 @@ def point_name(point: dict) -> str:
 
 
 def percent(value) -> str:
-    """A share for people; a dash for none, and no digits of what is round-off."""
+    """A share as text; a dash where there is none, and no digits of round-off."""
     if not _number(value):
         return "–"
     return f"< {100 * ROUND_OFF:g} %" if 0.0 < abs(value) < ROUND_OFF else f"{100 * value:.3g} %"
@@ -97,7 +97,7 @@ def _number(value) -> bool:
 
 
 def _ladders(study: dict) -> str:
-    """What is varied, so that the short names in the tables can be read."""
+    """The meaning of the short names of ladders in the tables."""
     run = {point["ladder"] for point in study["points"]}
     return "; ".join(f"`{la['name']}`: {la['what']}" for la in study["ladders"] if la["name"] in run) + "."
 
@@ -141,7 +141,7 @@ def _run_row(study: dict, point: dict, quantities: list[dict]) -> list[str]:
 
 
 def _cheapest(study: dict) -> str:
-    """A row a quantity (and value across its ladders), a column a level: setting, its error, its CPU seconds."""
+    """One row per quantity (and value across its ladders), one column per level: setting, error, CPU seconds."""
     what = {q["name"]: q["what"] for q in study["quantities"]}
     rows: dict[str, dict[float, str]] = {}
     for e in study["cheapest"]:
@@ -154,7 +154,7 @@ def _cheapest(study: dict) -> str:
 
 
 def curve_of(entry: dict) -> str:
-    """The value of the ladder across which an entry was found, in brackets."""
+    """The value of the second ladder at which an entry was found, in brackets."""
     return f" ({entry['curve']})" if entry["curve"] else ""
 
 

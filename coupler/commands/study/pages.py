@@ -1,4 +1,4 @@
-"""docs/studies.md with its figures out of several studies: `python -m coupler.commands.study.pages STUDY...`."""
+"""Writes docs/studies.md and its figures from several studies: `python -m coupler.commands.study.pages STUDY...`."""
 
 from __future__ import annotations
 
@@ -14,33 +14,36 @@ OPENING = """\
 
 <!-- Made from studies by `python -m coupler.commands.study.pages STUDY...`; changes here are lost. -->
 
-`surgebreak study CASE` runs the ladders of the case's [`[study]`](case_file.md#study): mesh, step, law, scheme. A
-study that was stopped goes on when the command is given again; `--larger` adds the larger rungs; `surgebreak study
-compare A B` leaves with 3 if errors or CPU times got worse. Results: `study.json`, `study.csv`, `study.md`, and a
-figure a quantity. The tables below are those of the default ladders, each run once; the larger rungs are left out.
+`surgebreak study CASE` runs the ladders of the case's section [`[study]`](case_file.md#study), in which the mesh,
+the step, the law or the scheme is varied. A study that was stopped is continued when the command is given again.
+`--larger` adds the larger rungs, and `surgebreak study compare A B` ends with exit code 3 if errors or CPU times
+have become worse. The results are `study.json`, `study.csv`, `study.md` and one figure for each quantity. The
+tables below were made with the default ladders, each run once, without the larger rungs.
 
-Every quantity has errors of one kind: against an exact answer, a measurement, or the finest run. CPU s are user and
-system time of the steps and of writing results, one thread; set-up of the scene (and loading YADE), start of the
-program and compilation stand apart. A run that had to compile is made again. In the figures dotted lines are 1, 5 and
-10 %, crosses on the upper edge are failed runs; errors below 0.0001 % are drawn there. A run that belongs to several
-ladders carries its settings in all of them ("50 mm / 10 ms / 2").
+All errors of a quantity are of one kind: relative to an exact solution, to a measurement, or to the finest run. The
+column "CPU s" contains the user and system time of the steps and of writing results, on one thread; the set-up of
+the scene (with loading YADE), the start of the program and the compilation have columns of their own. A run that
+had to compile kernels is repeated. In the figures the dotted lines mark 1, 5 and 10 %, and crosses at the upper
+edge are failed runs; errors below 0.0001 % are drawn at 0.0001 %. A run that belongs to several ladders is labelled
+with its settings in all of them ("50 mm / 10 ms / 2").
 
-The cheapest setting counts only if every finer run of its ladder is as near, since a coarse run may hit the answer by
-chance. The order of convergence is the slope of the errors where there is an exact answer; else it comes from the
-differences of the three finest runs, and there is none where these do not shrink.
+A setting counts as the cheapest only if all finer runs of its ladder are at least as accurate as required, because
+a coarse run may be accurate by chance. The order of convergence is the slope of the errors where there is an exact
+solution. Otherwise it follows from the differences of the three finest runs, and none is given where these
+differences do not decrease.
 
-What a part of the program costs is the difference of two runs, the case with and without it; what is within the
-scatter of CPU times, some 10 % on a busy machine and 0.3 s of short runs, is noise. Less than nothing beyond that
-means that the scene does more without the part: blocks that no joints hold have contacts instead. Wall seconds are
-those of a machine that did other work too.
+The cost of a part of the program is the difference between two runs, the case with this part and without it.
+Differences within the scatter of CPU times (about 10 % on a busy machine, and 0.3 s for short runs) are not
+significant. A negative cost beyond this scatter means that the scene does more work without the part: blocks
+without joints have contacts instead. The wall time was measured while other programs were running.
 """
 
 COLOURS = 96
-"""Of a picture in the repository: lines, texts and their smooth edges."""
+"""Number of colours of a picture in the repository: lines, texts and their smooth edges."""
 
 
 def summary(studies: list[dict]) -> str:
-    """The settings for 5 % of all studies."""
+    """Table of the cheapest settings for an error of 5 %, over all studies."""
     rows: list[list[str]] = []
     for content in studies:
         what = {q["name"]: f"{q['what']}, {AGAINST[q['against']]}" for q in content["quantities"]}
@@ -49,7 +52,7 @@ def summary(studies: list[dict]) -> str:
             for entry in content["cheapest"]
             if entry["level"] == 0.05
         ]
-    head = ["case", "quantity", "setting", "its error", "CPU s"]
+    head = ["case", "quantity", "setting", "error", "CPU s"]
     cases = [row[0] for row in rows]
     for row, before in zip(rows[1:], cases):
         row[0] = "" if row[0] == before else row[0]
@@ -57,7 +60,7 @@ def summary(studies: list[dict]) -> str:
 
 
 def _copy(figure: Path, place: Path) -> None:
-    """A figure with as many colours as it needs: a third of the file."""
+    """Copies a figure with a reduced palette, which makes the file three times smaller."""
     from PIL import Image
 
     with Image.open(figure) as image:
@@ -65,7 +68,7 @@ def _copy(figure: Path, place: Path) -> None:
 
 
 def main() -> None:
-    """docs/studies.md, and the figures into docs/pictures/studies."""
+    """Writes docs/studies.md, and the figures into docs/pictures/studies."""
     folders = [Path(word) for word in sys.argv[1:]]
     pictures = ROOT / "docs" / "pictures" / "studies"
     pictures.mkdir(parents=True, exist_ok=True)

@@ -26,42 +26,57 @@ def command_line():
     parser.add_argument(
         "run", type=Path, metavar="RUN", help="a run directory, finished or still being written"
     )
-    parser.add_argument("--still", action="store_true", help="one picture for print, of --time")
-    parser.add_argument("--film", action="store_true", help="H.264 film, one frame per stored step")
+    parser.add_argument("--still", action="store_true", help="make one picture for print, at --time")
+    parser.add_argument(
+        "--film", action="store_true", help="make an H.264 film with one frame per stored step"
+    )
     parser.add_argument(
         "--plots",
         action="store_true",
-        help="histories, and curves over the data of the case, as PDF, SVG and PNG",
+        help="draw histories, and curves over the data of the case, as PDF, SVG and PNG",
     )
     parser.add_argument(
-        "--time", type=float, metavar="S", help="of the still [s]; default: the last stored step"
+        "--time", type=float, metavar="S", help="time of the still [s]; default: the last stored step"
     )
     parser.add_argument(
-        "--size", type=pixels, default=(1280, 720), metavar="WxH", help="of the film; a still has twice that"
+        "--size",
+        type=pixels,
+        default=(1280, 720),
+        metavar="WxH",
+        help="size of the film in pixels; a still is twice as large",
     )
-    parser.add_argument("--fps", type=rate, default=20.0, help="frames a second of the film (default 20)")
+    parser.add_argument("--fps", type=rate, default=20.0, help="frames per second of the film (default 20)")
     parser.add_argument(
         "--azimuth",
         type=float,
-        help="of the camera, degrees from +x towards +y; default: the side on which things break",
+        help="direction of the camera in degrees from +x towards +y; default: the side where joints break",
     )
     parser.add_argument(
-        "--elevation", type=angle, default=22.0, help="of the camera above the ground, degrees"
+        "--elevation", type=angle, default=22.0, help="elevation of the camera above the ground in degrees"
     )
     parser.add_argument(
         "--view",
         choices=[*VIEWS, INSIDE],
-        help="plan, an elevation from y- (south), x+ (east), y+ (north), x- (west), or from inside of the blocks "
-        "towards --azimuth (default: where things happen)",
+        help="a plan, an elevation from y- (south), x+ (east), y+ (north) or x- (west), or a view from among the "
+        "blocks towards --azimuth (default: where joints break)",
     )
     parser.add_argument(
-        "--cut", type=section, metavar="x=M", help="a section: what lies before x, y or z = M [m] is left out"
+        "--cut",
+        type=section,
+        metavar="x=M",
+        help="draw a section: everything in front of x, y or z = M [m] is removed",
     )
-    parser.add_argument("--foam", action="store_true", help="white where fast water is torn")
+    parser.add_argument("--foam", action="store_true", help="draw white water where fast water disperses")
     parser.add_argument(
-        "--letters", type=letters, default=1.0, metavar="TIMES", help="the usual size, for a small picture"
+        "--letters",
+        type=letters,
+        default=1.0,
+        metavar="TIMES",
+        help="factor on the size of letters, for a small picture",
     )
-    parser.add_argument("--to", type=Path, metavar="FOLDER", help="where to write; default RUN/pictures")
+    parser.add_argument(
+        "--to", type=Path, metavar="FOLDER", help="directory for the pictures; default RUN/pictures"
+    )
     return parser
 
 
