@@ -288,11 +288,14 @@ class JointPair(Section):
 class Joints(Section):
     """Cohesion between touching faces, by default T = 27/4 T_max d (1 - d)^2, d = opening/opening_at_failure."""
 
-    strength: Annotated[float, InSI("Pa", gt=0)] = Field(
-        description="T_max, largest traction", examples=["0.5 MPa"]
+    strength: Annotated[float, InSI("Pa", gt=0)] | None = Field(
+        None,
+        description="T_max, largest traction; needed unless the material of every block is a preset, such as "
+        '"brick-masonry" (`explain concrete`)',
+        examples=["0.5 MPa"],
     )
-    opening_at_failure: PositiveLength = Field(
-        description="opening at which nothing holds any more", examples=["5 mm"]
+    opening_at_failure: PositiveLength | None = Field(
+        None, description="opening at which nothing holds any more; needed as strength is", examples=["5 mm"]
     )
     law: Name = Field(
         "polynomial",

@@ -1,18 +1,21 @@
 """Materials by name: what a table with `material = "brick-masonry"` takes where the case says nothing else.
 
-A preset gives the density of its blocks, the joints between two blocks of it and between it and the ground, and the
-friction of broken ones. What the case says of the same counts more: density in the table, [[joints.pair]] and
-[[contact.pair]] with its name. Openings follow from measured energies by G = 9/16 T_max δ_f (polynomial law), and are
-short: joints this stiff need short substeps.
+A preset gives the density of its blocks, the joints between two blocks of it and between it and what does not move (the
+ground, the floor of the tank, solids, held blocks), and the friction of broken ones. Between two presets the weaker
+counts. Where all blocks that can move are of presets, an empty section [joints] will do. What the case says of the same
+counts more: density in the table, [[joints.pair]] and [[contact.pair]] with its name. Openings follow from measured
+energies by G = 9/16 T_max δ_f (polynomial law), and are short: joints this stiff need short substeps.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
 from coupler.case.case import Case, ContactPair, JointPair
+from coupler.case.types import KeyPath
+from coupler.program.errors import did_you_mean
 
 
 @dataclass(frozen=True)
@@ -64,50 +67,175 @@ def with_presets(case: Case) -> Case:
     """The case with what the presets among its materials say, before what it says itself."""
     if case.structure is None:
         return case
-    used: dict[str, Material] = {}
+    used = presets_of(case)
+    if not used:
+        return case
     changes = {
-        kind: tuple(_with_density(table, used) for table in getattr(case.structure, kind))
+        kind: tuple(_with_density(table) for table in getattr(case.structure, kind))
         for kind in type(case.structure).model_fields
         if isinstance(getattr(case.structure, kind), tuple)
     }
-    if not used:
-        return case
     update: dict[str, Any] = {"structure": case.structure.model_copy(update=changes)}
     if case.joints is not None:
         update["joints"] = case.joints.model_copy(update={"pair": (*_joints(case, used), *case.joints.pair)})
     if case.contact is not None:
-        update["contact"] = case.contact.model_copy(update={"pair": _friction(case.contact.pair, used)})
+        update["contact"] = case.contact.model_copy(update={"pair": _friction(case, used)})
     return case.model_copy(update=update)
 
 
-def _with_density(table: Any, used: dict[str, Material]) -> Any:
-    """A table with the density of its preset, and its rules with theirs; presets met are added to `used`."""
+def with_strength(case: Case) -> tuple[Case, list[tuple[KeyPath, str]]]:
+    """The case with strength and opening of all joints, and what is missing for that.
+
+    Where every block that can move is of a preset, all joints follow from presets, and [joints] need not say them; the
+    weakest of the presets stands for them then. What is missing is made up, so that the rest can be checked too."""
+    j = case.joints
+    if j is None or (j.strength is not None and j.opening_at_failure is not None):
+        return case, []
+    movable, used = _materials(case, held=False), presets_of(case)
+    others = [name for name in movable if name not in PRESETS]
+    mistakes: list[tuple[KeyPath, str]] = []
+    for name, example in (("strength", "0.5 MPa"), ("opening_at_failure", "5 mm")):
+        if getattr(j, name) is None and (others or not used):
+            mistakes.append((("joints", name), f'missing; for instance "{example}"{_why(others, used)}'))
+    weakest = _weakest(used.values()) if used else PRESETS["brick-masonry"]
+    given = {
+        "strength": weakest.strength if j.strength is None else j.strength,
+        "opening_at_failure": weakest.opening if j.opening_at_failure is None else j.opening_at_failure,
+    }
+    return case.model_copy(update={"joints": j.model_copy(update=given)}), mistakes
+
+
+def _why(others: list[str], used: dict[str, Material]) -> str:
+    """Which material has no strength of its own."""
+    if not others:
+        return ""
+    hint = did_you_mean(others[0], list(PRESETS))
+    known = " or ".join(f'"{name}"' for name in PRESETS)
+    return f": material '{others[0]}' has no preset{hint or f'; those of material = {known} follow from it'}"
+
+
+def material_remarks(case: Case) -> Iterator[str]:
+    """Materials that are nearly called like a preset, and a strength that counts nowhere."""
+    if case.structure is None:
+        return
+    movable = _materials(case, held=False)
+    named = {name for pair in (case.joints.pair if case.joints else ()) for name in pair.between}
+    named |= {name for pair in (case.contact.pair if case.contact else ()) for name in pair.materials}
+    for name in movable:
+        hint = "" if name in PRESETS or name in named else did_you_mean(name, list(PRESETS))
+        if hint:
+            yield (
+                f"material '{name}' is no preset{hint} As it is, it takes its density from [structure] and its "
+                "joints from [joints]"
+            )
+    used = presets_of(case)
+    given = None if case.joints is None else case.joints.strength
+    of_presets = bool(movable) and all(name in PRESETS for name in movable)
+    if given is not None and of_presets and given != _weakest(used.values()).strength:
+        yield (
+            f"joints.strength counts nowhere: every joint follows from a preset ({', '.join(movable)}). For another "
+            f'strength write [[joints.pair]] between = ["{movable[0]}", "{movable[0]}"]'
+        )
+
+
+def presets_of(case: Case) -> dict[str, Material]:
+    """The presets among the materials of blocks and solids, by name."""
+    found = [*_materials(case, held=False), *_materials(case, held=True)] if case.structure else []
+    return {name: PRESETS[name] for name in found if name in PRESETS}
+
+
+def _tables(case: Case) -> Iterator[tuple[Any, str | None, bool]]:
+    """The tables that name a material: table, material and whether its blocks are held."""
+    assert case.structure is not None
+    for kind in type(case.structure).model_fields:
+        tables = getattr(case.structure, kind)
+        for table in tables if isinstance(tables, tuple) else ():
+            held = bool(getattr(table, "fixed", False))
+            yield table, table.material, held
+            for part in (*getattr(table, "rule", ()), *getattr(table, "layer", ())):
+                if not getattr(part, "leave_out", False):
+                    yield part, part.material, held or bool(getattr(part, "fixed", False))
+    for solid in case.solid:
+        yield solid, solid.material, True
+
+
+def _materials(case: Case, held: bool) -> list[str]:
+    """Materials of the blocks that are held, or of those that can move, each once."""
+    if case.structure is None:
+        return []
+    return list(dict.fromkeys(name for _, name, fixed in _tables(case) if name and fixed == held))
+
+
+def _held(case: Case) -> list[str]:
+    """Names by which joints know what does not move: materials, or names where blocks that move are of the same."""
+    movable = _materials(case, held=False)
+    found = [
+        table.name if name in movable else name
+        for table, name, held in _tables(case)
+        if held and name and name not in PRESETS
+    ]
+    return list(dict.fromkeys(found))
+
+
+def _with_density(table: Any) -> Any:
+    """A table with the density of its preset, and its rules and layers with theirs."""
     change: dict[str, Any] = {}
-    if hasattr(table, "rule"):
-        change["rule"] = tuple(_with_density(rule, used) for rule in table.rule)
+    for parts in ("rule", "layer"):
+        if hasattr(table, parts):
+            change[parts] = tuple(_with_density(part) for part in getattr(table, parts))
     preset = PRESETS.get(getattr(table, "material", None) or "")
-    if preset is not None:
-        used[table.material] = preset
-        if table.density is None:
-            change["density"] = preset.density
+    if preset is not None and table.density is None:
+        change["density"] = preset.density
     return table.model_copy(update=change) if change else table
 
 
 def _joints(case: Case, used: dict[str, Material]) -> Iterator[JointPair]:
-    on_ground = case.structure is not None and case.structure.ground is not None
-    with_ground = on_ground or case.terrain is not None
+    """Of each preset with itself, with all that is held, and with the other presets: there the weaker counts."""
+    assert case.joints is not None
+    held = [*_held(case), *(("ground", "tank") if case.joints.ground else ())]
+    known = _planes(case)
     for name, preset in used.items():
-        for other in (name, "ground") if with_ground else (name,):
-            yield JointPair(
-                between=(name, other), strength=preset.strength, opening_at_failure=preset.opening
-            )
+        for other in held:
+            if other not in ("ground", "tank") or other in known:
+                yield _pair(name, other, preset)
+    for i, (name, preset) in enumerate(used.items()):
+        for other, also in list(used.items())[i:]:
+            yield _pair(name, other, _weakest((preset, also)))
 
 
-def _friction(own: tuple[ContactPair, ...], used: dict[str, Material]) -> tuple[ContactPair, ...]:
-    """The pairs that the case gives, and those of the presets that it does not."""
+def _pair(name: str, other: str, law: Material) -> JointPair:
+    return JointPair(between=(name, other), strength=law.strength, opening_at_failure=law.opening)
+
+
+def _planes(case: Case) -> set[str]:
+    """Which of ground and tank (its floor) blocks may stand on."""
+    assert case.structure is not None
+    ground = case.structure.ground is not None or case.terrain is not None
+    floor = case.tank is not None and not ground and "z-" not in case.tank.open
+    return {name for name, there in (("ground", ground), ("tank", floor)) if there}
+
+
+def _weakest(materials: Iterable[Material]) -> Material:
+    return min(materials, key=lambda material: material.strength)
+
+
+def _friction(case: Case, used: dict[str, Material]) -> tuple[ContactPair, ...]:
+    """The pairs that the case gives, and those of the presets that it does not: of two presets the smoother counts."""
+    assert case.contact is not None
+    own = case.contact.pair
     given = {frozenset(pair.materials) for pair in own}
-    wanted = [(name, other, m.friction) for name, m in used.items() for other in (name, "ground")]
-    more = [ContactPair(materials=(a, b), friction=mu) for a, b, mu in wanted if {a, b} not in given]
+    wanted = {
+        frozenset((name, other)): used[name].friction
+        for name in used
+        for other in ("ground", *(solid.material for solid in case.solid if solid.material not in used))
+    }
+    for name, one in used.items():
+        wanted |= {frozenset((name, other)): min(one.friction, also.friction) for other, also in used.items()}
+    more = [
+        ContactPair(materials=(min(names), max(names)), friction=friction)
+        for names, friction in wanted.items()
+        if names not in given
+    ]
     return (*own, *more)
 
 

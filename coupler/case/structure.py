@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from coupler.case.types import (
+    MATERIAL,
     Density,
     Length,
     Name,
@@ -44,7 +45,7 @@ class Block(Section):
     velocity: VelocityVector = Field((0.0, 0.0, 0.0), description="velocity of the centre at the start")
     spin: SpinVector = Field((0.0, 0.0, 0.0), description="angular velocity at the start, world axes")
     density: Density | None = Field(None, description="mass per volume; absent: structure.density")
-    material: Name = Field("block", description="a name that contact.pair may go by")
+    material: Name = Field("block", description=MATERIAL)
     fixed: Switch = Field(False, description="true: held in place for the whole run")
     group: Name | None = Field(None, description="a name shared by blocks; gauges can add up a group")
 
@@ -80,7 +81,7 @@ class Building(Section):
     )
     roof: Switch = Field(True, description="false: open at the top")
     density: Density | None = Field(None, description="mass per volume; absent: structure.density")
-    material: Name = Field("block", description="a name that contact.pair may go by")
+    material: Name = Field("block", description=MATERIAL)
     on: Literal["terrain"] | None = Field(
         None,
         description="terrain: it stands on a footing in the ground, a held box NAME-footing, and the z of lower counts "
@@ -130,7 +131,7 @@ class MasonryWall(Section):
         examples=["30 deg"],
     )
     density: Density | None = Field(None, description="mass per volume; absent: structure.density")
-    material: Name = Field("block", description="a name that contact.pair may go by")
+    material: Name = Field("block", description=MATERIAL)
 
 
 class Column(Section):
@@ -151,7 +152,7 @@ class Column(Section):
     )
     sides: Annotated[int, Field(strict=True, ge=3, le=64)] = Field(12, description="sides of a round drum")
     density: Density | None = Field(None, description="mass per volume; absent: structure.density")
-    material: Name = Field("block", description="a name that contact.pair may go by")
+    material: Name = Field("block", description=MATERIAL)
 
 
 class Arch(Section):
@@ -176,7 +177,7 @@ class Arch(Section):
     )
     abutment_fixed: Switch = Field(True, description="false: the abutments may move")
     density: Density | None = Field(None, description="mass per volume; absent: structure.density")
-    material: Name = Field("block", description="a name that contact.pair may go by")
+    material: Name = Field("block", description=MATERIAL)
 
 
 class Rubble(Section):
@@ -197,7 +198,7 @@ class Rubble(Section):
         1, description="the same seed gives the same blocks"
     )
     density: Density | None = Field(None, description="mass per volume; absent: structure.density")
-    material: Name = Field("block", description="a name that contact.pair may go by")
+    material: Name = Field("block", description=MATERIAL)
 
 
 class TownRule(Section):
@@ -215,7 +216,7 @@ class TownRule(Section):
         None, description="wanted length and height of the blocks"
     )
     density: Density | None = Field(None, description="mass per volume")
-    material: Name | None = Field(None, description="a name that contact.pair and joints.pair may go by")
+    material: Name | None = Field(None, description=MATERIAL)
 
 
 class Town(Section):
@@ -250,7 +251,7 @@ class Town(Section):
         examples=[["2 m", "1.5 m"]],
     )
     density: Density | None = Field(None, description="mass per volume; absent: structure.density")
-    material: Name = Field("block", description="a name that contact.pair and joints.pair may go by")
+    material: Name = Field("block", description=MATERIAL)
     pad: Annotated[float, InSI("m", ge=0)] = Field(0.0, description="how far footings reach beyond the walls")
     shape: Literal["rectangle", "outline"] = Field(
         "rectangle",
@@ -281,7 +282,7 @@ class BlockFile(Section):
         "digits of the file resolve",
     )
     density: Density | None = Field(None, description="mass per volume; absent: structure.density")
-    material: Name = Field("block", description="a name that contact.pair may go by")
+    material: Name = Field("block", description=MATERIAL)
     fixed: Switch = Field(False, description="true: held in place for the whole run")
 
 
@@ -333,8 +334,12 @@ class Drawing(Section):
         description="parts narrower than this are merged with a neighbour where both make a convex block; absent: a "
         "quarter of the usual thickness",
     )
+    most_blocks: Annotated[int, Field(strict=True, ge=1, le=20_000)] = Field(
+        5000,
+        description="more are refused before any is made: most often the unit of the file (scale) is another one",
+    )
     density: Density | None = Field(None, description="mass per volume; absent: structure.density")
-    material: Name = Field("block", description="a name that contact.pair and joints.pair may go by")
+    material: Name = Field("block", description=MATERIAL)
     fixed: Switch = Field(False, description="true: held in place for the whole run")
     layer: tuple[DrawingLayer, ...] = Field((), description="layers that differ from the rest")
 

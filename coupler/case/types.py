@@ -29,6 +29,11 @@ Wall = Literal["x-", "x+", "y-", "y+"]
 Switch = Annotated[bool, Field(strict=True)]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]*$", max_length=60)]
 
+MATERIAL = (
+    "concrete, brick-masonry or timber (presets), or any name that contact.pair and joints.pair may go by"
+)
+"""What the material of blocks is, for every table of them."""
+
 
 class Section(BaseModel):
     """A table of the case file: unknown names, infinities and NaN are refused; nothing changes afterwards."""

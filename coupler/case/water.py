@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from coupler.case.types import (
+    MATERIAL,
     Density,
     Length,
     Name,
@@ -285,7 +286,7 @@ class Solid(Section):
     weld: PositiveLength | None = Field(
         None, description="corners of the file closer than this are one; absent: found from its edges"
     )
-    material: Name = Field("solid", description="a name that contact.pair may go by")
+    material: Name = Field("solid", description=MATERIAL)
     density: Density | None = Field(
         None, description="mass per volume, for its weight among the loads; absent: structure.density"
     )

@@ -11,6 +11,7 @@ from contextlib import suppress
 import numpy as np
 
 from coupler.case.case import Case
+from coupler.case.materials import material_remarks
 from coupler.case.schedule import MOST_OUTPUTS
 from coupler.case.toml_lines import shown
 from coupler.case.types import KeyPath
@@ -69,10 +70,11 @@ def _study(case: Case) -> Iterator[Problem]:
 def remarks(case: Case) -> list[str]:
     """What is allowed but worth knowing before the run."""
     found = [
-        *_thin_remarks(case),
+        *thin_remarks(case),
         *_contact_remarks(case),
         *softness_remarks(case),
         *water_remarks(case),
+        *material_remarks(case),
         *_joint_remarks(case),
         *_loose_remarks(case),
     ]
@@ -80,15 +82,19 @@ def remarks(case: Case) -> list[str]:
     return [*found, *_unit_remarks(case), *_window_remarks(case)]
 
 
-def _thin_remarks(case: Case) -> Iterator[str]:
+def thin_remarks(case: Case) -> Iterator[str]:
+    """Bodies too thin for single covers, told once for the thinnest."""
     if case.tank is None or case.water is None or case.water.covers != "single":
         return
-    thin = [(name, width) for name, width in _widths(case) if width < finest_cell(case.tank)]
+    cell = finest_cell(case.tank)
+    thin = [(name, width) for name, width in _widths(case) if width < cell]
     if thin:
         name, width = min(thin, key=lambda item: item[1])
+        others = f" (and {len(thin) - 1} more are thinner than a cell)" if len(thin) > 1 else ""
         yield (
-            f"{name} is {width:g} m thick, thinner than a cell ({finest_cell(case.tank):.3g} m): with single covers "
-            "the water on its two sides is one field there and the load comes out too small"
+            f"{name} is {width:g} m thick, thinner than a cell ({cell:.3g} m){others}: with single covers the water on "
+            "its two sides is one field there, and most of the load can be missing; write "
+            'water.covers = "multiple" for the whole load'
         )
 
 

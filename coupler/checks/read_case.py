@@ -21,7 +21,7 @@ from pydantic import ValidationError
 
 from coupler.case.case import Case
 from coupler.case.keys import find, keys
-from coupler.case.materials import with_presets
+from coupler.case.materials import with_presets, with_strength
 from coupler.case.messages import explain_error
 from coupler.case.paths import BadPath, place_of, read_text
 from coupler.case.promises import mistakes_in
@@ -369,7 +369,8 @@ def _validate(table: dict, places: _Places, nowhere: list) -> tuple[Case | None,
     mistakes = [*nowhere, *(explain_error(item) for item in found)]
     if case is not None and not nowhere:
         case, refused = measured(case)
-        mistakes += [*refused, *problems(case)]
+        case, missing = with_strength(case)
+        mistakes += [*refused, *missing, *problems(case)]
     mistakes.sort(key=lambda mistake: places.line(mistake[0]))
     lines = [_line(path, text, places) for path, text in mistakes]
     return (None if mistakes or case is None else with_presets(case)), list(dict.fromkeys(lines))

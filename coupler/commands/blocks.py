@@ -14,7 +14,7 @@ from pydantic import ValidationError
 from coupler.case.case import Case
 from coupler.case.messages import explain_error
 from coupler.geometry.bodies import Body
-from coupler.geometry.drawing.drawing import Cut, cut_drawing
+from coupler.geometry.drawing.drawing import Cut, cut_drawing, in_words
 from coupler.geometry.drawing.reading import BadDrawing
 from coupler.geometry.parts import parts_of
 from coupler.geometry.solids import solids_of
@@ -88,6 +88,7 @@ def _case(path: Path, options: dict, joints: dict) -> Case:
 
 
 def _rows(cut: Cut) -> Iterable[terminal.Row]:
+    yield terminal.Row("extent", in_words(cut.extent).removesuffix(" m"), "m", "along x, y and z (scale)")
     yield terminal.Row("volume", cut.volume, "m3", "of the drawing; that of the blocks is the same")
     yield terminal.Row("blocks", len(cut.blocks), "", _counted(b.group for b in cut.blocks))
     for name, (volume, count) in cut.layers.items():

@@ -324,6 +324,7 @@ def blocks(
         str | None,
         typer.Option(metavar="M", help="parts narrower than this are merged with their neighbours"),
     ] = None,
+    most_blocks: Annotated[int | None, typer.Option(help="more blocks are refused; default: 5000")] = None,
     density: Annotated[
         str | None, typer.Option(help="density of the blocks, for instance '1800 kg/m3'")
     ] = None,
@@ -349,6 +350,7 @@ def blocks(
     given = {"size": size, "course": course, "bond": bond, "scale": scale, "up": up, "sliver": sliver}
     given["density"] = density
     options = {k: as_number(v) for k, v in given.items() if v is not None and (k, v) not in DRAWN_AS_USUAL}
+    options |= {} if most_blocks is None else {"most_blocks": most_blocks}
     joints = {"strength": strength, "opening_at_failure": opening}
     cut(drawing, options, joints, picture, to)
 

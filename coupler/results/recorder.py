@@ -27,6 +27,7 @@ from coupler.results.columns import (
 from coupler.results.cracks import crack_columns, write_crack_surfaces, write_cracks
 from coupler.results.fields import BlockWriter, WaterWriter, write_solids
 from coupler.results.history import HistoryTable
+from coupler.results.tank_top import TankTop
 from coupler.step.observe import block_damage, fastest_point, joint_counts
 
 
@@ -66,6 +67,7 @@ class Recorder:
         self._structure = self._table("structure", STRUCTURE) if structure else None
         self._gauges = self._table("gauges", self._gauge_columns()) if self._together() else None
         self._own = [(gauge, self._table(gauge.table, gauge.columns)) for gauge in gauges if gauge.table]
+        self.top = TankTop(water) if water else None
         self._written = 0 if kept is None else int(kept["outputs"])
         keep = None if kept is None else self._written
         self._fields = WaterWriter(directory / "fields.vtkhdf", keep=keep) if water else None
@@ -107,6 +109,8 @@ class Recorder:
             self.watch.restore(_below("watch_", kept))
         if self.maps is not None:
             self.maps.restore(_below("maps_", kept))
+        if self.top is not None:
+            self.top.restore(_below("top_", kept))
         self._write_tables()
 
     def _gauge_memory(self) -> dict[str, np.ndarray]:
@@ -126,6 +130,7 @@ class Recorder:
             | self._gauge_memory()
             | {f"watch_{name}": a for name, a in (self.watch.save() if self.watch else {}).items()}
             | {f"maps_{name}": a for name, a in (self.maps.save() if self.maps else {}).items()}
+            | {f"top_{name}": a for name, a in (self.top.save() if self.top else {}).items()}
             | {
                 "outputs": np.array(self._written),
                 "impulse": self.impulse.copy(),

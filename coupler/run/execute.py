@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
-from coupler.case.case import modules
+import numpy as np
+
+from coupler.case.case import Case, modules
 from coupler.checks.case import remarks
 from coupler.checks.read_case import CaseFile
+from coupler.geometry.parts import parts_of
 from coupler.program import arithmetic
 from coupler.program.errors import ExitCode
 from coupler.results.expected import verdicts
@@ -52,8 +55,19 @@ def describe(file: CaseFile, tell: Callable[[str], object]) -> None:
     tell(f"{file.path}: {file.case.case.title}")
     tell("on:  " + (", ".join(name for name, on in parts.items() if on) or "nothing"))
     tell("off: " + (", ".join(name for name, on in parts.items() if not on) or "nothing"))
+    for line in drawn(file.case):
+        tell(line)
     for remark in [*remarks(file.case), *filter(None, [arithmetic.remark()])]:
         tell(f"note: {remark}")
+
+
+def drawn(case: Case) -> Iterator[str]:
+    """The extent of what comes from files, so that a wrong unit is seen."""
+    for part in parts_of(case):
+        if part.path[1] in ("drawing", "file") and part.blocks:
+            corners = np.concatenate([block.world_vertices() for block in part.blocks])
+            lengths = " x ".join(f"{length:.4g}" for length in np.ptp(corners, axis=0))
+            yield f"structure.{part.path[1]} '{part.name}': {lengths} m along x, y and z, {len(part.blocks)} blocks"
 
 
 def tell_laws(file: CaseFile, directory: RunDirectory, tell: Callable[[str], object]) -> None:

@@ -1,7 +1,7 @@
 """How a run tells what it does: a bar with the time left on a terminal, one line per 10 % anywhere else.
 
 The loop knows only the protocol `Reporter`; figures are ordered name -> text, for instance
-{"dt": "12 ms", "joints broken": "140/900", "force": "2.1 MN", "volume": "+0.02 %", "energy": "0.4 %"}.
+{"dt": "12 ms", "joints broken": "140/900", "force on house": "2.1 MN", "volume": "+0.02 %", "energy": "0.4 %"}.
 """
 
 from __future__ import annotations

@@ -9,10 +9,12 @@ import numpy as np
 
 from coupler.case.case import Case, effective
 from coupler.case.schedule import Schedule, checkpoint_interval
+from coupler.checks.case import remarks, thin_remarks
 from coupler.geometry.overlaps import deepest_overlap
 from coupler.program.errors import ExitCode
 from coupler.program.terminal import newtons
 from coupler.results.recorder import Recorder
+from coupler.results.tank_top import in_all, reached
 from coupler.run.clock import Clock
 from coupler.run.left_out import imports, note_work
 from coupler.run.pace import Calm
@@ -46,7 +48,7 @@ def run(case: Case, directory, reporter, checkpoint=None, each=None) -> ExitCode
                 _restore(scene, checkpoint, clock)
             _describe(scene, reporter)
             if checkpoint is None:  # the size at the start
-                directory.record(size=size(scene.coupling))
+                directory.record(size=size(scene.coupling), notes=remarks(case))
             if scene.coupling.structure is not None:
                 directory.record(laws=laws_of(scene.coupling.structure))
             _steps(case, scene, directory, reporter, clock, figures, checkpoint, each)
@@ -143,8 +145,9 @@ def _steps(
             with clock("output"):
                 recorder.step(record)
             _note(coupling, record, figures)
+            _note_top(case, recorder, coupling, figures, reporter)
             reporter.expect(_is_calm(calm, coupling, record))
-            reporter.step(coupling.time, _reported(coupling, record))
+            reporter.step(coupling.time, _reported(case, coupling, record, scene.watch))
             if each is not None:
                 each(coupling, record, figures, recorder.readings)
             check_step(coupling, record, limits)
@@ -170,19 +173,34 @@ def _steps(
         raise _end(reporter)(str(left) + way_on) from None
     finally:
         recorder.close()
-        _tell_verdict(recorder, directory, reporter)
+        _tell_verdict(case, recorder, figures, directory, reporter)
 
 
-def _tell_verdict(recorder: Recorder, directory, reporter) -> None:
-    """Into run.json and the log, however the run ends."""
-    reported = recorder.verdict()
-    if reported is None:
+def _note_top(case: Case, recorder: Recorder, coupling, figures: dict, reporter) -> None:
+    """Carry into the figures that the water was at the top of the tank, and tell it when it comes there."""
+    if recorder.top is None:
         return
-    from coupler.verdict.words import sentences
+    is_new = recorder.top.step(coupling.water, coupling.time)
+    found = recorder.top.reported("z+" in case.tank.open)
+    if found is not None:
+        figures["tank_top"] = found
+    if is_new:
+        reporter.message(f"note: {reached(found)}")
 
-    directory.record(verdict=reported)
-    for line in sentences(reported):
-        reporter.message(line)
+
+def _tell_verdict(case: Case, recorder: Recorder, figures: dict, directory, reporter) -> None:
+    """Into run.json and the log, however the run ends, with what makes its loads wrong."""
+    reported = recorder.verdict()
+    doubts = [*thin_remarks(case), *([in_all(figures["tank_top"])] if "tank_top" in figures else [])]
+    directory.record(doubts=doubts)
+    if reported is not None:
+        from coupler.verdict.words import sentences
+
+        directory.record(verdict=reported)
+        for line in sentences(reported):
+            reporter.message(line)
+    for line in doubts:
+        reporter.message(f"but: {line}")
 
 
 def _long_steps(coupling, limits: Limits, reporter, clock: Clock, figures: dict, checkpoints) -> LongSteps:
@@ -263,14 +281,25 @@ def _is_calm(calm: Calm, coupling, record) -> bool:
     return calm.now(coupling.time, record.wetted, joints.intact, joints.broken)
 
 
-def _reported(coupling, record) -> dict[str, str]:
+def _force(case: Case, record, watch) -> tuple[str, float]:
+    """Whose force of the water is told while a run goes on, and that force [N]: of the judged body that bears most;
+    without one, of all."""
+    strongest = None if watch is None else watch.strongest()
+    if strongest is not None:
+        return strongest
+    whose = case.solid[0].name if len(case.solid) == 1 and case.structure is None else "all bodies"
+    return whose, float(np.linalg.norm(record.load[:, :3].sum(axis=0)))
+
+
+def _reported(case: Case, coupling, record, watch) -> dict[str, str]:
     reported = {"dt": f"{1e3 * record.dt:.3g} ms"}
     if coupling.structure is not None:
         joints = joint_counts(coupling.structure)
         reported["broken"] = f"{joints.broken}/{joints.intact + joints.broken}"
     if coupling.water is not None:
         if len(record.load):
-            reported["force"] = newtons(float(np.linalg.norm(record.load[:, :3].sum(axis=0))))
+            whose, force = _force(case, record, watch)
+            reported[f"force on {whose}"] = newtons(force)
         reported["volume"] = f"{_volume_error(coupling):+.2%}"
     if coupling.coupled:
         reported["defect"] = f"{record.defect:.1e}"

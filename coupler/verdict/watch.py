@@ -101,6 +101,7 @@ class Watch:
         self.left_at = np.full(n, np.nan)
         self.pressure = Peaks.none(n)
         self.force, self.moment = Peaks.none(bodies + 1), Peaks.none(bodies + 1)
+        self._force_now: Array | None = None
         self.direction, self.impulse = np.zeros((bodies + 1, 3)), np.zeros((bodies + 1, 3))
         self.depth = Peaks.none(bodies)
         self.depth_at = np.full((bodies, 2), np.nan)
@@ -142,11 +143,21 @@ class Watch:
         of_body = np.array([label == k for k in range(len(self.divisions.bodies.names))] + [self.judged])
         force = of_body @ load[:, :3]
         self.impulse += record.dt * force
-        larger = self.force.take(np.linalg.norm(force, axis=1), record.time)
+        self._force_now = np.linalg.norm(force, axis=1)
+        larger = self.force.take(self._force_now, record.time)
         self.direction[larger] = force[larger]
         about_zero = of_body @ (load[:, 3:] + np.cross(centre, load[:, :3]))
         overturning = about_zero - np.cross(self.foot, force)
         self.moment.take(np.linalg.norm(overturning[:, :2], axis=1), record.time)
+
+    def strongest(self) -> tuple[str, float] | None:
+        """The judged body on which the force of the water is the largest now, and that force [N]; None without one."""
+        own = np.unique(self.divisions.bodies.label[self.judged])
+        own = own[own >= 0]
+        if self._force_now is None or not len(own):
+            return None
+        k = int(own[np.argmax(self._force_now[own])])
+        return self.divisions.bodies.names[k], float(self._force_now[k])
 
     def _hit(self, s: Structure, record: StepRecord, velocity: Array, in_place: Array) -> None:
         """Debris that lost speed to a contact in this step, and what it met."""

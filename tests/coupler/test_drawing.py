@@ -1,6 +1,8 @@
 """Blocks from drawings: nothing lost, openings kept, joints across every cut, whatever the file, and refusals that show
 the place."""
 
+import time
+
 import meshio
 import numpy as np
 import pytest
@@ -223,3 +225,23 @@ def test_ifc_files_by_their_materials(tmp_path):
     assert {name: volume for name, (volume, _) in found.layers.items()} == pytest.approx(
         {"brick": 3.6, "concrete": 2.0}
     )
+
+
+def test_a_drawing_in_millimetres_is_refused_before_blocks_are_made_and_told_its_unit(tmp_path):
+    write(tmp_path / "house.stl", all=house().scale([1000.0] * 3))
+    began = time.process_time()
+    with pytest.raises(BadDrawing, match="it is 9000 x 7000 x 3000 m as it is read") as refused:
+        cut_drawing(Drawing(path=str(tmp_path / "house.stl"), size=1.2))
+    assert time.process_time() - began < 5.0
+    assert 'drawn in millimetres, write scale = "1 mm"' in str(refused.value)
+    assert "then it is 9 x 7 x 3 m" in str(refused.value)
+    cut = cut_drawing(Drawing(path=str(tmp_path / "house.stl"), size=1.2, scale="1 mm"))
+    assert cut.extent == pytest.approx([9.0, 7.0, 3.0])
+
+
+def test_more_blocks_than_wanted_are_refused_by_the_number_of_the_case(tmp_path):
+    write(tmp_path / "house.stl", all=house())
+    with pytest.raises(
+        BadDrawing, match=r"at most 50 \(most_blocks\). Take a larger size, or raise most_blocks"
+    ):
+        cut_drawing(Drawing(path=str(tmp_path / "house.stl"), size=1.2, most_blocks=50))

@@ -4,7 +4,9 @@ import pytest
 
 from coupler.case.docs import explanation
 from coupler.case.materials import PRESETS
+from coupler.checks.case import remarks
 from coupler.checks.read_case import load
+from coupler.program.errors import BadCase
 
 CASE = """
 [case]
@@ -70,3 +72,93 @@ def test_explain_gives_numbers_and_sources(name):
     assert f"{PRESETS[name].density:g} kg/m3" in text
     assert PRESETS[name].source in text
     assert PRESETS[name].strength * PRESETS[name].opening * 9 / 16 == pytest.approx(PRESETS[name].energy)
+
+
+QUAY = """
+[case]
+title = "a wall on a quay of presets alone"
+[time]
+end = "1 s"
+[[solid]]
+name = "quay"
+centre = [2, 0.25, -0.5]
+size = [4, 0.5, 1]
+[structure]
+[[structure.wall]]
+name = "w"
+lower = [0, 0, 0]
+size = [4, 0.5, 2]
+block = [1, 0.5, 1]
+material = "brick-masonry"
+[[structure.block]]
+name = "lintel"
+size = [4, 0.5, 0.5]
+centre = [2, 0.25, 2.25]
+material = "concrete"
+[[structure.block]]
+name = "held"
+size = [1, 0.5, 1]
+centre = [4.5, 0.25, 0.5]
+fixed = true
+[contact]
+[joints]
+"""
+
+
+def test_presets_alone_are_enough_and_reach_solids_held_blocks_and_the_weaker_of_two(tmp_path):
+    from coupler.scene.build import build_structure
+
+    (tmp_path / "case.toml").write_text(QUAY)
+    case = load(tmp_path).case
+    brick, concrete = PRESETS["brick-masonry"], PRESETS["concrete"]
+    with build_structure(case) as s:
+        found = {}
+        for a, b, law in zip(s.joints.a, s.joints.b, s.joints.laws):
+            pair = frozenset(s.names[row].split("-")[0] for row in (a, b))
+            found.setdefault(pair, set()).add((law.strength, law.opening_at_failure))
+    weak = {(brick.strength, brick.opening)}
+    assert found == {
+        frozenset({"w"}): weak,
+        frozenset({"w", "quay"}): weak,
+        frozenset({"w", "held"}): weak,
+        frozenset({"w", "lintel"}): weak,
+    }
+    friction = {frozenset(p.materials): p.friction for p in case.contact.pair}
+    assert friction[frozenset({"brick-masonry", "solid"})] == brick.friction
+    assert friction[frozenset({"brick-masonry", "concrete"})] == min(brick.friction, concrete.friction)
+    assert remarks(case) == []
+
+
+def test_a_strength_is_asked_for_where_a_material_has_none(tmp_path):
+    (tmp_path / "case.toml").write_text(QUAY.replace('"brick-masonry"', '"brick-masonery"'))
+    with pytest.raises(BadCase) as refused:
+        load(tmp_path)
+    strength, opening = str(refused.value).splitlines()
+    assert "joints.strength: missing" in strength
+    assert "'brick-masonery' has no preset" in strength
+    assert "did you mean 'brick-masonry'?" in strength
+    assert "joints.opening_at_failure: missing" in opening
+
+
+def test_a_name_near_a_preset_and_a_strength_that_counts_nowhere_are_told(tmp_path):
+    with_strength = QUAY + 'strength = "1 MPa"\nopening_at_failure = "1 mm"\n'
+    (tmp_path / "case.toml").write_text(with_strength.replace('"brick-masonry"', '"brick-masonery"'))
+    found = remarks(load(tmp_path).case)
+    assert any("'brick-masonery' is no preset; did you mean 'brick-masonry'?" in line for line in found)
+    (tmp_path / "case.toml").write_text(with_strength)
+    assert any("joints.strength counts nowhere" in line for line in remarks(load(tmp_path).case))
+
+
+def test_blocks_that_are_not_to_be_glued_to_the_ground_are_not_by_a_preset_either(tmp_path):
+    (tmp_path / "case.toml").write_text(CASE.replace("[joints]", "[joints]\nground = false"))
+    assert all("ground" not in pair.between for pair in load(tmp_path).case.joints.pair)
+
+
+def test_a_layer_of_a_drawing_has_the_density_of_its_preset():
+    from coupler.case.case import Case
+    from coupler.case.materials import with_presets
+
+    drawing = {"path": "a.obj", "size": 1, "layer": [{"name": "roof", "material": "timber"}]}
+    case = {"case": {"title": "x"}, "time": {"end": 1}, "structure": {"drawing": [drawing]}}
+    layer = with_presets(Case.model_validate(case)).structure.drawing[0].layer[0]
+    assert layer.density == PRESETS["timber"].density

@@ -12,6 +12,7 @@ The opening at failure stays, so stiffness and work of separation go with the st
 from __future__ import annotations
 
 import math
+from collections import Counter
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -24,6 +25,8 @@ from yade_scripts.joints.cohesion import JointParameterError, JointParameters
 
 Array = np.ndarray
 
+MOST_KINDS = 6
+"""Strengths that are listed one by one."""
 LEAST = 1e-3
 """Smallest coefficient of variation: below it strengths are equal."""
 
@@ -115,7 +118,13 @@ class JointRules:
         text = self.everywhere.described()
         if self.pairs:
             other = sum(law != self.everywhere for law in laws)
-            text += f"; {other} of {len(laws)} joints by joints.pair"
+            text += f"; {other} of {len(laws)} joints by joints.pair or a preset"
+            kinds = Counter((law.strength, law.opening_at_failure) for law in laws)
+            if self.scatter is None and len(kinds) <= MOST_KINDS:
+                listed = (
+                    f"{n} of {t / 1e6:.4g} MPa and {1e3 * d:.3g} mm" for (t, d), n in kinds.most_common()
+                )
+                text += f" ({', '.join(listed)})"
         if self.scatter is not None:
             s = self.scatter
             text += f"; strengths {s.distribution}, {s.variation:g} of their mean, seed {s.seed}"

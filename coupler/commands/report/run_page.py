@@ -68,9 +68,11 @@ def run_page(run: Path, summary: dict, pictures: Path, remarks: list[str]) -> st
             f"<h1>{escape(title)}</h1>",
             paragraph(summary["case"]["case"].get("description", "")),
             _verdict(run, summary),
+            _doubts(summary),
             section("Does it stand?", *stands(run, summary, pictures)),
             section("What was run", _what(run, summary)),
             section("Results", _figures(summary), _promises(summary)),
+            section("Notes before the run", _notes(summary)),
             section("Pictures", _stills(run, pictures), *map(note, remarks)),
             section("Computed over data", *(figure(p, _words(p.stem)) for p in over_data(run, pictures))),
             section("Histories", *_histories(run, pictures, of_scheme=False)),
@@ -95,6 +97,19 @@ def _verdict(run: Path, summary: dict) -> str:
     elif summary["status"] == "running":
         shown += f": this is what the run has written so far{_until(run)}"
     return f'<p class="verdict{" bad" if bad else ""}">{escape(shown)}</p>'
+
+
+def _doubts(summary: dict) -> str:
+    """What makes the loads of this run wrong, on the first screen; of a run without any, nothing."""
+    return "".join(
+        f'<p class="verdict bad">{escape(line)}</p>' for line in summary["figures"].get("doubts", [])
+    )
+
+
+def _notes(summary: dict) -> str:
+    """What the run told of its case before it began."""
+    found = summary["figures"].get("notes", [])
+    return f"<ul>{''.join(f'<li>{escape(line)}</li>' for line in found)}</ul>" if found else ""
 
 
 def _until(run: Path) -> str:

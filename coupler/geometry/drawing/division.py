@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from coupler.geometry.drawing.convex_parts import ROUND_OFF, Part, directions
@@ -17,7 +19,7 @@ def divided(body, part: Part, size: tuple[float, float], bond: str) -> list[Part
     """
     axes = directions(part.corners)
     span = np.ptp(part.corners @ axes.T, axis=0)
-    count = [_pieces(span[0], size[0]), _pieces(span[1], size[0]), _pieces(span[2], size[1])]
+    count = _counts(span, size)
     if count == [1, 1, 1]:
         return [part]
     low = (part.corners @ axes.T).min(axis=0)
@@ -27,6 +29,15 @@ def divided(body, part: Part, size: tuple[float, float], bond: str) -> list[Part
         for wythe in _sliced(course, axes[0], low[0], _cuts(span[0], count[0])):
             found += _sliced(wythe, axes[1], low[1], _cuts(span[1], count[1], shifted))
     return [_as_part(piece) for piece in found]
+
+
+def how_many(part: Part, size: tuple[float, float]) -> int:
+    """Into how many pieces `divided` cuts a part, about, before it does."""
+    return math.prod(_counts(np.ptp(part.corners @ directions(part.corners).T, axis=0), size))
+
+
+def _counts(span: Array, size: tuple[float, float]) -> list[int]:
+    return [_pieces(span[0], size[0]), _pieces(span[1], size[0]), _pieces(span[2], size[1])]
 
 
 def _pieces(length: float, size: float) -> int:

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from coupler.geometry.drawing.convex_parts import CannotCut, Part, convex_parts, merged, smallest_width
-from coupler.geometry.drawing.division import divided
+from coupler.geometry.drawing.division import divided, how_many
 from coupler.geometry.drawing.names import member_names
 from coupler.geometry.drawing.reading import BadDrawing, Layer, read_layers
 from yade_scripts.blocks.block import Block
@@ -22,15 +22,21 @@ Array = np.ndarray
 SLIVER = 0.25
 """Of the usual thickness of a layer: parts narrower than this are merged with a neighbour where that is convex."""
 SAME_VOLUME = 1e-9
+UNITS = {"millimetres": 1e-3, "centimetres": 1e-2, "inches": 0.0254, "feet": 0.3048}
+UNIT_TEXT = {"millimetres": "mm", "centimetres": "cm", "inches": "inch", "feet": "ft"}
+"""Lengths of one unit [m] of drawings that are not in metres, and how a case writes them."""
+A_BUILDING = (1.0, 300.0)
+"""Largest lengths [m] of what is drawn, from a garden wall to a quay."""
 GROUP = re.compile("[a-z]+")
 
 
 @dataclass(frozen=True)
 class Cut:
-    """What a drawing was cut into: blocks · volume [m³] drawn · layers: volume and number of blocks by name · slivers:
-    places (3,) [m] of the narrow parts that no neighbour could take, with their width [m]"""
+    """What a drawing was cut into: blocks · extent (3,) [m] and volume [m³] drawn · layers: volume and number of blocks
+    by name · slivers: places (3,) [m] of the narrow parts that no neighbour could take, with their width [m]"""
 
     blocks: tuple[Block, ...]
+    extent: Array
     volume: float
     layers: dict[str, tuple[float, int]]
     slivers: tuple[tuple[Array, float], ...]
@@ -50,10 +56,14 @@ def cut_drawing(spec, **common) -> Cut:
     layers = [layer for layer in layers if not (layer.name in rules and rules[layer.name].leave_out)]
     pieces: list[tuple[Layer, Part, list[Part]]] = []
     slivers: list[tuple[Array, float]] = []
-    for layer in layers:
+    extent = _extent(layers)
+    cut = [(layer, _parts_of(path, layer, tolerance)) for layer in layers]
+    _check_size(
+        path, spec, extent, [(part, _size(spec, rules.get(la.name))) for la, ps in cut for part in ps]
+    )
+    for layer, parts in cut:
         rule = rules.get(layer.name)
         size = _size(spec, rule)
-        parts = _parts_of(path, layer, tolerance)
         least = spec.sliver or SLIVER * _usual(parts)
         parts = merged(parts, tolerance, max(size), least)
         slivers += [(p.middle, w) for p in parts for w in [smallest_width(p.corners)] if w < least]
@@ -65,7 +75,7 @@ def cut_drawing(spec, **common) -> Cut:
     _check_volume(path, blocks, whole, tolerance, layers)
     counts = Counter(layer.name for layer, _, found in pieces for _ in found)
     given_values = {layer.name: (layer.body.volume(), counts[layer.name]) for layer in layers}
-    return Cut(tuple(blocks), whole, given_values, tuple(slivers))
+    return Cut(tuple(blocks), extent, whole, given_values, tuple(slivers))
 
 
 def _size(spec, rule) -> tuple[float, float]:
@@ -109,6 +119,45 @@ def _solid(part: Part):
     from manifold3d import Manifold
 
     return Manifold.hull_points(part.corners)
+
+
+def _extent(layers: list[Layer]) -> Array:
+    """Length along x, y and z (3,) [m] of all that is drawn."""
+    boxes = np.array([layer.body.bounding_box() for layer in layers]).reshape(-1, 6)
+    return boxes[:, 3:].max(axis=0) - boxes[:, :3].min(axis=0) if len(boxes) else np.zeros(3)
+
+
+def _check_size(path: Path, spec, extent: Array, parts: list[tuple[Part, tuple[float, float]]]) -> None:
+    """Refuse more blocks than are wanted before one is made, with the unit of the file that is most likely meant."""
+    count = sum(how_many(part, size) for part, size in parts)
+    if count <= spec.most_blocks:
+        return
+    raise BadDrawing(
+        f"{path.name}: it is {in_words(extent)} as it is read (scale: a unit of the file is {spec.scale:g} m) and "
+        f"would make about {count:.3g} blocks of {spec.size:g} m, at most {spec.most_blocks} (most_blocks). "
+        f"{_likely_unit(spec, extent)}"
+    )
+
+
+def _likely_unit(spec, extent: Array) -> str:
+    """What to do about too many blocks."""
+    for name, unit in UNITS.items():
+        size = extent * unit / spec.scale
+        if (
+            unit < spec.scale
+            and extent.max() > A_BUILDING[1]
+            and A_BUILDING[0] <= size.max() <= A_BUILDING[1]
+        ):
+            return (
+                f'If the file is drawn in {name}, write scale = "1 {UNIT_TEXT[name]}" (--scale "1 {UNIT_TEXT[name]}"): '
+                f"then it is {in_words(size)}"
+            )
+    return "Take a larger size, or raise most_blocks"
+
+
+def in_words(extent: Array) -> str:
+    """9 x 7 x 3 m"""
+    return " x ".join(f"{length:.4g}" for length in extent) + " m"
 
 
 def _check_count(path: Path, count: int) -> None:
