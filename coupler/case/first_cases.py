@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from string import Template
 
+from coupler.case.materials import PRESETS
 from coupler.case.units import to_si
 from coupler.program.errors import SurgebreakError, UnitError, did_you_mean
 
@@ -20,11 +22,12 @@ class CannotBegin(SurgebreakError):
 
 @dataclass(frozen=True)
 class Question:
-    """What is asked for a $name: question · answer that is taken without one · unit, "" of a plain number."""
+    """What is asked for a $name: question · answer that is taken without one · unit, "" of a plain number, None of the name
+    of a material."""
 
     text: str
     usual: str
-    unit: str = "m"
+    unit: str | None = "m"
 
 
 END = Question("How long is the run?", "4 s", "s")
@@ -50,6 +53,21 @@ class FirstCase:
 
 def _half(of: str, to: str) -> Callable[[dict[str, str]], dict[str, str]]:
     return lambda answers: {to: f"{0.5 * to_si(answers[of], 'm'):g}"}
+
+
+def _harbour(answers: dict[str, str]) -> dict[str, str]:
+    """Heights over the bed of the harbour; the tank ends well above what the quay throws up."""
+    height, depth, freeboard = (to_si(answers[name], "m") for name in ("height", "depth", "freeboard"))
+    quay = depth + freeboard
+    found = {
+        "still": depth,
+        "level": depth + height,
+        "quay_top": quay,
+        "half_quay": 0.5 * quay,
+        "speed_at": quay + 0.6,
+        "top": math.ceil(max(quay + 6.0, depth + 3.0 * height)),
+    }
+    return {name: f"{value:g}" for name, value in found.items()}
 
 
 def _site() -> str:
@@ -132,6 +150,20 @@ FIRST_CASES = {
             "end": Question("How long is the run?", "8 s", "s"),
         },
         lambda answers: {"level": f"{3.0 + to_si(answers['overtopping'], 'm'):g}"},
+    ),
+    "harbour": FirstCase(
+        "a house on a quay in a bore that comes in through the harbour",
+        {
+            "height": Question("How high does the bore stand over the still water of the harbour?", "3.5 m"),
+            "depth": Question("Depth of the harbour", "4 m"),
+            "freeboard": Question("Height of the quay over the still water", "1.5 m"),
+            "material": Question(
+                "Material of the house (brick-masonry, concrete or timber)", "brick-masonry", None
+            ),
+            "cell": Question(CELL.text, "1 m"),
+            "end": Question("How long is the run?", "5 s", "s"),
+        },
+        _harbour,
     ),
     "column": FirstCase(
         "drums on one another without mortar, hit by a surge",
@@ -222,8 +254,12 @@ def _answer(question: Question, ask: Callable[[str, str], str] | None) -> str:
     return question.usual
 
 
-def _checked(given: str, unit: str) -> str:
+def _checked(given: str, unit: str | None) -> str:
     """With a unit; a plain number has that of the question."""
+    if unit is None:
+        if given not in PRESETS:
+            raise UnitError(f"{given!r} is no material{did_you_mean(given, list(PRESETS))}")
+        return given
     try:
         number = float(given)
     except ValueError:

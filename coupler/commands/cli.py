@@ -473,7 +473,8 @@ def docs(
 def init(
     directory: Annotated[Path, typer.Argument(metavar="DIR", help="the new case directory")],
     template: Annotated[
-        str, typer.Option(metavar="NAME", help="tank, wall, house, quay, column, terrain, town or dry")
+        str,
+        typer.Option(metavar="NAME", help="tank, wall, house, quay, harbour, column, terrain, town or dry"),
     ] = "tank",
     ask: Annotated[bool, typer.Option("--ask", help="ask at most six questions about the case")] = False,
 ) -> None:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from coupler.case.case import Case, modules
+from coupler.checks.bores import bores, in_words
 from coupler.checks.case import remarks
 from coupler.checks.read_case import CaseFile
 from coupler.geometry.parts import parts_of
@@ -55,7 +56,7 @@ def describe(file: CaseFile, tell: Callable[[str], object]) -> None:
     tell(f"{file.path}: {file.case.case.title}")
     tell("on:  " + (", ".join(name for name, on in parts.items() if on) or "nothing"))
     tell("off: " + (", ".join(name for name, on in parts.items() if not on) or "nothing"))
-    for line in drawn(file.case):
+    for line in [*drawn(file.case), *map(in_words, bores(file.case))]:
         tell(line)
     for remark in [*remarks(file.case), *filter(None, [arithmetic.remark()])]:
         tell(f"note: {remark}")

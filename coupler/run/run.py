@@ -9,6 +9,7 @@ import numpy as np
 
 from coupler.case.case import Case, effective
 from coupler.case.schedule import Schedule, checkpoint_interval
+from coupler.checks.bores import bores
 from coupler.checks.case import remarks, thin_remarks
 from coupler.geometry.overlaps import deepest_overlap
 from coupler.program.errors import ExitCode
@@ -49,6 +50,7 @@ def run(case: Case, directory, reporter, checkpoint=None, each=None) -> ExitCode
             _describe(scene, reporter)
             if checkpoint is None:  # the size at the start
                 directory.record(size=size(scene.coupling), notes=remarks(case))
+                directory.record(bores=[bore.as_table() for bore in bores(case)])
             if scene.coupling.structure is not None:
                 directory.record(laws=laws_of(scene.coupling.structure))
             _steps(case, scene, directory, reporter, clock, figures, checkpoint, each)

@@ -33,6 +33,7 @@ def stands(run: Path, summary: dict, pictures: Path) -> list[str]:
     return [
         f'<p class="verdict state-{escape(judged["state"])}">{escape(first)}</p>',
         f"<ul>{''.join(f'<li>{escape(line)}</li>' for line in rest)}</ul>",
+        *_bores(summary["figures"].get("bores", []), judged),
         *_groups("body", judged["bodies"] if len(judged["bodies"]) > 1 else [], judged, loads=True),
         *_groups("storey", judged["storeys"] if len(judged["storeys"]) > 1 else [], judged),
         *_groups("wall, floor or part", judged["members"] if len(judged["members"]) > 1 else [], judged),
@@ -41,6 +42,23 @@ def stands(run: Path, summary: dict, pictures: Path) -> list[str]:
         _hits(judged),
         note(_rules(judged)),
     ]
+
+
+def _bores(found: list[dict], judged: dict) -> list[str]:
+    """What each bore is at the structure by theory, and the depth that was measured beside it."""
+    measured = judged["largest"]["depth"]
+    beside = f"{length(measured['value'])} at {moment_of(measured['time'])}" if measured else "–"
+    rows = [
+        [
+            f"{bore['side']}: {length(bore['depth'])}, {quantity(bore['velocity'], 'm/s')}",
+            f"{length(bore['depth_there'])}, {quantity(bore['velocity_there'], 'm/s')}",
+            length(bore["against_wall"]),
+            beside,
+        ]
+        for bore in found
+    ]
+    head = ["bore: depth, velocity", f"by theory at {found[0]['at'] if found else ''}", "stopped by a wall"]
+    return [table([*head, "measured: largest depth beside it"], rows, (0, 1))] if rows else []
 
 
 def _is_there(pictures: Path, name: str) -> bool:
