@@ -22,8 +22,8 @@ class CannotBegin(SurgebreakError):
 
 @dataclass(frozen=True)
 class Question:
-    """What is asked for a $name: question · answer that is taken without one · unit, "" of a plain number, None of the name
-    of a material."""
+    """What is asked for a $name: question · answer that is taken without one · unit, "" of a plain number, None of
+    the name of a material."""
 
     text: str
     usual: str

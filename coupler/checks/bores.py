@@ -100,7 +100,10 @@ def bores(case: Case) -> Iterator[Bore]:
 
 def in_words(bore: Bore) -> str:
     """One line for `check` and the log of a run."""
-    begins = f"bore at {bore.side}: {bore.depth:.3g} m deep and {bore.velocity:.3g} m/s fast, its front {bore.front:.3g} m/s"
+    begins = (
+        f"bore at {bore.side}: {bore.depth:.3g} m deep and {bore.velocity:.3g} m/s fast, "
+        f"its front {bore.front:.3g} m/s"
+    )
     if not bore.depth_there > 0.0:
         return f"{begins}; by theory it does not get onto the step of {bore.step:.3g} m before {bore.at}"
     over = f" on top of the step of {bore.step:.3g} m" if bore.step > 0.0 else ""
@@ -146,7 +149,7 @@ def _rise(depth: float, velocity: float, g: float) -> float:
 
 
 def _behind_back(depth: float, velocity: float, back: float, g: float) -> float:
-    """Velocity [m/s] behind the bore, or the drop of the surface, that runs back from where the water is `back` deep."""
+    """Velocity [m/s] where the bore, or the drop of the surface, that runs back has made the water `back` deep."""
     if back < depth:
         return velocity + 2.0 * (math.sqrt(g * depth) - math.sqrt(g * back))
     return velocity - (back - depth) * math.sqrt(g * (back + depth) / (2.0 * back * depth))

@@ -27,7 +27,7 @@ from coupler.geometry.parts import PARTS, Part, parts_of, recipes
 from coupler.geometry.solids import refused_solids
 from coupler.geometry.tank_mesh import finest_cell, is_measured, mesh_remarks
 from coupler.geometry.terrain.land import land_problems
-from coupler.geometry.town import town_problems
+from coupler.geometry.town import town_problems, town_remarks
 from coupler.program.errors import did_you_mean
 from coupler.verdict.divisions import member, storey
 
@@ -77,6 +77,7 @@ def remarks(case: Case) -> list[str]:
         *material_remarks(case),
         *_joint_remarks(case),
         *_loose_remarks(case),
+        *town_remarks(case),
     ]
     found += mesh_remarks(case.tank) if case.tank is not None else []
     return [*found, *_unit_remarks(case), *_window_remarks(case)]

@@ -61,6 +61,8 @@ def measured(case: Case) -> tuple[Case, list[Problem]]:
         return case.model_copy(update={"tank": tank.model_copy(update={"lower": None})}), wrong
     if case.terrain is not None:
         case, wrong = _on_terrain(case)
+        if wrong:  # what stands on the ground, or is joined to it, would be refused for the same fault again
+            return case.model_copy(update={"tank": tank.model_copy(update={"lower": None})}), wrong
     elif tank.mesh is not None:
         case, wrong = _of_file(case)
     return (case, wrong) if wrong else _with_finer_parts(case)

@@ -13,6 +13,7 @@ from coupler.case.case import Case
 from coupler.case.structure import Building
 from coupler.case.types import Rotation
 from coupler.geometry.footprints import Footprint, FootprintError, best_rectangle, read_footprints
+from coupler.program.errors import did_you_mean
 
 Array = np.ndarray
 
@@ -22,6 +23,8 @@ RECTANGLE = 0.98
 """Share from which a footprint is a rectangle where outlines are asked for."""
 
 
+MOST_VALUES = 8
+"""Values of an attribute that a message lists."""
 OVERLAP = 1e-5
 """Share of its width by which a house may be in another: the digits of a file."""
 
@@ -180,11 +183,34 @@ def town_problems(case: Case) -> Iterator[tuple[tuple, str]]:
 
 
 def _idle_rules(path, town) -> Iterator[tuple[tuple, str]]:
-    known = [f.attributes for f in read_footprints(Path(town.path))] if town.crs is None and town.rule else []
+    """Rules by an attribute that no footprint of the file has."""
+    known = _attributes(town)
     for k, rule in enumerate(town.rule):
-        if known and not any(rule.attribute in attributes for attributes in known):
-            there = ", ".join(sorted({str(name) for attributes in known for name in attributes})) or "none"
-            yield (*path, "rule", k, "attribute"), f"no footprint has '{rule.attribute}'; there are {there}"
+        if not any(rule.attribute in attributes for attributes in known):
+            names = sorted({str(name) for attributes in known for name in attributes})
+            hint = did_you_mean(rule.attribute, names) or f"; there are {', '.join(names) or 'none'}"
+            yield (*path, "rule", k, "attribute"), f"no footprint has '{rule.attribute}'{hint}"
+
+
+def town_remarks(case: Case) -> Iterator[str]:
+    """Rules for a value that no footprint has: allowed, since one set of rules may serve many files, but often a
+    slip."""
+    for i, town in enumerate(case.structure.town if case.structure else ()):
+        known = _attributes(town)
+        for k, rule in enumerate(town.rule):
+            values = {a[rule.attribute] for a in known if rule.attribute in a}
+            if rule.equals not in values:
+                there = ", ".join(sorted(map(repr, values))[:MOST_VALUES])
+                near = did_you_mean(str(rule.equals), {str(v) for v in values} - {str(rule.equals)})
+                yield (
+                    f"structure.town[{i}].rule[{k}] changes nothing: no footprint has {rule.attribute} = "
+                    f"{rule.equals!r}{near or f'; there are {there}'} (a text is no number: '2' is not 2)"
+                )
+
+
+def _attributes(town) -> list[dict]:
+    """Of every footprint; not read where no rule asks for them."""
+    return [f.attributes for f in read_footprints(Path(town.path))] if town.rule else []
 
 
 def _overlapping(case: Case, path, town) -> Iterator[tuple[tuple, str]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import numpy as np
 
@@ -64,11 +65,29 @@ def describe(file: CaseFile, tell: Callable[[str], object]) -> None:
 
 def drawn(case: Case) -> Iterator[str]:
     """The extent of what comes from files, so that a wrong unit is seen."""
+    if case.terrain is not None and case.tank is not None and case.tank.ground is not None:
+        yield _ground(case)
     for part in parts_of(case):
         if part.path[1] in ("drawing", "file") and part.blocks:
             corners = np.concatenate([block.world_vertices() for block in part.blocks])
             lengths = " x ".join(f"{length:.4g}" for length in np.ptp(corners, axis=0))
             yield f"structure.{part.path[1]} '{part.name}': {lengths} m along x, y and z, {len(part.blocks)} blocks"
+
+
+def _ground(case: Case) -> str:
+    """Extent and heights of the terrain, and that its unit was guessed where the file names none."""
+    ground, path = case.tank.ground, Path(case.terrain.path)
+    named = case.terrain.crs or case.terrain.reproject or case.terrain.scale != 1.0
+    named = named or path.suffix.lower() in NAMES_ITS_UNIT or path.with_suffix(".prj").is_file()
+    guessed = "" if named else "; the file names no unit and is taken to be in metres (terrain.scale)"
+    return (
+        f"terrain {path.name}: {np.ptp(ground.x):.4g} x {np.ptp(ground.y):.4g} m, heights from "
+        f"{np.nanmin(ground.z):.4g} to {np.nanmax(ground.z):.4g} m{guessed}"
+    )
+
+
+NAMES_ITS_UNIT = (".tif", ".tiff", ".nc", ".grd")
+"""Endings of terrain files that may say their coordinate system themselves."""
 
 
 def tell_laws(file: CaseFile, directory: RunDirectory, tell: Callable[[str], object]) -> None:

@@ -7,12 +7,14 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
+from coupler.checks.case import remarks
 from coupler.checks.read_case import load
 from coupler.geometry.footprints import best_rectangle, read_footprints
 from coupler.geometry.parts import parts_of
 from coupler.geometry.solids import solids_of
 from coupler.program.errors import BadCase
 from coupler.run.clock import Clock
+from coupler.run.execute import drawn
 from coupler.scene.build import build
 
 CASE = """
@@ -144,7 +146,7 @@ ELL = [[0, 0], [10, 0], [10, 3], [3, 3], [3, 10], [0, 10], [0, 0]]
         (
             HOUSES,
             ["structure.town[0].rule[0].attribute=bilt"],
-            "no footprint has 'bilt'; there are built, id, levels",
+            "no footprint has 'bilt'; did you mean 'built'?",
         ),
         (
             [{"type": "Feature", "geometry": {"type": "Point"}}],
@@ -233,3 +235,37 @@ def test_ground_with_a_hole_is_the_only_mistake_that_is_reported(tmp_path):
         load(tmp_path, ('joints.pair=[{between=["timber","timber"], strength="1 kPa"}]',))
     assert len(error.value.lines) == 1
     assert "holes (no data)" in error.value.lines[0]
+
+
+def test_a_fault_of_the_terrain_is_told_once(tmp_path):
+    loaded(tmp_path)
+    path = tmp_path / "case.toml"
+    path.write_text(
+        path.read_text() + '[[joints.pair]]\nbetween = ["timber", "ground"]\nstrength = "2 MPa"\n'
+    )
+    with pytest.raises(BadCase) as refused:
+        load(tmp_path, ["terrain.path=nowhere.csv"])
+    (line,) = str(refused.value).splitlines()
+    assert "no such file" in line
+    with pytest.raises(BadCase) as refused:
+        load(tmp_path, ["terrain.origin=[0, 0]"])
+    assert len(str(refused.value).splitlines()) == 1
+
+
+def test_the_extent_of_the_terrain_is_told_and_that_its_unit_is_taken_to_be_metres(tmp_path):
+    (line,) = drawn(loaded(tmp_path))
+    assert line.startswith("terrain ground.csv: 40 x 30 m, heights from -2 to 2 m")
+    assert line.endswith("the file names no unit and is taken to be in metres (terrain.scale)")
+    (line,) = drawn(loaded(tmp_path, "terrain.crs=EPSG:32654"))
+    assert "names no unit" not in line
+
+
+@pytest.mark.parametrize(
+    ("value", "says"), [("timbre", "did you mean 'timber'?"), ("stone", "there are 'brick', 'timber'")]
+)
+def test_a_rule_for_a_value_that_no_footprint_has_is_told(tmp_path, value, says):
+    found = remarks(loaded(tmp_path, f"structure.town[0].rule[0].equals={value}"))
+    assert any(
+        f"rule[0] changes nothing: no footprint has built = '{value}'; {says}" in line for line in found
+    )
+    assert not any("changes nothing" in line for line in remarks(loaded(tmp_path)))
