@@ -128,8 +128,9 @@ class Tank(Section):
         None,
         description="a file of tetrahedra in any format that meshio reads (MSH, VTU, VTK, ...), from the directory of "
         "the case, instead of lower, upper, cell and split; its whole boundary is wall but for the flat ends along the "
-        "axes that open, smooth, an inflow or a sea name. Water alone may have a basin of any shape; with blocks the "
-        "mesh must fill a box",
+        "axes that open, smooth, an inflow or a sea name. Water alone may have a basin of any shape; blocks need a bed "
+        "that is a height over every place, up to 3 to 1 steep, and steeper walls that are flat and bound the whole "
+        "basin, as those of a round tank. They are not joined to an uneven bed: they lie on it",
         examples=["basin.msh"],
     )
     scale: PositiveLength = Field(1.0, description="length of one unit of mesh", examples=["1 mm"])

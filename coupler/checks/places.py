@@ -11,10 +11,11 @@ import numpy as np
 from coupler.case.case import Case
 from coupler.case.structure import Building
 from coupler.case.types import KeyPath
+from coupler.geometry.basin import basin_problem, outside_of
 from coupler.geometry.bodies import Body, overlap_depth
 from coupler.geometry.parts import Part, standing_on_terrain
 from coupler.geometry.solids import solids_of
-from coupler.geometry.tank_mesh import beside_mesh, is_measured, mesh_of, tank_places, what_of
+from coupler.geometry.tank_mesh import beside_mesh, is_basin, is_measured, mesh_of, tank_places, what_of
 from coupler.geometry.tank_regions import BYTES_PER_CELL
 
 Problem = tuple[KeyPath, str]
@@ -141,6 +142,8 @@ def _outside(case: Case, solids: list[Placed], blocks: list[Placed], names: list
         for path, name, bounds in outlines:
             for place, text in _beyond_tank(case, path, f"'{name}'", bounds):
                 yield place, text + _which_blocks(case, path, name, blocks, names)
+        if is_basin(case.tank) and basin_problem(mesh_of(case.tank)) is None:
+            yield from outside_of(mesh_of(case.tank), [(p, n, body.vertices) for p, n, body in blocks])
         for path, name, body in solids:
             if overlap_depth(tank, body) <= 0:
                 yield (

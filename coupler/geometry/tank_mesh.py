@@ -14,6 +14,7 @@ import numpy as np
 from coupler.case.case import Case, Tank
 from coupler.case.paths import stamp
 from coupler.case.types import KeyPath
+from coupler.geometry.basin import basin_problem
 from coupler.geometry.mesh_files import MeshFileError
 from coupler.geometry.stretches import axes_of
 from coupler.geometry.tank_regions import regions_of, stretch_problems, too_many
@@ -171,14 +172,15 @@ def tank_places(case: Case) -> Iterator[Problem]:
                 ("water", "fill", i),
                 f"no node of {what_of(case.tank)} lies in this box, so there is no water; enlarge it",
             )
-    if case.structure is not None and case.tank.mesh is not None and not _fills_its_box(mesh):
-        share = mesh.cell_volume.sum() / np.prod(np.ptp(mesh.bounds, axis=0))
-        low, high = (shown(corner) for corner in mesh.bounds)
-        yield (
-            ("tank", "mesh"),
-            f"it fills {share:.1%} of the box around it, {low} to {high} m, and blocks know no walls but the sides of "
-            "that box: with [structure] the mesh must fill it; mesh the whole box and make bed and shores [[solid]]s",
-        )
+    if case.structure is not None and is_basin(case.tank):
+        wrong = basin_problem(mesh)
+        if wrong is not None:
+            yield ("tank", "mesh"), wrong
+
+
+def is_basin(tank: Tank | None) -> bool:
+    """Whether a tank is a mesh file that does not fill the box around it."""
+    return tank is not None and tank.mesh is not None and not _fills_its_box(mesh_of(tank))
 
 
 def mesh_remarks(tank: Tank) -> Iterator[str]:

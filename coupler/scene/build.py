@@ -12,8 +12,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from coupler.case.case import Case
+from coupler.geometry.basin import basin_planes
 from coupler.geometry.parts import Part, parts_of
 from coupler.geometry.solids import obstacle_blocks, solids_of
+from coupler.geometry.tank_mesh import is_basin, mesh_of
 from coupler.geometry.terrain.standing import ground_surface
 from coupler.results.gauges import Bodies, Gauge, make_gauges
 from coupler.scene.build_water import water_of
@@ -221,8 +223,11 @@ def joint_parameters(joints):
 
 def planes_of(case: Case) -> list:
     """What bounds the room of the blocks: the ground, even or not, and the closed sides of the tank."""
-    uneven = ground_surface(case)
-    return [*_ground(case), *([] if uneven is None else [uneven]), *_tank_planes(case)]
+    uneven, walls = ground_surface(case), []
+    if is_basin(case.tank):
+        uneven, walls = basin_planes(mesh_of(case.tank))
+    bed = [] if uneven is None else [uneven]
+    return [*_ground(case), *bed, *_tank_planes(case, has_bed=bool(bed)), *walls]
 
 
 def _ground(case: Case) -> list:
@@ -237,13 +242,13 @@ def _ground(case: Case) -> list:
     )
 
 
-def _tank_planes(case: Case) -> list:
+def _tank_planes(case: Case, has_bed: bool) -> list:
     """The closed sides of the tank as walls for blocks; its floor only where there is no other ground."""
     from yade_scripts.blocks.faces import FixedPlane
 
     if case.tank is None:
         return []
-    planes, has_ground = [], case.structure.ground is not None or case.tank.ground is not None
+    planes, has_ground = [], case.structure.ground is not None or has_bed
     for axis, name in enumerate("xyz"):
         for sign, corner in (("-", case.tank.lower), ("+", case.tank.upper)):
             side = name + sign

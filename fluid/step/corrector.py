@@ -39,6 +39,10 @@ WATERLINE_DAMPING, WATERLINE_DEPTH = 0.5, 1.0
 """c of `damp_waterline` in calm water, and how far below the surface it acts (in cell sizes). Noise on a slope of 1:20
 grows by 0.03 a step without, and not with 0.5. Less in faster water, none where it crosses a cell in a step: there it
 would take what is real."""
+BED_DAMPING, BED_ROUNDS = 1.0, 3
+"""c of `damp_waterline` along water lines on slanting sides of the mesh, the largest that turns no velocity round as
+M⁻¹L lies between 0 and 1, and how often in a step. Where water is a tenth of a cell deep on a slope of one in two, a
+motion over several cells grows by 0.034 a step without, by 0.008 with 0.5 once, by 0.004 with 1 once."""
 AT_REST = (0.002, 0.01)
 """Speeds in √(g h) between which the damping along water lines on slanting sides of the mesh, a bed, ends: at full
 strength it takes a tenth of the run-up of a wave (P42), and what is to be kept still is far slower."""
@@ -240,7 +244,9 @@ def _damp_surface(water, kept, u) -> None:
 
     even_out(WATERLINE_DAMPING, t.beside_solid)
     if t.slanting.any():
-        even_out(WATERLINE_DAMPING * _hardly_moving(water, u)[:, None], t.slanting)
+        slow = _hardly_moving(water, u)[:, None]
+        for _ in range(BED_ROUNDS):
+            even_out(BED_DAMPING * slow, t.slanting)
     if t.is_obtuse:
         mesh = (t.cells, t.parent, t.gradients, t.volume, t.neighbours)
         beside = np.where(t.near_obtuse, wet[1], -np.inf)

@@ -319,16 +319,19 @@ def test_sides_are_the_flat_ends_along_the_axes(tmp_path):
     loaded(tmp_path, case_text('mesh = "box.vtu"\nopen = []'))
 
 
-def test_blocks_need_a_mesh_that_fills_a_box(tmp_path):
-    """The walls of blocks are the sides of the box; a bed of another shape is a solid in it."""
-    path = write(tmp_path / "box.vtu", *bricks()[:1], tetra=bricks()[1])
-    loaded(tmp_path, case_text('mesh = "box.vtu"', BLOCK))
+def test_blocks_need_a_basin_without_angles_and_overhangs(tmp_path):
+    """A beach is one; a box with a corner cut out is not (more in test_basin.py)."""
     nodes, cells = sloping()
-    write(path, nodes, tetra=cells)
+    path = write(tmp_path / "box.vtu", nodes, tetra=cells)
+    loaded(tmp_path, case_text('mesh = "box.vtu"', BLOCK.replace("0.06", "0.26")))
+    nodes, cells = bricks()
+    middle = nodes[cells].mean(axis=1)
+    used, kept = np.unique(cells[(middle[:, 0] < 0.5) | (middle[:, 2] > 0.4)], return_inverse=True)
+    write(path, nodes[used], tetra=kept.reshape(-1, 4))
     loaded(tmp_path)
-    assert "tank.mesh: it fills 75.0% of the box around it" in refusals(
-        tmp_path, case_text('mesh = "box.vtu"', BLOCK)
-    )
+    said = refusals(tmp_path, case_text('mesh = "box.vtu"', BLOCK))
+    assert "tank.mesh: blocks would be stopped at (0.5, " in said
+    assert "the basin goes on behind the plane of that wall" in said
 
 
 def test_water_and_gauges_must_be_in_the_mesh(tmp_path):
