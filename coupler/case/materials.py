@@ -55,9 +55,9 @@ PRESETS = {
     ),
     "timber": Material(
         420.0, 0.4e6, 300.0, 0.4, 0.2,
-        "softwood C24 across the grain: mean density and f_t,90,k of EN 338:2016, table 1; energy of spruce in opening, "
-        "0.2 to 0.3 N/mm, as in Gustafsson in Thelandersson and Larsen, Timber Engineering, Wiley 2003; friction of EN 1995-2, "
-        "table 6.1",
+        "softwood C24 across the grain: mean density and f_t,90,k of EN 338:2016, table 1; energy of spruce in "
+        "opening, 0.2 to 0.3 N/mm, as in Gustafsson in Thelandersson and Larsen, Timber Engineering, Wiley 2003; "
+        "friction of EN 1995-2, table 6.1",
         "energy 300 J/m2, friction 0.4, scatter 0.2 (an assumption)",
     ),
 }  # fmt: skip
