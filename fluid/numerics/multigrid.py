@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fluid.numerics.threads import over
-from kernel_decorators import kernel, plain, ranged
+from kernel_decorators import kernel, plain, ranged, released
 
 PAIRINGS = 3
 """Pairs of pairs of pairs: about eight unknowns become one."""
@@ -32,6 +32,8 @@ SWEEPS = 4
 """Double sweeps on a last level that is too large for its inverse."""
 BLOCK, MOST_BLOCKS = 4096, 64
 """Least number of unknowns in a block of a sweep, and how many blocks there are at most."""
+COARSE_ROW = 20
+"""To add up a row of a coarser level takes as long as so many rows of a loop."""
 SAME = 0.99
 """Share of the strongest coupling from which one counts as equally strong: round-off must not choose the pairs."""
 
@@ -195,9 +197,22 @@ def _chained(first, second):
     return out
 
 
-@kernel
 def _galerkin(start, middle, column, entry, diagonal, aggregate, n, scale):
     """scale Pᵀ A P as csr (indptr, indices, data), the diagonal first in every row."""
+    first, member = _members(aggregate, n)
+    fine = (start, column, entry, diagonal, aggregate, n, scale)
+    parts = over(_coarse_rows, n, first, member, *fine, weight=COARSE_ROW)
+    if len(parts) == 1:
+        return parts[0]
+    lengths, indices, data = zip(*parts)
+    before = np.cumsum([0, *(length[-1] for length in lengths)])
+    indptr = np.concatenate([lengths[0][:1], *(length[1:] + k for length, k in zip(lengths, before))])
+    return indptr.astype(np.uint32), np.concatenate(indices), np.concatenate(data)
+
+
+@kernel
+def _members(aggregate, n):
+    """first (n + 1,), member: the unknowns of every aggregate, one behind the other."""
     first = np.zeros(n + 1, np.uint32)
     for i in range(len(aggregate)):
         if aggregate[i] >= 0:
@@ -209,10 +224,19 @@ def _galerkin(start, middle, column, entry, diagonal, aggregate, n, scale):
         if aggregate[i] >= 0:
             member[filled[aggregate[i]]] = i
             filled[aggregate[i]] += 1
-    slot, indptr = np.full(n, -1, np.int64), np.zeros(n + 1, np.uint32)
-    indices, data = np.empty(len(column) + n, np.uint32), np.empty(len(column) + n)
+    return first, member
+
+
+@released
+def _coarse_rows(begin_row, end_row, first, member, start, column, entry, diagonal, aggregate, n, scale):
+    """Rows of `_galerkin`: indptr from 0, indices, data."""
+    room = end_row - begin_row
+    for t in range(first[begin_row], first[end_row]):
+        room += np.int64(start[member[t] + 1]) - np.int64(start[member[t]])
+    slot, indptr = np.full(n, -1, np.int64), np.zeros(end_row - begin_row + 1, np.uint32)
+    indices, data = np.empty(room, np.uint32), np.empty(room)
     k = 0
-    for row in range(n):
+    for row in range(begin_row, end_row):
         begin = k
         slot[row], indices[k], data[k] = k, row, 0.0
         k += 1
@@ -225,7 +249,7 @@ def _galerkin(start, middle, column, entry, diagonal, aggregate, n, scale):
                     slot[c], indices[k], data[k] = k, c, 0.0
                     k += 1
                 data[slot[c]] += scale * entry[s]
-        indptr[row + 1] = k
+        indptr[row - begin_row + 1] = k
     return indptr, indices[:k].copy(), data[:k].copy()
 
 

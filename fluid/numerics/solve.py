@@ -95,13 +95,12 @@ def conjugate_gradients(
             raise _failure("did not converge", history, rtol, r)
         z = free(precondition(r))
         rz, rz_before = r @ z, rz
-        p = z if p is None else z + (rz / rz_before) * p
+        p = z if p is None else _onward(z, rz / rz_before, p)
         Ap = free(apply(p))
         curvature = p @ Ap
         if curvature <= 0.0:
             raise _failure(f"met a direction of curvature {curvature:.3g} ≤ 0", history, rtol, p)
-        x += (rz / curvature) * p
-        r -= (rz / curvature) * Ap
+        over(_advance, len(x), rz / curvature, p, Ap, x, r)
         history.append(np.linalg.norm(r) / scale)
         if enough is not None and enough(x, history[-1]):
             break
@@ -116,6 +115,27 @@ def _without(held, v):
     """v (n,) with zeros where held, in place."""
     v[held] = 0.0
     return v
+
+
+def _onward(z, share, p):
+    """z + share p (n,)."""
+    out = np.empty(len(z))
+    over(_sum, len(z), z, share, p, out)
+    return out
+
+
+@ranged
+def _sum(first, last, z, share, p, out):
+    for i in range(first, last):
+        out[i] = z[i] + share * p[i]
+
+
+@ranged
+def _advance(first, last, share, p, Ap, x, r):
+    """x + share p and r - share Ap in place."""
+    for i in range(first, last):
+        x[i] += share * p[i]
+        r[i] -= share * Ap[i]
 
 
 def _product(indptr, indices, data, v):

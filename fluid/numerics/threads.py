@@ -18,6 +18,7 @@ that is forked off starts its own.
 
 from __future__ import annotations
 
+import math
 import os
 import threading
 import time
@@ -36,6 +37,9 @@ BLOCK = 256
 """Entries of a list that are left out, or not, together."""
 CHUNK = 16_384
 """Entries that are summed as one; shorter sums run through."""
+FILLED, LAZY = 64, 32 << 20
+"""Numbers that are filled as one row, and bytes from which on the C library hands out pages that are zero already and
+are not there before something is written to them."""
 KEPT = 8
 """Lists whose reach is remembered: those of one step."""
 
@@ -205,6 +209,22 @@ def summed(kernel: Callable, count: int, shape: tuple[int, ...], *args) -> np.nd
     for part in partial[1:]:
         total += part
     return total
+
+
+def zeros(shape: tuple[int, ...]) -> np.ndarray:
+    """np.zeros(shape) of floats; what the C library would fill on this thread, all threads fill."""
+    count = math.prod(shape)
+    if 8 * count >= LAZY:
+        return np.zeros(shape)
+    out = np.empty(shape)
+    over(_fill, -(-count // FILLED), out.reshape(-1))
+    return out
+
+
+@ranged
+def _fill(first, last, out):
+    for i in range(first * FILLED, min(last * FILLED, out.shape[0])):
+        out[i] = 0.0
 
 
 def _parts(count: int) -> int:

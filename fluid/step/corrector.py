@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fluid.numerics.sums import kinetic_energy
-from fluid.numerics.threads import found_over, over
+from fluid.numerics.threads import found_over, over, zeros
 from fluid.pressure.pressure_bound import BoundMet
 from fluid.pressure.projection import (
     cell_gradient,
@@ -166,7 +166,7 @@ def _after_pressure(first, last, wet, u_star, mean, advected, time, u, a, forced
 def _remainders(water, kept, gradient, mean, dt):
     """u' (M, 3) [m/s] after this step and its rate -(∇x - Π∇x)/(θ ρ) (M, 3) [m/s²] for the next kick."""
     t = water.topology
-    remainder, rate = np.zeros(water.remainder.shape), np.zeros(water.remainder.shape)
+    remainder, rate = zeros(water.remainder.shape), zeros(water.remainder.shape)
     if water.parameters.subscale_memory:
         depth = t.in_cells(kept.level_set)
         cells, deep, time = kept.wet_cells, -MEMORY_DEPTH * water.mesh.spacing, kept.theta * dt
@@ -299,7 +299,7 @@ def _flux(water, kept, listed, start, u, u_cell):
     near = np.zeros(len(u), bool)
     near[reached] = True
     around = t.cells_around(near)
-    cell_field = np.zeros(water.cell_velocity.shape)
+    cell_field = zeros(water.cell_velocity.shape)
     put(around, cell_velocity(around, u, np.zeros((0, 3)), t.cells, t.share), cell_field)
     put(kept.wet_cells, u_cell, cell_field)
     # with implicit Euler the velocity at the end of the step is the stable choice
@@ -326,7 +326,7 @@ def _put(first, last, rows, values, field):
 def to_middle(cell_list, now, before):
     """1.5 u - 0.5 u_before (M, 3) in the listed cells: the velocity half a step ahead; u where none was before. Zero in
     the others."""
-    out = np.zeros(now.shape)
+    out = zeros(now.shape)
     over(_to_middle, len(cell_list), cell_list, now, before, out)
     return out
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fluid.domain.coupling_matrix import wetted_coupling
-from fluid.numerics.threads import over
+from fluid.numerics.threads import over, zeros
 from fluid.pressure.active_cells import WetPart
 from fluid.pressure.indefinite_cells import about, reserve
 from fluid.pressure.pressure_bound import lowest_pressure
@@ -351,7 +351,7 @@ def _carried_remainder(water, dt, theta, cells):
     if not p.subscale_memory:
         return np.zeros_like(water.remainder)
     rate = (1.0 - theta) * dt
-    out = np.zeros(water.remainder.shape)  # pages that nobody writes to are never touched
+    out = zeros(water.remainder.shape)
     nu = p.viscosity / p.density
     state = (water.remainder, water.kick_remainder, rate, water.velocity, dt, nu, t.cells, t.size)
     carry_remainder(cells, *state, out)

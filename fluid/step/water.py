@@ -19,6 +19,7 @@ from fluid.domain.physical_domain import carry, wetted_coupling
 from fluid.domain.topology import Graph, Topology, layers_around
 from fluid.mesh.background import Background
 from fluid.numerics.sums import kinetic_energy
+from fluid.numerics.threads import zeros
 from fluid.pressure.projection import PressureProblem
 from fluid.sides.walls import Walls
 from fluid.step.corrector import Corrected, corrected
@@ -334,7 +335,7 @@ class Water:
         p, flux = self.parameters, self.flux
         u, a, phi, t = self.left_behind or (self.velocity, self.acceleration, self.level_set, self.topology)
         kick = dt * kick_factor(a, self._largest_kick(t.node_size))[:, None] * a
-        total = np.zeros(len(flux.rate))
+        total = zeros(flux.rate.shape)
         if p.advection == "supg":
             found = Carried(carry_volume(flux, dt, total=total))
         else:

@@ -18,7 +18,7 @@ import numpy as np
 
 from fluid.domain.topology import layers_around
 from fluid.numerics.threads import found_over, over
-from kernel_decorators import inner, kernel, plain, released
+from kernel_decorators import inner, kernel, plain, ranged, released
 
 LAYERS = 6
 EXACT_LAYERS = 2
@@ -142,9 +142,36 @@ def _ratio(part, whole):
     return part / whole if whole > 0.0 else 0.0
 
 
+def _closest_in_layers(order, layer_start, triangles, owner, nodes, cells, *mesh):
+    """`_closest`, with what the corners of the cells of the triangles start from."""
+    corner = np.empty((len(triangles), 4))
+    over(_of_corners, len(triangles), triangles, owner, nodes, cells, corner)
+    return _closest(order, layer_start, triangles, owner, corner, nodes, cells, *mesh)
+
+
+@ranged
+def _of_corners(first, last, triangles, owner, nodes, cells, corner):
+    """Squared distance (T, 4) [m²] of each triangle from the corners of its cell."""
+    for t in range(first, last):
+        for a in range(4):
+            corner[t, a] = squared_distance(nodes[cells[owner[t], a]], triangles[t])
+
+
 @kernel
-def _closest_in_layers(
-    order, layer_start, triangles, owner, nodes, cells, start, around, exact, obtuse, node_start, node_cells
+def _closest(
+    order,
+    layer_start,
+    triangles,
+    owner,
+    corner,
+    nodes,
+    cells,
+    start,
+    around,
+    exact,
+    obtuse,
+    node_start,
+    node_cells,
 ):
     """Distance (N,) [m] of the nodes of `order` to the triangles, handed outward; two sweeps a layer.
 
@@ -155,7 +182,20 @@ def _closest_in_layers(
     first = _first_triangles(owner, cells.shape[0] if exact > 0 else 0)
     asked, found = np.zeros(n, np.int32), np.zeros(n, np.int32)
     _hand_outward(
-        order, layer_start, triangles, owner, nodes, cells, start, around, closest, best, tried, asked, found
+        order,
+        layer_start,
+        triangles,
+        owner,
+        corner,
+        nodes,
+        cells,
+        start,
+        around,
+        closest,
+        best,
+        tried,
+        asked,
+        found,
     )
     for s in range(layer_start[1], layer_start[exact + 1]):
         i = order[s]
@@ -197,7 +237,7 @@ def _descend(x, closest, best, triangles, owner, first, cells, node_start, node_
 
 @inner
 def _hand_outward(
-    order, layer_start, triangles, owner, nodes, cells, start, around, closest, best, tried, asked, found
+    order, layer_start, triangles, owner, corner, nodes, cells, start, around, closest, best, tried, asked, found
 ):  # fmt: skip
     """Squared distance `best` (N,) and number of the `closest` triangle (N,); tried (T,): the last node that asked.
 
@@ -206,8 +246,7 @@ def _hand_outward(
     now = 1
     for t in range(triangles.shape[0]):
         for a in range(4):
-            i = cells[owner[t], a]
-            d = squared_distance(nodes[i], triangles[t])
+            i, d = cells[owner[t], a], corner[t, a]
             if d < best[i]:
                 best[i], closest[i], found[i] = d, t, now
     for layer in range(1, layer_start.shape[0] - 1):

@@ -30,9 +30,9 @@ import scipy.sparse as sp
 
 from fluid.domain.moments import nodal_water
 from fluid.domain.topology import Graph
-from fluid.numerics.threads import over
+from fluid.numerics.threads import over, zeros
 from fluid.surface.level_set import without_films
-from kernel_decorators import kernel, released
+from kernel_decorators import kernel, ranged, released
 
 BAND_WIDTH = 3.0
 LARGEST_SHIFT = 0.3
@@ -107,31 +107,53 @@ def edge_rates(topology, graph, listed, u_cell):
     """q (edges,) [m³/s] of (1) out of the listed nodes (n,) along the edges of the graph; u_cell (M, 3) [m/s]."""
     t, g = topology, graph
     mesh = (t.nodes, t.cells, t.parent, t.gradients, t.upright, t.volume, (t.node_start, t.node_cells))
-    rate = np.zeros(len(g.neighbour))
+    rate = zeros((len(g.neighbour),))
     over(_edge_rates, len(listed), listed, g.row, g.start, g.neighbour, u_cell, *mesh, rate)
     return rate
 
 
-@kernel
-def _diffused_shift(band, place, graph_row, start, neighbour, stiffness, c, residual, kappa, tolerance, most):
+def _diffused_shift(band, place, graph, c, residual, kappa, tolerance, most):
     """Equation (2) on the band nodes by conjugate gradients with the diagonal as preconditioner, (n,)."""
-    n = band.shape[0]
-    diagonal = c.copy()
-    first, column, entry = np.zeros(n + 1, np.uint32), np.empty(40 * n, np.uint32), np.empty(40 * n)
-    count = 0
-    for r in range(n):
+    n, diagonal = len(band), c.copy()
+    rows = (band, place, graph.row, graph.start, graph.neighbour, graph.stiffness)
+    found = np.zeros(n + 1, np.uint32)
+    over(_length_of_rows, n, *rows, found[1:])
+    first = np.cumsum(found, dtype=np.uint32)
+    column, entry = np.empty(first[-1], np.uint32), np.empty(first[-1])
+    over(_rows_of_shift, n, *rows, kappa, first, column, entry, diagonal)
+    return _shift(first, column, entry, diagonal, residual, tolerance, most)
+
+
+@ranged
+def _length_of_rows(begin, end, band, place, graph_row, start, neighbour, stiffness, found):
+    """Edges of stiffness within the band (n,) of each of its nodes."""
+    for r in range(begin, end):
         row = graph_row[band[r]]
+        for s in range(start[row], start[row + 1]):
+            if place[neighbour[s]] >= 0 and stiffness[s] != 0.0:
+                found[r] += 1
+
+
+@ranged
+def _rows_of_shift(
+    begin, end, band, place, graph_row, start, neighbour, stiffness, kappa, first, column, entry, diagonal
+):
+    """κ K of the edges within the band, and c + Σ κ K on the diagonal, in place."""
+    for r in range(begin, end):
+        row, k = graph_row[band[r]], first[r]
         for s in range(start[row], start[row + 1]):
             q = place[neighbour[s]]
             if q >= 0 and stiffness[s] != 0.0:
-                if count == column.shape[0]:
-                    column = np.concatenate((column, np.empty_like(column)))
-                    entry = np.concatenate((entry, np.empty_like(entry)))
-                column[count] = q
-                entry[count] = 0.5 * (kappa[band[r]] + kappa[neighbour[s]]) * stiffness[s]
-                diagonal[r] -= entry[count]
-                count += 1
-        first[r + 1] = count
+                column[k] = q
+                entry[k] = 0.5 * (kappa[band[r]] + kappa[neighbour[s]]) * stiffness[s]
+                diagonal[r] -= entry[k]
+                k += 1
+
+
+@kernel
+def _shift(first, column, entry, diagonal, residual, tolerance, most):
+    """x (n,) of the rows first[r]:first[r + 1] of (column, entry) with their diagonal, which is overwritten."""
+    n = diagonal.shape[0]
     typical = diagonal.mean() if n > 0 else 1.0
     x, r_, Ap = np.zeros(n), residual.copy(), np.empty(n)
     for r in range(n):
@@ -200,10 +222,7 @@ def correct_volume(topology, graph, listed, phi, carried, target: float, kappa: 
     shift = _diffused_shift(
         band,
         place,
-        graph.row,
-        graph.start,
-        graph.neighbour,
-        graph.stiffness,
+        graph,
         slope[band] + ANCHOR * topology.node_volume[band] / spacing[band],
         (carried - own)[band],
         kappa * spacing,

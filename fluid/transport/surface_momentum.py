@@ -123,7 +123,7 @@ def _mixed(first, last, nodes, weight, carried, u):
 def _pass_on(graph: Graph, shift: Shift, water, u) -> None:
     """Velocity u (N, 3) [m/s] carried along with the volumes (2), in place; water (N,) [m³] before them."""
     along = (shift.band, graph.row, graph.start, graph.neighbour)
-    psi, inside, moved = np.zeros(len(water)), np.zeros(len(water), bool), np.zeros(len(graph.neighbour))
+    psi, inside, moved = np.zeros(len(water)), np.zeros(len(water), bool), np.empty(len(graph.neighbour))
     psi[shift.band], inside[shift.band] = shift.value, water[shift.band] > 0.0
     over(_corrected, len(shift.band), *along, graph.stiffness, psi, inside, shift.kappa, water, moved)
     carry_velocity(*along, moved, water, u)
@@ -135,9 +135,11 @@ def _corrected(first, last, band, graph_row, start, neighbour, stiffness, psi, i
     holds. ψ (N,), inside (N,): where the band holds water."""
     for place in range(first, last):
         i = band[place]
+        row = graph_row[i]
+        for s in range(start[row], start[row + 1]):
+            moved[s] = 0.0
         if not inside[i]:
             continue
-        row = graph_row[i]
         total = 0.0
         for s in range(start[row], start[row + 1]):
             if inside[neighbour[s]]:

@@ -40,7 +40,7 @@ def carry_volume(flux: Flux, dt: float, u=None, total=None):
     along = (flux.nodes, g.row, g.start, g.neighbour)
     share = np.zeros(len(water))
     for _ in range(n_sub):
-        moved, change = np.zeros(len(flux.rate)), np.zeros(len(water))
+        moved, change = np.empty(len(flux.rate)), np.zeros(len(water))
         over(_share, count, flux.nodes, water, capacity, share)
         over(_moved, count, *along, flux.rate, water, capacity, share, dt / n_sub, moved)
         if u is not None:
@@ -48,8 +48,17 @@ def carry_volume(flux: Flux, dt: float, u=None, total=None):
         owning(_hand_over, len(water), reach_of_rows(*along), count, *along, moved, change)
         water += change
         if total is not None:
-            total += moved
+            over(_add, count, flux.nodes, g.row, g.start, moved, total)
     return water
+
+
+@ranged
+def _add(first, last, nodes, graph_row, start, moved, total):
+    """What went out along the edges of the listed nodes, on top of the total (edges,)."""
+    for place in range(first, last):
+        r = graph_row[nodes[place]]
+        for s in range(start[r], start[r + 1]):
+            total[s] += moved[s]
 
 
 @released
@@ -82,11 +91,14 @@ def _share(first, last, nodes, water, capacity, share):
 
 @ranged
 def _moved(first, last, nodes, graph_row, start, neighbour, rate, water, capacity, share, h, moved):
-    """w_ij (edges,) [m³]: what leaves the listed nodes within h [s] by (1); no node gives more than it holds."""
+    """w_ij (edges,) [m³]: what leaves the listed nodes within h [s] by (1); no node gives more than it holds. Edges of
+    other nodes are not written to."""
     for place in range(first, last):
         i = nodes[place]
         r = graph_row[i]
         out = h * _out(r, start, rate)
+        for s in range(start[r], start[r + 1]):
+            moved[s] = 0.0
         if out <= 0.0 or water[i] <= 0.0:
             continue
         behind = share[i] - _upstream(r, start, neighbour, rate, share)

@@ -84,8 +84,9 @@ class Rows(NamedTuple):
     """The contacts of one evaluation, one row each: a block of the node, b of the face; slot.
 
     point, normal (out of b) (c, 3) · depth [m] · kn, kt, cn, ct · mu · force, viscous, shear (c, 3) on a
-    arm_a, arm_b (c, 3) [m] · shift (c, 3) [m]: from there to where it rubs · velocity (c, 3): of a against b before
-    the substep · held (c,) [J]: energy of the shear spring at the time of that velocity.
+    push (c,) [N]: mean normal force over the substep · arm_a, arm_b (c, 3) [m] · shift (c, 3) [m]: from there to where
+    it rubs · velocity (c, 3): of a against b before the substep · held (c,) [J]: energy of the shear spring at the
+    time of that velocity.
     """
 
     a: Array
@@ -99,6 +100,7 @@ class Rows(NamedTuple):
     cn: Array
     ct: Array
     mu: Array
+    push: Array
     force: Array
     viscous: Array
     shear: Array
@@ -112,6 +114,6 @@ class Rows(NamedTuple):
 def empty_rows(size: int) -> Rows:
     """Room for `size` contacts."""
     whole, one, three = (np.zeros(size, np.int64) for _ in range(3)), (size,), (size, 3)
-    scalars = [np.zeros(one) for _ in range(7)]
+    scalars = [np.zeros(one) for _ in range(8)]
     vectors = [np.zeros(three) for _ in range(9)]
-    return Rows(*whole, vectors[0], vectors[1], *scalars[:6], *vectors[2:], scalars[6])
+    return Rows(*whole, vectors[0], vectors[1], *scalars[:7], *vectors[2:], scalars[7])

@@ -10,7 +10,7 @@ from yade_scripts.blocks.block import Block
 from yade_scripts.blocks.faces import FixedPlane
 from yade_scripts.contact.arrays import CROSSINGS, Bodies, Law, Pairs, Slots, empty_rows
 from yade_scripts.contact.ground import NO_GROUND, GroundSurface
-from yade_scripts.contact.kernel import carry_slots, contact_forces
+from yade_scripts.contact.kernel import alone, carry_slots, contact_forces
 from yade_scripts.contact.law import ContactLaw
 from yade_scripts.contact.nodes import contact_shapes
 from yade_scripts.contact.springs import contact_work
@@ -43,6 +43,8 @@ class ContactForces:
         neighbours: Callable[[bool], Array],
         reach: float,
     ):
+        self.share: Callable[..., list] = alone
+        """As in `contact_forces`."""
         self._motion, self._neighbours, self._reach = motion, neighbours, reach
         self._planes = planes
         uneven = [row for row, plane in enumerate(planes) if isinstance(plane, GroundSurface)]
@@ -187,8 +189,8 @@ class ContactForces:
         """Add the contact forces at the present places to F (n, 6) for a substep of dt [s]."""
         m = self._motion
         self._count, lost = contact_forces(
-            self._shapes, self._bodies, self._law, self._pairs, self._slots, self._ground, m.all_x, m.all_v, m.all_R,
-            dt, m.dt, self._rows, F,
+            self.share, self._shapes, self._bodies, self._law, self._pairs, self._slots, self._ground,
+            m.all_x, m.all_v, m.all_R, dt, m.dt, self._rows, F,
         )  # fmt: skip
         self.friction += lost
         self._read = None

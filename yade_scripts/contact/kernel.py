@@ -7,19 +7,23 @@ node in the frame of b. `contact_search` finds them, `contact_springs` says what
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
-from kernel_decorators import inner, kernel
+from kernel_decorators import inner, kernel, released
 from yade_scripts.contact.arrays import CROSSINGS
 from yade_scripts.contact.edges import pair_scratch
 from yade_scripts.contact.ground import scan_ground
 from yade_scripts.contact.search import closing_bound, cross, lie_flat, planes_seen_from, scan, separation
-from yade_scripts.contact.springs import Mode, apply, set_dashpots
+from yade_scripts.contact.springs import Mode, add_up, apply, set_dashpots
 
 CROSSING = 0.5
 """Overlap of crossing edges over that of faces below which nodes that touch leave the contact to the edges as well; and
 depth of nodes over the overlap of faces below which they do not hold the blocks apart: a corner may just touch the side
 of an edge that crosses the edges beside it."""
+PAIR = 20
+"""To look at a pair takes as long as so many rows of a loop."""
 SUNK = 0.01
 """Overlap in radii of the smaller block up to which that is not asked: the search for edges costs more than nodes."""
 SAME = 1.0 + 1e-6
@@ -27,29 +31,49 @@ SAME = 1.0 + 1e-6
 same."""
 
 
-@kernel
-def contact_forces(shapes, bodies, law, pairs, slots, ground, x, v, R, dt, last_dt, rows, F):
+def alone(kernel: Callable, count: int, *args, weight: int = 1) -> list:
+    """kernel(0, count, *args) on this thread: what `contact_forces` does without others to share its work with."""
+    return [kernel(0, count, *args)]
+
+
+def contact_forces(share, shapes, bodies, law, pairs, slots, ground, x, v, R, dt, last_dt, rows, F):
     """Find the contacts at the present places and add their forces to F (n, 6).
 
-    ground: `Ground`, NO_GROUND without · dt [s]: substep to come, 0: only look · last_dt [s]: substep that led here
+    share: `alone`, or what runs ranges of the pairs on several threads: forces are added in the order of the pairs
+    afterwards, so the bits are the same · ground: `Ground`, NO_GROUND without · dt [s]: substep to come, 0: only look
+    · last_dt [s]: substep that led here
     → (contacts, work of friction and of springs that were let go [J])
     """
-    count, lost = 0, 0.0
+    lost = np.zeros(len(pairs.a))
+    state = (shapes, bodies, law, pairs, slots, ground, len(F), x, v, R, dt, last_dt, rows, lost)
+    spans = np.array(share(_contacts, len(pairs.a), *state, weight=PAIR))
+    return _added_up(spans, rows, lost, F)
+
+
+@released
+def _contacts(
+    first_pair, last_pair, shapes, bodies, law, pairs, slots, ground, n, x, v, R, dt, last_dt, rows, lost
+):
+    """Contacts of a range of pairs, into the rows from the first slot of the first pair on → where they begin and end.
+
+    n: blocks, the other bodies are planes · lost (p,) [J]: what friction and springs that were let go took."""
+    begins = pairs.start[first_pair]
+    count = begins
     most = 0
     for body in range(len(shapes.face_start) - 1):
         most = max(most, shapes.face_start[body + 1] - shapes.face_start[body])
     planes, scratch = np.empty((most, 4)), pair_scratch(shapes)
-    for p in range(len(pairs.a)):
-        a, b = pairs.a[p], pairs.b[p]
+    for p in range(first_pair, last_pair):
+        a, b, taken = pairs.a[p], pairs.b[p], 0.0
         if pairs.calm[p] > 0.0:
             pairs.calm[p] -= last_dt * closing_bound(v, a, b, shapes.radius[a], shapes.radius[b])
             if pairs.calm[p] > 0.0:
                 continue
         first, apart = count, -np.inf
         if b == ground.row:
-            count, lost, apart = scan_ground(
+            count, taken, apart = scan_ground(
                 shapes, bodies, law.shear, slots, pairs.start[p], pairs.fresh[p], a, ground, x, v, R, last_dt, rows,
-                count, lost, scratch, planes[0],
+                count, taken, scratch, planes[0],
             )  # fmt: skip
         for node_body, face_body in ((a, b), (b, a)):
             begin, end = shapes.node_start[node_body], shapes.node_start[node_body + 1]
@@ -63,15 +87,15 @@ def contact_forces(shapes, bodies, law, pairs, slots, ground, x, v, R, dt, last_
             apart = max(apart, gap)
             if gap <= margin or pairs.touching[p]:
                 slot = pairs.start[p] if node_body == a else pairs.start[p + 1] - CROSSINGS - (end - begin)
-                count, lost = scan(
+                count, taken = scan(
                     shapes, bodies, law, slots, slot, pairs.fresh[p], node_body, face_body, planes, faces,
-                    nearest, margin, x, v, R, last_dt, rows, count, lost, scratch,
+                    nearest, margin, x, v, R, last_dt, rows, count, taken, scratch,
                 )  # fmt: skip
         base, nodes = pairs.start[p + 1] - CROSSINGS, count
         known = False
         for s in range(base, base + CROSSINGS):
             known = known or slots.face[s] >= 0
-        meets = apart < 0.0 and b < len(F)
+        meets = apart < 0.0 and b < n
         sunk = -apart > SUNK * min(shapes.radius[a], shapes.radius[b])
         bare = count == first or (sunk and _deepest(slots, rows, first, count) < -CROSSING * apart)
         leads = meets and (bare or not pairs.touching[p])
@@ -80,9 +104,9 @@ def contact_forces(shapes, bodies, law, pairs, slots, ground, x, v, R, dt, last_
             deepest = 0.0
             if leads:
                 deepest = -SAME * apart if bare else -CROSSING * apart
-            count, lost, parted = cross(
+            count, taken, parted = cross(
                 shapes, bodies, law.shear, slots, base, pairs.fresh[p], a, b, deepest, flat, x, v, R, last_dt, rows,
-                first, count, lost, scratch,
+                first, count, taken, scratch,
             )  # fmt: skip
             apart = max(apart, parted)
         pairs.overlap[p] = max(0.0, -apart)
@@ -92,9 +116,52 @@ def contact_forces(shapes, bodies, law, pairs, slots, ground, x, v, R, dt, last_
         if count > first:
             yields, K = set_dashpots(bodies, law, a, b, R, rows, first, count, scratch)
             mode = Mode(law.zeta, np.sqrt(yields * K))
-            lost += apply(slots, v, R, dt, last_dt, mode, a, rows, first, count, F, scratch)
+            taken += apply(slots, v, R, dt, last_dt, mode, a, rows, first, count, scratch)
         pairs.calm[p] = apart if count == first else 0.0
-    return count, lost
+        lost[p] = taken
+    return begins, count
+
+
+@kernel
+def _added_up(spans, rows, lost, F):
+    """The rows in `spans` (k, 2) one behind the other, and their forces on F; → how many they are, Σ lost."""
+    count, S = 0, np.empty(3)
+    for k in range(len(spans)):
+        for c in range(spans[k, 0], spans[k, 1]):
+            if c != count:
+                _move(rows, c, count)
+            add_up(rows, count, F, S)
+            count += 1
+    total = 0.0
+    for p in range(len(lost)):
+        total += lost[p]
+    return count, total
+
+
+@inner
+def _move(rows, c, to):
+    """Row c to another, before it."""
+    rows.a[to], rows.b[to], rows.slot[to] = rows.a[c], rows.b[c], rows.slot[c]
+    rows.depth[to], rows.kn[to], rows.kt[to], rows.cn[to] = rows.depth[c], rows.kn[c], rows.kt[c], rows.cn[c]
+    rows.ct[to], rows.mu[to], rows.push[to], rows.held[to] = (
+        rows.ct[c],
+        rows.mu[c],
+        rows.push[c],
+        rows.held[c],
+    )
+    for k in range(3):
+        rows.point[to, k], rows.normal[to, k], rows.force[to, k] = (
+            rows.point[c, k],
+            rows.normal[c, k],
+            rows.force[c, k],
+        )
+        rows.viscous[to, k], rows.shear[to, k] = rows.viscous[c, k], rows.shear[c, k]
+        rows.arm_a[to, k], rows.arm_b[to, k], rows.shift[to, k] = (
+            rows.arm_a[c, k],
+            rows.arm_b[c, k],
+            rows.shift[c, k],
+        )
+        rows.velocity[to, k] = rows.velocity[c, k]
 
 
 @inner

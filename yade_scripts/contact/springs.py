@@ -107,9 +107,9 @@ def _all_turning(bodies, a, R, arm, axis, u):
 
 
 @inner
-def apply(slots, v, R, dt, last_dt, mode, pair_a, rows, first, count, F, scratch):
-    """Forces of the contacts first .. count of a pair on F; → work of friction [J]. scratch (6, 3): work space,
-    its first two rows the middles of the contacts seen from both blocks; pair_a: the first of these.
+def apply(slots, v, R, dt, last_dt, mode, pair_a, rows, first, count, scratch):
+    """Forces of the contacts first .. count of a pair; → work of friction [J]. scratch (6, 3): work space, its first
+    two rows the middles of the contacts seen from both blocks; pair_a: the first of these.
 
     Work of friction: the way slipped times the mean of the forces before and after it, which is what the leapfrog
     takes.
@@ -168,11 +168,17 @@ def apply(slots, v, R, dt, last_dt, mode, pair_a, rows, first, count, F, scratch
         if dt > 0.0:
             for k in range(3):
                 slots.shear[s, k] = R[b, 0, k] * S[0] + R[b, 1, k] * S[1] + R[b, 2, k] * S[2]
-        for k in range(3):
-            S[k] = rows.force[c, k] - N * n[k]
-        _add(F, a, 1.0, rows.force[c], rows.arm_a[c], S, rows.shift[c])
-        _add(F, b, -1.0, rows.force[c], rows.arm_b[c], S, rows.shift[c])
+        rows.push[c] = N
     return lost if dt > 0.0 else 0.0
+
+
+@inner
+def add_up(rows, c, F, S):
+    """Add the force of the contact c and its moments to F (n, 6); S (3,): work space."""
+    for k in range(3):
+        S[k] = rows.force[c, k] - rows.push[c] * rows.normal[c, k]
+    _add(F, rows.a[c], 1.0, rows.force[c], rows.arm_a[c], S, rows.shift[c])
+    _add(F, rows.b[c], -1.0, rows.force[c], rows.arm_b[c], S, rows.shift[c])
 
 
 @inner

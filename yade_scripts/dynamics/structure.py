@@ -222,6 +222,13 @@ class Structure(StructureReadings):
             self._who_sleeps_changed,
         )
 
+    def share_work(self, share: Callable[..., list]) -> None:
+        """Run the loop over pairs of blocks by share(kernel, count, *arguments, weight=...), which may call
+        kernel(first, last, *arguments) on several threads and gives what the calls return, in order. The bits are the
+        same."""
+        if self._contacts is not None:
+            self._contacts.share = share
+
     def _who_sleeps_changed(self) -> None:
         self._limit = None
         self._list_bodies()
