@@ -141,6 +141,16 @@ def test_an_existing_yade_is_honoured(machine):
     assert not any(call.startswith("apt-get") for call in calls)
 
 
+def test_a_yade_below_a_folder_with_a_blank_in_its_name_is_honoured(machine):
+    """As a user has it who unpacked the packages into a home of his own, without root."""
+    place = machine.state / "Käthe Übel" / "yade"
+    place.mkdir(parents=True)
+    (machine.state / "venv-module").touch()
+    code, reported, calls = machine("doctor", SURGEBREAK_YADE=str(place), USER_NUMBER="1000")
+    assert code == 0, reported
+    assert not any(call.startswith("apt-get") for call in calls)
+
+
 def test_a_yade_known_to_the_package_system_is_honoured_wherever_it_is(machine):
     machine.stub("dpkg-query", "#!/bin/sh\necho installed\n")
     (machine.state / "venv-module").touch()

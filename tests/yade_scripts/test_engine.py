@@ -56,6 +56,25 @@ except e.YadeMissing as error:
     assert "apt install yade" in out
 
 
+def test_a_folder_named_by_the_user_is_taken_whatever_is_in_its_path(tmp_path):
+    package = tmp_path / "Käthe [1] Übel" / "py" / "yade"
+    package.mkdir(parents=True)
+    (package / "__init__.py").write_text("")
+    out = run(f"""
+import os
+os.environ["SURGEBREAK_YADE"] = {str(package)!r}
+import yade_scripts.yade_side.engine as e
+print(e.find_yade() == e.Path({str(package.parent)!r}))
+os.environ["SURGEBREAK_YADE"] = {str(tmp_path)!r}
+try:
+    e.find_yade()
+except e.YadeMissing as error:
+    print(error)
+""")
+    assert "True" in out
+    assert f"SURGEBREAK_YADE = {tmp_path} holds no YADE" in out
+
+
 def test_the_wrong_package_called_yade_is_named(tmp_path):
     (tmp_path / "yade").mkdir()
     (tmp_path / "yade" / "__init__.py").write_text("")

@@ -92,16 +92,21 @@ def load_yade(threads: int = 1) -> Engine:
 
 
 def find_yade() -> Path:
-    """Folder that contains the `yade` package of the distribution, or of where SURGEBREAK_YADE says that it is."""
-    for pattern in (*os.environ.get("SURGEBREAK_YADE", "").split(), *PACKAGED):
+    """Folder that contains the `yade` package: the one in SURGEBREAK_YADE if that is set, else the distribution's.
+
+    Raises YadeMissing, WrongYade."""
+    named = os.environ.get("SURGEBREAK_YADE")
+    if named:
+        if not _is_yade(Path(named)):
+            raise YadeMissing(
+                f"SURGEBREAK_YADE = {named} holds no YADE; "
+                "name the folder .../py/yade of the unpacked package, or unset the variable"
+            )
+        return Path(named).resolve().parent
+    for pattern in PACKAGED:
         for place in sorted(glob.glob(pattern)):
-            package = Path(place).resolve()
-            if (
-                (package / "wrapper").exists()
-                or list(package.glob("boot*.so"))
-                or (package / "__init__.py").exists()
-            ):
-                return package.parent
+            if _is_yade(Path(place)):
+                return Path(place).resolve().parent
     other = importlib.util.find_spec("yade")
     if other is not None:
         raise WrongYade(
@@ -111,6 +116,14 @@ def find_yade() -> Path:
     raise YadeMissing(
         f"YADE is not installed (looked for {', '.join(PACKAGED)}); install it with 'apt install yade' on Debian 12, "
         "or let ./surgebreak do it; water-only cases run without it"
+    )
+
+
+def _is_yade(package: Path) -> bool:
+    return (
+        (package / "wrapper").exists()
+        or bool(list(package.glob("boot*.so")))
+        or (package / "__init__.py").exists()
     )
 
 
