@@ -1,4 +1,6 @@
-"""What `import surgebreak` offers, and the commands use: cases that a script changes and runs, and runs read back.
+"""The Python side: what `import surgebreak` offers, and what the commands use. Scripts change and run cases and read
+runs.
 
-May import everything of the coupler but its commands; the names that scripts may rely on are those of `surgebreak.py`.
+This package may import everything of the coupler except its commands; the names on which scripts may rely are those of
+`surgebreak.py`.
 """

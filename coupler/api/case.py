@@ -1,4 +1,4 @@
-"""A case in the hands of a script: read or built, changed by the names of the case file, checked, run."""
+"""A case as an object for scripts: it is loaded or built, changed by the keys of the case file, checked, and run."""
 
 from __future__ import annotations
 

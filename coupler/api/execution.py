@@ -1,4 +1,4 @@
-"""Runs of a script in this process: what it reports after each step, its wish to stop, one run at a time."""
+"""Runs that a script makes in its own process: reports after each step, requests to stop, and one run at a time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Laws of the user: from a file or an object to the names that a case may use."""
+"""Cohesive laws of the user: a file or an object is registered under the names that a case may use."""
 
 from __future__ import annotations
 

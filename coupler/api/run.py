@@ -1,4 +1,4 @@
-"""A run read back from its directory, also while it goes on; everything comes from files."""
+"""A run that is read back from the files in its directory, also while it is in progress."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a callback is given after every step of a run: numbers, and copies of where the blocks are."""
+"""The record that a callback receives after every step of a run: numbers, and copies of the positions of the blocks."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""The case: what a `case.toml` may say, in SI, with a description and a unit for every name.
+"""The schema of a case: all keys of `case.toml` in SI units, each with its description and unit.
 
-A section that is absent switches its module off (`modules`). Unknown names are refused. The page
-`docs/case_file.md` and `surgebreak explain` are made from this file and the others named `case_...`.
+A section that is absent switches its module off (`modules`). Unknown keys are refused. The page `docs/case_file.md` and
+the command `surgebreak explain` are made from this file and from the other modules of this package.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""First cases: `surgebreak init` writes one that runs, of what is nearest to what somebody has in mind, and can ask."""
+"""First cases: `surgebreak init` writes a small case that runs, chosen by name or by a few questions."""
 
 from __future__ import annotations
 

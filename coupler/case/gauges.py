@@ -1,4 +1,4 @@
-"""What a case measures at every step; a gauge is one or more columns of `history/gauges.csv`."""
+"""The gauges of a case. Each is read in every step and gives one or more columns of `history/gauges.csv`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Reading the schema itself: every key of a case with its unit, limits, default and description."""
+"""Access to the schema itself: every key of a case with its unit, limits, default and description."""
 
 from __future__ import annotations
 

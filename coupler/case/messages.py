@@ -1,4 +1,4 @@
-"""What the schema's refusals mean, in words: a pydantic error becomes a place and a sentence."""
+"""Messages for refused values: an error of pydantic is converted to a place in the file and a sentence."""
 
 from __future__ import annotations
 

@@ -1,6 +1,7 @@
-"""Paths that a case names, and texts that are read whole: what cannot be found or held is refused before it is opened.
+"""Paths and texts named in a case. A file that is missing, is no regular file or is too large is refused before it is
+opened.
 
-A pipe would wait for a writer, a device never ends, and a file of gigabytes takes the memory of the machine.
+A pipe would wait for a writer, a device never ends, and a file of gigabytes would exhaust the memory of the machine.
 """
 
 from __future__ import annotations

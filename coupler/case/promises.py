@@ -1,6 +1,7 @@
-"""What an `expected.toml` may say: promises ([[expect]]) and curves over data ([[curve]]), checked before a run begins.
+"""The schema of `expected.toml`: expected results ([[expect]]) and curves over data ([[curve]]), checked before a run
+begins.
 
-The meaning of the entries stands where they are used: `expected.py`, `view/over_data.py`, `compare/outcome.py`.
+The entries are described where they are used: `expected.py`, `view/over_data.py`, `compare/outcome.py`.
 """
 
 from __future__ import annotations

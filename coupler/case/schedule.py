@@ -1,4 +1,4 @@
-"""When a run writes: output times that divide it evenly, and times of checkpoints."""
+"""The times at which a run writes its output, evenly spaced within the run, and its checkpoints."""
 
 from __future__ import annotations
 

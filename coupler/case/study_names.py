@@ -1,4 +1,4 @@
-"""What the schema cannot see in [study]: names that must exist, and names that are taken."""
+"""Checks of names in [study] that the schema cannot make: names that must exist, and names that are already used."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What `surgebreak sweep` varies and measures; a run of the case takes no notice of it."""
+"""The section [sweep]: what `surgebreak sweep` varies and measures. It has no effect on a run of the case."""
 
 from __future__ import annotations
 

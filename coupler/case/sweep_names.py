@@ -1,4 +1,4 @@
-"""What the schema cannot see in [sweep]: names that must exist, names that are taken, values without their unit."""
+"""Checks of [sweep] that the schema cannot make: names that must exist, names that are already used, missing units."""
 
 from __future__ import annotations
 

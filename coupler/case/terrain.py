@@ -1,4 +1,4 @@
-"""The ground of a case from a file."""
+"""The section [terrain]: the ground of a case from a file."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Where each name of a TOML text stands: key path -> line number.
+"""Line numbers of the keys of a TOML text: key path -> line number.
 
-A path is a tuple of names and list places, ("structure", "block", 1, "size"). The text must be valid TOML
-(tomllib has read it before); so the scan may take shortcuts that a parser could not.
+A path is a tuple of names and list indices, ("structure", "block", 1, "size"). The text must be valid TOML, because
+tomllib has read it before; the scan may therefore be simpler than a parser.
 """
 
 from __future__ import annotations

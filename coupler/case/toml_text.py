@@ -1,4 +1,4 @@
-"""Plain data written as TOML: numbers, text, booleans, lists, tables and lists of tables. tomllib only reads."""
+"""Plain data as TOML text: numbers, text, booleans, lists, tables and lists of tables. (tomllib can only read.)"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the tables of a case file are made of: quantities, names, points and turns."""
+"""The types of values in the tables of a case file: quantities, names, points and rotations."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The section [verdict]: by which rules a structure stands, is damaged, or has collapsed."""
+"""The section [verdict]: the rules by which a structure is judged to stand, to be damaged, or to have collapsed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The water of a case: fluid, walls, where it stands at the start, where it comes in, and what stands fixed in it."""
+"""The section [water]: fluid, walls, initial fills, inflows and seas, and fixed solids."""
 
 from __future__ import annotations
 

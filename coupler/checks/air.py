@@ -1,4 +1,4 @@
-"""What is wrong with the trapped air of a case, and what is worth knowing of it."""
+"""Checks of the trapped air of a case: errors, and remarks."""
 
 from __future__ import annotations
 

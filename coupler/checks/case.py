@@ -1,4 +1,5 @@
-"""What a schema cannot see: sections that need each other, names that must exist, bodies that cannot be made.
+"""Checks that a schema cannot make: sections that require each other, names that must exist, bodies that cannot be
+made.
 
 Every check yields (key path, message); none needs YADE or the flow solver.
 """

@@ -1,4 +1,4 @@
-"""Cases whose joints must do what a contact would: faces that touch, and no block without one."""
+"""Checks of cases in which joints replace all contact: faces must touch, and no block may be without a joint."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Blocks with a prescribed motion that nothing stops: where they are when the run ends is known before it begins."""
+"""Checks of prescribed motions: the position of a driven block at the end of the run is known before it begins."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Bodies, fills and gauges that cannot be where a case puts them. Every check yields (key path, message)."""
+"""Checks of the positions of bodies, fills and gauges. Every check yields (key path, message)."""
 
 from __future__ import annotations
 

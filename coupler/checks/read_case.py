@@ -1,7 +1,6 @@
-"""From a case directory to a checked case: TOML, `--set`, schema, geometry. All mistakes are reported at once.
+"""Reading a case directory: TOML, `--set`, schema, geometry. All errors are reported together.
 
-A message has the form `PLACE: KEY: what is wrong; what to do`, where PLACE is `path/case.toml:LINE` or
-`--set KEY=VALUE`.
+A message has the form `PLACE: KEY: error; remedy`, where PLACE is `path/case.toml:LINE` or `--set KEY=VALUE`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Contacts that are too soft for the blocks they hold, by the weight and the speed that are known before the run."""
+"""Checks of contact stiffness against the weight and the speed of the blocks, which are known before the run."""
 
 from __future__ import annotations
 

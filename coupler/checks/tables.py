@@ -1,4 +1,4 @@
-"""Gauges whose results would stand in one place: two columns of a name, two tables in one file."""
+"""Checks of gauges whose results would be written to the same place: two columns or two tables of one name."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is wrong with the water of a case: walls, friction, inflows and seas. Every check yields (key path, message)."""
+"""Checks of the water of a case: walls, friction, inflows and seas. Every check yields (key path, message)."""
 
 from __future__ import annotations
 

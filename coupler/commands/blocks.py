@@ -1,4 +1,4 @@
-"""`surgebreak blocks FILE`: what a drawing is cut into, what that costs, and a picture; nothing is run."""
+"""`surgebreak blocks FILE`: cuts a drawing into blocks, forecasts their cost and draws them, without a run."""
 
 from __future__ import annotations
 

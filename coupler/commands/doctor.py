@@ -1,4 +1,5 @@
-"""Is this machine ready? Each part is tried for real; what may crash is tried in a process of its own."""
+"""The command `surgebreak doctor`: each part of the installation is executed; parts that may crash run in their own
+process."""
 
 from __future__ import annotations
 

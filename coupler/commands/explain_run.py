@@ -1,7 +1,7 @@
-"""`surgebreak explain RUN`: what a run computed, what it skipped, and what that would have cost.
+"""`surgebreak explain RUN`: what a run computed, what it skipped, and an estimate of the cost of the skipped work.
 
-The cost is an estimate: seconds per unit of work (a wet cell, a body cut, a spring, a pass), measured in the same run,
-times the units that were skipped. Units are means over the steps, from figures.work of run.json.
+The estimate is the processor time per unit of work (a wet cell, a body cut, a spring, a pass), measured in the same
+run, times the number of units that were skipped. Units are means over the steps, from figures.work of run.json.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""What `surgebreak doctor --mend` can put right by itself: kernels that were not written to their end, folders of one's
-own that may not be written to, and packages that are missing in the virtual environment.
+"""Repairs made by `surgebreak doctor --mend`: incomplete compiled kernels, folders of the user that are not writable,
+and packages that are missing in the virtual environment.
 
-Nothing outside of the cache and the virtual environment is touched: no system package, no result of a run.
+Only the cache and the virtual environment are changed, never a system package or the results of a run.
 """
 
 from __future__ import annotations

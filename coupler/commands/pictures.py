@@ -1,4 +1,4 @@
-"""Pictures for a report, made from files in processes of their own: VTK and YADE do not live in one."""
+"""Pictures for a report, made from files in separate processes, because VTK and YADE cannot share one."""
 
 from __future__ import annotations
 

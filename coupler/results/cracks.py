@@ -1,4 +1,4 @@
-"""The joints at the end of a run, as a table and as surfaces for viewing: a polygon each, where its block a is."""
+"""The joints at the end of a run, as a table and as surfaces: one polygon per joint, at the position of its block a."""
 
 from __future__ import annotations
 

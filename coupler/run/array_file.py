@@ -1,6 +1,7 @@
-"""A file of named arrays and one text that is there as a whole or not at all, and tells if it was damaged since.
+"""A file of named arrays and one text that is written atomically and in which damage is detected.
 
-Written beside and renamed; a digest of every name, type, shape and byte stands in the file and is checked on reading.
+The file is written beside its place and renamed. It contains a digest of every name, type, shape and byte, which is
+checked on reading.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Checkpoints: everything that a run needs to go on later as if it had never stopped.
+"""Checkpoints: the complete state from which a run is continued.
 
-`checkpoints/<steps>.h5`: water, immersed solids, blocks with their joints and contacts, loads, ledger, how far the
-result files go, figures and processor time; with it the case and the program that it belongs to.
+`checkpoints/<steps>.h5` contains the water, immersed solids, blocks with their joints and contacts, loads, the energy
+balance, the lengths of the result files, figures and processor time, and identifies the case and the program.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Where the processor time of a run goes: seconds of user and system time booked to named parts."""
+"""Processor time of a run by part: user and system time in seconds, assigned to named parts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A run from its case to its end, as the commands `run` and `resume` make it: reported, compared, its exit code."""
+"""Executes a run from its case to its end for the commands `run` and `resume`: reports, comparison, exit code."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a scene is made of and which program ran it, as short digests, to refuse a restart of something else."""
+"""Short digests of a scene and of the program that ran it, by which a restart of something else is refused."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""What a run will take, before it is run: steps, substeps, memory, disk, and what sets them.
+"""Forecast of a run before it begins: steps, substeps, memory, disk space, and what determines them.
 
-The steps follow from the speed that the highest water could fall to, √(2 g H); the substep is the structure's own.
-Memory and disk per cell were read off runs; they are forecasts, not bounds.
+The number of steps follows from the speed √(2 g H) of a fall from the highest water; the substep is that of the
+structure. Memory and disk space per cell were measured in runs; they are forecasts and not bounds.
 """
 
 from __future__ import annotations

@@ -1,7 +1,9 @@
-"""What a run left out, counted while it goes: means over its steps, from what the steps know already.
+"""Work that a run skipped, counted while it runs: means over its steps, from numbers that the steps have already
+computed.
 
-Of the mesh only cells that water reaches are assembled, only bodies that moved are cut again, only joints that hold
-and contacts that touch are visited; `explain_run` puts the difference into words. In run.json under figures.work.
+Only cells of the mesh that water reaches are assembled, only bodies that moved are cut again, and only intact joints
+and active contacts are evaluated; `explain_run` describes the difference in words. Stored in run.json under
+figures.work.
 """
 
 from __future__ import annotations

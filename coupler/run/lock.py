@@ -1,7 +1,8 @@
-"""One process a run directory: whoever runs or resumes there holds a lock, which the system lets go when it dies.
+"""One process per run directory: the process that runs or resumes there holds a lock, which the system releases when
+it dies.
 
-The lock is an flock on log.txt, which every run has: no file of its own is left behind, and that of a killed process
-holds up nobody.
+The lock is an flock on log.txt, which every run has; no separate lock file is left behind, and the lock of a killed
+process blocks no other one.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Going on with a run that stopped: which checkpoint, and whether it still belongs to the case and the program.
+"""Continuing a stopped run: the choice of the checkpoint, and the check that it belongs to the case and the program.
 
-The newest checkpoint that is whole and whose result files still reach that far is taken; newer ones are reported and
-removed. The case is the run's own copy; only what does not change the scene may be given anew (`fingerprint.FREE`).
+The newest complete checkpoint up to which the result files are complete is used; newer ones are reported and
+removed. The case is the run's own copy; only keys that do not change the scene may be changed (`fingerprint.FREE`).
 """
 
 from __future__ import annotations

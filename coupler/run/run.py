@@ -1,4 +1,4 @@
-"""A whole run: build the scene, step to the end, write, and end with a reason."""
+"""A whole run: builds the scene, makes the steps, writes the results, and ends with a reason."""
 
 from __future__ import annotations
 

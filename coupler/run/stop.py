@@ -1,7 +1,7 @@
-"""The user's wish to stop: Ctrl-C, the end of the session, or a file named `stop` in the run directory.
+"""Requests to stop a run: Ctrl-C, the end of the session, or a file named `stop` in the run directory.
 
-The loop asks once a step, and within one that lasts long (`within_step.py`). A second Ctrl-C stops at once. When the
-terminal closes (SIGHUP) there is nobody to tell any more: what is printed goes nowhere from then on.
+The time loop checks for them once per step, and within a step that lasts long (`within_step.py`). A second Ctrl-C stops
+at once. After the terminal has closed (SIGHUP), output to it is discarded.
 """
 
 from __future__ import annotations

@@ -1,4 +1,5 @@
-"""What run.json must hold for the commands that read it: one that was edited or torn is refused, not tripped over."""
+"""The required content of run.json for the commands that read it: a file that was edited or is incomplete is
+refused."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The pockets of air that a run begins with, in words and as a row of its forecast."""
+"""The pockets of air at the start of a run, in words and as a row of the forecast."""
 
 from __future__ import annotations
 

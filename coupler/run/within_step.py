@@ -1,7 +1,7 @@
-"""Wishes to stop and budgets are met within a step too, where that is a long one: with fine cells and many substeps it
-may take minutes.
+"""Requests to stop and time budgets are also honoured within a step, which may take minutes with fine cells and many
+substeps.
 
-A step that is left in the middle leaves no state: what the run stood at before it was held, and is what is saved.
+A step that is abandoned leaves no state: the state before it was kept, and is saved.
 """
 
 from __future__ import annotations

@@ -1,4 +1,5 @@
-"""The verdict of a run, as plain data for run.json, from what was watched and the joints as they are."""
+"""The verdict of a run, as plain data for run.json, from the quantities that were followed and the state of the
+joints."""
 
 from __future__ import annotations
 

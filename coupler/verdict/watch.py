@@ -1,7 +1,7 @@
-"""What a run keeps an eye on for its verdict: how far blocks went, the largest loads, hits of debris, depths.
+"""Quantities that a run follows for its verdict: displacements of blocks, largest loads, impacts of debris, depths.
 
-Everything is cheap beside a step; it changes nothing in it and goes into checkpoints, so that a run that goes on tells
-the same verdict.
+They are cheap beside a step, change nothing in it, and are stored in checkpoints, so that a continued run has the same
+verdict.
 """
 
 from __future__ import annotations

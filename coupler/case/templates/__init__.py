@@ -1,1 +1,1 @@
-"""First cases of `surgebreak init`: a text with $names for each, and what is asked for them."""
+"""The templates of `surgebreak init`: one text with $names for each first case, and the questions that fill them in."""

@@ -1,6 +1,6 @@
-"""What a substep costs: ours in its parts, whole scenes, and the laws of YADE at the same size, in one run.
+"""The command `surgebreak benchmark`: processor time of substeps and their parts, of whole scenes, and of YADE's laws.
 
 scenes   blocks of the measurements
 part     one measurement, in a process of its own (YADE holds one scene)
-command  all of them, as a table or as JSON
+command  all measurements, as a table or as JSON
 """

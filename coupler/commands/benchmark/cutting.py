@@ -1,7 +1,7 @@
-"""What cutting a cell by the bodies near it costs: walls of blocks, and loose boxes by how many are near the cell.
+"""Processor time of cutting a cell: walls of blocks, and loose boxes by the number of boxes near the cell.
 
-196,608 tetrahedra, search, splitting, surfaces and parts included; microseconds for every cell of which something was
-taken away.
+The mesh has 196,608 tetrahedra. The time includes the search, the splitting, the surfaces and the parts, and is given
+in microseconds for every cell that was cut.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
-"""What debris costs a coupled step, part by part: `python -m coupler.commands.benchmark.debris [BLOCKS]`.
+"""Processor time of debris in a coupled step, by part: `python -m coupler.commands.benchmark.debris [BLOCKS]`.
 
-The same mesh and water without blocks, with blocks cut with one cover a node, and with several: the difference of the
-last two is the price of the covers. CPU milliseconds a step, the median of STEPS.
+The same mesh and water are measured without blocks, with blocks and single covers, and with blocks and multiple
+covers; the difference of the last two is the cost of the covers. The result is the median of STEPS in CPU milliseconds
+per step.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""The same blocks under our laws and YADE's own: one command, one table, one figure.
+"""The command `surgebreak compare`: the same blocks with the laws of this program and with those of YADE.
 
-plan     which laws, and cases that cannot be compared
-matching our other laws made like that of the case
-own      one of our laws, in a process of its own: the structure of the case, stepped as in a run
-run      all laws, all substeps; the stock ones from the scripts that are written
-outcome  what a run gave, and its errors against the exact answer
+plan     the laws to compare, and cases that cannot be compared
+matching parameters of the other laws of this program, matched to those of the case
+own      one law of this program, in a process of its own: the structure of the case, stepped as in a run
+run      all laws and substeps; the laws of YADE are run from the scripts that are written
+outcome  results of a run, and their errors relative to the exact solution
 report   table, CSV, JSON
 """

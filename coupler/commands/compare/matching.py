@@ -1,7 +1,9 @@
-"""Our other laws made like the law of a case: same strength, same G_c, and the same stiffness where the law allows.
+"""Parameters of the other laws of this program, matched to the law of a case: strength, G_c and, where possible,
+stiffness.
 
-A law gives k_0 G_c/T_max² = s(0, p) w(1, p), so the place p of its peak sets that number and δ_f = G_c/(T_max w(1, p))
-the rest. Polynomial 3.80; bilinear 1/(2p), any; exponential e² to 4 %: nearly twice as stiff at the same G_c.
+The shape of a law gives k_0 G_c/T_max² = s(0, p) w(1, p). This equation determines the place p of its peak, and
+δ_f = G_c/(T_max w(1, p)) follows. The value is 3.80 for the polynomial law, 1/(2p), which can be any value, for the
+bilinear law, and e² to within 4 % for the exponential law, which is nearly twice as stiff at the same G_c.
 """
 
 from __future__ import annotations

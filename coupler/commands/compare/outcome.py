@@ -1,4 +1,4 @@
-"""What a law gave on a case, and how far that is from the exact answer."""
+"""Results of a law on a case, and their errors relative to the exact solution."""
 
 from __future__ import annotations
 

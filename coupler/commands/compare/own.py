@@ -1,8 +1,8 @@
-"""One of our laws in a process of its own: `python -m coupler.commands.compare.own REQUEST.json` writes a table and
-figures.
+"""One law of this program in a process of its own: `python -m coupler.commands.compare.own REQUEST.json` writes a table
+and figures.
 
-The structure is the one that a run of the case builds, and moves on as there; columns and figures are those of the
-stock scripts (yade_scripts/stock/driver.py).
+The structure is built and moved as in a run of the case; the columns and figures are those of the stock scripts
+(yade_scripts/stock/driver.py).
 """
 
 from __future__ import annotations

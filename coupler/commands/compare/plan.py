@@ -1,4 +1,4 @@
-"""Which laws are compared on which case, and the cases that cannot be."""
+"""The laws that are compared on a case, and the cases that cannot be compared."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Run all laws of a plan, each in a process of its own, and keep what they wrote."""
+"""Runs all laws of a plan, each in a process of its own, and keeps the files that they write."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Results in files that other programs open: ParaView from 5.11 on, xarray, Blender."""
+"""The command `surgebreak export`: results in files for ParaView from 5.11 on, xarray and Blender."""

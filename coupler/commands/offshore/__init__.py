@@ -1,6 +1,7 @@
-"""`surgebreak offshore FILE`: the sea before the coast by ANUGA, one way, to a record for a side of a case.
+"""`surgebreak offshore FILE`: computes the sea off the coast with ANUGA and writes a record for a side of a case
+(one-way).
 
-file       what an offshore file may say, and what is wrong with it
+file       the schema of an offshore file, and its checks
 command    the sea as arrays, ANUGA in a process of its own, the record
 in_anuga   that process
 """

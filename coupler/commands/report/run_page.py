@@ -1,4 +1,4 @@
-"""The report of a run: what was run, what came out, how far it is to be trusted, what was left out."""
+"""The report of a run: the case, the results, checks of their reliability, and what was not computed."""
 
 from __future__ import annotations
 

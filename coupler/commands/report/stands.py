@@ -1,4 +1,4 @@
-"""The first screen of a report of a structure: the verdict, what broke and when, and its figures."""
+"""The first screen of the report of a structure: the verdict, the order and times of failures, and its figures."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a scene with water keeps: volume, energy, and how the two sides agree, looked at in every step."""
+"""Limits for scenes with water: volume, energy, and the coupling residual, checked in every step."""
 
 from __future__ import annotations
 

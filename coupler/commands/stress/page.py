@@ -1,4 +1,4 @@
-"""The tables of docs/stress.md out of outcomes: `surgebreak stress --json | python -m coupler.commands.stress.page`."""
+"""Writes the tables of docs/stress.md: `surgebreak stress --json | python -m coupler.commands.stress.page`."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""The list of scenes: what each one strains, what it must keep, and what its functions yield.
+"""The list of scenes: the purpose of each scene, its limits, and the results that its function yields.
 
-A scene is a generator of `Measure`s: a figure of a run in physical terms and the most that it may be. A scene may end
-by refusing: an error of ours with a message that says what to change, where `refusal` allows or asks for it.
+A scene is a generator of `Measure`s: a physical quantity of a run and its limit. A scene may end
+by refusing: an error of this program with a message that says what to change, where `refusal` allows or asks for it.
 """
 
 from __future__ import annotations

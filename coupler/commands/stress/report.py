@@ -1,4 +1,4 @@
-"""Outcomes for people (a table that grows scene by scene) and for programs (one JSON object a line)."""
+"""Outcomes as a table that grows scene by scene, and as JSON, one object per line."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Run scenes one after the other, each in a process of its own: an extreme scene may take its process with it."""
+"""Runs scenes one after the other, each in a process of its own, because an extreme scene may crash its process."""
 
 from __future__ import annotations
 

@@ -1,17 +1,17 @@
-"""Error against run time: a ladder of runs of a case, each in a process of its own.
+"""The command `surgebreak study`: error against run time over ladders of runs of a case, each in a process of its own.
 
-plan       which runs, named and checked before any of them is made
-study_run  (beside this package) one run in this process, with the processor time that compiling took
-runner     runs one after the other, those that are done are not made again
-reading    the number that a quantity has in a run
-reference  what it is compared with: exact, measured, or the finest run
-formula    formulas of names of the case
+plan       the runs, named and checked before the first of them is made
+study_run  (beside this package) one run in this process, with the processor time of compilation
+runner     makes the runs one after the other; completed runs are not repeated
+reading    the value of a quantity in a run
+reference  the reference of a quantity: exact, measured, or the finest run
+formula    formulas of keys of the case
 results    errors of all runs
 order      observed order of convergence
-cheapest   the cheapest setting for an error; what parts of the program cost
+cheapest   the cheapest setting for an error; the cost of parts of the program
 report     JSON, CSV, tables
-against    two studies of one case: what got worse
+against    comparison of two studies of one case
 command    the command; figures are made by coupler/commands/view/study.py
 page       a study as Markdown
-pages      docs/studies.md out of several
+pages      docs/studies.md from several studies
 """

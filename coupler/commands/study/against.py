@@ -1,4 +1,4 @@
-"""`surgebreak study compare A B`: what got worse from one study of a case to another one."""
+"""`surgebreak study compare A B`: the results that are worse in study B than in study A of the same case."""
 
 from __future__ import annotations
 

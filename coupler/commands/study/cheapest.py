@@ -1,4 +1,4 @@
-"""Tables of a study: the cheapest setting for an error, and what parts of the program cost."""
+"""Tables of a study: the cheapest setting for an error, and the cost of parts of the program."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""Which runs a study makes: every setting by its overrides, checked and named before the first of them is made.
+"""The plan of a study: every setting with its overrides, checked and named before the first run is made.
 
-Two rungs with the same effective case are one run: the case as it stands is part of most ladders.
+Two rungs with the same effective case share one run; the unchanged case belongs to most ladders.
 """
 
 from __future__ import annotations

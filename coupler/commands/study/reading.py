@@ -1,4 +1,4 @@
-"""The number that a quantity has in a run: a column with a reduction, or a figure of run.json."""
+"""The value of a quantity in a run: a column with a reduction, or a figure of run.json."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a quantity is compared with, of one kind for all its runs: exact, measured, or the finest run."""
+"""The reference of a quantity, of one kind for all its runs: exact, measured, or the finest run."""
 
 from __future__ import annotations
 

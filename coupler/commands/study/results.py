@@ -1,4 +1,4 @@
-"""Errors of all runs of a study, each quantity against the one reference that it has."""
+"""Errors of all runs of a study, each quantity relative to its one reference."""
 
 from __future__ import annotations
 

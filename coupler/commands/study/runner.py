@@ -1,9 +1,9 @@
-"""Run the settings of a study one after the other, each in a process of its own, and measure what they cost.
+"""Runs the settings of a study one after the other, each in a process of its own, and measures their cost.
 
-    runs/ID-K/        run directory of the K-th run of a setting          runs/ID-K.json   what it cost
+    runs/ID-K/        run directory of the K-th run of a setting          runs/ID-K.json   its cost
 
-The second is written when the process has ended by itself, so a study that was stopped goes on after the last of
-them. User and system time and peak memory are those of the process and what it started (wait4).
+The second file is written when the process has ended, so that a study that was stopped continues after the last
+completed run. User and system time and peak memory are those of the process and its children (wait4).
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""What a sweep will take: from its runs that are done, or from the first steps of the first one.
+"""The forecast cost of a sweep, from its completed runs or from the first steps of the first run.
 
-Processor time is that of a run times the runs that are left; a run of which only some steps were made is given as
-(set-up) + (steps) (end time / time that they reached). Runs may differ: it is a forecast, no bound.
+The processor time is that of one run times the number of remaining runs. Where only some steps of a run were made, it
+is (set-up) + (steps) (end time / time reached). Runs may differ, so this is a forecast and not a bound.
 """
 
 from __future__ import annotations

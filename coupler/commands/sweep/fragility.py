@@ -1,7 +1,8 @@
-"""Fragility curves of a sweep: which state each run reached, curves with bands, and why there is no curve.
+"""Fragility curves of a sweep: the state that each run reached, curves with bands, and the reason where there is no
+curve.
 
-A run counts when it reached its end, when its structure could not stand at the start, or when it had reached the
-heaviest state before it failed; other failed runs are unknown, and are counted as such.
+A run counts if it reached its end, if its structure could not stand at the start, or if it had reached the heaviest
+state before it failed. Other failed runs are unknown, and their number is reported.
 """
 
 from __future__ import annotations

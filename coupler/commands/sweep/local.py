@@ -1,4 +1,4 @@
-"""Runs on this machine, so many at a time: each worker process makes one after the other."""
+"""Runs on this machine: a number of worker processes, each of which makes one run after the other."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""Make one run of a sweep, or go on with it, read it and keep what is wanted: `python -m coupler.commands.sweep.one
+"""Makes or continues one run of a sweep, reads it and keeps the files asked for: `python -m coupler.commands.sweep.one
 FOLDER ID...`, also as the job of a cluster.
 
-A run that was killed or stopped goes on from its newest checkpoint, without one it begins again. Leaves with 0 if all
-runs have ended in a way that would be the same again (done, or failed with a reason), else with 1.
+A run that was killed or stopped is continued from its newest checkpoint, or started again if there is none. The exit
+code is 0 if all runs have ended in a way that would be the same again (done, or failed with a reason), otherwise 1.
 """
 
 from __future__ import annotations

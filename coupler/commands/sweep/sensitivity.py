@@ -1,9 +1,9 @@
-"""On which of the drawn quantities a result depends, with intervals.
+"""The dependence of a result on the drawn quantities, with confidence intervals.
 
-Samples that are even or random: partial rank correlations (Spearman's, with the ranks of the other quantities taken off
-by least squares; Helton and Davis, Reliab. Eng. Syst. Saf. 81 (2003) 23), intervals by bootstrap. They are between -1
-and 1 and say how monotonic a dependence is. Pairs of sets (saltelli): Sobol indices of first order and total, by
-scipy's estimators, intervals by its bootstrap; they are shares of the variance.
+For samples of one set: partial rank correlations (Spearman's, after the ranks of the other quantities have been
+removed by least squares; Helton and Davis, Reliab. Eng. Syst. Saf. 81 (2003) 23), with intervals by bootstrap. They
+lie between -1 and 1 and measure how monotonic a dependence is. For pairs of sets (saltelli): Sobol indices of first
+order and total, by scipy's estimators, with intervals by its bootstrap; they are shares of the variance.
 """
 
 from __future__ import annotations

@@ -1,9 +1,10 @@
-"""Runs as jobs of Slurm, through submitit: an array of them, each making one run or a few one after the other.
+"""Runs as jobs of Slurm, through submitit: an array of jobs, each of which makes one run or a few in sequence.
 
-A job that reaches its time limit gets a signal `signal_delay_s` before; its run then writes a checkpoint, the job is
-put into the queue again, and goes on from there. So does a job that Slurm itself puts back (`scontrol requeue`, a lost
-node). How a run ended stands in the files of the sweep; Slurm is only asked which jobs are in its queue, so no
-accounting is needed. jobs.json holds the job of each run: a call that was left and made again waits for them.
+A job that approaches its time limit receives a signal `signal_delay_s` before. Its run then writes a checkpoint, and
+the job is put into the queue again and continues from there; so does a job that Slurm itself requeues (`scontrol
+requeue`, a lost node). The files of the sweep record how a run ended. Slurm is only asked which jobs are in its queue,
+so that no accounting is needed. jobs.json contains the job of each run, so that a repeated call waits for the existing
+jobs.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""The time limit of a job of a batch system: read as that system reads it, handed to the job, and asked in it.
+"""The time limit of a job of a batch system: read in the notation of that system, passed to the job, and checked there.
 
-Batch systems end a job at its limit without asking. A job therefore knows the moment (`VARIABLE`), has its run write a
-checkpoint shortly before, and the run goes on in another job.
+Batch systems end a job at its limit without warning. A job therefore knows this time (`VARIABLE`) and has its run write
+a checkpoint shortly before; the run is continued in another job.
 """
 
 from __future__ import annotations

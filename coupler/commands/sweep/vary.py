@@ -1,4 +1,4 @@
-"""--vary KEY=... of the command line: the same as a table of [[sweep.vary]].
+"""The option --vary KEY=... of the command line as a table of [[sweep.vary]].
 
 tank.cell=0.5,0.25                                   a list
 water.fill[0].upper[2]='0.6 m:1.2 m:7'               a grid: from, to, number of values

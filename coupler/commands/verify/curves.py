@@ -1,7 +1,7 @@
-"""Curves that a case computed, beside measured or exact ones: what a figure of it shows.
+"""Computed curves beside measured or exact ones: the content of a figure.
 
-A case yields `Figure`s between its findings; they are drawn where `surgebreak verify --plots DIR` asks for them, and
-cost nothing otherwise. Written as JSON, so that pictures are made by a process of their own
+A case yields `Figure`s between its findings. They are drawn where `surgebreak verify --plots DIR` asks for them, and
+cost nothing otherwise. They are written as JSON, because pictures are made in a process of their own
 (coupler/commands/view/curves.py).
 """
 

@@ -1,4 +1,4 @@
-"""What the numerics do to the volume of the water in a run: reported with every dam break, not hidden."""
+"""Numerical losses of the water volume in a run, which are reported with every dam break."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""The list of cases: what each one checks, against what, and what its functions yield.
+"""The list of cases: the subject of each case, its reference, and the results that its function yields.
 
-A case is a generator of `Finding`s: a value out of a run, what it should be, and how far off it may be. The time
-between two findings is booked to the second.
+A case is a generator of `Finding`s: a value of a run, its reference value, and the permitted error. The processor time
+between two findings is assigned to the second.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Results for people (a table that grows case by case, with totals) and for programs (one JSON object a line)."""
+"""Results as a table that grows case by case, with totals, and as JSON, one object per line."""
 
 from __future__ import annotations
 

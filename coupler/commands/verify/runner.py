@@ -1,4 +1,4 @@
-"""Run cases one after the other, each in a process of its own."""
+"""Runs cases one after the other, each in a process of its own."""
 
 from __future__ import annotations
 

@@ -1,11 +1,12 @@
-"""Does the swinging of a bonded wall in still water die away in one pass, and in two?
+"""Stability of the vibration of a bonded wall in still water with one pass and with two.
 
-`python -m coupler.commands.verify.stability` prints the whole map, growth a step over density, damping, step and
+`python -m coupler.commands.verify.stability` prints the whole map: growth per step over density, damping, step and
 passes.
 
-The load comes on at once and the wall swings far below damage. A coupling that holds the stiffness of the structure
-over the step is not stable by that alone: the blocks answer with their mean motion over the step, the pressure solve
-assumed the implicit one. What grows is small (some ten thousandths a step), so it takes hundreds of steps to see.
+The load is applied suddenly, and the wall vibrates far below damage. A coupling that treats the stiffness of the
+structure implicitly over the step is not stable for that reason alone: the blocks respond with their mean motion over
+the step, whereas the pressure solve assumed the implicit one. The growth is small (some ten thousandths per step) and
+becomes visible only after hundreds of steps.
 """
 
 from __future__ import annotations

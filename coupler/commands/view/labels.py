@@ -1,4 +1,5 @@
-"""Texts beside points of a figure, each where it covers no point, no other text and as little of a line as can be."""
+"""Labels beside points of a figure, placed so that each covers no point, no other label and as little of a line as
+possible."""
 
 import itertools
 

@@ -1,4 +1,4 @@
-"""Figures of the histories of a run, fit for a paper: one file per table, one panel per unit, vector and pixels."""
+"""Figures of the histories of a run for publication: one file per table, one panel per unit, as vectors and pixels."""
 
 import os
 

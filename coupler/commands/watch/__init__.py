@@ -1,1 +1,1 @@
-"""A page that lives: runs and sweeps while they go on, in the browser of this machine."""
+"""The command `surgebreak watch`: a live page about runs and sweeps in the browser of this machine."""

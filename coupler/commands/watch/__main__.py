@@ -1,4 +1,4 @@
-"""python -m coupler.commands.watch PLACE: the page beside a run, until it is ended; its address is the first line."""
+"""python -m coupler.commands.watch PLACE: serves the page beside a run until it is ended; prints its address first."""
 
 import signal
 import sys

@@ -1,4 +1,4 @@
-"""Pictures for the page, one at a time in a process of its own, and no more often than they are worth."""
+"""Pictures for the page, made one at a time in a process of their own and at a limited rate."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a run directory says about its run now, as plain data for the page."""
+"""The present state of a run, read from its directory, as plain data for the page."""
 
 from __future__ import annotations
 

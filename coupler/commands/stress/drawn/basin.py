@@ -1,4 +1,5 @@
-"""Where the water may be: a box of split bricks, a mesh from a file, a terrain in a box or as the floor of the mesh."""
+"""The tank of a random scene: a box of split bricks, a mesh from a file, or a terrain in a box or as the floor of the
+mesh."""
 
 from __future__ import annotations
 

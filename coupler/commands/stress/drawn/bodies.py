@@ -1,4 +1,4 @@
-"""What stands in a scene: fixed solids and blocks, each in a slot of its own along the tank, so that none overlap."""
+"""The bodies of a random scene: fixed solids and blocks, each in its own section of the tank, so that none overlap."""
 
 from __future__ import annotations
 

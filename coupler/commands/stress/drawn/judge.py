@@ -1,4 +1,4 @@
-"""What a run must keep, read from its result files alone: figures in physical terms and the most that each may be."""
+"""Judging a random scene from its result files alone: physical quantities and their limits."""
 
 from __future__ import annotations
 

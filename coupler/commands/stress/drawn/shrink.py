@@ -1,4 +1,4 @@
-"""A failing scene made small: sections and entries are left out, and the run is shortened, while it fails as before."""
+"""Reducing a failed scene: sections and entries are removed and the run is shortened while it fails in the same way."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The water of a scene: where it stands, what comes in, and how it goes along walls."""
+"""The water of a random scene: its initial fills, its inflows, and its wall conditions."""
 
 from __future__ import annotations
 

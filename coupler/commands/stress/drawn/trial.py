@@ -1,8 +1,8 @@
-"""One drawn scene in a process of its own, as a user would run it, and what came of it.
+"""One random scene in a process of its own, run as a user would run it, and its verdict.
 
-passed: it ended, or used up its processor time, and its files keep every figure · refused: the case was not accepted,
-each message with file, line and key, or the run was refused for what a drawn scene may ask too much ·
-failed: anything else
+passed: the run ended or used up its processor time, and its files keep all limits · refused: the case was not accepted,
+each message with file, line and key, or the run was refused because a random scene may ask too much · failed: any other
+result
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Water that has no reason to move: it must not, whatever cuts its cells and whichever way gravity points."""
+"""Scenes with water at rest, which must stay at rest for any cut of its cells and any direction of gravity."""
 
 from __future__ import annotations
 
