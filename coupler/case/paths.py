@@ -42,7 +42,7 @@ def place_of(text: str | Path, directory: Path) -> Path:
 
 
 def check_file(path: Path, most: int | None = None) -> None:
-    """Refuse what is no ordinary file, or larger than `most` [B]. Raises BadPath with the nearest name there is."""
+    """Refuse what is not a regular file, or larger than `most` [B]. Raises BadPath with the nearest name there is."""
     try:
         there = os.stat(path)
     except FileNotFoundError as error:
@@ -51,7 +51,7 @@ def check_file(path: Path, most: int | None = None) -> None:
         raise BadPath(f"cannot be read: {getattr(error, 'strerror', error)}") from error
     if not stat.S_ISREG(there.st_mode):
         what = "a directory" if stat.S_ISDIR(there.st_mode) else "a pipe, a device or a socket"
-        raise BadPath(f"is {what}, no ordinary file")
+        raise BadPath(f"is {what}, not a regular file")
     if most is not None and there.st_size > most:
         raise BadPath(f"has {there.st_size / 1e6:.0f} MB; at most {most / 1e6:.0f} MB are read")
 
@@ -63,7 +63,7 @@ def read_text(path: Path, encoding: str = "utf-8", most: int = MOST_BYTES) -> st
         with open(path, "rb") as stream:
             content = stream.read(most + 1)
         if len(content) > most:
-            raise BadPath(f"has more than {most / 1e6:.0f} MB, which is all that is read")
+            raise BadPath(f"has more than {most / 1e6:.0f} MB, the largest that is read")
         return content.decode(encoding).replace("\r\n", "\n").replace("\r", "\n")
     except UnicodeDecodeError as error:
         raise BadPath(f"not a text in UTF-8 (byte {error.start}); save it as UTF-8") from error

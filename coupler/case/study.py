@@ -102,14 +102,15 @@ def _reference_problems(q: Quantity) -> Iterator[str]:
     scatter = [n for n in ("band", "band_columns") if getattr(q, n) is not None]
     if q.against == "finest" and (given or scatter):
         yield (
-            f"against = 'finest' and {', '.join([*given, *scatter])}: references are never mixed; leave "
+            f"against = 'finest' and {', '.join([*given, *scatter])}: references must be of one kind; leave "
             "them out, or say against = 'exact' or 'measured'"
         )
     if q.against != "finest" and len(given) != 1:
         yield f"against = '{q.against}' needs one of value and path"
     if q.against != "finest" and q.ladder is not None:
         yield (
-            f"ladder is for against = 'finest'; against = '{q.against}' has its reference: they are never mixed"
+            f"ladder is for against = 'finest'; against = '{q.against}' has its own: "
+            "references must be of one kind"
         )
     if q.against == "exact" and scatter:
         yield f"{scatter[0]} is the scatter of a measurement; an exact answer has none: say against = 'measured'"

@@ -104,7 +104,7 @@ def to_si(value: object, unit: str) -> float:
     number = _from_text(value, unit) if isinstance(value, str) else value
     if _is_finite(number) and number != 0 and not LEAST <= abs(number) <= MOST:
         raise UnitError(
-            f"{briefly(value)} is beyond all that is computed with: write 0, or a number of a size "
+            f"{briefly(value)} is outside the range of the computation: write 0, or a number of a size "
             f"between {LEAST:g} and {MOST:g}{_in(unit)}"
         )
     return float(number)

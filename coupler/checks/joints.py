@@ -29,7 +29,7 @@ def joint_problems(case: Case, parts: list[Part]) -> Iterator[Problem]:
         if loose:
             yield (
                 ("structure",),
-                f"'{loose[0]}' has no joint, and {len(loose) - 1} more: blocks that lie loose need a section [contact] "
+                f"'{loose[0]}' has no joint, and {len(loose) - 1} more: blocks without joints need a section [contact] "
                 "with stiffness, restitution and friction",
             )
 

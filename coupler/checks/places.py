@@ -52,7 +52,7 @@ def frame_problems(case: Case) -> Iterator[Problem]:
     ]
     for path, body in turned:
         if body.rotation is not None and not np.any(body.rotation.axis):
-            yield (*path, "rotation", "axis"), "[0, 0, 0] is no direction; write for instance [0, 0, 1]"
+            yield (*path, "rotation", "axis"), "[0, 0, 0] is not a direction; write for instance [0, 0, 1]"
     if case.tank is not None and is_measured(case.tank):
         yield from _corners_in_order(("tank",), case.tank)
 

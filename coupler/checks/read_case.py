@@ -205,7 +205,7 @@ def _find(place: Path) -> Path:
         hint = f"below it are {', '.join(cases)}" if cases else f"`surgebreak init {place}` writes one"
         raise BadCase([f"{place}: no case.toml in this directory; {hint}"])
     if place.exists():
-        raise BadCase([f"{place}: no ordinary file; give a case directory or a case.toml"])
+        raise BadCase([f"{place}: not a regular file; give a case directory or a case.toml"])
     around = place.parent if place.parent.is_dir() else Path(".")
     near = difflib.get_close_matches(place.name, [child.name for child in around.iterdir()], n=1)
     hint = f"; did you mean '{around / near[0]}'?" if near else "; give a case directory or a case.toml"

@@ -43,8 +43,8 @@ def water_problems(case: Case) -> Iterator[Problem]:
     if case.case.gravity == 0.0:
         yield (
             ("case", "gravity"),
-            "0: water needs a weight, by which its step, its spray and its pressure at the start go; give a small one, "
-            "for instance 0.01 m/s2, or leave [water] out",
+            "0: water needs gravity, which determines its time step, its spray and its initial pressure; give a small "
+            "value, for instance 0.01 m/s2, or leave [water] out",
         )
     if not (w.fill or w.inflow or w.sea):
         yield (
@@ -136,7 +136,7 @@ def _still_water(case: Case, spec) -> Iterator[str]:
     if abs(there - wanted) > STILL * case.tank.cell:
         yield (
             f"the {spec.kind.replace('solitary', 'solitary wave')} at {spec.side} runs into still water up to "
-            f"z = {wanted:g} m, but [[water.fill]] reaches z = {there:g} m beside it: that difference falls at once"
+            f"z = {wanted:g} m, but [[water.fill]] reaches z = {there:g} m beside it: this step would collapse at once"
         )
 
 
@@ -315,7 +315,7 @@ def _tide(case: Case, path: KeyPath, sea, bed: float, top: float) -> Iterator[Pr
     if found.min() <= bed or found.max() > top:
         yield (
             place,
-            f"its level goes from z = {found.min():.4g} to {found.max():.4g} m in the run, which is not between the "
+            f"its level varies from z = {found.min():.4g} to {found.max():.4g} m in the run, which is not between the "
             f"floor ({bed:g} m) and the top ({top:g} m)",
         )
 

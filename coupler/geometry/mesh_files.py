@@ -116,7 +116,7 @@ def _patience(seconds: float) -> Iterator[None]:
         return
 
     def enough(number: int, frame: object) -> None:
-        raise ValueError(f"the reader came to no end in {seconds:.0f} s of processor time")
+        raise ValueError(f"the reader did not finish within {seconds:.0f} s of processor time")
 
     before = signal.signal(signal.SIGPROF, enough)
     signal.setitimer(signal.ITIMER_PROF, seconds, 1.0)

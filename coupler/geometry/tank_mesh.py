@@ -206,14 +206,14 @@ def mesh_remarks(tank: Tank) -> Iterator[str]:
     if angle < THIN:
         place = shown(mesh.nodes[mesh.cells[thin]].mean(axis=0))
         yield (
-            f"tank.mesh has a cell at {place} m with two faces {angle:.2g} degrees apart; flows were tried down to "
-            f"{THIN:g}: optimise the mesh (gmsh: Mesh.Optimize = 1)"
+            f"tank.mesh has a cell at {place} m with two faces {angle:.2g} degrees apart; the solver was tested down "
+            f"to {THIN:g}: optimise the mesh (gmsh: Mesh.Optimize = 1)"
         )
     small, large = mesh.cell_size.min(), mesh.cell_size.max()
     if large > UNLIKE * small:
         yield (
-            f"tank.mesh has cells of {small:.2g} to {large:.2g} m; flows were tried with cells up to {UNLIKE:g} times "
-            "as large as others: expect small steps, set by the smallest"
+            f"tank.mesh has cells of {small:.2g} to {large:.2g} m; the solver was tested with cells up to {UNLIKE:g} "
+            "times as large as others: expect small steps, set by the smallest"
         )
 
 

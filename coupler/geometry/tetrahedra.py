@@ -87,7 +87,7 @@ def _refuse_twins(name: str, nodes: Array, cells: Array) -> None:
     if len(twins):
         raise MeshFileError(
             f"{name}: two nodes at {shown(nodes[twins[0, 0]])}, and {len(twins) - 1} more such pairs: the cells on "
-            "both sides do not hang together there; merge double nodes (gmsh: Coherence Mesh)"
+            "both sides are not connected there; merge double nodes (gmsh: Coherence Mesh)"
         )
 
 

@@ -34,7 +34,7 @@ LONG = "9" * 400
         ),
         (
             "[structure]\ndensity = 1e-200\n" + BLOCK,
-            "1e-200 is beyond all that is computed with: write 0, or a num",
+            "1e-200 is outside the range of the computation: write 0, or a num",
         ),
         (f"[structure]\ndensity = {'9' * 5000}\n", "case.toml: not valid TOML: Exceeds the limit"),
         (f"[structure]\ndensity = 0x{'f' * 9000}\n", "case.toml: a whole number of thousands of digits"),
@@ -61,7 +61,7 @@ LONG = "9" * 400
         ('[[structure.file]]\npath = "circle/x.stl"\n', "'circle/x.stl' leads nowhere: Symlink loop"),
         (
             '[[structure.file]]\npath = "."\n',
-            "structure.file[0].path: FOLDER: is a directory, no ordinary file",
+            "structure.file[0].path: FOLDER: is a directory, not a regular file",
         ),
     ],
 )
@@ -149,13 +149,13 @@ def test_cells_of_any_smallness_are_too_many(tmp_path, cell):
 
 
 @pytest.mark.parametrize("device", ["/dev/zero", "pipe", "/dev", "nothing"])
-def test_what_is_no_ordinary_file_is_not_opened(tmp_path, device):
+def test_what_is_not_a_regular_file_is_not_opened(tmp_path, device):
     """A pipe would wait for a writer, a device has no end."""
     os.mkfifo(tmp_path / "pipe")
     path = tmp_path / device
-    with pytest.raises(BadPath, match=r"no ordinary file|no such file"):
+    with pytest.raises(BadPath, match=r"not a regular file|no such file"):
         read_text(path)
-    with pytest.raises(MeshFileError, match=r"no ordinary file|no such file"):
+    with pytest.raises(MeshFileError, match=r"not a regular file|no such file"):
         read_mesh(path)
     with pytest.raises(NoSuchData):
         read_record(path)
@@ -306,7 +306,7 @@ def test_contact_is_asked_for_only_where_blocks_lie_loose(tmp_path):
     assert load(write(tmp_path, bonded)).case.contact is None
     third = BLOCK.replace('"b"', '"d"').replace("[0, 0, 0.5]", "[5, 0, 0.5]")
     (line,) = mistakes(tmp_path, bonded + third)
-    assert "structure: 'd' has no joint, and 0 more: blocks that lie loose need a section [contact]" in line
+    assert "structure: 'd' has no joint, and 0 more: blocks without joints need a section [contact]" in line
     assert load(write(tmp_path, bonded + third + "fixed = true\n"))
     (line,) = mistakes(tmp_path, bonded.replace(GLUE, ""))
     assert "blocks need a section [contact]" in line

@@ -166,7 +166,7 @@ def test_a_block_below_the_ground():
 def test_an_axis_without_direction():
     turned = {"centre": [7, 5, 0.5], "rotation": {"axis": [0, 0, 0], "angle": 1}}
     assert reported(case(**structure(turned))) == [
-        "structure.block.0.rotation.axis: [0, 0, 0] is no direction; write for instance [0, 0, 1]"
+        "structure.block.0.rotation.axis: [0, 0, 0] is not a direction; write for instance [0, 0, 1]"
     ]
 
 

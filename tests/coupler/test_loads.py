@@ -174,4 +174,4 @@ def test_loads_that_cannot_be_are_refused(gauge, message):
 
 def test_water_without_weight_is_refused():
     case = wall_case().model_copy(update={"case": wall_case().case.model_copy(update={"gravity": 0.0})})
-    assert any("water needs a weight" in text for _, text in problems(case))
+    assert any("water needs gravity" in text for _, text in problems(case))

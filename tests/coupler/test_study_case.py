@@ -23,9 +23,9 @@ def messages(tmp_path, text):
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ('against = "finest"', 'against = "finest"\nvalue = 3', "references are never mixed"),
-        ('against = "finest"', 'against = "finest"\nband = 3', "references are never mixed"),
-        ('against = "exact"', 'against = "exact"\nladder = "dt"', "never mixed"),
+        ('against = "finest"', 'against = "finest"\nvalue = 3', "references must be of one kind"),
+        ('against = "finest"', 'against = "finest"\nband = 3', "references must be of one kind"),
+        ('against = "exact"', 'against = "exact"\nladder = "dt"', "must be of one kind"),
         ('against = "exact"', 'against = "exact"\nband = 0.1', "an exact answer has none"),
         ("band = 0.1\n", "", "needs the scatter of the measurement"),
         ("value = 2.02\n", "", "needs one of value and path"),

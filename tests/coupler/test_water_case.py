@@ -559,7 +559,7 @@ def test_tide_of_a_sea(tmp_path):
     [
         ({}, "write amplitude and period, or path"),
         ({"amplitude": 0.1}, "write amplitude and period, or path"),
-        ({"amplitude": 0.6, "period": 1}, "its level goes from z = -0.1"),
+        ({"amplitude": 0.6, "period": 1}, "its level varies from z = -0.1"),
         ({"path": "/nowhere/tide.csv"}, "no such file"),
     ],
 )

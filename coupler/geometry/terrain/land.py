@@ -116,12 +116,12 @@ def _tables(above: KeyPath, land, law: str) -> Iterator[Problem]:
         if getattr(use, law) is None:
             yield (
                 (*above, "use", k),
-                f"{law}: missing, by which the water of this case is rubbed (water.{law})",
+                f"{law}: missing; the wall friction of this case is given by water.{law}",
             )
         elif getattr(use, other) is not None:
             yield (
                 (*above, "use", k, other),
-                f"the water of this case is rubbed by water.{law}; leave {other} out",
+                f"the wall friction of this case is given by water.{law}; leave {other} out",
             )
         if use.code in seen:
             yield (*above, "use", k, "code"), f"{use.code} is the code of use[{seen[use.code]}] already"
