@@ -22,7 +22,7 @@ from coupler.run.fingerprint import differences, program, scene_parts
 
 FOLDER = "checkpoints"
 KEPT = 2
-LAYOUT = 3
+LAYOUT = 4
 UNSET = (
     "structure/joints/failure_time",
     *(

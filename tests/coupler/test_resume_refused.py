@@ -62,7 +62,7 @@ def test_another_program_is_refused_with_the_difference(stopped):
 
 def test_another_layout_is_refused(stopped):
     rewritten(listed(stopped / FOLDER)[0], layout=99)
-    with pytest.raises(CannotResume, match="written in layout 99, this program reads 3"):
+    with pytest.raises(CannotResume, match="written in layout 99, this program reads 4"):
         prepare(stopped)
 
 

@@ -6,6 +6,7 @@ import sys
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from yade_scripts.blocks.block import Block
 from yade_scripts.blocks.generators.column import column_of_boxes
@@ -58,11 +59,61 @@ def collapsing():
     return Structure(blocks, ContactLaw(), JointParameters(2e5, 2e-3, damping=0.0), ground=0.0)
 
 
+def tumbling():
+    """Debris of all shapes that falls, spins and lies on other debris: contacts of corners and of edges."""
+    draw = np.random.default_rng(4)
+    blocks = []
+    for i in range(12):
+        block = Block(
+            f"b{i}",
+            np.array([0.8 * (i % 3), 0.8 * (i // 3 % 2), 0.7 + 0.8 * (i // 6)]) + draw.uniform(-0.1, 0.1, 3),
+            size=draw.uniform(0.1, 0.9, 3),
+            rotation=Rotation.from_rotvec(draw.uniform(-2.0, 2.0, 3)).as_matrix(),
+            velocity=draw.uniform(-1.0, 1.0, 3),
+            spin=draw.uniform(-6.0, 6.0, 3),
+        )
+        if i % 3 == 0:
+            corners = WEDGE - WEDGE.mean(axis=0) + block.centre
+            block = Block.standing(block.name, corners, velocity=block.velocity, spin=block.spin)
+        blocks.append(block)
+    return Structure(blocks, ContactLaw(stiffness=3e6, restitution=0.4, friction=0.4), None, ground=0.0)
+
+
+def scattered():
+    """A wall that four boxes knock over; its blocks come to lie on one another with their edges crossed."""
+    draw = np.random.default_rng(3)
+    blocks = wall_of_blocks("w", (0, -0.25, 0), (3.0, 0.3, 3.0), (1.0, 0.3, 0.5))
+    for i in range(4):
+        shot = Block(
+            f"s{i}",
+            (0.3 + 0.8 * i, -1.2 - 0.2 * i, 1.0 + 0.5 * i),
+            size=draw.uniform(0.3, 0.8, 3),
+            rotation=Rotation.random(random_state=i).as_matrix(),
+            velocity=(0, 9.0, 0),
+            spin=draw.uniform(-5.0, 5.0, 3),
+        )
+        blocks.append(shot)
+    return Structure(blocks, ContactLaw(), JointParameters(3e4, 2e-3, damping=0.0), ground=0.0)
+
+
+def turning():
+    """Two beams that turn nearly on the spot until one meets the other."""
+    size = (1.0, 0.12, 0.2)
+    blocks = [
+        Block("a", (0, 0, 0), size=size, velocity=(0.01, 0, 0), spin=(0, 0, 2.0)),
+        Block("b", (0.1, 0.5, 0.03), size=size, spin=(0, 0, 1.0)),
+    ]
+    return Structure(blocks, ContactLaw(stiffness=1e6, restitution=0.6), None, gravity=STILL)
+
+
 SCENES = {
     "torn": (torn, 0.004, 10),
     "hanging": (hanging, 0.004, 10),
     "bouncing": (bouncing, 0.02, 20),
     "collapsing": (collapsing, 0.004, 16),
+    "scattered": (scattered, 0.004, 380),
+    "tumbling": (tumbling, 0.01, 120),
+    "turning": (turning, 0.01, 80),
 }
 """How to build it, length of a step [s], steps."""
 
@@ -88,6 +139,51 @@ def figures(s, rows):
     contacts = s.contacts()
     out |= {f"contacts.{name}": value for name, value in vars(contacts).items()}
     return out
+
+
+def path(name, before_step):
+    """Places and velocities (steps, n, 15) of a scene; before_step(structure, step): called before each."""
+    build, dt, count = SCENES[name]
+    rows = []
+    with build() as s:
+        for k in range(count):
+            before_step(s, k)
+            s.advance(dt)
+            rows.append(np.concatenate([s.centre(), s.rotation().reshape(s.n, 9), s.velocity()], axis=1))
+    return np.array(rows)
+
+
+def search_in_each_substep(s, k):
+    if k == 0:
+        contacts, settle = s._contacts, s._contacts.settle
+
+        def settle_and_search(dt):
+            settle(dt)
+            contacts.search()
+
+        contacts.settle = settle_and_search
+
+
+def go_back_to_here(s, k):
+    s.restore(StructureState.of(s.save().arrays()))
+
+
+@pytest.mark.parametrize("disturb", [search_in_each_substep, go_back_to_here, lambda s, k: s.save()])
+@pytest.mark.parametrize("name", ["bouncing", "collapsing", "scattered", "tumbling", "turning"])
+def test_when_neighbours_are_looked_for_and_contacts_are_read_changes_no_bit(name, disturb):
+    """What a restarted scene does not know is when the neighbours were looked for last; and neither that nor how often
+    somebody has looked at the contacts is part of the physics."""
+    np.testing.assert_array_equal(path(name, disturb), path(name, lambda s, k: None))
+
+
+def test_beams_that_turn_on_the_spot_meet_before_they_are_in_one_another():
+    """The neighbours are looked for in time where no centre moves."""
+    with turning() as s:
+        depths = [0.0]
+        while s.time < 0.7:
+            s.advance(1e-3)
+            depths.append(max(s.contacts().depth.max(initial=0.0), s.deepest()[2].max(initial=0.0)))
+    assert 0.0 < max(depths) < 0.01
 
 
 CHILD = """

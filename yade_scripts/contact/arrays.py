@@ -44,7 +44,8 @@ class Pairs(NamedTuple):
 
     fresh (p,): contact begins with the depth there is, what held the two until now having this share of its stiffness;
     0: it does not · touching (p,) bool: had contacts last time · calm (p,) [m]: way that the two must move before they
-    can touch · overlap (p,) [m]: way that parts them, zero if they are apart.
+    can touch · overlap (p,) [m]: way that parts them, zero if they are apart · found (p,) bool: its contacts at the
+    present places are known; contacts begin and end once for each place, however often they are read there.
     """
 
     a: Array
@@ -54,6 +55,7 @@ class Pairs(NamedTuple):
     touching: Array
     calm: Array
     overlap: Array
+    found: Array
 
 
 class Slots(NamedTuple):

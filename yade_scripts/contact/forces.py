@@ -13,6 +13,7 @@ from yade_scripts.contact.ground import NO_GROUND, GroundSurface
 from yade_scripts.contact.kernel import alone, carry_slots, contact_forces
 from yade_scripts.contact.law import ContactLaw
 from yade_scripts.contact.nodes import contact_shapes
+from yade_scripts.contact.search import fastest
 from yade_scripts.contact.springs import contact_work
 from yade_scripts.contact.state import Contacts, contacts_of_rows
 from yade_scripts.yade_side.motion import Motion
@@ -23,9 +24,9 @@ Array = np.ndarray
 class ContactForces:
     """Contacts of the blocks with what `neighbours` says is near.
 
-    blocks, planes: in the scene's coordinates · face_stiffness (n,) K [N/m] · neighbours(now) → (p, 2) pairs of
-    rows whose bounding boxes are close · closing (n,): K of the faces while joints hold them [N/m] · reach [m]: how far
-    a block can move before `neighbours` is asked again
+    blocks, planes: in the scene's coordinates · face_stiffness (n,) K [N/m] · neighbours() → (p, 2) pairs of rows
+    whose bounding boxes come close while no point of a block moves by more than reach [m]; then it is asked again ·
+    closing (n,): K of the faces while joints hold them [N/m]
     free (n,) bool: motion not prescribed.
 
     Running sums [J]: taken by dashpots, by friction and by springs let go; driving: put in by driven blocks.
@@ -40,7 +41,7 @@ class ContactForces:
         closing: Array,
         free: Array,
         motion: Motion,
-        neighbours: Callable[[bool], Array],
+        neighbours: Callable[[], Array],
         reach: float,
     ):
         self.share: Callable[..., list] = alone
@@ -68,11 +69,11 @@ class ContactForces:
         self._on = np.zeros(self._n, bool)
         self._asleep = np.zeros(len(self._free), bool)
         self._boxes = np.zeros((0, 2, 3))
-        self.roused = np.zeros(0, bool)
-        """Groups of blocks asleep that something loose had come near to when the pairs were last renewed."""
+        self._comers = np.zeros((0, 2), np.int64)
         self._joined = np.zeros(0, np.int64)
         self._set_pairs(np.zeros((0, 2), np.int64))
         self._count, self._read = 0, None
+        self._moved = 0.0
         self.dashpot = self.friction = self.driving = 0.0
 
     # ---- pairs ----------------------------------------------------------------------------------------------
@@ -80,7 +81,7 @@ class ContactForces:
     def switch_on(self, rows: Array, as_deep: bool = False) -> None:
         """Blocks that meet others by contact from now on. as_deep: with the depth there is; else counted from here."""
         self._on[rows] = True
-        self.search(True, as_deep=as_deep)
+        self.search(as_deep=as_deep)
 
     def leave_out(self, joined: Array) -> None:
         """Pairs (p, 2) that live joints hold, in compression too; pairs that were among them before and are no more go
@@ -89,33 +90,46 @@ class ContactForces:
         parted = self._joined[~_among(self._joined, keys)]
         self._joined = keys
         if len(parted):
-            self.search(True, parted)
+            self.search(parted)
 
-    def search(self, now: bool, parted: Array | None = None, as_deep: bool = False) -> None:
-        """Renew the pairs from YADE's last search, or from one made now."""
-        self._set_pairs(_in_order(self._near(now)), parted, as_deep)
+    def search(self, parted: Array | None = None, as_deep: bool = False) -> None:
+        """Renew the pairs at the present places."""
+        self._set_pairs(_in_order(self._near()), parted, as_deep)
 
     def _key(self, a: Array, b: Array) -> Array:
         return a * len(self._free) + b
 
-    def _near(self, now: bool) -> Array:
-        """Pairs that may touch before the next search, (p, 2)."""
-        near = self._neighbours(now)
-        near = np.concatenate([near[self._on[near].any(axis=1)], self._near_planes()])
+    def _near(self) -> Array:
+        """Pairs that touch or may do so before the next search, (p, 2)."""
+        near, self._moved = self._neighbours(), 0.0
+        held = np.stack([self._pairs.a, self._pairs.b], axis=1)[self._pairs.touching]
+        near = np.concatenate([near[self._on[near].any(axis=1)], self._near_planes(), held])
         near = np.sort(near[self._free[near].any(axis=1)], axis=1)
         if self._asleep.any():
             near = self._awake(near)
         return near[~_among(self._key(*near.T), self._joined)]
 
     def _awake(self, near: Array) -> Array:
-        """The pairs in which something can move; which groups of those asleep something comes near to is noted."""
+        """The pairs in which something can move; which blocks may come near to a group of those asleep is noted."""
         moves = self._free[: self._n] | self._motion.v.any(axis=1)
         on = np.flatnonzero(self._on & moves & ~self._asleep[: self._n])
-        reach = self._shapes.radius[on, None] + 2.0 * self._reach
-        low, high = self._motion.x[on] - reach, self._motion.x[on] + reach
-        meets = (low[:, None] <= self._boxes[None, :, 1]) & (high[:, None] >= self._boxes[None, :, 0])
-        self.roused = meets.all(axis=2).any(axis=0)
+        row, group = np.indices((len(on), len(self._boxes))).reshape(2, -1)
+        comes = self._within(on[row], group, 3.0 * self._reach)
+        self._comers = np.stack([on[row], group], axis=1)[comes]
         return near[(self._free & ~self._asleep)[near].any(axis=1)]
+
+    def _within(self, rows: Array, groups: Array, way: float) -> Array:
+        """(k,) bool: whether the boxes around blocks `rows` (k,) are within `way` [m] of those of `groups` (k,)."""
+        reach = self._shapes.radius[rows, None] + way
+        x, boxes = self._motion.x[rows], self._boxes[groups]
+        return ((x - reach <= boxes[:, 1]) & (x + reach >= boxes[:, 0])).all(axis=1)
+
+    def roused(self) -> Array:
+        """(groups,) bool: groups of blocks asleep that something loose has come near to."""
+        rows, groups = self._comers.T
+        found = np.zeros(len(self._boxes), bool)
+        found[groups[self._within(rows, groups, 2.0 * self._reach)]] = True
+        return found
 
     def let_rest(self, asleep: Array, groups: list[Array]) -> None:
         """asleep (n,) bool: blocks that stand still and meet nothing from now on; rows of each group of them."""
@@ -124,15 +138,26 @@ class ContactForces:
         self._boxes = np.array(
             [[(x[g] - radius[g]).min(axis=0), (x[g] + radius[g]).max(axis=0)] for g in groups]
         ).reshape(-1, 2, 3)
-        self.roused = np.zeros(len(groups), bool)
-        self.search(True)
+        self._comers = np.zeros((0, 2), np.int64)
+        self.search()
 
     def busy(self) -> Array:
         """(n,) bool: blocks that touch something by contact, or have another one near that can move too."""
         pairs, found = self._pairs, np.zeros(len(self._free), bool)
-        near = pairs.touching | (self._free[pairs.a] & self._free[pairs.b])
+        near, both = pairs.touching.copy(), np.flatnonzero(self._free[pairs.a] & self._free[pairs.b])
+        low, high = self._bounds()
+        a, b = pairs.a[both], pairs.b[both]
+        near[both] |= ((low[a] <= high[b]) & (high[a] >= low[b])).all(axis=1)
         found[pairs.a[near]] = found[pairs.b[near]] = True
         return found[: self._n]
+
+    def _bounds(self) -> tuple[Array, Array]:
+        """Lowest and highest corners (n, 3) of the boxes around the blocks, with the margins of their faces."""
+        s, m = self._shapes, self._motion
+        of = np.repeat(np.arange(self._n), self._nodes[: self._n])
+        points = m.x[of] + np.einsum("kij,kj->ki", m.R[of], s.node)
+        margin, first = s.margin[: self._n, None], s.node_start[: self._n]
+        return np.minimum.reduceat(points, first) - margin, np.maximum.reduceat(points, first) + margin
 
     def _near_planes(self) -> Array:
         """Blocks that may reach a plane before the next search, (k, 2)."""
@@ -152,16 +177,18 @@ class ContactForces:
         start = np.concatenate([[0], np.cumsum(size)]).astype(np.int64)
         total = int(start[-1])
         slots = Slots.empty(total)
-        known, touching = (np.zeros(len(a), bool) for _ in range(2))
-        fresh = np.zeros(len(a))
+        known, touching, found = (np.zeros(len(a), bool) for _ in range(3))
+        fresh, overlap = np.zeros(len(a)), np.zeros(len(a))
         if hasattr(self, "_pairs") and len(self._pairs.a):
-            known = self._carry(a, b, start, fresh, touching, slots)
+            known, spot = self._carry(a, b, start, slots)
+            for now, old in zip((fresh, touching, overlap, found), self._remembered()):
+                now[known] = old[spot]
         if as_deep:
             fresh[~known] = 1.0
         elif parted is not None:
             begins = ~known & np.isin(self._key(a, b), parted)
             fresh[begins] = self._joint_share(a[begins], b[begins])
-        self._pairs = Pairs(a, b, start, fresh, touching, np.zeros(len(a)), np.zeros(len(a)))
+        self._pairs = Pairs(a, b, start, fresh, touching, np.zeros(len(a)), overlap, found)
         self._slots = slots
         if not hasattr(self, "_rows") or len(self._rows.a) < total:
             self._rows = empty_rows(total + total // 4)
@@ -171,17 +198,21 @@ class ContactForces:
         K = self._bodies.stiffness
         return (1.0 / K[a] + 1.0 / K[b]) / (1.0 / self._closing[a] + 1.0 / self._closing[b])
 
-    def _carry(self, a, b, start, fresh: Array, touching: Array, slots: Slots) -> Array:
-        """Copy the slots of pairs that were known before; (p,) bool."""
+    def _remembered(self) -> tuple[Array, ...]:
+        """What pairs that go on remember; how far they are apart is found anew."""
+        p = self._pairs
+        return p.fresh, p.touching, p.overlap, p.found
+
+    def _carry(self, a, b, start, slots: Slots) -> tuple[Array, Array]:
+        """Copy the slots of pairs that were known before; (p,) bool, and which of the pairs before these are."""
         old = self._pairs
         old_keys, keys = self._key(old.a, old.b), self._key(a, b)
         spot = np.minimum(np.searchsorted(old_keys, keys), len(old_keys) - 1)
         known = old_keys[spot] == keys
-        fresh[known], touching[known] = old.fresh[spot[known]], old.touching[spot[known]]
         self.friction += carry_slots(
             old, self._slots, np.flatnonzero(known), spot[known], start, slots, self._law.shear
         )
-        return known
+        return known, spot[known]
 
     # ---- forces ---------------------------------------------------------------------------------------------
 
@@ -196,10 +227,13 @@ class ContactForces:
         self._read = None
 
     def settle(self, dt: float) -> None:
-        """Book the work of the contacts over the substep that has just ended."""
+        """Book the work of the contacts over the substep that has just ended, and look for neighbours in time."""
         dashpot, driving = contact_work(self._rows, self._count, self._motion.all_v, ~self._free, dt)
         self.dashpot += dashpot
         self.driving += driving
+        self._moved += dt * fastest(self._motion.v, self._shapes.radius)
+        if self._moved > self._reach:
+            self.search()
 
     def now(self) -> Contacts:
         """Contacts at the present places, found afresh after `moved`."""
@@ -218,7 +252,9 @@ class ContactForces:
         return pairs.a[on], np.where(b < self._n, b, self._n - 1 - b), pairs.overlap[on]
 
     def moved(self) -> None:
-        """Places have changed since the last evaluation."""
+        """Blocks have been moved by hand."""
+        self.search()
+        self._pairs.found[:] = False
         self._read = None
 
     # ---- saving and going back ------------------------------------------------------------------------------
@@ -228,6 +264,7 @@ class ContactForces:
         self.now()  # contacts that are to take over from joints begin here, not after the way back
         index = np.flatnonzero(self._slots.face >= 0)
         pair = np.searchsorted(self._pairs.start, index, side="right") - 1
+        over = np.flatnonzero(self._pairs.overlap > 0.0)
         return {
             "on": self._on.copy(),
             "joined": self._joined.copy(),
@@ -241,6 +278,9 @@ class ContactForces:
             "spread": self._slots.spread[index],
             "push": self._slots.push[index],
             "speed": self._slots.speed[index],
+            "over_a": self._pairs.a[over],
+            "over_b": self._pairs.b[over],
+            "overlap": self._pairs.overlap[over],
             "sums": np.array([self.dashpot, self.friction, self.driving]),
         }
 
@@ -249,10 +289,14 @@ class ContactForces:
         self._on[:], self._joined = saved["on"], saved["joined"].copy()
         self._set_pairs(np.zeros((0, 2), np.int64))
         in_contact = np.stack([saved["a"], saved["b"]], axis=1)
-        self._set_pairs(_in_order(np.concatenate([self._near(now=True), in_contact])))
-        pair = np.searchsorted(self._key(self._pairs.a, self._pairs.b), self._key(saved["a"], saved["b"]))
+        over = np.stack([saved["over_a"], saved["over_b"]], axis=1)
+        self._set_pairs(_in_order(np.concatenate([self._near(), in_contact, over])))
+        keys = self._key(self._pairs.a, self._pairs.b)
+        pair = np.searchsorted(keys, self._key(saved["a"], saved["b"]))
         slot = self._pairs.start[pair] + saved["node"]
         self._pairs.touching[pair] = True
+        self._pairs.overlap[np.searchsorted(keys, self._key(*over.T))] = saved["overlap"]
+        self._pairs.found[:] = True  # `save` has found them
         for name in Slots._fields:
             getattr(self._slots, name)[slot] = saved[name]
         self.dashpot, self.friction, self.driving = saved["sums"].tolist()

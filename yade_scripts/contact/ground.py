@@ -115,10 +115,11 @@ def surface_at(ground, px, py, normal):
 
 @inner
 def scan_ground(
-    shapes, bodies, shear, slots, slot, fresh, a, ground, x, v, R, last_dt, rows, count, lost, scratch, plane
-):
+    shapes, bodies, shear, slots, slot, finds, fresh, a, ground, x, v, R, last_dt, rows, count, lost, scratch, plane
+):  # fmt: skip
     """Contacts of the nodes of a with the ground; → (contacts, energy lost [J], lower bound of the distance [m],
-    negative where a node is below). plane (4,), scratch (8, 3): work space."""
+    negative where a node is below). finds: whether contacts may begin here; not where they have been found ·
+    plane (4,), scratch (8, 3): work space."""
     b, begin, way, n = ground.row, shapes.node_start[a], scratch[6:8], scratch[4]
     face, apart = shapes.face_start[b], np.inf
     for i in range(begin, shapes.node_start[a + 1]):
@@ -131,12 +132,12 @@ def scan_ground(
         depth = -above * n[2]
         apart = min(apart, above * ground.upright if above > 0.0 else -depth)
         known = slots.face[s] >= 0
-        if depth <= 0.0 and not known:
+        if not known and (depth <= 0.0 or not finds):
             continue
         for j in range(3):
             plane[j] = R[a, 0, j] * n[0] + R[a, 1, j] * n[1] + R[a, 2, j] * n[2]
         plane[3] = depth + plane[0] * xi0 + plane[1] * xi1 + plane[2] * xi2
-        if known:
+        if known and finds:
             across = slots.shear[s, 0] * n[0] + slots.shear[s, 1] * n[1] + slots.shear[s, 2] * n[2]
             for k in range(
                 3
@@ -147,7 +148,7 @@ def scan_ground(
             if depth <= 0.0:
                 lost += let_go(slots, s, shear, depth, way, R, b)
                 continue
-        else:
+        elif not known:
             own = _lowest_face(shapes, i, plane)
             if own < 0:
                 continue

@@ -12,6 +12,7 @@ from collections.abc import Callable
 import numpy as np
 
 from kernel_decorators import inner, kernel, released
+from yade_scripts.blocks.block import MARGIN
 from yade_scripts.contact.arrays import CROSSINGS
 from yade_scripts.contact.edges import pair_scratch
 from yade_scripts.contact.ground import scan_ground
@@ -42,6 +43,7 @@ def contact_forces(share, shapes, bodies, law, pairs, slots, ground, x, v, R, dt
     share: `alone`, or what runs ranges of the pairs on several threads: forces are added in the order of the pairs
     afterwards, so the bits are the same · ground: `Ground`, NO_GROUND without · dt [s]: substep to come, 0: only look
     · last_dt [s]: substep that led here
+    Which contacts there are and what they hold does not depend on which pairs that do not touch are in the list.
     → (contacts, work of friction and of springs that were let go [J])
     """
     lost = np.zeros(len(pairs.a))
@@ -64,16 +66,19 @@ def _contacts(
         most = max(most, shapes.face_start[body + 1] - shapes.face_start[body])
     planes, scratch = np.empty((most, 4)), pair_scratch(shapes)
     for p in range(first_pair, last_pair):
-        a, b, taken = pairs.a[p], pairs.b[p], 0.0
-        if pairs.calm[p] > 0.0:
+        a, b, finds, taken = pairs.a[p], pairs.b[p], not pairs.found[p], 0.0
+        pairs.found[p] = dt == 0.0
+        if not finds and not pairs.touching[p]:
+            continue
+        if finds and pairs.calm[p] > 0.0:
             pairs.calm[p] -= last_dt * closing_bound(v, a, b, shapes.radius[a], shapes.radius[b])
             if pairs.calm[p] > 0.0:
                 continue
         first, apart = count, -np.inf
         if b == ground.row:
             count, taken, apart = scan_ground(
-                shapes, bodies, law.shear, slots, pairs.start[p], pairs.fresh[p], a, ground, x, v, R, last_dt, rows,
-                count, taken, scratch, planes[0],
+                shapes, bodies, law.shear, slots, pairs.start[p], finds, pairs.fresh[p], a, ground, x, v, R, last_dt,
+                rows, count, taken, scratch, planes[0],
             )  # fmt: skip
         for node_body, face_body in ((a, b), (b, a)):
             begin, end = shapes.node_start[node_body], shapes.node_start[node_body + 1]
@@ -88,14 +93,14 @@ def _contacts(
             if gap <= margin or pairs.touching[p]:
                 slot = pairs.start[p] if node_body == a else pairs.start[p + 1] - CROSSINGS - (end - begin)
                 count, taken = scan(
-                    shapes, bodies, law, slots, slot, pairs.fresh[p], node_body, face_body, planes, faces,
-                    nearest, margin, x, v, R, last_dt, rows, count, taken, scratch,
+                    shapes, bodies, law, slots, slot, finds, pairs.fresh[p], node_body, face_body, planes,
+                    faces, nearest, margin, x, v, R, last_dt, rows, count, taken, scratch,
                 )  # fmt: skip
         base, nodes = pairs.start[p + 1] - CROSSINGS, count
         known = False
         for s in range(base, base + CROSSINGS):
             known = known or slots.face[s] >= 0
-        meets = apart < 0.0 and b < n
+        meets = finds and apart < 0.0 and b < n
         sunk = -apart > SUNK * min(shapes.radius[a], shapes.radius[b])
         bare = count == first or (sunk and _deepest(slots, rows, first, count) < -CROSSING * apart)
         leads = meets and (bare or not pairs.touching[p])
@@ -105,19 +110,20 @@ def _contacts(
             if leads:
                 deepest = -SAME * apart if bare else -CROSSING * apart
             count, taken, parted = cross(
-                shapes, bodies, law.shear, slots, base, pairs.fresh[p], a, b, deepest, flat, x, v, R, last_dt, rows,
-                first, count, taken, scratch,
+                shapes, bodies, law.shear, slots, base, finds, pairs.fresh[p], a, b, deepest, flat, x, v, R, last_dt,
+                rows, first, count, taken, scratch,
             )  # fmt: skip
             apart = max(apart, parted)
-        pairs.overlap[p] = max(0.0, -apart)
-        if count > nodes:
-            pairs.overlap[p] = min(pairs.overlap[p], _deepest(slots, rows, nodes, count))
-        pairs.fresh[p], pairs.touching[p] = 0.0, count > first
+        if finds:
+            pairs.overlap[p] = max(0.0, -apart)
+            if count > nodes:
+                pairs.overlap[p] = min(pairs.overlap[p], _deepest(slots, rows, nodes, count))
+            pairs.fresh[p], pairs.touching[p] = 0.0, count > first
+            pairs.calm[p] = apart - _overhang(shapes, a, b) if count == first else 0.0
         if count > first:
             yields, K = set_dashpots(bodies, law, a, b, R, rows, first, count, scratch)
             mode = Mode(law.zeta, np.sqrt(yields * K))
             taken += apply(slots, v, R, dt, last_dt, mode, a, rows, first, count, scratch)
-        pairs.calm[p] = apart if count == first else 0.0
         lost[p] = taken
     return begins, count
 
@@ -162,6 +168,14 @@ def _move(rows, c, to):
             rows.shift[c, k],
         )
         rows.velocity[to, k] = rows.velocity[c, k]
+
+
+@inner
+def _overhang(shapes, a, b):
+    """Bound of the distance at which nodes beside the faces of two blocks may count as on them [m]: planes that are
+    moved out by `MARGIN` of the inner radius lie in the block made larger by that share."""
+    other = shapes.radius[b] if shapes.radius[b] < np.inf else 0.0
+    return MARGIN * max(shapes.radius[a], other)
 
 
 @inner

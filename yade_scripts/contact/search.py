@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kernel_decorators import inner
+from kernel_decorators import inner, plain
 from yade_scripts.contact.arrays import BEGINS, CROSSINGS
 from yade_scripts.contact.edges import FLAT, PARALLEL, crossing, find_crossing, next_beside
 from yade_scripts.contact.overlap import share_of_overlap
@@ -30,6 +30,17 @@ def closing_bound(v, a, b, radius_a, radius_b):
         turn_b += v[b, 3 + k] ** 2
     speed = np.sqrt(linear) + np.sqrt(turn_a) * radius_a
     return speed + np.sqrt(turn_b) * radius_b if turn_b > 0.0 else speed
+
+
+@plain
+def fastest(v, radius):
+    """Upper bound of the speed of any point of the blocks [m/s]; v (n, 6), radius (n+m,) [m]."""
+    most = 0.0
+    for a in range(len(v)):
+        linear = v[a, 0] ** 2 + v[a, 1] ** 2 + v[a, 2] ** 2
+        turn = v[a, 3] ** 2 + v[a, 4] ** 2 + v[a, 5] ** 2
+        most = max(most, np.sqrt(linear) + np.sqrt(turn) * radius[a])
+    return most
 
 
 @inner
@@ -73,6 +84,7 @@ def scan(
     law,
     slots,
     slot,
+    finds,
     fresh,
     a,
     b,
@@ -90,6 +102,7 @@ def scan(
     scratch,
 ):
     """Contacts of the nodes of a with the faces of b; contacts that ended leave their springs' energy in `lost`.
+    finds: whether contacts may begin here; not where they have been found.
 
     Most nodes are outside the plane `nearest`, so it is asked first."""
     begin, base, way = shapes.node_start[a], shapes.face_start[b], scratch[6:8]
@@ -108,7 +121,7 @@ def scan(
                 way_of(v, R, x, a, b, xi0, xi1, xi2, planes[g], last_dt, scratch, way)
                 lost += let_go(slots, s, law.shear, depth, way, R, b)
                 continue
-        elif smallest < -margin:
+        elif smallest < -margin or not finds:
             continue
         else:
             g, own = _entered(
@@ -138,13 +151,15 @@ def scan(
 
 @inner
 def cross(
-    shapes, bodies, shear, slots, base, fresh, a, b, deepest, flat, x, v, R, last_dt, rows, first, count, lost, scratch
+    shapes, bodies, shear, slots, base, finds, fresh, a, b, deepest, flat, x, v, R, last_dt, rows, first, count, lost,
+    scratch,
 ):  # fmt: skip
     """Contacts of edges of a with edges of b, known or new; the third result parts the blocks if it is positive [m].
 
+    finds: whether contacts may begin here. Those that are known fill the first slots, in the order they began in.
     rows first .. count: contacts of nodes of the pair · deepest [m]: least overlap of edges that leads to a contact,
     0: none does · flat: edges may cross in the faces of these nodes."""
-    nodes, parted, leading = count - first, -1.0, -1
+    nodes, parted, leading, to = count - first, -1.0, -1, base
     plane, xi, way, n = scratch[4], scratch[5], scratch[6:8], scratch[8]
     for s in range(base, base + CROSSINGS):
         if slots.face[s] >= 0:
@@ -153,7 +168,11 @@ def cross(
                 way_of(v, R, x, a, b, xi[0], xi[1], xi[2], plane, last_dt, scratch, way)
                 lost += let_go(slots, s, shear, depth, way, R, b)
             else:
-                count = _write_crossing(slots, s, a, b, plane, depth, xi, x, R, rows, count)
+                _move_slot(slots, s, to)
+                count = _write_crossing(slots, to, a, b, plane, depth, xi, x, R, rows, count)
+                to += 1
+    if not finds:
+        return count, lost, parted
     if count - first == nodes and deepest > 0.0:
         leading, parted = find_crossing(shapes, a, b, x, R, deepest, scratch)
     if leading >= 0:
@@ -200,6 +219,18 @@ def _free_slot(slots, base, number):
         if slots.face[s] < 0 and free < 0:
             free = s
     return free
+
+
+@inner
+def _move_slot(slots, s, to):
+    """What slot s remembers is in slot `to` from now on."""
+    if s == to:
+        return
+    slots.face[to], slots.k[to], slots.rest[to] = slots.face[s], slots.k[s], slots.rest[s]
+    slots.spread[to], slots.push[to], slots.speed[to] = slots.spread[s], slots.push[s], slots.speed[s]
+    for k in range(3):
+        slots.shear[to, k] = slots.shear[s, k]
+    slots.face[s], slots.rest[s] = -1, 0.0
 
 
 @inner

@@ -156,7 +156,7 @@ class Sleep:
         """Wake whom something awake has come near to since the last substep; whether there was any."""
         if self._contacts is None or not self._sleepers:
             return False
-        near = self._contacts.roused
+        near = self._contacts.roused()
         if not near.any():
             return False
         self._wake([s for s, woken in zip(self._sleepers, near) if woken], time)

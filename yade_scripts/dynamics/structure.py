@@ -383,7 +383,6 @@ class Structure(StructureReadings):
             self.joints.forces(m.x, m.v, m.R, np.zeros((self.n, 6)), advance=True)
         self._onset.rest_here()
         if self._contacts is not None:
-            self._contacts.search(now=True)
             self._contacts.moved()
         self._accounts.start_here()
 

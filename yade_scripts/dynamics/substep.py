@@ -106,5 +106,3 @@ class Substepper:
             self._accounts.take_joints(self._joint_F, before, self._joined, dt)
         if self._contacts is not None:
             self._contacts.settle(dt)
-            if self._scene.searched():
-                self._contacts.search(now=False)

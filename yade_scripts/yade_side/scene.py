@@ -1,8 +1,8 @@
 """The YADE side: one body a block, found by its number and moved by YADE under forces that are given to it.
 
-YADE keeps the bodies, integrates their motion (`NewtonIntegrator`) and looks for neighbours (`InsertionSortCollider`);
-the laws of contact and joints act through its Python interface: forces go in before each step. YADE's own contact
-geometries are not used, because none of them is right for blocks (docs/theory.md).
+YADE keeps the bodies, integrates their motion (`NewtonIntegrator`) and looks for neighbours (`InsertionSortCollider`)
+when it is asked; the laws of contact and joints act through its Python interface: forces go in before each step. YADE's
+own contact geometries are not used, because none of them is right for blocks (docs/theory.md).
 """
 
 from __future__ import annotations
@@ -37,7 +37,8 @@ class Scene:
     """Bodies of `blocks` (local coordinates) in YADE; meets: whether neighbours are looked for.
 
     ids: body of each row · frame (n, 3, 3): fixed turn from the block frame to YADE's principal frame
-    margin [m]: how far a body may go before the neighbours are looked for again.
+    margin [m]: how far a point of a body may go before the neighbours are to be looked for again. (YADE's own measure
+    leaves out that bodies turn.)
     """
 
     _owner: Scene | None = None
@@ -59,7 +60,6 @@ class Scene:
         search for neighbours pass them by."""
         self._loose = np.zeros(len(blocks), bool)
         self._subdomain = engine.wrapper.Subdomain()
-        self._searched = -1
         self._set_engines(gravity, meets)
         for row, block in enumerate(blocks):
             self._add_block(row, block)
@@ -88,14 +88,11 @@ class Scene:
 
     def _shape(self, block: Block):
         """Its box, or a sphere around it, with the margin of its faces: what the search for neighbours sees."""
-        margin = MARGIN * block.planes[1].min()
         if block.is_box:
-            return self.engine.utils.box(
-                self._v(block.centre), self._v(0.5 * block.size + margin), mask=STANDING, color=WHITE
-            )
-        return self.engine.utils.sphere(
-            self._v(block.centre), block.radius + margin, mask=STANDING, color=WHITE
-        )
+            half = 0.5 * block.size + MARGIN * block.planes[1].min()
+            return self.engine.utils.box(self._v(block.centre), self._v(half), mask=STANDING, color=WHITE)
+        radius = (1.0 + MARGIN) * block.radius
+        return self.engine.utils.sphere(self._v(block.centre), radius, mask=STANDING, color=WHITE)
 
     def _set_engines(self, gravity: Array, meets: bool) -> None:
         """Integration first: forces are handed over before the step. (YADE warns of forces that were not reset in the
@@ -105,15 +102,14 @@ class Scene:
             damping=0.0, exactAsphericalRot=True, gravity=self._v(gravity), warnNoForceReset=False
         )
         self.collider = None
-        engines = [newton, w.ForceResetter()]
         if meets:
             self.collider = w.InsertionSortCollider(
                 [w.Bo1_Box_Aabb(), w.Bo1_Sphere_Aabb()],
                 verletDist=self.margin,
+                targetInterv=-1,  # margins that do not depend on how fast bodies were
                 avoidSelfInteractionMask=APART,
             )
-            engines.append(self.collider)
-        self.O.engines = engines
+        self.O.engines = [newton, w.ForceResetter()]
 
     # ---- reading and moving ---------------------------------------------------------------------------------
 
@@ -180,18 +176,12 @@ class Scene:
         else:
             self.O.bodies.insertAtId(self._bodies[row], self.ids[row])
 
-    def neighbours(self, now: bool) -> Array:
-        """Pairs of rows (p, 2) whose bounding boxes are within the margin; now: looked for at the present places, after
-        bodies were moved by hand or became loose."""
-        if now:
-            self.collider.doSort = True
-            self.collider()
-        self._searched = self.collider.numAction
+    def neighbours(self) -> Array:
+        """Pairs of rows (p, 2) whose bounding boxes at the present places come within the margin of one another, each
+        moved by no more than that."""
+        self.collider.doSort = True  # masks may have changed, and bodies may have been moved by hand
+        self.collider()
         return np.array([(i.id1, i.id2) for i in self.O.interactions.all()], np.int64).reshape(-1, 2)
-
-    def searched(self) -> bool:
-        """Whether YADE has looked for neighbours since `neighbours` was asked."""
-        return self.collider.numAction != self._searched
 
     def displace(self, rows: Array, shift: Array, turn: Array) -> None:
         """Move the blocks `rows` by shift (m, 3) and turn (m, 3, 3) about their centres."""
