@@ -54,6 +54,7 @@ _CAPITALS = (
     "rad", "deg", "kg/m3", "t/m3", "g/cm3", "kN/m3", "N/m", "kN/m", "MN/m", "GN/m", "N/mm", "m/s", "mm/s", "m/s2",
 )  # fmt: skip
 """Units that people write with wrong capitals."""
+_SYMBOL_WITH_S = re.compile("(?:[munpfkhdcMGT]|da)?(?:Pa|N|J|W|Hz|g|t|m)s")
 _RAISED = str.maketrans("⁻¹²³⁴", "-1234")
 _POWER = re.compile(r"(?<=[A-Za-z])(-?\d+)")
 
@@ -130,6 +131,9 @@ def _factor(given: str, unit: str, value: str) -> float:
     import pint
 
     registry = _registry()
+    plural = _plural_symbol(given)
+    if plural:
+        raise UnitError(f"{value!r}: unknown unit '{given}'; did you mean '{plural}'?{_example(unit)}")
     try:
         if not _UNIT_TEXT.fullmatch(given):
             raise ValueError(given)
@@ -141,6 +145,16 @@ def _factor(given: str, unit: str, value: str) -> float:
     if of_other_kind or _is_angle(source) != _is_angle(target):
         raise UnitError(f"{value!r} is {_kind(source)}, needs {DIMENSIONS[unit]}{_in(unit)}")
     return float(source.to(target.units).magnitude)
+
+
+def _plural_symbol(given: str) -> str:
+    """The text without an s behind a symbol, which pint takes for a plural: 'MPas' is no pressure, 'Pa s' was meant or
+    'MPa'. Names have plurals (pascals), and 'ms' is a unit of its own."""
+    words = re.findall(r"[A-Za-z]+", given)
+    for word in words:
+        if word != "ms" and _SYMBOL_WITH_S.fullmatch(word):
+            return given.replace(word, word[:-1], 1)
+    return ""
 
 
 def _near(given: str) -> str:

@@ -109,7 +109,7 @@ def in_words(bore: Bore) -> str:
     over = f" on top of the step of {bore.step:.3g} m" if bore.step > 0.0 else ""
     return (
         f"{begins}; by theory (no friction) at {bore.at}{over} up to {bore.depth_there:.3g} m deep and "
-        f"{bore.velocity_there:.3g} m/s fast from about t = {bore.arrival:.2g} s on, and {bore.against_wall:.3g} m "
+        f"{bore.velocity_there:.3g} m/s fast, not before t = {bore.arrival:.2g} s, and {bore.against_wall:.3g} m "
         "deep where a wall across the tank stops it"
     )
 

@@ -36,6 +36,8 @@ Problem = tuple[KeyPath, str]
 
 LIGHTEST, HEAVIEST = 5.0, 25e3
 """Densities [kg/m3] between which solids lie: foam and platinum."""
+FALLEN = 0.01
+"""Share of its strength that a law may carry at the opening at failure without a remark."""
 WEAKEST = 1.0
 """Strength [Pa] below which a joint holds nothing: a millimetre of stone weighs more."""
 
@@ -127,6 +129,25 @@ def _joint_remarks(case: Case) -> Iterator[str]:
             f"joints.points = {j.points} with joints.closing_ratio = {j.closing_ratio:g}: too few for the strength in "
             f"bending (3 are 8 % weak at 10, 16 % at 100); 'auto' takes {len(enough(j.closing_ratio, 3))} or more"
         )
+    yield from _law_remarks(case)
+
+
+def _law_remarks(case: Case) -> Iterator[str]:
+    """Laws from outside that do not fall to zero before a joint lets go."""
+    from yade_scripts.joints import laws
+    from yade_scripts.joints.outside_laws import carried_at_failure
+
+    j = case.joints
+    used = {j.law: j.peak} | {pair.law: pair.peak for pair in j.pair if pair.law}
+    own = laws.shipped()
+    for name, peak in used.items():
+        carried = 0.0 if name in own else carried_at_failure(laws.find(name), peak)
+        if carried > FALLEN:
+            yield (
+                f"law '{name}' does not fall to zero: at opening_at_failure it still carries {carried:.0%} of its "
+                "strength, which is gone at once there: the energy that the joint took until then is counted, but the "
+                "drop strikes its blocks. Let secant(1, p) be 0"
+            )
 
 
 def _loose_remarks(case: Case) -> Iterator[str]:

@@ -602,9 +602,11 @@ def compare_laws(
         typer.Option("--list", help="list the laws, and the properties that the laws of YADE cannot match"),
     ] = False,
 ) -> None:
-    """Run a dry case with the cohesive laws of this program and with those of YADE.
+    """Run a case without water with the cohesive laws of this program and with those of YADE.
 
-    Their parameters are matched as far as possible. The results are a table, a figure, CSV, JSON, and scripts for YADE.
+    A case with [water] is refused: YADE's own scenes know no water. For such a case run each law by
+    `run --set joints.law=NAME`. The parameters of the laws are matched as far as possible. The results are a table, a
+    figure, CSV, JSON, and scripts for YADE.
     """
     one_thread()
     take_laws(law)
@@ -684,6 +686,7 @@ def sweep(
         ),
     ] = None,
     set: Overrides = None,
+    law: Laws = None,
     output: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="directory of the sweep; default: runs/sweep beside the case"),
@@ -734,6 +737,7 @@ def sweep(
     Completed runs are not repeated, and a killed run is continued. The results are a table, curves and a report.
     """
     one_thread()
+    take_laws(law)
     from coupler.commands.sweep.command import Wish
     from coupler.commands.sweep.command import sweep as make_sweep
 

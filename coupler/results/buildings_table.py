@@ -18,8 +18,8 @@ COLUMNS = tuple(
     Column(*c)
     for c in (
         ("name", "", "body: building, wall or group"),
-        ("x", "m", "middle of its foot"),
-        ("y", "m", "middle of its foot"),
+        ("x", "m", "middle of its base"),
+        ("y", "m", "middle of its base"),
         ("z", "m", "its foot"),
         ("state", "", "stands, damaged or collapsed, by the rules of [verdict]"),
         ("joints", "1", "its joints"),
@@ -32,7 +32,7 @@ COLUMNS = tuple(
         ("force_time", "s", "when that was"),
         ("impulse_x", "N s", "force of the water added up over the run"),
         ("impulse_y", "N s", "force of the water added up over the run"),
-        ("moment", "N m", "largest overturning moment of the water about the middle of its foot"),
+        ("moment", "N m", "largest overturning moment of the water about the middle of its base"),
         ("moment_time", "s", "when that was"),
         ("depth", "m", "largest depth around it"),
         ("speed", "m/s", "largest speed around it, mean over the depth"),

@@ -110,10 +110,10 @@ class Damage:
 
     @property
     def word(self) -> str:
-        """The state in words: what was never glued cannot break, it is moved or carried away."""
+        """The state in words: what was never glued cannot break, it is moved in part or as a whole."""
         if self.joined:
             return self.state.word
-        return ("in place", "moved", "carried away")[self.state]
+        return ("in place", "partly moved", "moved")[self.state]
 
 
 def damage(label: Array, names: Sequence[str], blocks: Blocks, joints: Joints, rules: Rules) -> list[Damage]:
@@ -178,11 +178,13 @@ def state_of(area_broken: float, weight_moved: float, blocks_moved: int, rules: 
     """The state and the rule that decided it, from shares of the joined area and of the weight."""
     if weight_moved >= rules.collapsed_weight and blocks_moved:
         return State.COLLAPSED, (
-            f"{weight_moved:.0%} of its weight left its place (verdict.collapsed_weight: {rules.collapsed_weight:.0%})"
+            f"{weight_moved:.0%} of its weight left its place "
+            f"(rule: {rules.collapsed_weight:.0%} or more, verdict.collapsed_weight)"
         )
     if rules.collapsed_joints is not None and area_broken >= rules.collapsed_joints:
         return State.COLLAPSED, (
-            f"{area_broken:.0%} of its joined area is broken (verdict.collapsed_joints: {rules.collapsed_joints:.0%})"
+            f"{area_broken:.0%} of its joined area is broken "
+            f"(rule: {rules.collapsed_joints:.0%} or more, verdict.collapsed_joints)"
         )
     if blocks_moved:
         return (
@@ -193,7 +195,8 @@ def state_of(area_broken: float, weight_moved: float, blocks_moved: int, rules: 
         return State.DAMAGED, f"{_percent(area_broken)} of its joined area is broken"
     if area_broken > 0.0:
         return State.STANDS, (
-            f"{_percent(area_broken)} of its joined area is broken (verdict.damaged_joints: {rules.damaged_joints:.0%})"
+            f"{_percent(area_broken)} of its joined area is broken "
+            f"(rule: damaged from more than {rules.damaged_joints:.0%}, verdict.damaged_joints)"
         )
     return State.STANDS, "no joint broke and no block left its place"
 

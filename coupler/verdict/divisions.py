@@ -88,14 +88,15 @@ def storey(of: str) -> str | None:
 
 
 def in_words(name: str, one_body: bool = True) -> str:
-    """'wall x- of storey 1' of house-wall0x-, with the body behind where there are several; other names as they are."""
+    """'wall x- of the ground storey' of house-wall0x-, 'floor of storey 2' of house-floor1, with the body behind where
+    there are several; other names as they are."""
     found = OF_A_STOREY.fullmatch(name)
     if found is None:
         return name
-    number, which = int(found["storey"]) + 1, f" {found['which']}" if found["which"] else ""
-    reported = (
-        f"storey {number}" if found["kind"] == "storey" else f"{found['kind']}{which} of storey {number}"
-    )
+    which = f" {found['which']}" if found["which"] else ""
+    number = int(found["storey"])
+    level = "the ground storey" if number == 0 else f"storey {number + 1}"
+    reported = level if found["kind"] == "storey" else f"{found['kind']}{which} of {level}"
     return reported if one_body else f"{reported} ({found['body']})"
 
 

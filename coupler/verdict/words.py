@@ -71,7 +71,7 @@ def _loads(largest: dict) -> Iterator[str]:
     if force:
         parts.append(f"force of the water {at(force, 'N')}")
     if moment:
-        parts.append(f"overturning moment about the middle of its foot {at(moment, 'N m')}")
+        parts.append(f"overturning moment about the middle of its base {at(moment, 'N m')}")
     if depth:
         parts.append(f"depth of water beside it {length(depth['value'])} at {moment_of(depth['time'])}")
     if parts:
@@ -89,8 +89,9 @@ def _displaced(reported: dict) -> Iterator[str]:
         yield f"no block left its place; the farthest moved by {length(reported['farthest']['way'])}"
         return
     farthest = found["list"][0]
+    whose = "its" if found["blocks"] == 1 else "their"
     yield (
-        f"{found['blocks']} of {reported['blocks']} blocks left their place, the first at t = "
+        f"{found['blocks']} of {reported['blocks']} blocks left {whose} place, the first at t = "
         f"{moment_of(found['first'])}; the farthest is {farthest['block']}, by {length(farthest['way'])}"
     )
 
@@ -100,7 +101,7 @@ def _hits(hits: dict) -> Iterator[str]:
         return
     hard, count = hits["list"][0], "once" if hits["pairs"] == 1 else f"{hits['pairs']} times"
     yield (
-        f"debris hit something {count}; hardest: {hard['block']} on {hard['other']} at t = "
-        f"{moment_of(hard['time'])}, at {point(hard['place'])}, losing {quantity(hard['speed'], 'm/s')}, "
-        f"{quantity(hard['impulse'], 'N s')}"
+        f"loose blocks hit something {count}; the hardest hit: {hard['block']} against {hard['other']} at t = "
+        f"{moment_of(hard['time'])}, at {point(hard['place'])}, with an impulse of {quantity(hard['impulse'], 'N s')} "
+        f"(it lost {quantity(hard['speed'], 'm/s')})"
     )

@@ -70,7 +70,7 @@ def test_broken_joints_alone_are_a_collapse_only_where_the_case_says_so():
 def test_what_was_never_glued_is_moved_and_not_damaged():
     blocks = Blocks(np.ones(2), np.ones(2), np.array([0.5, 0.0]))
     found = damage(np.zeros(2, int), ["crates"], blocks, Joints.none(), RULES)[0]
-    assert (found.word, found.state) == ("carried away", State.COLLAPSED)
+    assert (found.word, found.state) == ("moved", State.COLLAPSED)
 
 
 def test_blocks_of_no_group_count_nowhere():

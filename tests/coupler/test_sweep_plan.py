@@ -264,6 +264,8 @@ def test_mistakes_are_reported_with_file_and_key(case, sweep, says):
         ("joints.strength=lognormal(0.1 MPa)", "write NAME=NUMBER"),
         ("joints.strength=lognorm(median=1, dispersion=1)", "did you mean 'lognormal'"),
         ("joints.strength=normal(mean=1, dispersion=1)", "is given by mean and deviation"),
+        ("joints.strength=0.1,0.2 MPa", "0.1 has no unit, which means SI, but '0.2 MPa' has one"),
+        ("joints.strength=0.1 MPa:0.5:5", "write the unit at every value"),
         ("joints.strenght=1,2", "did you mean 'joints.strength'"),
     ],
 )

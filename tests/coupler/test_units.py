@@ -34,6 +34,8 @@ SIZES = st.floats(1e-9, 1e9)
         ("2 kg·m⁻³", "kg/m3", 2.0),
         ("30 %", "", 0.3),
         ("0.5", "", 0.5),
+        ("5 ms", "s", 0.005),
+        ("2 pascals", "Pa", 2.0),
     ],
 )
 def test_text_with_a_unit_becomes_si(text, unit, value):
@@ -83,6 +85,8 @@ def test_any_other_text_is_refused_with_words_and_never_crashes(text):
         ("3 m)", "m", "unknown unit"),
         ("3 kpa", "Pa", "did you mean 'kPa'?"),
         ("3 mn/M", "N/m", "did you mean 'MN/m'?"),
+        ("0.1 MPas", "Pa", "unknown unit 'MPas'; did you mean 'MPa'?"),
+        ("3 kNs/m2", "Pa s", "unknown unit 'kNs/m2'; did you mean 'kN/m2'?"),
         ("fast", "m/s", "is not a number with a unit"),
         (True, "m", "is not a number"),
         ([1], "m", "is not a number"),

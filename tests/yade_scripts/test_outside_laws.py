@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 
 import surgebreak
+from coupler.checks.case import remarks
+from coupler.checks.read_case import load
 from coupler.program.provenance import ROOT
 from yade_scripts.joints import laws, outside_laws
 from yade_scripts.joints.cohesion import CohesiveLaw, JointParameters
@@ -207,3 +209,46 @@ def test_the_command_takes_a_law_that_the_user_names_and_a_case_alone_runs_nothi
 def test_this_folder_holds_no_law_of_a_test():
     assert laws.shipped() == ["bilinear", "exponential", "polynomial"]
     assert Path(laws.__file__).parent.name == "laws"
+
+
+def test_a_law_that_would_push_an_opening_joint_is_refused():
+    def secant(r, peak):
+        return 1.0 / peak if r <= peak else (1.0 - r / 0.9) / ((1.0 - peak / 0.9) * r)
+
+    with pytest.raises(outside_laws.BadLaw, match="secant is negative at r = 1"):
+        outside_laws.examined(triangle(secant=secant), "here")
+
+
+def test_a_law_that_does_not_fall_to_zero_is_noted(forgotten, tmp_path):
+    """T stays at half of its strength from the middle on, whatever the peak."""
+    text = write(tmp_path, "half").read_text()
+    text = text.replace("(1.0 - r) / ((1.0 - peak) * r)", "(1.0 - 0.5 * (r - peak) / (1.0 - peak)) / r")
+    text = text.replace(
+        "0.5 - 0.5 * (1.0 - r) ** 2 / (1.0 - peak)",
+        "0.5 * peak + (r - peak) - 0.25 * (r - peak) ** 2 / (1.0 - peak)",
+    )
+    (tmp_path / "half.py").write_text(text)
+    surgebreak.register_law(tmp_path / "half.py")
+    (tmp_path / "case.toml").write_text(TWO_BLOCKS.replace('law = "bilinear"', 'law = "half"'))
+    (line,) = remarks(load(tmp_path).case)
+    assert line.startswith("law 'half' does not fall to zero: at opening_at_failure it still carries 50%")
+    (tmp_path / "case.toml").write_text(TWO_BLOCKS)
+    assert remarks(load(tmp_path).case) == []
+
+
+TWO_BLOCKS = """
+[case]
+title = "two blocks"
+[time]
+end = "1 ms"
+[structure]
+block = [
+    { name = "a", size = [1, 1, 1], centre = [0, 0, 0.5] },
+    { name = "b", size = [1, 1, 1], centre = [0, 0, 1.5] },
+]
+[contact]
+[joints]
+strength = "1 MPa"
+opening_at_failure = "1 mm"
+law = "bilinear"
+"""

@@ -125,8 +125,8 @@ def _offered(found: Any, origin: str) -> CohesiveLaw:
 def examined(law: CohesiveLaw, place: str) -> CohesiveLaw:
     """The law, its functions compiled by numba if they were not, if it holds what the solver relies on. Raises BadLaw.
 
-    At the lowest, the usual and the highest peak: s finite at 0 and never rising, s r at most 1 and 1 at the peak, w
-    the integral of s r, w - s r²/2 never falling.
+    At the lowest, the usual and the highest peak: s finite at 0, never negative and never rising, s r at most 1 and
+    1 at the peak, w the integral of s r, w - s r²/2 never falling.
     """
     from numba import njit
 
@@ -138,6 +138,11 @@ def examined(law: CohesiveLaw, place: str) -> CohesiveLaw:
         if problem:
             raise BadLaw(f"{place}, peak = {peak:g}: {problem}")
     return law
+
+
+def carried_at_failure(law: CohesiveLaw, peak: float | None) -> float:
+    """T/T_max with which a joint of this law reaches opening_at_failure, where it lets go."""
+    return float(law.secant(1.0, law.peak if peak is None else peak))
 
 
 def _compiled(function: Callable, njit: Callable) -> Callable:
@@ -156,6 +161,8 @@ def _problem(law: CohesiveLaw, peak: float) -> str:
     at = int(np.searchsorted(r, peak))
     if not (np.isfinite(secant).all() and np.isfinite(work).all()):
         return "secant and work must be finite for 0 <= r <= 1"
+    if secant.min() < -SLACK * secant[0]:
+        return f"secant is negative at r = {r[int(secant.argmin())]:.3g}: an opening joint would push"
     rising = np.diff(secant)
     if (rising > SLACK * secant[0]).any():
         return f"secant rises at r = {r[int(rising.argmax())]:.3g}; it may only fall (damage softens)"

@@ -97,8 +97,9 @@ def refuse(file: CaseFile) -> None:
     case, lines = file.case, []
     if case.water is not None:
         lines.append(
-            f"{file.path}: water: the stock scenes know no water, and a dry comparison would leave out the load; "
-            "take a dry case (cases/bonded_wall_pulled), or run this one with --set joints.law=... for each law of ours"
+            f"{file.path}: water: `compare` works on cases without water only: the scenes of YADE's own laws know "
+            "none, and without it the load would be missing. Take a dry case (cases/bonded_wall_pulled), or compare "
+            "our own laws by `run --set joints.law=NAME`, or by `sweep --vary joints.law=polynomial,bilinear`"
         )
     if case.structure is None or case.joints is None:
         lines.append(f"{file.path}: joints: there are no joints, so there are no laws to compare")

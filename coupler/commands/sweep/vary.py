@@ -17,16 +17,34 @@ from coupler.program.errors import BadCase, did_you_mean
 
 FORMS = "KEY=A,B,...  KEY=FROM:TO:STEPS  or  KEY=lognormal(median=..., dispersion=...)"
 
+WITH_UNIT = re.compile(r"[-+]?[\d.]+(?:[eE][-+]?\d+)?\s*[A-Za-z%°]")
+
 
 def varied(text: str) -> Varied:
     """The table that one --vary stands for. Raises BadCase."""
     key, sign, value = (part.strip() for part in text.partition("="))
     if not sign or not key or not value:
         raise BadCase([f"--vary {text}: write {FORMS}"])
+    content = _content(value, text)
+    _refuse_mixed_units(content, text)
     try:
-        return Varied.model_validate({"key": key, **_content(value, text)})
+        return Varied.model_validate({"key": key, **content})
     except ValidationError as error:
         raise BadCase([f"--vary {text}: {_said(item)}" for item in error.errors()]) from error
+
+
+def _refuse_mixed_units(content: dict, text: str) -> None:
+    """0.1,0.2 MPa is not meant as 0.1 Pa and 0.2 MPa. Raises BadCase."""
+    given = content.get("values", tuple(content[name] for name in ("low", "high") if name in content))
+    plain_numbers = [v for v in given if isinstance(v, int | float) and not isinstance(v, bool) and v]
+    with_unit = [v for v in given if isinstance(v, str) and WITH_UNIT.match(v)]
+    if plain_numbers and with_unit:
+        raise BadCase(
+            [
+                f"--vary {text}: {plain_numbers[0]:g} has no unit, which means SI, but '{with_unit[0]}' has one; "
+                "write the unit at every value"
+            ]
+        )
 
 
 def _said(item: dict) -> str:
