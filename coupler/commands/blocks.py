@@ -27,6 +27,8 @@ from yade_scripts.blocks.polyhedra import fans, hull_faces, shown
 
 WATER = "water"
 """The part of a picture that is seen through."""
+BED, BED_POINTS = "ground", 121
+"""Name of the ground of a terrain in a picture, and points along a side of it."""
 APART = 0.12
 """Of their size by which blocks are pulled apart in a picture."""
 
@@ -170,15 +172,18 @@ def _draw_blocks(cut: Cut, name: str, picture: Path) -> None:
 
 
 def draw_case(case: Case, picture: Path) -> None:
-    """Blocks by their groups, fixed solids and the boxes of water of a case, as they are at the start."""
+    """Blocks by their groups, fixed solids, the ground of a terrain and the boxes of water of a case, at the start."""
     bodies = [(b.group, b.world_vertices(), b.faces) for part in parts_of(case) for b in part.blocks]
     bodies += [("solid", solid.vertices, solid.faces) for solid in solids_of(case)]
-    for fill in case.water.fill if case.water else ():
+    bed = _bed_triangles(case)
+    fills = case.water.fill if case.water else ()
+    for fill in fills if not len(bed) else ():
         bodies.append((WATER, Body.between(fill.lower, fill.upper).vertices, None))
-    names = sorted({name for name, *_ in bodies} - {WATER}) + [WATER] * any(
-        name == WATER for name, *_ in bodies
-    )
-    triangles, part, edges = [], [], []
+    names = sorted({name for name, *_ in bodies} - {WATER}) + [BED] * bool(len(bed)) + [WATER] * bool(fills)
+    triangles, part, edges = [bed], [np.full(len(bed), names.index(BED) if len(bed) else 0)], []
+    for fill in fills if len(bed) else ():
+        triangles.append(_surface_over(bed, fill))
+        part.append(np.full(len(triangles[-1]), names.index(WATER)))
     for name, x, faces in bodies:
         own = fans(faces if faces is not None else hull_faces(name, x, 1e-9))[0]
         triangles.append(x[own])
@@ -188,6 +193,35 @@ def draw_case(case: Case, picture: Path) -> None:
             edges.append(x[np.array(sorted(pairs))])
     lines = np.concatenate(edges) if edges else np.zeros((0, 2, 3))
     _draw(picture, np.concatenate(triangles), np.concatenate(part), names, lines, np.zeros((0, 2, 3)))
+
+
+def _bed_triangles(case: Case) -> np.ndarray:
+    """(t, 3, 3) [m] of the ground under the tank; none without a terrain."""
+    if case.tank is None or case.tank.ground is None:
+        return np.zeros((0, 3, 3))
+    x, y = (np.linspace(case.tank.lower[k], case.tank.upper[k], BED_POINTS) for k in (0, 1))
+    X, Y = np.meshgrid(x, y, indexing="ij")
+    z = case.tank.ground(X.ravel(), Y.ravel())
+    points = np.column_stack([X.ravel(), Y.ravel(), z])
+    i, j = np.meshgrid(np.arange(BED_POINTS - 1), np.arange(BED_POINTS - 1), indexing="ij")
+    a = (i * BED_POINTS + j).ravel()
+    rows = np.concatenate(
+        [
+            np.column_stack([a, a + BED_POINTS, a + 1]),
+            np.column_stack([a + 1, a + BED_POINTS, a + BED_POINTS + 1]),
+        ]
+    )
+    found = points[rows]
+    return found[np.isfinite(found).all(axis=(1, 2))]
+
+
+def _surface_over(bed: np.ndarray, fill) -> np.ndarray:
+    """(t, 3, 3) [m] the surface of a box of water where the ground lies below it."""
+    middle = bed.mean(axis=1)
+    inside = ((middle >= fill.lower) & (middle <= fill.upper))[:, :2].all(axis=1)
+    found = bed[inside & (middle[:, 2] < fill.upper[2])].copy()
+    found[:, :, 2] = fill.upper[2]
+    return found
 
 
 def _draw_trouble(error: BadDrawing, picture: Path) -> None:

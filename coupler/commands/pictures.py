@@ -34,6 +34,11 @@ def plots(run: Path, folder: Path) -> str:
     return _view("coupler.commands.view", run, "--plots", "--to", folder)
 
 
+def flood_map(run: Path, folder: Path, title: str) -> str:
+    """The maps of a flood over terrain as flood_map.png into folder; the reason if they could not be drawn."""
+    return _view("coupler.commands.view.flood_map", run, folder / "flood_map.png", title)
+
+
 def study_figures(study: Path) -> str:
     """Error against run time beside study.json; the reason if they could not be drawn."""
     return _view("coupler.commands.view.study", study)

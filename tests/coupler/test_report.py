@@ -234,3 +234,11 @@ def test_round_off_in_a_book_is_zero(run):
         for size in (1e-14, 1500.0):
             history.append(**{c[0]: size if c[1] == "J" else 0.1 for c in ENERGY})
     assert "<td class=n>0</td><td class=n>1.5</td>" in read(report(run, with_pictures=False))
+
+
+def test_the_maps_of_a_flood_are_in_the_page(tmp_path):
+    from coupler.commands.report.run_page import _flood
+
+    assert _flood(tmp_path) == ""
+    (tmp_path / "flood_map.png").write_bytes(b"\x89PNG\r\n\x1a\n")
+    assert "Largest depth" in _flood(tmp_path)

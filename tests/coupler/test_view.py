@@ -51,6 +51,27 @@ def test_a_still_shows_what_the_run_has(tmp_path, water, blocks):
     assert (sand > 0.03) == blocks
 
 
+def test_a_still_of_a_run_over_terrain_shows_the_ground(tmp_path):
+    """The bed of the maps, greener than all else, is there where the run has maps and not where it has none."""
+    from PIL import Image
+
+    run = write_run(tmp_path / "run", [0.0], water=False, cell=2.0)
+
+    def green():
+        assert render(run, "--still", "--size", "320x180").returncode == 0
+        (picture,) = (run / "pictures").glob("still_*.png")
+        red, green, blue = np.asarray(Image.open(picture).convert("RGB")).astype(int).transpose(2, 0, 1)
+        return np.mean((green > red) & (green - blue > 10))
+
+    assert green() < 0.01
+    (run / "maps").mkdir()
+    rows = [" ".join(f"{0.2 * i:g}" for i in range(13))] * 6
+    head = "ncols 13\nnrows 6\nxllcenter 0\nyllcenter 0\ncellsize 5\nNODATA_value -9999\n"
+    (run / "maps" / "bed.asc").write_text(head + "\n".join(rows) + "\n")
+    (run / "effective.json").write_text(json.dumps({"tank": {"lower": [0, 0, 0]}}))
+    assert green() > 0.1
+
+
 def test_film_and_figures(tmp_path):
     """An H.264 film with a frame for each step and a second's hold, and each history in three formats."""
     run = write_run(tmp_path / "run", [0.0, 1.0, 2.0], cell=2.0)

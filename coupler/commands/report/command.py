@@ -52,6 +52,9 @@ def _draw(run: Path, folder: Path) -> list[str]:
         "No stills": pictures.stills(run, folder, times) if times else "the run has stored no fields",
         "Figures are missing": pictures.plots(run, folder) if times else "",
     }
+    if (run / "maps" / "bed.asc").exists():
+        title = read_summary(run)["case"]["case"]["title"]
+        failed["No maps of the flood"] = pictures.flood_map(run, folder, title)
     return [f"{what}: {why}" for what, why in failed.items() if why]
 
 

@@ -35,6 +35,8 @@ CAPTIONS = {
     "coupling": "Steps: length, passes, iterations, defect",
 }
 """Of the figures of the histories, in the order in which they are shown; other tables come behind the gauges."""
+FLOOD = "flood_map"
+"""The picture with the maps of a flood over terrain."""
 OF_SCHEME = ("momentum", "angular_momentum", "coupling")
 """Histories that tell of the scheme rather than of the scene: towards the end of the page."""
 FIGURES = {
@@ -74,6 +76,7 @@ def run_page(run: Path, summary: dict, pictures: Path, remarks: list[str]) -> st
             section("Results", _figures(summary), _promises(summary)),
             section("Notes before the run", _notes(summary)),
             section("Pictures", _stills(run, pictures), *map(note, remarks)),
+            section("The flood", _flood(pictures)),
             section("Computed over data", *(figure(p, _words(p.stem)) for p in over_data(run, pictures))),
             section("Histories", *_histories(run, pictures, of_scheme=False)),
             section("Ledger", tables.energy(run), tables.volume(run), tables.momentum(run, "momentum")),
@@ -179,6 +182,13 @@ def _stills(run: Path, pictures: Path) -> str:
     return "\n".join(shown)
 
 
+def _flood(pictures: Path) -> str:
+    """The maps of a run over terrain."""
+    path = pictures / f"{FLOOD}.png"
+    words = "Largest depth, speed and h v², time of arrival, and the buildings by their state (maps/, buildings.csv)"
+    return figure(path, words) if path.exists() else ""
+
+
 def _time_of(still: Path) -> float:
     return float(still.stem.removeprefix("still_").removesuffix("s"))
 
@@ -223,7 +233,7 @@ def over_data(run: Path, pictures: Path) -> list[Path]:
     return [
         p
         for p in sorted(pictures.glob("*.png"))
-        if p not in histories and p.stem not in OF_VERDICT and not p.name.startswith("still_")
+        if p not in histories and p.stem not in (*OF_VERDICT, FLOOD) and not p.name.startswith("still_")
     ]
 
 

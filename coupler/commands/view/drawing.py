@@ -38,7 +38,7 @@ def draw(place, picture):
             mesh = pv.PolyData.from_regular_faces(own.reshape(-1, 3), np.arange(3 * len(own)).reshape(-1, 3))
             wet = name == "water"
             faint = 0.35 if len(lines) or wet else 1.0
-            tint = "#56a0d3" if wet else TINTS[k % len(TINTS)]
+            tint = "#56a0d3" if wet else palette.BED if name == "ground" else TINTS[k % len(TINTS)]
             plotter.add_mesh(mesh, color=tint, ambient=0.25, opacity=faint, label=name)
     for ends, colour, width in ((edges, "#5b4a3a", 1.5), (lines, TROUBLE, 8)):
         if len(ends):

@@ -9,6 +9,7 @@ import numpy as np
 PAPER = "#ffffff"
 INK = "#222222"
 GROUND = "#efedea"
+BED = "#aeb59a"
 SHADOW = "#c9c5bf"
 SOLID = "#9a9a9a"
 TANK = "#8a8f96"

@@ -11,8 +11,10 @@ import h5py
 import numpy as np
 import pyvista as pv
 
+from coupler.commands.view.flood_map import in_tank
 from coupler.program.errors import ExitCode, SurgebreakError
 from coupler.results import vtkhdf
+from coupler.results.maps import read_map
 
 TRIES, PAUSE = 20, 0.1  # a step that is just being added takes milliseconds
 
@@ -109,7 +111,7 @@ def faces_for_vtk(connectivity, ends):
 @dataclass(frozen=True)
 class RunFiles:
     """What a run has to show; absent parts are None. tank (2, 3) and the edges of one that is no box, basin (k, 2, 3),
-    [m] relative to the origin."""
+    [m] relative to the origin · bed: of a terrain, a surface."""
 
     directory: Path
     water: WaterSeries | None
@@ -118,6 +120,7 @@ class RunFiles:
     tank: np.ndarray | None
     times: np.ndarray
     basin: np.ndarray | None = None
+    bed: object = None
 
     def nearest(self, time):
         """The stored time nearest to `time`; the last one for None."""
@@ -139,7 +142,19 @@ def open_run(directory):
             "output yet, or it was stopped before"
         )
     solids, tank, basin = _solids(directory / "solids.vtkhdf")
-    return RunFiles(directory, water, blocks, solids, tank, (water or blocks).times, basin)
+    bed = _bed(directory)
+    return RunFiles(directory, water, blocks, solids, tank, (water or blocks).times, basin, bed)
+
+
+def _bed(directory):
+    """The ground of a run over terrain as a surface, None without one."""
+    path = directory / "maps" / "bed.asc"
+    if not path.exists():
+        return None
+    found = read_map(path)
+    x, y = np.meshgrid(*in_tank(directory, found))
+    z = np.asarray(found.z, float)
+    return pv.StructuredGrid(x, y, np.where(np.isfinite(z), z, np.nanmin(z))).extract_surface()
 
 
 def _series(kind, path):

@@ -152,6 +152,8 @@ class Scene:
 
     def _draw_still_parts(self):
         self.plotter.add_mesh(self.ground, color=palette.GROUND, lighting=False)
+        if self.run.bed is not None:
+            self.plotter.add_mesh(self.run.bed, color=palette.BED, ambient=0.25, smooth_shading=True)
         if self.run.solids is not None:
             self.plotter.add_mesh(
                 self.run.solids, color=palette.SOLID, show_edges=True, edge_color="#6b6b6b", ambient=0.3
