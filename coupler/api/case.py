@@ -26,15 +26,15 @@ class Case:
 
         Case({"case": {"title": "a drop"}, "time": {"end": "1 s"}, "tank": {...}, "water": {...}})
 
-    Names, units and errors are those of the case file (docs/case_file.md): numbers are SI, texts may carry units.
-    A change that names nothing in the schema, or gives it what it cannot be, raises BadCase at once and changes
-    nothing; what values mean beside one another is looked at by `check` and `run`.
+    Names, units and errors are those of the case file (docs/case_file.md): numbers are in SI units, texts may carry
+    units. A change of an unknown name or to a value that is not permitted raises BadCase at once and changes nothing;
+    the consistency of values with one another is examined by `check` and `run`.
     """
 
     def __init__(self, tables: Mapping[str, Any], directory: Path | str = "."):
-        """directory: from which paths in the case are meant, and where `run` puts `runs/`.
+        """directory: to which paths in the case are relative, and in which `run` creates `runs/`.
 
-        Raises TypeError for values that no case file can hold.
+        Raises TypeError for values that a case file cannot contain.
         """
         self._text = toml_text.document(tables)
         self._place: Path | None = None
@@ -60,9 +60,10 @@ class Case:
     # ------------------------------------------------------------ values
 
     def set(self, key: str, value: Any) -> Case:
-        """Give a name of the case file a value: `set("tank.cell", "10 cm")`, `set("structure.block[0].density", 900)`.
+        """Set a key of the case file to a value: `set("tank.cell", "10 cm")`, `set("structure.block[0].density",
+        900)`.
 
-        value: a number (SI), a text with a unit, a boolean, a list or array, a table; None leaves the name out.
+        value: a number (SI), a text with a unit, a boolean, a list or array, a table; None removes the key.
         Raises BadCase (an unknown name, a wrong unit, out of range) and TypeError. Returns the case, so that calls
         can follow one another.
         """
@@ -77,7 +78,7 @@ class Case:
         return self.set(f"{section}[+]", values)
 
     def get(self, key: str) -> Any:
-        """A value as it was written or set, None where it was not: defaults are in `effective`."""
+        """The value as it was written or set, or None where it was not; `effective` contains the defaults."""
         found: Any = self._table
         for part in key.replace("[", ".[").split("."):
             try:
@@ -102,19 +103,19 @@ class Case:
         return self.get(key) is not None
 
     def copy(self) -> Case:
-        """The same case, to be changed apart."""
+        """An independent copy of the case."""
         found = Case.__new__(Case)
         found.__dict__.update(self.__dict__, _changes=list(self._changes))
         return found
 
     @property
     def changes(self) -> tuple[str, ...]:
-        """What was set, as `--set` of the command line takes it."""
+        """The changes made by `set` and `add`, in the form of `--set` on the command line."""
         return tuple(self._changes)
 
     @property
     def effective(self) -> dict[str, Any]:
-        """Every value in SI, defaults filled in. Raises BadCase."""
+        """All values in SI units, including defaults. Raises BadCase."""
         return effective(self.file().case)
 
     def __repr__(self) -> str:
@@ -128,16 +129,17 @@ class Case:
     # ------------------------------------------------------------ what to do with it
 
     def file(self) -> CaseFile:
-        """The checked case, as the rest of the program takes it. Raises BadCase with a line for each mistake."""
+        """The checked case in the form that the rest of the program uses. Raises BadCase with a line for each
+        mistake."""
         if self._place is not None:
             return load(self._place, self._changes, text=self._text)
         return from_text(self._text, "case", self._directory, self._changes)
 
     def save(self, directory: Path | str) -> Path:
-        """Write the case, with its changes, as `case.toml` into a directory; its path.
+        """Write the case with its changes to `case.toml` in a directory, and return the path of the file.
 
-        Paths in it stay as they are written, and are then meant from there. Raises SurgebreakError where there is one
-        already.
+        Paths in the case are not changed, and are then relative to that directory. Raises SurgebreakError if the file
+        exists.
         """
         path = Path(directory) / "case.toml"
         if path.exists():
@@ -147,10 +149,10 @@ class Case:
         return path
 
     def check(self, exact: bool = False) -> Forecast:
-        """Check the case and forecast steps, substep, memory and disk; with a structure YADE is asked.
+        """Check the case and forecast steps, substep, memory and disk; for a structure YADE is loaded.
 
-        exact: solve for the exact frequency of the joints as well.
-        Returns `Forecast`: `rows` of name, value, unit, remark, and `remarks`, what is worth knowing. Raises BadCase.
+        exact: also solve for the exact highest frequency of the joints. Returns `Forecast`: `rows` of name, value,
+        unit, remark, and `remarks`. Raises BadCase.
         """
         file = self.file()
         from coupler.run.forecast import forecast
@@ -166,15 +168,15 @@ class Case:
         stop: Callable[[Step], object] | None = None,
         quiet: bool = True,
     ) -> Run:
-        """Run the case in this process, to its end or until `stop`; the run, to be read.
+        """Run the case in this process, to its end or until `stop`, and return the `Run`.
 
         output: a new or empty directory; None: `runs/<time>-<hash>` beside the case ·
-        callback: called after every step with a `Step` · stop: called after it; what is true ends the run, a text says
-        why · quiet: tell nothing but the log of the run.
+        callback: called after every step with a `Step` · stop: called after each step; a true result ends the run, and
+        a text is recorded as the reason · quiet: print nothing (the log of the run is written).
 
         A run that `stop`, Ctrl-C or a file named `stop` ended has the status "stopped", and `Run.resume` goes on.
         Raises BadCase, RunDirectoryExists, RunInRun, Diverged, LimitReached (a limit of the case), and what the
-        callback raises; what was written until then stays, and `surgebreak.open` reads it.
+        callback raises; the results written until then remain and can be read with `surgebreak.open`.
         """
         file = self.file()
         with alone():

@@ -36,7 +36,7 @@ class WaterState:
     """The water at a stored time [s].
 
     nodes (n, 3) [m] · cells (m, 4) rows of nodes · level_set (n,) [m], negative in the water · velocity (n, 3) [m/s] ·
-    pressure (n,) [Pa] · fluid_fraction (m,), share of a cell that no solid takes
+    pressure (n,) [Pa] · fluid_fraction (m,), share of a cell outside the solids
     """
 
     time: float
@@ -48,7 +48,8 @@ class WaterState:
     fluid_fraction: Floats
 
     def mesh(self) -> Any:
-        """A `pyvista.UnstructuredGrid`. Raises NotInstalled, and CrashesAfterYade in a process that holds YADE."""
+        """A `pyvista.UnstructuredGrid`. Raises NotInstalled, and CrashesAfterYade in a process that has loaded
+        YADE."""
         pv = _pyvista()
         cells = np.insert(self.cells, 0, 4, axis=1).ravel()
         found = pv.UnstructuredGrid(cells, np.full(len(self.cells), pv.CellType.TETRA), self.nodes)
@@ -63,7 +64,7 @@ class BlockState:
     """The blocks at a stored time [s], as faces.
 
     points (k, 3) [m] · faces: per face the rows of its corners, in order · block (f,): number of the block of a face ·
-    names, groups: one text a block · speed (n,) [m/s] of the centres · damage (n,): 0 whole, 1 all joints broken
+    names, groups: one text per block · speed (n,) [m/s] of the centres · damage (n,): 0 whole, 1 all joints broken
     """
 
     time: float
@@ -95,10 +96,10 @@ class BlockState:
 
 
 class Run:
-    """The directory of a run; `surgebreak.open` and `Case.run` give one."""
+    """A run, read from its directory; returned by `surgebreak.open` and `Case.run`."""
 
     def __init__(self, directory: Path | str):
-        """Raises NoRun where the directory holds none."""
+        """Raises NoRun if the directory contains no run."""
         self.directory = Path(directory)
         self.summary: dict[str, Any] = read_summary(self.directory)
         """run.json: status, figures, versions, machine, the case with every default."""
@@ -107,7 +108,7 @@ class Run:
         return f"<surgebreak.Run {str(self.directory)!r}, {self.status}>"
 
     def reload(self) -> Run:
-        """Read run.json again, of a run that goes on in another process; returns itself."""
+        """Read run.json again, for a run that is in progress in another process; returns the run itself."""
         self.summary = read_summary(self.directory)
         return self
 
@@ -118,28 +119,29 @@ class Run:
 
     @property
     def reason(self) -> str:
-        """Why it ended, in words; empty while it runs."""
+        """The reason for its end, in words; empty while it runs."""
         return self.summary["exit_reason"] or ""
 
     @property
     def figures(self) -> dict[str, Any]:
-        """Its numbers: steps, joints, joints_broken, energy_error, cpu_seconds by part, and more."""
+        """Figures of the run: steps, joints, joints_broken, energy_error, cpu_seconds by part, and others."""
         return dict(self.summary["figures"])
 
     @property
     def case(self) -> dict[str, Any]:
-        """The case that was run, every value in SI, defaults filled in."""
+        """The case of the run, with all values in SI units, including defaults."""
         return dict(self.summary["case"])
 
     # ------------------------------------------------------------ tables
 
     @property
     def histories(self) -> list[str]:
-        """Names of its tables."""
+        """Names of the history tables."""
         return sorted(path.stem for path in (self.directory / "history").glob("*.csv"))
 
     def history(self, name: str) -> History:
-        """A table by its name: `run.history("water")["volume"]` (rows,), NaN where a cell is empty; `columns` gives
+        """A history table by its name: `run.history("water")["volume"]` (rows,), NaN where a cell is empty; `columns`
+        gives
         units and meanings. Raises UnknownName, BadTable."""
         if name not in self.histories:
             known = self.histories
@@ -154,7 +156,8 @@ class Run:
 
     @property
     def cracks(self) -> History:
-        """A row a joint, as of the last stored time: which blocks, where, when it broke, what it dissipated.
+        """One row per joint at the last stored time: its blocks, its position, the time of its failure, its dissipated
+        energy.
 
         Raises BadTable for a run without joints."""
         return read_history(self.directory / "cracks.csv")
@@ -174,7 +177,8 @@ class Run:
         return np.zeros(0)
 
     def water(self, time: float | None = None) -> WaterState:
-        """The water at the stored time nearest to `time` [s]; None: the last. Raises NoRun where none is stored."""
+        """The water at the stored time nearest to `time` [s]; None: the last one. Raises NoRun if no state is
+        stored."""
         path, k, found = self._stored("fields.vtkhdf", "the case has no water", time)
         points, at_nodes, in_cells = vtkhdf.read_step(path, k)
         return WaterState(
@@ -188,7 +192,8 @@ class Run:
         )
 
     def blocks(self, time: float | None = None) -> BlockState:
-        """The blocks at the stored time nearest to `time` [s]; None: the last. Raises NoRun where none is stored."""
+        """The blocks at the stored time nearest to `time` [s]; None: the last one. Raises NoRun if no state is
+        stored."""
         path, k, found = self._stored("blocks.vtkhdf", "the case has no structure", time)
         points, _, on_faces = vtkhdf.read_step(path, k)
         origin, names, group_names = _scene(path)
@@ -217,7 +222,8 @@ class Run:
     # ------------------------------------------------------------ pictures, going on
 
     def picture(self, time: float | None = None, **options: Any) -> Path:
-        """A still of the stored time nearest to `time` [s] as PNG; made in a process of its own (the extra `view`).
+        """A still at the stored time nearest to `time` [s] as PNG, made in a separate process (needs the extra
+        `view`).
 
         options: those of `surgebreak render`, for instance azimuth=-110, elevation=30, size="1280x720".
         Raises NotDrawn, NotInstalled.
@@ -225,7 +231,8 @@ class Run:
         return self.render("still", time=time, **options)[0]
 
     def render(self, *what: str, **options: Any) -> list[Path]:
-        """Pictures as `surgebreak render` makes them: "still", "film", "plots"; nothing named: all. What was written.
+        """Pictures as `surgebreak render` makes them: "still", "film", "plots"; without names, all of them. Returns
+        the paths of the files.
 
         Raises NotDrawn, NotInstalled.
         """
@@ -246,7 +253,7 @@ class Run:
         return sorted(path for path, stamp in after.items() if before.get(path) != stamp)
 
     def report(self, pictures: bool = True) -> Path:
-        """Write report.html, one page about the run; its path. Raises NotDrawn."""
+        """Write report.html, one page about the run, and return its path. Raises NotDrawn."""
         words = [] if pictures else ["--no-pictures"]
         done = run_module(
             "coupler.commands.cli", "report", self.directory, *words, capture_output=True, text=True
@@ -265,9 +272,10 @@ class Run:
         quiet: bool = True,
         any_version: bool = False,
     ) -> Run:
-        """Go on from the newest checkpoint, as `surgebreak resume`; the run, to be read.
+        """Continue from the newest checkpoint, as `surgebreak resume` does, and return the `Run`.
 
-        changes: `KEY=VALUE`, for instance "time.end=4 s" · the rest as in `Case.run`. Raises CannotResume, Busy, and
+        changes: `KEY=VALUE`, for instance "time.end=4 s" · the other arguments as in `Case.run`. Raises CannotResume,
+        Busy, and
         what `Case.run` raises.
         """
         resume(self.directory, changes, callback, stop, quiet, any_version)

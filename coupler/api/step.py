@@ -15,9 +15,10 @@ Floats = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class Blocks:
-    """The blocks now, held ones with them; copies, which later steps do not change.
+    """The present state of all blocks, including held ones, as copies that later steps do not change.
 
-    names, groups: one text a block · centre (n, 3) [m] · rotation (n, 3, 3), body to world · velocity (n, 6) [m/s and
+    names, groups: one text per block · centre (n, 3) [m] · rotation (n, 3, 3), body to world · velocity (n, 6) [m/s
+    and
     rad/s] of the centre · force (n, 6) [N and N m] of the water in this step · damage (n,): 0 whole, 1 all joints
     broken
     """
@@ -32,9 +33,9 @@ class Blocks:
 
 
 class Step:
-    """One step of a run that goes on. SI units; what a case does not have reads zero.
+    """One step of a run in progress, in SI units; quantities that a case does not have are zero.
 
-    number: of steps so far · time [s] it reached · dt [s] · substeps: of YADE in it · passes: pressure solves in it
+    number: steps so far · time [s] at its end · dt [s] · substeps of YADE · passes: number of pressure solves
     """
 
     def __init__(
@@ -53,12 +54,12 @@ class Step:
 
     @property
     def joints(self) -> int:
-        """Joints that hold."""
+        """Number of intact joints."""
         return 0 if self._coupling.structure is None else joint_counts(self._coupling.structure).intact
 
     @property
     def joints_broken(self) -> int:
-        """Joints that have failed so far."""
+        """Number of joints that have failed so far."""
         return 0 if self._coupling.structure is None else joint_counts(self._coupling.structure).broken
 
     @property
@@ -73,7 +74,7 @@ class Step:
 
     @property
     def blocks(self) -> Blocks:
-        """Where the blocks are. Raises AttributeError in a case without a structure."""
+        """The state of the blocks. Raises AttributeError in a case without a structure."""
         s = self._coupling.structure
         if s is None:
             raise AttributeError("blocks: this case has no section [structure]")

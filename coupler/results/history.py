@@ -40,7 +40,7 @@ MOST_BYTES = 4_000_000_000
 
 @dataclass(frozen=True)
 class History:
-    """A table read back: columns as declared, values by name (float (rows,), NaN where empty; text as it stands)."""
+    """A history table: columns as declared, values by name (float (rows,), NaN where empty, or text)."""
 
     title: str
     columns: tuple

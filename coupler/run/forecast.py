@@ -54,7 +54,7 @@ SECONDS_PER_STATE_CELL, SECONDS_PER_STATE_BLOCK = 5e-7, 7e-4
 
 @dataclass(frozen=True)
 class Forecast:
-    """rows: (name, value, unit, remark), in the order of the list · remarks: what else is worth knowing."""
+    """rows: (name, value, unit, remark), in the order of the list · remarks: further sentences."""
 
     rows: list[Row]
     remarks: tuple[str, ...] = ()
