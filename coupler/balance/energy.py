@@ -64,7 +64,9 @@ class Ledger:
     """Accumulates the balances of a run. Either side may be absent (None)."""
 
     available: float = 0.0
-    """Potential energy of the water above its level state at the start, and what inflows and seas can bring [J]."""
+    """Potential energy of the water above its level state at the start [J]."""
+    coming: float = 0.0
+    """What inflows and seas can bring, the largest so far [J]."""
     work_given: float = 0.0
     behind: float = 0.0
     """Part of it that the blocks count half a substep later [J]."""
@@ -94,7 +96,7 @@ class Ledger:
         # a scene at perfect rest puts nothing in: then a small part of what it holds is the scale
         held = abs(sum(water or (0.0,))) + abs(gravity)
         thrown = 0.0 if structure is None else structure["kinetic"]
-        self._input = max(self.available, thrown, NEGLIGIBLE * held)
+        self._input = max(self.available + self.coming, thrown, NEGLIGIBLE * held)
 
     def save(self) -> dict[str, np.ndarray]:
         """Everything that it holds, by name."""
@@ -133,6 +135,7 @@ class Ledger:
             self._input = max(self._input, structure["kinetic"], abs(driven))
             potential_now = potential + structure["gravity"]
         released = self._potential_start - potential_now
+        self._input = max(self._input, self.available + self.coming)
         self._input = max(self._input, abs(released), kinetic, abs(self.entered), abs(self.air))
         interface = self.work_given - received if water is not None and structure is not None else 0.0
         now = (residual, interface, dissipation + self.left)

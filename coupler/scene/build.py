@@ -5,6 +5,7 @@ A case without `[water]` imports no fluid code here, one without `[structure]` n
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
@@ -112,7 +113,7 @@ def _coupling(case: Case, structure, solids, clock, from_start: bool) -> Coupled
         tolerance=case.coupling.tolerance,
         most_defect=case.limits.defect,
         limits=limits_of(case),
-        expected=_side_energy(case),
+        coming=_coming_energy(case),
     )
 
 
@@ -122,13 +123,13 @@ def limits_of(case: Case) -> Limits:
     return Limits(wanted.volume_error, wanted.energy_error, wanted.cpu_seconds, wanted.momentum_error)
 
 
-def _side_energy(case: Case) -> float:
-    """What inflows and seas can bring [J]; without any their code is not loaded."""
+def _coming_energy(case: Case) -> Callable[[float], float] | None:
+    """What inflows and seas can bring [J] at a time [s]; without any their code is not loaded."""
     if case.water is None or not (case.water.inflow or case.water.sea):
-        return 0.0
-    from coupler.scene.side_energy import side_energy
+        return None
+    from coupler.scene.side_energy import coming_energy
 
-    return side_energy(case)
+    return coming_energy(case)
 
 
 def _settled(structure, water) -> bool:

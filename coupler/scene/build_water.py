@@ -213,6 +213,19 @@ def _absorbing(case: Case, spec, flow, mesh):
     return Absorber(flow, -_outward(spec.side), places, along[:, 1], case.case.gravity).as_flow()
 
 
+def instants_of(case: Case, spec) -> np.ndarray:
+    """Times (k,) [s] from the start on at which an inflow of the case is looked at for the most that it brings: those
+    of its record, or around its wave."""
+    if spec.kind in ("solitary", "n-wave"):
+        return np.linspace(0.0, 4.0 * (spec.crest if spec.kind == "solitary" else spec.middle), 401)
+    if spec.kind != "record":
+        return np.zeros(1)
+    found = record_of(
+        spec, _turn(case), mean_bed(case.tank, spec.side, level_at_start(spec)), case.case.gravity
+    )
+    return np.unique(np.maximum(found.time, 0.0))
+
+
 def flow_of(case: Case, spec):
     """What an inflow of the case brings; waves count their depth over the bed along their side."""
     from fluid.sides import waves

@@ -2,50 +2,96 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
 import numpy as np
 
 from coupler.case.case import Case
 from coupler.geometry.tank_mesh import floor_along
-from coupler.scene.build_water import fills_beside, flow_of, sea_level
+from coupler.scene.build_water import fills_beside, flow_of, instants_of, sea_level
 
 TIMES = 101
-"""Instants of a run at which an inflow is looked at."""
+"""Instants at the start at which a sea is looked at."""
 
 
-def side_energy(case: Case) -> float:
-    """Σ ½ ρ b h (g Δz² + h v²) [J] over the sides: what a step Δz in the level and a stream of speed v hold over a
-    stretch of the tank as long as the water is deep.
+@dataclass(frozen=True)
+class SideEnergy:
+    """½ ρ b h (g Δz² + h v²) [J] of one side at an instant: what a step Δz in the level and a stream of speed v hold
+    over a stretch of the tank as long as the water is deep.
 
-    b [m] width of the side, h [m] largest depth there, Δz [m] largest difference from the water at the start, v [m/s]
-    largest speed, each over the whole run."""
-    times = np.linspace(0.0, case.time.end, TIMES)
-    found = 0.0
-    for sea in case.water.sea:
-        level = sea_level(sea)
-        found += _energy(case, sea.side, np.array([level(time) for time in times]), 0.0)
-    for spec in case.water.inflow:
-        flow = flow_of(case, spec)
-        level = np.array([flow.level(time) for time in times])
-        floor = floor_along(case.tank, spec.side)
-        speed = max(_speed(flow, floor, time, z) for time, z in zip(times, level))
-        found += _energy(case, spec.side, level, speed)
-    return float(found)
+    level(time) z [m], speed(time) the largest v [m/s] there · width b [m] · floor, start: heights z [m] of the bed and
+    of the water at the start, Δz is the difference from it · density ρ [kg/m³] · gravity g [m/s²]
+    crossing [s]: time of a long wave through the tank.
+    """
+
+    level: Callable[[float], float]
+    speed: Callable[[float], float]
+    width: float
+    floor: float
+    start: float
+    density: float
+    gravity: float
+    crossing: float
+
+    def at(self, time: float) -> float:
+        """[J]"""
+        level = self.level(time)
+        depth = max(level - self.floor, 0.0)
+        held = self.gravity * (level - self.start) ** 2 + depth * self.speed(time) ** 2
+        return 0.5 * self.density * self.width * depth * held
 
 
-def _speed(flow, floor: float, time: float, level: float) -> float:
-    """Largest speed [m/s] of a flow between the bed and its surface."""
-    points = np.zeros((2, 3))
-    points[:, 2] = floor, level
-    return float(np.linalg.norm(flow.velocity(points, time), axis=1).max())
+def coming_energy(case: Case) -> Callable[[float], float]:
+    """Energy [J] that all sides can bring as a function of the time [s].
+
+    Of an inflow the largest of all that is known of it. Of a sea, whose tide takes hours, what it brings after the time
+    of a wave through the tank; at 0 the largest until then. Nothing goes by the end of the run, so that a run with
+    another end has the same figures until then."""
+    seas = [_of_sea(case, sea) for sea in case.water.sea]
+    inflows = sum(max(map(_of_inflow(case, s).at, instants_of(case, s))) for s in case.water.inflow)
+
+    def coming(time: float) -> float:
+        if time > 0.0:
+            return inflows + sum(side.at(time + side.crossing) for side in seas)
+        return float(
+            inflows + sum(max(map(side.at, np.linspace(0.0, side.crossing, TIMES))) for side in seas)
+        )
+
+    return coming
 
 
-def _energy(case: Case, side: str, level, speed: float) -> float:
-    """The energy [J] of one side with the levels (k,) [m] that it has in the run."""
+def _of_sea(case: Case, sea) -> SideEnergy:
+    return _side(case, sea.side, sea_level(sea), lambda time: 0.0)
+
+
+def _of_inflow(case: Case, spec) -> SideEnergy:
+    flow, floor = flow_of(case, spec), floor_along(case.tank, spec.side)
+
+    def speed(time: float) -> float:
+        """Largest speed [m/s] between the bed and the surface."""
+        points = np.zeros((2, 3))
+        points[:, 2] = floor, flow.level(time)
+        return float(np.linalg.norm(flow.velocity(points, time), axis=1).max())
+
+    return _side(case, spec.side, flow.level, speed)
+
+
+def _side(case: Case, side: str, level, speed) -> SideEnergy:
     size = np.subtract(case.tank.upper, case.tank.lower)
-    width = size[1] if side[0] == "x" else size[0]
-    depth = max(level.max() - floor_along(case.tank, side), 0.0)
-    step = np.abs(level - _level_at(case, side)).max()
-    return 0.5 * case.water.density * width * depth * (case.case.gravity * step**2 + depth * speed**2)
+    along, across = (0, 1) if side[0] == "x" else (1, 0)
+    gravity = case.case.gravity
+    return SideEnergy(
+        level,
+        speed,
+        float(size[across]),
+        floor_along(case.tank, side),
+        _level_at(case, side),
+        case.water.density,
+        gravity,
+        float(size[along]) / math.sqrt(gravity * size[2]) if gravity > 0.0 else 0.0,
+    )
 
 
 def _level_at(case: Case, side: str) -> float:

@@ -66,7 +66,7 @@ class CoupledStepper:
         tolerance: float = 0.02,
         most_defect: float = 0.5,
         limits: Limits | None = None,
-        expected: float = 0.0,
+        coming: Callable[[float], float] | None = None,
     ) -> None:
         self.passes, self.tolerance = passes, tolerance
         self.pause: Callable[[], None] | None = None
@@ -88,7 +88,9 @@ class CoupledStepper:
             self.sheared = ShearedBlocks(self.structure, self.immersion.n_solids)
         self.ledger = Ledger()
         if water is not None:
-            self.ledger.available = water.available_energy() + expected
+            self.ledger.available = water.available_energy()
+        self._coming = coming
+        self._look_ahead()
         self.ledger.start(self._water_energy(), self._structure_energies())
         self.momentum = momentum_ledger(water, structure)
 
@@ -209,12 +211,18 @@ class CoupledStepper:
             self.ledger.entered = self.water.energy_through_sides()
         if self.water is not None:
             self.ledger.air = self.water.air_energy()
+        self._look_ahead()
         energies = self._structure_energies()
         record.energies = energies or {}
         record.balance = self.ledger.balance(self._water_energy(), energies)
         record.momentum = book_step(
             self.momentum, self.water, self.structure, dt, record.load, record.impulses
         )
+
+    def _look_ahead(self) -> None:
+        """The largest energy that sides could bring at any time so far."""
+        if self._coming is not None:
+            self.ledger.coming = max(self.ledger.coming, self._coming(self.time))
 
     def _cut(self, record: StepRecord) -> None:
         """The domain that the bodies leave now, and what they do to the water besides."""

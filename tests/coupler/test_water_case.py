@@ -10,7 +10,7 @@ from coupler.checks.case import problems, remarks
 from coupler.run.forecast import forecast
 from coupler.scene.build import build
 from coupler.scene.build_water import sea_level
-from coupler.scene.side_energy import side_energy
+from coupler.scene.side_energy import coming_energy
 from coupler.step.limits import Diverged, check_pressure
 from fluid.numerics import bounded
 from fluid.numerics.solve import NotConverged
@@ -207,11 +207,11 @@ def test_a_dry_start_keeps_its_books_from_the_first_step(side):
 
 def test_energy_that_a_side_can_bring():
     """A sea 0.2 m above the water: ½ ρ g Δz² over its depth; a stream on a dry bed has its speed too."""
-    sea = side_energy(case({"sea": [{"side": "x+", "level": 0.7}]}))
-    assert sea == pytest.approx(0.5 * 1000 * 0.2 * 0.7 * 9.81 * 0.2**2)
+    sea = coming_energy(case({"sea": [{"side": "x+", "level": 0.7}]}))
+    assert sea(0.0) == sea(0.3) == pytest.approx(0.5 * 1000 * 0.2 * 0.7 * 9.81 * 0.2**2)
     stream = {"kind": "steady", "side": "x-", "level": 0.3, "velocity": 1.0}
-    both = side_energy(case({"fill": [], "inflow": [stream]}))
-    assert both == pytest.approx(0.5 * 1000 * 0.2 * 0.3 * (9.81 * 0.3**2 + 0.3))
+    both = coming_energy(case({"fill": [], "inflow": [stream]}))
+    assert both(0.0) == pytest.approx(0.5 * 1000 * 0.2 * 0.3 * (9.81 * 0.3**2 + 0.3))
 
 
 def test_a_wave_without_its_still_water_is_remarked():
