@@ -444,7 +444,9 @@ def test_pip_fails_for_the_reason_that_its_log_tells(machine, log, reported):
 
 def as_a_user_who_may_only_read(machine, *words, **environment):
     """Root may write everywhere; so another user calls, who may write into the lists of the test alone."""
-    private = [place for place in machine.root.parents if place.stat().st_mode & 0o777 == 0o700]  # pytest's own
+    private = [
+        place for place in machine.root.parents if place.stat().st_mode & 0o777 == 0o700
+    ]  # pytest's own
     for place in (machine.root, *private):
         place.chmod(0o755)
     (machine.root.parent / "calls").touch()
