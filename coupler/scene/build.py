@@ -100,8 +100,8 @@ def _coupling(case: Case, structure, solids, clock, from_start: bool) -> Coupled
     if case.water:
         water, immersion = water_of(case, structure, solids)
     settles = from_start and case.joints and case.structure.start == "settled"
-    if settles and _settled(structure, water) and case.water:
-        water, immersion = water_of(case, structure, solids)
+    if settles and _settled(structure, water) and immersion is not None:
+        water, immersion = water_of(case, structure, solids, immersion.mesh)
     return CoupledStepper(
         water,
         structure,

@@ -18,8 +18,9 @@ SLACK = 1e-3
 """Share of a cell within which a box of water reaches a side of the tank."""
 
 
-def water_of(case: Case, structure, solids):
-    """(Water, Immersion) of a case with a structure or None and fixed solids [(vertices, faces)]."""
+def water_of(case: Case, structure, solids, mesh=None):
+    """(Water, Immersion) of a case with a structure or None and fixed solids [(vertices, faces)]; mesh: `Background` of
+    its tank, None: it is made here."""
     from coupler.scene.fill import start_level, start_velocity
     from coupler.step.immersion import Immersion
     from fluid.domain.covers import OPENINGS
@@ -31,7 +32,7 @@ def water_of(case: Case, structure, solids):
     if structure is not None:
         structure.share_work(over)
     w = case.water
-    mesh = mesh_of(case.tank)
+    mesh = mesh_of(case.tank) if mesh is None else mesh
     cracks = _narrow_cracks(w.cracks, structure, mesh)
     immersion = Immersion(mesh, structure, solids, w.covers, cracks, OPENINGS[w.openings])
     parameters = WaterParameters(

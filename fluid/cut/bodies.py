@@ -222,12 +222,18 @@ def _hull_planes(vertices):
 
 def _loop_plane(loop, inner):
     """Newell's normal of a polygon, pointing away from the inner point."""
-    normal = np.cross(loop, np.roll(loop, -1, axis=0)).sum(axis=0)
+    normal = _cross(loop, np.concatenate([loop[1:], loop[:1]])).sum(axis=0)
     normal = normal / np.linalg.norm(normal)
     middle = loop.mean(axis=0)
     if normal @ (middle - inner) < 0:
         normal = -normal
     return normal, float(normal @ middle)
+
+
+def _cross(a, b):
+    """a × b of vectors (k, 3); numpy's own takes ten times as long for few of them."""
+    ax, ay, az, bx, by, bz = *a.T, *b.T
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=1)
 
 
 def _reach(vertices, normals, offsets):

@@ -13,7 +13,7 @@ import numpy as np
 
 from kernel_decorators import inner, kernel
 from yade_scripts.blocks.block import Block
-from yade_scripts.blocks.polyhedra import face_areas, polygon_area_vector
+from yade_scripts.blocks.polyhedra import cross_products, face_areas, polygon_area_vector
 from yade_scripts.blocks.quadrature import Rule, gauss
 
 Array = np.ndarray
@@ -345,7 +345,7 @@ def _mapped_rule(corners: Array, rule: Rule) -> tuple[Array, Array]:
     shape = np.stack([(1 - u) * (1 - v), u * (1 - v), u * v, (1 - u) * v], axis=1)
     du = np.stack([-(1 - v), 1 - v, v, -v], axis=1) @ corners
     dv = np.stack([-(1 - u), -u, u, 1 - u], axis=1) @ corners
-    return shape @ corners, np.outer(w, w).ravel() * np.linalg.norm(np.cross(du, dv), axis=1)
+    return shape @ corners, np.outer(w, w).ravel() * np.linalg.norm(cross_products(du, dv), axis=1)
 
 
 def to_body(points: Array, row: Array, centre: Array, R: Array) -> Array:

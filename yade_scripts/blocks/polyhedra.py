@@ -28,7 +28,13 @@ class BlockError(ValueError):
 def polygon_area_vector(corners: Array) -> Array:
     """Area times unit normal of a planar polygon (k, 3) [m²]."""
     arm = corners - corners[0]
-    return 0.5 * np.cross(arm[1:-1], arm[2:]).sum(axis=0)
+    return 0.5 * cross_products(arm[1:-1], arm[2:]).sum(axis=0)
+
+
+def cross_products(a: Array, b: Array) -> Array:
+    """a × b of vectors (k, 3); numpy's own takes ten times as long for few of them."""
+    ax, ay, az, bx, by, bz = *a.T, *b.T
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=1)
 
 
 def fans(faces) -> tuple[Array, Array]:

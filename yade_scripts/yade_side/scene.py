@@ -185,10 +185,13 @@ class Scene:
 
     def displace(self, rows: Array, shift: Array, turn: Array) -> None:
         """Move the blocks `rows` by shift (m, 3) and turn (m, 3, 3) about their centres."""
-        for row, move, Q in zip(rows, shift, turn):
-            state = self._bodies[row].state
+        if len(rows) == 0:
+            return
+        states = [self._bodies[row].state for row in rows]
+        turned = np.array([Q @ _matrix(state.ori) for state, Q in zip(states, turn)])
+        for state, move, (x, y, z, w) in zip(states, shift, Rotation.from_matrix(turned).as_quat().tolist()):
             state.pos = self._v(np.array(state.pos) + move)
-            state.ori = self._q(Q @ _matrix(state.ori))
+            state.ori = self.engine.Quaternion(w, x, y, z)
 
     # ---- saving and going back ------------------------------------------------------------------------------
 
