@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.spatial import ConvexHull
 
+from fluid.mesh.arrays import Planes
 from kernel_decorators import kernel
 
 # Two facets of a hull belong to one plane below this difference of (normal, offset / size).
@@ -146,6 +147,10 @@ class ConvexBodies:
     def cut_offsets(self) -> np.ndarray:
         """(P,) [m] offsets of the planes that the water is cut by."""
         return self.offsets + self.growth
+
+    def planes(self) -> Planes:
+        """The planes that the water is cut by, as kernels take them."""
+        return Planes(self.normals, self.cut_offsets(), self.plane_start)
 
     def bounds(self) -> np.ndarray:
         """(n, 2, 3) [m] boxes that hold the grown bodies."""

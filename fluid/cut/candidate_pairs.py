@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fluid.mesh.arrays import Bins, Boxes
 from fluid.mesh.background import bin_of
 from kernel_decorators import plain
 
@@ -22,14 +23,12 @@ def near_pairs(mesh, solids, chosen, margin) -> tuple[np.ndarray, np.ndarray]:
     bounds = solids.bounds()[chosen]
     low = np.stack([bin_of(a, bounds[:, 0, k] - margin) for k, a in enumerate(mesh.axes)], axis=1)
     high = np.stack([bin_of(a, bounds[:, 1, k] + margin) for k, a in enumerate(mesh.axes)], axis=1)
+    bins = Bins(mesh.bin_start, mesh.bin_cells, len(mesh.axes[1]) - 1, len(mesh.axes[2]) - 1)
+    planes, reach = solids.planes(), Boxes(low, high)
     capacity = 64 * len(chosen) + 1024
     while True:
         cell, body = np.empty(capacity, dtype=np.int64), np.empty(capacity, dtype=np.int64)
-        n = _search(
-            mesh.nodes, mesh.cells, mesh.bin_start, mesh.bin_cells, len(mesh.axes[1]) - 1,
-            len(mesh.axes[2]) - 1, chosen, low, high, solids.normals, solids.cut_offsets(),
-            solids.plane_start, margin, cell, body,
-        )  # fmt: skip
+        n = _search(mesh.nodes, mesh.cells, bins, chosen, reach, planes, margin, cell, body)
         if n <= capacity:
             break
         capacity = n
@@ -38,14 +37,15 @@ def near_pairs(mesh, solids, chosen, margin) -> tuple[np.ndarray, np.ndarray]:
 
 
 @plain
-def _apart(nodes, cells, e, normals, offsets, first, last, margin):
+def _apart(nodes, cells, e, planes, first, last, margin):
     """Is the cell wholly beyond one of the planes first:last?"""
     for g in range(first, last):
         beyond = True
         for k in range(4):
             i = cells[e, k]
-            d = normals[g, 0] * nodes[i, 0] + normals[g, 1] * nodes[i, 1] + normals[g, 2] * nodes[i, 2]
-            if d - offsets[g] <= margin:
+            n = planes.normal[g]
+            d = n[0] * nodes[i, 0] + n[1] * nodes[i, 1] + n[2] * nodes[i, 2]
+            if d - planes.offset[g] <= margin:
                 beyond = False
                 break
         if beyond:
@@ -54,21 +54,18 @@ def _apart(nodes, cells, e, normals, offsets, first, last, margin):
 
 
 @plain
-def _search(
-    nodes, cells, bin_start, bin_cells, ny, nz, chosen, low, high, normals, offsets, plane_start, margin,
-    cell, body,
-):  # fmt: skip
-    """Fill the pairs as far as they fit -> how many there are."""
+def _search(nodes, cells, bins, chosen, reach, planes, margin, cell, body):
+    """Fill the pairs as far as they fit -> how many there are. reach: bins of each of the chosen bodies."""
     n = 0
     for b in range(len(chosen)):
-        first, last = plane_start[chosen[b]], plane_start[chosen[b] + 1]
-        for i in range(low[b, 0], high[b, 0] + 1):
-            for j in range(low[b, 1], high[b, 1] + 1):
-                for k in range(low[b, 2], high[b, 2] + 1):
-                    at = (i * ny + j) * nz + k
-                    for s in range(bin_start[at], bin_start[at + 1]):
-                        e = bin_cells[s]
-                        if _apart(nodes, cells, e, normals, offsets, first, last, margin):
+        first, last = planes.start[chosen[b]], planes.start[chosen[b] + 1]
+        for i in range(reach.low[b, 0], reach.high[b, 0] + 1):
+            for j in range(reach.low[b, 1], reach.high[b, 1] + 1):
+                for k in range(reach.low[b, 2], reach.high[b, 2] + 1):
+                    at = (i * bins.ny + j) * bins.nz + k
+                    for s in range(bins.start[at], bins.start[at + 1]):
+                        e = bins.cells[s]
+                        if _apart(nodes, cells, e, planes, first, last, margin):
                             continue
                         if n < len(cell):
                             cell[n] = e

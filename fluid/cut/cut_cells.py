@@ -14,9 +14,11 @@ vertices made by splitting only round-off is snapped (see `pieces.py`).
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from fluid.cut.cut_arrays import Cuts, behind, doubled, output, trimmed
+from fluid.cut.cut_arrays import Cuts, Output, behind, doubled, output, trimmed
 from fluid.cut.fans import fan
 from fluid.cut.parts_of_cell import label_parts
 from fluid.cut.pieces import (
@@ -25,6 +27,7 @@ from fluid.cut.pieces import (
     OUTPUT_FULL,
     ROUND_OFF,
     WORKSPACE_FULL,
+    Workspace,
     classify,
     copy_piece,
     merge_moments,
@@ -34,6 +37,7 @@ from fluid.cut.pieces import (
     workspace,
 )
 from fluid.cut.wetted_polygons import wetted
+from fluid.mesh.arrays import Corners, Planes
 from fluid.numerics.threads import over
 from kernel_decorators import inner, released
 
@@ -49,8 +53,42 @@ class CutFailed(RuntimeError):
     """The cross-section of a piece could not be closed although the piece is not thin."""
 
 
+class Limits(NamedTuple):
+    """tolerance [m]: nodes of the mesh nearer to a plane lie in it · round_off [m]: vertices made by splitting do ·
+    thin [m]: see THIN · least [m²]: see NO_AREA."""
+
+    tolerance: float
+    round_off: float
+    thin: float
+    least: float
+
+    @classmethod
+    def of(cls, tolerance: float, spacing: float) -> Limits:
+        """Of a mesh with that spacing [m]."""
+        return cls(tolerance, ROUND_OFF * spacing, THIN * spacing, NO_AREA * spacing * spacing)
+
+
+class Cutting(NamedTuple):
+    """What a cut works with: scratch, planes of all bodies, tolerances, and the arrays that it fills."""
+
+    work: Workspace
+    planes: Planes
+    limits: Limits
+    out: Output
+
+
+class Chosen(NamedTuple):
+    """cell (C,) to cut · start (C+1,), bodies: those near each · link_area (C,) [m²] over which pieces of it are one
+    part, < 0: all are, and no openings are listed."""
+
+    cell: np.ndarray
+    start: np.ndarray
+    bodies: np.ndarray
+    link_area: np.ndarray
+
+
 @inner
-def _nearby(w, x, bodies, normals, offsets, plane_start, tolerance):
+def _nearby(w, x, bodies, planes, tolerance):
     """Bodies that meet or touch the cell x (4, 3), with the planes of each that separate some of its nodes.
 
     -> number of bodies, or -1 when one body holds the whole cell."""
@@ -60,10 +98,15 @@ def _nearby(w, x, bodies, normals, offsets, plane_start, tolerance):
         body = bodies[at]
         end = w.near_start[n]
         apart = False
-        for g in range(plane_start[body], plane_start[body + 1]):
+        for g in range(planes.start[body], planes.start[body + 1]):
             low, high = np.inf, -np.inf
             for k in range(4):
-                d = normals[g, 0] * x[k, 0] + normals[g, 1] * x[k, 1] + normals[g, 2] * x[k, 2] - offsets[g]
+                n_x = (
+                    planes.normal[g, 0] * x[k, 0]
+                    + planes.normal[g, 1] * x[k, 1]
+                    + planes.normal[g, 2] * x[k, 2]
+                )
+                d = n_x - planes.offset[g]
                 if abs(d) <= tolerance:
                     d = 0.0
                 w.near_distance[end, k] = d
@@ -189,10 +232,11 @@ def _openings(w, piece, origin, part, out, n_open):
 
 
 @inner
-def _emit(w, cell, origin, count, n_near, whole, normals, round_off, least, link_area, out, at):
+def _emit(cut, cell, origin, count, n_near, whole, link_area, at):
     """Write the parts of one cell, their moments, wetted polygons and tetrahedra (and openings if link_area >= 0)."""
+    w, out = cut.work, cut.out
     n_part, n_wet, n_open, n_tet = at[1], at[2], at[3], at[4]
-    parts = label_parts(w, count, normals, round_off, link_area)
+    parts = label_parts(w, count, cut.planes.normal, cut.limits.round_off, link_area)
     if n_part + parts > len(out.part_cell):
         return OUTPUT_FULL
     for part in range(n_part, n_part + parts):
@@ -204,7 +248,7 @@ def _emit(w, cell, origin, count, n_near, whole, normals, round_off, least, link
         part = n_part + w.label[piece]
         piece_moments(w, piece, w.moments)
         merge_moments(out.part_moments[part], w.moments)
-        state, n_wet = wetted(w, piece, origin, n_near, normals, round_off, least, part, out, n_wet)
+        state, n_wet = wetted(cut, piece, origin, n_near, part, n_wet)
         if state == DONE and link_area >= 0.0:
             state, n_open = _openings(w, piece, origin, part, out, n_open)
         if state == DONE and not whole:
@@ -219,42 +263,27 @@ def _emit(w, cell, origin, count, n_near, whole, normals, round_off, least, link
 
 
 @released
-def _cut_cells(
-    last, nodes, cells, chosen, body_start, bodies, normals, offsets, plane_start, tolerance, spacing, link_area,
-    w, out, at,
-):  # fmt: skip
-    """Cut the cells `chosen` from at[0] to before `last`.
+def _cut_cells(last, mesh, chosen, cut, at):
+    """Cut the chosen cells from at[0] to before `last`.
 
-    at (5,) <- cells, parts, wetted polygons, openings, tetrahedra done."""
+    mesh: Corners · cut: Cutting · at (5,) <- cells, parts, wetted polygons, openings, tetrahedra done."""
     x = np.empty((4, 3))
-    round_off, thin, least = ROUND_OFF * spacing, THIN * spacing, NO_AREA * spacing * spacing
+    w, planes, limits = cut.work, cut.planes, cut.limits
+    nodes, cells = mesh
     for row in range(at[0], last):
+        cell = chosen.cell[row]
         for k in range(4):
             for c in range(3):
-                x[k, c] = nodes[cells[chosen[row], k], c]
-        near = _nearby(
-            w, x, bodies[body_start[row] : body_start[row + 1]], normals, offsets, plane_start, tolerance
-        )
+                x[k, c] = nodes[cells[cell, k], c]
+        bodies = chosen.bodies[chosen.start[row] : chosen.start[row + 1]]
+        near = _nearby(w, x, bodies, planes, limits.tolerance)
         if near >= 0:
             start_piece(w, x)
-            state, count, whole = _fluid_pieces(w, near, round_off, thin)
+            state, count, whole = _fluid_pieces(w, near, limits.round_off, limits.thin)
             if state != DONE:
                 return state
             if count > 0:
-                state = _emit(
-                    w,
-                    chosen[row],
-                    x[0],
-                    count,
-                    near,
-                    whole,
-                    normals,
-                    round_off,
-                    least,
-                    link_area[row],
-                    out,
-                    at,
-                )
+                state = _emit(cut, cell, x[0], count, near, whole, chosen.link_area[row], at)
                 if state != DONE:
                     return state
         at[0] = row + 1
@@ -270,33 +299,26 @@ def cut_cells(nodes, cells, chosen, body_start, bodies, solids, tolerance, spaci
     a cell are one part and no openings are listed.
     Raises CutFailed where the cross-section of a piece that is not thin cannot be closed."""
     link_area = np.broadcast_to(np.asarray(link_area, float), len(chosen)).copy()
-    mesh, which = (nodes, cells), (chosen, body_start, bodies)
-    return behind(
-        over(_cut_range, len(chosen), mesh, which, solids, tolerance, spacing, link_area, weight=WORK)
-    )
+    mesh, which = Corners(nodes, cells), Chosen(chosen, body_start, bodies, link_area)
+    limits = Limits.of(tolerance, spacing)
+    return behind(over(_cut_range, len(chosen), mesh, which, solids.planes(), limits, weight=WORK))
 
 
-def _cut_range(first, last, mesh, which, solids, tolerance, spacing, link_area) -> Cuts:
-    """Those of the chosen cells from `first` to before `last`; arguments of `cut_cells`."""
+def _cut_range(first, last, mesh: Corners, chosen: Chosen, planes: Planes, limits: Limits) -> Cuts:
+    """Those of the chosen cells from `first` to before `last`."""
     at = np.array([first, 0, 0, 0, 0])
-    chosen, body_start, bodies = which
     scale = 1
-    most_bodies = int(np.diff(body_start[first : last + 1]).max()) if last > first else 0
-    most_planes = int(np.diff(solids.plane_start).max()) if len(solids) else 0
+    most_bodies = int(np.diff(chosen.start[first : last + 1]).max()) if last > first else 0
+    most_planes = int(np.diff(planes.start).max(initial=0))
     w = workspace(scale, most_bodies, most_bodies * most_planes)
     count = last - first
-    out = output(count * 4 + 64, count * 32 + 256, bool((link_area >= 0).all()))
-    offsets = solids.cut_offsets()
+    out = output(count * 4 + 64, count * 32 + 256, bool((chosen.link_area >= 0).all()))
     while True:
-        state = _cut_cells(
-            last, *mesh, chosen, body_start, bodies, solids.normals, offsets, solids.plane_start,
-            tolerance, spacing, link_area, w, out, at,
-        )  # fmt: skip
+        state = _cut_cells(last, mesh, chosen, Cutting(w, planes, limits, out), at)
         if state == DONE:
             return _with_volume(trimmed(out, at))
         if state == BROKEN_CAP:
-            nodes, cells = mesh
-            raise CutFailed(_failure(cells, nodes, chosen, body_start, bodies, int(at[0])))
+            raise CutFailed(_failure(mesh, chosen, int(at[0])))
         if state == WORKSPACE_FULL:
             scale *= 2
             w = workspace(scale, most_bodies, most_bodies * most_planes)
@@ -312,10 +334,11 @@ def _with_volume(cuts):
     return cuts.kept(solid)
 
 
-def _failure(cells, nodes, chosen, body_start, bodies, row):
-    centre = nodes[cells[chosen[row]]].mean(axis=0)
-    near = bodies[body_start[row] : body_start[row + 1]].tolist()
+def _failure(mesh: Corners, chosen: Chosen, row: int) -> str:
+    cell = chosen.cell[row]
+    centre = mesh.nodes[mesh.cells[cell]].mean(axis=0)
+    near = chosen.bodies[chosen.start[row] : chosen.start[row + 1]].tolist()
     return (
-        f"cell {chosen[row]} at {np.round(centre, 6).tolist()} m could not be cut by bodies {near}: "
+        f"cell {cell} at {np.round(centre, 6).tolist()} m could not be cut by bodies {near}: "
         "check that the polyhedra are convex and no smaller than a millionth of the cell"
     )

@@ -14,11 +14,9 @@ def facing(bodies, polygons, reach, bounds, loose):
     (n_bodies,) bool: only what lies between two things one of which is loose counts; sides of the tank are not."""
     body, centroid, normal = polygons
     box = bodies.bounds()
-    start, near = near_bodies(box[:, 0], box[:, 1], loose, float(reach.max(initial=0.0)))
-    return _facing(
-        body, np.ascontiguousarray(centroid), np.ascontiguousarray(normal), bodies.normals, bodies.cut_offsets(),
-        bodies.plane_start, loose, start, near, bounds, reach,
-    )  # fmt: skip
+    near = near_bodies(box[:, 0], box[:, 1], loose, float(reach.max(initial=0.0)))
+    polygons = (body, np.ascontiguousarray(centroid), np.ascontiguousarray(normal))
+    return _facing(polygons, bodies.planes(), loose, near, bounds, reach)
 
 
 @kernel
@@ -45,9 +43,11 @@ def near_bodies(low, high, loose, reach):
 
 
 @kernel
-def _facing(
-    face_body, centroid, normal, normals, offsets, plane_start, loose, near_start, near, bounds, reach
-):  # fmt: skip
+def _facing(polygons, planes, loose, near, bounds, reach):
+    """near: (start, members) of `near_bodies`."""
+    face_body, centroid, normal = polygons
+    normals, offsets, plane_start = planes
+    near_start, members = near
     in_film, plane = np.zeros(face_body.shape[0], np.bool_), np.empty(face_body.shape[0], np.int64)
     for s in range(face_body.shape[0]):
         b = face_body[s]
@@ -67,7 +67,7 @@ def _facing(
         for t in range(near_start[b], near_start[b + 1]):
             if in_film[s]:
                 break
-            other = near[t]
+            other = members[t]
             first, last = 0.0, reach[s]
             for g in range(plane_start[other], plane_start[other + 1]):
                 along, room = 0.0, offsets[g]

@@ -10,8 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fluid.cut.cut_arrays import Cuts
 from fluid.cut.pieces import workspace
 from fluid.cut.polygons import shared_area
+from fluid.mesh.arrays import Corners
 from fluid.numerics.threads import over
 from kernel_decorators import inner, kernel, released
 
@@ -33,6 +35,30 @@ class Contacts(NamedTuple):
     full: np.ndarray
 
 
+class PartsOfCells(NamedTuple):
+    """Elements in the order of their cells: part (M,) row among the cut parts, -1 whole · start (cells + 1,) first
+    element of each cell."""
+
+    part: np.ndarray
+    start: np.ndarray
+
+
+class OpenFaces(NamedTuple):
+    """Open polygons of cut parts by the face they lie in: polygon order[s], s from start[4 part + face], has the
+    corners x (k, 3) [m] from polygon_start[polygon]."""
+
+    order: np.ndarray
+    start: np.ndarray
+    polygon_start: np.ndarray
+    x: np.ndarray
+
+    @classmethod
+    def of(cls, cuts: Cuts) -> OpenFaces:
+        """Those of parts that were cut."""
+        order, start = _openings_by_face(cuts.open_part, cuts.open_face, len(cuts.part_cell))
+        return cls(order, start, cuts.open_start, cuts.open_x)
+
+
 def find_contacts(
     mesh, part, start, cuts, enough: float, old: Contacts | None = None, again=None
 ) -> Contacts:
@@ -42,22 +68,19 @@ def find_contacts(
     a face from which a lower bound of the area will do."""
     near = _with_parts(part, start) if again is None else again
     searched = _beside(mesh.neighbours, near)
-    order, open_start = _openings_by_face(cuts.open_part, cuts.open_face, len(cuts.part_cell))
-    state = (mesh, part, start, order, open_start, cuts, enough)
-    found = over(_in_range, len(searched), searched, *state, weight=WORK)
+    elements, openings = PartsOfCells(part, start), OpenFaces.of(cuts)
+    found = over(_in_range, len(searched), searched, mesh, elements, openings, enough, weight=WORK)
     fresh = found[0] if len(found) == 1 else Contacts(*(np.concatenate(arrays) for arrays in zip(*found)))
     return fresh if again is None or old is None else _merged(old, searched, fresh)
 
 
-def _in_range(first, last, searched, mesh, part, start, order, open_start, cuts, enough) -> Contacts:
+def _in_range(first, last, searched, mesh, elements, openings, enough) -> Contacts:
     """Contacts of the searched cells from `first` to before `last`."""
     chosen = searched[first:last]
-    count = _count(chosen, mesh.neighbours, part, start)
+    count = _count(chosen, mesh.neighbours, elements)
     fresh = Contacts(np.empty(count, np.int64), np.empty(count), np.empty(count))
-    _find(
-        chosen, mesh.nodes, mesh.cells, mesh.neighbours, part, start, order, open_start, cuts.open_start,
-        cuts.open_x, CLIP * mesh.spacing, enough, workspace(1, 0, 0), *fresh,
-    )  # fmt: skip
+    corners, limits = Corners(mesh.nodes, mesh.cells), (CLIP * mesh.spacing, enough)
+    _find(chosen, corners, mesh.neighbours, elements, openings, limits, workspace(1, 0, 0), fresh)
     return fresh
 
 
@@ -114,7 +137,8 @@ def _openings_by_face(open_part, open_face, n_parts):
 
 
 @released
-def _count(searched, neighbours, part, start):
+def _count(searched, neighbours, elements):
+    part, start = elements
     n = 0
     for one in searched:
         for e in range(start[one], start[one + 1]):
@@ -128,10 +152,10 @@ def _count(searched, neighbours, part, start):
 
 
 @released
-def _find(
-    searched, nodes, cells, neighbours, part, start, order, open_start, polygon_start, polygon_x, tolerance,
-    enough, w, cell, area, full,
-):  # fmt: skip
+def _find(searched, mesh, neighbours, elements, openings, limits, w, found):
+    """Fill the contacts `found`; limits: tolerance [m] of the clipping, share of a face that is enough."""
+    part, start = elements
+    cell, area, full = found
     n = 0
     for one in searched:
         for e in range(start[one], start[one + 1]):
@@ -146,27 +170,27 @@ def _find(
                     if part[e] < 0 and part[other] < 0:
                         continue
                     cell[n] = one
-                    area[n], full[n] = _contact_area(
-                        nodes, cells, one, f, part[e], g, part[other], order, open_start, polygon_start,
-                        polygon_x, tolerance, enough, w,
-                    )  # fmt: skip
+                    ours = 4 * part[e] + f if part[e] >= 0 else -1
+                    theirs = 4 * part[other] + g if part[other] >= 0 else -1
+                    area[n], full[n] = _contact_area(mesh, one, f, ours, theirs, openings, limits, w)
                     n += 1
 
 
 @inner
-def _load_opening(w, slot, row, polygon_start, polygon_x):
-    first = polygon_start[row]
-    w.corners[slot] = polygon_start[row + 1] - first
+def _load_opening(w, slot, row, openings):
+    first = openings.polygon_start[row]
+    w.corners[slot] = openings.polygon_start[row + 1] - first
     for k in range(w.corners[slot]):
         for c in range(3):
-            w.polygon[slot, k, 4 + c] = polygon_x[first + k, c]
+            w.polygon[slot, k, 4 + c] = openings.x[first + k, c]
 
 
 @inner
-def _open_area(key, order, open_start, polygon_start, x):
+def _open_area(key, openings):
     """Area [m2] of the openings of a part in a face, key = 4 part + face."""
+    order, start, polygon_start, x = openings
     area = 0.0
-    for s in range(open_start[key], open_start[key + 1]):
+    for s in range(start[key], start[key + 1]):
         o = polygon_start[order[s]]
         sx, sy, sz = 0.0, 0.0, 0.0
         ax, ay, az = x[o + 1, 0] - x[o, 0], x[o + 1, 1] - x[o, 1], x[o + 1, 2] - x[o, 2]
@@ -181,36 +205,36 @@ def _open_area(key, order, open_start, polygon_start, x):
 
 
 @inner
-def _contact_area(
-    nodes, cells, cell, f, part, g, other, order, open_start, polygon_start, polygon_x, tolerance, enough, w
-):
+def _contact_area(mesh, cell, f, ours, theirs, openings, limits, w):
     """Area over which two parts touch across the face opposite to corner f of `cell`, area of the face.
 
-    Part -1 is a whole cell; at most one of the two is. A lower bound of the area serves where it exceeds
-    the share `enough` of the face."""
+    ours, theirs: 4 part + face of the two, -1 for a whole cell, which at most one of them is. A lower bound of the area
+    serves where it exceeds the share of the face that is enough."""
+    nodes, cells = mesh
+    tolerance, enough = limits
     i, j, k = cells[cell, (f + 1) % 4], cells[cell, (f + 2) % 4], cells[cell, (f + 3) % 4]
     ax, ay, az = nodes[j, 0] - nodes[i, 0], nodes[j, 1] - nodes[i, 1], nodes[j, 2] - nodes[i, 2]
     bx, by, bz = nodes[k, 0] - nodes[i, 0], nodes[k, 1] - nodes[i, 1], nodes[k, 2] - nodes[i, 2]
     nx, ny, nz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
     twice = np.sqrt(nx * nx + ny * ny + nz * nz)
     full = twice / 2
-    if other < 0:
-        return _open_area(4 * part + f, order, open_start, polygon_start, polygon_x), full
-    theirs = _open_area(4 * other + g, order, open_start, polygon_start, polygon_x)
-    if part < 0:
-        return theirs, full
-    ours = _open_area(4 * part + f, order, open_start, polygon_start, polygon_x)
-    if min(ours, theirs) == 0.0 or max(ours, theirs) >= full * (1 - 1e-12):
-        return min(ours, theirs), full
+    if theirs < 0:
+        return _open_area(ours, openings), full
+    open_there = _open_area(theirs, openings)
+    if ours < 0:
+        return open_there, full
+    open_here = _open_area(ours, openings)
+    if min(open_here, open_there) == 0.0 or max(open_here, open_there) >= full * (1 - 1e-12):
+        return min(open_here, open_there), full
     # Both sides are partly closed, not necessarily in the same place; they share at least this much.
-    if ours + theirs > (1 + enough) * full:
-        return ours + theirs - full, full
+    if open_here + open_there > (1 + enough) * full:
+        return open_here + open_there - full, full
     nx, ny, nz = nx / twice, ny / twice, nz / twice
     area = 0.0
-    for s in range(open_start[4 * part + f], open_start[4 * part + f + 1]):
-        for t in range(open_start[4 * other + g], open_start[4 * other + g + 1]):
-            _load_opening(w, 0, order[s], polygon_start, polygon_x)
-            _load_opening(w, 1, order[t], polygon_start, polygon_x)
+    for s in range(openings.start[ours], openings.start[ours + 1]):
+        for t in range(openings.start[theirs], openings.start[theirs + 1]):
+            _load_opening(w, 0, openings.order[s], openings)
+            _load_opening(w, 1, openings.order[t], openings)
             area += shared_area(w, 0, 1, nx, ny, nz, tolerance)
             if area > enough * full:
                 return area, full

@@ -57,17 +57,18 @@ def _claim(w, polygon, at, plane, round_off, top):
 
 
 @inner
-def _claim_face(w, at, r, origin, normals, round_off, least, top, part, out, n_wet):
+def _claim_face(cut, at, r, origin, top, part, n_wet):
     """Let one body claim its share of the polygons 0..top of a face -> (state, new top, polygons written)."""
+    w = cut.work
     planes = w.near_start[at + 1] - w.near_start[at]
     g = w.near_plane[r]
     for polygon in range(top, -1, -1):
         if top + planes + 4 > len(w.corners) or w.corners[polygon] + planes + 2 > w.polygon.shape[1]:
             return WORKSPACE_FULL, top, n_wet
-        claimed, top = _claim(w, polygon, at, r, round_off, top)
+        claimed, top = _claim(w, polygon, at, r, cut.limits.round_off, top)
         if not claimed:
             continue
-        state, n_wet = _append(w, polygon, at, g, origin, normals, least, part, out, n_wet)
+        state, n_wet = _append(cut, polygon, at, g, origin, part, n_wet)
         if state != DONE:
             return state, top, n_wet
         if polygon != top:
@@ -77,10 +78,11 @@ def _claim_face(w, at, r, origin, normals, round_off, least, top, part, out, n_w
 
 
 @inner
-def _append(w, polygon, at, g, origin, normals, least, part, out, n_wet):
+def _append(cut, polygon, at, g, origin, part, n_wet):
     """Write a polygon in plane g of body number `at` as triangles -> (state, triangles written).
 
     Triangles, because the water surface may clip them later."""
+    w, out, normal = cut.work, cut.out, cut.planes.normal
     triangle = len(w.corners) - 1
     w.corners[triangle] = 3
     for second in range(1, w.corners[polygon] - 1):
@@ -93,7 +95,7 @@ def _append(w, polygon, at, g, origin, normals, least, part, out, n_wet):
                 w.polygon[triangle, k, c] = w.polygon[polygon, corner, c]
             for c in range(3):
                 row[16 + 3 * k + c] = w.polygon[polygon, corner, 4 + c]
-        polygon_rule(w, triangle, normals[g, 0], normals[g, 1], normals[g, 2], least, row)
+        polygon_rule(w, triangle, normal[g, 0], normal[g, 1], normal[g, 2], cut.limits.least, row)
         if row[0] > 0.0:
             for c in range(3):
                 for q in (1, 7, 10, 13, 16, 19, 22):
@@ -105,11 +107,12 @@ def _append(w, polygon, at, g, origin, normals, least, part, out, n_wet):
 
 
 @inner
-def wetted(w, piece, origin, n_near, normals, round_off, least, part, out, n_wet):
+def wetted(cut, piece, origin, n_near, part, n_wet):
     """Append the wetted polygons of a piece -> (state, number of polygons).
 
     Polygons 0..top of the stack are the part of a face that no body has claimed yet; only bodies that
     overlap and share a plane compete for the same part."""
+    w, normals, round_off = cut.work, cut.planes.normal, cut.limits.round_off
     for f in range(w.faces[piece]):
         top, loaded = 0, False
         for at in range(n_near):
@@ -119,9 +122,7 @@ def wetted(w, piece, origin, n_near, normals, round_off, least, part, out, n_wet
                 if not loaded:
                     load_face(w, piece, f, 0)
                     loaded = True
-                state, top, n_wet = _claim_face(
-                    w, at, r, origin, normals, round_off, least, top, part, out, n_wet
-                )
+                state, top, n_wet = _claim_face(cut, at, r, origin, top, part, n_wet)
                 if state != DONE:
                     return state, n_wet
     return DONE, n_wet

@@ -2,9 +2,25 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from kernel_decorators import inner, kernel
+
+
+class Walled(NamedTuple):
+    """Elements: centroid (M, 3) [m] · wall (M,) a body that each is wetted by, -1 = none."""
+
+    centroid: np.ndarray
+    wall: np.ndarray
+
+
+class Placed(NamedTuple):
+    """Where bodies are: centre (n, 3) [m] · rotation (n, 3, 3) body to world."""
+
+    centre: np.ndarray
+    rotation: np.ndarray
 
 
 def pick_old_nodes(old, new) -> np.ndarray:
@@ -81,12 +97,10 @@ def _old_elements(old, new, chosen):
     cell = new.parent_cell[chosen]
     first = np.searchsorted(old.parent_cell, cell)
     last = np.searchsorted(old.parent_cell, cell, side="right")
-    before, after = old.memory.bodies, new.memory.bodies
-    return _same_side(
-        first, last, new.centroid[chosen], _wall_of(new)[chosen], old.centroid, _wall_of(old),
-        before.centre, before.rotation, after.centre, after.rotation,
-        before.normals, before.cut_offsets(), before.plane_start,
-    )  # fmt: skip
+    before, after = (Placed(d.memory.bodies.centre, d.memory.bodies.rotation) for d in (old, new))
+    sought = Walled(new.centroid[chosen], _wall_of(new)[chosen])
+    found = Walled(old.centroid, _wall_of(old))
+    return _same_side(first, last, sought, found, before, after, old.memory.bodies.planes())
 
 
 def _wall_of(domain):
@@ -97,10 +111,12 @@ def _wall_of(domain):
 
 
 @kernel
-def _same_side(
-    first, last, point, wall, centroid, old_wall, centre, rotation, new_centre, new_rotation, normals,
-    offsets, plane_start,
-):  # fmt: skip
+def _same_side(first, last, sought, old, before, after, planes):
+    point, wall = sought
+    centroid, old_wall = old
+    centre, rotation = before
+    new_centre, new_rotation = after
+    normals, offsets, plane_start = planes
     found = np.full(len(first), -1, dtype=np.int64)
     x, local = np.empty(3), np.empty(3)
     for e in range(len(first)):

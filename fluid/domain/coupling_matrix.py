@@ -15,23 +15,21 @@ def wetted_coupling(domain, polygons=slice(None)) -> sp.csr_matrix:
     that the body's motion V = (v, omega) pushes into the test functions. Exact: the integrands are of
     degree 2. domain: PhysicalDomain; polygons: rows of its wetted polygons to sum over."""
     shape = (len(domain.nodes), 6 * domain.n_bodies)
-    cell, body = domain.face_cell[polygons], domain.face_body[polygons]
-    if len(cell) == 0:
+    wetted = domain.polygons(polygons)
+    if len(wetted.cell) == 0:
         return sp.csr_matrix(shape)
-    area, normal, points = (f[polygons] for f in (domain.face_area, domain.face_normal, domain.face_points))
-    block = _blocks(
-        cell, body, area, normal, points, domain.body_centre,
-        domain.nodes, domain.cells, domain.parent_cell, domain.memory.mesh.gradients,
-    )  # fmt: skip
-    start, members = polygons_of_nodes(cell, domain.cells, shape[0])
-    row = _distinct(start, members, body, domain.n_bodies)
-    values, columns = _summed(start, members, body, block, row, domain.n_bodies)
+    block = _blocks(wetted, domain.body_centre, domain.nodes, domain.hats)
+    start, members = polygons_of_nodes(wetted.cell, domain.cells, shape[0])
+    row = _distinct(start, members, wetted.body, domain.n_bodies)
+    values, columns = _summed(start, members, wetted.body, block, row, domain.n_bodies)
     return sp.csr_matrix((values.ravel(), columns.ravel(), 6 * row), shape=shape)
 
 
 @kernel
-def _blocks(face_cell, face_body, area, normal, points, centre, nodes, cells, parent, g):
+def _blocks(polygons, centre, nodes, hats):
     """∫ N_a (n, (x - x_b) x n) dA over every polygon, (S, 4, 6), a the corners of its cell."""
+    face_cell, face_body, area, normal, points = polygons
+    cells, parent, g = hats
     block = np.zeros((len(face_cell), 4, 6))
     x, hat, turning = np.empty(3), np.empty(4), np.empty(3)
     for s in range(len(face_cell)):

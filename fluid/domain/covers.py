@@ -14,6 +14,7 @@ cell wide) and close openings narrower than about a cell, so they are off by def
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -64,21 +65,28 @@ OPENINGS = {"all": Connection(), "wide": WIDE_OPENINGS, "edges": EDGES_APART}
 """By the names that a case gives."""
 
 
-def virtual_cells(
-    mesh, parent, part, start, contacts, connection, part_in_slit
-) -> tuple[np.ndarray, np.ndarray]:
+class VirtualElements(NamedTuple):
+    """parent (M,) background cell of each element, ascending · part (M,) row of its cut part, -1 whole · start
+    (cells + 1,) first element of each cell · in_slit (M,) bool: its contacts count over any area."""
+
+    parent: np.ndarray
+    part: np.ndarray
+    start: np.ndarray
+    in_slit: np.ndarray
+
+
+def virtual_cells(mesh, elements, contacts, connection, part_in_slit) -> tuple[np.ndarray, np.ndarray]:
     """Nodes of the virtual elements.
 
-    mesh: Background · parent (M,) background cell of each element, ascending · part (M,) row of its cut part, -1 whole
-    start (cells + 1,) first element of each cell · contacts: Contacts · connection: Connection
+    mesh: Background · elements: `physical_domain.Elements` · contacts: Contacts · connection: Connection
     part_in_slit (K,) bool: cut parts beside slits, whose contacts count over any area
     -> cells (M, 4), parent_node (N,)."""
-    several = _nodes_with_choice(mesh.cells, part, start, len(mesh.nodes))
-    label = _unite_corners(
-        mesh.cells, mesh.neighbours, parent, part, start, several, contacts.area, contacts.full,
-        np.append(part_in_slit, False)[part], connection.face, NO_AREA * mesh.spacing**2,
-    )  # fmt: skip
-    return _numbered(mesh.cells, parent, several, label, len(mesh.nodes))
+    several = _nodes_with_choice(mesh.cells, elements.part, elements.start, len(mesh.nodes))
+    in_slit = np.append(part_in_slit, False)[elements.part]
+    virtual = VirtualElements(elements.parent, elements.part, elements.start, in_slit)
+    least = NO_AREA * mesh.spacing**2
+    label = _unite_corners(mesh.cells, mesh.neighbours, virtual, several, contacts, connection.face, least)
+    return _numbered(mesh.cells, elements.parent, several, label, len(mesh.nodes))
 
 
 def components(cells, n_nodes: int) -> np.ndarray:
@@ -144,13 +152,14 @@ def _numbered(cells, parent, several, label, n_nodes):
 
 
 @kernel
-def _unite_corners(cells, neighbours, parent, part, start, several, areas, fulls, slit, share, least):
+def _unite_corners(cells, neighbours, elements, several, contacts, share, least):
     """Union-find over the corners 4 e + k of the elements, at nodes that may have several copies.
 
-    areas, fulls (L,) [m2]: of the contacts of cut parts, in the order in which they are met here.
-    slit (M,) bool: elements whose contacts count over any area.
+    elements: VirtualElements · contacts: Contacts of cut parts, in the order in which they are met here.
     With a threshold, groups of cut parts that it has left without a whole cell are then joined across their
     widest opening, until nothing changes: a threshold closes openings, it makes no pockets."""
+    parent, part, start, slit = elements
+    areas, fulls = contacts.area, contacts.full
     label = np.arange(4 * len(parent))
     group = np.arange(len(parent) if share > 0.0 else 0)
     anchored = part < 0

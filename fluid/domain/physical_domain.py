@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,6 +30,7 @@ from fluid.cut.recut import joined
 from fluid.domain.continued_nodes import pick_old_nodes
 from fluid.domain.coupling_matrix import wetted_coupling
 from fluid.domain.covers import Connection, virtual_cells, without_pockets
+from fluid.mesh.arrays import Hats, WettedPolygons
 from fluid.mesh.background import Background, gradients
 from kernel_decorators import kernel
 
@@ -65,8 +67,7 @@ class Memory:
     contacts: Contacts | None
 
 
-@dataclass(frozen=True)
-class Elements:
+class Elements(NamedTuple):
     """Fluid elements in the order of the background cells: parent (M,) background cell · part (M,) row of the cut
     part, -1 whole or nothing removed · start (cells + 1,) first element of each cell · of_part (K,) element of each cut
     part."""
@@ -112,6 +113,21 @@ class PhysicalDomain:
     body_centre: np.ndarray
     covers: str
     memory: Memory = field(repr=False, compare=False)
+
+    def polygons(self, rows=slice(None)) -> WettedPolygons:
+        """These of the wetted polygons, as kernels take them."""
+        return WettedPolygons(
+            self.face_cell[rows],
+            self.face_body[rows],
+            self.face_area[rows],
+            self.face_normal[rows],
+            self.face_points[rows],
+        )
+
+    @cached_property
+    def hats(self) -> Hats:
+        """The linear functions of the cells, as kernels take them."""
+        return Hats(self.cells, self.parent_cell, self.memory.mesh.gradients)
 
     @cached_property
     def is_cut(self) -> np.ndarray:
@@ -304,9 +320,7 @@ def _assembled(memory: Memory, elements: Elements, covers: str) -> PhysicalDomai
     else:
         cells, parent_node = virtual_cells(
             mesh,
-            elements.parent,
-            elements.part,
-            elements.start,
+            elements,
             memory.contacts,
             memory.connection,
             _parts_in_slits(mesh, memory.bodies, cuts, memory.connection),

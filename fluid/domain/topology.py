@@ -16,6 +16,7 @@ import numpy as np
 
 from fluid.domain.coupling_matrix import polygons_of_nodes
 from fluid.domain.moments import FluidParts
+from fluid.mesh.arrays import Edges, FluidCells, Hats
 from fluid.mesh.background import Background
 from fluid.numerics.threads import over
 from kernel_decorators import kernel, ranged, released
@@ -97,6 +98,18 @@ class Topology:
             slanting=mesh.slanting[domain.parent_node],
             spacing=mesh.spacing,
         )
+
+    @cached_property
+    def fluid_cells(self) -> FluidCells:
+        """The cells as kernels take them."""
+        return FluidCells(
+            self.cells, self.parent, self.gradients, self.volume, self.share, self.size, self.upright
+        )
+
+    @cached_property
+    def hats(self) -> Hats:
+        """The linear functions of the cells as kernels take them."""
+        return Hats(self.cells, self.parent, self.gradients)
 
     @cached_property
     def finer(self) -> np.ndarray:
@@ -364,6 +377,11 @@ class Graph:
     neighbour: np.ndarray
     stiffness: np.ndarray
 
+    @property
+    def edges(self) -> Edges:
+        """The edges as kernels take them."""
+        return Edges(self.row, self.start, self.neighbour, self.stiffness)
+
     def covers(self, nodes) -> bool:
         """Whether all these nodes (n,) are listed."""
         return bool((self.row[nodes] >= 0).all())
@@ -385,18 +403,9 @@ class Graph:
         if len(cell_list) == 0:
             return self
         t, stiffness = topology, self.stiffness.copy()
-        _take_out(
-            cell_list,
-            t.cells,
-            t.parent,
-            t.products,
-            t.volume,
-            self.row,
-            self.start,
-            self.neighbour,
-            stiffness,
-        )
-        return replace(self, stiffness=stiffness)
+        found = replace(self, stiffness=stiffness)
+        _take_out(cell_list, t.cells, t.parent, t.products, t.volume, found.edges)
+        return found
 
 
 WORK = 10
@@ -406,7 +415,8 @@ _PAIR = np.array([[-1, 0, 1, 2], [0, -1, 3, 4], [1, 3, -1, 5], [2, 4, 5, -1]])
 
 
 @kernel
-def _take_out(cell_list, cells, parent, products, volume, row, start, neighbour, stiffness):
+def _take_out(cell_list, cells, parent, products, volume, edges):
+    row, start, neighbour, stiffness = edges
     for e in cell_list:
         for a in range(4):
             r = row[cells[e, a]]

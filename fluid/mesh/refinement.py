@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fluid.mesh.arrays import Boxes, Planes
 from fluid.mesh.background import Background, MeshError, bin_of
 from fluid.mesh.bisection import MOST_LEVELS, Tetrahedra, refined
 from kernel_decorators import kernel
@@ -60,18 +61,8 @@ class NearBodies:
         """(M,) bool: cells of the mesh that are to have this level."""
         margin = self.margin * 2.0 ** (self.levels - level)
         low, high = _boxes_of(mesh)
-        return _near(
-            mesh.nodes,
-            mesh.cells,
-            low,
-            high,
-            self.normals,
-            self.offsets,
-            self.start,
-            self.lower,
-            self.upper,
-            margin,
-        )
+        planes, boxes = Planes(self.normals, self.offsets, self.start), Boxes(self.lower, self.upper)
+        return _near(mesh.nodes, mesh.cells, Boxes(low, high), planes, boxes, margin)
 
     def volume_in(self, lower, upper) -> float:
         """About how much [m³] of it lies in the box from lower to upper."""
@@ -188,8 +179,11 @@ def _divided(axis, low, high, share):
 
 
 @kernel
-def _near(nodes, cells, low, high, normals, offsets, start, body_low, body_high, margin):
+def _near(nodes, cells, boxes, planes, body_boxes, margin):
     """(M,) bool: cells that no plane of some body, moved out by the margin, parts from it, nor its box."""
+    low, high = boxes
+    normals, offsets, start = planes
+    body_low, body_high = body_boxes
     found = np.zeros(cells.shape[0], np.bool_)
     for e in range(cells.shape[0]):
         for b in range(start.shape[0] - 1):

@@ -113,7 +113,7 @@ class Films:
         if len(kept.void):
             cells = np.setdiff1d(cells, kept.void, assume_unique=True)
         g = np.broadcast_to(problem.dt * water.parameters.weight, (len(cells), 3))
-        return inflow(cells, g, t.cells, t.parent, t.gradients, t.volume, len(self.node))
+        return inflow(cells, g, t.fluid_cells, len(self.node))
 
 
 def _placed(block, rows, columns, shape):

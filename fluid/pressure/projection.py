@@ -20,7 +20,7 @@ water in it must not push (growth of 0.1 a step otherwise).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -87,8 +87,53 @@ class PressureProblem:
         return values[values.shape[0] - self.pockets :]
 
 
+class Rows(NamedTuple):
+    """The matrix that is filled, csr: indptr (n + 1,), indices, entries · anchored (n,) bool: next to p = 0 · turned
+    (n,): added to the diagonal."""
+
+    indptr: np.ndarray
+    indices: np.ndarray
+    entries: np.ndarray
+    anchored: np.ndarray
+    turned: np.ndarray
+
+
+class AtSurface(NamedTuple):
+    """level_set (N,) [m] · open_node (N,) bool: nodes on open sides, p = 0."""
+
+    level_set: np.ndarray
+    open_node: np.ndarray
+
+
+class Outside(NamedTuple):
+    """Nodal fields (N,) from which pressure is continued: pressure, and that of the air [Pa] · wet, open_node bool ·
+    level_set [m]."""
+
+    pressure: np.ndarray
+    air: np.ndarray
+    wet: np.ndarray
+    open_node: np.ndarray
+    level_set: np.ndarray
+
+
+class WetCells(NamedTuple):
+    """Cells with water: rows (n,) · share (n,) of them that is water."""
+
+    rows: np.ndarray
+    share: np.ndarray
+
+
+class Waterline(NamedTuple):
+    """Where cells lie near it: level_set (N,) [m] · beside_solid (N,) bool · deep [m]: cells with φ < deep are not."""
+
+    level_set: np.ndarray
+    beside_solid: np.ndarray
+    deep: float
+
+
 @ranged
-def _row_lengths(first, last, dofs, column, graph_row, start, neighbour, length):
+def _row_lengths(first, last, dofs, column, edges, length):
+    graph_row, start, neighbour = edges.row, edges.start, edges.neighbour
     for r in range(first, last):
         row = graph_row[dofs[r]]
         count = 1
@@ -98,10 +143,10 @@ def _row_lengths(first, last, dofs, column, graph_row, start, neighbour, length)
 
 
 @ranged
-def _wet_rows(
-    first, last, dofs, column, graph_row, start, neighbour, stiffness, phi, open_node, scale, reserve, indptr, indices,
-    entries, anchored, turned,
-):  # fmt: skip
+def _wet_rows(first, last, dofs, column, edges, surface, scale, reserve, made):
+    graph_row, start, neighbour, stiffness = edges
+    phi, open_node = surface
+    indptr, indices, entries, anchored, turned = made
     for r in range(first, last):
         i = dofs[r]
         row = graph_row[i]
@@ -139,15 +184,14 @@ def pressure_matrix(graph, phi, dofs, open_node, scale: float, reserve):
     """
     column = np.full(len(phi), -1, np.int64)
     column[dofs] = np.arange(len(dofs))
-    g, n = graph, len(dofs)
+    n, edges = len(dofs), graph.edges
     indptr = np.zeros(n + 1, np.int32)
-    over(_row_lengths, n, dofs, column, g.row, g.start, g.neighbour, indptr[1:])
+    over(_row_lengths, n, dofs, column, edges, indptr[1:])
     np.cumsum(indptr, out=indptr)
     indices, entries = np.empty(indptr[n], np.int32), np.empty(indptr[n])
     anchored, turned = np.zeros(n, bool), np.zeros(n)
-    edges = (g.row, g.start, g.neighbour, g.stiffness)
-    made = (indptr, indices, entries, anchored, turned)
-    over(_wet_rows, n, dofs, column, *edges, phi, open_node, scale, reserve, *made)
+    made = Rows(indptr, indices, entries, anchored, turned)
+    over(_wet_rows, n, dofs, column, edges, AtSurface(phi, open_node), scale, reserve, made)
     matrix = sp.csr_array((entries, indices, indptr), shape=(n, n))
     return matrix, anchored, turned
 
@@ -155,12 +199,12 @@ def pressure_matrix(graph, phi, dofs, open_node, scale: float, reserve):
 def pull_of_held(graph, dofs, held, scale: float):
     """-Σ_j K_ij x_j scale (n,) for the wet nodes dofs (n,): what nodes with a given pressure held (N,) [Pa] add to the
     right hand side; zero on all others."""
-    g = graph
-    return _pull(dofs, g.row, g.start, g.neighbour, g.stiffness, held, scale)
+    return _pull(dofs, graph.edges, held, scale)
 
 
 @kernel
-def _pull(dofs, graph_row, start, neighbour, stiffness, held, scale):
+def _pull(dofs, edges, held, scale):
+    graph_row, start, neighbour, stiffness = edges
     out = np.zeros(dofs.shape[0])
     for r in range(dofs.shape[0]):
         row = graph_row[dofs[r]]
@@ -223,16 +267,19 @@ def _cell_velocity(first, last, cell_list, u, remainder, cells, share, out):
                 out[s, k] += share[e, a] * u[cells[e, a], k]
 
 
-def inflow(cell_list, u_cell, cells, parent, g, volume, n_nodes):
-    """∫ u·∇N_i dV (N,) [m³/s] over the listed cells, u_cell (n, 3) one velocity each: exact for P1 velocities."""
+def inflow(cell_list, u_cell, fluid, n_nodes):
+    """∫ u·∇N_i dV (N,) [m³/s] over the listed cells, u_cell (n, 3) one velocity each: exact for P1 velocities.
+
+    fluid: FluidCells"""
     out = np.zeros(n_nodes)
-    reach = reach_of_cells(cell_list, cells)
-    owning(_inflow, n_nodes, reach, len(cell_list), cell_list, u_cell, cells, parent, g, volume, out)
+    reach = reach_of_cells(cell_list, fluid.cells)
+    owning(_inflow, n_nodes, reach, len(cell_list), cell_list, u_cell, fluid, out)
     return out
 
 
 @ranged
-def _inflow(first, last, runs, cell_list, u_cell, cells, parent, g, volume, out):
+def _inflow(first, last, runs, cell_list, u_cell, fluid, out):
+    cells, parent, g, volume = fluid.cells, fluid.parent, fluid.gradients, fluid.volume
     for run in range(runs.shape[0]):
         for s in range(runs[run, 0], runs[run, 1]):
             e = cell_list[s]
@@ -250,14 +297,16 @@ def with_ghosts(pressure, air, wet, open_node, phi, cell_list, cells):
     p_j = a_j + φ_j Σ_i (p_i - a_j) φ_i / Σ_i φ_i²,    over the wet corners i beside j, once for each shared cell."""
     n = len(pressure)
     out, up, down = pressure.copy(), np.zeros(n), np.zeros(n)
-    state = (pressure, air, wet, open_node, phi)
+    state = Outside(pressure, air, wet, open_node, phi)
     reach = reach_of_cells(cell_list, cells)
-    owning(_with_ghosts, n, reach, len(cell_list), cell_list, *state, cells, up, down, out)
+    owning(_with_ghosts, n, reach, len(cell_list), cell_list, state, cells, (up, down), out)
     return out
 
 
 @ranged
-def _with_ghosts(first, last, runs, cell_list, pressure, air, wet, open_node, phi, cells, up, down, out):
+def _with_ghosts(first, last, runs, cell_list, state, cells, sums, out):
+    pressure, air, wet, open_node, phi = state
+    up, down = sums
     for run in range(runs.shape[0]):
         for s in range(runs[run, 0], runs[run, 1]):
             e = cell_list[s]
@@ -293,17 +342,18 @@ def _cell_gradient(first, last, cell_list, f, cells, parent, g, out):
                 out[s, k] += f[cells[e, a]] * g[parent[e], a, k]
 
 
-def nodal_mean(cell_list, value, wet_share, cells, share, volume, n_nodes):
-    """Σ_e w_e value_e / Σ_e w_e (N, 3), w_e = volume_e share_ea wet_e; value (n, 3), wet_share (n,) of the cells."""
+def nodal_mean(wet, value, fluid, n_nodes):
+    """Σ_e w_e value_e / Σ_e w_e (N, 3), w_e = volume_e share_ea wet_e; value (n, 3) of the WetCells."""
     out, weight = np.zeros((n_nodes, 3)), np.zeros(n_nodes)
-    reach = reach_of_cells(cell_list, cells)
-    own = (cell_list, value, wet_share, cells, share, volume, weight, out)
-    owning(_nodal_mean, n_nodes, reach, len(cell_list), *own)
+    reach = reach_of_cells(wet.rows, fluid.cells)
+    owning(_nodal_mean, n_nodes, reach, len(wet.rows), wet, value, fluid, weight, out)
     return out
 
 
 @ranged
-def _nodal_mean(first, last, runs, cell_list, value, wet_share, cells, share, volume, weight, out):
+def _nodal_mean(first, last, runs, wet, value, fluid, weight, out):
+    cell_list, wet_share = wet
+    cells, share, volume = fluid.cells, fluid.share, fluid.volume
     for run in range(runs.shape[0]):
         for s in range(runs[run, 0], runs[run, 1]):
             e = cell_list[s]
@@ -321,25 +371,27 @@ def _nodal_mean(first, last, runs, cell_list, value, wet_share, cells, share, vo
                 out[i, k] /= weight[i]
 
 
-def damp_divergence(cell_list, weight, phi, beside_solid, deep, u, cells, parent, g, volume, size, wet_share):
+def damp_divergence(wet, weight, line, u, fluid):
     """u_i -= c_L Σ_e |e| l_e² (div u)_e ∇N_i / m_i over wholly wet cells, in place on wet nodes (LSIC).
 
     Equal-order elements leave divergence that the pressure cannot see; without this sloshing gains energy.
     Deep cells (φ < deep) beside solids are left out: there the remainder of the cells, not the nodes, holds the
-    balance, and damping would let the added mass of a body drift (26 % in 25 steps)."""
+    balance, and damping would let the added mass of a body drift (26 % in 25 steps).
+
+    wet: WetCells · weight: c_L · line: Waterline · u (N, 3) [m/s] · fluid: FluidCells"""
     n = len(u)
     mass, push = np.zeros(n), np.zeros((n, 3))
-    state = (weight, phi, beside_solid, deep, u, cells, parent, g, volume, size, wet_share)
-    reach = reach_of_cells(cell_list, cells)
-    owning(_push_of_divergence, n, reach, len(cell_list), cell_list, *state, mass, push)
-    over(_pushed, n, phi, mass, push, u)
+    reach = reach_of_cells(wet.rows, fluid.cells)
+    owning(_push_of_divergence, n, reach, len(wet.rows), wet, weight, line, u, fluid, (mass, push))
+    over(_pushed, n, line.level_set, mass, push, u)
 
 
 @ranged
-def _push_of_divergence(
-    first, last, runs, cell_list, weight, phi, beside_solid, deep, u, cells, parent, g, volume, size, wet_share, mass,
-    push,
-):  # fmt: skip
+def _push_of_divergence(first, last, runs, wet, weight, line, u, fluid, sums):
+    cell_list, wet_share = wet
+    phi, beside_solid, deep = line
+    cells, parent, g, volume, size = fluid.cells, fluid.parent, fluid.gradients, fluid.volume, fluid.size
+    mass, push = sums
     for run in range(runs.shape[0]):
         for s in range(runs[run, 0], runs[run, 1]):
             e = cell_list[s]
@@ -369,29 +421,33 @@ def _pushed(first, last, phi, mass, push, u):
                 u[i, k] -= push[i, k] / mass[i]
 
 
-def damp_waterline(cell_list, weight, phi, wet, beside_solid, deep, u, cells, volume, wet_share):
+def damp_waterline(wet_cells, weight, line, wet, u, fluid):
     """u ← u - c (M⁻¹L)² u in place on wet nodes, over the cells beside solids that reach up to φ > deep:
     (L u)_i = Σ_e w_e (u_i - mean of u over the wet corners of e), w_e the water of the cell, M all water around a node.
 
     Where a surface meets a solid slantwise, velocity of one cell's wave length and the surface feed each other (growth
     of 0.03 a step on still water against 1:20).  L is symmetric and positive and annihilates a uniform velocity, so its
     square only takes energy and no momentum; squared, because L alone is a viscosity that holds a thin tongue of
-    run-up back."""
-    near = _around_waterline(cell_list, phi, beside_solid, deep, cells)
-    cell_list, wet_share = cell_list[near], wet_share[near]
-    one = _unlike_neighbours(cell_list, phi, wet, beside_solid, deep, u, cells, volume, wet_share)
-    u -= weight * _unlike_neighbours(cell_list, phi, wet, beside_solid, deep, one, cells, volume, wet_share)
+    run-up back.
+
+    wet_cells: WetCells · weight: c, one or (N, 1) · line: Waterline · wet (N,) bool · u (N, 3) [m/s] ·
+    fluid: FluidCells"""
+    near = _around_waterline(wet_cells.rows, line, fluid.cells)
+    around = WetCells(wet_cells.rows[near], wet_cells.share[near])
+    one = _unlike_neighbours(around, line, wet, u, fluid)
+    u -= weight * _unlike_neighbours(around, line, wet, one, fluid)
 
 
-def _around_waterline(cell_list, phi, beside_solid, deep, cells):
+def _around_waterline(cell_list, line, cells):
     """Places in the list of the cells beside solids that reach up to φ > deep, and of all that touch them."""
-    reached = np.zeros(len(phi), bool)
-    over(_mark_waterline, len(cell_list), cell_list, phi, beside_solid, deep, cells, reached)
+    reached = np.zeros(len(line.level_set), bool)
+    over(_mark_waterline, len(cell_list), cell_list, line, cells, reached)
     return found_over(_places_beside, len(cell_list), cell_list, reached, cells)
 
 
 @ranged
-def _mark_waterline(first, last, cell_list, phi, beside_solid, deep, cells, reached):
+def _mark_waterline(first, last, cell_list, line, cells, reached):
+    phi, beside_solid, deep = line
     for s in range(first, last):
         e = cell_list[s]
         beside, highest = False, -np.inf
@@ -415,8 +471,11 @@ def _places_beside(first, last, cell_list, reached, cells):
 
 
 @kernel
-def _unlike_neighbours(cell_list, phi, wet, beside_solid, deep, u, cells, volume, wet_share):
+def _unlike_neighbours(wet_cells, line, wet, u, fluid):
     """M⁻¹L u (N, 3), zero on dry nodes."""
+    cell_list, wet_share = wet_cells
+    phi, beside_solid, deep = line
+    cells, volume = fluid.cells, fluid.volume
     mass, out, mean = np.zeros(u.shape[0]), np.zeros((u.shape[0], 3)), np.empty(3)
     for s in range(cell_list.shape[0]):
         e = cell_list[s]

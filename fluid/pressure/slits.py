@@ -26,6 +26,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -159,8 +160,7 @@ def conductance(opening, length, depth, spacing):
     return length / (depth / opening + 2.0 / np.pi * np.log(np.maximum(2.0 * spacing / opening, 1.0)))
 
 
-@dataclass(frozen=True)
-class _Mouths:
+class _Mouths(NamedTuple):
     """Mouths 2k and 2k+1 of slit k: crack (m,), name (m, 4), length and depth (m,) [m], from (m, 3) and along (m, 3)
     unit: the piece of the edge, outward (m, 3), across (m, 3) unit normal of the crack."""
 
@@ -220,19 +220,20 @@ def _patches(domain, cracks, mouths, spacing):
     """Hats in the mouths: node (w,), mouth (w,), weight (w,) [m²], and Σ weight x (m, 3) of every mouth."""
     order = np.argsort(domain.face_body, kind="stable")
     start = np.searchsorted(domain.face_body[order], np.arange(domain.n_bodies + 1))
-    return _hats(
-        mouths.crack, mouths.length, mouths.origin, mouths.along, mouths.outward, mouths.across, cracks.bodies,
-        order, start, domain.face_cell, domain.face_area, domain.face_normal, domain.face_points, domain.nodes,
-        domain.cells, domain.parent_cell, domain.memory.mesh.gradients, spacing, FACING, NEAREST,
-    )  # fmt: skip
+    beside = (cracks.bodies, order, start)
+    return _hats(mouths, beside, domain.polygons(), domain.nodes, domain.hats, spacing)
 
 
 @kernel
-def _hats(
-    crack, length, origin, along, outward, across, bodies, order, start, face_cell, area, normal, points, nodes,
-    cells, parent, g, size, facing, nearest,
-):  # fmt: skip
-    """Σ over the points of the wetted polygons at every mouth of weight N_a; weight: hats across and along the slit."""
+def _hats(mouths, beside, polygons, nodes, hats, size):
+    """Σ over the points of the wetted polygons at every mouth of weight N_a; weight: hats across and along the slit.
+
+    beside: bodies (c, 2) of the cracks, and polygons order[start[b]:start[b + 1]] of body b."""
+    crack, length, origin = mouths.crack, mouths.length, mouths.origin
+    along, outward, across = mouths.along, mouths.outward, mouths.across
+    bodies, order, start = beside
+    face_cell, area, normal, points = polygons.cell, polygons.area, polygons.normal, polygons.points
+    cells, parent, g = hats
     capacity, n = 256, 0
     node, mouth, weight = np.empty(capacity, np.int64), np.empty(capacity, np.int64), np.empty(capacity)
     centre = np.zeros((len(crack), 3))
@@ -247,7 +248,7 @@ def _hats(
                 s = order[at]
                 if (
                     normal[s, 0] * outward[m, 0] + normal[s, 1] * outward[m, 1] + normal[s, 2] * outward[m, 2]
-                    < facing
+                    < FACING
                 ):
                     continue
                 e = face_cell[s]
@@ -261,7 +262,7 @@ def _hats(
                         d += r[k] * outward[m, k]
                     beyond = max(-t, t - length[m], 0.0)
                     w = area[s] / 3.0 * (1.0 - abs(c) / h) * (1.0 - 2.0 * beyond / h)
-                    if abs(c) >= h or 2.0 * beyond >= h or abs(d) > nearest * h:
+                    if abs(c) >= h or 2.0 * beyond >= h or abs(d) > NEAREST * h:
                         continue
                     if n + 4 > capacity:
                         capacity *= 2

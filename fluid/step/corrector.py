@@ -17,6 +17,8 @@ from fluid.numerics.sums import kinetic_energy
 from fluid.numerics.threads import found_over, over, zeros
 from fluid.pressure.pressure_bound import BoundMet
 from fluid.pressure.projection import (
+    Waterline,
+    WetCells,
     cell_gradient,
     cell_velocity,
     damp_divergence,
@@ -145,15 +147,16 @@ def _projected(t, kept, gradient, dt):
     """u (N, 3) after the pressure, its acceleration a (N, 3), what the forces alone make of it (N, 3), and Π of the
     gradient (N, 3)."""
     n = len(kept.wet)
-    mean = nodal_mean(kept.wet_cells, gradient, kept.wet_share, t.cells, t.share, t.volume, n)
+    mean = nodal_mean(WetCells(kept.wet_cells, kept.wet_share), gradient, t.fluid_cells, n)
     u, a, forced = np.empty((n, 3)), np.zeros((n, 3)), np.empty((n, 3))
-    over(_after_pressure, n, kept.wet, kept.u_star, mean, kept.advected, kept.theta * dt, u, a, forced)
+    over(_after_pressure, n, kept.wet, kept.u_star, mean, kept.advected, kept.theta * dt, (u, a, forced))
     return u, a, forced, mean
 
 
 @ranged
-def _after_pressure(first, last, wet, u_star, mean, advected, time, u, a, forced):
-    """u and a of wet nodes, u* of the others; u* - Π∇x of all."""
+def _after_pressure(first, last, wet, u_star, mean, advected, time, made):
+    """made: u and a of wet nodes, u* of the others; u* - Π∇x of all."""
+    u, a, forced = made
     for i in range(first, last):
         for k in range(3):
             forced[i, k] = u_star[i, k] - mean[i, k]
@@ -171,15 +174,17 @@ def _remainders(water, kept, gradient, mean, dt):
         depth = t.in_cells(kept.level_set)
         cells, deep, time = kept.wet_cells, -MEMORY_DEPTH * water.mesh.spacing, kept.theta * dt
         whole = found_over(_all_below, len(cells), cells, depth, deep, t.cells)
-        state = (mean, gradient, kept.remainder, time, t.cells, t.share)
+        state = ((mean, gradient), kept.remainder, time, t.fluid_cells)
         over(_leave, len(whole), whole, cells, *state, remainder, rate)
     return remainder, rate
 
 
 @ranged
-def _leave(first, last, places, cell_list, mean, gradient, before, time, cells, share, remainder, rate):
+def _leave(first, last, places, cell_list, slopes, before, time, fluid, remainder, rate):
     """What the nodes do not hold of the gradient, Π∇x - ∇x [m/s], in the cells at these places of the list: added to
-    the remainder before, and over a time [s] as its rate."""
+    the remainder before, and over a time [s] as its rate. slopes: Π∇x (N, 3) and ∇x of the listed cells (n, 3)."""
+    mean, gradient = slopes
+    cells, share = fluid.cells, fluid.share
     for place in range(first, last):
         s = places[place]
         e = cell_list[s]
@@ -212,20 +217,9 @@ def _limit_and_damp(water, kept, u, a):
     t, parameters = water.topology, water.parameters
     clipped = _limit_speed(water, u, a)
     limited = u.copy()
-    damp_divergence(
-        kept.wet_cells,
-        parameters.divergence_damping,
-        t.in_cells(kept.level_set),
-        t.beside_solid,
-        -MEMORY_DEPTH * water.mesh.spacing,
-        u,
-        t.cells,
-        t.parent,
-        t.gradients,
-        t.volume,
-        t.size,
-        kept.wet_share,
-    )
+    line = Waterline(t.in_cells(kept.level_set), t.beside_solid, -MEMORY_DEPTH * water.mesh.spacing)
+    wet = WetCells(kept.wet_cells, kept.wet_share)
+    damp_divergence(wet, parameters.divergence_damping, line, u, t.fluid_cells)
     _damp_surface(water, kept, u)
     damped = u.copy()
     water.hold(u, kept.end)
@@ -235,12 +229,11 @@ def _limit_and_damp(water, kept, u, a):
 def _damp_surface(water, kept, u) -> None:
     """`damp_waterline`, and `damp_kinks` where there are obtuse cells, in calm water, in place."""
     t, h, calm = water.topology, water.mesh.spacing, water.calm(kept.end - water.time)
-    wet = (kept.wet_cells, t.in_cells(kept.level_set), kept.wet)
+    phi, wet = t.in_cells(kept.level_set), WetCells(kept.wet_cells, kept.wet_share)
 
     def even_out(weight, where):
-        list_, *level = wet
-        deep = -WATERLINE_DEPTH * h
-        damp_waterline(list_, weight * calm, *level, where, deep, u, t.cells, t.volume, kept.wet_share)
+        line = Waterline(phi, where, -WATERLINE_DEPTH * h)
+        damp_waterline(wet, weight * calm, line, kept.wet, u, t.fluid_cells)
 
     even_out(WATERLINE_DAMPING, t.beside_solid)
     if t.slanting.any():
@@ -248,9 +241,9 @@ def _damp_surface(water, kept, u) -> None:
         for _ in range(BED_ROUNDS):
             even_out(BED_DAMPING * slow, t.slanting)
     if t.is_obtuse:
-        mesh = (t.cells, t.parent, t.gradients, t.volume, t.neighbours)
-        beside = np.where(t.near_obtuse, wet[1], -np.inf)
-        damp_kinks(wet[0], beside, wet[2], KINK_DAMPING * calm, -KINK_DEPTH * h, u, *mesh)
+        beside = np.where(t.near_obtuse, phi, -np.inf)
+        weight, deep = KINK_DAMPING * calm, -KINK_DEPTH * h
+        damp_kinks(wet.rows, beside, kept.wet, weight, deep, u, t.fluid_cells, t.neighbours)
         even_out(SURFACE_DAMPING, t.near_obtuse)
 
 
@@ -287,7 +280,7 @@ def _continue(water, kept, listed, start, u, a, forced) -> None:
     forced: see `extend_velocity`."""
     calm = water.calm(kept.end - water.time)
     rubbed = water.rubbed_nodes()
-    extend_velocity(water.topology, listed, start, kept.wet, kept.wet_cells, u, a, calm, forced, rubbed)
+    extend_velocity(water.topology, (listed, start), kept.wet, kept.wet_cells, u, a, calm, forced, rubbed)
     _limit_speed(water, u, a)
     water.hold(u, kept.end)
 

@@ -154,7 +154,7 @@ def _reactions(water, kept, x, p, dt):
     """Impulses on the water: by the cells, of x and of p - x; by the sides of the tank and by the bodies, of p."""
     t, at_side = water.topology, water.on_sides
     cells = np.concatenate([kept.wet_cells, kept.void])
-    mesh = (t.nodes, t.cells, t.parent, t.gradients, t.volume, t.share)
+    mesh = (t.nodes, t.fluid_cells)
     of_x, of_p, of_sides = hat_forces(cells, x, p, at_side, water.reference, *mesh)
     of_sides += _on_bodies(water, np.where(at_side, p, 0.0))
     return (-dt * of_x, -dt * (of_p - of_x)), -dt * of_sides, dt * _on_bodies(water, p)
@@ -168,7 +168,7 @@ def _at_closed_openings(water, kept, p, dt):
     parent = water.domain.parent_node
     beside = (np.bincount(parent)[parent] > 1) & ~water.on_sides
     cells = np.concatenate([kept.wet_cells, kept.void])
-    mesh = (t.nodes, t.cells, t.parent, t.gradients, t.volume, t.share)
+    mesh = (t.nodes, t.fluid_cells)
     total = hat_forces(cells, p, p, beside, water.reference, *mesh)[2]
     return -dt * (total + _on_bodies(water, np.where(beside, p, 0.0)))
 
@@ -183,7 +183,7 @@ def _of_air(water, problem, unknown, pressure):
     in_pocket = kept.cushions.air.label > 0
     x, p = np.where(in_pocket, unknown, 0.0), np.where(in_pocket, pressure, 0.0)
     cells = np.concatenate([kept.wet_cells, kept.void])
-    mesh = (t.nodes, t.cells, t.parent, t.gradients, t.volume, t.share)
+    mesh = (t.nodes, t.fluid_cells)
     of_x, of_p, _ = hat_forces(cells, x, p, np.zeros(len(x), bool), water.reference, *mesh)
     acting = problem.of_air(problem.coupling).T @ kept.cushions.air.at_pockets(pressure)
     on_bodies = -dt * about(water.reference, acting, water.domain.body_centre)
@@ -236,18 +236,19 @@ def _pressure_on_sides(water, p):
     return total
 
 
-def hat_forces(cell_list, x, p, at_side, reference, nodes, cells, parent, g, volume, share):
+def hat_forces(cell_list, x, p, at_side, reference, nodes, fluid):
     """Σ_e |e| [∇f; (c_e - x_0) × ∇f] (3, 6) over the listed cells for f = x, p, and p on the nodes at_side (N,) only.
 
-    c_e: centroid of the fluid part; exact for linear f."""
-    state = (x, p, at_side, reference, nodes, cells, parent, g, volume, share)
+    c_e: centroid of the fluid part; exact for linear f. reference x_0 (3,), nodes (N, 3) [m] · fluid: FluidCells"""
+    state = ((x, p), at_side, reference, nodes, fluid)
     return summed(_hat_forces, len(cell_list), (3, 6), cell_list, *state)
 
 
 @released
-def _hat_forces(
-    first, last, cell_list, x, p, at_side, reference, nodes, cells, parent, g, volume, share, partial
-):
+def _hat_forces(first, last, cell_list, fields, at_side, reference, nodes, fluid, partial):
+    x, p = fields
+    cells, parent, g = fluid.cells, fluid.parent, fluid.gradients
+    volume, share = fluid.volume, fluid.share
     arm, beside = np.empty(3), np.empty(4, np.bool_)
     for c in range(first, last):
         for s in range(c * CHUNK, min((c + 1) * CHUNK, cell_list.shape[0])):

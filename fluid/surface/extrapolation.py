@@ -7,6 +7,8 @@ frequency at 32 cells a length), farther ones do not.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from fluid.domain.moments import touching_among
@@ -25,43 +27,40 @@ WAVE_SLACK = 0.05
 _NO_LIMIT = np.zeros(0)
 
 
+class Continued(NamedTuple):
+    """Field that is filled: value (N, m) · gradient (N, m, 3) · done (N,) bool: nodes whose value is known ·
+    least (N,), or of length 0, as in `continue_outward`."""
+
+    value: np.ndarray
+    gradient: np.ndarray
+    done: np.ndarray
+    least: np.ndarray
+
+
 def continue_outward(order, layer_start, linear_layers, f, gradient, nodes, around, done, least):
     """Fill f (N, m) in place on layers 1.. of `order` from layer 0; gradient (N, m, 3) read where linear.
 
     around: `Topology.around_by_cells` · done (N,) bool: nodes whose f is known; extended in place, layer by layer.
     least (N,): no filled |f| is larger than the largest of its known neighbours and its own `least`; of length 0: no
     limit."""
+    field = Continued(f, gradient, done, least)
     for layer in range(1, len(layer_start) - 1):
         nodes_of_it = order[layer_start[layer] : layer_start[layer + 1]]
         linear = layer <= linear_layers
-        over(_one_layer, len(nodes_of_it), nodes_of_it, linear, f, gradient, nodes, *around, done, least)
+        over(_one_layer, len(nodes_of_it), nodes_of_it, linear, field, nodes, around)
         done[nodes_of_it] = True
 
 
 @released
-def _one_layer(first, last, layer, linear, f, gradient, nodes, start, around, shared, done, least):
-    _continue(
-        first,
-        last,
-        layer,
-        linear,
-        f,
-        gradient,
-        nodes,
-        start,
-        around,
-        shared,
-        done,
-        least,
-        np.empty(f.shape[1]),
-    )
+def _one_layer(first, last, layer, linear, field, nodes, around):
+    _continue(first, last, layer, linear, field, nodes, around, np.empty(field.value.shape[1]))
 
 
 @inner
-def _continue(
-    first, last, layer, linear, f, gradient, nodes, start, around, shared, done, least, total
-):  # fmt: skip
+def _continue(first, last, layer, linear, field, nodes, around_by_cells, total):
     """The loop of `continue_outward` over the nodes of a layer; total (m,): work space."""
+    f, gradient, done, least = field
+    start, around, shared = around_by_cells
     m = f.shape[1]
     for s in range(first, last):
         i = layer[s]
@@ -124,19 +123,19 @@ def _pass_gradient(i, m, gradient, start, around, shared, done):
             gradient[i, k, d] /= max(count, 1)
 
 
-def mean_gradients(cell_list, marked, f, cells, parent, g, volume, n_nodes):
+def mean_gradients(cell_list, marked, f, fluid, n_nodes):
     """Volume-weighted mean of ∇f over the cells around each node whose corners are all marked, (N, m, 3).
 
-    f (N, m), marked (N,) bool; zero where there is no such cell."""
+    f (N, m), marked (N,) bool · fluid: FluidCells; zero where there is no such cell."""
     gradient, weight = np.zeros((n_nodes, f.shape[1], 3)), np.zeros(n_nodes)
-    reach = reach_of_cells(cell_list, cells)
-    state = (marked, f, cells, parent, g, volume)
-    owning(_mean_gradients, n_nodes, reach, len(cell_list), cell_list, *state, weight, gradient)
+    reach = reach_of_cells(cell_list, fluid.cells)
+    owning(_mean_gradients, n_nodes, reach, len(cell_list), cell_list, marked, f, fluid, weight, gradient)
     return gradient
 
 
 @released
-def _mean_gradients(first, last, runs, cell_list, marked, f, cells, parent, g, volume, weight, gradient):
+def _mean_gradients(first, last, runs, cell_list, marked, f, fluid, weight, gradient):
+    cells, parent, g, volume = fluid.cells, fluid.parent, fluid.gradients, fluid.volume
     m = f.shape[1]
     local = np.empty((m, 3))
     for run in range(runs.shape[0]):
@@ -183,7 +182,7 @@ def smoothed_slope(topology, cell_list, marked, u, calm: float):
         # each sweep reads one layer of nodes farther in than it is to be right on
         reach.append(_one_layer_more(cell_list, reach[-1], t.cells))
     near = touching_among(cell_list, reach.pop(), t.cells)
-    slope = mean_gradients(near, marked, u, t.cells, t.parent, t.gradients, t.volume, len(u))
+    slope = mean_gradients(near, marked, u, t.fluid_cells, len(u))
     once = before = slope = _averaged(near, reach.pop(), has, slope, t.cells)
     while reach:
         before, slope = slope, _averaged(near, reach.pop(), has, slope, t.cells)
@@ -253,12 +252,13 @@ def _averaged(cell_list, reach, has, field, cells):
     # not zeros_like, which would write to the pages of all nodes
     mean, count = np.zeros(field.shape), np.zeros(len(field))
     listed = reach_of_cells(cell_list, cells)
-    owning(_average, len(field), listed, len(cell_list), cell_list, reach, has, field, cells, count, mean)
+    owning(_average, len(field), listed, len(cell_list), cell_list, (reach, has), field, cells, count, mean)
     return mean
 
 
 @released
-def _average(first, last, runs, cell_list, reach, has, field, cells, count, mean):
+def _average(first, last, runs, cell_list, marks, field, cells, count, mean):
+    reach, has = marks
     total = np.empty(field.shape[1:])
     for run in range(runs.shape[0]):
         for s in range(runs[run, 0], runs[run, 1]):
@@ -335,8 +335,8 @@ def _fill(t, order, start, linear, f, gradient, done, least):
     continue_outward(order, start, linear, f, gradient, t.nodes, t.around_by_cells, done, least)
 
 
-def extend_velocity(topology, order, start, wet, wet_cells, u, a, calm: float, forced, rubbed=None):
-    """Continue u (linear, then constant) and a (constant), each (N, 3), over the layers of `order`, in place; calm as
+def extend_velocity(topology, layers, wet, wet_cells, u, a, calm: float, forced, rubbed=None):
+    """Continue u (linear, then constant) and a (constant), each (N, 3), over layers (order, start), in place; calm as
     in `smoothed_slope`. rubbed (N,) bool: nodes on walls that rub or hold the water, None: there are none.
 
     No slope is taken from cells beside such walls: the shear of the layer along a bed, carried on through the surface
@@ -347,7 +347,7 @@ def extend_velocity(topology, order, start, wet, wet_cells, u, a, calm: float, f
     the energy of a dam break.  So no speed is continued beyond the largest of its known neighbours or its own.
 
     Nodes outside the layers are set to zero."""
-    t = topology
+    t, (order, start) = topology, layers
     if rubbed is not None:
         wet_cells = wet_cells[~rubbed[t.cells[wet_cells]].any(axis=1)]
     gradient = smoothed_slope(t, wet_cells, wet, u, calm)

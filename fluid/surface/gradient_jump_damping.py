@@ -23,8 +23,11 @@ from kernel_decorators import kernel
 
 
 @kernel
-def damp_kinks(cell_list, phi, wet, weight, deep, u, cells, parent, g, volume, neighbours):
-    """Equation (1) with c = weight, in place on u (N, 3) [m/s], over the listed cells that reach up to φ > deep [m]."""
+def damp_kinks(cell_list, phi, wet, weight, deep, u, fluid, neighbours):
+    """Equation (1) with c = weight, in place on u (N, 3) [m/s], over the listed cells that reach up to φ > deep [m].
+
+    fluid: FluidCells · neighbours (M, 4) of the cells across their faces."""
+    cells, parent, g, volume = fluid.cells, fluid.parent, fluid.gradients, fluid.volume
     chosen = _whole_near(cell_list, phi, wet, deep, cells)
     mass, push = np.zeros(u.shape[0]), np.zeros(u.shape)
     for e in cell_list:

@@ -14,9 +14,12 @@ polygons around the one in hand until none is closer: on a surface that is nearl
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from fluid.domain.topology import layers_around
+from fluid.mesh.arrays import Corners
 from fluid.numerics.threads import found_over, over
 from kernel_decorators import inner, kernel, plain, ranged, released
 
@@ -142,67 +145,58 @@ def _ratio(part, whole):
     return part / whole if whole > 0.0 else 0.0
 
 
-def _closest_in_layers(order, layer_start, triangles, owner, nodes, cells, *mesh):
+class Surface(NamedTuple):
+    """triangles (T, 3, 3) [m] · owner (T,) the cell of each; those of a cell follow each other."""
+
+    triangles: np.ndarray
+    owner: np.ndarray
+
+
+class Nearest(NamedTuple):
+    """What is known of the closest triangle: closest (N,) number, -1 none · best (N,) [m²] squared distance ·
+    tried (T,) the last node that asked · asked, found (N,): when a node asked last, and when it found its triangle."""
+
+    closest: np.ndarray
+    best: np.ndarray
+    tried: np.ndarray
+    asked: np.ndarray
+    found: np.ndarray
+
+
+def _closest_in_layers(layers, surface, mesh, *more):
     """`_closest`, with what the corners of the cells of the triangles start from."""
-    corner = np.empty((len(triangles), 4))
-    over(_of_corners, len(triangles), triangles, owner, nodes, cells, corner)
-    return _closest(order, layer_start, triangles, owner, corner, nodes, cells, *mesh)
+    corner = np.empty((len(surface.triangles), 4))
+    over(_of_corners, len(corner), surface, mesh, corner)
+    return _closest(layers, surface, corner, mesh, *more)
 
 
 @ranged
-def _of_corners(first, last, triangles, owner, nodes, cells, corner):
+def _of_corners(first, last, surface, mesh, corner):
     """Squared distance (T, 4) [m²] of each triangle from the corners of its cell."""
+    triangles, owner = surface
+    nodes, cells = mesh
     for t in range(first, last):
         for a in range(4):
             corner[t, a] = squared_distance(nodes[cells[owner[t], a]], triangles[t])
 
 
 @kernel
-def _closest(
-    order,
-    layer_start,
-    triangles,
-    owner,
-    corner,
-    nodes,
-    cells,
-    start,
-    around,
-    exact,
-    obtuse,
-    node_start,
-    node_cells,
-):
-    """Distance (N,) [m] of the nodes of `order` to the triangles, handed outward; two sweeps a layer.
+def _closest(layers, surface, corner, mesh, around, exact, obtuse, cells_of_nodes):
+    """Distance (N,) [m] of the nodes in layers (order, start) to the surface, handed outward; two sweeps a layer.
 
-    exact: first layers whose nodes, where `obtuse` (N,) bool, go on to the closest of all (`_descend`)."""
-    n = nodes.shape[0]
+    around: (start, neighbours) of each node · exact: first layers whose nodes, where `obtuse` (N,) bool, go on to the
+    closest of all (`_descend`) among the cells_of_nodes (start, members)."""
+    order, layer_start = layers
+    n, count = mesh.nodes.shape[0], surface.triangles.shape[0]
     closest, best = np.full(n, -1, np.int64), np.full(n, np.inf)
-    tried = np.full(triangles.shape[0], -1, np.int64)
-    first = _first_triangles(owner, cells.shape[0] if exact > 0 else 0)
-    asked, found = np.zeros(n, np.int32), np.zeros(n, np.int32)
-    _hand_outward(
-        order,
-        layer_start,
-        triangles,
-        owner,
-        corner,
-        nodes,
-        cells,
-        start,
-        around,
-        closest,
-        best,
-        tried,
-        asked,
-        found,
-    )
+    tried = np.full(count, -1, np.int64)
+    first = _first_triangles(surface.owner, mesh.cells.shape[0] if exact > 0 else 0)
+    known = Nearest(closest, best, tried, np.zeros(n, np.int32), np.zeros(n, np.int32))
+    _hand_outward(layers, surface, corner, mesh, around, known)
     for s in range(layer_start[1], layer_start[exact + 1]):
         i = order[s]
         if closest[i] >= 0 and obtuse[i]:
-            best[i] = _descend(
-                nodes[i], closest[i], best[i], triangles, owner, first, cells, node_start, node_cells
-            )
+            best[i] = _descend(mesh.nodes[i], closest[i], best[i], surface, first, mesh.cells, cells_of_nodes)
     return np.sqrt(best)
 
 
@@ -217,9 +211,11 @@ def _first_triangles(owner, n_cells):
 
 
 @inner
-def _descend(x, closest, best, triangles, owner, first, cells, node_start, node_cells):
+def _descend(x, closest, best, surface, first, cells, cells_of_nodes):
     """Squared distance [m²] of x (3,) to the closest triangle that can be reached from `closest`, at the squared
     distance `best`, through cells with a common node, always coming closer."""
+    triangles, owner = surface
+    node_start, node_cells = cells_of_nodes
     before = -1
     while closest != before:
         before = closest
@@ -236,13 +232,14 @@ def _descend(x, closest, best, triangles, owner, first, cells, node_start, node_
 
 
 @inner
-def _hand_outward(
-    order, layer_start, triangles, owner, corner, nodes, cells, start, around, closest, best, tried, asked, found
-):  # fmt: skip
-    """Squared distance `best` (N,) and number of the `closest` triangle (N,); tried (T,): the last node that asked.
-
-    asked, found (N,): when a node asked last and when it found its triangle. In the second sweep only neighbours that
-    have found another one since are worth a question."""
+def _hand_outward(layers, surface, corner, mesh, around_nodes, known):
+    """Fill `known`, Nearest; corner as in `_of_corners`. In the second sweep only neighbours that have found another triangle
+    since are worth a question."""
+    order, layer_start = layers
+    triangles, owner = surface
+    nodes, cells = mesh
+    start, around = around_nodes
+    closest, best, tried, asked, found = known
     now = 1
     for t in range(triangles.shape[0]):
         for a in range(4):
@@ -303,9 +300,9 @@ def redistance(topology, phi, spacing, rescale: bool):
     order, start = layers_around(front, LAYERS, *t.around)
     triangles, owner = surface_triangles(cut, phi, t.nodes, t.cells)
     exact, obtuse = (EXACT_LAYERS, t.near_obtuse) if t.is_obtuse else (0, np.zeros(0, bool))
-    distance = _closest_in_layers(
-        order, start, triangles, owner, t.nodes, t.cells, *t.around, exact, obtuse, t.node_start, t.node_cells
-    )
+    surface, mesh = Surface(triangles, owner), Corners(t.nodes, t.cells)
+    of_nodes = (t.node_start, t.node_cells)
+    distance = _closest_in_layers((order, start), surface, mesh, t.around, exact, obtuse, of_nodes)
     listed = order[start[1] :]
     far[listed] = np.copysign(np.minimum(distance[listed], farthest[listed]), phi[listed])
     far[front] = phi[front]

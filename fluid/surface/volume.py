@@ -24,6 +24,7 @@ spread over the length sqrt(κ ...) ~ κ.  What is left of the total is met by o
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -61,9 +62,10 @@ class Flux:
 
 
 @released
-def _edge_rates(
-    first, last, listed, graph_row, start, neighbour, u_cell, nodes, cells, parent, g, upright, volume, around, rate
-):  # fmt: skip
+def _edge_rates(first, last, listed, edges, u_cell, nodes, fluid, around, rate):
+    graph_row, start, neighbour = edges.row, edges.start, edges.neighbour
+    cells, parent, g = fluid.cells, fluid.parent, fluid.gradients
+    volume, upright = fluid.volume, fluid.upright
     slot = np.empty(nodes.shape[0], np.int64)
     node_start, node_cells = around
     for place in range(first, last):
@@ -105,28 +107,36 @@ def edge_flux(topology, graph, listed, u_cell, water) -> Flux:
 
 def edge_rates(topology, graph, listed, u_cell):
     """q (edges,) [m³/s] of (1) out of the listed nodes (n,) along the edges of the graph; u_cell (M, 3) [m/s]."""
-    t, g = topology, graph
-    mesh = (t.nodes, t.cells, t.parent, t.gradients, t.upright, t.volume, (t.node_start, t.node_cells))
-    rate = zeros((len(g.neighbour),))
-    over(_edge_rates, len(listed), listed, g.row, g.start, g.neighbour, u_cell, *mesh, rate)
+    t, rate = topology, zeros((len(graph.neighbour),))
+    mesh = (t.nodes, t.fluid_cells, (t.node_start, t.node_cells))
+    over(_edge_rates, len(listed), listed, graph.edges, u_cell, *mesh, rate)
     return rate
 
 
-def _diffused_shift(band, place, graph, c, residual, kappa, tolerance, most):
+def _diffused_shift(band, place, edges, c, residual, kappa, tolerance, most):
     """Equation (2) on the band nodes by conjugate gradients with the diagonal as preconditioner, (n,)."""
     n, diagonal = len(band), c.copy()
-    rows = (band, place, graph.row, graph.start, graph.neighbour, graph.stiffness)
     found = np.zeros(n + 1, np.uint32)
-    over(_length_of_rows, n, *rows, found[1:])
+    over(_length_of_rows, n, band, place, edges, found[1:])
     first = np.cumsum(found, dtype=np.uint32)
-    column, entry = np.empty(first[-1], np.uint32), np.empty(first[-1])
-    over(_rows_of_shift, n, *rows, kappa, first, column, entry, diagonal)
-    return _shift(first, column, entry, diagonal, residual, tolerance, most)
+    made = MadeRows(first, np.empty(first[-1], np.uint32), np.empty(first[-1]), diagonal)
+    over(_rows_of_shift, n, band, place, edges, kappa, made)
+    return _shift(first, made.column, made.entry, diagonal, residual, tolerance, most)
+
+
+class MadeRows(NamedTuple):
+    """The matrix c + κ K that is filled: first (n + 1,) entry of each row, column, entry, diagonal (n,)."""
+
+    first: np.ndarray
+    column: np.ndarray
+    entry: np.ndarray
+    diagonal: np.ndarray
 
 
 @ranged
-def _length_of_rows(begin, end, band, place, graph_row, start, neighbour, stiffness, found):
+def _length_of_rows(begin, end, band, place, edges, found):
     """Edges of stiffness within the band (n,) of each of its nodes."""
+    graph_row, start, neighbour, stiffness = edges
     for r in range(begin, end):
         row = graph_row[band[r]]
         for s in range(start[row], start[row + 1]):
@@ -135,10 +145,10 @@ def _length_of_rows(begin, end, band, place, graph_row, start, neighbour, stiffn
 
 
 @ranged
-def _rows_of_shift(
-    begin, end, band, place, graph_row, start, neighbour, stiffness, kappa, first, column, entry, diagonal
-):
+def _rows_of_shift(begin, end, band, place, edges, kappa, made):
     """κ K of the edges within the band, and c + Σ κ K on the diagonal, in place."""
+    graph_row, start, neighbour, stiffness = edges
+    first, column, entry, diagonal = made
     for r in range(begin, end):
         row, k = graph_row[band[r]], first[r]
         for s in range(start[row], start[row + 1]):
@@ -222,7 +232,7 @@ def correct_volume(topology, graph, listed, phi, carried, target: float, kappa: 
     shift = _diffused_shift(
         band,
         place,
-        graph,
+        graph.edges,
         slope[band] + ANCHOR * topology.node_volume[band] / spacing[band],
         (carried - own)[band],
         kappa * spacing,

@@ -13,21 +13,65 @@ The body gets what the hats sum up to, -∫ (t - λ (u - u_Γ) - C (u - u_Γ)_t)
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from fluid.viscous.strain import COLUMN, ROW, add_to_edges, edge_strain, mean_strain, spread_stress
+from fluid.mesh.arrays import Hats
+from fluid.viscous.strain import (
+    COLUMN,
+    ROW,
+    StrainEdges,
+    add_to_edges,
+    edge_strain,
+    mean_strain,
+    spread_stress,
+)
 from kernel_decorators import kernel
 
 
+class Walls(NamedTuple):
+    """Polygons that the water touches: cell (S,), row (S,) of the cell in the list of wet cells, -1 if it is not
+    there · body (S,) · normal (S, 3) · hat (S, 3, 4), arm (S, 3, 3) [m] and area (S, 3) [m²] of each point ·
+    nitsche (S,) λ and drag (S,) C [kg/(m² s)]."""
+
+    cell: np.ndarray
+    row: np.ndarray
+    body: np.ndarray
+    normal: np.ndarray
+    hat: np.ndarray
+    arm: np.ndarray
+    area: np.ndarray
+    nitsche: np.ndarray
+    drag: np.ndarray
+
+
+class ViscousTerms(NamedTuple):
+    """What K and f are made of: cells (n,) in the water, weight (n,) 2μ times their water · walls · viscosity μ ·
+    node_drag (N,) [kg/s] of nodes on sides of the tank · held (k,) nodes on sides, projector (k, 3, 3) onto what is
+    free there · idle (N,) bool: nodes that keep their velocity · hats · edges of the cells in the water."""
+
+    cells: np.ndarray
+    weight: np.ndarray
+    walls: Walls
+    viscosity: float
+    node_drag: np.ndarray
+    held: np.ndarray
+    projector: np.ndarray
+    idle: np.ndarray
+    hats: Hats
+    edges: StrainEdges
+
+
 @kernel
-def wall_stress(walls, mu, u, body_velocity, edge, edge_weight, strain, flux, cells, out, load):
+def wall_stress(walls, mu, u, body_velocity, edges, strains, cells, out, load):
     """The terms on Γ: those with hats added to out (N, 3), what the bodies get to load (n_bodies, 6), and those with
     t(N_i) to the strains flux (n_edges, 6), for `spread_stress`.
 
-    walls: (cell (S,), row (S,) of the cell in the list of wet cells, -1 if it is not there, body (S,), normal (S, 3),
-    hat (S, 3, 4), arm (S, 3, 3) [m], area (S, 3) [m²] of each point, nitsche (S,) λ [kg/(m² s)], drag (S,) C
-    [kg/(m² s)]) · body_velocity (n_bodies, 6) · strain (n_edges, 6) of u."""
+    walls: Walls · body_velocity (n_bodies, 6) · edges: StrainEdges · strains: that of u (n_edges, 6), and flux."""
     cell, row, body, normal, hat, arm, area, nitsche, drag = walls
+    edge, edge_weight = edges
+    strain, flux = strains
     mean = np.empty((3, 3))
     t, v, f, pull, x = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(6)
     for s in range(cell.shape[0]):
@@ -43,7 +87,7 @@ def wall_stress(walls, mu, u, body_velocity, edge, edge_weight, strain, flux, ce
             w = area[s, q]
             if w == 0.0:
                 continue
-            _slip_velocity(s, q, e, b, u, hat, arm, body_velocity, cells, v)
+            _slip_velocity(walls, s, q, u, body_velocity, cells, v)
             into = v[0] * normal[s, 0] + v[1] * normal[s, 1] + v[2] * normal[s, 2]
             for k in range(3):
                 f[k] = w * (t[k] - nitsche[s] * v[k] - drag[s] * (v[k] - into * normal[s, k]))
@@ -63,8 +107,9 @@ def wall_stress(walls, mu, u, body_velocity, edge, edge_weight, strain, flux, ce
 
 
 @kernel
-def _slip_velocity(s, q, e, b, u, hat, arm, V, cells, v):
-    """v = u - u_Γ at a point of a polygon, in place."""
+def _slip_velocity(walls, s, q, u, V, cells, v):
+    """v = u - u_Γ at point q of polygon s, in place."""
+    e, b, hat, arm = walls.cell[s], walls.body[s], walls.hat, walls.arm
     v[0] = -(V[b, 0] + V[b, 4] * arm[s, q, 2] - V[b, 5] * arm[s, q, 1])
     v[1] = -(V[b, 1] + V[b, 5] * arm[s, q, 0] - V[b, 3] * arm[s, q, 2])
     v[2] = -(V[b, 2] + V[b, 3] * arm[s, q, 1] - V[b, 4] * arm[s, q, 0])
@@ -75,27 +120,27 @@ def _slip_velocity(s, q, e, b, u, hat, arm, V, cells, v):
 
 @kernel
 def momentum_rate(terms, u, body_velocity):
-    """r (N, 3) [N] and load (n_bodies, 6) [N, N m].  terms: see `implicit_change`."""
-    node_drag, node, projector, idle = terms[4], terms[5], terms[6], terms[7]
+    """r (N, 3) [N] and load (n_bodies, 6) [N, N m].  terms: ViscousTerms."""
+    node_drag = terms.node_drag
     r, load = unheld_rate(terms, u, body_velocity)
     for i in range(u.shape[0]):
         if node_drag[i] != 0.0:
             for k in range(3):
                 r[i, k] -= node_drag[i] * u[i, k]
-    _restrict(r, node, projector, idle)
+    _restrict(r, terms.held, terms.projector, terms.idle)
     return r, load
 
 
 @kernel
 def unheld_rate(terms, u, body_velocity):
     """The same without the sides of the tank: without drag on their nodes, and as if they held nothing."""
-    cell_list, weight, walls, mu, _drag, _node, _projector, _idle, cells, parent, g, edge, edge_weight = terms
+    cells, weight, hats, edges = terms.cells, terms.weight, terms.hats, terms.edges
     r = np.zeros_like(u)
     load = np.zeros_like(body_velocity)
-    strain = edge_strain(cell_list, weight, edge, edge_weight, u, cells, parent, g)
+    strain = edge_strain(cells, weight, edges, u, hats)
     flux = strain.copy()
-    wall_stress(walls, mu, u, body_velocity, edge, edge_weight, strain, flux, cells, r, load)
-    spread_stress(cell_list, weight, edge, flux, cells, parent, g, r)
+    wall_stress(terms.walls, terms.viscosity, u, body_velocity, edges, (strain, flux), hats.cells, r, load)
+    spread_stress(cells, weight, edges.of_cell, flux, hats, r)
     return r, load
 
 
@@ -118,9 +163,11 @@ def _restrict(r, node, projector, idle):
 @kernel
 def preconditioner(terms, mass, tau):
     """1 / diagonal (N,) of M + τ K, the flux terms left out; 0 on idle nodes."""
-    cell_list, weight, walls, _mu, node_drag, _node, _projector, idle, cells, parent, g, _edge, _total = terms
-    cell, _row, _body, _normal, hat, _arm, area, nitsche, drag = walls
-    diagonal = mass + tau * node_drag
+    cell_list, weight, idle = terms.cells, terms.weight, terms.idle
+    cells, parent, g = terms.hats
+    cell, hat, area = terms.walls.cell, terms.walls.hat, terms.walls.area
+    nitsche, drag = terms.walls.nitsche, terms.walls.drag
+    diagonal = mass + tau * terms.node_drag
     for s in range(cell_list.shape[0]):
         e = cell_list[s]
         for a in range(4):
@@ -142,7 +189,7 @@ def preconditioner(terms, mass, tau):
 @kernel
 def body_preconditioner(terms, body_mass, moves, tau):
     """Inverse (n_bodies, 6, 6) of the diagonal blocks of the bodies without the flux terms; 0 where they are driven."""
-    _cell, _row, body, normal, _hat, arm, area, nitsche, drag = terms[2]
+    _cell, _row, body, normal, _hat, arm, area, nitsche, drag = terms.walls
     block, c = body_mass.copy(), np.zeros((3, 6))
     for s in range(body.shape[0]):
         b = body[s]
@@ -183,9 +230,7 @@ def implicit_change(terms, mass, tau, right, bodies, body_right, tolerance, most
     """d (N, 3) and D (n_bodies, 6) with (M + τ K) (d, D) = (right, body_right) by conjugate gradients: (d, D,
     iterations, residual reached over the first).
 
-    terms: (cells in the water (n,), 2μ times their water (n,), walls of `wall_stress`, μ, drag of the nodes on sides
-    (N,) [kg/s], nodes on sides (n,), their projectors (n, 3, 3), idle (N,) bool: nodes that keep their velocity, cells,
-    parent, gradients, edges of the cells in the water (n, 6) and their weight (n_edges,)) · mass (N,) [kg] · tau [s] ·
+    terms: ViscousTerms · mass (N,) [kg] · tau [s] ·
     right (N, 3) [N s] · bodies: (mass (n_bodies, 6, 6) [kg, kg m²], moves (n_bodies,) bool: the others keep their
     velocity) · body_right (n_bodies, 6) [N s, N m s]."""
     body_mass, moves = bodies

@@ -17,6 +17,8 @@ Strains are (n, 6): xx, yy, zz, yz, xz, xy.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from kernel_decorators import kernel
@@ -25,6 +27,13 @@ PAIRS = np.array([(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)])
 """Corners at the ends of the edges of a cell."""
 ROW, COLUMN = np.array([0, 1, 2, 1, 0, 0]), np.array([0, 1, 2, 2, 2, 1])
 """Where the six numbers of a strain stand in its tensor."""
+
+
+class StrainEdges(NamedTuple):
+    """Edges of listed cells: of_cell (n, 6) their numbers · weight (n_edges,) W."""
+
+    of_cell: np.ndarray
+    weight: np.ndarray
 
 
 @kernel
@@ -52,8 +61,10 @@ def edges_of(cell_list, weight, cells, n_nodes):
 
 
 @kernel
-def edge_strain(cell_list, weight, edge, edge_weight, u, cells, parent, g):
-    """ε̂ (n_edges, 6) [1/s] of u (N, 3)."""
+def edge_strain(cell_list, weight, edges, u, hats):
+    """ε̂ (n_edges, 6) [1/s] of u (N, 3); weight (n,) of the listed cells, edges: StrainEdges, hats: Hats."""
+    edge, edge_weight = edges
+    cells, parent, g = hats
     out = np.zeros((len(edge_weight), 6))
     G, x = np.empty((3, 3)), np.empty(6)
     for s in range(len(cell_list)):
@@ -92,8 +103,9 @@ def mean_strain(strain, edges, out):
 
 
 @kernel
-def spread_stress(cell_list, weight, edge, strain, cells, parent, g, out):
+def spread_stress(cell_list, weight, edge, strain, hats, out):
     """out (N, 3) -= Σ_e w_e ε̄_e ∇N_i over the listed cells."""
+    cells, parent, g = hats
     mean = np.empty((3, 3))
     for s in range(len(cell_list)):
         e = cell_list[s]

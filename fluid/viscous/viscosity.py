@@ -28,8 +28,8 @@ from fluid.domain.moments import wet_fraction
 from fluid.domain.physical_domain import hat_values
 from fluid.numerics.solve import NotConverged
 from fluid.numerics.sums import momentum_of
-from fluid.viscous.kernels import implicit_change, momentum_rate, unheld_rate
-from fluid.viscous.strain import edges_of
+from fluid.viscous.kernels import ViscousTerms, Walls, implicit_change, momentum_rate, unheld_rate
+from fluid.viscous.strain import StrainEdges, edges_of
 
 GAMMA = 1.0 - np.sqrt(0.5)
 TOLERANCE = 1e-7
@@ -163,18 +163,18 @@ class Viscosity:
             if columns is not None:
                 viscosity = p.viscosity + p.density * self.friction.mixing(water, columns, cells)
         weight = 2.0 * viscosity * share * t.volume[cells]
-        return (
-            cells,
-            weight,
-            self._wall_terms(water, phi, columns, w, cells, share),
-            p.viscosity,
-            drag,
-            *water.held_by_sides(),
-            idle,
-            t.cells,
-            t.parent,
-            t.gradients,
-            *edges_of(cells, weight, t.cells, len(phi)),
+        held, projector = water.held_by_sides()
+        return ViscousTerms(
+            cells=cells,
+            weight=weight,
+            walls=self._wall_terms(water, phi, columns, w, cells, share),
+            viscosity=p.viscosity,
+            node_drag=drag,
+            held=held,
+            projector=projector,
+            idle=idle,
+            hats=t.hats,
+            edges=StrainEdges(*edges_of(cells, weight, t.cells, len(phi))),
         )
 
     def _wall_terms(self, water, phi, columns, w, wet_cells, share):
@@ -190,10 +190,8 @@ class Viscosity:
         row = np.full(len(cells), -1, np.int64)
         row[wet_cells] = np.arange(len(wet_cells))
         use = (area > 0.0).any(axis=1) & ((nitsche > 0.0) | (drag > 0.0))
-        return tuple(
-            np.ascontiguousarray(a[use])
-            for a in (k.cell, row[k.cell], k.body, k.normal, k.hat, k.arm, area, nitsche, drag)
-        )
+        found = Walls(k.cell, row[k.cell], k.body, k.normal, k.hat, k.arm, area, nitsche, drag)
+        return Walls(*(np.ascontiguousarray(a[use]) for a in found))
 
 
 def _acting(water, terms, u, V):

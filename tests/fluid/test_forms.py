@@ -16,6 +16,8 @@ from fluid.domain.topology import Graph, Topology
 from fluid.mesh.background import box_mesh
 from fluid.numerics.solve import solve
 from fluid.pressure.projection import (
+    Waterline,
+    WetCells,
     cell_gradient,
     cell_velocity,
     damp_divergence,
@@ -24,8 +26,8 @@ from fluid.pressure.projection import (
     pressure_matrix,
 )
 from fluid.transport import forms
-from fluid.viscous.kernels import wall_stress
-from fluid.viscous.strain import edge_strain, spread_stress
+from fluid.viscous.kernels import Walls, wall_stress
+from fluid.viscous.strain import StrainEdges, edge_strain, spread_stress
 from tests.fluid import reference_forms
 from tests.fluid.scenes import tank
 
@@ -81,7 +83,7 @@ def test_right_hand_side_of_the_pressure(n, seed, covers):
     t, cells, u = laid_out(domain)
     basis = forms.basis_of(domain)
     mean = cell_velocity(cells, u, np.zeros((0, 3)), t.cells, t.share)
-    found = inflow(cells, mean, t.cells, t.parent, t.gradients, t.volume, len(u))
+    found = inflow(cells, mean, t.fluid_cells, len(u))
     same(found, asm(reference_forms.inflow, basis, u=forms.at_points(basis, u)))
 
 
@@ -99,7 +101,7 @@ def test_nodal_volume_and_what_the_pressure_takes_off_the_momentum(n, seed, cove
     same(t.node_volume, volume)
     expected = asm(reference_forms.pressure_gradient, vector, p=basis.interpolate(f[:, 0])).reshape(-1, 3)
     gradient = cell_gradient(cells, np.ascontiguousarray(f[:, 0]), t.cells, t.parent, t.gradients)
-    mean = nodal_mean(cells, gradient, np.ones(len(cells)), t.cells, t.share, t.volume, n)
+    mean = nodal_mean(WetCells(cells, np.ones(len(cells))), gradient, t.fluid_cells, n)
     same(mean * volume[:, None], expected, 1e-8)
 
 
@@ -115,10 +117,8 @@ def test_divergence_damping(n, seed, covers):
         reference_forms.grad_div, vector, u=vector.interpolate(reference_forms.by_component(u)), l=size
     )
     damped, everywhere = u.copy(), np.ones(len(cells))
-    damp_divergence(
-        cells, 0.05, -np.ones(len(u)), t.beside_solid, -np.inf, damped, t.cells, t.parent, t.gradients, t.volume,
-        t.size, everywhere,
-    )  # fmt: skip
+    line = Waterline(-np.ones(len(u)), t.beside_solid, -np.inf)
+    damp_divergence(WetCells(cells, everywhere), 0.05, line, damped, t.fluid_cells)
     mass = np.bincount(t.cells.ravel(), np.repeat(0.25 * t.volume, 4), minlength=len(u))
     # the change of a node next to a sliver is huge, its mass tiny: compare what they make together
     scale = np.abs(expected).max() + np.abs(mass[:, None] * u).max()
@@ -134,8 +134,8 @@ def test_viscous_stress(n, seed, covers):
     t, cells, u = laid_out(domain)
     rate, weight = np.zeros_like(u), 2.0 * 0.7 * t.volume
     edge = _unshared_edges(len(cells))
-    strain = edge_strain(cells, weight, edge, weight, u, t.cells, t.parent, t.gradients)
-    spread_stress(cells, weight, edge, strain, t.cells, t.parent, t.gradients, rate)
+    strain = edge_strain(cells, weight, StrainEdges(edge, weight), u, t.hats)
+    spread_stress(cells, weight, edge, strain, t.hats, rate)
     vector = reference_forms.vector_basis_of(domain)
     stiffness = asm(reference_forms.viscous, vector, mu=0.7)
     same(-rate, (stiffness @ reference_forms.by_component(u)).reshape(-1, 3))
@@ -160,7 +160,7 @@ def test_stress_on_wetted_faces(n, seed, covers):
     arm = domain.face_points - domain.body_centre[domain.face_body][:, None]
     area = np.repeat(domain.face_area[:, None] / 3.0, 3, axis=1)
     normals, drag = np.ascontiguousarray(domain.face_normal), np.zeros(len(penalty))
-    walls = (
+    walls = Walls(
         domain.face_cell.astype(np.int64),
         domain.face_cell.astype(np.int64),  # every cell is listed
         domain.face_body.astype(np.int64),
@@ -174,10 +174,10 @@ def test_stress_on_wetted_faces(n, seed, covers):
     rate, load = np.zeros_like(u), np.zeros((domain.n_bodies, 6))
     still = np.zeros((domain.n_bodies, 6))
     edge, weight = _unshared_edges(len(cells)), 2.0 * 0.7 * t.volume
-    strain = edge_strain(cells, weight, edge, weight, u, t.cells, t.parent, t.gradients)
+    strain = edge_strain(cells, weight, StrainEdges(edge, weight), u, t.hats)
     flux = np.zeros_like(strain)
-    wall_stress(walls, 0.7, u, still, edge, weight, strain, flux, t.cells, rate, load)
-    spread_stress(cells, weight, edge, flux, t.cells, t.parent, t.gradients, rate)
+    wall_stress(walls, 0.7, u, still, StrainEdges(edge, weight), (strain, flux), t.cells, rate, load)
+    spread_stress(cells, weight, edge, flux, t.hats, rate)
     form = asm(reference_forms.nitsche, basis, mu=0.7, n=normal, penalty=forms.per_cell(basis, penalty))
     reached = form.shape[0] // 3  # scikit-fem numbers nodes up to the highest one of its cells
     same(-rate[:reached], (form @ reference_forms.by_component(u[:reached])).reshape(-1, 3))
@@ -225,7 +225,7 @@ def test_projection_is_stabilised_by_the_pressure(covers):
     x[problem.dofs] = solve(problem.matrix, problem.rhs, problem.guess, 1e-12).x
     cells, star = problem.predicted.wet_cells, problem.predicted.u_star
     gradient = cell_gradient(cells, x, t.cells, t.parent, t.gradients) / problem.density
-    mean = nodal_mean(cells, gradient, np.ones(len(cells)), t.cells, t.share, t.volume, len(x))
+    mean = nodal_mean(WetCells(cells, np.ones(len(cells))), gradient, t.fluid_cells, len(x))
     basis = forms.basis_of(water.domain)
     left = np.repeat(gradient.T[:, :, None], 4, axis=2)
     tau = forms.per_cell(basis, np.full(len(t.cells), dt))

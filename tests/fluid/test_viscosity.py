@@ -115,7 +115,9 @@ def test_what_the_water_loses_the_body_gets(walls, more):
     water, u = turned_box(walls, **more)
     stage = Viscosity(water.parameters)
     terms = stage._terms(water, water.level_set, DENSITY * water.nodal_water, u, 0.1)
-    free = (*terms[:5], np.zeros(0, np.int64), np.zeros((0, 3, 3)), np.zeros(len(u), bool), *terms[8:])
+    free = terms._replace(
+        held=np.zeros(0, np.int64), projector=np.zeros((0, 3, 3)), idle=np.zeros(len(u), bool)
+    )
     rate, load = momentum_rate(free, u, water.body_velocity)
     arm = water.topology.nodes - water.domain.body_centre[0]
     lost = -np.concatenate([rate.sum(axis=0), np.cross(arm, rate).sum(axis=0)])
@@ -235,9 +237,9 @@ def test_shear_along_a_bed_is_not_carried_on_into_the_air():
 
     def fastest(rubbed):
         u = np.where(wet[:, None], speed[:, None] * [1.0, 0.0, 0.0], 0.0)
-        order = water.listed, water.layer_start
+        layers = water.listed, water.layer_start
         extend_velocity(
-            water.topology, *order, wet, cells, u, np.zeros_like(u), 0.0, np.full_like(u, np.inf), rubbed
+            water.topology, layers, wet, cells, u, np.zeros_like(u), 0.0, np.full_like(u, np.inf), rubbed
         )
         return u[:, 0].max()
 

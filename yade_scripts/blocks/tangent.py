@@ -123,7 +123,7 @@ def joint_springs(joints, x: Array, R: Array, index: Array | None = None) -> Spr
     arm, normal, k = np.zeros((2, len(index), 3)), np.zeros((len(index), 3)), np.zeros((2, len(index)))
     for kernels, own, arrays in joints.of_points(index):
         arms, normals, stiffness = arm[:, own], normal[own], k[:, own]  # copies
-        kernels.point_springs(*arrays, joints.rub, x, R, arms, normals, stiffness)
+        kernels.point_springs(*arrays, (x, R), (arms, normals, stiffness))
         arm[:, own], normal[own], k[:, own] = arms, normals, stiffness
     j = joints.joint_of[index]
     kn, kt = k * joints.weight[index]
@@ -150,7 +150,7 @@ def joint_tangent(joints, x: Array, R: Array, n: int, index: Array | None = None
     D = np.zeros((len(index), 3, 3))
     for kernels, own, arrays in joints.of_points(index):
         found = D[own]  # a copy
-        kernels.point_tangents(*arrays, x, R, found)
+        kernels.point_tangents(*arrays, (x, R), found)
         D[own] = found
     D = 0.5 * (D + D.transpose(0, 2, 1)) * joints.weight[index][:, None, None]
     return _assembled(springs, D, n)

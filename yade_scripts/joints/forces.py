@@ -105,38 +105,16 @@ def torn_traction(before, now, move, ks, unit, df, peak, paid):
     return pull
 
 
-def joint_forces(
-    live,
-    a,
-    b,
-    start,
-    xi_a,
-    xi_b,
-    weight,
-    normal,
-    law,
-    peak,
-    largest,
-    paid,
-    rub,
-    eta,
-    x,
-    v,
-    R,
-    dt,
-    advance,
-    F,
-    damped,
-    rubbed,
-):
+def joint_forces(live, joints, memory, motion, eta, dt, advance, F, taken_by):
     """Forces of the live joints on the blocks; with `advance` also their history and what their dashpots take.
 
-    live (l,) joints to visit · a, b (J,) rows · start (J+1,) first point of a joint · xi_a, xi_b (P, 3) [m]
-    weight (P,) [m²] · normal (J, 3) in block a · law (J, 6) · peak p
-    largest (P,) λ [m] · paid (P, 2) · rub (P, 3) [m]: where failed points stick, in the frame of a · eta [s] dashpot
-    time · x (n, 3), v (n, 6), R (n, 3, 3)
-    F (n, 6) is added to · damped, rubbed (J,) [J] too   →   largest growth of λ/δ_f in this call
+    live (l,) joints to visit · joints: JointPoints · memory: PointMemory · motion: Motion · eta [s] dashpot time ·
+    dt [s] · F (n, 6) is added to · taken_by: Taken, too   →   largest growth of λ/δ_f in this call
     """
+    a, b, start, xi_a, xi_b, weight, normal, law, peak = joints
+    largest, paid, rub = memory
+    x, v, R = motion
+    damped, rubbed = taken_by
     fastest = 0.0
     for j in live:
         ra, rb = a[j], b[j]
@@ -186,11 +164,15 @@ def joint_forces(
     return fastest
 
 
-def stored_between(live, a, b, start, xi_a, xi_b, weight, normal, law, peak, largest, rub, x, R, x0, R0, out):
-    """Elastic energy out (J,) [J] of the live joints half a substep before (x, R), between it and the place (x0, R0).
+def stored_between(live, joints, memory, now, before, out):
+    """Elastic energy out (J,) [J] of the live joints between the places (x, R) half a substep `before` and `now`.
 
     Leapfrog conserves kinetic(t + dt/2) + 1/2 k δ(t)·δ(t + dt) exactly, so the product of the two openings is used.
     """
+    a, b, start, xi_a, xi_b, weight, normal, law, peak = joints
+    largest, rub = memory.largest, memory.rub
+    x, R = now
+    x0, R0 = before
     for j in live:
         kc = law[j, KC]
         n, n0 = turned(a[j], R, normal[j]), turned(a[j], R0, normal[j])
@@ -207,8 +189,9 @@ def stored_between(live, a, b, start, xi_a, xi_b, weight, normal, law, peak, lar
                     out[j] += 0.5 * weight[p] * k * (d[c] - at[c]) * (e[c] - at[c])
 
 
-def lost(start, weight, law, peak, largest, out):
+def lost(joints, largest, out):
     """Energy out (J,) [J] that the damage of every joint has taken for good, Σ weight (W(λ) - k_s λ²/2)."""
+    start, weight, law, peak = joints.start, joints.weight, joints.law, joints.peak
     for j in range(len(out)):
         out[j] = 0.0
         unit, df = law[j, UNIT], law[j, DF]
@@ -218,8 +201,15 @@ def lost(start, weight, law, peak, largest, out):
             out[j] += weight[p] * (separation_work(unit, df, r, peak) - back)
 
 
-def point_springs(index, joint_of, a, b, xi_a, xi_b, normal, law, peak, largest, rub, x, R, arms, normals, k):
-    """Of the points `index` (s,): arms (2, s, 3) from both centres, normals (s, 3), k_n and k_t in k (2, s) [Pa/m]."""
+def point_springs(index, joint_of, joints, memory, place_now, out):
+    """Of the points `index` (s,), where the blocks are, (x, R): fills `out`; joint_of (P,).
+
+    out: arms (2, s, 3) [m] from both centres, normals (s, 3), k_n and k_t (2, s) [Pa/m]."""
+    a, b, xi_a, xi_b = joints.a, joints.b, joints.xi_a, joints.xi_b
+    normal, law, peak = joints.normal, joints.law, joints.peak
+    largest, rub = memory.largest, memory.rub
+    x, R = place_now
+    arms, normals, k = out
     for i in range(len(index)):
         p = index[i]
         j = joint_of[p]
@@ -240,8 +230,12 @@ def point_springs(index, joint_of, a, b, xi_a, xi_b, normal, law, peak, largest,
             k[1, i] = stick if dot(S, S) < (STICKS * limit) ** 2 else 0.0
 
 
-def point_tangents(index, joint_of, a, b, xi_a, xi_b, normal, law, peak, largest, x, R, out):
+def point_tangents(index, joint_of, joints, memory, place_now, out):
     """out (s, 3, 3) [Pa/m]: ∂t/∂δ of the points `index` while λ may grow, by central differences over 1e-7 δ_f."""
+    a, b, xi_a, xi_b = joints.a, joints.b, joints.xi_a, joints.xi_b
+    normal, law, peak = joints.normal, joints.law, joints.peak
+    largest = memory.largest
+    x, R = place_now
     d = np.empty(3)
     for i in range(len(index)):
         p = index[i]

@@ -10,6 +10,7 @@ import numpy as np
 from yade_scripts.blocks.block import Block
 from yade_scripts.blocks.faces import TouchingFaces, gauss_points, to_body
 from yade_scripts.joints import kernel
+from yade_scripts.joints.arrays import JointPoints, Motion, PointMemory, Taken
 from yade_scripts.joints.cohesion import JointParameters
 from yade_scripts.joints.forces import MU, NOT_GROWING, PULL, JointKernels, kernels_of
 
@@ -133,55 +134,51 @@ class Joints:
         """Add the forces of the joints `which`, by default of all live ones that do not rest, on the blocks to F
         (n, 6); see `joint_forces.joint_forces`."""
         eta, fastest = self.eta if eta is None else eta, 0.0
-        for kernels, arrays in self._families_of(self.visited if which is None else which):
-            growth = kernels.joint_forces(
-                *arrays, self.paid, self.rub, eta, x, v, R, dt, advance, F, self.damped, self.rubbed
-            )
+        memory, motion = self._memory(), Motion(x, v, R)
+        for kernels, own, points in self._families_of(self.visited if which is None else which):
+            taken = Taken(self.damped, self.rubbed)
+            growth = kernels.joint_forces(own, points, memory, motion, eta, dt, advance, F, taken)
             fastest = max(fastest, growth)
         return fastest
 
-    def _families_of(self, joints: Array) -> Iterator[tuple[JointKernels, tuple]]:
-        """Kernels of each law, and what they read of the live `joints` of that law, in their order."""
+    def _points(self, peak: float) -> JointPoints:
+        """As kernels take them; peak: of the law."""
+        return JointPoints(
+            self.a, self.b, self.start, self.xi_a, self.xi_b, self.weight, self.normal, self.law, peak
+        )
+
+    def _memory(self) -> PointMemory:
+        return PointMemory(self.largest, self.paid, self.rub)
+
+    def _families_of(self, joints: Array) -> Iterator[tuple[JointKernels, Array, JointPoints]]:
+        """Kernels of each law, those of the live `joints` of that law, and what the kernels read of them."""
         for number, (kernels, peak) in enumerate(self.families):
             own = joints if len(self.families) == 1 else joints[self.family[joints] == number]
-            yield (
-                kernels,
-                (
-                    own, self.a, self.b, self.start, self.xi_a, self.xi_b, self.weight, self.normal, self.law,
-                    peak, self.largest,
-                ),
-            )  # fmt: skip
+            yield kernels, own, self._points(peak)
 
     def stored_between(self, x: Array, R: Array, x0: Array, R0: Array, which: Array | None = None) -> Array:
         """Elastic energy of the joints `which`, by default of all live ones, between two places of the blocks; zero for
         the others, (J,) [J]."""
         out = np.zeros(len(self))
-        for kernels, arrays in self._families_of(self.live if which is None else which):
-            kernels.stored_between(*arrays, self.rub, x, R, x0, R0, out)
+        for kernels, own, points in self._families_of(self.live if which is None else which):
+            kernels.stored_between(own, points, self._memory(), (x, R), (x0, R0), out)
         return out
 
     def lost(self) -> Array:
         """Energy that the damage of each joint stands for by its law, G_c A once it has failed, (J,) [J]."""
         out, own = np.empty(len(self)), np.empty(len(self))
         for number, (kernels, peak) in enumerate(self.families):
-            kernels.lost(self.start, self.weight, self.law, peak, self.largest, own)
+            kernels.lost(self._points(peak), self.largest, own)
             of_law = self.family == number
             out[of_law] = own[of_law]
         return out
 
     def of_points(self, index: Array) -> Iterator[tuple[JointKernels, Array, tuple]]:
         """For each law: its kernels, which of the points `index` are its own (bool), and what the kernels of single
-        points read of these, in their order."""
+        points read of these first: index, joint of each point, JointPoints, PointMemory."""
         for number, (kernels, peak) in enumerate(self.families):
             own = self.family[self.joint_of[index]] == number
-            yield (
-                kernels,
-                own,
-                (
-                    index[own], self.joint_of, self.a, self.b, self.xi_a, self.xi_b, self.normal, self.law,
-                    peak, self.largest,
-                ),
-            )  # fmt: skip
+            yield kernels, own, (index[own], self.joint_of, self._points(peak), self._memory())
 
     def broken_now(self) -> Array:
         """Live joints that have failed since the last call of `retire`."""
@@ -229,19 +226,7 @@ class Joints:
     def openings(self, joints: Array, x: Array, R: Array) -> Array:
         """Mean normal opening, mean sliding, largest normal opening of the points of `joints`, (len, 3) [m]."""
         out = np.zeros((len(self), 3))
-        kernel.joint_openings(
-            np.asarray(joints),
-            self.a,
-            self.b,
-            self.start,
-            self.xi_a,
-            self.xi_b,
-            self.weight,
-            self.normal,
-            x,
-            R,
-            out,
-        )
+        kernel.joint_openings(np.asarray(joints), self._points(0.0), x, R, out)
         return out[joints]
 
     def sealed_faces(self, x: Array, R: Array) -> tuple[Array, Array, Array]:

@@ -36,8 +36,10 @@ def broken(live, start, largest, df):
 
 
 @plain
-def joint_openings(live, a, b, start, xi_a, xi_b, weight, normal, x, R, out):
-    """Mean normal opening, mean sliding and largest normal opening of joints, out (J, 3) [m]."""
+def joint_openings(live, joints, x, R, out):
+    """Mean normal opening, mean sliding and largest normal opening of joints, out (J, 3) [m]; joints: JointPoints."""
+    a, b, start, weight, normal = joints.a, joints.b, joints.start, joints.weight, joints.normal
+    xi_a, xi_b = joints.xi_a, joints.xi_b
     for j in live:
         n = turned(a[j], R, normal[j])
         total = open_ = slide = 0.0

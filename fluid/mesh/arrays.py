@@ -1,0 +1,84 @@
+"""Arrays that belong together, as kernels take them: one argument, whose parts have names.
+
+A kernel takes the parts out before its loops where it makes arrays: inside, each access would count references."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Planes(NamedTuple):
+    """Planes of convex bodies, n·x = o: normal (P, 3) unit, outward · offset (P,) [m] · start (n + 1,): those of body b
+    are start[b]:start[b + 1]."""
+
+    normal: np.ndarray
+    offset: np.ndarray
+    start: np.ndarray
+
+
+class Boxes(NamedTuple):
+    """Boxes along the axes, from low to high (n, 3): [m], or numbers of bins."""
+
+    low: np.ndarray
+    high: np.ndarray
+
+
+class Corners(NamedTuple):
+    """Tetrahedra by their corners: nodes (N, 3) [m] · cells (M, 4)."""
+
+    nodes: np.ndarray
+    cells: np.ndarray
+
+
+class Bins(NamedTuple):
+    """Cells that reach into each brick of a lattice of ny by nz bricks in its last two directions: brick
+    (i ny + j) nz + k has cells[start[b]:start[b + 1]]."""
+
+    start: np.ndarray
+    cells: np.ndarray
+    ny: int
+    nz: int
+
+
+class Hats(NamedTuple):
+    """Linear functions of cells: cells (M, 4) nodes · parent (M,) row of their gradients (.., 4, 3) [1/m]."""
+
+    cells: np.ndarray
+    parent: np.ndarray
+    gradients: np.ndarray
+
+
+class FluidCells(NamedTuple):
+    """`Hats` of a domain with what is left of its cells: volume (M,) [m³] · share (M, 4) mean of each function over
+    it · size (M,) [m] · upright (rows of the gradients,) bool: see `Background.upright`."""
+
+    cells: np.ndarray
+    parent: np.ndarray
+    gradients: np.ndarray
+    volume: np.ndarray
+    share: np.ndarray
+    size: np.ndarray
+    upright: np.ndarray
+
+
+class Edges(NamedTuple):
+    """Edges of listed nodes: row (N,) place of a node in the list, -1 if it is not there · start (n + 1,), neighbour,
+    stiffness [m] of each."""
+
+    row: np.ndarray
+    start: np.ndarray
+    neighbour: np.ndarray
+    stiffness: np.ndarray
+
+
+class WettedPolygons(NamedTuple):
+    """cell (S,), body (S,) · area (S,) [m²] · normal (S, 3) out of the body · points (S, 3, 3) [m], each with a third
+    of the area."""
+
+    cell: np.ndarray
+    body: np.ndarray
+    area: np.ndarray
+    normal: np.ndarray
+    points: np.ndarray
