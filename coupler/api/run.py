@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
-import numpy.typing as npt
 
+from array_types import Floats, Ints
 from coupler.api.execution import resume
 from coupler.api.step import Step
 from coupler.program.errors import NoRun, SurgebreakError, UnknownName, did_you_mean
@@ -22,9 +22,6 @@ from coupler.run.summary import read_summary
 
 if TYPE_CHECKING:
     import pandas
-
-Floats = npt.NDArray[np.float64]
-Whole = npt.NDArray[np.int64]
 
 
 class NotDrawn(SurgebreakError):
@@ -41,7 +38,7 @@ class WaterState:
 
     time: float
     nodes: Floats
-    cells: Whole
+    cells: Ints
     level_set: Floats
     velocity: Floats
     pressure: Floats
@@ -69,8 +66,8 @@ class BlockState:
 
     time: float
     points: Floats
-    faces: list[Whole]
-    block: Whole
+    faces: list[Ints]
+    block: Ints
     names: list[str]
     groups: list[str]
     speed: Floats
@@ -286,7 +283,7 @@ def _written(folder: Path) -> dict[Path, int]:
     return {path: path.stat().st_mtime_ns for path in folder.glob("*")} if folder.is_dir() else {}
 
 
-def _polygons(path: Path) -> tuple[Whole, Whole]:
+def _polygons(path: Path) -> tuple[Ints, Ints]:
     """Rows of points of all faces one after the other, and where each but the last ends."""
     rows, ends = vtkhdf.read_polygons(path)
     return np.asarray(rows, np.int64), np.asarray(ends, np.int64)[:-1]

@@ -25,6 +25,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from array_types import Array
+
 STORED = ("kinetic", "gravity", "joint_stored", "contact_stored")
 DISSIPATED = ("joint_dissipated", "joint_damping", "dashpot", "friction")
 
@@ -98,11 +100,11 @@ class Ledger:
         thrown = 0.0 if structure is None else structure["kinetic"]
         self._input = max(self.available + self.coming, thrown, NEGLIGIBLE * held)
 
-    def save(self) -> dict[str, np.ndarray]:
+    def save(self) -> dict[str, Array]:
         """Everything that it holds, by name."""
         return {name: np.array(value) for name, value in vars(self).items() if value is not None}
 
-    def restore(self, saved: dict[str, np.ndarray]) -> None:
+    def restore(self, saved: dict[str, Array]) -> None:
         """Back to what was saved."""
         for name, array in saved.items():
             value = array.tolist()

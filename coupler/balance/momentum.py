@@ -27,13 +27,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from array_types import Array, Floats
+
 if TYPE_CHECKING:
     from fluid.step.momentum import MomentumChange
     from fluid.step.water import Water
     from yade_scripts.dynamics.impulses import Impulses
     from yade_scripts.dynamics.structure import Structure
 
-Array = np.ndarray
 
 LINES = (
     ("water_weight", "weight of the water"),
@@ -72,9 +73,9 @@ class MomentumBalance:
     impulses so far · scheme [1]: sum of the lines of the scheme over it · error [1]: residual of this step over the
     impulses of this step."""
 
-    water: Array
-    blocks: Array
-    residual: Array
+    water: Floats
+    blocks: Floats
+    residual: Floats
     lines: dict[str, Array]
     exchanged: float
     scheme: float
@@ -148,7 +149,7 @@ class WaterStep:
 
     change: MomentumChange
     lines: dict[str, Array]
-    given: Array
+    given: Floats
     exchanged: float
 
     @classmethod
@@ -184,10 +185,10 @@ class BlocksStep:
     """after (6,): momentum of the free blocks · lines · held (6,): held blocks on free ones · received (6,): from the
     water · exchanged [N s]"""
 
-    after: Array
+    after: Floats
     lines: dict[str, Array]
-    held: Array
-    received: Array
+    held: Floats
+    received: Floats
     exchanged: float
 
     @classmethod

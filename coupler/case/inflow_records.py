@@ -13,12 +13,11 @@ from pathlib import Path
 
 import numpy as np
 
+from array_types import Array
 from coupler.case.paths import BadPath, check_file, read_text
 from coupler.case.records import repeated
 from coupler.case.water import RecordInflow
 from coupler.program.errors import briefly, did_you_mean
-
-Array = np.ndarray
 
 
 class RecordError(ValueError):

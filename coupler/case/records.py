@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from array_types import Array
 from coupler.case.paths import BadPath, place_of, read_text
 from coupler.program.errors import BadCase, did_you_mean
 
@@ -32,7 +33,7 @@ def find_record(file: str | Path, directory: Path) -> Path:
 
 
 @lru_cache(maxsize=32)
-def read_record(path: Path) -> dict[str, np.ndarray]:
+def read_record(path: Path) -> dict[str, Array]:
     """Columns (n,) by their heading.  Raises NoSuchData for what is no such table."""
     try:
         text = read_text(path)
@@ -57,7 +58,7 @@ def repeated(names: list[str]) -> str | None:
     return next((name for k, name in enumerate(names) if name in names[:k]), None)
 
 
-def column(table: dict[str, np.ndarray], name: str, file: str | Path) -> np.ndarray:
+def column(table: dict[str, Array], name: str, file: str | Path) -> Array:
     """The column of that name.  Raises NoSuchData."""
     if name not in table:
         raise NoSuchData(

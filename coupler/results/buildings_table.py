@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import numpy as np
-
+from array_types import Array
 from coupler.results.history import Column, write_table
 from coupler.results.maps import NEVER, Maps
 from coupler.verdict.judge import verdict
 from coupler.verdict.watch import Watch
-
-Array = np.ndarray
 
 AROUND = 1.5
 """Cells around its footprint within which the flood counts as that of a body."""

@@ -7,10 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
+from array_types import Array
 from coupler.results.history import Column, WrongShape, write_table
 from coupler.results.storage import NotFinite
-
-Array = np.ndarray
 
 CRACK_COLUMNS = tuple(
     Column(*c)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from array_types import Array
 from coupler.results.history import Column, write_table
 from coupler.verdict.judge import joints_of
 from coupler.verdict.watch import Watch
@@ -52,7 +53,7 @@ def write_blocks(path, structure, watch: Watch) -> None:
     )  # fmt: skip
 
 
-def breaks(structure) -> tuple[np.ndarray, np.ndarray]:
+def breaks(structure) -> tuple[Array, Array]:
     """Time of the first break of each block (n,) [s], NaN without one, and the broken share of its joined area (n,)."""
     joints = joints_of(structure)
     first, area, gone = np.full(structure.n, np.inf), np.zeros(structure.n), np.zeros(structure.n)

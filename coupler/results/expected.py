@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
+from array_types import Array
 from coupler.program.errors import did_you_mean
 from coupler.results.history import read_history
 
@@ -65,13 +66,13 @@ def _columns(entry: dict, run: Path) -> tuple[dict, str]:
     return columns, "" if len(columns["time"]) else f"{table} has no rows"
 
 
-def _integral(time: np.ndarray, values: np.ndarray, entry: dict) -> float:
+def _integral(time: Array, values: Array, entry: dict) -> float:
     grid = np.unique(np.concatenate([[entry["from"], entry["to"]], time]))
     grid = grid[(grid >= entry["from"]) & (grid <= entry["to"])]
     return np.trapezoid(np.interp(grid, time, values), grid)
 
 
-def _period(time: np.ndarray, values: np.ndarray, entry: dict) -> float:
+def _period(time: Array, values: Array, entry: dict) -> float:
     """Mean distance of upward crossings of the mean [s]; NaN with fewer than two."""
     around = values - values.mean()
     up = np.flatnonzero((around[:-1] < 0) & (around[1:] >= 0))
@@ -79,13 +80,13 @@ def _period(time: np.ndarray, values: np.ndarray, entry: dict) -> float:
     return np.diff(crossing).mean() if len(crossing) > 1 else np.nan
 
 
-def _arrival(time: np.ndarray, values: np.ndarray, entry: dict) -> float:
+def _arrival(time: Array, values: Array, entry: dict) -> float:
     """First time at which the values exceed entry["above"] [s]; NaN if they never do."""
     above = values > entry["above"]
     return time[above.argmax()] if above.any() else np.nan
 
 
-TAKE: dict[str, Callable[[np.ndarray, np.ndarray, dict], float]] = {
+TAKE: dict[str, Callable[[Array, Array, dict], float]] = {
     "last": lambda time, values, entry: values[-1],
     "largest": lambda time, values, entry: values[np.abs(values).argmax()],
     "max": lambda time, values, entry: values.max(),

@@ -16,6 +16,8 @@ from collections import deque
 
 import numpy as np
 
+from array_types import Array
+
 
 class Windows:
     """The accumulated values of one gauge; impulse (from, to) [s] or None, mean_over [s] or None."""
@@ -52,17 +54,17 @@ class Windows:
             found += [*mean, self.peak]
         return found
 
-    def save(self) -> dict[str, np.ndarray]:
+    def save(self) -> dict[str, Array]:
         """What has been accumulated; steps (k, 2 + values): begin and end [s] of each, and its values."""
         steps = [np.r_[begin, end, value] for begin, end, value in self._steps]
         return {"total": np.array(self.total), "peak": np.array(self.peak), "steps": np.array(steps)}
 
-    def restore(self, saved: dict[str, np.ndarray]) -> None:
+    def restore(self, saved: dict[str, Array]) -> None:
         """Back to what was saved."""
         self.total, self.peak = saved["total"][()], float(saved["peak"])
         self._steps = deque((float(row[0]), float(row[1]), row[2:].copy()) for row in saved["steps"])
 
-    def _mean(self, time: float, dt: float, value) -> np.ndarray:
+    def _mean(self, time: float, dt: float, value) -> Array:
         if np.isfinite(value).all():
             self._steps.append((time - dt, time, value))
         start = time - self.mean_over

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from array_types import Array, Floats
 from coupler.results.gauge_windows import Windows
 from coupler.results.loads import BlockLoads, GroupLoads
 
@@ -35,9 +36,9 @@ class Bodies:
     for solids); rows_of: rows for each name of a block, group, part or solid · parts: of the loads that there are."""
 
     names: list[str]
-    centre: np.ndarray
-    mass: np.ndarray
-    rows_of: dict[str, np.ndarray]
+    centre: Floats
+    mass: Floats
+    rows_of: dict[str, Array]
     parts: list[str]
 
 
@@ -56,7 +57,7 @@ def make_gauges(spec, bodies: Bodies) -> list[Gauge]:
     return [Gauge(tuple(found.columns()), found.read, found, name) for name, found in tables.items()]
 
 
-def make_gauge(spec, rows_of: dict[str, np.ndarray]) -> Gauge:
+def make_gauge(spec, rows_of: dict[str, Array]) -> Gauge:
     """A gauge in the common table. rows_of: rows of the load table for each name of a block, group or solid."""
     makers = {
         "level": _level,
@@ -166,11 +167,11 @@ class Followed:
             return np.nan, np.nan
         return float(air.mean_pressure[there[0]]), float(water.pocket_volumes()[there[0]])
 
-    def save(self) -> dict[str, np.ndarray]:
+    def save(self) -> dict[str, Array]:
         """What `restore` takes."""
         return {"name": np.array(self.name)}
 
-    def restore(self, saved: dict[str, np.ndarray]) -> None:
+    def restore(self, saved: dict[str, Array]) -> None:
         """Back to what was saved."""
         self.name = int(saved["name"])
 
@@ -199,14 +200,14 @@ PATCH_POINTS = 6
 """Points along each edge of a patch, and rings of a disc."""
 
 
-def parallelogram(centre, edges, points: int = PATCH_POINTS) -> np.ndarray:
+def parallelogram(centre, edges, points: int = PATCH_POINTS) -> Array:
     """(points², 3) [m] middles of equal parts of the parallelogram with these edges (2, 3)."""
     s = (np.arange(points) + 0.5) / points - 0.5
     u, v = np.meshgrid(s, s, indexing="ij")
     return np.asarray(centre) + np.column_stack([u.ravel(), v.ravel()]) @ np.asarray(edges, float)
 
 
-def disc(centre, radius: float, normal, rings: int = PATCH_POINTS) -> np.ndarray:
+def disc(centre, radius: float, normal, rings: int = PATCH_POINTS) -> Array:
     """Points (m, 3) [m] of equal parts of a disc: ring k, 6 k - 3 points at sqrt(mean r²) of its area."""
     n = np.asarray(normal, float) / np.linalg.norm(normal)
     first = np.cross(n, np.eye(3)[np.argmin(np.abs(n))])
@@ -270,7 +271,7 @@ def _motion(spec, rows_of) -> Gauge:
     return Gauge(columns, read)
 
 
-def _rotation_vector(R) -> np.ndarray:
+def _rotation_vector(R) -> Array:
     from scipy.spatial.transform import Rotation
 
     return Rotation.from_matrix(R).as_rotvec()

@@ -17,9 +17,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from array_types import Array
 from coupler.results.gauge_windows import Windows
-
-Array = np.ndarray
 
 PARTS = {
     "pressure": "pressure of the water",

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-Array = np.ndarray
+from array_types import Array
 
 FILM = 0.1
 """Depth from which a place counts as wet, in layers of the mesh: thinner films have no speed to speak of."""

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from array_types import Array
 from coupler.geometry.tank_mesh import basin_edges
 from coupler.results.columns import (
     AIR,
@@ -113,7 +114,7 @@ class Recorder:
             self.top.restore(_below("top_", kept))
         self._write_tables()
 
-    def _gauge_memory(self) -> dict[str, np.ndarray]:
+    def _gauge_memory(self) -> dict[str, Array]:
         """What the gauges have accumulated, by number of the gauge."""
         return {
             f"gauge_{k}_{name}": array
@@ -122,7 +123,7 @@ class Recorder:
             for name, array in gauge.windows.save().items()
         }
 
-    def save(self) -> dict[str, np.ndarray]:
+    def save(self) -> dict[str, Array]:
         """Sums so far, and how far the files go: written states, rows and bytes of each table."""
         places = {f"table_{name}": np.array(table.place) for name, table in self._tables.items()}
         return (
@@ -313,7 +314,7 @@ class Recorder:
             table.close()
 
 
-def _below(start: str, kept) -> dict[str, np.ndarray]:
+def _below(start: str, kept) -> dict[str, Array]:
     """What was kept under names with this start, by the rest of the name."""
     return {name.removeprefix(start): a for name, a in kept.items() if name.startswith(start)}
 

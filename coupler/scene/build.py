@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from array_types import Array
 from coupler.case.case import Case
 from coupler.geometry.basin import basin_planes
 from coupler.geometry.parts import Part, parts_of
@@ -36,7 +37,7 @@ class Scene:
 
     coupling: CoupledStepper
     gauges: list[Gauge]
-    solids: list[tuple[np.ndarray, tuple]]
+    solids: list[tuple[Array, tuple]]
     tank: tuple | None
     watch: Watch | None = None
     """What the verdict is made from; None without a structure."""
@@ -140,7 +141,7 @@ def _settled(structure, water) -> bool:
     return settle(structure, load) > 0.0
 
 
-def _load_at_rest(structure, water) -> np.ndarray:
+def _load_at_rest(structure, water) -> Array:
     """Force and moment (n, 6) of the water on the blocks while these are held."""
     from coupler.step.pressure_with_structure import water_load
     from fluid.numerics.bounded import solve_pressure
@@ -284,7 +285,7 @@ def _bodies(case: Case) -> Bodies:
     return Bodies(names, np.array(centre, float).reshape(-1, 3), np.array(mass), rows, loads)
 
 
-def rows_by_name(case: Case, parts: tuple[Part, ...]) -> dict[str, np.ndarray]:
+def rows_by_name(case: Case, parts: tuple[Part, ...]) -> dict[str, Array]:
     """Rows of the load table for every name a case may use: blocks, groups, parts of the structure, solids."""
     rows: dict[str, list[int]] = {}
     row = 0

@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from array_types import Array
 from coupler.case.case import Case
 from coupler.case.inflow_records import levels_of, record_of
 from coupler.geometry.tank_mesh import bed_along, floor_along, mean_bed, mesh_of, on_side
@@ -158,7 +159,7 @@ def sides_named(names, mesh):
     return chosen
 
 
-def _outward(side: str) -> np.ndarray:
+def _outward(side: str) -> Array:
     direction = np.zeros(3)
     direction["xyz".index(side[0])] = 1.0 if side[1] == "+" else -1.0
     return direction

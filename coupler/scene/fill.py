@@ -21,9 +21,8 @@ from itertools import product
 
 import numpy as np
 
+from array_types import Array
 from fluid.domain.quadrature import part_points
-
-Array = np.ndarray
 
 TOUCHES = 0.1
 """Share of a cell edge within which the side of a box counts as the face of the solid."""

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
+from array_types import Array
 from coupler.balance.energy import Ledger
 from coupler.balance.momentum import book_step, momentum_ledger
 from coupler.step.limits import Diverged, Limits, check_finite, check_pressure, no_room
@@ -34,7 +35,6 @@ if TYPE_CHECKING:
     from fluid.step.water import Water
     from yade_scripts.dynamics.structure import Structure
 
-Array = np.ndarray
 
 BLOCK_COURANT = 0.5
 """Share of a cell that the fastest block may cross in one step: its cells are cut once a step."""

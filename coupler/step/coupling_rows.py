@@ -11,9 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
+from array_types import Array, Floats, Ints
 from kernel_decorators import kernel
-
-Array = np.ndarray
 
 
 @dataclass(frozen=True)
@@ -21,13 +20,13 @@ class Wetting:
     """dof, body (k,) of each pair · rows (k, 6) [m², m³], entries of G · n_dofs · start (n_bodies + 1,): pairs of each
     body in own_dof (k,) and own_rows (k, 6), the same ordered by bodies: read in order, both products are faster."""
 
-    dof: Array
-    body: Array
-    rows: Array
+    dof: Ints
+    body: Ints
+    rows: Floats
     n_dofs: int
-    start: Array
-    own_dof: Array
-    own_rows: Array
+    start: Ints
+    own_dof: Ints
+    own_rows: Floats
 
     @classmethod
     def of(cls, coupling: sp.csr_matrix) -> Wetting:

@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from array_types import Array
 from fluid.pressure.slits import Cracks
 
 if TYPE_CHECKING:
     from yade_scripts.dynamics.structure import Structure
 
-Array = np.ndarray
 
 WIDEST = 0.25
 """Largest opening in cells of a crack that is closed: below it a closed one is nearer to the truth than an open one."""

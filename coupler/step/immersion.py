@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
+from array_types import Array
 from fluid.cut.bodies import ConvexBodies
 from fluid.domain.physical_domain import cut_domain
 
@@ -14,7 +15,6 @@ if TYPE_CHECKING:
     from fluid.mesh.background import Background
     from yade_scripts.dynamics.structure import Structure
 
-Array = np.ndarray
 
 STILL = 1e-3
 """Share of a cell edge that a block may move before its cells are cut again."""

@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from array_types import Array
 from coupler.program.errors import ExitCode, SurgebreakError
 
 if TYPE_CHECKING:
     from coupler.geometry.overlaps import Overlap
     from fluid.step.water import Water
-
-Array = np.ndarray
 
 
 class Diverged(SurgebreakError):

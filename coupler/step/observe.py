@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from array_types import Array
+
 if TYPE_CHECKING:
     from coupler.step.sides import CoupledSides
     from yade_scripts.dynamics.structure import Structure
-
-Array = np.ndarray
 
 
 class JointCounts(NamedTuple):

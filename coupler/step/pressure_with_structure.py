@@ -43,13 +43,12 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
+from array_types import Array, Bools, Floats
 from coupler.step.coupling_rows import Wetting
 from kernel_decorators import kernel, plain
 
 if TYPE_CHECKING:
     from fluid.pressure.projection import PressureProblem
-
-Array = np.ndarray
 
 
 def mass_matrix(mass: Array, inertia: Array) -> sp.csr_array:
@@ -184,14 +183,14 @@ class CoupledSolution:
     the bodies · restoring (n_bodies, 6): the part of it by which floating bodies are lifted less on their way ·
     at_bound (n_dofs,) bool, parting (n_dofs,) [m³/s], lower (n_dofs,) [Pa]: see `fluid.numerics.bounded`."""
 
-    x: Array
-    velocity: Array
-    load: Array
-    restoring: Array
+    x: Floats
+    velocity: Floats
+    load: Floats
+    restoring: Floats
     iterations: int
-    at_bound: Array
-    parting: Array
-    lower: Array
+    at_bound: Bools
+    parting: Floats
+    lower: Floats
 
 
 def water_load(problem: PressureProblem, x: Array | float) -> Array:

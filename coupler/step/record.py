@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from array_types import Floats
 from coupler.balance.energy import Balance
 from coupler.balance.momentum import MomentumBalance
 
 if TYPE_CHECKING:
     from yade_scripts.dynamics.impulses import Impulses
-
-Array = np.ndarray
 
 
 @dataclass(kw_only=True)
@@ -37,13 +36,13 @@ class StepRecord:
     """Whether it stays although it breaks a limit, since shorter ones do so too."""
     wetted: bool = False
     """Whether water touched a body in this step."""
-    load: Array = field(default_factory=lambda: np.zeros((0, 6)))
-    shear_load: Array = field(default_factory=lambda: np.zeros((0, 6)))
+    load: Floats = field(default_factory=lambda: np.zeros((0, 6)))
+    shear_load: Floats = field(default_factory=lambda: np.zeros((0, 6)))
     """The part of `load` that walls of bodies take by viscosity and friction."""
-    surface_load: Array = field(default_factory=lambda: np.zeros((0, 6)))
+    surface_load: Floats = field(default_factory=lambda: np.zeros((0, 6)))
     """The part of `load` that corrects the pressure where the surface passes through the cells of a body, and the
     weight of the films of water beside it (`fluid.pressure.films`)."""
-    missed_work: Array = field(default_factory=lambda: np.zeros(0))
+    missed_work: Floats = field(default_factory=lambda: np.zeros(0))
     """Work of the load on each block (n,) [J] that the blocks got less than the water gave."""
     impulses: Impulses | None = None
     """What contacts and joints gave to the blocks; None without a structure."""

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from array_types import Array
 from coupler.step.limits import check_misses
 
 if TYPE_CHECKING:
@@ -68,11 +69,11 @@ class Defects:
         if record.bad:
             check_misses(time, list(self._last)[-MISSES:], MISSES, self.most, record.dt)
 
-    def save(self) -> dict[str, np.ndarray]:
+    def save(self) -> dict[str, Array]:
         """Its memory, by name."""
         return {"defects": np.array(self._last, float), "share": np.array(self.share)}
 
-    def restore(self, saved: dict[str, np.ndarray]) -> None:
+    def restore(self, saved: dict[str, Array]) -> None:
         """Back to what was saved."""
         self._last = deque(saved["defects"].tolist(), maxlen=DEFECT_STEPS)
         self.share = float(saved["share"])

@@ -15,12 +15,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from array_types import Array
 from fluid.viscous.viscosity import FreeBodies
 
 if TYPE_CHECKING:
     from yade_scripts.dynamics.structure import Structure
-
-Array = np.ndarray
 
 
 class ShearedBlocks:

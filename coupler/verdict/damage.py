@@ -21,7 +21,8 @@ from enum import IntEnum
 
 import numpy as np
 
-Array = np.ndarray
+from array_types import Array, Floats, Ints
+
 NOWHERE = -1
 """Label of a block that belongs to no group, and of the ground."""
 
@@ -54,9 +55,9 @@ class Blocks:
     """mass (n,) [kg] · thickness (n,) [m] · moved (n,) [m]: how far each centre has moved since the start, the farthest
     so far"""
 
-    mass: Array
-    thickness: Array
-    moved: Array
+    mass: Floats
+    thickness: Floats
+    moved: Floats
 
     def left(self, rules: Rules) -> Array:
         """(n,) bool: blocks that have left their place."""
@@ -68,10 +69,10 @@ class Joints:
     """a, b (J,) rows of the blocks, negative for the ground · area (J,) [m²] · broken (J,) [s]: time of failure, NaN
     while it holds"""
 
-    a: Array
-    b: Array
-    area: Array
-    broken: Array
+    a: Ints
+    b: Ints
+    area: Floats
+    broken: Floats
 
     @classmethod
     def none(cls) -> Joints:

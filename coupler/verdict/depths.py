@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from array_types import Array
 from coupler.verdict.divisions import Division
 
 if TYPE_CHECKING:
     from fluid.step.water import Water
 
-Array = np.ndarray
 
 OUTSIDE = 1.5
 """Cells between a body and where its depth is read: the cells that it cuts lie between."""

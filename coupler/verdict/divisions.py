@@ -13,9 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from array_types import Array, Ints
 from coupler.verdict.damage import NOWHERE
-
-Array = np.ndarray
 
 PLACE_IN_WALL = re.compile(r"(-\d+)+$")
 OF_A_STOREY = re.compile(r"(?P<body>.*)-(?P<kind>[a-z]+)(?P<storey>\d+)(?P<which>[a-z]?[+-]?\d*)$")
@@ -27,7 +26,7 @@ class Division:
     """names of the groups in the order of their first block · label (n,): group of each block, NOWHERE for none."""
 
     names: tuple[str, ...]
-    label: Array
+    label: Ints
 
     @classmethod
     def of(cls, names: Iterable[str | None]) -> Division:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from array_types import Array
 from coupler.verdict.damage import Blocks, Damage, Joints, damage
 from coupler.verdict.divisions import Division
 from coupler.verdict.watch import HIT_COLUMNS, Peaks, Watch
@@ -15,7 +16,6 @@ from coupler.verdict.watch import HIT_COLUMNS, Peaks, Watch
 if TYPE_CHECKING:
     from yade_scripts.dynamics.structure import Structure
 
-Array = np.ndarray
 MOST_LISTED = 25
 """Blocks that left their place, and hits, that are listed one by one; tables hold them all."""
 

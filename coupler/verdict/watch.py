@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from array_types import Array, Floats
 from coupler.verdict.damage import Rules
 from coupler.verdict.divisions import Divisions
 
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     from yade_scripts.blocks.block import Block
     from yade_scripts.dynamics.structure import Structure
 
-Array = np.ndarray
 
 FALL = 0.1
 """Of its thickness: the fall whose speed a block must lose in a step to count as a hit, unless the case says one."""
@@ -35,8 +35,8 @@ HIT_COLUMNS = ("time", "block", "other", "speed", "impulse", "force", "x", "y", 
 class Peaks:
     """The largest of a quantity for each of k groups: value (k,), time (k,) [s], NaN before the first."""
 
-    value: Array
-    time: Array
+    value: Floats
+    time: Floats
 
     @classmethod
     def none(cls, k: int) -> Peaks:
@@ -54,13 +54,13 @@ class Facts:
     """Of the blocks at the start, one row each, fixed solids too: centre (n, 3) [m] · thickness (n,) [m] ·
     across (n, 3): unit normal of the widest pair of faces · area (n,) [m²] that it stands for · radius (n,) [m]"""
 
-    centre: Array
-    thickness: Array
-    across: Array
-    area: Array
-    radius: Array
-    lower: Array = field(repr=False)
-    upper: Array = field(repr=False)
+    centre: Floats
+    thickness: Floats
+    across: Floats
+    area: Floats
+    radius: Floats
+    lower: Floats = field(repr=False)
+    upper: Floats = field(repr=False)
 
     @classmethod
     def of(cls, blocks: list[Block]) -> Facts:

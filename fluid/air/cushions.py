@@ -26,6 +26,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import scipy.sparse as sp
 
+from array_types import Array
 from fluid.air.gas import Gas
 from fluid.air.pockets import OPEN_AIR, SLIVER, Descent, bricks, labelled, volumes, without
 from fluid.domain.coupling_matrix import wetted_coupling
@@ -48,13 +49,13 @@ class Air:
     filled so far · let_go: those that became too small (`Gas.smallest`) so far."""
 
     gas: Gas
-    label: np.ndarray
-    reference: np.ndarray
-    rate: np.ndarray
-    end_pressure: np.ndarray
-    mean_pressure: np.ndarray
-    turned: np.ndarray
-    name: np.ndarray
+    label: Array
+    reference: Array
+    rate: Array
+    end_pressure: Array
+    mean_pressure: Array
+    turned: Array
+    name: Array
     names: int = 0
     lost: float = 0.0
     entrained: float = 0.0
@@ -83,7 +84,7 @@ class Air:
     def __len__(self) -> int:
         return len(self.reference)
 
-    def volumes(self, topology, phi, taken) -> np.ndarray:
+    def volumes(self, topology, phi, taken) -> Array:
         """Volume (K,) [m³] of the pockets; taken (N,) [m³] that bodies took from the nodes since the cells were cut."""
         found = volumes(topology, phi, self.label, len(self))
         there = self.label > OPEN_AIR
@@ -93,14 +94,14 @@ class Air:
         """On new nodes; source (N,) old node of each, known (N,) bool: whether there is one."""
         return replace(self, label=np.where(known, self.label[source], -1))
 
-    def at_pockets(self, nodal) -> np.ndarray:
+    def at_pockets(self, nodal) -> Array:
         """Values (K,) of the pockets from those at the nodes (N,), the same at all nodes of one."""
         out = np.zeros(len(self))
         there = np.flatnonzero(self.label > OPEN_AIR)
         out[self.label[there] - 1] = nodal[there]
         return out
 
-    def nodal(self, values) -> np.ndarray:
+    def nodal(self, values) -> Array:
         """values (K,) at the nodes of their pockets, zero elsewhere, (N,)."""
         out = np.zeros(len(self.label))
         there = self.label > OPEN_AIR
@@ -116,10 +117,10 @@ class Cushions:
     theta (K,) · known (K,) [Pa] part of the pressure that is not sought · links csr (n, K) s of (3) [m³/(s Pa)]."""
 
     air: Air
-    pressure: np.ndarray
-    stiffness: np.ndarray
-    theta: np.ndarray
-    known: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    pressure: Array
+    stiffness: Array
+    theta: Array
+    known: Array = field(default_factory=lambda: np.zeros(0))
     links: sp.csr_array | None = None
 
     @classmethod
@@ -187,11 +188,11 @@ class Cushions:
         ahead = self.pressure + 2.0 * self.stiffness * dt * np.minimum(self.air.rate, 0.0)
         return float(min(ahead.min(initial=0.0), 0.0))
 
-    def compliance(self, dt: float) -> np.ndarray:
+    def compliance(self, dt: float) -> Array:
         """C (K,) [m³/(s Pa)] of (3)."""
         return 1.0 / (self.theta**2 * self.stiffness * dt)
 
-    def source(self, dt: float) -> np.ndarray:
+    def source(self, dt: float) -> Array:
         """Right hand side (K,) [m³/s] of (3) but for the flow of the water and the bodies."""
         return self.compliance(dt) * (self.pressure - self.known) + self._carried_rate()
 
@@ -240,7 +241,7 @@ class Cushions:
         there = np.flatnonzero(label > OPEN_AIR)
         return sp.csr_array((np.ones(len(there)), (label[there] - 1, there)), shape=(len(self), len(label)))
 
-    def nodes(self) -> np.ndarray:
+    def nodes(self) -> Array:
         """A node (K,) of each pocket."""
         label = self.air.label
         there = np.flatnonzero(label > OPEN_AIR)[::-1]
@@ -276,7 +277,7 @@ def _of_parent(values, only):
     return values[only] if len(values) else np.zeros(len(only), values.dtype)
 
 
-def _names(air: Air, descent: Descent) -> tuple[np.ndarray, int]:
+def _names(air: Air, descent: Descent) -> tuple[Array, int]:
     """Names (K,) of the pockets: that of the old one with most air in each unless it is taken, else a new one."""
     taken, names = set(), air.names
     name = np.zeros(descent.share.shape[1], np.int64)

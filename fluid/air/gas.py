@@ -23,6 +23,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from array_types import Array
+
 AIR_DENSITY = 1.2
 """Density [kg/m³] of air at the pressure of the atmosphere (20 °C)."""
 SMALLEST_VOLUME = 1e-12
@@ -40,17 +42,17 @@ class Gas:
     atmospheric: float = 101_325.0
     smallest: float = 8.0
 
-    def pressure(self, reference, volume) -> np.ndarray:
+    def pressure(self, reference, volume) -> Array:
         """Gauge pressure (K,) [Pa] of (1); reference V_a and volume V (K,) [m³]."""
         v = np.maximum(volume, SMALLEST_VOLUME)
         return self.atmospheric * ((np.asarray(reference) / v) ** self.gamma - 1.0)
 
-    def stiffness(self, reference, volume) -> np.ndarray:
+    def stiffness(self, reference, volume) -> Array:
         """-dP/dV (K,) [Pa/m³] of (1)."""
         v = np.maximum(volume, SMALLEST_VOLUME)
         return self.gamma * (self.pressure(reference, v) + self.atmospheric) / v
 
-    def energy(self, reference, volume) -> np.ndarray:
+    def energy(self, reference, volume) -> Array:
         """U (K,) [J] of (2)."""
         a, v = np.asarray(reference, float), np.maximum(volume, SMALLEST_VOLUME)
         outside = self.atmospheric * (a - v)

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from array_types import Array
 from fluid.air.pockets import OPEN_AIR
 from fluid.domain.point_location import Places
 from fluid.pressure.slits import DISCHARGE
@@ -22,12 +23,12 @@ class Vent:
     place (3,) [m], in the pocket: with a body that it moves with, from its centre and along its own axes ·
     area [m²] · discharge C_d · body, -1: none."""
 
-    place: np.ndarray
+    place: Array
     area: float
     discharge: float = DISCHARGE
     body: int = -1
 
-    def now(self, bodies) -> np.ndarray:
+    def now(self, bodies) -> Array:
         """Where it is (3,) [m] with the bodies (`ConvexBodies`) as they stand now."""
         if self.body < 0:
             return self.place
@@ -35,7 +36,7 @@ class Vent:
         return bodies.centre[b] + bodies.rotation[b] @ self.place
 
 
-def pockets_at(water, points) -> np.ndarray:
+def pockets_at(water, points) -> Array:
     """Label (m,) of the air at points (m, 3) [m]: that of a dry corner of the cell that holds each, -1 without any."""
     corners = Places.of(water, points, beyond=True).corners
     return water.air.label[corners].max(axis=1)

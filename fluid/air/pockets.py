@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from array_types import Array
 from fluid.domain.moments import wet_fraction
 from kernel_decorators import kernel
 
@@ -20,7 +21,7 @@ SLIVER = 0.1
 """Share of the room of a pocket below which what it has in common with another one, or with the open air, is none."""
 
 
-def labelled(topology, phi, open_to_air) -> tuple[np.ndarray, int]:
+def labelled(topology, phi, open_to_air) -> tuple[Array, int]:
     """Label (N,) of the air at the nodes below the level set φ (N,) [m], and the number of pockets K.
 
     open_to_air (N,) bool: nodes on open sides. Pockets are numbered by their first node."""
@@ -83,7 +84,7 @@ def _join(root, i, j):
         root[a] = b
 
 
-def volumes(topology, phi, label, count: int) -> np.ndarray:
+def volumes(topology, phi, label, count: int) -> Array:
     """Volume (K,) [m³] of the pockets: what φ (N,) [m] leaves of the cells at their nodes."""
     t = topology
     cells = t.cells_around(label > OPEN_AIR)
@@ -92,7 +93,7 @@ def volumes(topology, phi, label, count: int) -> np.ndarray:
     return np.bincount(pocket - 1, free, minlength=count)[:count]
 
 
-def bricks(topology, label, count: int) -> np.ndarray:
+def bricks(topology, label, count: int) -> Array:
     """Mean volume (K,) [m³] of the bricks, of six cells each, around the nodes of the pockets."""
     t = topology
     cells = t.cells_around(label > OPEN_AIR)
@@ -101,7 +102,7 @@ def bricks(topology, label, count: int) -> np.ndarray:
     return total / np.maximum(np.bincount(pocket, minlength=count)[:count], 1)
 
 
-def without(label, small) -> tuple[np.ndarray, int]:
+def without(label, small) -> tuple[Array, int]:
     """Labels (N,) and number of the pockets that are left when those of small (K,) bool count as open air."""
     number = np.concatenate([[OPEN_AIR], np.where(small, OPEN_AIR, np.cumsum(~small))])
     return np.where(label > OPEN_AIR, number[np.maximum(label, 0)], label), int((~small).sum())
@@ -115,11 +116,11 @@ class Descent:
     atmosphere had · only (K,): the one old pocket that became this one whole and without any other air, -1: there is
     none · opened (O,): share that the atmosphere reaches now · gone (O,) bool: without any room left."""
 
-    share: np.ndarray
-    fresh: np.ndarray
-    only: np.ndarray
-    opened: np.ndarray
-    gone: np.ndarray
+    share: Array
+    fresh: Array
+    only: Array
+    opened: Array
+    gone: Array
 
     @classmethod
     def of(cls, before, n_before: int, now, n_now: int, node_volume) -> Descent:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.spatial import ConvexHull
 
+from array_types import Array, Floats, Ints
 from fluid.mesh.arrays import Planes
 from kernel_decorators import kernel
 
@@ -32,12 +33,12 @@ class BodyShapes:
     reach (n,): a shift g of the planes moves no vertex by more than reach * g.
     """
 
-    normals: np.ndarray
-    offsets: np.ndarray
-    plane_start: np.ndarray
-    vertices: np.ndarray
-    vertex_start: np.ndarray
-    reach: np.ndarray
+    normals: Floats
+    offsets: Floats
+    plane_start: Ints
+    vertices: Floats
+    vertex_start: Ints
+    reach: Floats
 
     def __len__(self) -> int:
         return len(self.plane_start) - 1
@@ -98,15 +99,15 @@ class ConvexBodies:
     shapes: the reference geometry, for `moved`.
     """
 
-    normals: np.ndarray
-    offsets: np.ndarray
-    plane_start: np.ndarray
-    vertices: np.ndarray
-    vertex_start: np.ndarray
-    centre: np.ndarray
-    rotation: np.ndarray
-    growth: np.ndarray
-    reach: np.ndarray
+    normals: Floats
+    offsets: Floats
+    plane_start: Ints
+    vertices: Floats
+    vertex_start: Ints
+    centre: Floats
+    rotation: Floats
+    growth: Floats
+    reach: Floats
     shapes: BodyShapes = field(repr=False, compare=False)
 
     def __len__(self) -> int:
@@ -144,7 +145,7 @@ class ConvexBodies:
         """The same bodies with another outward shift of their planes, growth (P,) or () [m]."""
         return replace(self, growth=np.array(np.broadcast_to(growth, self.offsets.shape), dtype=np.float64))
 
-    def cut_offsets(self) -> np.ndarray:
+    def cut_offsets(self) -> Array:
         """(P,) [m] offsets of the planes that the water is cut by."""
         return self.offsets + self.growth
 
@@ -152,7 +153,7 @@ class ConvexBodies:
         """The planes that the water is cut by, as kernels take them."""
         return Planes(self.normals, self.cut_offsets(), self.plane_start)
 
-    def bounds(self) -> np.ndarray:
+    def bounds(self) -> Array:
         """(n, 2, 3) [m] boxes that hold the grown bodies."""
         if len(self) == 0:
             return np.zeros((0, 2, 3))
@@ -162,7 +163,7 @@ class ConvexBodies:
         margin = (self.reach * growth)[:, None]
         return np.stack([lower - margin, upper + margin], axis=1)
 
-    def contains(self, points) -> np.ndarray:
+    def contains(self, points) -> Array:
         """points (m, 3) [m] -> (m,) first (grown) body that holds the point, -1 where there is none."""
         points = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 3)
         return _holder(points, self.normals, self.cut_offsets(), self.plane_start, self.bounds())
@@ -184,7 +185,7 @@ def box_shapes(size) -> BodyShapes:
     )
 
 
-def centre_of_volume(vertices) -> np.ndarray:
+def centre_of_volume(vertices) -> Array:
     """Centre of volume (3,) [m] of the convex hull of vertices (k, 3)."""
     vertices = np.asarray(vertices, dtype=np.float64)
     hull = ConvexHull(vertices)

@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from array_types import Array
 from fluid.mesh.arrays import Bins, Boxes
 from fluid.mesh.background import bin_of
 from kernel_decorators import plain
 
 
-def near_pairs(mesh, solids, chosen, margin) -> tuple[np.ndarray, np.ndarray]:
+def near_pairs(mesh, solids, chosen, margin) -> tuple[Array, Array]:
     """mesh: Background · solids: ConvexBodies · chosen (c,) bodies to search for · margin [m]
     -> cell (k,), body (k,), sorted by cell, then body."""
     chosen = np.asarray(chosen, dtype=np.int64)

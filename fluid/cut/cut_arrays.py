@@ -6,22 +6,24 @@ from typing import NamedTuple
 
 import numpy as np
 
+from array_types import Bools, Floats, Ints
+
 
 class Output(NamedTuple):
     """What the kernel fills; rows beyond the returned counts are unused."""
 
-    part_cell: np.ndarray  # (parts,) background cell
-    part_whole: np.ndarray  # (parts,) True where nothing was removed from the cell
-    part_moments: np.ndarray  # (parts, 10) V, c, S
-    wet_part: np.ndarray  # (wetted polygons,) row of the part it bounds
-    wet_body: np.ndarray  # (wetted polygons,)
-    wet: np.ndarray  # (wetted triangles, 25) area, centroid, normal, three quadrature points, corners
-    open_part: np.ndarray  # (open polygons,)  pieces' faces on faces of the cell
-    open_face: np.ndarray  # (open polygons,)  0..3
-    open_start: np.ndarray  # (open polygons + 1,)
-    open_x: np.ndarray  # (corners, 3)
-    tet_part: np.ndarray  # (tetrahedra,) row of the part that they fill
-    tet: np.ndarray  # (tetrahedra, 17) volume, barycentric coordinates of the four corners
+    part_cell: Ints  # (parts,) background cell
+    part_whole: Bools  # (parts,) True where nothing was removed from the cell
+    part_moments: Floats  # (parts, 10) V, c, S
+    wet_part: Ints  # (wetted polygons,) row of the part it bounds
+    wet_body: Ints  # (wetted polygons,)
+    wet: Floats  # (wetted triangles, 25) area, centroid, normal, three quadrature points, corners
+    open_part: Ints  # (open polygons,)  pieces' faces on faces of the cell
+    open_face: Ints  # (open polygons,)  0..3
+    open_start: Ints  # (open polygons + 1,)
+    open_x: Floats  # (corners, 3)
+    tet_part: Ints  # (tetrahedra,) row of the part that they fill
+    tet: Floats  # (tetrahedra, 17) volume, barycentric coordinates of the four corners
 
 
 def output(parts: int, polygons: int, with_openings: bool) -> Output:
@@ -54,18 +56,18 @@ class Cuts(NamedTuple):
     tet_part (T,) row of the part · tet (T, 17) tetrahedra that fill it: volume [m3], barycentric coordinates of the
     four corners in the cell (only of parts that are not whole cells)"""
 
-    part_cell: np.ndarray
-    part_whole: np.ndarray
-    moments: np.ndarray
-    wet_part: np.ndarray
-    wet_body: np.ndarray
-    wet: np.ndarray
-    open_part: np.ndarray
-    open_face: np.ndarray
-    open_start: np.ndarray
-    open_x: np.ndarray
-    tet_part: np.ndarray
-    tet: np.ndarray
+    part_cell: Ints
+    part_whole: Bools
+    moments: Floats
+    wet_part: Ints
+    wet_body: Ints
+    wet: Floats
+    open_part: Ints
+    open_face: Ints
+    open_start: Ints
+    open_x: Floats
+    tet_part: Ints
+    tet: Floats
 
     def kept(self, keep) -> Cuts:
         """Only the parts keep (K,) bool, with their polygons."""

@@ -18,6 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from array_types import Floats, Ints
 from fluid.cut.cut_arrays import Cuts, Output, behind, doubled, output, trimmed
 from fluid.cut.fans import fan
 from fluid.cut.parts_of_cell import label_parts
@@ -81,10 +82,10 @@ class Chosen(NamedTuple):
     """cell (C,) to cut · start (C+1,), bodies: those near each · link_area (C,) [m²] over which pieces of it are one
     part, < 0: all are, and no openings are listed."""
 
-    cell: np.ndarray
-    start: np.ndarray
-    bodies: np.ndarray
-    link_area: np.ndarray
+    cell: Ints
+    start: Ints
+    bodies: Ints
+    link_area: Floats
 
 
 @inner

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from array_types import Floats, Ints
 from fluid.cut.cut_arrays import Cuts
 from fluid.cut.pieces import workspace
 from fluid.cut.polygons import shared_area
@@ -30,27 +31,27 @@ class Contacts(NamedTuple):
     cell (L,) the lower of the two cells · area (L,) [m2] shared, a lower bound where that exceeds the share `enough`
     of the face · full (L,) [m2] area of the face."""
 
-    cell: np.ndarray
-    area: np.ndarray
-    full: np.ndarray
+    cell: Ints
+    area: Floats
+    full: Floats
 
 
 class PartsOfCells(NamedTuple):
     """Elements in the order of their cells: part (M,) row among the cut parts, -1 whole · start (cells + 1,) first
     element of each cell."""
 
-    part: np.ndarray
-    start: np.ndarray
+    part: Ints
+    start: Ints
 
 
 class OpenFaces(NamedTuple):
     """Open polygons of cut parts by the face they lie in: polygon order[s], s from start[4 part + face], has the
     corners x (k, 3) [m] from polygon_start[polygon]."""
 
-    order: np.ndarray
-    start: np.ndarray
-    polygon_start: np.ndarray
-    x: np.ndarray
+    order: Ints
+    start: Ints
+    polygon_start: Ints
+    x: Floats
 
     @classmethod
     def of(cls, cuts: Cuts) -> OpenFaces:

@@ -6,24 +6,25 @@ from typing import NamedTuple
 
 import numpy as np
 
+from array_types import Array
 from kernel_decorators import inner, kernel
 
 
 class Walled(NamedTuple):
     """Elements: centroid (M, 3) [m] · wall (M,) a body that each is wetted by, -1 = none."""
 
-    centroid: np.ndarray
-    wall: np.ndarray
+    centroid: Array
+    wall: Array
 
 
 class Placed(NamedTuple):
     """Where bodies are: centre (n, 3) [m] · rotation (n, 3, 3) body to world."""
 
-    centre: np.ndarray
-    rotation: np.ndarray
+    centre: Array
+    rotation: Array
 
 
-def pick_old_nodes(old, new) -> np.ndarray:
+def pick_old_nodes(old, new) -> Array:
     """(N_new,) old virtual node for each new one, -1 = none.
 
     Away from the bodies a node has one copy before and after. Near them each new element votes with

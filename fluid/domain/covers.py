@@ -18,6 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from array_types import Array, Bools, Ints
 from fluid.cut.parts_of_cell import root as find
 from kernel_decorators import inner, kernel
 
@@ -69,13 +70,13 @@ class VirtualElements(NamedTuple):
     """parent (M,) background cell of each element, ascending · part (M,) row of its cut part, -1 whole · start
     (cells + 1,) first element of each cell · in_slit (M,) bool: its contacts count over any area."""
 
-    parent: np.ndarray
-    part: np.ndarray
-    start: np.ndarray
-    in_slit: np.ndarray
+    parent: Ints
+    part: Ints
+    start: Ints
+    in_slit: Bools
 
 
-def virtual_cells(mesh, elements, contacts, connection, part_in_slit) -> tuple[np.ndarray, np.ndarray]:
+def virtual_cells(mesh, elements, contacts, connection, part_in_slit) -> tuple[Array, Array]:
     """Nodes of the virtual elements.
 
     mesh: Background · elements: `physical_domain.Elements` · contacts: Contacts · connection: Connection
@@ -89,12 +90,12 @@ def virtual_cells(mesh, elements, contacts, connection, part_in_slit) -> tuple[n
     return _numbered(mesh.cells, elements.parent, several, label, len(mesh.nodes))
 
 
-def components(cells, n_nodes: int) -> np.ndarray:
+def components(cells, n_nodes: int) -> Array:
     """(M,) number of the connected component (by shared nodes) of each cell (M, 4)."""
     return _components(cells, n_nodes)
 
 
-def without_pockets(cells, volume, n_nodes: int, least) -> np.ndarray:
+def without_pockets(cells, volume, n_nodes: int, least) -> Array:
     """(M,) bool: the cell belongs to a component of at least that volume [m3]; volume (M,) [m3], least [m3]
     one or (M,): that of the largest cell of the component counts.
 

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from array_types import Floats, Integers, Ints
 from fluid.numerics.threads import found_over, over, owning, reach_of_cells
 from kernel_decorators import inner, kernel, plain, released
 
@@ -76,12 +77,12 @@ class FluidParts(NamedTuple):
     """Where water can be: cells (M, 4) · volume (M,) [m³] of their fluid part · share (M, 4), mean of N_a over it ·
     start (M + 1,), fan_volume (T,) [m³], corners (T, 4, 4): fans of the cut cells (`fans.py`)."""
 
-    cells: np.ndarray
-    volume: np.ndarray
-    share: np.ndarray
-    start: np.ndarray
-    fan_volume: np.ndarray
-    corners: np.ndarray
+    cells: Integers
+    volume: Floats
+    share: Floats
+    start: Ints
+    fan_volume: Floats
+    corners: Floats
 
 
 @inner

@@ -19,6 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from array_types import Array, Floats, Ints
 from fluid.cut.bodies import ConvexBodies
 from fluid.cut.candidate_pairs import near_pairs
 from fluid.cut.cut_arrays import Cuts
@@ -48,8 +49,8 @@ YY = np.array([0, 1, 2, 1, 2, 2])
 class WholeCells:
     """Moments of the uncut background cells: volume (M,), centroid (M, 3)."""
 
-    volume: np.ndarray
-    centroid: np.ndarray
+    volume: Floats
+    centroid: Floats
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,8 +61,8 @@ class Memory:
     mesh: Background
     bodies: ConvexBodies
     whole: WholeCells
-    pair_cell: np.ndarray
-    pair_body: np.ndarray
+    pair_cell: Ints
+    pair_body: Ints
     cuts: Cuts
     connection: Connection
     contacts: Contacts | None
@@ -72,10 +73,10 @@ class Elements(NamedTuple):
     part, -1 whole or nothing removed · start (cells + 1,) first element of each cell · of_part (K,) element of each cut
     part."""
 
-    parent: np.ndarray
-    part: np.ndarray
-    start: np.ndarray
-    of_part: np.ndarray
+    parent: Ints
+    part: Ints
+    start: Ints
+    of_part: Ints
 
 
 @dataclass(frozen=True)
@@ -92,25 +93,25 @@ class PhysicalDomain:
     n_bodies · body_centre (n_bodies, 3) [m] · covers "single" or "multiple".
     """
 
-    nodes: np.ndarray
-    cells: np.ndarray
-    parent_node: np.ndarray
-    parent_cell: np.ndarray
-    volume: np.ndarray
-    centroid: np.ndarray
-    part: np.ndarray
-    fan_start: np.ndarray
-    fan_volume: np.ndarray
-    fan_corners: np.ndarray
-    face_cell: np.ndarray
-    face_body: np.ndarray
-    face_area: np.ndarray
-    face_centroid: np.ndarray
-    face_normal: np.ndarray
-    face_points: np.ndarray
-    face_corners: np.ndarray
+    nodes: Floats
+    cells: Ints
+    parent_node: Ints
+    parent_cell: Ints
+    volume: Floats
+    centroid: Floats
+    part: Ints
+    fan_start: Ints
+    fan_volume: Floats
+    fan_corners: Floats
+    face_cell: Ints
+    face_body: Ints
+    face_area: Floats
+    face_centroid: Floats
+    face_normal: Floats
+    face_points: Floats
+    face_corners: Floats
     n_bodies: int
-    body_centre: np.ndarray
+    body_centre: Floats
     covers: str
     memory: Memory = field(repr=False, compare=False)
 
@@ -130,11 +131,11 @@ class PhysicalDomain:
         return Hats(self.cells, self.parent_cell, self.memory.mesh.gradients)
 
     @cached_property
-    def is_cut(self) -> np.ndarray:
+    def is_cut(self) -> Array:
         """(M,) bool: something was removed from the cell."""
         return self.part >= 0
 
-    def second_of(self, rows) -> np.ndarray:
+    def second_of(self, rows) -> Array:
         """Second moments (n, 6) [m5] (xx, yy, zz, xy, xz, yz) of the fluid part of cells (n,). They are not held: a
         fifth of the memory of a cell, and asked for at cut cells."""
         found, part = _whole_second(self.memory.mesh, self.parent_cell[rows]), self.part[rows]
@@ -175,7 +176,7 @@ def cut_domain(
     return _assembled(memory, elements, covers)
 
 
-def changed_bodies(old: ConvexBodies, new: ConvexBodies) -> np.ndarray:
+def changed_bodies(old: ConvexBodies, new: ConvexBodies) -> Array:
     """(n,) bool: some plane of the body differs, in direction, position or growth."""
     if len(new) == 0:
         return np.zeros(0, dtype=bool)
@@ -199,7 +200,7 @@ def _whole_second(mesh, cells):
     return (d[:, :, XX] * d[:, :, YY]).sum(axis=1) * (mesh.cell_volume[cells] / 20)[:, None]
 
 
-def hat_values(corners, points) -> np.ndarray:
+def hat_values(corners, points) -> Array:
     """P1 functions of tetrahedra corners (k, 4, 3) at points (k, q, 3) -> (k, q, 4)."""
     e1, e2, e3 = (corners[:, a] - corners[:, 0] for a in (1, 2, 3))
     normals = np.stack([np.cross(e2, e3), np.cross(e3, e1), np.cross(e1, e2)], axis=2)
@@ -208,7 +209,7 @@ def hat_values(corners, points) -> np.ndarray:
     return np.concatenate([1.0 - rest.sum(axis=2, keepdims=True), rest], axis=2)
 
 
-def carry(old: PhysicalDomain, new: PhysicalDomain) -> np.ndarray:
+def carry(old: PhysicalDomain, new: PhysicalDomain) -> Array:
     """(N_new,) index of the old node each new node takes its values from, -1 = no source.
 
     Single covers keep their nodes. Multiple covers: the copy of the same background node that shares the

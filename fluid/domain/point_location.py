@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from array_types import Array, Bools, Floats, Integers
 from kernel_decorators import inner, kernel, plain
 
 SKIN = 0.05
@@ -33,10 +34,10 @@ class Places:
     """Points (m, 3) [m] in a domain: corners (m, 4) nodes of the cell that answers, weight (m, 4) its hat functions
     there, known (m,) bool: there is such a cell · inside (m,) bool: in a body, deeper than its skin."""
 
-    corners: np.ndarray
-    weight: np.ndarray
-    known: np.ndarray
-    inside: np.ndarray
+    corners: Integers
+    weight: Floats
+    known: Bools
+    inside: Bools
 
     @classmethod
     def of(cls, water, points, beyond: bool = False) -> Places:
@@ -61,7 +62,7 @@ class Places:
         weight[:, 0] += 1.0
         return cls(corners, weight, cell >= 0, deep | (cell < 0))
 
-    def read(self, field, inside: bool = False) -> np.ndarray:
+    def read(self, field, inside: bool = False) -> Array:
         """P1 values (m, ...) of a field (N, ...); NaN inside bodies, or, with inside=True, continued into cut cells."""
         value = np.einsum("ma,ma...->m...", self.weight, field[self.corners])
         value[~self.known if inside else self.inside] = np.nan
@@ -151,7 +152,7 @@ def _height(normal, a, x):
     return normal[0] * (x[0] - a[0]) + normal[1] * (x[1] - a[1]) + normal[2] * (x[2] - a[2])
 
 
-def _depth(memory, parent, points) -> np.ndarray:
+def _depth(memory, parent, points) -> Array:
     """How deep (m,) [m] points (m, 3) in background cells parent (m,) lie in the body that they lie deepest in, at
     most 0 outside of all."""
     bodies, depth = memory.bodies, np.zeros(len(points))

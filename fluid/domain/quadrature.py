@@ -17,6 +17,8 @@ from __future__ import annotations
 import numpy as np
 from skfem import CellBasis, ElementTetP1, MeshTet
 
+from array_types import Array
+
 # Corners of the regular tetrahedron with unit covariance of the four points.
 CORNERS = np.array([[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]])
 # The usual degree-2 rule: barycentric (a, b, b, b).
@@ -26,7 +28,7 @@ FULL_FAR = (5.0 - np.sqrt(5.0)) / 20.0
 MATRIX = np.array([[0, 3, 4], [3, 1, 5], [4, 5, 2]])
 
 
-def quadrature_rule(domain) -> tuple[np.ndarray, np.ndarray]:
+def quadrature_rule(domain) -> tuple[Array, Array]:
     """X (3, M, 4), W (M, 4) in the reference coordinates of each cell, for
     skfem.CellBasis(MeshTet(nodes.T, cells.T), ElementTetP1(), quadrature=(X, W))."""
     n = len(domain.cells)
@@ -43,7 +45,7 @@ def quadrature_rule(domain) -> tuple[np.ndarray, np.ndarray]:
     return np.ascontiguousarray(np.moveaxis(barycentric, 2, 0)), weight
 
 
-def part_points(corners, volume, centroid, second) -> np.ndarray:
+def part_points(corners, volume, centroid, second) -> Array:
     """Points (k, 4, 3) [m] of the parts of cells corners (k, 4, 3): volume (k,), centroid (k, 3) [m],
     second (k, 6) [m5] central. Weights volume / 4."""
     centre = corners.mean(axis=1)
@@ -56,7 +58,7 @@ def part_points(corners, volume, centroid, second) -> np.ndarray:
     return centre[:, None] + np.einsum("kij,kqj->kqi", B, y)
 
 
-def symmetric_root(S) -> np.ndarray:
+def symmetric_root(S) -> Array:
     """Symmetric square root of (k, 3, 3); eigenvalues below zero (round-off of thin parts) count as zero."""
     value, vector = np.linalg.eigh((S + np.swapaxes(S, 1, 2)) / 2)
     scaled = vector * np.sqrt(np.maximum(value, 0.0))[:, None]
@@ -69,7 +71,7 @@ def cell_basis(domain) -> CellBasis:
     return CellBasis(mesh, ElementTetP1(), quadrature=quadrature_rule(domain))
 
 
-def surface_basis(domain) -> tuple[CellBasis, np.ndarray]:
+def surface_basis(domain) -> tuple[CellBasis, Array]:
     """scikit-fem basis on the wetted polygons (one "cell" per polygon, three points) and the normals
     (3, S, 3) out of the bodies, to be passed to a form by keyword."""
     cells = domain.cells[domain.face_cell]

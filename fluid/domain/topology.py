@@ -14,6 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
+from array_types import Array, Bools, Floats, Integers, Ints
 from fluid.domain.coupling_matrix import polygons_of_nodes
 from fluid.domain.moments import FluidParts
 from fluid.mesh.arrays import Edges, FluidCells, Hats
@@ -34,29 +35,29 @@ class Topology:
     angles, is_obtuse: the mesh has such · upright (rows of `gradients`,) bool: `Background.upright` ·
     node_size (N,) [m]: `Background.node_size`, slanting (N,) bool: `Background.slanting` · spacing [m] of the mesh."""
 
-    nodes: np.ndarray
-    cells: np.ndarray
-    background: np.ndarray
+    nodes: Floats
+    cells: Integers
+    background: Ints
     n_background: int
-    parent: np.ndarray
-    gradients: np.ndarray
-    products: np.ndarray
-    volume: np.ndarray
-    fraction: np.ndarray
-    share: np.ndarray
-    size: np.ndarray
-    node_start: np.ndarray
-    node_cells: np.ndarray
-    neighbours: np.ndarray
-    node_volume: np.ndarray
-    covered: np.ndarray
-    beside_solid: np.ndarray
+    parent: Integers
+    gradients: Floats
+    products: Floats
+    volume: Floats
+    fraction: Floats
+    share: Floats
+    size: Floats
+    node_start: Integers
+    node_cells: Integers
+    neighbours: Integers
+    node_volume: Floats
+    covered: Bools
+    beside_solid: Bools
     parts: FluidParts
-    obtuse: np.ndarray
+    obtuse: Bools
     is_obtuse: bool
-    upright: np.ndarray
-    node_size: np.ndarray
-    slanting: np.ndarray
+    upright: Bools
+    node_size: Floats
+    slanting: Bools
     spacing: float
 
     @classmethod
@@ -112,7 +113,7 @@ class Topology:
         return Hats(self.cells, self.parent, self.gradients)
 
     @cached_property
-    def finer(self) -> np.ndarray:
+    def finer(self) -> Array:
         """(N,): how many times finer the mesh is at a node than its mean, exactly 1 where all cells are equal. Lengths
         times it are in cells at hand where the spacing is the unit."""
         return self.spacing / self.node_size
@@ -123,7 +124,7 @@ class Topology:
         return bool((self.node_size == self.spacing).all())
 
     @cached_property
-    def near_obtuse(self) -> np.ndarray:
+    def near_obtuse(self) -> Array:
         """(N,) bool: nodes of cells with obtuse dihedral angles and three layers around them."""
         near = np.zeros(len(self.nodes), bool)
         near[self.cells[self.obtuse]] = True
@@ -131,14 +132,14 @@ class Topology:
         return near
 
     @cached_property
-    def row_of_background(self) -> np.ndarray:
+    def row_of_background(self) -> Array:
         """Row of the (first) cell of each background cell, -1 inside solids; a last -1 for "no cell"."""
         row = np.full(self.n_background + 1, -1, np.int64)
         row[self.background[::-1]] = np.arange(len(self.background))[::-1]
         return row
 
     @cached_property
-    def rows_of_background(self) -> tuple[np.ndarray, np.ndarray]:
+    def rows_of_background(self) -> tuple[Array, Array]:
         """First row and number of the cells of each background cell: none inside solids, several where a thin wall
         parts it."""
         cells = np.arange(self.n_background)
@@ -146,42 +147,42 @@ class Topology:
         return first, np.searchsorted(self.background, cells, side="right") - first
 
     @property
-    def around(self) -> tuple[np.ndarray, np.ndarray]:
+    def around(self) -> tuple[Array, Array]:
         """start (N+1,), neighbours: the nodes that share a cell with each node."""
         return self.around_by_cells[:2]
 
     @cached_property
-    def around_by_cells(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def around_by_cells(self) -> tuple[Array, Array, Array]:
         """`around`, and how many cells each of these neighbours shares with the node."""
         n = len(self.nodes)
         rows = (self.cells, self.node_start, self.node_cells)
         return _one_behind_the_other(over(_nodes_around, n, *rows, weight=WORK))
 
     @cached_property
-    def near_solids(self) -> np.ndarray:
+    def near_solids(self) -> Array:
         """(N,) bool: nodes of cut cells and two layers around them."""
         near = self.beside_solid.copy()
         near[layers_around(near, 2, *self.around)[0]] = True
         return near
 
-    def cells_around(self, nodes) -> np.ndarray:
+    def cells_around(self, nodes) -> Array:
         """Numbers of the cells with at least one of these nodes (N,) bool, in order; cost grows with their number only,
         but for a byte a cell."""
         touched = np.zeros(len(self.cells), bool)
         over(_touched, len(nodes), nodes, self.node_start, self.node_cells, touched)
         return np.flatnonzero(touched)
 
-    def in_cells(self, length) -> np.ndarray:
+    def in_cells(self, length) -> Array:
         """Lengths (N,) [m] times `finer`: as they are where all cells are equal."""
         return length if self.is_uniform else length * self.finer
 
     @cached_property
-    def active(self) -> np.ndarray:
+    def active(self) -> Array:
         """(N,) bool: nodes that belong to a cell with fluid volume."""
         return np.diff(self.node_start) > 0
 
 
-def covered_nodes(domain) -> np.ndarray:
+def covered_nodes(domain) -> Array:
     """(N,) bool: nodes behind every wetted polygon that some one body has in the cells around them.
 
     A body is convex, so a node with all of its nearby faces in front of it lies inside."""
@@ -371,11 +372,11 @@ class Graph:
     row (N,) place of a node in `nodes`, -1 if not listed · start (n+1,), neighbour, stiffness [m]: CSR without
     diagonal, K_ij = Σ_e volume_e ∇N_i·∇N_j."""
 
-    nodes: np.ndarray
-    row: np.ndarray
-    start: np.ndarray
-    neighbour: np.ndarray
-    stiffness: np.ndarray
+    nodes: Ints
+    row: Ints
+    start: Integers
+    neighbour: Integers
+    stiffness: Floats
 
     @property
     def edges(self) -> Edges:

@@ -6,38 +6,38 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
+from array_types import Bools, Floats, Integers, Ints
 
 
 class Planes(NamedTuple):
     """Planes of convex bodies, n·x = o: normal (P, 3) unit, outward · offset (P,) [m] · start (n + 1,): those of body b
     are start[b]:start[b + 1]."""
 
-    normal: np.ndarray
-    offset: np.ndarray
-    start: np.ndarray
+    normal: Floats
+    offset: Floats
+    start: Ints
 
 
 class Boxes(NamedTuple):
     """Boxes along the axes, from low to high (n, 3): [m], or numbers of bins."""
 
-    low: np.ndarray
-    high: np.ndarray
+    low: Ints
+    high: Ints
 
 
 class Corners(NamedTuple):
     """Tetrahedra by their corners: nodes (N, 3) [m] · cells (M, 4)."""
 
-    nodes: np.ndarray
-    cells: np.ndarray
+    nodes: Floats
+    cells: Integers
 
 
 class Bins(NamedTuple):
     """Cells that reach into each brick of a lattice of ny by nz bricks in its last two directions: brick
     (i ny + j) nz + k has cells[start[b]:start[b + 1]]."""
 
-    start: np.ndarray
-    cells: np.ndarray
+    start: Ints
+    cells: Ints
     ny: int
     nz: int
 
@@ -45,40 +45,40 @@ class Bins(NamedTuple):
 class Hats(NamedTuple):
     """Linear functions of cells: cells (M, 4) nodes · parent (M,) row of their gradients (.., 4, 3) [1/m]."""
 
-    cells: np.ndarray
-    parent: np.ndarray
-    gradients: np.ndarray
+    cells: Integers
+    parent: Integers
+    gradients: Floats
 
 
 class FluidCells(NamedTuple):
     """`Hats` of a domain with what is left of its cells: volume (M,) [m³] · share (M, 4) mean of each function over
     it · size (M,) [m] · upright (rows of the gradients,) bool: see `Background.upright`."""
 
-    cells: np.ndarray
-    parent: np.ndarray
-    gradients: np.ndarray
-    volume: np.ndarray
-    share: np.ndarray
-    size: np.ndarray
-    upright: np.ndarray
+    cells: Integers
+    parent: Integers
+    gradients: Floats
+    volume: Floats
+    share: Floats
+    size: Floats
+    upright: Bools
 
 
 class Edges(NamedTuple):
     """Edges of listed nodes: row (N,) place of a node in the list, -1 if it is not there · start (n + 1,), neighbour,
     stiffness [m] of each."""
 
-    row: np.ndarray
-    start: np.ndarray
-    neighbour: np.ndarray
-    stiffness: np.ndarray
+    row: Ints
+    start: Integers
+    neighbour: Integers
+    stiffness: Floats
 
 
 class WettedPolygons(NamedTuple):
     """cell (S,), body (S,) · area (S,) [m²] · normal (S, 3) out of the body · points (S, 3, 3) [m], each with a third
     of the area."""
 
-    cell: np.ndarray
-    body: np.ndarray
-    area: np.ndarray
-    normal: np.ndarray
-    points: np.ndarray
+    cell: Ints
+    body: Ints
+    area: Floats
+    normal: Floats
+    points: Floats

@@ -16,6 +16,7 @@ from functools import cached_property
 import numpy as np
 from skfem import MeshTet
 
+from array_types import Array, Floats, Ints
 from fluid.mesh.bricks import SPLITS, split_bricks
 from fluid.mesh.shapes import Shapes
 from fluid.numerics.cube_root import cube_root
@@ -46,18 +47,18 @@ class Background:
     axes: three increasing arrays [m], the walls of the bins · bin_start, bin_cells: cells of each bin (CSR).
     """
 
-    nodes: np.ndarray
-    cells: np.ndarray
+    nodes: Floats
+    cells: Ints
     spacing: float
-    gradients: np.ndarray
-    cell_volume: np.ndarray
-    neighbours: np.ndarray
-    boundary_faces: np.ndarray
-    boundary_cell: np.ndarray
-    boundary_normal: np.ndarray
-    axes: tuple[np.ndarray, np.ndarray, np.ndarray]
-    bin_start: np.ndarray
-    bin_cells: np.ndarray
+    gradients: Floats
+    cell_volume: Floats
+    neighbours: Ints
+    boundary_faces: Ints
+    boundary_cell: Ints
+    boundary_normal: Floats
+    axes: tuple[Array, Array, Array]
+    bin_start: Ints
+    bin_cells: Ints
 
     @classmethod
     def from_arrays(cls, nodes, cells, axes=None, straddling: bool = False) -> Background:
@@ -91,7 +92,7 @@ class Background:
             bin_cells=members,
         )
 
-    def locate(self, points) -> np.ndarray:
+    def locate(self, points) -> Array:
         """Cell that holds each point (m, 3) [m] → (m,), -1 outside; ties go to the first cell of the bin."""
         points = np.ascontiguousarray(np.atleast_2d(points), float)
         x, y, z = self.axes
@@ -100,36 +101,36 @@ class Background:
         )
 
     @cached_property
-    def bounds(self) -> np.ndarray:
+    def bounds(self) -> Array:
         """(2, 3) [m] lowest and highest coordinates."""
         return np.array([self.nodes.min(axis=0), self.nodes.max(axis=0)])
 
     @cached_property
-    def cell_size(self) -> np.ndarray:
+    def cell_size(self) -> Array:
         """(M,) [m] edge of the brick that holds six such cells, (6 |e|)^(1/3)."""
         return cube_root(6.0 * self.cell_volume)
 
     @cached_property
-    def local_size(self) -> np.ndarray:
+    def local_size(self) -> Array:
         """(M,) [m] `cell_size`; exactly the spacing where it differs from that by round-off only, as in a box of equal
         bricks."""
         size = self.cell_size
         return np.where(np.abs(size - self.spacing) <= SAME_SIZE * self.spacing, self.spacing, size)
 
     @cached_property
-    def node_size(self) -> np.ndarray:
+    def node_size(self) -> Array:
         """(N,) [m] least `local_size` of the cells around each node: what is near a node goes by it."""
         size = np.full(len(self.nodes), np.inf)
         np.minimum.at(size, self.cells.ravel(), np.repeat(self.local_size, 4))
         return np.where(np.isfinite(size), size, self.spacing)
 
-    def size_at(self, points) -> np.ndarray:
+    def size_at(self, points) -> Array:
         """(m,) [m] `local_size` of the cells that hold points (m, 3) [m]; the least of all outside."""
         cell = self.locate(points)
         return np.where(cell >= 0, self.local_size[cell], self.finest)
 
     @cached_property
-    def slanting(self) -> np.ndarray:
+    def slanting(self) -> Array:
         """(N,) bool: nodes of faces of the boundary that lie along no axis, as those of a bed."""
         along = np.abs(self.boundary_normal).max(axis=1) > 1.0 - ALONG
         found = np.zeros(len(self.nodes), bool)
@@ -142,18 +143,18 @@ class Background:
         return float(self.local_size.min())
 
     @cached_property
-    def boundary_area(self) -> np.ndarray:
+    def boundary_area(self) -> Array:
         """(B,) [m²] of the boundary faces."""
         x = self.nodes[self.boundary_faces]
         return 0.5 * np.linalg.norm(np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), axis=1)
 
     @property
-    def products(self) -> np.ndarray:
+    def products(self) -> Array:
         """∇N_a·∇N_b (M, 6) [1/m²] of the pairs ab = 01, 02, 03, 12, 13, 23."""
         return _products(self.gradients)
 
     @cached_property
-    def obtuse(self) -> np.ndarray:
+    def obtuse(self) -> Array:
         """(M,) bool: some dihedral angle of the cell is more than a right one, ∇N_a·∇N_b > 0: never in `box_mesh`."""
         return self.products.max(axis=1) * self.cell_size**2 > 1e-9
 
@@ -163,7 +164,7 @@ class Background:
         return bool(self.obtuse.any())
 
     @cached_property
-    def upright(self) -> np.ndarray:
+    def upright(self) -> Array:
         """(M,) bool: cells in which the borders upright on the edges serve the volume (`volume.py`): neither obtuse nor
         slender."""
         return ~self.obtuse & (_slenderness(self.nodes, self.cells) <= MOST_SLENDER)
@@ -192,7 +193,7 @@ def box_mesh(lower, upper, cell_size=None, axes=None, split: str = "kuhn") -> Ba
     return Background.from_arrays(*split_bricks(axes, split), axes)
 
 
-def gradients(nodes, cells) -> tuple[np.ndarray, np.ndarray]:
+def gradients(nodes, cells) -> tuple[Array, Array]:
     """∇N_a (M, 4, 3) [1/m] and volume (M,) [m³] of cells (M, 4) with nodes (N, 3) [m].
 
     ∇N_a is the row a of the inverse of the edge matrix; ∇N_0 = -Σ ∇N_a, so that they sum to zero exactly."""
@@ -206,7 +207,7 @@ def gradients(nodes, cells) -> tuple[np.ndarray, np.ndarray]:
     return g, six_volume / 6.0
 
 
-def cell_neighbours(cells, n_nodes: int) -> np.ndarray:
+def cell_neighbours(cells, n_nodes: int) -> Array:
     """neighbours (M, 4) of cells (M, 4): the cell across the face opposite to each corner, -1 = none."""
     faces = np.sort(cells[:, CORNERS_OF_FACE].reshape(-1, 3), axis=1)
     order = np.lexsort(faces.T[::-1])
@@ -286,7 +287,7 @@ def _shrunk(low, high):
     return low + less, high - less
 
 
-def bin_of(axis, x) -> np.ndarray:
+def bin_of(axis, x) -> Array:
     """Number of the bin along one of the axes that holds each coordinate x (m,) [m]; beyond the ends, the nearest."""
     return np.clip(np.searchsorted(axis, x, side="right") - 1, 0, len(axis) - 2)
 

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from array_types import Array
 from kernel_decorators import kernel
 
 PER_LEVEL = 3
@@ -29,10 +30,10 @@ class Tetrahedra:
     """nodes (N, 3) [m] · lattice (N, 3), their places in bricks of edge 1 · cells (M, 4) · depth (M,) bisections that
     each cell comes from."""
 
-    nodes: np.ndarray
-    lattice: np.ndarray
-    cells: np.ndarray
-    depth: np.ndarray
+    nodes: Array
+    lattice: Array
+    cells: Array
+    depth: Array
 
     @classmethod
     def coarse(cls, nodes, cells, lattice) -> Tetrahedra:
@@ -42,7 +43,7 @@ class Tetrahedra:
         return cls(nodes, lattice, np.ascontiguousarray(cells, np.int64), np.zeros(len(cells), np.int64))
 
 
-def refined(mesh: Tetrahedra, chosen: Callable[[Tetrahedra, int], np.ndarray], levels: int) -> Tetrahedra:
+def refined(mesh: Tetrahedra, chosen: Callable[[Tetrahedra, int], Array], levels: int) -> Tetrahedra:
     """The mesh with all chosen cells halved in every direction, and again, `levels` times; around them smaller cells
     only as far as whole faces ask for.
 

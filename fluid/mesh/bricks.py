@@ -13,8 +13,10 @@ from __future__ import annotations
 import numpy as np
 from skfem import MeshTet
 
+from array_types import Array
 
-def split_bricks(axes, split: str = "kuhn") -> tuple[np.ndarray, np.ndarray]:
+
+def split_bricks(axes, split: str = "kuhn") -> tuple[Array, Array]:
     """Nodes (N, 3) [m] and cells (6 n, 4) of the bricks between the coordinates axes (three arrays [m]), the six cells
     of a brick one after the other: what is near in space is near in memory."""
     mesh = MeshTet.init_tensor(*axes)

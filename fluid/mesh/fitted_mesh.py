@@ -25,6 +25,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from array_types import Array
 from fluid.mesh.background import Background, MeshError
 from kernel_decorators import kernel
 
@@ -48,16 +49,16 @@ class FittedMesh:
     of the nodes in bricks of edge 1, for `refinement.py`."""
 
     mesh: Background
-    on_bed: np.ndarray
-    bed_face: np.ndarray
-    column_x: np.ndarray
-    column_y: np.ndarray
-    bed: np.ndarray
+    on_bed: Array
+    bed_face: Array
+    column_x: Array
+    column_y: Array
+    bed: Array
     layer: float
     steepest: float
     steepest_at: tuple[float, float]
     lowered: int
-    lattice: np.ndarray
+    lattice: Array
 
 
 def fitted_mesh(
@@ -134,9 +135,9 @@ def fitted_mesh(
 class _Columns:
     """nodes (N, 3) [m], those of column i ny + j from start[i ny + j] upwards · height (N,) in layers over the base."""
 
-    nodes: np.ndarray
-    height: np.ndarray
-    start: np.ndarray
+    nodes: Array
+    height: Array
+    start: Array
     shape: tuple[int, int]
 
     @classmethod

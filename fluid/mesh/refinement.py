@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from array_types import Array
 from fluid.mesh.arrays import Boxes, Planes
 from fluid.mesh.background import Background, MeshError, bin_of
 from fluid.mesh.bisection import MOST_LEVELS, Tetrahedra, refined
@@ -30,7 +31,7 @@ class InBox:
     upper: tuple[float, float, float]
     levels: int
 
-    def cells(self, mesh: Tetrahedra, level: int) -> np.ndarray:
+    def cells(self, mesh: Tetrahedra, level: int) -> Array:
         """(M,) bool: cells of the mesh that are to have this level."""
         low, high = _boxes_of(mesh)
         touch = TOUCH * (high - low)
@@ -49,15 +50,15 @@ class NearBodies:
     lower, upper (n, 3) [m]: boxes around the bodies · margin: one number [m]; twice as far a level less is reached, and
     so on, so that sizes change gradually."""
 
-    normals: np.ndarray
-    offsets: np.ndarray
-    start: np.ndarray
-    lower: np.ndarray
-    upper: np.ndarray
+    normals: Array
+    offsets: Array
+    start: Array
+    lower: Array
+    upper: Array
     margin: float
     levels: int
 
-    def cells(self, mesh: Tetrahedra, level: int) -> np.ndarray:
+    def cells(self, mesh: Tetrahedra, level: int) -> Array:
         """(M,) bool: cells of the mesh that are to have this level."""
         margin = self.margin * 2.0 ** (self.levels - level)
         low, high = _boxes_of(mesh)
@@ -82,7 +83,7 @@ class OnBed:
     height: float
     levels: int
 
-    def cells(self, mesh: Tetrahedra, level: int) -> np.ndarray:
+    def cells(self, mesh: Tetrahedra, level: int) -> Array:
         """(M,) bool: cells of the mesh that are to have this level."""
         x = mesh.nodes
         z = np.asarray(self.bed(x[:, 0], x[:, 1]), float)
@@ -104,7 +105,7 @@ class Either:
     regions: tuple
     levels: int
 
-    def cells(self, mesh: Tetrahedra, level: int) -> np.ndarray:
+    def cells(self, mesh: Tetrahedra, level: int) -> Array:
         """(M,) bool: cells of the mesh that are to have this level."""
         return np.any([region.cells(mesh, level) for region in self.regions], axis=0)
 

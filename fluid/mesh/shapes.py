@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from array_types import Bools, Floats, Integers
 from kernel_decorators import inner, kernel, plain
 
 MOST_SHAPES = 64
@@ -27,10 +28,10 @@ class Shapes:
     """row (M,): shape of each cell of a mesh · gradients (S, 4, 3) [1/m], products (S, 6) [1/m²] and upright (S,) bool
     of the shapes, those of their first cells; names as in `mesh.Background`."""
 
-    row: np.ndarray
-    gradients: np.ndarray
-    products: np.ndarray
-    upright: np.ndarray
+    row: Integers
+    gradients: Floats
+    products: Floats
+    upright: Bools
 
     @classmethod
     def of(cls, mesh) -> Shapes:

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from array_types import Bools, Floats
 from fluid.numerics.solve import MOST_ITERATIONS, NotConverged, conjugate_gradients, operators, solve
 from kernel_decorators import kernel
 
@@ -41,10 +42,10 @@ class BoundedResult:
     """x (n,) · at_bound (n,) bool: held at the bound · parting (n,) [m³/s]: A x - b there, 0 elsewhere · lower (n,):
     bound at the end, None: there is none · iterations, of all rounds · residual of the free rows over ‖b‖ · rounds."""
 
-    x: np.ndarray
-    at_bound: np.ndarray
-    parting: np.ndarray
-    lower: np.ndarray | None
+    x: Floats
+    at_bound: Bools
+    parting: Floats
+    lower: Floats | None
     iterations: int
     residual: float
     rounds: int

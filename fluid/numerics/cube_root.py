@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from array_types import Array
+
 ROUND_TO_24_BITS = 1.5 * 2.0**28
 """Added to a number between 1/2 and 1 and taken away again, it leaves multiples of 2^-24."""
 
 
-def cube_root(x) -> np.ndarray:
+def cube_root(x) -> Array:
     """x^(1/3) of any shape, within one unit in the last place; `cube_root(8 x)` is `2 cube_root(x)` to the last bit.
 
     Zeros, infinities and what is not a number come back as they are; the root of -x is that of x with its sign."""

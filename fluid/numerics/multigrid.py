@@ -17,6 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from array_types import Array, Floats, Integers
 from fluid.numerics.threads import over
 from kernel_decorators import kernel, plain, ranged, released
 
@@ -45,22 +46,22 @@ class Level:
     diagonal (n,) and its inverse · aggregate (n,) unknown of the coarser level, -1 none (an unknown without
     neighbours, which one sweep solves) · start, middle, column: unsigned, see `topology.py`."""
 
-    start: np.ndarray
-    middle: np.ndarray
-    column: np.ndarray
-    entry: np.ndarray
-    diagonal: np.ndarray
-    inverse: np.ndarray
-    aggregate: np.ndarray
+    start: Integers
+    middle: Integers
+    column: Integers
+    entry: Floats
+    diagonal: Floats
+    inverse: Floats
+    aggregate: Integers
 
-    def blocks(self) -> np.ndarray:
+    def blocks(self) -> Array:
         """Where the blocks of its sweeps begin and end (b + 1,)."""
         n = len(self.diagonal)
         count = max(1, min(MOST_BLOCKS, n // BLOCK))
         return np.array([n * k // count for k in range(count + 1)])
 
 
-def unsigned(A) -> tuple[np.ndarray, np.ndarray]:
+def unsigned(A) -> tuple[Array, Array]:
     """indptr and indices of A: csr as uint32, see `topology.py`; scipy keeps them in 32 bits or, after sums, in 64."""
     return tuple(k.view(np.uint32) if k.itemsize == 4 else k.astype(np.uint32) for k in (A.indptr, A.indices))
 
@@ -81,7 +82,7 @@ class Multigrid:
         self._last = Level(*parts, 1.0 / parts[-1], np.full(n, -1, np.int32))
         self._dense = _dense_inverse(self._last) if n <= COARSEST else None
 
-    def __call__(self, r) -> np.ndarray:
+    def __call__(self, r) -> Array:
         """M⁻¹ r (n,)."""
         return self._cycle(0, r)
 

@@ -12,6 +12,7 @@ from functools import partial
 
 import numpy as np
 
+from array_types import Array, Floats
 from fluid.numerics.multigrid import Multigrid, unsigned
 from fluid.numerics.threads import over
 from kernel_decorators import ranged
@@ -26,7 +27,7 @@ class NotConverged(RuntimeError):
     """The linear solver stopped above its tolerance; `history` holds the residual norms of every iteration, `unknown`
     the row where it is worst, None where that has no meaning."""
 
-    def __init__(self, message: str, history: np.ndarray, unknown: int | None = None):
+    def __init__(self, message: str, history: Array, unknown: int | None = None):
         super().__init__(message)
         self.history, self.unknown = history, unknown
 
@@ -35,7 +36,7 @@ class NotConverged(RuntimeError):
 class SolveResult:
     """x (n,) · iterations · residual, ‖b - A x‖ / ‖b‖."""
 
-    x: np.ndarray
+    x: Floats
     iterations: int
     residual: float
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from array_types import Array
 from fluid.numerics.threads import CHUNK, summed
 from kernel_decorators import ranged
 
 
-def momentum_of(weight, u, place) -> np.ndarray:
+def momentum_of(weight, u, place) -> Array:
     """Σ m_i [u_i; r_i × u_i] (6,); weight m (n,), u (n, 3), place r (n, 3)."""
     return momentum_of_rows(np.arange(len(weight)), 1.0, weight, u, place, np.zeros(3))
 
@@ -35,7 +36,7 @@ def _momentum(first, last, rows, density, volume, u, nodes, reference, partial):
             out[5] += r0 * p1 - r1 * p0
 
 
-def about(point, load, centre) -> np.ndarray:
+def about(point, load, centre) -> Array:
     """Loads (n, 6) about their centres (n, 3) → their sum (6,) about a point (3,)."""
     load, arm = np.reshape(load, (-1, 6)), np.reshape(centre, (-1, 3)) - point
     return np.concatenate([load[:, :3].sum(axis=0), (load[:, 3:] + np.cross(arm, load[:, :3])).sum(axis=0)])

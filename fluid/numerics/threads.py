@@ -29,6 +29,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from array_types import Array
 from kernel_decorators import kernel, ranged
 
 LEAST_ROWS = 2_000
@@ -173,7 +174,7 @@ def over(kernel: Callable, count: int, *args, weight: int = 1) -> list:
     return _team.together([_call(kernel, (first, last), args) for first, last in pairwise(ends)])
 
 
-def found_over(kernel: Callable, count: int, *args) -> np.ndarray:
+def found_over(kernel: Callable, count: int, *args) -> Array:
     """The arrays that `over` gives, one behind the other."""
     found = over(kernel, count, *args)
     return found[0] if len(found) == 1 else np.concatenate(found)
@@ -199,7 +200,7 @@ def owning(kernel: Callable, nodes: int, reach: Callable, count: int, *args) -> 
     )
 
 
-def summed(kernel: Callable, count: int, shape: tuple[int, ...], *args) -> np.ndarray:
+def summed(kernel: Callable, count: int, shape: tuple[int, ...], *args) -> Array:
     """Σ over 0 ... `count` of what kernel(first, last, *args, partial) adds to partial[c] (*shape) in each CHUNK c from
     `first` to before `last`: the sums of chunks, which do not depend on the threads, are added in their order."""
     chunks = max(1, -(-count // CHUNK))
@@ -245,7 +246,7 @@ def _call(kernel, span, args):
     return lambda: kernel(*span, *args)
 
 
-_reaches: list[tuple[tuple, tuple[np.ndarray, np.ndarray]]] = []
+_reaches: list[tuple[tuple, tuple[Array, Array]]] = []
 
 
 def reach_of_cells(cell_list, cells) -> Callable:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from array_types import Bools, Floats, Ints
 from fluid.domain.moments import wet_fraction
 from fluid.pressure.indefinite_cells import without_indefinite
 from kernel_decorators import kernel
@@ -25,10 +26,10 @@ class WetPart:
     """nodes (N,) bool with an unknown · cells (n,), share (n,) of each with φ < 0, 1 in wholly wet ones ·
     void (k,) cells left out: without water, or those that `indefinite_cells.py` drops."""
 
-    nodes: np.ndarray
-    cells: np.ndarray
-    share: np.ndarray
-    void: np.ndarray
+    nodes: Bools
+    cells: Ints
+    share: Floats
+    void: Ints
 
     @classmethod
     def of(cls, topology, domain, phi, spacing: float) -> WetPart:

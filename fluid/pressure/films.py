@@ -31,6 +31,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
+from array_types import Bools
 from fluid.cut.facing import facing
 from fluid.domain.coupling_matrix import wetted_coupling
 from fluid.pressure.projection import inflow
@@ -45,7 +46,7 @@ class Films:
     """Films of a domain. node (N,) bool: all cells around it lie in films · thinned csr (N, 6 n_bodies): what shares
     below 1 take off G."""
 
-    node: np.ndarray
+    node: Bools
     thinned: sp.csr_array
 
     @classmethod

@@ -12,11 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from array_types import Array, Bools, Floats
 from fluid.numerics.bounded import at_air
 from kernel_decorators import kernel
 
 
-def lowest_pressure(water, graph, dofs, phi, of_air: float = 0.0) -> np.ndarray | None:
+def lowest_pressure(water, graph, dofs, phi, of_air: float = 0.0) -> Array | None:
     """Bound (n,) [Pa] of the pressure at the wet nodes dofs (n,) of the level set φ (N,) [m]; None: there is none.
 
     of_air [Pa]: lowest pressure of any air. Water that a cushion slows down has less than its pressure beside it, and
@@ -37,9 +38,9 @@ class BoundMet:
     opened · work [J] that it took to part water from its vapour (the air's pressure is zero) · lowest [Pa] pressure
     of the water · wall: share of the wetted walls, of tank and bodies, on which the pressure is at its bound."""
 
-    at_bound: np.ndarray
-    ventilated: np.ndarray
-    rate: np.ndarray | float
+    at_bound: Bools
+    ventilated: Bools
+    rate: Floats | float
     volume: float
     work: float
     lowest: float
@@ -85,7 +86,7 @@ class BoundMet:
         )
 
 
-def wall_area(mesh, domain) -> np.ndarray:
+def wall_area(mesh, domain) -> Array:
     """Area (N,) [m²] of the walls around each node: of the sides of the tank a third to each corner of a face, of
     bodies a quarter to each corner of the cell that a polygon lies in."""
     of_tank = np.bincount(

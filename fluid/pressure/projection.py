@@ -25,6 +25,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import scipy.sparse as sp
 
+from array_types import Array, Bools, Floats, Integers, Ints
 from fluid.numerics.threads import found_over, over, owning, reach_of_cells
 from kernel_decorators import kernel, ranged, released
 
@@ -47,30 +48,30 @@ class PressureProblem:
     """
 
     matrix: sp.csr_array
-    rhs: np.ndarray
+    rhs: Floats
     coupling: sp.csr_array
-    known: np.ndarray
-    guess: np.ndarray
-    dofs: np.ndarray
+    known: Floats
+    guess: Floats
+    dofs: Ints
     dt: float
     density: float
-    other_load: np.ndarray
+    other_load: Floats
     predicted: Any = None
     """What the water keeps between predict and correct."""
-    bound: np.ndarray | None = None
-    at_bound: np.ndarray | None = None
+    bound: Floats | None = None
+    at_bound: Bools | None = None
     of_open_air: float = 0.0
     """Bound [Pa] where air can reach: that of the air outside, or of trapped air that has less."""
     pockets: int = 0
     """How many of the last unknowns are those of trapped air (`fluid.air.cushions`)."""
 
     @property
-    def lower(self) -> np.ndarray | None:
+    def lower(self) -> Array | None:
         """Bound of x (n,) [Pa]."""
         return None if self.bound is None else self.bound - self.known
 
     @property
-    def air(self) -> np.ndarray | None:
+    def air(self) -> Array | None:
         """Bound of x (n,) [Pa] where air is; none for what is air itself."""
         if self.bound is None:
             return None
@@ -78,11 +79,11 @@ class PressureProblem:
         air[len(air) - self.pockets :] = -np.inf
         return air
 
-    def of_water(self, values) -> np.ndarray:
+    def of_water(self, values) -> Array:
         """values (n, ...) of the unknowns, without those of trapped air."""
         return values[: values.shape[0] - self.pockets]
 
-    def of_air(self, values) -> np.ndarray:
+    def of_air(self, values) -> Array:
         """values (n, ...) of the unknowns of trapped air."""
         return values[values.shape[0] - self.pockets :]
 
@@ -91,43 +92,43 @@ class Rows(NamedTuple):
     """The matrix that is filled, csr: indptr (n + 1,), indices, entries · anchored (n,) bool: next to p = 0 · turned
     (n,): added to the diagonal."""
 
-    indptr: np.ndarray
-    indices: np.ndarray
-    entries: np.ndarray
-    anchored: np.ndarray
-    turned: np.ndarray
+    indptr: Integers
+    indices: Integers
+    entries: Floats
+    anchored: Bools
+    turned: Floats
 
 
 class AtSurface(NamedTuple):
     """level_set (N,) [m] · open_node (N,) bool: nodes on open sides, p = 0."""
 
-    level_set: np.ndarray
-    open_node: np.ndarray
+    level_set: Floats
+    open_node: Bools
 
 
 class Outside(NamedTuple):
     """Nodal fields (N,) from which pressure is continued: pressure, and that of the air [Pa] · wet, open_node bool ·
     level_set [m]."""
 
-    pressure: np.ndarray
-    air: np.ndarray
-    wet: np.ndarray
-    open_node: np.ndarray
-    level_set: np.ndarray
+    pressure: Floats
+    air: Floats
+    wet: Bools
+    open_node: Bools
+    level_set: Floats
 
 
 class WetCells(NamedTuple):
     """Cells with water: rows (n,) · share (n,) of them that is water."""
 
-    rows: np.ndarray
-    share: np.ndarray
+    rows: Ints
+    share: Floats
 
 
 class Waterline(NamedTuple):
     """Where cells lie near it: level_set (N,) [m] · beside_solid (N,) bool · deep [m]: cells with φ < deep are not."""
 
-    level_set: np.ndarray
-    beside_solid: np.ndarray
+    level_set: Floats
+    beside_solid: Bools
     deep: float
 
 

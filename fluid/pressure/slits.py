@@ -31,6 +31,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy.sparse as sp
 
+from array_types import Array
 from kernel_decorators import kernel
 
 DISCHARGE = 0.6
@@ -48,16 +49,16 @@ class Cracks:
     corners (k, 3) [m] of the faces, those of crack i from start[i], start (c+1,) · opening (c,) [m] ·
     bodies (c, 2), -1 = none · name (c,) number by which the flow of a crack is known from step to step."""
 
-    corners: np.ndarray
-    start: np.ndarray
-    opening: np.ndarray
-    bodies: np.ndarray
-    name: np.ndarray
+    corners: Array
+    start: Array
+    opening: Array
+    bodies: Array
+    name: Array
 
     def __len__(self) -> int:
         return len(self.opening)
 
-    def middle(self) -> np.ndarray:
+    def middle(self) -> Array:
         """Mean of the corners of each crack (c, 3) [m]."""
         return np.array([self.corners[a:b].mean(axis=0) for a, b in pairwise(self.start)]).reshape(-1, 3)
 
@@ -71,11 +72,11 @@ class Slits:
     name (s, 4): crack, the two edges, piece."""
 
     difference: sp.csr_array
-    conductance: np.ndarray
-    area: np.ndarray
-    rise: np.ndarray
-    flow: np.ndarray
-    name: np.ndarray
+    conductance: Array
+    area: Array
+    rise: Array
+    flow: Array
+    name: Array
 
     def __len__(self) -> int:
         return len(self.conductance)
@@ -124,7 +125,7 @@ class Slits:
             name=name,
         )
 
-    def flow_by_name(self, name) -> np.ndarray:
+    def flow_by_name(self, name) -> Array:
         """Flows (n,) of the slits with these names (n, 4), zero where there is none."""
         known = {tuple(row): q for row, q in zip(self.name.tolist(), self.flow)}
         return np.array([known.get(tuple(row), 0.0) for row in name.tolist()])
@@ -150,7 +151,7 @@ class Slits:
         """β (s,) of equation (3)."""
         return dt * self.conductance * np.abs(self.flow) / (2.0 * self.area**2)
 
-    def carried(self, dt: float) -> np.ndarray:
+    def carried(self, dt: float) -> Array:
         """(N,) [m³] that the slits bring to the nodes in dt [s]; sums to zero."""
         return -dt * (self.difference @ self.flow)
 
@@ -164,14 +165,14 @@ class _Mouths(NamedTuple):
     """Mouths 2k and 2k+1 of slit k: crack (m,), name (m, 4), length and depth (m,) [m], from (m, 3) and along (m, 3)
     unit: the piece of the edge, outward (m, 3), across (m, 3) unit normal of the crack."""
 
-    crack: np.ndarray
-    name: np.ndarray
-    length: np.ndarray
-    depth: np.ndarray
-    origin: np.ndarray
-    along: np.ndarray
-    outward: np.ndarray
-    across: np.ndarray
+    crack: Array
+    name: Array
+    length: Array
+    depth: Array
+    origin: Array
+    along: Array
+    outward: Array
+    across: Array
 
     @classmethod
     def of(cls, cracks: Cracks, spacing) -> _Mouths:

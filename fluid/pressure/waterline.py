@@ -20,13 +20,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from array_types import Array
 from fluid.domain.moments import cells_touching
 from fluid.domain.physical_domain import hat_values
 from fluid.pressure.projection import with_ghosts
 from kernel_decorators import kernel
 
 
-def waterline_load(domain, faces, left_out, phi, wet, pressure, open_node, air=None) -> np.ndarray:
+def waterline_load(domain, faces, left_out, phi, wet, pressure, open_node, air=None) -> Array:
     """R of (2): force and moment on every body (n_bodies, 6) [N, N m].
 
     faces (k,) rows of the polygons of G · left_out (l,) rows of those not in G though their cells hold water ·
@@ -62,7 +63,7 @@ def waterline_load(domain, faces, left_out, phi, wet, pressure, open_node, air=N
     return load
 
 
-def hydrostatic_stiffness(water, phi, bodies) -> np.ndarray | None:
+def hydrostatic_stiffness(water, phi, bodies) -> Array | None:
     """K (n_bodies, 3, 3) [N/m, N, N m]: how the load of still water on a body changes as it heaves, rolls and pitches
     about its centre in water that stays where it is,
 

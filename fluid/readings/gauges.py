@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from array_types import Array
 from fluid.domain.moments import wet_fraction
 from fluid.domain.point_location import Places
 from fluid.readings.clip import clipped, volumes
@@ -23,7 +24,7 @@ def level(water, xy) -> float:
     return float(levels(water, [xy])[0])
 
 
-def levels(water, places) -> np.ndarray:
+def levels(water, places) -> Array:
     """The same (m,) [m] over places (m, 2) [m]."""
     places = np.asarray(places, float)
     low, high = water.mesh.bounds[:, 2]
@@ -43,7 +44,7 @@ def levels(water, places) -> np.ndarray:
     return depth + _beside_solids(water, places, z, phi, is_open)
 
 
-def _beside_solids(water, places, z, phi, is_open) -> np.ndarray:
+def _beside_solids(water, places, z, phi, is_open) -> Array:
     """Wet length (m,) [m] between the last sample in a solid, or below the bed, and the first in the open; where the
     solid ends is found by halving."""
     found = np.zeros(len(places))
@@ -91,7 +92,7 @@ def velocity(water, points):
     return u if np.ndim(points) == 2 else u[0]
 
 
-def level_set_at(water, points) -> np.ndarray:
+def level_set_at(water, points) -> Array:
     """φ [m] at points (m, 3) [m] → (m,), negative in the water, NaN inside a solid."""
     return Places.of(water, points).read(water.level_set)
 

@@ -17,9 +17,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from array_types import Array
 from fluid.sides.inflow import Flow
-
-Array = np.ndarray
 
 
 @dataclass

@@ -23,6 +23,7 @@ from typing import cast
 
 import numpy as np
 
+from array_types import Array, Floats, Ints
 from fluid.domain.moments import nodal_water
 from kernel_decorators import kernel
 
@@ -58,14 +59,14 @@ class Side:
     chosen: Callable
     flow: Flow | None
     level: Callable
-    cell: np.ndarray
-    corner: np.ndarray
-    faces: np.ndarray
-    hats: np.ndarray
-    area: np.ndarray
-    nodes: np.ndarray
-    place: np.ndarray
-    normal: np.ndarray
+    cell: Ints
+    corner: Ints
+    faces: Ints
+    hats: Floats
+    area: Floats
+    nodes: Ints
+    place: Floats
+    normal: Floats
 
     @classmethod
     def of(cls, mesh, chosen: Callable, flow: Flow | None = None, level: Callable | None = None) -> Side:
@@ -279,6 +280,6 @@ class Sides:
         self.left -= float(volume[volume < 0.0].sum())
         self.energy += float(volume @ head)
 
-    def nodes(self) -> np.ndarray:
+    def nodes(self) -> Array:
         """Nodes (n,) of all sides."""
         return np.concatenate([side.nodes for side in self.now])

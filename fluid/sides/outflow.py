@@ -14,6 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from array_types import Array
+
 _NEAR, _FAR = 0.445948490915965, 0.091576213509771
 _POINTS = np.array(
     [
@@ -33,7 +35,7 @@ _WEIGHTS = np.array([0.223381589678011] * 3 + [0.109951743655322] * 3)
 class Outflow:
     """volume (N,) [m³] off each node · energy [J], kinetic and potential."""
 
-    volume: np.ndarray
+    volume: Array
     energy: float
 
     @classmethod

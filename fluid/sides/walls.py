@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
+from array_types import Bools, Floats, Ints
 from fluid.surface.level_set import without_films
 from kernel_decorators import plain
 
@@ -22,17 +23,17 @@ class Walls:
     rough_faces (C, 3), rough_area (C, 3) [m²], rough_cell (C,) background cell: the same of closed sides that may hold
     or rub the water."""
 
-    nodes: np.ndarray
-    projector: np.ndarray
-    open_node: np.ndarray
-    open_nodes: np.ndarray
-    open_projector: np.ndarray
-    open_faces: np.ndarray
-    open_area: np.ndarray
-    rough_faces: np.ndarray
-    rough_area: np.ndarray
-    rough_cell: np.ndarray
-    flowing: np.ndarray
+    nodes: Ints
+    projector: Floats
+    open_node: Bools
+    open_nodes: Ints
+    open_projector: Floats
+    open_faces: Ints
+    open_area: Floats
+    rough_faces: Ints
+    rough_area: Floats
+    rough_cell: Ints
+    flowing: Ints
     """Nodes (k,) whose velocity an inflow gives."""
 
     @classmethod

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from array_types import Bools, Floats, Ints
 from fluid.numerics.sums import kinetic_energy
 from fluid.numerics.threads import found_over, over, zeros
 from fluid.pressure.pressure_bound import BoundMet
@@ -57,20 +58,20 @@ surface reach 1.6 cell sizes down), and c of `damp_waterline` along the whole su
 class Corrected:
     """The state at the end of the step; names as in Water."""
 
-    velocity: np.ndarray
-    acceleration: np.ndarray
-    pressure: np.ndarray
-    end_pressure: np.ndarray
-    remainder: np.ndarray
-    kick_remainder: np.ndarray
-    cell_velocity: np.ndarray
-    nodal_water: np.ndarray
+    velocity: Floats
+    acceleration: Floats
+    pressure: Floats
+    end_pressure: Floats
+    remainder: Floats
+    kick_remainder: Floats
+    cell_velocity: Floats
+    nodal_water: Floats
     flux: Flux
-    listed: np.ndarray
-    layer_start: np.ndarray
-    at_bound: np.ndarray
-    ventilated: np.ndarray
-    given_by_films: np.ndarray
+    listed: Ints
+    layer_start: Ints
+    at_bound: Bools
+    ventilated: Bools
+    given_by_films: Floats
     report: object
 
 

@@ -28,6 +28,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from array_types import Array, Floats
 from fluid.numerics.sums import about, momentum_of, momentum_of_rows
 from fluid.numerics.threads import CHUNK, summed
 from fluid.step.predictor import kick_factor
@@ -53,10 +54,10 @@ class MomentumChange:
     """before, after (6,) [N s, N m s]: momentum of the water at both ends of the step · lines: name → (6,), all of
     PHYSICAL and NUMERICAL · pressure_closure (6,): what (1) misses, the residual of the step."""
 
-    before: np.ndarray
-    after: np.ndarray
-    lines: dict[str, np.ndarray]
-    pressure_closure: np.ndarray
+    before: Floats
+    after: Floats
+    lines: dict[str, Array]
+    pressure_closure: Floats
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,14 +65,14 @@ class Stages:
     """Velocities (N, 3) [m/s] through the second half of the step: after the pressure, the speed limit, the damping,
     the slip along the sides, and at the end."""
 
-    projected: np.ndarray
-    limited: np.ndarray
-    damped: np.ndarray
-    slipping: np.ndarray
-    end: np.ndarray
+    projected: Floats
+    limited: Floats
+    damped: Floats
+    slipping: Floats
+    end: Floats
 
 
-def momentum(water) -> np.ndarray:
+def momentum(water) -> Array:
     """P, L (6,) of a Water now."""
     wet = np.flatnonzero(water.nodal_water > 0.0)
     state = (water.nodal_water, water.velocity, water.topology.nodes, water.reference)
@@ -124,7 +125,7 @@ def momentum_change(water, problem, unknown, pressure, stages: Stages) -> Moment
     )
 
 
-def _momenta(water, kept, dt, stages: Stages) -> dict[str, np.ndarray]:
+def _momenta(water, kept, dt, stages: Stages) -> dict[str, Array]:
     """Momentum (6,) after every stage of the step; "weight" [N, N m]: that of the water."""
     W0, own, W1 = water.nodal_water, kept.uncorrected_water, kept.nodal_water
     rows = np.flatnonzero((W0 > 0.0) | (own > 0.0) | (W1 > 0.0))

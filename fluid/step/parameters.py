@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from array_types import Array
+
 
 @dataclass(frozen=True)
 class WaterParameters:
@@ -68,6 +70,6 @@ class WaterParameters:
         return self.viscosity > 0.0 or self.walls != "slip"
 
     @property
-    def weight(self) -> np.ndarray:
+    def weight(self) -> Array:
         """g (3,) [m/s²]."""
         return self.gravity * np.asarray(self.down)

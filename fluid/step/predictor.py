@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from array_types import Bools, Floats, Ints
 from fluid.domain.coupling_matrix import wetted_coupling
 from fluid.numerics.threads import over, zeros
 from fluid.pressure.active_cells import WetPart
@@ -50,26 +51,26 @@ class Predicted:
     displaced (N,) [m³]: part of nodal_water that the bodies take in this step; given_by_films: `films.Handed.given`;
     cushions: trapped air (`fluid.air.cushions`), None without any."""
 
-    level_set: np.ndarray
-    nodal_water: np.ndarray
-    advected: np.ndarray
-    u_star: np.ndarray
-    wet: np.ndarray
-    wet_cells: np.ndarray
-    wet_share: np.ndarray
-    void: np.ndarray
-    cell_star: np.ndarray
-    remainder: np.ndarray
+    level_set: Floats
+    nodal_water: Floats
+    advected: Floats
+    u_star: Floats
+    wet: Bools
+    wet_cells: Ints
+    wet_share: Floats
+    void: Ints
+    cell_star: Floats
+    remainder: Floats
     theta: float
     conserved_volume: float
     reinserted: float
-    uncorrected_water: np.ndarray
+    uncorrected_water: Floats
     shear: object | None
     end: float
     left: Outflow | None
-    through: np.ndarray | None
-    held: np.ndarray | None
-    displaced: np.ndarray
+    through: Floats | None
+    held: Floats | None
+    displaced: Floats
     cushions: object | None = None
     given_by_films: object | None = None
 

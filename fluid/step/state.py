@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from array_types import Array
 from fluid.domain.topology import Graph
 from fluid.surface.volume import Flux
 
@@ -60,7 +61,7 @@ class OtherWater(ValueError):
     """A state does not fit the mesh or the domain of the water that is to take it over."""
 
 
-def save(water) -> dict[str, np.ndarray]:
+def save(water) -> dict[str, Array]:
     """Everything of a Water that changes in time, by name.  Raises NotAfterAStep."""
     if water.flux.capacity is not water.topology.node_volume:
         raise NotAfterAStep("the state of the water can be saved after a step, before the solids move on")

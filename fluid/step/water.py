@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from array_types import Array
 from fluid.domain.physical_domain import carry, wetted_coupling
 from fluid.domain.topology import Graph, Topology, layers_around
 from fluid.mesh.background import Background
@@ -198,7 +199,7 @@ class Water:
         """Largest component of the velocity of the water [m/s], films beside solids left out."""
         return largest_component(self.velocity, self._counted())
 
-    def fastest_place(self) -> tuple[float, np.ndarray]:
+    def fastest_place(self) -> tuple[float, Array]:
         """Speed [m/s] and place (3,) [m] of the fastest water, films beside solids left out; zeros without water."""
         counted = np.flatnonzero(self._counted())
         if len(counted) == 0:
@@ -207,7 +208,7 @@ class Water:
         worst = int(speed.argmax())
         return float(speed[worst]), self.topology.nodes[counted[worst]]
 
-    def largest_kick(self) -> np.ndarray:
+    def largest_kick(self) -> Array:
         """Largest acceleration (N,) [m/s²] that is carried over to the next step: kick_limit g, or what turns the
         fastest stream aside within two cells, v²/(2 h).  More would throw spray on by the acceleration of an impact."""
         return self._largest_kick(self.topology.node_size)
@@ -472,7 +473,7 @@ class Water:
         """Water in the tank [m³]."""
         return float(self.nodal_water.sum()) - float(self.displaced.sum())
 
-    def displacement(self, dt: float) -> np.ndarray:
+    def displacement(self, dt: float) -> Array:
         """Volume (N,) [m³] that the bodies have taken from the nodes at the end of a step dt [s], negative where they
         left room, since they stood where the cells are cut.
 
@@ -481,7 +482,7 @@ class Water:
         way = self.moved_on + dt * self.pushed_by
         return self._taken_by(way)
 
-    def _taken_by(self, way) -> np.ndarray:
+    def _taken_by(self, way) -> Array:
         """Volume (N,) [m³] that bodies take from the nodes on a way (n_bodies, 6) [m, rad]."""
         if not way.any():
             return np.zeros(len(self.level_set))
@@ -492,7 +493,7 @@ class Water:
         """(volume - conserved volume) / handled volume, what the step could not put right."""
         return (self.volume() - self.conserved_volume) / max(self.handled_volume, 1e-300)
 
-    def momentum(self) -> np.ndarray:
+    def momentum(self) -> Array:
         """∫ ρ u dV (3,) [kg m/s]."""
         return self.parameters.density * (self.nodal_water @ self.velocity)
 
@@ -533,11 +534,11 @@ class Water:
             return 0.0
         return self.air.lost + float(self.air.gas.energy(self.air.reference, self.pocket_volumes()).sum())
 
-    def pocket_volumes(self) -> np.ndarray:
+    def pocket_volumes(self) -> Array:
         """Volume (K,) [m³] of the pockets of trapped air at the end of the last step."""
         return self.air.volumes(self.topology, self.level_set, self.coupling @ self.moved_by_end.ravel())
 
-    def pocket_bounds(self, pocket: int) -> np.ndarray:
+    def pocket_bounds(self, pocket: int) -> Array:
         """Lower and upper corner (2, 3) [m] of the box around the nodes of a pocket, 0 ... K-1."""
         nodes = self.topology.nodes[self.air.label == pocket + 1]
         return np.array([nodes.min(axis=0), nodes.max(axis=0)])
@@ -556,13 +557,13 @@ class Water:
         ]
         return float(self.below_floor(self.topology.nodes[near]).mean()) if len(near) else 0.0
 
-    def head(self) -> np.ndarray:
+    def head(self) -> Array:
         """½ ρ u² - ρ g·x + p (N,) [J/m³] at the nodes."""
         p = self.parameters
         kinetic = 0.5 * p.density * np.einsum("ij,ij->i", self.velocity, self.velocity)
         return kinetic - p.density * self.nodes_below_floor + self.pressure
 
-    def below_floor(self, x) -> np.ndarray:
+    def below_floor(self, x) -> Array:
         """g·x (...) [m²/s²] of places x (..., 3) [m], zero at the floor of the tank and negative above it: what leaves
         the tank takes energy with it, wherever the tank lies."""
         return x @ self.parameters.weight - self._lowest

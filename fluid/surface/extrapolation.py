@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from array_types import Bools, Floats
 from fluid.domain.moments import touching_among
 from fluid.domain.topology import layers_around
 from fluid.numerics.threads import over, owning, reach_of_cells
@@ -31,10 +32,10 @@ class Continued(NamedTuple):
     """Field that is filled: value (N, m) · gradient (N, m, 3) · done (N,) bool: nodes whose value is known ·
     least (N,), or of length 0, as in `continue_outward`."""
 
-    value: np.ndarray
-    gradient: np.ndarray
-    done: np.ndarray
-    least: np.ndarray
+    value: Floats
+    gradient: Floats
+    done: Bools
+    least: Floats
 
 
 def continue_outward(order, layer_start, linear_layers, f, gradient, nodes, around, done, least):

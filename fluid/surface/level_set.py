@@ -18,6 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from array_types import Array, Floats, Ints
 from fluid.domain.topology import layers_around
 from fluid.mesh.arrays import Corners
 from fluid.numerics.threads import found_over, over
@@ -148,19 +149,19 @@ def _ratio(part, whole):
 class Surface(NamedTuple):
     """triangles (T, 3, 3) [m] · owner (T,) the cell of each; those of a cell follow each other."""
 
-    triangles: np.ndarray
-    owner: np.ndarray
+    triangles: Floats
+    owner: Ints
 
 
 class Nearest(NamedTuple):
     """What is known of the closest triangle: closest (N,) number, -1 none · best (N,) [m²] squared distance ·
     tried (T,) the last node that asked · asked, found (N,): when a node asked last, and when it found its triangle."""
 
-    closest: np.ndarray
-    best: np.ndarray
-    tried: np.ndarray
-    asked: np.ndarray
-    found: np.ndarray
+    closest: Array
+    best: Array
+    tried: Array
+    asked: Array
+    found: Array
 
 
 def _closest_in_layers(layers, surface, mesh, *more):

@@ -29,6 +29,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy.sparse as sp
 
+from array_types import Floats, Ints
 from fluid.domain.moments import nodal_water
 from fluid.domain.topology import Graph
 from fluid.numerics.threads import over, zeros
@@ -53,12 +54,12 @@ class Flux:
     velocity (M, 3) [m/s] of the cells that it comes from; water (N,) and capacity (N,) [m³]: what every node holds and
     could hold on the same domain."""
 
-    nodes: np.ndarray
+    nodes: Ints
     graph: Graph
-    rate: np.ndarray
-    velocity: np.ndarray
-    water: np.ndarray
-    capacity: np.ndarray
+    rate: Floats
+    velocity: Floats
+    water: Floats
+    capacity: Floats
 
 
 @released
@@ -195,9 +196,9 @@ def _shift(first, column, entry, diagonal, residual, tolerance, most):
 class Shift:
     """ψ of (2): value (n,) [m] at the nodes of the band (n,), with κ (N,) [m]."""
 
-    band: np.ndarray
-    value: np.ndarray
-    kappa: np.ndarray
+    band: Ints
+    value: Floats
+    kappa: Floats
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -205,9 +206,9 @@ class VolumeCorrection:
     """level_set (N,) · nodal_water (N,) [m³] of it, and `uncorrected_water` before · reinserted [m³] moved by the
     uniform shift · shift: ψ of (2)."""
 
-    level_set: np.ndarray
-    nodal_water: np.ndarray
-    uncorrected_water: np.ndarray
+    level_set: Floats
+    nodal_water: Floats
+    uncorrected_water: Floats
     reinserted: float
     shift: Shift
 

@@ -17,6 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from array_types import Bools, Floats, Ints
 from fluid.mesh.arrays import Hats
 from fluid.viscous.strain import (
     COLUMN,
@@ -35,15 +36,15 @@ class Walls(NamedTuple):
     there · body (S,) · normal (S, 3) · hat (S, 3, 4), arm (S, 3, 3) [m] and area (S, 3) [m²] of each point ·
     nitsche (S,) λ and drag (S,) C [kg/(m² s)]."""
 
-    cell: np.ndarray
-    row: np.ndarray
-    body: np.ndarray
-    normal: np.ndarray
-    hat: np.ndarray
-    arm: np.ndarray
-    area: np.ndarray
-    nitsche: np.ndarray
-    drag: np.ndarray
+    cell: Ints
+    row: Ints
+    body: Ints
+    normal: Floats
+    hat: Floats
+    arm: Floats
+    area: Floats
+    nitsche: Floats
+    drag: Floats
 
 
 class ViscousTerms(NamedTuple):
@@ -51,14 +52,14 @@ class ViscousTerms(NamedTuple):
     node_drag (N,) [kg/s] of nodes on sides of the tank · held (k,) nodes on sides, projector (k, 3, 3) onto what is
     free there · idle (N,) bool: nodes that keep their velocity · hats · edges of the cells in the water."""
 
-    cells: np.ndarray
-    weight: np.ndarray
+    cells: Ints
+    weight: Floats
     walls: Walls
     viscosity: float
-    node_drag: np.ndarray
-    held: np.ndarray
-    projector: np.ndarray
-    idle: np.ndarray
+    node_drag: Floats
+    held: Ints
+    projector: Floats
+    idle: Bools
     hats: Hats
     edges: StrainEdges
 

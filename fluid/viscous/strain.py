@@ -21,6 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from array_types import Floats, Ints
 from kernel_decorators import kernel
 
 PAIRS = np.array([(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)])
@@ -32,8 +33,8 @@ ROW, COLUMN = np.array([0, 1, 2, 1, 0, 0]), np.array([0, 1, 2, 2, 2, 1])
 class StrainEdges(NamedTuple):
     """Edges of listed cells: of_cell (n, 6) their numbers · weight (n_edges,) W."""
 
-    of_cell: np.ndarray
-    weight: np.ndarray
+    of_cell: Ints
+    weight: Floats
 
 
 @kernel

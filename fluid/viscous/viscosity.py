@@ -24,6 +24,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from array_types import Bools, Floats
 from fluid.domain.moments import wet_fraction
 from fluid.domain.physical_domain import hat_values
 from fluid.numerics.solve import NotConverged
@@ -45,11 +46,11 @@ class ViscousChange:
     is too large by a third in thick liquids) · iterations · tank (6,) [N, N m] of the sides of the tank on the water,
     mean over the step."""
 
-    change: np.ndarray
-    load: np.ndarray
+    change: Floats
+    load: Floats
     energy: float
     iterations: int
-    tank: np.ndarray
+    tank: Floats
 
 
 @dataclass(frozen=True)
@@ -58,9 +59,9 @@ class FreeBodies:
     moves (n_bodies,) bool: the others keep their velocity · acceleration (n_bodies, 6) [m/s², rad/s²] by all but
     shear."""
 
-    mass: np.ndarray
-    moves: np.ndarray
-    acceleration: np.ndarray
+    mass: Floats
+    moves: Bools
+    acceleration: Floats
 
     @classmethod
     def none(cls, n: int) -> FreeBodies:

@@ -31,6 +31,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from array_types import Floats
 from fluid.domain.moments import wet_fraction
 from fluid.numerics.cube_root import cube_root
 
@@ -152,10 +153,10 @@ class Columns:
     """Water over the bins of the plan: depth (c,) [m], its volume over their area · velocity (c, 3) [m/s], its mean ·
     left (c,): share of the velocity before that this is · centre (c, 2) [m] · of_water: the Water they belong to."""
 
-    depth: np.ndarray
-    velocity: np.ndarray
-    left: np.ndarray
-    centre: np.ndarray
+    depth: Floats
+    velocity: Floats
+    left: Floats
+    centre: Floats
     of_water: object
 
     @classmethod

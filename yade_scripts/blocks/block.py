@@ -11,6 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
+from array_types import Array, Floats
 from yade_scripts.blocks.polyhedra import (
     BlockError,
     Faces,
@@ -18,8 +19,6 @@ from yade_scripts.blocks.polyhedra import (
     face_planes,
     polyhedron_moments,
 )
-
-Array = np.ndarray
 
 MARGIN = 0.01
 """In contact a face reaches beyond its edges by this share of the block's inner radius, so that flush blocks carry each
@@ -49,18 +48,18 @@ class Block:
     """
 
     name: str
-    centre: Array
-    size: Array | None = None
-    vertices: Array | None = None
+    centre: Floats
+    size: Floats | None = None
+    vertices: Floats | None = None
     faces: Faces | None = None
-    rotation: Array = field(default_factory=lambda: np.eye(3))
+    rotation: Floats = field(default_factory=lambda: np.eye(3))
     density: float = 2400.0
     group: str = "block"
     material: str = "block"
     fixed: bool = False
     driven: bool = False
-    velocity: Array = field(default_factory=lambda: np.zeros(3))
-    spin: Array = field(default_factory=lambda: np.zeros(3))
+    velocity: Floats = field(default_factory=lambda: np.zeros(3))
+    spin: Floats = field(default_factory=lambda: np.zeros(3))
 
     def __post_init__(self):
         for name, shape in (("centre", (3,)), ("rotation", (3, 3)), ("velocity", (3,)), ("spin", (3,))):

@@ -11,12 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from array_types import Array, Floats, Ints
 from kernel_decorators import inner, kernel
 from yade_scripts.blocks.block import Block
 from yade_scripts.blocks.polyhedra import cross_products, face_areas, polygon_area_vector
 from yade_scripts.blocks.quadrature import Rule, gauss
-
-Array = np.ndarray
 
 PARALLEL = 1e-6
 """Largest 1 + n_a·n_b of faces that count as opposite."""
@@ -38,8 +37,8 @@ class FixedPlane:
     bonds: blocks that stand on it are joined to it where joints are asked for; False: only contact
     material: what friction by pairs goes by."""
 
-    point: Array
-    normal: Array
+    point: Floats
+    normal: Floats
     name: str = "ground"
     bonds: bool = True
     material: str = "ground"
@@ -65,8 +64,8 @@ class TouchingFaces:
     b: int
     face_a: int
     face_b: int
-    polygon: Array
-    normal: Array
+    polygon: Floats
+    normal: Floats
 
     @property
     def area(self) -> float:
@@ -84,12 +83,12 @@ class _WorldFaces:
 
     normals (f, 3) · middles (f, 3) [m] mean of the corners · areas (f,) [m²] · corners (c, 3) [m]."""
 
-    block_start: Array
-    corner_start: Array
-    normals: Array
-    middles: Array
-    areas: Array
-    corners: Array
+    block_start: Ints
+    corner_start: Ints
+    normals: Floats
+    middles: Floats
+    areas: Floats
+    corners: Floats
 
 
 def touching_faces(blocks: list[Block], planes: list[FixedPlane] | tuple = ()) -> list[TouchingFaces]:

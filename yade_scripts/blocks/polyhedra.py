@@ -8,7 +8,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-Array = np.ndarray
+from array_types import Array
+
 Faces = tuple[tuple[int, ...], ...]
 
 FLAT = 1e-9

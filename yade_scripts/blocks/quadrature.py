@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-Array = np.ndarray
+from array_types import Floats
 
 MOST = 12
 """Most points along an edge."""
@@ -25,8 +25,8 @@ BEYOND = 6
 class Rule:
     """places (q,) in 0..1 and weights (q,) of sum 1."""
 
-    places: Array
-    weights: Array
+    places: Floats
+    weights: Floats
 
     def __len__(self) -> int:
         return len(self.places)

@@ -6,12 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from array_types import Array
 from yade_scripts.blocks.block import Block, BlockError
 from yade_scripts.blocks.polyhedra import polygon_area_vector
 from yade_scripts.contact.law import ContactError
 from yade_scripts.joints.joints import Joints
-
-Array = np.ndarray
 
 FAR = 1e3
 """Scenes farther than this from the origin [m] are computed about a local one."""

@@ -10,12 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from array_types import Array, Bools, Floats
 from yade_scripts.blocks.kinematics import work_of
 from yade_scripts.contact.forces import ContactForces
 from yade_scripts.joints.joints import Joints
 from yade_scripts.yade_side.motion import Motion
-
-Array = np.ndarray
 
 _SUMS = ("load_work", "joint_work", "driving_work", "handed_over")
 
@@ -27,10 +26,10 @@ class Masses:
     gravity (3,) [m/s²].
     """
 
-    mass: Array
-    body_inertia: Array
-    free: Array
-    gravity: Array
+    mass: Floats
+    body_inertia: Floats
+    free: Bools
+    gravity: Floats
 
     def inertia(self, R: Array) -> Array:
         """(n, 3, 3) about the centres, world axes."""

@@ -19,7 +19,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 from scipy.spatial.transform import Rotation
 
-Array = np.ndarray
+from array_types import Array
 
 TOLERANCE = 1e-7
 MOST_ITERATIONS = 100

@@ -14,9 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from array_types import Array, Floats
 from kernel_decorators import plain
-
-Array = np.ndarray
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,12 +28,12 @@ class Impulses:
     that was not there yet.
     """
 
-    contact: Array
-    joint: Array
-    place: Array
+    contact: Floats
+    joint: Floats
+    place: Floats
     dt: float
-    zero: Array
-    lifted: Array
+    zero: Floats
+    lifted: Floats
     lifted_dt: float = 0.0
 
     @classmethod

@@ -10,13 +10,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from array_types import Array
 from yade_scripts.blocks.block import Block
 from yade_scripts.contact.forces import ContactForces
 from yade_scripts.joints.joints import Joints
 from yade_scripts.yade_side.motion import Motion
 from yade_scripts.yade_side.scene import Scene
-
-Array = np.ndarray
 
 STANDS = 0.02
 """A joined block stands in its place as long as it has moved less than this share of its radius."""

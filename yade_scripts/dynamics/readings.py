@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy.sparse as sp
 
+from array_types import Array
 from yade_scripts.blocks import tangent
 from yade_scripts.contact.forces import ContactForces
 from yade_scripts.contact.state import Contacts, no_contacts, sum_on_blocks
@@ -25,8 +26,6 @@ from yade_scripts.yade_side.scene import Scene
 
 if TYPE_CHECKING:
     from yade_scripts.dynamics.sleep import Sleep
-
-Array = np.ndarray
 
 
 class StructureReadings:

@@ -29,6 +29,7 @@ from scipy.sparse import csc_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial.transform import Rotation
 
+from array_types import Array
 from yade_scripts.blocks import tangent
 from yade_scripts.contact.forces import ContactForces
 from yade_scripts.dynamics.energy import Accounts, Masses
@@ -39,8 +40,6 @@ from yade_scripts.dynamics.spin import SpinCorrection
 from yade_scripts.joints.joints import Joints
 from yade_scripts.yade_side.motion import Motion
 from yade_scripts.yade_side.scene import Scene
-
-Array = np.ndarray
 
 FALLS = 0.5
 """Share of the share up to which openings may change, and forces be out of balance, of what is about to sleep."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-Array = np.ndarray
+from array_types import Array, Floats
 
 _OPTIONAL = ("joints", "contacts", "sleep")
 
@@ -25,11 +25,11 @@ class StructureState:
     without
     """
 
-    motion: Array
+    motion: Floats
     time: float
     dt: float
-    load: Array
-    lent_spin: Array
+    load: Floats
+    lent_spin: Floats
     onset: dict[str, Array]
     sums: dict[str, float]
     joints: dict[str, Array] | None

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from array_types import Array, Floats, Ints
 from yade_scripts.blocks.block import Block, BlockError
 from yade_scripts.blocks.faces import FixedPlane, TouchingFaces, both_held, touching_faces
 from yade_scripts.contact.forces import ContactForces
@@ -32,8 +33,6 @@ from yade_scripts.yade_side.engine import load_yade
 from yade_scripts.yade_side.motion import Motion
 from yade_scripts.yade_side.scene import Scene
 
-Array = np.ndarray
-
 GRAVITY = (0.0, 0.0, -9.81)
 
 
@@ -52,9 +51,9 @@ class AdvanceReport:
     substeps: int
     dt_s: float
     opening_rate: float
-    mean_velocity: Array
+    mean_velocity: Floats
     load_work: float
-    broken: Array
+    broken: Ints
     impulses: Impulses
 
 

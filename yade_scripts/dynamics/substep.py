@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from array_types import Array
 from yade_scripts.contact.forces import ContactForces
 from yade_scripts.dynamics.energy import Accounts
 from yade_scripts.dynamics.impulses import ImpulseSums
@@ -17,8 +18,6 @@ from yade_scripts.dynamics.spin import SpinCorrection
 from yade_scripts.joints.joints import Joints
 from yade_scripts.yade_side.motion import Motion
 from yade_scripts.yade_side.scene import Scene
-
-Array = np.ndarray
 
 
 class Substepper:

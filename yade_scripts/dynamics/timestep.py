@@ -16,10 +16,9 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import eigsh
 
+from array_types import Array
 from yade_scripts.blocks.block import Block
 from yade_scripts.blocks.tangent import assemble, joint_springs
-
-Array = np.ndarray
 
 JOINT_SHARE = 0.1
 CONTACT_SHARE = 0.2

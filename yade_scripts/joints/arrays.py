@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
+from array_types import Floats, Ints
 
 
 class JointPoints(NamedTuple):
@@ -12,14 +12,14 @@ class JointPoints(NamedTuple):
     xi_a, xi_b (P, 3) [m] of the points in the blocks · weight (P,) [m²] · normal (J, 3) in block a · law (J, 6) ·
     peak: place of the largest traction."""
 
-    a: np.ndarray
-    b: np.ndarray
-    start: np.ndarray
-    xi_a: np.ndarray
-    xi_b: np.ndarray
-    weight: np.ndarray
-    normal: np.ndarray
-    law: np.ndarray
+    a: Ints
+    b: Ints
+    start: Ints
+    xi_a: Floats
+    xi_b: Floats
+    weight: Floats
+    normal: Floats
+    law: Floats
     peak: float
 
 
@@ -27,21 +27,21 @@ class PointMemory(NamedTuple):
     """What points remember: largest (P,) λ [m] · paid (P, 2), columns WORK and PULL · rub (P, 3) [m]: where failed
     points stick, in the frame of a."""
 
-    largest: np.ndarray
-    paid: np.ndarray
-    rub: np.ndarray
+    largest: Floats
+    paid: Floats
+    rub: Floats
 
 
 class Motion(NamedTuple):
     """Blocks: x (n, 3) [m] · v (n, 6) [m/s, rad/s] · R (n, 3, 3)."""
 
-    x: np.ndarray
-    v: np.ndarray
-    R: np.ndarray
+    x: Floats
+    v: Floats
+    R: Floats
 
 
 class Taken(NamedTuple):
     """What joints took (J,) [J]: damped by their dashpots, rubbed by friction of failed points."""
 
-    damped: np.ndarray
-    rubbed: np.ndarray
+    damped: Floats
+    rubbed: Floats

@@ -17,11 +17,10 @@ from typing import Literal
 
 import numpy as np
 
+from array_types import Array
 from yade_scripts.blocks import quadrature
 from yade_scripts.joints import laws, mixed_modes
 from yade_scripts.joints.law import CohesiveLaw
-
-Array = np.ndarray
 
 
 class JointParameterError(ValueError):

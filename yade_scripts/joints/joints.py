@@ -7,14 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from array_types import Array, Bools, Floats, Ints
 from yade_scripts.blocks.block import Block
 from yade_scripts.blocks.faces import TouchingFaces, gauss_points, to_body
 from yade_scripts.joints import kernel
 from yade_scripts.joints.arrays import JointPoints, Motion, PointMemory, Taken
 from yade_scripts.joints.cohesion import JointParameters
 from yade_scripts.joints.forces import MU, NOT_GROWING, PULL, JointKernels, kernels_of
-
-Array = np.ndarray
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,23 +26,23 @@ class JointTable:
     failure_time [s], nan while alive · intact: nothing broken · alive: still carries tension
     """
 
-    a: Array
-    b: Array
-    face_a: Array
-    face_b: Array
-    area: Array
-    centre: Array
-    normal: Array
-    damage: Array
-    mean_damage: Array
-    opening: Array
-    sliding: Array
-    mode_mix: Array
-    stored: Array
-    dissipated: Array
-    damped: Array
-    failure_time: Array
-    alive: Array
+    a: Ints
+    b: Ints
+    face_a: Ints
+    face_b: Ints
+    area: Floats
+    centre: Floats
+    normal: Floats
+    damage: Floats
+    mean_damage: Floats
+    opening: Floats
+    sliding: Floats
+    mode_mix: Floats
+    stored: Floats
+    dissipated: Floats
+    damped: Floats
+    failure_time: Floats
+    alive: Bools
 
     def __len__(self) -> int:
         return len(self.a)

@@ -19,11 +19,10 @@ from typing import Literal
 import numpy as np
 from scipy.optimize import brentq
 
+from array_types import Array
 from yade_scripts.blocks.block import Block
 from yade_scripts.blocks.faces import FixedPlane, TouchingFaces
 from yade_scripts.joints.cohesion import JointParameterError, JointParameters
-
-Array = np.ndarray
 
 MOST_KINDS = 6
 """Strengths that are listed one by one."""

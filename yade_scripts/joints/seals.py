@@ -10,10 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from array_types import Array
 from yade_scripts.blocks.block import Block
 from yade_scripts.blocks.faces import TouchingFaces, to_body
-
-Array = np.ndarray
 
 OPENED, SLID = 0.01, 0.5
 """Shares of the square root of the common area."""

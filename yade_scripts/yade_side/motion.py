@@ -8,11 +8,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from array_types import Array
 from yade_scripts.blocks.faces import FixedPlane
 from yade_scripts.blocks.kinematics import scatter
 from yade_scripts.yade_side.scene import STATE, Scene
-
-Array = np.ndarray
 
 
 class Motion:

@@ -13,10 +13,9 @@ from collections import deque
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from array_types import Array
 from yade_scripts.blocks.block import MARGIN, Block
 from yade_scripts.yade_side.engine import Engine, YadeError
-
-Array = np.ndarray
 
 STANDING, LOOSE = 5, 1
 """Masks: two bodies are neighbours if they share a bit, unless both stand (equal masks that hold `APART`)."""

@@ -12,10 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from array_types import Array
 from yade_scripts.blocks.block import Block
 from yade_scripts.blocks.polyhedra import BlockError
-
-Array = np.ndarray
 
 
 @dataclass(frozen=True)

@@ -12,12 +12,10 @@ from itertools import pairwise
 
 import numpy as np
 
+from array_types import Array, Floats
 from yade_scripts.blocks.block import Block
 from yade_scripts.blocks.generators.cuts import check_count, equal_cuts, pieces
 from yade_scripts.blocks.polyhedra import BlockError
-
-Array = np.ndarray
-
 
 SAME = 1e-6
 """Cuts closer than this share of a block's edge are one cut."""
@@ -29,8 +27,8 @@ CLOSE = 1.0 / 3.0
 class Opening:
     """A door or window: what of the building lies in the box lower (3,) .. upper (3,) [m] is left out, exactly."""
 
-    lower: Array
-    upper: Array
+    lower: Floats
+    upper: Floats
 
     def meets(self, low: Array, high: Array) -> bool:
         """Whether the opening and the box low .. high share a volume."""
@@ -52,8 +50,8 @@ class Building:
     density [kg/m³] · material: of its blocks
     """
 
-    lower: Array
-    upper: Array
+    lower: Floats
+    upper: Floats
     height: float
     thickness: float
     block: float
@@ -104,8 +102,8 @@ class _Part:
 
     name: str
     group: str
-    low: Array
-    high: Array
+    low: Floats
+    high: Floats
     edges: tuple[float, float, float]
     wished: tuple[tuple[float, ...], ...]
 

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from array_types import Array
 from yade_scripts.blocks.block import Block
 from yade_scripts.blocks.polyhedra import BlockError
-
-Array = np.ndarray
 
 
 def column_of_boxes(name: str, foot, size, count: int, **more) -> list[Block]:

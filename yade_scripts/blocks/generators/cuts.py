@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from array_types import Array
 from yade_scripts.blocks.polyhedra import BlockError
-
-Array = np.ndarray
 
 MOST_BLOCKS = 20_000
 """Blocks of a scene: that many take gigabytes, and hours a second of motion."""

@@ -14,11 +14,10 @@ from itertools import pairwise
 
 import numpy as np
 
+from array_types import Array
 from yade_scripts.blocks.block import Block
 from yade_scripts.blocks.generators.cuts import check_count, equal_cuts, pieces
 from yade_scripts.blocks.polyhedra import BlockError
-
-Array = np.ndarray
 
 SLIVER = 0.01
 """Share of a block's plan below which a piece of a slab beside a slanting edge is left out."""

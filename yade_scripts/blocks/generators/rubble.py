@@ -12,11 +12,11 @@ from typing import Literal
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from array_types import Array
 from yade_scripts.blocks.block import Block
 from yade_scripts.blocks.generators.cuts import check_count
 from yade_scripts.blocks.polyhedra import BlockError
 
-Array = np.ndarray
 Shape = Literal["polyhedra", "boxes", "mixed"]
 
 TRIES, TRIES_IN_ALL = 5000, 400_000
