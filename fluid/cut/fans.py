@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fluid.cut.pieces import DONE, OUTPUT_FULL
+from fluid.cut.pieces import DONE, OUTPUT_FULL, has_vertex
 from kernel_decorators import inner, kernel
 
 
@@ -20,10 +20,7 @@ def fan(w, piece, part, out, n):
     o = w.loop[piece, 0, 0]
     ox, oy, oz = w.x[o, 4], w.x[o, 5], w.x[o, 6]
     for f in range(w.faces[piece]):
-        touches = False
-        for k in range(w.size[piece, f]):
-            touches = touches or w.loop[piece, f, k] == o
-        if touches:
+        if has_vertex(w, piece, f, o):
             continue
         a = w.loop[piece, f, 0]
         ax, ay, az = w.x[a, 4] - ox, w.x[a, 5] - oy, w.x[a, 6] - oz

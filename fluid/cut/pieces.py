@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from array_types import Floats, Integers, Ints
 from kernel_decorators import inner
 
 DONE, OUTPUT_FULL, WORKSPACE_FULL, BROKEN_CAP = 0, 1, 2, 3
@@ -29,23 +30,23 @@ TET_FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 class Workspace(NamedTuple):
     """Scratch for one cell: a pool of vertices, a stack of convex pieces, a stack of polygons."""
 
-    x: np.ndarray  # (vertices, 7) barycentric coordinates, then position relative to node 0 of the cell
-    distance: np.ndarray  # (vertices,) to the plane in hand, 0 where snapped
-    cap: np.ndarray  # (2, edges, 2) edges of the cross-section in hand, for the outer and the inner half
-    edge: np.ndarray  # (vertices, 2) the edge a new vertex lies on
-    loop: np.ndarray  # (pieces, faces, corners)
-    size: np.ndarray  # (pieces, faces) corners of each face
-    tag: np.ndarray  # (pieces, faces) -1..-4 face of the cell; 2g outside plane g; 2g + 1 inside it
-    faces: np.ndarray  # (pieces,)
-    label: np.ndarray  # (pieces,) part of each live piece
-    polygon: np.ndarray  # (polygons, corners, 7)
-    corners: np.ndarray  # (polygons,)
-    height: np.ndarray  # (corners,) distances of a polygon to the plane in hand
-    moments: np.ndarray  # (10,) of the piece in hand
-    near_body: np.ndarray  # (bodies,) bodies that meet or touch the cell
-    near_start: np.ndarray  # (bodies + 1,)
-    near_plane: np.ndarray  # (planes,) their planes that pass through or touch the cell
-    near_distance: np.ndarray  # (planes, 4) distances of the nodes of the cell to them
+    x: Floats  # (vertices, 7) barycentric coordinates, then position relative to node 0 of the cell
+    distance: Floats  # (vertices,) to the plane in hand, 0 where snapped
+    cap: Integers  # (2, edges, 2) edges of the cross-section in hand, for the outer and the inner half
+    edge: Integers  # (vertices, 2) the edge a new vertex lies on
+    loop: Integers  # (pieces, faces, corners)
+    size: Integers  # (pieces, faces) corners of each face
+    tag: Ints  # (pieces, faces) -1..-4 face of the cell; 2g outside plane g; 2g + 1 inside it
+    faces: Integers  # (pieces,)
+    label: Integers  # (pieces,) part of each live piece
+    polygon: Floats  # (polygons, corners, 7)
+    corners: Integers  # (polygons,)
+    height: Floats  # (corners,) distances of a polygon to the plane in hand
+    moments: Floats  # (10,) of the piece in hand
+    near_body: Ints  # (bodies,) bodies that meet or touch the cell
+    near_start: Ints  # (bodies + 1,)
+    near_plane: Ints  # (planes,) their planes that pass through or touch the cell
+    near_distance: Floats  # (planes, 4) distances of the nodes of the cell to them
 
 
 def workspace(scale: int, n_bodies: int, n_planes: int) -> Workspace:
@@ -279,6 +280,15 @@ def copy_piece(w, source, target):
 
 
 @inner
+def has_vertex(w, piece, f, vertex):
+    """Is it a corner of face f of the piece?"""
+    found = False
+    for k in range(w.size[piece, f]):
+        found = found or w.loop[piece, f, k] == vertex
+    return found
+
+
+@inner
 def piece_moments(w, piece, m):
     """m (10,) <- V, c, S of a convex piece: a fan of tetrahedra from one of its vertices, in coordinates
     relative to that vertex, so that slivers keep their relative accuracy."""
@@ -287,10 +297,7 @@ def piece_moments(w, piece, m):
     for c in range(10):
         m[c] = 0.0
     for f in range(w.faces[piece]):
-        touches = False
-        for k in range(w.size[piece, f]):
-            touches = touches or w.loop[piece, f, k] == o
-        if touches:
+        if has_vertex(w, piece, f, o):
             continue
         a = w.loop[piece, f, 0]
         ax, ay, az = w.x[a, 4] - ox, w.x[a, 5] - oy, w.x[a, 6] - oz
