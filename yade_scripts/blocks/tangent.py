@@ -11,9 +11,8 @@ from dataclasses import dataclass, fields
 import numpy as np
 import scipy.sparse as sp
 
+from array_types import Array, Floats, Ints
 from kernel_decorators import inner, kernel
-
-Array = np.ndarray
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,15 +22,15 @@ class Springs:
     normal (s, 3) · kn, kt (s,) [N/m] · cn, ct (s,) [N s/m].
     """
 
-    a: Array
-    b: Array
-    arm_a: Array
-    arm_b: Array
-    normal: Array
-    kn: Array
-    kt: Array
-    cn: Array
-    ct: Array
+    a: Ints
+    b: Ints
+    arm_a: Floats
+    arm_b: Floats
+    normal: Floats
+    kn: Floats
+    kt: Floats
+    cn: Floats
+    ct: Floats
 
     @classmethod
     def none(cls) -> Springs:
@@ -91,7 +90,11 @@ def _accumulate(pair, swap, arm_a, arm_b, D, out):
         first, second = (arm_b[s], arm_a[s]) if swap[s] else (arm_a[s], arm_b[s])
         _relative(B, 0, 1.0, first)
         _relative(B, 6, -1.0, second)
-        out[pair[s]] += B.T @ (D[s] @ B)
+        product, k = B.T @ (D[s] @ B), pair[s]
+        # entry by entry: numba compiles for three seconds to name the shapes of arrays that might not fit each other
+        for i in range(12):
+            for j in range(12):
+                out[k, i, j] += product[i, j]
 
 
 @inner
