@@ -94,6 +94,7 @@ class Joints:
         unit, self.df, self.beta, self.kc, self.k0 = (column.copy() for column in numbers.T)
         self.law = np.stack([unit, self.df, self.beta, self.kc, self.k0, np.zeros(n)], axis=1)
         """Columns as in `joint_forces`."""
+        self._points = [self._of_law(peak) for _, peak in self.families]
         self.eta = 0.0
         """Time constant of the stiffness-proportional dashpot [s]."""
         self.stiffness_on: tuple[Array, Array] | None = None
@@ -140,8 +141,8 @@ class Joints:
             fastest = max(fastest, growth)
         return fastest
 
-    def _points(self, peak: float) -> JointPoints:
-        """As kernels take them; peak: of the law."""
+    def _of_law(self, peak: float) -> JointPoints:
+        """What never changes, as kernels take it; peak: of the law."""
         return JointPoints(
             self.a, self.b, self.start, self.xi_a, self.xi_b, self.weight, self.normal, self.law, peak
         )
@@ -151,9 +152,9 @@ class Joints:
 
     def _families_of(self, joints: Array) -> Iterator[tuple[JointKernels, Array, JointPoints]]:
         """Kernels of each law, those of the live `joints` of that law, and what the kernels read of them."""
-        for number, (kernels, peak) in enumerate(self.families):
+        for number, (kernels, _) in enumerate(self.families):
             own = joints if len(self.families) == 1 else joints[self.family[joints] == number]
-            yield kernels, own, self._points(peak)
+            yield kernels, own, self._points[number]
 
     def stored_between(self, x: Array, R: Array, x0: Array, R0: Array, which: Array | None = None) -> Array:
         """Elastic energy of the joints `which`, by default of all live ones, between two places of the blocks; zero for
@@ -166,8 +167,8 @@ class Joints:
     def lost(self) -> Array:
         """Energy that the damage of each joint stands for by its law, G_c A once it has failed, (J,) [J]."""
         out, own = np.empty(len(self)), np.empty(len(self))
-        for number, (kernels, peak) in enumerate(self.families):
-            kernels.lost(self._points(peak), self.largest, own)
+        for number, (kernels, _) in enumerate(self.families):
+            kernels.lost(self._points[number], self.largest, own)
             of_law = self.family == number
             out[of_law] = own[of_law]
         return out
@@ -175,9 +176,9 @@ class Joints:
     def of_points(self, index: Array) -> Iterator[tuple[JointKernels, Array, tuple]]:
         """For each law: its kernels, which of the points `index` are its own (bool), and what the kernels of single
         points read of these first: index, joint of each point, JointPoints, PointMemory."""
-        for number, (kernels, peak) in enumerate(self.families):
+        for number, (kernels, _) in enumerate(self.families):
             own = self.family[self.joint_of[index]] == number
-            yield kernels, own, (index[own], self.joint_of, self._points(peak), self._memory())
+            yield kernels, own, (index[own], self.joint_of, self._points[number], self._memory())
 
     def broken_now(self) -> Array:
         """Live joints that have failed since the last call of `retire`."""
@@ -225,7 +226,7 @@ class Joints:
     def openings(self, joints: Array, x: Array, R: Array) -> Array:
         """Mean normal opening, mean sliding, largest normal opening of the points of `joints`, (len, 3) [m]."""
         out = np.zeros((len(self), 3))
-        kernel.joint_openings(np.asarray(joints), self._points(0.0), x, R, out)
+        kernel.joint_openings(np.asarray(joints), self._of_law(0.0), x, R, out)
         return out[joints]
 
     def sealed_faces(self, x: Array, R: Array) -> tuple[Array, Array, Array]:
