@@ -176,16 +176,17 @@ def _remainders(water, kept, gradient, mean, dt):
         cells, deep, time = kept.wet_cells, -MEMORY_DEPTH * water.mesh.spacing, kept.theta * dt
         whole = found_over(_all_below, len(cells), cells, depth, deep, t.cells)
         state = ((mean, gradient), kept.remainder, time, t.fluid_cells)
-        over(_leave, len(whole), whole, cells, *state, remainder, rate)
+        over(_leave, len(whole), whole, cells, *state, (remainder, rate))
     return remainder, rate
 
 
 @ranged
-def _leave(first, last, places, cell_list, slopes, before, time, fluid, remainder, rate):
+def _leave(first, last, places, cell_list, slopes, before, time, fluid, made):
     """What the nodes do not hold of the gradient, Π∇x - ∇x [m/s], in the cells at these places of the list: added to
     the remainder before, and over a time [s] as its rate. slopes: Π∇x (N, 3) and ∇x of the listed cells (n, 3)."""
     mean, gradient = slopes
     cells, share = fluid.cells, fluid.share
+    remainder, rate = made
     for place in range(first, last):
         s = places[place]
         e = cell_list[s]

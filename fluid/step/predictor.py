@@ -361,12 +361,14 @@ def _carried_remainder(water, dt, theta, cells):
 
 def carry_remainder(cell_list, remainder, kick, kick_time, u, dt, nu, cells, size, out):
     """β (u' + kick_time r) (M, 3) in the listed cells of `out`; nu: kinematic viscosity [m²/s]."""
-    state = (remainder, kick, kick_time, u, dt, nu, cells, size)
+    state = ((remainder, kick), (kick_time, dt, nu), u, cells, size)
     over(_carry_remainder, len(cell_list), cell_list, *state, out)
 
 
 @ranged
-def _carry_remainder(first, last, cell_list, remainder, kick, kick_time, u, dt, nu, cells, size, out):
+def _carry_remainder(first, last, cell_list, held, numbers, u, cells, size, out):
+    remainder, kick = held
+    kick_time, dt, nu = numbers
     for place in range(first, last):
         e = cell_list[place]
         square = 0.0

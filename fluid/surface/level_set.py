@@ -234,8 +234,8 @@ def _descend(x, closest, best, surface, first, cells, cells_of_nodes):
 
 @inner
 def _hand_outward(layers, surface, corner, mesh, around_nodes, known):
-    """Fill `known`, Nearest; corner as in `_of_corners`. In the second sweep only neighbours that have found another triangle
-    since are worth a question."""
+    """Fill `known`, Nearest; corner as in `_of_corners`. In the second sweep only neighbours that have found another
+    triangle since are worth a question."""
     order, layer_start = layers
     triangles, owner = surface
     nodes, cells = mesh

@@ -199,7 +199,8 @@ def carry_slots(old_pairs, old, new_index, old_index, start, new, shear):
             new.face[to] = old.face[source]
             new.k[to] = old.k[source]
             new.rest[to] = old.rest[source]
-            new.shear[to] = old.shear[source]
+            for c in range(3):  # a whole row at once takes numba two seconds to compile
+                new.shear[to, c] = old.shear[source, c]
             new.spread[to] = old.spread[source]
             new.push[to] = old.push[source]
             new.speed[to] = old.speed[source]

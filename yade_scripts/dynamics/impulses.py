@@ -112,15 +112,17 @@ def _add(dt, x, joint, before, whole, joint_sum, contact_sum, place):
     for r in range(len(x)):
         for k in range(3):
             place[r, k] += dt * x[r, k]
-        f0, f1, f2 = joint[r, 0], joint[r, 1], joint[r, 2]
-        _take(dt, x, r, f0, f1, f2, joint[r, 3], joint[r, 4], joint[r, 5], joint_sum)
-        f0, f1, f2 = whole[r, 0] - before[r, 0], whole[r, 1] - before[r, 1], whole[r, 2] - before[r, 2]
-        m0, m1, m2 = whole[r, 3] - before[r, 3], whole[r, 4] - before[r, 4], whole[r, 5] - before[r, 5]
-        _take(dt, x, r, f0, f1, f2, m0, m1, m2, contact_sum)
+        f, m = (joint[r, 0], joint[r, 1], joint[r, 2]), (joint[r, 3], joint[r, 4], joint[r, 5])
+        _take(dt, x, r, f, m, joint_sum)
+        f = (whole[r, 0] - before[r, 0], whole[r, 1] - before[r, 1], whole[r, 2] - before[r, 2])
+        m = (whole[r, 3] - before[r, 3], whole[r, 4] - before[r, 4], whole[r, 5] - before[r, 5])
+        _take(dt, x, r, f, m, contact_sum)
 
 
 @plain
-def _take(dt, x, r, f0, f1, f2, m0, m1, m2, out):
+def _take(dt, x, r, force, moment, out):
+    f0, f1, f2 = force
+    m0, m1, m2 = moment
     out[r, 0] += dt * f0
     out[r, 1] += dt * f1
     out[r, 2] += dt * f2
