@@ -72,3 +72,31 @@ def test_a_gain_of_water_counts_only_beyond_what_fell_out():
     ledger.left = 10.0
     assert ledger.balance((50.0, 46.0), NOTHING).energy_error == 0.0
     assert ledger.balance((50.0, 56.0), NOTHING).energy_error == pytest.approx(0.06)
+
+
+def test_the_work_of_imposed_motions_is_a_scale_of_its_own():
+    """A machine that put 50 J into joints, of which 1 J is nowhere: 2 %, however little moves or falls."""
+    ledger = Ledger()
+    ledger.start(None, NOTHING)
+    found = ledger.balance(None, NOTHING | {"driving_work": 50.0, "joint_stored": 49.0})
+    assert found.input_energy == 50.0
+    assert found.energy_error == pytest.approx(0.02)
+
+
+def test_what_the_blocks_count_half_a_substep_late_has_arrived():
+    ledger = started()
+    ledger.give(30.0, behind=2.0)
+    found = ledger.balance((50.0, 20.0), NOTHING | {"kinetic": 28.0, "load_work": 28.0})
+    assert found.work_received == 30.0
+    assert found.energy_error == 0.0
+
+
+def test_what_trapped_air_holds_is_not_numerical_dissipation():
+    """It is shown in a line of its own, and water that gains what the air had lost is in balance."""
+    ledger = started()
+    ledger.air = 8.0
+    found = ledger.balance((50.0, 42.0), NOTHING)
+    assert (found.air_energy, found.numerical_dissipation) == (8.0, 0.0)
+    ledger.air = -8.0
+    assert ledger.balance((50.0, 58.0), NOTHING).energy_error == 0.0
+    assert ledger.balance((50.0, 64.0), NOTHING).energy_error == pytest.approx(0.06)

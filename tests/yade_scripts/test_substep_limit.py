@@ -8,7 +8,7 @@ import pytest
 from yade_scripts.blocks.block import Block
 from yade_scripts.contact.law import ContactLaw
 from yade_scripts.dynamics.structure import Structure
-from yade_scripts.dynamics.timestep import SubstepTooLong, exact_joint_frequency
+from yade_scripts.dynamics.timestep import DRIVEN_SHARE, SubstepTooLong, exact_joint_frequency
 from yade_scripts.joints.cohesion import JointParameters
 
 STILL = (0.0, 0.0, 0.0)
@@ -93,3 +93,19 @@ def test_the_limit_with_dashpots_is_where_energy_starts_to_grow(share):
             assert grown < 1e-4
         else:
             assert grown > 0.01
+
+
+@pytest.mark.parametrize(
+    ("motion", "speed"),
+    [
+        ({"velocity": (0.0, 0.0, 300.0)}, 300.0),
+        ({"spin": (0.0, 400.0, 0.0)}, 400.0 * np.sqrt(0.75)),
+        ({"velocity": (0.0, 0.0, 300.0), "spin": (0.0, 400.0, 0.0)}, 300.0 + 400.0 * np.sqrt(0.75)),
+    ],
+)
+def test_a_driven_block_opens_no_joint_by_more_than_a_share_of_its_opening_in_a_substep(motion, speed):
+    """Moved on, turned, or both: the fastest point of the cube is one of its corners."""
+    with Structure(two_cubes(driven=True, **motion), None, JOINT, gravity=STILL) as s:
+        limit = s.substep_limit()
+        assert limit.dt == pytest.approx(DRIVEN_SHARE * JOINT.opening_at_failure / speed)
+        assert "prescribed motion of block high" in limit.what

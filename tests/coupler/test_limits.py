@@ -1,0 +1,62 @@
+"""Limits of a run: on which side of them it ends, and what the message asks for."""
+
+import re
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from coupler.geometry.overlaps import Overlap
+from coupler.step.limits import Diverged, check_air, check_momentum, check_overlap
+from coupler.step.step_limits import Attempt, best_of
+
+
+def test_a_run_ends_just_beyond_its_limit_of_momentum():
+    check_momentum(1.0, 1e-6, 1e-6)
+    with pytest.raises(Diverged, match=r"miss 1\.1e-06 of the impulses"):
+        check_momentum(1.0, 1.1e-6, 1e-6)
+    with pytest.raises(Diverged):
+        check_momentum(1.0, np.nan, 1e-6)
+
+
+def test_contact_is_to_be_stiffer_by_the_square_of_what_the_overlap_exceeds():
+    """A block that falls goes in by v sqrt(m/K): a quarter of the depth takes sixteen times the stiffness."""
+    with pytest.raises(Diverged, match="about 16 times as high"):
+        check_overlap(1.0, Overlap("brick", "the ground", 0.2, 0.4), 0.1)
+    with pytest.raises(Diverged, match="about 2 times as high"):
+        check_overlap(1.0, Overlap("brick", "the ground", 0.2, 0.11), 0.1)
+    check_overlap(1.0, None, 0.1)
+
+
+@pytest.mark.parametrize("pressure", [5e4, -5e4])
+def test_air_that_is_drawn_out_breaks_its_law_like_air_that_is_squeezed(pressure):
+    class Air(SimpleNamespace):
+        def __len__(self):
+            return len(self.mean_pressure)
+
+    water = SimpleNamespace(
+        air=Air(mean_pressure=np.array([1e3, pressure])),
+        pocket_bounds=lambda k: (np.full(3, float(k)), np.full(3, k + 1.0)),
+        pocket_volumes=lambda: np.array([1.0, 2.0]),
+    )
+    check_air(0.5, water, 6e4)
+    told = f"between (1, 1, 1) to (2, 2, 2) m, 2 m3, has {pressure:.4g} Pa"
+    with pytest.raises(Diverged, match=re.escape(told)):
+        check_air(0.5, water, 4e4)
+
+
+@pytest.mark.parametrize("ends", [False, True])
+def test_the_shortest_attempt_stays_where_it_is_better_in_one_thing_that_the_longest_breaks(ends):
+    """The volume did not get better with the step, the defect did."""
+    broken = frozenset({"defect", "volume"})
+    longest = Attempt(0, {"defect": 0.4, "volume": 1.0}, broken, False)
+    shortest = Attempt(3, {"defect": 0.1, "volume": 1.0}, broken, ends)
+    assert best_of([longest, shortest]) is shortest
+
+
+def test_the_longest_attempt_stays_where_no_shorter_one_helps_or_only_the_shorter_one_ends_the_run():
+    longest = Attempt(0, {"defect": 0.4}, frozenset({"defect"}), False)
+    assert best_of([longest, Attempt(3, {"defect": 0.3}, frozenset({"defect"}), True)]) is longest
+    ends = Attempt(0, {"defect": 0.4}, frozenset({"defect"}), True)
+    shortest = Attempt(3, {"defect": 0.3}, frozenset({"defect"}), False)
+    assert best_of([ends, shortest]) is shortest
