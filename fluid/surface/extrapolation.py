@@ -54,7 +54,8 @@ def continue_outward(order, layer_start, linear_layers, f, gradient, nodes, arou
 
 @released
 def _one_layer(first, last, layer, linear, field, nodes, around):
-    _continue(first, last, layer, linear, field, nodes, around, np.empty(field.value.shape[1]))
+    value, _, _, _ = field
+    _continue(first, last, layer, linear, field, nodes, around, np.empty(value.shape[1]))
 
 
 @inner

@@ -12,6 +12,7 @@ import surgebreak
 from coupler.commands.benchmark import threads as measured
 from coupler.commands.warm_up import CASE
 from coupler.program import threads
+from fluid.mesh.arrays import Corners
 from kernel_decorators import ranged
 
 SCENE = tomllib.loads(CASE)
@@ -151,3 +152,7 @@ def test_the_benchmark_counts_what_threads_share_and_what_kernels_move(monkeypat
     runs = np.array([[0, 50]])
     moved = measured._bytes("_inflow", (0, 200, runs, listed, np.zeros((1000, 4))), 200, 1000)
     assert moved == runs.nbytes + listed.nbytes + 1000 * 32 / 20
+    bundle = Corners(np.zeros((200, 3)), np.zeros((1000, 4)))
+    moved = measured._bytes("_fast", (0, 50, bundle, out), 200, 1000, ("nodes", "shape"))
+    assert moved == bundle.nodes.nbytes / 4 + out.nbytes
+    assert measured._bytes("_fast", (0, 50, (bundle, out)), 200, 1000) > moved + bundle.cells.nbytes / 5

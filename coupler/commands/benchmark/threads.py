@@ -142,7 +142,8 @@ def _traffic(nodes: int, cells: int) -> Iterator[dict[str, list[float]]]:
         result = given(kernel, count, args)
         sums = found.setdefault(kernel.__name__, [0.0, 0.0])
         sums[0] += time.process_time() - began
-        sums[1] += _bytes(kernel.__name__, args, nodes, cells)
+        names = getattr(kernel, "py_func", kernel).__code__.co_names
+        sums[1] += _bytes(kernel.__name__, args, nodes, cells, names)
         return result
 
     team._alone = alone
@@ -152,15 +153,22 @@ def _traffic(nodes: int, cells: int) -> Iterator[dict[str, list[float]]]:
         team._alone = given
 
 
-def _bytes(name: str, args, nodes: int, cells: int) -> float:
-    """Bytes of the arrays among the arguments, of those of the whole mesh the share that the rows are of it."""
-    arrays = [
-        a for arg in args for a in (arg if isinstance(arg, tuple) else (arg,)) if isinstance(a, np.ndarray)
-    ]
+def _bytes(name: str, args, nodes: int, cells: int, read=()) -> float:
+    """Bytes of the arrays among the arguments, of those of the whole mesh the share that the rows are of it; read:
+    names that the kernel uses, by which it takes what it reads out of a bundle of arrays."""
+    arrays = [a for arg in args for a in _arrays(arg, read)]
     rows = _rows(name, args)
     whole = cells if name in ROWS_OF_CELLS else nodes
     share = min(1.0, rows / whole)
     return float(sum(a.nbytes * (1.0 if len(a) <= rows else share) for a in arrays))
+
+
+def _arrays(arg, read) -> list[np.ndarray]:
+    """An array, or those of a tuple: of a named one the fields that are read, all where none is read by its name."""
+    if isinstance(arg, tuple):
+        named = [getattr(arg, field) for field in getattr(arg, "_fields", ()) if field in read]
+        return [a for part in (named or arg) for a in _arrays(part, read)]
+    return [arg] if isinstance(arg, np.ndarray) else []
 
 
 def _rows(name: str, args) -> int:
