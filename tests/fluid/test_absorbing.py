@@ -50,6 +50,14 @@ def test_wave_that_comes_in_and_one_that_goes_out_pass_each_other():
     assert side.speed == pytest.approx(-c * b / DEPTH, rel=1e-3)
 
 
+def test_water_that_circulates_over_an_uneven_bed_brings_nothing():
+    """Out over the deep half, back twice as fast over the shallow one: what counts is the flow, not the mean speed."""
+    side = Absorber(steady(INWARD, DEPTH, 0.0), INWARD, PLACES, np.array([0.0, DEPTH / 2]), G)
+    side.hear(np.array([DEPTH, DEPTH / 2]), np.array([-1.0, 2.0])[:, None] * INWARD, 0.0)
+    assert side.height == pytest.approx(0.0, abs=1e-12)
+    assert side.speed == pytest.approx(0.0, abs=1e-12)
+
+
 def test_dry_side_brings_nothing():
     side = absorber(steady(INWARD, -1.0, 0.0))
     side.hear(np.zeros(2), np.zeros((2, 3)), 0.0)
