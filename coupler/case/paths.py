@@ -72,10 +72,15 @@ def read_text(path: Path, encoding: str = "utf-8", most: int = MOST_BYTES) -> st
 
 
 def _nearest(path: Path) -> str:
+    there = next((above for above in path.parents if above.is_dir()), path.parent)
     try:
-        beside = [place.name for place in path.parent.iterdir()]
+        beside = [place.name for place in there.iterdir()]
     except OSError:
         return ""
+    if there != path.parent:  # a folder on the way is missing
+        return f"; did you mean '{path.name}'? Paths are from the directory of the case" * (
+            path.name in beside
+        )
     return did_you_mean(path.name, beside)
 
 

@@ -126,7 +126,8 @@ def _forecast(case: Case) -> Iterable[terminal.Row]:
 
 
 def _snippet(path: Path, options: dict) -> str:
-    lines = ["in a case:", "", "[[structure.drawing]]", f'path = "{path}"']
+    beside = "   # from the directory of the case"
+    lines = ["in a case:", "", "[[structure.drawing]]", f'path = "{path.name}"{beside}']
     for name, value in options.items():
         lines.append(f"{name} = {_toml(value)}")
     return "\n".join(lines)

@@ -394,3 +394,14 @@ def test_a_file_that_ends_within_a_face_has_the_faces_before(tmp_path):
     (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf ", encoding="utf-8")
     _, cells, _ = read_mesh(tmp_path / "a.obj")
     assert {kind: rows.tolist() for kind, rows in cells.items()} == {"triangle": [[0, 1, 2]]}
+
+
+def test_a_path_from_the_wrong_directory_is_told_where_paths_are_from(tmp_path):
+    """`mine/house.stl` in mine/case.toml means mine/mine/house.stl."""
+    from coupler.case.paths import BadPath, check_file
+
+    (tmp_path / "house.stl").write_text("solid")
+    with pytest.raises(BadPath, match=r"did you mean 'house.stl'. Paths are from the directory of the case"):
+        check_file(tmp_path / "mine" / "house.stl")
+    with pytest.raises(BadPath, match=r"^no such file$"):
+        check_file(tmp_path / "mine" / "other.stl")

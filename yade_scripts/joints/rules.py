@@ -117,13 +117,13 @@ class JointRules:
         text = self.everywhere.described()
         if self.pairs:
             other = sum(law != self.everywhere for law in laws)
-            text += f"; {other} of {len(laws)} joints by joints.pair or a preset"
+            text += f"; {other} of {len(laws)} joints by joints.pair or a preset" if other else ""
             kinds = Counter((law.strength, law.opening_at_failure) for law in laws)
             if self.scatter is None and len(kinds) <= MOST_KINDS:
                 listed = (
                     f"{n} of {t / 1e6:.4g} MPa and {1e3 * d:.3g} mm" for (t, d), n in kinds.most_common()
                 )
-                text += f" ({', '.join(listed)})"
+                text += f"; joints: {', '.join(listed)}"
         if self.scatter is not None:
             s = self.scatter
             text += f"; strengths {s.distribution}, {s.variation:g} of their mean, seed {s.seed}"
