@@ -238,7 +238,7 @@ def _loop_plane(loop, inner):
 
 def _cross(a, b):
     """a × b of vectors (k, 3); numpy's own takes ten times as long for few of them."""
-    ax, ay, az, bx, by, bz = *a.T, *b.T
+    (ax, ay, az), (bx, by, bz) = a.T, b.T
     return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=1)
 
 
