@@ -21,13 +21,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from fluid.domain.moments import wet_fraction
-from fluid.numerics.threads import over
+from fluid.domain.moments import wet_moments
+from fluid.numerics.threads import found_over, over
 from fluid.surface.volume import Flux, edge_rates
-from kernel_decorators import kernel, ranged
+from kernel_decorators import kernel, ranged, released
 
 NEAR = 3.0
-"""|φ| in cell sizes beyond which no surface arrives in a step."""
+"""|φ| in cell sizes beyond which no node has a hat that the surface gets to in a step."""
+STEP = 0.75
+"""... and no cell is cut: in water that crosses half of one."""
 SLOW = (0.25, 0.5)
 """Cells crossed in a step between which the fluxes by shares take over again."""
 
@@ -36,69 +38,104 @@ def swept(topology, flux: Flux, phi, u, moved, dt: float) -> np.ndarray:
     """Volume (N,) [m³] that the nodes get by (1) in dt [s] beyond what they got by the fluxes along the edges.
 
     All of the domain of the flux: φ (N,) [m] at the beginning · u (N, 3) [m/s] at mid-step · moved (edges,) [m³] what
-    went out along each edge."""
+    went out along each edge. Where no surface is slow enough, this costs a look at the nodes."""
     t, g = topology, flux.graph
-    band = flux.nodes[np.abs(phi[flux.nodes]) < NEAR * t.node_size[flux.nodes]]
-    mesh = (t.cells, t.parent, t.gradients, t.volume, t.node_start, t.node_cells)
-    after, growth = phi.copy(), np.zeros(len(band))
-    over(_growth, len(band), band, phi, u, *mesh, growth)
-    after[band] -= dt * growth
-    near = np.zeros(len(phi), bool)
-    near[band] = True
-    cells = t.cells_around(near)
-    stages = [wet_fraction(cells, level, t.parts) for level in (phi, 0.5 * (phi + after), after)]
-    share = (stages[0] + 4.0 * stages[1] + stages[2]) / 6.0
-    cut = (share > 0.0) & (share < 1.0)
-    if not cut.any():
+    weight, counted = np.zeros(len(phi)), np.zeros(len(phi), bool)
+    over(_weights, len(flux.nodes), flux.nodes, phi, u, t.near_solids, t.node_size, dt, weight, counted)
+    if not counted.any():
         return np.zeros(len(phi))
-    beside = np.zeros(len(phi), bool)
-    beside[t.cells[cells[cut]]] = True
+    around = t.cells_around(counted)
+    velocity, beside = np.zeros(flux.velocity.shape), np.zeros(len(phi), bool)
+    reached = found_over(
+        _in_reach, len(around), around, phi, t.node_size, t.cells, flux.velocity, velocity, beside
+    )
+    after, near = phi.copy(), np.flatnonzero(beside)
+    over(_after, len(near), near, phi, u, dt, t.cells, t.parent, t.gradients, t.volume, *_rows(t), after)
+    beside[:] = False
+    over(_by_share, len(reached), reached, phi, after, t.cells, t.volume, flux.velocity, velocity, beside)
     nodes = flux.nodes[beside[flux.nodes]]
-    reached = np.zeros(len(phi), bool)
-    reached[nodes] = True
-    around = t.cells_around(reached)
-    velocity = np.zeros(flux.velocity.shape)
-    over(_where_all_wet, len(around), around, phi, t.cells, flux.velocity, velocity)
-    over(_by_share, len(cells), cells, share, flux.velocity, velocity)
     rate = edge_rates(t, g, nodes, velocity)
-    crossed = dt * np.sqrt((u * u).sum(axis=1)) / t.node_size
-    weight = np.clip((SLOW[1] - crossed) / (SLOW[1] - SLOW[0]), 0.0, 1.0)
-    weight[t.near_solids] = 0.0
-    return _difference(nodes, reached, weight, g.row, g.start, g.neighbour, dt * rate, moved)
+    return _difference(nodes, beside, weight, g.row, g.start, g.neighbour, dt * rate, moved)
+
+
+def _rows(t):
+    return t.node_start, t.node_cells
 
 
 @ranged
-def _growth(first, last, nodes, phi, u, cells, parent, g, volume, node_start, node_cells, out):
-    """u·∇φ (n,) [m/s] at the listed nodes, with the mean of ∇φ over the cells around each."""
+def _weights(first, last, nodes, phi, u, near_solids, size, dt, weight, counted):
+    """Weight (N,) of what the surface sweeps at the listed nodes; counted (N,) bool: those of some near the surface."""
     for s in range(first, last):
-        i, weight = nodes[s], 0.0
+        i = nodes[s]
+        if not near_solids[i]:
+            speed = np.sqrt(u[i, 0] * u[i, 0] + u[i, 1] * u[i, 1] + u[i, 2] * u[i, 2])
+            weight[i] = min(1.0, max(0.0, (SLOW[1] - dt * speed / size[i]) / (SLOW[1] - SLOW[0])))
+            counted[i] = weight[i] > 0.0 and abs(phi[i]) < NEAR * size[i]
+
+
+@released
+def _in_reach(first, last, cell_list, phi, size, cells, u, velocity, beside):
+    """The listed cells that the surface may cut within the step, whose corners are marked (N,) bool; the others take
+    the velocity u (M, 3) if they are wet."""
+    found, n = np.empty(last - first, np.int64), 0
+    for s in range(first, last):
+        e = cell_list[s]
+        wet, dry = True, True
+        for a in range(4):
+            i = cells[e, a]
+            wet = wet and phi[i] < -STEP * size[i]
+            dry = dry and phi[i] > STEP * size[i]
+        if wet:
+            for k in range(3):
+                velocity[e, k] = u[e, k]
+        elif not dry:
+            found[n] = e
+            n += 1
+            for a in range(4):
+                beside[cells[e, a]] = True
+    return found[:n].copy()
+
+
+@ranged
+def _after(first, last, nodes, phi, u, dt, cells, parent, g, volume, node_start, node_cells, out):
+    """φ (N,) [m] that u has carried on for dt at the listed nodes, with the mean of ∇φ over the cells around each."""
+    for s in range(first, last):
+        i, weight, rate = nodes[s], 0.0, 0.0
         for c in range(node_start[i], node_start[i + 1]):
             e = node_cells[c]
             p = parent[e]
             weight += volume[e]
             for a in range(4):
                 for k in range(3):
-                    out[s] += volume[e] * phi[cells[e, a]] * g[p, a, k] * u[i, k]
-        out[s] /= max(weight, 1e-300)
+                    rate += volume[e] * phi[cells[e, a]] * g[p, a, k] * u[i, k]
+        out[i] = phi[i] - dt * (rate / max(weight, 1e-300))
 
 
-@ranged
-def _where_all_wet(first, last, cell_list, phi, cells, u, out):
-    """u (M, 3) in the listed cells with φ < 0 at all corners."""
+@released
+def _by_share(first, last, cell_list, phi, after, cells, volume, u, velocity, beside):
+    """u (M, 3) times the wet share of the listed cells, mean over the step by Simpson's rule; the corners of those
+    that are cut are marked (N,) bool."""
+    at, moments = np.empty(4), np.empty(4)
     for s in range(first, last):
-        e = cell_list[s]
-        if max(max(phi[cells[e, 0]], phi[cells[e, 1]]), max(phi[cells[e, 2]], phi[cells[e, 3]])) < 0.0:
-            for k in range(3):
-                out[e, k] = u[e, k]
-
-
-@ranged
-def _by_share(first, last, cell_list, share, u, out):
-    """u (M, 3) times the share (n,) of the listed cells."""
-    for s in range(first, last):
-        e = cell_list[s]
+        e, share = cell_list[s], 0.0
+        for stage in range(3):
+            for a in range(4):
+                i = cells[e, a]
+                at[a] = phi[i] if stage == 0 else after[i] if stage == 2 else 0.5 * (phi[i] + after[i])
+            wet_moments(at, moments)
+            part = (
+                volume[e] * moments[0]
+                + volume[e] * moments[1]
+                + volume[e] * moments[2]
+                + volume[e] * moments[3]
+            )
+            share += (4.0 if stage == 1 else 1.0) * min(part / volume[e], 1.0)
+        share /= 6.0
         for k in range(3):
-            out[e, k] = share[s] * u[e, k]
+            velocity[e, k] = share * u[e, k]
+        if 0.0 < share < 1.0:
+            for a in range(4):
+                beside[cells[e, a]] = True
 
 
 @kernel
