@@ -33,6 +33,9 @@ LEAST_DROP = 2.5
 
 STILL = 0.1
 """Share of a cell by which the still water may miss the level that a wave is made for, without a remark."""
+SPRAY = 1.1
+"""What an inflow may bring into a tank with an open top, over the room above its water: a tank of 2 m that filled by
+0.5 m a second lost a tenth of that by its top before it stood full and broke the limit on the volume."""
 
 
 def water_problems(case: Case) -> Iterator[Problem]:
@@ -165,19 +168,24 @@ def _walls(w) -> Iterator[Problem]:
 
 
 def _filled_up(case: Case) -> Iterator[Problem]:
-    """Inflows into a tank without a way out, which they fill before the end."""
-    if case.tank.open or case.water.sea or not case.tank.is_box:
+    """Inflows into a tank without a way out but its open top, which they fill before the end: what they bring is given,
+    and no more than spray leaves by the top."""
+    if set(case.tank.open) - {"z+"} or case.water.sea or not case.tank.is_box:
         return
+    way_out, share = ("no way out but its open top", SPRAY) if case.tank.open else ("no way out", 1.0)
     size = [high - low for low, high in zip(case.tank.lower, case.tank.upper)]
     boxes = [[high - low for low, high in zip(fill.lower, fill.upper)] for fill in case.water.fill]
     room = math.prod(size) - max((math.prod(box) for box in boxes), default=0.0)
     for i, spec in enumerate(case.water.inflow):
+        if spec.absorbs:
+            continue
         brought = size[1 if spec.side[0] == "x" else 0] * _brought(case, spec)
-        if brought > room:
+        if brought > share * room:
             yield (
                 ("water", "inflow", i),
-                f"brings {brought:.3g} m3 until the end of the run ({case.time.end:g} s) into a tank without a way out "
-                f"that has room for {room:.3g} m3: name open sides (tank.open), or end before it is full",
+                f"brings {brought:.3g} m3 until the end of the run ({case.time.end:g} s) into a tank that has "
+                f"room for {room:.3g} m3 and {way_out}: name open sides (tank.open), let it take back what returns "
+                "(absorbs = true), or end before the tank is full",
             )
 
 

@@ -75,7 +75,8 @@ def test_what_cannot_be_is_refused_with_its_place(water, message):
 
 
 def test_a_tank_that_its_inflow_fills_is_refused():
-    """0.2 m x 0.5 m x 1 m/s bring 0.1 m3 in a second, there is room for 0.2 m3. Any way out is enough."""
+    """0.2 m x 0.5 m x 1 m/s bring 0.1 m3 in a second, there is room for 0.2 m3. A side as a way out is
+    enough; an open top lets out spray only, and a stream that takes back what returns does not fill a tank."""
     stream = {"kind": "steady", "side": "x-", "level": 0.5, "velocity": 1.0}
     closed = TANK | {"open": []}
 
@@ -86,6 +87,9 @@ def test_a_tank_that_its_inflow_fills_is_refused():
     assert filled(1.9, closed) == []
     assert "brings 0.21 m3 until the end of the run (2.1 s)" in filled(2.1, closed)[0]
     assert filled(2.1, TANK) == []
+    assert "room for 0.2 m3 and no way out but its open top" in filled(2.3, TANK)[0]
+    assert filled(2.3, TANK | {"open": ["z+", "x+"]}) == []
+    assert filled(2.3, TANK, inflow=[stream | {"absorbs": True}]) == []
     assert filled(2.1, closed, sea=[{"side": "x+", "level": 0.5}]) == []
 
 
