@@ -44,7 +44,7 @@ SECONDS_PER_SUBSTEP, SECONDS_PER_POINT, SECONDS_PER_LOOSE_BLOCK = 1.2e-4, 1.7e-7
 contacts must be found."""
 SECONDS_OF_A_START, SECONDS_OF_A_STRUCTURE = 1.0, 0.8
 SECONDS_PER_STEP, SECONDS_PER_WATER_STEP = 5e-3, 5e-3
-"""Of books and histories, and of water however little."""
+"""[s] Balances and histories of a step, and the part of a step of the water that does not depend on its size."""
 SECONDS_PER_CELL, SECONDS_PER_WET_BLOCK = 6e-7, 1.2e-3
 """Of a step: for each cell of the mesh, and for each block that moves in water (cutting, carrying over, its rows of the
 pressure)."""
