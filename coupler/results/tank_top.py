@@ -33,18 +33,20 @@ class TankTop:
     def __init__(self, water: Water):
         low, self.height = water.mesh.bounds[:, 2]
         nodes = water.mesh.nodes
-        self._places = nodes[:, :2]
-        self._is_top = nodes[:, 2] >= self.height - NEAR * (self.height - low)
+        self._top = np.flatnonzero(nodes[:, 2] >= self.height - NEAR * (self.height - low))
+        self._places = nodes[self._top, :2]
         self._reached = REACHED * water.mesh.finest
         self._at_start = self._wet(water)
         self.first, self.place, self.share, self.share_at = NEVER, np.zeros(2), 0.0, NEVER
 
     def _wet(self, water: Water) -> Array:
-        """(N,) bool, of the nodes of the mesh: water is at the top there."""
-        parent = water.domain.parent_node
-        own = self._is_top[parent] & water.topology.active & (water.level_set < self._reached)
-        found = np.zeros(len(self._is_top), bool)
-        found[parent[own]] = True
+        """(k,) bool, of the nodes at the top: water is there, at one of the copies of the node at least."""
+        parent, found = water.domain.parent_node, np.zeros(len(self._top), bool)
+        first, last = (np.searchsorted(parent, self._top, side) for side in ("left", "right"))
+        for copy in range(int((last - first).max(initial=0))):
+            has = np.flatnonzero(first + copy < last)
+            own = first[has] + copy
+            found[has] |= water.topology.active[own] & (water.level_set[own] < self._reached)
         return found
 
     def step(self, water: Water, time: float) -> bool:
@@ -52,7 +54,7 @@ class TankTop:
         wet = np.flatnonzero(self._wet(water) & ~self._at_start)
         if not len(wet):
             return False
-        share = len(wet) / int(self._is_top.sum())
+        share = len(wet) / len(self._top)
         if share > self.share:
             self.share, self.share_at = share, time
         if self.first != NEVER:

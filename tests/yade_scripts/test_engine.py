@@ -31,6 +31,17 @@ print(os.path.dirname(engine.O.tmpFilename()))
     assert not __import__("os").path.exists(out)
 
 
+def test_loads_without_a_home():
+    """Services and containers start programs without HOME, which YADE reads while it loads."""
+    out = run("""
+import os
+os.environ.pop("HOME", None)
+from yade_scripts.yade_side.engine import load_yade
+print(load_yade().O.iter)
+""")
+    assert out == "0"
+
+
 @pytest.mark.parametrize("package", ["vtk", "pyvista", "rasterio"])
 def test_packages_that_would_crash_are_refused(package):
     out = run(f"""

@@ -41,25 +41,27 @@ def contact_forces(share, shapes, bodies, law, pairs, slots, ground, x, v, R, dt
     """Find the contacts at the present places and add their forces to F (n, 6).
 
     share: `alone`, or what runs ranges of the pairs on several threads: forces are added in the order of the pairs
-    afterwards, so the bits are the same · ground: `Ground`, NO_GROUND without · dt [s]: substep to come, 0: only look
-    · last_dt [s]: substep that led here
+    afterwards, so the bits are the same; a range of all pairs adds them as it finds them · ground: `Ground`,
+    NO_GROUND without · dt [s]: substep to come, 0: only look · last_dt [s]: substep that led here
     Which contacts there are and what they hold does not depend on which pairs that do not touch are in the list.
     → (contacts, work of friction and of springs that were let go [J])
     """
     lost = np.zeros(len(pairs.a))
-    state = (shapes, bodies, law, pairs, slots, ground, len(F), x, v, R, dt, last_dt, rows, lost)
+    state = (shapes, bodies, law, pairs, slots, ground, F, x, v, R, dt, last_dt, rows, lost)
     spans = np.array(share(_contacts, len(pairs.a), *state, weight=PAIR))
     return _added_up(spans, rows, lost, F)
 
 
 @released
 def _contacts(
-    first_pair, last_pair, shapes, bodies, law, pairs, slots, ground, n, x, v, R, dt, last_dt, rows, lost
+    first_pair, last_pair, shapes, bodies, law, pairs, slots, ground, F, x, v, R, dt, last_dt, rows, lost
 ):
     """Contacts of a range of pairs, into the rows from the first slot of the first pair on → where they begin and end.
 
-    n: blocks, the other bodies are planes · lost (p,) [J]: what friction and springs that were let go took."""
-    begins = pairs.start[first_pair]
+    F (n, 6): of the blocks, the other bodies are planes; the forces are added where the range holds all pairs ·
+    lost (p,) [J]: what friction and springs that were let go took."""
+    begins, n, S = pairs.start[first_pair], len(F), np.empty(3)
+    all_pairs = first_pair == 0 and last_pair == len(pairs.a)
     count = begins
     most = 0
     for body in range(len(shapes.face_start) - 1):
@@ -124,15 +126,18 @@ def _contacts(
             yields, K = set_dashpots(bodies, law, a, b, R, rows, first, count, scratch)
             mode = Mode(law.zeta, np.sqrt(yields * K))
             taken += apply(slots, v, R, dt, last_dt, mode, a, rows, first, count, scratch)
+            for c in range(first, count if all_pairs else first):
+                add_up(rows, c, F, S)
         lost[p] = taken
     return begins, count
 
 
 @kernel
 def _added_up(spans, rows, lost, F):
-    """The rows in `spans` (k, 2) one behind the other, and their forces on F; → how many they are, Σ lost."""
-    count, S = 0, np.empty(3)
-    for k in range(len(spans)):
+    """The rows in `spans` (k, 2) one behind the other, and their forces on F, where one range has not added them
+    already; → how many they are, Σ lost."""
+    count, S = spans[0, 1] if len(spans) == 1 else 0, np.empty(3)
+    for k in range(len(spans) if len(spans) > 1 else 0):
         for c in range(spans[k, 0], spans[k, 1]):
             if c != count:
                 _move(rows, c, count)

@@ -85,6 +85,7 @@ def load_yade(threads: int = 1) -> Engine:
         _refuse_present()
         os.environ["OMP_NUM_THREADS"] = str(threads)
         os.environ.setdefault("OMP_WAIT_POLICY", "passive")
+        os.environ.setdefault("HOME", os.path.expanduser("~"))  # YADE does not load without it
         with _side_effects_undone():
             _loaded = _import_yade(folder)
         sys.meta_path.insert(0, RefuseAfterYade())
