@@ -482,6 +482,54 @@ def test_the_packages_may_go_elsewhere(machine):
     assert not (machine.root / ".venv").exists()
 
 
+def second_checkout(machine):
+    """Beside one that is set up, the same without a .venv."""
+    machine.ready()("doctor")
+    other = machine.root.parent / "checkout of mine"
+    other.mkdir()
+    for name in ("surgebreak", "pyproject.toml", "constraints.txt"):
+        shutil.copy(ROOT / name, other / name)
+    return other
+
+
+@pytest.mark.parametrize("changed", [False, True], ids=["the same packages", "other packages"])
+@pytest.mark.parametrize("words", [("doctor",), ("run", "--help"), ("render", "r")])
+def test_the_installation_of_another_checkout_is_refused_through_a_link(machine, changed, words):
+    """Its program is that of the other checkout; an installation for this one would change what that one runs."""
+    other = second_checkout(machine)
+    (other / ".venv").symlink_to("../checkout/.venv")
+    if changed:
+        (other / "constraints.txt").write_text("# none\n", encoding="utf-8")
+    code, reported, calls = machine(*words, program=other / "surgebreak")
+    assert (code, calls) == (1, [])
+    assert f"{other}/.venv is the installation of another checkout, {machine.root}" in reported
+    assert f'Remove the link (rm "{other}/.venv")' in reported
+    (other / ".venv").unlink()
+    assert machine("doctor", program=other / "surgebreak")[0] == 0
+    assert (other / ".venv" / "bin" / "surgebreak").exists()
+    assert machine("doctor")[::2] == (0, ["surgebreak doctor"])
+
+
+def test_the_installation_of_another_checkout_is_refused_by_name(machine):
+    other = second_checkout(machine)
+    place = machine.root / ".venv"
+    code, reported, calls = machine("doctor", program=other / "surgebreak", SURGEBREAK_VENV=str(place))
+    assert (code, calls) == (1, [])
+    assert "Let SURGEBREAK_VENV name a folder of this checkout's own, or unset it" in reported
+    assert machine("doctor", SURGEBREAK_VENV=str(place))[::2] == (0, ["surgebreak doctor"])
+
+
+def test_the_packages_may_lie_behind_a_link(machine):
+    """On a larger disk, for instance; a checkout that is itself reached by a link is still the same one."""
+    machine.ready()
+    (machine.state / "large").mkdir()
+    (machine.root / ".venv").symlink_to(machine.state / "large")
+    assert machine("doctor")[0] == 0
+    assert (machine.state / "large" / "bin" / "surgebreak").exists()
+    (machine.state / "here").symlink_to(machine.root)
+    assert machine("doctor", program=machine.state / "here" / "surgebreak")[::2] == (0, ["surgebreak doctor"])
+
+
 def test_the_installation_of_somebody_else_is_used_as_it_is(machine):
     """Its kernels are compiled into a cache of each user's own."""
     machine.ready()("doctor")
