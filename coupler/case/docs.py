@@ -37,13 +37,25 @@ def explanation(name: str | None) -> str:
         return "\n".join(
             [f"'{name}' is no name of a case file; perhaps one of these is meant:", *map(_entry, found)]
         )
-    entries = [_entry(key)]
+    entries = [_entry(key), *others_of(key)]
     for section in key.sections:
         entries += ["", inspect.getdoc(section) or ""]
         entries += [
             f"  {_entry(inner)}" for inner in keys(section, f"{key.path}.") if _depth(inner, key) == 1
         ]
     return "\n".join(entries)
+
+
+def others_of(key: Key) -> Iterator[str]:
+    """The same name in the other kinds of its section: gauge.kind is "level", "pressure" and others."""
+    above = key.path.rpartition(".")[0]
+    section = find(tuple(above.split(".")))
+    if not above or section is None:
+        return
+    for other in section.sections:
+        for inner in keys(other, f"{above}."):
+            if inner.path == key.path and _entry(inner) != _entry(key):
+                yield _entry(inner)
 
 
 WORDS = {

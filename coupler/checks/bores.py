@@ -8,6 +8,8 @@ has the head for the flow over the edge, critical there (the depth on dry ground
 A slower one sinks before the edge instead, u₃ = u₂ + 2 (sqrt(g h₂) - sqrt(g h₃)); a faster one (u₂ > sqrt(g h₂)) whose
 head is enough passes without a bore back, with its own q and head. Stopped by a wall, h₃ is where u₃ = 0. Stoker, Water
 Waves, 1957, 10.6 (shocks, drops); Henderson, Open Channel Flow, 1966, 2.5 (steps).
+On dry ground there is no shock: the water thins out to a tip that runs at u + 2 sqrt(g h) (Ritter,
+Z. VDI 36, 1892, 947-954).
 No friction, no losses, as wide as the tank: an upper value for what turns aside.
 """
 
@@ -32,9 +34,10 @@ LEVEL = 0.02
 
 @dataclass(frozen=True)
 class Bore:
-    """side · depth [m], velocity [m/s] and speed of the front [m/s] where it comes in · at: name of the structure ·
-    step [m]: height of what the structure stands on over the bed · depth_there [m], velocity_there [m/s]: 0 where the
-    step is too high · against_wall [m]: depth where a wall stops it · arrival [s]: of the front at the structure"""
+    """side · depth [m], velocity [m/s] and speed of the front [m/s] where it comes in (on dry ground that of the tip,
+    which runs ahead of the depth behind it) · at: name of the structure · step [m]: height of what the structure stands
+    on over the bed · depth_there [m], velocity_there [m/s]: 0 where the step is too high · against_wall [m]: depth
+    where a wall stops it · arrival [s]: of the front at the structure"""
 
     side: str
     depth: float
@@ -53,7 +56,7 @@ class Bore:
 
 
 def bores(case: Case) -> Iterator[Bore]:
-    """Of every bore and steady stream onto dry ground, where it meets the structure; none over terrain, where the bed
+    """Of every bore, on water or dry ground, where it meets the structure; none over terrain, where the bed
     changes it on its way."""
     if case.water is None or case.tank is None or not case.tank.is_box or case.structure is None:
         return
@@ -69,7 +72,7 @@ def bores(case: Case) -> Iterator[Bore]:
         bed = mean_bed(case.tank, spec.side, spec.level)
         depth, velocity = spec.level - bed, bore_velocity(case, spec)
         ahead = 0.0 if spec.ahead is None else spec.ahead - bed
-        front = velocity * depth / (depth - ahead)
+        front = velocity * depth / (depth - ahead) if ahead > 0.0 else velocity + 2.0 * math.sqrt(g * depth)
         start = (case.tank.lower if inward > 0 else case.tank.upper)[axis]
         face = (low if inward > 0 else high)[axis]
         step = max(float(low[2]) - bed, 0.0)

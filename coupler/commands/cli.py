@@ -301,8 +301,16 @@ def explain(
         print(explanation_of_run(Path(key)))
         return
     from coupler.case.docs import explanation
+    from coupler.program.errors import UnknownName
 
-    print(explanation(key))
+    try:
+        print(explanation(key))
+    except UnknownName:
+        if key not in typer.main.get_command(app).commands:
+            raise
+        raise UnknownName(
+            f"{key}: a command, no name of a case file; `surgebreak {key} --help` explains it"
+        ) from None
 
 
 @app.command()

@@ -67,7 +67,7 @@ class Pace:
         to_go = max(self.end - time, 0.0)
         newer, older = self._pace(time - 0.5 * window, time), self._pace(time - window, time - 0.5 * window)
         pace = newer
-        if newer and older:
+        if newer and older and window > 0.0:
             ahead = 0.25 * window + 0.5 * min(to_go, 0.5 * window)
             pace += TREND * (newer - older) / (0.5 * window) * ahead
             pace = min(max(pace, newer / MOST_TREND), newer * MOST_TREND)

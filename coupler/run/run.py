@@ -175,7 +175,7 @@ def _steps(
         raise _end(reporter)(str(left) + way_on) from None
     finally:
         recorder.close()
-        _tell_verdict(case, recorder, figures, directory, reporter)
+        _tell_verdict(case, recorder, figures, directory, reporter, coupling.coupled)
 
 
 def _note_top(case: Case, recorder: Recorder, coupling, figures: dict, reporter) -> None:
@@ -190,14 +190,18 @@ def _note_top(case: Case, recorder: Recorder, coupling, figures: dict, reporter)
         reporter.message(f"note: {reached(found)}")
 
 
-def _tell_verdict(case: Case, recorder: Recorder, figures: dict, directory, reporter) -> None:
+def _tell_verdict(
+    case: Case, recorder: Recorder, figures: dict, directory, reporter, is_coupled: bool
+) -> None:
     """Into run.json and the log, however the run ends, with what makes its loads wrong."""
+    from coupler.verdict.words import sentences, unreached
+
     reported = recorder.verdict()
     doubts = [*thin_remarks(case), *([in_all(figures["tank_top"])] if "tank_top" in figures else [])]
+    if reported is not None and is_coupled and figures["steps"]:
+        doubts += filter(None, [unreached(reported, figures["time"])])
     directory.record(doubts=doubts)
     if reported is not None:
-        from coupler.verdict.words import sentences
-
         directory.record(verdict=reported)
         for line in sentences(reported):
             reporter.message(line)

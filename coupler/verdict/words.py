@@ -26,6 +26,17 @@ def sentences(reported: dict) -> Iterator[str]:
     yield from _hits(reported["hits"])
 
 
+def unreached(reported: dict, time: float) -> str | None:
+    """A sentence where no water touched the structure until time [s], so that its verdict is one of its weight and
+    contacts alone; None otherwise. For runs whose water can meet the structure."""
+    if reported["largest"]["force"]:
+        return None
+    return (
+        f"no water touched the structure until the run ended at t = {moment_of(time)}: this verdict says nothing about "
+        "the water; raise time.end, or look in the pictures where the water goes"
+    )
+
+
 def name_of(reported: dict, name: str) -> str:
     """A wall, floor or storey in words."""
     return in_words(name, len(reported["bodies"]) < 2)
@@ -86,7 +97,7 @@ def at(peak: dict, unit: str) -> str:
 def _displaced(reported: dict) -> Iterator[str]:
     found = reported["displaced"]
     if not found["blocks"]:
-        yield f"no block left its place; the farthest moved by {length(reported['farthest']['way'])}"
+        yield f"no block left its place; the largest displacement is {length(reported['farthest']['way'])}"
         return
     farthest = found["list"][0]
     whose = "its" if found["blocks"] == 1 else "their"

@@ -57,6 +57,44 @@ def test_the_template_of_a_harbour_says_what_its_bore_is_at_the_house(tmp_path):
     assert found.arrival < case.time.end
 
 
+ON_DRY_GROUND = """
+[case]
+title = "a bore on dry ground"
+[time]
+end = "1 s"
+[tank]
+lower = [0, 0, 0]
+upper = [10, 4, 5]
+cell = 0.5
+[[water.inflow]]
+kind = "bore"
+side = "x-"
+level = 3
+[structure]
+[[structure.block]]
+name = "block"
+centre = [6.5, 2, 0.5]
+size = [1, 1, 1]
+[contact]
+stiffness = "1 MN/m"
+"""
+
+
+def test_the_tip_on_dry_ground_runs_ahead_of_the_water_behind_it(tmp_path):
+    """Ritter: u + 2 sqrt(g h) = 3 sqrt(g h) = 16.3 m/s. In a run of such a bore a wall at x = 6 m broke at
+    0.72 s, when water at the velocity of the side, 5.4 m/s, had come to 3.9 m."""
+    (tmp_path / "case.toml").write_text(ON_DRY_GROUND, encoding="utf-8")
+    (found,) = bores(load(tmp_path).case)
+    assert found.velocity == pytest.approx(math.sqrt(G * 3.0), rel=1e-3)
+    assert found.front == pytest.approx(3.0 * math.sqrt(G * 3.0), rel=1e-3)
+    assert found.arrival == pytest.approx(6.0 / found.front)
+    shallow = ON_DRY_GROUND.replace("level = 3", "level = 3\nahead = 0.5")
+    shallow += "[[water.fill]]\nlower = [0, 0, 0]\nupper = [10, 4, 0.5]\n"
+    (tmp_path / "case.toml").write_text(shallow, encoding="utf-8")
+    (wet,) = bores(load(tmp_path).case)
+    assert wet.front == pytest.approx(wet.velocity * 3.0 / 2.5)
+
+
 def test_the_report_sets_theory_beside_what_was_measured(tmp_path):
     bore = Bore("x-", 7.5, 4.8, 10.3, "house", 5.5, 3.31, 5.7, 7.18, 2.0).as_table()
     judged = {"largest": {"depth": {"value": 3.9, "time": 2.4}}}

@@ -103,6 +103,22 @@ def test_explain_offers_the_nearest_name():
     )
 
 
+def test_explain_lists_every_kind_of_a_name():
+    reported = surgebreak("explain", "water.inflow.kind").stdout.splitlines()
+    assert [line.split("(")[1].split(";")[0] for line in reported] == [
+        "steady", "record", "bore", "solitary", "n-wave",
+    ]  # fmt: skip
+    assert len(surgebreak("explain", "tank.cell").stdout.splitlines()) == 1
+
+
+def test_explain_of_a_command_names_its_help():
+    done = surgebreak("explain", "render")
+    assert done.returncode == 2
+    assert done.stderr == (
+        "surgebreak: render: a command, no name of a case file; `surgebreak render --help` explains it\n"
+    )
+
+
 def test_init_writes_a_case_that_passes_and_never_overwrites(tmp_path):
     place = tmp_path / "new" / "case"
     assert surgebreak("init", place).returncode == 0

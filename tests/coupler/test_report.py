@@ -92,7 +92,7 @@ def test_the_page_of_a_run_is_whole_and_alone(run):
     assert "diverged (exit code 3): the water volume is off by &lt;5 %" in reported
     assert "Water &amp; a &lt;wall&gt;" in reported
     assert "&lt;b&gt;" in reported
-    for title in ("What was run", "Ledger", "Cracks", "Limits", "Processor time, and what was left out"):
+    for title in ("What was run", "Ledger", "Cracks", "Limits", "Processor time, and what was not computed"):
         assert f"<h2>{title}</h2>" in reported
     assert "NOT KEPT" in reported
     assert "time.end=2 s" in reported
@@ -120,6 +120,14 @@ def test_what_could_not_be_drawn_is_said(run, monkeypatch):
 
 
 def test_a_directory_of_something_else_is_refused(tmp_path):
+    (tmp_path / "case.toml").touch()
+    with pytest.raises(NoRun, match=r"a case; `surgebreak run .*` makes a run of it"):
+        report(tmp_path)
+    (tmp_path / "case.toml").unlink()
+    (tmp_path / "run.json").touch()
+    with pytest.raises(NoRun, match="a file of a run or a study; name its directory"):
+        report(tmp_path / "run.json")
+    (tmp_path / "run.json").unlink()
     with pytest.raises(NoRun, match="neither a run"):
         report(tmp_path)
 

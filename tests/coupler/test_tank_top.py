@@ -70,7 +70,19 @@ def test_a_run_tells_when_and_where_water_reached_the_top_and_that_loads_are_dou
 def test_water_that_stays_below_is_not_told(tmp_path):
     low = CASE.replace("velocity = [4, 0, 0]", "").replace("0.5 s", "0.1 s")
     run = run_of(tmp_path, low)
-    assert "tank_top" not in read_summary(run)["figures"]
+    summary = read_summary(run)
+    assert "tank_top" not in summary["figures"]
+
+
+def test_a_verdict_without_water_at_the_structure_is_doubtful(tmp_path):
+    """STANDS means nothing for a run that ended before the water came."""
+    run = run_of(tmp_path, CASE.replace("0.5 s", "20 ms"))
+    summary = read_summary(run)
+    assert summary["figures"]["verdict"]["largest"]["force"] is None
+    said = "no water touched the structure until the run ended at t = 0.02 s"
+    assert summary["figures"]["doubts"][-1].startswith(said)
+    assert f"but: {said}" in (run / "log.txt").read_text()
+    assert said in _doubts(summary)
 
 
 def column(wet):

@@ -15,7 +15,7 @@ from coupler.verdict.damage import Rules
 from coupler.verdict.divisions import Divisions, in_words, member, storey
 from coupler.verdict.judge import verdict
 from coupler.verdict.watch import Watch
-from coupler.verdict.words import sentences
+from coupler.verdict.words import sentences, unreached
 from tests.coupler.resumed import DRY, begin
 from yade_scripts.blocks.block import Block
 
@@ -115,6 +115,7 @@ def test_nothing_happened(scene):
     )
     assert reported["largest"]["force"] is None
     assert "no joint of 2 broke" in list(sentences(reported))
+    assert "until the run ended at t = 0.1 s" in unreached(reported, 0.1)
 
 
 def test_the_largest_load_stays_with_its_time_and_the_moment_is_about_the_foot(scene):

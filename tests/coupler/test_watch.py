@@ -140,6 +140,16 @@ def test_other_programs_that_come_make_the_time_to_go_longer():
     assert pace.left() == pytest.approx(2.0 * 200.0)
 
 
+def test_the_time_to_go_is_known_at_the_moment_the_water_arrives():
+    """Asked before the next step has ended, nothing has been seen of the new pace yet: the last step stands for it."""
+    pace = Pace(1.0)
+    pace.calm = True
+    for k in range(1, 6):
+        pace.add(0.1 * k, float(k), float(k))
+    pace.calm = False
+    assert pace.left() == pytest.approx(5.0)
+
+
 def test_what_was_calm_is_forgotten_when_the_water_arrives():
     """1 s a tenth before, 3 s after: half a second later 1.4 of 2 s are to go, at 3 s a tenth; before, GROWTH stands
     for that."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import tempfile
 from pathlib import Path
+from shlex import quote
 
 from coupler.case.paths import BadPath, read_text
 from coupler.commands import pictures
@@ -27,12 +28,21 @@ def report(place: Path, with_pictures: bool = True) -> Path:
     elif (place / "run.json").is_file():
         page = run_report(place, with_pictures)
     else:
-        raise NoRun(f"{place}: neither a run (run.json) nor a study (study.json)")
+        raise NoRun(f"{place}: {_what_it_is(place)}")
     path = place / NAME
     part = place / f".{NAME}.part"
     part.write_text(page, encoding="utf-8")
     part.replace(path)
     return path
+
+
+def _what_it_is(place: Path) -> str:
+    """Of what is neither a run nor a study: what is to be named instead."""
+    if place.name in ("run.json", "study.json", NAME) and place.is_file():
+        return f"a file of a run or a study; name its directory, {place.parent}"
+    if place.suffix == ".toml" or (place / "case.toml").is_file():
+        return f"a case; `surgebreak run {quote(str(place))}` makes a run of it, whose directory a report is made of"
+    return "neither a run (run.json) nor a study (study.json)"
 
 
 def run_report(run: Path, with_pictures: bool) -> str:

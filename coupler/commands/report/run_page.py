@@ -28,10 +28,10 @@ from coupler.program.quantities import percent, quantity
 CAPTIONS = {
     "gauges": "Gauges",
     "energy": "Energy: change since the first step",
-    "structure": "Structure: joints, momentum of the blocks, impulse of the water on them, fastest point",
-    "water": "Water: volume, what the numerics moved, momentum",
-    "momentum": "Momentum: what each line has added since the start",
-    "angular_momentum": "Angular momentum: what each line has added since the start",
+    "structure": "Structure: joints, momentum of the blocks, impulse of the water on them, largest speed of a block",
+    "water": "Water: volume, numerical corrections of it, momentum",
+    "momentum": "Momentum: contribution of each term since the start",
+    "angular_momentum": "Angular momentum: contribution of each term since the start",
     "coupling": "Steps: length, passes, iterations, defect",
 }
 """Of the figures of the histories, in the order in which they are shown; other tables come behind the gauges."""
@@ -40,15 +40,15 @@ FLOOD = "flood_map"
 OF_SCHEME = ("momentum", "angular_momentum", "coupling")
 """Histories that tell of the scheme rather than of the scene: towards the end of the page."""
 FIGURES = {
-    "time": ("time that was reached", "s"),
+    "time": ("simulated time", "s"),
     "steps": ("steps", "1"),
     "substeps": ("substeps of the blocks", "1"),
     "largest_water_force": ("largest force of the water on all bodies", "N"),
     "joints": ("joints at the start", "1"),
     "joints_broken": ("joints broken", "1"),
-    "largest_opening_rate": ("largest opening in a substep, of the opening at failure", "%"),
-    "numerical_dissipation": ("energy that the numerics took, of the input", "%"),
-    "numerical_impulse": ("impulse of the lines of the scheme, of all impulses", "%"),
+    "largest_opening_rate": ("largest opening in a substep, share of the opening at failure", "%"),
+    "numerical_dissipation": ("numerical dissipation, share of the energy put in", "%"),
+    "numerical_impulse": ("impulse of numerical corrections, share of all impulses", "%"),
 }
 """Figures of run.json that the page tells."""
 NEEDS = {
@@ -82,9 +82,9 @@ def run_page(run: Path, summary: dict, pictures: Path, remarks: list[str]) -> st
             section("Ledger", tables.energy(run), tables.volume(run), tables.momentum(run, "momentum")),
             section("Cracks", tables.cracks(run)),
             section("Limits", tables.limits(summary)),
-            section("Processor time, and what was left out", _time(summary), _left_out(summary)),
+            section("Processor time, and what was not computed", _time(summary), _left_out(summary)),
             section("Histories of the scheme", *_histories(run, pictures, of_scheme=True)),
-            section("The case as it was written", _case(run)),
+            section("The case file", _case(run)),
         ],
     )
 
@@ -259,18 +259,18 @@ def _left_out(summary: dict) -> str:
         for row in skipped(summary)
         if row.done + row.skipped > 0.0
     ]  # fmt: skip
-    head = ["skipped in the steps", "done", "skipped", "would have cost", "paid", "for"]
+    head = ["skipped in the steps", "done", "skipped", "would have cost", "processor time spent", "by"]
     shown = [f"{part} ({', '.join(names)})" for part, names in not_loaded(summary).items()]
     return "\n".join(
         [
             table(head, rows, (0, 5)),
             note(
-                "Numbers a step, means over the steps. The cost is an estimate: what one took in this run, times those "
-                "that were skipped; a dash where the run holds no measure of one."
+                "Mean numbers per step. The cost is an estimate: what one took in this run, times those that were "
+                "skipped; a dash where the run measured none."
                 if rows
-                else "This run has counted nothing of what it skipped."
+                else "This run did not count what it skipped."
             ),
-            paragraph(f"Not loaded at all: {', '.join(shown)}." if shown else ""),
+            paragraph(f"Parts of the program that were not loaded: {', '.join(shown)}." if shown else ""),
         ]
     )
 

@@ -10,7 +10,7 @@ from coupler.program.quantities import length, moment_of, percent, quantity
 from coupler.verdict.words import name_of, point, sentences
 
 FIGURES = {
-    "damage": "Share of the joined area that is broken, by wall and floor, in the order of their first break",
+    "damage": "Share of the joined area that is broken, by wall and floor, in order of their first break",
     "cracks": "Cracks by the time at which they opened, in elevation and plan",
     "wall_pressure": "Envelope: the largest net pressure of the water that each block bore in its place",
 }
@@ -57,7 +57,11 @@ def _bores(found: list[dict], judged: dict) -> list[str]:
         ]
         for bore in found
     ]
-    head = ["bore: depth, velocity", f"by theory at {found[0]['at'] if found else ''}", "stopped by a wall"]
+    head = [
+        "bore where it comes in: depth, velocity",
+        f"by theory at {found[0]['at'] if found else ''}",
+        "depth against a wall across the tank",
+    ]
     return [table([*head, "measured: largest depth beside it"], rows, (0, 1))] if rows else []
 
 
@@ -70,7 +74,15 @@ def _groups(what: str, groups: list[dict], judged: dict, loads: bool = False) ->
     if not groups:
         return []
     ranked = sorted(groups, key=lambda g: g["first_break"]["time"] if g["first_break"] else float("inf"))
-    head = [what, "state", "first break", "joints broken", "of the joined area", "blocks moved", "farthest"]
+    head = [
+        what,
+        "state",
+        "first break",
+        "joints broken",
+        "share of the joined area",
+        "blocks out of place",
+        "largest displacement",
+    ]
     head += ["largest force", "at", "largest depth"] if loads else []
     rows = [_group(group, judged, loads) for group in ranked[:MOST]]
     left = len(ranked) - len(rows)

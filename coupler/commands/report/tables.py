@@ -31,7 +31,7 @@ def energy(run: Path) -> str:
     if found is None:
         return ""
     error = _share(float(found["energy_error"][-1]))
-    note_text = f"What the lines miss at the end, over the energy that the scene has put in: {error}."
+    note_text = f"Energy missing in the balance at the end, share of the energy put in: {error}."
     return _book("energy", found, "J") + note(note_text)
 
 
@@ -157,8 +157,12 @@ LITTLE = 1e-4
 """Share of a limit below which its digits say nothing."""
 LIMITS = (
     ("volume_error", "largest_volume_error", "volume of water missing in the balance"),
-    ("energy_error", "largest_energy_error", "energy missing in the balance, of the input"),
-    ("momentum_error", "largest_momentum_error", "impulse missing in the balance, of those of a step"),
+    ("energy_error", "largest_energy_error", "energy missing in the balance, share of the energy put in"),
+    (
+        "momentum_error",
+        "largest_momentum_error",
+        "impulse missing in the balance, share of the impulses of a step",
+    ),
     ("defect", "largest_defect", "coupling residual of a step"),
 )
 """Name in [limits], figure of run.json, what it is."""
@@ -189,9 +193,9 @@ def limits(summary: dict) -> str:
                 "limits.cpu_seconds",
             ]
         )
-    return table(["quantity", "largest", "limit", "of the limit", "key"], rows, (0, 4)) + note(
-        "The run stops where one is passed; the defect does so as a mean over 20 steps, so that a single step may "
-        "be above it."
+    return table(["quantity", "largest", "limit", "share of the limit", "key"], rows, (0, 4)) + note(
+        "The run stops where a limit is passed; that of the coupling residual applies to the mean over 20 steps, so "
+        "that a single step may exceed it."
         if rows
         else ""
     )
