@@ -37,6 +37,10 @@ FULL = 1e-4
 """Share of the box around a mesh that may be missing in one that fills it."""
 THIN = 5.0
 """Least angle [degrees] between two faces of a cell without a remark."""
+UPRIGHT = 1e-9
+"""Twice the area seen from above, over the square of the finest cell, up to which a face stands upright."""
+ON_EDGE = 1e-9
+"""Share of a face by which a place may lie beyond its edge and still be on it: round-off."""
 UNLIKE = 8.0
 """Largest over smallest cell without a remark."""
 IN_PLANE = 1e-3
@@ -134,6 +138,33 @@ def bed_along(tank: Tank, side: str) -> Array:
     bed = fitted.bed[at] if axis == 0 else fitted.bed[:, at]
     found = np.column_stack([(fitted.column_x, fitted.column_y)[along], bed])
     return found[np.isfinite(bed)]
+
+
+def bed_under(mesh, places) -> Array:
+    """Heights z (n,) [m] at which vertical lines through places (n, 2) [m] enter a mesh (`Background`) from below; NaN
+    where they miss it."""
+    places = np.asarray(places, float)
+    down = mesh.boundary_normal[:, 2] < 0.0
+    corners = mesh.nodes[mesh.boundary_faces[down]]
+    (a, z), (b, c) = (corners[:, 0, :2], corners[:, :, 2]), np.moveaxis(corners[:, 1:, :2], 1, 0)
+    turn = _cross(b - a, c - a)
+    standing = np.abs(turn) <= UPRIGHT * mesh.finest**2
+    turn, a, b, c, z = (part[~standing] for part in (turn, a, b, c, z))
+    found = np.full(len(places), np.nan)
+    for i, place in enumerate(places):
+        share = np.column_stack(
+            [_cross(b - place, c - place), _cross(c - place, a - place), _cross(a - place, b - place)]
+        )
+        share /= turn[:, None]
+        over = (share >= -ON_EDGE).all(axis=1)
+        if over.any():
+            found[i] = np.einsum("fk,fk->f", share[over], z[over]).min()
+    return found
+
+
+def _cross(p, q):
+    """z of the cross products of vectors (n, 2)."""
+    return p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]
 
 
 def floor_along(tank: Tank, side: str) -> float:

@@ -9,14 +9,19 @@ import numpy as np
 from array_types import Array
 from coupler.case.case import Case
 from coupler.case.inflow_records import levels_of, record_of
-from coupler.geometry.tank_mesh import bed_along, floor_along, mean_bed, mesh_of, on_side
+from coupler.geometry.tank_mesh import bed_along, bed_under, floor_along, mean_bed, mesh_of, on_side
 from coupler.geometry.terrain.land import friction_of
+from coupler.program.errors import SurgebreakError
 from coupler.program.threads import threads
 
 HEARD = 16
 """Places along a side at which the water is read that it lets go."""
 SLACK = 1e-3
 """Share of a cell within which a box of water reaches a side of the tank."""
+
+
+class NothingToHear(SurgebreakError):
+    """Beside a side that absorbs the tank has no room for water."""
 
 
 def water_of(case: Case, structure, solids, mesh=None):
@@ -200,7 +205,9 @@ def sea_level(sea):
 
 
 def _absorbing(case: Case, spec, flow, mesh):
-    """The flow of a side that lets go what runs against it: the water is read a cell inside, at columns of the mesh."""
+    """The flow of a side that lets go what runs against it: the water is read a cell inside, at columns of the mesh.
+
+    Raises NothingToHear."""
     from fluid.sides.absorbing import Absorber
 
     axis = "xyz".index(spec.side[0])
@@ -212,7 +219,14 @@ def _absorbing(case: Case, spec, flow, mesh):
     inside = -_outward(spec.side)[axis] * mesh.spacing
     places[:, axis] = mesh.bounds[int(spec.side[1] == "+"), axis] + inside
     places[:, 1 - axis] = along[:, 0]
-    return Absorber(flow, -_outward(spec.side), places, along[:, 1], case.case.gravity).as_flow()
+    bed = bed_under(mesh, places)  # there, not at the side: a bed that rises inwards is higher
+    there = np.isfinite(bed)
+    if not there.any():
+        raise NothingToHear(
+            f"side {spec.side} absorbs, but {mesh.spacing:.3g} m inside of it, where the water is read, the tank has "
+            f"no room for water: the ground reaches its upper side; let another side absorb, or move this one"
+        )
+    return Absorber(flow, -_outward(spec.side), places[there], bed[there], case.case.gravity).as_flow()
 
 
 def instants_of(case: Case, spec) -> np.ndarray:

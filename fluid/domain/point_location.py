@@ -26,7 +26,7 @@ RINGS = 4
 
 
 class Outside(ValueError):
-    """A gauge lies outside the tank."""
+    """A place at which the water is asked lies outside the mesh of the tank."""
 
 
 @dataclass(frozen=True)
@@ -50,8 +50,13 @@ class Places:
         outside = parent < 0
         if outside.all() if beyond else outside.any():
             low, high = water.mesh.bounds
-            place = points[np.flatnonzero(outside)[0]]
-            raise Outside(f"gauge at {place} lies outside the tank {low} to {high}; move it inside")
+            place, low, high = (
+                "({:.6g}, {:.6g}, {:.6g})".format(*x) for x in (points[np.flatnonzero(outside)[0]], low, high)
+            )
+            raise Outside(
+                f"the place {place} m, at which the water is asked, lies outside the mesh of the tank, which reaches "
+                f"from {low} to {high} m: beyond a side or under the bed; move it into the water"
+            )
         t = water.topology
         deep = outside | (_depth(water.domain.memory, parent, points) > SKIN * water.mesh.local_size[parent])
         first, count = t.rows_of_background

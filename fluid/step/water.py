@@ -237,7 +237,10 @@ class Water:
             from fluid.readings.gauges import levels, velocity
 
             depths = levels(self, absorber.places)
-            absorber.hear(depths, velocity(self, absorber.points(depths)), self.time)
+            wet, velocities = depths > 0.0, np.zeros((len(depths), 3))
+            if wet.any():
+                velocities[wet] = velocity(self, absorber.points(depths)[wet])
+            absorber.hear(depths, velocities, self.time)
 
     def correct(self, problem: PressureProblem, x, parting=None) -> None:
         """Take over the pressure x (n,) [Pa] of the problem and end the step; parting (n,) [m³/s]: rate at which the

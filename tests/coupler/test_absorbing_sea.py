@@ -1,11 +1,17 @@
 """A solitary wave runs out of an absorbing sea: what comes back is measured at a gauge on its way."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from coupler.checks.read_case import load
+from coupler.geometry.tank_mesh import bed_along, bed_under, mesh_of
 from coupler.run.clock import Clock
 from coupler.scene.build import build
+from coupler.scene.build_water import NothingToHear, _absorbing
+from fluid.mesh.background import box_mesh
+from fluid.mesh.fitted_mesh import fitted_mesh
 from fluid.readings.gauges import levels
 
 CASE = """
@@ -49,3 +55,79 @@ def test_at_most_a_twentieth_of_a_solitary_wave_comes_back(tmp_path):
     crest = level[time < 11.0].max()
     assert crest > 0.09
     assert np.abs(level[time > 12.5]).max() < 0.05 * crest
+
+
+BEACH = """
+[case]
+title = "a beach beside a sea that absorbs"
+[time]
+end = "1 s"
+[tank]
+lower = [0, 0, -4]
+upper = [10, 3, 3]
+cell = "1 m"
+open = ["z+"]
+[terrain]
+path = "beach.asc"
+origin = [0, 0]
+[water]
+[[water.fill]]
+lower = [0, 0, -4]
+upper = [10, 3, LEVEL]
+[[water.sea]]
+side = "x-"
+level = LEVEL
+absorbs = true
+"""
+
+
+def beach(folder, slope: float, level: float):
+    """A tank over ground that rises inwards from z = -2 m at the side x- on."""
+    x, y = np.arange(-1.0, 12.0), np.arange(-1.0, 5.0)
+    rows = np.tile(np.clip(-2.0 + slope * x, -2.5, 2.8), (len(y), 1))
+    head = f"ncols {len(x)}\nnrows {len(y)}\nxllcenter {x[0]}\nyllcenter {y[0]}\ncellsize 1\n"
+    (folder / "beach.asc").write_text(head + "\n".join(" ".join(f"{z:g}" for z in row) for row in rows))
+    (folder / "case.toml").write_text(BEACH.replace("LEVEL", f"{level:g}"))
+    return load(folder).case
+
+
+def test_lines_enter_a_fitted_mesh_at_its_bed():
+    def slope(x, y):
+        return -1.0 + 0.3 * x - 0.1 * y
+
+    mesh = fitted_mesh((0, 0, -2), (6, 4, 3), 0.5, slope).mesh
+    places = np.array([[0.5, 0.5], [0.77, 3.1], [0.0, 4.0], [5.9, 0.01], [6.5, 1.0], [3.0, -0.1]])
+    np.testing.assert_allclose(bed_under(mesh, places)[:4], slope(*places[:4].T), atol=1e-12)
+    assert np.isnan(bed_under(mesh, places)[4:]).all()
+    assert (bed_under(box_mesh((0, 0, -3), (2, 2, 1), 0.5), [[0.5, 0.5], [1.3, 0.2]]) == -3.0).all()
+
+
+def test_absorbing_side_stands_on_the_bed_where_it_reads_the_water(tmp_path):
+    """The bed a cell inside is 0.3 m higher than at the side: with the lower one a dry place was asked for its velocity
+    in the ground, and water at rest seemed to be 0.3 m too low."""
+    case = beach(tmp_path, 0.3, 0.0)
+    scene = build(case, Clock())
+    absorber = scene.coupling.water.sides.absorbers()[0]
+    bed = -2.0 + 0.3 * absorber.places[:, 0]
+    np.testing.assert_allclose(absorber.bed, bed, atol=1e-6)
+    assert np.all(absorber.bed > bed_along(case.tank, "x-")[1:-1, 1] + 0.25)
+    scene.coupling.water.predict(0.01)
+    assert absorber.height == pytest.approx(0.0, abs=1e-3)
+    assert absorber.speed == pytest.approx(0.0, abs=1e-3)
+
+
+def test_absorbing_side_goes_on_when_the_water_has_left_it(tmp_path):
+    """A ground of which only the strip at the side is below the sea: where the water is read it is dry."""
+    scene = build(beach(tmp_path, 0.9, -1.5), Clock())
+    absorber = scene.coupling.water.sides.absorbers()[0]
+    assert (levels(scene.coupling.water, absorber.places) == 0.0).all()
+    for _ in range(3):
+        scene.coupling.step(0.02)
+    assert np.isfinite(scene.coupling.water.velocity).all()
+
+
+def test_absorbing_side_before_ground_up_to_the_lid_is_refused(tmp_path):
+    case = beach(tmp_path, 0.3, 0.0)
+    beyond = replace(mesh_of(case.tank), spacing=20.0)
+    with pytest.raises(NothingToHear, match=r"side x- absorbs, but 20 m inside.*reaches its upper side"):
+        _absorbing(case, case.water.sea[0], None, beyond)

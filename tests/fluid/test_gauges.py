@@ -74,7 +74,7 @@ def test_volume_of_all_and_of_a_half(pool):
 
 
 def test_gauge_outside_the_tank_is_refused(pool):
-    with pytest.raises(Outside, match="lies outside the tank"):
+    with pytest.raises(Outside, match=r"\(2, 0.5, 0.5\) m.* outside the mesh of the tank.*under the bed"):
         gauges.pressure(pool, [[2.0, 0.5, 0.5]])
 
 
