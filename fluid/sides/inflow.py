@@ -8,11 +8,22 @@ n outward, joins the mass balance of the pressure, the conservative volume and t
 side, the integral is over what it leaves open: the faces that its cell's tetrahedra (`fans.py`) have there.
 Sea: φ = z - level on its nodes and there
 
-    p = ρ g (level - z) - ½ ρ min(u·n, 0)²                                                     (2)
+    p = ρ g (level - z) - min(½ ρ min(u·n, 0)², ρ g depth)                                      (2)
 
 (what comes in was at rest: Bernoulli; it comes in straight.  With the static pressure alone, water that goes to and fro
-through the side gains energy at every turn).  Equation (1) holds with the water's own velocity, both signs.  For water
-far from waves: what reaches a sea partly comes back, as from any side.
+through the side gains energy at every turn).  What came in at rest cannot be faster than its own head makes it, so the
+last term is at most ρ g times the depth of the sea: it is taken at the velocity before the step, and where a long first
+step has made a thin sheet faster than that, the whole would throw the sheet out again, and so to and fro.  Equation (1)
+holds with the water's own velocity, both signs.  For water far from waves: what reaches a sea partly comes back, as
+from any side.
+
+The water that the pressure of a sea sets in motion comes in half a step later, and by then the pressure may be another
+one.  What it has done by the end of a step beyond p V is therefore booked ahead, and taken back at the same pressure,
+
+    E += Σ_i p_i (V_i + δ q_i' - δ_0 q_i),                                                               (3)
+
+V_i the volume that comes in during the step, q and q' of equation (1) at its beginning and its end, δ_0 and δ the times
+by which the surface lags behind the velocity then.  In a steady stream that is p V.
 """
 
 from __future__ import annotations
@@ -138,7 +149,9 @@ class Side:
     def pressure(self, density: float, gravity: float, u, time: float):
         """Equation (2) at the nodes (n,) [Pa], u (N, 3) [m/s]; the weight goes on above the level: exact at rest."""
         coming = np.minimum(np.einsum("nk,nk->n", u[self.nodes], self.normal), 0.0)
-        return density * (gravity * (self.level(time) - self.place[:, 2]) - 0.5 * coming**2)
+        above = self.level(time) - self.place[:, 2]
+        most = gravity * float(above.max(initial=0.0))
+        return density * (gravity * above - np.minimum(0.5 * coming**2, most))
 
     def rate(self, phi, u):
         """q (N,) [m³/s] of equation (1): what enters at each node; phi (N,), u (N, 3) [m/s]."""
@@ -220,7 +233,7 @@ class Sides:
     """All inflows and seas of a tank: what the step asks of them.
 
     entered, left [m³]: water that came in and went out through them so far · energy [J] that they brought: kinetic,
-    potential, and the work of the pressure."""
+    potential, and the work of the pressure, equation (3)."""
 
     def __init__(self, sides):
         self.every = tuple(sides)
@@ -274,11 +287,22 @@ class Sides:
                 found[side.nodes] = held[side.nodes] - carried[side.nodes]
         return found
 
-    def book(self, volume, head) -> None:
-        """Add what came in at the nodes in a step: volume (N,) [m³], head (N,) [J/m³] its energy and pressure."""
+    def sea_rate(self, phi, u):
+        """q (N,) [m³/s] of equation (1) at the nodes of the seas; phi (N,), u (N, 3) [m/s]."""
+        q = np.zeros(len(phi))
+        for side in self.now:
+            if side.is_sea:
+                q += side.rate(phi, u)
+        return q
+
+    def book(self, volume, head, ahead) -> None:
+        """Add what came in at the nodes in a step.
+
+        volume (N,) [m³] · head (N,) [J/m³]: its energy and pressure · ahead [J]: what the pressure of seas has
+        done beyond it, equation (3)."""
         self.entered += float(volume[volume > 0.0].sum())
         self.left -= float(volume[volume < 0.0].sum())
-        self.energy += float(volume @ head)
+        self.energy += float(volume @ head) + ahead
 
     def nodes(self) -> Array:
         """Nodes (n,) of all sides."""

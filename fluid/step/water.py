@@ -246,6 +246,7 @@ class Water:
         """Take over the pressure x (n,) [Pa] of the problem and end the step; parting (n,) [m³/s]: rate at which the
         water parts where x is at its bound, None: nowhere (`bounded.py`)."""
         new: Corrected = corrected(self, problem, np.asarray(x), parting)
+        late = self._late()
         self.level_set, self.nodal_water = problem.predicted.level_set, new.nodal_water
         self.displaced = problem.predicted.displaced
         self.velocity, self.acceleration = new.velocity, new.acceleration
@@ -260,8 +261,6 @@ class Water:
             self.air = kept.cushions.after(problem.of_air(x), kept.theta, problem.dt)
             self._let_air_out(problem.dt)
         self.conserved_volume = problem.predicted.conserved_volume
-        if self.sides is not None:
-            self.sides.book(problem.predicted.through, self.head())
         if self.slits is not None:
             p = self.parameters
             pressure, dofs = problem.of_water(x + problem.known), problem.of_water(problem.dofs)
@@ -269,6 +268,9 @@ class Water:
         self.report = new.report
         share = 1.0 - self.calm(problem.dt) if self.pushed_by.any() else 1.0
         self._surface_lag = 0.5 * problem.dt * share
+        if self.sides is not None:
+            ahead = float((self._late() - late) @ self.pressure)
+            self.sides.book(problem.predicted.through, self.head(), ahead)
         self.time += problem.dt
         self.steps += 1
         self._domain_is_new, self.renumbered, self.left_behind = False, None, None
@@ -520,16 +522,15 @@ class Water:
         found += p.density * float(farther @ (self.nodes_below_floor - surface))
         return found + p.density * (self.volume() - self.conserved_volume) * surface
 
-    def energy_through_sides(self) -> float:
-        """Energy [J] that came in through inflows and seas, less what left, at the time of the velocity.
-
-        The water that the pressure of a sea sets in motion moves in the next step; what that pressure has done for it
-        by now is missing in what the sea brought, as the fall of the surface is in `potential_energy`. An inflow brings
-        its own in every step."""
+    def _late(self) -> Array | float:
+        """Volume (N,) [m³] that has set out through seas and is not booked, as the surface lags behind the velocity."""
         if self.sides is None:
             return 0.0
-        seas = [side.rate(self.level_set, self.velocity) for side in self.sides.now if side.is_sea]
-        return self.sides.energy + self._surface_lag * sum(float(rate @ self.pressure) for rate in seas)
+        return self._surface_lag * self.sides.sea_rate(self.level_set, self.velocity)
+
+    def energy_through_sides(self) -> float:
+        """Energy [J] that came in through inflows and seas, less what left, at the time of the velocity."""
+        return 0.0 if self.sides is None else self.sides.energy
 
     def air_energy(self) -> float:
         """What the water can get back from trapped air, and what of it was lost so far [J]; 0 without any."""
