@@ -49,7 +49,10 @@ class SteadyInflow(Section):
     kind: Literal["steady"] = Field(description="what comes in: a steady stream")
     side: Wall = Field(description="the side of the tank, across its whole width")
     level: Length = Field(description="height z of its surface")
-    velocity: Velocity = Field(description="velocity into the tank, the same over the depth")
+    velocity: Velocity = Field(
+        description="velocity into the tank, the same over the depth; where only the depth of a surge is known, take "
+        'kind = "bore"'
+    )
     absorbs: Switch = ABSORBS
 
 

@@ -203,7 +203,10 @@ def _overlaps(solids: list[Placed], blocks: list[Placed], block_names: list[str]
     for (path, other), (depth, i, j) in deepest.items():
         if path == other:
             place = 0.5 * (bodies[i][2].vertices.mean(axis=0) + bodies[j][2].vertices.mean(axis=0))
-            text = f"'{names[j]}' overlaps '{names[i]}' by {depth:.4g} m near {shown(place)}; mend the file"
+            text = (
+                f"'{names[j]}' overlaps '{names[i]}' by {depth:.4g} m near {shown(place)}; mend the file (walls around "
+                "a room are cut into blocks by [[structure.drawing]])"
+            )
         else:
             text = (
                 f"'{bodies[j][1]}' overlaps '{bodies[i][1]}' by {depth:.4g} m; move one of them by that much"

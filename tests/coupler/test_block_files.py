@@ -218,6 +218,7 @@ def test_a_case_finds_its_file_beside_it_and_refuses_it_with_the_line(tmp_path, 
     points, cells = joined([brick((0, 0, 0)), brick((1.5, 0, 0))], TRIANGLES)
     for wrong, says in (
         ((points, cells), "case.toml:6: structure.file[0]: 'house-1' overlaps 'house-0' by 0.5 m near (1.75, "),
+        ((points, cells), "mend the file (walls around a room are cut into blocks by [[structure.drawing]])"),
         ((points[:8], cells[1:12]), "case.toml:8: structure.file[0].path: house.obj: open surface"),
         ((points[:8] - [0, 0, 0.1], cells[:12]), "'house' reaches 0.1 m below the ground"),
     ):  # fmt: skip

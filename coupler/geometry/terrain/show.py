@@ -78,7 +78,7 @@ def _ground_rows(ground: HeightMap) -> list[Row]:
                 f"slope, {share} %",
                 steep,
                 "",
-                f"{np.degrees(np.arctan(steep)):.1f} degrees; that much of it is no steeper",
+                f"{np.degrees(np.arctan(steep)):.1f} degrees; this share of the ground is no steeper",
             )
         )
     return rows
