@@ -346,7 +346,7 @@ class Water:
             found = Carried(carry_volume(flux, dt, total=total))
         else:
             u_hat = u + (1.0 - theta) * kick
-            found = Carried.by(flux, dt, u_hat, a, p.gravity, t.node_size, total)
+            found = Carried.by(flux, dt, u_hat, a, p.gravity, p.viscosity / p.density, t.node_size, total)
         if t.is_obtuse:
             return replace(found, swept=np.zeros(len(phi)))
         u_m = u + 0.5 * kick if p.theta < 1.0 else u
