@@ -170,12 +170,11 @@ def _heights(mesh, faces: Array) -> tuple[Array, Array, Array]:
         first = [np.searchsorted(a, corners[:, k].min() - slack) for k, a in enumerate((x, y))]
         last = [np.searchsorted(a, corners[:, k].max() + slack, side="right") for k, a in enumerate((x, y))]
         at = np.ix_(range(first[0], last[0]), range(first[1], last[1]))
-        along = np.linalg.solve(corners[1:, :2] - corners[0, :2], corners[1:, 2] - corners[0, 2])
         dx, dy = x[first[0] : last[0], None] - corners[0, 0], y[None, first[1] : last[1]] - corners[0, 1]
         inverse = np.linalg.inv((corners[1:, :2] - corners[0, :2]).T)
         s, t = inverse[0, 0] * dx + inverse[0, 1] * dy, inverse[1, 0] * dx + inverse[1, 1] * dy
         inside = (s >= -1e-6) & (t >= -1e-6) & (s + t <= 1.0 + 1e-6)
-        z = corners[0, 2] + along[0] * dx + along[1] * dy
+        z = corners[0, 2] + s * (corners[1, 2] - corners[0, 2]) + t * (corners[2, 2] - corners[0, 2])
         bed[at] = np.where(inside, np.maximum(bed[at], z), bed[at])
     beside = ~np.isfinite(bed)
     if beside.any():

@@ -34,8 +34,9 @@ NOTES = {
     "sides of the slice and 0.5 % are weight.",
     "P42": "The wave is less than half a cell high, and its run-up is one to two cells of water. The result depends "
     "on where the tongue tears off a film: 0.064 to 0.099 d on 24 and 48 cells over the depth, with variants "
-    "of damping and transport; round-off alone changes it by 0.004 d. On the fitted bed with 8 layers it was 4 % too "
-    "low until the damping at the water line acted in three rounds, and is 11 % too high since.",
+    "of damping and transport; round-off alone changes it by 0.004 d. On the fitted bed with 8 layers, "
+    "variants of the damping at the water line (one to three rounds, ended at smaller speeds) gave 0.072 to 0.100 d: a "
+    "single figure within the limit says little there, and neither does one outside.",
     "P55": "With four cells over the diameter the speed is 5 to 6 % low, because linear velocities are too coarse "
     "there (a spinning sphere is subject to 1.04 times the moment of Stokes; 1.003 times with eight cells). "
     "At Re 1.5 the digitised records contradict each other: the integral of the speed gives a gap of 4 D at "
