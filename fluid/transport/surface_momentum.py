@@ -84,10 +84,10 @@ class Carried:
             for _ in range(RINGS):
                 before, weight = weight, weight.copy()
                 over(_wider, n, *along, before, weight)
-        over(_fast, n, flux.nodes, velocity, np.sqrt(gravity * spacing), FAST, fast)
+        over(_by_speed, n, flux.nodes, velocity, np.sqrt(gravity * spacing), FAST, fast)
         if viscosity > 0.0:
             resolved = np.zeros(size)
-            over(_fast, n, flux.nodes, velocity, viscosity / spacing, RESOLVED, resolved)
+            over(_by_speed, n, flux.nodes, velocity, viscosity / spacing, RESOLVED, resolved)
             fast *= resolved
         if not weight.any() and not fast.any():
             return cls(carry_volume(flux, dt, total=total))
@@ -192,7 +192,7 @@ def _jumps(
 
 
 @ranged
-def _fast(first, last, nodes, u, celerity, ends, weight):
+def _by_speed(first, last, nodes, u, celerity, ends, weight):
     """(N,): R(|u|/celerity) between two ends at the listed nodes; celerity (N,) [m/s]: √(g h), or ν/h."""
     for s in range(first, last):
         i = nodes[s]
