@@ -40,6 +40,8 @@ def _what_it_is(place: Path) -> str:
     """Of what is neither a run nor a study: what is to be named instead."""
     if place.name in ("run.json", "study.json", NAME) and place.is_file():
         return f"a file of a run or a study; name its directory, {place.parent}"
+    if (place / "run.json").exists():
+        return "neither a run nor a study: run.json is not a file"
     if place.suffix == ".toml" or (place / "case.toml").is_file():
         return f"a case; `surgebreak run {quote(str(place))}` makes a run of it, whose directory a report is made of"
     return "neither a run (run.json) nor a study (study.json)"
