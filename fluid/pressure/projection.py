@@ -134,12 +134,12 @@ class Waterline(NamedTuple):
 
 @ranged
 def _row_lengths(first, last, dofs, column, edges, length):
-    graph_row, start, neighbour = edges.row, edges.start, edges.neighbour
+    graph_row, start, neighbour, stiffness = edges
     for r in range(first, last):
         row = graph_row[dofs[r]]
         count = 1
         for s in range(start[row], start[row + 1]):
-            count += column[neighbour[s]] >= 0
+            count += stiffness[s] != 0.0 and column[neighbour[s]] >= 0
         length[r] = count
 
 
@@ -155,6 +155,8 @@ def _wet_rows(first, last, dofs, column, edges, surface, scale, reserve, made):
         diagonal, beyond = 0.0, 0.0
         for s in range(start[row], start[row + 1]):
             j = neighbour[s]
+            if stiffness[s] == 0.0:  # along half of the edges of a split brick
+                continue
             k = -scale * stiffness[s]
             if column[j] >= 0:
                 diagonal += k
