@@ -57,8 +57,8 @@ def test_matrix_is_symmetric_positive_definite_with_a_surface():
 
 
 def test_edges_without_stiffness_have_no_entry():
-    """Along the diagonals of split bricks the gradients of the two ends are perpendicular in every cell, cut or not: of 14
-    neighbours of a node inside only the six along the axes are left, and the diagonal."""
+    """Along the diagonals of split bricks the gradients of the two ends are perpendicular in every cell, cut or not: of
+    14 neighbours of a node inside only the six along the axes are left, and the diagonal."""
     bodies = ConvexBodies.boxes([[0.5, 0.45, 0.4]], [[0.3, 0.25, 0.2]], [rotation([1, 2, 3], 0.7)])
     A = tank([1, 1, 1], 0.125, lambda x: x[:, 2] - 0.8, bodies).predict(0.01).matrix
     assert (A.data != 0.0).all()
