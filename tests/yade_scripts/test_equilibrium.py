@@ -1,13 +1,17 @@
 """Start at rest: settled structures do not move, deflect as beams of blocks do, and refuse what cannot stand."""
 
+import re
+
 import numpy as np
 import pytest
 
 from coupler.commands.verify.figures import columns
 from yade_scripts.blocks.block import Block
+from yade_scripts.blocks.faces import FixedPlane
 from yade_scripts.blocks.generators.building import Building, Opening, building_blocks
 from yade_scripts.blocks.generators.wall import wall_of_blocks
 from yade_scripts.contact.law import ContactLaw
+from yade_scripts.dynamics import equilibrium
 from yade_scripts.dynamics.equilibrium import SLACK, CannotStand, Search, settle
 from yade_scripts.dynamics.structure import Structure
 from yade_scripts.joints.cohesion import JointParameters
@@ -178,3 +182,63 @@ def test_a_step_that_is_far_too_long_is_cut_until_it_overshoots_by_little():
         gone = 0.5 + 1e-4 - s.centre()[0, 2]
         assert 0.0 < gone < 2e-4
         assert search.residual() @ way > -SLACK * (residual @ way)
+
+
+def wall_in_a_flume():
+    """2 m high and 0.4 m thick, in running bond, between the sides of a flume of its own width."""
+    sides = [FixedPlane((0, 0, 0), (0, 1, 0)), FixedPlane((0, 0.5, 0), (0, -1, 0))]
+    return wall_of_blocks("w", (1, 0, 0), (0.4, 0.5, 2.0), (0.2, 0.25, 0.25), bond="running"), sides
+
+
+def uneven_load(blocks):
+    """Of water 0.6 m deep in front (x = 1 m), on one half of the wall 1 % heavier than on the other."""
+    F = np.zeros((len(blocks), 6))
+    for row, block in enumerate(blocks):
+        x, y, z = block.centre
+        if x < 1.15 and z < 0.6:
+            F[row, 0] = 9.81e3 * (0.6 - z) * 0.25**2 * (1.01 if y > 0.25 else 1.0)
+    return F
+
+
+@pytest.mark.parametrize("ratio", [1.0, 20.0, 1e4])
+def test_a_wall_between_the_sides_of_a_flume_settles(ratio):
+    """Upright joints neither open nor close but for 1e-10 m, where a stiffness of both sides is that of neither, and
+    contacts with the sides push in some places tried and not in others. Newton's method ends in a few steps, and what
+    it finds stays at rest."""
+    blocks, sides = wall_in_a_flume()
+    law = JointParameters(8e3, 1e-3, closing_ratio=ratio, damping=0.0)
+    with Structure(blocks, ContactLaw(friction=0.6), law, ground=0.0, planes=sides) as s:
+        load = uneven_load(blocks)
+        settle(s, load)
+        residual = s.internal_force() + s.gravity_force() + load
+        assert np.abs(residual).max() < 1e-6 * np.abs(s.gravity_force()).max()
+        assert 0.02 < s.joint_table().damage.max() < 0.5
+
+
+def test_contacts_hold_a_joined_block_by_the_depth_there_is():
+    """A block on a joint is pushed by u against a wall that stood 0.1 mm from it and that nothing joins it to: with
+    P = k A u + K (u - gap), and a moment that lets it slide upright, the search ends at u, whatever it tried on the
+    way. The joint has softened by 2 u/δ_f there."""
+    gap, u, K = 1e-4, 3e-4, 4e9
+    law = JointParameters(1e9, 1.0, damping=0.0)
+    wall = FixedPlane((0.5 + gap, 0, 0), (-1, 0, 0))
+    contact = ContactLaw(stiffness=K)
+    with Structure([Block("b", (0, 0, 0.5), size=1.0)], contact, law, ground=0.0, planes=[wall]) as s:
+        joint = law.stiffness * u
+        load = np.zeros((1, 6))
+        load[0, 0], load[0, 4] = joint + K * (u - gap), -0.5 * joint
+        settle(s, load)
+        assert s.centre()[0, 0] == pytest.approx(u, rel=2e-3)
+        assert s.contacts().depth == pytest.approx(u - gap, rel=3e-3)
+
+
+def test_a_search_without_end_tells_the_damage_and_the_block_where_it_stands(monkeypatch):
+    """Broken off after one step: the damage is that of the place tried, not that from before the search."""
+    monkeypatch.setattr(equilibrium, "MOST_ITERATIONS", 1)
+    blocks, _ = wall_in_a_flume()
+    law = JointParameters(8e3, 1e-3, damping=0.0)
+    with Structure(blocks, None, law, ground=0.0) as s, pytest.raises(CannotStand) as told:
+        settle(s, uneven_load(blocks))
+    assert "no equilibrium after 1 iterations" in str(told.value)
+    assert re.search(r"left on 'w-\d-\d-\d'", str(told.value))
+    assert re.search(r"damage 0\.(0[1-9]|[1-9])", str(told.value))

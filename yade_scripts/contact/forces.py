@@ -252,9 +252,10 @@ class ContactForces:
         return pairs.a[on], np.where(b < self._n, b, self._n - 1 - b), pairs.overlap[on]
 
     def moved(self) -> None:
-        """Blocks have been moved by hand."""
+        """Blocks have been moved by hand. Contacts that begin there count from the touch, with the depth there is: what
+        they push then goes by the places alone, not by the way there."""
         self.search()
-        self._pairs.found[:] = False
+        self._pairs.found[:], self._pairs.fresh[:] = False, 1.0
         self._read = None
 
     # ---- saving and going back ------------------------------------------------------------------------------

@@ -68,12 +68,15 @@ class Contacts:
 
     def springs(self, x: Array) -> Springs:
         """Secant springs and dashpots; a sliding contact has no tangential ones."""
-        sticks = ~self.slides
-        none = np.zeros(len(self))
-        across = self._springs_at(self.point, x, self.kn, none, self.cn, none)
-        return across.and_(
+        sticks, none = ~self.slides, np.zeros(len(self))
+        return self.pushing_springs(x).and_(
             self._springs_at(self.shear_point, x, none, self.ks * sticks, none, self.cs * sticks)
         )
+
+    def pushing_springs(self, x: Array) -> Springs:
+        """Their part along the normals."""
+        none = np.zeros(len(self))
+        return self._springs_at(self.point, x, self.kn, none, self.cn, none)
 
     def _springs_at(self, point, x, kn, kt, cn, ct) -> Springs:
         """`assemble` reads -1 as the fixed world; its arm is not used there."""

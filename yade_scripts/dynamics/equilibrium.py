@@ -8,7 +8,8 @@ the joined blocks are moved to their equilibrium first,
 by Newton's method with the tangent of the joints as they open. K is then the curvature of an energy that equilibrium
 makes smallest: where softening makes K indefinite the secant stiffness takes its place, whose step still goes
 downhill, and a is cut until f(u + a Δu)·Δu does not point back strongly (stiff closing flips points between open and
-closed). Joints that cannot carry the load open beyond their opening at failure, or the search finds no end.
+closed). Contacts push by the depth there is and do not rub: moving blocks by hand stretches no spring of friction.
+Joints that cannot carry the load open beyond their opening at failure, or the search finds no end.
 """
 
 from __future__ import annotations
@@ -54,11 +55,14 @@ def settle(structure, load: Array | None = None) -> float:
     enough = max(TOLERANCE * scale, search.rounding())
     for _ in range(MOST_ITERATIONS):
         residual = search.residual()
-        if np.abs(residual).max() <= enough:
+        largest = np.abs(residual).max()
+        if largest <= enough:
             search.keep()
             return float(np.linalg.norm(structure.centre() - start, axis=1).max())
         search.along(search.direction(residual), residual)
-    raise CannotStand(_message(structure, f"no equilibrium after {MOST_ITERATIONS} iterations"))
+    at = structure.names[rows[np.abs(residual).argmax() // 6]]
+    reason = f"no equilibrium after {MOST_ITERATIONS} iterations, {largest:.2g} N or N m left on '{at}'"
+    raise CannotStand(_message(structure, reason, search.damage))
 
 
 class Search:
@@ -69,10 +73,12 @@ class Search:
         self._structure, self._rows, self._outer = structure, rows, outer
         self._dofs = (6 * rows[:, None] + np.arange(6)).ravel()
         self._history = structure.joints.history()
+        self.damage = structure.joints.damage()
+        """(J,) of the joints at the last place tried."""
 
     def rounding(self) -> float:
         """Forces [N] that the rounding of positions makes in the stiffest joints."""
-        stiffest = self._structure.tangent()[0].diagonal().reshape(-1, 6)[:, :3].max()
+        stiffest = self._structure.secant_by_hand().diagonal().reshape(-1, 6)[:, :3].max()
         extent = np.ptp(self._structure.centre(), axis=0).max() + max(
             b.radius for b in self._structure.blocks
         )
@@ -84,11 +90,11 @@ class Search:
 
     def direction(self, residual: Array) -> Array:
         """Newton's step where the tangent is positive definite, else the step of the secant stiffness."""
-        tangent = factors(self._part(self._structure.opening_tangent()))
+        tangent = factors(self._part(self._structure.tangent_by_hand()))
         if tangent is None:
-            tangent = factors(self._part(self._structure.tangent()[0]))
+            tangent = factors(self._part(self._structure.secant_by_hand()))
         if tangent is None:
-            raise CannotStand(_message(self._structure, "joints have lost their stiffness"))
+            raise CannotStand(_message(self._structure, "joints have lost their stiffness", self.damage))
         return tangent.solve(residual)
 
     def along(self, step: Array, residual: Array) -> None:
@@ -112,14 +118,14 @@ class Search:
         step = step.reshape(-1, 6)
         turn = Rotation.from_rotvec(step[:, 3:]).as_matrix()
         self._structure.displace(self._rows, step[:, :3], turn)
-        self.damage = self._structure.joint_table().damage
+        self.damage = self._structure.joints.damage()
         if not note:
             self._structure.joints.restore(self._history)
 
     def _check(self) -> None:
         if not np.isfinite(self.damage).all() or self.damage.max() >= 1.0:
-            self.keep()
-            raise CannotStand(_message(self._structure, "a joint opens beyond its opening at failure"))
+            reason = "a joint opens beyond its opening at failure"
+            raise CannotStand(_message(self._structure, reason, self.damage))
 
     def _part(self, matrix):
         return csc_matrix(matrix[self._dofs, :][:, self._dofs])
@@ -154,12 +160,13 @@ def supported_blocks(structure) -> Array:
     return np.flatnonzero((component[:n] == component[n]) & ~structure.fixed)
 
 
-def _message(structure, reason: str) -> str:
-    table = structure.joint_table()
-    worst = int(np.nanargmax(table.damage))
-    b = "the ground" if table.b[worst] < 0 else f"'{structure.names[table.b[worst]]}'"
+def _message(structure, reason: str, damage: Array) -> str:
+    joints = structure.joints
+    worst = int(np.nanargmax(damage))
+    a, b = joints.a[worst], joints.b[worst]
+    other = "the ground" if b < 0 else f"'{structure.names[b]}'"
     return (
         f"the structure cannot carry its own weight and the load at the start: {reason}. Most strained: the joint "
-        f"of '{structure.names[table.a[worst]]}' with {b}, damage {min(table.damage[worst], 1.0):.2f}. Raise "
+        f"of '{structure.names[a]}' with {other}, damage {damage[worst]:.2f}. Raise "
         "joints.strength, shorten the spans, or let it fall with structure.start = 'sudden'."
     )

@@ -131,17 +131,25 @@ class StructureReadings:
 
     def tangent(self) -> tuple[sp.csr_array, sp.csr_array]:
         """(K, C), each (6n, 6n): secant stiffness and damping of live joints and of contacts; none of blocks asleep."""
-        springs = self.contacts().springs(self._motion.x)
-        if self.joints is not None:
-            springs = springs.and_(tangent.joint_springs(self.joints, self._motion.x, self._motion.R))
-        return tangent.assemble(springs, self.n)
+        return tangent.assemble(self._with_joints(self.contacts().springs(self._motion.x)), self.n)
 
-    def opening_tangent(self) -> sp.csr_array:
-        """(6n, 6n): as K of `tangent`, with the joints as they answer while they open further: softening counts."""
-        contacts = tangent.assemble(self.contacts().springs(self._motion.x), self.n)[0]
+    def secant_by_hand(self) -> sp.csr_array:
+        """(6n, 6n): K of `tangent` where blocks are moved by hand (`displace`), which stretches no spring of
+        friction: contacts push only."""
+        springs = self._with_joints(self.contacts().pushing_springs(self._motion.x))
+        return tangent.assemble(springs, self.n)[0]
+
+    def tangent_by_hand(self) -> sp.csr_array:
+        """(6n, 6n): as `secant_by_hand`, with the joints as they answer while they open further: softening counts."""
+        contacts = tangent.assemble(self.contacts().pushing_springs(self._motion.x), self.n)[0]
         if self.joints is None:
             return contacts
         return contacts + tangent.joint_tangent(self.joints, self._motion.x, self._motion.R, self.n)
+
+    def _with_joints(self, springs: tangent.Springs) -> tangent.Springs:
+        if self.joints is None:
+            return springs
+        return springs.and_(tangent.joint_springs(self.joints, self._motion.x, self._motion.R))
 
     def joint_damage(self) -> tuple[Array, Array]:
         """Damage (J,) of every joint, 0 to 1, and whether it still carries tension (J,) bool: the quick part of

@@ -231,7 +231,10 @@ def point_springs(index, joint_of, joints, memory, place_now, out):
 
 
 def point_tangents(index, joint_of, joints, memory, place_now, out):
-    """out (s, 3, 3) [Pa/m]: ∂t/∂δ of the points `index` while λ may grow, by central differences over 1e-7 δ_f."""
+    """out (s, 3, 3) [Pa/m]: ∂t/∂δ of the points `index` while λ may grow, by central differences over 1e-7 δ_f.
+
+    A point closer than that to where opening turns into closing is moved that far to its own side: the mean of both
+    stiffnesses is neither, and with it a search for rest goes back and forth between them."""
     a, b, xi_a, xi_b = joints.a, joints.b, joints.xi_a, joints.xi_b
     normal, law, peak = joints.normal, joints.law, joints.peak
     largest = memory.largest
@@ -245,9 +248,14 @@ def point_tangents(index, joint_of, joints, memory, place_now, out):
         unit, df, beta, k0 = law[j, UNIT], law[j, DF], law[j, BETA], law[j, K0]
         kc = law[j, KC]
         h = 1e-7 * df
+        own, _ = split(pa, pb, n)
+        aside = 0.0
+        if kc != k0 and abs(own) < 2.0 * h:
+            aside = 2.0 * h if own > 0.0 else -2.0 * h
         for c in range(3):
             for side in (1.0, -1.0):
-                d[0], d[1], d[2] = pb
+                for k in range(3):
+                    d[k] = pb[k] + aside * n[k]
                 d[c] += side * h
                 dn, s = split(pa, d, n)
                 after = max(largest[p], measure(dn, dot(s, s), beta))
