@@ -10,8 +10,15 @@ import numpy as np
 from coupler.case.case import Case
 from coupler.case.inflow_records import RecordError, record_of
 from coupler.case.types import KeyPath
-from coupler.geometry.tank_mesh import finest_cell, floor_along, is_measured, mean_bed
-from coupler.scene.build_water import SLACK, bore_velocity, fills_beside, level_at_start, sea_level
+from coupler.geometry.tank_mesh import (
+    bed_along,
+    finest_cell,
+    floor_along,
+    is_measured,
+    mean_bed,
+    room_beside,
+)
+from coupler.scene.build_water import SLACK, fills_beside, flow_of, level_at_start, sea_level
 
 Problem = tuple[KeyPath, str]
 
@@ -36,6 +43,9 @@ STILL = 0.1
 SPRAY = 1.1
 """What an inflow may bring into a tank with an open top, over the room above its water: a tank of 2 m that filled by
 0.5 m a second lost a tenth of that by its top before it stood full and broke the limit on the volume."""
+
+BROUGHT_AT, LAYERS = 401, 8
+"""Instants and layers of water at which what an inflow brings is summed up."""
 
 
 def water_problems(case: Case) -> Iterator[Problem]:
@@ -170,16 +180,14 @@ def _walls(w) -> Iterator[Problem]:
 def _filled_up(case: Case) -> Iterator[Problem]:
     """Inflows into a tank without a way out but its open top, which they fill before the end: what they bring is given,
     and no more than spray leaves by the top."""
-    if set(case.tank.open) - {"z+"} or case.water.sea or not case.tank.is_box:
+    if set(case.tank.open) - {"z+"} or case.water.sea:
         return
     way_out, share = ("no way out but its open top", SPRAY) if case.tank.open else ("no way out", 1.0)
-    size = [high - low for low, high in zip(case.tank.lower, case.tank.upper)]
-    boxes = [[high - low for low, high in zip(fill.lower, fill.upper)] for fill in case.water.fill]
-    room = math.prod(size) - max((math.prod(box) for box in boxes), default=0.0)
+    room = room_beside(case.tank, case.water.fill)
     for i, spec in enumerate(case.water.inflow):
         if spec.absorbs:
             continue
-        brought = size[1 if spec.side[0] == "x" else 0] * _brought(case, spec)
+        brought = _brought(case, spec)
         if brought > share * room:
             yield (
                 ("water", "inflow", i),
@@ -236,18 +244,24 @@ def _depth_behind(ahead: float, speed: float, gravity: float) -> float:
 
 
 def _brought(case: Case, spec) -> float:
-    """Volume a metre of width [m2] that an inflow brings until the end of the run, what it takes back not counted."""
-    bed, end = floor_along(case.tank, spec.side), case.time.end
-    if spec.kind in ("solitary", "n-wave"):
-        return 0.0
-    if spec.kind == "record":
-        found = record_of(spec, 0.0, bed, case.case.gravity)
-        inward = np.maximum((found.level - bed) * found.velocity, 0.0).mean(axis=1)
-        return float(np.trapezoid(inward[found.time <= end], found.time[found.time <= end]))
-    depth = spec.level - bed
-    if spec.kind == "steady":
-        return max(spec.velocity, 0.0) * depth * end
-    return bore_velocity(case, spec) * depth * end
+    """Volume [m3] that an inflow brings until the end of the run, at the most that it has brought at any time."""
+    along = bed_along(case.tank, spec.side)
+    middle, bed = 0.5 * (along[1:] + along[:-1]).T
+    axis, sign = "xyz".index(spec.side[0]), 1.0 if spec.side[1] == "-" else -1.0
+    width, layer = np.diff(along[:, 0]), (np.arange(LAYERS) + 0.5) / LAYERS
+    flow, rates = flow_of(case, spec), []
+    times = np.linspace(0.0, case.time.end, BROUGHT_AT)
+    for time in times:
+        places = np.zeros((len(middle), LAYERS, 3))
+        places[:, :, axis] = (case.tank.lower if sign > 0.0 else case.tank.upper)[axis]
+        places[:, :, 1 - axis] = middle[:, None]
+        level = np.broadcast_to(flow.level_at(places[:, 0], time), middle.shape)
+        depth = np.maximum(level - bed, 0.0)
+        places[:, :, 2] = bed[:, None] + depth[:, None] * layer
+        speed = sign * flow.velocity(places.reshape(-1, 3), time)[:, axis].reshape(len(middle), LAYERS)
+        rates.append(float((width * depth * speed.mean(axis=1)).sum()))
+    steps = 0.5 * np.diff(times) * np.add(rates[1:], rates[:-1])
+    return float(np.cumsum(steps).max(initial=0.0))
 
 
 def _sides(case: Case) -> Iterator[Problem]:

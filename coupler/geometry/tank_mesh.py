@@ -128,9 +128,13 @@ def finest_cell(tank: Tank) -> float:
 
 
 def bed_along(tank: Tank, side: str) -> Array:
-    """Places along a side and heights of the bed there (n, 2) [m], at the columns of the mesh that reach the side; the
-    floor of a box, and of a mesh from a file its lowest node."""
+    """Places along a side and heights of the bed there (n, 2) [m]: the floor of a box, and the lower edge of a mesh
+    from a file at its nodes in the side; of a mesh without a face there its lowest node."""
     axis, along = "xyz".index(side[0]), 1 - "xyz".index(side[0])
+    if tank.mesh is not None:
+        found = _lower_edge(mesh_of(tank), side)
+        if len(found):
+            return found
     if tank.ground is None:
         return np.array([[end[along], tank.lower[2]] for end in (tank.lower, tank.upper)])
     fitted = fitted_of(tank)
@@ -138,6 +142,28 @@ def bed_along(tank: Tank, side: str) -> Array:
     bed = fitted.bed[at] if axis == 0 else fitted.bed[:, at]
     found = np.column_stack([(fitted.column_x, fitted.column_y)[along], bed])
     return found[np.isfinite(bed)]
+
+
+def _lower_edge(mesh, side: str) -> Array:
+    """Places along a side and heights (n, 2) [m] of the lowest edges of the faces that lie in it."""
+    along = 1 - "xyz".index(side[0])
+    faces = mesh.boundary_faces[
+        on_side(mesh, side, mesh.boundary_normal, mesh.nodes[mesh.boundary_faces].mean(axis=1))
+    ]
+    edges = mesh.nodes[np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])][
+        :, :, [along, 2]
+    ]
+    places = np.unique(edges[:, :, 0])
+    (start, low), (end, high) = edges[:, 0].T, edges[:, 1].T
+    width = np.where(start == end, 1.0, end - start)
+    found = np.empty(len(places))
+    for i, place in enumerate(places):
+        over = (np.minimum(start, end) <= place) & (place <= np.maximum(start, end))
+        share = ((place - start) / width)[over]
+        level = (low[over] + share * (high - low)[over]).min()
+        upright = over & (start == end)
+        found[i] = min(level, np.minimum(low, high)[upright].min(initial=np.inf))
+    return np.column_stack([places, found])
 
 
 def bed_under(mesh, places) -> Array:
@@ -248,8 +274,16 @@ def mesh_remarks(tank: Tank) -> Iterator[str]:
         )
 
 
+def room_beside(tank: Tank, boxes) -> float:
+    """Volume [m³] of a tank without that of the boxes of water in it; of a box without the largest of them."""
+    if tank.is_box:
+        volumes = [np.prod(np.subtract(box.upper, box.lower)) for box in boxes]
+        return float(np.prod(np.subtract(tank.upper, tank.lower)) - max(volumes, default=0.0))
+    return float(mesh_of(tank).cell_volume.sum()) - water_in(tank, boxes)
+
+
 def water_in(tank: Tank, boxes) -> float:
-    """Volume [m³] of the cells of a mesh file whose middle lies in one of the boxes."""
+    """Volume [m³] of the cells of a mesh whose middle lies in one of the boxes."""
     mesh = mesh_of(tank)
     middle = mesh.nodes[mesh.cells].mean(axis=1)
     inside = np.any([_within(middle, box) for box in boxes], axis=0) if boxes else np.zeros(len(middle), bool)

@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from array_types import Array, Floats, Ints
+from array_types import Array, Bools, Floats, Ints
 from fluid.cut.bodies import ConvexBodies
 from fluid.cut.candidate_pairs import near_pairs
 from fluid.cut.cut_arrays import Cuts
@@ -90,6 +90,7 @@ class PhysicalDomain:
     face_cell (S,) row of `cells` · face_body (S,) · face_area (S,) [m2] · face_centroid (S, 3) [m]
     face_normal (S, 3) out of the body · face_points (S, 3, 3) [m] three points, weight area / 3, degree 2
     face_corners (S, 3, 3) [m] (the polygons are triangles)
+    several (N,) bool: there is, or was before small pockets were dropped, another copy of the same background node
     n_bodies · body_centre (n_bodies, 3) [m] · covers "single" or "multiple".
     """
 
@@ -110,6 +111,7 @@ class PhysicalDomain:
     face_normal: Floats
     face_points: Floats
     face_corners: Floats
+    several: Bools
     n_bodies: int
     body_centre: Floats
     covers: str
@@ -330,13 +332,14 @@ def _assembled(memory: Memory, elements: Elements, covers: str) -> PhysicalDomai
     of_part = elements.of_part
     face_cell, wet, wet_body = of_part[cuts.wet_part], cuts.wet, cuts.wet_body
     parent, part = elements.parent, elements.part
-    keep = np.ones(len(parent), bool)
+    keep, several = np.ones(len(parent), bool), np.zeros(len(parent_node), bool)
     if covers == "multiple":
+        several = np.bincount(parent_node)[parent_node] > 1
         least = memory.connection.pocket * mesh.local_size[elements.parent] ** 3
         keep = without_pockets(cells, volume, len(parent_node), least)
     if not keep.all():
         used, renumbered, cells = _compressed(cells, keep, len(parent_node))
-        parent_node = parent_node[used]
+        parent_node, several = parent_node[used], several[used]
         left = keep[face_cell]
         face_cell, wet, wet_body = renumbered[face_cell[left]], wet[left], wet_body[left]
         of_part = np.where(keep[of_part], renumbered[of_part], -1)
@@ -361,6 +364,7 @@ def _assembled(memory: Memory, elements: Elements, covers: str) -> PhysicalDomai
         face_normal=wet[:, 4:7],
         face_points=wet[:, 7:16].reshape(-1, 3, 3),
         face_corners=wet[:, 16:].reshape(-1, 3, 3),
+        several=several,
         n_bodies=len(memory.bodies),
         body_centre=memory.bodies.centre,
         covers=covers,

@@ -14,7 +14,8 @@ linear functions are integrated exactly.  So
 to round-off, whatever the pressure is: `pressure_closure` is what is missing.  b_i is summed over the cells around
 nodes of the sides, so that (1) is a check of the cutting and not an identity.  Where thresholds of the covers close
 narrow openings, water pushes on what closes them: the same sum over the cells around the nodes there, those with
-several copies, is the line "openings", and (1) stays a check at all other nodes.
+several copies (of which one may have been dropped with the pocket behind the opening), is the line "openings", and (1)
+stays a check at all other nodes.
 
 What the nodes make of it differs from (1) where the surface cuts cells or leaves them void, and where the part of the
 last pressure that is carried over acts on other nodes than it came from. These differences, and what transport,
@@ -166,8 +167,7 @@ def _at_closed_openings(water, kept, p, dt):
     t, connection = water.topology, water.domain.memory.connection
     if connection is None or connection.face == 0.0:
         return np.zeros(6)
-    parent = water.domain.parent_node
-    beside = (np.bincount(parent)[parent] > 1) & ~water.on_sides
+    beside = water.domain.several & ~water.on_sides
     cells = np.concatenate([kept.wet_cells, kept.void])
     mesh = (t.nodes, t.fluid_cells)
     total = hat_forces(cells, p, p, beside, water.reference, *mesh)[2]

@@ -10,7 +10,7 @@ import pytest
 
 from coupler.checks.case import remarks
 from coupler.checks.read_case import load
-from coupler.geometry.tank_mesh import basin_edges, mesh_of, on_side
+from coupler.geometry.tank_mesh import basin_edges, bed_along, floor_along, mean_bed, mesh_of, on_side
 from coupler.program.errors import BadCase
 from coupler.program.provenance import ROOT
 from coupler.results.expected import verdicts
@@ -317,6 +317,50 @@ def test_sides_are_the_flat_ends_along_the_axes(tmp_path):
     said = refusals(tmp_path)
     assert "tank.open: z+: no face of tank.mesh lies in the plane z = 0." in said
     loaded(tmp_path, case_text('mesh = "box.vtu"\nopen = []'))
+
+
+def test_the_bed_along_a_side_of_a_file_is_its_lower_edge(tmp_path):
+    """A beach of 1:4: level at x- and, 1.6 m on, 0.4 m higher; along y- it rises."""
+    nodes, cells = sloping()
+    write(tmp_path / "box.vtu", nodes, tetra=cells)
+    text = case_text().replace("upper = [0.4, 0.4, 0.6]", "upper = [1.6, 0.4, 0.6]")
+    tank = loaded(tmp_path, text.replace("[0.9, 0.2]", "[0.3, 0.2]")).tank
+    for side, bed in (("x-", 0.0), ("x+", 0.4)):
+        along = bed_along(tank, side)
+        np.testing.assert_allclose(along, np.column_stack([np.linspace(0.0, 0.4, 5), np.full(5, bed)]))
+    along = bed_along(tank, "y-")
+    np.testing.assert_allclose(along[:, 1], 0.25 * along[:, 0], atol=1e-12)
+    assert np.ptp(along[:, 0]) == pytest.approx(1.6)
+    assert floor_along(tank, "x+") == pytest.approx(0.4)
+    assert mean_bed(tank, "y-", 0.2) == pytest.approx(0.1)
+
+
+def test_a_wave_that_fills_a_basin_is_refused(tmp_path):
+    """A solitary wave of 0.3 m on 0.4 m carries 2 sqrt(4 d^3 H / 3) = 0.32 m2, by the time of its crest half of that;
+    over a beach of 1.6 m with a lid at 0.8 m there is room for 0.64 m2."""
+    nodes, cells = sloping()
+    write(tmp_path / "box.vtu", nodes, tetra=cells)
+
+    def filled(length, end):
+        write(tmp_path / "box.vtu", nodes * [length, 1.0, 1.0], tetra=cells)
+        text = case_text().replace("upper = [0.4, 0.4, 0.6]", f"upper = [{1.6 * length}, 0.4, 0.4]")
+        text = text.replace("[0.9, 0.2]", f"[{0.3 * length}, 0.2]").replace('"0.3 s"', f'"{end} s"')
+        wave = (
+            '[[water.inflow]]\nkind = "solitary"\nside = "x-"\nlevel = 0.4\nheight = 0.3\ncrest = "1.5 s"\n'
+        )
+        try:
+            loaded(tmp_path, text + wave)
+        except BadCase as refusal:
+            return "\n".join(refusal.lines)
+        return ""
+
+    assert filled(1.0, 3.0) == ""
+    assert filled(0.3, 1.5) == ""
+    said = filled(0.3, 3.0)
+    brought = float(re.search(r"brings ([0-9.e-]+) m3", said)[1])
+    assert brought == pytest.approx(0.4 * 2.0 * np.sqrt(4.0 * 0.4**3 * 0.3 / 3.0), rel=0.3)
+    assert float(re.search(r"room for ([0-9.e-]+) m3", said)[1]) == pytest.approx(0.0768, rel=0.1)
+    assert "no way out but its open top" in said
 
 
 def test_blocks_need_a_basin_without_angles_and_overhangs(tmp_path):

@@ -93,6 +93,20 @@ def test_a_tank_that_its_inflow_fills_is_refused():
     assert filled(2.1, closed, sea=[{"side": "x+", "level": 0.5}]) == []
 
 
+def test_what_a_record_takes_back_leaves_room(tmp_path):
+    """To and fro: 0.2 m x 0.5 m x 2/pi x 1 m/s, 0.0637 m3, come in within a second and leave in the next."""
+    rows = [f"{t:.2f},0.5,{np.sin(np.pi * t):.6f}" for t in np.arange(0.0, 20.01, 0.05)]
+    (tmp_path / "swell.csv").write_text("\n".join(["time,level,velocity", *rows]), encoding="utf-8")
+    swell = {"kind": "record", "side": "x-", "path": str(tmp_path / "swell.csv")}
+    for end in (0.9, 20.0):
+        assert problems(case({"inflow": [swell]}, time={"end": end})) == []
+    small = TANK | {"upper": [0.5, 0.2, 1]}
+    fill = {"fill": [{"lower": [0, 0, 0], "upper": [0.5, 0.2, 0.5]}]}
+    assert problems(case({"inflow": [swell]} | fill, tank=small, time={"end": 0.4})) == []
+    found = [text for _, text in problems(case({"inflow": [swell]} | fill, tank=small, time={"end": 20.0}))]
+    assert any("brings 0.0635 m3 until the end" in text for text in found), found
+
+
 def test_water_without_air_above_it_may_not_leave():
     """Full to its closed top with an open side: what leaves leaves a hole. An open top, or some air, and it may."""
     whole = {"fill": [{"lower": [0, 0, 0], "upper": [2, 0.2, 1]}]}
