@@ -138,11 +138,8 @@ def test_a_vibration_that_does_not_break_the_joint_gains_no_more_than_leapfrog_a
         assert gain(share, True) <= gain(share, False) + 0.01
 
 
-@pytest.mark.parametrize("name", ["polynomial", "bilinear", "exponential"])
-@pytest.mark.parametrize(("speed", "tolerance"), [(1.0, 0.005), (10.0, 0.04)])
-def test_a_wall_that_flies_apart_takes_the_energy_of_its_law(name, speed, tolerance):
-    """Blocks of 1 m with velocities and spins of up to 14 times the critical speed: what the forces took (force times
-    velocity) is what the damage stands for. Joints are torn in one substep there, from compression too."""
+def wall_that_flies_apart(speed, law):
+    """16 blocks of 1 m with velocities and spins of random directions, `speed` in size [m/s, rad/s]."""
     rng = np.random.default_rng(1)
     blocks = [
         Block(
@@ -155,12 +152,65 @@ def test_a_wall_that_flies_apart_takes_the_energy_of_its_law(name, speed, tolera
         for i in range(4)
         for j in range(4)
     ]
-    with Structure(
-        blocks, None, JointParameters(1e6, 1e-3, law=name, damping=0.0), gravity=(0.0, 0.0, 0.0)
-    ) as s:
+    return Structure(blocks, None, law, gravity=(0.0, 0.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("name", "speed", "tolerance"),
+    [
+        ("polynomial", 1.0, 0.004),
+        ("polynomial", 10.0, 0.002),
+        ("polynomial", 100.0, 0.002),
+        ("exponential", 1.0, 0.004),
+        ("exponential", 10.0, 0.02),
+        ("exponential", 100.0, 0.01),
+        ("bilinear", 1.0, 0.004),
+        ("bilinear", 10.0, 0.02),
+        ("bilinear", 100.0, 0.09),
+    ],
+)
+def test_a_wall_that_flies_apart_takes_the_energy_of_its_law(name, speed, tolerance):
+    """Speeds of up to 140 times the critical one: what the forces took (force times velocity) is what the damage
+    stands for. Joints are torn in one substep there, from compression too; closed ones hold a hundred times as much
+    at 100 m/s, of which 9 % are a thousandth."""
+    with wall_that_flies_apart(speed, JointParameters(1e6, 1e-3, law=name, damping=0.0)) as s:
         s.advance(0.03 / np.sqrt(speed))
         assert (~s.joint_table().alive).sum() > 20
         assert s.energies()["joint_dissipated"] == pytest.approx(s.law_dissipation(), rel=tolerance)
+
+
+@pytest.mark.parametrize("mode", ["effective", "needleman"])
+@pytest.mark.parametrize("normal", [-1e-4, 1e-4], ids=["pressed", "open"])
+def test_forces_are_the_gradient_of_the_energy_however_the_blocks_turn(mode, normal):
+    """A joint that is sheared and pressed, or open, at constant damage: moving or turning either block changes its
+    energy by the work of the forces on the blocks, to the angle between the blocks (0.1 per mille)."""
+    law = JointParameters(1e6, 0.01, shear_ratio=0.7, closing_ratio=10.0, mixed_mode=mode, damping=0.0)
+    blocks = [Block("lower", (0, 0, 0), size=1.0), Block("upper", (0, 0, 1), size=1.0)]
+    rows, rng = np.array([0, 1]), np.random.default_rng(3)
+
+    def move(s, step):
+        step = np.asarray(step).reshape(2, 6)
+        s.displace(rows, step[:, :3], Rotation.from_rotvec(step[:, 3:]).as_matrix())
+
+    with Structure(blocks, None, law, gravity=(0.0, 0.0, 0.0)) as s:
+        there = np.zeros(12)
+        there[6:] = 3e-4, -2e-4, normal, 1e-4, -5e-5, 1e-4
+        further = there.copy()
+        further[8] = 2e-3
+        move(s, further)  # no damage is added on the way back
+        move(s, there - further)
+        force, history = s.internal_force().ravel(), s.joints.history()
+        for _ in range(6):
+            step = 1e-8 * rng.normal(size=12)
+            energy = []
+            for way in (step, -2.0 * step):
+                move(s, way)
+                energy.append(s.joint_table().stored.sum())
+            move(s, step)
+            s.joints.restore(history)
+            assert 0.5 * (energy[1] - energy[0]) == pytest.approx(
+                force @ step, abs=1e-4 * np.linalg.norm(force) * 1e-8
+            )
 
 
 # ---- Needleman's potential --------------------------------------------------------------------------------------
@@ -273,7 +323,7 @@ def test_running_bond_joins_every_block_to_those_above_and_below():
     )
     row = [b.name for b in blocks].index("1-1")
     touching = (joints.a == row) | (joints.b == row)
-    flat = np.abs(joints.normal[:, 2]) > 0.5
+    flat = np.abs(joints.normal[:, 0, 2]) > 0.5
     np.testing.assert_allclose(joints.area[touching & flat], 0.25)
     assert (touching & flat).sum() == 4
     assert (touching & ~flat).sum() == 2

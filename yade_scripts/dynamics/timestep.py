@@ -132,7 +132,7 @@ def _stiffness_on_blocks(blocks: list[Block], joints) -> tuple[Array, Array]:
             root[i, :3, :3] = np.eye(3) / np.sqrt(block.mass)
             root[i, 3:, 3:] = np.linalg.inv(np.linalg.cholesky(block.inertia)).T
     frame = np.array([b.rotation for b in blocks] + [np.eye(3)])
-    normal = np.einsum("jkl,jl->jk", frame[joints.a], joints.normal)
+    normal = np.einsum("jkl,jl->jk", frame[joints.a], joints.normal[:, 0])
     yields = root.any(axis=(1, 2))
     count = np.where(yields[joints.a] & yields[joints.b], 2.0, 1.0)[:, None, None]
     sides = ((joints.xi_a, joints.a), (joints.xi_b, joints.b))

@@ -21,7 +21,7 @@ import numpy as np
 from kernel_decorators import plain
 from yade_scripts.blocks.kinematics import add_forces, arm, cross, dot, parting, place, turned
 from yade_scripts.joints import laws, mixed_modes
-from yade_scripts.joints.kernel import split
+from yade_scripts.joints.kernel import facing, split
 from yade_scripts.joints.law import CohesiveLaw
 from yade_scripts.joints.specialise import source_checksum, specialised
 
@@ -120,7 +120,7 @@ def joint_forces(live, joints, memory, motion, eta, dt, advance, F, taken_by):
         ra, rb = a[j], b[j]
         unit, df, beta, k0 = law[j, UNIT], law[j, DF], law[j, BETA], law[j, K0]
         kc = law[j, KC]
-        n = turned(ra, R, normal[j])
+        n = facing(ra, rb, R, normal[j])
         f0 = f1 = f2 = m0 = m1 = m2 = 0.0
         for p in range(start[j], start[j + 1]):
             pa, pb = place(ra, R, x, xi_a[p]), place(rb, R, x, xi_b[p])
@@ -175,7 +175,7 @@ def stored_between(live, joints, memory, now, before, out):
     x0, R0 = before
     for j in live:
         kc = law[j, KC]
-        n, n0 = turned(a[j], R, normal[j]), turned(a[j], R0, normal[j])
+        n, n0 = facing(a[j], b[j], R, normal[j]), facing(a[j], b[j], R0, normal[j])
         out[j] = 0.0
         for p in range(start[j], start[j + 1]):
             dn, d = split(place(a[j], R, x, xi_a[p]), place(b[j], R, x, xi_b[p]), n)
@@ -215,7 +215,7 @@ def point_springs(index, joint_of, joints, memory, place_now, out):
         j = joint_of[p]
         pa, pb = place(a[j], R, x, xi_a[p]), place(b[j], R, x, xi_b[p])
         mid = (0.5 * (pa[0] + pb[0]), 0.5 * (pa[1] + pb[1]), 0.5 * (pa[2] + pb[2]))
-        n = turned(a[j], R, normal[j])
+        n = facing(a[j], b[j], R, normal[j])
         dn, s = split(pa, pb, n)
         to_a, to_b = arm(a[j], x, mid), arm(b[j], x, mid)
         for c in range(3):
@@ -244,7 +244,7 @@ def point_tangents(index, joint_of, joints, memory, place_now, out):
         p = index[i]
         j = joint_of[p]
         pa, pb = place(a[j], R, x, xi_a[p]), place(b[j], R, x, xi_b[p])
-        n = turned(a[j], R, normal[j])
+        n = facing(a[j], b[j], R, normal[j])
         unit, df, beta, k0 = law[j, UNIT], law[j, DF], law[j, BETA], law[j, K0]
         kc = law[j, KC]
         h = 1e-7 * df

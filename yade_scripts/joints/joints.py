@@ -88,7 +88,7 @@ class Joints:
         self.xi_a = to_body(place, self.a[self.joint_of], centre, R)
         self.xi_b = to_body(place, self.b[self.joint_of], centre, R)
         normal = np.array([f.normal for f in faces]).reshape(-1, 3)
-        self.normal = np.einsum("nji,nj->ni", R[self.a], normal) if n else np.zeros((0, 3))
+        self.normal = np.stack([to_body(normal, rows, np.zeros_like(centre), R) for rows in (self.a, self.b)], 1)
         known = {law: _numbers(law) for law in dict.fromkeys(laws)}
         numbers = np.array([known[law] for law in laws]).reshape(-1, 5)
         unit, self.df, self.beta, self.kc, self.k0 = (column.copy() for column in numbers.T)
@@ -270,7 +270,7 @@ class Joints:
         opening[self.live] = self.openings(self.live, x, R)
         mean = np.bincount(self.joint_of, self._ratio() * self.weight, minlength=len(self)) / self.area
         centre = x[self.a] + np.einsum("nij,nj->ni", R[self.a], self._centre_in_a())
-        normal = np.einsum("nij,nj->ni", R[self.a], self.normal)
+        normal = np.einsum("nij,nj->ni", R[self.a], self.normal[:, 0])
         shear = self.beta * opening[:, 1]
         effective = np.hypot(np.maximum(opening[:, 0], 0.0), shear)
         mix = np.divide(shear, effective, out=np.zeros(len(self)), where=effective > 0.0)

@@ -1,8 +1,11 @@
 """Points of joints in the world: where they are, how fast they part, forces on the blocks, openings; no law.
 
-A point of a joint sits at ξ_a in block a and ξ_b in block b (or at a fixed place). With the separation
-d = x_b - x_a, the normal n turning with block a:  δ_n = d·n, δ_t = d - δ_n n. The traction acts on both blocks at the
-mid point of the pair, so linear and angular momentum are exact. Absolute positions: no incremental drift.
+A point of a joint sits at ξ_a in block a and ξ_b in block b (or at a fixed place). With the separation d = x_b - x_a
+and the normal n half way between those that turn with block a and block b:  δ_n = d·n, δ_t = d - δ_n n. The traction
+acts on both blocks at the mid point of the pair, so linear and angular momentum are exact, and so is energy: n turns at
+the mean of both spins ω, and at the mid point the velocities differ by the rate of d as seen from axes that turn with
+this mean, d' - ω x d. (With a normal that turns with block a alone, pressed joints that shear while their blocks spin
+gained or lost a hundredth of what they held.) Absolute positions: no incremental drift.
 """
 
 from __future__ import annotations
@@ -19,6 +22,21 @@ def split(pa, pb, n):
     d = (pb[0] - pa[0], pb[1] - pa[1], pb[2] - pa[2])
     dn = dot(d, n)
     return dn, (d[0] - dn * n[0], d[1] - dn * n[1], d[2] - dn * n[2])
+
+
+@plain
+def facing(a, b, R, normal):
+    """Normal of a joint now, as a tuple: half way between normal[0] as it turns with block a and normal[1] with b."""
+    n0, n1, n2 = turned(a, R, normal[0])
+    if b < 0:
+        m0, m1, m2 = n0 + normal[1, 0], n1 + normal[1, 1], n2 + normal[1, 2]
+    else:
+        k0, k1, k2 = turned(b, R, normal[1])
+        m0, m1, m2 = n0 + k0, n1 + k1, n2 + k2
+    size = np.sqrt(m0 * m0 + m1 * m1 + m2 * m2)
+    if size == 0.0:  # turned by half a turn against one another
+        return n0, n1, n2
+    return m0 / size, m1 / size, m2 / size
 
 
 @kernel
@@ -41,7 +59,7 @@ def joint_openings(live, joints, x, R, out):
     a, b, start, weight, normal = joints.a, joints.b, joints.start, joints.weight, joints.normal
     xi_a, xi_b = joints.xi_a, joints.xi_b
     for j in live:
-        n = turned(a[j], R, normal[j])
+        n = facing(a[j], b[j], R, normal[j])
         total = open_ = slide = 0.0
         widest = -np.inf
         for p in range(start[j], start[j + 1]):
