@@ -9,8 +9,8 @@ from array_types import Floats, Ints
 
 class JointPoints(NamedTuple):
     """Joints that never change: a, b (J,) rows of the blocks, b = -1: a fixed place · start (J+1,) first point of each;
-    xi_a, xi_b (P, 3) [m] of the points in the blocks · weight (P,) [m²] · normal (J, 2, 3) in block a and in b · law (J, 6) ·
-    peak: place of the largest traction."""
+    xi_a, xi_b (P, 3) [m] of the points in the blocks · weight (P,) [m²] · normal (J, 2, 3) in block a and in b ·
+    law (J, 6) · peak: place of the largest traction."""
 
     a: Ints
     b: Ints

@@ -88,7 +88,9 @@ class Joints:
         self.xi_a = to_body(place, self.a[self.joint_of], centre, R)
         self.xi_b = to_body(place, self.b[self.joint_of], centre, R)
         normal = np.array([f.normal for f in faces]).reshape(-1, 3)
-        self.normal = np.stack([to_body(normal, rows, np.zeros_like(centre), R) for rows in (self.a, self.b)], 1)
+        self.normal = np.stack(
+            [to_body(normal, rows, np.zeros_like(centre), R) for rows in (self.a, self.b)], 1
+        )
         known = {law: _numbers(law) for law in dict.fromkeys(laws)}
         numbers = np.array([known[law] for law in laws]).reshape(-1, 5)
         unit, self.df, self.beta, self.kc, self.k0 = (column.copy() for column in numbers.T)
