@@ -138,6 +138,20 @@ def test_a_load_that_does_not_arrive_is_an_error():
         check_momentum(0.1, balance.error, 1e-8)
 
 
+def test_a_moment_from_nowhere_is_an_error_by_its_arm():
+    """A moment of 6 N m s that no line has, with an arm of 4 m, counts as an impulse of 1.5 N s, whatever its sign;
+    impulses of 3 N s were exchanged, and nothing has momentum that would count as well."""
+    for turned in ([0, 0, 0, 0, -6.0, 0], [0, 0, 0, 0, 0, 6.0]):
+        ledger = MomentumLedger(np.zeros(3), 4.0)
+        ledger.start(None, np.zeros(6))
+        lines = {name: np.zeros(6) for name in ("blocks_weight", "ground", "ground_joints")}
+        got = np.array(turned)
+        step = BlocksStep(after=got, lines=lines, held=np.zeros(6), received=np.zeros(6), exchanged=3.0)
+        balance = ledger.book(None, step)
+        assert balance.error == pytest.approx(0.5)
+        assert balance.residual == pytest.approx(got)
+
+
 def test_books_go_on_from_what_was_saved():
     ledger = MomentumLedger([1.0, 2.0, 3.0], 4.0)
     ledger.start(None, np.arange(6.0))

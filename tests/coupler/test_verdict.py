@@ -13,8 +13,8 @@ from coupler.results.history import read_history
 from coupler.run.summary import read_summary
 from coupler.verdict.damage import Rules
 from coupler.verdict.divisions import Divisions, in_words, member, storey
-from coupler.verdict.judge import verdict
-from coupler.verdict.watch import Watch
+from coupler.verdict.judge import _largest, places_of, verdict
+from coupler.verdict.watch import Peaks, Watch
 from coupler.verdict.words import sentences, unreached
 from tests.coupler.resumed import DRY, begin
 from yade_scripts.blocks.block import Block
@@ -200,6 +200,48 @@ def test_the_order_of_failure_goes_by_the_first_break(scene):
     assert reported["first_break"]["blocks"] == ["wall-1", "wall-0"]
     assert reported["first_break"]["place"] == pytest.approx([5.0, 0.0, 1.0])
     assert reported["order"] == ["wall"]
+
+
+def test_a_joint_is_placed_at_the_middle_of_its_corners_at_the_start():
+    """A triangle and a square, which have moved since."""
+
+    class Moved:
+        def joint_polygons(self, at_start=False):
+            assert at_start
+            triangle = [[0.0, 0.0, 0.0], [3.0, 0.0, 0.0], [0.0, 3.0, 6.0]]
+            square = [[1.0, 1.0, 5.0], [3.0, 1.0, 5.0], [3.0, 3.0, 5.0], [1.0, 3.0, 5.0]]
+            return np.array(triangle + square), np.array([0, 3, 7])
+
+    assert places_of(Moved()).tolist() == [[1.0, 1.0, 2.0], [2.0, 2.0, 5.0]]
+    none = SimpleNamespace(joint_polygons=lambda at_start: (np.zeros((0, 3)), np.zeros(1, int)))
+    assert places_of(none).shape == (0, 3)
+
+
+def test_the_deepest_water_is_that_beside_a_body_that_is_judged():
+    """Three bodies, the first and the second of them judged, and a wall of no body; forces of all that is judged come
+    last. The deepest water, beside the third body, does not count, nor does that beside the first, which is shallower
+    than that beside the second."""
+    peaks = Peaks(np.array([0.4, 0.9, 1.5, 0.0]), np.array([1.0, 2.0, 3.0, np.nan]))
+    watch = SimpleNamespace(
+        divisions=SimpleNamespace(bodies=SimpleNamespace(label=np.array([0, 0, 1, -1, 2]))),
+        judged=np.array([True, True, True, True, False]),
+        force=Peaks(np.array([1.0, 2.0, 3.0, 7.0]), np.array([0.1, 0.2, 0.3, 0.7])),
+        moment=Peaks(np.array([4.0, 5.0, 0.0, 8.0]), np.array([0.4, 0.5, np.nan, 0.8])),
+        direction=np.arange(12.0).reshape(4, 3),
+        foot=-np.arange(12.0).reshape(4, 3),
+        depth=peaks,
+        depth_at=np.arange(8.0).reshape(4, 2),
+    )
+    assert _largest(watch, 3, judged=True) == {
+        "force": {"value": 7.0, "time": 0.7, "direction": [9.0, 10.0, 11.0]},
+        "moment": {"value": 8.0, "time": 0.8, "about": [-9.0, -10.0, -11.0]},
+        "depth": {"value": 0.9, "time": 2.0, "place": [2.0, 3.0]},
+    }
+    assert _largest(watch, 2) == {
+        "force": {"value": 3.0, "time": 0.3, "direction": [6.0, 7.0, 8.0]},
+        "moment": None,
+        "depth": {"value": 1.5, "time": 3.0, "place": [4.0, 5.0]},
+    }
 
 
 def test_a_run_tells_that_a_shot_broke_a_column(tmp_path):
