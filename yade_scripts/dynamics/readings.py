@@ -6,6 +6,7 @@ World coordinates and SI units; one row a block; motions and forces are six numb
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -37,6 +38,7 @@ class StructureReadings:
     fixed: Array
     gravity: Array
     joints: Joints | None
+    substep: Callable[[], float]
     _origin: Array
     _masses: Masses
     _scene: Scene
@@ -131,7 +133,8 @@ class StructureReadings:
 
     def tangent(self) -> tuple[sp.csr_array, sp.csr_array]:
         """(K, C), each (6n, 6n): secant stiffness and damping of live joints and of contacts; none of blocks asleep."""
-        return tangent.assemble(self._with_joints(self.contacts().springs(self._motion.x)), self.n)
+        springs = self.contacts().springs(self._motion.v, self._motion.x, self.substep())
+        return tangent.assemble(self._with_joints(springs), self.n)
 
     def secant_by_hand(self) -> sp.csr_array:
         """(6n, 6n): K of `tangent` where blocks are moved by hand (`displace`), which stretches no spring of
