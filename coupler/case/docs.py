@@ -59,7 +59,7 @@ def others_of(key: Key) -> Iterator[str]:
 
 
 WORDS = {
-    "wave": ("water.inflow", "water.inflow.kind", "water.sea", "water.fill"),
+    "wave": ("water.inflow", "water.inflow.kind", "water.sea", "water.fill", "water.fill.surface"),
     "tsunami": ("water.inflow", "water.inflow.kind", "water.sea"),
     "bore": ("water.inflow", "water.inflow.level", "water.inflow.ahead"),
     "quay": ("solid", "structure.wall"),
@@ -80,6 +80,11 @@ WORDS = {
     "house": ("structure.building", "structure.drawing", "structure.town"),
     "drawing": ("structure.drawing", "structure.file"),
     "container": ("structure.block",),
+    "sphere": ("structure.block.diameter", "structure.block.faces", "structure.rubble"),
+    "ball": ("structure.block.diameter", "structure.block.faces"),
+    "boulder": ("structure.block.diameter", "structure.rubble"),
+    "slosh": ("water.fill.surface", "water.fill.slope"),
+    "tilt": ("water.fill.slope",),
     "debris": ("structure.rubble", "verdict.hit_speed"),
     "roof": ("structure.building.roof",),
     "window": ("structure.building.opening",),

@@ -103,7 +103,7 @@ _SIGNS = {"gt": "> ", "ge": "≥ ", "lt": "< ", "le": "≤ "}
 def _limits(field: FieldInfo, parts: list) -> str:
     choices = _choices(field.annotation)
     if choices:
-        return " | ".join(choices)
+        return " | ".join(map(str, choices))
     found = []
     for part in parts:
         if isinstance(part, annotated_types.BaseMetadata | InSI):

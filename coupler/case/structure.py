@@ -26,7 +26,8 @@ from coupler.case.units import InSI
 
 
 class Block(Section):
-    """One rigid block that moves: a box (size) or a convex polyhedron (vertices)."""
+    """One rigid block that moves: a box (size), a convex polyhedron (vertices), or one that stands for a sphere
+    (diameter)."""
 
     name: Name = Field(description="for joints, gauges, motions and results; one block a name")
     centre: Point | None = Field(
@@ -38,6 +39,17 @@ class Block(Section):
         None,
         description="corners of a convex polyhedron in any order, its faces are found; with a centre from any origin",
         examples=[[[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]],
+    )
+    diameter: PositiveLength | None = Field(
+        None,
+        description="of a sphere, made as a polyhedron with flat faces and the volume of the sphere; its inertia is "
+        "that of the sphere within 0.1 % (20 faces: 1.1 %). It rolls over its edges",
+        examples=["30 cm"],
+    )
+    faces: Literal[20, 80, 320] | None = Field(
+        None,
+        description="triangles of a sphere; absent: 80. Its corners reach 18, 4.6, 1.2 % of the radius beyond the "
+        "sphere; contact and cutting cost in proportion",
     )
     rotation: Rotation | None = Field(
         None, description="turn about the centre of mass; absent: along the axes"

@@ -11,6 +11,7 @@ from coupler.case.types import (
     Density,
     Length,
     Name,
+    Number,
     Point,
     PositiveLength,
     PositiveTime,
@@ -27,12 +28,26 @@ File = Annotated[str, Field(min_length=1)]
 
 
 class Fill(Section):
-    """A box full of water at the start; solids and blocks in it displace the water."""
+    """A box of water at the start, full unless slope or surface say otherwise; solids and blocks in it displace the
+    water."""
 
     lower: Point = Field(description="corner with the smallest coordinates", examples=[[0, 0, 0]])
     upper: Point = Field(description="corner with the largest coordinates", examples=[[20, 24, 10]])
     velocity: tuple[Velocity, Velocity, Velocity] = Field(
         (0.0, 0.0, 0.0), description="velocity of its water at the start", examples=[[3, 0, 0]]
+    )
+    slope: tuple[Number, Number] | None = Field(
+        None,
+        description="rise of its surface over a length along x and y, as shares; in the middle of the box the surface "
+        "is at upper[2]. Absent: level",
+        examples=[[0.02, 0]],
+    )
+    surface: File | None = Field(
+        None,
+        description="instead: heights z [m] of its surface in coordinates of the tank, as a wave that has come in, or "
+        "a mode of a basin: rows of x, y, z (.csv) or a raster as terrain.path, from the directory of the case. The "
+        "water fills the box up to them; upper[2] is the highest that they may be",
+        examples=["start.csv"],
     )
 
 

@@ -38,6 +38,8 @@ LIGHTEST, HEAVIEST = 5.0, 25e3
 """Densities [kg/m3] between which solids lie: foam and platinum."""
 FALLEN = 0.01
 """Share of its strength that a law may carry at the opening at failure without a remark."""
+SHAPES = {"size": "box", "diameter": "sphere"}
+"""What a block is by the name that gives its shape, where it needs a centre."""
 WEAKEST = 1.0
 """Strength [Pa] below which a joint holds nothing: a millimetre of stone weighs more."""
 
@@ -275,15 +277,22 @@ def _shapes(case: Case) -> Iterator[Problem]:
     structure = case.structure
     for i, block in enumerate(structure.block if structure else ()):
         path = ("structure", "block", i)
-        if block.size is None and block.vertices is None:
+        given = [name for name in ("size", "vertices", "diameter") if getattr(block, name) is not None]
+        if not given:
             yield (
                 (*path, "size"),
-                "missing; give size (edges of a box) or vertices (corners of a convex polyhedron)",
+                "missing; give size (edges of a box), vertices (corners of a convex polyhedron) or diameter (a sphere, "
+                "made as a polyhedron)",
             )
-        elif block.size is not None and block.vertices is not None:
-            yield (*path, "vertices"), "size is given as well; a block is a box or a polyhedron"
-        elif block.size is not None and block.centre is None:
-            yield (*path, "centre"), "missing; centre of mass of the box at the start [m]"
+        elif len(given) > 1:
+            yield (
+                (*path, given[1]),
+                f"{given[0]} is given as well; a block is a box, a polyhedron or a sphere",
+            )
+        elif given != ["vertices"] and block.centre is None:
+            yield (*path, "centre"), f"missing; centre of mass of the {SHAPES[given[0]]} at the start [m]"
+        if block.faces is not None and block.diameter is None:
+            yield (*path, "faces"), "is for a sphere (diameter); leave it out"
     for i, column in enumerate(structure.column if structure else ()):
         path = ("structure", "column", i)
         if (column.size is None) == (column.radius is None):

@@ -9,14 +9,17 @@ from collections.abc import Iterator
 import numpy as np
 
 from coupler.case.case import Case
+from coupler.case.paths import BadPath
 from coupler.case.structure import Building
 from coupler.case.types import KeyPath
 from coupler.geometry.basin import basin_problem, outside_of
 from coupler.geometry.bodies import Body, overlap_depth
 from coupler.geometry.parts import Part, standing_on_terrain
 from coupler.geometry.solids import solids_of
+from coupler.geometry.start_surfaces import surface_of
 from coupler.geometry.tank_mesh import beside_mesh, is_basin, is_measured, mesh_of, tank_places, what_of
 from coupler.geometry.tank_regions import BYTES_PER_CELL
+from coupler.geometry.terrain.grid import TerrainError
 
 Problem = tuple[KeyPath, str]
 Placed = tuple[KeyPath, str, Body]
@@ -111,9 +114,50 @@ def _memory(case: Case) -> Iterator[Problem]:
 def _fills(case: Case) -> Iterator[Problem]:
     for i, fill in enumerate(case.water.fill if case.water else ()):
         path = ("water", "fill", i)
-        yield from _corners_in_order(path, fill)
+        disorder = list(_corners_in_order(path, fill))
+        yield from disorder
+        if not disorder:
+            yield from _start_surface(case, path, fill)
         if case.tank is not None and case.tank.is_box:  # a basin of any shape cuts its boxes of water
             yield from _beyond_tank(case, path, f"water fill {i}", np.array([fill.lower, fill.upper]))
+
+
+def _start_surface(case: Case, path: KeyPath, fill) -> Iterator[Problem]:
+    """A surface of the water that cannot be read, does not cover its box, or lies beside it."""
+    if fill.slope is not None and fill.surface is not None:
+        yield (*path, "slope"), "the surface is given by a file as well; leave one of them out"
+        return
+    try:
+        surface = surface_of(fill)
+    except (TerrainError, BadPath) as error:
+        yield (*path, "surface"), str(error)
+        return
+    if surface is None:
+        return
+    key = (*path, "slope" if fill.surface is None else "surface")
+    x, y, z = surface.sampled()
+    unknown = ~np.isfinite(z)
+    if unknown.any():
+        yield (
+            key,
+            f"has no height over {unknown.mean():.1%} of the box of water, for instance at ({x[unknown][0]:.6g}, "
+            f"{y[unknown][0]:.6g}) m: its points must cover the box, in coordinates of the tank",
+        )
+        return
+    top = int(z.argmax())
+    if z[top] <= fill.lower[2]:
+        yield (
+            key,
+            f"lies at z = {z.min():.4g} to {z[top]:.4g} m, below the box of water (z = {fill.lower[2]:g} m)",
+        )
+    limit, what = fill.upper[2], "upper[2] of the box"
+    if fill.surface is None:
+        limit, what = (case.tank.upper[2], "the top of the tank") if case.tank is not None else (math.inf, "")
+    if z[top] > limit + TOUCH * (fill.upper[2] - fill.lower[2]):
+        yield (
+            key,
+            f"rises to z = {z[top]:.4g} m at ({x[top]:.6g}, {y[top]:.6g}) m, above {what} ({limit:g} m)",
+        )
 
 
 def _beyond_tank(case: Case, path: KeyPath, name: str, bounds: np.ndarray) -> Iterator[Problem]:

@@ -126,6 +126,7 @@ def _place_files(table: dict, directory: Path) -> list[tuple[KeyPath, str]]:
     later."""
     found = [((*path, "path"), entry, "path") for path, entry in _named_files(table)]
     found += [((*path, "tide", "path"), tide, "path") for path, tide in _tides(table)]
+    found += [((*path, "surface"), fill, "surface") for path, fill in _tables_of_water(table, "fill")]
     if isinstance(table.get("tank"), dict):
         found.append((("tank", "mesh"), table["tank"], "mesh"))
     if isinstance(table.get("terrain"), dict):
@@ -156,10 +157,17 @@ def _named_files(table: dict) -> Iterator[tuple[KeyPath, dict]]:
 
 def _tides(table: dict) -> Iterator[tuple[KeyPath, dict]]:
     """The tides of seas, with the places of the seas."""
-    seas = table["water"].get("sea") if isinstance(table.get("water"), dict) else None
-    for i, sea in enumerate(seas if isinstance(seas, list) else ()):
-        if isinstance(sea, dict) and isinstance(sea.get("tide"), dict):
-            yield ("water", "sea", i), sea["tide"]
+    for path, sea in _tables_of_water(table, "sea"):
+        if isinstance(sea.get("tide"), dict):
+            yield path, sea["tide"]
+
+
+def _tables_of_water(table: dict, name: str) -> Iterator[tuple[KeyPath, dict]]:
+    """The tables [[water.NAME]] with their places."""
+    entries = table["water"].get(name) if isinstance(table.get("water"), dict) else None
+    for i, entry in enumerate(entries if isinstance(entries, list) else ()):
+        if isinstance(entry, dict):
+            yield ("water", name, i), entry
 
 
 class _Places:

@@ -18,6 +18,7 @@ from coupler.geometry.drawing.drawing import Cut, cut_drawing, in_words
 from coupler.geometry.drawing.reading import BadDrawing
 from coupler.geometry.parts import parts_of
 from coupler.geometry.solids import solids_of
+from coupler.geometry.start_surfaces import surface_of
 from coupler.program import terminal
 from coupler.program.errors import BadCase
 from coupler.program.extras import missing
@@ -178,12 +179,14 @@ def draw_case(case: Case, picture: Path) -> None:
     bodies += [("solid", solid.vertices, solid.faces) for solid in solids_of(case)]
     bed = _bed_triangles(case)
     fills = case.water.fill if case.water else ()
+    own_top = [] if len(bed) else [fill for fill in fills if surface_of(fill) is not None]
     for fill in fills if not len(bed) else ():
-        bodies.append((WATER, Body.between(fill.lower, fill.upper).vertices, None))
+        if fill not in own_top:
+            bodies.append((WATER, Body.between(fill.lower, fill.upper).vertices, None))
     names = sorted({name for name, *_ in bodies} - {WATER}) + [BED] * bool(len(bed)) + [WATER] * bool(fills)
     triangles, part, edges = [bed], [np.full(len(bed), names.index(BED) if len(bed) else 0)], []
-    for fill in fills if len(bed) else ():
-        triangles.append(_surface_over(bed, fill))
+    for fill in fills if len(bed) else own_top:
+        triangles.append(_surface_over(bed if len(bed) else _floor(fill), fill))
         part.append(np.full(len(triangles[-1]), names.index(WATER)))
     for name, x, faces in bodies:
         own = fans(faces if faces is not None else hull_faces(name, x, 1e-9))[0]
@@ -200,10 +203,19 @@ def _bed_triangles(case: Case) -> np.ndarray:
     """(t, 3, 3) [m] of the ground under the tank; none without a terrain."""
     if case.tank is None or case.tank.ground is None:
         return np.zeros((0, 3, 3))
-    x, y = (np.linspace(case.tank.lower[k], case.tank.upper[k], BED_POINTS) for k in (0, 1))
-    X, Y = np.meshgrid(x, y, indexing="ij")
-    z = case.tank.ground(X.ravel(), Y.ravel())
-    points = np.column_stack([X.ravel(), Y.ravel(), z])
+    return _raster(case.tank.lower, case.tank.upper, case.tank.ground)
+
+
+def _floor(fill) -> np.ndarray:
+    """(t, 3, 3) [m] of the underside of a box of water."""
+    return _raster(fill.lower, fill.upper, lambda x, y: np.full(x.shape, fill.lower[2]))
+
+
+def _raster(lower, upper, heights) -> np.ndarray:
+    """(t, 3, 3) [m] of heights(x, y) over the rectangle between two corners."""
+    x, y = (np.linspace(lower[k], upper[k], BED_POINTS) for k in (0, 1))
+    X, Y = (a.ravel() for a in np.meshgrid(x, y, indexing="ij"))
+    points = np.column_stack([X, Y, heights(X, Y)])
     i, j = np.meshgrid(np.arange(BED_POINTS - 1), np.arange(BED_POINTS - 1), indexing="ij")
     a = (i * BED_POINTS + j).ravel()
     rows = np.concatenate(
@@ -220,8 +232,9 @@ def _surface_over(bed: np.ndarray, fill) -> np.ndarray:
     """(t, 3, 3) [m] the surface of a box of water where the ground lies below it."""
     middle = bed.mean(axis=1)
     inside = ((middle >= fill.lower) & (middle <= fill.upper))[:, :2].all(axis=1)
-    found = bed[inside & (middle[:, 2] < fill.upper[2])].copy()
-    found[:, :, 2] = fill.upper[2]
+    top = surface_of(fill)
+    found = bed[inside & (middle[:, 2] < (fill.upper[2] if top is None else top(middle)))].copy()
+    found[:, :, 2] = fill.upper[2] if top is None else top(found.reshape(-1, 3)).reshape(-1, 3)
     return found
 
 

@@ -121,6 +121,11 @@ def _single(spec, common: dict) -> list:
     }
     if spec.size is not None:
         return [Block(spec.name, np.array(spec.centre), size=np.array(spec.size), **more)]
+    if spec.diameter is not None:
+        from yade_scripts.blocks.generators.sphere import sphere_vertices
+
+        vertices = sphere_vertices(0.5 * spec.diameter, spec.faces or 80)
+        return [Block(spec.name, np.array(spec.centre), vertices=vertices, **more)]
     block = Block.standing(spec.name, np.array(spec.vertices), **more)
     return [block if spec.centre is None else block.changed(centre=np.array(spec.centre))]
 

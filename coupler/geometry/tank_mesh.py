@@ -16,6 +16,7 @@ from coupler.case.paths import stamp
 from coupler.case.types import KeyPath
 from coupler.geometry.basin import basin_problem
 from coupler.geometry.mesh_files import MeshFileError
+from coupler.geometry.start_surfaces import surface_of
 from coupler.geometry.stretches import axes_of
 from coupler.geometry.tank_regions import regions_of, stretch_problems, too_many
 from coupler.geometry.terrain.bed_mesh import fitted_of
@@ -385,7 +386,14 @@ def _sides(case: Case, mesh) -> Iterator[Problem]:
 
 
 def _within(points: Array, box) -> Array:
-    return np.all((points >= box.lower) & (points <= box.upper), axis=1)
+    """(n,) bool: points (n, 3) in the water of a box."""
+    top = surface_of(box)
+    inside = np.all((points >= box.lower)[:, :2] & (points <= box.upper)[:, :2], axis=1)
+    return (
+        inside
+        & (points[:, 2] >= box.lower[2])
+        & (points[:, 2] <= (box.upper[2] if top is None else top(points)))
+    )
 
 
 @lru_cache(maxsize=1)

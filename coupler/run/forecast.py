@@ -13,12 +13,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from coupler.case.case import Case
 from coupler.case.inflow_records import record_of
 from coupler.case.schedule import Schedule, checkpoint_interval
 from coupler.checks.places import BYTES_PER_CELL, mesh_size
+from coupler.geometry import start_surfaces
 from coupler.geometry.tank_mesh import finest_cell, water_in
 from coupler.program.terminal import Row, lines
 from coupler.step.observe import joint_counts
@@ -135,7 +134,7 @@ def _checkpoint_bytes(case: Case) -> float:
 def _water_rows(case: Case, interval: float, rows: list[Row]) -> float:
     """Rows of the water; the step [s] that its greatest speed allows."""
     cells, nodes = mesh_size(case.tank)
-    volume = sum(float(np.prod(np.subtract(f.upper, f.lower))) for f in case.water.fill)
+    volume = sum(start_surfaces.volume(fill) for fill in case.water.fill)
     if not case.tank.is_box:
         volume = water_in(case.tank, case.water.fill)
     height = _highest(case) - case.tank.lower[2]
@@ -156,7 +155,7 @@ def _water_rows(case: Case, interval: float, rows: list[Row]) -> float:
 
 def _highest(case: Case) -> float:
     """Height z [m] of the highest water: in the boxes at the start, of a sea, or that comes in."""
-    found = [box.upper[2] for box in case.water.fill]
+    found = [start_surfaces.highest(fill) for fill in case.water.fill]
     found += [sea.level + (sea.tide.amplitude or 0.0 if sea.tide else 0.0) for sea in case.water.sea]
     for spec in case.water.inflow:
         if spec.kind == "record":

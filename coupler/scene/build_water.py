@@ -9,6 +9,7 @@ import numpy as np
 from array_types import Array
 from coupler.case.case import Case
 from coupler.case.inflow_records import levels_of, record_of
+from coupler.geometry.start_surfaces import surface_of
 from coupler.geometry.tank_mesh import bed_along, bed_under, floor_along, mean_bed, mesh_of, on_side
 from coupler.geometry.terrain.land import friction_of
 from coupler.program.errors import SurgebreakError
@@ -57,7 +58,8 @@ def water_of(case: Case, structure, solids, mesh=None):
     boxes = [_reaching(case.tank, fill) for fill in w.fill] + _strips(case)
     velocity = None
     if boxes:
-        level = start_level(boxes, _walls(case.tank), mesh, immersion.domain)
+        tops = [surface_of(fill) for fill in w.fill]
+        level = start_level(boxes, _walls(case.tank), mesh, immersion.domain, tops)
         velocity = start_velocity(boxes, [fill.velocity for fill in w.fill], immersion.domain.nodes)
     opened, smooth = sides_named(case.tank.open, mesh), sides_named(case.tank.smooth, mesh)
     water = Water(

@@ -1,5 +1,8 @@
 """Where the water stands at the start: boxes of a case → level set at the nodes of the physical domain.
 
+The top of a box may be a surface that is not level (`StartSurface`). Such a box goes on upwards to the top of the tank,
+and its water ends at the surface, wherever solids are: level = max(that of the box, distance to the surface).
+
 A fill box often ends at a wall. That side is no surface: left as it is, the level set would be zero in the face of
 the wall and the water there without pressure; and beside a thin wall the copies of its nodes on the dry side would
 count as wet. So a side of a box counts at a node only where water and air can meet in the cells around it:
@@ -17,11 +20,14 @@ cells around a node is dry for lying beyond a side alone, this is no surface the
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 
 from array_types import Array
+from coupler.geometry.start_surfaces import StartSurface
 from fluid.domain.quadrature import part_points
 
 TOUCHES = 0.1
@@ -34,14 +40,27 @@ SEAM = 1e-6
 """Share of a cell edge within which two boxes touch."""
 
 
-def start_level(boxes, tank, mesh, domain) -> Array:
+class _Box(NamedTuple):
+    """lower, upper (3,) [m]; top: its surface where it is not level, and then upper[2] lies above the tank."""
+
+    lower: Sequence[float]
+    upper: Sequence[float]
+    top: StartSurface | None = None
+
+    def above(self, points: Array, slack: float = 0.0) -> Array:
+        """(n,) bool: points (n, 3) more than slack [m] above a surface that is not level."""
+        return np.zeros(len(points), bool) if self.top is None else points[:, 2] > self.top(points) + slack
+
+
+def start_level(boxes, tank, mesh, domain, tops=()) -> Array:
     """Level set (N,) [m] of the union of the boxes at the nodes of a PhysicalDomain, negative in the water.
 
-    boxes: list of (lower (3,), upper (3,)) [m] · tank: (lower, upper) of the tank, whose walls are no surfaces either.
+    boxes: list of (lower (3,), upper (3,)) [m] · tank: (lower, upper) of the tank, whose walls are no surfaces either ·
+    tops: of the first boxes the surface (`StartSurface`), None where it is level.
     """
     low, high = _reach(domain.nodes, domain.cells, *_fluid_extent(domain))
     edge = _cell_edge(mesh)
-    boxes = merged(boxes, SEAM * edge)
+    boxes = _with_tops(boxes, tops, tank, SEAM * edge)
     whole_low, whole_high = _reach(mesh.nodes, mesh.cells, *_extent(mesh.nodes[mesh.cells]))
     edges = edge * _relative_size(mesh)[domain.parent_node]
     cut_low = low - whole_low[domain.parent_node] > MISSING * edges[:, None]
@@ -50,12 +69,31 @@ def start_level(boxes, tank, mesh, domain) -> Array:
     stars = (domain.nodes, low, high, cut_low & faced_low, cut_high & faced_high)
     hidden = _hidden_sides(boxes, tank, domain, FLUSH * edge)
     levels = np.array([_box_level(box, tank, stars, edges, *of) for box, of in zip(boxes, hidden)])
+    for box, of_box in zip(boxes, levels):
+        if box.top is not None:
+            np.maximum(of_box, box.top.distance(domain.nodes, 0.5 * edge), out=of_box)
     level = levels.min(axis=0)
     inner = np.array([_goes_on(box, tank, *of) for box, of in zip(boxes, hidden)])
     others = np.where(inner, np.inf, levels).min(axis=0)  # a surface near the node is one of theirs
     deep = inner.any(axis=0)
     level[deep] = np.where(others < 0.0, np.maximum(others, -edges), -edges)[deep]
     return _without_seams(level, boxes, tank, domain.nodes, edge)
+
+
+def _with_tops(boxes, tops, tank, slack: float) -> list[_Box]:
+    """Boxes under one surface that make one box together as that one; those whose surface is not level end above the
+    tank."""
+    above = max(tank[1][2], *(high[2] for _, high in boxes)) + 1.0
+    under: dict[object, list] = {}
+    for (low, high), top in zip(boxes, [*tops, *[None] * (len(boxes) - len(tops))]):
+        end = high if top is None else (*high[:2], above)
+        under.setdefault(None if top is None else top.heights, []).append((low, end))
+    found = []
+    for heights, own in under.items():
+        for low, high in merged(own, slack):
+            top = None if heights is None else StartSurface(heights, np.array(low), np.array(high))
+            found.append(_Box(low, high, top))
+    return found
 
 
 class _Corners:
@@ -92,10 +130,11 @@ def _hidden_sides(boxes, tank, domain, slack: float) -> list[tuple[Array, Array]
     corners, (tank_low, tank_high) = _Corners(domain), tank
     dry = ~np.any([_in_box(box, tank, corners.points, slack) for box in boxes], axis=0)
     hidden = []
-    for low, high in boxes:
-        below = (corners.points < np.array(low) - slack) & (np.array(low) > tank_low)
-        above = (corners.points > np.array(high) + slack) & (np.array(high) < tank_high)
-        beyond = below.sum(axis=1) + above.sum(axis=1)
+    for box in boxes:
+        low, high = np.array(box.lower), np.array(box.upper)
+        below = (corners.points < low - slack) & (low > tank_low)
+        above = (corners.points > high + slack) & (high < tank_high)
+        beyond = below.sum(axis=1) + above.sum(axis=1) + box.above(corners.points, slack)
         meets = corners.beside & corners.around(beyond == 0)
         sides = []
         for past in (below, above):
@@ -175,6 +214,9 @@ def _without_seams(level, boxes, tank, nodes, edge: float) -> Array:
     at = at[held.any(axis=0).all(axis=0) & ~held.all(axis=1).any(axis=0)]
     if len(at) > 0:
         ways = [_reach_of(boxes, tank, nodes[at], k, sign, step) for k in range(3) for sign in (-1, 1)]
+        under = [-box.top.distance(nodes[at], 0.5 * edge) for box in boxes if box.top is not None]
+        if under:
+            ways.append(np.max(under, axis=0))
         level[at] = -np.min(ways, axis=0)
     return level
 
@@ -185,7 +227,7 @@ def _reach_of(boxes, tank, points, axis: int, sign: int, step: float) -> Array:
     for box in list(boxes) * len(boxes):  # from box to box, at most through all of them
         ahead = points.copy()
         ahead[:, axis] += sign * (way + step)
-        end = box[0 if sign < 0 else 1][axis]
+        end = (box.lower if sign < 0 else box.upper)[axis]
         goes_on = end <= tank[0][axis] if sign < 0 else end >= tank[1][axis]
         far = whole if goes_on else sign * (end - points[:, axis])
         way = np.where(_in_box(box, tank, ahead, 0.5 * step), np.maximum(way, far), way)
@@ -194,16 +236,16 @@ def _reach_of(boxes, tank, points, axis: int, sign: int, step: float) -> Array:
 
 def _in_box(box, tank, points, slack: float = 0.0) -> Array:
     """(n,) bool: inside the box, which goes on beyond the walls of the tank that it reaches."""
-    (box_low, box_high), (tank_low, tank_high) = np.array(box), np.array(tank)
+    box_low, box_high, (tank_low, tank_high) = np.array(box.lower), np.array(box.upper), np.array(tank)
     low = np.where(box_low > tank_low, box_low - slack, -np.inf)
     high = np.where(box_high < tank_high, box_high + slack, np.inf)
-    return np.all((points > low) & (points < high), axis=1)
+    return np.all((points > low) & (points < high), axis=1) & ~box.above(points, slack)
 
 
 def _box_level(box, tank, stars, edge: Array, hidden_low: Array, hidden_high: Array) -> Array:
     """Signed distance (N,) of one box, its sides at solids and tank walls left out, hidden ones a cell off at least."""
     nodes, low, high, cut_low, cut_high = stars
-    (box_low, box_high), (tank_low, tank_high) = box, tank
+    (box_low, box_high, _), (tank_low, tank_high) = box, tank
     level = np.full(len(nodes), -np.inf)
     for k in range(3):
         x = nodes[:, k]
@@ -225,7 +267,9 @@ def _box_level(box, tank, stars, edge: Array, hidden_low: Array, hidden_high: Ar
 
 def _goes_on(box, tank, hidden_low: Array, hidden_high: Array) -> Array:
     """Nodes (N,) bool at which no side of a box is a surface."""
-    sides_low, sides_high = np.array(box[0]) > tank[0], np.array(box[1]) < tank[1]
+    sides_low, sides_high = np.array(box.lower) > tank[0], np.array(box.upper) < tank[1]
+    if box.top is not None:
+        return np.zeros(len(hidden_low), bool)
     return (
         (hidden_low | ~sides_low).all(axis=1)
         & (hidden_high | ~sides_high).all(axis=1)

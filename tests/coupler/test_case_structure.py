@@ -85,6 +85,19 @@ def made(folder, text, *overrides):
     return {block.name: block for part in parts_of(case) for block in part.blocks}
 
 
+@pytest.mark.parametrize(("faces", "inertia"), [(20, 1.02), (80, 1.001), (320, 1.0001)])
+def test_a_block_with_a_diameter_has_volume_and_inertia_of_the_sphere(faces, inertia, tmp_path):
+    text = f'[[structure.block]]\nname = "ball"\ncentre = [1, 2, 3]\ndiameter = 0.4\nfaces = {faces}\n'
+    ball = made(tmp_path, text)["ball"]
+    mass = 2000.0 * np.pi / 6.0 * 0.4**3
+    assert ball.mass == pytest.approx(mass, rel=1e-12)
+    assert len(ball.faces) == faces
+    np.testing.assert_allclose(ball.centre, [1, 2, 3])
+    moments = np.linalg.eigvalsh(ball.inertia) / (0.4 * mass * 0.2**2)
+    assert (moments >= 1.0).all()
+    assert (moments <= inertia).all()
+
+
 def test_a_polyhedron_stands_where_its_vertices_are(tmp_path):
     block = made(tmp_path, BLOCK)["wedge"]
     np.testing.assert_allclose(block.centre, [0.25] * 3, rtol=1e-12)
@@ -135,11 +148,17 @@ def test_gauges_find_blocks_groups_and_parts(tmp_path):
     ("text", "wrong", "right", "message"),
     [
         (BLOCK, "", "vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]\n",
-         "9: structure.block[0].size: missing; give size (edges of a box) or vertices"),
+         "9: structure.block[0].size: missing; give size (edges of a box), vertices"),
         (BLOCK, "size = [1, 1, 1]", "vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]",
          "9: structure.block[0].centre: missing; centre of mass of the box"),
         (BLOCK, 'name = "wedge"\nsize = [1, 1, 1]', 'name = "wedge"',
          "12: structure.block[0].vertices: size is given as well"),
+        (BLOCK, "diameter = 1", "vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]",
+         "9: structure.block[0].centre: missing; centre of mass of the sphere"),
+        (BLOCK, "diameter = 1\nfaces = 40", "vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]",
+         "12: structure.block[0].faces: 40"),
+        (BLOCK, 'name = "wedge"\nfaces = 80', 'name = "wedge"',
+         "11: structure.block[0].faces: is for a sphere (diameter)"),
         (BLOCK, "[1, 1, 0]]", "[0, 0, 1]]",
          "9: structure.block[0]: block 'wedge': its 4 vertices span no volume"),
         (BLOCK, "[0, 0, 1], [0.1, 0.1, 0.1]]", "[0, 0, 1]]",

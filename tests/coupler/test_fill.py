@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from coupler.geometry.start_surfaces import StartSurface
 from coupler.scene.fill import merged, start_level, start_velocity
 from fluid.cut.bodies import ConvexBodies
 from fluid.domain.physical_domain import cut_domain
@@ -108,3 +109,80 @@ def test_water_around_a_hull_is_at_rest_at_its_lower_edges_too(covers):
     for _ in range(5):
         advance(water)
     assert np.abs(water.velocity).max() < 1e-8
+
+
+def sloped(heights, box):
+    return StartSurface(heights, np.array(box[0]), np.array(box[1]))
+
+
+def water_under(heights, boxes, solid=None, covers="single", cell=CELL):
+    """Water in boxes that end at one surface, in the tank with fixed bodies or none."""
+    mesh = box_mesh(*TANK, cell)
+    domain = cut_domain(mesh, ConvexBodies.empty() if solid is None else solid, covers)
+    tops = [sloped(heights, box) for box in boxes]
+    return Water(mesh, domain, start_level(boxes, TANK, mesh, domain, tops), WaterParameters())
+
+
+WHOLE = ((0.0, 0.0, 0.0), (1.0, 0.5, 0.3))
+HALVES = [((0.0, 0.0, 0.0), (0.43, 0.5, 0.3)), ((0.43, 0.0, 0.0), (1.0, 0.5, 0.3))]
+
+
+@pytest.mark.parametrize("boxes", [[WHOLE], HALVES], ids=["one", "side by side"])
+def test_a_plane_that_is_not_level_has_its_exact_volume(boxes):
+    water = water_under(lambda x, y: 0.25 + 0.13 * (x - 0.5) + 0.07 * (y - 0.25), boxes)
+    assert water.volume() == pytest.approx(0.125, rel=1e-12)
+
+
+def test_a_curved_surface_comes_to_its_volume_with_the_square_of_the_cells():
+    """η = 0.2 + 0.2 x²: 0.5 (0.2 + 0.2/3) m³."""
+    exact = 0.5 * (0.2 + 0.2 / 3.0)
+    off = [
+        abs(water_under(lambda x, y: 0.2 + 0.2 * x**2, [WHOLE], cell=h).volume() - exact)
+        for h in (0.125, 0.0625)
+    ]
+    assert off[0] < 0.01 * exact
+    assert off[1] < 0.35 * off[0]
+
+
+def test_a_surface_from_a_file_that_is_level_stays_level_around_a_hull():
+    """As with the level top of a box: nothing moves beside the edges of the hull."""
+    low, high, top = np.array([0.257, 0.154, 0.152]), np.array([0.643, 0.371, 0.6]), 0.33
+    solid = ConvexBodies.boxes(0.5 * (low + high)[None], (high - low)[None])
+    for covers in ("single", "multiple"):
+        boxes = [((0.0, 0.0, 0.0), (low[0], 0.5, 0.4)), ((low[0], 0.0, 0.0), (1.0, 0.5, 0.4))]
+        water = water_under(lambda x, y: np.full(x.shape, top), boxes, solid, covers)
+        plane = Water(water.mesh, water.domain, water.domain.nodes[:, 2] - top, WaterParameters())
+        np.testing.assert_allclose(water.nodal_water, plane.nodal_water, rtol=1e-12, atol=1e-18)
+        for _ in range(5):
+            advance(water)
+        assert np.abs(water.velocity).max() < 1e-8
+
+
+def test_a_box_under_a_slope_and_a_level_one_are_one_pool():
+    """A ramp of water that meets a level pool at its height: no seam between them."""
+    boxes = [((0.0, 0.0, 0.0), (0.5, 0.5, 0.4)), ((0.5, 0.0, 0.0), (1.0, 0.5, 0.25))]
+    mesh = box_mesh(*TANK, CELL)
+    domain = cut_domain(mesh, ConvexBodies.empty())
+    ramp = sloped(lambda x, y: 0.25 + 0.2 * (0.5 - x), boxes[0])
+    water = Water(mesh, domain, start_level(boxes, TANK, mesh, domain, [ramp]), WaterParameters())
+    assert water.volume() == pytest.approx(0.125 + 0.5 * 0.5 * 0.05, rel=3e-3)
+
+
+def test_the_first_mode_of_a_tank_from_a_slope_of_its_surface_swings_in_its_period():
+    """ω² = g k tanh(k h), k = π/L; a plane is the first mode but for 1/9 of the third and less."""
+    water = water_under(lambda x, y: 0.25 + 0.02 * (x - 0.5), [((0.0, 0.0, 0.0), (1.0, 0.5, 0.3))])
+    k = np.pi / 1.0
+    period = 2.0 * np.pi / np.sqrt(9.81 * k * np.tanh(k * 0.25))
+    steps = int(0.75 * period / 0.01)
+    moving = []
+    for _ in range(steps):
+        advance(water, 0.01)
+        moving.append(water.kinetic_energy())
+    time, moving = 0.01 * np.arange(1, steps + 1), np.array(moving)
+    near = np.abs(time - 0.5 * period) < 0.12 * period
+    fit = np.polyfit(time[near], moving[near], 2)  # it comes to rest on the other side after half a period
+    assert -0.5 * fit[1] / fit[0] == pytest.approx(0.5 * period, rel=0.03)
+    assert moving[near].min() < 0.1 * moving.max()
+    assert moving.max() == pytest.approx(
+        0.5 * 9810.0 * 0.5 * 0.02**2 / 12.0, rel=0.1
+    )  # the potential energy of the slope

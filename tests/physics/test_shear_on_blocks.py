@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from coupler.commands.verify.scenes import level_at, tank
-from coupler.commands.verify.spheres import sphere
 from coupler.step.shear import minmod
 from fluid.cut.bodies import ConvexBodies
 from fluid.domain.physical_domain import cut_domain
@@ -14,6 +13,7 @@ from fluid.step.water import Water
 from fluid.viscous.kernels import implicit_change, momentum_rate
 from fluid.viscous.viscosity import Viscosity
 from yade_scripts.blocks.block import Block
+from yade_scripts.blocks.generators.sphere import sphere_vertices
 from yade_scripts.dynamics.structure import Structure
 
 THICK = 200.0
@@ -53,7 +53,7 @@ def test_a_sphere_that_falls_steadily_does_so_at_any_step():
 
 def _speed_of_fall(dt, until=0.12):
     """[m/s] of a sphere of four cells and 1100 kg/m³ that reaches its speed of fall within 0.05 s; closed tank."""
-    block = Block("ball", (0.25, 0.25, 0.3), vertices=sphere(0.125, 1), density=1100.0)
+    block = Block("ball", (0.25, 0.25, 0.3), vertices=sphere_vertices(0.125), density=1100.0)
     with Structure([block]) as s:
         c = spinning_cube(s)
         while c.time < until * (1 - 1e-9):
@@ -71,7 +71,7 @@ def test_a_coarse_sphere_that_spins_feels_the_moment_of_stokes(cells, limit):
     grown = np.append(grown[grown < half - 0.3], half)
     axis = np.concatenate([-grown[::-1], fine, grown]) + 0.03
     mesh = box_mesh(None, None, axes=[axis] * 3)
-    ball = ConvexBodies.from_polyhedra([(sphere(radius), None)])
+    ball = ConvexBodies.from_polyhedra([(sphere_vertices(radius, 320), None)])
     water = Water(
         mesh, cut_domain(mesh, ball), level_at(9.0), WaterParameters(viscosity=1.0, walls="no-slip")
     )

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.signal import argrelextrema
-from scipy.spatial import ConvexHull
 
 from coupler.commands.verify.figures import columns
 from coupler.commands.verify.registry import Finding, check
@@ -19,21 +18,8 @@ from fluid.mesh.background import box_mesh
 from fluid.step.parameters import WaterParameters
 from fluid.step.water import Water
 from yade_scripts.blocks.block import Block
+from yade_scripts.blocks.generators.sphere import sphere_vertices
 from yade_scripts.dynamics.structure import Structure
-
-
-def sphere(radius: float, subdivisions: int = 2) -> np.ndarray:
-    """Corners (k, 3) [m] of a subdivided icosahedron (20 · 4^subdivisions faces) with the volume of the sphere."""
-    golden = 0.5 * (1.0 + np.sqrt(5.0))
-    corners = [(0, a, b * golden) for a in (-1, 1) for b in (-1, 1)]
-    x = np.array([np.roll(c, s) for c in corners for s in range(3)], float)
-    for _ in range(subdivisions):
-        x /= np.linalg.norm(x, axis=1)[:, None]
-        triangles = ConvexHull(x).simplices
-        edges = np.unique(np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0)
-        x = np.concatenate([x, 0.5 * (x[edges[:, 0]] + x[edges[:, 1]])])
-    x /= np.linalg.norm(x, axis=1)[:, None]
-    return x * radius * np.cbrt(4.0 / 3.0 * np.pi / ConvexHull(x).volume)
 
 
 def graded(low: float, high: float, fine: tuple[float, float], h: float, most: float, growth: float = 1.2):
@@ -83,7 +69,9 @@ def _heave(radius: float, cells: float, until: float):
     across = graded(-half, half, (-1.6 * radius, 1.6 * radius), h, 0.08)
     up = graded(0.0, depth + 1.6 * radius, (depth - 1.6 * radius, depth + 1.6 * radius), h, 0.08)
     density, g, drop = 998.2, 9.82, 0.2 * radius
-    block = Block("sphere", (0.0, 0.0, depth + drop), vertices=sphere(radius), density=0.5 * density)
+    block = Block(
+        "sphere", (0.0, 0.0, depth + drop), vertices=sphere_vertices(radius, 320), density=0.5 * density
+    )
     with Structure([block], gravity=(0, 0, -g)) as body:
         c = _scene((across, across, up), level_at(depth), body, WaterParameters(density=density, gravity=g))
         t, z = [0.0], [1.0]
@@ -131,7 +119,7 @@ def _fall(density: float, viscosity: float, cells: int):
     across = graded(-0.5 * side, 0.5 * side, (-0.9 * D, 0.9 * D), h, 0.015, 1.3)
     up = graded(0.0, height, (2.6 * D, height), h, 0.015, 1.3)
     settings = WaterParameters(density=density, viscosity=viscosity, walls="no-slip")
-    block = Block("sphere", (0.0, 0.0, 8.5 * D), vertices=sphere(0.5 * D, 1), density=1120.0)
+    block = Block("sphere", (0.0, 0.0, 8.5 * D), vertices=sphere_vertices(0.5 * D), density=1120.0)
     with Structure([block]) as body:
         c = _scene((across, across, up), level_at(1.0), body, settings, top)
         t, v, gap = [0.0], [0.0], [8.0]
