@@ -37,7 +37,7 @@ def explanation(name: str | None) -> str:
         return "\n".join(
             [f"'{name}' is no name of a case file; perhaps one of these is meant:", *map(_entry, found)]
         )
-    entries = [_entry(key), *others_of(key)]
+    entries = entries_of(key)
     for section in key.sections:
         entries += ["", inspect.getdoc(section) or ""]
         entries += [
@@ -46,16 +46,25 @@ def explanation(name: str | None) -> str:
     return "\n".join(entries)
 
 
-def others_of(key: Key) -> Iterator[str]:
-    """The same name in the other kinds of its section: gauge.kind is "level", "pressure" and others."""
+def entries_of(key: Key) -> list[str]:
+    """What a name means; in a section of several kinds, such as gauges and inflows, each meaning with the kinds that
+    have it."""
     above = key.path.rpartition(".")[0]
-    section = find(tuple(above.split(".")))
-    if not above or section is None:
-        return
-    for other in section.sections:
-        for inner in keys(other, f"{above}."):
-            if inner.path == key.path and _entry(inner) != _entry(key):
-                yield _entry(inner)
+    section = find(tuple(above.split("."))) if above else None
+    kinds: dict[str, list[str]] = {}
+    for kind in section.sections if section is not None else ():
+        for inner in keys(kind, f"{above}."):
+            if inner.path == key.path:
+                kinds.setdefault(_entry(inner), []).append(_kind_of(kind))
+    if section is None or len(section.sections) < 2 or key.path.endswith(".kind"):
+        return list(kinds) or [_entry(key)]
+    return [f"{entry} [kind: {', '.join(names)}]" for entry, names in kinds.items()]
+
+
+def _kind_of(section: type[BaseModel]) -> str:
+    """The value of `kind` by which a section is told from others."""
+    field = section.model_fields.get("kind")
+    return ", ".join(get_args(field.annotation)) if field is not None else section.__name__
 
 
 WORDS = {

@@ -19,7 +19,10 @@ PLAIN = {
     "time": ("time that was reached", "s"),
     "joints": ("joints at the start", ""),
     "joints_broken": ("joints broken", ""),
-    "largest_water_force": ("largest force of the water on all bodies", "N"),
+    "largest_water_force": (
+        "largest force of the water on blocks that can move (all bodies if none can)",
+        "N",
+    ),
 }
 """Figures of run.json that are read where [sweep] has no quantities: what they are, their unit."""
 Problem = tuple[tuple[str | int, ...], str]

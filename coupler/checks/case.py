@@ -249,7 +249,11 @@ def _structure_sections(case: Case) -> Iterator[Problem]:
     if case.structure.sleep is not None and case.joints is None:
         yield ("structure", "sleep"), "needs [joints]: only blocks that joints hold fall asleep; leave it out"
     if case.contact is None and case.joints is None:
-        yield ("structure",), "blocks need a section [contact] with stiffness, restitution and friction"
+        yield (
+            ("structure",),
+            "blocks need [joints], which hold them together, or [contact] with a stiffness, where they lie loose; "
+            "write both where joints may break (with materials by name, as 'brick-masonry', both may be empty)",
+        )
     elif case.contact is not None and case.contact.stiffness is None and case.joints is None:
         yield ("contact",), "stiffness: missing; without [joints] there is nothing to take it from"
 

@@ -29,8 +29,8 @@ def joint_problems(case: Case, parts: list[Part]) -> Iterator[Problem]:
         if loose:
             yield (
                 ("structure",),
-                f"'{loose[0]}' has no joint, and {len(loose) - 1} more: blocks without joints need a section [contact] "
-                "with stiffness, restitution and friction",
+                f"'{loose[0]}' has no joint, and {len(loose) - 1} more: blocks without joints need a section "
+                "[contact], which may be empty",
             )
 
 

@@ -274,7 +274,7 @@ def _note(coupling, record, figures: dict) -> None:
         figures["numerical_impulse"] = record.momentum.scheme
         figures["volume_error"] = coupling.water.volume_error()
         largest("volume_error", abs(figures["volume_error"]))
-        largest("water_force", np.linalg.norm(record.load[:, :3].sum(axis=0)))
+        largest("water_force", np.linalg.norm(load_of_what_moves(coupling, record)))
     joints = None
     if coupling.structure is not None:
         joints = joint_counts(coupling.structure)
@@ -284,6 +284,16 @@ def _note(coupling, record, figures: dict) -> None:
             figures["sleep"] = coupling.structure.sleeps.figures()
         largest("opening_rate", record.opening_rate)
     note_work(figures.setdefault("work", {}), coupling, record, joints, figures["steps"])
+
+
+def load_of_what_moves(coupling, record) -> np.ndarray:
+    """Force (3,) [N] of the water on the blocks that can move; where none can, on all bodies. Ground, quays and
+    footings, which are held, bear many times the load of a house."""
+    force = record.load[:, :3]
+    if coupling.structure is not None:
+        free = np.flatnonzero(~coupling.structure.fixed)
+        force = force[free] if len(free) and len(force) else force
+    return force.sum(axis=0)
 
 
 def _is_calm(calm: Calm, coupling, record) -> bool:

@@ -309,7 +309,7 @@ def test_contact_is_asked_for_only_where_blocks_lie_loose(tmp_path):
     assert "structure: 'd' has no joint, and 0 more: blocks without joints need a section [contact]" in line
     assert load(write(tmp_path, bonded + third + "fixed = true\n"))
     (line,) = mistakes(tmp_path, bonded.replace(GLUE, ""))
-    assert "blocks need a section [contact]" in line
+    assert "blocks need [joints], which hold them together, or [contact]" in line
 
 
 def driven(velocity, *more):

@@ -166,7 +166,7 @@ def test_water_needs_a_tank(tmp_path):
 
 def test_blocks_need_contact(tmp_path):
     (line,) = mistakes(tmp_path, WATER + BLOCKS.replace('[contact]\nstiffness = "1 MN/m"\n', ""))
-    assert line.startswith("case.toml:14: structure: blocks need a section [contact]")
+    assert line.startswith("case.toml:14: structure: blocks need [joints], which hold them together")
 
 
 def test_an_empty_case_says_what_to_write(tmp_path):

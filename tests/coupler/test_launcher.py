@@ -174,6 +174,7 @@ def test_extras_come_with_the_command_that_needs_them(machine):
     assert pip_installs(machine("report", "r")[2]) == []
     assert pip_installs(machine("test")[2]) == ["[test]"]
     assert pip_installs(machine("benchmark")[2]) == ["[benchmark]"]
+    assert pip_installs(machine("blocks", "x.stl")[2]) == ["[drawing]"]
     assert pip_installs(machine("test", "render")[2]) == []
 
 
@@ -184,7 +185,9 @@ def test_a_run_installs_no_extra_and_compiles_nothing_by_itself(machine):
     assert machine("run", "x")[2] == ["surgebreak run x"]
 
 
-@pytest.mark.parametrize("command", ["run", "render", "report", "benchmark", "sweep", "docs", "test"])
+@pytest.mark.parametrize(
+    "command", ["run", "render", "report", "blocks", "benchmark", "sweep", "docs", "test"]
+)
 @pytest.mark.parametrize("word", ["--help", "-h"])
 def test_help_of_a_command_installs_none_of_its_extras(machine, command, word):
     """850 MB of pictures for a page of help was what the first user got."""

@@ -1,11 +1,14 @@
 """Loads split by what they come from: the parts add up to what the blocks do, and each is right where it is known."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from coupler.case.case import Case
 from coupler.checks.case import problems
 from coupler.results.loads import BlockLoads, GroupLoads, loads
+from coupler.run.run import load_of_what_moves
 from coupler.scene.build import build
 from tests.coupler.test_momentum import run, scene
 from tests.fakes import no_clock
@@ -175,3 +178,18 @@ def test_loads_that_cannot_be_are_refused(gauge, message):
 def test_water_without_weight_is_refused():
     case = wall_case().model_copy(update={"case": wall_case().case.model_copy(update={"gravity": 0.0})})
     assert any("water needs gravity" in text for _, text in problems(case))
+
+
+def test_the_largest_force_of_a_run_is_that_on_what_can_move():
+    """A quay that is held bears a thousand times the load of the house on it."""
+    force = np.array([[3.0, 4.0, 0.0, 0, 0, 0], [5000.0, 0.0, 0.0, 0, 0, 0]])
+    record = SimpleNamespace(load=force)
+    house = SimpleNamespace(structure=SimpleNamespace(fixed=np.array([False, True])))
+    quay = SimpleNamespace(structure=SimpleNamespace(fixed=np.array([True, True])))
+    np.testing.assert_array_equal(load_of_what_moves(house, record), [3.0, 4.0, 0.0])
+    np.testing.assert_array_equal(load_of_what_moves(quay, record), [5003.0, 4.0, 0.0])
+    np.testing.assert_array_equal(
+        load_of_what_moves(SimpleNamespace(structure=None), record), [5003.0, 4.0, 0.0]
+    )
+    nothing = SimpleNamespace(load=np.zeros((0, 6)))
+    np.testing.assert_array_equal(load_of_what_moves(house, nothing), np.zeros(3))

@@ -43,7 +43,10 @@ FIGURES = {
     "time": ("simulated time", "s"),
     "steps": ("steps", "1"),
     "substeps": ("substeps of the blocks", "1"),
-    "largest_water_force": ("largest force of the water on all bodies", "N"),
+    "largest_water_force": (
+        "largest force of the water on blocks that can move (all bodies if none can)",
+        "N",
+    ),
     "joints": ("joints at the start", "1"),
     "joints_broken": ("joints broken", "1"),
     "largest_opening_rate": ("largest opening in a substep, share of the opening at failure", "%"),

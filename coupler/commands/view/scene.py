@@ -7,6 +7,8 @@ from pathlib import Path
 # Must stand before VTK opens a window: without a display its X window only warns and falls back to EGL.
 os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
 
+import textwrap
+
 import matplotlib
 import numpy as np
 import pyvista as pv
@@ -63,7 +65,7 @@ class Scene:
         self.traps_air = bool(run.water) and any(
             run.water.at(time).pocket.any() for time in sampled(run.water.times)
         )
-        self.caption = caption_of(run)
+        self.caption = caption_of(run, round(CAPTION_LETTERS * size[0] / size[1] / letters))
         self.ground = ground(self.lower, self.upper, run.tank is None)
         self._pockets_drawn = 0
         self.plotter = pv.Plotter(off_screen=True, window_size=size, lighting="none")
@@ -110,11 +112,12 @@ class Scene:
         )  # fmt: skip
         lettered(text.prop)
         caption = self.plotter.add_text(
-            self.caption, name="caption", position=(0.985, 0.96),
+            self.caption, name="caption", position=(0.985, 0.985),
             viewport=True, font_size=self._points(7), color=palette.TANK, render=False,
         )  # fmt: skip
         lettered(caption.prop)
         caption.prop.justification_horizontal = "right"
+        caption.prop.justification_vertical = "top"
 
     def _set_lights(self, headlight):
         """One sun, a weak light from the right and one from the camera: soft, and no face is black."""
@@ -311,18 +314,19 @@ class Scene:
             )
 
 
-LONGEST_TITLE = 60
+CAPTION_LETTERS = 31
+"""Letters in a line of the caption for each picture height of width, so that it ends beside the time."""
 
 
-def caption_of(run):
-    """Title of the case, number of cells and blocks."""
-    title = _entry(run, "case", "case", "title") or run.directory.name
-    parts = [title if len(title) <= LONGEST_TITLE else title[: LONGEST_TITLE - 1] + "…"]
+def caption_of(run, width):
+    """Title of the case, then number of cells and blocks, in lines of at most width letters, broken between words."""
+    counts = []
     if run.water:
-        parts.append(f"{len(run.water.at(run.water.times[0]).cells)} cells")
+        counts.append(f"{len(run.water.at(run.water.times[0]).cells)} cells")
     if run.blocks:
-        parts.append(f"{int(run.blocks.at(run.blocks.times[0])['block'].max()) + 1} blocks")
-    return ", ".join(parts)
+        counts.append(f"{int(run.blocks.at(run.blocks.times[0])['block'].max()) + 1} blocks")
+    title = _entry(run, "case", "case", "title") or run.directory.name
+    return "\n".join([*textwrap.wrap(title, max(width, 1)), *([", ".join(counts)] if counts else [])])
 
 
 def north_of(run):
