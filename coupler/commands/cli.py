@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from pathlib import Path
 from shlex import quote
 from typing import Annotated
@@ -68,7 +69,20 @@ Laws = Annotated[
 def main() -> None:
     """Entry point. Exit codes: 0 done, 1 failure, 2 bad case, 3 diverged or out of balance, 4 stopped."""
     with Failures():
-        app()
+        try:
+            app()
+        finally:
+            _write_out()
+
+
+def _write_out() -> None:
+    """Write what is still held back: where nobody reads any more, end as quietly as other commands do."""
+    try:
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        raise SystemExit(1) from None
 
 
 @app.callback(invoke_without_command=True)

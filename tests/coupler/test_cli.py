@@ -211,11 +211,14 @@ def test_the_first_case_is_commented():
 
 
 @pytest.mark.parametrize("words", [("explain",), ("verify", "--list"), ("check", "cases/joint_pulled")])
-def test_a_reader_who_has_enough_ends_a_command_quietly(words):
-    """`| head` closes the pipe while the command still writes: no traceback, no word."""
-    with subprocess.Popen(
-        [COMMAND, *words], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as command:
+@pytest.mark.parametrize("held_back", [True, False])
+def test_a_reader_who_has_enough_ends_a_command_quietly(words, held_back):
+    """`| head` closes the pipe while the command still writes, or before what was held back is written at its end: no
+    traceback, no word."""
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+    environment |= {} if held_back else {"PYTHONUNBUFFERED": "1"}
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    with subprocess.Popen([COMMAND, *words], cwd=ROOT, env=environment, **pipes) as command:
         command.stdout.close()
         assert command.stderr.read() == ""
     assert command.returncode != 0
