@@ -4,6 +4,7 @@ projection              mass balance with moving walls, and the correction of th
 active_cells            which nodes and cells take part
 indefinite_cells        obtuse cells at the surface that would make the matrix indefinite
 pressure_bound          how far the pressure may fall: to that of the air, to vapour pressure elsewhere
+displaced               the water that bodies take from the nodes as they move on
 waterline               the load on solids where the surface passes through their cells
 slits                   cracks narrower than the mesh, as conductances
 films                   water under blocks that hands on the pressure of its rim

@@ -104,14 +104,14 @@ def _differences(height, full, acting, arm, area):
     corner = np.eye(3)
     for s in range(n):
         _add(1.0, area[s], corner, acting[s], arm[s], force, first, s)
-        for k in range(_wet_triangles(height[s], share)):
+        for k in range(wet_triangles(height[s], share)):
             part = share[k]
-            _add(-1.0, area[s] * _relative_area(part), part, full[s], arm[s], force, first, s)
+            _add(-1.0, area[s] * relative_area(part), part, full[s], arm[s], force, first, s)
     return force, first
 
 
 @kernel
-def _wet_triangles(height, share):
+def wet_triangles(height, share):
     """Barycentric corners (·, 3, 3) of the part with height < 0, as 0, 1 or 2 triangles → how many."""
     share[:] = 0.0
     n_wet = 0
@@ -142,7 +142,7 @@ def _wet_triangles(height, share):
 
 
 @kernel
-def _relative_area(part):
+def relative_area(part):
     """|det| of barycentric corners (3, 3): the area of the part over that of the triangle."""
     d = part[0, 0] * (part[1, 1] * part[2, 2] - part[1, 2] * part[2, 1])
     d -= part[0, 1] * (part[1, 0] * part[2, 2] - part[1, 2] * part[2, 0])

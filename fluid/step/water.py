@@ -21,6 +21,7 @@ from fluid.domain.topology import Graph, Topology, layers_around
 from fluid.mesh.background import Background
 from fluid.numerics.sums import kinetic_energy
 from fluid.numerics.threads import zeros
+from fluid.pressure.displaced import taken_from_nodes
 from fluid.pressure.projection import PressureProblem
 from fluid.sides.walls import Walls
 from fluid.step.corrector import Corrected, corrected
@@ -491,8 +492,7 @@ class Water:
         """Volume (N,) [m³] that bodies take from the nodes on a way (n_bodies, 6) [m, rad]."""
         if not way.any():
             return np.zeros(len(self.level_set))
-        share = np.clip(self.nodal_water / np.maximum(self.topology.node_volume, 1e-300), 0.0, 1.0)
-        return share * (self.coupling @ way.ravel())
+        return taken_from_nodes(self.domain, self.coupling, self.level_set, way)
 
     def volume_error(self) -> float:
         """(volume - conserved volume) / handled volume, what the step could not put right."""

@@ -130,6 +130,7 @@ def test_the_largest_load_stays_with_its_time_and_the_moment_is_about_the_foot(s
     assert largest["moment"]["value"] == pytest.approx(1.5e5)
     assert largest["moment"]["about"] == pytest.approx([5.0, 0.0, 0.0])
     assert watch.pressure.value[1] == pytest.approx(1e5)  # over a face of 1 m2
+    assert watch.impulse[0] == pytest.approx([1.5e3, 0.0, 0.0])  # 10 ms of the whole and of half
 
 
 def test_a_block_that_comes_back_has_left_its_place_all_the_same(scene):
@@ -221,7 +222,7 @@ def test_the_deepest_water_is_that_beside_a_body_that_is_judged():
     """Three bodies, the first and the second of them judged, and a wall of no body; forces of all that is judged come
     last. The deepest water, beside the third body, does not count, nor does that beside the first, which is shallower
     than that beside the second."""
-    peaks = Peaks(np.array([0.4, 0.9, 1.5, 0.0]), np.array([1.0, 2.0, 3.0, np.nan]))
+    peaks = Peaks(np.array([0.4, 0.9, 1.5]), np.array([1.0, 2.0, 3.0]))
     watch = SimpleNamespace(
         divisions=SimpleNamespace(bodies=SimpleNamespace(label=np.array([0, 0, 1, -1, 2]))),
         judged=np.array([True, True, True, True, False]),
@@ -230,7 +231,7 @@ def test_the_deepest_water_is_that_beside_a_body_that_is_judged():
         direction=np.arange(12.0).reshape(4, 3),
         foot=-np.arange(12.0).reshape(4, 3),
         depth=peaks,
-        depth_at=np.arange(8.0).reshape(4, 2),
+        depth_at=np.arange(6.0).reshape(3, 2),
     )
     assert _largest(watch, 3, judged=True) == {
         "force": {"value": 7.0, "time": 0.7, "direction": [9.0, 10.0, 11.0]},

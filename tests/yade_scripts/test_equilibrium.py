@@ -201,10 +201,11 @@ def uneven_load(blocks):
 
 
 @pytest.mark.parametrize("ratio", [1.0, 20.0, 1e4])
-def test_a_wall_between_the_sides_of_a_flume_settles(ratio):
+def test_a_wall_between_the_sides_of_a_flume_settles(ratio, monkeypatch):
     """Upright joints neither open nor close but for 1e-10 m, where a stiffness of both sides is that of neither, and
     contacts with the sides push in some places tried and not in others. Newton's method ends in a few steps, and what
     it finds stays at rest."""
+    monkeypatch.setattr(equilibrium, "MOST_ITERATIONS", 40)
     blocks, sides = wall_in_a_flume()
     law = JointParameters(8e3, 1e-3, closing_ratio=ratio, damping=0.0)
     with Structure(blocks, ContactLaw(friction=0.6), law, ground=0.0, planes=sides) as s:
@@ -242,3 +243,39 @@ def test_a_search_without_end_tells_the_damage_and_the_block_where_it_stands(mon
     assert "no equilibrium after 1 iterations" in str(told.value)
     assert re.search(r"left on 'w-\d-\d-\d'", str(told.value))
     assert re.search(r"damage 0\.(0[1-9]|[1-9])", str(told.value))
+
+
+def test_places_that_were_tried_leave_no_damage():
+    """A block lifted by a tenth of the opening at failure and put back: the joint has not noted it until `keep`."""
+    law = JointParameters(1e6, 1e-3, damping=0.0)
+    with Structure([Block("b", (0, 0, 0.5), size=1.0)], None, law, ground=0.0) as s:
+        search, lift = Search(s, np.array([0]), s.gravity_force()), np.array([0.0, 0.0, 1e-4, 0.0, 0.0, 0.0])
+        search._move(lift)
+        assert search.damage == pytest.approx(0.1)
+        assert s.joints.largest.max() == 0.0
+        search.keep()
+        assert s.joints.largest == pytest.approx(1e-4)
+
+
+def test_by_hand_contacts_are_stiff_along_their_normals_alone():
+    """A block glued to the ground that overlaps a rough wall: the wall holds it by K across and not at all along it,
+    with the secant as with the tangent; in motion it holds it along, too."""
+    K = 1e8
+    wall = FixedPlane((0.51, 0, 0), (-1, 0, 0))  # apart at the start: they are not joined
+    law, contact = JointParameters(1e8, 10.0, damping=0.0), ContactLaw(stiffness=K, friction=0.9)
+    with Structure([Block("b", (0, 0, 0.5), size=1.0)], contact, law, ground=0.0, planes=[wall]) as s:
+        s.displace(np.array([0]), np.array([[0.011, 0.0, 0.0]]), np.eye(3)[None])
+        for stiffness in (s.secant_by_hand(), s.tangent_by_hand()):
+            along_x, along_y = stiffness.diagonal()[:2]
+            assert along_x == pytest.approx(law.stiffness + K, rel=0.01)
+            assert along_y == pytest.approx(law.stiffness, rel=0.01)
+        assert s.tangent()[0].diagonal()[1] > 1.1 * law.stiffness
+
+
+@pytest.mark.parametrize(("gap", "ratio"), [(-1e-11, 20.0), (1e-11, 1.0)])
+def test_the_tangent_beside_closing_is_that_of_its_own_side(gap, ratio):
+    """A joint twenty times as stiff in closing, a hundred millionth of its opening at failure from it."""
+    law = JointParameters(1e6, 1e-3, closing_ratio=20.0, damping=0.0)
+    with Structure([Block("b", (0, 0, 0.5), size=1.0)], None, law, ground=0.0) as s:
+        s.displace(np.array([0]), np.array([[0.0, 0.0, gap]]), np.eye(3)[None])
+        assert s.tangent_by_hand().diagonal()[2] == pytest.approx(ratio * law.stiffness, rel=1e-3)

@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from yade_scripts.blocks.block import Block
+from yade_scripts.blocks.faces import touching_faces
 from yade_scripts.contact.law import ContactLaw
 from yade_scripts.dynamics.structure import Structure
 from yade_scripts.joints.cohesion import JointParameters
+from yade_scripts.joints.seals import Seals
 
 GLUE = JointParameters(1e6, 1e-3, damping=0.0)
 
@@ -59,3 +61,26 @@ def test_loose_blocks_seal_where_that_is_asked_for(uplift, closed):
         assert len(s.joined_planes()[0]) == closed
         s.displace(np.array([1]), np.array([[0.6, 0.0, 0.0]]), np.eye(3)[None])
         assert len(s.joined_planes()[0]) == closed // 3
+
+
+def test_what_a_load_does_to_a_driven_block_goes_to_what_drives_it():
+    """0.1 m/s against 3 N for 0.5 s: the load does -0.15 J, the drive puts in as much."""
+    block = Block("b", (0, 0, 2.0), size=0.2, driven=True, velocity=(0.0, 0.0, 0.1))
+    with Structure([block]) as s:
+        s.set_load(np.array([[2.0, 0.0, -3.0, 0.0, 0.0, 0.0]]))
+        s.advance(0.5)
+        energies = s.energies()
+    assert energies["load_work"] == pytest.approx(-0.15)
+    assert energies["driving_work"] == pytest.approx(0.15)
+
+
+def test_faces_that_have_opened_on_one_side_are_sealed_to_half_of_that():
+    """Lifted by 4 mm on one edge of 1 m: both faces are drawn out by 2 mm."""
+    blocks = [Block("low", (0, 0, 0.5), size=1.0), Block("high", (0, 0, 1.5), size=1.0)]
+    seals = Seals(blocks, touching_faces(blocks))
+    angle = 4e-3
+    turn = np.array([[1.0, 0.0, angle], [0.0, 1.0, 0.0], [-angle, 0.0, 1.0]])
+    x = np.array([[0.0, 0.0, 0.5], [0.5 * -angle + 0.5 * angle, 0.0, 1.5 + 0.5 * angle]])
+    rows, _, half = seals.closed_faces(x, np.array([np.eye(3), turn]))
+    assert sorted(rows.tolist()) == [0, 1]
+    np.testing.assert_allclose(half, 0.5 * angle, rtol=1e-3)

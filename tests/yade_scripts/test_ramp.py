@@ -58,3 +58,13 @@ def test_a_ramp_goes_on_where_it_was_after_a_restore():
         assert s.weight_now()[0, 2] > s.gravity_force()[0, 2]  # less than the whole, downwards
         s.advance(0.2)
         np.testing.assert_array_equal(s.weight_now(), s.gravity_force())
+
+
+def test_weight_comes_on_and_ends_without_a_jump_of_its_rate():
+    """3 s² - 2 s³ of it at the share s of the ramp."""
+    block = Block("b", (0, 0, 0.5), size=1.0, density=MASS)
+    with Structure([block], ContactLaw(1e9), GLUE, ground=0.0, ramp=0.4) as s:
+        for share in (0.25, 0.5, 0.75):
+            s.advance(0.1)
+            expected = -MASS * G * (3.0 * share**2 - 2.0 * share**3)
+            assert s.weight_now()[0, 2] == pytest.approx(expected, rel=1e-6)

@@ -79,3 +79,27 @@ def test_friction_of_failed_points_comes_back_after_a_restore():
         s.advance(1e-5 / SPEED)
         np.testing.assert_array_equal(s.internal_force(), first)
         assert s.energies()["friction"] == friction
+
+
+def test_friction_that_is_let_go_takes_what_its_springs_hold():
+    """k s²/2 on the failed part while it sticks."""
+    s, failed = half_failed("polynomial")
+    with s:
+        j = s.joints
+        k, limit = j.parameters.stiffness, MU * j.parameters.closing_stiffness * PRESSED
+        slide = 0.5 * limit / k
+        s.advance(slide / SPEED)
+        before = float(j.rubbed.sum())
+        held = j.let_go(np.array([0]), s._motion.x, s._motion.R)
+        assert held == pytest.approx(0.5 * k * slide**2 * j.weight[failed].sum(), rel=0.02)
+        assert float(j.rubbed.sum()) - before == pytest.approx(held)
+
+
+def test_a_joint_that_slides_while_it_is_pressed_is_all_shear():
+    """How deep it is pressed has no part in the mode."""
+    s, _ = half_failed("polynomial")
+    with s:
+        s.advance(1e-6 / SPEED)
+        table = s.joint_table()
+        assert table.opening[0] == pytest.approx(-PRESSED, rel=1e-6)
+        assert table.mode_mix[0] == pytest.approx(1.0)
