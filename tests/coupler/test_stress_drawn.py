@@ -101,6 +101,17 @@ def test_scenes_cover_the_case_format():
         "open",
     ]
     wanted += ["rotation", "vertices", "velocity", "spin", "fixed", "gravity", "advection", "pair"]
+    wanted += [
+        "[[tank.refine]]",
+        "[[tank.stretch]]",
+        "absorbs = true",
+        'kind = "n-wave"',
+        'openings = "edges"',
+        "uplift_share",
+        "distribution",
+        "[structure.sleep]",
+        'start = "ramp"',
+    ]
     assert [name for name in wanted if name not in text] == []
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from coupler.commands.stress.drawn.basin import Basin, basin, terrain_solids
 from coupler.commands.stress.drawn.bodies import Bodies, bodies, slots
 from coupler.commands.stress.drawn.dice import Dice, rounded
+from coupler.commands.stress.drawn.options import add_options
 from coupler.commands.stress.drawn.stream import Stream, stream
 from coupler.commands.stress.registry import GROUPS
 
@@ -58,13 +59,14 @@ def draw(seed: int, number: int, seconds: float = WANTED) -> Drawn:
     table = {"case": about, **_tables(dice, place, flow, found, gravity, seconds)}
     if flow is not None:
         _air(dice, place, flow, found, table)
+    add_options(dice, place, table)
     still = flow is not None and flow.still and not found.tables
     files = place.files | found.files | (flow.files if flow else {})
     return Drawn(f"R{seed}-{number}", group, title, table, files, still)
 
 
 def _air(dice: Dice, place: Basin, flow: Stream, found: Bodies, table: dict) -> None:
-    """Trapped air in some scenes, most of them below a closed lid; drawn last, so that all others stay the same."""
+    """Trapped air in some scenes, most of them below a closed lid; drawn late, so that all else stays the same."""
     if not dice.chance(0.15):
         return
     water = table["water"]
