@@ -144,6 +144,28 @@ def overlap(blocks, centres, rotations):
     return min((p.max(axis=0) - q.min(axis=0)).min(), (q.max(axis=0) - p.min(axis=0)).min())
 
 
+def test_other_edges_take_over_from_crossing_ones_that_are_not_the_outermost_any_more():
+    """A plate that spins comes down on another with one pair of edges; as it turns another pair becomes the one that
+    the blocks overlap by, eight times as deep. The springs are far too soft to matter: it is about who is found."""
+    low = Block("low", (0, 0, 0), size=(4, 0.5, 3), density=DENSITY, fixed=True)
+    high = Block(
+        "high",
+        (0.4128, -1.9414, -0.9862),
+        size=(3, 4, 0.5),
+        rotation=Rotation.from_matrix(
+            [[0.5887, -0.5211, 0.6179], [0.0033, -0.7629, -0.6465], [0.8083, 0.3827, -0.4474]]
+        ).as_matrix(),
+        density=DENSITY,
+        velocity=(0.3157, 0.2256, 0.3405),
+        spin=(2.0440, 2.5965, 0.3411),
+    )
+    with Structure([low, high], ContactLaw(1e3, 0.3, 0.0), gravity=STILL) as s:
+        s.advance(0.07, 1e-3)
+        deep = overlap([low, high], s.centre(), s.rotation())
+        assert deep > 0.1
+        assert s.deepest()[2].max() > 0.9 * deep
+
+
 @settings(max_examples=8, deadline=None)
 @given(st.integers(0, 10_000))
 def test_random_polyhedra_do_not_sink_into_each_other(seed):

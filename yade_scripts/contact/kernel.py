@@ -16,13 +16,18 @@ from yade_scripts.blocks.block import MARGIN
 from yade_scripts.contact.arrays import CROSSINGS
 from yade_scripts.contact.edges import pair_scratch
 from yade_scripts.contact.ground import scan_ground
-from yade_scripts.contact.search import closing_bound, cross, lie_flat, planes_seen_from, scan, separation
+from yade_scripts.contact.search import (
+    CROSSING,
+    closing_bound,
+    cross,
+    deepest_of,
+    lie_flat,
+    planes_seen_from,
+    scan,
+    separation,
+)
 from yade_scripts.contact.springs import Mode, add_up, apply, set_dashpots
 
-CROSSING = 0.5
-"""Overlap of crossing edges over that of faces below which nodes that touch leave the contact to the edges as well; and
-depth of nodes over the overlap of faces below which they do not hold the blocks apart: a corner may just touch the side
-of an edge that crosses the edges beside it."""
 PAIR = 20
 """To look at a pair takes as long as so many rows of a loop."""
 SUNK = 0.01
@@ -104,7 +109,7 @@ def _contacts(
             known = known or slots.face[s] >= 0
         meets = finds and apart < 0.0 and b < n
         sunk = -apart > SUNK * min(shapes.radius[a], shapes.radius[b])
-        bare = count == first or (sunk and _deepest(slots, rows, first, count) < -CROSSING * apart)
+        bare = count == first or (sunk and deepest_of(slots, rows, first, count) < -CROSSING * apart)
         leads = meets and (bare or not pairs.touching[p])
         flat = meets and count > first and not known and lie_flat(shapes, slots, a, b, R, rows, first, count)
         if known or leads or flat:
@@ -112,14 +117,14 @@ def _contacts(
             if leads:
                 deepest = -SAME * apart if bare else -CROSSING * apart
             count, taken, parted = cross(
-                shapes, bodies, law.shear, slots, base, finds, pairs.fresh[p], a, b, deepest, flat, x, v, R, last_dt,
-                rows, first, count, taken, scratch,
+                shapes, bodies, law.shear, slots, base, finds, pairs.fresh[p], a, b, deepest, sunk, flat, x, v, R,
+                last_dt, rows, first, count, taken, scratch,
             )  # fmt: skip
             apart = max(apart, parted)
         if finds:
             pairs.overlap[p] = max(0.0, -apart)
             if count > nodes:
-                pairs.overlap[p] = min(pairs.overlap[p], _deepest(slots, rows, nodes, count))
+                pairs.overlap[p] = min(pairs.overlap[p], deepest_of(slots, rows, first, count))
             pairs.fresh[p], pairs.touching[p] = 0.0, count > first
             pairs.calm[p] = apart - _overhang(shapes, a, b) if count == first else 0.0
         if count > first:
@@ -181,15 +186,6 @@ def _overhang(shapes, a, b):
     moved out by `MARGIN` of the inner radius lie in the block made larger by that share."""
     other = shapes.radius[b] if shapes.radius[b] < np.inf else 0.0
     return MARGIN * max(shapes.radius[a], other)
-
-
-@inner
-def _deepest(slots, rows, first, count):
-    """Largest depth of the contacts first .. count [m], with that at which their springs began."""
-    deepest = 0.0
-    for c in range(first, count):
-        deepest = max(deepest, rows.depth[c] + slots.rest[rows.slot[c]])
-    return deepest
 
 
 @kernel

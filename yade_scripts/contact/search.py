@@ -16,6 +16,10 @@ from yade_scripts.contact.springs import ARRIVED, let_go, stiffness_together, ta
 
 ALIGNED = 0.02
 """Least cosine between a face and the opposite of one that holds the node: others cannot be what it ran into."""
+CROSSING = 0.5
+"""Overlap of crossing edges over that of faces below which nodes that touch leave the contact to the edges as well; and
+depth of contacts over the overlap below which they do not hold the blocks apart: a corner may just touch the side of an
+edge that crosses the edges beside it."""
 SHALLOW = 2.0
 """Depth in margins up to which a node beside a face counts as on it."""
 
@@ -151,14 +155,15 @@ def scan(
 
 @inner
 def cross(
-    shapes, bodies, shear, slots, base, finds, fresh, a, b, deepest, flat, x, v, R, last_dt, rows, first, count, lost,
-    scratch,
+    shapes, bodies, shear, slots, base, finds, fresh, a, b, deepest, sunk, flat, x, v, R, last_dt, rows, first, count,
+    lost, scratch,
 ):  # fmt: skip
     """Contacts of edges of a with edges of b, known or new; the third result parts the blocks if it is positive [m].
 
     finds: whether contacts may begin here. Those that are known fill the first slots, in the order they began in.
     rows first .. count: contacts of nodes of the pair · deepest [m]: least overlap of edges that leads to a contact,
-    0: none does · flat: edges may cross in the faces of these nodes."""
+    0: none does · sunk: also beside known ones, where these hold less than `CROSSING` of it: as the blocks turn, other
+    edges become the outermost · flat: edges may cross in the faces of these nodes."""
     nodes, parted, leading, to = count - first, -1.0, -1, base
     plane, xi, way, n = scratch[4], scratch[5], scratch[6:8], scratch[8]
     for s in range(base, base + CROSSINGS):
@@ -173,8 +178,12 @@ def cross(
                 to += 1
     if not finds:
         return count, lost, parted
-    if count - first == nodes and deepest > 0.0:
+    held = deepest_of(slots, rows, first, count)
+    if deepest > 0.0 and (count - first == nodes or (sunk and held < CROSSING * deepest)):
         leading, parted = find_crossing(shapes, a, b, x, R, deepest, scratch)
+    if leading >= 0 and count - first > nodes:
+        depth, _ = crossing(shapes, a, b, leading, x, R, plane, xi, scratch)
+        leading = leading if held < CROSSING * depth else -1
     if leading >= 0:
         crossing(shapes, a, b, leading, x, R, plane, xi, scratch)
         for k in range(3):
@@ -207,6 +216,15 @@ def cross(
             else:
                 slots.rest[s] = max(0.0, depth - ARRIVED * max(way[1, 0], 0.0))
             count = _write_crossing(slots, s, a, b, plane, depth, xi, x, R, rows, count)
+
+
+@inner
+def deepest_of(slots, rows, first, count):
+    """Largest depth of the contacts first .. count [m], with that at which their springs began."""
+    deepest = 0.0
+    for c in range(first, count):
+        deepest = max(deepest, rows.depth[c] + slots.rest[rows.slot[c]])
+    return deepest
 
 
 @inner
