@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from coupler.geometry.overlaps import Overlap
-from coupler.step.limits import Diverged, check_air, check_momentum, check_overlap
-from coupler.step.step_limits import Attempt, best_of
+from coupler.step.limits import Diverged, Limits, check_air, check_momentum, check_overlap
+from coupler.step.step_limits import STEP_SHARE, Attempt, attempt_of, best_of
 
 
 def test_a_run_ends_just_beyond_its_limit_of_momentum():
@@ -60,3 +60,26 @@ def test_the_longest_attempt_stays_where_no_shorter_one_helps_or_only_the_shorte
     ends = Attempt(0, {"defect": 0.4}, frozenset({"defect"}), True)
     shortest = Attempt(3, {"defect": 0.3}, frozenset({"defect"}), False)
     assert best_of([ends, shortest]) is shortest
+
+
+def test_steps_of_all_lengths_are_compared_by_the_second():
+    """A step of 10 ms that loses 2e-5 of the volume and misses 1e-4 of the energy: 2e-3 and 1e-2 a second. The defect
+    and the momentum are shares of what moved already."""
+    water = SimpleNamespace(volume_error=lambda: -1e-4, fastest_place=lambda: (1.0, np.zeros(3)))
+    coupling = SimpleNamespace(water=water, defects=SimpleNamespace(too_large=lambda defect: defect > 0.3))
+    record = SimpleNamespace(
+        time=1.0,
+        dt=0.01,
+        defect=0.2,
+        wetted=True,
+        retries=1,
+        balance=SimpleNamespace(step_error=1e-4, energy_error=0.01),
+        momentum=SimpleNamespace(error=1e-12),
+        missed_work=np.zeros(0),
+    )
+    limits = Limits(volume_error=0.02, energy_error=0.05, cpu_seconds=None, momentum_error=1e-8)
+    found = attempt_of(coupling, record, limits, -8e-5)
+    assert found.measures == pytest.approx({"defect": 0.2, "volume": 2e-3, "energy": 0.01, "momentum": 1e-12})
+    assert (found.broken, found.ends) == (frozenset(), False)
+    record.balance.step_error = 1.01 * STEP_SHARE * limits.energy_error
+    assert attempt_of(coupling, record, limits, 0.0).broken == {"energy"}

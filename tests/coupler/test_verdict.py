@@ -177,6 +177,12 @@ def test_what_the_water_stops_has_hit_nothing(scene):
     assert crate_hits(scene, [[0, 0, 0], [0, 0, 0], [0, 0, W]])["pairs"] == 0
 
 
+def test_debris_that_something_else_stops_has_not_hit_what_it_grazes(scene):
+    """The ground took its speed; the wall beside it felt a hundredth of that."""
+    J = 500.0 * 3.0
+    assert crate_hits(scene, [[0.01 * J, 0, 0], [0, 0, 0], [-J, 0, 0]])["pairs"] == 0
+
+
 def test_a_press_without_a_change_of_speed_is_no_hit(scene):
     s, watch, coupling = scene
     s.x[2, 0] = 4.2
