@@ -11,7 +11,7 @@ from fluid.sides.inflow import Side, Sides
 from fluid.sides.waves import steady
 from fluid.step.parameters import WaterParameters
 from fluid.step.water import Water
-from fluid.viscous.wall_friction import Columns
+from fluid.viscous.wall_friction import Columns, WallFriction
 from tests.fluid.scenes import advance
 
 DRY = ConvexBodies.empty()
@@ -44,6 +44,20 @@ def test_drive_along_the_bed_ends_at_the_velocity_of_the_formula(cells):
         advance(water, 0.1)
     _, u = means(water, 1)
     np.testing.assert_allclose(u[:, 0], 1.0 / n, rtol=0.02)
+
+
+@pytest.mark.parametrize("step", [0.01, 1.0, 100.0])
+def test_the_bed_takes_what_a_step_of_any_length_leaves_of_the_stream(step):
+    """A pool of 0.75 m at 2 m/s: U' + dt C_f U'^2/d = 2 m/s with C_f = g n^2/d^(1/3), n = 0.05."""
+    mesh = box_mesh(np.zeros(3), [1.0, 0.5, 1.0], 0.25)
+    settings = WaterParameters(walls="friction", manning=0.05)
+    water = Water(mesh, cut_domain(mesh, DRY), lambda x: x[:, 2] - 0.75, settings)
+    u = np.tile([2.0, 0.0, 0.0], (len(water.level_set), 1))
+    columns = WallFriction.of(settings).columns(water, water.level_set, u, step)
+    drag = settings.gravity * 0.05**2 / 0.75 ** (4 / 3)
+    left = columns.velocity[:, 0]
+    np.testing.assert_allclose(left + step * drag * left**2, 2.0, rtol=1e-9)
+    np.testing.assert_allclose(columns.left, 0.5 * left, rtol=1e-9)
 
 
 def stream(start, until, manning, slope=0.1, cell=0.25, length=16.0):
