@@ -31,9 +31,9 @@ def waterline_load(domain, faces, left_out, phi, wet, pressure, open_node, air=N
     """R of (2): force and moment on every body (n_bodies, 6) [N, N m].
 
     faces (k,) rows of the polygons of G · left_out (l,) rows of those not in G though their cells hold water ·
-    phi (N,) [m] · wet (N,) bool · pressure (N,) [Pa], read on wet nodes · open_node (N,) bool: p = 0 · air (N,) [Pa]:
-    pressure of trapped air at dry nodes, None: there is none. It acts on both sides of the surface, so that the
-    correction is that of the pressure above it."""
+    phi (N,) [m] · wet (N,) bool · pressure (N,) [Pa], read on wet nodes · open_node (N,) bool: p = 0, no seas ·
+    air (N,) [Pa]: pressure of trapped air at dry nodes, None: there is none. It acts on both sides of the surface, so
+    that the correction is that of the pressure above it."""
     load = np.zeros((domain.n_bodies, 6))
     count = wet[domain.cells[domain.face_cell[faces]]].sum(axis=1)
     mixed = faces[(count > 0) & (count < 4)]

@@ -283,10 +283,16 @@ def _problem(
         displaced=displaced,
         cushions=cushions,
     )
-    acted = _known_pressure(water, water.pressure, phi)
+    acted, unheld = _known_pressure(water, water.pressure, phi), water.walls.open_node
+    if held is not None:
+        unheld = unheld & (held == 0.0)
+        acted = np.where(held == 0.0, acted, held / theta)
     air = None if cushions is None else cushions.air.nodal(cushions.pressure)
     least = 0.0 if cushions is None else cushions.lowest(dt)
-    other = waterline_load(water.domain, faces, left_out, phi, wet, acted, water.walls.open_node, air)
+    other = waterline_load(water.domain, faces, left_out, phi, wet, acted, unheld, air)
+    if held is not None:
+        beside = np.flatnonzero(wet & (held != 0.0))
+        other -= (coupling[beside].T @ acted[beside]).reshape(-1, 6)
     if shear is not None:
         other += shear.load
     problem = PressureProblem(
