@@ -6,20 +6,33 @@ There are several, since what numba builds around a function takes as long to co
 - `plain`: makes and returns no arrays; called from Python too. Without counting references to the arrays that it is
   handed, and to every view of one, such a function runs up to twice as fast.
 - `inner`: the same for functions that only other kernels call; without a Python entry they compile a third faster.
+- `helper`: like `kernel`, for functions that only other kernels call.
 - `ranged`: like `plain`, for functions that `fluid.numerics.threads` runs on several threads: they take a range first
   and let other threads of Python run meanwhile.
 - `released`: like `kernel`, for functions of several threads that make arrays, for work space or for what they return.
 
 All are kept on disk (`coupler/program/kernel_cache.py`), and compiled once for an argument that is a constant in the
-call: numba would compile them anew for each constant (`split(w, 0, 1)`, `split(w, 1, 0)`, ...).
+call: numba would compile them anew for each constant (`split(w, 0, 1)`, `split(w, 1, 0)`, ...). Of several processes
+that need the same kernel at the same time, one compiles it and the others wait for what it leaves on disk.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import contextlib
+import fcntl
+import functools
+import hashlib
+import os
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 from numba import njit, types
+
+PATIENCE = 60.0
+"""Seconds for which a process waits for another one that compiles a kernel: none takes as long, but a process may be
+stopped."""
 
 
 def kernel(function: Callable) -> Any:
@@ -37,6 +50,11 @@ def inner(function: Callable) -> Any:
     return _compiled(function, _nrt=False, no_cpython_wrapper=True)
 
 
+def helper(function: Callable) -> Any:
+    """Compile a function that may make arrays. Only other kernels may call it."""
+    return _compiled(function, no_cpython_wrapper=True)
+
+
 def ranged(function: Callable) -> Any:
     """Compile a function of a range, which several threads call at once; it neither makes nor returns arrays."""
     return _compiled(function, _nrt=False, nogil=True)
@@ -48,10 +66,12 @@ def released(function: Callable) -> Any:
 
 
 def _compiled(function: Callable, **options: bool) -> Any:
-    """Numba's dispatcher of a function, for which a constant in a call has the type of a variable."""
+    """Numba's dispatcher of a function, for which a constant in a call has the type of a variable, and which one
+    process at a time compiles."""
     decorate: Any = njit  # whose stubs lack these options
     dispatcher = decorate(cache=True, no_cfunc_wrapper=True, **options)(function)
-    given = dispatcher.get_call_template
+    given, compile_alone = dispatcher.get_call_template, dispatcher.compile
+    name = f"{function.__module__}.{function.__qualname__}"
 
     def get_call_template(args: tuple, kws: dict) -> tuple:
         return given(
@@ -59,5 +79,42 @@ def _compiled(function: Callable, **options: bool) -> Any:
             {name: types.unliteral(a) for name, a in dict(kws).items()},
         )
 
-    dispatcher.get_call_template = get_call_template
+    def compile(sig: Any) -> Any:
+        with _turn(name):
+            return compile_alone(sig)
+
+    dispatcher.get_call_template, dispatcher.compile = get_call_template, compile
     return dispatcher
+
+
+@contextlib.contextmanager
+def _turn(name: str) -> Iterator[None]:
+    """While no other process compiles the kernel `name` into the same folder, or after PATIENCE; numba then looks in
+    the folder first. The lock is one byte of a file there, which the system releases if the process ends."""
+    at = int.from_bytes(hashlib.sha256(name.encode()).digest()[:7], "big")
+    file = _locks(os.environ.get("NUMBA_CACHE_DIR"))
+    with contextlib.suppress(OSError):  # from a file system without locks
+        until = time.monotonic() + PATIENCE
+        while file is not None and time.monotonic() < until:
+            try:
+                fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, at)
+                break
+            except (BlockingIOError, PermissionError):
+                time.sleep(0.02)
+    try:
+        yield
+    finally:
+        if file is not None:
+            with contextlib.suppress(OSError):
+                fcntl.lockf(file, fcntl.LOCK_UN, 1, at)
+
+
+@functools.cache
+def _locks(place: str | None) -> int | None:
+    """File descriptor of the locks in a folder of kernels; None where there is no such folder."""
+    if place is None:
+        return None
+    try:
+        return os.open(Path(place) / "locks", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+    except OSError:
+        return None

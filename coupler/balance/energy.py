@@ -4,20 +4,20 @@ Structure:  Δ(kinetic + gravity + joints stored + contacts stored) + dissipated
 Interface:  W_given − W_received = r_i,  W_given = Σ dt F·V with the velocities V of the pressure solve,
             W_received = work of the same loads over the motion that the discrete elements made
 Water:      Δ(kinetic + potential) + W_given + D_shear + D_vapour + D = E_sides − E_left
-            U_air: energy of trapped air that the water can get back, and what of it was lost with air that got away;
-            D_vapour: spent on parting water from its vapour, whose pressure lies below that of the air;
-            D_shear: taken by viscosity and by friction of walls; D: what is missing, the dissipation of the numerics;
+            U_air: recoverable energy of trapped air, and the part lost with air that escaped;
+            D_vapour: work to separate water against its vapour pressure, which is below that of the air;
+            D_shear: dissipated by viscosity and by friction of walls; D: the remainder, the numerical dissipation;
             E_sides: energy of the water that came in through inflows and seas, with the work of its pressure;
             E_left: energy of the water that fell out through open sides
 
-A scheme that gains energy shows D < 0; dissipation D > 0 is damping of the water by the numerics and is reported, not
+A scheme that gains energy shows D < 0; dissipation D > 0 is numerical damping of the water and is reported, not
 counted as an error. The energy error is (|r_s| + |r_i| + max(0, −D − E_left)) / E_in: the head of water at an open
 side is not that of the water which the volume correction then takes off, within five cells of the side, so a gain is
 distinguished from an outflow only beyond it. E_in is the energy that the scene puts in, whichever is the largest so
 far: the potential energy of the water above its level state and what inflows and seas can bring, the potential energy
-that water and blocks have given up together, kinetic energy, or work of imposed motions. What a body that floats gives
-to the water and gets back is not in it, so the error of a small swing is measured by the energy of the swing.
-"""
+that water and blocks have given up together, kinetic energy, or work of imposed motions. Energy that a floating body
+exchanges with the water is not in it, so the error of a small oscillation is relative to the energy of that
+oscillation."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ class Ledger:
         return {name: np.array(value) for name, value in vars(self).items() if value is not None}
 
     def restore(self, saved: dict[str, Array]) -> None:
-        """Back to what was saved."""
+        """Return to what `save` gave."""
         for name, array in saved.items():
             value = array.tolist()
             setattr(self, name, tuple(value) if isinstance(value, list) else value)

@@ -2,7 +2,7 @@
 
     P = P_water + P_blocks = Σ lines,     each (6,): [N s] and, about one fixed point, [N m s]
 
-A line is what it has added since the start, so weight is negative in z and the floor that carries it positive:
+A line is the momentum added since the start: weight is negative in z, and the floor that carries it is positive:
 
     water_weight, blocks_weight      weight
     tank, tank_shear                 sides of the tank on the water: pressure; viscosity and friction
@@ -16,8 +16,9 @@ A line is what it has added since the start, so weight is negative in z and the 
     recut                            handing the fields of the water to newly cut cells
     lag                              moments only: a load is held while its block moves on under it
 
-What water and free blocks give each other, and blocks one another, is no line: it must cancel.  The residual, what the
-lines miss, is round-off in every step; `error` is its size over the impulses exchanged in the step.
+Impulses between water and free blocks, and between blocks, have no line, since they must cancel.  The residual, the
+change of momentum that the lines do not explain, is round-off in every step; `error` is its size over the impulses
+exchanged in the step.
 """
 
 from __future__ import annotations
@@ -103,7 +104,7 @@ class MomentumLedger:
         return own | {f"line_{name}": value.copy() for name, value in self.lines.items()}
 
     def restore(self, saved: dict[str, Array]) -> None:
-        """Back to what was saved."""
+        """Return to what `save` gave."""
         self.lines = {name: saved[f"line_{name}"].copy() for name in self.lines}
         self.about, self.residual = saved["about"].copy(), saved["residual"].copy()
         self.water, self.blocks = saved["water"].copy(), saved["blocks"].copy()
@@ -248,10 +249,10 @@ def book_step(
     load: Array,
     impulses: Impulses | None,
 ) -> MomentumBalance:
-    """Book the step of dt [s] that has just ended on the two sides, either of which may be None.
+    """Add the step of dt [s] that has just ended on the two sides, either of which may be None.
 
-    load (n_bodies, 6) [N, N m] of the water on the bodies, blocks first; (0, 6) without water · impulses: what contacts
-    and joints gave to the blocks; None without a structure."""
+    load (n_bodies, 6) [N, N m] of the water on the bodies, blocks first; (0, 6) without water · impulses: those of
+    contacts and joints on the blocks; None without a structure."""
     free = np.zeros(0, bool) if structure is None else ~structure.fixed
     of_water = None if water is None else WaterStep.of(water, load, dt, free)
     of_blocks = None

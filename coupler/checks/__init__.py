@@ -1,4 +1,4 @@
-"""What is wrong with a case, found before it is run, all at once, each with its file, line and key.
+"""Checks of a case before it is run: all faults are found at once, each with its file, line and key.
 
 read_case                                    from a case directory to a checked case
 case                                         sections that need each other, names that must exist

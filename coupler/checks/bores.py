@@ -1,17 +1,16 @@
-"""What a bore is where it meets the structure, from theory: depth and velocity, on the level ground or up on a quay.
+"""Depth and velocity of a bore where it meets the structure, from theory: on level ground or up on a quay.
 
 A bore of depth h₂ and velocity u₂ that meets a step of height z (a quay) sends a bore h₃ back, behind which the water
 has the head for the flow over the edge, critical there (the depth on dry ground behind it is at most that of the edge):
 
     u₃ = u₂ - (h₃ - h₂) sqrt(g (h₂ + h₃) / (2 h₂ h₃)),    h₃ u₃ = q,    h₃ + u₃²/2g = z + 3/2 (q²/g)^(1/3)
 
-A slower one sinks before the edge instead, u₃ = u₂ + 2 (sqrt(g h₂) - sqrt(g h₃)); a faster one (u₂ > sqrt(g h₂)) whose
-head is enough passes without a bore back, with its own q and head. Stopped by a wall, h₃ is where u₃ = 0. Stoker, Water
-Waves, 1957, 10.6 (shocks, drops); Henderson, Open Channel Flow, 1966, 2.5 (steps).
-On dry ground there is no shock: the water thins out to a tip that runs at u + 2 sqrt(g h) (Ritter,
-Z. VDI 36, 1892, 947-954).
-No friction, no losses, as wide as the tank: an upper value for what turns aside.
-"""
+A slower bore lowers the level in front of the edge instead, u₃ = u₂ + 2 (sqrt(g h₂) - sqrt(g h₃)); a faster one (u₂ >
+sqrt(g h₂)) whose head is enough passes without a bore back, with its own q and head. Stopped by a wall, h₃ is where u₃
+= 0. Stoker, Water Waves, 1957, 10.6 (shocks, drops); Henderson, Open Channel Flow, 1966, 2.5 (steps). On dry ground
+there is no shock: the water thins out to a tip that runs at u + 2 sqrt(g h) (Ritter, Z. VDI 36, 1892, 947-954). The
+theory has no friction or losses and assumes a structure as wide as the tank; it is an upper bound where water can flow
+around."""
 
 from __future__ import annotations
 
@@ -175,7 +174,8 @@ def _root(value: Callable[[float], float], low: float, high: float) -> float:
 
 
 def _structure(case: Case) -> tuple[str, np.ndarray, np.ndarray] | None:
-    """Name, lower and upper corner (3,) [m] of what is asked about: what [verdict] names, else all that can move."""
+    """Name, lower and upper corner (3,) [m] of the structure: the bodies that [verdict] names, else all that can
+    move."""
     wanted = set(case.verdict.on)
     blocks = [
         (part.name, block)

@@ -6,6 +6,8 @@ parts that a case needs. Without a part, the scene that has water and a structur
 
 from __future__ import annotations
 
+import gc
+import os
 import sys
 import tempfile
 from pathlib import Path
@@ -108,5 +110,9 @@ if __name__ == "__main__":
     from coupler.program.start import one_thread
 
     one_thread()
+    gc.disable()  # numba makes millions of objects and keeps most: looking for those that it does not costs a tenth
+    os.environ.setdefault(
+        "NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING", "1"
+    )  # it asks the terminal for colours each time
     for part in sys.argv[1:] or ["both"]:
         warm_up(part)

@@ -1,12 +1,11 @@
 """The same last digits on every processor: one thread in the libraries, and the instructions of x86-64-v3.
 
-NumPy, OpenBLAS and Numba choose their code by the processor they find: with AVX-512 products of matrices, hyperbolic
-functions and sorting of equal numbers come out otherwise than with AVX2, first in the last digit, then in where drops
-and debris go. Here all are set to take what processors since 2013 (Intel) and 2015 (AMD) have. The C library chooses
-between code with and without fused multiply-add, the same on all of these. On an older processor each part takes what
-it finds, and `missing` says what is not there. Only the variables of the process are set, and only those which the
-user has not, so it must happen before numpy or numba is imported; processes that are started later take them over.
-"""
+NumPy, OpenBLAS and Numba choose their code by the processor: with AVX-512, products of matrices, hyperbolic functions
+and the sorting of equal numbers differ from those with AVX2, at first in the last digit and later in where drops and
+debris go. Here all three are set to use the instructions of processors since 2013 (Intel) and 2015 (AMD). The C library
+chooses between code with and without fused multiply-add, which gives the same on all of these. On an older processor
+each library uses what is available, and `missing` names what is not. Environment variables that the user has not set
+are set, so this must happen before numpy or numba is imported; processes started later inherit them."""
 
 from __future__ import annotations
 
@@ -45,7 +44,8 @@ def fix_arithmetic(environment: MutableMapping[str, str] = os.environ) -> None:
 
 
 def _remark_on_order() -> str:
-    """What a script should know that loaded a library before this program could set it up, where that matters."""
+    """A warning for scripts that loaded a library before this program could configure it, if that matters; else
+    empty."""
     if not _too_late or not _has_more():
         return ""
     return (
@@ -71,7 +71,7 @@ def missing(cpuinfo: Path = Path("/proc/cpuinfo")) -> list[str]:
 
 
 def remark() -> str:
-    """What a user of an older processor should know; empty on others."""
+    """A remark for users of older processors; empty on others."""
     absent = missing()
     if not absent:
         return _remark_on_order()

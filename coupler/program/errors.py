@@ -13,7 +13,7 @@ FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 class ExitCode(IntEnum):
-    """What the command returns to the shell."""
+    """Exit codes of the commands."""
 
     DONE = 0
     CRASHED = 1
@@ -29,7 +29,7 @@ class SurgebreakError(Exception):
 
 
 class BadCase(SurgebreakError):
-    """The case cannot be run as it is written; holds every reason found, one line each."""
+    """The case cannot be run as written; the message has one line for each fault found."""
 
     exit_code = ExitCode.BAD_CASE
 
@@ -49,7 +49,7 @@ class UnitError(ValueError):
 
 
 class RunDirectoryExists(SurgebreakError):
-    """The directory for the results is there already; results are never overwritten."""
+    """The directory for the results exists already; results are never overwritten."""
 
     exit_code = ExitCode.BAD_CASE
 

@@ -45,7 +45,7 @@ def _is_there(name: str) -> bool:
 
 
 def missing(extra: str) -> str:
-    """What is absent of an extra and what brings it; empty where all of it is there."""
+    """The missing packages of an extra and how to install them; empty if none is missing."""
     names = absent(extra)
     if not names:
         return ""

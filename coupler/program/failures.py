@@ -1,7 +1,7 @@
-"""How a command ends when something goes wrong: which exit code, and what the user and the log read.
+"""The exit of a command after an error: its exit code, and the messages to the user and the log.
 
-Errors of this program carry a message that says everything. A full disk is reported as such. Whatever else
-happens is a mistake in the program: its traceback belongs to the log (or to standard error without a run).
+Errors of this program carry a complete message. A full disk is reported as such. Any other exception is a fault of the
+program, whose traceback goes to the log (or to standard error without a run).
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ NO_MEMORY = ("cannot allocate memory", "failed to map segment", "not enough memo
 
 @dataclass(frozen=True)
 class Failure:
-    """The exit code, the message, and the traceback when there is something to mend in the program."""
+    """The exit code, the message, and the traceback if the program itself is at fault."""
 
     exit_code: ExitCode
     message: str
@@ -73,7 +73,7 @@ def _closed(error: OSError) -> str:
 
 
 def out_of_memory(error: BaseException | None) -> bool:
-    """Whether an error, or what it came from, is a lack of memory: libraries have words of their own for it."""
+    """Whether an error or its cause is a lack of memory, which libraries report in different ways."""
     if error is None:
         return False
     if isinstance(error, MemoryError) or getattr(error, "errno", None) == errno.ENOMEM:
@@ -99,7 +99,7 @@ def _memory(error: BaseException) -> str:
 
 
 class Failures:
-    """A context around a command: tells what went wrong and leaves with its exit code."""
+    """A context around a command: reports an error and exits with its code."""
 
     def __enter__(self) -> Failures:
         return self

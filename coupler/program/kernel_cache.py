@@ -1,10 +1,11 @@
-"""Where compiled kernels are kept: for each module, one folder for each state of its source and of all that it imports.
+"""The cache of compiled kernels: for each module, one folder for each state of its code and of all that it imports.
 
 Numba renews a cached kernel when its own file changes, but not when a function that it calls in another file does;
-after an update of the checkout it would run old code. And it takes the path of a file for a part of its name, so that
-every checkout compiles anew. Here the folder of a module is named by a checksum of its text and of the texts that it
-imports from the same packages, directly or not: an edit compiles again what it can change, and nothing else, and
-checkouts share the rest. Numba's own key has the processor in it.
+after an update of the checkout it would run old code. It also takes the path of a file as a part of the kernel's name,
+so that every checkout would compile anew. Here the folder of a module is named by a checksum of its code and of the
+code that it imports from the same packages, directly or not. An edit therefore compiles again what it can change and
+nothing else, and checkouts share the rest. Comments and docstrings do not count as code: rewording them compiles
+nothing. Numba's own key contains the processor.
 """
 
 from __future__ import annotations
@@ -30,10 +31,15 @@ NUMBA_S_OWN = "UserProvidedCacheLocator"  # for functions in other files, such a
 _IMPORT = re.compile(
     r"^\s*(?:from\s+([\w.]+)\s+import\s+(?:\(([^)]*)\)|([^\n(]+))|import\s+([\w.]+))", re.MULTILINE
 )
+_TOKEN = re.compile(
+    r"""("{3}|'{3})(?:\\.|(?!\1).)*\1|"(?:\\.|[^"\\\n])*"|'(?:\\.|[^'\\\n])*'|\#[^\n]*|[()\[\]{}]""",
+    re.DOTALL,
+)
+"""A string in triple quotes (group 1 holds the quotes), any other string, a comment, or a bracket."""
 
 
 class NoCache(SurgebreakError):
-    """There is no place for compiled kernels, without which numba does not compile them."""
+    """No folder for compiled kernels can be written, and numba does not compile without one."""
 
 
 def use_kernel_cache() -> None:
@@ -60,7 +66,7 @@ def use_kernel_cache() -> None:
 
 
 class ByContent:
-    """Tells numba the folder of a function's module; numba's name for such a class is a cache locator."""
+    """A cache locator of numba, which gives it the folder of a function's module."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
@@ -82,11 +88,11 @@ class ByContent:
         return str(self._folder)
 
     def get_source_stamp(self) -> str:
-        """What a kept kernel must have been made from: the name of the folder says it."""
+        """The state of the code from which a kernel in the folder was compiled: the folder's own name."""
         return self._folder.name
 
     def get_disambiguator(self) -> None:
-        """Nothing: the names of functions in a module differ by their lines."""
+        """None: no line number enters the name of a kernel's file, since functions of a module have different names."""
 
 
 @functools.cache
@@ -98,7 +104,7 @@ def folder_of(py_file: Path, place: Path) -> Path | None:
     digest = hashlib.sha256()
     for path in sorted(_with_imports(source)):  # with names: numba imports the module of a kernel by its name
         digest.update(f"{path.relative_to(ROOT)}\0".encode())
-        digest.update(path.read_bytes())
+        digest.update(_code(path).encode())
     name = ".".join(source.relative_to(ROOT).with_suffix("").parts)
     return place / name / digest.hexdigest()[:16]
 
@@ -116,9 +122,40 @@ def _with_imports(source: Path) -> set[Path]:
 
 
 @functools.cache
+def _code(path: Path) -> str:
+    return without_words(path.read_text(encoding="utf-8"))
+
+
+def without_words(source: str) -> str:
+    """Python source without comments, blank lines and docstrings; the same program for every source that differs in
+    these alone.
+
+    A docstring is found as a statement of its own: a string in triple quotes, outside of brackets, that fills its
+    lines. A string with a prefix, or in single quotes, is kept, which costs a needless compilation at worst. Blank
+    lines are dropped from other strings too, which kernels do not print."""
+    kept, last, depth = [], 0, 0
+    for token in _TOKEN.finditer(source):
+        start, end = token.span()
+        depth += {"(": 1, "[": 1, "{": 1, ")": -1, "]": -1, "}": -1}.get(token[0], 0)
+        if token[0][0] == "#" or (token[1] and depth == 0 and _fills_its_lines(source, start, end)):
+            kept.append(source[last:start])
+            last = end
+    kept.append(source[last:])
+    return "\n".join(line for line in map(str.rstrip, "".join(kept).split("\n")) if line)
+
+
+def _fills_its_lines(source: str, start: int, end: int) -> bool:
+    """Whether nothing but indentation stands before a part of the source, nothing after it on its last line, and the
+    line before is not continued by a backslash."""
+    line = source.rfind("\n", 0, start) + 1
+    before, after = source[line:start], source[end : end + 1]
+    return before.strip(" ") == "" and after in ("", "\n") and source[line - 2 : line - 1] != "\\"
+
+
+@functools.cache
 def _imports(path: Path) -> tuple[Path, ...]:
     files = []
-    for module, within, listed, whole in _IMPORT.findall(path.read_text(encoding="utf-8")):
+    for module, within, listed, whole in _IMPORT.findall(_code(path)):
         dotted = module or whole
         if dotted.split(".")[0] in ROOMS:
             base = ROOT.joinpath(*dotted.split("."))

@@ -99,7 +99,7 @@ def _check(file: tarfile.TarFile, source: Path) -> None:
 
 
 def _put(file: tarfile.TarFile, entry: tarfile.TarInfo) -> bool:
-    """Write one kernel into the cache, unless it is there; it appears as a whole or not at all."""
+    """Write one kernel into the cache unless it is there, by renaming a complete file."""
     target = _place() / entry.name
     content = file.extractfile(entry)
     if target.exists() or content is None:

@@ -35,8 +35,8 @@ def run_module(module: str, *words: object, **options: Any) -> subprocess.Comple
 
 
 def end_with(parent: int, number: int = signal.SIGTERM) -> None:
-    """Called in a child: it gets the signal when the thread that started it ends, however that ends. parent: process id
-    of who started it, which may be gone already."""
+    """To be called in a child process: have the system send it the signal when the thread that started it ends. parent:
+    process id of the parent, which may have ended already."""
     _LIBC.prctl(PR_SET_PDEATHSIG, number)
     if os.getppid() != parent:
         os.kill(os.getpid(), number)
@@ -59,7 +59,7 @@ def rows_of_module(module: str, id: str, limit: float, *words: object) -> tuple[
 
 
 def trouble(exit_code: int, output: str) -> str:
-    """How a process ended that did not end well, with the last lines of what it printed."""
+    """A description of how a process failed, with the last lines of its output."""
     last = " | ".join(output.strip().splitlines()[-LAST_LINES:])
     return f"its process ended with {exit_code}: {last}"
 

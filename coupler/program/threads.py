@@ -1,8 +1,7 @@
-"""How many threads a run works with: what the command says, or SURGEBREAK_THREADS, or the cores of this process.
+"""The number of threads of a run: from the command, from SURGEBREAK_THREADS, or the number of cores of this process.
 
-The results are the same bits at any number (`fluid/numerics/threads.py`). The variable is what a run and the processes
-that it starts see; without it, in scripts and tests, one thread works.
-"""
+The results have the same bits with any number (`fluid/numerics/threads.py`). A run and the processes that it starts
+read the variable; without it, as in scripts and tests, there is one thread."""
 
 from __future__ import annotations
 
@@ -39,7 +38,8 @@ def threads() -> int:
 
 
 def take_threads(asked: int | None) -> None:
-    """Take what the command says over the variable, that over all cores. Raises BadThreads."""
+    """Set the number of threads from the command, else from the variable, else to that of all cores. Raises
+    BadThreads."""
     if asked is not None and asked < 1:
         raise BadThreads(
             f"--threads {asked}: at least 1; without it all {cores()} cores of this process work"

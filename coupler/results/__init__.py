@@ -1,4 +1,4 @@
-"""What a run leaves behind: histories, fields, tables, and whether they are what the case expects.
+"""Results of a run: histories, fields and tables, and their comparison with what the case expects.
 
 recorder                               what is written at which time
 history, columns                       CSV tables of one row a step, and their columns
@@ -6,7 +6,7 @@ fields, vtkhdf                         water and blocks for ParaView
 cracks                                 the joints as a table and as surfaces
 gauges, loads, gauge_windows           what a case measures
 expected                               `expected.toml` against the histories
-storage                                writing that a full disk does not tear
+storage                                writing that a full disk cannot leave incomplete
 
-docs/results.md is its page.  Imports `step`, `balance`, `geometry`, `case` and `program`.
+They are described in docs/results.md.  Imports `step`, `balance`, `geometry`, `case` and `program`.
 """

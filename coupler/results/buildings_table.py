@@ -1,4 +1,4 @@
-"""`buildings.csv`: a row per body on the terrain, what the flood did around it and to it."""
+"""`buildings.csv`: one row for each body on the terrain, with the flood around it and its damage."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a case promises, and whether a run kept it: `expected.toml` against the histories of a run directory.
+"""Comparison of `expected.toml`, the values that a case promises, with the histories of a run directory.
 
 [[expect]]
 what = "..."           for people                    table, column   of the history
@@ -24,7 +24,7 @@ from coupler.results.history import read_history
 
 @dataclass(frozen=True)
 class Verdict:
-    """One promise: what was expected and what the run has."""
+    """One promise: the value expected and the value of the run."""
 
     what: str
     found: float

@@ -2,7 +2,7 @@
 
 `fields.vtkhdf`  points, tetrahedra; per node level_set [m], velocity [m/s], pressure [Pa] and, where air is trapped,
                  pocket, its number for life (0: none); per cell fluid_fraction [-]
-`blocks.vtkhdf`  the faces of the blocks at their present place; per face block, group and what the run hands over
+`blocks.vtkhdf`  the faces of the blocks at their present place; per face block, group and further values of the run
 `solids.vtkhdf`  fixed solids and the tank box
 All three state the origin [m] that their float32 coordinates are relative to.
 """

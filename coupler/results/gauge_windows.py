@@ -1,4 +1,5 @@
-"""What a gauge makes of its values in time: impulse over a window, running mean, and the peak of that mean.
+"""Quantities that a gauge derives from its values over time: impulse over a window, running mean, and the peak of that
+mean.
 
 Values v_n hold over the step that ends at t_n:
 
@@ -6,8 +7,8 @@ Values v_n hold over the step that ends at t_n:
     mean      m(t) = 1/T ∫_{t-T}^{t} v dt,  T the time since the start if that is shorter
     peak      max over the time so far of |m|
 
-A peak is only as sharp as its mean is short; those of different runs compare at the same `mean_over` only. Steps
-without a value (NaN: the place is inside a block) add nothing to I, and m goes over the others; without any it is NaN.
+A shorter mean gives a higher peak, so peaks of different runs can be compared only at the same `mean_over`. Steps
+without a value (NaN: the place is inside a block) add nothing to I and are left out of m, which is NaN if none remains.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ class Windows:
         self._steps: deque = deque()
 
     def columns(self, name: str, unit: str, axes) -> tuple[tuple[str, str, str], ...]:
-        """What is added to the columns of a gauge `name`; axes: endings of its components, ("",) of a number."""
+        """Columns that are added to those of a gauge `name`; axes: endings of its components, ("",) of a number."""
         found = []
         if self.impulse:
             window = ", within {:g} to {:g} s".format(*self.impulse) if np.isfinite(self.impulse[1]) else ""
@@ -60,7 +61,7 @@ class Windows:
         return {"total": np.array(self.total), "peak": np.array(self.peak), "steps": np.array(steps)}
 
     def restore(self, saved: dict[str, Array]) -> None:
-        """Back to what was saved."""
+        """Return to what `save` gave."""
         self.total, self.peak = saved["total"][()], float(saved["peak"])
         self._steps = deque((float(row[0]), float(row[1]), row[2:].copy()) for row in saved["steps"])
 

@@ -1,7 +1,7 @@
-"""Gauges of a case: what is read every step, as columns of `history/gauges.csv` or in a table of its own.
+"""Gauges of a case: quantities that are read in every step, as columns of `history/gauges.csv` or as a separate table.
 
-A place inside a block or solid has no water to measure: its cell of the table stays empty, it adds nothing to impulses,
-and running means and peaks go over the time in which it was free.
+At a place inside a block or solid there is no water to measure: the cell of the table stays empty, nothing is added to
+impulses, and running means and peaks cover the time in which the place was free.
 """
 
 from __future__ import annotations
@@ -32,8 +32,9 @@ class Gauge:
 
 @dataclass(frozen=True)
 class Bodies:
-    """What gauges can be on, in the rows of the load table: names, centre (k, 3) [m] at the start, mass (k,) [kg] (1
-    for solids); rows_of: rows for each name of a block, group, part or solid · parts: of the loads that there are."""
+    """The bodies that gauges can refer to, in the rows of the load table: names, centre (k, 3) [m] at the start, mass
+    (k,) [kg] (1 for solids); rows_of: rows for each name of a block, group, part or solid · parts: of the loads that
+    there are."""
 
     names: list[str]
     centre: Floats
@@ -88,7 +89,7 @@ def _named(columns, values) -> dict[str, float]:
 
 
 def _measured(columns, values) -> dict[str, float | None]:
-    """The same, None where there was nothing to measure (NaN)."""
+    """The same value, or None if there was nothing to measure (NaN)."""
     return {name: None if np.isnan(v) else v for name, v in _named(columns, values).items()}
 
 
@@ -172,7 +173,7 @@ class Followed:
         return {"name": np.array(self.name)}
 
     def restore(self, saved: dict[str, Array]) -> None:
-        """Back to what was saved."""
+        """Return to what `save` gave."""
         self.name = int(saved["name"])
 
 

@@ -1,4 +1,4 @@
-"""Histories: one CSV table per subject, a row per step, which anything can read.
+"""Histories: one CSV table for each subject, with a row for each step.
 
 Lines that begin with '#' give name, unit and meaning (with the sign) of every column; then the names; then rows
 with as many digits as tell two floats apart. A row is in the file as soon as it is written, and a row that a killed
@@ -21,7 +21,7 @@ from coupler.results.storage import DiskFull, NotFinite, WrongShape
 
 @dataclass(frozen=True)
 class Column:
-    """name · unit ("1" for a pure number, "" for text) · meaning, with what a positive value says."""
+    """name · unit ("1" for a pure number, "" for text) · meaning, with that of a positive sign."""
 
     name: str
     unit: str
@@ -54,7 +54,7 @@ class History:
 
 
 class CannotContinue(SurgebreakError):
-    """A file of results is not what the run left; it cannot be continued."""
+    """A file of results is not as the run left it, so that it cannot be continued."""
 
 
 class HistoryTable:

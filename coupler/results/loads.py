@@ -102,7 +102,7 @@ class GroupLoads:
         return {f"{n}_{key}": a for n, w in self.windows.items() for key, a in w.save().items()}
 
     def restore(self, saved: dict[str, Array]) -> None:
-        """Back to what was saved."""
+        """Return to what `save` gave."""
         for name, window in self.windows.items():
             start = f"{name}_"
             own = {k.removeprefix(start): a for k, a in saved.items() if k.startswith(start)}
@@ -167,7 +167,7 @@ class BlockLoads:
         return {"since": np.array(self._since)} | {n: a.copy() for n, a in self._impulse.items()}
 
     def restore(self, saved: dict[str, Array]) -> None:
-        """Back to what was saved."""
+        """Return to what `save` gave."""
         self._since = float(saved["since"])
         self._impulse = {name: saved[name].copy() for name in self.parts}
 

@@ -78,7 +78,7 @@ class Maps:
         return {name: getattr(self, name).copy() for name in KEPT} | {"dry": self._dry.copy()}
 
     def restore(self, saved: dict[str, Array]) -> None:
-        """Back to what was saved."""
+        """Return to what `save` gave."""
         for name in KEPT:
             setattr(self, name, saved[name].copy())
         self._dry = saved["dry"].copy()

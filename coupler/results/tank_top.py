@@ -82,7 +82,7 @@ class TankTop:
         return {"numbers": numbers, "at_start": self._at_start.copy()}
 
     def restore(self, saved: dict[str, Array]) -> None:
-        """Back to what was saved."""
+        """Return to what `save` gave."""
         self.first, x, y, self.share, self.share_at = map(float, saved["numbers"])
         self.place, self._at_start = np.array([x, y]), saved["at_start"].copy()
 

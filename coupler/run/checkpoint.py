@@ -41,7 +41,8 @@ class OtherScene(SurgebreakError):
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """One that was read. path · arrays by name · about: what it belongs to and what is no array."""
+    """A checkpoint that was read. path · arrays by name · about: the run that it belongs to, and values that are no
+    arrays."""
 
     path: Path
     arrays: dict[str, np.ndarray]
@@ -86,7 +87,7 @@ class _Figures(BaseModel):
 
 
 class _About(BaseModel):
-    """What the text of a checkpoint says; a file that was edited may have a digest that fits."""
+    """The text of a checkpoint, checked key by key, since an edited file may have a matching digest."""
 
     layout: int
     case: dict
@@ -99,7 +100,8 @@ class _About(BaseModel):
 
 @dataclass(frozen=True)
 class State:
-    """What a checkpoint holds, before it is written. time [s] · name of the file · arrays by name · about, as text"""
+    """The content of a checkpoint before it is written. time [s] · name of the file · arrays by name · about, as
+    text"""
 
     time: float
     name: str
@@ -108,7 +110,7 @@ class State:
 
 
 class Checkpoints:
-    """Writes those of a run: the newest KEPT stay.
+    """Writes the checkpoints of a run, of which the newest KEPT are kept.
 
     directory: of the run · every [s] · case: effective · scene, recorder: what is saved
     """

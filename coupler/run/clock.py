@@ -9,7 +9,7 @@ from contextlib import contextmanager
 
 
 class Clock:
-    """Books processor time [s] to parts by name; parts do not nest.
+    """Assigns processor time [s] to named parts, which do not nest.
 
     before: `split` of the processes that the run was in before this one.
     """
@@ -37,7 +37,7 @@ class Clock:
         return time.process_time() - self._start
 
     def split(self) -> dict[str, float]:
-        """Seconds of each part, largest first, with what was booked to none as 'other'."""
+        """Seconds of each part, largest first, and of all the rest as 'other'."""
         parts = dict(self.seconds)
         parts["other"] = max(0.0, self.total() - sum(parts.values()))
         return dict(sorted(parts.items(), key=lambda item: -item[1]))

@@ -1,7 +1,8 @@
-"""Kernels of a case compiled before its run, by two processes side by side: one alone takes almost two minutes.
+"""Compiles the kernels of a case before its run, in two processes side by side: a single one takes about twice as long.
 
-A part of the program counts as compiled where most of its modules have their folder in the cache; what is missing then,
-after an edit for instance, the run compiles as it comes to it.
+A part of the program counts as compiled if most of its modules have their folder in the cache. Kernels that are still
+missing, after an edit for instance, are compiled by the run when it first calls them. Processes that need the same
+kernel wait for one another (`kernel_decorators.py`), so none is compiled twice.
 """
 
 from __future__ import annotations
@@ -24,14 +25,15 @@ MODULES = {"solids": "fluid/cut", "water": "fluid", "structure": "yade_scripts",
 """Where the kernels of each part are; those of fluid/cut count for solids alone."""
 CHAINS = (("solids", "water"), ("structure", "both"))
 """Parts that one process compiles one after the other, since the second uses kernels of the first. Both chains take
-about as long, and share nothing until "both" comes to the water, which the other chain has compiled by then."""
+about equally long."""
 KERNEL = re.compile(r"^@(kernel|inner|plain|ranged|released)$", re.MULTILINE)
 ENOUGH = 0.5
 """Share of the modules of a part with kernels in the cache, from which it counts as compiled."""
 
 
 def compile_ahead(case: Case, tell: Callable[[str], object]) -> None:
-    """Compile what the case needs and the cache lacks, unless there is one core alone. Failures are left to the run."""
+    """Compile the kernels that the case needs and the cache lacks, if there is more than one core. Failures are left to
+    the run."""
     cores = len(os.sched_getaffinity(0))
     wanted = [part for part in needed(case) if not is_compiled(part)]
     chains = [own for chain in CHAINS if (own := [part for part in chain if part in wanted])]
@@ -69,7 +71,7 @@ def needed(case: Case) -> list[str]:
 
 
 def is_compiled(part: str) -> bool:
-    """Whether most modules of a part have kernels in the cache; without a cache of ours there is nothing to fill."""
+    """Whether most modules of a part have kernels in the cache; also True if the program uses no cache of its own."""
     place = os.environ.get("NUMBA_CACHE_DIR")
     if not place or "NUMBA_CACHE_LOCATOR_CLASSES" not in os.environ:
         return True

@@ -61,7 +61,7 @@ class RunDirectory:
 
     @classmethod
     def reopen(cls, path: Path, file: CaseFile, again: dict, lock: RunLock) -> RunDirectory:
-        """The directory of a run that goes on: it is running again, and `again` says from where and how.
+        """Reopen the directory of a run that continues and mark it as running; `again` describes from where and how.
 
         lock: of that directory, taken before anything in it was read or changed."""
         before = read_summary(path)
@@ -77,7 +77,7 @@ class RunDirectory:
         return run
 
     def begin(self) -> None:
-        """Write the first lines of this process: what was called, and the summary of a run that runs."""
+        """Write the first lines of this process: the command, and the summary of a running run."""
         self.log(f"surgebreak {provenance.version()}: {' '.join(sys.argv)}")
         if not self.lock.known:
             self.log(

@@ -27,10 +27,10 @@ def carry_out(
     wish: Callable[[], str | None] | None = None,
     quiet: bool = False,
 ) -> ExitCode:
-    """Run a case in its directory to the end, from a checkpoint or from the start; how it ended.
+    """Run a case in its directory to the end, from a checkpoint or from the start, and return how it ended.
 
-    each: see `run` · wish: asked after every step why the run is to end, None to go on · quiet: tells the log alone.
-    """
+    each: see `run` · wish: called after every step, returns why the run is to end or None · quiet: report to the log
+    only."""
     # here, because `check` describes a case without what a run loads
     from coupler.run.progress import ProgressFile, reporter
     from coupler.run.run import run
@@ -52,7 +52,7 @@ def carry_out(
 
 
 def describe(file: CaseFile, tell: Callable[[str], object]) -> None:
-    """Tell which parts are on and off, and what is worth knowing before the run."""
+    """Report which parts are on and off, with remarks that matter before the run."""
     parts = modules(file.case)
     tell(f"{file.path}: {file.case.case.title}")
     tell("on:  " + (", ".join(name for name, on in parts.items() if on) or "nothing"))
@@ -91,7 +91,7 @@ NAMES_ITS_UNIT = (".tif", ".tiff", ".nc", ".grd")
 
 
 def tell_laws(file: CaseFile, directory: RunDirectory, tell: Callable[[str], object]) -> None:
-    """Tell of laws that did not come with the program, and keep what they were in run.json; others load nothing."""
+    """Report laws that did not come with the program, and record their origin and checksum in run.json."""
     if file.case.joints is None:
         return
     from yade_scripts.joints import laws
@@ -105,7 +105,7 @@ def tell_laws(file: CaseFile, directory: RunDirectory, tell: Callable[[str], obj
 
 
 def compare(file: CaseFile, directory: RunDirectory, tell: Callable[[str], object]) -> None:
-    """Tell whether a run of the case as it is written kept what its expected.toml promises; no file, no promise."""
+    """Report whether a run of the unchanged case meets its expected.toml, if there is one."""
     promises = file.directory / "expected.toml"
     if file.overrides or not file.path.is_file() or not promises.exists():
         return

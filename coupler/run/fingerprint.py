@@ -1,4 +1,5 @@
-"""Short digests of a scene and of the program that ran it, by which a restart of something else is refused."""
+"""Short digests of a scene and of the program that ran it, by which a restart with another scene or program is
+refused."""
 
 from __future__ import annotations
 

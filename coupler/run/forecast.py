@@ -166,7 +166,7 @@ def _highest(case: Case) -> float:
 
 
 def structure_seconds(structure, substeps: int) -> float:
-    """Processor time [s] that so many substeps take, about, while joints hold."""
+    """Estimated processor time [s] of that many substeps while joints hold."""
     points = 0 if structure.joints is None else len(structure.joints.weight)
     loose = int(structure.loose().sum())
     each = SECONDS_PER_SUBSTEP + SECONDS_PER_POINT * points + SECONDS_PER_LOOSE_BLOCK * loose
@@ -222,7 +222,7 @@ def _structure_rows(case: Case, rows: list[Row], exact: bool) -> tuple[int, int,
 
 
 def _air_rows(case: Case, structure) -> list[Row]:
-    """What trapped air there is at the start; none where all air is open."""
+    """Rows about trapped air at the start; none if all air is open."""
     if case.water.air.model == "open":
         return []
     from coupler.run.trapped_air import air_row

@@ -1,13 +1,12 @@
-"""How long a run has still to go, from its own pace.
+"""Estimate of the time left of a run, from its own pace.
 
-A run changes its pace: water that arrives takes shorter steps, blocks that break loose are cut and searched, and a hit
-takes a few steps that cost ten times as much. What is followed is processor time over simulated time: of the last
-quarter of the run so far, with a part of its trend since the quarter before (`TREND`); on the clock that is as much
-more as it was lately, since other programs come and go. What has not begun yet no pace knows: runs in which water
-reached blocks were GROWTH times slower afterwards. That is expected until the water arrives, and while nothing is
-broken for half as long again (`Calm`); the pace before that is then forgotten. TREND, MOST_TREND and GROWTH were chosen
-on fourteen of the shipped cases (docs/speed.md).
-"""
+The pace of a run changes: arriving water needs shorter steps, loose blocks have to be cut and searched, and an impact
+takes a few steps that cost ten times as much. The estimate is based on the ratio of processor time to simulated time
+over the last quarter of the run so far, with a part of its trend since the quarter before (`TREND`). It is converted to
+wall time by their recent ratio, since other programs come and go. The past pace says nothing about what has not begun
+yet: runs in which water reached blocks were GROWTH times slower afterwards. This factor is applied until the water
+arrives and, as long as nothing breaks, for half that time again (`Calm`); the pace before that is then dropped. TREND,
+MOST_TREND and GROWTH were chosen on fourteen of the shipped cases (docs/speed.md)."""
 
 from __future__ import annotations
 
@@ -96,7 +95,7 @@ class Pace:
 
 
 class Calm:
-    """Whether a run is still before what it is made for: water on its way to blocks that may break or drift."""
+    """Whether the main event of a run is still to come: water is on its way to blocks that may break or drift."""
 
     def __init__(self):
         self._arrived: float | None = None

@@ -1,4 +1,4 @@
-"""How a run tells what it does: a bar with the time left on a terminal, one line per 10 % anywhere else.
+"""Reports of a running run: a bar with the time left on a terminal, one line per 10 % anywhere else.
 
 The loop knows only the protocol `Reporter`; figures are ordered name -> text, for instance
 {"dt": "12 ms", "joints broken": "140/900", "force on house": "2.1 MN", "volume": "+0.02 %", "energy": "0.4 %"}.
@@ -20,7 +20,7 @@ from coupler.run.pace import Pace
 
 
 class Reporter(Protocol):
-    """What the loop tells while it runs."""
+    """Receives the reports of the time loop."""
 
     def step(self, time: float, figures: Mapping[str, str]) -> None:
         """After each coupled step: the time reached [s] and the figures that matter."""
@@ -42,7 +42,7 @@ EVERY = 1.0
 
 
 class ProgressFile:
-    """Hands on to another reporter, and keeps PROGRESS in the run directory up to date."""
+    """Passes reports on to another reporter, and keeps PROGRESS in the run directory up to date."""
 
     def __init__(self, inner, path):
         self.inner, self.path = inner, path / PROGRESS
@@ -165,7 +165,7 @@ class BarReporter(_Base):
 
 
 class QuietReporter(LineReporter):
-    """Nothing but the log."""
+    """A reporter that writes only to the log."""
 
     def __init__(self, end, log, stop):
         super().__init__(end, log, stop)

@@ -26,14 +26,14 @@ from coupler.run.summary import read_summary
 
 
 class CannotResume(SurgebreakError):
-    """The run cannot go on; the message says why and what to do."""
+    """The run cannot be continued; the message gives the reason and the remedy."""
 
     exit_code = ExitCode.BAD_CASE
 
 
 @dataclass(frozen=True)
 class Resumption:
-    """What `run` needs to go on."""
+    """The arguments with which `run` continues."""
 
     file: CaseFile
     directory: RunDirectory
@@ -43,9 +43,9 @@ class Resumption:
 def prepare(
     path: Path, overrides: Iterable[str] = (), any_version: bool = False, tell: Callable[[str], None] = print
 ) -> Resumption:
-    """Find where the run in the directory `path` can go on, and open the directory again.
+    """Find the checkpoint from which the run in the directory `path` can continue, and reopen the directory.
 
-    overrides: KEY=VALUE, of names in `FREE` only · any_version: go on with another version of the program too.
+    overrides: KEY=VALUE, of names in `FREE` only · any_version: also continue with another version of the program.
     Raises NoRun, Busy, CannotResume, BadCase; nothing was changed then.
     """
     summary = read_summary(path)
@@ -89,7 +89,8 @@ def _locked(path: Path) -> RunLock:
 
 
 def _clear(path: Path, checkpoint: Checkpoint) -> None:
-    """Remove what the run would take for its own: newer checkpoints, half-written ones, a wish to stop that was met."""
+    """Remove files that the run would mistake for its own: newer or incomplete checkpoints, and the last request to
+    stop."""
     for newer in listed(path / FOLDER):
         if newer.name > checkpoint.path.name:
             newer.unlink()
@@ -127,7 +128,7 @@ def _check_free(overrides: tuple[str, ...]) -> None:
 
 
 def _newest(path: Path) -> tuple[Checkpoint, list[str]]:
-    """The newest checkpoint that can be used, and what is wrong with newer ones."""
+    """The newest checkpoint that can be used, and the faults of newer ones."""
     unusable: list[str] = []
     for place in listed(path / FOLDER):
         try:
@@ -196,7 +197,7 @@ def _check_program(checkpoint: Checkpoint, any_version: bool, tell) -> None:
 
 
 def _check_laws(path: Path, laws: dict, any_version: bool) -> None:
-    """Laws that did not come with the program are given again, and are what they were."""
+    """Check that laws from outside the program are given again and have not changed. Raises CannotResume."""
     if not laws:
         return
     from yade_scripts.joints.laws import identity, names

@@ -34,11 +34,12 @@ FAST_OPENING_NEEDLEMAN = 0.1
 def run(case: Case, directory, reporter, checkpoint=None, each=None) -> ExitCode:
     """Run a case into a RunDirectory; its figures go into run.json however the run ends.
 
-    checkpoint: Checkpoint of an earlier process from which the run goes on ·
-    each: called after every step with the CoupledStepper, the StepRecord, the figures so far and what the gauges read.
+    checkpoint: Checkpoint of an earlier process from which the run continues ·
+    each: called after every step with the CoupledStepper, the StepRecord, the figures so far and the values of the
+    gauges.
 
-    Raises SurgebreakError (or an error of the water or the structure) when the run ends before its time; what was
-    written until then stays.
+    Raises SurgebreakError (or an error of the water or the structure) when the run ends early; results written
+    until then are kept.
     """
     clock = Clock(checkpoint.about["cpu_seconds"] if checkpoint else None)
     figures: dict[str, float] = {"steps": 0, "substeps": 0}
@@ -120,7 +121,7 @@ def _describe(scene: Scene, reporter) -> None:
 
 
 def laws_of(structure) -> dict[str, str]:
-    """What its contact and joints go by, in words: what every result of theirs depends on."""
+    """A description of the laws of contact and joints of a structure, on which all its results depend."""
     found = {}
     if structure.contact is not None:
         found["contact"] = structure.contact.described(structure.face_stiffness)
@@ -186,7 +187,7 @@ def _steps(
 
 
 def _note_top(case: Case, recorder: Recorder, coupling, figures: dict, reporter) -> None:
-    """Carry into the figures that the water was at the top of the tank, and tell it when it comes there."""
+    """Record in the figures that water reached the top of the tank, and report it when this first happens."""
     if recorder.top is None:
         return
     is_new = recorder.top.step(coupling.water, coupling.time)
@@ -239,7 +240,7 @@ def _reached(time: float, target: float) -> bool:
 
 
 def _checkpoints(case: Case, scene: Scene, directory, recorder: Recorder, schedule: Schedule):
-    """Checkpoints of the run, None if the case wants none; then nothing of theirs is loaded."""
+    """Checkpoints of the run; None if the case asks for none, and then their module is not loaded."""
     every = checkpoint_interval(case)
     if every == 0.0:
         return None
@@ -335,7 +336,7 @@ def _volume_error(coupling) -> float:
 
 
 def _wish_to_stop(clock: Clock, limits: Limits, reporter) -> str | None:
-    """Why the run is to end now, None to go on."""
+    """The reason why the run is to end now, or None."""
     if limits.cpu_seconds is not None and clock.here() > limits.cpu_seconds:
         return (
             f"the run has used {clock.here():.0f} s of processor time; limit {limits.cpu_seconds:.0f} s "

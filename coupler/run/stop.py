@@ -64,7 +64,8 @@ class StopRequest:
         self._reason = self._reason or f"stopped by {WHO[number]}; all steps until then are written"
 
     def _leave_the_terminal(self) -> None:
-        """A terminal that is gone refuses what is printed, which would end the run instead of its step."""
+        """Redirect output after the terminal is gone: printing to it would end the run at once instead of after its
+        step."""
         with contextlib.suppress(OSError):
             nowhere = os.open(os.devnull, os.O_WRONLY)
             for handle in self._terminals:

@@ -48,7 +48,7 @@ class _Case(_Part):
 
 
 class _Work(_Part):
-    """Counts of what was done; those of a side come together."""
+    """Counts of the work done; those of one side are given together."""
 
     @model_validator(mode="after")
     def _whole(self):

@@ -37,7 +37,7 @@ class LongSteps:
         self.held: object = None
 
     def around(self, step: Callable[[], object]):
-        """What the step returns. Raises StepLeft, and what the step raises."""
+        """Return the result of the step. Raises StepLeft, and the exceptions of the step."""
         self._may_leave = self._last >= LONG
         self.held = self._hold() if self._may_leave else None
         self._began = time.monotonic()

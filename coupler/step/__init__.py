@@ -4,11 +4,11 @@ coupled_step                           the order of a step, its passes, and the 
 immersion, cracks                      where the structure cuts the water
 pressure_with_structure                the pressure system with the blocks in it
 coupling_rows                          the matrix G of theory (10), a short row for each node and body
-shear                                  how blocks answer to shear
-residual                               the coupling residual, and what is remembered of it
+shear                                  implicit response of blocks to shear
+residual                               the coupling residual, and its history over steps
 step_limits, step_start, limits        when a step is taken again, and when a run ends
-sides                                  what these parts ask of the two sides together
-observe                                what is read off a structure for a step
+sides                                  the interface of the two sides that these parts use
+observe                                readings of a structure for a step
 
 Imports `balance`, `fluid` and `yade_scripts`; knows no case and writes no file.
 """

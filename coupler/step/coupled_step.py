@@ -46,10 +46,10 @@ class CoupledStepper:
     """The two sides and the state of their coupling; `step` advances both.
 
     water, structure, immersion: either side may be None (immersion only with water).
-    passes: most pressure solves in a step; beyond the first, the structure goes back and takes the step again, as long
-    as the defect is above `tolerance`.
-    most_defect, limits: above a share of the one (`Defects`), beyond the others (`step_limits.py`), or where no
-    pressure is found, both sides go back and take half of the step; without limits only what is not finite counts.
+    passes: largest number of pressure solves in a step; after the first, the structure returns to the start of the step
+    and takes it again as long as the defect is above `tolerance`.
+    most_defect, limits: if a step exceeds a share of the first (`Defects`) or one of the others (`step_limits.py`), or
+    if no pressure is found, both sides return and take half of the step; without limits only non-finite results count.
     expected: energy that inflows and seas can bring [J], a scale for errors.
     """
 
@@ -95,14 +95,14 @@ class CoupledStepper:
         self.momentum = momentum_ledger(water, structure)
 
     def save(self) -> dict[str, Array]:
-        """What the coupling itself remembers between two steps; both sides and the ledger save theirs."""
+        """The state of the coupling itself between two steps; both sides and the ledger save their own."""
         found = {"time": np.array(self.time), **self.defects.save()}
         if self.sheared is not None:
             found["sheared"] = self.sheared.accelerations.copy()
         return found
 
     def restore(self, saved: dict[str, Array]) -> None:
-        """Back to what was saved."""
+        """Return to what `save` gave."""
         self.time = float(saved["time"])
         self.defects.restore(saved)
         if self.sheared is not None:
@@ -128,7 +128,7 @@ class CoupledStepper:
     def step(self, dt: float) -> StepRecord:
         """Advance both sides by dt [s], or by the half of it, its half, ... where a whole one fails: `record.dt`.
 
-        Raises Diverged, or what the pressure solver says, when that does not help either."""
+        Raises Diverged, or the error of the pressure solver, if that does not help either."""
         record = StepRecord(time=self.time + dt, dt=dt)
         if self.water is None:
             self._take(record, None)
@@ -143,11 +143,11 @@ class CoupledStepper:
         return record
 
     def _take_until_good(self, dt: float, record: StepRecord) -> None:
-        """A step of dt [s]; its half, and so on, where that has no solution or breaks a limit. Where the shortest one
-        breaks one too, the better of it and the longest (`best_of`) stays: whether the run stops there is for its
-        caller to say.
+        """Take a step of dt [s], or of its half, and so on, as long as it has no solution or breaks a limit. If the
+        shortest one breaks a limit too, the better of it and the longest (`best_of`) is kept; the caller decides
+        whether the run ends there.
 
-        Raises Diverged where none has a solution."""
+        Raises Diverged if none has a solution."""
         start, volume = self._start(), volume_error(self)
         tried: list[Attempt] = []
         for record.retries in range(RETRIES + 1):
@@ -182,7 +182,7 @@ class CoupledStepper:
             return StepStart.of(self)
 
     def _failures(self) -> tuple:
-        """What a step raises that a shorter one may cure."""
+        """Exceptions of a step that a shorter step may avoid."""
         from fluid.numerics.solve import NotConverged
 
         if self.structure is None:
@@ -192,11 +192,12 @@ class CoupledStepper:
         return Diverged, NotConverged, NotFinite
 
     def _judge(self, record: StepRecord, volume_before: float) -> Attempt:
-        """What the step that was just taken breaks."""
+        """The limits that the last step breaks."""
         return attempt_of(self, record, self.limits, volume_before)
 
     def _take(self, record: StepRecord, start: StepStart | None) -> None:
-        """One step of record.dt on both sides and in the balances. Raises what the solvers say, and Diverged."""
+        """Take one step of record.dt on both sides and in the balances. Raises the errors of the solvers, and
+        Diverged."""
         dt = record.dt
         if self.coupled:
             self._coupled_step(dt, record, start)
@@ -225,7 +226,7 @@ class CoupledStepper:
             self.ledger.coming = max(self.ledger.coming, self._coming(self.time))
 
     def _cut(self, record: StepRecord) -> None:
-        """The domain that the bodies leave now, and what they do to the water besides."""
+        """The domain outside of the bodies at their present positions, and their other effects on the water."""
         with self.clock("cut"):
             changed = self.immersion.update()
         with self.clock("carry over"):
@@ -348,8 +349,8 @@ class CoupledStepper:
         return mass, response, response.free_velocity(velocity, self._padded(force) + known)
 
     def _afloat(self, problem: PressureProblem) -> tuple[PressureProblem, Array | None]:
-        """The problem with the bodies where they stand, not where their cells were cut, and how still water resists the
-        free ones that its surface cuts, (n, 3, 3); None where there is none."""
+        """The problem with the bodies at their present positions instead of those where the cells were cut, and the
+        hydrostatic stiffness (n, 3, 3) of the free bodies that the surface cuts; None if there are none."""
         from fluid.pressure.waterline import hydrostatic_stiffness
 
         driven = np.append(self.structure.still, np.ones(self.immersion.n_solids, bool))

@@ -107,8 +107,8 @@ class Immersion:
         return True
 
     def films(self) -> tuple[Array, Array]:
-        """Which bodies may move (n + m,) bool, so that films under them hand on the pressure around, and the share of
-        it (P,) that acts on each plane."""
+        """Which bodies may move (n + m,) bool, so that films under them transmit the pressure around, and the share of
+        that pressure (P,) that acts on each plane."""
         held = [block.fixed for block in self.structure.blocks]
         loose = ~np.append(np.array(held, bool), np.ones(self.n_solids, bool))
         share = np.ones(len(self._body_of_plane))
@@ -135,7 +135,7 @@ class Immersion:
         }
 
     def restore(self, saved: dict[str, Array]) -> None:
-        """The domain that these places leave, cut anew: the same, bit for bit."""
+        """Cut the domain outside of the bodies at these positions again; it is the same, bit for bit."""
         self._centre, self._rotation = saved["centre"].copy(), saved["rotation"].copy()
         self._growth = saved["growth"].copy()
         self.bodies = self._placed()
@@ -154,8 +154,8 @@ class Immersion:
 
     def _new_growth(self, before: Array) -> Array:
         """Outward shift of each plane (P,) [m]: sealed faces reach over the gap to the other block, loose blocks
-        that touch something are drawn in by a film. In steps, and never less while a face stays sealed, so that a
-        block that stands still keeps its planes bit for bit and is not cut again."""
+        that touch something are drawn in by a film. The shift changes in steps and never decreases while a face stays
+        sealed, so that the planes of a block at rest keep their bits and its cells are not cut again."""
         growth = np.zeros(len(self._body_of_plane))
         if self.n_blocks == 0:
             return growth

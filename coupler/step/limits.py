@@ -140,8 +140,8 @@ HIGHEST_PRESSURE = 1e8
 
 
 def no_room(place: Array, blocks: bool, sides: bool) -> str:
-    """Where water finds no pressure, place (3,) [m], and what of a scene may be the cause: blocks that move, sides that
-    water comes through, or neither."""
+    """A message for a place (3,) [m] at which no pressure can be found, with the possible cause: moving blocks, sides
+    through which water enters, or neither."""
     causes = ["a block closes or makes smaller"] * blocks + ["an inflow or a sea fills"] * sides
     at = ", ".join(f"{x:.3g}" for x in place)
     if causes:
@@ -155,7 +155,7 @@ def no_room(place: Array, blocks: bool, sides: bool) -> str:
 
 
 def check_pressure(time: float, pressure: Array, nodes: Array, blocks: bool, sides: bool) -> None:
-    """Stop where water has no room: a chamber without a free surface that something driven makes smaller.
+    """Stop if water has no room: a driven body reduces the volume of a chamber without a free surface.
 
     pressure (N,) [Pa] at nodes (N, 3) [m]; blocks, sides as in `no_room`. Raises Diverged.
     """

@@ -1,4 +1,4 @@
-"""What the coupler reads off a structure for steps, histories and pictures."""
+"""Readings of a structure for steps, histories and pictures."""
 
 from __future__ import annotations
 

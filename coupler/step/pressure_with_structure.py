@@ -15,23 +15,23 @@ C: their dashpots. Eliminating V gives one symmetric positive definite system,
     [(dt/ρ) K + G D⁻¹ Gᵀ] x = ∫ u*·∇q + G V_free,   V = V_free − D⁻¹ Gᵀ x,                             (3)
     V_free = D⁻¹ (M/dt V^n + f − Gᵀ known).
 
-The force −Gᵀ (x + known) is the exact adjoint of how the bodies move the water in (1), so the power leaving the water
-through the wetted surfaces is the power given to the velocities V, to round-off. `other_load` of the water (wall
-shear; its surface in the cells of a body) is part of f.
+The force −Gᵀ (x + known) is the exact adjoint of the volume flux G V of the bodies in (1), so the power that leaves the
+water through the wetted surfaces equals the power received by the velocities V, to round-off. `other_load` of the water
+(wall shear; its surface in the cells of a body) is part of f.
 
-The blocks move on while the load is held, and one that floats is lifted less the higher it comes. So K_h, what still
-water does to a body that moves in it (`fluid.pressure.waterline`, 3), acts over the half of the way: D has (dt/2) K_h
-besides, and the load is less by (dt/2) K_h V. With the load of the place at the start a swing grows by ω² dt²/4 in
-every step.
+The blocks move while the load is held constant, and the buoyancy of a floating block decreases as it rises. The
+hydrostatic stiffness K_h (`fluid.pressure.waterline`, 3) therefore acts over half of the displacement: (dt/2) K_h is
+added to D, and the load is reduced by (dt/2) K_h V. With the load at the initial position an oscillation would grow by
+ω² dt²/4 in every step.
 
 V is the velocity at the end of the step.  Over the step the blocks move with the mean
 
     V − L,    L = ½ (1 − dt_s/dt) D⁻¹ (M/dt + dt/2 K_h) (V − V^n)                                         (4)
 
-(dt_s: substep; the load acts from the first one on).  Stiff joints and contacts, which make D⁻¹ small, swing to and
-fro within a step and have no other velocity than their mean.  A second pass replaces the guess of (2) by what the
-discrete elements did under the first load x₁, whose mean velocity over the step was W:  V_free = W + L + D⁻¹ Gᵀ x₁.
-"""
+(dt_s: substep; the load acts from the first one on).  Stiff joints and contacts, for which D⁻¹ is small,
+oscillate within a step, so that only their mean velocity matters.  A second pass replaces the estimate (2) by the
+motion of the discrete elements under the first load x₁, with the mean velocity W over the step:  V_free = W + L + D⁻¹
+Gᵀ x₁."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ class StructureResponse:
     def compliance(self, force: Array) -> Array:
         """D⁻¹ force over the free bodies, zero on the driven ones. force (6n,) [N, N m] → (6n,) [m/s, rad/s]
 
-        Bodies that nothing ties to others are solved each by itself."""
+        Bodies without joints or contacts are solved one by one."""
         velocity = np.zeros_like(force)
         _answer(self._alone, self._inverse, force, velocity)
         if self._factor is not None:
@@ -120,7 +120,7 @@ class StructureResponse:
         return self.velocity(self.mass @ velocity.ravel() / self.dt + force.ravel())
 
     def restoring_load(self, velocity: Array) -> Array:
-        """-(dt/2) K_h V (n, 6) [N, N m] of V (n, 6): what the load loses over the first half of the way."""
+        """-(dt/2) K_h V (n, 6) [N, N m] of V (n, 6): change of the load over the first half of the displacement."""
         if self._restoring is None:
             return np.zeros_like(velocity)
         return -(self._restoring @ velocity.ravel()).reshape(-1, 6)
@@ -244,7 +244,7 @@ def solve_coupled(
 def corrected_free_velocity(
     response: StructureResponse, mean_velocity: Array, x: Array, coupling: sp.csr_matrix
 ) -> Array:
-    """V_free of a second pass from what the bodies did, mean_velocity (n, 6), under the pressure x."""
+    """V_free of a second pass, from the mean_velocity (n, 6) of the bodies under the pressure x."""
     return mean_velocity.ravel() + response.compliance(coupling.T @ x)
 
 

@@ -1,7 +1,7 @@
-"""What a coupled run remembers of steps in which the blocks missed the motion that the pressure solve assumed.
+"""History of the steps in which the motion of the blocks differed from the one that the pressure solve assumed.
 
-Such a step is halved and taken again; the steps after it stay short and grow back, and where they keep missing the run
-ends.
+Such a step is halved and taken again; the steps after it stay short and grow back. If the motions keep differing, the
+run ends.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ REGROWTH = 1.5
 class Defects:
     """Defects of the last steps, and how long the next one may be.
 
-    most: largest defect allowed · share (0, 1]: what the next step takes of the one that water, blocks and case ask
-    for; never less than RETRIES halvings leave, however many steps in a row are bad
+    most: largest defect allowed · share (0, 1]: length of the next step over that allowed by water, blocks and case;
+    it is never less than after RETRIES halvings, however many steps in a row are bad
     """
 
     def __init__(self, most: float) -> None:
@@ -47,7 +47,7 @@ class Defects:
 
     @property
     def mean(self) -> float:
-        """Over the last DEFECT_STEPS steps; 0 before there are as many."""
+        """Mean defect over the last DEFECT_STEPS steps; 0 before that many steps were taken."""
         return sum(self._last) / DEFECT_STEPS if len(self._last) == DEFECT_STEPS else 0.0
 
     @property
@@ -74,6 +74,6 @@ class Defects:
         return {"defects": np.array(self._last, float), "share": np.array(self.share)}
 
     def restore(self, saved: dict[str, Array]) -> None:
-        """Back to what was saved."""
+        """Return to what `save` gave."""
         self._last = deque(saved["defects"].tolist(), maxlen=DEFECT_STEPS)
         self.share = float(saved["share"])

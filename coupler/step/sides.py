@@ -1,4 +1,5 @@
-"""What the parts of a coupled step ask of the whole: two sides, their balances, how far the last steps missed."""
+"""The interface that the parts of a coupled step use: the two sides, their balances, and the defects of the last
+steps."""
 
 from __future__ import annotations
 

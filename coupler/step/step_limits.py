@@ -1,11 +1,10 @@
-"""Whether a step is to be taken again, and which of its attempts stays: the limits it broke, looked at once it is
-complete.
+"""Decides whether a step is taken again, and which of its attempts is kept, from the limits that a completed step
+breaks.
 
-A step is bad where the blocks miss the motion that the water was given, where its momentum or volume breaks the limit
-at which a run stops, and where it alone puts more energy out of balance than a share of what a whole run may: a wall
-that fell once lost in one step all that its run was allowed, with the blocks missing their motion by less than their
-own limit. What built up over many steps no shorter step cures, nor what goes wrong as fast in a shorter one.
-"""
+A step is bad if the motion of the blocks differs too much from the one that the water assumed, if its momentum or
+volume breaks the limit at which a run stops, or if its energy error alone exceeds a share of the limit for the whole
+run: a falling wall once used up the whole limit in one step in which the motions differed by less than their own limit.
+Errors that have built up over many steps, or grow as fast in a shorter step, are not cured by taking a shorter one."""
 
 from __future__ import annotations
 
@@ -72,15 +71,15 @@ def _ends(coupling: CoupledSides, record: StepRecord, limits: Limits) -> bool:
 
 
 def best_of(attempts: list[Attempt]) -> Attempt:
-    """Which of the bad attempts, longest first, stays: the shortest where it is better in something that the longest
-    breaks, or where only the longest ends the run; else the longest."""
+    """Which of the bad attempts, longest first, is kept: the shortest if it is better in one of the limits that the
+    longest breaks, or if only the longest ends the run; otherwise the longest."""
     longest, shortest = attempts[0], attempts[-1]
     helped = any(shortest.measures[name] < HELPS * longest.measures[name] for name in longest.broken)
     return shortest if helped or (longest.ends and not shortest.ends) else longest
 
 
 def volume_error(coupling: CoupledSides) -> float:
-    """That of the water; 0 where there is none."""
+    """Relative error of the volume of the water; 0 without water."""
     return 0.0 if coupling.water is None else coupling.water.volume_error()
 
 
@@ -93,8 +92,8 @@ def check_step(coupling: CoupledSides, record: StepRecord, limits: Limits) -> No
 
 
 def worst_place(coupling: CoupledSides, record: StepRecord) -> str:
-    """Where to look when the energy does not balance: the block that missed the most work in the last step, and where
-    the water is fastest. "" where there is neither."""
+    """Where to look if the energy does not balance: the block with the largest missing work in the last step, and the
+    place where the water is fastest; "" if there is neither."""
     parts = []
     if len(record.missed_work) and abs(record.missed_work).max() > 0.0:
         worst = int(abs(record.missed_work).argmax())

@@ -221,7 +221,7 @@ class Watch:
         return {**peaks, **own, "before": self._before.copy(), "hits": self.hits}
 
     def restore(self, saved: dict[str, Array]) -> None:
-        """Back to what was saved."""
+        """Return to what `save` gave."""
         for name in ("pressure", "force", "moment", "depth"):
             setattr(self, name, Peaks(saved[f"{name}_value"].copy(), saved[f"{name}_time"].copy()))
         for name in _OWN:

@@ -13,7 +13,7 @@ import numpy as np
 
 from array_types import Array
 from fluid.domain.moments import wet_fraction
-from kernel_decorators import kernel
+from kernel_decorators import inner, kernel
 
 NO_AIR, OPEN_AIR = -1, 0
 """Labels of nodes without air and of those that air from outside reaches; pockets count from 1."""
@@ -67,7 +67,7 @@ def _components(dry, covered, cells):
     return root
 
 
-@kernel
+@inner
 def _root_of(root, i):
     while root[i] != i:
         root[i] = root[root[i]]
@@ -75,7 +75,7 @@ def _root_of(root, i):
     return i
 
 
-@kernel
+@inner
 def _join(root, i, j):
     a, b = _root_of(root, i), _root_of(root, j)
     if a < b:

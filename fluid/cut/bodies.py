@@ -1,4 +1,4 @@
-"""Rigid convex bodies as the water sees them: half spaces n . x <= o, in world coordinates.
+"""Rigid convex bodies for the water: half spaces n·x ≤ o in world coordinates.
 
 A body is the intersection of its half spaces; its vertices serve only the broad search and the tests.
 Every plane may be shifted outward by its `growth` [m] before the water is cut: faces of intact joints are
@@ -22,7 +22,7 @@ SAME_PLANE = 1e-9
 
 
 class NotConvex(ValueError):
-    """A polyhedron handed to the water is not convex, not closed, or has no volume."""
+    """A polyhedron passed to the water is not convex, not closed, or has no volume."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -133,7 +133,7 @@ class ConvexBodies:
 
     @classmethod
     def empty(cls) -> ConvexBodies:
-        """No bodies at all."""
+        """An empty set of bodies."""
         return BodyShapes.from_polyhedra([]).placed(np.zeros((0, 3)))
 
     def moved(self, centre, rotation=None) -> ConvexBodies:
@@ -150,7 +150,7 @@ class ConvexBodies:
         return self.offsets + self.growth
 
     def planes(self) -> Planes:
-        """The planes that the water is cut by, as kernels take them."""
+        """The planes that cut the water, as kernels take them."""
         return Planes(self.normals, self.cut_offsets(), self.plane_start)
 
     def bounds(self) -> Array:

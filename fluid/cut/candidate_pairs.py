@@ -12,7 +12,7 @@ import numpy as np
 from array_types import Array
 from fluid.mesh.arrays import Bins, Boxes
 from fluid.mesh.background import bin_of
-from kernel_decorators import plain
+from kernel_decorators import inner, plain
 
 
 def near_pairs(mesh, solids, chosen, margin) -> tuple[Array, Array]:
@@ -37,9 +37,9 @@ def near_pairs(mesh, solids, chosen, margin) -> tuple[Array, Array]:
     return key // len(solids), key % len(solids)
 
 
-@plain
+@inner
 def _apart(nodes, cells, e, planes, first, last, margin):
-    """Is the cell wholly beyond one of the planes first:last?"""
+    """Whether the cell lies wholly beyond one of the planes first:last."""
     for g in range(first, last):
         beyond = True
         for k in range(4):
@@ -56,7 +56,8 @@ def _apart(nodes, cells, e, planes, first, last, margin):
 
 @plain
 def _search(nodes, cells, bins, chosen, reach, planes, margin, cell, body):
-    """Fill the pairs as far as they fit -> how many there are. reach: bins of each of the chosen bodies."""
+    """Write as many of the pairs as there is room for, and return how many there are. reach: bins of each of the chosen
+    bodies."""
     n = 0
     for b in range(len(chosen)):
         first, last = planes.start[chosen[b]], planes.start[chosen[b] + 1]

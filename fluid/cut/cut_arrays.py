@@ -1,4 +1,4 @@
-"""Arrays that the cut fills, and what is handed on of them."""
+"""Arrays that the cut fills, and the parts of them that are passed on."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Output(NamedTuple):
 
 
 def output(parts: int, polygons: int, with_openings: bool) -> Output:
-    """Room for that many parts and polygons, ample everywhere: pages that nobody writes to cost nothing."""
+    """Arrays with ample room for that many parts and polygons; memory that is never written to takes no space."""
     openings, tetrahedra = polygons * 4 if with_openings else 64, polygons * 4
     return Output(
         np.zeros(parts, dtype=np.int64),
@@ -91,7 +91,7 @@ class Cuts(NamedTuple):
 
 
 def behind(parts: list[Cuts]) -> Cuts:
-    """Cuts of cells that follow each other, as one."""
+    """One Cuts from those of consecutive ranges of cells."""
     if len(parts) == 1:
         return parts[0]
     rows = np.cumsum([0, *(len(cuts.part_cell) for cuts in parts)])

@@ -1,6 +1,6 @@
 """Which part of a tetrahedron lies outside convex bodies: exact, for any number of bodies per cell.
 
-Sequential convex splitting. The fluid in a cell is a list of convex pieces, at first the cell itself. For
+The method is sequential convex splitting. The fluid in a cell is a list of convex pieces, at first the cell itself. For
 each body B, each piece P is split by the planes of B one after the other: what lies outside a plane is set
 aside, what lies inside goes on to the next plane. If nothing is left inside, P does not meet B and stays
 whole; else P is replaced by what was set aside. The *wetted surface* is then read off the pieces: a face of
@@ -132,8 +132,8 @@ def _nearby(w, x, bodies, planes, tolerance):
 
 @inner
 def _align(w, row, tolerance):
-    """Give a plane the distances of an earlier one (or their negatives) that it misses by the tolerance, so
-    that touching and flush faces of two bodies are in one plane exactly and not up to their noise."""
+    """Give a plane the distances of an earlier one (or their negatives) if the two agree within the tolerance, so that
+    touching and flush faces of two bodies lie in exactly one plane in spite of round-off."""
     for r in range(row):
         for sign in (1.0, -1.0):
             same = True
@@ -182,7 +182,8 @@ def _subtract(w, piece, at, round_off, thin, top, n_vertices):
 
 @inner
 def _is_thin(w, piece, thin):
-    """Is the volume of a piece below that of a layer `thin` over a tenth of the spacing squared?"""
+    """Whether the volume of a piece is below that of a layer of thickness `thin` over a tenth of the spacing
+    squared."""
     piece_moments(w, piece, w.moments)
     return w.moments[0] < thin * (thin / THIN) ** 2 * 0.01
 
@@ -306,7 +307,7 @@ def cut_cells(nodes, cells, chosen, body_start, bodies, solids, tolerance, spaci
 
 
 def _cut_range(first, last, mesh: Corners, chosen: Chosen, planes: Planes, limits: Limits) -> Cuts:
-    """Those of the chosen cells from `first` to before `last`."""
+    """Cut the chosen cells from `first` to before `last`."""
     at = np.array([first, 0, 0, 0, 0])
     scale = 1
     most_bodies = int(np.diff(chosen.start[first : last + 1]).max()) if last > first else 0

@@ -1,4 +1,4 @@
-"""What lies opposite to wetted polygons: other bodies, or the sides of the box around the mesh, with water between."""
+"""What lies opposite to wetted polygons across the water: other bodies, or the sides of the box around the mesh."""
 
 from __future__ import annotations
 

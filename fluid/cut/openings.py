@@ -1,4 +1,4 @@
-"""Over which area cut parts of neighbouring cells touch: the geometry behind the multiple covers.
+"""Areas over which cut parts of neighbouring cells are in contact: the geometry of the multiple covers.
 
 The fluid parts of two cells touch across their common face where their open polygons overlap. A contact depends on
 the two cells only, so those of cells that were not cut again are kept from one cut to the next.

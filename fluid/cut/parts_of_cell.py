@@ -34,7 +34,7 @@ def _linked_area(w, one, two, normals, round_off):
 
 @inner
 def _reaches_faces(w, piece):
-    """Does a piece have a face on a face of the cell?"""
+    """Whether a piece has a face on a face of the cell."""
     reaches = False
     for f in range(w.faces[piece]):
         reaches = reaches or w.tag[piece, f] < 0
@@ -43,7 +43,8 @@ def _reaches_faces(w, piece):
 
 @inner
 def label_parts(w, count, normals, round_off, link_area):
-    """Number the connected parts of the fluid in w.label -> how many. link_area < 0: one part."""
+    """Number the connected parts of the fluid in w.label and return how many there are; with link_area < 0, one
+    part."""
     for piece in range(count):
         w.label[piece] = 0 if link_area < 0.0 else piece
     if link_area < 0.0:

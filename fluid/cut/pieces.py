@@ -50,7 +50,7 @@ class Workspace(NamedTuple):
 
 
 def workspace(scale: int, n_bodies: int, n_planes: int) -> Workspace:
-    """Scratch arrays; `scale` doubles until the most fragmented cell fits."""
+    """Work space for cutting; `scale` is doubled until the most fragmented cell fits."""
     vertices, pieces, loops, corners, polygons = 1024 * scale, 96 * scale, 32 * scale, 32 * scale, 64 * scale
     return Workspace(
         np.empty((vertices, 7)),

@@ -16,7 +16,7 @@ from fluid.numerics.threads import found_over, over, owning, reach_of_cells
 from kernel_decorators import inner, kernel, plain, released
 
 
-@plain
+@inner
 def corner_moments(phi, a, out):
     """∫ N_k / |e| over the part of the cell on the side of corner a, the only one there. phi (4,), out (4,)."""
     v = 1.0
@@ -31,7 +31,7 @@ def corner_moments(phi, a, out):
             out[a] += 0.25 * v * (1.0 - t)
 
 
-@plain
+@inner
 def _prism_moments(phi, a, b, c, d, out):
     """∫ N_k / |e| over the wet side when a, b are wet and c, d dry.
 
@@ -87,7 +87,8 @@ class FluidParts(NamedTuple):
 
 @inner
 def part_moments(e, phi, parts, total, local, out):
-    """total (4,) <- ∫_{φ<0} N_a dV [m³] over the fluid part of cell e; phi (4,) at its corners; rest: work space.
+    """total (4,) <- ∫_{φ<0} N_a dV [m³] over the fluid part of cell e; phi (4,) at its corners; other arguments: work
+    space.
 
     Exact: a whole cell by its corners, a cut one by the tetrahedra that fill it."""
     n_wet = 0

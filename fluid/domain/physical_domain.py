@@ -1,4 +1,4 @@
-"""The physical domain: what the background tetrahedra hold of the water's side of the solids.
+"""The physical domain: the parts of the background tetrahedra that lie outside the solids.
 
 Every element keeps its P1 functions; only the region of integration shrinks to the fluid part, known by its
 exact moments V = ∫ dV, c = ∫ x dV / V, S = ∫ (x - c)(x - c)^T dV, and by its wetted surface, polygons with
@@ -55,8 +55,8 @@ class WholeCells:
 
 @dataclass(frozen=True, kw_only=True)
 class Memory:
-    """What the next cut needs of this one: mesh, bodies, pairs sorted by (cell, body), cut parts; contacts of the parts
-    with multiple covers, else None."""
+    """Data that the next cut takes over from this one: mesh, bodies, pairs sorted by (cell, body), cut parts; contacts
+    of the parts with multiple covers, else None."""
 
     mesh: Background
     bodies: ConvexBodies
@@ -118,7 +118,7 @@ class PhysicalDomain:
     memory: Memory = field(repr=False, compare=False)
 
     def polygons(self, rows=slice(None)) -> WettedPolygons:
-        """These of the wetted polygons, as kernels take them."""
+        """The listed wetted polygons, as kernels take them."""
         return WettedPolygons(
             self.face_cell[rows],
             self.face_body[rows],
@@ -138,8 +138,8 @@ class PhysicalDomain:
         return self.part >= 0
 
     def second_of(self, rows) -> Array:
-        """Second moments (n, 6) [m5] (xx, yy, zz, xy, xz, yz) of the fluid part of cells (n,). They are not held: a
-        fifth of the memory of a cell, and asked for at cut cells."""
+        """Second moments (n, 6) [m5] (xx, yy, zz, xy, xz, yz) of the fluid part of cells (n,). They are not stored,
+        since they would take a fifth of the memory of a cell and are needed only at cut cells."""
         found, part = _whole_second(self.memory.mesh, self.parent_cell[rows]), self.part[rows]
         cut = part >= 0
         found[cut] = self.memory.cuts.moments[part[cut], 4:10]
@@ -420,7 +420,7 @@ def _elements(memory) -> Elements:
 
 @kernel
 def _listed(met, part_cell, part_whole):
-    """Elements: each cell that no body meets, and each part of the others."""
+    """The Elements: every cell that no body meets, and every part of the others."""
     most = len(met) + len(part_cell)
     parent, part, n = np.empty(most, np.int64), np.full(most, -1, np.int64), 0
     start, of_part, k = np.empty(len(met) + 1, np.int64), np.empty(len(part_cell), np.int64), 0

@@ -1,11 +1,11 @@
-"""Where a point is in the physical domain: in which cell, on which side of a thin wall, or inside a body.
+"""Location of points in the physical domain: in which cell, on which side of a thin wall, or inside a body.
 
-A background cell that a thin wall cuts in two holds two cells of the domain, each with its own unknowns. The one whose
-fluid part holds the point answers: of all tetrahedra of the parts (`fans.py`) that to which the point is nearest,
+A background cell that a thin wall cuts in two holds two cells of the domain, each with its own unknowns. The cell
+whose fluid part contains the point is the one sought: of all tetrahedra of the parts (`fans.py`), that with the least
 
     d(x) = max over its four planes of the distance of x outside of them, 0 within,
 
-since a point on the face of a wall is outside of all of them by round-off.
+since round-off may put a point on the face of a wall outside of all of them.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from array_types import Array, Bools, Floats, Integers
-from kernel_decorators import inner, kernel, plain
+from kernel_decorators import inner, kernel
 
 SKIN = 0.05
 """Share of a cell edge within which a point inside a body still counts as on its face: blocks creep under load."""
@@ -26,7 +26,7 @@ RINGS = 4
 
 
 class Outside(ValueError):
-    """A place at which the water is asked lies outside the mesh of the tank."""
+    """A point at which the water is read lies outside the mesh of the tank."""
 
 
 @dataclass(frozen=True)
@@ -103,9 +103,9 @@ def _answering(points, parent, skipped, neighbours, first, count, parts, nodes, 
     return answer
 
 
-@plain
+@inner
 def _with_neighbours(around, found, n):
-    """Add those of `around` (4,) that are there and not among the first n of `found` yet; the new n."""
+    """Append those of `around` (4,) that exist and are not among the first n of `found`, and return the new n."""
     for c in around:
         new = c >= 0
         for k in range(n):

@@ -1,11 +1,10 @@
-"""Who touches whom in the physical domain, laid out for the kernels of the step.
+"""Connectivity of the physical domain, laid out for the kernels of the step.
 
 The gradients of a cell are those of its cell in the background mesh (a cover is a copy with the same
 corners), so that nothing geometric is recomputed when solids move.  Every loop over cells reads them: cells of one
 shape share a row (`shapes.py`), which stays in the cache of the processor.  Numbers of
-nodes and cells are unsigned: a loop that gathers by them need not ask whether one counts from the end, as negative
-numbers do in Python, and takes half of the time.
-"""
+nodes and cells are unsigned: a loop that gathers by them need not test for negative numbers, which count from the end
+in Python, and takes half the time."""
 
 from __future__ import annotations
 
@@ -17,7 +16,7 @@ import numpy as np
 from array_types import Array, Bools, Floats, Integers, Ints
 from fluid.domain.coupling_matrix import polygons_of_nodes
 from fluid.domain.moments import FluidParts
-from fluid.mesh.arrays import Edges, FluidCells, Hats
+from fluid.mesh.arrays import Edges, FluidCells, Hats, Paths
 from fluid.mesh.background import Background
 from fluid.numerics.threads import over
 from kernel_decorators import kernel, ranged, released
@@ -111,6 +110,19 @@ class Topology:
     def hats(self) -> Hats:
         """The linear functions of the cells as kernels take them."""
         return Hats(self.cells, self.parent, self.gradients)
+
+    @property
+    def paths(self) -> Paths:
+        """The mesh as kernels take it that follow paths from cell to cell."""
+        return Paths(
+            self.nodes,
+            self.cells,
+            self.parent,
+            self.gradients,
+            self.neighbours,
+            self.node_start,
+            self.node_cells,
+        )
 
     @cached_property
     def finer(self) -> Array:

@@ -63,6 +63,21 @@ class FluidCells(NamedTuple):
     upright: Bools
 
 
+class Paths(NamedTuple):
+    """What a path through a mesh walks on: nodes (N, 3) [m] · cells (M, 4), their nodes · parent (M,) row of the
+    gradients (.., 4, 3) [1/m] of their linear functions · neighbours (M, 4): cell behind the face opposite each
+    corner, -1 none · node_start (N + 1,), node_cells: the cells around node i are
+    node_cells[node_start[i]:node_start[i + 1]]."""
+
+    nodes: Floats
+    cells: Integers
+    parent: Integers
+    gradients: Floats
+    neighbours: Integers
+    node_start: Integers
+    node_cells: Integers
+
+
 class Edges(NamedTuple):
     """Edges of listed nodes: row (N,) place of a node in the list, -1 if it is not there · start (n + 1,), neighbour,
     stiffness [m] of each."""

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from array_types import Array
-from kernel_decorators import kernel
+from kernel_decorators import helper, inner, kernel
 
 PER_LEVEL = 3
 """Bisections that halve all edges of a brick."""
@@ -139,7 +139,7 @@ def _bisect(nodes, lattice, cells, depth, wanted, deep):
     )
 
 
-@kernel
+@inner
 def _longest(corners, lattice):
     """Corners a, b of the longest edge; of equal ones that with the smallest numbers."""
     best, one, other, low, high = -1.0, 0, 1, 0, 0
@@ -154,7 +154,7 @@ def _longest(corners, lattice):
     return one, other
 
 
-@kernel
+@inner
 def _has_halved(corners, touched, keys, middle):
     """Whether some edge of a cell has a node in its middle."""
     for a in range(4):
@@ -167,7 +167,7 @@ def _has_halved(corners, touched, keys, middle):
     return False
 
 
-@kernel
+@inner
 def _slot(keys, key):
     """Place of a key in the table, or the free one where it belongs."""
     mask = keys.shape[0] - 1
@@ -177,7 +177,7 @@ def _slot(keys, key):
     return at
 
 
-@kernel
+@helper
 def _rehashed(keys, middle):
     wider, values = np.full(2 * keys.shape[0], -1, np.int64), np.empty(2 * keys.shape[0], np.int64)
     for s in range(keys.shape[0]):
@@ -187,28 +187,28 @@ def _rehashed(keys, middle):
     return wider, values
 
 
-@kernel
+@helper
 def _grown(rows):
     out = np.empty((2 * rows.shape[0], rows.shape[1]))
     out[: rows.shape[0]] = rows
     return out
 
 
-@kernel
+@helper
 def _grown_ints(rows):
     out = np.empty((2 * rows.shape[0], rows.shape[1]), np.int64)
     out[: rows.shape[0]] = rows
     return out
 
 
-@kernel
+@helper
 def _grown_numbers(values):
     out = np.empty(2 * values.shape[0], np.int64)
     out[: values.shape[0]] = values
     return out
 
 
-@kernel
+@helper
 def _grown_flags(flags):
     out = np.zeros(2 * flags.shape[0], np.bool_)
     out[: flags.shape[0]] = flags

@@ -27,7 +27,7 @@ import numpy as np
 
 from array_types import Array
 from fluid.mesh.background import Background, MeshError
-from kernel_decorators import kernel
+from kernel_decorators import helper, kernel
 
 FOLLOW = 0.2
 """Steepest slope that layers follow: one in five. Cells sheared more let still water at a shore grow restless (0.01 a
@@ -293,7 +293,7 @@ def _cells(height, start, nx, ny, below, mirrored):
     return cells[:n].copy()
 
 
-@kernel
+@helper
 def _climb(height, start, corner, rank, mirrored, cells, n):
     """Tetrahedra between the three columns corner (3,), written from row n on; the next row."""
     at, end = np.empty(3, np.int64), np.empty(3, np.int64)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from array_types import Bools, Floats, Integers
-from kernel_decorators import inner, kernel, plain
+from kernel_decorators import inner, kernel
 
 MOST_SHAPES = 64
 """Shapes that are compared one by one, 6 kB of gradients: those of a box of bricks."""
@@ -101,7 +101,7 @@ def _largest(g):
     return largest
 
 
-@plain
+@inner
 def _alike(g, other, tolerance):
     for a in range(4):
         for k in range(3):

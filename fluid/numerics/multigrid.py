@@ -13,7 +13,7 @@ other blocks. The blocks depend on the number of unknowns alone, so the result d
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -39,8 +39,17 @@ SAME = 0.99
 """Share of the strongest coupling from which one counts as equally strong: round-off must not choose the pairs."""
 
 
-@dataclass(frozen=True)
-class Level:
+class Matrix(NamedTuple):
+    """A symmetric matrix: as `Level`, without what its sweeps need."""
+
+    start: Integers
+    middle: Integers
+    column: Integers
+    entry: Floats
+    diagonal: Floats
+
+
+class Level(NamedTuple):
     """Rows of A: start[i]:middle[i] of (column, entry) lie left of the diagonal, middle[i]:start[i+1] right of it.
 
     diagonal (n,) and its inverse · aggregate (n,) unknown of the coarser level, -1 none (an unknown without
@@ -77,7 +86,7 @@ class Multigrid:
             if count > LEAST_GAIN * len(aggregate):
                 break
             self.levels.append(Level(*parts, 1.0 / parts[-1], aggregate))
-            parts = _split(*_galerkin(*parts, aggregate, count, SCALE))
+            parts = _split(*_galerkin(Matrix(*parts), aggregate, count, SCALE))
         n = len(parts[-1])
         self._last = Level(*parts, 1.0 / parts[-1], np.full(n, -1, np.int32))
         self._dense = _dense_inverse(self._last) if n <= COARSEST else None
@@ -103,12 +112,12 @@ class Multigrid:
     def _by_blocks(self, depth: int, at: Level, n_coarse: int, r):
         """`_cycle` on a large level."""
         bounds, x, left = at.blocks(), np.empty(len(r)), np.empty(len(r))
-        rows, count, work = (at.start, at.middle, at.column, at.entry), len(bounds) - 1, BLOCK
-        over(_down_blocks, count, bounds, *rows, at.inverse, r, x, weight=work)
-        over(_left_over, count, bounds, *rows, x, left, weight=work)
+        count, work = len(bounds) - 1, BLOCK
+        over(_down_blocks, count, bounds, at, r, x, weight=work)
+        over(_left_over, count, bounds, at, x, left, weight=work)
         coarse = self._cycle(depth + 1, _restricted(at.aggregate, left, n_coarse))
         over(_add, len(r), at.aggregate, coarse, x)
-        over(_up_blocks, count, bounds, *rows, at.inverse, r, x.copy(), x, weight=work)
+        over(_up_blocks, count, bounds, at, r, x.copy(), x, weight=work)
         return x
 
     def _at_the_bottom(self, r):
@@ -158,7 +167,7 @@ def _aggregates(parts):
     aggregate, count = _matched(*parts)
     pairs = aggregate
     for _ in range(PAIRINGS - 1):
-        parts = _split(*_galerkin(*parts, pairs, count, 1.0))
+        parts = _split(*_galerkin(Matrix(*parts), pairs, count, 1.0))
         pairs, count = _matched(*parts)
         aggregate = _chained(aggregate, pairs)
     return aggregate, count
@@ -198,11 +207,10 @@ def _chained(first, second):
     return out
 
 
-def _galerkin(start, middle, column, entry, diagonal, aggregate, n, scale):
+def _galerkin(fine: Matrix, aggregate, n, scale):
     """scale Pᵀ A P as csr (indptr, indices, data), the diagonal first in every row."""
     first, member = _members(aggregate, n)
-    fine = (start, column, entry, diagonal, aggregate, n, scale)
-    parts = over(_coarse_rows, n, first, member, *fine, weight=COARSE_ROW)
+    parts = over(_coarse_rows, n, first, member, fine, aggregate, n, scale, weight=COARSE_ROW)
     if len(parts) == 1:
         return parts[0]
     lengths, indices, data = zip(*parts)
@@ -229,8 +237,9 @@ def _members(aggregate, n):
 
 
 @released
-def _coarse_rows(begin_row, end_row, first, member, start, column, entry, diagonal, aggregate, n, scale):
+def _coarse_rows(begin_row, end_row, first, member, fine, aggregate, n, scale):
     """Rows of `_galerkin`: indptr from 0, indices, data."""
+    start, column, entry, diagonal = fine.start, fine.column, fine.entry, fine.diagonal
     room = end_row - begin_row
     for t in range(first[begin_row], first[end_row]):
         room += np.int64(start[member[t] + 1]) - np.int64(start[member[t]])
@@ -283,8 +292,9 @@ def _up(start, column, entry, inverse, aggregate, coarse, r, x):
 
 
 @ranged
-def _down_blocks(first, last, bounds, start, middle, column, entry, inverse, r, x):
+def _down_blocks(first, last, bounds, at, r, x):
     """Forward sweeps of blocks from zero → x."""
+    start, middle, column, entry, inverse = at.start, at.middle, at.column, at.entry, at.inverse
     for b in range(first, last):
         low = bounds[b]
         for i in range(low, bounds[b + 1]):
@@ -296,8 +306,9 @@ def _down_blocks(first, last, bounds, start, middle, column, entry, inverse, r, 
 
 
 @ranged
-def _left_over(first, last, bounds, start, middle, column, entry, x, left):
-    """r - A x after `_down_blocks`: of what is left of the diagonal only the other blocks count."""
+def _left_over(first, last, bounds, at, x, left):
+    """r - A x after `_down_blocks`: left of the diagonal only columns of other blocks count."""
+    start, middle, column, entry = at.start, at.middle, at.column, at.entry
     for b in range(first, last):
         low = bounds[b]
         for i in range(low, bounds[b + 1]):
@@ -329,8 +340,9 @@ def _add(first, last, aggregate, coarse, x):
 
 
 @ranged
-def _up_blocks(first, last, bounds, start, middle, column, entry, inverse, r, before, x):
-    """Backward sweeps of blocks in place; before (n,): x before them, which other blocks see."""
+def _up_blocks(first, last, bounds, at, r, before, x):
+    """Backward sweeps of blocks in place; before (n,): x before the sweeps, which the other blocks see."""
+    start, column, entry, inverse = at.start, at.column, at.entry, at.inverse
     for b in range(first, last):
         low, high = bounds[b], bounds[b + 1]
         for i in range(high - 1, low - 1, -1):

@@ -1,7 +1,7 @@
 """Which nodes and cells take part in the pressure of a step.
 
-A node below the surface inside a solid may have no water at all around it: on a gentle slope the cells beyond the water
-line have such nodes for many cells, and their fluid part is air.  A cut cell whose fluid part lies above the surface is
+A node below the surface but inside a solid may have no water around it: on a gentle slope many cells beyond the water
+line have such nodes, while their fluid part is air.  A cut cell whose fluid part lies above the surface is
 void: it is left out of the matrix, the right hand side, the coupling to the solids and the correction alike.  Water at
 rest stays at rest exactly, as its balance holds cell by cell.
 """

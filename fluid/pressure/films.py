@@ -1,26 +1,28 @@
-"""Films of water under blocks: they hand on the pressure of their rim, and push or hold nobody by themselves.
+"""Films of water under blocks: they transmit the pressure at their rim and exert no other force.
 
-A block that lies on the bed or on another one leaves a film of almost no volume.  As cells of the mesh such a film is
-right at rest, where it hands the pressure of its rim on, whatever its thickness is; but the water that a lifted block
-has to draw in through it has no room to flow in, so that the film holds the block down (or stops one that falls) by
+A block that lies on the bed or on another block leaves a film of almost no volume.  Resolved as cells of the mesh, such
+a film is correct at rest, where it transmits the pressure at its rim whatever its thickness. But the water that a
+lifted block has to draw in has no room to flow through it, so that the film holds the block down (or stops a falling
+one) by
 
     G_f V_n · A_ff⁻¹ G_f V_n                                                                              (1)
 
-(f: nodes whose cells all lie in films, A: the pressure matrix), the inertia of a sheet of no thickness.  What a real
-film does there depends on the roughness of both faces and not on the cells.  So (1) is left out: in films narrower
-than NARROW h the pressure is that of the water around, r, and its own weight,
+(f: nodes whose cells all lie in films, A: the pressure matrix), the inertia of a sheet of no thickness.  The
+behaviour of a real film depends on the roughness of both faces and not on the cells.  So (1) is left out: in films
+narrower than NARROW h the pressure follows from that of the water around, r, and from the weight of the film,
 
     p_f = R p_r + c,     R = -A_ff⁻¹ A_fr,     c = A_ff⁻¹ ∫ dt g·∇N_f dV                                   (2)
 
-and what a block sets free there is drawn in at the rim, Ĝ_r = G_r + Rᵀ G_f, Ĝ_f = 0, the exact adjoint: with Ĝ instead
-of G and the load -G_fᵀ c besides, the system with the structure inside stays symmetric and positive definite, and the
-power that leaves the water is that given to the blocks.  The matrix stays as it is: the rows of the film give (2)
-where their right hand side is ∫ dt g·∇N_f dV - (A known)_f.  Volume: what the rim gave goes to the film,
+and the volume that a moving block sets free is drawn in at the rim, Ĝ_r = G_r + Rᵀ G_f, Ĝ_f = 0, the exact adjoint:
+with Ĝ instead of G and the load -G_fᵀ c besides, the system with the structure inside stays symmetric and positive
+definite, and the power that leaves the water is that given to the blocks.  The matrix stays as it is: the rows of the
+film give (2) where their right hand side is ∫ dt g·∇N_f dV - (A known)_f.  The volume that the rim loses goes to the
+film,
 
     dW_r/dt = (Rᵀ G_f V)_r,     dW_f/dt = -(R 1)_f (G_f V)_f.                                             (3)
 
-A film that touches no other water keeps its own balance.  A face may get a share of its pressure only (uplift of
-contacts that keep a part of the water out): its polygons in films count by that share in G.
+A film that touches no other water keeps its own balance.  A face may receive only a share of the
+pressure (uplift of contacts that keep part of the water out): its polygons in films then count in G with that share.
 """
 
 from __future__ import annotations
@@ -43,8 +45,8 @@ NARROW = 0.25
 
 @dataclass(frozen=True)
 class Films:
-    """Films of a domain. node (N,) bool: all cells around it lie in films · thinned csr (N, 6 n_bodies): what shares
-    below 1 take off G."""
+    """Films of a domain. node (N,) bool: all cells around it lie in films · thinned csr (N, 6 n_bodies): reduction of
+    G by shares below 1."""
 
     node: Bools
     thinned: sp.csr_array
@@ -69,7 +71,7 @@ class Films:
         return cls(node, sp.csr_array(thinned))
 
     def handed_on(self, water, problem):
-        """The PressureProblem in which films hand on the pressure of their rim; itself where none takes part."""
+        """The PressureProblem in which films transmit the pressure at their rim; the same one if no film takes part."""
         p, dofs = problem, problem.dofs
         coupling = p.coupling if self.thinned.nnz == 0 else sp.csr_array(p.coupling - self.thinned[dofs])
         film = _with_a_rim(p.matrix, self.node[dofs])
@@ -124,7 +126,7 @@ def _placed(block, rows, columns, shape):
 
 
 def _with_a_rim(matrix, film):
-    """(n,) bool: film without the parts that no other unknown touches."""
+    """(n,) bool: nodes in films, without the parts that touch no other unknown."""
     f = np.flatnonzero(film)
     if len(f) == 0:
         return film
@@ -164,7 +166,7 @@ def _one_solved(own, rows, right):
 
 @kernel
 def _film_cells(face_cell, area, in_film, volume, reach):
-    """(M,) bool: cells with polygons in films only, and no more water than these have within reach (M,) [m]."""
+    """(M,) bool: cells whose polygons all lie in films, and whose water lies within reach (M,) [m] of them."""
     n_cells = len(volume)
     covered, other = np.zeros(n_cells), np.zeros(n_cells, np.bool_)
     for s in range(face_cell.shape[0]):

@@ -1,26 +1,26 @@
-"""Cells with obtuse angles at the surface that would turn the pressure matrix indefinite.
+"""Cells with obtuse angles at the surface that would make the pressure matrix indefinite.
 
 The zero of the pressure at the crossings of wet-dry edges (`projection.py`, equation (2)) gives the wet corners i of a
 cell the matrix
 
     A_ij = |e| ∇N_i·∇N_j,      A_ii = |e| [Σ_{j wet} k_ij + Σ_{j dry} k_ij / ϑ_ij],      k_ij = -∇N_i·∇N_j,
 
-indefinite where a dry corner lies behind an obtuse angle.  In the open its neighbours outweigh such a cell; beside a
-solid, where cells have little fluid, they may not: the row of a node then has no pressure that the surface could hold,
-and any positive number in its place stirs water at rest.  Left out of matrix and right hand side alike are
-- cells with less than SMALL of their volume in the fluid whose own matrix is not positive,
-- cells that take from the diagonal of a row until the sum is no longer clearly positive.
-Water at rest balances in every cell by itself, so it stays at rest.
+indefinite where a dry corner lies behind an obtuse angle.  Away from solids the neighbours outweigh such a cell.
+Beside a solid, where cells contain little fluid, they may not: the row of the node then determines no pressure, and any
+positive number in place of its diagonal stirs water at rest.  These cells are left out of both matrix and right hand
+side: - cells with less than SMALL of their volume in the fluid whose own matrix is not positive, - cells that take from
+the diagonal of a row until the sum is no longer clearly positive. Water at rest is in balance in every cell separately,
+so it stays at rest.
 
-What is left may still be indefinite where the surface passes close to a node behind an obtuse angle, 1/ϑ being large.
-With K_UU, rows and columns of the unknowns in the stiffness of all cells, the matrix is
+The remaining matrix may still be indefinite where the surface passes close to a node behind an obtuse angle, 1/ϑ being
+large. With K_UU, rows and columns of the unknowns in the stiffness of all cells, the matrix is
 
     A = K_UU + diag(d),      d_i = Σ_{j dry} k_ij (1/ϑ_ij - 1),
 
 and K_UU ⪰ diag(r) with r_i = Σ_e t_e K_e,ii, t_e the least eigenvalue of the cell's K_e,UU scaled to a diagonal of ones
-(above 0 where a corner of the cell is no unknown).  So A is positive definite wherever d > -r; rows that miss that get
-|d_i| instead of d_i, and the difference times what the pressure of the node is about goes to the right hand side: the
-surface still holds the pressure near 0 there, and water at rest still balances (`reserve`, `about`).
+(above 0 where a corner of the cell is no unknown).  So A is positive definite wherever d > -r; other rows get
+|d_i| instead of d_i, and the difference times an estimate of the pressure at the node is added to the right hand side.
+The surface then still keeps the pressure near 0, and water at rest is still in balance (`reserve`, `about`).
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from __future__ import annotations
 import numpy as np
 
 from fluid.pressure.projection import SMALLEST_CUT
-from kernel_decorators import kernel
+from kernel_decorators import inner, kernel
 
 LEAST = 0.05
 """Least share of a row's positive and negative entries on the diagonal that is to be left."""
@@ -38,13 +38,14 @@ ROUND_OFF = 1e-12
 
 
 def without_indefinite(topology, cells, wet, phi):
-    """Which of the listed cells (n,) stay, (n,) bool; wet (N,) bool and phi (N,) [m]: the surface."""
+    """Which of the listed cells (n,) are kept, (n,) bool; wet (N,) bool and phi (N,) [m]: the surface."""
     t = topology
     return _kept(cells, t.fraction, wet, phi, t.cells, t.parent, t.products, t.volume)
 
 
 def reserve(topology, cells, unknown):
-    """r (N,) [m]: what the diagonal of each row may lose, from the listed cells (n,); unknown (N,) bool."""
+    """r (N,) [m]: by how much the diagonal of each row may be reduced, from the listed cells (n,); unknown (N,)
+    bool."""
     t = topology
     return _reserve(cells, unknown, t.cells, t.parent, t.products, t.volume)
 
@@ -81,9 +82,9 @@ def _reserve(cell_list, unknown, cells, parent, products, volume):
     return out
 
 
-@kernel
+@inner
 def _least_root(off):
-    """Least eigenvalue of the symmetric 3 x 3 matrix with zeros on its diagonal and these entries (3,) beside it, from
+    """Least eigenvalue of the symmetric 3 x 3 matrix with a zero diagonal and the off-diagonal entries `off` (3,), from
     below: λ³ - p λ - q = 0 by Newton's method, which comes up from -2 sqrt(p/3) without passing the root."""
     p = off[0] * off[0] + off[1] * off[1] + off[2] * off[2]
     q = 2.0 * off[0] * off[1] * off[2]
@@ -97,7 +98,7 @@ def _least_root(off):
 
 
 def about(graph, rows, beside, phi, pressure):
-    """What the pressure of nodes rows (k,) is about [Pa]: φ times the mean slope p/φ of the nodes around, beside (N,)
+    """Estimate [Pa] of the pressure at the nodes rows (k,): φ times the mean slope p/φ of the nodes around, beside (N,)
     bool the surface, where φ is exact, the deep ones first; pressure (N,) [Pa] a step ago."""
     return _about(rows, graph.row, graph.start, graph.neighbour, beside, phi, pressure)
 
@@ -150,7 +151,7 @@ def _kept(cell_list, fraction, wet, phi, cells, parent, products, volume):
     return kept
 
 
-@kernel
+@inner
 def _cell_matrix(corners, products, wet, phi, matrix):
     """A / |e| in `matrix` (4, 4), rows and columns of dry corners zero; the number of wet corners."""
     matrix[:] = 0.0
@@ -172,15 +173,15 @@ def _cell_matrix(corners, products, wet, phi, matrix):
     return n_wet
 
 
-@kernel
+@inner
 def _crossing(inside, outside):
     """ϑ of the edge from a wet node to one that is not."""
     return max(inside / (inside - outside), SMALLEST_CUT) if outside >= 0.0 else 1.0
 
 
-@kernel
+@inner
 def _is_positive(matrix):
-    """Whether elimination (in place) meets no pivot below zero; empty rows are none."""
+    """Whether elimination, in place, meets no negative pivot; empty rows are skipped."""
     largest = max(max(matrix[0, 0], matrix[1, 1]), max(matrix[2, 2], matrix[3, 3]))
     for a in range(4):
         if matrix[a, a] < -ROUND_OFF * largest or largest <= 0.0:

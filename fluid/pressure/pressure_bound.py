@@ -1,10 +1,9 @@
-"""How far the pressure may fall: to that of the air where air can reach, to the vapour pressure elsewhere.
+"""Lower bound of the pressure: that of the air where air can get to, the vapour pressure elsewhere.
 
-Water open to the air cannot pull on a wall: air comes in, and the water parts from the wall.  Air reaches the nodes
-that share a cell with a dry one or with an open side, and from there a cell a step through water that has parted
-already; within a step it goes on where water parts (`bounded.py`).  Water that no air reaches parts where its pressure
-falls to that of its vapour.
-"""
+Water in contact with air cannot pull on a wall: air enters, and the water separates from the wall.  Air reaches the
+nodes that share a cell with a dry node or with an open side, and advances from there by one cell in a step through
+water that has separated already; within a step it follows the separation (`bounded.py`).  Water that no air reaches
+separates where its pressure falls to that of its vapour."""
 
 from __future__ import annotations
 
@@ -20,8 +19,9 @@ from kernel_decorators import kernel
 def lowest_pressure(water, graph, dofs, phi, of_air: float = 0.0) -> Array | None:
     """Bound (n,) [Pa] of the pressure at the wet nodes dofs (n,) of the level set φ (N,) [m]; None: there is none.
 
-    of_air [Pa]: lowest pressure of any air. Water that a cushion slows down has less than its pressure beside it, and
-    water that a pocket of low pressure draws on has less than that of the open air: it is all air that bounds it."""
+    of_air [Pa]: lowest pressure of any air. Beside an air cushion that slows it down, water has less than the pressure
+    of the cushion, and water drawn on by a pocket of low pressure has less than that of the open air; the bound is
+    therefore the lowest pressure of all air."""
     p = water.parameters
     if p.suction != "bounded":
         return None
@@ -33,10 +33,11 @@ def lowest_pressure(water, graph, dofs, phi, of_air: float = 0.0) -> Array | Non
 
 @dataclass(frozen=True, kw_only=True)
 class BoundMet:
-    """Where the pressure of a step met its bound: at_bound (N,) bool, ventilated (N,) bool where that is the air's ·
-    rate (n,) [m³/s] at which the water parts at the unknowns, a number where it does nowhere · volume [m³] that
-    opened · work [J] that it took to part water from its vapour (the air's pressure is zero) · lowest [Pa] pressure
-    of the water · wall: share of the wetted walls, of tank and bodies, on which the pressure is at its bound."""
+    """Where the pressure of a step met its bound: at_bound (N,) bool, ventilated (N,) bool where the bound is that of
+    air · rate (n,) [m³/s] at which water separates at the unknowns, a single number if it does so nowhere · volume [m³]
+    that opened · work [J] done to separate water against its vapour pressure (that of the air is zero) · lowest [Pa]
+    pressure of the water · wall: share of the wetted walls, of tank and bodies, on which the pressure is at its
+    bound."""
 
     at_bound: Bools
     ventilated: Bools
@@ -99,7 +100,7 @@ def wall_area(mesh, domain) -> Array:
 
 @kernel
 def _beside_air(dofs, graph_row, start, neighbour, phi, open_to_air, ventilated):
-    """(n,) bool: nodes beside a dry one, on an open side or beside one, in parted water or beside it."""
+    """(n,) bool: nodes at or next to dry nodes, open sides or water that has separated."""
     found = np.zeros(dofs.shape[0], np.bool_)
     for r in range(dofs.shape[0]):
         i = dofs[r]

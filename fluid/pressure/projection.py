@@ -42,10 +42,9 @@ class PressureProblem:
 
     matrix csr (n, n) [m³/(s Pa)], SPD · rhs (n,) [m³/s], without body velocities · coupling csr (n, 6 n_bodies)
     [m², m³] · known (n,) [Pa] · guess (n,) [Pa] · dofs (n,) node of each unknown · dt [s] · density [kg/m³] ·
-    other_load (n_bodies, 6) [N, N m]: what the pressure does not do (wall shear) or does otherwise (`waterline.py`) ·
-    bound (n,) [Pa] that p = x + known does not fall below, None: it may · at_bound (n,) bool: where it is first sought
-    there (`bounded.py`).
-    """
+    other_load (n_bodies, 6) [N, N m]: loads beside that of the pressure (wall shear) and its correction
+    (`waterline.py`) · bound (n,) [Pa]: lower bound of p = x + known, or None · at_bound (n,) bool: unknowns that the
+    iteration first assumes to be at the bound (`bounded.py`)."""
 
     matrix: sp.csr_array
     rhs: Floats
@@ -217,7 +216,7 @@ def _pull(dofs, edges, held, scale):
 
 
 def seal_pockets(matrix, anchored, volume, compliance: float, pressure):
-    """Water cut off from every surface has no pressure level: give it a compressibility.
+    """Give water that is cut off from every surface a compressibility, since its pressure level is undetermined.
 
     Adds V_i · compliance [1/(Pa s)] to the diagonal of the components without an anchored row and the same times
     `pressure` (n,) [Pa] to the right hand side, so that a state at rest is unchanged.  volume (n,) [m³].
@@ -377,9 +376,9 @@ def _nodal_mean(first, last, runs, wet, value, fluid, weight, out):
 def damp_divergence(wet, weight, line, u, fluid):
     """u_i -= c_L Σ_e |e| l_e² (div u)_e ∇N_i / m_i over wholly wet cells, in place on wet nodes (LSIC).
 
-    Equal-order elements leave divergence that the pressure cannot see; without this sloshing gains energy.
-    Deep cells (φ < deep) beside solids are left out: there the remainder of the cells, not the nodes, holds the
-    balance, and damping would let the added mass of a body drift (26 % in 25 steps).
+    With elements of equal order some divergence is invisible to the pressure; without this damping sloshing gains
+    energy. Deep cells (φ < deep) beside solids are left out: there the subscale velocity of the cells, not that of the
+    nodes, satisfies the mass balance, and damping would let the added mass of a body drift (26 % in 25 steps).
 
     wet: WetCells · weight: c_L · line: Waterline · u (N, 3) [m/s] · fluid: FluidCells"""
     n = len(u)
@@ -428,10 +427,10 @@ def damp_waterline(wet_cells, weight, line, wet, u, fluid):
     """u ← u - c (M⁻¹L)² u in place on wet nodes, over the cells beside solids that reach up to φ > deep:
     (L u)_i = Σ_e w_e (u_i - mean of u over the wet corners of e), w_e the water of the cell, M all water around a node.
 
-    Where a surface meets a solid slantwise, velocity of one cell's wave length and the surface feed each other (growth
-    of 0.03 a step on still water against 1:20).  L is symmetric and positive and annihilates a uniform velocity, so its
-    square only takes energy and no momentum; squared, because L alone is a viscosity that holds a thin tongue of
-    run-up back.
+    Where a surface meets a solid at an oblique angle, the surface and velocities with the wave length of a cell amplify
+    each other (by 0.03 a step for still water on a slope of 1:20).  L is symmetric and positive and annihilates a
+    uniform velocity, so its square takes energy but no momentum. It is squared because L alone acts as a viscosity that
+    slows a thin tongue of run-up.
 
     wet_cells: WetCells · weight: c, one or (N, 1) · line: Waterline · wet (N,) bool · u (N, 3) [m/s] ·
     fluid: FluidCells"""

@@ -1,9 +1,9 @@
 """Water through cracks too narrow for the mesh: closed in the geometry, open by a lumped conductance.
 
-An opening in a wall thinner than a cell acts as one about a cell wide, however narrow it is, because its edge
-elements see no more of it than that it is there. Below about a cell it is better closed, and the flow through it
-lumped. Water in a slit of opening g [m], length L [m] and depth th [m] through the wall, and in front of its mouths up
-to the distance h where the mesh takes over, is as inert as a stream of the *conductance*
+An opening in a wall thinner than a cell acts like one about a cell wide, however narrow it is, because the elements at
+its edge only register that it exists. Openings narrower than about a cell are therefore closed, and the flow through
+them is lumped. Water in a slit of opening g [m], length L [m] and depth th [m] through the wall, and in front of its
+mouths up to the distance h where the mesh takes over, has the inertia of a stream with the *conductance*
 
     κ = L / (th / g + (2/π) ln(2 h / g))        [m]                                                          (1)
 
@@ -114,7 +114,7 @@ class Slits:
 
     @classmethod
     def remembered(cls, name, flow) -> Slits:
-        """Only the flows (s,) [m³/s] by name (s, 4), for `of` to take over."""
+        """Slits with only their flows (s,) [m³/s] and names (s, 4), from which `of` takes the flows over."""
         s = len(flow)
         return cls(
             difference=sp.csr_array((0, s)),
@@ -140,7 +140,8 @@ class Slits:
         return sp.csr_array(d @ sp.diags_array(gain) @ d.T), -(d @ start)
 
     def advanced(self, dofs, pressure, weight, dt: float, density: float) -> Slits:
-        """After a step under the pressure (n,) [Pa] at the nodes dofs (n,), others dry; a dry mouth gives nothing."""
+        """The slits after a step under the pressure (n,) [Pa] at the nodes dofs (n,), all others being dry; no water
+        enters a dry mouth."""
         d = self.difference[dofs]
         drive = d.T @ pressure - density * (self.rise @ weight)
         flow = (self.flow + dt / density * self.conductance * drive) / (1.0 + self._loss(dt))

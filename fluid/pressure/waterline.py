@@ -1,9 +1,9 @@
 """The load on solids where the water surface passes through their cells.
 
-The coupling G of the pressure solve takes the wetted polygons of a cell whole.  It has to: for every hat function of
-a wet node, ∫ V·∇N_i dV + G V = 0 must hold for water and solid that move together, and that leaves no other G.  As a
-load, -Gᵀp is then wrong by what the hat functions of the wet corners reach up the dry part of a face, up to
-(h/depth)²/2, or all over a deck less than a cell above the water.  The pressure itself ends at the surface,
+The coupling G of the pressure solve takes the wetted polygons of a cell whole.  This is required: for every hat
+function of a wet node, ∫ V·∇N_i dV + G V = 0 must hold for water and solid that move together, which determines G.  As
+a load, -Gᵀp then includes the hat functions of wet corners over the dry part of a face, an error of up to (h/depth)²/2,
+or even a load on a whole deck less than a cell above the water.  The pressure itself ends at the surface,
 
     F = -∫_{φ<0} p n dA,        p = Σ_wet p_i N_i + Σ_dry p_j N_j,                                        (1)
 
@@ -11,10 +11,9 @@ with the dry values p_j continued through the zero at the surface (`projection.w
 
     R = F + Gᵀp = -∫_{φ<0} p n dA + ∫ Σ_wet p_i N_i n dA                                                  (2)
 
-is added to the load as a known force, with the pressure of the step before.  It opposes a share of Gᵀp itself, which
-the solve has inside, so its lag cannot grow: with a share ε of the added mass m_a of a body of mass m, an error of the
-acceleration is multiplied by ε m_a / (m + m_a) < 1 in every step.
-"""
+is added to the load as a known force, with the pressure of the last step.  It opposes a share of Gᵀp, which is part of
+the solve, so the error of this delay cannot grow: with a share ε of the added mass m_a of a body of mass m, an error of
+the acceleration is multiplied by ε m_a / (m + m_a) < 1 in every step."""
 
 from __future__ import annotations
 
@@ -24,7 +23,7 @@ from array_types import Array
 from fluid.domain.moments import cells_touching
 from fluid.domain.physical_domain import hat_values
 from fluid.pressure.projection import with_ghosts
-from kernel_decorators import kernel
+from kernel_decorators import helper, inner, kernel
 
 
 def waterline_load(domain, faces, left_out, phi, wet, pressure, open_node, air=None) -> Array:
@@ -110,7 +109,7 @@ def _differences(height, full, acting, arm, area):
     return force, first
 
 
-@kernel
+@inner
 def wet_triangles(height, share):
     """Barycentric corners (·, 3, 3) of the part with height < 0, as 0, 1 or 2 triangles → how many."""
     share[:] = 0.0
@@ -141,7 +140,7 @@ def wet_triangles(height, share):
     return 2
 
 
-@kernel
+@inner
 def relative_area(part):
     """|det| of barycentric corners (3, 3): the area of the part over that of the triangle."""
     d = part[0, 0] * (part[1, 1] * part[2, 2] - part[1, 2] * part[2, 1])
@@ -150,7 +149,7 @@ def relative_area(part):
     return abs(d)
 
 
-@kernel
+@helper
 def _add(sign, area, part, p, arm, force, first, s):
     """force[s] += sign ∫ p dA, first[s] += sign ∫ p arm dA over the part with barycentric corners (3, 3).
 

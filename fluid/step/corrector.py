@@ -1,4 +1,4 @@
-"""Second half of the step: the velocity that the pressure leaves.
+"""Second half of the step: the velocity after the pressure.
 
 u_i = u*_i - (dt/ρ) Π(∇x)_i,   a_i = (u_i - u_adv_i) / (θ dt)                 on wet nodes, Π: weighted mean
 p = x + known, mean over the step, acts on the bodies;  x/θ belongs to a_i and starts the next step
@@ -126,7 +126,7 @@ def corrected(water, problem, x, parting) -> Corrected:
 
 
 def _given_by_films(water, problem):
-    """(N,) [m³/s] that films take from their rims as the bodies move."""
+    """Rate (N,) [m³/s] at which films take water from their rims as the bodies move."""
     found, given = np.zeros(len(problem.predicted.wet)), problem.predicted.given_by_films
     if given is not None:
         found[problem.of_water(problem.dofs)] = given @ water.pushed_by.ravel()
@@ -134,7 +134,7 @@ def _given_by_films(water, problem):
 
 
 def _pressure_gradient(water, kept, pressure, scale):
-    """(dt/ρ) ∇x of the wet cells (n, 3) [m/s]."""
+    """(dt/ρ) ∇x (n, 3) [m/s] of the wet cells."""
     t = water.topology
     unheld = water.walls.open_node if kept.held is None else water.walls.open_node & (kept.held == 0.0)
     air = np.zeros(len(pressure)) if kept.cushions is None else np.where(kept.wet, 0.0, pressure)
@@ -182,8 +182,9 @@ def _remainders(water, kept, gradient, mean, dt):
 
 @ranged
 def _leave(first, last, places, cell_list, slopes, before, time, fluid, made):
-    """What the nodes do not hold of the gradient, Π∇x - ∇x [m/s], in the cells at these places of the list: added to
-    the remainder before, and over a time [s] as its rate. slopes: Π∇x (N, 3) and ∇x of the listed cells (n, 3)."""
+    """Add the part of the gradient that the nodes cannot represent, Π∇x - ∇x [m/s], to the subscale velocity of the
+    cells at these places of the list, and, divided by a time [s], to its rate. slopes: Π∇x (N, 3) and ∇x of the listed
+    cells (n, 3)."""
     mean, gradient = slopes
     cells, share = fluid.cells, fluid.share
     remainder, rate = made
@@ -259,7 +260,7 @@ def _hardly_moving(water, u):
 
 
 def _limit_speed(water, u, a) -> int:
-    """|u| ≤ `Water.speed_cap` in place; clipped nodes go on in free fall."""
+    """Limit |u| to `Water.speed_cap`, in place; clipped nodes continue in free fall."""
     return sum(over(_clip, len(u), u, a, water.speed_cap(), water.parameters.weight))
 
 

@@ -1,4 +1,4 @@
-"""Values continued from the water into the nodes around it, layer by layer.
+"""Extrapolation of values from the water to the nodes around it, layer by layer.
 
 u_i = Σ_j n_ij [u_j + ∇u_j·(x_i - x_j)] / d_ij² / Σ_j n_ij / d_ij²  over the neighbours j in earlier layers, n_ij: how
 many cells they share.  The first two layers use the gradient (a constant continuation costs 1.4 % of the sloshing
@@ -99,7 +99,7 @@ def _continue(first, last, layer, linear, field, nodes, around_by_cells, total):
 
 @inner
 def _square(v):
-    """|v|²."""
+    """Square of the length of v."""
     total = 0.0
     for k in range(v.shape[0]):
         total += v[k] * v[k]
@@ -341,12 +341,13 @@ def extend_velocity(topology, layers, wet, wet_cells, u, a, calm: float, forced,
     """Continue u (linear, then constant) and a (constant), each (N, 3), over layers (order, start), in place; calm as
     in `smoothed_slope`. rubbed (N,) bool: nodes on walls that rub or hold the water, None: there are none.
 
-    No slope is taken from cells beside such walls: the shear of the layer along a bed, carried on through the surface
-    of a film, made the air above it 1.6 times as fast as the water and drew its tip ahead of one without friction.
+    No slope is taken from cells beside such walls: the shear of the layer along a bed, extrapolated through the surface
+    of a film, made the air above it 1.6 times as fast as the water, so that its tip ran ahead of one without friction.
 
-    forced (N, 3) [m/s]: the velocity that the forces alone make of the water at these nodes.  They hold water of the
-    cells that the surface cuts, and a slope of the velocity continued beyond a front would speed it up: 2 to 8 % of
-    the energy of a dam break.  So no speed is continued beyond the largest of its known neighbours or its own.
+    forced (N, 3) [m/s]: velocity of the water at these nodes under the forces alone.  These nodes hold water of cells
+    that the surface cuts, and extrapolating the slope of the velocity beyond a front would accelerate it: by 2 to 8 %
+    of the energy of a dam break.  Extrapolated speeds are therefore limited by that of the known neighbours or their
+    own.
 
     Nodes outside the layers are set to zero."""
     t, (order, start) = topology, layers

@@ -1,9 +1,9 @@
 """Damping of velocity of single nodes along the surface of calm water on meshes with obtuse cells.
 
-Where all cells are alike the pressure of a wave and the way in which velocity lifts the surface are each other's
-transpose, near enough.  Where they are not, velocity along the surface that changes from node to node and the surface
-feed each other: growth of 0.005 to 0.015 a step in still water, with and without solids.  Every such velocity bends at
-the faces of the cells.  The jumps of its gradient (Burman and Hansbo, Comput. Methods Appl. Mech. Eng. 193 (2004) 1437)
+Where all cells have the same shape, the pressure of a wave and the motion of the surface by the velocity are transposes
+of each other to good accuracy.  Elsewhere the surface and velocities along it that alternate from node to node amplify
+each other: by 0.005 to 0.015 a step in still water, with and without solids.  The gradient of every such velocity jumps
+at the faces of the cells.  These jumps (Burman and Hansbo, Comput. Methods Appl. Mech. Eng. 193 (2004) 1437)
 are damped:
 
     u_i ← u_i - c/m_i Σ_F V_F [∇u]·[∇N_i] / γ_F,      γ_F = Σ |∇N_a|² of both cells,      m_i = Σ_e W_e / 4,      (1)
@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kernel_decorators import kernel
+from kernel_decorators import helper, inner, kernel
 
 
 @kernel
@@ -46,7 +46,7 @@ def damp_kinks(cell_list, phi, wet, weight, deep, u, fluid, neighbours):
                 u[i, k] -= weight * push[i, k] / mass[i]
 
 
-@kernel
+@helper
 def _whole_near(cell_list, phi, wet, deep, cells):
     """(M,): 2 for wholly wet listed cells that reach up to φ > deep, 1 for deeper ones, 0 for all others."""
     chosen = np.zeros(cells.shape[0], np.int8)
@@ -60,7 +60,7 @@ def _whole_near(cell_list, phi, wet, deep, cells):
     return chosen
 
 
-@kernel
+@inner
 def _push_face(e, f, u, cells, parent, g, water, slope, push):
     """Add V_F [∇u]·[∇N_i] / γ_F of the face between cells e and f to push (N, 3); slope (2, 3, 3): work space."""
     size = 0.0

@@ -1,15 +1,16 @@
-"""The level set φ [m], negative in the water: signed distance to the surface, kept near it only.
+"""The level set φ [m], negative in the water: the signed distance to the surface, maintained only near it.
 
 Nodes of cells that the surface passes through keep φ: their zero is the surface, and moving them by the true
 closest point pulls the surface off the walls (0.2 m/s in a tilted tank at rest).  Only where the mean |∇φ| around
 such a node has left [0.9, 1.1] is φ divided by it.  All other nodes take the distance to the closest polygon of
-the surface, handed from layer to layer; beyond the layers φ = ±FAR h.
+the surface, which is passed on from layer to layer; beyond the layers φ = ±FAR h.
 
-What is handed on is the closest polygon of a neighbour.  Where the cells are obtuse that may be some polygons away from
-the node's own, φ too large by 0.02 h to 0.15 h there, and its slope in the cells above and below the surface so far
-from upright that velocity along still water lifts it (growth of 0.005 a step).  There, and up to three layers of nodes
-around (between coarse and fine bricks, not inside them), the nodes of the first layers look for their own among the
-polygons around the one in hand until none is closer: on a surface that is nearly flat over a cell, the closest of all.
+A node takes over the closest polygon of a neighbour.  Where cells are obtuse this may lie some polygons away from the
+closest one of the node itself. There φ is too large by 0.02 h to 0.15 h, and its gradient in the cells above and below
+the surface deviates so much from the normal that velocity along still water lifts the surface (growth of 0.005 a step).
+In such cells, and up to three layers of nodes around them (between coarse and fine bricks, not inside them), the nodes
+of the first layers therefore search the polygons around the one taken over until none is closer. On a surface that is
+nearly flat over a cell, this finds the closest of all.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from array_types import Array, Floats, Ints
 from fluid.domain.topology import layers_around
 from fluid.mesh.arrays import Corners
 from fluid.numerics.threads import found_over, over
-from kernel_decorators import inner, kernel, plain, ranged, released
+from kernel_decorators import helper, inner, kernel, plain, ranged, released
 
 LAYERS = 6
 EXACT_LAYERS = 2
@@ -32,7 +33,8 @@ FILM = 1e-7
 
 
 def without_films(phi, spacing):
-    """φ (N,) with water thinner than FILM h at a node taken as none: its pressure would be 0/0 at the surface.
+    """φ (N,) in which water thinner than FILM h at a node counts as none, since its pressure at the surface would be
+    0/0.
 
     spacing [m]: h at each node (N,), or one for all."""
     return np.where((phi < 0.0) & (phi > -FILM * spacing), 0.0, phi)
@@ -109,7 +111,7 @@ def _surface_triangles(first, last, cut, phi, nodes, cells):
 @plain
 def squared_distance(p, t):
     """Squared distance [m²] from the point p (3,) to the triangle t (3, 3) (Ericson, Real-Time Collision
-    Detection (2005), 5.1.5).  Scalars only: this is called millions of times a second."""
+    Detection (2005), 5.1.5).  It uses scalars only, since it is called millions of times a second."""
     abx, aby, abz = t[1, 0] - t[0, 0], t[1, 1] - t[0, 1], t[1, 2] - t[0, 2]
     acx, acy, acz = t[2, 0] - t[0, 0], t[2, 1] - t[0, 1], t[2, 2] - t[0, 2]
     apx, apy, apz = p[0] - t[0, 0], p[1] - t[0, 1], p[2] - t[0, 2]
@@ -140,7 +142,7 @@ def squared_distance(p, t):
     return x * x + y * y + z * z
 
 
-@plain
+@inner
 def _ratio(part, whole):
     """part / whole; 0 for an edge or a triangle without extent."""
     return part / whole if whole > 0.0 else 0.0
@@ -154,8 +156,9 @@ class Surface(NamedTuple):
 
 
 class Nearest(NamedTuple):
-    """What is known of the closest triangle: closest (N,) number, -1 none · best (N,) [m²] squared distance ·
-    tried (T,) the last node that asked · asked, found (N,): when a node asked last, and when it found its triangle."""
+    """The closest triangle of each node found so far: closest (N,) its number, -1 none · best (N,) [m²] squared
+    distance · tried (T,) the last node that tested the triangle · asked, found (N,): sweeps in which a node last tested
+    triangles, and in which it found its closest one."""
 
     closest: Array
     best: Array
@@ -165,7 +168,7 @@ class Nearest(NamedTuple):
 
 
 def _closest_in_layers(layers, surface, mesh, *more):
-    """`_closest`, with what the corners of the cells of the triangles start from."""
+    """Call `_closest`, after the distances at the corners of the cells of the triangles."""
     corner = np.empty((len(surface.triangles), 4))
     over(_of_corners, len(corner), surface, mesh, corner)
     return _closest(layers, surface, corner, mesh, *more)
@@ -201,7 +204,7 @@ def _closest(layers, surface, corner, mesh, around, exact, obtuse, cells_of_node
     return np.sqrt(best)
 
 
-@kernel
+@helper
 def _first_triangles(owner, n_cells):
     """First triangle of each cell (n_cells,), -1 none; those of a cell follow each other."""
     first = np.full(n_cells, -1, np.int64)
@@ -235,7 +238,7 @@ def _descend(x, closest, best, surface, first, cells, cells_of_nodes):
 @inner
 def _hand_outward(layers, surface, corner, mesh, around_nodes, known):
     """Fill `known`, Nearest; corner as in `_of_corners`. In the second sweep only neighbours that have found another
-    triangle since are worth a question."""
+    triangle since then are tested."""
     order, layer_start = layers
     triangles, owner = surface
     nodes, cells = mesh

@@ -1,8 +1,8 @@
 """The conservative volume of water at the nodes, and the level set corrected towards it.
 
-A level set alone loses thin sheets (a dam break lost its own volume once over).  Cure (after Kees, Akkerman,
-Farthing and Bazilevs, J. Comput. Phys. 230 (2011) 4536, lumped):  the volume W_i = ∫_{φ<0} N_i dV of the step before
-is carried by the fluxes of the projected velocity u_e, which balance exactly at wholly wet nodes,
+A level set alone loses thin sheets (in one dam break the losses added up to the whole volume).  Therefore (after Kees,
+Akkerman, Farthing and Bazilevs, J. Comput. Phys. 230 (2011) 4536, lumped) the volume W_i = ∫_{φ<0} N_i dV of the step
+before is carried by the fluxes of the projected velocity u_e, which balance exactly at wholly wet nodes,
 
     q_ij = -Σ_e |e| (∇N_i·∇N_j) (x_j - x_i)·u_e,      Σ_j q_ij = -Σ_e |e| ∇N_i·u_e = (G V)_i,              (1)
 
@@ -18,7 +18,8 @@ Then φ takes the shift ψ that brings its own volume there,
 
     (c + κ K) ψ = W - ∫_{φ<0} N dV,        c_i = d/dψ ∫_{φ<ψ} N_i dV,                                       (2)
 
-spread over the length sqrt(κ ...) ~ κ.  What is left of the total is met by one uniform shift, counted and reported.
+which spreads over a length of the order of κ.  The remaining difference of the total volume is corrected by one uniform
+shift, which is counted and reported.
 """
 
 from __future__ import annotations
@@ -321,11 +322,11 @@ def nodal_volume(topology, phi):
 
 
 def renumbering(source, old_parent, new_parent, new_volume) -> sp.csr_array:
-    """T (N_new, N_old) that hands the volume of every old node to its copies: W_new = T W_old, columns sum to 1.
+    """T (N_new, N_old), which passes the volume of every old node on to its copies: W_new = T W_old, columns sum to 1.
 
     source (N_new,): old node that each new one continues, -1 none · parents (N,): background node of each copy ·
-    new_volume (N_new,) [m³] by which several heirs share.  A node without heir leaves its water to the first
-    copy of its background node; without any copy the water is left to the uniform shift."""
+    new_volume (N_new,) [m³], in proportion to which several successors share.  The water of a node without a successor
+    goes to the first copy of its background node; if there is no copy, the uniform shift restores it."""
     heir = np.flatnonzero(source >= 0)
     weight = np.maximum(new_volume[heir], 1e-300)
     total = np.bincount(source[heir], weight, minlength=len(old_parent))

@@ -2,20 +2,20 @@
 
 Foot of the path that ends at node x:           x_d = x - dt u_m(x_d),  u_m = u + dt/2 a       (fixed point)
 Transported value:                              f1(x) = f(x_d)
-Error of one interpolation, seen on the way back, taken off half (Selle, Fedkiw, Kim, Liu, Rossignac,
+Half of the error of one interpolation, estimated on the way back, is subtracted (Selle, Fedkiw, Kim, Liu, Rossignac,
 J. Sci. Comput. 35 (2008) 350):                 f2(x) = f1(x) + [f(x) - f1(x + dt u_m)] / 2
-and f2 is refused where it leaves the range of f in the cell of the foot, and on open sides: the way on from there ends
-at the side, f1 there is no way back, and the water would lose only half of its change on the way (a pool that
-drained left with a quarter more energy than it had).
+f2 is rejected where it leaves the range of f in the cell of the foot, and on open sides: the path forward from there
+ends at the side, so that the way back does not return f1, and only half of the change would be applied (the water of a
+draining pool left with a quarter more energy than it had).
 
-Paths walk from cell to cell through open faces, starting at the node's own cells: on any mesh, and never
-through a wall, however thin, because a wall has no neighbour on its other side.
-"""
+Paths are followed from cell to cell through open faces, starting in a cell of the node. This works on any mesh and
+never leads through a wall, however thin, because cells at a wall have no neighbour on its other side."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from fluid.mesh.arrays import Paths
 from fluid.numerics.threads import over
 from kernel_decorators import inner, ranged, released
 
@@ -23,11 +23,12 @@ _LONGEST_WALK = 100
 
 
 @inner
-def walk(x, e, nodes, cells, parent, g, neighbours, lam):
+def walk(x, e, mesh, lam):
     """Cell that holds x (3,), walking from cell e; its barycentric coordinates in lam (4,).
 
     A point beyond a wall or an open side is moved to the nearest point of the face, in place: a clip of lam alone
     would shift it along the side, 2-5 % of the profile of a channel fed through that side."""
+    nodes, cells, parent, g, neighbours = mesh.nodes, mesh.cells, mesh.parent, mesh.gradients, mesh.neighbours
     for _ in range(_LONGEST_WALK):
         p = parent[e]
         o = cells[e, 0]
@@ -72,48 +73,39 @@ def _to_face(x, lam, g):
     return True
 
 
-def feet(listed, sense, dt, sweeps, u_m, nodes, cells, parent, g, neighbours, node_start, node_cells):
+def feet(listed, sense, dt, sweeps, u_m, mesh: Paths):
     """Where the paths through the listed nodes begin (sense -1) or end (sense +1): cell (n,), weights (n, 4).
 
-    u_m (N, 3) [m/s].  sweeps: fixed-point sweeps with u_m at the foot; 0 takes u_m at the node."""
+    dt [s], u_m (N, 3) [m/s]. sweeps: fixed-point sweeps with u_m at the foot; 0 takes u_m at the node."""
     n = listed.shape[0]
     cell, weight = np.empty(n, np.int64), np.empty((n, 4))
-    mesh = (nodes, cells, parent, g, neighbours)
-    over(_feet, n, listed, sense * dt, sweeps, u_m, *mesh, node_start, node_cells, cell, weight)
+    over(_feet, n, listed, sense * dt, sweeps, u_m, mesh, cell, weight)
     return cell, weight
 
 
 @released
-def _feet(
-    first, last, listed, dt, sweeps, u_m, nodes, cells, parent, g, neighbours, node_start, node_cells, cell, weight
-):  # fmt: skip
-    mesh = (nodes, cells, parent, g, neighbours)
-    _trace(
-        first, last, listed, dt, sweeps, u_m, *mesh, node_start, node_cells, np.empty((3, 4)), cell, weight
-    )
+def _feet(first, last, listed, dt, sweeps, u_m, mesh, cell, weight):
+    _trace(first, last, listed, dt, sweeps, u_m, mesh, np.empty((3, 4)), cell, weight)
 
 
 @inner
-def _trace(
-    first, last, listed, dt, sweeps, u_m, nodes, cells, parent, g, neighbours, node_start, node_cells, scratch, cell,
-    weight,
-):  # fmt: skip
+def _trace(first, last, listed, dt, sweeps, u_m, mesh, scratch, cell, weight):
     """The loop of `feet`; scratch (3, 4): work space."""
     x, lam, u = scratch[0], scratch[1], scratch[2]
     for s in range(first, last):
         i = listed[s]
         for k in range(3):
             u[k] = u_m[i, k]
-        e = np.int64(node_cells[node_start[i]])
+        e = np.int64(mesh.node_cells[mesh.node_start[i]])
         for sweep in range(sweeps + 1):
             for k in range(3):
-                x[k] = nodes[i, k] + dt * u[k]
-            e = walk(x, e, nodes, cells, parent, g, neighbours, lam)
+                x[k] = mesh.nodes[i, k] + dt * u[k]
+            e = walk(x, e, mesh, lam)
             if sweep < sweeps:
                 for k in range(3):
                     u[k] = 0.0
                     for a in range(4):
-                        u[k] += lam[a] * u_m[cells[e, a], k]
+                        u[k] += lam[a] * u_m[mesh.cells[e, a], k]
         cell[s] = e
         for a in range(4):
             weight[s, a] = lam[a]
@@ -139,10 +131,12 @@ def _interpolate(first, last, cell, weight, cells, f, out):
 
 
 @ranged
-def _limited(first, last, listed, on_open_side, back_cell, back_weight, f, f1, f1_ahead, cells, out):
-    """out (n, m) <- f2 where it stays within the range of f over the cell of the foot, f1 elsewhere and on open sides.
+def _limited(first, last, listed, on_open_side, foot, f, f1, f1_ahead, cells, out):
+    """Set out (n, m) to f2 where this stays within the range of f over the cell of the foot, and to f1 elsewhere and on
+    open sides. foot: its cell (n,) and weights (n, 4).
 
-    Only corners with weight count: a foot on a face must not depend on the side it was found from."""
+    Only corners with a weight count: a foot on a face must not depend on the side it was found from."""
+    back_cell, back_weight = foot
     for s in range(first, last):
         e = back_cell[s]
         for k in range(f.shape[1]):
@@ -159,13 +153,12 @@ def transport(topology, listed, dt: float, u_m, f, on_open_side):
 
     on_open_side (N,) bool: nodes where water may leave."""
     t = topology
-    mesh = (t.nodes, t.cells, t.parent, t.gradients, t.neighbours, t.node_start, t.node_cells)
-    cell, weight = feet(listed, -1.0, dt, 3, u_m, *mesh)
+    cell, weight = feet(listed, -1.0, dt, 3, u_m, t.paths)
     f1 = interpolate(cell, weight, t.cells, f)
     moved = f.copy()
     moved[listed] = f1
-    ahead, ahead_weight = feet(listed, 1.0, dt, 0, u_m, *mesh)
+    ahead, ahead_weight = feet(listed, 1.0, dt, 0, u_m, t.paths)
     f1_ahead = interpolate(ahead, ahead_weight, t.cells, moved)
     out = np.empty_like(f1)
-    over(_limited, len(listed), listed, on_open_side, cell, weight, f, f1, f1_ahead, t.cells, out)
+    over(_limited, len(listed), listed, on_open_side, (cell, weight), f, f1, f1_ahead, t.cells, out)
     return out

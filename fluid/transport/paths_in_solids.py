@@ -1,14 +1,14 @@
-"""The level set at nodes inside solids, carried past the last cell of their water.
+"""Transport of the level set at nodes inside solids, beyond the last cell of their water.
 
 A path that leaves the covers of the water through a solid ends on the face of its last cell (`advection.walk`): the
 foot is moved along the normal m of that face, and φ changes by dt (u - (u·m) m)·∇φ instead of dt u·∇φ.  At a water line
 on a solid, where such a node carries the surface of cut cells, a velocity *along* the surface then lifts it wherever
-that face leans; the slope of the surface drives the velocity on, and still water grows by up to 0.05 a step.  So φ goes
-on beyond the face with the slope of the last cell,
+that face is inclined; the slope of the surface drives the velocity further, which grows in still water by up to 0.05 a
+step.  Therefore φ is extrapolated beyond the face with the gradient of the last cell,
 
     φ̃_i = φ(x_d) + r·∇φ,      r = x_i - dt u_m(x_d) - x_d,                                                    (1)
 
-without the MacCormack correction, as the way ahead ends at such a face as well.
+without the MacCormack correction, because the path forward ends at such a face as well.
 """
 
 from __future__ import annotations
@@ -23,23 +23,21 @@ FARTHEST = 0.1
 
 
 def levels_in_solids(topology, listed, dt: float, u_m, phi, spacing):
-    """Equation (1) at those of the listed nodes (n,) that lie inside solids: their places in the list (k,), φ̃ (k,) [m].
+    """Equation (1) at those of the listed nodes (n,) that lie inside solids: their places in the list (k,), φ̃ (k,)
+    [m].
 
     u_m (N, 3) [m/s], phi (N,) [m], spacing [m]: size of the cells at each node (N,), or one for all."""
     t = topology
     places = np.flatnonzero(t.covered[listed])
     inside = listed[places]
-    cell, weight = feet(
-        inside, -1.0, dt, 3, u_m, t.nodes, t.cells, t.parent, t.gradients, t.neighbours, t.node_start, t.node_cells
-    )  # fmt: skip
+    cell, weight = feet(inside, -1.0, dt, 3, u_m, t.paths)
     farthest = np.broadcast_to(FARTHEST * np.asarray(spacing), phi.shape)[inside]
-    return places, _continued(
-        inside, cell, weight, dt, farthest, u_m, phi, t.nodes, t.cells, t.parent, t.gradients
-    )
+    return places, _continued(inside, cell, weight, dt, farthest, u_m, phi, t.nodes, t.hats)
 
 
 @kernel
-def _continued(inside, cell, weight, dt, farthest, u_m, phi, nodes, cells, parent, g):
+def _continued(inside, cell, weight, dt, farthest, u_m, phi, nodes, hats):
+    cells, parent, g = hats.cells, hats.parent, hats.gradients
     out, missing, slope = np.zeros(inside.shape[0]), np.empty(3), np.empty(3)
     for s in range(inside.shape[0]):
         e, length = cell[s], 0.0

@@ -1,6 +1,7 @@
-"""The velocity carried by stabilised finite elements, instead of along paths (`advection = "supg"`).
+"""Transport of the velocity by stabilised finite elements instead of along paths (`advection = "supg"`).
 
-The change δ of each component f̂ over the step solves, by the Crank-Nicolson rule with the velocity c half a step ahead,
+The change δ of each component f̂ over the step solves, by the Crank-Nicolson rule with the velocity c half a step
+ahead,
 
     ∫ (v + τ c·∇v) [δ/dt + c·∇(f̂ + δ/2)] dV + j(δ, v)/dt + a(δ, v)/dt = 0     for every hat function v,       (1)
     τ = [(2/dt)² + (Σ_a |c·∇N_a|)²]^(-1/2)

@@ -1,25 +1,25 @@
 """Velocity in fast water and around jumps of the surface: it follows the momentum that the volume carries.
 
 A path that ends at a node at rest began at that node: semi-Lagrangian transport leaves the node ahead of a bore at rest
-while the bore pours its water in, and the momentum of that water is gone.  A jet that meets a plate, a sheet that runs
-up a wall lose theirs in the same way, the more the fewer cells they are thick.  So there
+while the bore pours its water in, and the momentum of that water is lost.  A jet that meets a plate and a sheet that
+runs up a wall lose momentum in the same way, and the more, the fewer cells they are thick.  There the velocity is
 
     u = (1 - w) u_paths + w u_volume                                                                        (1)
 
-where u_volume goes with the fluxes of the volume (`volume_transport.py`).  The level set that is then corrected towards
-the volume holds other volumes at the nodes than the fluxes brought: what one has too much, others get.  In the equation
-of that correction (`volume.py`, 2), c ψ + κ K ψ = r, the volumes
+where u_volume is carried by the fluxes of the volume (`volume_transport.py`).  The level set that is then corrected
+towards the volume contains other volumes at the nodes than the fluxes brought: what one node has too much, others
+receive.  In the equation of that correction (`volume.py`, 2), c ψ + κ K ψ = r, the volumes
 
     v_ij = -κ K_ij (ψ_i - ψ_j)                                                                              (2)
 
-go from node to node, and momentum goes with them as with the fluxes.
+pass from node to node, and they carry momentum as the fluxes do.
 
 In fast water w = R(|u|/√(g h); 1, 3), h the size of the cells and R(x; b, c) = (x - b)/(c - b) kept within 0 and 1:
-where water is faster than the shallow wave of one cell, what it does in a cell is a matter of momentum.  Slower water
-keeps its head, and its waves are not damped by fluxes that are of first order at their crests.  The fluxes act like a
-viscosity |u| h/2.  Liquids whose own viscosity ν is not far below that lose no momentum within a cell that it would not
-have spread itself: there w is multiplied with R(|u| h/ν; 10, 100), which is 1 for water on cells of a millimetre and
-more.
+where water is faster than the shallow-water wave of one cell, its motion within a cell is governed by momentum.  Slower
+water conserves its head, and its waves are not damped by fluxes that are of first order at their crests.  The fluxes
+act like a viscosity |u| h/2.  In liquids whose viscosity ν is not far below that, semi-Lagrangian transport loses no
+momentum within a cell that viscosity would not have diffused: there w is multiplied with R(|u| h/ν; 10, 100), which is
+1 for water on cells of a millimetre and more.
 
 In slow water w is 0 deeper than 3 h and within two layers around cut cells, where pressure is what stops water, and in
 full between the surface and 2 h, within RINGS nodes around a jump: a node with water s V, less fast than the water that
@@ -28,11 +28,10 @@ flows into it, u_up with acceleration a_up,
     R(d/√(g h); 0.1, 0.3) R(η; 0.5, 0.9) R(s; 0.25, 0.75),    d = |u_up| - |u|,
     η = 1 + (h (a + a_up)·u_up/|u_up| - |u|²) / |u_up|²                                                     (3)
 
-η is the share of the head that is lost on the way and not spent against pressure and weight: momentum where water
-slows down in jumps, head elsewhere is the rule of Stelling and Duinmeijer (Int. J. Numer. Methods Fluids 43 (2003)
-1329).  The rings matter: where neighbours take from different laws, neither momentum nor head is kept, and a bore
-scatters by a tenth with the step; within them it does by a hundredth.
-"""
+η is the share of the head that is lost between the two nodes and not spent against pressure and weight. To conserve
+momentum where water slows down in jumps, and head elsewhere, is the rule of Stelling and Duinmeijer (Int. J. Numer.
+Methods Fluids 43 (2003) 1329).  The rings matter: where neighbouring nodes follow different laws, neither momentum nor
+head is conserved, and the speed of a bore varies by a tenth with the step; with the rings it varies by a hundredth."""
 
 from __future__ import annotations
 
@@ -45,7 +44,7 @@ from fluid.numerics.threads import over
 from fluid.surface.volume import Flux, Shift
 from fluid.transport.velocity_transport import carry_velocity
 from fluid.transport.volume_transport import carry_volume
-from kernel_decorators import plain, ranged, released
+from kernel_decorators import inner, ranged, released
 
 SHALLOW, DEEP = 2.0, 3.0
 """Depths in cell sizes down to which momentum counts in full, and at all."""
@@ -60,7 +59,7 @@ DROP, LOST, FULL = (0.1, 0.3), (0.5, 0.9), (0.25, 0.75)
 
 @dataclass(frozen=True)
 class Carried:
-    """What the fluxes make of the nodes in a step: water (N,) [m³], that of the fluxes along the edges, and swept (N,)
+    """Result of the fluxes of a step at the nodes: water (N,) [m³], that of the fluxes along the edges, and swept (N,)
     [m³] what the surface brings beyond that (`swept_volume.py`); velocity (N, 3) [m/s], the weight w (N,) of it
     around jumps before it is cut off at depth, and that in fast water (N,); None where there is neither."""
 
@@ -74,16 +73,15 @@ class Carried:
     def by(cls, flux: Flux, dt: float, velocity, acceleration, gravity, viscosity, spacing, total) -> Carried:
         """After dt [s] by the flux; velocity (N, 3) [m/s] before, acceleration (N, 3) [m/s²] then, gravity [m/s²],
         viscosity: kinematic [m²/s], spacing (N,) [m]: size of the cells; total (edges,) [m³] as in `carry_volume`."""
-        g = flux.graph
-        along = (flux.nodes, g.row, g.start, g.neighbour)
+        edges = flux.graph.edges
         n, size = len(flux.nodes), len(velocity)
         weight, fast = np.zeros(size), np.zeros(size)
         state = (flux.rate, flux.water, flux.capacity, velocity, acceleration, gravity, spacing)
-        over(_jumps, n, *along, *state, weight)
+        over(_jumps, n, flux.nodes, edges, *state, weight)
         if weight.any():
             for _ in range(RINGS):
                 before, weight = weight, weight.copy()
-                over(_wider, n, *along, before, weight)
+                over(_wider, n, flux.nodes, edges, before, weight)
         over(_by_speed, n, flux.nodes, velocity, np.sqrt(gravity * spacing), FAST, fast)
         if viscosity > 0.0:
             resolved = np.zeros(size)
@@ -95,7 +93,7 @@ class Carried:
         return cls(carry_volume(flux, dt, u, total), u, weight, fast)
 
     def handed_on(self, heirs) -> Carried:
-        """The same on another numbering, heirs (N_new, N) of `volume.renumbering`."""
+        """The same with another numbering of the nodes; heirs (N_new, N): from `volume.renumbering`."""
         water, swept = heirs @ self.water, heirs @ self.swept
         if self.velocity is None:
             return Carried(water, swept=swept)
@@ -131,20 +129,21 @@ def _mixed(first, last, nodes, weight, carried, u):
 
 def _pass_on(graph: Graph, shift: Shift, water, u) -> None:
     """Velocity u (N, 3) [m/s] carried along with the volumes (2), in place; water (N,) [m³] before them."""
-    along = (shift.band, graph.row, graph.start, graph.neighbour)
+    edges = graph.edges
     psi, inside, moved = np.zeros(len(water)), np.zeros(len(water), bool), np.empty(len(graph.neighbour))
     psi[shift.band], inside[shift.band] = shift.value, water[shift.band] > 0.0
-    over(_corrected, len(shift.band), *along, graph.stiffness, psi, inside, shift.kappa, water, moved)
-    carry_velocity(*along, moved, water, u)
+    over(_corrected, len(shift.band), shift.band, edges, psi, inside, shift.kappa, water, moved)
+    carry_velocity(shift.band, edges, moved, water, u)
 
 
 @ranged
-def _corrected(first, last, band, graph_row, start, neighbour, stiffness, psi, inside, kappa, water, moved):
+def _corrected(first, last, band, edges, psi, inside, kappa, water, moved):
     """v_ij (edges,) [m³] of (2) out of each node of the band, κ (N,), where both hold water; none gives more than it
     holds. ψ (N,), inside (N,): where the band holds water."""
+    start, neighbour, stiffness = edges.start, edges.neighbour, edges.stiffness
     for place in range(first, last):
         i = band[place]
-        row = graph_row[i]
+        row = edges.row[i]
         for s in range(start[row], start[row + 1]):
             moved[s] = 0.0
         if not inside[i]:
@@ -163,14 +162,13 @@ def _corrected(first, last, band, graph_row, start, neighbour, stiffness, psi, i
 
 
 @released
-def _jumps(
-    first, last, nodes, graph_row, start, neighbour, rate, water, capacity, u, a, gravity, spacing, weight
-):
+def _jumps(first, last, nodes, edges, rate, water, capacity, u, a, gravity, spacing, weight):
     """Equation (3), (N,); zero at nodes that nothing flows into."""
+    row, start, neighbour = edges.row, edges.start, edges.neighbour
     up, push = np.empty(3), np.empty(3)
     for place in range(first, last):
         i = nodes[place]
-        r = graph_row[i]
+        r = row[i]
         came = 0.0
         up[:] = 0.0
         push[:] = 0.0
@@ -200,20 +198,20 @@ def _by_speed(first, last, nodes, u, celerity, ends, weight):
 
 
 @ranged
-def _wider(first, last, nodes, graph_row, start, neighbour, weight, wider):
+def _wider(first, last, nodes, edges, weight, wider):
     """The largest weight (N,) of each node and those around it."""
     for place in range(first, last):
         i = nodes[place]
-        r = graph_row[i]
-        for s in range(start[r], start[r + 1]):
-            wider[i] = max(wider[i], weight[neighbour[s]])
+        r = edges.row[i]
+        for s in range(edges.start[r], edges.start[r + 1]):
+            wider[i] = max(wider[i], weight[edges.neighbour[s]])
 
 
-@plain
+@inner
 def _size(v):
     return np.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
 
 
-@plain
+@inner
 def _ramp(x, ends):
     return min(1.0, max(0.0, (x - ends[0]) / (ends[1] - ends[0])))

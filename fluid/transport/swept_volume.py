@@ -1,15 +1,16 @@
-"""The volume of the nodes beside the surface, by what the surface sweeps.
+"""The volume of nodes near the surface, from the volume that the surface sweeps.
 
 A velocity u, the same in all of a cell, that carries water and surface changes W_i = ∫_{φ<0} N_i dV at the rate
 
     dW_i/dt = ∫_{φ<0} u·∇N_i dV = -Σ_j q_ij,      q_ij = -Σ_e w_e |e| (∇N_i·∇N_j) (x_j - x_i)·u_e,          (1)
 
 w_e the share of the fluid part of a cell below the surface: the flux of `volume.py` (1), as far as a cell has water.
-It is conservative along edges, and exact for a plane surface that moves on as it is.  `volume_transport.py` fills the
-edges by the shares of the nodes instead, which are not those of a plane: hats on split bricks have other profiles at
-each corner of a brick.  Within the tank these add up to one profile for all nodes, on its sides they do not, and the
-correction of the level set tilted every surface that moved by 2 % of its way there, up and down in the same direction:
-a column that bounced on air lost 7 % of its energy in ten periods, and sloshing a quarter more of its height.
+It is conservative along edges, and exact for a plane surface that moves without changing shape.  `volume_transport.py`
+fills the edges by the shares of the nodes instead, which are not those of a plane: hats on split bricks have other
+profiles at each corner of a brick.  Within the tank these add up to one profile for all nodes, on its sides they do
+not, and the correction of the level set tilted every surface that moved by 2 % of its way there, up and down in the
+same direction: a column that bounced on air lost 7 % of its energy in ten periods, and sloshing a quarter more of its
+height.
 
 Mean over the step by Simpson's rule, with φ carried on by its mean slope at the nodes, which is good for a part of a
 cell: in water that crosses half of one in a step the shares count alone (fronts of dam breaks came 0.2 % later and the
@@ -42,7 +43,7 @@ def swept(topology, flux: Flux, phi, u, moved, dt: float) -> np.ndarray:
     """Volume (N,) [m³] that the nodes get by (1) in dt [s] beyond what they got by the fluxes along the edges.
 
     All of the domain of the flux: φ (N,) [m] at the beginning · u (N, 3) [m/s] at mid-step · moved (edges,) [m³] what
-    went out along each edge. Where no surface is slow enough, this costs a look at the nodes."""
+    went out along each edge. Where no surface is slow enough, only the nodes are visited."""
     t, g = topology, flux.graph
     weight, counted = np.zeros(len(phi)), np.zeros(len(phi), bool)
     over(_weights, len(flux.nodes), flux.nodes, phi, u, t.node_size, dt, weight, counted)
@@ -54,16 +55,12 @@ def swept(topology, flux: Flux, phi, u, moved, dt: float) -> np.ndarray:
         _in_reach, len(around), around, phi, t.node_size, t.cells, flux.velocity, velocity, beside
     )
     after, near = phi.copy(), np.flatnonzero(beside)
-    over(_after, len(near), near, phi, u, dt, t.cells, t.parent, t.gradients, t.volume, *_rows(t), after)
+    over(_after, len(near), near, phi, u, dt, t.paths, t.volume, after)
     beside[:] = False
     over(_by_share, len(reached), reached, phi, after, t.parts, flux.velocity, velocity, beside)
     nodes = flux.nodes[beside[flux.nodes]]
     rate = edge_rates(t, g, nodes, velocity)
     return _difference(nodes, beside, weight, g.row, g.start, g.neighbour, dt * rate, moved)
-
-
-def _rows(t):
-    return t.node_start, t.node_cells
 
 
 @ranged
@@ -100,12 +97,13 @@ def _in_reach(first, last, cell_list, phi, size, cells, u, velocity, beside):
 
 
 @ranged
-def _after(first, last, nodes, phi, u, dt, cells, parent, g, volume, node_start, node_cells, out):
+def _after(first, last, nodes, phi, u, dt, mesh, volume, out):
     """φ (N,) [m] that u has carried on for dt at the listed nodes, with the mean of ∇φ over the cells around each."""
+    cells, parent, g = mesh.cells, mesh.parent, mesh.gradients
     for s in range(first, last):
         i, weight, rate = nodes[s], 0.0, 0.0
-        for c in range(node_start[i], node_start[i + 1]):
-            e = node_cells[c]
+        for c in range(mesh.node_start[i], mesh.node_start[i + 1]):
+            e = mesh.node_cells[c]
             p = parent[e]
             weight += volume[e]
             for a in range(4):

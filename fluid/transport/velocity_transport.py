@@ -1,7 +1,7 @@
-"""Velocity that goes along with volumes of water moved from node to node: momentum is kept.
+"""Velocity carried along with volumes of water that move from node to node, so that momentum is conserved.
 
-The volume w_ij that leaves i for j takes momentum along, component by component (mass and momentum by the same fluxes:
-Rudman, Int. J. Numer. Methods Fluids 28 (1998) 357),
+The volume w_ij that leaves i for j carries momentum with it, component by component (mass and momentum by the same
+fluxes: Rudman, Int. J. Numer. Methods Fluids 28 (1998) 357),
 
     u_ij = u_i + ½ (1 - C_i) B(u_j - u_i, u_i - u_up),    C_i = Σ_j w_ij / W_i                              (1)
 
@@ -14,21 +14,21 @@ from __future__ import annotations
 
 import numpy as np
 
+from fluid.mesh.arrays import Edges
 from fluid.numerics.threads import over, owning, reach_of_rows
-from kernel_decorators import kernel, ranged
+from kernel_decorators import inner, ranged
 
 
-def carry_velocity(nodes, graph_row, start, neighbour, moved, water, u):
+def carry_velocity(nodes, edges: Edges, moved, water, u):
     """Equation (1): u (N, 3) [m/s] after the volumes moved (edges,) [m³] left the listed nodes, in place.
 
-    water (N,) [m³] before they are handed over, no node gives more than it holds."""
-    along = (nodes, graph_row, start, neighbour)
-    size, reach = len(water), reach_of_rows(*along)
+    water (N,) [m³] before they are moved; no node gives more than it holds."""
+    size, reach = len(water), reach_of_rows(nodes, edges.row, edges.start, edges.neighbour)
     up, came = np.zeros(u.shape), np.zeros(size)
     change, volume = np.zeros(u.shape), np.zeros(size)
-    owning(_what_comes, size, reach, len(nodes), *along, moved, u, up, came)
+    owning(_what_comes, size, reach, len(nodes), nodes, edges, moved, u, up, came)
     over(_mean_of_it, len(nodes), nodes, came, u, up)
-    owning(_exchange, size, reach, len(nodes), *along, moved, water, u, up, change, volume)
+    owning(_exchange, size, reach, len(nodes), nodes, edges, moved, water, u, up, change, volume)
     over(_new_velocity, len(nodes), nodes, water, change, volume, u)
 
 
@@ -42,12 +42,13 @@ def _new_velocity(first, last, nodes, water, change, volume, u):
 
 
 @ranged
-def _what_comes(first, last, runs, nodes, graph_row, start, neighbour, moved, u, up, came):
+def _what_comes(first, last, runs, nodes, edges, moved, u, up, came):
     """Σ w u (N, 3) [m⁴/s] and Σ w (N,) [m³] of what flows into a node."""
+    row, start, neighbour = edges.row, edges.start, edges.neighbour
     for run in range(runs.shape[0]):
         for place in range(runs[run, 0], runs[run, 1]):
             i = nodes[place]
-            for s in range(start[graph_row[i]], start[graph_row[i] + 1]):
+            for s in range(start[row[i]], start[row[i] + 1]):
                 j = neighbour[s]
                 if moved[s] > 0.0 and first <= j < last:
                     came[j] += moved[s]
@@ -65,12 +66,13 @@ def _mean_of_it(first, last, nodes, came, u, up):
 
 
 @ranged
-def _exchange(first, last, runs, nodes, graph_row, start, neighbour, moved, water, u, up, change, volume):
+def _exchange(first, last, runs, nodes, edges, moved, water, u, up, change, volume):
     """Change of Σ W u (N, 3) [m⁴/s] and the volume afterwards (N,) [m³]."""
+    start, neighbour = edges.start, edges.neighbour
     for run in range(runs.shape[0]):
         for place in range(runs[run, 0], runs[run, 1]):
             i = nodes[place]
-            r = graph_row[i]
+            r = edges.row[i]
             out = 0.0
             for s in range(start[r], start[r + 1]):
                 out += moved[s]
@@ -95,6 +97,6 @@ def _exchange(first, last, runs, nodes, graph_row, start, neighbour, moved, wate
                             change[j, k] += momentum
 
 
-@kernel
+@inner
 def _van_leer(a, b):
     return 2.0 * a * b / (a + b) if a * b > 0.0 else 0.0

@@ -6,9 +6,9 @@ Share of water that leaves node i for j, with s = W/V and the Courant number C_i
 
 s_up: mean share of what flows into i.  B: the superbee of both differences (Roe 1985; Sweby, SIAM J. Numer. Anal. 21
 (1984) 995), 0 where their signs differ, so that no s leaves the range around it and front and back of a drop are alike.
-B = 0 is upwind, which smears the water over the cells: a front is fed by what diffuses into it and takes the speed that
-is there, and sloshing loses a sixth more of its height.  Zalesak's correction towards Lax and Wendroff keeps still
-more, but lets a falling drop of five cells lag by 0.7 %.
+B = 0 is the upwind scheme, which smears the water over the cells: a front is fed by what diffuses into it and takes the
+speed there, and sloshing loses a sixth more of its height.  Zalesak's correction towards the Lax-Wendroff scheme loses
+even less, but lets a falling drop of five cells lag by 0.7 %.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ LEAST_COUNTED = 0.3
 def carry_volume(flux: Flux, dt: float, u=None, total=None):
     """W (N,) [m³] after dt [s] by the flux; Σ W is kept to round-off.
 
-    u (N, 3) [m/s], if given, goes along (`velocity_transport.py`), in place; nodes without water keep theirs.
-    total (edges,) [m³], if given, gets what went out along each edge on top, in place."""
+    u (N, 3) [m/s], if given, is carried with the volume, in place (`velocity_transport.py`); nodes without water keep
+    theirs. total (edges,) [m³], if given: the volume that leaves along each edge is added, in place."""
     water = flux.water.copy()
     capacity = np.maximum(flux.capacity, 1e-300)
     least = LEAST_COUNTED * np.median(capacity[flux.nodes]) if len(flux.nodes) else 0.0
@@ -37,15 +37,15 @@ def carry_volume(flux: Flux, dt: float, u=None, total=None):
     count = len(flux.nodes)
     turnover = max(over(_largest_turnover, count, flux.nodes, g.row, g.start, flux.rate, capacity, least))
     n_sub = int(np.ceil(dt * turnover / LARGEST_COURANT)) or 1
-    along = (flux.nodes, g.row, g.start, g.neighbour)
+    edges, reach = g.edges, reach_of_rows(flux.nodes, g.row, g.start, g.neighbour)
     share = np.zeros(len(water))
     for _ in range(n_sub):
         moved, change = np.empty(len(flux.rate)), np.zeros(len(water))
         over(_share, count, flux.nodes, water, capacity, share)
-        over(_moved, count, *along, flux.rate, water, capacity, share, dt / n_sub, moved)
+        over(_moved, count, flux.nodes, edges, flux.rate, water, capacity, share, dt / n_sub, moved)
         if u is not None:
-            carry_velocity(*along, moved, water, u)
-        owning(_hand_over, len(water), reach_of_rows(*along), count, *along, moved, change)
+            carry_velocity(flux.nodes, edges, moved, water, u)
+        owning(_hand_over, len(water), reach, count, flux.nodes, edges, moved, change)
         water += change
         if total is not None:
             over(_add, count, flux.nodes, g.row, g.start, moved, total)
@@ -54,7 +54,7 @@ def carry_volume(flux: Flux, dt: float, u=None, total=None):
 
 @ranged
 def _add(first, last, nodes, graph_row, start, moved, total):
-    """What went out along the edges of the listed nodes, on top of the total (edges,)."""
+    """Add the volumes that left along the edges of the listed nodes to the total (edges,)."""
     for place in range(first, last):
         r = graph_row[nodes[place]]
         for s in range(start[r], start[r + 1]):
@@ -90,12 +90,13 @@ def _share(first, last, nodes, water, capacity, share):
 
 
 @ranged
-def _moved(first, last, nodes, graph_row, start, neighbour, rate, water, capacity, share, h, moved):
+def _moved(first, last, nodes, edges, rate, water, capacity, share, h, moved):
     """w_ij (edges,) [m³]: what leaves the listed nodes within h [s] by (1); no node gives more than it holds. Edges of
     other nodes are not written to."""
+    start, neighbour = edges.start, edges.neighbour
     for place in range(first, last):
         i = nodes[place]
-        r = graph_row[i]
+        r = edges.row[i]
         out = h * _out(r, start, rate)
         for s in range(start[r], start[r + 1]):
             moved[s] = 0.0
@@ -114,12 +115,13 @@ def _moved(first, last, nodes, graph_row, start, neighbour, rate, water, capacit
 
 
 @ranged
-def _hand_over(first, last, runs, nodes, graph_row, start, neighbour, moved, change):
-    """The volumes moved (edges,) [m³] off the one node and on to the other (N,) [m³]."""
+def _hand_over(first, last, runs, nodes, edges, moved, change):
+    """Subtract the volumes moved (edges,) [m³] from one node and add them to the other: change (N,) [m³]."""
+    start, neighbour = edges.start, edges.neighbour
     for run in range(runs.shape[0]):
         for place in range(runs[run, 0], runs[run, 1]):
             i = nodes[place]
-            r = graph_row[i]
+            r = edges.row[i]
             own = first <= i < last
             for s in range(start[r], start[r + 1]):
                 if own:

@@ -3,14 +3,16 @@
 In it each module has one folder for each state of its source and of what it imports.
 """
 
+import ast
 import os
+import re
 import tempfile
 from pathlib import Path
 
 import pytest
 
 from coupler.program import kernel_cache
-from coupler.program.kernel_cache import KEPT, ByContent, NoCache, use_kernel_cache
+from coupler.program.kernel_cache import KEPT, ByContent, NoCache, use_kernel_cache, without_words
 
 
 @pytest.fixture
@@ -81,13 +83,17 @@ def checkout(tmp_path, monkeypatch):
             (root / file).parent.mkdir(parents=True, exist_ok=True)
             (root / file).write_text(text)
         monkeypatch.setattr(kernel_cache, "ROOT", root)
-        kernel_cache.folder_of.cache_clear()
-        kernel_cache._imports.cache_clear()
+        forget()
         return lambda file: ByContent.from_function(None, str(root / file)).get_cache_path()
 
     yield make
-    kernel_cache.folder_of.cache_clear()
-    kernel_cache._imports.cache_clear()
+    forget()
+
+
+def forget():
+    """What was read of files that have changed since."""
+    for kept in (kernel_cache.folder_of, kernel_cache._imports, kernel_cache._code):
+        kept.cache_clear()
 
 
 @pytest.mark.parametrize(
@@ -108,8 +114,96 @@ def test_an_edit_compiles_again_what_imports_it_and_nothing_else(checkout, edite
     kernels = [file for file in SOURCES if file.startswith("fluid")]
     folder = checkout("here")
     before = {file: folder(file) for file in kernels}
-    folder = checkout("here", **{edited: SOURCES[edited] + "# edited\n"})
+    folder = checkout("here", **{edited: SOURCES[edited] + "edited = 1\n"})
     assert {file for file in kernels if folder(file) != before[file]} == anew
+
+
+KERNELS = '''\
+"""Sums."""
+
+LABEL = """from fluid import parts"""
+
+
+@kernel
+def total(values):
+    """The sum of all values."""
+    s = 0.0
+    # from the first to the last
+    for v in values:
+        s += v  # in place
+    return s
+'''
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ('"""Sums."""', '"""Sums of\n\nmany "numbers", it\'s said (all of them.\n"""'),
+        ('"""Sums."""\n', ""),
+        ('    """The sum of all values."""\n', ""),
+        ("The sum of all values.", "The sum [m]; see\n    from fluid import parts\n    "),
+        ("# from the first to the last", '# from one "end [\n\n    # to the other'),
+        ("  # in place", ""),
+        ("return s\n", "return s\n\n\n# the end"),
+    ],
+)
+def test_words_compile_nothing(checkout, old, new):
+    assert old in KERNELS
+    folder = checkout("here", **{"fluid/signs.py": KERNELS})
+    before = folder("fluid/edges.py"), folder("fluid/signs.py")
+    folder = checkout("here", **{"fluid/signs.py": KERNELS.replace(old, new)})
+    assert (folder("fluid/edges.py"), folder("fluid/signs.py")) == before
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("s += v", "s -= v"),
+        ('LABEL = """from', 'LABEL = """From'),
+        ('LABEL = """from fluid import parts"""', 'LABEL = (\n"""from fluid import parts"""\n)'),
+        ('LABEL = """from fluid import parts"""', 'LABEL = \\\n"""from fluid import part"""'),
+        ("        s += v", "    s += v"),
+        ("    for v in values:", "    s = '#'\n    for v in values:"),
+    ],
+)
+def test_code_that_looks_like_words_counts(checkout, old, new):
+    assert old in KERNELS
+    before = checkout("here", **{"fluid/signs.py": KERNELS})("fluid/edges.py")
+    assert checkout("here", **{"fluid/signs.py": KERNELS.replace(old, new)})("fluid/edges.py") != before
+
+
+def test_what_is_left_of_the_program_without_words_is_the_same_program():
+    """Judged by Python's own parser, for all files of the packages that have kernels."""
+    files = [file for room in kernel_cache.ROOMS for file in (kernel_cache.ROOT / room).rglob("*.py")]
+    with_kernels = [file for file in files if "kernel_decorators import" in file.read_text()]
+    assert len(with_kernels) > 50
+    for file in with_kernels:
+        text = file.read_text()
+        left = without_words(text)
+        assert len(left) < len(text)
+        assert meaning(EMPTY.sub(r"\1\2\n\1    pass\n", left)) == meaning(text), file
+
+
+EMPTY = re.compile(r"^( *)(class .*:)\n(?!\1 )", re.MULTILINE)
+"""A class of which nothing but a docstring was there."""
+
+
+def meaning(source):
+    """The syntax tree of a program without `pass`, docstrings and other strings that stand alone."""
+    tree = ast.parse(source)
+    for node in ast.walk(tree):
+        body = getattr(node, "body", None)
+        if isinstance(body, list):
+            node.body = [line for line in body if not (is_words(line) or isinstance(line, ast.Pass))]
+    return ast.dump(tree)
+
+
+def is_words(line):
+    return (
+        isinstance(line, ast.Expr)
+        and isinstance(line.value, ast.Constant)
+        and isinstance(line.value.value, str)
+    )
 
 
 def test_checkouts_with_the_same_sources_share_their_kernels(checkout):
@@ -124,7 +218,7 @@ def test_files_elsewhere_are_left_to_numba(checkout, tmp_path):
 
 def test_old_states_are_dropped(checkout, tmp_path):
     for number in range(KEPT + 3):
-        checkout("here", **{"fluid/edges.py": f"# {number}\n"})
+        checkout("here", **{"fluid/edges.py": f"number = {number}\n"})
         kept = ByContent.from_function(None, str(tmp_path / "here" / "fluid" / "edges.py"))
         kept.ensure_cache_path()
         os.utime(kept.get_cache_path(), (number, number))

@@ -71,12 +71,6 @@ def test_paths_do_not_cross_a_thin_wall():
         0.1,
         3,
         u,
-        t.nodes,
-        t.cells,
-        t.parent,
-        t.gradients,
-        t.neighbours,
-        t.node_start,
-        t.node_cells,
+        t.paths,
     )
     assert domain.centroid[cell, 0].min() > 0.52

@@ -38,8 +38,7 @@ def check_sides(t, side, seed, courant):
     for _ in range(3):
         fields[listed] = transport(t, listed, 1.0, u, fields, np.zeros(len(u), bool))
     np.testing.assert_allclose(fields[listed], start[listed], rtol=1e-13, atol=0)
-    mesh = (t.nodes, t.cells, t.parent, t.gradients, t.neighbours, t.node_start, t.node_cells)
-    cell, _ = feet(listed, -1.0, 1.0, 3, u, *mesh)
+    cell, _ = feet(listed, -1.0, 1.0, 3, u, t.paths)
     np.testing.assert_array_equal(side[t.cells[cell]], np.repeat(side[listed][:, None], 4, axis=1))
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from array_types import Array, Floats, Ints
-from kernel_decorators import inner, kernel
+from kernel_decorators import helper, inner, kernel
 from yade_scripts.blocks.block import Block
 from yade_scripts.blocks.polyhedra import cross_products, face_areas, polygon_area_vector
 from yade_scripts.blocks.quadrature import Rule, gauss
@@ -251,7 +251,7 @@ def _between(polygon, i, j):
     return polygon[j, 0] - polygon[i, 0], polygon[j, 1] - polygon[i, 1], polygon[j, 2] - polygon[i, 2]
 
 
-@kernel
+@helper
 def clip(subject, window, normal):
     """Part of the convex polygon `subject` (k, 3) inside `window` (l, 3); one plane, same sense about normal."""
     kept, extent = np.empty((len(subject), 3)), 0.0  # relative to the first corner of the window
@@ -276,7 +276,7 @@ def clip(subject, window, normal):
     return kept
 
 
-@kernel
+@helper
 def _keep_inside(polygon, start, inward, same):
     """Part of a convex polygon where inward·(x - start) ≥ 0; heights below `same` are zero."""
     count = len(polygon)
@@ -302,7 +302,7 @@ def _keep_inside(polygon, start, inward, same):
     return kept[:found]
 
 
-@kernel
+@helper
 def _without_doubles(polygon, same):
     """The corners (k, 3) that lie farther than `same` [m] from the one before."""
     kept = np.empty((len(polygon), 3))

@@ -10,7 +10,7 @@ import numpy as np
 from kernel_decorators import inner, kernel, plain
 
 
-@plain
+@inner
 def rotation_matrix(q, R):
     """R (3, 3) of the unit quaternion q = (x, y, z, w)."""
     x, y, z, w = q[0], q[1], q[2], q[3]

@@ -3,7 +3,7 @@
 law                         stiffness, damping, friction
 nodes, search, edges        points of a block that meet faces of another; where, how deep; crossing edges
 springs                     forces of the contacts found, and their work
-kernel, arrays, jit         the loop over candidate pairs, on arrays
+kernel, arrays              the loop over candidate pairs, on arrays
 forces, state               contact of a whole structure, with its memory; the contacts there are now
 
 Imports `yade_side` and `blocks`.

@@ -1,4 +1,4 @@
-"""What the loops over contact nodes work on: blocks, pairs, the memory of nodes, and the contacts of an evaluation."""
+"""Arrays for the loops over contact nodes: blocks, pairs, the history of nodes, and the contacts of an evaluation."""
 
 from __future__ import annotations
 
@@ -28,7 +28,8 @@ class Bodies(NamedTuple):
 
 class Law(NamedTuple):
     """shear: k_t/k_n · zeta, zeta_t: damping ratios (zeta_t < 0: c_t = sqrt(shear) c_n) · friction (m, m) μ
-    whole: K is that of two faces of which the smaller lies on the other, whatever its size; else it goes with the area.
+    whole: whether a face has the stiffness K wherever the smaller of two faces lies wholly on the other; otherwise K is
+    proportional to the area in contact.
     """
 
     shear: float
@@ -38,14 +39,50 @@ class Law(NamedTuple):
     whole: bool
 
 
+class Kinematics(NamedTuple):
+    """Bodies at the time of an evaluation: x (n, 3) [m] centres · v (n, 6) [m/s, rad/s] before the substep to come ·
+    R (n, 3, 3) from the frame of the body · dt [s]: that substep, 0: the contacts are only read · last_dt [s]: the
+    substep that led here."""
+
+    x: Array
+    v: Array
+    R: Array
+    dt: float
+    last_dt: float
+
+
+class Direction(NamedTuple):
+    """One direction of a pair: the nodes or edges of body a against the faces or edges of body b.
+
+    begins: whether contacts may begin here; they may not where those of the present places are known already ·
+    fresh: as in `Pairs`."""
+
+    a: int
+    b: int
+    begins: bool
+    fresh: float
+
+
+class Faces(NamedTuple):
+    """Faces of b in the frame of a: planes (.., 4), of which the first `count` are in use: the depth of a point ξ
+    behind face g is planes[g, 3] - planes[g, :3]·ξ · farthest: the face before which the nodes of a lie farthest out ·
+    margin [m] by which a node may lie beside a face."""
+
+    planes: Array
+    count: int
+    farthest: int
+    margin: float
+
+
 class Pairs(NamedTuple):
     """a < b (p,) bodies; b may be a plane · start (p+1,) first slot: the nodes of a, those of b, then
     `CROSSINGS` for edges that cross
 
-    fresh (p,): contact begins with the depth there is, what held the two until now having this share of its stiffness;
-    0: it does not · touching (p,) bool: had contacts last time · calm (p,) [m]: way that the two must move before they
-    can touch · overlap (p,) [m]: way that parts them, zero if they are apart · found (p,) bool: its contacts at the
-    present places are known; contacts begin and end once for each place, however often they are read there.
+    fresh (p,): stiffness of what held the two bodies until now, over that of their contact, where a new contact takes
+    over the present overlap; 0 where it starts without force · touching (p,) bool: the pair had contacts at the last
+    evaluation · calm (p,) [m]: relative motion below which the two cannot touch · overlap (p,) [m]: smallest
+    displacement that separates them, zero if they are apart · found (p,) bool: the contacts at the present positions
+    are known. Contacts begin and end once for each position, however often they are evaluated there.
     """
 
     a: Array
@@ -59,12 +96,13 @@ class Pairs(NamedTuple):
 
 
 class Slots(NamedTuple):
-    """What a node remembers of its contact with the other body of the pair: face (s,) or -1 (of edges: the number of
-    their pair), k (s,) [N/m],
+    """History of the contact of each node with the other body of its pair.
 
-    rest (s,) [m]: depth at which it began · shear (s, 3) [N] on the node's block, in the frame of the face's
-    spread (s,): how much nearer to the middle of the contacts of its pair it rubs · push (s,) [N]: normal force of
-    the substep before, `BEGINS` in none · speed (s,) [m/s] at which it closed then.
+    face (s,): the face in contact, -1 without contact; for edges the number of the pair of edges · k (s,) [N/m]:
+    stiffness · rest (s,) [m]: depth at which the contact began · shear (s, 3) [N]: elastic shear force on the block of
+    the node, in the frame of the block of the face · spread (s,): distance of the point where friction acts from the
+    middle of the contacts of the pair, over that of the node · push (s,) [N]: normal force in the last substep,
+    `BEGINS` if there was none · speed (s,) [m/s]: closing speed in the last substep.
     """
 
     face: Array
@@ -77,19 +115,18 @@ class Slots(NamedTuple):
 
     @classmethod
     def empty(cls, size: int) -> Slots:
-        """Nodes without a contact."""
+        """The history of `size` nodes without contact."""
         rest, k, spread, push, speed = (np.zeros(size) for _ in range(5))
         return cls(np.full(size, -1, np.int64), k, rest, np.zeros((size, 3)), spread, push, speed)
 
 
 class Rows(NamedTuple):
-    """The contacts of one evaluation, one row each: a block of the node, b of the face; slot.
+    """The contacts of one evaluation, one row each: a: block of the node · b: block of the face · slot: its history.
 
     point, normal (out of b) (c, 3) · depth [m] · kn, kt, cn, ct · mu · force, viscous, shear (c, 3) on a
-    push (c,) [N]: mean normal force over the substep · arm_a, arm_b (c, 3) [m] · shift (c, 3) [m]: from there to where
-    it rubs · velocity (c, 3): of a against b before the substep · held (c,) [J]: energy of the shear spring at the
-    time of that velocity.
-    """
+    push (c,) [N]: mean normal force over the substep · arm_a, arm_b (c, 3) [m] · shift (c, 3) [m]: from the contact
+    point to the point where friction acts · velocity (c, 3) [m/s]: of a relative to b before the substep · held (c,)
+    [J]: energy of the shear spring at the time of that velocity."""
 
     a: Array
     b: Array
@@ -114,7 +151,7 @@ class Rows(NamedTuple):
 
 
 def empty_rows(size: int) -> Rows:
-    """Room for `size` contacts."""
+    """Uninitialised rows for up to `size` contacts."""
     whole, one, three = (np.zeros(size, np.int64) for _ in range(3)), (size,), (size, 3)
     scalars = [np.zeros(one) for _ in range(8)]
     vectors = [np.zeros(three) for _ in range(9)]

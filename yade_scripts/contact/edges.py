@@ -1,21 +1,20 @@
-"""Edges that cross between contact nodes: contacts of edges against edges for a pair of blocks.
+"""Contacts of edges against edges, which the contact nodes of a pair of blocks do not detect.
 
 Two convex bodies are apart if a plane along a face or along an edge of each parts them (separating axes: Gottschalk,
-Lin and Manocha, SIGGRAPH 1996). Where no node is in contact or contact begins, no such plane is left, and the smallest
-overlap is that of two edges with directions d_a and d_b, these carry:
+Lin and Manocha, SIGGRAPH 1996). Where no such plane exists, although no node is in contact or contact has just begun,
+and the smallest overlap is that of two edges with directions d_a and d_b, these two edges carry the contact:
 
     n = ± d_a x d_b / |d_a x d_b|, out of b,   depth δ = n·(p_b - p_a),   p: nearest points of the two lines
 
-with the force of a node contact. The edges are kept until they part, become parallel or leave each other past an end.
-Where faces lie on one another, as of beams that cross, other edges cross beside these with the same normal, each with
-a depth of its own (`next_beside`).
-"""
+with the force of a node contact. The contact lasts until the edges separate, become parallel or slide past an end.
+Where faces lie on one another, as those of crossed beams do, further edges cross beside these with the same normal,
+each with its own depth (`next_beside`)."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from kernel_decorators import inner, kernel
+from kernel_decorators import helper, inner
 
 PARALLEL = 0.05
 """Sine of the angle below which two edges do not cross."""
@@ -24,14 +23,14 @@ ROUND_OFF = 1e-9
 SUPPORT = 1e-6
 """Share of the radius by which an edge may be off the outermost point of its block."""
 FLAT = 0.99875
-"""Cosine of the angle of two normals from which edges cross beside others: sine 0.05."""
+"""Cosine of the angle of two normals above which further edges may cross beside a pair: sine 0.05."""
 ENDS = 0.01
-"""Share of an edge at its ends where the node of its vertex does for a crossing beside others."""
+"""Share of an edge, at either end, in which the contact node of the vertex replaces a further crossing."""
 SCRATCH = 9
 """Rows of the work space of a pair before those for the vertices of both blocks."""
 
 
-@kernel
+@helper
 def pair_scratch(shapes):
     """Work space (.., 3) of a pair of blocks."""
     most = 0
@@ -42,9 +41,10 @@ def pair_scratch(shapes):
 
 @inner
 def find_crossing(shapes, a, b, x, R, deepest, scratch):
-    """Edges of a and b with the smallest overlap, if that is less than `deepest` [m]; scratch: of `pair_scratch`.
+    """Find the edges of a and b with the smallest overlap, if that is less than `deepest` [m]; scratch: see
+    `pair_scratch`.
 
-    → (number of the pair of edges or -1, distance that parts the blocks or -1 [m])
+    → (number of the pair of edges or -1, distance by which the blocks are apart [m], or -1)
     """
     count = shapes.vertex_end[a] - shapes.node_start[a]
     A, B = scratch[SCRATCH : SCRATCH + count], scratch[SCRATCH + count :]
@@ -86,12 +86,14 @@ def find_crossing(shapes, a, b, x, R, deepest, scratch):
 
 
 @inner
-def crossing(shapes, a, b, number, x, R, plane, point, scratch):
-    """Depth of a pair of edges [m], and the share of an edge that they meet before the nearest end, negative past it or
-    where they no longer cross.
+def crossing(shapes, a, b, number, state, plane, point, scratch):
+    """Depth of a pair of edges [m], and the distance of their crossing from the nearest end as a share of that edge,
+    which is negative past the end or where the edges no longer cross.
 
-    plane, point (3,): set to the normal out of b and to the point of a, both in the frame of a, also where the edges no
-    longer cross: what the springs held is known by them; scratch (8, 3), of which rows 4 and 5 are not used."""
+    plane, point (3,): set to the normal out of b and to the point of a, both in the frame of a. They are also set where
+    the edges no longer cross, since the energy left in the springs is computed from them. scratch (8, 3): work space,
+    of which rows 4 and 5 are not used."""
+    x, R = state.x, state.R
     count_b = shapes.edge_start[b + 1] - shapes.edge_start[b]
     ea, eb = shapes.edge_start[a] + number // count_b, shapes.edge_start[b] + number % count_b
     pa, da, pb, db, n, outward = scratch[0], scratch[1], scratch[2], scratch[3], scratch[6], 0.0
@@ -120,12 +122,13 @@ def crossing(shapes, a, b, number, x, R, plane, point, scratch):
 
 
 @inner
-def next_beside(shapes, a, b, n, number, leading, level, x, R, plane, point, scratch):
-    """The next pair of edges after `number` that cross between their ends in faces across n (3,), out of b, or that
-    is `leading`; level: whether there are such faces.
+def next_beside(shapes, side, n, number, leading, level, state, plane, point, scratch):
+    """Find the next pair of edges after `number` that is `leading`, or that cross between their ends and bound faces
+    perpendicular to n (3,), which points out of b. level: whether both blocks have such faces.
 
-    plane, point, scratch: as of `crossing`   →   (number of the pair or -1, depth [m], negative where they are apart)
+    plane, point, scratch: as in `crossing`   →   (number of the pair or -1, depth [m], negative where they are apart)
     """
+    a, b, R = side.a, side.b, state.R
     count_b = shapes.edge_start[b + 1] - shapes.edge_start[b]
     count_a = shapes.edge_start[a + 1] - shapes.edge_start[a]
     start = number + 1
@@ -135,7 +138,7 @@ def next_beside(shapes, a, b, n, number, leading, level, x, R, plane, point, scr
         for j in range(max(start - i * count_b, 0), count_b):
             if not _across(shapes, b, shapes.edge_start[b] + j, R, n, 1.0):
                 continue
-            depth, within = crossing(shapes, a, b, i * count_b + j, x, R, plane, point, scratch)
+            depth, within = crossing(shapes, a, b, i * count_b + j, state, plane, point, scratch)
             along = 0.0
             for k in range(3):
                 along += n[k] * (R[a, k, 0] * plane[0] + R[a, k, 1] * plane[1] + R[a, k, 2] * plane[2])
@@ -146,7 +149,7 @@ def next_beside(shapes, a, b, n, number, leading, level, x, R, plane, point, scr
 
 @inner
 def _across(shapes, a, edge, R, n, sign):
-    """Whether an edge of a is nearly across n (3,) and its faces look along sign n."""
+    """Whether an edge of a is nearly perpendicular to n (3,) and its faces point in the direction of sign n."""
     begin = shapes.node_start[a]
     first, second = begin + shapes.edge[edge, 0], begin + shapes.edge[edge, 1]
     along = size = outward = 0.0
@@ -184,7 +187,7 @@ def _vertices(shapes, a, shift, R, out):
 
 @inner
 def _normal(da, db, n):
-    """Set n (3,) to the unit normal of two directions; → sine of the angle between them, 0 where n has no direction."""
+    """Set n (3,) to the unit normal of two directions; → sine of the angle between them, 0 where n is undefined."""
     n[0] = da[1] * db[2] - da[2] * db[1]
     n[1] = da[2] * db[0] - da[0] * db[2]
     n[2] = da[0] * db[1] - da[1] * db[0]
@@ -213,7 +216,7 @@ def _least(points, n, sign):
 
 @inner
 def _nearest(pa, da, pb, db):
-    """Where the lines pa + s da and pb + t db are nearest: (s, t)."""
+    """Parameters (s, t) of the nearest points of the lines pa + s da and pb + t db."""
     aa, bb, ab = _dot(da, da), _dot(db, db), _dot(da, db)
     ra, rb = _dot(pb, da) - _dot(pa, da), _dot(pb, db) - _dot(pa, db)
     size = (da[1] * db[2] - da[2] * db[1]) ** 2 + (da[2] * db[0] - da[0] * db[2]) ** 2

@@ -1,4 +1,4 @@
-"""Contact between blocks, and of blocks with fixed planes: candidate pairs, history, forces and their account."""
+"""Contact between blocks, and of blocks with fixed planes: candidate pairs, history, forces and their work."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from yade_scripts.blocks.block import Block
 from yade_scripts.blocks.faces import FixedPlane
-from yade_scripts.contact.arrays import CROSSINGS, Bodies, Law, Pairs, Slots, empty_rows
+from yade_scripts.contact.arrays import CROSSINGS, Bodies, Kinematics, Law, Pairs, Slots, empty_rows
 from yade_scripts.contact.ground import NO_GROUND, GroundSurface
 from yade_scripts.contact.kernel import alone, carry_slots, contact_forces
 from yade_scripts.contact.law import ContactLaw
@@ -22,14 +22,15 @@ Array = np.ndarray
 
 
 class ContactForces:
-    """Contacts of the blocks with what `neighbours` says is near.
+    """Contacts between the blocks, and of the blocks with planes and ground.
 
-    blocks, planes: in the scene's coordinates · face_stiffness (n,) K [N/m] · neighbours() → (p, 2) pairs of rows
-    whose bounding boxes come close while no point of a block moves by more than reach [m]; then it is asked again ·
-    closing (n,): K of the faces while joints hold them [N/m]
+    blocks, planes: in the coordinates of the scene · face_stiffness (n,) K [N/m] · neighbours(): the pairs (p, 2) of
+    rows whose bounding boxes can meet while no point of a block moves by more than reach [m]; after that it is called
+    again · closing (n,) [N/m]: stiffness of the faces as long as joints hold them
     free (n,) bool: motion not prescribed.
 
-    Running sums [J]: taken by dashpots, by friction and by springs let go; driving: put in by driven blocks.
+    Running sums [J]: dashpot and friction, the energy taken by dashpots, and by friction and springs of contacts that
+    ended; driving, the energy put in by driven blocks.
     """
 
     def __init__(
@@ -79,13 +80,14 @@ class ContactForces:
     # ---- pairs ----------------------------------------------------------------------------------------------
 
     def switch_on(self, rows: Array, as_deep: bool = False) -> None:
-        """Blocks that meet others by contact from now on. as_deep: with the depth there is; else counted from here."""
+        """Let these blocks have contacts from now on. as_deep: present overlaps count in full; otherwise depths are
+        measured from the present ones."""
         self._on[rows] = True
         self.search(as_deep=as_deep)
 
     def leave_out(self, joined: Array) -> None:
-        """Pairs (p, 2) that live joints hold, in compression too; pairs that were among them before and are no more go
-        on by contact, with the depth there is."""
+        """Exclude pairs (p, 2) that live joints hold, since these carry compression too. Pairs that were excluded
+        before and are not now continue by contact, with the present depth."""
         keys = np.unique(self._key(*np.sort(joined, axis=1).T))
         parted = self._joined[~_among(self._joined, keys)]
         self._joined = keys
@@ -93,7 +95,7 @@ class ContactForces:
             self.search(parted)
 
     def search(self, parted: Array | None = None, as_deep: bool = False) -> None:
-        """Renew the pairs at the present places."""
+        """Find the candidate pairs at the present positions."""
         self._set_pairs(_in_order(self._near()), parted, as_deep)
 
     def _key(self, a: Array, b: Array) -> Array:
@@ -110,7 +112,7 @@ class ContactForces:
         return near[~_among(self._key(*near.T), self._joined)]
 
     def _awake(self, near: Array) -> Array:
-        """The pairs in which something can move; which blocks may come near to a group of those asleep is noted."""
+        """The pairs in which something can move. Blocks that may come near to a sleeping group are noted on the way."""
         moves = self._free[: self._n] | self._motion.v.any(axis=1)
         on = np.flatnonzero(self._on & moves & ~self._asleep[: self._n])
         row, group = np.indices((len(on), len(self._boxes))).reshape(2, -1)
@@ -125,7 +127,7 @@ class ContactForces:
         return ((x - reach <= boxes[:, 1]) & (x + reach >= boxes[:, 0])).all(axis=1)
 
     def roused(self) -> Array:
-        """(groups,) bool: groups of blocks asleep that something loose has come near to."""
+        """(groups,) bool: sleeping groups of blocks that a loose body has come near to."""
         rows, groups = self._comers.T
         found = np.zeros(len(self._boxes), bool)
         found[groups[self._within(rows, groups, 2.0 * self._reach)]] = True
@@ -160,7 +162,7 @@ class ContactForces:
         return np.minimum.reduceat(points, first) - margin, np.maximum.reduceat(points, first) + margin
 
     def _near_planes(self) -> Array:
-        """Blocks that may reach a plane before the next search, (k, 2)."""
+        """Pairs (k, 2) of a block and a plane that it may reach before the next search."""
         rows = np.arange(self._n)
         radius = self._shapes.radius[rows] + 2.0 * self._reach
         found = [np.zeros((0, 2), np.int64)]
@@ -194,12 +196,12 @@ class ContactForces:
             self._rows = empty_rows(total + total // 4)
 
     def _joint_share(self, a: Array, b: Array) -> Array:
-        """Stiffness of the joints that held the pairs a, b (k,) over that of their contact."""
+        """Stiffness of the joints that held the pairs a, b (k,), over that of their contact."""
         K = self._bodies.stiffness
         return (1.0 / K[a] + 1.0 / K[b]) / (1.0 / self._closing[a] + 1.0 / self._closing[b])
 
     def _remembered(self) -> tuple[Array, ...]:
-        """What pairs that go on remember; how far they are apart is found anew."""
+        """Copy the history of pairs that continue; their distance is found again."""
         p = self._pairs
         return p.fresh, p.touching, p.overlap, p.found
 
@@ -219,15 +221,17 @@ class ContactForces:
     def add_forces(self, dt: float, F: Array) -> None:
         """Add the contact forces at the present places to F (n, 6) for a substep of dt [s]."""
         m = self._motion
+        state = Kinematics(m.all_x, m.all_v, m.all_R, dt, m.dt)
         self._count, lost = contact_forces(
-            self.share, self._shapes, self._bodies, self._law, self._pairs, self._slots, self._ground,
-            m.all_x, m.all_v, m.all_R, dt, m.dt, self._rows, F,
+            self.share, self._shapes, self._bodies, self._law, self._pairs, self._slots, self._ground, state,
+            self._rows, F,
         )  # fmt: skip
         self.friction += lost
         self._read = None
 
     def settle(self, dt: float) -> None:
-        """Book the work of the contacts over the substep that has just ended, and look for neighbours in time."""
+        """Account for the work of the contacts over the substep that has just ended, and search for neighbours if it is
+        due."""
         dashpot, driving = contact_work(self._rows, self._count, self._motion.all_v, ~self._free, dt)
         self.dashpot += dashpot
         self.driving += driving
@@ -236,15 +240,15 @@ class ContactForces:
             self.search()
 
     def now(self) -> Contacts:
-        """Contacts at the present places, found afresh after `moved`."""
+        """The contacts at the present positions; they are found again after `moved`."""
         if self._read is None:
             self.add_forces(0.0, np.zeros((self._n, 6)))
             self._read = contacts_of_rows(self._rows, self._count, self._n)
         return self._read
 
     def deepest(self) -> tuple[Array, Array, Array]:
-        """Pairs that overlap: blocks a (p,) and b (p,), -1 - number for a fixed plane, and the way that parts them
-        (p,) [m]."""
+        """Pairs that overlap: blocks a (p,) and b (p,), where -1 - k stands for the fixed plane k, and the smallest
+        displacement (p,) [m] that would separate them."""
         self.now()
         pairs = self._pairs
         on = np.flatnonzero(pairs.overlap > 0.0)
@@ -252,8 +256,8 @@ class ContactForces:
         return pairs.a[on], np.where(b < self._n, b, self._n - 1 - b), pairs.overlap[on]
 
     def moved(self) -> None:
-        """Blocks have been moved by hand. Contacts that begin there count from the touch, with the depth there is: what
-        they push then goes by the places alone, not by the way there."""
+        """Note that blocks have been displaced directly. Contacts that begin there have the full present depth, so that
+        their forces depend on the positions alone and not on the path to them."""
         self.search()
         self._pairs.found[:], self._pairs.fresh[:] = False, 1.0
         self._read = None
@@ -261,7 +265,7 @@ class ContactForces:
     # ---- saving and going back ------------------------------------------------------------------------------
 
     def save(self) -> dict[str, Array]:
-        """History of the contacts there are, and the sums."""
+        """The history of all contacts, and the running sums."""
         self.now()  # contacts that are to take over from joints begin here, not after the way back
         index = np.flatnonzero(self._slots.face >= 0)
         pair = np.searchsorted(self._pairs.start, index, side="right") - 1
@@ -286,7 +290,7 @@ class ContactForces:
         }
 
     def restore(self, saved: dict[str, Array]) -> None:
-        """Back to a saved state, the blocks being where they were then."""
+        """Return to a saved state; the blocks must be where they were then."""
         self._on[:], self._joined = saved["on"], saved["joined"].copy()
         self._set_pairs(np.zeros((0, 2), np.int64))
         in_contact = np.stack([saved["a"], saved["b"]], axis=1)

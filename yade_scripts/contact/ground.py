@@ -2,8 +2,9 @@
 
     z_s(x, y) plane on each triangle,   δ = (z_s - z) n_z,   n upward normal of the triangle below the node        (1)
 
-A node goes on from triangle to triangle with the depth it has, so that no seam between them catches it; δ is continuous
-but for the change of n_z.  The ground's own edges meet no faces: a block across a ridge rests on its nodes.
+A node that moves from one triangle to the next keeps its depth, so that no seam between triangles can catch it; δ is
+continuous except for the change of n_z.  Edges of the ground are not tested against faces of blocks: a block that lies
+across a ridge rests on its nodes.
 """
 
 from __future__ import annotations
@@ -60,7 +61,7 @@ class GroundSurface(FixedPlane):
         return float(1.0 / np.sqrt(1.0 + steepest**2))
 
     def as_row(self, row: int) -> Ground:
-        """For the kernel, as the body of this row."""
+        """The ground as the kernel takes it, as the body with this row."""
         arrays = (np.ascontiguousarray(a, float) for a in (self.x, self.y, self.z))
         return Ground(row, *arrays, self.mirrored, self.upright)
 
@@ -115,12 +116,12 @@ def surface_at(ground, px, py, normal):
 
 @inner
 def scan_ground(
-    shapes, bodies, shear, slots, slot, finds, fresh, a, ground, x, v, R, last_dt, rows, count, lost, scratch, plane
+    shapes, bodies, shear, slots, slot, side, ground, state, rows, count, lost, scratch, plane
 ):  # fmt: skip
-    """Contacts of the nodes of a with the ground; → (contacts, energy lost [J], lower bound of the distance [m],
-    negative where a node is below). finds: whether contacts may begin here; not where they have been found ·
-    plane (4,), scratch (8, 3): work space."""
-    b, begin, way, n = ground.row, shapes.node_start[a], scratch[6:8], scratch[4]
+    """Contacts of the nodes of a block with the ground; → (contacts, energy lost [J], lower bound of the distance [m],
+    negative where a node is below). plane (4,), scratch (8, 3): work space."""
+    a, b, x, R = side.a, side.b, state.x, state.R
+    begin, way, n = shapes.node_start[a], scratch[6:8], scratch[4]
     face, apart = shapes.face_start[b], np.inf
     for i in range(begin, shapes.node_start[a + 1]):
         s = slot + i - begin
@@ -132,19 +133,19 @@ def scan_ground(
         depth = -above * n[2]
         apart = min(apart, above * ground.upright if above > 0.0 else -depth)
         known = slots.face[s] >= 0
-        if not known and (depth <= 0.0 or not finds):
+        if not known and (depth <= 0.0 or not side.begins):
             continue
         for j in range(3):
             plane[j] = R[a, 0, j] * n[0] + R[a, 1, j] * n[1] + R[a, 2, j] * n[2]
         plane[3] = depth + plane[0] * xi0 + plane[1] * xi1 + plane[2] * xi2
-        if known and finds:
+        if known and side.begins:
             across = slots.shear[s, 0] * n[0] + slots.shear[s, 1] * n[1] + slots.shear[s, 2] * n[2]
             for k in range(
                 3
-            ):  # of another triangle than before: what now stands upright on the ground is no friction
+            ):  # on another triangle than before, a part of it may be normal to the ground: no friction
                 slots.shear[s, k] -= across * n[k]
             lost += 0.5 * across**2 / (shear * slots.k[s])
-            way_of(v, R, x, a, b, xi0, xi1, xi2, plane, last_dt, scratch, way)
+            way_of(state, a, b, xi0, xi1, xi2, plane, scratch, way)
             if depth <= 0.0:
                 lost += let_go(slots, s, shear, depth, way, R, b)
                 continue
@@ -157,13 +158,13 @@ def scan_ground(
             slots.spread[s] = shapes.face_spread[own]
             slots.shear[s, 0] = slots.shear[s, 1] = slots.shear[s, 2] = 0.0
             slots.push[s] = BEGINS
-            way_of(v, R, x, a, b, xi0, xi1, xi2, plane, last_dt, scratch, way)
-            if fresh > 0.0:
-                lost += take_over(slots, s, fresh, depth, way[1, 0])
+            way_of(state, a, b, xi0, xi1, xi2, plane, scratch, way)
+            if side.fresh > 0.0:
+                lost += take_over(slots, s, side.fresh, depth, way[1, 0])
             else:
                 slots.rest[s] = max(0.0, depth - ARRIVED * max(way[1, 0], 0.0))
         slots.rest[s] = min(slots.rest[s], depth)
-        write_row(rows, count, a, b, s, plane, depth, xi0, xi1, xi2, x, R)
+        write_row(rows, count, side, s, plane, depth, xi0, xi1, xi2, state)
         rows.depth[count], rows.kn[count] = depth - slots.rest[s], slots.k[s]
         count += 1
     return count, lost, apart

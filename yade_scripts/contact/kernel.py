@@ -1,8 +1,9 @@
-"""The loop over pairs of blocks that are near: places and velocities of the blocks → contact forces and what they take.
+"""The loop over candidate pairs of blocks: from positions and velocities to contact forces and the energy they
+dissipate.
 
 A node of block a inside block b, behind its face f, is a contact: normal n out of f, depth δ = offset - n·y with y the
-node in the frame of b. `contact_search` finds them, `contact_springs` says what they do; edges that cross are in
-`contact_edges`.
+node in the frame of b. `search.py` finds the contacts, `springs.py` computes their forces, and `edges.py` treats edges
+that cross.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import numpy as np
 
 from kernel_decorators import inner, kernel, released
 from yade_scripts.blocks.block import MARGIN
-from yade_scripts.contact.arrays import CROSSINGS
+from yade_scripts.contact.arrays import CROSSINGS, Direction, Faces
 from yade_scripts.contact.edges import pair_scratch
 from yade_scripts.contact.ground import scan_ground
 from yade_scripts.contact.search import (
@@ -29,42 +30,43 @@ from yade_scripts.contact.search import (
 from yade_scripts.contact.springs import Mode, add_up, apply, set_dashpots
 
 PAIR = 20
-"""To look at a pair takes as long as so many rows of a loop."""
+"""Cost of one pair, in rows of an ordinary loop: it decides how pairs are divided among threads."""
 SUNK = 0.01
-"""Overlap in radii of the smaller block up to which that is not asked: the search for edges costs more than nodes."""
+"""Overlap, in radii of the smaller block, below which the second limit is not tested: the search for edges is more
+expensive than that for nodes."""
 SAME = 1.0 + 1e-6
-"""Overlap of crossing edges over that of faces up to which edges carry where no node does: that of flat beams is the
-same."""
+"""Largest ratio of the overlap of crossing edges to that of the faces at which edges carry where no node does. For
+flat beams the two overlaps are equal."""
 
 
 def alone(kernel: Callable, count: int, *args, weight: int = 1) -> list:
-    """kernel(0, count, *args) on this thread: what `contact_forces` does without others to share its work with."""
+    """Run kernel(0, count, *args) on this thread: the value of `share` in `contact_forces` for one thread."""
     return [kernel(0, count, *args)]
 
 
-def contact_forces(share, shapes, bodies, law, pairs, slots, ground, x, v, R, dt, last_dt, rows, F):
+def contact_forces(share, shapes, bodies, law, pairs, slots, ground, state, rows, F):
     """Find the contacts at the present places and add their forces to F (n, 6).
 
-    share: `alone`, or what runs ranges of the pairs on several threads: forces are added in the order of the pairs
-    afterwards, so the bits are the same; a range of all pairs adds them as it finds them · ground: `Ground`,
-    NO_GROUND without · dt [s]: substep to come, 0: only look · last_dt [s]: substep that led here
-    Which contacts there are and what they hold does not depend on which pairs that do not touch are in the list.
-    → (contacts, work of friction and of springs that were let go [J])
+    share: `alone`, or a function that runs ranges of the pairs on several threads. In that case the forces are added
+    afterwards in the order of the pairs, so that the result has the same bits; a range of all pairs adds them as it
+    finds them · ground: `Ground`, or NO_GROUND.
+    Pairs in the list that do not touch change neither the contacts nor their forces.
+    → (number of contacts, energy [J] taken by friction and by springs of contacts that ended)
     """
     lost = np.zeros(len(pairs.a))
-    state = (shapes, bodies, law, pairs, slots, ground, F, x, v, R, dt, last_dt, rows, lost)
-    spans = np.array(share(_contacts, len(pairs.a), *state, weight=PAIR))
+    scene = (shapes, bodies, law, pairs, slots, ground, F, state, rows, lost)
+    spans = np.array(share(_contacts, len(pairs.a), *scene, weight=PAIR))
     return _added_up(spans, rows, lost, F)
 
 
 @released
-def _contacts(
-    first_pair, last_pair, shapes, bodies, law, pairs, slots, ground, F, x, v, R, dt, last_dt, rows, lost
-):
-    """Contacts of a range of pairs, into the rows from the first slot of the first pair on → where they begin and end.
+def _contacts(first_pair, last_pair, shapes, bodies, law, pairs, slots, ground, F, state, rows, lost):
+    """Write the contacts of a range of pairs into the rows from the first slot of the first pair on → first and last
+    row.
 
-    F (n, 6): of the blocks, the other bodies are planes; the forces are added where the range holds all pairs ·
-    lost (p,) [J]: what friction and springs that were let go took."""
+    F (n, 6): forces on the blocks; bodies beyond n are planes. Forces are added here only if the range is all pairs ·
+    lost (p,) [J]: energy taken by friction and by springs of contacts that ended."""
+    x, v, R = state.x, state.v, state.R
     begins, n, S = pairs.start[first_pair], len(F), np.empty(3)
     all_pairs = first_pair == 0 and last_pair == len(pairs.a)
     count = begins
@@ -74,17 +76,17 @@ def _contacts(
     planes, scratch = np.empty((most, 4)), pair_scratch(shapes)
     for p in range(first_pair, last_pair):
         a, b, finds, taken = pairs.a[p], pairs.b[p], not pairs.found[p], 0.0
-        pairs.found[p] = dt == 0.0
+        pairs.found[p] = state.dt == 0.0
         if not finds and not pairs.touching[p]:
             continue
         if finds and pairs.calm[p] > 0.0:
-            pairs.calm[p] -= last_dt * closing_bound(v, a, b, shapes.radius[a], shapes.radius[b])
+            pairs.calm[p] -= state.last_dt * closing_bound(v, a, b, shapes.radius[a], shapes.radius[b])
             if pairs.calm[p] > 0.0:
                 continue
-        first, apart = count, -np.inf
+        first, apart, forward = count, -np.inf, Direction(a, b, finds, pairs.fresh[p])
         if b == ground.row:
             count, taken, apart = scan_ground(
-                shapes, bodies, law.shear, slots, pairs.start[p], finds, pairs.fresh[p], a, ground, x, v, R, last_dt,
+                shapes, bodies, law.shear, slots, pairs.start[p], forward, ground, state,
                 rows, count, taken, scratch, planes[0],
             )  # fmt: skip
         for node_body, face_body in ((a, b), (b, a)):
@@ -95,13 +97,13 @@ def _contacts(
                 shapes.face_start, shapes.normal, shapes.offset, node_body, face_body, x, R, planes
             )
             margin = min(shapes.margin[node_body], shapes.margin[face_body])
-            gap, nearest = separation(shapes.node, begin, shapes.vertex_end[node_body], planes, faces)
+            gap, farthest = separation(shapes.node, begin, shapes.vertex_end[node_body], planes, faces)
             apart = max(apart, gap)
             if gap <= margin or pairs.touching[p]:
                 slot = pairs.start[p] if node_body == a else pairs.start[p + 1] - CROSSINGS - (end - begin)
                 count, taken = scan(
-                    shapes, bodies, law, slots, slot, finds, pairs.fresh[p], node_body, face_body, planes,
-                    faces, nearest, margin, x, v, R, last_dt, rows, count, taken, scratch,
+                    shapes, bodies, law, slots, slot, Direction(node_body, face_body, finds, pairs.fresh[p]),
+                    Faces(planes, faces, farthest, margin), state, rows, count, taken, scratch,
                 )  # fmt: skip
         base, nodes = pairs.start[p + 1] - CROSSINGS, count
         known = False
@@ -117,8 +119,8 @@ def _contacts(
             if leads:
                 deepest = -SAME * apart if bare else -CROSSING * apart
             count, taken, parted = cross(
-                shapes, bodies, law.shear, slots, base, finds, pairs.fresh[p], a, b, deepest, sunk, flat, x, v, R,
-                last_dt, rows, first, count, taken, scratch,
+                shapes, bodies, law.shear, slots, base, forward, deepest, sunk, flat, state, rows,
+                first, count, taken, scratch,
             )  # fmt: skip
             apart = max(apart, parted)
         if finds:
@@ -130,7 +132,7 @@ def _contacts(
         if count > first:
             yields, K = set_dashpots(bodies, law, a, b, R, rows, first, count, scratch)
             mode = Mode(law.zeta, np.sqrt(yields * K))
-            taken += apply(slots, v, R, dt, last_dt, mode, a, rows, first, count, scratch)
+            taken += apply(slots, state, mode, a, rows, first, count, scratch)
             for c in range(first, count if all_pairs else first):
                 add_up(rows, c, F, S)
         lost[p] = taken
@@ -139,8 +141,8 @@ def _contacts(
 
 @kernel
 def _added_up(spans, rows, lost, F):
-    """The rows in `spans` (k, 2) one behind the other, and their forces on F, where one range has not added them
-    already; → how many they are, Σ lost."""
+    """Move the rows of several `spans` (k, 2) together and add their forces to F; a single span has added its own
+    already. → (number of rows, Σ lost)"""
     count, S = spans[0, 1] if len(spans) == 1 else 0, np.empty(3)
     for k in range(len(spans) if len(spans) > 1 else 0):
         for c in range(spans[k, 0], spans[k, 1]):
@@ -156,7 +158,7 @@ def _added_up(spans, rows, lost, F):
 
 @inner
 def _move(rows, c, to):
-    """Row c to another, before it."""
+    """Copy row c to an earlier row."""
     rows.a[to], rows.b[to], rows.slot[to] = rows.a[c], rows.b[c], rows.slot[c]
     rows.depth[to], rows.kn[to], rows.kt[to], rows.cn[to] = rows.depth[c], rows.kn[c], rows.kt[c], rows.cn[c]
     rows.ct[to], rows.mu[to], rows.push[to], rows.held[to] = (
@@ -182,15 +184,16 @@ def _move(rows, c, to):
 
 @inner
 def _overhang(shapes, a, b):
-    """Bound of the distance at which nodes beside the faces of two blocks may count as on them [m]: planes that are
-    moved out by `MARGIN` of the inner radius lie in the block made larger by that share."""
+    """Upper bound [m] of the distance beside the faces of two blocks at which nodes may still count as on them: planes
+    moved outwards by `MARGIN` times the inner radius lie within the block scaled up by that share."""
     other = shapes.radius[b] if shapes.radius[b] < np.inf else 0.0
     return MARGIN * max(shapes.radius[a], other)
 
 
 @kernel
 def carry_slots(old_pairs, old, new_index, old_index, start, new, shear):
-    """Copy the memory of pairs old_index to pairs new_index; → energy of contacts in pairs that are no more [J]."""
+    """Copy the history of the pairs old_index to the pairs new_index; → energy [J] in contacts of pairs that were
+    dropped."""
     kept = np.zeros(len(old_pairs.a), np.bool_)
     for i in range(len(new_index)):
         p, q = new_index[i], old_index[i]

@@ -106,7 +106,8 @@ class ContactLaw:
 
     @property
     def keeps_water_out(self) -> bool:
-        """Whether any faces that lie on one another get less than all of the pressure around."""
+        """Whether between any faces that lie on one another less than the full pressure of the surrounding water
+        acts."""
         return self.uplift < 1.0 or any(p.uplift is not None and p.uplift < 1.0 for p in self.pairs)
 
     def uplift_between(self, a: str, b: str) -> float:

@@ -1,4 +1,5 @@
-"""How much of two faces lies on one another, by their nodes: the stiffness of a pair of blocks is what was asked for.
+"""The share of two faces that lies on one another, counted by their nodes, so that a pair of blocks has the stiffness
+asked for.
 
 A node of either face carries K/2n, both faces being in series and n nodes on each: K where equal faces lie on one
 another. Of a small face on a large one only the small one's nodes are in contact, with half of that. So nodes carry
@@ -14,10 +15,10 @@ from kernel_decorators import inner
 
 
 @inner
-def share_of_overlap(shapes, a, own, b, g, planes, faces, margin, x, R):
+def share_of_overlap(shapes, a, own, b, g, faces, state):
     """2 max(s_a, s_b)/(s_a + s_b) of the face `own` of a and the face g of b, of which each is looked at along its
-    normal; planes (faces, 4): all faces of b in the frame of a · margin [m] by which a node may lie beside a face.
-    1 for a plane, which has no nodes."""
+    normal. faces: those of b in the frame of a. 1 for a plane, which has no nodes."""
+    planes, margin = faces.planes, faces.margin
     if shapes.node_start[b] == shapes.node_start[b + 1]:
         return 1.0
     on_a = on_b = 0
@@ -26,7 +27,7 @@ def share_of_overlap(shapes, a, own, b, g, planes, faces, margin, x, R):
             xi = shapes.node[i]
             d = planes[g, 3] - planes[g, 0] * xi[0] - planes[g, 1] * xi[1] - planes[g, 2] * xi[2]
             inside = True
-            for h in range(faces):
+            for h in range(faces.count):
                 aside = planes[h, 3]
                 for k in range(3):
                     aside -= planes[h, k] * (xi[k] + d * planes[g, k])
@@ -35,7 +36,7 @@ def share_of_overlap(shapes, a, own, b, g, planes, faces, margin, x, R):
     first, end = shapes.face_start[a], shapes.face_start[a + 1]
     for i in range(shapes.node_start[b], shapes.node_start[b + 1]):
         if _holds(shapes, i, shapes.face_start[b] + g):
-            y0, y1, y2 = _seen_from(shapes, i, a, b, x, R)
+            y0, y1, y2 = _seen_from(shapes, i, a, b, state.x, state.R)
             n = shapes.normal[own]
             d = shapes.offset[own] - n[0] * y0 - n[1] * y1 - n[2] * y2
             inside = True
@@ -56,7 +57,7 @@ def share_of_overlap(shapes, a, own, b, g, planes, faces, margin, x, R):
 
 @inner
 def _holds(shapes, i, face):
-    """Whether a node lies on a face."""
+    """Whether node i lies on a face of its block."""
     found = False
     for at in range(shapes.of_start[i], shapes.of_start[i + 1]):
         found = found or shapes.of[at] == face

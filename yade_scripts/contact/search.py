@@ -1,7 +1,8 @@
-"""Which nodes of a block are behind which faces of another, and how deep: the contacts of one pair.
+"""The contacts of one pair: which nodes of a block are behind which faces of the other, and how deep.
 
-A contact keeps its face until the node leaves b. Where a node appears deep inside (from the side, or past an edge) its
-depth counts from there on, so that no contact begins with a force: contacts add no energy when they begin.
+A contact keeps its face until the node leaves b. Where a node enters deep behind a face (from the side, or past an
+edge), its depth is measured from there, so that no contact begins with a force and contacts add no energy when they
+begin.
 """
 
 from __future__ import annotations
@@ -15,18 +16,20 @@ from yade_scripts.contact.overlap import share_of_overlap
 from yade_scripts.contact.springs import ARRIVED, let_go, stiffness_together, take_over, way_of
 
 ALIGNED = 0.02
-"""Least cosine between a face and the opposite of one that holds the node: others cannot be what it ran into."""
+"""Least cosine between the normal of a face and the reversed normal of a face of the node: the node cannot have run
+into other faces."""
 CROSSING = 0.5
-"""Overlap of crossing edges over that of faces below which nodes that touch leave the contact to the edges as well; and
-depth of contacts over the overlap below which they do not hold the blocks apart: a corner may just touch the side of an
-edge that crosses the edges beside it."""
+"""Two limits in one. Where the overlap of crossing edges is below this share of that of the faces, the edges carry the
+contact together with nodes that touch. Where the depth of contacts is below this share of the overlap, they do not hold
+the blocks apart: a corner may just touch the side of an edge that crosses the edges beside it."""
 SHALLOW = 2.0
-"""Depth in margins up to which a node beside a face counts as on it."""
+"""Depth, in margins, up to which a node just beside a face still counts as on it."""
 
 
 @inner
 def closing_bound(v, a, b, radius_a, radius_b):
-    """Upper bound of the speed at which points of two bodies approach [m/s]; planes (radius inf) stand still."""
+    """Upper bound [m/s] of the speed at which points of two bodies approach each other; planes have radius inf and
+    rest."""
     linear = turn_a = turn_b = 0.0
     for k in range(3):
         linear += (v[a, k] - v[b, k]) ** 2
@@ -68,8 +71,8 @@ def planes_seen_from(face_start, normal, offset, a, b, x, R, planes):
 
 @inner
 def separation(node, begin, end, planes, faces):
-    """Largest distance of all nodes begin .. end before one plane [m], and that plane: two bodies are at least that far
-    apart. The vertices are enough."""
+    """The plane in front of which all nodes begin .. end lie farthest out, and their distance [m] from it, by which the
+    two bodies are at least apart. It is enough to pass the vertices. → (distance, plane)"""
     best, witness = -np.inf, 0
     for g in range(faces):
         m0, m1, m2 = planes[g, 0], planes[g, 1], planes[g, 2]
@@ -82,39 +85,18 @@ def separation(node, begin, end, planes, faces):
 
 
 @inner
-def scan(
-    shapes,
-    bodies,
-    law,
-    slots,
-    slot,
-    finds,
-    fresh,
-    a,
-    b,
-    planes,
-    faces,
-    nearest,
-    margin,
-    x,
-    v,
-    R,
-    last_dt,
-    rows,
-    count,
-    lost,
-    scratch,
-):
-    """Contacts of the nodes of a with the faces of b; contacts that ended leave their springs' energy in `lost`.
-    finds: whether contacts may begin here; not where they have been found.
+def scan(shapes, bodies, law, slots, slot, side, faces, state, rows, count, lost, scratch):
+    """Contacts of the nodes of a with the faces of b, which `slots` remembers from `slot` on; the energy of springs
+    whose contacts end is added to `lost`. → (contacts, lost [J])
 
-    Most nodes are outside the plane `nearest`, so it is asked first."""
+    Most nodes lie outside of the face `farthest`, which is therefore looked at first."""
+    a, b, planes, margin = side.a, side.b, faces.planes, faces.margin
     begin, base, way = shapes.node_start[a], shapes.face_start[b], scratch[6:8]
     for i in range(begin, shapes.node_start[a + 1]):
         s = slot + i - begin
         xi0, xi1, xi2 = shapes.node[i, 0], shapes.node[i, 1], shapes.node[i, 2]
-        smallest = _behind(planes, nearest, xi0, xi1, xi2)
-        for g in range(faces):
+        smallest = _behind(planes, faces.farthest, xi0, xi1, xi2)
+        for g in range(faces.count):
             if smallest < -margin:
                 break
             smallest = min(smallest, _behind(planes, g, xi0, xi1, xi2))
@@ -122,32 +104,30 @@ def scan(
         if g >= 0:
             depth = _behind(planes, g, xi0, xi1, xi2)
             if depth <= 0.0 or smallest < -margin:
-                way_of(v, R, x, a, b, xi0, xi1, xi2, planes[g], last_dt, scratch, way)
-                lost += let_go(slots, s, law.shear, depth, way, R, b)
+                way_of(state, a, b, xi0, xi1, xi2, planes[g], scratch, way)
+                lost += let_go(slots, s, law.shear, depth, way, state.R, b)
                 continue
-        elif smallest < -margin or not finds:
+        elif smallest < -margin or not side.begins:
             continue
         else:
-            g, own = _entered(
-                shapes.of_start, shapes.of, shapes.normal, i, xi0, xi1, xi2, planes, faces, smallest, margin
-            )
+            g, own = _entered(shapes, i, xi0, xi1, xi2, faces, smallest)
             if g < 0:
                 continue
             depth = _behind(planes, g, xi0, xi1, xi2)
             slots.face[s] = base + g
             slots.k[s] = stiffness_together(bodies.stiffness[a], bodies.stiffness[b]) / shapes.face_nodes[own]
             if law.whole:
-                slots.k[s] *= share_of_overlap(shapes, a, own, b, g, planes, faces, margin, x, R)
+                slots.k[s] *= share_of_overlap(shapes, a, own, b, g, faces, state)
             slots.spread[s] = shapes.face_spread[own]
             slots.shear[s, 0] = slots.shear[s, 1] = slots.shear[s, 2] = 0.0
             slots.push[s] = BEGINS
-            way_of(v, R, x, a, b, xi0, xi1, xi2, planes[g], last_dt, scratch, way)
-            if fresh > 0.0:
-                lost += take_over(slots, s, fresh, depth, way[1, 0])
+            way_of(state, a, b, xi0, xi1, xi2, planes[g], scratch, way)
+            if side.fresh > 0.0:
+                lost += take_over(slots, s, side.fresh, depth, way[1, 0])
             else:
                 slots.rest[s] = max(0.0, depth - ARRIVED * max(way[1, 0], 0.0))
         slots.rest[s] = min(slots.rest[s], depth)
-        write_row(rows, count, a, b, s, planes[g], depth, xi0, xi1, xi2, x, R)
+        write_row(rows, count, side, s, planes[g], depth, xi0, xi1, xi2, state)
         rows.depth[count], rows.kn[count] = depth - slots.rest[s], slots.k[s]
         count += 1
     return count, lost
@@ -155,37 +135,39 @@ def scan(
 
 @inner
 def cross(
-    shapes, bodies, shear, slots, base, finds, fresh, a, b, deepest, sunk, flat, x, v, R, last_dt, rows, first, count,
-    lost, scratch,
+    shapes, bodies, shear, slots, base, side, deepest, sunk, flat, state, rows, first, count, lost, scratch
 ):  # fmt: skip
-    """Contacts of edges of a with edges of b, known or new; the third result parts the blocks if it is positive [m].
+    """Contacts of edges of a with edges of b, both known and new. → (contacts, lost [J], distance [m] by which the
+    blocks are found to be apart, if positive)
 
-    finds: whether contacts may begin here. Those that are known fill the first slots, in the order they began in.
-    rows first .. count: contacts of nodes of the pair · deepest [m]: least overlap of edges that leads to a contact,
-    0: none does · sunk: also beside known ones, where these hold less than `CROSSING` of it: as the blocks turn, other
-    edges become the outermost · flat: edges may cross in the faces of these nodes."""
+    Known contacts fill the first slots, in the order in which they began.
+    rows first .. count: contacts of nodes of the pair · deepest [m]: edges begin a contact where they overlap by less,
+    0: none begins · sunk: edges may begin a contact beside known ones where these hold less than `CROSSING` of that
+    overlap, since other edges become the outermost as the blocks turn · flat: whether edges may cross in the faces of
+    these nodes."""
+    a, b, x, R = side.a, side.b, state.x, state.R
     nodes, parted, leading, to = count - first, -1.0, -1, base
     plane, xi, way, n = scratch[4], scratch[5], scratch[6:8], scratch[8]
     for s in range(base, base + CROSSINGS):
         if slots.face[s] >= 0:
-            depth, within = crossing(shapes, a, b, slots.face[s], x, R, plane, xi, scratch)
+            depth, within = crossing(shapes, a, b, slots.face[s], state, plane, xi, scratch)
             if within < 0.0 or depth <= 0.0:
-                way_of(v, R, x, a, b, xi[0], xi[1], xi[2], plane, last_dt, scratch, way)
+                way_of(state, a, b, xi[0], xi[1], xi[2], plane, scratch, way)
                 lost += let_go(slots, s, shear, depth, way, R, b)
             else:
                 _move_slot(slots, s, to)
-                count = _write_crossing(slots, to, a, b, plane, depth, xi, x, R, rows, count)
+                count = _write_crossing(slots, to, side, plane, depth, xi, state, rows, count)
                 to += 1
-    if not finds:
+    if not side.begins:
         return count, lost, parted
     held = deepest_of(slots, rows, first, count)
     if deepest > 0.0 and (count - first == nodes or (sunk and held < CROSSING * deepest)):
         leading, parted = find_crossing(shapes, a, b, x, R, deepest, scratch)
     if leading >= 0 and count - first > nodes:
-        depth, _ = crossing(shapes, a, b, leading, x, R, plane, xi, scratch)
+        depth, _ = crossing(shapes, a, b, leading, state, plane, xi, scratch)
         leading = leading if held < CROSSING * depth else -1
     if leading >= 0:
-        crossing(shapes, a, b, leading, x, R, plane, xi, scratch)
+        crossing(shapes, a, b, leading, state, plane, xi, scratch)
         for k in range(3):
             n[k] = R[a, k, 0] * plane[0] + R[a, k, 1] * plane[1] + R[a, k, 2] * plane[2]
     elif count - first > nodes or flat:
@@ -196,13 +178,13 @@ def cross(
     level = _has_face(shapes, a, n, R) and _has_face(shapes, b, n, R)
     there, number = 0, -1
     while True:
-        number, _ = next_beside(shapes, a, b, n, number, leading, level, x, R, plane, xi, scratch)
+        number, _ = next_beside(shapes, side, n, number, leading, level, state, plane, xi, scratch)
         if number < 0:
             break
         there += 1
     k = 2.0 * stiffness_together(bodies.stiffness[a], bodies.stiffness[b]) / (max(there, 2) + nodes)
     while True:
-        number, depth = next_beside(shapes, a, b, n, number, leading, level, x, R, plane, xi, scratch)
+        number, depth = next_beside(shapes, side, n, number, leading, level, state, plane, xi, scratch)
         if number < 0:
             return count, lost, -1.0
         s = _free_slot(slots, base, number)
@@ -210,17 +192,17 @@ def cross(
             slots.face[s], slots.k[s], slots.spread[s] = number, k, 1.0
             slots.shear[s, 0] = slots.shear[s, 1] = slots.shear[s, 2] = 0.0
             slots.push[s] = BEGINS
-            way_of(v, R, x, a, b, xi[0], xi[1], xi[2], plane, last_dt, scratch, way)
-            if fresh > 0.0:
-                lost += take_over(slots, s, fresh, depth, way[1, 0])
+            way_of(state, a, b, xi[0], xi[1], xi[2], plane, scratch, way)
+            if side.fresh > 0.0:
+                lost += take_over(slots, s, side.fresh, depth, way[1, 0])
             else:
                 slots.rest[s] = max(0.0, depth - ARRIVED * max(way[1, 0], 0.0))
-            count = _write_crossing(slots, s, a, b, plane, depth, xi, x, R, rows, count)
+            count = _write_crossing(slots, s, side, plane, depth, xi, state, rows, count)
 
 
 @inner
 def deepest_of(slots, rows, first, count):
-    """Largest depth of the contacts first .. count [m], with that at which their springs began."""
+    """Largest depth [m] of the contacts first .. count, the depth at which they began included."""
     deepest = 0.0
     for c in range(first, count):
         deepest = max(deepest, rows.depth[c] + slots.rest[rows.slot[c]])
@@ -229,7 +211,7 @@ def deepest_of(slots, rows, first, count):
 
 @inner
 def _free_slot(slots, base, number):
-    """Where a pair of edges is to be remembered; -1: it is already, or there is no room."""
+    """Slot for the history of a pair of edges; -1 if it has one already or all are in use."""
     free = -1
     for s in range(base, base + CROSSINGS):
         if slots.face[s] == number:
@@ -241,7 +223,7 @@ def _free_slot(slots, base, number):
 
 @inner
 def _move_slot(slots, s, to):
-    """What slot s remembers is in slot `to` from now on."""
+    """Move the history in slot s to slot `to`."""
     if s == to:
         return
     slots.face[to], slots.k[to], slots.rest[to] = slots.face[s], slots.k[s], slots.rest[s]
@@ -252,18 +234,18 @@ def _move_slot(slots, s, to):
 
 
 @inner
-def _write_crossing(slots, s, a, b, plane, depth, xi, x, R, rows, count):
-    """The row of a contact of edges; → number of rows."""
+def _write_crossing(slots, s, side, plane, depth, xi, state, rows, count):
+    """Write the row of a contact of edges; → number of rows."""
     slots.rest[s] = min(slots.rest[s], depth)
-    write_row(rows, count, a, b, s, plane, depth, xi[0], xi[1], xi[2], x, R)
+    write_row(rows, count, side, s, plane, depth, xi[0], xi[1], xi[2], state)
     rows.depth[count], rows.kn[count] = depth - slots.rest[s], slots.k[s]
     return count + 1
 
 
 @inner
 def lie_flat(shapes, slots, a, b, R, rows, first, count):
-    """Whether nodes of a pair have just come into contact in one line only, with a face of each nearly flat on the
-    other: beams that cross would rock about that line."""
+    """Whether the nodes of a pair have just come into contact along one line only while the faces are nearly flat on
+    one another: crossed beams would rock about that line."""
     begins = False
     for c in range(first, count):
         begins = begins or slots.push[rows.slot[c]] == BEGINS
@@ -284,7 +266,7 @@ def lie_flat(shapes, slots, a, b, R, rows, first, count):
 
 @inner
 def _apart(rows, first, c):
-    """Way from one contact to another, three floats."""
+    """Vector from one contact to another, as three floats."""
     return (
         rows.point[c, 0] - rows.point[first, 0],
         rows.point[c, 1] - rows.point[first, 1],
@@ -294,7 +276,7 @@ def _apart(rows, first, c):
 
 @inner
 def _has_face(shapes, a, n, R):
-    """Whether a face of a is nearly across n (3,)."""
+    """Whether a face of a is nearly perpendicular to n (3,)."""
     for f in range(shapes.face_start[a], shapes.face_start[a + 1]):
         along = 0.0
         for j in range(3):
@@ -311,29 +293,32 @@ def _behind(planes, g, xi0, xi1, xi2):
 
 
 @inner
-def _entered(of_start, of, normal, i, xi0, xi1, xi2, planes, faces, smallest, margin):
-    """Face g of b that node i of a is behind, and the face of a opposite; -1 if it is outside.
+def _entered(shapes, i, xi0, xi1, xi2, faces, smallest):
+    """Face g of b that node i of a has entered, and the face of a opposite to it; -1, -1 if the node is outside.
 
-    Of the faces that the node can have run into, the nearest; one that the node is still before keeps it outside."""
+    It is the nearest of the faces that the node can have run into; if the node is still in front of that one, it is
+    outside."""
+    planes, normal = faces.planes, shapes.normal
     face, own, best = -1, -1, np.inf
-    for g in range(faces):
+    for g in range(faces.count):
         depth = _behind(planes, g, xi0, xi1, xi2)
         if depth >= best:
             continue
         cosine = ALIGNED
-        for at in range(of_start[i], of_start[i + 1]):
-            f = of[at]
+        for at in range(shapes.of_start[i], shapes.of_start[i + 1]):
+            f = shapes.of[at]
             c = -(planes[g, 0] * normal[f, 0] + planes[g, 1] * normal[f, 1] + planes[g, 2] * normal[f, 2])
             if c > cosine:
                 cosine, face, own, best = c, g, f, depth
-    if best <= 0.0 or (smallest < 0.0 and best > SHALLOW * margin):
+    if best <= 0.0 or (smallest < 0.0 and best > SHALLOW * faces.margin):
         return -1, -1
     return face, own
 
 
 @inner
-def write_row(rows, c, a, b, s, plane, depth, xi0, xi1, xi2, x, R):
-    """Geometry of a contact: half way between the node ξ and the face."""
+def write_row(rows, c, side, s, plane, depth, xi0, xi1, xi2, state):
+    """Write the geometry of a contact; its point is half way between the node ξ and the face."""
+    a, b, x, R = side.a, side.b, state.x, state.R
     rows.a[c], rows.b[c], rows.slot[c] = a, b, s
     for k in range(3):
         n = R[a, k, 0] * plane[0] + R[a, k, 1] * plane[1] + R[a, k, 2] * plane[2]

@@ -107,15 +107,15 @@ def _all_turning(bodies, a, R, arm, axis, u):
 
 
 @inner
-def apply(slots, v, R, dt, last_dt, mode, pair_a, rows, first, count, scratch):
-    """Forces of the contacts first .. count of a pair; → work of friction [J]. scratch (6, 3): work space, its first
-    two rows the middles of the contacts seen from both blocks; pair_a: the first of these.
+def apply(slots, state, mode, pair_a, rows, first, count, scratch):
+    """Compute the forces of the contacts first .. count of a pair; → work of friction [J]. pair_a: the first block of
+    the pair · scratch (6, 3): work space, whose first two rows are the middles of the contacts seen from both blocks.
 
-    Work of friction: the way slipped times the mean of the forces before and after it, which is what the leapfrog
-    takes.
-    A spring that began within the last substep is stretched for the time since it touched only, and pulls for half of
-    that and half a substep.
-    dt [s]: substep to come, 0: only look, nothing is remembered · last_dt [s]: substep that led here."""
+    The work of friction is the distance slipped times the mean of the forces before and after, as the leapfrog scheme
+    integrates it. A spring that began within the last substep is stretched only over the time since the touch, and acts
+    for half of that time and half a substep. The history is left unchanged if the contacts are only read
+    (state.dt = 0)."""
+    v, R, dt, last_dt = state.v, state.R, state.dt, state.last_dt
     lost, w, S, n, old = 0.0, scratch[2], scratch[3], scratch[4], scratch[5]
     for c in range(first, count):
         a, b, s = rows.a[c], rows.b[c], rows.slot[c]
@@ -337,12 +337,12 @@ def stiffness_together(K_a, K_b):
 
 @inner
 def take_over(slots, s, share, depth, into):
-    """Begin a contact at the depth there is [m], where a spring of `share` of its stiffness held until now: with the
-    force that this had, or the depth there is where contact is softer; → what of its energy is lost [J], half a substep
-    ago.
+    """Begin a contact at the present depth [m] where a spring with `share` of its stiffness acted until now. The
+    contact takes over the force of that spring, or the whole depth if the contact is softer. → energy lost [J], at the
+    time of the velocities half a substep ago.
 
-    into [m]: of `way_of` over the last substep. A stiffer spring that took on all of the depth would push the blocks
-    apart with energy from nowhere."""
+    into [m]: motion into the face over the last substep, from `way_of`. A stiffer spring with the whole depth would
+    push the blocks apart with energy that was never put in."""
     u = min(share, 1.0) * depth
     slots.rest[s] = depth - u
     return 0.5 * slots.k[s] * (share * depth * max(depth - into, 0.0) - u * max(u - into, 0.0))
@@ -350,9 +350,10 @@ def take_over(slots, s, share, depth, into):
 
 @inner
 def let_go(slots, s, shear, depth, way, R, b):
-    """End a contact; what its springs still held is lost [J], half a substep ago.
+    """End a contact; → energy [J] left in its springs, which is lost, at the time of the velocities half a substep ago.
 
-    depth [m]: now · way (2, 3) [m]: of `way_of` over the last substep: the springs were stretched by that much less."""
+    depth [m]: now · way (2, 3) [m]: motion over the last substep from `way_of`, by which the springs were shorter
+    then."""
     u, k_t, left = max(depth - slots.rest[s], 0.0), shear * slots.k[s], 0.0
     for k in range(3):
         S = R[b, k, 0] * slots.shear[s, 0] + R[b, k, 1] * slots.shear[s, 1] + R[b, k, 2] * slots.shear[s, 2]
@@ -364,16 +365,17 @@ def let_go(slots, s, shear, depth, way, R, b):
 
 
 @inner
-def way_of(v, R, x, a, b, xi0, xi1, xi2, plane, dt, scratch, way):
-    """Set way[0] [m] to what a point ξ of a moves along a face of b in dt, way[1, 0] to what it moves into the face;
-    the normal of the face in the frame of a is plane[:3]. scratch (3, 3)."""
+def way_of(state, a, b, xi0, xi1, xi2, plane, scratch, way):
+    """Set way[0] [m] to how far a point ξ of a moved along a face of b in the last substep, and way[1, 0] to how far it
+    moved into the face, whose normal in the frame of a is plane[:3]. scratch (3, 3): work space."""
+    x, R = state.x, state.R
     arm, point, n = scratch[0], scratch[1], scratch[2]
     for k in range(3):
         arm[k] = R[a, k, 0] * xi0 + R[a, k, 1] * xi1 + R[a, k, 2] * xi2
         point[k] = x[a, k] + arm[k] - x[b, k]
         n[k] = R[a, k, 0] * plane[0] + R[a, k, 1] * plane[1] + R[a, k, 2] * plane[2]
-    w = slip(v, a, b, arm, point)
+    w = slip(state.v, a, b, arm, point)
     wn = w[0] * n[0] + w[1] * n[1] + w[2] * n[2]
-    way[1, 0] = -dt * wn
+    way[1, 0] = -state.last_dt * wn
     for k in range(3):
-        way[0, k] = dt * (w[k] - wn * n[k])
+        way[0, k] = state.last_dt * (w[k] - wn * n[k])

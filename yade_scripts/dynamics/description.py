@@ -1,4 +1,4 @@
-"""What is checked and derived from the list of blocks before a structure is built."""
+"""Checks of the list of blocks, and quantities derived from it, before a structure is built."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def check_names(blocks: list[Block]) -> None:
 
 
 def local_origin(blocks: list[Block]) -> Array:
-    """(3,) [m]: zero, or near the blocks where map coordinates would cost digits."""
+    """Origin (3,) [m] of local coordinates: zero, or near the blocks if large map coordinates would cost digits."""
     if not blocks:
         return np.zeros(3)
     middle = np.mean([b.centre for b in blocks], axis=0)
@@ -34,7 +34,7 @@ def local_origin(blocks: list[Block]) -> Array:
 
 
 def moved_block(block: Block, shift: Array) -> Block:
-    """The same block elsewhere."""
+    """The same block at another position."""
     return replace(block, centre=block.centre + shift, vertices=None if block.is_box else block.vertices)
 
 

@@ -1,4 +1,4 @@
-"""Energies of a structure and the work done on it: the ledger of the joints, the contacts and the load.
+"""Energies of a structure and the work done on it by joints, contacts and loads.
 
 Kinetic energy lives at half substeps (leapfrog), so the potentials are taken there too: that of a spring with the
 opening u is 1/2 k u(t) u(t - dt), which together with the kinetic energy is constant to round-off.
@@ -65,7 +65,7 @@ class Accounts:
         return np.flatnonzero(self._masses.free)
 
     def start_here(self) -> None:
-        """The present state is the start: blocks were displaced by hand."""
+        """Take the present state as the start, after blocks were displaced directly."""
         self.joint_work = -self.joint_stored() - self.law_dissipation()
         self.joint_work -= 0.0 if self._joints is None else float(self._joints.rubbed.sum())
 
@@ -125,7 +125,7 @@ class Accounts:
         }
 
     def joint_stored(self) -> float:
-        """Springs of the live joints half a substep ago [J]."""
+        """Energy [J] in the springs of the live joints half a substep ago."""
         if self._joints is None or not len(self._joints.live):
             return 0.0
         m, j = self._motion, self._joints
@@ -141,7 +141,7 @@ class Accounts:
         return float(0.5 * (mass @ (v**2).sum(axis=1) + spin)) + fall
 
     def contact_stored(self) -> float:
-        """Springs of the contacts half a substep ago: 1/2 k u(t) u(t - dt) [J]."""
+        """Energy [J] in the springs of the contacts half a substep ago: 1/2 k u(t) u(t - dt)."""
         if self._contacts is None:
             return 0.0
         c, m = self._contacts.now(), self._motion
@@ -151,10 +151,10 @@ class Accounts:
         return float(np.sum(normal + c.shear_energy))
 
     def sums(self) -> dict[str, float]:
-        """What `restore` needs."""
+        """The running sums, for `restore`."""
         return {name: getattr(self, name) for name in _SUMS}
 
     def restore(self, sums: dict[str, float]) -> None:
-        """Back to earlier sums."""
+        """Return to earlier sums."""
         for name, value in sums.items():
             setattr(self, name, value)

@@ -1,7 +1,7 @@
 """Start at rest: where the joints carry the weight and the load that act at the start.
 
-A building whose weight comes on at once swings to twice its deflection, and may break before anything has hit it. So
-the joined blocks are moved to their equilibrium first,
+A building whose weight is applied at once swings to twice its static deflection and may break before anything has hit
+it. The joined blocks are therefore moved to their equilibrium first,
 
     f(u) = f_joints(u) + f_weight + f_load = 0,      K(u) Δu = f(u),   u ← u + a Δu,
 
@@ -85,7 +85,7 @@ class Search:
         return ROUNDING * np.finfo(float).eps * extent * float(stiffest)
 
     def residual(self) -> Array:
-        """Forces that are not balanced, of the unknowns (6 rows,)."""
+        """Unbalanced forces of the unknowns (6 rows,)."""
         return (self._outer + self._structure.internal_force()).ravel()[self._dofs]
 
     def direction(self, residual: Array) -> Array:
@@ -111,7 +111,7 @@ class Search:
         self._check()
 
     def keep(self) -> None:
-        """The joints take note of the present places."""
+        """Write the present positions into the history of the joints."""
         self._move(np.zeros(len(self._dofs)), note=True)
 
     def _move(self, step: Array, note: bool = False) -> None:

@@ -1,11 +1,11 @@
-"""What acted on the blocks over a step, kept apart: impulses of contacts and of joints, and the momentum they change.
+"""Impulses of contacts and of joints on the blocks over a step, kept apart, and the momentum that they change.
 
 A substep changes the momentum of a block by dt F and, since its place moves on with the new velocity,
 
     x⁺ × m v⁺ - x × m v = x × dt F(x)        (leapfrog: x⁺ = x + dt v⁺)
 
 so that sums of dt F and of dt (x × F + M) at the places of the substeps give linear and angular momentum to
-round-off. The spin is that which YADE integrates, less what `spin.py` has lent.
+round-off. The spin is that which YADE integrates, less the correction that `spin.py` has added for the substep.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from array_types import Array, Floats
-from kernel_decorators import plain
+from kernel_decorators import inner, plain
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,7 +38,7 @@ class Impulses:
 
     @classmethod
     def none(cls, n: int, zero: Array) -> Impulses:
-        """Before the first substep."""
+        """Zero impulses, before the first substep."""
         return cls(
             contact=np.zeros((n, 9)),
             joint=np.zeros((n, 9)),
@@ -67,34 +67,35 @@ class Impulses:
 
 
 class ImpulseSums:
-    """The sums while they grow; `taken` gives them and starts anew."""
+    """The running sums; `taken` returns them and sets them to zero."""
 
     def __init__(self, n: int, zero: Array):
         self._n, self._zero = n, np.asarray(zero, float)
         self.start()
 
     def start(self) -> None:
-        """From here on."""
+        """Start the sums at the present state."""
         self._sums = Impulses.none(self._n, self._zero)
         self._dt = self._lifted_dt = 0.0
 
     def lift(self, dt: float, x: Array, share: float) -> None:
-        """A substep at the places x (n, 3) without `share` of the weight."""
+        """Add a substep at the positions x (n, 3) in which `share` of the weight did not act yet."""
         self._sums.lifted[:] += dt * share * x
         self._lifted_dt += dt * share
 
     def add(self, dt: float, x: Array, joint: Array, before: Array, whole: Array) -> None:
-        """A substep at the places x (n, 3): joint forces (n, 6), and all forces before and with those of contacts."""
+        """Add a substep at the positions x (n, 3): joint forces (n, 6), and all forces without and with those of
+        contacts."""
         s = self._sums
         _add(dt, x, joint, before, whole, s.joint, s.contact, s.place)
         self._dt += dt
 
     def give(self, rows: Array, impulse: Array) -> None:
-        """What joints gave to the blocks `rows` (k,) besides: impulse (k, 9), as in `Impulses`."""
+        """Add a further impulse (k, 9) of joints on the blocks `rows` (k,), as in `Impulses`."""
         self._sums.joint[rows] += impulse
 
     def taken(self) -> Impulses:
-        """Those since `start`."""
+        """The impulses since `start`."""
         s = self._sums
         return Impulses(
             contact=s.contact,
@@ -119,7 +120,7 @@ def _add(dt, x, joint, before, whole, joint_sum, contact_sum, place):
         _take(dt, x, r, f, m, contact_sum)
 
 
-@plain
+@inner
 def _take(dt, x, r, force, moment, out):
     f0, f1, f2 = force
     m0, m1, m2 = moment

@@ -1,10 +1,9 @@
-"""Where contact sets in: which blocks are loose.
+"""Which blocks are loose and therefore have contacts.
 
-Two blocks with a live joint do not meet: the joint carries them, in compression too. When it fails, contact goes on
-with the depth there is. Other pairs meet as soon as one of them is loose: it has lost a joint, moves on its own, lies
-on another without one (`joints.pair`), or has left its place. So most of a building costs no contact at all before it
-is hit. Fixed planes meet all blocks.
-"""
+Two blocks with a live joint have no contact: the joint carries compression too. When it fails, contact continues with
+the present depth. Other pairs can have contact as soon as one of the two is loose: it has lost a joint, moves freely,
+rests on another without a joint (`joints.pair`), or has left its initial position. Most of a building therefore needs
+no contact search before it is hit. All blocks can touch fixed planes."""
 
 from __future__ import annotations
 
@@ -29,7 +28,7 @@ def loose_at_start(blocks: list[Block], joints: Joints | None) -> Array:
 
 
 def moves(block: Block) -> bool:
-    """Whether it moves at the start."""
+    """Whether the block moves at the start."""
     return bool(block.velocity.any() or block.spin.any())
 
 
@@ -56,11 +55,11 @@ class ContactOnset:
         self.loosen(np.flatnonzero(loose), as_deep=True)
 
     def rest_here(self) -> None:
-        """The present places are those that the blocks stand in."""
+        """Take the present positions as those in which the blocks stand."""
         self._x_rest, self._R_rest = self._motion.x.copy(), self._motion.R.copy()
 
     def moved(self) -> Array:
-        """Rows not loose so far that have left their place: intact pieces of a broken wall meet the ground too."""
+        """Rows that were not loose and have left their position: intact pieces of a broken wall meet the ground too."""
         if self.loose.all():
             return NONE
         turned = np.abs(self._motion.R - self._R_rest).max(axis=(1, 2)) * self._radius
@@ -68,29 +67,31 @@ class ContactOnset:
         return np.flatnonzero(~self.loose & (moved > STANDS * self._radius))
 
     def of_failed(self, joints: Array) -> Array:
-        """Rows not loose so far that have just lost one of `joints`."""
+        """Rows that were not loose and have just lost one of `joints`."""
         ends = np.concatenate([self._joints.a[joints], self._joints.b[joints]])
         ends = np.unique(ends[ends >= 0])
         return ends[~self.loose[ends]]
 
     def leave_out_joined(self) -> None:
-        """Contact goes on where a joint has failed; live joints carry compression themselves."""
+        """Exclude pairs with a live joint, which carries compression itself, from contact; failed joints give way to
+        it."""
         if self._contacts is not None and self._joints is not None:
             self._contacts.leave_out(self._joints.joined_pairs(len(self.loose)))
 
     def loosen(self, rows: Array, as_deep: bool = False) -> None:
-        """The blocks `rows` meet all others from now on; as_deep: with the depth there is."""
+        """Let the blocks `rows` have contacts with all others from now on; as_deep: with their full present
+        overlaps."""
         self.loose[rows] = True
         if self._contacts is not None and (len(rows) or as_deep):
             self._scene.set_loose(self.loose)
             self._contacts.switch_on(rows, as_deep)
 
     def save(self) -> dict[str, Array]:
-        """Which blocks are loose, and the places that the others stand in."""
+        """Which blocks are loose, and the positions in which the others stand."""
         return {"loose": self.loose.copy(), "x_rest": self._x_rest.copy(), "R_rest": self._R_rest.copy()}
 
     def restore(self, saved: dict[str, Array]) -> None:
-        """Back to a saved state; the contacts have theirs."""
+        """Return to a saved state; contacts restore their own."""
         self.loose[:] = saved["loose"]
         self._x_rest, self._R_rest = saved["x_rest"].copy(), saved["R_rest"].copy()
         if self._contacts is not None:

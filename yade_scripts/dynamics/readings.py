@@ -1,4 +1,4 @@
-"""What others read of a structure between its steps: places, forces, stiffness, joints, contacts, energies.
+"""What can be read from a structure between its steps: positions, forces, stiffness, joints, contacts, energies.
 
 World coordinates and SI units; one row a block; motions and forces are six numbers a block about its centre,
 [velocity, angular velocity] and [force, moment], world axes.
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 
 class StructureReadings:
-    """The half of `Structure` that changes nothing; that one sets the parts up and moves them on."""
+    """The part of `Structure` that reads and changes nothing; `Structure` itself builds the parts and advances them."""
 
     n: int
     time: float
@@ -96,7 +96,7 @@ class StructureReadings:
         return force
 
     def weight_now(self) -> Array:
-        """(n, 6) [N, N m]: as `gravity_force`, less what has not come on yet."""
+        """(n, 6) [N, N m]: as `gravity_force`, less the part of the weight that does not act yet."""
         return self.gravity_force() - self._substepper.missing_weight(self.time) * self._accounts.weight
 
     def internal_force(self, viscous: bool = False) -> Array:
@@ -113,7 +113,7 @@ class StructureReadings:
 
     @property
     def sleeps(self) -> Sleep | None:
-        """Who sleeps; None where nobody may."""
+        """The sleeping blocks; None where sleep is switched off."""
         return self._sleep
 
     @property
@@ -127,7 +127,8 @@ class StructureReadings:
         return self.fixed if self._sleep is None else self.fixed | self._sleep.asleep
 
     def reaction(self) -> Array:
-        """(n, 6): what holds the blocks of prescribed motion, minus every force on them; zero for the others."""
+        """(n, 6) [N, N m]: forces that hold the blocks of prescribed motion, the negative sum of all other forces on
+        them; zero for the other blocks."""
         total = self.internal_force(viscous=True) + self.gravity_force() + self._substepper.load
         return np.where(self.fixed[:, None], -total, 0.0)
 
@@ -214,15 +215,15 @@ class StructureReadings:
         return tuple(np.concatenate(two) for two in zip(glued, lying))
 
     def uplift_shares(self) -> tuple[Array, Array, Array]:
-        """Faces that lie on one another and get a share of the pressure of the water around: block (m,), face (m,),
-        share (m,)."""
+        """Faces that rest on one another and between which a share of the pressure of the surrounding water acts: block
+        (m,), face (m,), share (m,)."""
         if self._partly is None:
             return np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0)
         on = self._partly.closed(self._motion.x, self._motion.R)
         return self._partly.both_faces(on, self._shares[on])
 
     def broken_joints(self) -> tuple[Array, Array, Array, Array]:
-        """Joints that carry nothing any more: number (m,), blocks and their faces (m, 2), -1 a fixed plane, and now
+        """Joints that have failed: number (m,), blocks and their faces (m, 2), -1 a fixed plane, and now
         their mean normal opening, mean sliding and largest normal opening (m, 3) [m]."""
         if self.joints is None:
             none = np.zeros((0, 2), np.int64)
@@ -243,5 +244,6 @@ class StructureReadings:
         return self._accounts.energies()
 
     def law_dissipation(self) -> float:
-        """Energy that the damage stands for by the law, Σ A D(λ) [J]: to compare with joint_dissipated."""
+        """Energy Σ A D(λ) [J] that the damage has dissipated according to the law, for comparison with
+        joint_dissipated."""
         return self._accounts.law_dissipation()

@@ -1,12 +1,12 @@
-"""Buildings at rest take no substeps.
+"""Sleep: islands of blocks at rest are left out of the substeps.
 
 Live joints tie blocks together into islands; held blocks and fixed planes part them. An island sleeps while every one
 of its blocks stands in its place, held by joints that reach the ground or a held block, with nothing loose in reach,
-and while the forces on it stay in balance. Asleep, its blocks stand still, its joints keep what they have seen and
-carry what they must, and the water meets a rigid body.
+and while the forces on it stay in balance. While it sleeps, its blocks stand still, its joints keep their history and
+carry the load, and for the water it is a rigid body.
 
-How far from balance: with the forces of the joints f as they were left, weight and load F, and the tangent K of the
-joints as they open further,
+The distance from balance is measured with the forces f of the joints at the time the island fell asleep, weight and
+load F, and the tangent K of the joints as they open further,
 
     K u = F + f,    change = max over joints of k_0 |δ(u) - δ(0)|/T_max
 
@@ -119,7 +119,7 @@ class Sleep:
         """Change of traction over the strength, of a change of each opening [1/m]."""
 
     def described(self) -> str:
-        """One line for people: who may sleep, and how far off that can be."""
+        """A description in one line: which islands may sleep, and how large the error in traction can be."""
         islands = self.islands()
         blocks = sum(len(i.rows) for i in islands)
         return (
@@ -139,8 +139,8 @@ class Sleep:
     # ---- a step ---------------------------------------------------------------------------------------------
 
     def begin(self, outer: Array, time: float, ramp: float) -> None:
-        """Before a step under the weight and load `outer` (n, 6) [N, N m]: wake whom they move. ramp [s]: until the
-        weight has come on nobody falls asleep."""
+        """Before a step under the weight and load `outer` (n, 6) [N, N m], wake the islands that these would move. ramp
+        [s]: no island falls asleep before the weight acts in full."""
         self._began, self._outer, self._from = time, outer, ramp
         if self._sleepers and (self._seen is None or not np.array_equal(self._seen, outer)):
             changes = [self._change(s, outer) for s in self._sleepers]
@@ -152,7 +152,7 @@ class Sleep:
             self._fall(time)
 
     def reached(self, time: float) -> bool:
-        """Wake whom something awake has come near to since the last substep; whether there was any."""
+        """Wake the islands that a moving block has come near to since the last substep; whether there were any."""
         if self._contacts is None or not self._sleepers:
             return False
         near = self._contacts.roused()
@@ -162,18 +162,19 @@ class Sleep:
         return True
 
     def end(self, time: float) -> None:
-        """After the substeps of a step: book what held the sleepers, and see who has come to rest."""
+        """After the substeps of a step, account for the forces that held the sleeping islands, and put others to
+        sleep."""
         self._hold(self._sleepers, time)
         self._fall(time)
         self._began = time
 
     def joints_failed(self) -> None:
-        """Islands are to be found anew."""
+        """Have the islands determined again."""
         self._islands = None
         self._period[~self.asleep] = UNKNOWN
 
     def wake_all(self, time: float) -> None:
-        """Blocks are about to be moved by hand."""
+        """Wake all islands, before blocks are displaced directly."""
         self._wake(self._sleepers, time)
         self._reference[:] = NEVER
 
@@ -219,7 +220,7 @@ class Sleep:
         return found
 
     def _quiet(self, island: Island) -> bool:
-        """Whether contact has nothing to do with it."""
+        """Whether no contact acts on the island and no loose block is near."""
         return not self._onset.loose[island.rows].any() and (
             self._contacts is None or not self._contacts.busy()[island.rows].any()
         )
@@ -248,7 +249,7 @@ class Sleep:
             self._changed()
 
     def _try(self, island: Island, time: float) -> bool:
-        """Put it to sleep where it is in balance."""
+        """Put an island to sleep if it is in balance."""
         sleeper = self._sleeper(island)
         if sleeper is None or self._change(sleeper, self._outer) > FALLS * self.share:
             self._since[island.joints] = time  # not again before another period
@@ -259,7 +260,7 @@ class Sleep:
         return True
 
     def _stop(self, rows: Array) -> None:
-        """The blocks stand still from here on; their joints take their momentum and energy."""
+        """Stop the blocks; their joints take up their momentum and energy."""
         m, accounts = self._motion, self._accounts
         if m.v[rows].any():
             left = accounts.of_motion(rows)
@@ -273,7 +274,7 @@ class Sleep:
         self._scene.hold(rows)
 
     def _sleeper(self, island: Island) -> Sleeper | None:
-        """What is known of an island that stands still where it is; None where it has no stiffness."""
+        """The state of an island that is to sleep at its present position; None if it has no stiffness."""
         m, joints = self._motion, self._joints
         n = len(self.asleep)
         points = np.flatnonzero(np.isin(joints.joint_of, island.joints))
@@ -347,7 +348,7 @@ class Sleep:
         self._changed()
 
     def _hold(self, sleepers: list[Sleeper], time: float) -> None:
-        """Impulses of their joints on sleepers since the step began: whatever kept them still."""
+        """Add the impulses of joints on the sleeping blocks since the step began: those that kept them still."""
         dt = time - self._began
         if dt <= 0.0 or not sleepers:
             return
@@ -362,7 +363,7 @@ class Sleep:
         self._impulses.give(rows, np.concatenate([impulse, arm + impulse[:, 3:]], axis=1))
 
     def _changed(self) -> None:
-        """Others take note of who sleeps."""
+        """Pass the list of sleeping blocks on to the other parts of the structure."""
         self._seen = None
         self._sleepers.sort(key=lambda s: int(s.island.rows[0]))  # sums in one order
         self.asleep[:] = False
@@ -382,7 +383,7 @@ class Sleep:
     # ---- saving and going back ------------------------------------------------------------------------------
 
     def save(self) -> dict[str, Array]:
-        """Who sleeps, and since when the others have not changed from what."""
+        """Which islands sleep, and since when the openings of the others have not changed from which values."""
         return {
             "asleep": self.asleep.copy(),
             "reference": self._reference.copy(),
@@ -392,7 +393,7 @@ class Sleep:
         }
 
     def restore(self, saved: dict[str, Array]) -> None:
-        """Back to what was saved, the blocks and joints being where they were then."""
+        """Return to a saved state; blocks and joints must be where they were then."""
         self._reference[:], self._since[:] = saved["reference"], saved["since"]
         self._period[:] = saved["period"]
         self.wakes, self.falls = int(saved["counts"][0]), int(saved["counts"][1])

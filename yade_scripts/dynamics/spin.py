@@ -5,7 +5,8 @@ those at its middle), which makes the rotation first order: free bodies gain ene
 
     dt τ = (exp(-dt/2 ω) - 1) L⁺,   L⁺: angular momentum half a step later, ω = R I⁻¹ Rᵀ L
 
-turns L⁺ back by as much as the axes are late; it is taken back in the next step, so that L itself is not touched.
+turns L⁺ back by the angle by which the axes lag behind; it is removed again in the next step, so that L itself is not
+changed.
 """
 
 from __future__ import annotations
@@ -40,15 +41,15 @@ class SpinCorrection:
         _correct(rows, R, v, self._inertia, self._inverse, dt, last_dt, self._lent, F)
 
     def forget(self, rows: Array) -> None:
-        """Blocks that stand still: nothing is lent to them."""
+        """Drop the corrections of blocks that stand still."""
         self._lent[rows] = 0.0
 
     def save(self) -> Array:
-        """What was lent in the last substep, (n, 3) [N m s]."""
+        """The corrections (n, 3) [N m s] added in the last substep."""
         return self._lent.copy()
 
     def restore(self, saved: Array) -> None:
-        """Back to what `save` gave."""
+        """Return to what `save` gave."""
         self._lent[:] = saved
 
 
@@ -95,7 +96,7 @@ _product = _to_world
 """Matrix times vector."""
 
 
-@plain
+@inner
 def _turn(time, spin, u, out):
     """The vector u turned by the rotation vector time * spin (Rodrigues)."""
     speed = np.sqrt(spin[0] ** 2 + spin[1] ** 2 + spin[2] ** 2)

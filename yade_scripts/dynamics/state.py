@@ -1,4 +1,4 @@
-"""The state of a structure as arrays: what `Structure.restore` goes back to, in this process or in a new one."""
+"""The state of a structure as arrays, to which `Structure.restore` returns in this process or in a new one."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class OtherStructure(ValueError):
 
 @dataclass(frozen=True, kw_only=True)
 class StructureState:
-    """Everything of a structure that changes in time; the rest follows from how it was built.
+    """Everything in a structure that changes in time; the rest follows from its construction.
 
     motion (n, 16): position 3, orientation 4, velocity 3, spin 3, angular momentum 3 of each block, of half a substep
     before the positions · time [s] · dt [s] of the last substep · load (n, 6) that is held · lent_spin (n, 3)
@@ -72,7 +72,7 @@ class StructureState:
 
 
 def _below(name: str, arrays: dict[str, Array]) -> dict[str, Array]:
-    """The arrays under `name/`, without it."""
+    """The arrays whose names begin with `name/`, without this prefix."""
     return {key[len(name) + 1 :]: value for key, value in arrays.items() if key.startswith(name + "/")}
 
 

@@ -1,4 +1,4 @@
-"""The structure as its neighbours see it: blocks, joints and contact, moved by YADE under given loads.
+"""The structure: blocks, joints and contact, moved by YADE under given loads.
 
 World coordinates and SI units outside; one row a block; motions and forces are six numbers a block about its centre,
 [velocity, angular velocity] and [force, moment], world axes.
@@ -37,13 +37,13 @@ GRAVITY = (0.0, 0.0, -9.81)
 
 
 class NotFinite(RuntimeError):
-    """Positions, velocities or loads of blocks are no numbers."""
+    """Positions, velocities or loads of blocks are not finite."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class AdvanceReport:
-    """substeps · dt_s [s] · opening_rate: largest growth of λ/δ_f in a substep (beyond about 0.25 the tearing is
-    averaged over the substep) · mean_velocity (n, 6) = displacement and rotation vector over the step / dt
+    """substeps · dt_s [s] · opening_rate: largest growth of λ/δ_f in a substep (beyond about 0.25 one substep
+    averages over the softening) · mean_velocity (n, 6) = displacement and rotation vector over the step / dt
     load_work [J] done by the load · broken: joints that failed, rows of the joint table
     impulses: what contacts and joints gave to every block
     """
@@ -63,12 +63,12 @@ class Structure(StructureReadings):
     blocks: list of Block, unique names · ground: level of a horizontal floor [m] or None
     planes: further fixed planes (tank walls) · gravity (3,) [m/s²]
     joints: one law for all touching faces, or rules by pairs and scatter
-    substep: used in place of the one that `substep_limit` finds accurate, None: that one
+    substep: length to use instead of the accurate one from `substep_limit`; None: that one
     ramp [s]: time over which the weight of the blocks comes on
     sleep: share of the strength of joints by which their tractions may be off while islands of blocks sleep
     (`sleep.py`), None: all blocks take all substeps
-    Faces that touch at the start without a joint and get none of the pressure of the water around (`contact.uplift`)
-    count as sealed while they do (`joined_planes`).
+    Faces that touch at the start without a joint, and between which no pressure of the surrounding water acts
+    (`contact.uplift`), count as sealed as long as they touch (`joined_planes`).
 
     Fixed blocks are not joined to one another or to planes, since nothing could break there; their faces are sealed
     as those of a joint. Driven blocks are joined: they may part.
@@ -268,16 +268,16 @@ class Structure(StructureReadings):
         return self._limit
 
     def stable_substep(self) -> tuple[float, str]:
-        """(dt_s [s], the joint or contact that limits it)."""
+        """The largest stable substep [s], and the joint or contact that limits it."""
         limit = self.substep_limit()
         return limit.dt, limit.what
 
     def substep(self) -> float:
-        """[s] as asked for, else the accurate one."""
+        """The substep [s]: the one asked for, or else the accurate one."""
         return self.stable_substep()[0] if self._substep is None else self._substep
 
     def advance(self, dt: float, substep: float | None = None) -> AdvanceReport:
-        """Move on by dt [s] under the load of `set_load`, in equal substeps no longer than `substep`, by default that
+        """Advance by dt [s] under the load of `set_load`, in equal substeps no longer than `substep`, by default that
         of the structure. Raises SubstepTooLong where the motion would be unstable."""
         m = self._motion
         self._turn_on_contacts()
@@ -307,7 +307,7 @@ class Structure(StructureReadings):
         )
 
     def _count(self, dt: float, substep: float | None) -> int:
-        """Equal substeps that a time dt [s] takes."""
+        """Number of equal substeps in a time dt [s]."""
         limit = self.substep() if substep is None else substep
         self.substep_limit().check(min(limit, dt))
         if self._sleep is not None and self.still.all() and not self._motion.v.any():
@@ -329,7 +329,7 @@ class Structure(StructureReadings):
         return broken, len(broken)
 
     def _turn_on_contacts(self) -> None:
-        """Before a step: for pieces that left their place."""
+        """Before a step, switch contacts on for pieces that have left their position."""
         if self.contact is None:
             return
         moved = self._onset.moved()
@@ -339,7 +339,7 @@ class Structure(StructureReadings):
             self._list_bodies()
 
     def _one_substep(self, dt: float) -> Array:
-        """Joints that failed, rows of the table."""
+        """Take one substep; rows of the table of the joints that failed in it."""
         self._substepper.step(dt, self.time)
         self.time += dt
         broken = self.joints.broken_now() if self.joints is not None else np.zeros(0, np.int64)
@@ -350,7 +350,7 @@ class Structure(StructureReadings):
         return broken
 
     def _retire(self, broken: Array) -> None:
-        """Take failed joints out; contact goes on with what of their energy was compression."""
+        """Remove failed joints; contact takes over the part of their energy that was compression."""
         stored = self._accounts.joint_stored()
         self._motion.read()
         stored -= self.joints.let_go(broken, self._motion.x, self._motion.R)
@@ -429,7 +429,7 @@ class Structure(StructureReadings):
         self.set_load(saved.load)
 
     def _take_driven(self, motion: Array) -> None:
-        """Prescribed motions as they were, in case `drive` has changed them since."""
+        """Return to the prescribed motions of a state, in case `drive` has changed them since."""
         for row in np.flatnonzero([b.driven for b in self.blocks]):
             velocity, spin = motion[row, 7:10], motion[row, 10:13]
             block = self.blocks[row]
@@ -437,7 +437,7 @@ class Structure(StructureReadings):
                 self.blocks[row] = block.changed(velocity=velocity, spin=spin)
 
     def close(self) -> None:
-        """Give YADE's scene back."""
+        """Release YADE's scene; the structure cannot be used afterwards."""
         self._scene.close()
 
     def __enter__(self) -> Structure:
@@ -453,7 +453,7 @@ def _with_ground(ground: float | None, planes) -> list[FixedPlane]:
 
 
 def _materials(blocks, planes, face: TouchingFaces) -> tuple[str, str]:
-    """Of both sides of a pair of faces."""
+    """Materials of both sides of a pair of faces."""
     other = blocks[face.b] if face.b >= 0 else planes[-1 - face.b]
     return blocks[face.a].material, other.material
 
@@ -501,7 +501,7 @@ class _Faces:
         )
 
     def joints(self, blocks, rules: JointRules | None) -> Joints | None:
-        """None where no faces are joined."""
+        """The joints; None where no faces are joined."""
         if not self.joined:
             return None
         return Joints(blocks, self.joined, rules.everywhere, rules.scattered(self.laws))

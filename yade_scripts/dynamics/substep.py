@@ -23,7 +23,7 @@ from yade_scripts.yade_side.scene import Scene
 class Substepper:
     """Moves the scene by one substep at a time. load (n, 6) [N, N m] acts in every substep.
 
-    ramp [s]: the weight comes on over this time from the start, as τ² (3 - 2 τ); 0: it is there at once.
+    ramp [s]: time over which the weight grows from the start, as τ² (3 - 2 τ); 0: it acts in full at once.
 
     fastest: largest growth of λ/δ_f in a substep since it was set to zero.
     """
@@ -69,14 +69,14 @@ class Substepper:
         self._pushed_ids = [self._scene.ids[r] for r in self._pushed]
 
     def missing_weight(self, time: float) -> float:
-        """Share of the weight that is not there yet."""
+        """Share of the weight that does not act yet."""
         if time >= self.ramp:
             return 0.0
         part = time / self.ramp
         return 1.0 - part**2 * (3.0 - 2.0 * part)
 
     def step(self, dt: float, time: float) -> None:
-        """From the present places, at `time` [s], to those dt [s] later."""
+        """Advance by dt [s] from the present positions, at `time` [s]."""
         m = self._motion
         before = m.v.copy()
         self._F[:] = self.load

@@ -29,7 +29,7 @@ DENSE = 60
 
 
 class SubstepTooLong(ValueError):
-    """A substep was asked for at which the explicit scheme is not stable."""
+    """The explicit scheme is unstable at the substep asked for."""
 
     exit_code = 2
 
@@ -56,7 +56,7 @@ class SubstepLimit:
             )
 
     def remark(self, substep: float) -> str:
-        """What is worth knowing of a substep that is stable, "" if it is accurate too."""
+        """A remark on a substep that is stable but not accurate; "" if it is both."""
         if substep <= self.dt * (1.0 + 1e-9):
             return ""
         return (
@@ -204,7 +204,7 @@ def _dashpot_share(damping: float) -> float:
 
 
 def _driven_limit(blocks: list[Block], joints, best: SubstepLimit) -> SubstepLimit:
-    """A driven block opens no joint by more than DRIVEN_SHARE δ_f a substep."""
+    """Substep at which a driven block opens no joint by more than DRIVEN_SHARE δ_f."""
     if joints is None:
         return best
     for block in (b for b in blocks if b.driven):

@@ -1,4 +1,4 @@
-"""What the loops over joints and their points work on, as kernels take it."""
+"""Arrays for the loops over joints and their points, as kernels take them."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from array_types import Floats, Ints
 
 
 class JointPoints(NamedTuple):
-    """Joints that never change: a, b (J,) rows of the blocks, b = -1: a fixed place · start (J+1,) first point of each;
-    xi_a, xi_b (P, 3) [m] of the points in the blocks · weight (P,) [m²] · normal (J, 2, 3) in block a and in b ·
-    law (J, 6) · peak: place of the largest traction."""
+    """What never changes of the joints: a, b (J,) rows of the blocks, b = -1 for a fixed point · start (J+1,) first
+    point of each; xi_a, xi_b (P, 3) [m] of the points in the blocks · weight (P,) [m²] · normal (J, 2, 3) in block a
+    and in b · law (J, 6) · peak: λ/δ_f of the largest traction."""
 
     a: Ints
     b: Ints
@@ -24,7 +24,7 @@ class JointPoints(NamedTuple):
 
 
 class PointMemory(NamedTuple):
-    """What points remember: largest (P,) λ [m] · paid (P, 2), columns WORK and PULL · rub (P, 3) [m]: where failed
+    """History of the points: largest (P,) λ [m] · paid (P, 2), columns WORK and PULL · rub (P, 3) [m]: where failed
     points stick, in the frame of a."""
 
     largest: Floats
@@ -32,8 +32,8 @@ class PointMemory(NamedTuple):
     rub: Floats
 
 
-class Motion(NamedTuple):
-    """Blocks: x (n, 3) [m] · v (n, 6) [m/s, rad/s] · R (n, 3, 3)."""
+class Placement(NamedTuple):
+    """Blocks: x (n, 3) [m] centres · v (n, 6) [m/s, rad/s] · R (n, 3, 3) from the frame of the block."""
 
     x: Floats
     v: Floats

@@ -1,4 +1,5 @@
-"""Cohesive joints of a structure: built from touching faces, state through time, table for reports."""
+"""Cohesive joints of a structure: their construction from touching faces, their state over time, and the table for
+reports."""
 
 from __future__ import annotations
 
@@ -11,7 +12,7 @@ from array_types import Array, Bools, Floats, Ints
 from yade_scripts.blocks.block import Block
 from yade_scripts.blocks.faces import TouchingFaces, gauss_points, to_body
 from yade_scripts.joints import kernel
-from yade_scripts.joints.arrays import JointPoints, Motion, PointMemory, Taken
+from yade_scripts.joints.arrays import JointPoints, Placement, PointMemory, Taken
 from yade_scripts.joints.cohesion import JointParameters
 from yade_scripts.joints.forces import MU, NOT_GROWING, PULL, JointKernels, kernels_of
 
@@ -136,7 +137,7 @@ class Joints:
         """Add the forces of the joints `which`, by default of all live ones that do not rest, on the blocks to F
         (n, 6); see `joint_forces.joint_forces`."""
         eta, fastest = self.eta if eta is None else eta, 0.0
-        memory, motion = self._memory(), Motion(x, v, R)
+        memory, motion = self._memory(), Placement(x, v, R)
         for kernels, own, points in self._families_of(self.visited if which is None else which):
             taken = Taken(self.damped, self.rubbed)
             growth = kernels.joint_forces(own, points, memory, motion, eta, dt, advance, F, taken)
@@ -167,7 +168,8 @@ class Joints:
         return out
 
     def lost(self) -> Array:
-        """Energy that the damage of each joint stands for by its law, G_c A once it has failed, (J,) [J]."""
+        """Energy (J,) [J] that the damage of each joint has dissipated according to its law: G_c A once it has
+        failed."""
         out, own = np.empty(len(self)), np.empty(len(self))
         for number, (kernels, _) in enumerate(self.families):
             kernels.lost(self._points[number], self.largest, own)
@@ -183,7 +185,7 @@ class Joints:
             yield kernels, own, (index[own], self.joint_of, self._points[number], self._memory())
 
     def broken_now(self) -> Array:
-        """Live joints that have failed since the last call of `retire`."""
+        """Numbers of the live joints that have failed since the last call of `retire`."""
         return self.visited[kernel.broken(self.visited, self.start, self.largest, self.df)]
 
     def let_rest(self, resting: Array) -> None:
@@ -203,8 +205,8 @@ class Joints:
         self.law[:, MU] = friction
 
     def let_go(self, joints: Array, x: Array, R: Array) -> float:
-        """Friction of `joints` ends at the places x (n, 3), R (n, 3, 3): it takes what its springs hold, which is
-        returned [J]."""
+        """End the friction of `joints` at the positions x (n, 3), R (n, 3, 3) and return the energy [J] that was left
+        in its springs."""
         friction = self.law[joints, MU]
         whole = self.stored_between(x, R, x, R, which=joints)[joints]
         self.law[joints, MU] = 0.0
@@ -214,7 +216,7 @@ class Joints:
         return float(held.sum())
 
     def retire(self, joints: Array, x: Array, R: Array, time: float) -> None:
-        """Take failed joints out: they have dissipated G_c A and cost nothing from now on."""
+        """Remove failed joints from the live ones: they have dissipated G_c A and are not visited any more."""
         self.final_openings[joints] = self.openings(joints, x, R)
         self.alive[joints] = False
         self.failure_time[joints] = time
@@ -323,7 +325,7 @@ class Joints:
         return {name: getattr(self, name).copy() for name in names}
 
     def restore(self, history: dict[str, Array]) -> None:
-        """Back to a `history`."""
+        """Return to a state that `history` gave."""
         for name, value in history.items():
             setattr(self, name, value.copy())
         self._list_visited()

@@ -1,12 +1,13 @@
-"""Points of joints in the world: where they are, how fast they part, forces on the blocks, openings; no law.
+"""Kinematics of the points of joints: positions, rates of separation, openings, and forces on the blocks. No law enters
+here.
 
 A point of a joint sits at ξ_a in block a and ξ_b in block b (or at a fixed place). With the separation d = x_b - x_a
 and the normal n half way between those that turn with block a and block b:  δ_n = d·n, δ_t = d - δ_n n. The traction
 acts on both blocks at the mid point of the pair, so linear and angular momentum are exact, and so is energy: n turns at
 the mean of both spins ω, and at the mid point the velocities differ by the rate of d as seen from axes that turn with
 this mean, d' - ω x d. (With a normal that turns with block a alone, pressed joints that shear while their blocks spin
-gained or lost a hundredth of what they held.) Absolute positions: no incremental drift.
-"""
+gained or lost a hundredth of their stored energy.) Separations are computed from absolute positions, so they do not
+drift."""
 
 from __future__ import annotations
 
@@ -18,7 +19,7 @@ from yade_scripts.blocks.kinematics import dot, place, turned
 
 @plain
 def split(pa, pb, n):
-    """Separation pb - pa: its part along n, and what is left across n as a tuple."""
+    """Normal component of the separation pb - pa along n, and its tangential part as a tuple."""
     d = (pb[0] - pa[0], pb[1] - pa[1], pb[2] - pa[2])
     dn = dot(d, n)
     return dn, (d[0] - dn * n[0], d[1] - dn * n[1], d[2] - dn * n[2])
@@ -26,7 +27,8 @@ def split(pa, pb, n):
 
 @plain
 def facing(a, b, R, normal):
-    """Normal of a joint now, as a tuple: half way between normal[0] as it turns with block a and normal[1] with b."""
+    """Present normal of a joint as a tuple: half way between normal[0], turned with block a, and normal[1], turned with
+    b."""
     n0, n1, n2 = turned(a, R, normal[0])
     if b < 0:
         m0, m1, m2 = n0 + normal[1, 0], n1 + normal[1, 1], n2 + normal[1, 2]

@@ -1,6 +1,6 @@
-"""What a cohesive law is: two functions without dimensions.
+"""Definition of a cohesive law: two dimensionless functions.
 
-With r = λ/δ_f, λ = largest opening so far, and p the place of the peak:
+With r = λ/δ_f, where λ is the largest opening so far, and the peak at r = p:
 
     secant   s(r, p) = T/(T_max r),    work   w(r, p) = ∫₀^r T/T_max dr'           0 ≤ r ≤ 1
 """
@@ -13,11 +13,12 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class CohesiveLaw:
-    """secant(r, p), work(r, p): numba functions of floats, 0 ≤ r ≤ 1; the joint cuts the secant off at 1 itself
+    """secant(r, p), work(r, p): numba functions of floats for 0 ≤ r ≤ 1; beyond 1 the joint has failed and does not
+    call them
 
-    peak: p where the user gives none · lowest_peak, highest_peak: what p may be
-    points: Gauss points along an edge that a joint as stiff in closing as in opening needs
-    potential: whether Needleman's potential of 1987 belongs to it
+    peak: default of p · lowest_peak, highest_peak: range of p
+    points: Gauss points along an edge that are needed by a joint as stiff in closing as in opening
+    potential: whether the law is that of Needleman's potential of 1987
     """
 
     secant: Callable[[float, float], float]

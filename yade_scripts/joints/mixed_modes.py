@@ -1,4 +1,5 @@
-"""How normal opening δ_n and sliding δ_t act together: two rules, each of five short functions for the kernels.
+"""Interaction of normal opening δ_n and sliding δ_t: two rules, each consisting of five short functions for the
+kernels.
 
 `effective` (any law; Tvergaard, Mater. Sci. Eng. A 125 (1990) 203; Camacho and Ortiz, Int. J. Solids Struct. 33
 (1996) 2899): one history for both,
@@ -11,13 +12,13 @@
     t_n = 27/4 T_max [u (1 - u)² - α v² (1 - u)],    t_t = 27/4 T_max α (1 - u)² δ_t/δ_f
 
 Sliding pushes the faces apart and is not limited: without opening, shear never softens and the joint never fails.
-The potential itself knows no unloading. Here λ = max <δ_n>, L = λ/δ_f, and the stored energy is
+The potential itself has no unloading. Here λ = max <δ_n>, L = λ/δ_f, and the stored energy is
 
     ψ/(T_max δ_f) = 27/4 { (1 - L)² u²/2 + α v²/2 [(1 - L)² + 2 (1 - L)(L - u)] }
 
-It gives the tractions of the potential at u = L and goes on along their tangent for u < L. Growing damage takes
--∂ψ/∂L = 27/4 (1 - L) u² at u = L, as much as in pure opening and never less than zero; at constant L nothing is lost.
-G_c is that of pure opening in every mode, since sliding gives its energy back to the opening.
+Its tractions are those of the potential at u = L and follow their tangent for u < L. Growing damage dissipates
+-∂ψ/∂L = 27/4 (1 - L) u² at u = L, as much as in pure opening and never less than zero; at constant L nothing is
+dissipated. G_c is that of pure opening in every mode, since sliding returns its energy to the opening.
 
 Names: `ks` secant stiffness in opening, `ss` = |δ_t|², `k0` first stiffness, `kc` closing stiffness, zero where
 contact carries compression. All per unit area of the joint.
@@ -41,8 +42,8 @@ class UnknownMixedMode(ValueError):
 
 @dataclass(frozen=True)
 class MixedMode:
-    """measure: opening that damages [m] · pace: how fast it grows · response: (t_n, k_n, k_t), where t_t = k_t δ_t and
-    k_n, k_t also rule the dashpots · stored: elastic energy between two openings [J/m²]"""
+    """measure: effective opening [m] that drives damage · pace: its rate of growth · response: (t_n, k_n, k_t), where
+    t_t = k_t δ_t and k_n, k_t also scale the dashpots · stored: elastic energy between two openings [J/m²]"""
 
     measure: Callable
     pace: Callable
@@ -90,7 +91,7 @@ def needleman_pace(dn, ss, wn, sw, beta):
 
 @njit
 def needleman_response(ks, dn, ss, largest, k0, df, beta, kc):
-    """As `effective_response`: the potential takes β² k_0 s²/δ_f (1 - L) off the normal traction."""
+    """As `effective_response`; the potential reduces the normal traction by β² k_0 s²/δ_f (1 - L)."""
     whole = max(1.0 - largest / df, 0.0)
     kn = ks if dn > 0.0 else kc
     return kn * dn - beta**2 * k0 * ss / df * whole, kn, _needleman_shear(dn, largest, k0, df, beta)

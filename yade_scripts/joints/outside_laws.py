@@ -1,9 +1,9 @@
-"""Cohesive laws from outside of this program: a file that the user names, an object that a script makes, or an
+"""Cohesive laws from outside the program: from a file that the user names, from an object made by a script, or from an
 installed package with an entry point in the group `surgebreak.laws`.
 
-A case file names laws and never runs code: what is here was named by the user, on the command line, in a script, in the
-variable SURGEBREAK_LAWS (by which processes that this one starts get the files too), or by installing a package.
-A law is examined when it is taken: what it must hold stands in docs/add_a_law.md.
+A case file names laws and never runs code. The laws here were named by the user: on the command line, in a script, in
+the variable SURGEBREAK_LAWS (which passes the files on to processes started by this one), or by installing a package.
+A law is checked when it is registered; docs/add_a_law.md lists the requirements.
 """
 
 from __future__ import annotations
@@ -37,15 +37,15 @@ _files: dict[Path, str] = {}
 
 
 class BadLaw(ValueError):
-    """A law from outside cannot be used; the message says where it is from and what it lacks."""
+    """A law from outside cannot be used; the message names its origin and the requirement that it misses."""
 
     exit_code = 2
 
 
 def register(name: str, law: CohesiveLaw, origin: str = "a script") -> None:
-    """Take a law under a name that case files may then use: `[joints] law = "NAME"`.
+    """Register a law under a name that case files may then use: `[joints] law = "NAME"`.
 
-    A law of this name that a script or file gave before is replaced. Raises BadLaw.
+    It replaces a law of this name from an earlier script or file. Raises BadLaw.
     """
     if not NAME.fullmatch(name):
         raise BadLaw(f"{origin}: '{name}' cannot name a law; letters, digits, _ and -, a letter first")
@@ -55,7 +55,7 @@ def register(name: str, law: CohesiveLaw, origin: str = "a script") -> None:
 
 
 def register_file(path: Path | str) -> str:
-    """Run a Python file that offers LAW, and take that under the name of the file; the name. Raises BadLaw.
+    """Run a Python file that defines LAW, register this under the name of the file, and return the name. Raises BadLaw.
 
     Processes that are started later take the file too.
     """
@@ -78,13 +78,13 @@ def register_file(path: Path | str) -> str:
 
 
 def names() -> list[str]:
-    """Names of all laws from outside; packages are asked for their names and not loaded."""
+    """Names of all laws from outside; packages that offer them are listed without being loaded."""
     _take_files()
     return sorted({*_registered, *_packaged()})
 
 
 def find(name: str) -> CohesiveLaw | None:
-    """The law of that name, None where none was given. Raises BadLaw where its package cannot offer it."""
+    """The law of that name, or None. Raises BadLaw if a package declares it and cannot provide it."""
     _take_files()
     if name not in _registered and name in _packaged():
         point = _packaged()[name]
@@ -98,7 +98,7 @@ def find(name: str) -> CohesiveLaw | None:
 
 
 def origin(name: str) -> str | None:
-    """Where the law of that name is from; None for those that come with surgebreak."""
+    """Origin of the law of that name; None for those that come with surgebreak."""
     return _origins.get(name)
 
 
@@ -141,7 +141,7 @@ def examined(law: CohesiveLaw, place: str) -> CohesiveLaw:
 
 
 def carried_at_failure(law: CohesiveLaw, peak: float | None) -> float:
-    """T/T_max with which a joint of this law reaches opening_at_failure, where it lets go."""
+    """T/T_max that a joint of this law still carries when it reaches opening_at_failure and fails."""
     return float(law.secant(1.0, law.peak if peak is None else peak))
 
 
@@ -150,7 +150,7 @@ def _compiled(function: Callable, njit: Callable) -> Callable:
 
 
 def _problem(law: CohesiveLaw, peak: float) -> str:
-    """What the law does not hold at a peak; empty where it holds all."""
+    """The requirement that the law misses for this peak; empty if it meets all."""
     r = np.unique(np.append(np.linspace(0.0, 1.0, POINTS), peak))
     try:
         secant = np.array([float(law.secant.py_func(q, peak)) for q in r.tolist()])

@@ -1,12 +1,11 @@
-"""Which touching faces are joined, and by what law: one for all, others between chosen pairs, strengths that scatter.
+"""Which touching faces are joined and by which law: one for all, others between chosen pairs, with random strengths.
 
-Strengths scatter by joint as T_max f, with f of mean 1 and coefficient of variation c, drawn in the order of the
-joints:
+The strength of each joint is T_max f, with f of mean 1 and coefficient of variation c drawn in the order of the joints:
 
     Weibull      f = (-ln u)^(1/m) / Γ(1 + 1/m),   c² = Γ(1 + 2/m)/Γ(1 + 1/m)² - 1      (Weibull, J. Appl. Mech. 18
     (1951) 293) log-normal   f = exp(s z - s²/2),              s² = ln(1 + c²)
 
-The opening at failure stays, so stiffness and work of separation go with the strength.
+The opening at failure is not scaled, so stiffness and work of separation are proportional to the strength.
 """
 
 from __future__ import annotations
@@ -87,7 +86,7 @@ class JointRules:
 
     @property
     def plain(self) -> bool:
-        """Whether all joints are alike."""
+        """Whether all joints have the same law."""
         return not self.pairs and self.scatter is None
 
     def of_faces(
@@ -113,7 +112,7 @@ class JointRules:
         return [replace(law, strength=f * law.strength) for law, f in zip(laws, factors)]
 
     def described(self, laws: list[JointParameters]) -> str:
-        """One line for people."""
+        """A description in one line."""
         text = self.everywhere.described()
         if self.pairs:
             other = sum(law != self.everywhere for law in laws)

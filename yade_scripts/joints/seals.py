@@ -1,9 +1,8 @@
-"""Faces that lie on one another without a joint and keep water out as long as they do.
+"""Faces that rest on one another without a joint and keep water out as long as they do.
 
 A pair of faces that touched at the start is closed while its outline has opened by less than `OPENED` of its size and
 slid by
-less than `SLID` of it: what blocks resting on one another do by their contacts is far below that, and blocks that have
-come apart are open.
+less than `SLID` of it. Contact forces move blocks that rest on one another by far less than that.
 """
 
 from __future__ import annotations

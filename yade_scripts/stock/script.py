@@ -31,18 +31,18 @@ class StockLaw:
 
     @property
     def title(self) -> str:
-        """For people, with the variant unless it is the first."""
+        """Title for display, with the variant unless it is the first."""
         first = next(iter(self.module.VARIANTS))
         return self.module.TITLE if self.variant == first else f"{self.module.TITLE}, {self.variant}"
 
     @property
     def not_matched(self) -> tuple[str, ...]:
-        """What of the joints of a case the law cannot follow."""
+        """Properties of the joints of a case that the law cannot reproduce."""
         return (*self.module.VARIANTS[self.variant], *self.module.NOT_MATCHED)
 
     @property
     def stem(self) -> str:
-        """Name of its files."""
+        """Stem of the names of its files."""
         return self.name.replace(":", "_")
 
 

@@ -1,6 +1,6 @@
-"""Places and velocities of the blocks as arrays, read from YADE's bodies.
+"""Positions and velocities of the blocks as arrays, read from YADE's bodies.
 
-Leapfrog: places x, R belong to the present time t, velocities v to half a substep before it.
+Leapfrog: positions x, R belong to the present time t, velocities v to half a substep earlier.
 """
 
 from __future__ import annotations
@@ -34,26 +34,26 @@ class Motion:
         self._awake: Array | None = None
 
     def rest(self, asleep: Array) -> None:
-        """asleep (n,) bool: blocks that stand still from now on, where they were read last."""
+        """Let the blocks asleep (n,) bool stand still from now on, where they were read last."""
         awake = np.flatnonzero(~asleep)
         self._awake = None if len(awake) == len(asleep) else awake
         self._all = _Rows(awake, self._scene.ids)
 
     def put(self, rows: Array, states: Array) -> None:
-        """The blocks `rows` are where states (n, 16) as of `Scene.save` say, whether the scene holds them or not."""
+        """Set the blocks `rows` to the states (n, 16) of `Scene.save`, whether or not the scene holds them still."""
         order = [*range(3), *range(7, 13), *range(4, 7), 3]
         scatter(states[np.ix_(rows, order)], rows, self._scene.frame, self.x, self.v, self.R)
 
     def watch(self, rows: Array) -> None:
-        """Rows that `read_watched` reads."""
+        """Set the rows that `read_watched` reads."""
         self._watched = _Rows(rows, self._scene.ids)
 
     def read(self) -> None:
-        """Everything."""
+        """Read the states of all blocks."""
         self._take(self._all)
 
     def read_watched(self) -> None:
-        """The watched rows; the others keep what was read last."""
+        """Read the states of the watched rows; the others keep their last values."""
         self._take(self._watched)
 
     def _take(self, which: _Rows) -> None:
@@ -82,7 +82,7 @@ class Motion:
 
 
 class _Rows:
-    """Rows with the bodies that stand for them and a buffer for their states."""
+    """Rows with their bodies in YADE and a buffer for their states."""
 
     def __init__(self, rows: Array, ids: list[int]):
         self.rows = rows

@@ -1,4 +1,4 @@
-"""The YADE side: one body a block, found by its number and moved by YADE under forces that are given to it.
+"""The scene in YADE: one body for each block, which YADE moves under given forces.
 
 YADE keeps the bodies, integrates their motion (`NewtonIntegrator`) and looks for neighbours (`InsertionSortCollider`)
 when it is asked; the laws of contact and joints act through its Python interface: forces go in before each step. YADE's
@@ -29,7 +29,7 @@ STATE = 13
 
 
 class SceneInUse(YadeError):
-    """YADE holds one scene in a process; close the structure that has it first."""
+    """YADE holds only one scene in a process; the structure that uses it must be closed first."""
 
 
 class Scene:
@@ -86,7 +86,8 @@ class Scene:
             state.blockedDOFs = "xyzXYZ"
 
     def _shape(self, block: Block):
-        """Its box, or a sphere around it, with the margin of its faces: what the search for neighbours sees."""
+        """Shape for the neighbour search: the box of the block or a sphere around it, enlarged by the margin of its
+        faces."""
         if block.is_box:
             half = 0.5 * block.size + MARGIN * block.planes[1].min()
             return self.engine.utils.box(self._v(block.centre), self._v(half), mask=STANDING, color=WHITE)
@@ -127,7 +128,7 @@ class Scene:
         return np.array([tuple(self._bodies[r].state.angMom) for r in rows], float).reshape(-1, 3)
 
     def step(self, dt: float, ids: list[int], F: Array) -> None:
-        """Move on by dt [s] under the forces and moments F (k, 6) on the bodies `ids`.
+        """Advance by dt [s] under the forces and moments F (k, 6) on the bodies `ids`.
 
         YADE's permanent forces are not used: its integrator aborts when bodies are added after one was set."""
         forces = self.O.forces
@@ -148,7 +149,7 @@ class Scene:
         self._loose[:] = loose
 
     def hold(self, rows: Array) -> None:
-        """Blocks of no prescribed motion stand still from now on, and are no neighbours of others."""
+        """Hold freely moving blocks at their positions from now on; the neighbour search leaves them out."""
         states = self._states(rows.tolist())
         states[:, 7:] = 0.0
         self._write(rows, states)
@@ -157,7 +158,7 @@ class Scene:
         self._still[rows], self._still_states[rows] = True, states
 
     def let_go(self, rows: Array) -> None:
-        """Blocks that were held are free again, where they were left."""
+        """Release blocks that were held, at the positions where they were left."""
         self._write(rows, self._still_states[rows])
         for row in rows.tolist():
             self._fix(row, False)
@@ -211,7 +212,7 @@ class Scene:
         return np.array(rows, float).reshape(-1, 16)
 
     def restore(self, saved: Array) -> None:
-        """Back to a saved state, bit for bit."""
+        """Return to a saved state, bit for bit."""
         stay = self._still & (self._still_states == saved).all(axis=1)
         rows = np.flatnonzero(~stay)
         self._write(rows, saved[rows])
@@ -226,7 +227,7 @@ class Scene:
             state.vel, state.angVel, state.angMom = V(*row[7:10]), V(*row[10:13]), V(*row[13:])
 
     def close(self) -> None:
-        """Give the scene back; the structure cannot be used afterwards."""
+        """Release the scene; the structure cannot be used afterwards."""
         self._bodies.clear()
         if Scene._owner is self:
             self.O.reset()

@@ -1,7 +1,7 @@
 """Cohesive laws, one file a law; the name of the file is the name of the law.
 
-A file offers `LAW`, a `CohesiveLaw`: secant and work of a law in pure opening, without dimensions. Nothing
-else in the program knows a law by its formula. Laws of users come by `outside_laws`.
+Each file defines `LAW`, a `CohesiveLaw`: dimensionless secant and work in pure opening. No other part of the program
+contains the formula of a law. Laws of users are added by `outside_laws`.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ class UnknownLaw(ValueError):
 
 
 def names() -> list[str]:
-    """Names of all laws, sorted: those of this folder, and those from outside. Imports none of this folder."""
+    """Sorted names of all laws: those of this folder, which are not imported, and those from outside."""
     return sorted({*shipped(), *outside_laws.names()})
 
 
@@ -31,7 +31,7 @@ def shipped() -> list[str]:
 
 
 def identity(name: str) -> dict[str, str]:
-    """Where the law of that name is from, and a checksum of its source. Raises UnknownLaw."""
+    """Origin of the law of that name, and a checksum of its source. Raises UnknownLaw."""
     from yade_scripts.joints.specialise import source_checksum
 
     law = find(name)
@@ -40,7 +40,8 @@ def identity(name: str) -> dict[str, str]:
 
 
 def find(name: str) -> CohesiveLaw:
-    """The law of that name. Raises UnknownLaw, and BadLaw for one of a package that does not hold what a law must."""
+    """The law of that name. Raises UnknownLaw, and BadLaw for the law of a package that does not meet the
+    requirements."""
     if name not in shipped():
         found = outside_laws.find(name)
         if found is not None:

@@ -1,9 +1,10 @@
 """Bilinear law (Hillerborg, Modéer and Petersson, Cem. Concr. Res. 6 (1976) 773, with a ramp; Alfano and Crisfield,
-Int. J. Numer. Meth. Eng. 50 (2001) 1701): a ramp to the peak at δ = p δ_f, then straight down to nothing at δ_f.
+Int. J. Numer. Meth. Eng. 50 (2001) 1701): traction rises linearly to the peak at δ = p δ_f and falls linearly to zero
+at δ_f.
 
     T = T_max r/p  (r ≤ p),   T_max (1 - r)/(1 - p)  (r ≥ p);    G_c = 1/2 T_max δ_f;    k_0 = T_max/(p δ_f)
 
-Nothing is lost before the peak.
+No energy is dissipated before the peak.
 """
 
 from __future__ import annotations

@@ -4,9 +4,8 @@
     T = T_max (r/p) e^(1 - r/p)  (r < 1),  0 beyond
     G_c = e p [1 - (1 + 1/p) e^(-1/p)] T_max δ_f;    k_0 = e T_max/(p δ_f)
 
-The tail beyond δ_f, T = e^(1 - 1/p)/p T_max and falling, is left out: 0.1 % of T_max at p = 0.1, 9 % at 0.2. G_c is
-the area up to the cut, and what the last spring held there counts as dissipated.
-"""
+The tail beyond δ_f, T = e^(1 - 1/p)/p T_max and falling, is cut off: at δ_f it is 0.1 % of T_max for p = 0.1 and 9 %
+for 0.2. G_c is the area up to the cut, and the energy left in the spring there counts as dissipated."""
 
 from __future__ import annotations
 
