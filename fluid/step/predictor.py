@@ -100,6 +100,7 @@ def predicted(water, dt: float) -> PressureProblem:
         phi,
         water.topology.node_size,
         rescale=(water.steps % RESCALE_EVERY == RESCALE_EVERY - 1),
+        motion=(water.velocity, parameters.gravity),
     )
     if water.sides is not None:
         exchanged = water.sides.exchanged(water.topology, phi, carried + displaced)

@@ -11,6 +11,12 @@ the surface deviates so much from the normal that velocity along still water lif
 In such cells, and up to three layers of nodes around them (between coarse and fine bricks, not inside them), the nodes
 of the first layers therefore search the polygons around the one taken over until none is closer. On a surface that is
 nearly flat over a cell, this finds the closest of all.
+
+A surface that meets a solid goes on inside it as far as cells reach that the solid cuts. Where a bed that climbs passes
+a layer of nodes these cells end, and the first node of the next layer, inside the bed, is a cell or more from the last
+polygon, though the plane of the surface passes a tenth of a cell from it. With that distance the surface cannot go on:
+the tongue of a run-up stood upright there. In water slower than the wave of a cell such a node takes φ from that plane
+(`_past_the_last_polygon`); the surface of a splash is not that of the plane a cell farther on.
 """
 
 from __future__ import annotations
@@ -23,6 +29,7 @@ from array_types import Array, Floats, Ints
 from fluid.domain.topology import layers_around
 from fluid.mesh.arrays import Corners
 from fluid.numerics.threads import found_over, over
+from fluid.surface.extrapolation import continue_outward, mean_gradients
 from kernel_decorators import helper, inner, kernel, plain, ranged, released
 
 LAYERS = 6
@@ -287,12 +294,13 @@ def _mean_slope(cut, phi, cells, parent, g, n_nodes):
     return total / np.maximum(count, 1.0)
 
 
-def redistance(topology, phi, spacing, rescale: bool):
+def redistance(topology, phi, spacing, rescale: bool, motion=None):
     """φ (N,) as a signed distance near its zero, ±FAR·spacing elsewhere; the zero itself does not move.
 
     spacing [m]: size of the cells at each node (N,), or one for all.
 
-    rescale: also divide by the mean slope at the nodes of cut cells where it left [0.9, 1.1]."""
+    rescale: also divide by the mean slope at the nodes of cut cells where it left [0.9, 1.1] ·
+    motion: velocity (N, 3) [m/s] and gravity [m/s²], None: no surface goes on inside solids beyond its cells."""
     t = topology
     cut = surface_cells(phi, t.cells_around(phi < 0.0), t.cells)
     farthest = np.broadcast_to(FAR * np.asarray(spacing), phi.shape)
@@ -314,4 +322,24 @@ def redistance(topology, phi, spacing, rescale: bool):
         slope = _mean_slope(cut, phi, t.cells, t.parent, t.gradients, len(phi))
         off = front & ((slope > 1.1) | (slope < 0.9)) & (slope > 0.0)
         far[off] /= slope[off]
+    if motion is not None and not t.is_obtuse:
+        _past_the_last_polygon(t, cut, front, order[start[1] : start[2]], motion, far)
     return far
+
+
+def _past_the_last_polygon(t, cut, front, beside, motion, phi) -> None:
+    """φ (N,) in place at those of the nodes `beside` the cut cells that lie dry inside a solid, in slow water:
+    continued with its slope in the cut cells, to no larger distance than that to the closest polygon, and to either
+    side of the surface.
+
+    front (N,) bool: corners of the cut cells. Not on meshes with obtuse cells, where the paths of such nodes are
+    continued (`paths_in_solids.py`)."""
+    inside, (velocity, gravity) = beside[t.covered[beside] & (phi[beside] > 0.0)], motion
+    inside = inside[(velocity[inside] ** 2).sum(axis=1) < gravity * t.node_size[inside]]
+    if len(inside) == 0:
+        return
+    value = phi[:, None].copy()
+    slope = mean_gradients(cut, front, value, t.fluid_cells, len(phi))
+    layers, no_limit = np.array([0, 0, len(inside)]), np.zeros(0)
+    continue_outward(inside, layers, 1, value, slope, t.nodes, t.around_by_cells, front.copy(), no_limit)
+    phi[inside] = np.clip(value[inside, 0], -phi[inside], phi[inside])

@@ -38,6 +38,24 @@ def test_sphere_distance_and_volume(cube):
     np.testing.assert_allclose(after, 4 / 3 * np.pi * 0.32**3, rtol=0.06)
 
 
+def test_plane_goes_on_inside_a_bed_past_a_layer_of_nodes():
+    """A tenth of a cell below a layer of nodes where the bed, which climbs through it, ends the cells of the surface:
+    the nodes of that layer inside the bed lay a cell and more from the last polygon."""
+    mesh, slope, layer = box_mesh([0, 0, 0], [3.0, 0.2, 0.4], H), 0.2, 0.2
+    corners = np.array(
+        [(x, y, z) for x, z in ((0.25, 0.0), (4.0, 0.0), (4.0, 3.75 * slope)) for y in (-1.0, 1.2)]
+    )
+    bed = ConvexBodies.from_polyhedra([(corners, None)])
+    t = Topology.of(mesh, cut_domain(mesh, bed))
+    z = t.nodes[:, 2] - layer + 0.01
+    at_rest = (np.zeros_like(t.nodes), 9.81)
+    phi = redistance(t, np.where(t.active, z, FAR * H), H, rescale=False, motion=at_rest)
+    foot = 0.25 + layer / slope
+    last = np.isclose(t.nodes[:, 2], layer) & t.covered & t.active & (t.nodes[:, 0] < foot + 2 * H)
+    assert last.sum() >= 3
+    np.testing.assert_allclose(phi[last], z[last], atol=1e-12)
+
+
 coordinate = st.floats(-1, 1)
 point = st.tuples(coordinate, coordinate, coordinate)
 
