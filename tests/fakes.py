@@ -82,6 +82,8 @@ class FakeAdvance:
 class FreeBody:
     """One rigid box without rotation, contact or joints: the smallest structure the coupler can carry."""
 
+    joints = None
+
     def __init__(self, size, centre, density, gravity):
         half = 0.5 * np.array(size, float)
         corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)

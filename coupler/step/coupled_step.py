@@ -20,7 +20,7 @@ from array_types import Array
 from coupler.balance.energy import Ledger
 from coupler.balance.momentum import book_step, momentum_ledger
 from coupler.step.limits import Diverged, Limits, check_finite, check_pressure, no_room
-from coupler.step.observe import fastest_points
+from coupler.step.observe import fastest_points, joint_counts
 from coupler.step.record import StepRecord
 from coupler.step.residual import RETRIES, Defects
 from coupler.step.step_limits import Attempt, attempt_of, best_of, volume_error
@@ -33,13 +33,22 @@ if TYPE_CHECKING:
     from coupler.step.pressure_with_structure import CoupledSolution, StructureResponse
     from fluid.pressure.projection import PressureProblem
     from fluid.step.water import Water
-    from yade_scripts.dynamics.structure import Structure
+    from yade_scripts.dynamics.structure import AdvanceReport, Structure
 
 
 BLOCK_COURANT = 0.5
 """Share of a cell that the fastest block may cross in one step: its cells are cut once a step."""
 STANDS_STILL = 1e-3
 """Share of the energy of the scene below which the motion of the structure is no measure of the defect."""
+
+
+TO_AND_FRO = 0.9
+"""Share of the defect of the pass before above which passes go to and fro instead of coming closer: joints that hold
+while the water takes them to give way, and break under the load of water that takes them to hold."""
+HALF_WAY = 2
+"""Passes more in such a step, each half-way between the last two, which is the relaxation of Aitken for passes that
+alternate (Küttler and Wall 2008, doi:10.1007/s00466-008-0255-5). Where the last of them breaks no joint and one before
+it did, the load of that one counts: it was there before anything moved."""
 
 
 class CoupledStepper:
@@ -282,7 +291,11 @@ class CoupledStepper:
         Returns the problem with all of its load, the solution, and the mean velocities (n, 6) with which the blocks
         moved and were assumed to move."""
         from coupler.step.coupling_rows import Wetting
-        from coupler.step.pressure_with_structure import corrected_free_velocity, defect, solve_coupled
+        from coupler.step.pressure_with_structure import (
+            corrected_free_velocity,
+            defect,
+            solve_coupled,
+        )
         from fluid.numerics.bounded import solve_bounded
 
         structure, solve = self.structure, partial(solve_bounded, kept=[])
@@ -293,16 +306,15 @@ class CoupledStepper:
         record.wetted = problem.coupling.nnz > 0
         before = self._padded(structure.velocity())
         found: CoupledSolution | None = None
-        most = self.passes if record.wetted else 1
-        for record.passes in range(1, most + 1):
+        breaking: tuple[CoupledSolution, Array, float] | None = None
+        whole = self._joints_broken()
+        most, last_defect, record.passes = (self.passes if record.wetted else 1), math.inf, 0
+        while record.passes < most:
+            record.passes += 1
             self._pause()
             with self.clock("pressure"):
                 found = solve_coupled(problem, response, v_free, solve, self.rtol, found, wetting)
-            with self.clock("structure"):
-                if record.passes > 1 and start is not None and start.structure is not None:
-                    structure.restore(start.structure)
-                structure.set_load(found.load[: structure.n])
-                report = structure.advance(problem.dt)
+            report = self._advance(problem.dt, found, start if record.passes > 1 else None)
             record.iterations += found.iterations
             record.substeps += report.substeps
             floor = STANDS_STILL * self.ledger.input_energy
@@ -311,14 +323,35 @@ class CoupledStepper:
             record.defect = defect(mass, assumed, report.mean_velocity, floor)
             if record.defect <= self.tolerance:
                 break
+            if self._joints_broken() > whole:
+                breaking = found, assumed, record.defect
             after = self._padded(report.mean_velocity) + lead
-            v_free = corrected_free_velocity(response, after, found.x, problem.coupling)
+            corrected = corrected_free_velocity(response, after, found.x, problem.coupling)
+            if record.defect > TO_AND_FRO * last_defect:
+                most = self.passes + HALF_WAY
+                corrected = 0.5 * (v_free + corrected)
+            v_free, last_defect = corrected, record.defect
         assert found is not None  # there is one pass at least
+        if record.passes > self.passes and breaking is not None and self._joints_broken() == whole:
+            found, assumed, record.defect = breaking
+            report = self._advance(problem.dt, found, start)
+            record.substeps += report.substeps
         record.substep, record.opening_rate = report.dt_s, report.opening_rate
         record.impulses = report.impulses
         if found.restoring.any():
             problem = replace(problem, other_load=problem.other_load + found.restoring)
         return problem, found, report.mean_velocity, assumed
+
+    def _joints_broken(self) -> int:
+        return 0 if self.structure.joints is None else joint_counts(self.structure).broken
+
+    def _advance(self, dt: float, found: CoupledSolution, start: StepStart | None) -> AdvanceReport:
+        """The structure over dt [s] under the load of a solution; start: it goes back there first."""
+        with self.clock("structure"):
+            if start is not None and start.structure is not None:
+                self.structure.restore(start.structure)
+            self.structure.set_load(found.load[: self.structure.n])
+            return self.structure.advance(dt)
 
     def _pause(self) -> None:
         if self.pause is not None:

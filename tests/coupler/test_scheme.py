@@ -1,11 +1,15 @@
 """The pressure solve with the structure inside, on a pipe of water with a piston (exact in closed form)."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from coupler.step import pressure_with_structure
+from coupler.step.coupled_step import CoupledStepper
 from coupler.step.coupling_rows import Wetting
 from coupler.step.pressure_with_structure import (
     StructureResponse,
@@ -14,7 +18,8 @@ from coupler.step.pressure_with_structure import (
     mass_matrix,
     solve_coupled,
 )
-from tests.fakes import direct_solve, piston_column
+from coupler.step.record import StepRecord
+from tests.fakes import direct_solve, no_clock, piston_column
 
 WATER = 1000.0  # mass of the water in the pipe [kg]
 
@@ -184,3 +189,72 @@ def test_defect_of_a_body_that_stood_still_is_whole():
     moving, still = np.array([[1.0, 0, 0, 0, 0, 0]]), np.zeros((1, 6))
     assert defect(M, moving, still) == pytest.approx(1.0)
     assert defect(M, still, moving) == pytest.approx(1.0)
+
+
+class _Gate:
+    """A block of 1 kg whose joint breaks at 30 N; unbroken it does not move, broken it is free."""
+
+    n, fixed, joints = 1, np.zeros(1, bool), ()
+
+    def __init__(self):
+        self.restore(False)
+
+    def restore(self, broken):
+        self.broken, self.speed = broken, 0.0
+
+    def velocity(self):
+        return np.zeros((1, 6))
+
+    def set_load(self, load):
+        self.force = float(load[0, 0])
+
+    def advance(self, dt):
+        self.broken = self.broken or self.force > 30.0
+        self.speed = self.force * dt if self.broken else 0.0
+        moved = np.array([[self.speed, 0, 0, 0, 0, 0]])
+        return SimpleNamespace(substeps=1, dt_s=dt, mean_velocity=moved, opening_rate=0.0, impulses=None)
+
+    def joint_damage(self):
+        return np.zeros(1), np.array([not self.broken])
+
+
+@pytest.mark.parametrize(("before_it_moves", "broken"), [(100.0, True), (35.0, True), (25.0, False)])
+def test_a_wall_that_breaks_before_it_moves_does_not_hold_because_it_would_move(
+    before_it_moves, broken, monkeypatch
+):
+    """Water pushes with F before the gate moves, and with nothing once it moves as fast as F alone would make it: the
+    second pass takes the gate to be gone, so that it holds. A house stood by that, under 1.4 MN on its timber wall."""
+    gate, dt = _Gate(), 1.0
+
+    def solution(problem, response, v_free, *_):
+        push = before_it_moves * (1.0 - v_free[0] / before_it_moves)
+        return SimpleNamespace(
+            load=np.array([[push, 0, 0, 0, 0, 0]]), velocity=v_free.reshape(1, 6), x=np.zeros(1), iterations=1,
+            restoring=np.zeros((1, 6)),
+        )  # fmt: skip
+
+    monkeypatch.setattr(pressure_with_structure, "solve_coupled", solution)
+    monkeypatch.setattr(
+        pressure_with_structure, "corrected_free_velocity", lambda r, after, x, c: after.ravel()
+    )
+    monkeypatch.setattr("coupler.step.coupling_rows.Wetting.of", lambda coupling: None)
+    stepper = object.__new__(CoupledStepper)
+    stepper.structure, stepper.water, stepper.immersion = gate, None, SimpleNamespace(n_solids=0)
+    stepper.passes, stepper.tolerance, stepper.pause, stepper.rtol = 2, 0.02, None, 1e-8
+    stepper.clock, stepper.ledger = no_clock, SimpleNamespace(input_energy=1.0)
+    response = SimpleNamespace(lead=lambda velocity, before, substep: np.zeros((1, 6)))
+    monkeypatch.setattr(
+        CoupledStepper, "_response", lambda *_: (sp.eye_array(6).tocsr(), response, np.zeros(6))
+    )
+    monkeypatch.setattr(CoupledStepper, "_afloat", lambda self, problem: (problem, None))
+    problem = SimpleNamespace(dt=dt, coupling=sp.csr_matrix(np.ones((1, 6))))
+    record = StepRecord(time=0.0, dt=dt)
+    _, found, moved, _ = stepper._exchange(problem, record, SimpleNamespace(structure=False))
+    assert gate.broken == broken
+    assert record.passes <= 4
+    if broken:
+        assert moved[0, 0] == pytest.approx(found.load[0, 0])
+        assert found.load[0, 0] > 30.0
+    if before_it_moves == 100.0:  # half-way both agree: 50 N, 50 m/s
+        assert record.defect < 1e-9
+        assert found.load[0, 0] == pytest.approx(50.0)
