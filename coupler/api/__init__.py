@@ -1,5 +1,5 @@
-"""The Python side: what `import surgebreak` offers, and what the commands use. Scripts change and run cases and read
-runs.
+"""The Python side: the names that `import surgebreak` offers and the commands use. Scripts change and run cases and
+read runs.
 
 This package may import everything of the coupler except its commands; the names on which scripts may rely are those of
 `surgebreak.py`.

@@ -97,4 +97,4 @@ def resume(
 
 
 def _nowhere(text: str) -> None:
-    """Nobody looks on."""
+    """Discard a line of report."""

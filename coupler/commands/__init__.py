@@ -1,4 +1,4 @@
-"""What `surgebreak NAME` does: one module or package a command.  Nothing else may import them.
+"""The commands `surgebreak NAME`, each in a module or package of its own.  No other chapter may import them.
 
 cli                        the command line: words and options of every command
 doctor, explain_run        is this machine ready; what a run computed

@@ -35,7 +35,7 @@ APART = 0.12
 
 
 def blocks(path: Path, options: dict, joints: dict, picture: Path | None, to: Path | None) -> None:
-    """Cut a drawing, tell about its blocks, draw them. options: of [[structure.drawing]] · joints: of [joints].
+    """Cut a drawing into blocks, describe and draw them. options: of [[structure.drawing]] · joints: of [joints].
 
     Raises BadDrawing, with a picture of the place where one can be drawn, BadCase and MeshFileError."""
     case = _case(path, options, joints)
@@ -107,7 +107,7 @@ def _counted(names: Iterable[str]) -> str:
 
 
 def _forecast(case: Case) -> Iterable[terminal.Row]:
-    """Joints, the substep with the block that sets it, and what a second costs."""
+    """Number of joints, the substep and the block that limits it, and the cost of a simulated second."""
     from coupler.run.forecast import structure_seconds
     from coupler.scene.build import build_structure
 

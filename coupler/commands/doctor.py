@@ -59,7 +59,7 @@ def _show(found: Finding) -> None:
 
 
 def _mended(found: Finding, check: Callable[[], Finding]) -> Finding:
-    """What the check says after its remedy was carried out; the same as before where that failed."""
+    """The finding after the remedy was carried out; the earlier one if the remedy failed."""
     assert found.mend is not None
     try:
         print(f"     {'':22} -> {found.mend()}", flush=True)
@@ -94,7 +94,7 @@ def _packages() -> Finding:
 
 
 def _installer(names: list[str]) -> Callable[[], str] | None:
-    """What installs packages; nothing outside of a virtual environment."""
+    """The command that installs packages; none outside of a virtual environment."""
     return partial(mend.install, names) if mend.can_install() else None
 
 
@@ -254,7 +254,7 @@ def _pictures() -> Finding:
 
 
 def _in_process(code: str, *arguments: str, **environment: str) -> tuple[int, str]:
-    """Exit status and output of some Python; a crash there is a finding here."""
+    """Exit status and output of Python code in another process, so that a crash there becomes a finding."""
     command = [sys.executable, "-c", code, *arguments]
     try:
         done = subprocess.run(

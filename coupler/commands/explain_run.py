@@ -35,7 +35,7 @@ class Skipped:
 
     @property
     def share(self) -> float:
-        """Of what was done in what there was; 1 where there was nothing."""
+        """Share of the work that was done in all possible work; 1 if there was none."""
         whole = self.done + self.skipped
         return self.done / whole if whole > 0.0 else 1.0
 
@@ -46,7 +46,7 @@ class Skipped:
 
 
 def skipped(summary: dict) -> list[Skipped]:
-    """What a run of this summary (run.json) did not compute; empty for runs without figures.work."""
+    """The work that the run with this summary (run.json) skipped; empty for runs without figures.work."""
     work = summary["figures"].get("work", {})
     found = _in_water(summary, work) if "cells" in work else []
     return found + (_in_structure(summary, work) if "blocks" in work else [])
@@ -113,7 +113,7 @@ def seconds_of(summary: dict, parts: tuple[str, ...]) -> float:
 
 
 def not_loaded(summary: dict) -> dict[str, tuple[str, ...]]:
-    """Parts of which nothing was loaded, with what they would load; empty where the run did not note it."""
+    """Parts that were not loaded, with the packages that they would load; empty if the run did not record it."""
     loaded = summary["figures"].get("imports", {})
     return {
         part: names
@@ -162,7 +162,7 @@ def _work(summary: dict) -> list[str]:
 
 
 def in_words(row: Skipped, paid: float) -> str:
-    """One line: how many were skipped, how many not, and what the skipped ones would have cost."""
+    """One line: how much was skipped, how much was not, and what the skipped part would have cost."""
     line = f"{row.what}: {_count(row.skipped)} of {_count(row.skipped + row.done)} a step"
     if row.what == "cells inside solids":
         line = f"{row.what}: {_count(row.skipped)} a step"

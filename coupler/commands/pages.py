@@ -105,7 +105,7 @@ FIRST = ("load", "open", "Case", "Run", "Step", "Blocks", "WaterState", "BlockSt
 
 
 def _place(name: str) -> tuple[int, str]:
-    """What a reader meets first comes first, errors last."""
+    """Sort key of the entries: those that a reader needs first come first, errors last."""
     import surgebreak
 
     thing = getattr(surgebreak, name)
@@ -165,7 +165,7 @@ def _signature(function: Callable) -> str:
 
 
 def _text(docstring: str | None) -> str:
-    """Paragraphs of a docstring; what is indented stays as it is, as code."""
+    """Paragraphs of a docstring; indented lines are kept as code."""
     paragraphs = inspect.cleandoc(docstring or "").split("\n\n")
     return "\n\n".join(p if p.startswith("    ") else re.sub(r"\s*\n\s*", " ", p) for p in paragraphs)
 

@@ -1,4 +1,4 @@
-"""What a basin from a mesh file is to blocks: walls, planes that bound all of it, and the bed, a height map.
+"""A basin from a mesh file as blocks see it: walls, which are planes around it, and the bed, a height map.
 
 A face of the boundary steeper than the steepest bed, or one that looks down, is of a wall: its plane may have nothing
 of the basin behind it.  All other faces are the bed; no two of them may lie over one another.  A level bed is the floor
@@ -73,7 +73,7 @@ def basin_of(mesh) -> Basin:
 
 
 class _Key:
-    """A mesh by what it is, not by its numbers: it is kept as long as it is used."""
+    """A key that compares meshes by identity and keeps them alive as long as it is used."""
 
     def __init__(self, mesh):
         self.mesh = mesh

@@ -1,4 +1,4 @@
-"""Convex bodies in space for the checks of a case: bounds, what they hold, and how deep two of them overlap.
+"""Convex bodies in space for the checks of a case: bounds, points inside, and the depth at which two overlap.
 
 Two convex polyhedra overlap by the smallest of their overlaps along the separating axes: normals of the faces of
 either, and products of their edges (Gottschalk, Lin, Manocha 1996); zero or less means that a plane parts them.

@@ -24,7 +24,7 @@ DOUBLE_COVER = 1e-3
 
 
 class SurfaceError(ValueError):
-    """A surface that is open, dented or folded; the message goes on after "surface k" and names the place."""
+    """A surface that is open, dented or folded; the message follows "surface k" and names the place."""
 
 
 @dataclass(frozen=True)

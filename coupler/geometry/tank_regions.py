@@ -1,4 +1,4 @@
-"""Where a case asks for finer cells: `[[tank.refine]]` and `[[tank.stretch]]`, and what the names in them mean."""
+"""Regions of finer cells: `[[tank.refine]]` and `[[tank.stretch]]`, and the meaning of the names in them."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def regions_of(case: Case) -> tuple[Regions, list[Problem]]:
 
 
 def stretch_problems(case: Case) -> Iterator[Problem]:
-    """What is wrong with `[[tank.stretch]]`."""
+    """The faults in `[[tank.stretch]]`."""
     tank = case.tank
     for i, spec in enumerate(tank.stretch):
         path, k = ("tank", "stretch", i), "xyz".index(spec.along)

@@ -26,7 +26,7 @@ def air_row(case: Case, structure) -> Row:
 
 
 def _pockets(water) -> tuple[int, str]:
-    """A description of the pockets: their number, volume and largest possible lift."""
+    """Number of the pockets, and a description of their volume and largest possible lift."""
     volume = water.pocket_volumes()
     if len(volume) == 0:
         return 0, NONE_YET

@@ -1,4 +1,4 @@
-"""Air that cannot leave (docs/theory.md, 2.6): pockets, what is in them, and how they answer the water.
+"""Trapped air (docs/theory.md, 2.6): pockets, their content, and their response to the water.
 
 Loaded only where the case asks for it (`water.air`). `pockets` finds connected parts of the air and hands on what they
 hold, `gas` is the law of a pocket and of an orifice, `cushions` the rows that pockets add to the pressure of a step,

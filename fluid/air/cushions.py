@@ -39,7 +39,7 @@ RESOLVED, SETTLING = 0.5, 1.0
 
 @dataclass(frozen=True, kw_only=True)
 class Air:
-    """What the pockets hold between two steps. K pockets, numbered as their labels.
+    """State of the pockets between two steps. K pockets, numbered as their labels.
 
     gas · label (N,) of the air at each node (`pockets.py`) · reference (K,) [m³] of the gas · rate (K,) [m³/s], R of
     the last step · end_pressure (K,) [Pa] that goes with the acceleration at its end · mean_pressure (K,) [Pa] over
@@ -91,7 +91,7 @@ class Air:
         return found - np.bincount(self.label[there] - 1, taken[there], minlength=len(self))[: len(self)]
 
     def carried(self, source, known) -> Air:
-        """On new nodes; source (N,) old node of each, known (N,) bool: whether there is one."""
+        """The same air on new nodes; source (N,) old node of each, known (N,) bool: whether there is one."""
         return replace(self, label=np.where(known, self.label[source], -1))
 
     def at_pockets(self, nodal) -> Array:
@@ -250,7 +250,7 @@ class Cushions:
         return node
 
     def after(self, x, theta: float, dt: float) -> Air:
-        """What they hold after a step with the unknown part x (K,) [Pa] of their pressure."""
+        """The air after a step with the unknown part x (K,) [Pa] of its pressure."""
         rate = self.compliance(dt) * (x + self.known - self.pressure) - self._carried_rate()
         turned = (rate * self.air.rate < 0.0) & ~self.air.turned
         return replace(

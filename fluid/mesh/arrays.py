@@ -51,7 +51,7 @@ class Hats(NamedTuple):
 
 
 class FluidCells(NamedTuple):
-    """`Hats` of a domain with what is left of its cells: volume (M,) [m³] · share (M, 4) mean of each function over
+    """`Hats` of a domain with the fluid part of its cells: volume (M,) [m³] · share (M, 4) mean of each function over
     it · size (M,) [m] · upright (rows of the gradients,) bool: see `Background.upright`."""
 
     cells: Integers
@@ -64,7 +64,7 @@ class FluidCells(NamedTuple):
 
 
 class Paths(NamedTuple):
-    """What a path through a mesh walks on: nodes (N, 3) [m] · cells (M, 4), their nodes · parent (M,) row of the
+    """Arrays for following a path through a mesh: nodes (N, 3) [m] · cells (M, 4), their nodes · parent (M,) row of the
     gradients (.., 4, 3) [1/m] of their linear functions · neighbours (M, 4): cell behind the face opposite each
     corner, -1 none · node_start (N + 1,), node_cells: the cells around node i are
     node_cells[node_start[i]:node_start[i + 1]]."""

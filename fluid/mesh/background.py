@@ -119,7 +119,8 @@ class Background:
 
     @cached_property
     def node_size(self) -> Array:
-        """(N,) [m] least `local_size` of the cells around each node: what is near a node goes by it."""
+        """Smallest `local_size` (N,) [m] of the cells around each node: the length scale of everything near the
+        node."""
         size = np.full(len(self.nodes), np.inf)
         np.minimum.at(size, self.cells.ravel(), np.repeat(self.local_size, 4))
         return np.where(np.isfinite(size), size, self.spacing)
@@ -385,7 +386,7 @@ def _on_wall(axis, i, x):
 
 @inner
 def _seek(points, m, b, bin_start, bin_cells, nodes, cells, g, found):
-    """found[m] <- the cell of bin b that holds point m, if there is one."""
+    """Set found[m] to the cell of bin b that contains point m, if there is one."""
     best = -1e-10  # round-off: a point on a shared face belongs to the first cell that holds it
     for s in range(bin_start[b], bin_start[b + 1]):
         lowest = smallest_barycentric(points[m], bin_cells[s], nodes, cells, g)

@@ -1,4 +1,4 @@
-"""Boxes and beds with finer cells in parts: where, and what the flow takes for its mesh.
+"""Boxes and beds with regions of finer cells: the regions, and the resulting mesh.
 
 mesh = refined_mesh(box_mesh((0, 0, 0), (8, 4, 4), 0.5), [InBox((3, 1, 0), (5, 3, 2), levels=2)])
 """

@@ -1,4 +1,4 @@
-"""Pressure with a lower bound: water pushes, and parts where it would pull harder than the bound.
+"""Pressure with a lower bound: water separates where its pressure would fall below the bound.
 
     x ≥ l,    A x - b ≥ 0,    (x - l)·(A x - b) = 0                                                         (1)
 
@@ -179,7 +179,7 @@ class _Signs:
         return ~held & (x < self.lower - share * np.abs(x).max(initial=0.0))
 
     def early(self, x, residual: float, held) -> bool:
-        """Whether to end a round: it is loosely solved, and something lies far below its bound."""
+        """Whether to end a round: it is solved to a loose tolerance, and some value lies far below its bound."""
         return residual <= LOOSE and bool(self._below(x, held, FAR_BELOW).any())
 
     def wrong(self, x, held, parting, tolerance: float):

@@ -1,4 +1,4 @@
-"""Multigrid by aggregation: a preconditioner so cheap to make that every step makes its own, as its wet nodes ask.
+"""Multigrid by aggregation: a preconditioner that is cheap enough to be built anew in every step, for its wet nodes.
 
 Pairs of pairs of pairs of the most strongly coupled unknowns (Notay, Electron. Trans. Numer. Anal. 37 (2010) 123)
 become one unknown of the coarser level: blocks of 2 x 2 x 2 nodes on a lattice, flat ones where cells are flat, and

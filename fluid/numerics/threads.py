@@ -72,7 +72,7 @@ class _Worker:
         self._given.release()
 
     def end(self) -> tuple[Any, BaseException | None]:
-        """What the job returned, or raised; waits for it even where Ctrl-C comes in between."""
+        """Return the result of the job, or raise its exception; waits for it even if Ctrl-C is pressed meanwhile."""
         interruption = None
         while True:
             try:
@@ -102,7 +102,7 @@ class _Team:
         self.at_work = threading.Lock()
 
     def together(self, jobs: Sequence[Callable[[], Any]]) -> list:
-        """What the jobs return, one on this thread and the others beside it."""
+        """Results of the jobs, of which one runs on this thread and the others beside it."""
         if len(jobs) == 1 or not self.at_work.acquire(blocking=False):
             return [job() for job in jobs]
         try:
@@ -164,7 +164,7 @@ def watched() -> Iterator[list[Call]]:
 
 
 def over(kernel: Callable, count: int, *args, weight: int = 1) -> list:
-    """kernel(first, last, *args) on ranges that together are 0 ... count; what they return, in order.
+    """Run kernel(first, last, *args) on ranges that together cover 0 ... count; returns their results in order.
 
     weight: how many rows of the usual kind, which take some ten nanoseconds, one of these is worth."""
     parts = min(_parts(count * weight), max(count, 1))
@@ -181,7 +181,7 @@ def found_over(kernel: Callable, count: int, *args) -> Array:
 
 
 def owning(kernel: Callable, nodes: int, reach: Callable, count: int, *args) -> None:
-    """kernel(first, last, runs, *args) on ranges that together are the nodes 0 ... `nodes`.
+    """Run kernel(first, last, runs, *args) on ranges that together cover the nodes 0 ... `nodes`.
 
     runs (k, 2): from where to where in a list of `count` entries there can be something that has a node of the range.
     reach: () → lowest and highest node (B,) of each BLOCK of the list; asked on several threads only."""

@@ -1,4 +1,4 @@
-"""Tetrahedra clipped by half spaces: what of them lies where a linear function is negative, as tetrahedra again.
+"""Tetrahedra clipped by half spaces: the part in which a linear function is negative, again as tetrahedra.
 
 Points may carry further linear values behind their coordinates; these are interpolated along with them.
 """

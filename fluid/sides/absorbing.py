@@ -1,4 +1,4 @@
-"""A side that lets go what comes back: the given flow comes in, what runs against it goes out.
+"""An absorbing side: the given flow enters, and waves that run against it leave.
 
 Long waves over level ground, by their Riemann invariants (Stoker, Water Waves, 1957, 10.2): with h the depth and u the
 velocity inwards, means over the side,

@@ -240,7 +240,7 @@ class Sides:
         self.entered = self.left = self.energy = 0.0
 
     def absorbers(self) -> list:
-        """Those of the sides that let go what comes back."""
+        """The absorbing sides."""
         return [s.flow.absorber for s in self.every if s.flow is not None and s.flow.absorber is not None]
 
     def place(self, domain, active) -> None:
@@ -248,7 +248,7 @@ class Sides:
         self.now = tuple(side.on_domain(domain, active) for side in self.every)
 
     def hold(self, u, time: float, gravity: float) -> None:
-        """What the sides do to velocities (N, 3), in place."""
+        """Impose the velocities of the sides on (N, 3), in place."""
         for side in self.now:
             side.hold(u, time, gravity)
 

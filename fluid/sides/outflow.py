@@ -1,4 +1,4 @@
-"""What leaves through the open sides of the tank in a step: they are at the pressure of the air and nothing comes back.
+"""Outflow through the open sides of the tank in a step: they are at the pressure of the air, and no water returns.
 
     W_i^left = dt ∮ N_i s (u·n)⁺ dA,        E_left = ρ dt ∮ s (½ u² - g·x) (u·n)⁺ dA                          (1)
 

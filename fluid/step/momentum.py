@@ -1,4 +1,4 @@
-"""The momentum of the water and what changes it in a step, line by line.
+"""The momentum of the water, and its changes in a step by cause.
 
     P = ρ Σ W_i u_i,    L = ρ Σ W_i (x_i - x_0) × u_i         W_i: nodal volume, x_0: `Water.reference`
 
@@ -225,7 +225,7 @@ def _through(water, kept):
 
 
 def _pressure_on_sides(water, p):
-    """∮ p [n; r × n] dA (6,) over what is open of inflows and seas, n outward."""
+    """∮ p [n; r × n] dA (6,) over the open parts of inflows and seas, n outward."""
     total = np.zeros(6)
     for side in water.sides.now if water.sides is not None else ():
         place = np.einsum("fca,fak->fck", side.hats, water.topology.nodes[side.faces]) - water.reference

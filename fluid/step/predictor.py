@@ -1,4 +1,4 @@
-"""First half of the step: what the water does before its pressure is known.
+"""First half of the step, before the pressure is known.
 
 û = uⁿ + (1-θ) dt âⁿ,   âⁿ = aⁿ f,  f = min(1, a_max/|aⁿ|)         part of the last acceleration, limited
 φ̃, u_adv = transport of φ, û by uⁿ + dt/2 âⁿ     semi-Lagrangian, MacCormack; `surface_momentum.py`
@@ -76,7 +76,7 @@ class Predicted:
 
 
 def predicted(water, dt: float) -> PressureProblem:
-    """Everything of the step before the solve; reads the state of `water`, changes nothing."""
+    """Carry out the step up to the pressure solve; reads the state of `water` and changes nothing."""
     theta, parameters = water.theta(dt), water.parameters
     kick = kick_factor(water.acceleration, water.largest_kick())
     u_adv, phi = _transported(water, dt, theta, kick)
@@ -317,7 +317,7 @@ def _problem(
 
 
 def _known_pressure(water, pressure, phi):
-    """A pressure (N,) [Pa] of the last step; before the first there is none to go by: that of still water."""
+    """A pressure (N,) [Pa] of the last step; before the first step that of still water."""
     return pressure if water.steps else -water.parameters.density * water.parameters.gravity * phi
 
 

@@ -1,4 +1,4 @@
-"""The state of the water as arrays: saved after a step, taken over later, in this process or in a new one.
+"""The state of the water as arrays: saved after a step and restored later, in this process or in a new one.
 
 What follows from the mesh and from the solids is left out: whoever restores makes the same domain first.  A step after
 `restore` gives what it would have given after `save`, bit for bit.

@@ -1,4 +1,4 @@
-"""The speed that sets the step: that of the water without its spray.
+"""The speed that determines the length of a step: that of the water without spray.
 
 A splash throws single nodes of water at two and three times the speed of all the rest; a step in which these cross one
 cell takes 1.5 times as many steps through a dam break, for a thousandth of the water.  The scheme needs no such step:

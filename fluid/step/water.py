@@ -277,7 +277,7 @@ class Water:
         self._domain_is_new, self.renumbered, self.left_behind = False, None, None
 
     def remember(self) -> dict:
-        """The state now, for `go_back`: a step replaces what it changes, so these are references."""
+        """The present state, for `go_back`: references, since a step replaces the arrays that it changes."""
         return vars(self) | {"sides": None if self.sides is None else dict(vars(self.sides))}
 
     def go_back(self, remembered: dict) -> None:
@@ -310,7 +310,8 @@ class Water:
             self.renumbered = handed_on if self.renumbered is None else handed_on @ self.renumbered
 
     def set_cracks(self, cracks) -> None:
-        """Lump the flow through these `slits.Cracks`: anew after every change of the domain or of the cracks."""
+        """Lump the flow through these `slits.Cracks`; to be called after every change of the domain or of the
+        cracks."""
         from fluid.pressure.slits import Slits
 
         self.slits = Slits.of(self.domain, cracks, self.mesh.size_at(cracks.middle()), self.slits)
@@ -434,7 +435,7 @@ class Water:
     # ---- sides of the tank
 
     def hold(self, u, time: float) -> None:
-        """What the sides of the tank do to u (N, 3) [m/s] at a time [s], in place."""
+        """Impose the conditions of the sides of the tank on u (N, 3) [m/s] at a time [s], in place."""
         self.walls.slip(u)
         if self.sides is not None:
             self.sides.hold(u, time, self.parameters.gravity)
@@ -495,7 +496,7 @@ class Water:
         return taken_from_nodes(self.domain, self.coupling, self.level_set, way)
 
     def volume_error(self) -> float:
-        """(volume - conserved volume) / handled volume, what the step could not put right."""
+        """(volume - conserved volume) / handled volume: the error that the step could not correct."""
         return (self.volume() - self.conserved_volume) / max(self.handled_volume, 1e-300)
 
     def momentum(self) -> Array:
@@ -533,7 +534,7 @@ class Water:
         return 0.0 if self.sides is None else self.sides.energy
 
     def air_energy(self) -> float:
-        """What the water can get back from trapped air, and what of it was lost so far [J]; 0 without any."""
+        """Energy [J] of trapped air that the water can recover, and the part lost so far; 0 without trapped air."""
         if self.air is None:
             return 0.0
         return self.air.lost + float(self.air.gas.energy(self.air.reference, self.pocket_volumes()).sum())

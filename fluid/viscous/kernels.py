@@ -147,7 +147,7 @@ def unheld_rate(terms, u, body_velocity):
 
 @kernel
 def _restrict(r, node, projector, idle):
-    """Only what the sides of the tank leave free, in place."""
+    """Set the components that the sides of the tank hold to zero, in place."""
     moved = np.empty(3)
     for s in range(node.shape[0]):
         for k in range(3):

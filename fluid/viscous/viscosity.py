@@ -1,4 +1,4 @@
-"""Viscosity and walls that hold the water: the stage of a step between transport and pressure.
+"""Viscosity and no-slip walls: the stage of a step between transport and pressure.
 
     M du/dt = r(u) + M (w - uⁿ)/dt,   u(0) = uⁿ         r = f - K u: `viscous_kernels`, symmetric gradient, walls
 

@@ -134,7 +134,7 @@ class WallFriction:
 
 
 def _at(value, place):
-    """A number, or what the function gives at places (n, 3) [m]."""
+    """A number, or the values of a function at positions (n, 3) [m]."""
     return value(place[:, 0], place[:, 1]) if callable(value) else value
 
 

@@ -220,7 +220,7 @@ class Sleep:
         return found
 
     def _quiet(self, island: Island) -> bool:
-        """Whether no contact acts on the island and no loose block is near."""
+        """Whether no block of the island is loose, in contact, or near another one by contact."""
         return not self._onset.loose[island.rows].any() and (
             self._contacts is None or not self._contacts.busy()[island.rows].any()
         )

@@ -64,7 +64,7 @@ class Line:
 
 
 def benchmark(quick: bool, as_json: bool, only: str | None = None) -> ExitCode:
-    """Measure and tell; leaves with DIVERGED where a target is missed. only: one of GROUPS, None: all."""
+    """Measure and print; exits with DIVERGED if a target is missed. only: one of GROUPS, None: all."""
     if only is not None and only not in GROUPS:
         raise PartFailed(f"benchmark --only {only}: choose one of {', '.join(GROUPS)}")
     chosen = GROUPS if only is None else (only,)
@@ -139,7 +139,7 @@ SLACK = 1.3
 
 
 def _dead(sizes):
-    """Joints that died cost nothing: with all dead a substep costs what it does without any."""
+    """Failed joints: a substep with all joints failed should cost as much as one without joints."""
     m = _part("dead", AT)
     bare = 1e6 * m["without_joints"]
     for alive, cost in zip(m["alive"], m["cost"]):
@@ -156,7 +156,7 @@ def _dead(sizes):
 
 
 def _sleep(sizes):
-    """Buildings that nothing happens to: many of which one is hit, beside one alone that is."""
+    """Sleeping buildings: the cost of many, of which one is hit, compared with that of one alone that is hit."""
     one, many = _part("town", 1), _part("town", HOUSES)
     if one["broken"] != many["broken"]:
         raise PartFailed(
@@ -267,7 +267,7 @@ def _threads(sizes):
 
 
 def _roofline(sizes):
-    """Kernels of the water: what they move at least, and how fast that is beside a triad."""
+    """Kernels of the water: the least memory that they move, and the rate compared with that of a triad."""
     for nodes in THREADS_QUICK if sizes == QUICK_SIZES else WATER_NODES[-1:]:
         found = _part("roofline", nodes)
         n, best, share = found["nodes"], found["bandwidth"], 1e6 * 1e5 / found["cells"]

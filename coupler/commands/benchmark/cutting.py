@@ -89,7 +89,7 @@ def cut(mesh, bodies, cell, body):
 
 
 def cut_cells(cuts) -> int:
-    """How many cells lost something and kept something."""
+    """Number of cells of which a part was removed and a part is left."""
     return len(np.unique(cuts.part_cell[~cuts.part_whole]))
 
 

@@ -20,7 +20,7 @@ from yade_scripts.stock.script import stock_law, stock_names
 def compare(
     case: Path, laws: str, overrides: Iterable[str], output: Path | None, substeps: str, records: int
 ) -> ExitCode:
-    """Compare laws on a case and say where the results are. Raises BadCase, and what the runs raise."""
+    """Compare laws on a case and print where the results are. Raises BadCase, and the errors of the runs."""
     plan = make_plan(case, overrides, _words(laws), _multiples(substeps), records)
     stamp = f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}"
     with RunDirectory.create(
@@ -36,7 +36,7 @@ def compare(
 
 
 def show_laws() -> ExitCode:
-    """Print all laws, the stock ones with what they do not match."""
+    """Print all laws, with the properties that the stock laws do not match."""
     for name in own_laws.names():
         print(f"{name}: ours; as joints.law in a case too")
     for name in stock_names():

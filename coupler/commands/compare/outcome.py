@@ -59,7 +59,7 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Exact:
-    """What the case promises for its own law; value and where it comes from."""
+    """An exact result that the case states for its own law: value and source."""
 
     value: float
     source: str

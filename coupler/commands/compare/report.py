@@ -120,7 +120,7 @@ MEANINGLESS = 1e3
 
 
 def _cell(value, form: str) -> str:
-    """A cell of the table; a dash for errors that say nothing."""
+    """A cell of the table; a dash for errors that are not defined."""
     if form.endswith("%}") and not abs(value) < MEANINGLESS:
         return "-"
     return form.format(value)

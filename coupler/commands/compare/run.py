@@ -1,4 +1,4 @@
-"""Runs all laws of a plan, each in a process of its own, and keeps the files that they write."""
+"""Runs all laws of a plan, each in a separate process, and keeps the files that they write."""
 
 from __future__ import annotations
 

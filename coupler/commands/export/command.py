@@ -15,7 +15,7 @@ FORMATS = ("vtk", "netcdf", "gltf")
 
 
 class CannotExport(SurgebreakError):
-    """There is nothing to export, or not in that way."""
+    """The run holds nothing to export, or nothing that this format can hold."""
 
     exit_code = ExitCode.BAD_CASE
 
@@ -47,7 +47,7 @@ def _writer(name: str, run: Path, to: Path, title: str, chosen: Callable[[float]
 
 
 def _reported(name: str, made: Iterable[Path], folder: Path, tell) -> None:
-    """Carry out, and tell how many files, how large, how long."""
+    """Export, and print the number and size of the files and the time taken."""
     start, written = clock.process_time(), []
     try:
         written.extend(made)

@@ -25,7 +25,7 @@ UNITS = {"bed": "m", "depth": "m", "speed": "m s-1", "flux": "m3 s-2", "arrival"
 
 
 def write_netcdf(run: Path, to: Path, title: str) -> Iterator[Path]:
-    """One file for each table of `history/`, and `maps.nc` where there are maps."""
+    """Write one file for each table of `history/`, and `maps.nc` if the run has maps."""
     for source in sorted((run / "history").glob("*.csv")):
         table = read_history(source)
         if len(table["time"]):

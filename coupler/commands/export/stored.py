@@ -36,7 +36,7 @@ class Stored:
 
 
 def stored(path: Path) -> Stored:
-    """What a file holds so far."""
+    """The steps that a file holds so far."""
     with vtkhdf.opened(path, "r") as file:
         faces = "Polygons" in file["VTKHDF"]
         origin = np.array(file["scene"].attrs["origin"])

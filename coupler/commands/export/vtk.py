@@ -20,7 +20,7 @@ Array = np.ndarray
 
 
 def write_vtk(run: Path, to: Path, chosen: Callable[[float], bool]) -> Iterator[Path]:
-    """The files of a run, one after the other, as they are done. chosen: whether a time [s] is wanted."""
+    """Write the files of a run and yield each one when it is complete. chosen: whether a time [s] is wanted."""
     for name, kind in (("water", "fields.vtkhdf"), ("blocks", "blocks.vtkhdf")):
         if (run / kind).exists():
             yield from _series(to, name, stored(run / kind), chosen)
@@ -45,7 +45,7 @@ def _series(to: Path, name: str, series: Stored, chosen: Callable[[float], bool]
 
 
 def _collection(made: list[tuple[float, str]]) -> str:
-    """What a .pvd says: a file for each time."""
+    """The text of a .pvd file: one file for each time."""
     files = "\n".join(
         f'    <DataSet timestep="{time!r}" group="" part="0" file="{name}"/>' for time, name in made
     )
@@ -67,7 +67,7 @@ def _write_step(path: Path, series: Stored, k: int) -> None:
 
 
 def _solids(source: Path, path: Path) -> Iterator[Path]:
-    """What never moves, once; nothing of a tank without solids."""
+    """Write the fixed solids once; nothing for a tank without solids."""
     import meshio
 
     with vtkhdf.opened(source, "r") as file:

@@ -71,7 +71,7 @@ def _point(place) -> str:
 
 
 def _arrays(found: Offshore, case, name: str) -> dict:
-    """What the process of ANUGA is given; its coordinates begin at the lower corner of the sea."""
+    """Arrays for the process of ANUGA, whose coordinates begin at the lower corner of the sea."""
     sea = found.sea
     size = np.subtract(sea.upper, sea.lower)
     count = np.maximum(1, np.rint(size / sea.cell)).astype(int)

@@ -58,7 +58,7 @@ class Hump(Section):
 
 
 class Uplift(Section):
-    """Water that stands at the start by what a map says higher than the still water, at rest: the displacement of the
+    """Water at rest whose level at the start lies above still water by the heights of a map: the displacement of the
     bed by an earthquake, from any program."""
 
     kind: Literal["uplift"] = Field(description="a map of the displacement")
@@ -120,7 +120,7 @@ def _unknown(item: dict) -> str:
 
 
 def _placed(found: Offshore, directory: Path) -> tuple[Offshore, list[tuple[KeyPath, str]]]:
-    """Paths as they are meant from the directory of the file, and those that lead nowhere."""
+    """Paths resolved from the directory of the file, and those that do not exist."""
     wrong: list[tuple[KeyPath, str]] = []
 
     def placed(section, key: str, place: KeyPath):
@@ -142,7 +142,7 @@ def _placed(found: Offshore, directory: Path) -> tuple[Offshore, list[tuple[KeyP
 
 
 def _mistakes(found: Offshore):
-    """What a schema cannot see."""
+    """Faults that a schema cannot express."""
     sea = found.sea
     if any(low >= high for low, high in zip(sea.lower, sea.upper)):
         yield ("sea", "upper"), "must lie above sea.lower in x and y"

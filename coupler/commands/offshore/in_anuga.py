@@ -59,7 +59,7 @@ def main(source: str, out: str) -> None:
 
 
 def _stage(bed, level: float, moved):
-    """Surface z (n,) [m] at the start: what is moved is water, not dry land."""
+    """Surface z (n,) [m] at the start; the uplift moves water only and no dry land."""
     return np.where(bed < level, np.maximum(level + moved, bed), bed)
 
 

@@ -37,7 +37,7 @@ def report(place: Path, with_pictures: bool = True) -> Path:
 
 
 def _what_it_is(place: Path) -> str:
-    """Of what is neither a run nor a study: what is to be named instead."""
+    """A message for a path that is neither a run nor a study: what to name instead."""
     if place.name in ("run.json", "study.json", NAME) and place.is_file():
         return f"a file of a run or a study; name its directory, {place.parent}"
     if (place / "run.json").exists():

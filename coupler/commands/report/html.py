@@ -28,7 +28,7 @@ def document(title: str, parts: Iterable[str]) -> str:
 
 
 def section(title: str, *parts: str) -> str:
-    """A heading and what stands under it; nothing at all without content."""
+    """A heading with its content; empty if there is no content."""
     content = "\n".join(part for part in parts if part)
     return f"<section>\n<h2>{escape(title)}</h2>\n{content}\n</section>" if content else ""
 
@@ -75,7 +75,7 @@ def _cell(content: object) -> str:
 
 
 def facts(rows: Iterable[tuple[str, str]]) -> str:
-    """Names and what they are, without empty ones."""
+    """A list of names and values, without empty values."""
     found = "\n".join(f"<dt>{escape(name)}</dt><dd>{escape(value)}</dd>" for name, value in rows if value)
     return f'<dl class="facts">\n{found}\n</dl>'
 
@@ -86,7 +86,7 @@ def preformatted(text: str) -> str:
 
 
 def figure(path: Path, caption: str, wide: bool = True) -> str:
-    """A picture inside the page; of a figure that is there as SVG and PNG, the smaller of the two."""
+    """A picture embedded in the page; of a figure that exists as SVG and PNG, the smaller file is used."""
     svg = path.with_name(f"{path.stem}.svg")
     if path.suffix == ".png" and svg.exists() and svg.stat().st_size < path.stat().st_size:
         path = svg

@@ -19,7 +19,7 @@ MARKS = (
 
 
 def to_html(text: str, folder: Path) -> str:
-    """The page; figures come from folder, those that are not there are named instead."""
+    """The page as HTML; figures are read from `folder`, and missing ones are replaced by their names."""
     return "\n".join(_block(block.strip(), folder) for block in re.split(r"\n\s*\n", text) if block.strip())
 
 

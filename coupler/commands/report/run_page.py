@@ -106,14 +106,14 @@ def _verdict(run: Path, summary: dict) -> str:
 
 
 def _doubts(summary: dict) -> str:
-    """What makes the loads of this run wrong, on the first screen; of a run without any, nothing."""
+    """Reasons to doubt the loads of this run, for the first screen; empty if there are none."""
     return "".join(
         f'<p class="verdict bad">{escape(line)}</p>' for line in summary["figures"].get("doubts", [])
     )
 
 
 def _notes(summary: dict) -> str:
-    """What the run told of its case before it began."""
+    """The notes on the case that the run printed before it began."""
     found = summary["figures"].get("notes", [])
     return f"<ul>{''.join(f'<li>{escape(line)}</li>' for line in found)}</ul>" if found else ""
 
@@ -158,13 +158,13 @@ def _moment(text: str) -> str:
 
 
 def _again(again: dict) -> str:
-    """When and from where a run went on, and what was changed."""
+    """When and from where the run was resumed, and what was changed."""
     changed = f"; {', '.join(again['changed'])}" if again.get("changed") else ""
     return f"{_moment(again['at'])}, from the checkpoint at t = {quantity(again['time'], 's')}{changed}"
 
 
 def _times(summary: dict) -> list[tuple[str, str]]:
-    """What a run took, all its parts together; of one that has not ended only its files know until when."""
+    """Total time of all parts of a run; empty for one that has not ended, since its summary has no times yet."""
     if summary["ended"] is None:
         return []
     times = (("wall time", "wall_seconds"), ("processor time", "cpu_seconds"))
@@ -225,7 +225,7 @@ def plots(run: Path, pictures: Path) -> list[Path]:
 
 
 def _leaves(pictures: Path, stem: str) -> list[Path]:
-    """The figure of a table, and those on which it goes on: gauges.png, gauges_2.png."""
+    """The figure of a table and its continuations: gauges.png, gauges_2.png, ..."""
     more = sorted(p for p in pictures.glob(f"{stem}_*.png") if p.stem.removeprefix(f"{stem}_").isdigit())
     return [p for p in (pictures / f"{stem}.png", *more) if p.exists()]
 

@@ -65,7 +65,7 @@ def _book(title: str, found: History, unit: str) -> str:
 
 
 def _ends(values: np.ndarray, largest: float) -> list[float]:
-    """First, last and change; 0 for what is round-off beside the largest of the balance."""
+    """First value, last value and change; 0 for round-off compared with the largest term of the balance."""
     return [_no_noise(v, largest) for v in (values[0], values[-1], values[-1] - values[0])]
 
 

@@ -16,7 +16,7 @@ from coupler.program.provenance import ROOT
 
 
 class NoPages(SurgebreakError):
-    """There is nothing to build a site from, or building it failed."""
+    """There are no pages to build a site from, or building it failed."""
 
 
 def docs(folder: Path | None) -> ExitCode:
@@ -64,12 +64,12 @@ def _show(place: Path) -> None:
 
 
 class _Quiet(SimpleHTTPRequestHandler):
-    """Tells nothing of what is fetched."""
+    """A request handler that does not print requests."""
 
     def log_message(self, *_: object) -> None:
         return None
 
 
 def _is_site(folder: Path) -> bool:
-    """Whether what is there may be replaced: nothing, or a site."""
+    """Whether the target may be replaced: it does not exist, or it is a site."""
     return folder.is_dir() and (not any(folder.iterdir()) or (folder / "sitemap.xml").exists())

@@ -25,7 +25,7 @@ PROJECT = {
 
 
 def on_config(config: Any) -> Any:
-    """Pages of docs/ that mkdocs.yml does not place are ways to do something."""
+    """Add the pages of docs/ that mkdocs.yml does not name to the how-to section."""
     placed = str(config["nav"])
     rest = [page.name for page in sorted((ROOT / "docs").glob("*.md")) if page.name not in placed]
     for section in config["nav"]:
@@ -114,7 +114,7 @@ def _spaced(markdown: str) -> str:
 
 
 def _kind(line: str) -> str:
-    """What a line begins or belongs to; what is indented goes on with an item."""
+    """Kind of block that a line begins or belongs to; indented lines continue an item."""
     if re.match(r"([-*]|\d+\.) ", line):
         return "list"
     if line.startswith("|"):
@@ -123,7 +123,7 @@ def _kind(line: str) -> str:
 
 
 def _case(folder: Path) -> str:
-    """The page of a case: its README, then the case as it is written."""
+    """The page of a case: its README, followed by the case file."""
     text = (folder / "README.md").read_text(encoding="utf-8").replace("](../../docs/", "](../")
     case = (folder / "case.toml").read_text(encoding="utf-8")
     return f"{text}\n## case.toml\n\n`cases/{folder.name}/case.toml`\n\n```toml\n{case}```\n"

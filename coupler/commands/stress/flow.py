@@ -60,7 +60,7 @@ class Flow:
         return record
 
     def measures(self, what: str = "", energy: float | None = ENERGY) -> Iterator[Measure]:
-        """Energy and volume, and what is reported of the passes."""
+        """Measures of energy, volume and passes."""
         after = f", {what}" if what else ""
         yield Measure(f"error of the energy{after}", self.energy, energy)
         yield Measure(f"error of the volume{after}", self.volume, VOLUME)

@@ -22,7 +22,7 @@ def is_refusal(error: Exception) -> bool:
 
 
 def outcome(scene: Scene, keep=lambda measure: None) -> Outcome:
-    """Run a scene; errors that are not ours go on to the caller."""
+    """Run a scene and return its outcome; unexpected exceptions are passed on to the caller."""
     cpu, wall, measures, refused = time.process_time(), time.perf_counter(), [], ""
     try:
         for measure in scene.run():

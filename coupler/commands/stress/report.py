@@ -30,7 +30,7 @@ def stress(words: list[str], quick: bool, as_json: bool, only_list: bool) -> Exi
 
 
 def shown(outcome: Outcome) -> str:
-    """A row for the scene, one below it for each measure, and what was printed."""
+    """A row for the scene, one below it for each measure, and the output."""
     o = outcome
     verdict = o.verdict if o.verdict != "failed" else "FAILED"
     head = FORM.format(o.id, o.group, o.title, verdict, f"{o.cpu_s:.1f}", f"{o.wall_s:.1f}")

@@ -30,7 +30,7 @@ def chosen(ids: list[str], quick: bool) -> list[Scene]:
 
 
 def run(scene: Scene) -> Outcome:
-    """The outcome of a scene from its own process; a process that breaks off is a failure with what it said."""
+    """The outcome of a scene from its own process; a process that crashes is a failure, with its output."""
     began = time.perf_counter()
     rows, wrong = rows_of_module("coupler.commands.stress.one", scene.id, TIME_LIMIT[scene.cost])
     measures = [Measure(**row["measure"]) for row in rows if "measure" in row]

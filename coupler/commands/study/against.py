@@ -31,7 +31,7 @@ class Worse:
 
 
 def compare(first: Path, second: Path, error: float, cpu: float) -> ExitCode:
-    """Tell what got worse; leaves with DIVERGED if anything did. Raises BadCase for studies that do not compare."""
+    """Print what got worse; exits with DIVERGED if anything did. Raises BadCase for studies that do not compare."""
     before, now = read_study(first), read_study(second)
     refuse(before, now)
     if before["machine"]["processor"] != now["machine"]["processor"]:

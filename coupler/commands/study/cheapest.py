@@ -67,7 +67,7 @@ def _error(found: dict[str, Outcome], name: str, rung: Rung) -> float:
 
 @dataclass(frozen=True)
 class Part:
-    """What a part of the program costs: CPU seconds and memory [bytes] of the case less those without it.
+    """Cost of a part of the program: CPU seconds and memory [bytes] of the case less those without it.
 
     reason: why there is no such number, when a run failed."""
 

@@ -23,7 +23,7 @@ def study(
     larger: bool,
     any_version: bool,
 ) -> ExitCode:
-    """Make the study of a case in its directory and tell its tables; leaves with DIVERGED if a run failed.
+    """Make the study of a case in its directory and print its tables; exits with DIVERGED if a run failed.
 
     Runs that are done stay: a study that was stopped (STOPPED) goes on, larger rungs are added to it. Raises BadCase.
     """

@@ -1,4 +1,4 @@
-"""Runs the settings of a study one after the other, each in a process of its own, and measures their cost.
+"""Runs the settings of a study one after the other, each in a separate process, and measures their cost.
 
     runs/ID-K/        run directory of the K-th run of a setting          runs/ID-K.json   its cost
 
@@ -37,7 +37,7 @@ ENDED = (ExitCode.DONE, ExitCode.BAD_CASE, ExitCode.DIVERGED, ExitCode.STOPPED)
 
 @dataclass(frozen=True)
 class Cost:
-    """What a process took: CPU seconds (user + system), wall seconds, peak resident memory [bytes]; its exit code."""
+    """Cost of a process: CPU seconds (user + system), wall seconds, peak resident memory [bytes]; its exit code."""
 
     cpu_seconds: float
     wall_seconds: float
@@ -99,7 +99,7 @@ class Runs:
         return self.folder / f"{setting}-{number}"
 
     def measured(self, setting: Setting, number: int) -> Measured:
-        """The run, made now unless it is there already."""
+        """The run, which is made now unless it exists already."""
         known = self.known(setting, number)
         if known is not None:
             return known
@@ -147,7 +147,7 @@ class Runs:
         return FirstStep(**json.loads(path.read_text(encoding="utf-8"))) if path.exists() else None
 
     def _process(self, overrides: tuple[str, ...], place: Path) -> tuple[Cost, float]:
-        """Run the case into a directory; what it cost, and the CPU seconds in the compiler."""
+        """Run the case into a directory; returns its cost, and the CPU seconds in the compiler."""
         compiled = place.with_suffix(".compiled")
         compiled.unlink(missing_ok=True)
         sets = [word for override in overrides for word in ("--set", override)]
@@ -177,12 +177,12 @@ class Runs:
 
 
 def log_of(place: Path) -> Path:
-    """What the process of a run printed."""
+    """Path of the file with the output of the process of a run."""
     return place.with_suffix(".log")
 
 
 def measure(command: list[str], log: Path) -> Cost:
-    """Run a process to its end, what it tells into a file."""
+    """Run a process to its end with its output in a file, and measure its cost."""
     began = time.perf_counter()
     with log.open("w", encoding="utf-8") as stream:
         child = subprocess.Popen(command, stdout=stream, stderr=subprocess.STDOUT, env=environment())

@@ -41,8 +41,8 @@ SHOWN = 12
 
 @dataclass(frozen=True)
 class Wish:
-    """What the command line asks for. options: KEY=VALUE for the engine; chunk: runs that a cluster job makes one after
-    the other."""
+    """The request of the command line. options: KEY=VALUE for the engine; chunk: runs that a cluster job makes one
+    after the other."""
 
     vary: tuple[str, ...] = ()
     set: tuple[str, ...] = ()
@@ -122,7 +122,7 @@ def _alone(folder: Path) -> Iterator[None]:
 
 
 def _make(spec: Spec, wish: Wish) -> bool:
-    """Make what is to be made; whether it was stopped before all was."""
+    """Make the missing runs; returns whether this was stopped before the end."""
     ids = _to_make(spec, wish.any_version)
     rows = len(spec.rows)
     print(f"{rows} rows, {len(spec.runs)} runs, {len(ids)} to make; results in {spec.folder}", flush=True)
@@ -172,7 +172,7 @@ def _to_make(spec: Spec, any_version: bool) -> list[str]:
 
 
 class _Progress:
-    """Tells of every run that ended, and how long the rest may take."""
+    """Prints every run that has ended, and an estimate of the time left."""
 
     def __init__(self, spec: Spec, total: int):
         self.total, self.count, self.began = total, 0, time.monotonic()

@@ -81,7 +81,7 @@ class Dask:
         self.logs = spec.folder / "jobs"
 
     def make(self, ids: Iterable[str], tell: Callable[[dict], None]) -> None:
-        """Make the runs and tell how each ended."""
+        """Make the runs and report how each ended."""
         from distributed import Client, wait
 
         os.environ.update(environment())

@@ -1,4 +1,4 @@
-"""A body with plane faces cut along planes into convex parts, none of it lost.
+"""Cuts a body with plane faces along planes into convex parts that fill it exactly.
 
 A body is convex where it has no reflex edge, one whose faces turn outwards. A plane through such an edge, along one of
 its two faces, ends it there; the body falls apart where the plane cuts it through. Of all these planes that is taken
@@ -149,7 +149,7 @@ def _cut(
 
 
 def fallen_apart(body) -> list:
-    """The pieces of a body that hang together each; one with a cavity stays as it is until a cut opens that."""
+    """The connected pieces of a body; a piece with a cavity is kept as it is until a cut opens the cavity."""
     pieces = body.decompose()
     return [body] if any(piece.volume() < 0.0 for piece in pieces) else pieces
 

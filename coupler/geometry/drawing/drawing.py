@@ -32,7 +32,7 @@ GROUP = re.compile("[a-z]+")
 
 @dataclass(frozen=True)
 class Cut:
-    """What a drawing was cut into: blocks · extent (3,) [m] and volume [m³] drawn · layers: volume and number of blocks
+    """Result of cutting a drawing: blocks · extent (3,) [m] and volume [m³] drawn · layers: volume and number of blocks
     by name · slivers: places (3,) [m] of the narrow parts that no neighbour could take, with their width [m]"""
 
     blocks: tuple[Block, ...]
@@ -48,7 +48,7 @@ def blocks_from_drawing(spec, **common) -> list[Block]:
 
 
 def cut_drawing(spec, **common) -> Cut:
-    """The same, with what is to be reported of it."""
+    """The blocks of a drawing, with figures to report."""
     path = Path(spec.path)
     layers, tolerance = read_layers(path, spec.scale, spec.offset, spec.up, spec.weld)
     _check_layers(path, spec, layers)
@@ -187,7 +187,7 @@ def _blocks(path: Path, spec, pieces, rules: dict, tolerance: float, common: dic
 
 
 def _of_layer(rule, common: dict) -> dict:
-    """What a layer says for its blocks."""
+    """Settings that a layer makes for its blocks."""
     if rule is None:
         return {}
     given_values = {"material": rule.material, "density": rule.density}
@@ -199,7 +199,7 @@ def _of_layer(rule, common: dict) -> dict:
 def _check_volume(
     path: Path, blocks: list[Block], whole: float, tolerance: float, layers: list[Layer]
 ) -> None:
-    """No block is lost or twice: to round-off, or to what the digits of the file leave open."""
+    """Check that the blocks fill the drawn volume once, to round-off or to the digits of the file."""
     found = sum(block.volume for block in blocks)
     allowed = SAME_VOLUME * whole + tolerance * sum(layer.body.surface_area() for layer in layers)
     if abs(found - whole) > allowed:

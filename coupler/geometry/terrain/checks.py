@@ -16,7 +16,7 @@ FINE = 200
 
 
 def terrain_problems(case, ground: HeightMap) -> Iterator[Problem]:
-    """What is wrong with the ground below the box of a tank; case: with a tank that has lower, upper and cell."""
+    """The faults of the ground below the box of a tank; case: with a tank that has lower, upper and cell."""
     lower, upper = case.tank.lower, case.tank.upper
     if any(low >= high for low, high in zip(lower, upper)):
         return  # reported with the tank

@@ -12,7 +12,7 @@ Array = np.ndarray
 
 
 class TerrainError(SurgebreakError):
-    """A terrain that cannot be used; the message names the file, what is wrong with it, and the remedy."""
+    """A terrain that cannot be used; the message names the file, its fault, and the remedy."""
 
     exit_code = ExitCode.BAD_CASE
 

@@ -1,4 +1,4 @@
-"""Heights on a raster, placed in the coordinates of the tank: what the bed of the water and the houses stand on.
+"""Heights on a raster in the coordinates of the tank: the ground of the water and of the houses.
 
     (x, y) = origin + R(turn) [(X, Y) - pivot]          X, Y: coordinates of the file [m], z: heights after the datum
 

@@ -1,4 +1,4 @@
-"""GeoTIFF and other rasters of GDAL, and changes of the coordinate system: by rasterio, in a process of its own.
+"""GeoTIFF and other rasters of GDAL, and changes of the coordinate system: by rasterio, in a separate process.
 
 rasterio ends a process that has held YADE, so this module is also a program:
 

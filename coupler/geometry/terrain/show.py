@@ -1,4 +1,4 @@
-"""`surgebreak terrain`: what a terrain file holds, how steep it is, and what cells of a size make of it."""
+"""`surgebreak terrain`: the content of a terrain file, its slopes, and its resolution by cells of a given size."""
 
 from __future__ import annotations
 

@@ -73,7 +73,7 @@ def stress_drawn(
 
 
 def _shown(found: Outcome) -> str:
-    """The whole outcome of a failure, else its row and what was printed."""
+    """The whole outcome of a failure; otherwise its row and the output."""
     if found.verdict == "failed":
         return shown(found)
     return shown(

@@ -54,5 +54,5 @@ class Dice:
 
 
 def rounded(value: float, digits: int = DIGITS) -> float:
-    """A number of so many significant digits."""
+    """A number rounded to that many significant digits."""
     return float(f"{value:.{digits}g}")

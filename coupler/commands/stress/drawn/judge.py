@@ -53,7 +53,8 @@ def measures(directory: Path, still: bool) -> Iterator[Measure]:
 
 
 def _finite(tables: dict, case: Case) -> Iterator[Measure]:
-    """Numbers in all histories that are none; where there is no pocket of air, its gauge has an empty cell."""
+    """The number of values in all histories that are not finite; cells of a gauge without an air pocket may be
+    empty."""
     air = [gauge.name for gauge in case.gauge if gauge.kind == "air"]
     empty = {f"{name}_{what}" for name in air for what in ("pressure", "volume")}
     wrong = sum(

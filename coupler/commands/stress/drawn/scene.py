@@ -281,7 +281,7 @@ def _velocities(dice: Dice, tables: dict, speed: float) -> None:
 
 
 def _gauges(dice: Dice, place: Basin, flow, found: Bodies, tables: dict) -> list[dict]:
-    """A few of every kind that has something to measure."""
+    """A few gauges of each kind that applies to the scene."""
     gauges: list[dict] = []
     moving = [name for name, _ in found.singles]
     bodies = [*found.groups, *(s["name"] for s in found.solids)]
@@ -312,7 +312,7 @@ def _gauges(dice: Dice, place: Basin, flow, found: Bodies, tables: dict) -> list
 
 
 def _title(place: Basin, flow: Stream | None, found: Bodies) -> str:
-    """What is in it, in a line."""
+    """A title that lists the content of the scene."""
     parts = []
     if flow is not None:
         bed = (

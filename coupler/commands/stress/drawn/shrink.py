@@ -54,7 +54,7 @@ def _smaller(table: dict) -> Iterator[dict]:
 
 
 def _parts(table: dict, path: tuple) -> Iterator[tuple]:
-    """Paths of what may be left out; what is needed is refused by the case, and so does not fail in the same way."""
+    """Paths of keys to leave out on trial; a case without a necessary key is refused and so fails in another way."""
     inner: list[tuple] = []
     for name, value in table.items():
         if not path and name in SPARED:

@@ -1,4 +1,4 @@
-"""One random scene in a process of its own, run as a user would run it, and its verdict.
+"""One random scene, run in a separate process as a user would run it, and its verdict.
 
 passed: the run ended or used up its processor time, and its files keep all limits · refused: the case was not accepted,
 each message with file, line and key, or the run was refused because a random scene may ask too much · failed: any other
@@ -35,7 +35,7 @@ contact may take its stiffness from joints of such a strength."""
 
 @dataclass(frozen=True)
 class Trial:
-    """What came of one run: verdict, what was printed, figures, processor and wall seconds, time reached [s]."""
+    """Result of one run: verdict, what was printed, figures, processor and wall seconds, time reached [s]."""
 
     verdict: Verdict
     message: str

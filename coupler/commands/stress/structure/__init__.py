@@ -1,1 +1,1 @@
-"""Dry scenes: joints and contacts of rigid blocks at the ends of what they may be."""
+"""Dry scenes: joints and contacts of rigid blocks with extreme parameters."""

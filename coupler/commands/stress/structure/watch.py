@@ -17,7 +17,7 @@ GAIN, BALANCE = 1e-3, 0.005
 
 
 class Watch:
-    """Moves a structure on and keeps what its energy did. scale [J]: the energy in play
+    """Advances a structure and records the history of its energy. scale [J]: a typical energy
 
     gain: largest energy above that of the start, less what was put in · drift: largest error of the account [J]
     fastest_opening: largest growth of λ/δ_f in a substep.

@@ -16,7 +16,7 @@ from coupler.program.errors import BadCase
 
 
 def wave_speed(depth: float) -> float:
-    """sqrt(g h) [m/s]: what a speed at rest is measured by."""
+    """sqrt(g h) [m/s]: the scale for speeds in still water."""
     return float(np.sqrt(G * depth))
 
 
