@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from array_types import Array
+from fluid.cut.parts_of_cell import root as find
 from fluid.domain.moments import wet_fraction
 from kernel_decorators import inner, kernel
 
@@ -63,21 +64,13 @@ def _components(dry, covered, cells):
                     _join(root, first, i)
                     given[i] = True
     for i in range(root.shape[0]):
-        root[i] = _root_of(root, i)
+        root[i] = find(root, i)
     return root
 
 
 @inner
-def _root_of(root, i):
-    while root[i] != i:
-        root[i] = root[root[i]]
-        i = root[i]
-    return i
-
-
-@inner
 def _join(root, i, j):
-    a, b = _root_of(root, i), _root_of(root, j)
+    a, b = find(root, i), find(root, j)
     if a < b:
         root[b] = a
     else:
