@@ -325,12 +325,15 @@ class CoupledStepper:
                 break
             if self._joints_broken() > whole:
                 breaking = found, assumed, record.defect
-            after = self._padded(report.mean_velocity) + lead
-            corrected = corrected_free_velocity(response, after, found.x, problem.coupling)
+            moved = self._padded(report.mean_velocity)
             if record.defect > TO_AND_FRO * last_defect:
                 most = self.passes + HALF_WAY
-                corrected = 0.5 * (v_free + corrected)
-            v_free, last_defect = corrected, record.defect
+                moved = 0.5 * (found.velocity - lead + moved)
+            last_defect = record.defect
+            if record.passes < most:
+                response = self._answer(mass, problem.dt, before, afloat)
+                after = moved + response.lead(moved + lead, before, report.dt_s)
+                v_free = corrected_free_velocity(response, after, found.x, problem.coupling)
         assert found is not None  # there is one pass at least
         if record.passes > self.passes and breaking is not None and self._joints_broken() == whole:
             found, assumed, record.defect = breaking
@@ -361,25 +364,33 @@ class CoupledStepper:
         self, problem: PressureProblem, afloat: Array | None
     ) -> tuple[sp.csr_array, StructureResponse, Array]:
         """Mass of the blocks, the answer of all bodies to forces, and V_free of the first pass."""
-        from coupler.step.pressure_with_structure import StructureResponse, mass_matrix, water_load
+        from coupler.step.pressure_with_structure import mass_matrix, water_load
 
         structure = self.structure
         mass = mass_matrix(structure.mass, structure.inertia())
         velocity = self._padded(structure.velocity())
-        driven = np.append(structure.still, np.ones(self.immersion.n_solids, bool))
-        of_bodies, stiffness, damping = self._with_solids(mass, *structure.tangent())
-        response = StructureResponse(
-            mass=of_bodies,
-            stiffness=stiffness,
-            damping=damping,
-            dt=problem.dt,
-            driven=driven,
-            driven_velocity=velocity,
-            afloat=afloat,
-        )
+        response = self._answer(mass, problem.dt, velocity, afloat)
         known = water_load(problem, 0.0)
         force = structure.weight_now() + structure.internal_force()
         return mass, response, response.free_velocity(velocity, self._padded(force) + known)
+
+    def _answer(
+        self, mass: sp.csr_array, dt: float, driven_velocity: Array, afloat: Array | None
+    ) -> StructureResponse:
+        """The answer of all bodies to forces, with the springs of the joints and contacts that exist now."""
+        from coupler.step.pressure_with_structure import StructureResponse
+
+        structure = self.structure
+        of_bodies, stiffness, damping = self._with_solids(mass, *structure.tangent())
+        return StructureResponse(
+            mass=of_bodies,
+            stiffness=stiffness,
+            damping=damping,
+            dt=dt,
+            driven=np.append(structure.still, np.ones(self.immersion.n_solids, bool)),
+            driven_velocity=driven_velocity,
+            afloat=afloat,
+        )
 
     def _afloat(self, problem: PressureProblem) -> tuple[PressureProblem, Array | None]:
         """The problem with the bodies at their present positions instead of those where the cells were cut, and the

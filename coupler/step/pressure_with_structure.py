@@ -31,7 +31,8 @@ V is the velocity at the end of the step.  Over the step the blocks move with th
 (dt_s: substep; the load acts from the first one on).  Stiff joints and contacts, for which D⁻¹ is small,
 oscillate within a step, so that only their mean velocity matters.  A second pass replaces the estimate (2) by the
 motion of the discrete elements under the first load x₁, with the mean velocity W over the step:  V_free = W + L + D⁻¹
-Gᵀ x₁."""
+Gᵀ x₁.  D and L are then those of the joints and contacts at the end of the first pass: a block that the water presses
+to the floor is held by contacts that begin within the step."""
 
 from __future__ import annotations
 

@@ -84,6 +84,18 @@ def test_stacked_blocks_each_get_the_pressure_between_them(scene, uplift, share)
     assert load == pytest.approx(expected, abs=3e-4 * pressure[0])
 
 
+def test_a_light_block_that_the_water_presses_to_the_bed_is_held_in_the_first_step(scene):
+    """Sealed below, of a thirtieth of the density of water: its contact begins within the step. While the second pass
+    answered as a free block, the water above it fell with it (defect 1, 7 % of the energy and more out of balance)."""
+    coupling = scene([block(density=30.0)], {"uplift": "none"})
+    record = coupling.step(0.01)
+    assert record.retries == 0
+    assert record.passes == 2
+    assert record.defect < 1e-3
+    assert record.load[0, 2] == pytest.approx(-RHO * G * (DEPTH - HEIGHT) * AREA, rel=1e-3)
+    assert coupling.water.fastest() < 1e-3
+
+
 def test_a_block_lighter_than_water_leaves_the_bed_at_once(scene):
     """It rises as it would elsewhere: slower than without any added mass, faster than with three times the water of its
     volume. A film with inertia would hold it there for a second."""
