@@ -246,6 +246,7 @@ def test_a_wall_that_breaks_before_it_moves_does_not_hold_because_it_would_move(
     monkeypatch.setattr(
         CoupledStepper, "_response", lambda *_: (sp.eye_array(6).tocsr(), response, np.zeros(6))
     )
+    monkeypatch.setattr(CoupledStepper, "_answer", lambda *_: response)
     monkeypatch.setattr(CoupledStepper, "_afloat", lambda self, problem: (problem, None))
     problem = SimpleNamespace(dt=dt, coupling=sp.csr_matrix(np.ones((1, 6))))
     record = StepRecord(time=0.0, dt=dt)
