@@ -323,10 +323,11 @@ class CoupledStepper:
             record.defect = defect(mass, assumed, report.mean_velocity, floor)
             if record.defect <= self.tolerance:
                 break
-            if self._joints_broken() > whole:
+            held = self._joints_broken() == whole
+            if not held:
                 breaking = found, assumed, record.defect
             moved = self._padded(report.mean_velocity)
-            if record.defect > TO_AND_FRO * last_defect:
+            if record.defect > TO_AND_FRO * last_defect or (held and breaking is not None):
                 most = self.passes + HALF_WAY
                 moved = 0.5 * (found.velocity - lead + moved)
             last_defect = record.defect
