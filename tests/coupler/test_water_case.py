@@ -617,7 +617,9 @@ def test_water_starts_below_the_heights_of_a_file(tmp_path):
     assert problems(found) == []
     coupling = build(found, no_clock).coupling
     assert coupling.water.volume() == pytest.approx(2.0 * 0.2 * 0.4, rel=2e-3)
-    assert forecast(found)["water"] == pytest.approx(2.0 * 0.2 * 0.4, rel=3e-3)  # summed over a raster of columns
+    assert forecast(found)["water"] == pytest.approx(
+        2.0 * 0.2 * 0.4, rel=3e-3
+    )  # summed over a raster of columns
 
 
 def test_a_slope_turns_the_surface_about_the_middle_of_its_box():
