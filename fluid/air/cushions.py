@@ -1,7 +1,8 @@
-"""The air of a step: pockets take part in the pressure solve, each with one unknown.
+"""The air in a step: each pocket takes part in the pressure solve with one unknown.
 
-All nodes of a pocket have its pressure, so their hats add up to one: N_k = Σ N_j over its nodes.  Tested with it, the
-mass balance of the water (`fluid.pressure.projection`) gives the rate [m³/s] at which water and bodies squeeze it,
+All nodes of a pocket have its pressure, so their hat functions add up to one function, N_k = Σ N_j over its nodes.
+Tested with it, the mass balance of the water (`fluid.pressure.projection`) gives the rate [m³/s] at which water and
+bodies compress it,
 
     R_k = ∫ u*·∇N_k dV + (G V)_k - (dt/ρ) Σ_i k_ij (X_k - x_i)/ϑ_ij,        G_k = Σ_j G_j,                    (1)
 
@@ -9,14 +10,14 @@ and its pressure over the step is that of its gas (`gas.py`), linear about the v
 
     X_k + known_k = P^n + θ_k dt S ((1-θ_k) R^n + θ_k R_k),        S = -dP/dV.                                (2)
 
-With C = 1/(θ_k² S dt) that is a row like all others, symmetric and positive, in which the pressure of the pocket enters
+With C = 1/(θ_k² S dt) this is a row like all others, symmetric and positive, in which the pressure of the pocket enters
 at the crossing of every edge to its nodes as zero does where the air is open:
 
     (C + Σ s) X_k - Σ s x_i = ∫ u*·∇N_k dV + (G V)_k + C (P^n - known_k) + R^n (1-θ_k)/θ_k,                (3)
 
-with s = (dt/ρ) k_ij/ϑ_ij.  So neither a stiff cushion nor a soft one limits the step, and a body feels a pocket as it
-feels water.  θ_k is 1/2, which keeps the energy of a cushion that the steps resolve; where R changed its sign from one
-step to the next it is 1 for a step, so that a cushion too stiff for that comes to rest.
+with s = (dt/ρ) k_ij/ϑ_ij.  So neither a stiff cushion nor a soft one limits the step, and a pocket loads a body in the
+same way as water does.  θ_k is 1/2, which keeps the energy of a cushion that the steps resolve; where R changed its
+sign from one step to the next it is 1 for a step, so that a cushion too stiff for that comes to rest.
 """
 
 from __future__ import annotations
@@ -39,14 +40,15 @@ RESOLVED, SETTLING = 0.5, 1.0
 
 @dataclass(frozen=True, kw_only=True)
 class Air:
-    """State of the pockets between two steps. K pockets, numbered as their labels.
+    """State of the K pockets between two steps, in the order of their labels.
 
     gas · label (N,) of the air at each node (`pockets.py`) · reference (K,) [m³] of the gas · rate (K,) [m³/s], R of
-    the last step · end_pressure (K,) [Pa] that goes with the acceleration at its end · mean_pressure (K,) [Pa] over
-    it · turned (K,) bool: R changed its sign, or there is none of a step before · name (K,): number for life, from 1 ·
-    names: how many were given · lost [J]: energy of air that got away or was mixed, or of bubbles that were let go, so
-    far · entrained [m³]: reference volume of pockets that opened within the water so far · gone: pockets that the water
-    filled so far · let_go: those that became too small (`Gas.smallest`) so far."""
+    the last step · end_pressure (K,) [Pa] that belongs to the acceleration at the end of that step · mean_pressure (K,)
+    [Pa] over the step · turned (K,) bool: R changed its sign, or no earlier step has one · name (K,): permanent number,
+    from 1 · names: how many have been given · lost [J]: energy so far of air that escaped or was mixed, or of bubbles
+    that were released · entrained [m³]: reference volume of pockets that opened within the water so far · gone: pockets
+    that the water has filled so far · let_go: pockets released so far because they became too small
+    (`Gas.smallest`)."""
 
     gas: Gas
     label: Array
@@ -91,18 +93,19 @@ class Air:
         return found - np.bincount(self.label[there] - 1, taken[there], minlength=len(self))[: len(self)]
 
     def carried(self, source, known) -> Air:
-        """The same air on new nodes; source (N,) old node of each, known (N,) bool: whether there is one."""
+        """The same air on new nodes; source (N,) is the old node of each, known (N,) bool tells whether there is
+        one."""
         return replace(self, label=np.where(known, self.label[source], -1))
 
     def at_pockets(self, nodal) -> Array:
-        """Values (K,) of the pockets from those at the nodes (N,), the same at all nodes of one."""
+        """Values (K,) of the pockets from nodal values (N,), which are equal at all nodes of a pocket."""
         out = np.zeros(len(self))
         there = np.flatnonzero(self.label > OPEN_AIR)
         out[self.label[there] - 1] = nodal[there]
         return out
 
     def nodal(self, values) -> Array:
-        """values (K,) at the nodes of their pockets, zero elsewhere, (N,)."""
+        """Nodal values (N,): values (K,) at the nodes of their pockets, zero elsewhere."""
         out = np.zeros(len(self.label))
         there = self.label > OPEN_AIR
         out[there] = values[self.label[there] - 1]
@@ -111,9 +114,9 @@ class Air:
 
 @dataclass(frozen=True, kw_only=True)
 class Cushions:
-    """The pockets of a step; K of them.
+    """The K pockets of a step.
 
-    air: what they hold, with the labels of the new surface · pressure (K,) [Pa] P^n · stiffness (K,) [Pa/m³] S ·
+    air: their contents, with the labels of the new surface · pressure (K,) [Pa] P^n · stiffness (K,) [Pa/m³] S ·
     theta (K,) · known (K,) [Pa] part of the pressure that is not sought · links csr (n, K) s of (3) [m³/(s Pa)]."""
 
     air: Air
@@ -166,7 +169,7 @@ class Cushions:
         return len(self.pressure)
 
     def beside(self, graph, phi, dofs, theta: float, kick, scale: float) -> Cushions:
-        """With the links to the wet nodes dofs (n,), and what is known of the pressure.
+        """The cushions with their links to the wet nodes dofs (n,), and with the known part of the pressure.
 
         graph, phi: as in `pressure_matrix`, scale = dt/ρ · kick (N,): share of the last acceleration that is carried
         over, of which the pressure of the pocket is a part."""
@@ -184,7 +187,8 @@ class Cushions:
         return replace(self, known=known, links=links)
 
     def lowest(self, dt: float) -> float:
-        """Lowest pressure [Pa] of any air in the step, the open one included; what pockets lose in it counts twice."""
+        """Lowest pressure [Pa] of any air in the step, open air included; twice the predicted drop of a pocket is
+        allowed for."""
         ahead = self.pressure + 2.0 * self.stiffness * dt * np.minimum(self.air.rate, 0.0)
         return float(min(ahead.min(initial=0.0), 0.0))
 
@@ -232,7 +236,8 @@ class Cushions:
         )
 
     def sums(self, nodal):
-        """Σ over the nodes of each pocket of nodal (N,) or sparse (N, m): (K,) or csr (K, m)."""
+        """Sums over the nodes of each pocket of nodal values (N,) or of the rows of a sparse (N, m): (K,) or csr (K,
+        m)."""
         return self._summing @ nodal
 
     @property
@@ -242,7 +247,7 @@ class Cushions:
         return sp.csr_array((np.ones(len(there)), (label[there] - 1, there)), shape=(len(self), len(label)))
 
     def nodes(self) -> Array:
-        """A node (K,) of each pocket."""
+        """One node (K,) of each pocket."""
         label = self.air.label
         there = np.flatnonzero(label > OPEN_AIR)[::-1]
         node = np.zeros(len(self), np.int64)
@@ -262,7 +267,8 @@ def _handed_on(air: Air, before, topology, phi, label, count: int):
     """The Descent of the pockets labelled now (N,), their reference volumes and their volumes (K,) [m³] at the
     beginning of the step.
 
-    before (O,) [m³]: volumes of the old ones. What the water has just closed off has the pressure of the open air."""
+    before (O,) [m³]: volumes of the old ones. Air that the water has just closed off has the pressure of the open
+    air."""
     descent = Descent.of(air.label, len(air), label, count, topology.node_volume)
     reference = descent.share.T @ air.reference + descent.fresh
     volume = descent.share.T @ before + descent.fresh
@@ -273,12 +279,14 @@ def _handed_on(air: Air, before, topology, phi, label, count: int):
 
 
 def _of_parent(values, only):
-    """values (O,) of the old pocket of each new one, (K,); of the first where there is none."""
+    """Values (K,) for the new pockets, from values (O,) of the old pocket of each; those of the first where there is
+    none."""
     return values[only] if len(values) else np.zeros(len(only), values.dtype)
 
 
 def _names(air: Air, descent: Descent) -> tuple[Array, int]:
-    """Names (K,) of the pockets: that of the old one with most air in each unless it is taken, else a new one."""
+    """Names (K,) of the pockets: the name of the old pocket with most of the air in each, or a new one where that is
+    taken."""
     taken, names = set(), air.names
     name = np.zeros(descent.share.shape[1], np.int64)
     for k in range(len(name)):

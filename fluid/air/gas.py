@@ -1,7 +1,7 @@
-"""The gas in a pocket, and its way out through an orifice.
+"""The gas in a pocket, and its loss through an orifice.
 
-A pocket holds as much air as would fill the *reference volume* V_a at the pressure p_a of the atmosphere.  Squeezed
-without exchange of heat (or, with γ = 1, at one temperature) to V it has the gauge pressure
+A pocket holds as much air as would fill the *reference volume* V_a at the pressure p_a of the atmosphere.  Compressed
+to V without exchange of heat (or, with γ = 1, at constant temperature) it has the gauge pressure
 
     P = p_a ((V_a/V)^γ - 1),        -dP/dV = γ (P + p_a)/V,                                                (1)
 
@@ -28,7 +28,7 @@ from array_types import Array
 AIR_DENSITY = 1.2
 """Density [kg/m³] of air at the pressure of the atmosphere (20 °C)."""
 SMALLEST_VOLUME = 1e-12
-"""Volume [m³] below which the law of the gas is not followed, so that one that vanishes keeps a finite pressure."""
+"""Volume [m³] below which the gas law is not followed, so that a vanishing pocket keeps a finite pressure."""
 NEARLY_ISOTHERMAL = 1e-6
 """γ - 1 below which the limit of γ = 1 is taken."""
 
@@ -36,7 +36,8 @@ NEARLY_ISOTHERMAL = 1e-6
 @dataclass(frozen=True)
 class Gas:
     """gamma: 1 (isothermal) to 1.4 (adiabatic) · atmospheric [Pa]: absolute pressure of the air outside · smallest:
-    pockets with a reference volume of fewer bricks of the mesh are bubbles that it does not see, and let go."""
+    pockets with a reference volume of fewer bricks of the mesh are bubbles that the mesh does not resolve, and are
+    released."""
 
     gamma: float = 1.4
     atmospheric: float = 101_325.0

@@ -1,7 +1,8 @@
-"""Ways out of a pocket that the mesh does not see: orifices to the open air, and narrow cracks between two blocks.
+"""Flow out of a pocket that the mesh does not resolve: through orifices to the open air and narrow cracks between
+blocks.
 
-Cracks are those through which water would flow by a lumped conductance (`fluid.pressure.slits`): with air at both of
-its mouths the same opening lets air through, by the law of an orifice of its area (`gas.py`, equation 3).
+Cracks are those through which water would flow by a lumped conductance (`fluid.pressure.slits`): with air at both ends
+the same opening lets air through, by the law of an orifice of its area (`gas.py`, equation 3).
 """
 
 from __future__ import annotations
@@ -20,8 +21,8 @@ from fluid.pressure.slits import DISCHARGE
 class Vent:
     """An orifice to the open air.
 
-    place (3,) [m], in the pocket: with a body that it moves with, from its centre and along its own axes ·
-    area [m²] · discharge C_d · body, -1: none."""
+    place (3,) [m], a point in the pocket; for a vent that moves with a body, in the frame of the body ·
+    area [m²] · discharge coefficient C_d · body that it moves with, -1: none."""
 
     place: Array
     area: float
@@ -29,7 +30,7 @@ class Vent:
     body: int = -1
 
     def now(self, bodies) -> Array:
-        """Where it is (3,) [m] with the bodies (`ConvexBodies`) as they stand now."""
+        """Place (3,) [m] of the vent at the present position of the bodies (`ConvexBodies`)."""
         if self.body < 0:
             return self.place
         b = self.body
@@ -37,13 +38,14 @@ class Vent:
 
 
 def pockets_at(water, points) -> Array:
-    """Label (m,) of the air at points (m, 3) [m]: that of a dry corner of the cell that holds each, -1 without any."""
+    """Label (m,) of the air at points (m, 3) [m]: that of a dry corner of the cell that holds each point, -1 where
+    there is none."""
     corners = Places.of(water, points, beyond=True).corners
     return water.air.label[corners].max(axis=1)
 
 
 def leaked(water, vents, volume, dt: float):
-    """`Air` after what went through vents and cracks in dt [s]; volume (K,) [m³] of the pockets."""
+    """The `Air` after the flow through vents and cracks in dt [s]; volume (K,) [m³] of the pockets."""
     air, gas = water.air, water.air.gas
     if len(air) == 0:
         return air
@@ -67,7 +69,7 @@ def leaked(water, vents, volume, dt: float):
 
 
 def _ways(water, vents):
-    """(label, label, effective area [m²]) of every way out of a pocket."""
+    """(label, label, effective area [m²]) of every vent and crack of a pocket."""
     if vents:
         bodies = water.domain.memory.bodies
         places = np.array([vent.now(bodies) for vent in vents])

@@ -1,8 +1,8 @@
 """Pockets: connected parts of the air that reach no open side of the tank.
 
-Two dry nodes of one cell have air in common.  Nodes inside a solid hand it on only to the nodes of their own cells, so
-that a wall of a cell and more parts the air; thinner ones do so with multiple covers.  The volume of a pocket is what
-the surface φ = 0 leaves of the fluid parts of its cells: exact for a φ that is linear in each cell.
+Two dry nodes of one cell have air in common.  Nodes inside a solid connect only the nodes of their own cells, so that a
+wall at least one cell thick separates the air on its two sides; thinner walls do so with multiple covers.  The volume
+of a pocket is what the surface φ = 0 leaves of the fluid parts of its cells: exact for a φ that is linear in each cell.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from fluid.domain.moments import wet_fraction
 from kernel_decorators import inner, kernel
 
 NO_AIR, OPEN_AIR = -1, 0
-"""Labels of nodes without air and of those that air from outside reaches; pockets count from 1."""
+"""Labels of nodes without air and of nodes that the open air reaches; the labels of pockets begin with 1."""
 SLIVER = 0.1
-"""Share of the room of a pocket below which what it has in common with another one, or with the open air, is none."""
+"""Share of the volume of a pocket below which an overlap with another pocket, or with the open air, is neglected."""
 
 
 def labelled(topology, phi, open_to_air) -> tuple[Array, int]:
@@ -103,11 +103,11 @@ def without(label, small) -> tuple[Array, int]:
 
 @dataclass(frozen=True)
 class Descent:
-    """From which pockets of before (O) the pockets of now (K) come.
+    """The old pockets (O) from which the new pockets (K) come.
 
-    share (O, K): share of the air of each old one that each new one has · fresh (K,) [m³]: room that air of the
-    atmosphere had · only (K,): the one old pocket that became this one whole and without any other air, -1: there is
-    none · opened (O,): share that the atmosphere reaches now · gone (O,) bool: without any room left."""
+    share (O, K): share of the air of each old pocket that each new one holds · fresh (K,) [m³]: volume that belonged to
+    the open air before · only (K,): the one old pocket that became this one, whole and without any other air; -1: none
+    · opened (O,): share that the open air reaches now · gone (O,) bool: no volume is left."""
 
     share: Array
     fresh: Array
@@ -121,7 +121,7 @@ class Descent:
         both = (before >= OPEN_AIR) & (now >= OPEN_AIR)
         common = np.zeros((n_before + 1, n_now + 1))
         np.add.at(common, (before[both], now[both]), node_volume[both])
-        # cells that a moving wall cuts anew may have nodes of its other side: no air goes that way
+        # cells newly cut by a moving wall may have nodes on its other side: no air passes there
         of_old, of_new = common.sum(axis=1, keepdims=True), common.sum(axis=0, keepdims=True)
         common[(common < SLIVER * of_old) & (common < SLIVER * of_new)] = 0.0
         common[1:, 0][common[1:, 0] < SLIVER * of_old[1:, 0]] = 0.0

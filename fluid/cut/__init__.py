@@ -1,11 +1,11 @@
-"""What is left of a cell when convex bodies are taken out of it, exactly (theory 2.1).
+"""The exact remainder of a cell when convex bodies are removed from it (theory 2.1).
 
-bodies, candidate_pairs                convex bodies as half spaces; which cells each may meet
-cut_cells, cut_arrays, recut           the cut of all cells, and of those again whose bodies moved
+bodies, candidate_pairs                convex bodies as half spaces; the cells that each may meet
+cut_cells, cut_arrays, recut           the cut of all cells, and the new cut of cells whose bodies moved
 pieces, polygons, fans                 convex pieces, polygons on their faces, tetrahedra of a piece
 parts_of_cell                          connected parts of the water in a cell
-wetted_polygons                        which faces of a piece are the surface of which body
-openings                               over which area parts of neighbouring cells touch
+wetted_polygons                        the faces of a piece that are surfaces of bodies
+openings                               areas over which parts of neighbouring cells touch
 
 Imports `mesh` and `numerics`.
 """

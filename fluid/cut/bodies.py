@@ -1,9 +1,8 @@
 """Rigid convex bodies for the water: half spaces n·x ≤ o in world coordinates.
 
 A body is the intersection of its half spaces; its vertices serve only the broad search and the tests.
-Every plane may be shifted outward by its `growth` [m] before the water is cut: faces of intact joints are
-closed that way by the state of the joint and not by the noise of the gap, and faces in mere contact may be
-opened by a negative value.
+Every plane may be shifted outward by its `growth` [m] before the water is cut. In this way the state of a joint, and
+not the noise of the gap, closes the faces of an intact joint, and a negative value may open faces in mere contact.
 """
 
 from __future__ import annotations
@@ -154,7 +153,7 @@ class ConvexBodies:
         return Planes(self.normals, self.cut_offsets(), self.plane_start)
 
     def bounds(self) -> Array:
-        """(n, 2, 3) [m] boxes that hold the grown bodies."""
+        """(n, 2, 3) [m] bounding boxes of the grown bodies."""
         if len(self) == 0:
             return np.zeros((0, 2, 3))
         lower = np.minimum.reduceat(self.vertices, self.vertex_start[:-1], axis=0)
@@ -164,7 +163,7 @@ class ConvexBodies:
         return np.stack([lower - margin, upper + margin], axis=1)
 
     def contains(self, points) -> Array:
-        """points (m, 3) [m] -> (m,) first (grown) body that holds the point, -1 where there is none."""
+        """points (m, 3) [m] -> (m,) first (grown) body that contains the point, -1 where there is none."""
         points = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 3)
         return _holder(points, self.normals, self.cut_offsets(), self.plane_start, self.bounds())
 
@@ -215,7 +214,7 @@ def _planes_of(vertices, faces, at):
 
 
 def _hull_planes(vertices):
-    """Distinct planes of the convex hull: coplanar facets once."""
+    """Distinct planes of the convex hull; coplanar facets count once."""
     equations = ConvexHull(vertices).equations
     size = np.ptp(vertices, axis=0).max()
     scaled = equations / np.array([1.0, 1.0, 1.0, size])
@@ -237,7 +236,7 @@ def _loop_plane(loop, inner):
 
 
 def _cross(a, b):
-    """a × b of vectors (k, 3); numpy's own takes ten times as long for few of them."""
+    """a × b of vectors (k, 3); numpy.cross takes ten times as long for few of them."""
     (ax, ay, az), (bx, by, bz) = a.T, b.T
     return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=1)
 

@@ -1,4 +1,4 @@
-"""Which cells each body may meet: the broad search before the exact cut.
+"""The cells that each body may meet: the broad search before the exact cut.
 
 A pair (cell, body) is kept unless one plane of the body has the whole cell on its outer side by more than
 `margin`. The margin must exceed the tolerance of the cut: with a tighter search, a body that touches a mesh
@@ -56,7 +56,7 @@ def _apart(nodes, cells, e, planes, first, last, margin):
 
 @plain
 def _search(nodes, cells, bins, chosen, reach, planes, margin, cell, body):
-    """Write as many of the pairs as there is room for, and return how many there are. reach: bins of each of the chosen
+    """Write as many of the pairs as fit, and return how many there are. reach: bins of each of the chosen
     bodies."""
     n = 0
     for b in range(len(chosen)):

@@ -1,4 +1,4 @@
-"""Arrays that the cut fills, and the parts of them that are passed on."""
+"""Arrays that the cut fills, and the filled parts of them that it returns."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from array_types import Bools, Floats, Ints
 
 
 class Output(NamedTuple):
-    """What the kernel fills; rows beyond the returned counts are unused."""
+    """Arrays that the kernel fills; rows beyond the returned counts are unused."""
 
     part_cell: Ints  # (parts,) background cell
     part_whole: Bools  # (parts,) True where nothing was removed from the cell

@@ -1,12 +1,12 @@
-"""Which part of a tetrahedron lies outside convex bodies: exact, for any number of bodies per cell.
+"""The part of a tetrahedron outside convex bodies: exact, for any number of bodies per cell.
 
 The method is sequential convex splitting. The fluid in a cell is a list of convex pieces, at first the cell itself. For
-each body B, each piece P is split by the planes of B one after the other: what lies outside a plane is set
-aside, what lies inside goes on to the next plane. If nothing is left inside, P does not meet B and stays
-whole; else P is replaced by what was set aside. The *wetted surface* is then read off the pieces: a face of
-a piece that lies in a plane of B, with the piece on the outer side, clipped by the other planes of B. This
-one rule serves faces made by splitting and faces of a body that coincide with faces of the mesh, so each is
-counted once, in the cell on its water side, and never between two bodies that touch.
+each body B, each piece P is split by the planes of B one after the other: the part outside a plane is set aside, the
+part inside goes on to the next plane. If nothing is left inside, P does not meet B and stays whole; otherwise P is
+replaced by the parts set aside. The *wetted surface* is then read off the pieces: a face of a piece that lies in a
+plane of B, with the piece on the outer side, clipped by the other planes of B. This one rule serves faces made by
+splitting and faces of a body that coincide with faces of the mesh, so each is counted once, in the cell on its water
+side, and never between two bodies that touch.
 
 Two tolerances: mesh nodes nearer to a plane than `tolerance` [m], one for the whole mesh, lie in it; at
 vertices made by splitting only round-off is snapped (see `pieces.py`).
@@ -46,7 +46,7 @@ from kernel_decorators import inner, released
 THIN = 1e-6
 # Wetted polygons below this share of h^2 are round-off.
 NO_AREA = 1e-15
-# Cutting a cell takes as long as so many visits of a node.
+# Cost of cutting a cell, in visits of a node.
 WORK = 500
 
 
@@ -65,12 +65,12 @@ class Limits(NamedTuple):
 
     @classmethod
     def of(cls, tolerance: float, spacing: float) -> Limits:
-        """Of a mesh with that spacing [m]."""
+        """The limits for a mesh with that spacing [m]."""
         return cls(tolerance, ROUND_OFF * spacing, THIN * spacing, NO_AREA * spacing * spacing)
 
 
 class Cutting(NamedTuple):
-    """What a cut works with: scratch, planes of all bodies, tolerances, and the arrays that it fills."""
+    """The data of a cut: scratch arrays, planes of all bodies, tolerances, and the arrays that it fills."""
 
     work: Workspace
     planes: Planes
@@ -92,7 +92,7 @@ class Chosen(NamedTuple):
 def _nearby(w, x, bodies, planes, tolerance):
     """Bodies that meet or touch the cell x (4, 3), with the planes of each that separate some of its nodes.
 
-    -> number of bodies, or -1 when one body holds the whole cell."""
+    -> number of bodies, or -1 when one body contains the whole cell."""
     n = 0
     w.near_start[0] = 0
     for at in range(len(bodies)):

@@ -1,4 +1,4 @@
-"""What lies opposite to wetted polygons across the water: other bodies, or the sides of the box around the mesh."""
+"""Surfaces opposite to wetted polygons across the water: other bodies, or the sides of the box around the mesh."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ def facing(bodies, polygons, reach, bounds, loose):
     """(S,) bool: something lies within reach (S,) [m] ahead of the polygon; its plane (S,) among those of all bodies.
 
     polygons: body (S,), centroid (S, 3) [m], normal (S, 3) out of the body · bounds (2, 3) [m] of the tank · loose
-    (n_bodies,) bool: only what lies between two things one of which is loose counts; sides of the tank are not."""
+    (n_bodies,) bool: a polygon counts only if its own body or the one opposite is loose; sides of the tank are not
+    loose."""
     body, centroid, normal = polygons
     box = bodies.bounds()
     near = near_bodies(box[:, 0], box[:, 1], loose, float(reach.max(initial=0.0)))
@@ -21,8 +22,8 @@ def facing(bodies, polygons, reach, bounds, loose):
 
 @kernel
 def near_bodies(low, high, loose, reach):
-    """start (n + 1,), members: bodies whose bounds low, high (n, 3) [m] come within reach [m] of those of each body,
-    pairs with at least one loose one."""
+    """start (n + 1,), members: bodies whose bounds low, high (n, 3) [m] come within reach [m] of those of each body;
+    only pairs with at least one loose body."""
     n = low.shape[0]
     start = np.zeros(n + 1, np.int64)
     members, count = np.empty(16 * n + 16, np.int64), 0

@@ -16,7 +16,8 @@ from kernel_decorators import inner, kernel
 def fan(w, piece, part, out, n):
     """Append the tetrahedra of a piece -> (state, number of tetrahedra).
 
-    Volumes from coordinates relative to the common vertex, so that slivers keep their relative accuracy."""
+    Volumes are computed from coordinates relative to the common vertex, so that slivers keep their relative
+    accuracy."""
     o = w.loop[piece, 0, 0]
     ox, oy, oz = w.x[o, 4], w.x[o, 5], w.x[o, 6]
     for f in range(w.faces[piece]):
@@ -45,7 +46,8 @@ def fan(w, piece, part, out, n):
 
 
 def fans(tet_part, tet, element_of_part, n_elements: int):
-    """The tetrahedra (T, 17) of cut parts tet_part (T,) in the order of their elements element_of_part (K,), -1 gone.
+    """The tetrahedra (T, 17) of cut parts tet_part (T,) in the order of their elements element_of_part (K,); -1: the
+    part was dropped.
 
     -> start (n_elements + 1,), none in whole cells · volume (T,) [m³] · corners (T, 4, 4), the barycentric coordinates
     of the four corners in their cell."""
@@ -56,7 +58,8 @@ def fans(tet_part, tet, element_of_part, n_elements: int):
 
 @kernel
 def _sorted(element, n_elements):
-    """start (n_elements + 1,), and the places of the entries (T,) of `element` in its order; those < 0 are left out."""
+    """start (n_elements + 1,), and the indices that sort the entries (T,) of `element`; negative entries are left
+    out."""
     start = np.zeros(n_elements + 1, np.int64)
     for t in range(len(element)):
         if element[t] >= 0:

@@ -1,7 +1,7 @@
 """Areas over which cut parts of neighbouring cells are in contact: the geometry of the multiple covers.
 
-The fluid parts of two cells touch across their common face where their open polygons overlap. A contact depends on
-the two cells only, so those of cells that were not cut again are kept from one cut to the next.
+The fluid parts of two cells touch across their common face where their open polygons overlap. A contact depends on the
+two cells only, so contacts between cells that were not cut again are kept from one cut to the next.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from kernel_decorators import inner, kernel, released
 CLIP = 1e-12
 """Tolerance for clipping the open polygons, as a share of h."""
 WORK = 20
-"""The contacts of a cell take as long as so many visits of a node."""
+"""Cost of the contacts of a cell, in visits of a node."""
 
 
 class Contacts(NamedTuple):
@@ -55,7 +55,7 @@ class OpenFaces(NamedTuple):
 
     @classmethod
     def of(cls, cuts: Cuts) -> OpenFaces:
-        """Those of parts that were cut."""
+        """The open faces of parts that were cut."""
         order, start = _openings_by_face(cuts.open_part, cuts.open_face, len(cuts.part_cell))
         return cls(order, start, cuts.open_start, cuts.open_x)
 
@@ -66,7 +66,7 @@ def find_contacts(
     """Contacts of all cells, or with `old` only of cells near those cut `again` (cells,) bool; the others are kept.
 
     part (M,) row in `cuts` of each element, -1 whole · start (cells + 1,) first element of each cell · enough: share of
-    a face from which a lower bound of the area will do."""
+    a face above which a lower bound of the area suffices."""
     near = _with_parts(part, start) if again is None else again
     searched = _beside(mesh.neighbours, near)
     elements, openings = PartsOfCells(part, start), OpenFaces.of(cuts)
@@ -210,7 +210,7 @@ def _contact_area(mesh, cell, f, ours, theirs, openings, limits, w):
     """Area over which two parts touch across the face opposite to corner f of `cell`, area of the face.
 
     ours, theirs: 4 part + face of the two, -1 for a whole cell, which at most one of them is. A lower bound of the area
-    serves where it exceeds the share of the face that is enough."""
+    suffices where it exceeds the share `enough` of the face."""
     nodes, cells = mesh
     tolerance, enough = limits
     i, j, k = cells[cell, (f + 1) % 4], cells[cell, (f + 2) % 4], cells[cell, (f + 3) % 4]

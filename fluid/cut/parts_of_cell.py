@@ -66,6 +66,6 @@ def label_parts(w, count, normals, round_off, link_area):
             w.label[piece] = parts
             parts += 1
         else:
-            # Roots come before their members, so theirs is already the final number.
+            # Roots come before their members, so a root already has its final number.
             w.label[piece] = w.label[w.label[piece]]
     return parts

@@ -3,8 +3,8 @@
 Everything is in coordinates relative to the first node of the cell, and every vertex also carries its
 barycentric coordinates in the cell. A plane is known by its distances at the four nodes: the distance at a
 vertex is their interpolation. Nodes nearer to the plane than the tolerance of the mesh have distance zero,
-the same in every cell at the node; so the faces of bodies bend by at most that tolerance, and two cells
-always agree on what lies on which side at their common face.
+the same in every cell at the node; so the faces of bodies bend by at most that tolerance, and two cells always agree on
+the sides of a plane at their common face.
 
 Moments of a piece: V = ∫ dV, c = ∫ x dV / V, S = ∫ (x - c)(x - c)^T dV as (xx, yy, zz, xy, xz, yz).
 """
@@ -189,9 +189,8 @@ def _close_cap(w, piece, side, edges, tag):
 def _take_flat_faces(w, piece, target, side, edges):
     """Give the faces of a piece that lie wholly in the plane to one of its halves -> edges of the cap.
 
-    The piece goes on on both sides, so such a face has no area: it is what is left of a point or an edge where
-    three planes meet up to round-off. It belongs to either half, but the cap of one of them may touch itself
-    where it is left out."""
+    The piece continues on both sides, so such a face has no area: it is the remainder of a point or an edge where three
+    planes meet up to round-off. It may go to either half, but the cap of one of them may touch itself without it."""
     for f in range(w.faces[piece]):
         flat = True
         for k in range(w.size[piece, f]):
@@ -281,7 +280,7 @@ def copy_piece(w, source, target):
 
 @inner
 def has_vertex(w, piece, f, vertex):
-    """Is it a corner of face f of the piece?"""
+    """Whether the vertex is a corner of face f of the piece."""
     found = False
     for k in range(w.size[piece, f]):
         found = found or w.loop[piece, f, k] == vertex

@@ -132,7 +132,7 @@ def polygon_rule(w, polygon, nx, ny, nz, least, row):
     Points c + R s_q, R the symmetric root of the in-plane covariance, s_q the corners of an equilateral
     triangle with unit covariance. row[0] = 0 for an area of at most `least` [m2]."""
     x0, y0, z0 = w.polygon[polygon, 0, 4], w.polygon[polygon, 0, 5], w.polygon[polygon, 0, 6]
-    # Any two directions in the plane: the rule does not depend on them but for a turn of the points.
+    # Any two directions in the plane: the rule depends on them only by a rotation of the points.
     if abs(nx) <= abs(ny) and abs(nx) <= abs(nz):
         tx, ty, tz = 0.0, nz, -ny
     elif abs(ny) <= abs(nz):

@@ -56,7 +56,7 @@ def _merged(old_cell, new_cell, again):
 
 @kernel
 def _of_parts(kept, fresh, old_part, new_part):
-    """The same for rows that belong to parts old_part, new_part, sorted by part."""
+    """`take` as of `_merged`, for rows that belong to parts old_part, new_part, sorted by part."""
     take = np.empty(len(old_part) + len(new_part), np.int64)
     n, b = 0, 0
     for a in range(len(old_part)):

@@ -1,7 +1,8 @@
-"""The wetted surface of a piece: which of its faces lie in a plane of a body, and how much of each is that body's.
+"""The wetted surface of a piece: its faces that lie in a plane of a body, and the part of each that belongs to that
+body.
 
 A face of a piece that lies in a plane of a body, with the piece on the outer side, is clipped by the other planes of
-the body. Polygons 0..top of the stack are what no body has claimed yet.
+the body. Polygons 0..top of the stack are the parts that no body has claimed yet.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from kernel_decorators import inner
 
 @inner
 def _lies_in(w, piece, f, r, normals, round_off):
-    """Does a face lie in near plane r, with the piece on the outer side of it?"""
+    """Whether a face lies in near plane r, with the piece on the outer side of it."""
     g = w.near_plane[r]
     if w.tag[piece, f] == 2 * g:
         return True
@@ -36,8 +37,8 @@ def _lies_in(w, piece, f, r, normals, round_off):
 def _claim(w, polygon, at, plane, round_off, top):
     """Clip a polygon in near plane `plane` by the other planes of body number `at` -> (claimed, new top).
 
-    What is left replaces the polygon, the remainders go on top of the stack; if nothing is left the polygon
-    stays as it was."""
+    The part inside replaces the polygon and the remainders go on top of the stack; if no part is inside, the polygon
+    stays unchanged."""
     work, inner = len(w.corners) - 1, len(w.corners) - 2
     copy_polygon(w, polygon, work)
     new_top = top

@@ -34,7 +34,7 @@ def clipped(tets, values):
 
 
 def volumes(tets):
-    """(n,) [m³] of tetrahedra (n, 4, m ≥ 3), coordinates first."""
+    """Volumes (n,) [m³] of tetrahedra (n, 4, m ≥ 3), coordinates first."""
     x = tets[:, :, :3]
     return np.abs(np.linalg.det(x[:, 1:] - x[:, :1])) / 6.0
 

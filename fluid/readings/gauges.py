@@ -12,20 +12,20 @@ from fluid.sides.inflow import wet_shares
 
 SAMPLES_PER_CELL = 4
 HALVINGS = 10
-"""Of a sample's distance, to find where a solid or the bed begins."""
+"""Halvings of the distance between two samples to find where a solid or the bed begins."""
 
 
 def level(water, xy) -> float:
     """Depth [m] of water over xy (2,) [m]: the wet length of a vertical line, as a wire gauge measures it.
 
-    φ is read on the line, SAMPLES_PER_CELL a cell, and taken as linear between two samples; inside solids it is dry.
-    Spray and the space under an overturning crest do not count; over a solid that stands on the floor the depth is
-    that above it."""
+    φ is sampled on the line, SAMPLES_PER_CELL times in a cell, and taken as linear between samples; the inside of
+    solids counts as dry. Spray and the space under an overturning crest do not count; over a solid that stands on the
+    floor the depth is that above it."""
     return float(levels(water, [xy])[0])
 
 
 def levels(water, places) -> Array:
-    """The same (m,) [m] over places (m, 2) [m]."""
+    """Depths (m,) [m] of water over places (m, 2) [m], each as of `level`."""
     places = np.asarray(places, float)
     low, high = water.mesh.bounds[:, 2]
     count = int(np.ceil(SAMPLES_PER_CELL * (high - low) / water.mesh.finest)) + 1
@@ -57,7 +57,7 @@ def _beside_solids(water, places, z, phi, is_open) -> Array:
     inside, outside = z[inner], z[np.where(inner == k, k + 1, k)]
     for _ in range(HALVINGS):
         middle = 0.5 * (inside + outside)
-        # with the samples in the open: of points that are all beside the mesh nothing would be looked up
+        # together with the samples in the open: points that all lie outside the mesh would not be looked up
         points = np.column_stack([np.tile(places[row], (2, 1)), np.concatenate([middle, z[inner]])])
         free = np.isfinite(Places.of(water, points, beyond=True).read(water.level_set)[: len(row)])
         inside, outside = np.where(free, middle, inside), np.where(free, outside, middle)
@@ -66,8 +66,8 @@ def _beside_solids(water, places, z, phi, is_open) -> Array:
 
 
 def pressure(water, points):
-    """Pressure [Pa] at points (m, 3) or (3,) [m] → (m,) or a number; in the air 0 or that of the pocket, NaN inside a
-    solid."""
+    """Pressure [Pa] at points (m, 3) or (3,) [m] → (m,) or a number; 0 in the open air, that of the pocket in trapped
+    air, NaN inside a solid."""
     places = Places.of(water, points)
     in_air = places.read(water.level_set) >= 0.0
     p = np.where(in_air, 0.0, places.read(water.pressure))
@@ -138,7 +138,7 @@ def volume_in_box(water, lower, upper) -> float:
 
 
 def _in_box(water, cells, lower, upper):
-    """Water (n,) [m³] of the cells (n,) inside the box, solids not taken off."""
+    """Water (n,) [m³] of the cells (n,) inside the box, without subtracting solids."""
     t = water.topology
     number = np.broadcast_to(np.arange(len(cells))[:, None, None], (len(cells), 4, 1))
     parts = np.concatenate(

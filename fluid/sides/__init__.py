@@ -1,6 +1,6 @@
 """Sides of the tank: where water is held, comes in and goes out (theory 2.4).
 
-walls        closed sides, along which water slips or rests, and open ones
+walls        closed sides, with free slip or no slip, and open ones
 inflow       sides with a given velocity, or with the level of a still sea
 waves        streams, records, bores and solitary waves that come in
 outflow      what leaves through open sides

@@ -7,7 +7,7 @@ velocity inwards, means over the side,
     R_out = -u + 2 sqrt(g h)  of the water a cell inside     goes out
     sqrt(g h_side) = (R_in + R_out) / 4,   u_side = (R_in - R_out) / 2                               (1)
 
-exact for long waves of any height that run straight at the side; what is dispersive or oblique comes back in part.
+This is exact for long waves of any height at normal incidence; dispersive or oblique waves are partly reflected.
 Over a bed that varies along the side h is the wet area over the wet width.
 """
 
@@ -23,10 +23,10 @@ from fluid.sides.inflow import Flow
 
 @dataclass
 class Absorber:
-    """flow: what comes in · inward (3,) unit · places (k, 2) [m] a cell inside the side · bed (k,) [m] there · gravity
+    """flow: the given flow · inward (3,) unit · places (k, 2) [m] a cell inside the side · bed (k,) [m] there · gravity
 
-    height, speed: what (1) adds to the level [m] and to the velocity inwards [m/s] of the given flow, until the next
-    `hear`."""
+    height, speed: corrections by (1) to the level [m] and to the velocity inwards [m/s] of the given flow, kept until
+    the next `hear`."""
 
     flow: Flow
     inward: Array
@@ -37,7 +37,7 @@ class Absorber:
     speed: float = field(default=0.0, init=False)
 
     def as_flow(self) -> Flow:
-        """Level and velocity at the side."""
+        """The `Flow` at the side: its level and velocity."""
 
         def velocity(points, time):
             return self.flow.velocity(points, time) + self.speed * self.inward
@@ -49,11 +49,12 @@ class Absorber:
         return Flow(lambda time: self.flow.level(time) + self.height, velocity, self, along)
 
     def points(self, depths) -> Array:
-        """Where the velocity is asked, (k, 3) [m]: half way up the water of depths (k,) [m]."""
+        """Points (k, 3) [m] at which `hear` needs the velocity: at half the depths (k,) [m]."""
         return np.column_stack([self.places, self.bed + 0.5 * depths])
 
     def hear(self, depths, velocities, time: float) -> None:
-        """Follow equation (1) with the depths (k,) [m] and velocities (k, 3) [m/s] at the places."""
+        """Update height and speed by equation (1) from the depths (k,) [m] and velocities (k, 3) [m/s] at the
+        places."""
         level = self.flow.level_at(np.column_stack([self.places, self.bed]), time)
         given = np.maximum(level - self.bed, 0.0)
         wet = (given > 0.0) | (depths > 0.0)

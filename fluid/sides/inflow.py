@@ -1,23 +1,24 @@
 """Sides of the tank through which water comes and goes: inflow with a given velocity, or the level of a still sea.
 
-Inflow: u and the level are given.  On its nodes u = u_in (all components) and φ = z - level; what enters,
+Inflow: u and the level are given.  On its nodes u = u_in (all components) and φ = z - level; the flow that enters,
 
     q_i = -∮_wet N_i u·n dA,                                                                    (1)
 
-n outward, joins the mass balance of the pressure, the conservative volume and the ledger.  Where a solid stands in the
-side, the integral is over what it leaves open: the faces that its cell's tetrahedra (`fans.py`) have there.
-Sea: φ = z - level on its nodes and there
+with n outward, joins the mass balance of the pressure, the conservative volume and the ledger.  Where a solid stands in
+the side, the integral is over the part that it leaves open: the faces that its cell's tetrahedra (`fans.py`) have
+there. Sea: φ = z - level on its nodes and there
 
     p = ρ g (level - z) - ½ ρ min(u·n, 0)²,    -u·n ≤ sqrt(2 g depth)                           (2)
 
-(what comes in was at rest: Bernoulli; it comes in straight, and no faster than by a fall through the depth of the sea.
-With the static pressure alone, water that goes to and fro through the side gains energy at every turn.  The last term
-is of the velocity before the step: a long first step made a thin sheet on a dry floor 2.3 to 2.8 times as fast as that
-fall, and the next one threw it out again).  Equation (1) holds with the water's own velocity, both signs.  For water
-far from waves: what reaches a sea partly comes back, as from any side.
+(Bernoulli, since the water that enters was at rest; it enters along the normal, and no faster than by a fall through
+the depth of the sea.  With the static pressure alone, water that oscillates through the side gains energy at every
+reversal.  The last term uses the velocity before the step: without the limit a long first step made a thin sheet on a
+dry floor 2.3 to 2.8 times as fast as that fall, and the next one threw it out again).  Equation (1) holds with the
+water's own velocity, of either sign.  A sea is meant for sides far from waves: it partly reflects the waves that reach
+it, as any side does.
 
-The water that the pressure of a sea sets in motion comes in half a step later, and by then the pressure may be another
-one.  What it has done by the end of a step beyond p V is therefore booked ahead, and taken back at the same pressure,
+The water that the pressure of a sea sets in motion comes in half a step later, and by then the pressure may have
+changed.  Its work by the end of a step beyond p V is therefore booked ahead, and taken back at the same pressure,
 
     E += Σ_i p_i (V_i + δ q_i' - δ_0 q_i),                                                               (3)
 
@@ -43,12 +44,12 @@ ON_FACE = 1e-9
 
 @dataclass(frozen=True)
 class Flow:
-    """What an inflow brings: level(time) → z of the surface [m]; velocity(points (n, 3) [m], time) → (n, 3) [m/s]."""
+    """The flow at an inflow: level(time) → z of the surface [m]; velocity(points (n, 3) [m], time) → (n, 3) [m/s]."""
 
     level: Callable
     velocity: Callable
     absorber: object = None
-    """`Absorber` that the flow follows, None for one that is given for ever."""
+    """`Absorber` that the flow follows, None for a flow that is prescribed for all times."""
     varying: Callable | None = None
     """Levels at points (n, 3) [m] and a time → (n,) [m], where they differ along the side; `level` is their mean."""
 
@@ -63,8 +64,8 @@ class Side:
 
     chosen: face normals (B, 3), centres (B, 3) [m] → (B,) bool · flow: Flow, or None for a sea · level(time) [m] ·
     cell (F,) of each face, corner (F,) of the cell opposite to it, faces (F, 3) its nodes; on a domain a face that a
-    solid cuts is there as its open triangles: hats (F, 3, 3), values at each corner (row) of the hats of the nodes, and
-    area (F, 3) [m²] outward · nodes (n,), place (n, 3) [m], normal (n, 3) outward."""
+    solid cuts is replaced by its open triangles: hats (F, 3, 3), values at each corner (row) of the hats of the nodes,
+    and area (F, 3) [m²] outward · nodes (n,), place (n, 3) [m], normal (n, 3) outward."""
 
     chosen: Callable
     flow: Flow | None
@@ -106,7 +107,7 @@ class Side:
         )
 
     def on_domain(self, domain, active) -> Side:
-        """The same side on a domain: its own copies of the nodes, and what is open of the faces; active (N,) bool."""
+        """The same side on a domain, with the copies of its nodes and the open parts of its faces; active (N,) bool."""
         row = np.full(max(domain.parent_node.max(initial=-1), self.nodes.max(initial=-1)) + 1, -1)
         row[self.nodes] = np.arange(len(self.nodes))
         row = row[domain.parent_node]
@@ -132,7 +133,8 @@ class Side:
         return self.flow is None
 
     def hold(self, u, time: float, gravity: float) -> None:
-        """u (N, 3) on the nodes of an inflow, in place; what comes in from a sea goes along the normal, as in (2)."""
+        """Impose u (N, 3) [m/s] on the nodes of an inflow, in place; water that enters from a sea moves along the
+        normal, as in (2)."""
         if self.flow is not None:
             u[self.nodes] = self.flow.velocity(self.place, time)
             return
@@ -143,17 +145,18 @@ class Side:
         u[self.nodes[coming]] = across[coming, None] * self.normal[coming]
 
     def surface(self, phi, time: float) -> None:
-        """φ (N,) of the given level on the nodes, in place."""
+        """Impose φ (N,) [m] of the given level on the nodes, in place."""
         level = self.level(time) if self.flow is None else self.flow.level_at(self.place, time)
         phi[self.nodes] = self.place[:, 2] - level
 
     def pressure(self, density: float, gravity: float, u, time: float):
-        """Equation (2) at the nodes (n,) [Pa], u (N, 3) [m/s]; the weight goes on above the level: exact at rest."""
+        """Equation (2) at the nodes (n,) [Pa], u (N, 3) [m/s]; the hydrostatic part continues above the level, which is
+        exact at rest."""
         coming = np.minimum(np.einsum("nk,nk->n", u[self.nodes], self.normal), 0.0)
         return density * (gravity * (self.level(time) - self.place[:, 2]) - 0.5 * coming**2)
 
     def rate(self, phi, u):
-        """q (N,) [m³/s] of equation (1): what enters at each node; phi (N,), u (N, 3) [m/s]."""
+        """q (N,) [m³/s] of equation (1), the inflow at each node; phi (N,), u (N, 3) [m/s]."""
         q = np.zeros(len(phi))
         wet = wet_shares(np.einsum("fca,fa->fc", self.hats, phi[self.faces]))
         share = np.einsum("fca,fc->fa", self.hats, wet)
@@ -186,7 +189,7 @@ def _open_triangles(domain, cell, corner):
 
 
 def _on_faces(domain, face, element, corner):
-    """The same of cut elements: the faces of their tetrahedra on which the hat of the corner is zero."""
+    """The same for cut elements: the faces of their tetrahedra on which the hat function of the corner is zero."""
     count = domain.fan_start[element + 1] - domain.fan_start[element]
     which = np.repeat(np.arange(len(element)), count)
     first = np.repeat(domain.fan_start[element] - np.concatenate([[0], np.cumsum(count)[:-1]]), count)
@@ -229,7 +232,7 @@ def wet_shares(phi):
 
 
 class Sides:
-    """All inflows and seas of a tank: what the step asks of them.
+    """All inflows and seas of a tank, as the step uses them.
 
     entered, left [m³]: water that came in and went out through them so far · energy [J] that they brought: kinetic,
     potential, and the work of the pressure, equation (3)."""
@@ -253,7 +256,7 @@ class Sides:
             side.hold(u, time, gravity)
 
     def surface(self, phi, time: float) -> None:
-        """Level sets of all sides, in place."""
+        """Impose the level sets of all sides on phi (N,) [m], in place."""
         for side in self.now:
             side.surface(phi, time)
 
@@ -266,8 +269,8 @@ class Sides:
         return p
 
     def through(self, phi, u, dt: float, carried):
-        """Volume (N,) [m³] that comes in at the inflows over dt [s] (negative: leaves, at most what is carried (N,)
-        [m³]), and its rate (N,) [m³/s], which the pressure must know."""
+        """Volume (N,) [m³] that enters at the inflows over dt [s] (negative: leaves, at most the water carried (N,)
+        [m³]), and its rate (N,) [m³/s], which the pressure equation needs."""
         rate = np.zeros(len(phi))
         for side in self.now:
             if not side.is_sea:
@@ -275,8 +278,8 @@ class Sides:
         return np.maximum(dt * rate, -np.maximum(carried, 0.0)), rate
 
     def exchanged(self, topology, phi, carried):
-        """Volume (N,) [m³] that comes in from the seas (negative: leaves): what the level set φ (N,) with their levels
-        has at their nodes beyond what the water has carried there (N,) [m³]."""
+        """Volume (N,) [m³] that enters from the seas (negative: leaves): the water at their nodes below the level set φ
+        (N,) [m] with their levels, less the water carried there (N,) [m³]."""
         found = np.zeros(len(phi))
         for side in self.now:
             if side.is_sea:
@@ -295,10 +298,10 @@ class Sides:
         return q
 
     def book(self, volume, head, ahead) -> None:
-        """Add what came in at the nodes in a step.
+        """Add the water that entered at the nodes in a step to the totals.
 
-        volume (N,) [m³] · head (N,) [J/m³]: its energy and pressure · ahead [J]: what the pressure of seas has
-        done beyond it, equation (3)."""
+        volume (N,) [m³] · head (N,) [J/m³]: its energy and pressure · ahead [J]: work of the pressure of seas beyond
+        it, equation (3)."""
         self.entered += float(volume[volume > 0.0].sum())
         self.left -= float(volume[volume < 0.0].sum())
         self.energy += float(volume @ head) + ahead

@@ -3,7 +3,7 @@
     W_i^left = dt ∮ N_i s (u·n)⁺ dA,        E_left = ρ dt ∮ s (½ u² - g·x) (u·n)⁺ dA                          (1)
 
 over the open faces, with the velocity at the beginning of the step and the share s of water around the nodes, both
-linear on a face, g·x zero at the floor of the tank; no node gives more than it holds.  The rule is exact to degree 4.
+linear on a face, g·x zero at the floor of the tank; no node loses more than it holds.  The rule is exact to degree 4.
 Taken at the nodes alone, the flux of energy, a cubic of u, is up to 20 % too large at the foot of an outlet, where u
 doubles within a cell; and nodes that are partly full, the high ones, would empty as fast as full ones.
 """
@@ -33,7 +33,7 @@ _WEIGHTS = np.array([0.223381589678011] * 3 + [0.109951743655322] * 3)
 
 @dataclass(frozen=True)
 class Outflow:
-    """volume (N,) [m³] off each node · energy [J], kinetic and potential."""
+    """volume (N,) [m³] that leaves each node · its energy [J], kinetic and potential."""
 
     volume: Array
     energy: float

@@ -18,10 +18,10 @@ _SAME_DIRECTION = 0.3
 @dataclass(frozen=True, kw_only=True)
 class Walls:
     """nodes (n,) on closed sides · projector (n, 3, 3) onto the directions they leave free ·
-    open_node (N,) bool, p = 0; open_nodes (k,) the same, open_projector (k, 3, 3) onto their normals ·
+    open_node (N,) bool, p = 0; open_nodes (k,) their numbers, open_projector (k, 3, 3) onto their normals ·
     open_faces (F, 3) nodes, open_area (F, 3) [m²] outward area vectors ·
-    rough_faces (C, 3), rough_area (C, 3) [m²], rough_cell (C,) background cell: the same of closed sides that may hold
-    or rub the water."""
+    rough_faces (C, 3), rough_area (C, 3) [m²], rough_cell (C,) background cell: the same for closed sides with no slip
+    or friction."""
 
     nodes: Ints
     projector: Floats
@@ -39,9 +39,9 @@ class Walls:
     @classmethod
     def of(cls, mesh, is_open=None, is_smooth=None, no_slip: bool = False, sides=None) -> Walls:
         """is_open: function of face normals (B, 3) and centres (B, 3) [m] → (B,) bool; None: all closed.
-        is_smooth: the same, closed sides along which water slips whatever the walls do; None: none.
-        no_slip: the other closed sides hold the water, u = 0 · sides: `inflow.Sides` or None: seas are open, but what
-        leaves there is theirs; inflows are neither open nor rough."""
+        is_smooth: a function like is_open, of the closed sides with free slip whatever the other walls have; None:
+        none. no_slip: u = 0 on the other closed sides · sides: `inflow.Sides` or None; seas are open, but their own
+        rules govern the outflow there; inflows are neither open nor rough."""
         x = mesh.nodes[mesh.boundary_faces]
         area = 0.5 * np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
         opened, smooth = (
@@ -99,8 +99,8 @@ class Walls:
         )
 
     def restriction(self):
-        """Nodes (n,) on sides and projectors (n, 3, 3) onto what stresses in the water may change there: what closed
-        sides leave free, and only the normal velocity on open ones."""
+        """Nodes (n,) on sides and projectors (n, 3, 3) onto the velocities that stresses in the water may change there:
+        those that closed sides leave free, and only the normal one on open sides."""
         place = np.searchsorted(self.nodes, self.open_nodes)
         place = np.minimum(place, max(len(self.nodes) - 1, 0))
         both = self.nodes[place] == self.open_nodes if len(self.nodes) else np.zeros(len(place), bool)
@@ -122,12 +122,12 @@ class Walls:
         return nodes, total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-300)
 
     def let_air_in(self, phi, u, dt: float, spacing) -> None:
-        """Air lies beyond the open sides: where u (N, 3) [m/s] points into the tank, the surface was at the side at
-        most and lies |u·n| dt inside after dt [s]; φ (N,) [m] is raised to that, in place.
+        """Let air enter at the open sides: where u (N, 3) [m/s] points into the tank, the surface was at the side at
+        most and lies |u·n| dt inside after dt [s]. φ (N,) [m] is raised to that, in place.
 
-        Paths that come from outside end at the side and would find there the water that has just left it: a drop that
-        falls back from an open top then never ends, and runs down the wall faster and faster.  Nodes a cell and more
-        below the surface stay: a channel that is full and open at both ends goes on."""
+        Paths that come from outside end at the side, where they would find the water that has just left: a drop that
+        falls back from an open top would never end, and would run down the wall faster and faster.  Nodes at least one
+        cell below the surface are left alone, so that a full channel open at both ends keeps flowing."""
         nodes, normal = self.outward
         inward = -dt * np.einsum("ij,ij->i", u[nodes], normal)
         coming = (inward > 0.0) & (phi[nodes] > -spacing[nodes])
@@ -135,7 +135,7 @@ class Walls:
         phi[nodes] = without_films(phi[nodes], spacing[nodes])  # water up to the brim, rounded
 
     def slip(self, u) -> None:
-        """Take the part into the closed sides off u (N, 3), in place."""
+        """Remove the velocity into the closed sides from u (N, 3) [m/s], in place."""
         _project(self.nodes, self.projector, u)
 
 

@@ -1,4 +1,4 @@
-"""What comes through a side: steady streams, records, bores and solitary waves, as `Flow`s.
+"""Flows through a side: steady streams, records, bores and solitary waves, as `Flow`s.
 
 Directions: `inward` (3,), unit, level above z = 0 of the tank's coordinates, bed at z = `bed`.
 """
@@ -11,12 +11,13 @@ from fluid.sides.inflow import Flow
 
 
 def steady(inward, level: float, speed: float) -> Flow:
-    """The same level and uniform velocity for ever."""
+    """A constant level [m] and a constant uniform velocity [m/s]."""
     return record(inward, [0.0], [level], [speed])
 
 
 def record(inward, times, levels, speeds) -> Flow:
-    """Levels [m] and speeds [m/s] at times [s], straight lines between them, the ends kept before and after."""
+    """Levels [m] and speeds [m/s] at times [s], linear in between, with the first and last values kept before and
+    after."""
     inward, times = np.asarray(inward, float), np.asarray(times, float)
 
     def velocity(points, time):
@@ -27,7 +28,7 @@ def record(inward, times, levels, speeds) -> Flow:
 
 def record_along(inward, times, places, levels, speeds, sideways) -> Flow:
     """A record that differs along its side: levels [m], speeds inwards and sideways [m/s] (t, k) at times (t,) [s] and
-    places (k,) [m] along the side, straight lines between both, the ends kept beyond."""
+    places (k,) [m] along the side, linear between both, with the end values kept beyond."""
     inward, times = np.asarray(inward, float), np.asarray(times, float)
     axis = 1 if abs(inward[0]) > 0.5 else 0
     along = np.zeros(3)
@@ -48,7 +49,7 @@ def record_along(inward, times, places, levels, speeds, sideways) -> Flow:
 
 
 def tide(inward, level) -> Flow:
-    """A still sea whose level(time) [m] changes slowly; what moves is left to the side that absorbs."""
+    """A still sea whose level(time) [m] changes slowly; the velocity comes from the absorbing side alone."""
     still = np.zeros_like(np.asarray(inward, float))
     return Flow(level, lambda points, time: np.broadcast_to(still, (len(points), 3)))
 
@@ -64,19 +65,20 @@ def bore_speed(ahead: float, behind: float, gravity: float) -> tuple[float, floa
 def dry_bore_speed(depth: float, gravity: float) -> float:
     """Speed [m/s] of a surge of this depth [m] at the side onto dry level ground: u = sqrt(g h).
 
-    Where a dam of depth H stood that vanished, h = 4/9 H and u = 2/3 sqrt(g H) for ever (Ritter, Z. VDI 36 (1892) 947);
-    without friction the tip runs at 2 sqrt(g H) = 3 sqrt(g h)."""
+    Where a dam of depth H was removed at once, h = 4/9 H and u = 2/3 sqrt(g H) at all later times (Ritter, Z. VDI 36
+    (1892) 947); without friction the tip advances at 2 sqrt(g H) = 3 sqrt(g h)."""
     return float(np.sqrt(gravity * depth))
 
 
 def n_wave(
     inward, bed: float, depth: float, height: float, gravity: float, middle: float, sign: float = 1.0
 ) -> Flow:
-    """An N-wave with trough and crest of one height over a depth [m]; its middle passes the side at time `middle` [s].
+    """An N-wave with trough and crest of equal height over a depth [m]; its middle passes the side at time `middle`
+    [s].
 
     η = 3 sqrt(3)/2 H sech²θ tanh θ,  θ = γ c (t - middle),  γ d = 3/2 sqrt(sqrt(3/4) H/d),  c = sqrt(g d)
-    (Tadepalli and Synolakis, Proc. R. Soc. Lond. A 445 (1994) 99), u = c η/(d + η), which carries its volume.
-    sign: 1 trough first, -1 crest first."""
+    (Tadepalli and Synolakis, Proc. R. Soc. Lond. A 445 (1994) 99), u = c η/(d + η), which conserves volume. sign: 1
+    trough first, -1 crest first."""
     inward, c = np.asarray(inward, float), np.sqrt(gravity * depth)
     rate = 1.5 * np.sqrt(np.sqrt(0.75) * height / depth) * c / depth
 

@@ -1,14 +1,15 @@
 """Viscous stress and wall stress of P1 velocities, and conjugate gradients on them, without a matrix.
 
-r = f - K u: the rate of momentum [N] that stresses give to the nodes,
+r = f - K u is the rate of momentum [N] that the stresses give to the nodes,
 
     r_i = - ∫ 2μ ε(u) ∇N_i dV  +  ∫_Γ N_i (t - λ (u - u_Γ)) dA  +  ∫_Γ (u - u_Γ)·t(N_i) dA  -  ∫_Γ N_i C (u - u_Γ)_t dA
 
-ε: strain rate, smoothed over edges (`strain`), t(v) = -2μ ε(v) n, n out of the body into the water, u_Γ the velocity
-of the body there.  The second and third terms hold u = u_Γ weakly (symmetric Nitsche), the last is wall friction.  With
-λ = 4 μ A/V, A wetted area and V water of the cell, the form is positive definite on every cut, since ε is constant in a
-cell (trace inequality ∫_Γ |ε n|² ≤ A/V ∫ |ε|²; De Prenter, Lehrenfeld, Massing, Comput. Math. Appl. 75 (2018) 4322).
-The body gets what the hats sum up to, -∫ (t - λ (u - u_Γ) - C (u - u_Γ)_t) dA: momentum is exchanged to round-off.
+Here ε is the strain rate, smoothed over edges (`strain`), t(v) = -2μ ε(v) n, n points out of the body into the water,
+and u_Γ is the velocity of the body there.  The second and third terms hold u = u_Γ weakly (symmetric Nitsche), the last
+is wall friction.  With λ = 4 μ A/V, where A is the wetted area and V the water volume of the cell, the form is positive
+definite on every cut, since ε is constant in a cell (trace inequality ∫_Γ |ε n|² ≤ A/V ∫ |ε|²; De Prenter, Lehrenfeld,
+Massing, Comput. Math. Appl. 75 (2018) 4322). The force on the body is the sum over the hat functions, -∫ (t - λ (u -
+u_Γ) - C (u - u_Γ)_t) dA, so momentum is conserved to round-off.
 """
 
 from __future__ import annotations
@@ -48,9 +49,10 @@ class Walls(NamedTuple):
 
 
 class ViscousTerms(NamedTuple):
-    """What K and f are made of: cells (n,) in the water, weight (n,) 2μ times their water · walls · viscosity μ ·
-    node_drag (N,) [kg/s] of nodes on sides of the tank · held (k,) nodes on sides, projector (k, 3, 3) onto what is
-    free there · idle (N,) bool: nodes that keep their velocity · hats · edges of the cells in the water."""
+    """The data that K and f are assembled from: cells (n,) in the water, weight (n,) 2μ times their water · walls ·
+    viscosity μ · node_drag (N,) [kg/s] of nodes on sides of the tank · held (k,) nodes on sides, projector (k, 3, 3)
+    onto the directions that are free there · idle (N,) bool: nodes that keep their velocity · hats · edges of the cells
+    in the water."""
 
     cells: Ints
     weight: Floats
@@ -134,7 +136,7 @@ def momentum_rate(terms, u, body_velocity):
 
 @kernel
 def unheld_rate(terms, u, body_velocity):
-    """The same without the sides of the tank: without drag on their nodes, and as if they held nothing."""
+    """r and load as of `momentum_rate`, without the drag and the constraints of the sides of the tank."""
     cells, weight, hats, edges = terms.cells, terms.weight, terms.hats, terms.edges
     r = np.zeros_like(u)
     load = np.zeros_like(body_velocity)
@@ -163,7 +165,7 @@ def _restrict(r, node, projector, idle):
 
 @kernel
 def preconditioner(terms, mass, tau):
-    """1 / diagonal (N,) of M + τ K, the flux terms left out; 0 on idle nodes."""
+    """1 / diagonal (N,) of M + τ K without the flux terms; 0 on idle nodes."""
     cell_list, weight, idle = terms.cells, terms.weight, terms.idle
     cells, parent, g = terms.hats
     cell, hat, area = terms.walls.cell, terms.walls.hat, terms.walls.area
@@ -216,7 +218,7 @@ def body_preconditioner(terms, body_mass, moves, tau):
 
 @kernel
 def _slip_of_body(s, q, arm, c):
-    """c (3, 6): velocity of a point of a polygon by the six velocities of its body, in place."""
+    """Write c (3, 6), which takes the six velocities of a body to the velocity of a point of its polygon."""
     x, y, z = arm[s, q, 0], arm[s, q, 1], arm[s, q, 2]
     c[:] = 0.0
     for k in range(3):
@@ -228,8 +230,8 @@ def _slip_of_body(s, q, arm, c):
 
 @kernel
 def implicit_change(terms, mass, tau, right, bodies, body_right, tolerance, most):
-    """d (N, 3) and D (n_bodies, 6) with (M + τ K) (d, D) = (right, body_right) by conjugate gradients: (d, D,
-    iterations, residual reached over the first).
+    """Solve (M + τ K) (d, D) = (right, body_right) by conjugate gradients → d (N, 3), D (n_bodies, 6), the number of
+    iterations, and the last residual over the first.
 
     terms: ViscousTerms · mass (N,) [kg] · tau [s] ·
     right (N, 3) [N s] · bodies: (mass (n_bodies, 6, 6) [kg, kg m²], moves (n_bodies,) bool: the others keep their
@@ -268,7 +270,7 @@ def implicit_change(terms, mass, tau, right, bodies, body_right, tolerance, most
 
 @kernel
 def _answers(inverse, R):
-    """inverse (n, 6, 6) times R (n, 6), body by body."""
+    """The products of inverse (n, 6, 6) and R (n, 6) for each body."""
     out = np.zeros_like(R)
     for b in range(R.shape[0]):
         out[b] = inverse[b] @ R[b]

@@ -2,15 +2,15 @@
 
     ε̂_k = Σ_e w_e ε_e / Σ_e w_e   over the cells around the edge k,     ε̄_e = mean of ε̂ over the six edges of e
 
-w = 2μ times the water of the cell.  Stress of cells and walls goes by ε̄ in place of ε (edge-based smoothed finite
-elements; He, Li, Zhong, Cheng, Zhang, Liu, Li, Comput. Mech. 52 (2013) 221): a linear velocity is still exact and the
-form symmetric, and for a given velocity it takes less energy,
+w = 2μ times the water of the cell.  The stress in cells and at walls follows from ε̄ in place of ε (edge-based smoothed
+finite elements; He, Li, Zhong, Cheng, Zhang, Liu, Li, Comput. Mech. 52 (2013) 221): a linear velocity is still exact,
+the form stays symmetric, and a given velocity dissipates less energy,
 
     Σ_e w_e ε_e:ε̄_e = Σ_k W_k |ε̂_k|²,  W_k = 1/6 Σ_e w_e.
 
-A piecewise constant ε is always too stiff: a sphere with four cells over its diameter, held and spun, gets 1.21 times
-the moment of Stokes with ε and 1.04 times with ε̄; with eight cells 1.064 and 1.003 times.  Since
-w_e |ε̄_e|² ≤ w_e/6 Σ |ε̂|², the bounds that hold a wall weakly stay as they are.
+A piecewise constant ε is always too stiff: the moment on a spinning sphere with four cells over its diameter is 1.21
+times that of Stokes with ε and 1.04 times with ε̄; with eight cells it is 1.064 and 1.003 times.  Since w_e |ε̄_e|² ≤
+w_e/6 Σ |ε̂|², the bounds of the weak wall condition remain valid.
 
 Strains are (n, 6): xx, yy, zz, yz, xz, xy.
 """
@@ -27,11 +27,11 @@ from kernel_decorators import kernel
 PAIRS = np.array([(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)])
 """Corners at the ends of the edges of a cell."""
 ROW, COLUMN = np.array([0, 1, 2, 1, 0, 0]), np.array([0, 1, 2, 2, 2, 1])
-"""Where the six numbers of a strain stand in its tensor."""
+"""Row and column in the tensor of each of the six components of a strain."""
 
 
 class StrainEdges(NamedTuple):
-    """Edges of listed cells: of_cell (n, 6) their numbers · weight (n_edges,) W."""
+    """Edges of listed cells: of_cell (n, 6) numbers of the edges of each cell · weight (n_edges,) W."""
 
     of_cell: Ints
     weight: Floats
@@ -85,7 +85,7 @@ def edge_strain(cell_list, weight, edges, u, hats):
 
 @kernel
 def add_to_edges(strain, edges, edge_weight, x):
-    """A sixth of x (6,) to each edge of a cell, over its weight, in place."""
+    """Add a sixth of x (6,) over the weight of the edge to each edge of a cell, in place."""
     for m in range(6):
         k = edges[m]
         if edge_weight[k] > 0.0:
@@ -95,7 +95,7 @@ def add_to_edges(strain, edges, edge_weight, x):
 
 @kernel
 def mean_strain(strain, edges, out):
-    """ε̄ (3, 3) of a cell from the strains of its edges, in place."""
+    """Write ε̄ (3, 3) of a cell, from the strains of its edges, to out."""
     for c in range(6):
         total = 0.0
         for m in range(6):

@@ -2,20 +2,21 @@
 
     M du/dt = r(u) + M (w - uⁿ)/dt,   u(0) = uⁿ         r = f - K u: `viscous_kernels`, symmetric gradient, walls
 
-w = u_adv + θ dt âⁿ is where transport and the last pressure would lead without viscosity; its rate is the source, so
-that a steady state is steady for any dt (transport, then diffusion: 5 % off in a channel) and walls are felt by
-what stays after the projection.  The change δ = u - w is added to u_adv.  In time the two-stage
-method of order two that damps stiff parts fully (Alexander, SIAM J. Numer. Anal. 14 (1977) 1006), γ = 1 - 1/√2:
+w = u_adv + θ dt âⁿ is the velocity that transport and the last pressure would lead to without viscosity. Its rate is
+the source, so that a steady state is steady for any dt (transport followed by diffusion is 5 % off in a channel), and
+walls act on the velocity that remains after the projection.  The change δ = u - w is added to u_adv.  Time integration
+is by the two-stage L-stable method of order two (Alexander, SIAM J. Numer. Anal. 14 (1977) 1006), γ = 1 - 1/√2:
 
     u₁ = uⁿ + γ (w - uⁿ) + γ dt M⁻¹ r(u₁)
     u = w + dt M⁻¹ [(1-γ) r(u₁) + γ r(u)],        impulse on bodies  dt [(1-γ) F(u₁) + γ F(u)].
 
 Bodies that move freely are part of the stage, with their own mass and the motion that the other forces of the last
-step would give them (`FreeBodies`): what a light body and the water that sticks to it exchange does not depend on dt.
+step would give them (`FreeBodies`): so the momentum that a light body and the water that sticks to it exchange does not
+depend on dt.
 
-M: the water at each node, ∫_{φ<0} ρ N_i dV; cells count with their water.  No traction on the free surface (natural).
+M: the water at each node, ∫_{φ<0} ρ N_i dV; cells count by their water.  No traction on the free surface (natural).
 Sides of the tank: no-slip holds u = 0 on their nodes; friction acts on their nodes.  On open sides only the normal
-velocity changes: the tangential one leaves as it came, or the missing ∇uᵀ n would bend a parallel stream.
+velocity changes: the tangential one is left unchanged, since otherwise the missing ∇uᵀ n would bend a parallel stream.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ GAMMA = 1.0 - np.sqrt(0.5)
 TOLERANCE = 1e-7
 MOST_ITERATIONS = 1000
 STEEPEST = 1e6
-"""Largest A/V of a cell in 1/h: slivers."""
+"""Largest A/V of a cell [1/h]; slivers would exceed it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,9 +56,9 @@ class ViscousChange:
 
 @dataclass(frozen=True)
 class FreeBodies:
-    """How bodies answer to shear within a step: mass (n_bodies, 6, 6) [kg, kg m²] about their centres, world axes ·
-    moves (n_bodies,) bool: the others keep their velocity · acceleration (n_bodies, 6) [m/s², rad/s²] by all but
-    shear."""
+    """The response of bodies to shear within a step: mass (n_bodies, 6, 6) [kg, kg m²] about their centres, world axes
+    · moves (n_bodies,) bool: the others keep their velocity · acceleration (n_bodies, 6) [m/s², rad/s²] by all forces
+    but shear."""
 
     mass: Floats
     moves: Bools
@@ -114,7 +115,8 @@ class Viscosity:
             self.friction = WallFriction.of(parameters)
 
     def change(self, water, phi, nodal_water, w, dt: float) -> ViscousChange:
-        """δ over dt [s] on the way of the water to w (N, 3) [m/s]; surface phi (N,), nodal_water (N,) [m³].
+        """The change over dt [s], for water that would reach w (N, 3) [m/s] without viscosity; phi (N,) [m] is the
+        level set, nodal_water (N,) [m³] the water at the nodes.
 
         Raises NotConverged."""
         mass = self.parameters.density * nodal_water
@@ -179,7 +181,8 @@ class Viscosity:
         )
 
     def _wall_terms(self, water, phi, columns, w, wet_cells, share):
-        """The polygons that the water touches, with λ and C; λ rises as the surface takes water off a cell."""
+        """The polygons that the water touches, with λ and C; λ is larger where the free surface leaves less water in a
+        cell."""
         p, k, cells = self.parameters, self.walls, water.topology.cells
         water_share = np.ones(len(cells))
         water_share[wet_cells] = np.maximum(share, 1.0 / STEEPEST)

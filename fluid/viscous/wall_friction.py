@@ -4,22 +4,24 @@ Log law of a wall with sand roughness k_s (Nikuradse):
 
     C_f = [κ / ln(1 + y/z₀)]²,   κ = 0.41,   z₀ = k_s/30                                           (1)
 
-The velocity beside the wall is no point of the profile: the value of a node on a wall stands for the water of its hat.
-The mean of u = u*/κ ln(y/z₀) over it, 2/h ∫ (1 - y/h) u dy = u*/κ [ln(h/z₀) - 3/2], is the profile at y = e^(-3/2) h.
+The velocity beside the wall is not a point value of the profile: the value at a node on a wall represents the water
+under its hat function. The mean of u = u*/κ ln(y/z₀) over it, 2/h ∫ (1 - y/h) u dy = u*/κ [ln(h/z₀) - 3/2], is the
+profile at y = e^(-3/2) h.
 
 Manning, for beds under water of depth d, with the mean velocity U over the depth (the stress of uniform flow):
 
     τ = ρ C_f |U| U,   C_f = g n² / d^(1/3)                                                       (2)
 
-on the floor and on faces of solids that look up (n_z > 0.5); d and U are those of the water in the column of cells, d
-at least one cell.  The stress acts on the water at the bed, and the turbulence that it makes carries it up:
+on the floor and on faces of solids that point upwards (n_z > 0.5); d and U are those of the water in the column of
+cells, with d at least one cell.  The stress acts on the water at the bed, and the turbulence that it makes carries it
+up:
 
     ν_t = u_* d max(κ/6, 2/3 sqrt(C_f)),   u_* = sqrt(C_f) |U|                                    (3)
 
 the mean over the depth of κ u_* z (1 - z/d), which belongs to the logarithmic profile (Fischer, List, Koh, Imberger,
 Brooks, Mixing in Inland and Coastal Waters, 1979, 5.1.1); its second part keeps half of U at the bed where the bed is
-so rough that (1) would leave less.  Without it the water above the lowest cells runs down a slope ever faster.
-Both laws are linear in u_t once their factors are taken from before the stage, so the step stays symmetric.
+so rough that (1) would leave less.  Without this viscosity the water above the lowest cells runs down a slope ever
+faster. Both laws are linear in u_t once their factors are taken from before the stage, so the step stays symmetric.
 
 Roughness and n are numbers, or functions of x and y (n,) [m] → (n,) for beds of several kinds.
 """
@@ -37,11 +39,12 @@ from fluid.numerics.cube_root import cube_root
 
 KARMAN = 0.41
 OFF_WALL = np.exp(-1.5)
-"""Where the profile has its mean over the hat of a node on the wall, in cells."""
+"""Distance from the wall, in cells, at which the profile equals its mean over the hat function of a node on the
+wall."""
 LOOKS_UP = 0.5
 """Least upward part of the unit normal of a bed."""
 SLOWEST = 0.25
-"""Share of the mean velocity that the water at the bed is taken to have at least, for a factor that is bounded."""
+"""Least velocity assumed for the water at the bed, as a share of the mean velocity; it bounds the factor."""
 
 
 @dataclass(frozen=True)
@@ -64,9 +67,9 @@ class WallFriction:
         return cls(p.roughness, p.manning, p.density, p.gravity)
 
     def columns(self, water, phi, u, dt: float) -> Columns | None:
-        """What the columns of water are like, for Manning's law; None for the log law. u (N, 3) [m/s], before the
-        friction of the step dt [s]: the factors take what it leaves, U + C_f dt U²/d = |u|, or a steady stream would
-        depend on the step."""
+        """The water columns for Manning's law; None for the log law. u (N, 3) [m/s] is the velocity before the friction
+        of the step dt [s]. The factors use the velocity U that friction leaves, U + C_f dt U²/d = |u|, since otherwise
+        a steady stream would depend on the step."""
         if self.manning is None:
             return None
         c = Columns.of(water, phi, u)
@@ -103,7 +106,7 @@ class WallFriction:
             depth, left = columns.depth[at], columns.left[at]
             mean = np.linalg.norm(_along(columns.velocity[at], unit), axis=1)
         centre = t.nodes[faces].mean(axis=1)
-        size = size * t.fraction[cell]  # what solids stand on does not slide
+        size = size * t.fraction[cell]  # water does not slide over the part of a face that solids cover
         drag = np.zeros(len(phi))
         for corner in range(3):
             node = faces[:, corner]
@@ -150,8 +153,9 @@ def log_law(distance, roughness: float):
 
 @dataclass(frozen=True)
 class Columns:
-    """Water over the bins of the plan: depth (c,) [m], its volume over their area · velocity (c, 3) [m/s], its mean ·
-    left (c,): share of the velocity before that this is · centre (c, 2) [m] · of_water: the Water they belong to."""
+    """Columns of water over the bins of the plan: depth (c,) [m], volume over area · velocity (c, 3) [m/s], mean over
+    the water · left (c,): share of the velocity that friction leaves · centre (c, 2) [m] · of_water: the Water they
+    belong to."""
 
     depth: Floats
     velocity: Floats
