@@ -60,14 +60,14 @@ class Wish:
 
 
 class Busy(SurgebreakError):
-    """Another call makes the runs of this sweep."""
+    """Another process is making the runs of this sweep."""
 
     exit_code = ExitCode.BAD_CASE
 
 
 def sweep(case: Path, wish: Wish) -> ExitCode:
-    """Make the runs of a sweep that have not been made, and tell what came out; DIVERGED if a run failed, STOPPED if
-    runs are left. Raises BadCase, Busy, NotInstalled."""
+    """Make the runs of a sweep that are still missing, and print the results; return DIVERGED if a run failed, STOPPED
+    if runs are left. Raises BadCase, Busy, NotInstalled."""
     _check(wish)
     plan = make_plan(case, wish.vary, wish.set)
     folder = wish.output or plan.file.directory / "runs" / "sweep"
@@ -108,7 +108,7 @@ def _check(wish: Wish) -> None:
 
 @contextlib.contextmanager
 def _alone(folder: Path) -> Iterator[None]:
-    """One call at a time makes runs in a directory, where the file system has locks."""
+    """Allow one process at a time to make runs in a directory, where the file system has locks."""
     with (folder / ".lock").open("w") as file:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -243,7 +243,7 @@ def finish(spec: Spec, stopped: bool) -> ExitCode:
 
 
 def _summary(results: Results) -> str:
-    """How many rows ended how."""
+    """Number of rows by outcome."""
     counts: dict[str, int] = {}
     for outcome in results.column("outcome"):
         counts[outcome] = counts.get(outcome, 0) + 1

@@ -110,7 +110,7 @@ class Dask:
                         tell(found)
 
     def _keep(self, cluster, client, wanted: int) -> None:
-        """As many jobs as there are runs for, those that ended replaced; workers without a run are let go."""
+        """Keep as many jobs as there are runs for: replace those that ended, and release workers without a run."""
         target, there = min(self.jobs, wanted), len(cluster.worker_spec)
         if there <= target:
             cluster.scale(target)
@@ -122,7 +122,7 @@ class Dask:
             cluster.sync(cluster.scale_down, idle[: there - target])
 
     def _hint(self, client, asked: float) -> float:
-        """Say once where to look if no job runs. asked: when the jobs were asked for; infinite when said."""
+        """Print once where to look if no job runs. asked: time of the request for jobs; infinite once printed."""
         if client.scheduler_info(n_workers=-1)["workers"]:
             return math.inf
         if time.monotonic() < asked + PATIENCE:
@@ -177,7 +177,7 @@ def _handed(name: str) -> bool:
 
 
 def _gained(found: dict, reached: dict[str, float]) -> bool:
-    """Whether a run whose job had no time left came further than in the job before; one that was not begun does."""
+    """Whether a run whose job ran out of time got further than in the job before; True for one that had not begun."""
     if found["time"] is None:
         return "outcome" not in found
     before, reached[found["id"]] = reached.get(found["id"], -math.inf), found["time"]

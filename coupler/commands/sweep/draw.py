@@ -24,7 +24,7 @@ Array = np.ndarray
 
 
 def seed_of(*what: object) -> int:
-    """A whole number below 2^31 that depends on nothing but what is given: the same on every machine, for ever."""
+    """A whole number below 2^31 that depends on the arguments alone and is the same on every machine."""
     text = json.dumps(what, sort_keys=True, default=float).encode()
     return int.from_bytes(hashlib.blake2b(text, digest_size=8).digest()) >> 33
 
@@ -52,7 +52,7 @@ def _sobol(samples: int, dimensions: int, seed: int) -> Array:
 
 
 def _inside(points: Array) -> Array:
-    """Without 0 and 1, where distributions have no end."""
+    """Points moved off 0 and 1, where unbounded distributions are infinite."""
     tiny = np.finfo(float).eps
     return np.clip(points, tiny, 1.0 - tiny)
 
@@ -66,7 +66,8 @@ def _saltelli(pairs: Array) -> Array:
 
 
 def distribution(kind: str, given: dict[str, float]):
-    """The frozen distribution of scipy; given: its pair of numbers in SI. Raises ValueError for what is none."""
+    """The frozen distribution of scipy; given: its pair of numbers in SI. Raises ValueError for
+    parameters that make no distribution."""
     if kind == "uniform":
         if not given["low"] < given["high"]:
             raise ValueError(f"low = {given['low']:g} is not below high = {given['high']:g}")

@@ -25,7 +25,7 @@ ENOUGH = 1e-10
 
 @dataclass(frozen=True)
 class Fits:
-    """slope b (s,) · cut c (s, K) of ln x · found (s,) bool: whether the maximum was found, not at infinity"""
+    """slope b (s,) · cut c (s, K) of ln x · found (s,) bool: whether a finite maximum was found"""
 
     slope: Array
     cut: Array
@@ -77,7 +77,7 @@ def _none(sets: int, states: int) -> Fits:
 
 
 def _grouped(z: Array, y: Array, weight: Array) -> tuple[Array, Array, Array]:
-    """Runs of one intensity and state as one."""
+    """Merge runs of the same intensity and state into one weighted run."""
     pairs, group = np.unique(np.stack([z, y]), axis=1, return_inverse=True)
     columns = np.zeros((len(weight), pairs.shape[1]))
     for k in range(pairs.shape[1]):
@@ -86,8 +86,8 @@ def _grouped(z: Array, y: Array, weight: Array) -> tuple[Array, Array, Array]:
 
 
 def _overlap(z: Array, y: Array, w: Array, states: int) -> Array:
-    """Sets (s,) in which some run that reached a state has a smaller intensity than one that did not: else the
-    likelihood grows with b for ever."""
+    """Sets (s,) bool in which some run that reached a state has a smaller intensity than one that did not; otherwise
+    the likelihood increases with b without bound."""
     found = np.zeros(len(w), bool)
     for k in range(1, states + 1):
         below = np.where((w > 0.0) & (y < k), z, -np.inf).max(axis=1)
@@ -183,8 +183,8 @@ def bootstrap(x: Array, state: Array, states: int, samples: int, seed: int) -> F
 
 
 def separation(x: Array, reached: Array) -> tuple[float, float] | None:
-    """Between which intensities runs change from not reaching a state to reaching it, where none is out of order; None
-    where they overlap. reached (n,) bool, both kinds are there."""
+    """The intensities between which the runs change from not reaching a state to reaching it, if they are perfectly
+    separated; None where they overlap. reached (n,) bool contains both values."""
     low, high = x[~reached].max(), x[reached].min()
     return (float(low), float(high)) if low <= high else None
 

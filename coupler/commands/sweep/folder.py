@@ -89,17 +89,17 @@ def read_spec(folder: Path) -> Spec:
 
 
 def figures(spec: Spec, id: str) -> dict[str, Any] | None:
-    """How a run ended; None where it has not ended yet, or nobody could tell."""
+    """How a run ended; None where it has not ended yet or this is unknown."""
     return ended(spec, id) or _read(_open(spec, id))
 
 
 def ended(spec: Spec, id: str) -> dict[str, Any] | None:
-    """The same of a run that is not to be made again."""
+    """How a run ended that need not be made again; None for any other."""
     return _read(spec.folder / "runs" / f"{id}.json")
 
 
 def write_figures(spec: Spec, id: str, found: dict, final: bool) -> None:
-    """Write how a run ended; final: it would end the same way again."""
+    """Write how a run ended; final: it would end in the same way if it were repeated."""
     write_json(spec.folder / "runs" / f"{id}.json" if final else _open(spec, id), found)
     if final:
         _open(spec, id).unlink(missing_ok=True)

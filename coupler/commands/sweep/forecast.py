@@ -63,7 +63,7 @@ def _trial(spec: Spec) -> tuple[float, float, float]:
 
 
 def _first_steps(spec: Spec, id: str) -> tuple[float, float, float] | str:
-    """The same of one run; how it ended where it did not get so far."""
+    """The same for the given run; how it ended where it failed earlier."""
     case = load(spec.case_file, spec.runs[id]).case
     end = case.time.end
     short = min(end, STEPS * case.time.step_max)

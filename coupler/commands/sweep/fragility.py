@@ -92,7 +92,7 @@ def curves(spec: Spec, results: Results, f: Fragility) -> dict:
 
 
 def plain_meaning(meaning: str) -> str:
-    """What a column is, without what it sets and where it is from."""
+    """The meaning of a column, without the keys it sets and its origin."""
     return meaning.partition(": sets")[0].removesuffix(FREE)
 
 
@@ -119,7 +119,7 @@ def read_runs(results: Results, f: Fragility) -> Runs:
 
 
 def _reached(record: dict, s: DamageState) -> bool | None:
-    """Whether a run is in a state; None where nobody knows."""
+    """Whether a run reached a state; None where this is unknown."""
     outcome, value = record["outcome"], record[s.quantity]
     if outcome == "cannot stand":
         return True if s.cannot_stand else None

@@ -28,7 +28,7 @@ class Local:
         self.stopping = False
 
     def make(self, ids: Iterable[str], tell: Tell) -> None:
-        """Make the runs; tell is given how each ended. Raises KeyboardInterrupt when all have stopped after Ctrl-C."""
+        """Make the runs and `tell` how each ended. Raises KeyboardInterrupt when all have stopped after Ctrl-C."""
         ids = list(ids)
         for id in ids:
             self.waiting.put(id)
@@ -67,7 +67,7 @@ class Local:
                 os.killpg(worker.pid, 9)
 
     def _work(self) -> None:
-        """One hand: a worker process, and another one where it dies."""
+        """Work of one thread: keep a worker process busy, and replace it if it dies."""
         worker, cold = None, False
         try:
             while not self.stopping:
@@ -118,7 +118,7 @@ def _ask(worker: subprocess.Popen, id: str) -> dict | None:
 
 
 def _lost(id: str, code: int) -> dict:
-    """What is reported of a run whose worker died: the run itself may go on, and its next call finds out."""
+    """The report of a run whose worker died. The run itself may still be going on; the next call finds out."""
     return {
         "id": id,
         "outcome": "crashed",
@@ -128,5 +128,5 @@ def _lost(id: str, code: int) -> dict:
 
 
 def free_cores(threads: int) -> int:
-    """Runs of so many threads that this machine has cores for."""
+    """Number of runs with so many threads each for which this machine has cores, at least one."""
     return max(1, cores() // threads)

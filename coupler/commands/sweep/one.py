@@ -88,8 +88,8 @@ class Process:
 
 
 def _begin(parent: int) -> None:
-    """What a run does before it is one: it stops when the process that is to read it is gone. Slurm warns all processes
-    of a job of its end by SIGUSR2; it is the parent that stops the run then."""
+    """Prepare a new process for a run: it stops when the process that reads the run is gone. Slurm warns all processes
+    of a job of its end by SIGUSR2, which is ignored here, because the parent then stops the run."""
     signal.signal(signal.SIGUSR2, signal.SIG_IGN)
     end_with(parent)
 
@@ -105,8 +105,8 @@ def make(spec: Spec, id: str, execute: Execute) -> dict:
 
 @contextlib.contextmanager
 def _alone(spec: Spec, id: str) -> Iterator[None]:
-    """One process at a time makes a run: what a killed sweep has left behind may still be at it. Raises Busy when that
-    does not end within PATIENCE."""
+    """Allow one process at a time to make a run; one that a killed sweep left behind may still be working on it.
+    Raises Busy when that does not end within PATIENCE."""
     log, place = spec.folder / "runs" / f"{id}.log", spec.place(id)
     busy = f"{place}: a process of an earlier call still makes this run; call again when it is done, or end that one"
     lock = _patient(lambda: FileLock(log, busy))
@@ -212,7 +212,7 @@ def outcome_of(exit_code: int, summary: dict) -> str:
 
 
 def _tidy(place: Path, keep: str) -> None:
-    """Remove from a run directory what is not wanted any more."""
+    """Remove the files of a run directory that are not to be kept."""
     if keep == "all" or not place.is_dir():
         return
     for entry in place.iterdir():

@@ -191,7 +191,7 @@ class _Planner:
             yield values, tuple(overrides)
 
     def _values(self, v: Varied) -> list:
-        """Of a list as they are written, of a grid in SI."""
+        """Values to be run through: as written for a list, in SI for a grid."""
         if v.values:
             return list(v.values)
         low, high = self._amount(v, "low"), self._amount(v, "high")
@@ -299,7 +299,7 @@ class _Planner:
 
 
 def _point(row: Row, drawn: list[Varied]) -> str:
-    """What tells one point of the grid from another."""
+    """A text that distinguishes one point of the grid from another."""
     names = {v.column for v in drawn}
     return repr([(k, v) for k, v in row.values.items() if k not in names])
 
@@ -321,7 +321,7 @@ def _read(text: str):
 
 
 def _put(case: dict, key: str, value) -> None:
-    """Set a value in an effective case; sections that are not there are made, places in lists must be."""
+    """Set a value in an effective case. Missing sections are created; list entries must exist."""
     path = parse_path(key)
     holder = case
     for part in path[:-1]:

@@ -44,12 +44,12 @@ def asked(sweep: Sweep) -> tuple[SweepQuantity, ...]:
 
 
 def is_derived(q: SweepQuantity) -> bool:
-    """Whether it follows from other columns, and not from the files of a run."""
+    """Whether the quantity is computed from other columns instead of the files of a run."""
     return q.formula is not None and q.table is None
 
 
 def definition(q: SweepQuantity) -> str:
-    """What tells one definition from another, as far as numbers go."""
+    """A text that distinguishes definitions that give different numbers."""
     return fingerprint(q.model_dump(mode="json", exclude={"name", "what", "unit", "source"}))
 
 
@@ -100,7 +100,7 @@ def joints_broken(run: Path, of: str | None) -> float:
 
 
 def drift(run: Path, q: SweepQuantity) -> float:
-    """Largest drift ratio: way sideways at the upper height less that at the lower one, over their distance."""
+    """Largest drift ratio: difference of the lateral displacements at the two heights over their distance."""
     middle = middles(run / "blocks.vtkhdf")
     own = _rows_of(run, q.of) if q.of else np.ones(middle.shape[1], bool)
     upper = _way(middle, own, q.upper)
@@ -109,7 +109,7 @@ def drift(run: Path, q: SweepQuantity) -> float:
 
 
 def _way(middle: Array, own: Array, height: float) -> Array:
-    """Mean way (steps, 3) since the start of the own blocks that stood nearest to a height; 0 at the ground."""
+    """Mean displacement (steps, 3) [m] of those of the own blocks that stood nearest to a height; 0 at the ground."""
     start = middle[0, :, 2]
     if height <= start[own].min() - 0.5 * np.ptp(start[own]) / max(own.sum() - 1, 1):
         return np.zeros((len(middle), 3))

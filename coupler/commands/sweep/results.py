@@ -42,7 +42,7 @@ class Results:
 
 
 def collect(spec: Spec) -> Results:
-    """What all rows of a sweep have come to so far."""
+    """The results of all rows of a sweep so far."""
     found = {id: ended_run for id in _ids(spec) if (ended_run := figures(spec, id)) is not None}
     records = tuple(_record(spec, row, found) for row in spec.rows)
     return Results(tuple(_columns(spec)), records, found)
@@ -106,7 +106,7 @@ def _record(spec: Spec, row: Row, found: dict[str, dict]) -> dict:
 
 
 def _quantities(spec: Spec, row: Row, found: dict, record: dict, reasons: list[str]) -> dict[str, float]:
-    """Quantities of a row; why a run that is done lacks one stands in its reasons."""
+    """Quantities of a row; `reasons` receives why a completed run lacks one."""
     values: dict[str, float] = {}
     case = None
     for q in asked(spec.sweep):
@@ -128,7 +128,7 @@ def _quantities(spec: Spec, row: Row, found: dict, record: dict, reasons: list[s
 
 
 def _reading(spec: Spec, q, id: str, ended_run: dict) -> tuple[float, str]:
-    """Value and why there is none: as it was read when the run ended, or anew if it is defined otherwise now."""
+    """Value of a quantity, or why there is none. It is read again if its definition has changed since the run ended."""
     known = ended_run["readings"].get(q.name)
     if known is not None and known["of"] == definition(q):
         return number(known["value"]), known["why"]

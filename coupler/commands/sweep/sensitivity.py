@@ -23,7 +23,7 @@ LEAST = 8
 
 
 def sensitivities(spec: Spec, results: Results) -> list[dict]:
-    """Of every quantity of sweep.sensitivity: how, a row for each drawn quantity, or why there is none."""
+    """For every quantity of sweep.sensitivity: the method and a row for each drawn quantity, or why there is none."""
     return [_of(spec, results, name) for name in spec.sweep.sensitivity]
 
 
@@ -66,7 +66,8 @@ def _ends() -> tuple[float, float]:
 
 
 def partial_ranks(x: Array, y: Array) -> Array:
-    """(d,): of each column the correlation of what of its ranks, and of those of y, the others do not explain."""
+    """(d,): for each column, the correlation between the residuals of its ranks and of the ranks of y after regression
+    on the ranks of the other columns."""
     ranks = np.array([rankdata(column) for column in (*x.T, y)])
     inner = np.linalg.pinv(np.corrcoef(ranks))
     return -inner[-1, :-1] / np.sqrt(np.diag(inner)[:-1] * inner[-1, -1])

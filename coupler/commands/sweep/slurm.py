@@ -39,7 +39,7 @@ REQUEUES = 100
 
 
 class NoSlurm(SurgebreakError):
-    """The commands of Slurm are not there, or refuse."""
+    """The commands of Slurm are missing or fail."""
 
 
 class Work:
@@ -80,7 +80,7 @@ class Slurm:
         self.options = keywords(options, LISTS)
 
     def make(self, ids: Iterable[str], tell: Tell) -> None:
-        """Submit the runs that are in no job yet, and tell how each ended, unless the user wants to leave."""
+        """Submit the runs that are in no job yet, and report how each ended, unless the user does not want to wait."""
         known = _known(self.spec)
         queue = in_queue(set(known.values()))
         wanted = list(ids)
@@ -135,7 +135,7 @@ class Slurm:
                 time.sleep(POLL)
 
     def _left(self, id: str, job: str) -> dict:
-        """What is reported of a run whose job is gone: how its last process ended, or that nobody knows."""
+        """The report of a run whose job is gone: how its last process ended, or that this is unknown."""
         record = figures(self.spec, id)
         if record is not None and record["job"] and record["outcome"] != "lost":
             return record
@@ -163,7 +163,7 @@ def _known(spec: Spec) -> dict[str, str]:
 
 
 def in_queue(jobs: set[str]) -> set[str]:
-    """Those of the jobs that wait or run. Raises NoSlurm where the queue cannot be asked."""
+    """Those of the jobs that are waiting or running. Raises NoSlurm where the queue cannot be asked."""
     if not jobs:
         return set()
     words = ["squeue", "--me", "--noheader", "--array", "--format=%i"]

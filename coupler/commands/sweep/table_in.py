@@ -1,4 +1,4 @@
-"""Points of a grid from a CSV file: a line a point, a column a name of the case or a name for formulas.
+"""Points of a grid from a CSV file: one line per point, one column per key of the case or name for formulas.
 
 A head may carry a unit in brackets ("joints.strength [MPa]"), then its cells are plain numbers; without, a cell is what
 stands behind --set NAME=... Lines that begin with # are comments.

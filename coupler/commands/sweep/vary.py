@@ -34,7 +34,7 @@ def varied(text: str) -> Varied:
 
 
 def _refuse_mixed_units(content: dict, text: str) -> None:
-    """0.1,0.2 MPa is not meant as 0.1 Pa and 0.2 MPa. Raises BadCase."""
+    """Refuse `0.1,0.2 MPa`, which hardly means 0.1 Pa and 0.2 MPa. Raises BadCase."""
     given = content.get("values", tuple(content[name] for name in ("low", "high") if name in content))
     plain_numbers = [v for v in given if isinstance(v, int | float) and not isinstance(v, bool) and v]
     with_unit = [v for v in given if isinstance(v, str) and WITH_UNIT.match(v)]
@@ -101,7 +101,7 @@ def _listed(value: str) -> list:
 
 
 def plain(text: str) -> object:
-    """A TOML value; what is none is text."""
+    """The value of a TOML text; anything that is not TOML is kept as text."""
     try:
         found = tomllib.loads(f"x = {text}")["x"]
     except ValueError:

@@ -112,19 +112,19 @@ def _lowered() -> dict[str, float]:
 
 
 def _way(t: float) -> float:
-    """How far the bell is down [m] after t [s]."""
+    """Distance [m] by which the bell has been lowered at time t [s]."""
     return DEEP * 0.5 * (1.0 - np.cos(np.pi * t / TIME))
 
 
 def _bell_exact() -> dict[str, float]:
-    """At rest: the air squeezed by the difference of the levels, the water displaced by walls and air."""
+    """State at rest: the difference of the levels compresses the air, and walls and air displace water."""
     gas, rim = Gas(), LEVEL - 0.05 - DEEP
     top, area = rim + HEIGHT, INNER**2
     reference = area * (HEIGHT - 0.05)
     held = TANK**2 * LEVEL - (WIDE**2 - area) * 0.05
 
     def outside(inside: float) -> float:
-        """Level around it that keeps the volume of the water."""
+        """Level [m] outside the bell that conserves the volume of water, for a level inside it [m]."""
         walls = WIDE**2 - area
 
         def missing(level):
@@ -158,7 +158,7 @@ def _bell_exact() -> dict[str, float]:
 
 @dataclass(frozen=True)
 class Bounce:
-    """time (n,) [s] · thickness (n,) [m] of the cushion · pressure (n,) [Pa] · energy (n,) over that at the start."""
+    """time (n,) [s] · thickness (n,) [m] of the cushion · pressure (n,) [Pa] · energy (n,) over its initial value."""
 
     time: np.ndarray
     thickness: np.ndarray
@@ -169,7 +169,7 @@ class Bounce:
 def bounce(
     thickness: float, length: float, speed: float, cells: int, dt: float, until: float, across: int
 ) -> Bounce:
-    """Water of a length [m] that moves along a tube onto a cushion of air of a thickness [m], without weight."""
+    """Weightless column of water of a length [m] that moves along a tube onto an air cushion of a thickness [m]."""
     h = thickness / cells
     size = (across * h, across * h, thickness + length + 3.0 * h)
     mesh = box_mesh(np.zeros(3), size, h)
@@ -206,7 +206,7 @@ def piston(thickness: float, length: float, speed: float, times) -> np.ndarray:
 
 
 def period(thickness: float, length: float, speed: float) -> float:
-    """Period [s] of the bounce: four times no closed form, so twice the way between the turning points."""
+    """Period [s] of the bounce: twice the time between the turning points, by quadrature (no closed form exists)."""
     gas = Gas()
     energy = 0.5 * DENSITY * length * speed**2
 
@@ -248,7 +248,7 @@ def bouncing_column():
 
 
 def _period_of(run: Bounce) -> float:
-    """Mean time between passages through the thickness at the start, outward."""
+    """Mean time [s] between successive outward passages through the initial thickness."""
     off = run.thickness - run.thickness[0]
     k = np.flatnonzero((off[:-1] < 0.0) & (off[1:] >= 0.0))
     passages = run.time[k] - off[k] * (run.time[k + 1] - run.time[k]) / (off[k + 1] - off[k])
@@ -293,7 +293,7 @@ def floating_bell():
 
 
 def _afloat(reference: float) -> dict[str, float]:
-    """At rest: height of the ceiling over the water beside it [m], and the pressure [Pa]."""
+    """State at rest: height [m] of the ceiling above the water outside, and the pressure [Pa]."""
     inner, wall, height = BELL
     wide = inner + 2.0 * wall
     mass = HEAVY * (wide**2 * wall + (wide**2 - inner**2) * height)
@@ -311,7 +311,7 @@ def _afloat(reference: float) -> dict[str, float]:
 
 
 def _sinking() -> float:
-    """Time [s] in which the ceiling sinks from HIGH to LOW: the orifice lets out what the weight presses on."""
+    """Time [s] in which the ceiling sinks from HIGH to LOW while the bell's weight drives air out of the orifice."""
     gas, area = Gas(), BELL[0] ** 2
     references = [brentq(lambda r, top=top: _afloat(r)["top"] - top, 0.1, 0.6) for top in (HIGH, LOW)]
 

@@ -129,7 +129,7 @@ def _glued_pair(law: JointParameters) -> Structure:
 def _largest_carried(
     build: Callable[[], Structure], load: Callable[[float], np.ndarray], high: float, share: float = 1e-3
 ) -> float:
-    """The largest factor of a load under which the structure finds equilibrium, to `share`, by bisection."""
+    """Largest load factor at which the structure finds equilibrium, by bisection to the relative error `share`."""
     low = 0.0
     while high - low > share * high:
         middle = 0.5 * (low + high)
@@ -151,7 +151,7 @@ RIGID_ACROSS = 10.0
 
 
 def _chain(law: JointParameters, held: int) -> Structure:
-    """Six cubes in a row along x; block `held` fixed, -1: a wall at the left end holds the row."""
+    """Six cubes in a row along x; the block `held` is fixed (-1: a wall at the left end holds the row)."""
     blocks = [Block(f"b{i}", (EDGE * (i + 0.5), 0, 0), size=EDGE, fixed=i == held) for i in range(6)]
     if held < 0:
         blocks.append(Block("wall", (-0.5 * EDGE, 0, 0), size=EDGE, fixed=True))
@@ -159,7 +159,7 @@ def _chain(law: JointParameters, held: int) -> Structure:
 
 
 def _end_load(P: float, n: int, left: bool = False) -> np.ndarray:
-    """P downwards at the free end face of the row, or of both its ends."""
+    """The load P, acting downwards on the right end face of the row, or on both end faces."""
     F = np.zeros((n, 6))
     F[5, 2], F[5, 4] = -P, 0.5 * EDGE * P
     if left:
@@ -191,7 +191,7 @@ def three_point_bend():
 
 
 def _deflection(table, held: int, load, deflection):
-    """Load and deflection on the way to the peak, and at it, of joints that are as good as rigid in closing."""
+    """Findings for deflections below and at the peak load, with joints that are nearly rigid in closing."""
     law = JointParameters(STRENGTH, FAILURE, closing_ratio=RIGID, shear_ratio=RIGID_ACROSS, damping=0.0)
     peak, last = table["P_N"][-1], table["u_m"][-1]
     for share in (0.5, 0.9):
@@ -209,7 +209,7 @@ def _deflection(table, held: int, load, deflection):
 
 
 def _face(structure: Structure, row: int, side: float) -> np.ndarray:
-    """Where the middle of a face at ±EDGE/2 along x of a block in the row is now, less where it was."""
+    """Displacement (3,) [m] of the centre of a block's face at x = ±EDGE/2 since the start."""
     local = np.array([side * EDGE, 0.0, 0.0])
     return structure.centre()[row] + structure.rotation()[row] @ local - [EDGE * (row + 0.5 + side), 0.0, 0.0]
 

@@ -36,7 +36,7 @@ def bore():
 
 
 def _arrivals(lower: float):
-    """Places (n,) [m] after the gate in the middle, times (n,) [s] of the bore there; losses."""
+    """Distances (n,) [m] downstream of the gate, arrival times (n,) [s] of the bore there, losses of the run."""
     cell = UPPER / CELLS
     size = np.round(np.array([LENGTH, 2 * cell, 1.5 * UPPER]) / cell) * cell
     level = lambda x: np.minimum(np.maximum(x[:, 0] - GATE, x[:, 2] - UPPER), x[:, 2] - lower)  # noqa: E731
@@ -53,6 +53,6 @@ def _arrivals(lower: float):
 
 
 def _depth(water, x: float, cell: float, height: float) -> float:
-    """Water [m] over the floor, mean over four cells along x: a splash ahead of the front hardly counts."""
+    """Depth [m] of the water, averaged over four cells along x so that a splash ahead of the front hardly counts."""
     volume = gauges.volume_in_box(water, (x - 2 * cell, 0.0, 0.0), (x + 2 * cell, 2 * cell, height))
     return volume / (8 * cell**2)

@@ -30,8 +30,8 @@ FILM = 0.1
 
 @dataclass(frozen=True)
 class Coast:
-    """A run: times (n,) [s] · gauges (n, k) [m], levels at k places · wet (p,): which of the places looked at were wet
-    at any time · losses"""
+    """A run: times (n,) [s] · gauges (n, k) [m], levels at k places · wet (p,): whether each of the observed places
+    was wet at any time · losses of the run"""
 
     time: np.ndarray
     gauges: np.ndarray
@@ -92,7 +92,7 @@ def monai_valley():
 
 
 def _monai(cell) -> tuple[Coast, np.ndarray]:
-    """The run, and the height of the bed (p,) [m] at places all over the valley."""
+    """The run, and the bed height (p,) [m] at places throughout the valley."""
     from pathlib import Path
 
     from coupler.geometry.terrain.grids import read_grid

@@ -38,7 +38,7 @@ class Collapse:
         return float(np.polyfit(self.T[within], self.Z[within], 1)[0])
 
     def at(self, Z: float) -> float:
-        """T at which the front is at Z."""
+        """Time T at which the front reaches Z."""
         return float(np.interp(Z, self.Z, self.T))
 
 

@@ -84,7 +84,7 @@ def _added_mass(
     s: float, cells: int, closed: bool, dt: float = 1e-3, steps: int = 1, margin: float | None = None
 ) -> float:
     """ca = g (1 - s)/a - s from the first acceleration of a unit cube in a tank of side 3 (mean of `steps` steps).
-    margin [m]: cells are halved up to there around the cube, None: none are."""
+    margin [m]: cells are halved up to there around the cube, None: nowhere."""
     block = Block("cube", (1.5, 1.5, 1.5), size=1.0, density=s * DENSITY)
     with Structure([block], gravity=(0, 0, -G)) as body:
         height, extra = (3.0, 0) if closed else (3.0 + 6.0 / cells, 2)
@@ -142,7 +142,7 @@ def attitude():
 
 
 def _stable_heel(s: float) -> float:
-    """Heel [deg] in [0, 45] where the roll moment of still water on a held prism at its draught turns it back."""
+    """Heel [deg] in [0, 45] at which a floating prism is stable: the roll moment of still water on it changes sign."""
     heels = np.linspace(1.0, 44.0, 9)
     moments = [_roll_moment(a, s) for a in heels]
     if moments[0] <= 0.0:
@@ -154,7 +154,7 @@ def _stable_heel(s: float) -> float:
 
 
 def _roll_moment(heel: float, s: float) -> float:
-    """Moment [N m] of the water about the axis of the prism, positive towards more heel, where lift = weight."""
+    """Moment [N m] of the water about the axis of the prism, positive towards more heel, where buoyancy = weight."""
     weight = s * DENSITY * G * 0.4**2 * 0.05
 
     def surplus(z):

@@ -1,4 +1,4 @@
-"""What the step does to an impact: peak, mean over a window and impulse at several Courant numbers."""
+"""Influence of the time step on an impact: peak, mean over a window and impulse at several Courant numbers."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ WHAT = ("peak (reported, not judged)", "largest mean over {:g}", "impulse")
 
 
 def findings(runs: dict[float, tuple], window: float, end: float) -> Iterator[Finding]:
-    """Each of `runs` (by Courant number: times (n,) and pressures (n,) from 0 to `end`) against the first."""
+    """Compare each of `runs` with the first. They are keyed by Courant number; each holds times (n,) and pressures (n,)
+    from 0 to `end`."""
     first, *others = {number: figures(*run, window, end) for number, run in runs.items()}.items()
     for number, values in others:
         for what, value, goal, limit in zip(WHAT, values, first[1], (10.0, WITHIN, WITHIN)):
@@ -36,7 +37,7 @@ def figures(t, p, window: float, end: float) -> tuple[float, float, float]:
 
 
 def figure(name: str, runs: dict[float, tuple], window: float, end: float, axes, x_range) -> Figure:
-    """The pressures, and the three figures over those of the first run."""
+    """Figure of the pressures, and of the three values relative to those of the first run."""
     numbers = np.array(list(runs))
     found = np.array([figures(*run, window, end) for run in runs.values()])
     lines = tuple(Curve(f"CFL {n:g}", "computed", *run) for n, run in runs.items())

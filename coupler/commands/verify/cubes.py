@@ -1,4 +1,4 @@
-"""Three cubes on one another in the way of a dam break."""
+"""Three stacked cubes in the path of a dam break."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ ANY = 100.0
 
 @check("P56", "three stacked cubes in a dam break", "Canelas et al. 2016 (experiment), digitised", "M")
 def stacked_cubes():
-    """The gate is gone at t = 0; in the experiment it takes a time that is not reported."""
+    """The gate vanishes at t = 0; the opening time in the experiment is not reported."""
     table = columns("canelas_three_cubes_x")
     t, place = cubes(EDGE / 3.0, 1.65)
     finer_t, finer = cubes(EDGE / 3.0, 1.65, (FINER,))

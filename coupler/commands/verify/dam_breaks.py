@@ -81,7 +81,7 @@ def wall_impact():
 
 
 def _measured_plateaus(table) -> list[float]:
-    """Mean p* of sensors 1 to 3 over PLATEAU: one run, the median of 100, one run."""
+    """Mean p* of sensors 1 to 3 over PLATEAU; sensors 1 and 3 from one run, sensor 2 from the median of 100 runs."""
     at = np.linspace(*PLATEAU, 201)
     low, high = columns("lobovsky_p1_H300"), columns("lobovsky_p3_H300")
     curves = ((low, "pstar"), (table, "median"), (high, "pstar"))
@@ -89,7 +89,7 @@ def _measured_plateaus(table) -> list[float]:
 
 
 def _cells_figure(runs: dict[int, Impact], table) -> Figure:
-    """Sensor 2 with rough walls on different cells."""
+    """Figure of the pressure at sensor 2 for different cell sizes, with wall friction."""
     some = slice(None, None, 10)
     t = table["tstar"][some]
     curves = [Curve("measured, 2.5 to 97.5 %", "band", t, table["p2p5"][some], table["p97p5"][some])]
@@ -202,7 +202,7 @@ def spheric(until: float, per_metre: int = 20, **settings) -> tuple[dict[str, np
 
 
 def _record(table, name: str):
-    """The column of a record whose heading begins with the name of a probe."""
+    """Column of a record whose heading begins with the name of the probe."""
     return next(v for k, v in table.items() if k.startswith(name))
 
 
@@ -238,15 +238,15 @@ def levels():
 
 
 def _impulse(time, pressure, ahead: float = 0.0) -> float:
-    """∫ p dt [Pa s] from 0.35 to 1 s on a clock that is ahead by so much [s]."""
+    """∫ p dt [Pa s] from 0.35 to 1 s, on a clock that runs `ahead` [s] early."""
     time = time - ahead
     within = (time >= 0.35) & (time <= 1.0)
     return float(np.trapezoid(pressure[within], time[within]))
 
 
 def clock(found) -> float:
-    """By how much [s] the record's clock is ahead of a dam that vanishes at t = 0, from the fall of the level in the
-    reservoir (H4) until OF_CLOCK: the shift at which the two curves differ by a constant, as near as can be."""
+    """Time [s] by which the record's clock is ahead of a dam that vanishes at t = 0. It is the shift at which the
+    computed and the measured level in the reservoir (H4, until OF_CLOCK) come closest to differing by a constant."""
     table = columns("kleefsman_heights_h1_h4")
     within = table["t_s"] <= OF_CLOCK
     time, level = table["t_s"][within], _record(table, "H4")[within]
@@ -333,7 +333,7 @@ def impulses():
 
 
 def _box_figure(name, found, table, probes, shown, label: str, unit: float) -> Figure:
-    """A panel a probe: the record, and what was found."""
+    """One panel for each probe, with the record and the computed curve."""
     panels = []
     for probe in probes:
         curves = (

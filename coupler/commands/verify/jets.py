@@ -1,4 +1,4 @@
-"""Jets on plates, without gravity to speak of: force and pressure against free-streamline theory."""
+"""Jets on plates, practically without gravity: force and pressure against free-streamline theory."""
 
 from __future__ import annotations
 

@@ -32,7 +32,7 @@ def driven_pair(law: JointParameters, velocity=STILL, spin=STILL) -> Structure:
 
 
 def exact_traction(law: str, r):
-    """T/T_max at r = δ/δ_f, written out here once more: the laws of the package must agree with it."""
+    """T/T_max at r = δ/δ_f, written independently of the package, whose laws must agree with it."""
     if law == "polynomial":
         T = 6.75 * r * (1.0 - 2.0 * r + r * r)
     elif law == "bilinear":

@@ -15,7 +15,7 @@ from coupler.commands.verify.registry import Check, Result, checks
 
 
 def results(case: Check, figures=None) -> Iterator[Result]:
-    """Run a case. An error ends the process: `runner` reports it with what it said.
+    """Run a case. An error ends the process; `runner` reports it with its message.
 
     figures: a text file for the figures that the case has; None: they are dropped."""
     began = cpu_seconds()
@@ -30,7 +30,7 @@ def results(case: Check, figures=None) -> Iterator[Result]:
 
 
 def cpu_seconds() -> float:
-    """Processor time of this process and of those that it has waited for, as YADE running a script."""
+    """Processor time [s] of this process and of the children that it has waited for, such as YADE with a script."""
     spent = os.times()
     return spent.user + spent.system + spent.children_user + spent.children_system
 

@@ -103,7 +103,7 @@ def _overview(results: list[Result], cases: list[str]) -> str:
 
 
 def _of_limit(r: Result) -> float:
-    """Error over its limit; 0 where only equality passes and it does; infinite without a figure."""
+    """Error as a share of its limit; 0 where the limit is zero and is met; infinite where there is no value."""
     if r.error is None or r.tolerance is None:
         return math.inf
     return r.error / r.tolerance if r.tolerance > 0.0 else 0.0 if r.passed else math.inf

@@ -1,4 +1,4 @@
-"""A plate with a rim that falls flat on water, and the air that it catches."""
+"""A plate with a rim that falls flat on water, and the air that it traps."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ class CushionOnWater:
 
     @classmethod
     def of(cls) -> CushionOnWater:
-        """From the shapes that the fastest fall comes by."""
+        """Coefficients tabulated over the draughts and depths that occur in the fastest fall."""
         draught = np.linspace(0.25 * DRAUGHT, 0.145, 6)
         depth = np.array([0.0, 0.016, 0.032, 0.048])
         known = np.array([[response(s, e) for e in depth] for s in draught])

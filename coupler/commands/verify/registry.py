@@ -26,7 +26,8 @@ Cost = Literal["S", "M", "L"]
 
 @dataclass(frozen=True)
 class Finding:
-    """A value of a run beside what it should be. `relative`: tolerance is a share of `expected`, else its unit."""
+    """A value of a run and its reference value. `relative`: the tolerance is a share of `expected`; otherwise it has
+    the unit of the value."""
 
     quantity: str
     value: float
@@ -60,7 +61,7 @@ TOLD = "(reported, not judged)"
 
 @dataclass(frozen=True)
 class Result:
-    """One quantity of a case, or why the case gave none (`reason`; then value and error are None)."""
+    """One quantity of a case, or the `reason` why the case gave none; value and error are then None."""
 
     id: str
     quantity: str
@@ -75,19 +76,19 @@ class Result:
 
     @property
     def judged(self) -> bool:
-        """Whether it counts: what is only reported neither passes nor fails."""
+        """Whether the result is judged: one that is only reported neither passes nor fails."""
         return TOLD not in self.quantity
 
     @classmethod
     def of(cls, id: str, found: Finding, cpu_s: float) -> Result:
-        """The judgement; a value that is not a number does not pass."""
+        """The result of comparing a finding with its tolerance; NaN does not pass."""
         passed = bool(found.error <= found.tolerance)
         numbers = (float(found.value), float(found.expected), float(found.error), float(found.tolerance))
         return cls(id, found.quantity, *numbers, found.relative, passed, cpu_s)
 
     @classmethod
     def failed(cls, id: str, reason: str, cpu_s: float) -> Result:
-        """A case that ended before its time."""
+        """Result of a case that ended prematurely."""
         return cls(id, "ends", None, None, None, None, False, False, cpu_s, reason)
 
 

@@ -21,7 +21,7 @@ def verify(
 ) -> ExitCode:
     """Run the cases asked for and print each result as it comes; DIVERGED if one did not pass.
 
-    plots: a folder for figures of computed curves over measured ones, one or more a case that has any."""
+    plots: a folder for figures that compare computed with measured curves, where a case has any."""
     cases = chosen(ids, quick)
     if only_list:
         print(listing(cases))
@@ -43,7 +43,7 @@ def verify(
 
 
 def draw(plots: Path, ids: list[str]) -> None:
-    """Draw the figures that the cases left, in a process of its own, and tell the pictures on stderr."""
+    """Draw the figures that the cases left, in a process of its own, and list the pictures on stderr."""
     there = [str(path) for id in ids if (path := plots / f"{id}.json").exists() and path.stat().st_size]
     if there:
         run_module("coupler.commands.view.curves", plots, *there, check=True, stdout=sys.stderr)
@@ -55,7 +55,7 @@ def head() -> str:
 
 
 def line(result: Result) -> str:
-    """One row; a case that broke off says why instead of its figures."""
+    """One row; for a case that ended prematurely it gives the reason in place of the values."""
     verdict = "reported" if not result.judged else "ok" if result.passed else "FAIL"
     if result.value is None:
         return f"{result.id:5} {verdict}: {result.reason}"

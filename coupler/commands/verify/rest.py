@@ -57,7 +57,7 @@ def _stillness(name: str, c, level: float) -> Iterator[Finding]:
 
 
 def _anywhere(kind: str, covers: str) -> Iterator[Finding]:
-    """The worst of some random places and tilts of one kind of scene."""
+    """Worst error over several random positions and tilts of one kind of scene."""
     speeds, errors = [], []
     for seed in SEEDS:
         random = np.random.default_rng(seed)
@@ -90,7 +90,7 @@ def _turn(random, most: float = np.pi):
 
 
 def _through_the_surface(random):
-    """A block that the surface of the water cuts."""
+    """A block that pierces the water surface."""
     centre = [*random.uniform(0.35, 0.65, 2), random.uniform(0.65, 0.85)]
     return [box(centre, random.uniform(0.15, 0.4, 3), _turn(random))]
 
@@ -113,7 +113,7 @@ def _through_the_floor(random):
 
 
 def _two(random):
-    """Two turned blocks side by side or in one another."""
+    """Two rotated blocks, side by side or overlapping."""
     return [
         box((0.35, 0.5, 0.4), (0.3, 0.25, 0.2), _turn(random)),
         box((0.65, 0.45, 0.45), (0.2, 0.3, 0.5), _turn(random)),

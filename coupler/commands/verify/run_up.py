@@ -41,7 +41,7 @@ REST = 2.0
 
 @dataclass(frozen=True)
 class RunUp:
-    """Times t sqrt(g/d) (n,) and height of the water line R/d (n,), wave or still water; fastest water [m/s]."""
+    """Times t sqrt(g/d) (n,) and height R/d (n,) of the water line, for a wave or still water; largest speed [m/s]."""
 
     t: np.ndarray
     R: np.ndarray
@@ -84,7 +84,7 @@ def run_up():
 
 
 def _end() -> float:
-    """Time [s] at which the water has run up: crest to the inflow, over the flat, up the beach, and a fifth more."""
+    """Time [s] by which the run-up is over: the crest enters, crosses the flat and climbs the beach; plus 20 %."""
     c = np.sqrt(G * (1.0 + HEIGHT))
     return (AHEAD + FLAT) / c + 2.0 * SLOPE / np.sqrt(G) + 5.0
 
@@ -125,7 +125,7 @@ def _columns(length: float, lid: float, layer: float):
 
 
 def _run(until: float, waves: bool, mesh, immersion, film: float) -> RunUp:
-    """Water of the depth 1 m in a slice, with or without the wave; film [m] over the beach from which it is wet."""
+    """Water of the depth 1 m in a slice, with or without the wave; film [m]: depth from which the beach is wet."""
     sides = Sides([Side.of(mesh, lambda normal, _: normal[:, 0] < -0.5, _wave())]) if waves else None
     settings = WaterParameters(density=DENSITY, gravity=G)
     water = Water(mesh, immersion.domain, lambda x: x[:, 2] - 1.0, settings, None, None, sides)

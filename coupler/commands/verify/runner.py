@@ -30,7 +30,7 @@ def _unknown(id: str, known) -> str:
 
 
 def run(case: Check, plots: Path | None = None) -> Iterator[Result]:
-    """Results of one case from its own process; how that ended, when not well, is a result too.
+    """Results of one case from its own process; a process that failed gives a result with the reason.
 
     plots: an existing folder for the figures of the case, <id>.json; None: it has none to write."""
     figures = [] if plots is None else [plots / f"{case.id}.json"]

@@ -1,4 +1,4 @@
-"""Scenes shared by the cases with water: a tank, what is in it, and their coupling."""
+"""Scenes shared by the cases with water: a tank, its contents, and their coupling."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def tank(
 
 
 def slice_sides(normal, centre):
-    """Sides of a slice of a wide flow, which do not rub it: those that y pierces."""
+    """Sides normal to y of a slice of a wide flow; they are free of friction."""
     return np.abs(normal[:, 1]) > 0.5
 
 

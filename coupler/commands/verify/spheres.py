@@ -23,7 +23,7 @@ from yade_scripts.dynamics.structure import Structure
 
 
 def graded(low: float, high: float, fine: tuple[float, float], h: float, most: float, growth: float = 1.2):
-    """Coordinates from low to high [m]: steps of h within `fine`, growing outside up to `most`."""
+    """Coordinates from low to high [m]: steps of h within `fine`, growing outside it up to `most`."""
     middle = np.linspace(*fine, round((fine[1] - fine[0]) / h) + 1)
 
     def away(length):

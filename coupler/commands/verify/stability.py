@@ -64,8 +64,8 @@ def swinging_wall(scene: Scene):
 
 
 def growth(scene: Scene, steps: int = STEPS) -> float:
-    """Factor a step by which the largest speed of the wall grows (below 1: it dies away), from the second window of
-    the run to the last; infinite if a joint breaks."""
+    """Growth factor per step of the largest speed of the wall, from the second window of the run to the last. Below 1
+    the vibration decays; the factor is infinite if a joint breaks."""
     coupling = swinging_wall(scene)
     coupling.tolerance = 1e-6  # every step takes all its passes
     coupling.defects.most = np.inf
@@ -108,7 +108,7 @@ def table(densities=(2400.0, 500.0), dampings=(0.0, 0.02, 0.1), steps=(0.01, 0.0
 
 
 def main() -> None:
-    """Print the table row by row; arguments: densities to be taken instead of both."""
+    """Print the table row by row; arguments: densities to use instead of the default ones."""
     densities = tuple(float(word) for word in sys.argv[1:]) or (2400.0, 500.0)
     for line in table(densities):
         print(line, flush=True)

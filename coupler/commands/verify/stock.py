@@ -27,7 +27,7 @@ APART = 3.0
 
 
 def pairs(velocities, driven: bool) -> list[Block]:
-    """Unit cubes on fixed ones, glued, far from one another, each with its velocity (3,) [m/s]."""
+    """Pairs of a fixed and a glued unit cube, far from one another; each upper cube has its velocity (3,) [m/s]."""
     blocks = []
     for number, velocity in enumerate(velocities):
         x = APART * number
@@ -37,7 +37,7 @@ def pairs(velocities, driven: bool) -> list[Block]:
 
 
 def ran(name: str, blocks, end: float, substep: float, records: int, joints=LAW, **mortar) -> StockRun:
-    """Run a stock law on blocks without weight; mortar: further numbers of its envelope."""
+    """Run one of YADE's own laws on weightless blocks; mortar: further parameters of its envelope."""
     scene = described(blocks, touching_faces(blocks), joints, 3, 0.5, (0, 0, 0))
     scene["joint"] |= mortar
     law = stock_law(name)
@@ -83,7 +83,7 @@ def lourenco_envelope():
 
 
 def _border(angle: float) -> float:
-    """Length of the stress (σ, τ) = s (cos, sin) where it leaves the envelope, by bisection."""
+    """Magnitude s of the stress (σ, τ) = s (cos, sin) at which it leaves the envelope, by bisection."""
     low, high = 0.0, 2.0 * COMPRESSION
     while high - low > 1e-9 * high:
         s = 0.5 * (low + high)

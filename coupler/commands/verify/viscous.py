@@ -172,7 +172,7 @@ def _cylinder(h: float, end: float) -> tuple[float, float, float]:
     """(drag, lift, pressure difference) at time `end` [s] with cells of h [m] around the cylinder.
 
     ρ = 1, ν = 1e-3, D = 0.1, channel 2.2 × 0.41 with no-slip walls, parabola of 0.3 m/s at its inflow. Gravity of
-    1 m/s² gives the outflow its pressure; what it adds to the lift is taken off."""
+    1 m/s² gives the outflow its pressure; its contribution to the lift is subtracted."""
     thickness, far = 2 * h, 0.04
     axes = [
         _graded(0.0, 2.2, (0.12, 0.32), h, far),

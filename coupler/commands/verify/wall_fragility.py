@@ -42,7 +42,7 @@ def resultants(e: np.ndarray, turn: float) -> np.ndarray:
 
 
 def moment(n: float, turn: float) -> float:
-    """m at the angle φ under the compression n: of all e that carry it, the most closed one."""
+    """m at the angle φ under the compression n, for the most closed of all e that carry n."""
     trial = np.linspace(-0.5 * turn - n, 0.5 * turn + 1.0, 200)
     carried = resultants(trial, turn)[0] >= -n
     first = int(np.argmax(carried))
@@ -69,7 +69,7 @@ def depth_that_breaks(strength: float) -> float:
 
 
 def table() -> str:
-    """The file of the case: as many walls as have a strength below T fall under the depth h*(T)."""
+    """Text of the case's file: the probability of collapse at the depth h*(T) is that of a strength below T."""
     lines = [
         "# Probability that a wall falls over the depth of still water: own solution, the joint at the foot integrated",
         "# exactly (coupler/commands/verify/wall_fragility.py). GPL-2.0-or-later.",

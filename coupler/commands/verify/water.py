@@ -40,8 +40,8 @@ AMPLITUDE = 0.005
 
 
 def _slosh(omega: float, share: float, coarse: int = 1):
-    """Times (n,) [s] and the amplitude of the first mode (n,) [m] over five periods; steps `share` of the default;
-    coarse: cells are so many times as large below 0.125 m under the surface."""
+    """Times (n,) [s] and the amplitude of the first mode (n,) [m] over five periods. The step is `share` times the
+    default one; coarse: factor by which the cells deeper than 0.125 m below the surface are larger."""
     n, amplitude = 32 // coarse, AMPLITUDE
     high = 21 if coarse == 1 else 11
     c = tank(

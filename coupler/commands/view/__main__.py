@@ -81,7 +81,7 @@ def command_line():
 
 
 def arguments(given):
-    """The command line; without a choice of what to make, all is made."""
+    """The parsed command line; where it does not choose what to make, everything is made."""
     options = command_line().parse_args(given)
     if not (options.still or options.film or options.plots):
         options.still = options.film = options.plots = True
@@ -190,7 +190,7 @@ def summary(run):
 
 
 def report(action, *given, **options):
-    """Do it and print what it wrote and the CPU time."""
+    """Call `action`, and print the files it wrote and its CPU time."""
     start = time.process_time()
     written = action(*given, **options)
     for path in written if isinstance(written, list) else [written]:
@@ -199,7 +199,7 @@ def report(action, *given, **options):
 
 
 def tell(done, frames):
-    """A line for every tenth of the film."""
+    """Print a line for every tenth of the film."""
     if done == frames or done % max(1, frames // 10) == 0:
         print(f"  frame {done} of {frames}", flush=True)
 

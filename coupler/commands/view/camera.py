@@ -47,8 +47,8 @@ def frame(
     """The nearest camera in the given direction that sees all corners of the box [lower, upper] (3,) [m].
 
     aspect: width over height of the picture · margin: shares of it kept free at left, right, bottom, top.
-    With d the depth of a corner behind the camera, it is inside the picture if |across| ≤ d tan(angle/2): for each
-    side that is a plane, so along each picture axis the tightest pair of planes gives aim and distance.
+    A corner at the depth d in front of the camera is in the picture if |across| ≤ d tan(angle/2). Each side of the
+    picture is thus a plane, and along each picture axis the tightest pair of planes gives the aim and the distance.
     """
     corners = np.array(list(itertools.product(*zip(lower, upper))), dtype=float)
     back = direction(azimuth, elevation)

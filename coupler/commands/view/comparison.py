@@ -45,7 +45,7 @@ def draw(folder):
 
 
 def looks(laws):
-    """Colour and line of each law: ours nearly full, those of YADE in short dashes one behind the other."""
+    """Colour and line style of each law: ours nearly solid, those of YADE in short staggered dashes."""
     ours, stock = ([row["law"] for row in laws if row["stock"] is kind] for kind in (False, True))
     lines = {law: OURS[k % len(OURS)] for k, law in enumerate(ours)}
     gap = DASH * max(len(stock) - 1, 1)
@@ -64,7 +64,7 @@ def read(path):
 
 
 def along(tables):
-    """What the curves run over: the displacement where something is driven, else time; its scale and label."""
+    """Abscissa of the curves: the displacement where a block is driven, else time; its scale and label."""
     moved = max(table["displacement"][-1] for table in tables.values())
     column = "displacement" if moved > 0.0 else "time"
     power, unit = prefixed("m" if moved > 0.0 else "s", moved or max(t["time"][-1] for t in tables.values()))
@@ -72,7 +72,7 @@ def along(tables):
 
 
 def curves(axis, tables, look, column, unit):
-    """A column of each law over the displacement; returns the prefixed unit."""
+    """Draw a column of each law over the displacement; return the prefixed unit."""
     over, scale, label = along(tables)
     largest = max(abs(value) for table in tables.values() for value in table[column])
     power, text = prefixed(unit, largest)
@@ -89,7 +89,7 @@ def load(axis, tables, look):
 
 
 def energy(axis, tables, look, column, what):
-    """An energy [J] over time, with the prefix that suits it."""
+    """Draw an energy [J] over time, with a suitable unit prefix."""
     axis.set_ylabel(f"energy {what} [{curves(axis, tables, look, column, 'J')}]")
 
 
@@ -104,7 +104,7 @@ def broken(axis, tables, look):
 
 
 def cost(axis, laws, look):
-    """CPU time of a substep and joint, a bar a law."""
+    """CPU time per substep and joint, one bar for each law."""
     names = [row["law"] for row in laws]
     axis.barh(names, [row["us_per_joint_substep"] for row in laws], color=[look[n]["color"] for n in names])
     axis.invert_yaxis()
@@ -113,7 +113,7 @@ def cost(axis, laws, look):
 
 
 def accuracy(axis, about, look):
-    """Largest error against CPU time, a point a substep."""
+    """Largest error against CPU time, one point for each substep."""
     for name, style in look.items():
         runs = sorted((r for r in about["laws"] if r["law"] == name), key=lambda r: r["cpu_seconds"])
         points = [(r["cpu_seconds"], r["largest_error"]) for r in runs if r["largest_error"]]

@@ -119,14 +119,14 @@ def _plain_numbers(axis, log):
 
 
 def _ticks_of_a_ladder(axis, curves):
-    """Few places on the axis, such as Courant numbers 0.5 to 4: each has its number."""
+    """Label every value where the curves share only a few, such as the Courant numbers 0.5 to 4."""
     places = sorted({place for curve in curves for place in curve["x"]})
     if len(places) <= FEW:
         axis.xaxis.set_major_locator(FixedLocator(places))
 
 
 def look(curve, seen):
-    """Style of a curve; seen: how many computed and measured ones there were so far, counted on."""
+    """Style of a curve; seen: the number of computed and of measured curves so far, which is updated."""
     kind, style = curve["kind"], {"label": curve["label"] or "_unnamed"}
     if kind == "band":
         return style | {"color": BAND, "linewidth": 0, "zorder": 1}
@@ -147,7 +147,7 @@ def look(curve, seen):
 
 
 def measured(count, seen, single):
-    """Style of a measured curve: points, or a line where they are too many and not single results."""
+    """Style of a measured curve: points, or a line where there are too many and they are not single results."""
     if count > MOST_POINTS and not single:
         return {"color": INK, "linewidth": 1.0, "zorder": 2}
     marker = MARKERS[seen["measured"] % len(MARKERS)]
@@ -157,7 +157,7 @@ def measured(count, seen, single):
 
 
 def main(folder, *files):
-    """Draw the figures of all files; tell the pictures."""
+    """Draw the figures of all files and print the paths of the pictures."""
     Path(folder).mkdir(parents=True, exist_ok=True)
     for file in files:
         for line in Path(file).read_text(encoding="utf-8").splitlines():

@@ -44,7 +44,7 @@ class Files:
 
 
 def damage_figures(run, folder):
-    """Write those that there is something to show for; return the paths of the PDF files."""
+    """Write the figures for which there is data; return the paths of the PDF files."""
     if not (run / "blocks.csv").exists() or not (run / "blocks.vtkhdf").exists():
         return []
     found = read(run)
@@ -89,7 +89,7 @@ def read_joints(path):
 
 
 def shown_parts(found):
-    """Names of walls, floors and other parts: those that broke first come first, then by their weight."""
+    """Names of walls, floors and other parts, ordered by the time of their first break, then by weight."""
     member, first = found.blocks["member"], found.blocks["first_break"]
     names = list(dict.fromkeys(member))
     early = {n: np.nanmin(first[member == n], initial=np.inf) for n in names}
@@ -104,7 +104,7 @@ def words(found):
 
 
 def save(drawing, stem):
-    """In every format."""
+    """Save in every format."""
     for ending in FORMATS:
         drawing.savefig(stem.with_suffix("." + ending), metadata=_undated(ending))
     plt.close(drawing)
@@ -115,7 +115,7 @@ def save(drawing, stem):
 
 
 def over_time(found, parts):
-    """A row for each part: share of its joined area that is broken, by its darkness, over time."""
+    """Draw a row for each part; the darkness shows the broken share of its joined area over time."""
     time = np.linspace(0.0, found.end, INSTANTS)
     share = np.array([broken_share(found, part, time) for part in parts])
     kept = [k for k in range(len(parts)) if np.isfinite(share[k]).all()]
@@ -168,7 +168,7 @@ def of(member, rows, part):
 
 @dataclass(frozen=True)
 class View:
-    """How a part is seen: across, right, up (3,) unit vectors; names of the two axes of the picture."""
+    """Direction from which a part is seen: unit vectors across, right, up (3,), and the names of the picture's axes."""
 
     across: np.ndarray
     right: np.ndarray
@@ -181,7 +181,7 @@ class View:
 
 
 def view_of(points):
-    """From the side on which the part is widest: points (k, 3) of its blocks."""
+    """The view in which the part is widest; points (k, 3) [m] of its blocks."""
     middle = points - points.mean(axis=0)
     across = np.linalg.svd(middle, full_matrices=False)[2][2]
     if abs(across[2]) > FROM_ABOVE:
@@ -194,7 +194,7 @@ def view_of(points):
 
 
 def elevations(found, parts, draw, coloured):
-    """A panel for each part with its blocks; draw(axis, found, rows, view, coloured) puts on it what it is about."""
+    """A panel for each part with its blocks; draw(axis, found, rows, view, coloured) draws the content."""
     views = [view_of(np.concatenate([found.faces[k] for k in faces_of(found, part)])) for part in parts]
     spans = [span(found, part, view) for part, view in zip(parts, views)]
     columns = 2 if len(parts) > 1 else 1
@@ -234,7 +234,7 @@ def span(found, part, view):
 
 
 def outlines(found, part, view):
-    """Polygons (k, 2) of the blocks of a part as they are seen, and their rows: faces turned to the viewer."""
+    """Polygons (k, 2) of the block faces of a part that are turned towards the viewer, and the rows of these faces."""
     chosen = [k for k in faces_of(found, part) if normal(found.faces[k]) @ view.across > 0.5]
     return [view.flat(found.faces[k]) for k in chosen], found.block_of_face[chosen]
 
@@ -246,7 +246,7 @@ def normal(ring):
 
 
 def cracks_on(axis, found, part, view, coloured):
-    """Blocks with their joints: thin where they hold, thick in the colour of their time where they broke."""
+    """Draw blocks with their joints: intact ones thin, broken ones thick in the colour of the time of failure."""
     rings, rows = outlines(found, part, view)
     gone = np.isfinite(found.blocks["left_at"])[rows]
     fill = np.where(gone, LEFT, "#ffffff")
@@ -267,7 +267,7 @@ def cracks_on(axis, found, part, view, coloured):
 
 
 def is_line(flat):
-    """Whether a face is seen from its edge."""
+    """Whether a face is seen edge-on."""
     x, y = (flat - flat[0]).T
     area = 0.5 * abs(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1)))
     return area < 0.02 * np.ptp(flat, axis=0).max() ** 2
@@ -280,7 +280,7 @@ def longest(flat):
 
 
 def crack_colours(found):
-    """Times of the breaks."""
+    """Colour scale of the times of failure."""
     c = found.cracks
     broke = c["time"][c["intact"] == 0]
     if not len(broke):
@@ -290,7 +290,7 @@ def crack_colours(found):
 
 
 def pressure_on(axis, found, part, view, coloured):
-    """Blocks in the colour of the largest pressure that they bore."""
+    """Draw blocks in the colour of the largest pressure on them."""
     rings, rows = outlines(found, part, view)
     power = pressure_power(found)
     fill = coloured[0].to_rgba(found.blocks["pressure"][rows] / 1000.0**power)
@@ -298,12 +298,12 @@ def pressure_on(axis, found, part, view, coloured):
 
 
 def pressure_power(found):
-    """Of a thousand, so that the largest pressure is a short number."""
+    """Power of 1000 that makes the largest pressure a short number."""
     return prefixed("Pa", np.nanmax(found.blocks["pressure"]))[0]
 
 
 def pressure_colours(found):
-    """From nothing to the largest pressure."""
+    """Colour scale from zero to the largest pressure."""
     power, unit = prefixed("Pa", np.nanmax(found.blocks["pressure"]))
     top = np.nanmax(found.blocks["pressure"]) / 1000.0**power
     label = f"largest net pressure of the water across each block while it was in its place [{unit}]"
@@ -311,7 +311,7 @@ def pressure_colours(found):
 
 
 def mapped(low, high, ends):
-    """Colours from low to high; of one value alone, around it."""
+    """Colour scale from low to high; where both are equal, a range around the value."""
     if not high > low:
         low, high = low - 0.5 * abs(low) - 1e-12, high + 0.5 * abs(high) + 1e-12
     return plt.cm.ScalarMappable(plt.Normalize(low, high), colours(ends))

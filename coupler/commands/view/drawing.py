@@ -26,7 +26,7 @@ TROUBLE = "#b3261e"
 
 
 def draw(place, picture):
-    """The picture of what a .npz file holds."""
+    """Draw the content of a .npz file."""
     with np.load(place) as file:
         triangles, part, names = file["triangles"], file["part"], [str(n) for n in file["names"]]
         edges, lines = file["edges"], file["lines"]

@@ -2,8 +2,8 @@
 
     foam = ramp(h |∇u| / U; TORN) ramp(|u| / U; FAST)        h: edge of a cell · U: end of the run's scale of speed
 
-after two measures of Ihmsen et al., Vis. Comput. 28 (2012) 669, for where air is dragged in: differences of velocity
-nearby, and motion energy. It is a picture of the moment: no foam drifts, and none of it is computed in the run.
+after two measures of Ihmsen et al., Vis. Comput. 28 (2012) 669, for the entrainment of air: local differences of
+velocity, and kinetic energy. The foam is instantaneous: it does not drift, and it is not computed in the run.
 """
 
 import numpy as np

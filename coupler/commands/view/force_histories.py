@@ -1,7 +1,7 @@
 """python -m coupler.commands.view.force_histories GAUGE FIGURE NAME=RUN [NAME=RUN ...]: the force on a gauge in several
 runs of one scene, and its impulse, as a figure and as a table that compares each run with the first.
 
-What is compared ends when a joint of the first run breaks: from there on the runs are not the same structure.
+The comparison ends when a joint of the first run breaks, since the structures differ from then on.
 """
 
 import sys

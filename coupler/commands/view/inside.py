@@ -20,13 +20,13 @@ COMPASS = ((1, 0, 0), (0, 1, 0), (-1, 0, 0), (0, -1, 0), (0, 0, 1))
 
 
 class NoInside(SurgebreakError):
-    """There is nothing to be inside of."""
+    """No place has blocks on all four sides."""
 
     exit_code = ExitCode.BAD_CASE
 
 
 def inside(blocks, azimuth):
-    """The camera that looks towards an azimuth [degree] from inside of blocks, a surface mesh at the start.
+    """The camera that looks towards an azimuth [degree] from inside the blocks (their surface mesh at the start).
 
     Raises NoInside where no place has blocks on all four sides."""
     low, high = np.reshape(blocks.bounds, (3, 2)).T
@@ -73,5 +73,5 @@ def _way(blocks, place, towards, reach):
 
 
 def _hits(blocks, place, towards, reach):
-    """Where a ray enters or leaves blocks (k, 3)."""
+    """Points (k, 3) [m] at which a ray enters or leaves blocks."""
     return blocks.ray_trace(place, place + reach * towards, first_point=False)[0]

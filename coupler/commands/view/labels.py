@@ -26,7 +26,7 @@ STRETCH = 4.0
 def place_labels(drawing, axis, labels, size):
     """Write labels [(x, y, text, colour)] (data coordinates), each at the cheapest of PLACES.
 
-    Those that are alone come last: they find room anywhere.
+    Isolated points come last, because their labels find room anywhere.
     """
     drawing.draw_without_rendering()
     renderer = drawing.canvas.get_renderer()
@@ -49,7 +49,7 @@ def _crowded_first(points):
 
 
 def _price(written, offset, renderer, axis, taken, points, lines):
-    """What a text at this offset covers."""
+    """Cost of placing a text at this offset, from what it would cover."""
     _move(written, offset)
     box = _extent(written, renderer).padded(ROOM)
     frame = axis.bbox
@@ -105,7 +105,7 @@ def _extent(written, renderer):
 
 
 def _move(written, offset):
-    """The side of the text that faces the point follows from where it stands."""
+    """Move a text to an offset; its alignment follows from the direction to the point."""
     x, y = offset
     written.set_position(offset)
     written.arrow_patch.set_visible(max(abs(x), abs(y)) > NEAR)

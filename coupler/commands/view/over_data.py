@@ -4,7 +4,7 @@ figure = "levels"                       name of the file; its curves with the sa
 panel = "depth of water at H1 [m]"      name of the y-axis, with its unit
 table = "history/gauges.csv"            and column = "H1_level"
 columns, places, above                  instead of column: the times at which the columns exceed `above`, over
-                                        their places - the way of a front
+                                        their places: the path of a front
 x_label, x_scale, y_scale               "time [s]", 1, 1: what time and value are multiplied with
 x_range, y_range                        what is shown; absent: all
 references = [{file = "record.csv", x = "t", y = "H1", label = "measured"}]
@@ -33,7 +33,7 @@ def over_data(run, folder):
 
 
 def directory_of_case(run):
-    """Where the case of a run directory lies, None if that is not known or no longer there."""
+    """Directory of the case of a run; None if it is unknown or no longer exists."""
     summary = run / "run.json"
     if not summary.exists():
         return None

@@ -51,7 +51,7 @@ def plots(directory, folder):
 
 
 def leaves(panels):
-    """Panels in lists that a page can hold each."""
+    """Panels divided into lists, each of which fits on a page."""
     found, room = [[]], TALLEST
     for unit, names in panels:
         height = LOW_PANEL if unit == "1" else PANEL
@@ -153,7 +153,7 @@ def panel(axis, history, unit, names):
 
 
 def _keep_flat(axis):
-    """A line that stays within LEVEL of its value is shown level: its last digits would look like a swing."""
+    """Show a line that varies by less than LEVEL of its value as level; its last digits would look like a swing."""
     values = np.concatenate([line.get_ydata() for line in axis.lines])
     low, high = np.nanmin(values), np.nanmax(values)
     room = LEVEL * max(abs(low), abs(high))

@@ -1,6 +1,6 @@
 """The files of a run, read step by step, also while the run still writes them.
 
-HDF5 reads them, not VTK: VTK's reader may crash on a file that grows under its hands.
+HDF5 reads them, not VTK: VTK's reader may crash on a file that grows while it is read.
 """
 
 import time as clock
@@ -91,7 +91,7 @@ class BlockSeries(Series):
 
 
 def patiently(read, *given):
-    """read(*given), again after a moment if the run is just changing the file under our hands."""
+    """Call `read`; try again after a moment if the run is changing the file at the same time."""
     for left in reversed(range(TRIES)):
         try:
             return read(*given)
@@ -110,7 +110,7 @@ def faces_for_vtk(connectivity, ends):
 
 @dataclass(frozen=True)
 class RunFiles:
-    """What a run has to show; absent parts are None. tank (2, 3) and the edges of one that is no box, basin (k, 2, 3),
+    """The files of a run; absent parts are None. tank (2, 3) and the edges of one that is no box, basin (k, 2, 3),
     [m] relative to the origin · bed: of a terrain, a surface."""
 
     directory: Path

@@ -120,7 +120,7 @@ class Scene:
         caption.prop.justification_vertical = "top"
 
     def _set_lights(self, headlight):
-        """One sun, a weak light from the right and one from the camera: soft, and no face is black."""
+        """Add one sun, a weak light from the right and one from the camera; the light is soft, and no face is black."""
         span = np.linalg.norm(self.upper - self.lower)
         middle = (self.lower + self.upper) / 2
         for way, intensity in ((self.light, 0.5), (self.fill, 0.3)):
@@ -143,7 +143,7 @@ class Scene:
         camera.view_angle = view.view_angle
 
     def _smooth(self, soft):
-        """Smooth edges (2 x 2 samples a pixel) and, if `soft`, screen-space ambient occlusion: depth is seen."""
+        """Smooth edges (2 x 2 samples per pixel) and, if `soft`, add screen-space ambient occlusion for depth."""
         if soft:
             span = np.linalg.norm(self.upper - self.lower)
             self.plotter.enable_ssao(radius=0.045 * span, bias=0.003 * span, kernel_size=32, blur=True)
@@ -170,7 +170,7 @@ class Scene:
             self.plotter.add_mesh(tank, color=palette.TANK, line_width=self._line(0.9))
 
     def _draw_north(self, azimuth):
-        """Of a terrain, an arrow to the north on the ground, at the end of the edge that faces the camera."""
+        """Draw a north arrow on the ground of a terrain, at the end of the edge that faces the camera."""
         north = north_of(self.run)
         if north is None:
             return
@@ -191,7 +191,7 @@ class Scene:
         )  # fmt: skip
 
     def _draw_scale_bar(self, azimuth):
-        """A bar of a round length on the ground along the edge that faces the camera, its length under it."""
+        """Draw a labelled bar of a round length on the ground, along the edge that faces the camera."""
         side = -1 if np.sin(np.radians(azimuth)) < 0 else 1
         step = 0.03 * side * (self.upper - self.lower)[:2].max()
         length = nice_floor(0.25 * (self.upper[0] - self.lower[0]))
@@ -245,7 +245,7 @@ class Scene:
         self._draw_bar(mapper, "speed of water [m/s]", 0.03)
 
     def _draw_pockets(self, water):
-        """The surface below each pocket of trapped air in a colour of its own, and its pressure in the corner."""
+        """Draw the surface below each pocket of trapped air in a colour of its own, and its pressure in the corner."""
         for k in range(self._pockets_drawn):
             self.plotter.remove_actor(f"pocket{k}", reset_camera=False, render=False)
             self.plotter.remove_actor(f"pocket{k}_told", reset_camera=False, render=False)
@@ -267,7 +267,7 @@ class Scene:
             self._tell(MOST_POCKETS, f"and {len(drawn) - MOST_POCKETS} more", palette.INK)
 
     def _tell(self, line, words, colour):
-        """A line in the upper right corner."""
+        """Write a line in the upper right corner."""
         text = self.plotter.add_text(
             words, name=f"pocket{line}_told", position=(0.985, 0.935 - 0.042 * self.letters * line),
             viewport=True, font_size=self._points(11), color=colour, render=False,
@@ -299,7 +299,7 @@ class Scene:
         lettered(bar.GetLabelTextProperty())
 
     def _draw_shadow(self, mesh, name):
-        """The shadow that the sun throws on the ground: the mesh pressed flat along the light, as far as the plate."""
+        """Draw the shadow of a mesh on the ground: the mesh projected along the light onto the plate."""
         flat = pv.PolyData(
             mesh.points - (mesh.points[:, 2:] - self.lower[2]) * self.light / self.light[2], mesh.faces
         )
@@ -330,7 +330,7 @@ def caption_of(run, width):
 
 
 def north_of(run):
-    """Direction (2,) in plan that is north: y of the file of the terrain, which may be turned; None without one."""
+    """Direction (2,) of north in plan: y of the terrain file, which may be rotated; None without a terrain."""
     terrain = _entry(run, "case", "terrain")
     if not isinstance(terrain, dict):
         return None
@@ -339,7 +339,7 @@ def north_of(run):
 
 
 def camera_inside(run, azimuth):
-    """The camera among the blocks as they stand at the start, towards where things happen if no azimuth is given."""
+    """The camera among the blocks in their initial places; without an azimuth it looks towards where damage begins."""
     if not run.blocks:
         raise NoInside("--view inside: the run has no blocks")
     where = where_it_happens(run)
@@ -349,7 +349,7 @@ def camera_inside(run, azimuth):
 
 
 def foamy(colours, share):
-    """Colours (n, 4) as bytes of water with a share of foam (n,): white, and less to be seen through."""
+    """Colours (n, 4), as bytes, of water with a share of foam (n,): whiter and less transparent."""
     share = share[:, None]
     rgb = colours[:, :3] * (1.0 - share) + share
     opacity = WATER_OPACITY + (1.0 - WATER_OPACITY) * share
@@ -384,7 +384,7 @@ def where_it_happens(run):
 
 
 def _entry(run, *names):
-    """What run.json says under these names, one in the other; None where it does not, as of a run that was torn."""
+    """The value in run.json under these nested names; None where it is missing, as in an incomplete file."""
     path = run.directory / "run.json"
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
@@ -457,8 +457,8 @@ def sampled(times):
 
 
 def fastest_water(run):
-    """Speed [m/s] that 98 % of the nodes at the surface stay below over the run: what is inside is not seen, and spray
-    is not what the colours are for."""
+    """Speed [m/s] below which 98 % of the nodes at the surface stay over the run. Nodes inside are not visible, and
+    spray should not set the colour scale."""
     speeds = [np.zeros(1)]
     for time in sampled(run.water.times):
         water = run.water.at(time)
@@ -471,7 +471,7 @@ def fastest_water(run):
 
 
 def nice_ceiling(value):
-    """The next round number, so that little of a colour scale is left unused (1 for nothing that moves)."""
+    """The next larger round number, so that little of a colour scale is left unused (1 where nothing moves)."""
     if value <= 0:
         return 1.0
     power = 10.0 ** np.floor(np.log10(value))
@@ -485,7 +485,7 @@ def nice_floor(value):
 
 
 def behind(mapper):
-    """Let others win where surfaces coincide: a block at a wall of the tank lies in one plane with the water."""
+    """Draw a surface behind others that coincide with it, such as a block in the plane of a wall of the water."""
     mapper.SetResolveCoincidentTopologyToPolygonOffset()
     mapper.SetRelativeCoincidentTopologyPolygonOffsetParameters(1.0, 8.0)
 

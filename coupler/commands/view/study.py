@@ -114,7 +114,7 @@ def columns(curves):
 
 
 def ylabel(q):
-    """What the error is of, and against what: never of two kinds in one figure."""
+    """The quantity whose error is shown, and its reference; a figure never mixes two kinds of reference."""
     against = {"exact": "exact answer", "measured": "measurement", "finest": "finest run"}[q["against"]]
     return "\n".join([*textwrap.wrap(f"error of {q['what']}", 46), f"against the {against}"])
 
@@ -128,7 +128,7 @@ def line(axis, number, legend, points):
 
 
 def colour(number):
-    """Of a curve."""
+    """Colour of a curve."""
     return LINES[number % len(LINES)]
 
 
@@ -150,12 +150,12 @@ def _settings(error, texts):
 
 
 def text_colour(number):
-    """Of the texts at the points of a curve."""
+    """Colour of the texts at the points of a curve."""
     return tuple(DARKER * part for part in to_rgb(colour(number)))
 
 
 def band(axis, curves):
-    """The scatter of the measurement: errors inside it say nothing."""
+    """Shade the scatter of the measurement; errors within it are not significant."""
     bands = {p[3] for _, points in curves for p in points if p[3]}
     if bands:
         axis.axhspan(

@@ -71,7 +71,7 @@ def _save(drawing, folder, stem):
 
 
 def fragility(folder, f):
-    """Curves with bands; bars of the runs, of each state a little beside the others; known curves dashed."""
+    """Curves with bands; bars for the runs, those of different states side by side; known curves dashed."""
     drawing, axis = plt.subplots(figsize=SIZE)
     what = {s["name"]: s["what"] for s in f["states"]}
     power = _power([bar["x"] for bars in f["bars"] for bar in bars], f["measure"]["unit"])
@@ -242,7 +242,7 @@ def _power(values, unit):
 
 
 def _axis(what, unit, power, letters=42):
-    """A label with its unit, in lines of so many letters."""
+    """An axis label with its unit, broken into lines of at most `letters` letters."""
     text = UNIT_TEXT.get(unit, re.sub(r"(?<=[a-zA-Z])([23])", lambda found: "²³"[int(found[1]) - 2], unit))
     stored = f"{what} [{PREFIXES[power]}{text}]" if unit not in ("", "1") else what
     return "\n".join(textwrap.wrap(stored, letters))

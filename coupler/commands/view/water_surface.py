@@ -36,7 +36,7 @@ def skin(nodes, cells, level_set, fraction=None, tank=None):
     """Skin of {level set < 0} on nodes (n, 3), tetrahedra cells (m, 4), level_set (n,) [m].
 
     fraction (m,): share of each cell outside solids, and tank (2, 3) [m]: with both, faces of cut cells that do not lie
-    on a side of the tank are left out: they are inside of a body, or stick out of one that is thinner than a cell."""
+    on a side of the tank are left out: they are inside a body, or stick out of one that is thinner than a cell."""
     kept = np.any(level_set[cells] < 0, axis=1)
     wet = right_handed(nodes, cells[kept])
     free = free_triangles(wet, level_set)
