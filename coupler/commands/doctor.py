@@ -25,8 +25,8 @@ from coupler.program.threads import VARIABLE, cores
 
 
 class Finding(NamedTuple):
-    """What was looked at, how it is, whether that is good, what to do when not, and what does it, where the program
-    itself can."""
+    """What was examined, its state, whether that is good, the remedy if not, and the function that carries out the
+    remedy where the program can do so itself."""
 
     what: str
     found: str
@@ -36,7 +36,7 @@ class Finding(NamedTuple):
 
 
 def examine(mending: bool = False) -> ExitCode:
-    """Try every part, print a table, and return 0 when all is well; mending: put right what can be, and look again."""
+    """Test every part, print a table, and return 0 when all is well; mending: repair what can be, and test again."""
     findings = []
     for check in CHECKS:
         found = check()
@@ -99,14 +99,14 @@ def _installer(names: list[str]) -> Callable[[], str] | None:
 
 
 def _extras() -> Finding:
-    """What commands can do more; none of it is missing."""
+    """Optional packages, which enable more of the commands; their absence is no fault."""
     lacking = [name for name in EXTRAS if absent(name)]
     found = f"without {', '.join(lacking)}: pip install -c constraints.txt -e '.[NAME]'" if lacking else "all"
     return Finding("extras", found, True)
 
 
 def _kernels() -> Finding:
-    """Compiled kernels that are there and whole, in a folder that may be written to."""
+    """The compiled kernels must be complete, in a writable folder."""
     place = mend.kernel_place()
     if place is None or not place.is_dir():
         return Finding("compiled kernels", "none yet; the first run compiles them", True)
@@ -130,7 +130,7 @@ def _and_more(paths: list[Path]) -> str:
 
 
 def _yade_packages() -> Finding:
-    """YADE imports these without declaring them; without mpmath its error is unreadable."""
+    """Packages that YADE imports without declaring them; without mpmath its error is unreadable."""
     lacking = [name.lower() for name in ("future", "IPython", "mpmath") if find_spec(name) is None]
     return Finding(
         "packages YADE needs", f"missing: {' '.join(lacking)}" if lacking else "future, ipython, mpmath",
@@ -164,7 +164,7 @@ print(json.dumps({"version": str(engine.version), "z": O.bodies[0].state.vel[2]}
 
 
 def _yade_run() -> Finding:
-    """Ten steps of a falling sphere: v = g t."""
+    """YADE must compute ten steps of a falling sphere: v = g t."""
     status, output = _in_process(_FALLING_SPHERE)
     if status != 0:
         return Finding("ten steps of YADE", _last(output), False, "apt install --reinstall yade")
@@ -188,7 +188,7 @@ def _threads() -> Finding:
 
 
 def _processor() -> Finding:
-    """Older ones work: their last digits are their own."""
+    """The processor's instruction set; older processors work, but their results differ in the last digits."""
     absent = missing()
     return Finding(
         "processor", f"works; {remark()}" if absent else f"{BASELINE}: last digits as on every such one", True
@@ -219,7 +219,7 @@ assert (grid.GetNumberOfPoints(), grid.GetNumberOfCells()) == (4, 1)
 
 
 def _files() -> Finding:
-    """h5py writes a tetrahedron, VTK (when installed) reads it; never in one process with YADE."""
+    """h5py must write a tetrahedron that VTK, if installed, can read; never in one process with YADE."""
     with tempfile.TemporaryDirectory() as folder:
         path = os.path.join(folder, "one.vtkhdf")
         status, output = _in_process(_WRITE, path)

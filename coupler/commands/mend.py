@@ -80,7 +80,7 @@ def _wanted(mode: int) -> int:
 
 
 def unlock(place: Path) -> str:
-    """Give this user back what `locked` finds; folders first, since what lies in a locked one is not seen."""
+    """Restore this user's access to what `locked` finds; folders first, since the content of a locked one is hidden."""
     count = 0
     while found := locked(place):
         for path in found:

@@ -16,21 +16,21 @@ from coupler.program.start import one_thread
 
 
 class Compilation:
-    """Processor seconds inside numba's compiler, and how many kernels it compiled; kernels compile one in another."""
+    """Processor seconds inside numba's compiler, and how many kernels it compiled; compilations may be nested."""
 
     def __init__(self):
         self.seconds, self.kernels = 0.0, 0
         self._depth, self._began = 0, 0.0
 
     def start(self) -> None:
-        """A kernel begins to be compiled."""
+        """Called when the compilation of a kernel begins."""
         if self._depth == 0:
             self._began = time.process_time()
         self._depth += 1
         self.kernels += 1
 
     def end(self) -> None:
-        """A kernel is compiled."""
+        """Called when the compilation of a kernel ends."""
         self._depth -= 1
         if self._depth == 0:
             self.seconds += time.process_time() - self._began
@@ -42,7 +42,7 @@ class Compilation:
 
 
 def watch(compilation: Compilation) -> None:
-    """Have numba report to it; the kernel cache must be set before numba is imported."""
+    """Make numba report its compilations to `compilation`; the kernel cache must be set before numba is imported."""
     one_thread()
     from numba.core import event
 

@@ -2,8 +2,8 @@
 FOLDER [--cold]`, ids of runs line by line on standard input, how they ended as JSON on standard output.
 
 Before the first run it goes through one step of that run itself, which loads YADE and all kernels. Every run then has
-a process of its own, forked from there: one that crashes takes nothing with it. Nothing of the step before is left but
-what was loaded; a test compares the files of such a run with those of a run of its own bit for bit.
+a process of its own, forked from there: one that crashes takes nothing with it. Nothing remains of that step but the
+loaded modules; a test compares the files of such a run with those of a run of its own bit for bit.
 """
 
 from __future__ import annotations

@@ -68,7 +68,7 @@ def _of_case(place: Path, sets: list[str]) -> tuple[Path, dict]:
 
 
 def _options(sets: list[str]) -> dict:
-    """KEY=VALUE of [terrain], with the checks of a case."""
+    """Options of [terrain] from KEY=VALUE, checked as in a case."""
     table: dict = {"path": "-"}
     for text in sets:
         key, _, value = text.partition("=")

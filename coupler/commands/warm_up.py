@@ -74,7 +74,7 @@ PARTS = {
 
 
 class Silent:
-    """A Reporter that tells nothing and is never asked to stop."""
+    """A Reporter that prints nothing and never asks to stop."""
 
     def step(self, time, figures) -> None:
         return None

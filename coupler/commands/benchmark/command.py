@@ -108,7 +108,7 @@ def _part(kind: str, size: int = 0) -> dict:
 
 
 def _engine(sizes):
-    """The joint engine: what joints add to blocks without them, and its kernel by itself."""
+    """The joint engine: the cost that joints add to blocks, and the cost of its kernel alone."""
     for size in sizes:
         m = _part("joints", size)
         n, J = m["blocks"], m["joints"]
@@ -170,13 +170,13 @@ def _sleep(sizes):
 
 
 def _cutting(sizes):
-    """The water's side: cells that blocks cut."""
+    """Cost of cutting the water's cells by blocks."""
     for what, bodies, us, target in cutting.figures(_part("cutting")):
         yield Line(what, bodies, 0, us, "a cut cell", target)
 
 
 def _debris(sizes):
-    """What blocks cost a coupled step, part by part, and the pressure solve beside one without them."""
+    """Cost of blocks in a coupled step, part by part, and the pressure solve relative to one without blocks."""
     found, n = debris.costs(), debris.BLOCKS
     for name, what in debris.PARTS.items():
         yield Line(f"coupled step, {what}", n, 0, 1e3 * found.full[name], "a step")
@@ -238,7 +238,7 @@ def _stock_line(name: str, scene: dict, blocks: int, joints: int, points: int) -
 
 
 def _threads(sizes):
-    """A step of the water on the wall's clock by number of threads, its serial share, Amdahl's law."""
+    """Wall time of a step of the water by number of threads, its serial share, and Amdahl's law."""
     for nodes in THREADS_QUICK if sizes == QUICK_SIZES else THREADS_NODES:
         found = _part("threads", nodes)
         n, one = found["nodes"], found["wall"]["1"]

@@ -25,7 +25,7 @@ TURN = Rotation.from_euler("xyz", [0.1, 0.15, 0.2]).as_matrix()
 
 
 def wall(count: int):
-    """count x count blocks, 0.05 thick, turned out of all planes of the mesh."""
+    """count x count blocks, 0.05 thick, rotated out of all planes of the mesh."""
     from fluid.cut.bodies import ConvexBodies
 
     edge = 1.6 / count
@@ -36,7 +36,7 @@ def wall(count: int):
 
 
 def loose_boxes(count: int):
-    """Boxes of 1.3 to 3.8 cells anywhere and turned at random."""
+    """Boxes of 1.3 to 3.8 cells at random positions and orientations."""
     from fluid.cut.bodies import ConvexBodies
 
     random = np.random.default_rng(0)

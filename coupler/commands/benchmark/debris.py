@@ -41,7 +41,7 @@ PARTS = {
 
 
 def debris(count: int) -> list[Block]:
-    """Boxes of half a metre to one, turned at random, 500 to 2400 kg/m³, apart from each other on a lattice."""
+    """Boxes of 0.5 to 1 m, randomly oriented, 500 to 2400 kg/m³, apart from each other on a lattice."""
     edge = round(np.ceil(np.cbrt(count)))
     random = np.random.default_rng(1)
     places = np.stack(np.meshgrid(*[np.arange(edge)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)[:count]
@@ -140,7 +140,7 @@ def _in_process(count: int, covers: str, blocks: str) -> dict:
 
 
 def main() -> None:
-    """With a count: all of it. With covers and what the blocks do as well: one measurement as JSON."""
+    """Argument COUNT: print the table. Further arguments COVERS and BLOCKS: print one measurement as JSON."""
     words = sys.argv[1:]
     if len(words) < 2:
         count = int(words[0]) if words else BLOCKS

@@ -125,7 +125,7 @@ def dead(size: int) -> dict:
 
 
 def _take_away(structure: Structure, rows: np.ndarray) -> None:
-    """Blocks to places of their own, far from all others."""
+    """Move blocks to separate places, far from all others."""
     if len(rows):
         shift = np.zeros((len(rows), 3))
         shift[:, 1] = 10.0 * (1 + rows)

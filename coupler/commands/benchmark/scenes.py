@@ -12,12 +12,12 @@ RATTLE = 1e-7
 
 
 def wall_edge(joints: int) -> int:
-    """m of the m x m wall of cubes whose 2 m (m - 1) joints come nearest to a number."""
+    """Edge m of the m x m wall of cubes whose number of joints, 2 m (m - 1), is nearest to the given one."""
     return max(2, round(0.5 + np.sqrt(0.25 + 0.5 * joints)))
 
 
 def wall(joints: int) -> list[Block]:
-    """m x m unit cubes side by side and on one another, rattling a little."""
+    """Wall of m x m unit cubes with small random velocities."""
     m = wall_edge(joints)
     random = np.random.default_rng(1)
     velocity = random.uniform(-RATTLE, RATTLE, (m * m, 3))

@@ -1,7 +1,7 @@
 """Solvers for the pressure on systems of the water, alone and with a wall of blocks inside (`part.py solver UNKNOWNS`).
 
 Each preconditioner is set up, then used by the same conjugate gradients to 1e-8, once from zero and once from a guess
-that is off by some percent, as the pressure of the step before is. CPU seconds, the best of REPEATS.
+with an error of some per cent, like that of the pressure of the previous step. CPU seconds, the best of REPEATS.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
-"""What threads bring to a step of the water, and how far its kernels are from memory: `part.py threads NODES`, and
+"""Speed-up of a step of the water by threads, and its kernels against memory bandwidth: `part.py threads NODES`, and
 `part.py roofline NODES`.
 
-Speed-ups are of the clock on the wall, the least of REPEATS with the numbers of threads in turn, all from one state.
-The serial share is what of the processor time of one thread passes outside of the kernels that threads share; with it
-Amdahl's law says what more cores could bring. Bytes are those that a kernel must read and write at least, each once,
-as far as it touches its arrays; bandwidth is that of a triad a = b + s c in the same process.
+Speed-ups are ratios of wall times, the least of REPEATS with the numbers of threads in turn, all from one state.
+The serial share is the part of the processor time of one thread that is spent outside of the threaded kernels; Amdahl's
+law gives the speed-up with more cores from it. Bytes are the least that a kernel must read and write, each once, of
+the parts of the arrays that it uses; bandwidth is that of a triad a = b + s c in the same process.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def amdahl(serial: float, n: int) -> float:
 
 
 def numbers() -> list[int]:
-    """Threads that are tried: 1, 2, 4 ... and all cores of this process."""
+    """Numbers of threads to measure: 1, 2, 4 ... and all cores of this process."""
     most = cores()
     return sorted({n for n in (1, 2, 4, 8, 16, 32, 64) if n < most} | {1, most})
 
@@ -53,7 +53,7 @@ def started(nodes: int):
 
 
 def threads(nodes: int) -> dict:
-    """Seconds of a step on the wall by number of threads, the serial share, and the size of the scene."""
+    """Wall time [s] of a step by number of threads, the serial share, and the size of the scene."""
     from fluid.numerics.threads import use, watched
 
     scene = started(nodes)

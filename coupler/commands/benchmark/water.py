@@ -119,5 +119,5 @@ def water(nodes: int, height: float = 1.0) -> dict:
 
 
 def taller_tank(nodes: int) -> dict:
-    """The same water in a tank twice as high: what dry cells cost."""
+    """The same water in a tank twice as high, which gives the cost of dry cells."""
     return {"low": water(nodes), "high": water(nodes, 2.0)}

@@ -30,13 +30,13 @@ class Outcome:
 
     @property
     def peak_force(self) -> float:
-        """Until the first joint has failed: what comes later is swinging of what hangs on [N]."""
+        """Largest force [N] until the first joint has failed; later forces are due to vibration."""
         whole = self.table["joints_broken"] == 0
         return float(self.table["force"][whole].max())
 
     @property
     def dissipated(self) -> float:
-        """By the joints, to the end [J]."""
+        """Energy [J] dissipated by the joints until the end."""
         return float(self.table["dissipated"][-1])
 
     @property
@@ -53,7 +53,7 @@ class Outcome:
 
     @property
     def us_per_joint(self) -> float:
-        """Of a substep."""
+        """Processor time [µs] per substep and joint."""
         return self.us_per_substep / self.figures["joints"]
 
 

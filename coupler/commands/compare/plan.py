@@ -108,7 +108,7 @@ def refuse(file: CaseFile) -> None:
 
 
 def general_limits(file: CaseFile) -> list[str]:
-    """What no stock scene of this case matches, whatever the law."""
+    """Properties of this case that YADE's own laws cannot reproduce."""
     case, found = file.case, []
     if case.joints.damping > 0.0:
         found.append("dashpot of the joints (joints.damping): stock bonds have none")

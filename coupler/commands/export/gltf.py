@@ -1,7 +1,7 @@
 """A .glb for each stored time: the water as a surface coloured by speed, every block an object of its name; Blender
 imports them with colours (File, Import, glTF), others too.
 
-glTF has y up and metres; the importers of Blender and others turn that back.
+glTF has the y-axis up and metres; the importers of Blender and other programs rotate it back.
 """
 
 from __future__ import annotations

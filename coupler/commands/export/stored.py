@@ -45,7 +45,7 @@ def stored(path: Path) -> Stored:
 
 
 def _moved(points: Array, origin: Array) -> Array:
-    """In single precision where that is enough: near the zero of the map."""
+    """Points moved to world coordinates, in single precision where that is enough: near the origin of the map."""
     return points if not origin.any() else points.astype(float) + origin
 
 

@@ -82,7 +82,7 @@ def _solids(source: Path, path: Path) -> Iterator[Path]:
 
 
 def _whole(path: Path, write: Callable[[Path], object]) -> None:
-    """Write to a neighbour and put it in its place."""
+    """Write to a temporary file beside `path`, then rename it."""
     beside = path.with_name(f".{path.name}.part")
     write(beside)
     os.replace(beside, path)

@@ -23,7 +23,7 @@ Array = np.ndarray
 
 
 class OffshoreFailed(BadCase):
-    """ANUGA did not end well."""
+    """ANUGA ended with an error."""
 
 
 def offshore(path: Path) -> Path:
@@ -108,7 +108,7 @@ def _arrays(found: Offshore, case, name: str) -> dict:
 
 
 def _moved(found: Offshore, ground: HeightMap | None, X: Array, Y: Array) -> Array:
-    """By how much the surface stands higher at the start (n,) [m]."""
+    """Initial elevation (n,) [m] of the surface above still water."""
     moved = np.zeros(len(X))
     for spec in found.source:
         if spec.kind == "hump":

@@ -1,1 +1,1 @@
-"""One HTML file about a run or a study, complete in itself, that reads well on paper too."""
+"""One self-contained HTML file about a run or a study, which can also be printed."""

@@ -1,4 +1,4 @@
-"""`surgebreak report RUN|STUDY`: report.html in the directory, complete in itself."""
+"""`surgebreak report RUN|STUDY`: writes a self-contained report.html into the directory."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def _what_it_is(place: Path) -> str:
 
 
 def run_report(run: Path, with_pictures: bool) -> str:
-    """The page of a run; what could not be drawn is said in it."""
+    """The page of a run; the page names what could not be drawn."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         remarks = _draw(run, folder) if with_pictures else ["Made without pictures (--no-pictures)."]
@@ -87,7 +87,7 @@ def stored_times(run: Path) -> list[float]:
 
 
 def study_report(study: Path) -> str:
-    """The page of a study: what its study.md says, with the figures inside."""
+    """The page of a study: the content of its study.md with the figures embedded."""
     from coupler.commands.study.page import page
 
     try:

@@ -48,7 +48,7 @@ class Markup(str):
 
 
 def link(text: str, address: str) -> Markup:
-    """A cell that leads to another page."""
+    """A cell with a link to another page."""
     return Markup(f'<a href="{escape(address)}">{escape(text)}</a>')
 
 
@@ -81,7 +81,7 @@ def facts(rows: Iterable[tuple[str, str]]) -> str:
 
 
 def preformatted(text: str) -> str:
-    """Text as it stands."""
+    """Preformatted text, unchanged."""
     return f"<pre>{escape(text)}</pre>"
 
 
@@ -106,5 +106,5 @@ def film(path: Path, link: str) -> str:
 
 
 def as_data(path: Path) -> str:
-    """A file as the address of itself."""
+    """The data URI of a file."""
     return f"data:{KIND[path.suffix]};base64,{base64.b64encode(path.read_bytes()).decode('ascii')}"

@@ -119,7 +119,7 @@ def _notes(summary: dict) -> str:
 
 
 def _until(run: Path) -> str:
-    """How far the histories of a run go that could not say it itself."""
+    """Time reached by the histories of a run that did not record its end."""
     found = tables.history(run, "energy")
     return "" if found is None else f", to t = {quantity(float(found['time'][-1]), 's')}"
 
@@ -225,7 +225,7 @@ def plots(run: Path, pictures: Path) -> list[Path]:
 
 
 def _leaves(pictures: Path, stem: str) -> list[Path]:
-    """The figure of a table and its continuations: gauges.png, gauges_2.png, ..."""
+    """The figures of a table over several pages: gauges.png, gauges_2.png, ..."""
     more = sorted(p for p in pictures.glob(f"{stem}_*.png") if p.stem.removeprefix(f"{stem}_").isdigit())
     return [p for p in (pictures / f"{stem}.png", *more) if p.exists()]
 

@@ -45,7 +45,7 @@ def stands(run: Path, summary: dict, pictures: Path) -> list[str]:
 
 
 def _bores(found: list[dict], judged: dict) -> list[str]:
-    """What each bore is at the structure by theory, and the depth that was measured beside it."""
+    """Theoretical depth and velocity of each bore at the structure, and the depth computed beside it."""
     measured = judged["largest"]["depth"]
     beside = f"{length(measured['value'])} at {moment_of(measured['time'])}" if measured else "–"
     rows = [

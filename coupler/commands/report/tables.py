@@ -36,7 +36,7 @@ def energy(run: Path) -> str:
 
 
 def volume(run: Path) -> str:
-    """Volume of the water [m³] with what came and went."""
+    """Volume of the water [m³] with inflow and outflow."""
     found = history(run, "water")
     if found is None:
         return ""

@@ -89,8 +89,8 @@ def _math(text: str, display: str) -> str:
 
 
 def _spaced(markdown: str) -> str:
-    """With blank lines before lists and tables and around equations, and what goes on with an item of a list indented
-    by four: Python's Markdown takes them for text without."""
+    """Markdown with blank lines before lists and tables and around equations, and with continued list items indented by
+    four spaces: Python's Markdown takes them for plain text otherwise."""
     found: list[str] = []
     fenced = equation = item = loose = False
     for line in markdown.split("\n"):

@@ -20,7 +20,7 @@ DEFECT = 0.5
 
 
 class Flow:
-    """Steps a CoupledStepper on as a run does, with its limits, and keeps the worst of what it did.
+    """Advances a CoupledStepper as a run does, with the same limits, and keeps the largest errors.
 
     energy: largest error of the ledger · volume: largest error of the volume · fastest [m/s]: fastest water ·
     defect: largest one · retries: steps that were halved · lost: share of the energy put in that the numerics took
@@ -33,7 +33,8 @@ class Flow:
         self.record = None
 
     def run(self, time: float, dt: float | None = None, each=None) -> Flow:
-        """On by `time` [s] in steps of dt [s], or in those that the coupling wants; each(record) after each."""
+        """Advance by `time` [s] in steps of dt [s], or in those that the coupling chooses; each(record) is called after
+        each step."""
         c = self.coupling
         end = c.time + time
         while c.time < end * (1.0 - 1e-12):
@@ -69,7 +70,7 @@ class Flow:
             yield Measure(f"steps halved{after}", float(self.retries), None)
 
     def at_rest(self, scale: float, what: str = "", limit: float = 1e-6) -> Iterator[Measure]:
-        """Water that has no reason to move: its fastest over scale [m/s], and its volume."""
+        """Measures of water that should stay at rest: its largest speed over scale [m/s], and its volume."""
         after = f", {what}" if what else ""
         yield Measure(f"fastest water / sqrt(g h){after}", self.fastest / scale, limit)
         yield Measure(f"error of the volume{after}", self.volume, VOLUME)

@@ -10,7 +10,7 @@ HEAD = "| scene | what | verdict | CPU s |\n|---|---|---|---|"
 
 
 def tables(rows: list[dict]) -> str:
-    """One table a group; below it what refused scenes said and what failed ones missed."""
+    """One table a group; below it the messages of refused scenes and the limits that failed ones exceeded."""
     groups = list(dict.fromkeys(row["group"] for row in rows))
     return "\n\n".join(_group(name, [row for row in rows if row["group"] == name]) for name in groups) + "\n"
 

@@ -25,7 +25,7 @@ Verdict = Literal["passed", "refused", "failed"]
 
 @dataclass(frozen=True)
 class Measure:
-    """A figure and the most that it may be; `unit` "1" for shares. limit None: only reported, not judged."""
+    """A value and its upper limit; `unit` "1" for shares. limit None: only reported, not judged."""
 
     quantity: str
     value: float
@@ -34,7 +34,7 @@ class Measure:
 
     @property
     def kept(self) -> bool:
-        """A value that is no number is not kept."""
+        """Whether the value keeps its limit; NaN does not."""
         return self.limit is None or abs(self.value) <= self.limit
 
 
@@ -52,7 +52,7 @@ class Scene:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a scene: verdict, the message of a refusal or failure, measures, CPU and wall seconds."""
+    """Result of a scene: verdict, the message of a refusal or failure, measures, CPU and wall seconds."""
 
     id: str
     group: str

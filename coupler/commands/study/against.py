@@ -15,7 +15,7 @@ NEGLIGIBLE = 1e-9
 
 @dataclass(frozen=True)
 class Worse:
-    """One figure that got worse: what, before, now, and the largest ratio allowed (0: none, it failed)."""
+    """One value that got worse: its name, the value before and now, and the largest ratio allowed (0: it failed)."""
 
     what: str
     before: float
@@ -48,7 +48,7 @@ def compare(first: Path, second: Path, error: float, cpu: float) -> ExitCode:
 
 
 def read_study(folder: Path) -> dict:
-    """What study.json says. Raises BadCase."""
+    """The content of study.json. Raises BadCase."""
     path = folder / "study.json" if folder.is_dir() else folder
     try:
         return json.loads(path.read_text(encoding="utf-8"))
@@ -57,7 +57,7 @@ def read_study(folder: Path) -> dict:
 
 
 def refuse(before: dict, now: dict) -> None:
-    """Raise BadCase for quantities with references of two kinds, and where nothing is in common."""
+    """Raise BadCase where a quantity has references of two kinds, and where the studies have nothing in common."""
     kinds = [{q["name"]: (q["against"], q["finest"]) for q in study["quantities"]} for study in (before, now)]
     wrong = [
         f"{name}: errors against {kinds[0][name][0]} and against {kinds[1][name][0]}"

@@ -93,7 +93,7 @@ def _value(node: ast.expr, case: dict, formula: str, functions: dict[str, Callab
 
 
 def _named(node: ast.expr, case: dict, formula: str):
-    """What stands under a name of the case."""
+    """The value under a name of the case."""
     if isinstance(node, ast.Name):
         above, step = case, node.id
     elif isinstance(node, ast.Attribute):

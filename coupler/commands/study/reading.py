@@ -24,7 +24,7 @@ class Curve:
     values: Array
 
     def within(self, window: tuple[float, float] | None) -> Curve:
-        """The part between two times, with its ends; the whole without a window."""
+        """The part between two times, including its ends; the whole curve without a window."""
         if window is None:
             return self
         low, high = max(window[0], self.time[0]), min(window[1], self.time[-1])

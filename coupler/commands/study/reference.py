@@ -68,7 +68,7 @@ def fixed_reference(q: Quantity, case: dict) -> float:
 
 
 def half_band(q: Quantity) -> float:
-    """Half the scatter of a measured number; of two curves, that of what is taken from them."""
+    """Half the scatter of a measured number; for two curves, of the numbers that are taken from them."""
     if q.band is not None:
         return abs(q.band)
     low, high = (taken(q, file_curve(q, name)) for name in q.band_columns)

@@ -26,7 +26,7 @@ COLUMNS = (
 
 
 def content(plan: Plan, runs: Runs, found: dict[str, Outcome], laws: list[LawPoint]) -> dict:
-    """All of a study as plain data."""
+    """The whole study as plain data."""
     return {
         "program": "surgebreak",
         "case": str(plan.file.path),

@@ -29,7 +29,7 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Order:
-    """Observed order of a quantity on one curve: all its runs, and its finest ones; how it was found."""
+    """Observed order of a quantity on one curve, from all its runs and from the finest ones, and the method."""
 
     quantity: str
     ladder: str
@@ -74,9 +74,9 @@ def _named(plan: Plan, setting: str) -> str:
 
 
 def _readings(plan: Plan, runs: Runs, run: Measured) -> dict[str, Reading]:
-    """Every quantity of a run; those against the finest run still without an error.
+    """Every quantity of a run; those compared with the finest run have no error yet.
 
-    A variant may lack what a quantity is read from; elsewhere that is a mistake and is refused."""
+    A variant may lack the table or column of a quantity; elsewhere this is a mistake and is refused."""
     setting = plan.settings[run.setting]
     place = runs.place(run.setting, run.number)
     optional = run.setting in plan.off.values() and all(r.setting != run.setting for r in plan.rungs)

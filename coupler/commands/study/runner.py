@@ -142,7 +142,7 @@ class Runs:
         return found
 
     def _known_first_step(self) -> FirstStep | None:
-        """That of the study before it was stopped."""
+        """The first step measured before the study was stopped; None without one."""
         path = self.folder / "first_step.json"
         return FirstStep(**json.loads(path.read_text(encoding="utf-8"))) if path.exists() else None
 

@@ -35,7 +35,7 @@ POLICY = (
 
 
 class Site:
-    """What is watched, and what the page last heard."""
+    """The watched runs, and the state that was last sent to the page."""
 
     def __init__(self, places: list[Path], pictures: Pictures | None = None):
         self.places, self.pictures = places, pictures
@@ -114,7 +114,7 @@ class _Handler(BaseHTTPRequestHandler):
         self._send(b"{}", "application/json")
 
     def _words(self) -> list[str] | None:
-        """The address behind the secret; None where the request is not for us; the answer says so."""
+        """The parts of the address after the secret. None if the request is refused; the refusal has then been sent."""
         own = {f"{name}:{self.server.server_port}" for name in (ADDRESS, "localhost")}
         _, _, rest = self.path.partition("?")[0].partition("/")
         secret, slash, behind = rest.partition("/")
@@ -144,7 +144,7 @@ class _Handler(BaseHTTPRequestHandler):
             self._send(path.read_bytes(), "image/png")
 
     def _events(self) -> None:
-        """The state whenever it changes, and a comment in between, which shows when nobody listens any more."""
+        """Send the state whenever it changes, and comments in between, which fail when the browser has gone."""
         self.send_response(200)
         self.send_header("Content-Type", "text/event-stream")
         self.send_header("Cache-Control", "no-store")
@@ -160,4 +160,4 @@ class _Handler(BaseHTTPRequestHandler):
                 clock.sleep(EVERY)
 
     def log_message(self, *_) -> None:
-        """Nothing: the terminal belongs to the run."""
+        """Print nothing, because the terminal belongs to the run."""

@@ -49,13 +49,13 @@ def runs_in(places: list[Path]) -> list[Path]:
 
 @dataclass
 class Watched:
-    """One run; what was read is kept until its files change."""
+    """One run; its data are kept until its files change."""
 
     path: Path
     _curves: dict[Path, tuple[tuple, list]] = field(default_factory=dict)
 
     def state(self) -> dict:
-        """Everything that the page shows of it; a run that cannot be read says why."""
+        """Everything that the page shows of the run; the reason if the run cannot be read."""
         try:
             summary = read_summary(self.path)
         except (NoRun, OSError) as error:
@@ -171,5 +171,5 @@ def _read_curves(path: Path, columns) -> list[dict]:
 
 
 def _plain(values) -> list[float | None]:
-    """Six digits are enough for a curve; what is not there is null."""
+    """A value with six digits, which are enough for a curve; null where there is none."""
     return [float(f"{v:.6g}") if np.isfinite(v) else None for v in values]

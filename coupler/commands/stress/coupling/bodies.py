@@ -1,4 +1,4 @@
-"""Single blocks in water: far lighter and heavier than it, coming in, going out, hitting, resting, sliding."""
+"""Single blocks in water: much lighter or heavier than it, entering, leaving, colliding, resting, sliding."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ WALLS = [
 
 
 def pool(structure, **more):
-    """A tank of one metre, water 0.8 m deep, cells of a tenth; two passes, as cases have."""
+    """A tank of 1 m with water 0.8 m deep and cells of 0.1 m; two passes, the default of a case."""
     c = tank(SIZE, CELLS, level_at(LEVEL), structure, rtol=1e-9, **more)
     c.passes = 2
     return c
 
 
 def cube(name: str, centre, density: float, **more) -> Block:
-    """A cube of three cells."""
+    """A cube with an edge of three cells."""
     return Block(name, centre, size=EDGE, density=density, **more)
 
 
@@ -48,8 +48,8 @@ def submerged_weight(density: float) -> float:
 
 @scene("C01", "cube of a hundredth of the density of water let go under it")
 def light_released() -> Iterator[Measure]:
-    """Added mass is 50 times its own: stepped in turn it would blow up in two steps. It must not rise faster than
-    buoyancy can drive it, and it ends afloat."""
+    """The added mass is 50 times the block's own: a staggered scheme would diverge in two steps. It must not rise
+    faster than buoyancy can drive it, and it ends afloat."""
     with Structure([cube("c", (0.52, 0.47, 0.3), 10.0)], ContactLaw(1e5), ground=0.0, planes=WALLS) as s:
         flow = Flow(pool(s))
         fastest = [0.0]
@@ -87,7 +87,7 @@ def pulled_out() -> Iterator[Measure]:
 
 @scene("C04", "block rests on the bed, two more on it, all under water")
 def stack_at_rest() -> Iterator[Measure]:
-    """Each contact carries what is above it less buoyancy: the water reaches every face that is not glued."""
+    """Each contact carries what is above it less buoyancy: water acts on every face that is not glued."""
     density, stiffness = 2000.0, 1e7
     edge = 0.2
     sunk = (density - DENSITY) * edge**3 * G / stiffness * np.cumsum([3.0, 2.0, 1.0])
@@ -110,8 +110,8 @@ def stack_at_rest() -> Iterator[Measure]:
 
 @scene("C05", "block slides over the bed under water until friction stops it")
 def slides() -> Iterator[Measure]:
-    """Friction acts on the weight less buoyancy, and the water has to be set in motion: it goes no farther than
-    without water's drag, (1 + a/s) times the dry way with the added mass a < 0.8."""
+    """Friction follows from the weight less buoyancy, and the block must set the water in motion. It slides no farther
+    than without drag, which is (1 + a/s) times the dry distance with the added mass a < 0.8."""
     density, fast, mu = 2500.0, 1.0, 0.5
     block = cube("c", (0.3, 0.5, 0.5 * EDGE), density, velocity=(fast, 0.0, 0.0))
     with Structure([block], ContactLaw(1e7, 0.1, mu), ground=0.0, planes=WALLS) as s:
@@ -129,7 +129,7 @@ def slides() -> Iterator[Measure]:
 
 @scene("C06", "block sinks onto another one under water and hits it")
 def collide() -> Iterator[Measure]:
-    """No deeper than v √(m/K) with the water that comes along, and both come to rest on one another."""
+    """The overlap does not exceed v √(m/K) with the added mass included, and the blocks come to rest on one another."""
     stiffness, edge = 1e6, 0.25
     blocks = [
         Block("below", (0.5, 0.5, 0.5 * edge), size=edge, density=2000.0),
@@ -155,7 +155,7 @@ def collide() -> Iterator[Measure]:
 
 @scene("C07", "heavy on light under water, masses 1000 to 1")
 def masses() -> Iterator[Measure]:
-    """The light one wants up with 9.7 times less than the heavy one presses down."""
+    """The net buoyancy of the light block is 9.7 times smaller than the submerged weight of the heavy one."""
     edge, stiffness = 0.2, 1e7
     blocks = [
         Block("light", (0.52, 0.47, 0.5 * edge), size=edge, density=20.0),

@@ -18,7 +18,7 @@ from yade_scripts.joints.cohesion import JointParameters
 
 
 def tank(*args, **more):
-    """As in the cases, with two passes."""
+    """A tank as in the shipped cases, with two passes."""
     c = one_pass_tank(*args, **more)
     c.passes = 2
     return c
@@ -26,7 +26,7 @@ def tank(*args, **more):
 
 @scene("C20", "1000 blocks of debris, half of them lighter than water")
 def thousand() -> Iterator[Measure]:
-    """Apart at the start; they rise and sink. The momentum that they gain is the impulse of water and weight."""
+    """The blocks start apart, then rise or sink. The momentum they gain must equal the impulse of water and weight."""
     n, edge = 10, 0.05
     places = (np.stack(np.meshgrid(*[np.arange(n)] * 3, indexing="ij"), -1).reshape(-1, 3) + 0.5) * 0.08 + 0.1
     blocks = [
@@ -56,8 +56,8 @@ def thousand() -> Iterator[Measure]:
 
 @scene("C21", "block squeezed between two walls under water")
 def squeezed() -> Iterator[Measure]:
-    """One wall is driven on until the block is pressed by 2 mm. Both walls then press alike, with a spring of about
-    K/4: four faces in series."""
+    """One wall is driven until the block is compressed by 2 mm. Both walls must then exert the same force, with a
+    stiffness of about K/4: four faces in series."""
     stiffness, gap, press, fast = 1e6, 0.01, 0.002, 0.1
     plate = (0.2, 0.6, 0.6)
     blocks = [
@@ -80,7 +80,7 @@ def squeezed() -> Iterator[Measure]:
 
 @scene("C22", "chamber of loose blocks full of water, under water")
 def chamber() -> Iterator[Measure]:
-    """Four walls and a lid that only lie there: nothing has a reason to move, sealed or not."""
+    """Four walls and a lid that are not glued: nothing may move, whether the chamber is sealed or not."""
     t, h, stiffness = 0.1, 0.4, 1e7
     density = 2400.0
     walls = [
@@ -104,7 +104,7 @@ def chamber() -> Iterator[Measure]:
 
 @scene("C23", "piston driven into a chamber that is full and closed", refusal="must")
 def piston() -> Iterator[Measure]:
-    """Water has no room to go: no pressure is right, and the run must say so instead of inventing one."""
+    """The water cannot escape, so no pressure satisfies the equations; the run must report this, not make one up."""
     plate = Block("piston", (0.5, 0.5, 0.5), size=(0.2, 1.1, 1.1), driven=True, velocity=(0.05, 0.0, 0.0))
     with Structure([plate]) as s:
         flow = Flow(tank((1, 1, 1), (8, 8, 8), level_at(9.0), s, covers="multiple")).run(0.1, 0.01)
@@ -142,7 +142,7 @@ def long_steps() -> Iterator[Measure]:
 
 @scene("C32", "joints that close 1e4 times too stiffly, loaded at once by a full depth of water")
 def stiff_joints() -> Iterator[Measure]:
-    """The substep is a hundredth of the usual one; the wall must swing, not gain."""
+    """The substep is a hundredth of the usual one; the wall must vibrate without gaining energy."""
     structure, c = wave_on_wall(2e6, closing=1e4, width=1.5)
     with structure as s:
         flow = Flow(c).run(0.02, 0.002)

@@ -52,7 +52,7 @@ class Bodies:
     count: int = 0
 
     def add(self, kind: str, table: dict, edges, count: int, height: float) -> None:
-        """A table of [structure] whose blocks have such edges [m], piled up to a height [m]."""
+        """Add a table of [structure] whose blocks have these edges [m] and are piled up to a height [m]."""
         self.tables.setdefault(kind, []).append(table)
         self.groups.append(table["name"])
         self.smallest = min(self.smallest, *map(float, edges))
@@ -102,7 +102,7 @@ def _turn(dice: Dice) -> dict:
 
 
 def _hull(dice: Dice, edges) -> list[list[float]]:
-    """Corners about the origin, all on an ellipsoid of these axes."""
+    """Corners about the origin, all on an ellipsoid with these axes."""
     corners = [np.multiply(dice.direction(), 0.5 * np.asarray(edges)) for _ in range(dice.whole(8, 14))]
     return [_listed(point) for point in corners]
 
@@ -130,7 +130,7 @@ def _solid(dice: Dice, room: Slot, found: Bodies, k: int) -> None:
 
 
 def _block(dice: Dice, room: Slot, found: Bodies, k: int) -> None:
-    """One block: on the floor, in the air, turned, moving or held."""
+    """One block: on the floor or in the air, rotated, moving or held."""
     edges = room.edges(dice)
     if dice.chance(0.15):
         edges[dice.whole(0, 2)] *= dice.between(0.05, 0.3)
@@ -264,7 +264,7 @@ def _arch(dice: Dice, room: Slot, found: Bodies, k: int) -> None:
 
 
 def _rubble(dice: Dice, room: Slot, found: Bodies, k: int) -> None:
-    """Loose blocks scattered over the upper part of the room, which fill at most a tenth of it."""
+    """Loose blocks scattered over the upper part of the room, of which they fill at most a tenth."""
     low = room.low + room.size * [0.0, 0.0, dice.between(0.0, 0.5)]
     size = 0.95 * (room.high - low)
     largest = min(room.cell * dice.decades(0.5, 3.0), 0.4 * float(size.min()))

@@ -55,7 +55,7 @@ def stress_drawn(
 ) -> ExitCode:
     """Run scenes and print each outcome as it comes. DIVERGED if one failed.
 
-    Failures go to `keep`, each made small for so many seconds of processor time at most."""
+    Failures go to `keep`; each is reduced, which takes at most `seconds` of processor time."""
     outcomes = []
     if not as_json and not only_list:
         print(FORM.format(*HEAD).rstrip())
@@ -84,7 +84,7 @@ def _shown(found: Outcome) -> str:
 
 
 def outcome(drawn: Drawn, keep: Path, seconds: float) -> Outcome:
-    """Run a scene; a failure is made small, for so much processor time, and kept."""
+    """Run a scene; a failure is reduced, within `seconds` of processor time, and kept."""
     with tempfile.TemporaryDirectory() as folder:
         found = _run(drawn, drawn.table, Path(folder))
     message = found.message
@@ -101,7 +101,7 @@ def _run(drawn: Drawn, table: dict, folder: Path) -> Trial:
 
 
 def _kept(drawn: Drawn, found: Trial, keep: Path, seconds: float) -> Path:
-    """The scene as a case in keep/ID, the small one in keep/ID/small, and in found.txt what each said."""
+    """Write the scene as a case to keep/ID, the reduced one to keep/ID/small, and the output of both to found.txt."""
     place = keep / drawn.id
     shutil.rmtree(place, ignore_errors=True)
     write(drawn.table, drawn.files, place)

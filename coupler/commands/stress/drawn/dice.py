@@ -1,4 +1,4 @@
-"""Draws of one scene: the same seed and number give the same ones, on every machine."""
+"""Random draws for one scene: the same seed and number give the same draws on every machine."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Dice:
         self._rng = np.random.Generator(np.random.PCG64([seed, number]))
 
     def chance(self, share: float) -> bool:
-        """True in that share of the draws."""
+        """True with the probability `share`."""
         return bool(self._rng.random() < share)
 
     def between(self, low: float, high: float) -> float:
@@ -33,7 +33,7 @@ class Dice:
         return int(self._rng.integers(low, high + 1))
 
     def one(self, choices):
-        """One of the choices; of a dict of choices and weights by their weights."""
+        """One of the choices; a dict gives the weight of each."""
         if not isinstance(choices, dict):
             return choices[self.whole(0, len(choices) - 1)]
         place = self.between(0.0, sum(choices.values()))
@@ -44,11 +44,11 @@ class Dice:
         return choice
 
     def some(self, choices, share: float) -> list:
-        """Each of the choices in that share of the draws."""
+        """Each of the choices with the probability `share`."""
         return [choice for choice in choices if self.chance(share)]
 
     def direction(self) -> list[float]:
-        """A unit vector (3,), as likely one way as another."""
+        """A unit vector (3,), uniformly distributed over directions."""
         vector = self._rng.standard_normal(3)
         return [rounded(x) for x in vector / np.linalg.norm(vector)]
 

@@ -35,8 +35,8 @@ HELD_STILL = 1e-6
 
 
 def measures(directory: Path, still: bool) -> Iterator[Measure]:
-    """All figures of a run directory, of a run that ended or stopped at its budget; still: water without a reason to
-    move."""
+    """All figures of a run directory, of a run that ended or stopped at its budget; still: the water should
+    stay at rest."""
     summary = json.loads((directory / "run.json").read_text(encoding="utf-8"))
     case = Case.model_validate(summary["case"])
     history = directory / "history"
@@ -95,7 +95,7 @@ def _momentum(momentum: dict) -> Iterator[Measure]:
 
 
 def _water(water: dict, case: Case) -> Iterator[Measure]:
-    """Volume kept, and no more of it than the tank holds; no pull beyond that at which water parts."""
+    """Conservation of volume, within the volume of the tank; no suction beyond that at which the water separates."""
     held = water["volume"] + water["left"] - water["entered"]
     scale = np.maximum(held[:1] + np.maximum(water["entered"], 0.0), 1e-300)
     yield Measure("error of the volume", _largest(np.abs(held - held[:1]) / scale), VOLUME)
@@ -230,7 +230,7 @@ def _outside(bodies, case: Case, names) -> Iterator[tuple[float, str]]:
 
 
 def _gone(middle, case: Case) -> bool:
-    """Whether a block has left through an open side."""
+    """Whether a block has left the tank through an open side."""
     return any(
         middle["xyz".index(side[0])] * (1.0 if side[1] == "+" else -1.0)
         > (case.tank.upper if side[1] == "+" else case.tank.lower)["xyz".index(side[0])]
@@ -240,5 +240,5 @@ def _gone(middle, case: Case) -> bool:
 
 
 def _largest(values) -> float:
-    """Largest of the values, 0 without any; NaN stays NaN, which no limit keeps."""
+    """Largest of the values, 0 without any; NaN stays NaN, which exceeds every limit."""
     return float(np.max(values)) if len(values) else 0.0

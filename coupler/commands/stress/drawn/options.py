@@ -1,6 +1,6 @@
-"""Options of a random scene that most cases leave alone: finer cells and stretched bricks, sides that absorb, N-waves,
-openings beside edges only, films under blocks, random strengths, weight that comes on gradually, sleep. Drawn last,
-so that all else stays the same."""
+"""Options of a random scene that most cases leave at their defaults: finer cells, stretched bricks,
+absorbing sides, N-waves, openings beside edges only, films under blocks, random strengths, gradual weight, sleep.
+They are drawn last, so that all else stays the same."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def add_options(dice: Dice, place: Basin, table: dict) -> None:
 
 
 def _cells(dice: Dice, place: Basin, table: dict) -> None:
-    """Half the size in a box or around the solids, or bricks of another length in a part of an axis."""
+    """Use cells of half the size in a box or around the solids, or bricks of another length along part of an axis."""
     tank = table["tank"]
     if dice.chance(0.1):
         part: dict = {}
@@ -54,7 +54,7 @@ def _cells(dice: Dice, place: Basin, table: dict) -> None:
 
 
 def _sides(dice: Dice, water: dict) -> None:
-    """N-waves in the place of solitary ones; inflows and seas that let go what comes back."""
+    """Use N-waves in place of solitary ones, and inflows and seas that absorb reflected waves."""
     for spec in water.get("inflow", ()):
         if spec["kind"] == "solitary" and dice.chance(0.3):
             spec["kind"], spec["middle"] = "n-wave", spec.pop("crest")

@@ -30,7 +30,7 @@ WANTED = 4.0
 @dataclass
 class Drawn:
     """id R<seed>-<number> · group · title · table: the case as plain data · files: text, or (points, kind, cells) of a
-    mesh, by name · still: its water has no reason to move"""
+    mesh, by name · still: its water should stay at rest"""
 
     id: str
     group: str
@@ -41,8 +41,8 @@ class Drawn:
 
 
 def draw(seed: int, number: int, seconds: float = WANTED) -> Drawn:
-    """Scene `number` of `seed`; the same two give the same scene. seconds [CPU s]: what it is sized for, about; a
-    shorter one is the beginning of a longer one, but for what happens once in its time."""
+    """Scene `number` of `seed`; the same two give the same scene. seconds [CPU s]: about what it is sized for; a
+    shorter scene is the beginning of a longer one, except for events that are placed by the length of the run."""
     dice = Dice(seed, number)
     group = group_of(dice)
     gravity = 9.81 if dice.chance(0.8) else dice.decades(0.5, 30.0)
@@ -218,7 +218,7 @@ def _structure(dice: Dice, place: Basin, flow: Stream | None, found: Bodies, gra
 
 
 def _joints(dice: Dice, place: Basin, found: Bodies, density: float, gravity: float) -> dict:
-    """Strengths from a few to a thousand times the weight of the pile; openings small against the blocks."""
+    """Joints with strengths of a few to a thousand times the stress from the weight of the pile, and small openings."""
     strength = max(density, 1000.0) * gravity * float(place.size[2]) * dice.decades(3.0, 1000.0)
     joints: dict = {
         "strength": rounded(strength),
@@ -244,7 +244,8 @@ def _joints(dice: Dice, place: Basin, found: Bodies, density: float, gravity: fl
 def _times(
     dice: Dice, place: Basin, flow, found: Bodies, gravity, speed, rate, seconds
 ) -> tuple[float, float | None]:
-    """End of the run and longest step [s]: a few falls over the height of the tank, or less where that costs more."""
+    """End of the run and longest step [s]. The run lasts for a few falls over the height of the tank, or for less where
+    that costs too much."""
     wanted = dice.between(3.0, 8.0) * math.sqrt(float(place.size[2]) / gravity)
     if flow is not None:
         bricks = float(np.prod(place.size)) / place.cell**3

@@ -41,7 +41,7 @@ def _shortened(table: dict, reached: float | None) -> dict:
 
 
 def _smaller(table: dict) -> Iterator[dict]:
-    """The table without one of its parts, large parts first: sections, entries of lists, single values."""
+    """The table without one of its parts, for each part, large ones first: sections, list entries, single values."""
     for path in _parts(table, ()):
         found = copy.deepcopy(table)
         holder = found

@@ -16,8 +16,8 @@ SHALLOWEST = 3.0
 
 @dataclass
 class Stream:
-    """level [m]: highest water at the start, above the floor of the tank · fastest [m/s]: about what it may reach ·
-    still: it has no reason to move as long as no block moves it · table: [water] · files by name"""
+    """level [m]: highest water at the start, above the floor of the tank · fastest [m/s]: estimated largest speed ·
+    still: it should stay at rest as long as no block moves it · table: [water] · files by name"""
 
     level: float
     fastest: float
@@ -116,7 +116,7 @@ def _sides(dice: Dice, place: Basin, found: Stream, gravity: float) -> None:
 
 
 def _inflow(dice: Dice, place: Basin, found: Stream, side: str, gravity: float) -> None:
-    """What runs into still water of a known depth."""
+    """An inflow into still water of a known depth."""
     depth, z = found.level, float(place.lower[2])
     room = float(place.size[2]) - depth
     kind = dice.one(["bore", "solitary", "steady", "record"])

@@ -46,7 +46,7 @@ class Trial:
 
     @property
     def kind(self) -> str:
-        """Of a failure: the same for the same fault, whatever its numbers and names."""
+        """Kind of a failure: the same for the same fault, whatever the numbers and names in its message."""
         missed = [m.quantity.split(" (")[0] for m in self.measures if not m.kept]
         if missed:
             return "not kept: " + missed[0]
@@ -89,7 +89,7 @@ def trial(case: Path, output: Path, still: bool) -> Trial:
 
 
 def _within_processor_time() -> None:
-    """Called in the child: the kernel ends it where it computes for ever."""
+    """Limit the processor time of the child process, so that the system ends a run that never stops."""
     resource.setrlimit(resource.RLIMIT_CPU, (CPU_SECONDS, CPU_SECONDS + 10))
 
 
@@ -99,7 +99,7 @@ def asked_too_much(message: str, case: dict) -> bool:
 
 
 def _refusal(stderr: str) -> tuple[Verdict, str]:
-    """Whether all that was printed about a case says where and why."""
+    """Whether every message printed about a case gives the place and the reason."""
     lines = [line for line in stderr.splitlines() if line.strip()]
     mistakes = [line for line in lines if not line.startswith("surgebreak: ")]
     right = bool(mistakes) and all(MISTAKE.search(line) for line in mistakes)

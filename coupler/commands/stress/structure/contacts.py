@@ -122,7 +122,7 @@ def wedge() -> Iterator[Measure]:
 
 @scene("S15", "thin plate (aspect ratio 50) spins on the floor")
 def spinning_plate() -> Iterator[Measure]:
-    """It stays flat and stops in the time of an even pressure, ω I/(0.3826 a μ m g)."""
+    """The plate stays flat and stops after the time ω I/(0.3826 a μ m g), which follows from a uniform pressure."""
     plate = Block("p", (0, 0, 0.01), size=(1.0, 1.0, 0.02), density=DENSITY, spin=(0, 0, 20.0))
     torque = 0.3826 * 0.3 * plate.mass * G
     even = 20.0 * plate.mass / 6.0 / torque
@@ -143,7 +143,7 @@ def spinning_plate() -> Iterator[Measure]:
 
 @scene("S16", "hit as hard as the contact can take: sinks by half of the thinner block")
 def hard_hit() -> Iterator[Measure]:
-    """v √(m/K) is the depth of an impact: at half the plate the blocks must come back with e, nothing tunnels."""
+    """The overlap of an impact is v √(m/K). Where it is half the plate, the blocks must rebound with e, not tunnel."""
     stiffness, thickness = 1e9, 0.2
     plate = Block("plate", (0, 0, 0.1), size=(1.0, 1.0, thickness), density=DENSITY, fixed=True)
     mass = DENSITY

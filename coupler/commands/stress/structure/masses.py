@@ -19,7 +19,7 @@ STIFF = 1e8
 def pile(densities, stiffness: float = STIFF, time: float = 8.0) -> Iterator[Measure]:
     """Cubes of 1 m on one another come to rest: each interface carries what is above it.
 
-    The dashpot of a pair is that of its effective mass, next to nothing for the heavy one: it swings for seconds."""
+    The dashpot of a pair follows from its effective mass; it hardly damps the heavy block, which vibrates for long."""
     blocks = [
         Block(f"b{i}", (0, 0, i + 0.5), size=1.0, density=density) for i, density in enumerate(densities)
     ]

@@ -20,8 +20,8 @@ DENSITY = 2000.0
 
 @scene("S50", "tower of 100 loose blocks at rest for 60 s", cost="M")
 def tower() -> Iterator[Measure]:
-    """Slabs of 5 x 5 x 0.25 m, so that the springs stand up to buckling, K > ρ g n³ h²; they start as deep in each
-    other as the weight above presses them."""
+    """Slabs of 5 x 5 x 0.25 m, so that the stacked springs do not buckle, K > ρ g n³ h². They start with overlaps
+    at which the contacts carry the weight above."""
     count, edge, height, stiffness = 100, 5.0, 0.25, 3e9
     weight = DENSITY * edge**2 * height * G
     depth = weight * np.arange(count, 0, -1) / stiffness

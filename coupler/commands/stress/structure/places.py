@@ -19,7 +19,7 @@ DENSITY = 2000.0
 
 
 def dropped(size: float) -> Iterator[Measure]:
-    """A tilted cube falls by its edge and settles. The contact is as stiff for its weight whatever the size."""
+    """A tilted cube falls by its edge and settles. The ratio of stiffness to weight is the same for all sizes."""
     weight = DENSITY * size**3 * G
     stiffness = 2000.0 * weight / size
     turn = Rotation.from_euler("xyz", (10.0, 20.0, 30.0), degrees=True).as_matrix()
@@ -47,7 +47,7 @@ def sizes() -> Iterator[Measure]:
 
 @scene("S31", "a cube of 1 cm on one of 10 m")
 def small_on_large() -> Iterator[Measure]:
-    """Only the nodes of the small one carry; the stiffness of the pair is K all the same: it sinks by W/K."""
+    """Only the nodes of the small block carry load, yet the stiffness of the pair is K, so it sinks by W/K."""
     blocks = [
         Block("large", (0, 0, 5.0), size=10.0, density=DENSITY, fixed=True),
         Block("small", (3.0, 2.0, 10.01), size=0.01, density=DENSITY),

@@ -25,7 +25,7 @@ def bonded_column(**more) -> list[Block]:
 
 @scene("S40", "bonded column swings at 0.9 of the explicit limit")
 def at_the_limit() -> Iterator[Measure]:
-    """Far below damage nothing may grow. Near failure the kink of the law makes energy: how much is reported."""
+    """Far below damage nothing may grow. Near failure the kink of the law creates energy, which is reported."""
     for velocity, limit in ((1e-5, 1e-3), (0.3, None)):
         joints = JointParameters(1e6, 1e-3, damping=0.0)
         with Structure(bonded_column(velocity=(velocity, 0.0, velocity)), None, joints, gravity=STILL) as s:
@@ -39,7 +39,7 @@ def at_the_limit() -> Iterator[Measure]:
 
 @scene("S41", "bounces at 0.9 of the explicit limit of the contact")
 def bounces() -> Iterator[Measure]:
-    """Flat bounces in a shaft: what a coarse substep does to e is reported; no energy out of nothing."""
+    """Flat bounces in a shaft: the effect of a coarse substep on e is reported; no energy may be created."""
     floor = Block("floor", (0, 0, -0.5), size=1.0, density=DENSITY, fixed=True)
     roof = Block("roof", (0, 0, 1.51), size=1.0, density=DENSITY, fixed=True)
     ball = Block("ball", (0, 0, 0.503), size=1.0, density=DENSITY, velocity=(0, 0, 1.0))

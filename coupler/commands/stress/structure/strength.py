@@ -1,4 +1,4 @@
-"""Joints from weak to strong, brittle to soft, slow to fast: they take their work of separation and nothing else."""
+"""Joints from weak to strong, brittle to soft, slow to fast: they absorb exactly their work of separation."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def torn(parameters: JointParameters, times: float, density: float = MASS, size=
 
 
 def errors(cases) -> Iterator[Measure]:
-    """The worst of what joints took and blocks lost against G_c A, and of the energy."""
+    """Largest errors, relative to G_c A, of the joints' work and of the energy that the blocks lost; energy gained."""
     watches = [torn(*case) for case in cases]
     yield Measure("taken by the joint, off G_c", max(abs(w.taken - 1.0) for w in watches), 0.02)
     yield Measure("lost by the block, off G_c", max(abs(w.lost - 1.0) for w in watches), 0.03)
@@ -82,7 +82,8 @@ def slender() -> Iterator[Measure]:
 
 @scene("S05", "bonded rod of aspect ratio 50 held at one end, released under a quarter of its strength")
 def cantilever() -> Iterator[Measure]:
-    """The clamped joint bends; a sudden weight counts twice, half of the strength, so it swings and holds."""
+    """The clamped joint bends. A suddenly applied weight has twice its static effect, here half of the strength, so the
+    beam vibrates and holds."""
     length, width, opening = 1.0, 0.02, 1e-3
     weight = MASS * length * width**2 * G
     strength = 4.0 * (0.5 * weight * length) / (width**3 / 6.0)
@@ -102,7 +103,8 @@ def cantilever() -> Iterator[Measure]:
 
 @scene("S06", "pulled by 99.5, 100 and 100.5 % of the strength")
 def at_strength() -> Iterator[Measure]:
-    """Load grown over many periods; below it holds, above it fails, at it only the energy is asked."""
+    """The load grows over many periods. Below the strength the joint holds, above it fails; at it, only the energy is
+    checked."""
     for share, holds in ((0.995, 1.0), (1.0, None), (1.005, 0.0)):
         alive, watch = pulled(share)
         setting = f"at {100 * share:g} % of the strength"
@@ -114,7 +116,7 @@ def at_strength() -> Iterator[Measure]:
 
 
 def pulled(share: float) -> tuple[float, Watch]:
-    """Whether a joint holds a load of `share` of its strength; the energy in play is G_c A or the work of the load."""
+    """Whether a joint holds a load of `share` of its strength; the energy scale is G_c A or the work of the load."""
     parameters = JointParameters(1e6, 1e-3, damping=0.3)
     with Structure(held_and_free(), None, parameters, gravity=STILL) as s:
         watch = Watch(s, parameters.work_of_separation * AREA)

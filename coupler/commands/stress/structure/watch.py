@@ -1,4 +1,4 @@
-"""Energy and places of a structure, looked at as it moves."""
+"""Energy and positions of a structure, recorded as it moves."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Watch:
         return held, held + sum(e[name] for name in TAKEN)
 
     def advance(self, time: float, looks: int = 50, substep: float | None = None) -> None:
-        """Move on by `time` [s], looking `looks` times."""
+        """Advance by `time` [s], recording `looks` times."""
         for _ in range(looks):
             report = self.structure.advance(time / looks, substep)
             self.fastest_opening = max(self.fastest_opening, report.opening_rate)

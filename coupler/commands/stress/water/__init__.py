@@ -1,1 +1,1 @@
-"""Scenes of water alone: at rest in hard places, and as violent as it may get."""
+"""Scenes of water alone: at rest in difficult geometries, and in violent motion."""

@@ -41,7 +41,7 @@ def everything_dry() -> Iterator[Measure]:
 
 @scene("W02", "closed tank full to the lid, with a solid in it")
 def full_to_the_lid() -> Iterator[Measure]:
-    """No free surface: the pressure has no level of its own. Archimedes holds all the same."""
+    """No free surface: the pressure has no level of its own. Archimedes' principle must hold all the same."""
     c = tank((1, 1, 1), (8, 8, 8), full, solids=[box((0.47, 0.52, 0.51), (0.3, 0.3, 0.3))])
     flow = Flow(c).run(0.5)
     lift = DENSITY * G * 0.3**3

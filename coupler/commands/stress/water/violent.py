@@ -44,7 +44,7 @@ def slender_cells() -> Iterator[Measure]:
 
 @scene("W26", "cells of aspect ratio 10, lying and standing, in a dam break", refusal="may")
 def very_slender_cells() -> Iterator[Measure]:
-    """A case has cubes for cells, so only graded meshes get there: it may stop, not go on with a wrong volume."""
+    """Cells so slender occur in graded meshes only. The run may stop, but it must not continue with a wrong volume."""
     for name, cells in (("lying", (6, 1, 30)), ("standing", (60, 6, 6))):
         flow = Flow(dam_break(cells)).run(1.0)
         yield from flow.measures(name, energy=0.05)
@@ -57,7 +57,7 @@ def drop_at(height: float, radius: float = 0.15):
 
 @scene("W23", "a drop of three cells falls and bursts on the floor")
 def drop() -> Iterator[Measure]:
-    """In the air its momentum grows by its weight; what comes after must not gain energy."""
+    """In the air its momentum grows by the impulse of its weight; after the impact the energy must not grow."""
     c = tank((1, 1, 1), (20, 20, 20), drop_at(0.7), rtol=1e-8)
     flow = Flow(c).run(0.2, 0.01)
     weight = DENSITY * c.water.volume() * G
@@ -73,7 +73,7 @@ def drop() -> Iterator[Measure]:
 
 @scene("W24", "a slug of water hits a wall at 20 m/s")
 def fast_slug() -> Iterator[Measure]:
-    """15 times the speed of a fall from the lid: the wall takes its momentum, and no energy appears."""
+    """The slug is 15 times as fast as a fall from the lid. The wall must take its momentum; no energy may appear."""
     n = 20
     limit = 1.1 * 20.0 / np.sqrt(G)
     wall = box((0.85, 0.1, 0.5), (0.1, 1.0, 1.4))
@@ -100,7 +100,7 @@ def fast_slug() -> Iterator[Measure]:
 
 @scene("W25", "a column of one cell, and a film of a tenth of a cell")
 def few_cells() -> Iterator[Measure]:
-    """Less water than the mesh can show: it may go slowly or stay, but none is lost and none gains energy."""
+    """Less water than the mesh can resolve: it may move slowly or stay, but must neither be lost nor gain energy."""
     for name, fill in (("column", column(0.083, 0.6)), ("film", lambda x: x[:, 2] - 0.008)):
         flow = Flow(tank((2.0, 0.25, 1.0), (24, 3, 12), fill, rtol=1e-8)).run(0.5)
         yield from flow.measures(name)
