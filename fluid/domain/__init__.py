@@ -1,8 +1,8 @@
 """The physical domain: the covers of the finite cover method as an ordinary mesh (theory 2.1).
 
-covers, continued_nodes         unknowns for each connected part of a star; which old unknown a new one continues
+covers, continued_nodes         unknowns for each connected part of a star; the old unknown that a new one continues
 physical_domain                 cells, moments and wetted surface, made from the cut
-topology                        who touches whom, laid out for the kernels of a step
+topology                        the connectivity of nodes and cells, laid out for the kernels of a step
 moments, quadrature             volumes of water below a linear level set; points and weights in cut cells
 coupling_matrix                 G: pressure at nodes to loads on bodies, and its transpose
 point_location                  the cell that a point is in

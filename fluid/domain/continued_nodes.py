@@ -1,4 +1,4 @@
-"""Which old copy of a node each new one continues when solids have moved through multiple covers."""
+"""The old copy of a node that each new copy continues when solids have moved through multiple covers."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ def pick_old_nodes(old, new) -> Array:
 
     Away from the bodies a node has one copy before and after. Near them each new element votes with
     min(V_old, V_new) for the node at the same corner of an old element of the same background cell; most
-    votes win. Water moves with a wall: the old element is sought from where the wall has carried the new
-    centroid from, nearest first, and never across the wall."""
+    votes win. Water moves with a wall: the search for the old element starts at the point from which the wall has
+    carried the new centroid, takes the nearest element first, and never crosses the wall."""
     n = len(new.memory.mesh.nodes)
     near = _near_bodies(old) | _near_bodies(new)
     only = np.full(n, -1, dtype=np.int64)
@@ -69,7 +69,7 @@ def _touching(marked, cells):
 def _elected(voters, matched, cells, old_cells, volume, old_volume, parent_node, copies):
     """Winner of the votes for every new node, -1 where nobody voted.
 
-    copies (nodes + 1,): first old copy of each background node, which the candidates are."""
+    copies (nodes + 1,): first old copy of each background node; these copies are the candidates."""
     start = np.zeros(len(parent_node) + 1, np.int64)
     for i in range(len(parent_node)):
         start[i + 1] = start[i] + copies[parent_node[i] + 1] - copies[parent_node[i]]
@@ -143,7 +143,7 @@ def _same_side(first, last, sought, old, before, after, planes):
 
 @inner
 def _carry_back(x, centre, rotation, new_centre, new_rotation, local):
-    """x <- centre + rotation new_rotation^T (x - new_centre): where a point fixed to the body came from."""
+    """x <- centre + rotation new_rotation^T (x - new_centre): the earlier place of a point fixed to the body."""
     for i in range(3):
         local[i] = 0.0
         for j in range(3):
@@ -156,7 +156,7 @@ def _carry_back(x, centre, rotation, new_centre, new_rotation, local):
 
 @inner
 def blocked(a, b, normals, offsets, start, end):
-    """Does the segment from a to b pass through the body with planes start:end?"""
+    """Whether the segment from a to b passes through the body with planes start:end."""
     enter, leave = 0.0, 1.0
     for g in range(start, end):
         d_a, d_b = -offsets[g], -offsets[g]

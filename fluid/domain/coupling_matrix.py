@@ -1,4 +1,4 @@
-"""What pressure on wetted surfaces does to bodies, and bodies to the water: the coupling matrix G."""
+"""The coupling matrix G: the loads of pressure on bodies, and the flux that the motion of bodies gives the water."""
 
 from __future__ import annotations
 

@@ -28,14 +28,14 @@ NO_AREA = 1e-12
 
 @dataclass(frozen=True)
 class Connection:
-    """When fluid parts are one: thresholds of the multiple covers.
+    """Thresholds of the multiple covers: when touching fluid parts count as one.
 
     inner: pieces of a cell touch over more than inner h^2 (see WIDE_OPENINGS)
     face: parts of two cells overlap by more than this share of the face (0.2 for thin plates)
-    spares: any area counts beside slits, where a face of a solid looks at another one or at a side of the tank within
-    so many cell sizes; 0: nowhere
-    pocket: components of the water with less than pocket h^3 are dropped (they have no pressure of their
-    own to speak of, and a closed one makes the pressure system singular)."""
+    spares: any area counts beside slits, where a face of a solid lies opposite to another one or to a side of the tank
+    within this number of cell sizes; 0: nowhere
+    pocket: components of the water with less than pocket h^3 are dropped (their own pressure is insignificant, and a
+    closed one makes the pressure system singular)."""
 
     inner: float = 0.0
     face: float = 0.0
@@ -44,7 +44,7 @@ class Connection:
 
     @property
     def enough(self) -> float:
-        """Share of a face from which a lower bound of an area will do: areas that are compared must be true ones."""
+        """Share of a face above which a lower bound of the area suffices; areas that are compared must be exact."""
         return 1.0 if self.face > 0.0 else 1e-6
 
     def link_area(self, spacing):
@@ -52,7 +52,7 @@ class Connection:
         return max(self.inner, NO_AREA) * spacing**2
 
     def link_area_in_slits(self, spacing):
-        """The same beside slits."""
+        """`link_area` beside slits [m2]."""
         return NO_AREA * spacing**2
 
 
@@ -61,9 +61,9 @@ WIDE_OPENINGS = Connection(inner=0.35, face=0.35)
 (0.1, 0.4, 0.6 without thresholds), load beside a free edge off by 0.003 of rho g b (0.027 at h = 1/8); openings of thin
 walls that are narrower than about a cell are closed."""
 EDGES_APART = Connection(inner=0.35, face=0.35, spares=1.0)
-"""The same beside free edges, while slits between solids and films under blocks stay open."""
+"""Thresholds as above beside free edges, while slits between solids and films under blocks stay open."""
 OPENINGS = {"all": Connection(), "wide": WIDE_OPENINGS, "edges": EDGES_APART}
-"""By the names that a case gives."""
+"""The thresholds by the names that a case file uses."""
 
 
 class VirtualElements(NamedTuple):
@@ -99,7 +99,7 @@ def without_pockets(cells, volume, n_nodes: int, least) -> Array:
     """(M,) bool: the cell belongs to a component of at least that volume [m3]; volume (M,) [m3], least [m3]
     one or (M,): that of the largest cell of the component counts.
 
-    A cell that has it alone keeps all its neighbours, so only the smaller ones are put together."""
+    A cell that reaches the volume alone keeps all its neighbours, so only smaller cells are joined into components."""
     keep = volume >= least
     small = np.flatnonzero(~keep)
     least = np.broadcast_to(least, volume.shape)
@@ -156,9 +156,9 @@ def _numbered(cells, parent, several, label, n_nodes):
 def _unite_corners(cells, neighbours, elements, several, contacts, share, least):
     """Union-find over the corners 4 e + k of the elements, at nodes that may have several copies.
 
-    elements: VirtualElements · contacts: Contacts of cut parts, in the order in which they are met here.
-    With a threshold, groups of cut parts that it has left without a whole cell are then joined across their
-    widest opening, until nothing changes: a threshold closes openings, it makes no pockets."""
+    elements: VirtualElements · contacts: Contacts of cut parts, in the order of this search.
+    With a threshold, groups of cut parts without a whole cell are then joined across their widest opening, until
+    nothing changes: a threshold closes openings but creates no pockets."""
     parent, part, start, slit = elements
     areas, fulls = contacts.area, contacts.full
     label = np.arange(4 * len(parent))

@@ -1,7 +1,7 @@
 """Volume of water in cells that the surface φ = 0 (linear in the cell, φ < 0 water) passes through.
 
 With one corner a on one side, the corner tetrahedron has the relative volume v = t_b t_c t_d, where
-t_b = φ_a / (φ_a - φ_b) is the place of the crossing on the edge ab, and ∫ N_k over it is v times the mean of
+t_b = φ_a / (φ_a - φ_b) is the position of the crossing on the edge ab, and ∫ N_k over it is v times the mean of
 N_k at its four corners.  With two corners on each side the water is a prism, split in three.
 """
 
@@ -74,8 +74,8 @@ def wet_moments(phi, out):
 
 
 class FluidParts(NamedTuple):
-    """Where water can be: cells (M, 4) · volume (M,) [m³] of their fluid part · share (M, 4), mean of N_a over it ·
-    start (M + 1,), fan_volume (T,) [m³], corners (T, 4, 4): fans of the cut cells (`fans.py`)."""
+    """The fluid parts of the cells: cells (M, 4) · volume (M,) [m³] of their fluid part · share (M, 4), mean of N_a
+    over it · start (M + 1,), fan_volume (T,) [m³], corners (T, 4, 4): fans of the cut cells (`fans.py`)."""
 
     cells: Integers
     volume: Floats

@@ -55,7 +55,7 @@ class WholeCells:
 
 @dataclass(frozen=True, kw_only=True)
 class Memory:
-    """Data that the next cut takes over from this one: mesh, bodies, pairs sorted by (cell, body), cut parts; contacts
+    """Data that the next cut reuses from this one: mesh, bodies, pairs sorted by (cell, body), cut parts; contacts
     of the parts with multiple covers, else None."""
 
     mesh: Background
@@ -158,7 +158,7 @@ def cut_domain(
 
     previous: a domain of the same mesh and bodies. Only cells near bodies whose planes changed since (old or
     new position, growth too) are cut again, which gives the same domain bit for bit as a full cut.
-    moved (n_bodies,) bool: bodies to cut again in any case; not needed.
+    moved (n_bodies,) bool: bodies to cut again in any case (optional).
     connection: thresholds of the multiple covers (default: connect over any area)."""
     if covers not in ("single", "multiple"):
         raise ValueError(f"covers = {covers!r} is unknown; choose 'single' or 'multiple'")
@@ -255,8 +255,8 @@ def _cut_all(mesh, bodies, covers, connection):
 
 
 def _cut_moved(memory, bodies, moved, covers):
-    """Replace the pairs of moved bodies and cut the cells of the pairs that went or came → Memory with the contacts
-    from before, and these cells (cells,) bool."""
+    """Replace the pairs of moved bodies and cut the cells of the pairs that were removed or added → Memory with the
+    earlier contacts, and these cells (cells,) bool."""
     mesh = memory.mesh
     if memory.connection.spares > 0.0:
         moved = _with_neighbours(memory.bodies, moved, memory) | _with_neighbours(bodies, moved, memory)
@@ -298,7 +298,7 @@ def _cut_pairs(mesh, bodies, cell, body, covers, connection):
 
 
 def _parts_in_slits(mesh, bodies, cuts, connection):
-    """(K,) bool: cut parts with a wetted polygon that something else lies opposite to (`Connection.spares`)."""
+    """(K,) bool: cut parts with a wetted polygon that has another surface opposite to it (`Connection.spares`)."""
     found = np.zeros(len(cuts.part_cell), bool)
     if connection.spares > 0.0:
         reach = connection.spares * mesh.local_size[cuts.part_cell[cuts.wet_part]]

@@ -1,6 +1,6 @@
-"""Location of points in the physical domain: in which cell, on which side of a thin wall, or inside a body.
+"""Location of points in the physical domain: the cell, the side of a thin wall, or the inside of a body.
 
-A background cell that a thin wall cuts in two holds two cells of the domain, each with its own unknowns. The cell
+A background cell that a thin wall cuts in two contains two cells of the domain, each with its own unknowns. The cell
 whose fluid part contains the point is the one sought: of all tetrahedra of the parts (`fans.py`), that with the least
 
     d(x) = max over its four planes of the distance of x outside of them, 0 within,
@@ -22,7 +22,8 @@ SKIN = 0.05
 NEAR = 1e-9
 """Share of a cell edge within which a point counts as in the fluid part of a cell."""
 RINGS = 4
-"""Faces across which the fluid part that holds a point is sought: around a node of the mesh no more are needed."""
+"""Number of faces across which the fluid part that contains a point is sought; around a node of the mesh no more are
+needed."""
 
 
 class Outside(ValueError):
@@ -31,7 +32,7 @@ class Outside(ValueError):
 
 @dataclass(frozen=True)
 class Places:
-    """Points (m, 3) [m] in a domain: corners (m, 4) nodes of the cell that answers, weight (m, 4) its hat functions
+    """Points (m, 3) [m] in a domain: corners (m, 4) nodes of the cell used for each, weight (m, 4) its hat functions
     there, known (m,) bool: there is such a cell · inside (m,) bool: in a body, deeper than its skin."""
 
     corners: Integers
@@ -41,10 +42,11 @@ class Places:
 
     @classmethod
     def of(cls, water, points, beyond: bool = False) -> Places:
-        """Look points (m, 3) or (3,) [m] up.  Raises Outside for those outside the mesh; beyond: only if all are, the
-        rest count as inside a body.
+        """Look up points (m, 3) or (3,) [m].  Raises Outside if one lies outside the mesh; with beyond=True only if all
+        do, and other points outside count as inside a body.
 
-        A point on a face of the mesh may be found in the background cell behind it: then a neighbour answers."""
+        A point on a face of the mesh may be found in the background cell behind it; then a neighbour of that cell is
+        used."""
         points = np.atleast_2d(np.asarray(points, float))
         parent = water.mesh.locate(points)
         outside = parent < 0
@@ -77,8 +79,8 @@ class Places:
 @kernel
 def _answering(points, parent, skipped, neighbours, first, count, parts, nodes, near):
     """Cell (m,) of a topology for points (m, 3) in background cells parent (m,), but those skipped (m,) bool; -1 where
-    none is found.  Whole cells answer for themselves; else the nearest fluid part does, sought across ever more faces
-    until one is nearer than `near` [m]."""
+    none is found.  A whole cell is used itself, otherwise the nearest fluid part, sought across an increasing number of
+    faces until one is nearer than `near` [m]."""
     answer, x, corners = np.full(len(points), -1), np.empty((4, 3)), np.empty((4, 3))
     found = np.empty(4**RINGS * 2, np.int64)
     for i in range(len(points)):
@@ -158,8 +160,8 @@ def _height(normal, a, x):
 
 
 def _depth(memory, parent, points) -> Array:
-    """How deep (m,) [m] points (m, 3) in background cells parent (m,) lie in the body that they lie deepest in, at
-    most 0 outside of all."""
+    """Depth (m,) [m] of points (m, 3) in background cells parent (m,) inside the body that contains them deepest; at
+    most 0 outside all bodies."""
     bodies, depth = memory.bodies, np.zeros(len(points))
     start, end = (np.searchsorted(memory.pair_cell, parent, side=side) for side in ("left", "right"))
     for i in np.flatnonzero(end > start):

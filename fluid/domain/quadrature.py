@@ -5,7 +5,7 @@ A part with volume V, centroid c and second moment S (about c) gets points with 
     x_q = r + B (y_c + R s_q),   y_c = B^-1 (c - r),   R = (B^-1 (S/V) B^-T)^(1/2) symmetric,
     s_q = (1,1,1), (1,-1,-1), (-1,1,-1), (-1,-1,1),
 
-B maps the regular tetrahedron with corners s_q to the cell, r is the centre of the cell. The rule is exact
+where B maps the regular tetrahedron with corners s_q to the cell and r is the centre of the cell. The rule is exact
 for polynomials of degree 2, hence for all P1-P1 forms; on a full cell it is the usual four-point rule. Cut
 and full cells have the same number of points, so one scikit-fem basis serves all.
 

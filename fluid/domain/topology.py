@@ -1,9 +1,9 @@
 """Connectivity of the physical domain, laid out for the kernels of the step.
 
 The gradients of a cell are those of its cell in the background mesh (a cover is a copy with the same
-corners), so that nothing geometric is recomputed when solids move.  Every loop over cells reads them: cells of one
+corners), so that no geometry is recomputed when solids move.  Every loop over cells reads them: cells of one
 shape share a row (`shapes.py`), which stays in the cache of the processor.  Numbers of
-nodes and cells are unsigned: a loop that gathers by them need not test for negative numbers, which count from the end
+nodes and cells are unsigned: a loop that gathers by them need not test for negative indices, which count from the end
 in Python, and takes half the time."""
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ class Topology:
     share (M, 4) mean of N_a over the fluid part (∫ N_a = volume · share_a) · size (M,) [m] (6 |e|)^(1/3) ·
     node_start (N+1,), node_cells (4M,) cells around each node · neighbours (M, 4) across faces, -1 none ·
     node_volume (N,) [m³] ∫ N_i · covered (N,) bool: nodes inside a solid · beside_solid (N,) bool: nodes of
-    cut cells · parts: what of the cells water can fill · obtuse (M,) bool: cells with obtuse dihedral
-    angles, is_obtuse: the mesh has such · upright (rows of `gradients`,) bool: `Background.upright` ·
+    cut cells · parts: the fluid parts of the cells · obtuse (M,) bool: cells with obtuse dihedral
+    angles, is_obtuse: the mesh has such cells · upright (rows of `gradients`,) bool: `Background.upright` ·
     node_size (N,) [m]: `Background.node_size`, slanting (N,) bool: `Background.slanting` · spacing [m] of the mesh."""
 
     nodes: Floats
@@ -113,7 +113,7 @@ class Topology:
 
     @property
     def paths(self) -> Paths:
-        """The mesh as kernels take it that follow paths from cell to cell."""
+        """The mesh in the form for kernels that follow paths from cell to cell."""
         return Paths(
             self.nodes,
             self.cells,
@@ -126,13 +126,13 @@ class Topology:
 
     @cached_property
     def finer(self) -> Array:
-        """(N,): how many times finer the mesh is at a node than its mean, exactly 1 where all cells are equal. Lengths
-        times it are in cells at hand where the spacing is the unit."""
+        """Factor (N,) by which the mesh at a node is finer than on average, exactly 1 where all cells are equal. A
+        length times this factor, over the spacing, is the length in local cells."""
         return self.spacing / self.node_size
 
     @cached_property
     def is_uniform(self) -> bool:
-        """All cells have one size."""
+        """Whether all cells have the same size."""
         return bool((self.node_size == self.spacing).all())
 
     @cached_property
@@ -145,7 +145,7 @@ class Topology:
 
     @cached_property
     def row_of_background(self) -> Array:
-        """Row of the (first) cell of each background cell, -1 inside solids; a last -1 for "no cell"."""
+        """Row of the (first) cell of each background cell, -1 inside solids; a final -1 stands for "no cell"."""
         row = np.full(self.n_background + 1, -1, np.int64)
         row[self.background[::-1]] = np.arange(len(self.background))[::-1]
         return row
@@ -165,7 +165,7 @@ class Topology:
 
     @cached_property
     def around_by_cells(self) -> tuple[Array, Array, Array]:
-        """`around`, and how many cells each of these neighbours shares with the node."""
+        """`around`, and the number of cells that each of these neighbours shares with the node."""
         n = len(self.nodes)
         rows = (self.cells, self.node_start, self.node_cells)
         return _one_behind_the_other(over(_nodes_around, n, *rows, weight=WORK))
@@ -178,14 +178,14 @@ class Topology:
         return near
 
     def cells_around(self, nodes) -> Array:
-        """Numbers of the cells with at least one of these nodes (N,) bool, in order; cost grows with their number only,
-        but for a byte a cell."""
+        """Numbers of the cells with at least one of these nodes (N,) bool, in order; the cost grows with their number
+        only, apart from one byte a cell."""
         touched = np.zeros(len(self.cells), bool)
         over(_touched, len(nodes), nodes, self.node_start, self.node_cells, touched)
         return np.flatnonzero(touched)
 
     def in_cells(self, length) -> Array:
-        """Lengths (N,) [m] times `finer`: as they are where all cells are equal."""
+        """Lengths (N,) [m] times `finer`; unchanged where all cells are equal."""
         return length if self.is_uniform else length * self.finer
 
     @cached_property
@@ -195,7 +195,8 @@ class Topology:
 
 
 def covered_nodes(domain) -> Array:
-    """(N,) bool: nodes behind every wetted polygon that some one body has in the cells around them.
+    """(N,) bool: nodes that lie, for at least one body, behind all wetted polygons of that body in the cells around
+    them.
 
     A body is convex, so a node with all of its nearby faces in front of it lies inside."""
     d = domain
@@ -208,7 +209,7 @@ def covered_nodes(domain) -> Array:
 @kernel
 def _covered(start, members, nodes, body, centroid, normal, n_bodies):
     covered = np.zeros(len(nodes), np.bool_)
-    # marks of the node in hand: a body seen at all, a body with a face that the node is in front of
+    # marks of the current node: bodies met so far, and bodies with a face that the node is in front of
     seen, in_front = np.full(n_bodies, -1, np.int64), np.full(n_bodies, -1, np.int64)
     for i in range(len(nodes)):
         behind = 0
@@ -304,7 +305,8 @@ def _neighbours(parent_neighbours, cells, parent, n_parents):
 
 
 def _one_behind_the_other(parts):
-    """start (n + 1,) of rows that come in parts, with what the rows hold: of each part (start, what, what)."""
+    """Concatenate rows that come in parts, each (start, values, values) → start (n + 1,) of all rows, and their
+    values."""
     if len(parts) == 1:
         return parts[0]
     starts, first, second = zip(*parts)
@@ -315,7 +317,8 @@ def _one_behind_the_other(parts):
 
 @released
 def _nodes_around(first, last, cells, node_start, node_cells):
-    """start (n + 1,), neighbours: nodes that share a cell with each node, in the order of its cells; how many cells."""
+    """start (n + 1,), neighbours: nodes that share a cell with each node, in the order of its cells, and the number of
+    shared cells."""
     n = last - first
     start = np.zeros(n + 1, np.uint32)
     slot = np.full(node_start.shape[0] - 1, -1, np.int64)
@@ -343,7 +346,7 @@ def _nodes_around(first, last, cells, node_start, node_cells):
 
 @ranged
 def _touched(first, last, nodes, node_start, node_cells, touched):
-    """(M,) bool: cells around these nodes (N,) bool; several threads may say so of one cell."""
+    """(M,) bool: cells around these nodes (N,) bool; several threads may mark one cell."""
     for i in range(first, last):
         if nodes[i]:
             for t in range(node_start[i], node_start[i + 1]):
@@ -422,7 +425,7 @@ class Graph:
 
 
 WORK = 10
-"""To find the edges of a node takes as long as so many visits."""
+"""Cost of finding the edges of a node, in visits of a node."""
 _PAIR = np.array([[-1, 0, 1, 2], [0, -1, 3, 4], [1, 3, -1, 5], [2, 4, 5, -1]])
 """Column of Background.products that holds the corners a, b."""
 

@@ -1,6 +1,7 @@
-"""Arrays that belong together, as kernels take them: one argument, whose parts have names.
+"""Arrays that belong together, in the form for kernels: one argument, whose parts have names.
 
-A kernel takes the parts out before its loops where it makes arrays: inside, each access would count references."""
+A kernel that makes arrays takes the parts out before its loops, since inside them each access would count
+references."""
 
 from __future__ import annotations
 

@@ -24,13 +24,14 @@ from kernel_decorators import inner, kernel
 
 CORNERS_OF_FACE = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])  # outward for a positive cell
 MOST_SLENDER = 2.5
-"""Longest over shortest edge of a cell, 1.73 in a split cube, up to which its volume goes through upright borders."""
+"""Longest over shortest edge of a cell, 1.73 in a split cube, up to which volume passes through borders upright on its
+edges."""
 SAME_SIZE = 1e-9
-"""Difference of sizes over the spacing that is round-off."""
+"""Difference of sizes over the spacing that counts as round-off."""
 ALONG = 1e-9
-"""Largest 1 - |n·e| of a face that lies along an axis: round-off."""
+"""Largest 1 - |n·e| of a face that counts as normal to an axis: round-off."""
 MOST_BRICKS = 3e8
-"""Of a box: the numbers of the tetrahedra of more, six a brick, pass 32 bits."""
+"""Most bricks of a box: with more, the numbers of the tetrahedra, six a brick, exceed 32 bits."""
 
 
 class MeshError(ValueError):
@@ -39,7 +40,7 @@ class MeshError(ValueError):
 
 @dataclass(frozen=True, kw_only=True)
 class Background:
-    """Tetrahedra with what every step needs of them.  Cells are positively oriented.
+    """Tetrahedra with the data that every step needs.  Cells are positively oriented.
 
     nodes (N, 3) [m] · cells (M, 4) · spacing [m], mean edge of the equivalent brick (6 |e|)^(1/3) ·
     gradients (M, 4, 3) [1/m] · cell_volume (M,) [m³] · neighbours (M, 4) ·
@@ -62,7 +63,7 @@ class Background:
 
     @classmethod
     def from_arrays(cls, nodes, cells, axes=None, straddling: bool = False) -> Background:
-        """Any tetrahedra: nodes (N, 3) [m], cells (M, 4).  Cells may have either orientation.
+        """A mesh of any tetrahedra: nodes (N, 3) [m], cells (M, 4).  Cells may have either orientation.
 
         axes: walls of bins such that no cell straddles two of them (a split brick lattice), or None · straddling: cells
         may straddle the bins of `axes`.
@@ -112,7 +113,7 @@ class Background:
 
     @cached_property
     def local_size(self) -> Array:
-        """(M,) [m] `cell_size`; exactly the spacing where it differs from that by round-off only, as in a box of equal
+        """(M,) [m] `cell_size`; exactly the spacing where the two differ by round-off only, as in a box of equal
         bricks."""
         size = self.cell_size
         return np.where(np.abs(size - self.spacing) <= SAME_SIZE * self.spacing, self.spacing, size)
@@ -126,13 +127,13 @@ class Background:
         return np.where(np.isfinite(size), size, self.spacing)
 
     def size_at(self, points) -> Array:
-        """(m,) [m] `local_size` of the cells that hold points (m, 3) [m]; the least of all outside."""
+        """(m,) [m] `local_size` of the cells that hold points (m, 3) [m]; outside the mesh the least size of all."""
         cell = self.locate(points)
         return np.where(cell >= 0, self.local_size[cell], self.finest)
 
     @cached_property
     def slanting(self) -> Array:
-        """(N,) bool: nodes of faces of the boundary that lie along no axis, as those of a bed."""
+        """(N,) bool: nodes of boundary faces that are normal to no axis, such as those of a bed."""
         along = np.abs(self.boundary_normal).max(axis=1) > 1.0 - ALONG
         found = np.zeros(len(self.nodes), bool)
         found[self.boundary_faces[~along]] = True
@@ -156,23 +157,24 @@ class Background:
 
     @cached_property
     def obtuse(self) -> Array:
-        """(M,) bool: some dihedral angle of the cell is more than a right one, ∇N_a·∇N_b > 0: never in `box_mesh`."""
+        """(M,) bool: some dihedral angle of the cell exceeds a right angle, ∇N_a·∇N_b > 0; this never occurs in
+        `box_mesh`."""
         return self.products.max(axis=1) * self.cell_size**2 > 1e-9
 
     @cached_property
     def is_obtuse(self) -> bool:
-        """Some cell is obtuse."""
+        """Whether some cell is obtuse."""
         return bool(self.obtuse.any())
 
     @cached_property
     def upright(self) -> Array:
-        """(M,) bool: cells in which the borders upright on the edges serve the volume (`volume.py`): neither obtuse nor
-        slender."""
+        """(M,) bool: cells in which volume passes through borders upright on the edges (`volume.py`): neither obtuse
+        nor slender."""
         return ~self.obtuse & (_slenderness(self.nodes, self.cells) <= MOST_SLENDER)
 
     @cached_property
     def shapes(self) -> Shapes:
-        """The different cells of the mesh."""
+        """The distinct shapes of the cells (`Shapes`)."""
         return Shapes.of(self)
 
     @cached_property
@@ -368,7 +370,7 @@ def _locate(points, ax, ay, az, bin_start, bin_cells, nodes, cells, g):
         i, j, k = (_bin_index(ax, points[m, 0]), _bin_index(ay, points[m, 1]), _bin_index(az, points[m, 2]))
         b = (i * (ay.shape[0] - 1) + j) * (az.shape[0] - 1) + k
         _seek(points, m, b, bin_start, bin_cells, nodes, cells, g, found)
-        if found[m] < 0:  # on a wall of the bins a point may belong to a cell that ends there
+        if found[m] < 0:  # a point on a wall of the bins may belong to a cell that ends there
             for near in range(1, 8):
                 p, q, r = near & 1, near >> 1 & 1, near >> 2
                 on = (p == 0 or _on_wall(ax, i, points[m, 0])) and (q == 0 or _on_wall(ay, j, points[m, 1]))

@@ -1,12 +1,13 @@
-"""Finer cells where they are wanted: bisection of tetrahedra, conforming and the same in every run.
+"""Local refinement by bisection of tetrahedra: conforming, and the same in every run.
 
 A cell is halved through the middle of its longest edge, measured in the lattice that the mesh was made from; where two
-edges are as long, the numbers of their ends decide.  That is one order of all edges, so a neighbour that has the halved
-edge can always follow: it halves its own longest edges first until it comes to this one (Rivara, Int. J. Numer. Methods
-Eng. 20 (1984) 745).  In Kuhn's six tetrahedra of a brick the longest edge is the diagonal of the brick, then that of a
-side, then an edge of the brick: these are the cells of Maubach (SIAM J. Sci. Comput. 16 (1995) 210), three shapes up to
-scale, with dihedral angles of 45 to 120 degrees in a cube whatever the number of bisections.  Three bisections halve
-all edges of a brick: one *level*, after which the cells inside are split bricks again, without obtuse angles.
+edges are equally long, the numbers of their ends decide.  This is one order of all edges, so a neighbour that has the
+halved edge can always follow: it halves its own longest edges first until it comes to this one (Rivara, Int. J. Numer.
+Methods Eng. 20 (1984) 745).  In Kuhn's six tetrahedra of a brick the longest edge is the diagonal of the brick, then
+that of a side, then an edge of the brick: these are the cells of Maubach (SIAM J. Sci. Comput. 16 (1995) 210), three
+shapes up to scale, with dihedral angles of 45 to 120 degrees in a cube whatever the number of bisections.  Three
+bisections halve all edges of a brick: one *level*, after which the cells inside are split bricks again, without obtuse
+angles.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from kernel_decorators import helper, inner, kernel
 PER_LEVEL = 3
 """Bisections that halve all edges of a brick."""
 MOST_LEVELS = 8
-"""Levels beyond which sizes of cells differ more than the arithmetic of the flow is meant for."""
+"""Most levels; beyond them the sizes of cells differ more than the arithmetic of the flow allows for."""
 
 
 @dataclass(frozen=True)
@@ -37,17 +38,18 @@ class Tetrahedra:
 
     @classmethod
     def coarse(cls, nodes, cells, lattice) -> Tetrahedra:
-        """Before any bisection; lattice (N, 3) or None: the places themselves decide which edge is long."""
+        """The mesh before any bisection; lattice (N, 3), or None: edges are then measured between the nodes
+        themselves."""
         nodes = np.ascontiguousarray(nodes, float)
         lattice = nodes if lattice is None else np.ascontiguousarray(lattice, float)
         return cls(nodes, lattice, np.ascontiguousarray(cells, np.int64), np.zeros(len(cells), np.int64))
 
 
 def refined(mesh: Tetrahedra, chosen: Callable[[Tetrahedra, int], Array], levels: int) -> Tetrahedra:
-    """The mesh with all chosen cells halved in every direction, and again, `levels` times; around them smaller cells
-    only as far as whole faces ask for.
+    """The mesh with all chosen cells halved in every direction, and again, `levels` times; around them cells are halved
+    only as far as conforming faces require.
 
-    chosen(mesh, level) → (M,) bool: cells that are to have at least this level, 1 to `levels`.  Cells come in the order
+    chosen(mesh, level) → (M,) bool: cells that are to have at least this level, 1 to `levels`.  Cells are in the order
     of those that they were cut from, nodes in the order of the cells.  Raises ValueError for levels out of 0 to
     MOST_LEVELS."""
     if not 0 <= levels <= MOST_LEVELS:
@@ -60,7 +62,7 @@ def refined(mesh: Tetrahedra, chosen: Callable[[Tetrahedra, int], Array], levels
 
 
 def _halved(mesh: Tetrahedra, wanted, depth: int) -> Tetrahedra:
-    """The wanted cells (M,) bool brought to a depth, and what has to follow."""
+    """The mesh with the wanted cells (M,) bool brought to a depth, and with the neighbours that have to follow."""
     found = _bisect(mesh.nodes, mesh.lattice, mesh.cells, mesh.depth, wanted, depth)
     nodes, lattice, cells, reached, root = found
     order = np.argsort(root, kind="stable")
@@ -73,7 +75,7 @@ def _halved(mesh: Tetrahedra, wanted, depth: int) -> Tetrahedra:
 
 @kernel
 def _first_seen(cells, n):
-    """Nodes (k,), of n, in the order in which the cells name them; those of no cell are left out."""
+    """Nodes (k,), of n, in the order in which the cells name them; nodes of no cell are left out."""
     out, seen, k = np.empty(n, np.int64), np.zeros(n, np.bool_), 0
     for e in range(cells.shape[0]):
         for a in range(4):
@@ -87,8 +89,8 @@ def _first_seen(cells, n):
 
 @kernel
 def _bisect(nodes, lattice, cells, depth, wanted, deep):
-    """Nodes, lattice, cells and depth after all cells that are wanted and less deep, and what follows; the first cell
-    (M,) that each one comes from."""
+    """Bisect all wanted cells of less than the depth `deep`, and those that have to follow → nodes, lattice, cells,
+    depth, and the original cell (M,) that each new one comes from."""
     n_nodes, n = nodes.shape[0], cells.shape[0]
     root = np.arange(n)
     wanted = wanted.copy()
@@ -141,7 +143,7 @@ def _bisect(nodes, lattice, cells, depth, wanted, deep):
 
 @inner
 def _longest(corners, lattice):
-    """Corners a, b of the longest edge; of equal ones that with the smallest numbers."""
+    """Corners a, b of the longest edge; of equally long ones, that with the smallest numbers."""
     best, one, other, low, high = -1.0, 0, 1, 0, 0
     for a in range(4):
         for b in range(a + 1, 4):

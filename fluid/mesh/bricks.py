@@ -1,11 +1,11 @@
 """Lattices of bricks, each split into six tetrahedra along one diagonal (Kuhn, IBM J. Res. Dev. 4 (1960) 518).
 
-"kuhn": the same diagonal in all bricks.  The cells around an inner node are symmetric about the node only: what flows
-along the diagonal and what flows across it find different cells.
+"kuhn": the same diagonal in all bricks.  The cells around an inner node are symmetric about the node only: flow along
+the diagonal and flow across it meet different cells.
 "mirrored": every brick is the mirror image of those beside it, in all three directions (the triangulation J1 of Todd,
 The Computation of Fixed Points and Applications, Springer 1976, ch. III).  On a uniform lattice the cells around a node
 are symmetric in x, y and z, and so is the whole mesh about its middle where the number of bricks is even.  Diagonals
-end in every second node along each direction: these hold three times the volume of the others.
+end in every second node along each direction; these nodes hold three times the volume of the others.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from array_types import Array
 
 
 def split_bricks(axes, split: str = "kuhn") -> tuple[Array, Array]:
-    """Nodes (N, 3) [m] and cells (6 n, 4) of the bricks between the coordinates axes (three arrays [m]), the six cells
-    of a brick one after the other: what is near in space is near in memory."""
+    """Nodes (N, 3) [m] and cells (6 n, 4) of the bricks between the coordinates axes (three arrays [m]), with the six
+    cells of a brick one after the other, so that neighbours in space are close in memory."""
     mesh = MeshTet.init_tensor(*axes)
     nodes = mesh.p.T
     bricks = SPLITS[split](nodes, mesh.t.T.reshape(6, -1, 4).swapaxes(0, 1).astype(np.int64), axes)

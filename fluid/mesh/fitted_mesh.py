@@ -3,19 +3,20 @@
     mesh = fitted_mesh((0, 0, -2), (40, 20, 3), 0.5, lambda x, y: -2.0 + 0.1 * x).mesh
 
 Layers.  The nodes of a column lie at the heights f + k dz, k = 0, 1, ..., between the bed b and the lid, and on both.
-f is the largest function not above the bed whose slope along x and y is at most `follow`: where the bed is no
-steeper, f = b and the layers follow it, bricks as high as everywhere, only sheared; a steeper bed runs through the
+f is the largest function not above the bed whose slope along x and y is at most `follow`: where the bed is no steeper,
+f = b and the layers follow it with bricks of the usual height that are only sheared; a steeper bed cuts through the
 layers, and the lowest cell of each column is made 0.5 to 1.5 dz high.  So no cell is ever flatter than half a brick,
-however shallow the water.  follow = 0 gives level layers.  With `thinnest` below 1 the layers are squeezed between bed
-and lid, down to that share of dz: as many over the shore as over deep water, for run-up a few cells high.
+however shallow the water.  follow = 0 gives level layers.  With `thinnest` below 1 the layers are compressed between
+bed and lid, down to that share of dz, so that there are as many over the shore as over deep water; this serves run-up a
+few cells high.
 
-Cells.  Over each triangle of the lattice a surface of one node a column climbs from the bed to the lid; every time
-it takes one column one node up, the space passed is a tetrahedron.  The column whose next edge has the lowest middle
-goes first: on the wall between two columns that is the shorter diagonal, and as one order holds for all columns both
-sides of the wall choose the same one.  So the mesh is conforming for any heights, and whole bricks fall into Kuhn's
-six tetrahedra (`bricks.py`).
+Cells.  Over each triangle of the lattice a surface through one node of each column climbs from the bed to the lid;
+whenever it rises by one node in one column, it passes over a tetrahedron.  The column whose next edge has the lowest
+middle goes first: on the wall between two columns this gives the shorter diagonal, and since one order holds for all
+columns, both sides of the wall choose the same one.  So the mesh is conforming for any heights, and whole bricks fall
+into Kuhn's six tetrahedra (`bricks.py`).
 
-Where the bed comes nearer to the lid than half a layer there is no water to be: triangles of the lattice with three
+Where the bed is within half a layer of the lid there is no room for water: triangles of the lattice with three
 such corners are left out, at others the bed is lowered to one layer below the lid.
 """
 
@@ -30,8 +31,8 @@ from fluid.mesh.background import Background, MeshError
 from kernel_decorators import helper, kernel
 
 FOLLOW = 0.2
-"""Steepest slope that layers follow: one in five. Cells sheared more let still water at a shore grow restless (0.01 a
-step at one in two)."""
+"""Steepest slope that layers follow: one in five. With more shear, disturbances of still water at a shore grow (by 0.01
+a step at one in two)."""
 NEAREST = 0.5
 """Least height of a cell at bed or lid, in layers."""
 STEEPEST = 3.0
@@ -74,9 +75,9 @@ def fitted_mesh(
     """Mesh of the space between a bed and the upper side of a box.
 
     lower, upper (3,) [m]: corners of the box; the bed may lie below or above lower[2], which is not used ·
-    cell_size [m], one number or (3,): wanted edges of the bricks, changed so that whole numbers fit ·
+    cell_size [m], one number or (3,): wanted edges of the bricks, adjusted so that a whole number of them fits ·
     bed(x, y) → z [m], elevation at coordinates (n,), (n,) [m] → (n,), or the elevations (nx, ny) of the columns ·
-    axes: (x, y), two increasing arrays [m] of the columns instead of even ones · follow, thinnest, split:
+    axes: (x, y), two increasing arrays [m] of the columns instead of evenly spaced ones · follow, thinnest, split:
     see above and `bricks.py`.
 
     Raises MeshError: for a bed that is not finite, steeper than STEEPEST between two columns (with the place), or
@@ -144,7 +145,7 @@ class _Columns:
     def of(cls, bed, base, lid, layer, used, x, y) -> _Columns:
         low, high = (bed - base) / layer, (lid - base) / layer
         first, last = np.floor(low + NEAREST) + 1.0, np.ceil(high - NEAREST) - 1.0
-        # whole layers come out whole, up to the round-off of the heights
+        # whole numbers of layers stay whole, up to the round-off of the heights
         first = np.where(np.abs(low - np.rint(low)) < 1e-9, np.rint(low) + 1.0, first)
         last = np.where(np.abs(high - np.rint(high)) < 1e-9, np.rint(high) - 1.0, last)
         between = np.maximum(0.0, last - first + 1.0).astype(np.int64)
@@ -229,7 +230,7 @@ def _squeezed(base, lid, lowest, layer, thinnest):
 
 
 def _refuse_slender(x, y, layers):
-    """Bricks too slender anywhere; layers (nx, ny) [m]."""
+    """Raise MeshError where a brick is too slender; layers (nx, ny) [m]."""
     dx, dy = np.meshgrid(np.diff(x), np.diff(y), indexing="ij")
     dz = [layers[i : i + len(x) - 1, j : j + len(y) - 1] for i in (0, 1) for j in (0, 1)]
     edges = np.array([dx, dy, *dz])
@@ -295,7 +296,7 @@ def _cells(height, start, nx, ny, below, mirrored):
 
 @helper
 def _climb(height, start, corner, rank, mirrored, cells, n):
-    """Tetrahedra between the three columns corner (3,), written from row n on; the next row."""
+    """Tetrahedra between the three columns corner (3,), written from row n on → the next free row."""
     at, end = np.empty(3, np.int64), np.empty(3, np.int64)
     for c in range(3):
         at[c], end[c] = start[corner[c]], start[corner[c] + 1] - 1

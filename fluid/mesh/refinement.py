@@ -16,11 +16,11 @@ from fluid.mesh.bisection import MOST_LEVELS, Tetrahedra, refined
 from kernel_decorators import kernel
 
 MOST_ENTRIES = 6
-"""Bins that a cell may be listed in, on average."""
+"""Largest mean number of bins in which a cell is listed."""
 SAMPLED = 200
-"""Places along each side of a tank at which a bed is looked up to tell how large a region is."""
+"""Sample points along each side of a tank at which a bed is read to estimate the size of a region."""
 TOUCH = 1e-9
-"""Share of a cell within which one that only touches a region does not belong to it."""
+"""Overlap with a region, as a share of the cell, up to which the cell only touches it and is not refined."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class InBox:
         return ((low + touch < self.upper) & (high - touch > self.lower)).all(axis=1)
 
     def volume_in(self, lower, upper) -> float:
-        """About how much [m³] of it lies in the box from lower to upper."""
+        """Approximate volume [m³] of the region in the box from lower to upper."""
         return _common(self.lower, self.upper, lower, upper)
 
 
@@ -47,8 +47,8 @@ class NearBodies:
     """Cells within a margin [m] of convex bodies are halved `levels` times in every direction.
 
     normals (P, 3), unit, outward, and offsets (P,) [m] of their planes n·x = d · start (n + 1,): the planes of each ·
-    lower, upper (n, 3) [m]: boxes around the bodies · margin: one number [m]; twice as far a level less is reached, and
-    so on, so that sizes change gradually."""
+    lower, upper (n, 3) [m]: boxes around the bodies · margin: one number [m]; within twice the margin cells have one
+    level less, and so on, so that sizes change gradually."""
 
     normals: Array
     offsets: Array
@@ -66,14 +66,14 @@ class NearBodies:
         return _near(mesh.nodes, mesh.cells, Boxes(low, high), planes, boxes, margin)
 
     def volume_in(self, lower, upper) -> float:
-        """About how much [m³] of it lies in the box from lower to upper."""
+        """Approximate volume [m³] of the region in the box from lower to upper."""
         m = self.margin
         return sum(_common(low - m, high + m, lower, upper) for low, high in zip(self.lower, self.upper))
 
 
 @dataclass(frozen=True)
 class OnBed:
-    """Cells up to a height [m] above a bed where this lies between two levels: a shore, the ground of a town.
+    """Cells up to a height [m] above a bed where the bed lies between two elevations: a shore, the ground of a town.
 
     bed(x, y) → z [m] at (n,), (n,) [m] · lowest, highest [m] · height [m] · levels as above."""
 
@@ -91,7 +91,7 @@ class OnBed:
         return here[mesh.cells].any(axis=1)
 
     def volume_in(self, lower, upper) -> float:
-        """About how much [m³] of it lies in the box from lower to upper."""
+        """Approximate volume [m³] of the region in the box from lower to upper."""
         x, y = np.meshgrid(*(np.linspace(lower[k], upper[k], SAMPLED) for k in range(2)))
         z = np.asarray(self.bed(x.ravel(), y.ravel()), float)
         share = ((z >= self.lowest) & (z <= self.highest)).mean()
@@ -110,14 +110,14 @@ class Either:
         return np.any([region.cells(mesh, level) for region in self.regions], axis=0)
 
     def volume_in(self, lower, upper) -> float:
-        """About how much [m³] of it lies in the box from lower to upper."""
+        """Approximate volume [m³] of the region in the box from lower to upper."""
         return sum(region.volume_in(lower, upper) for region in self.regions)
 
 
 def refined_mesh(mesh: Background, regions, lattice=None) -> Background:
     """A mesh with finer cells in regions (InBox, NearBodies, OnBed, or others with `levels` and `cells`).
 
-    lattice (N, 3): places of the nodes in bricks of edge 1, None: of a box or of any tetrahedra, found here.
+    lattice (N, 3): places of the nodes in bricks of edge 1; None: derived here from the mesh, a box or any tetrahedra.
     Raises MeshError for levels out of 1 to MOST_LEVELS."""
     regions = list(regions)
     levels = max((region.levels for region in regions), default=0)
@@ -157,7 +157,7 @@ def _boxes_of(mesh: Tetrahedra):
 
 
 def _bin_walls(axes, mesh: Tetrahedra):
-    """Axes of bins about as small as the smallest cells across them, as far as cells are not listed too often."""
+    """Axes of bins about as small as the smallest cells across them, unless cells would be listed in too many bins."""
     low, high = _boxes_of(mesh)
     for share in (1.0, 2.0, 4.0, 8.0, 16.0):
         found = tuple(_divided(axis, low[:, k], high[:, k], share) for k, axis in enumerate(axes))
@@ -181,7 +181,8 @@ def _divided(axis, low, high, share):
 
 @kernel
 def _near(nodes, cells, boxes, planes, body_boxes, margin):
-    """(M,) bool: cells that no plane of some body, moved out by the margin, parts from it, nor its box."""
+    """(M,) bool: cells that neither the bounding box of some body nor any of its planes, moved out by the margin,
+    separates from it."""
     low, high = boxes
     normals, offsets, start = planes
     body_low, body_high = body_boxes

@@ -1,8 +1,8 @@
 """Cells of one shape and place in the lattice share their gradients.
 
 A box of equal bricks has six different cells, 48 if they are mirrored, whatever its size.  The loops of a step read
-gradients cell by cell: these rows stay in the first cache of the processor.  With a row for every cell they would be
-three quarters of all that is read.
+gradients cell by cell: these rows stay in the first-level cache of the processor.  With a row for every cell, gradients
+would be three quarters of all data read.
 """
 
 from __future__ import annotations
@@ -47,7 +47,8 @@ class Shapes:
 
 
 def _kinds(g):
-    """As `_shapes`, for many: cells are sorted by their gradients in millionths of the largest of the cell."""
+    """The result of `_shapes` for many shapes: cells are sorted by their gradients in millionths of the largest of the
+    cell."""
     largest = np.abs(g).max(axis=(1, 2))
     share, power = np.frexp(largest)
     whole = np.rint(g.reshape(len(g), 12) / largest[:, None] * 1e6)
@@ -60,7 +61,7 @@ def _kinds(g):
 
 
 def _odd_numbers(n):
-    """n fixed odd numbers of 62 bits: products with them, wrapped, tell rows of whole numbers apart."""
+    """n fixed odd numbers of 62 bits: the wrapped products with them distinguish rows of whole numbers."""
     return np.random.default_rng(7).integers(2**61, 2**62, n) | 1
 
 
@@ -75,7 +76,7 @@ def _all_alike(g, first, row, same):
 
 @kernel
 def _shapes(g, most, same):
-    """Shape (M,) of each cell and first cell (S,) of each shape; without any shape if there are more than `most`."""
+    """Shape (M,) of each cell and first cell (S,) of each shape; no shapes if there are more than `most`."""
     row, first, n = np.empty(g.shape[0], np.uint32), np.empty(most, np.int64), 0
     for e in range(g.shape[0]):
         size = _largest(g[e])
@@ -93,7 +94,7 @@ def _shapes(g, most, same):
 
 @inner
 def _largest(g):
-    """Largest entry of g (4, 3) by its size."""
+    """Largest absolute entry of g (4, 3)."""
     largest = 0.0
     for a in range(4):
         for k in range(3):

@@ -1,4 +1,4 @@
-"""Numerical tools without any geometry of the water in them.
+"""Numerical tools that do not depend on the geometry of the water.
 
 solve, multigrid      conjugate gradients for symmetric positive definite systems, and their preconditioner
 bounded               the same with a lower bound on the unknowns (theory 2.2)

@@ -3,11 +3,11 @@
     x ≥ l,    A x - b ≥ 0,    (x - l)·(A x - b) = 0                                                         (1)
 
 Where x lies above its bound the mass balance A x = b holds; where it is at the bound, A x - b [m³/s] is the rate at
-which the water parts there, from itself or from a wall.  For a symmetric positive definite A there is one solution.
-It is found by block principal pivoting: solve with the unknowns of a set held at their bound, exchange all that
-have the wrong sign, repeat; where that does not lessen their number for some rounds, one at a time for a while (the
-last one, which alone would end after finitely many rounds: Murty's rule; Judice and Pires, Comput. Oper. Res. 21
-(1994) 587).  With the set of the step before it takes one to three rounds.
+which the water separates there, from itself or from a wall.  For a symmetric positive definite A there is one solution.
+It is found by block principal pivoting: solve with the unknowns of a set held at their bound, exchange all that have
+the wrong sign, and repeat; where this does not reduce their number for some rounds, exchange one at a time for a while
+(the last one; this alone would end after finitely many rounds: Murty's rule; Judice and Pires, Comput. Oper. Res. 21
+(1994) 587).  From the set of the step before, one to three rounds suffice.
 """
 
 from __future__ import annotations
@@ -22,25 +22,26 @@ from fluid.numerics.solve import MOST_ITERATIONS, NotConverged, conjugate_gradie
 from kernel_decorators import kernel
 
 LOOSE = 1e-3
-"""Residual at which a round ends that has unknowns far below their bound: the next one goes on from there."""
+"""Residual at which a round with unknowns far below their bound ends; the next one continues from there."""
 FAR_BELOW, SLACK = 1e-2, 1e-6
-"""Shares of the largest |x|: how far x may lie below its bound while a round ends, and when it is done."""
+"""Shares of the largest |x| by which x may lie below its bound: beyond the first a round ends early, within the second
+x is accepted."""
 UNSETTLED = 10.0
-"""Rate at which water may flow together at the bound, in residuals of the solver: it is no more exact than that."""
+"""Rate at which water may converge at the bound, in residuals of the solver, which is no more exact than that."""
 REACH = 8
-"""Cells that air goes on within a step: it is faster than any water."""
+"""Number of cells over which air advances within a step: it is faster than any water."""
 PATIENCE = 5
 """Rounds without fewer wrong signs after which single unknowns are exchanged."""
 SINGLES = 10
-"""Single exchanges after which all that are wrong are tried again: the first rounds, loosely solved, may have shown few
-of them, and hundreds of single ones would be needed to come below that."""
+"""Single exchanges after which all unknowns of wrong sign are tried again: the first, loosely solved rounds may have
+shown few of them, and hundreds of single exchanges would be needed to come below that number."""
 MOST_ROUNDS = 100
 
 
 @dataclass(frozen=True, kw_only=True)
 class BoundedResult:
     """x (n,) · at_bound (n,) bool: held at the bound · parting (n,) [m³/s]: A x - b there, 0 elsewhere · lower (n,):
-    bound at the end, None: there is none · iterations, of all rounds · residual of the free rows over ‖b‖ · rounds."""
+    bound at the end, None without a bound · iterations of all rounds · residual of the free rows over ‖b‖ · rounds."""
 
     x: Floats
     at_bound: Bools
@@ -66,9 +67,10 @@ def solve_bounded(
     """Problem (1) for A + extra to a residual of rtol ‖b‖.
 
     lower (n,): bound l, None: there is none · at_bound (n,) bool: first guess of the set, None: empty · air (n,): bound
-    where air is, which the unknowns that it reaches beforehand have already; where water parts there, air goes on to
-    unknowns beside it that lie below `air`, REACH cells at most; None: it does not · the other arguments as in `solve`.
-    Without any unknown at the bound, x is that of `solve` to the last bit.  Raises NotConverged."""
+    in air, which `lower` already has at unknowns that air reaches at the start; where water separates there, air
+    advances to neighbouring unknowns that lie below `air`, over at most REACH cells; None: it does not · the other
+    arguments as in `solve`. Without any unknown at the bound, x is that of `solve` to the last bit.  Raises
+    NotConverged."""
     if lower is None:
         found = solve(A, b, x0, rtol, extra, most, kept)
         return BoundedResult(
@@ -138,20 +140,21 @@ def solve_bounded(
 
 
 def solve_pressure(problem, rtol: float, moved=0.0) -> BoundedResult:
-    """The pressure of a `projection.PressureProblem` whose bodies move as given: moved (n,) [m³/s], G V of theirs."""
+    """The pressure of a `projection.PressureProblem` whose bodies have a given motion: moved (n,) [m³/s], their G V."""
     return solve_bounded(
         problem.matrix, problem.rhs + moved, problem.guess, rtol, problem.lower, problem.at_bound, problem.air
     )
 
 
 def at_air(x, air):
-    """(n,) bool: where x is at the bound of air, to the slack of the solver: a hair above it may not decide where air
-    comes next."""
+    """(n,) bool: where x is at the bound of air within the slack of the solver, so that round-off above it does not
+    decide where air advances."""
     return x <= air + SLACK * np.abs(x).max(initial=0.0)
 
 
 def _air_goes_on(A, x, lower, air):
-    """(n,) bool: unknowns below the bound of air that it has not reached, beside those where it parts the water."""
+    """(n,) bool: unknowns below the bound of air that air has not reached, next to those where it separates the
+    water."""
     near = at_air(x, air)
     source, below = near & (lower == air), near & (lower < air)
     if not source.any() or not below.any():
@@ -170,7 +173,7 @@ def _beside(indptr, indices, source):
 
 
 class _Signs:
-    """Which unknowns have the wrong sign, and which of them to exchange."""
+    """The unknowns of wrong sign, and the choice of those to exchange."""
 
     def __init__(self, lower):
         self.lower, self.fewest, self.patience, self.singles = lower, len(lower) + 1, PATIENCE, 0
@@ -179,11 +182,11 @@ class _Signs:
         return ~held & (x < self.lower - share * np.abs(x).max(initial=0.0))
 
     def early(self, x, residual: float, held) -> bool:
-        """Whether to end a round: it is solved to a loose tolerance, and some value lies far below its bound."""
+        """Whether to end a round early: it is solved to a loose tolerance, and some value lies far below its bound."""
         return residual <= LOOSE and bool(self._below(x, held, FAR_BELOW).any())
 
     def wrong(self, x, held, parting, tolerance: float):
-        """(n,) bool: below the bound, or held there although water flows together."""
+        """(n,) bool: below the bound, or held there although water converges."""
         below = self._below(x, held, SLACK)
         return below if parting is None else below | (held & (parting < -tolerance))
 

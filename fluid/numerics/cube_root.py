@@ -1,8 +1,9 @@
 """Cube root with the same bits on every processor and at every scale.
 
-`numpy.cbrt` has other code for other instruction sets, and the codes differ in the last bit; nor is `cbrt(8 x)` always
-`2 cbrt(x)` to the last bit. Here x = y 8^k with 1/8 ≤ y < 1, and only +, -, *, / act on y, which IEEE 754 defines to
-the last bit: t ≈ y^(1/3) by Halley's method, then one step of Newton's from a t of 24 bits, whose square is exact.
+`numpy.cbrt` has different code for different instruction sets, and the results differ in the last bit; nor is `cbrt(8
+x)` always `2 cbrt(x)` to the last bit. Here x = y 8^k with 1/8 ≤ y < 1, and only +, -, *, / act on y, which IEEE 754
+defines to the last bit: t ≈ y^(1/3) by Halley's method, then one step of Newton's from a t of 24 bits, whose square is
+exact.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ ROUND_TO_24_BITS = 1.5 * 2.0**28
 def cube_root(x) -> Array:
     """x^(1/3) of any shape, within one unit in the last place; `cube_root(8 x)` is `2 cube_root(x)` to the last bit.
 
-    Zeros, infinities and what is not a number come back as they are; the root of -x is that of x with its sign."""
+    Zeros, infinities and NaN are returned unchanged; the root of -x is minus that of x."""
     x = np.asarray(x, float)
     regular = np.isfinite(x) & (x != 0.0)
     mantissa, exponent = np.frexp(np.where(regular, np.abs(x), 1.0))

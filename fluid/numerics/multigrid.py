@@ -7,8 +7,9 @@ coarser level is s Pᵀ A P. Constants overestimate the energy of smooth functio
 (Braess, Computing 55 (1995) 379). One cycle: a forward Gauss-Seidel sweep, the coarser level, a backward sweep. It is
 symmetric and positive definite, and the same in every run.
 
-Sweeps of large levels go by blocks, which threads share: within a block as ever, with the values before the sweep from
-other blocks. The blocks depend on the number of unknowns alone, so the result does not depend on the threads.
+Sweeps of large levels go by blocks, which threads share: within a block they are Gauss-Seidel sweeps, and from other
+blocks they use the values before the sweep. The blocks depend on the number of unknowns alone, so the result does not
+depend on the threads.
 """
 
 from __future__ import annotations
@@ -24,17 +25,17 @@ from kernel_decorators import kernel, plain, ranged, released
 PAIRINGS = 3
 """Pairs of pairs of pairs: about eight unknowns become one."""
 SCALE = 0.55
-"""s above."""
+"""The factor s of the coarser matrix."""
 COARSEST = 100
-"""Unknowns from which a level is solved by its inverse."""
+"""Most unknowns of a level that is solved by its inverse."""
 LEAST_GAIN = 0.8
 """A level is the last one where the next would keep more than this share of its unknowns."""
 SWEEPS = 4
 """Double sweeps on a last level that is too large for its inverse."""
 BLOCK, MOST_BLOCKS = 4096, 64
-"""Least number of unknowns in a block of a sweep, and how many blocks there are at most."""
+"""Least number of unknowns in a block of a sweep, and largest number of blocks."""
 COARSE_ROW = 20
-"""To add up a row of a coarser level takes as long as so many rows of a loop."""
+"""Cost of summing a row of a coarser level, in rows of a loop."""
 SAME = 0.99
 """Share of the strongest coupling from which one counts as equally strong: round-off must not choose the pairs."""
 
@@ -221,7 +222,7 @@ def _galerkin(fine: Matrix, aggregate, n, scale):
 
 @kernel
 def _members(aggregate, n):
-    """first (n + 1,), member: the unknowns of every aggregate, one behind the other."""
+    """first (n + 1,), member: the unknowns of every aggregate, listed consecutively."""
     first = np.zeros(n + 1, np.uint32)
     for i in range(len(aggregate)):
         if aggregate[i] >= 0:
@@ -265,7 +266,7 @@ def _coarse_rows(begin_row, end_row, first, member, fine, aggregate, n, scale):
 
 @kernel
 def _down(start, middle, column, entry, inverse, aggregate, n_coarse, r):
-    """Forward sweep from zero → x, and Pᵀ (r - A x), for which only the entries right of the diagonal count."""
+    """Forward sweep from zero → x, and Pᵀ (r - A x), for which only the entries right of the diagonal are needed."""
     n = len(r)
     x, coarse = np.empty(n), np.zeros(n_coarse)
     for i in range(n):

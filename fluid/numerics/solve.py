@@ -19,7 +19,8 @@ from kernel_decorators import ranged
 
 MULTIGRID_FROM = 1_000
 MULTIGRID_FROM_WITH_EXTRA = 300
-"""Unknowns from which multigrid pays; earlier with an extra operator, which costs a solve in every iteration."""
+"""Number of unknowns from which multigrid pays; it pays earlier with an extra operator, which costs a solve in every
+iteration."""
 MOST_ITERATIONS = 2000
 
 
@@ -83,7 +84,7 @@ def conjugate_gradients(
 ) -> SolveResult:
     """Preconditioned conjugate gradients from x (n,), which is overwritten, down to a residual of rtol ‖b‖.
 
-    held (n,) bool: unknowns that keep their value, their rows do not count; None: all are free.
+    held (n,) bool: unknowns that keep their value, and whose rows do not count; None: all are free.
     enough: called with x after every iteration; True ends the iteration there.
     Raises NotConverged."""
     scale = np.linalg.norm(b) or 1.0
@@ -163,7 +164,7 @@ def _preconditioner(A, multigrid_from: int) -> Callable:
 
 
 def _failure(what: str, history, rtol: float, vector) -> NotConverged:
-    """vector (n,): the residual, or the direction of no use; its largest entry is where to look."""
+    """vector (n,): the residual, or the direction of breakdown; its largest entry names the worst unknown."""
     text = (
         f"pressure solver {what} after {len(history) - 1} iterations: residual {history[-1]:.3g}, wanted {rtol:.3g}, "
         f"{len(vector)} unknowns, last residuals {', '.join(f'{r:.2g}' for r in history[-5:])}."

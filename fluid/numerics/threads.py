@@ -2,14 +2,14 @@
 
 A kernel of this kind takes a range as its first arguments, releases the interpreter (`kernel_decorators.ranged`), and
 writes to what belongs to the range only. Each thread gets one range; a single thread gets all of it and runs the loop
-as it stands. What a row comes to must not depend on where the ranges end. There are two forms:
+unchanged. The result of a row must not depend on where the ranges end. There are two forms:
 
-- `over`: rows that read what they like and write their own.
+- `over`: rows that may read everything and write only their own entries.
 - `owning`: sums over cells, or along edges, into nodes. The range is one of nodes: every thread goes through the cells
   that have a node in its range, in their order, and adds to those nodes alone. So each node gets the same summands in
   the same order as from one loop, without a list of the cells around it; cells at the border of two ranges are visited
-  twice. Runs of the list that reach no node of a range are left out, which is most of it where numbers are near where
-  places are.
+  twice. Runs of the list that reach no node of a range are skipped; these are most of the list where nearby places have
+  nearby numbers.
 
 Numba's own `prange` would take three times as long to compile and bring a second pool beside that of YADE's OpenMP.
 The threads here are those of Python, wait without using the processor, and start when they are first needed; a process
@@ -33,16 +33,16 @@ from array_types import Array
 from kernel_decorators import kernel, ranged
 
 LEAST_ROWS = 2_000
-"""Rows of a range that are worth a thread: to wake one takes as long as some hundred of them."""
+"""Least number of rows that is worth a thread: waking one takes as long as some hundred rows."""
 BLOCK = 256
-"""Entries of a list that are left out, or not, together."""
+"""Number of consecutive entries of a list that are skipped, or kept, together."""
 CHUNK = 16_384
-"""Entries that are summed as one; shorter sums run through."""
+"""Number of entries that are summed as one chunk; shorter sums have one chunk."""
 FILLED, LAZY = 64, 32 << 20
-"""Numbers that are filled as one row, and bytes from which on the C library hands out pages that are zero already and
-are not there before something is written to them."""
+"""Numbers that are filled as one row, and bytes from which the C library returns pages that are zero already and are
+allocated only when they are written to."""
 KEPT = 8
-"""Lists whose reach is remembered: those of one step."""
+"""Number of lists whose reach is remembered: those of one step."""
 
 
 class _Worker:
@@ -89,7 +89,7 @@ def _nothing() -> None:
 
 
 class _Team:
-    """The threads of this process; one caller at a time has them, others do their work alone."""
+    """The threads of this process; one caller at a time uses them, others work on their own thread alone."""
 
     def __init__(self) -> None:
         self.size, self.least = 1, LEAST_ROWS
@@ -97,7 +97,7 @@ class _Team:
         self.forget()
 
     def forget(self) -> None:
-        """Without threads, as a process is that has just been forked off."""
+        """Drop all threads, which a process that has just been forked off does not have."""
         self.workers: list[_Worker] = []
         self.at_work = threading.Lock()
 
@@ -133,15 +133,14 @@ os.register_at_fork(after_in_child=_team.forget)
 
 
 def use(threads: int, least: int = LEAST_ROWS) -> None:
-    """Run kernels on so many threads from now on, in this process; one at the start. least: rows that a range has at
-    least."""
+    """Set the number of threads of kernels in this process, at first 1. least: least number of rows of a range."""
     if threads < 1:
         raise ValueError(f"threads {threads}: at least 1")
     _team.size, _team.least = threads, least
 
 
 def in_use() -> int:
-    """How many threads kernels run on."""
+    """Number of threads that kernels run on."""
     return _team.size
 
 
@@ -166,7 +165,7 @@ def watched() -> Iterator[list[Call]]:
 def over(kernel: Callable, count: int, *args, weight: int = 1) -> list:
     """Run kernel(first, last, *args) on ranges that together cover 0 ... count; returns their results in order.
 
-    weight: how many rows of the usual kind, which take some ten nanoseconds, one of these is worth."""
+    weight: cost of a row, in usual rows, which take some ten nanoseconds."""
     parts = min(_parts(count * weight), max(count, 1))
     if parts == 1:
         return [_alone(kernel, count * weight, (0, count, *args))]
@@ -175,7 +174,7 @@ def over(kernel: Callable, count: int, *args, weight: int = 1) -> list:
 
 
 def found_over(kernel: Callable, count: int, *args) -> Array:
-    """The arrays that `over` gives, one behind the other."""
+    """The arrays that `over` returns, concatenated."""
     found = over(kernel, count, *args)
     return found[0] if len(found) == 1 else np.concatenate(found)
 
@@ -183,8 +182,8 @@ def found_over(kernel: Callable, count: int, *args) -> Array:
 def owning(kernel: Callable, nodes: int, reach: Callable, count: int, *args) -> None:
     """Run kernel(first, last, runs, *args) on ranges that together cover the nodes 0 ... `nodes`.
 
-    runs (k, 2): from where to where in a list of `count` entries there can be something that has a node of the range.
-    reach: () → lowest and highest node (B,) of each BLOCK of the list; asked on several threads only."""
+    runs (k, 2): first and last + 1 of the stretches of a list of `count` entries that can have a node of the range.
+    reach: () → lowest and highest node (B,) of each BLOCK of the list; called on several threads only."""
     parts = _parts(count)
     if parts == 1:
         _alone(kernel, count, (0, nodes, np.array([[0, count]]), *args))
@@ -213,7 +212,7 @@ def summed(kernel: Callable, count: int, shape: tuple[int, ...], *args) -> Array
 
 
 def zeros(shape: tuple[int, ...]) -> np.ndarray:
-    """np.zeros(shape) of floats; what the C library would fill on this thread, all threads fill."""
+    """np.zeros(shape) of floats, filled by all threads where the C library would fill it on this thread alone."""
     count = math.prod(shape)
     if 8 * count >= LAZY:
         return np.zeros(shape)
@@ -250,13 +249,13 @@ _reaches: list[tuple[tuple, tuple[Array, Array]]] = []
 
 
 def reach_of_cells(cell_list, cells) -> Callable:
-    """For `owning`: the nodes that the listed cells (n,) have."""
+    """`reach` for `owning`: the lowest and highest node of each block of the listed cells (n,)."""
     return lambda: _remembered((cell_list, cells), _cell_reach, len(cell_list), cell_list, cells)
 
 
 def reach_of_rows(nodes, row, start, neighbour) -> Callable:
-    """For `owning`: the listed nodes (n,) and those at the other ends of their edges; row, start, neighbour: of a
-    `topology.Graph`."""
+    """`reach` for `owning`, of the listed nodes (n,) and those at the other ends of their edges; row, start, neighbour:
+    of a `topology.Graph`."""
     key = (nodes, row, start, neighbour)
     return lambda: _remembered(key, _row_reach, len(nodes), *key)
 

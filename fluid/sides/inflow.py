@@ -6,7 +6,8 @@ Inflow: u and the level are given.  On its nodes u = u_in (all components) and �
 
 with n outward, joins the mass balance of the pressure, the conservative volume and the ledger.  Where a solid stands in
 the side, the integral is over the part that it leaves open: the faces that its cell's tetrahedra (`fans.py`) have
-there. Sea: φ = z - level on its nodes and there
+there.
+Sea: φ = z - level on its nodes and there
 
     p = ρ g (level - z) - ½ ρ min(u·n, 0)²,    -u·n ≤ sqrt(2 g depth)                           (2)
 

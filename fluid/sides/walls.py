@@ -39,9 +39,9 @@ class Walls:
     @classmethod
     def of(cls, mesh, is_open=None, is_smooth=None, no_slip: bool = False, sides=None) -> Walls:
         """is_open: function of face normals (B, 3) and centres (B, 3) [m] → (B,) bool; None: all closed.
-        is_smooth: a function like is_open, of the closed sides with free slip whatever the other walls have; None:
-        none. no_slip: u = 0 on the other closed sides · sides: `inflow.Sides` or None; seas are open, but their own
-        rules govern the outflow there; inflows are neither open nor rough."""
+        is_smooth: a function like is_open, of the closed sides with free slip whatever the other walls have, or None.
+        no_slip: u = 0 on the other closed sides · sides: `inflow.Sides` or None; seas are open, but their own rules
+        govern the outflow there; inflows are neither open nor rough."""
         x = mesh.nodes[mesh.boundary_faces]
         area = 0.5 * np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
         opened, smooth = (
