@@ -39,7 +39,7 @@ NOTES = {
     "with 8 layers, variants of the damping at the water line (one to three rounds, ended at smaller speeds) gave "
     "0.072 to 0.100 d: a single figure within the limit says little there, and neither does one outside.",
     "P53": "The period agrees, but each swing is smaller than the reference by 0.06 to 0.09 of the drop height. All "
-    "five quantities were within their limits with version 0.1.0; which change since then takes the energy has not been "
+    "five quantities were within their limits with version 0.1.0; which change since takes the energy has not been "
     "found. A box that floats on cells of 25 mm and swings by 20 mm also loses more than the cells explain.",
     "P55": "With four cells over the diameter the speed is 5 to 6 % low, because linear velocities are too coarse "
     "there (a spinning sphere is subject to 1.04 times the moment of Stokes; 1.003 times with eight cells). "
