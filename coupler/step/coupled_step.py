@@ -333,7 +333,7 @@ class CoupledStepper:
             last_defect = record.defect
             if record.passes < most:
                 response = self._answer(mass, problem.dt, before, afloat)
-                after = moved + response.lead(moved + lead, before, report.dt_s)
+                after = response.at_end(moved, before, report.dt_s)
                 v_free = corrected_free_velocity(response, after, found.x, problem.coupling)
         assert found is not None  # there is one pass at least
         if record.passes > self.passes and breaking is not None and self._joints_broken() == whole:

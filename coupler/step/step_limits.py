@@ -19,9 +19,10 @@ if TYPE_CHECKING:
 
 STEP_SHARE = 0.25
 """Share of `limits.energy_error` that a single step may put out of balance."""
-HELPS = 0.5
-"""Share to which the shortest attempt must bring what the longest one broke, over the same time: an error of the
-first order in the step falls to an eighth in three halvings, one that the step has no part in stays."""
+HELPS = 0.5 ** (1.0 / 3.0)
+"""Share to which every halving must bring what the longest attempt broke, over the same time, so that three of them
+bring it to a half: an error of the first order in the step falls to an eighth in three halvings, one that the step has
+no part in stays."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,8 @@ def best_of(attempts: list[Attempt]) -> Attempt:
     """Which of the bad attempts, longest first, is kept: the shortest if it is better in one of the limits that the
     longest breaks, or if only the longest ends the run; otherwise the longest."""
     longest, shortest = attempts[0], attempts[-1]
-    helped = any(shortest.measures[name] < HELPS * longest.measures[name] for name in longest.broken)
+    share = HELPS ** (shortest.retries - longest.retries)
+    helped = any(shortest.measures[name] < share * longest.measures[name] for name in longest.broken)
     return shortest if helped or (longest.ends and not shortest.ends) else longest
 
 

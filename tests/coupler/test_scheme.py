@@ -183,6 +183,21 @@ def test_a_driven_body_takes_along_what_hangs_on_it():
     assert found[1, 0] == pytest.approx(dt * k * 0.4 / (mass / dt + dt * k), rel=1e-12)
 
 
+@pytest.mark.parametrize("stiffness", [0.0, 1e4, 1e9])
+def test_the_velocity_at_the_end_is_the_one_whose_mean_was_found(stiffness):
+    """A body that was at 2 m/s and moved by nothing on the whole came back; a stiff spring holds it at the mean."""
+    dt, substep = 0.01, 1e-4
+    response = piston(300.0, dt, stiffness=stiffness)
+    before, mean = np.zeros((1, 6)), np.zeros((1, 6))
+    before[0, 0], mean[0, 0] = 2.0, 0.01
+    end = response.at_end(mean, before, substep)
+    assert (end - response.lead(end, before, substep))[0] == pytest.approx(mean[0], abs=1e-3)
+    if stiffness == 0.0:
+        assert end[0, 0] == pytest.approx(-1.94, rel=0.01)
+    if stiffness == 1e9:
+        assert end[0, 0] == pytest.approx(0.0, abs=0.05)
+
+
 def test_defect_of_a_body_that_stood_still_is_whole():
     """The larger of what was found and what was assumed is the measure: neither alone may vanish."""
     M = mass_matrix(np.array([2.0]), np.eye(3)[None])
@@ -246,7 +261,9 @@ def test_a_wall_that_breaks_before_it_moves_does_not_hold_because_it_would_move(
     stepper.structure, stepper.water, stepper.immersion = gate, None, SimpleNamespace(n_solids=0)
     stepper.passes, stepper.tolerance, stepper.pause, stepper.rtol = 2, 0.02, None, 1e-8
     stepper.clock, stepper.ledger = no_clock, SimpleNamespace(input_energy=sea)
-    response = SimpleNamespace(lead=lambda velocity, before, substep: np.zeros((1, 6)))
+    response = SimpleNamespace(
+        lead=lambda velocity, before, substep: np.zeros((1, 6)), at_end=lambda mean, before, substep: mean
+    )
     monkeypatch.setattr(
         CoupledStepper, "_response", lambda *_: (sp.eye_array(6).tocsr(), response, np.zeros(6))
     )

@@ -132,6 +132,24 @@ def test_a_cube_sinks_by_its_weight_over_k_whatever_is_below_it(below, at):
         assert s.contacts().kn.sum() == pytest.approx(K)
 
 
+def test_a_block_between_larger_plates_presses_both_with_half_of_the_stiffness():
+    """One plate is driven on until the block is pressed by 2 mm: two pairs of stiffness K in series."""
+    gap, press, fast = 0.01, 0.002, 0.1
+    plates = [
+        Block("still", (0.0, 0, 0), size=(0.2, 0.6, 0.6), density=2000.0, fixed=True),
+        Block("driven", (0.6 + gap, 0, 0), size=(0.2, 0.6, 0.6), driven=True, velocity=(-fast, 0.0, 0.0)),
+    ]
+    block = Block("block", (0.3 + 0.5 * gap, 0, 0), size=(0.4, 0.3, 0.3), density=1000.0)
+    with Structure([*plates, block], ContactLaw(1e6, 0.2), gravity=(0.0, 0.0, 0.0)) as s:
+        s.advance((gap + press) / fast)
+        s.drive("driven")
+        s.advance(0.2)
+        c = s.contacts()
+        for row, side in ((0, -1.0), (1, 1.0)):
+            force = c.normal_force[c.b == row, 0].sum() - c.normal_force[c.a == row, 0].sum()
+            assert force == pytest.approx(side * 0.5e6 * press, rel=1e-3)
+
+
 def test_a_stack_stays_where_it_was_put():
     """Three offset blocks at rest: no drift, no spin; the lowest carries all the weight."""
     blocks = [Block(f"b{i}", (0.1 * i, 0.05 * i, i + 0.5), size=1.0, density=2000.0) for i in range(3)]

@@ -28,18 +28,20 @@ class Flow:
 
     def __init__(self, coupling, limited: bool = True):
         self.coupling, self.limited = coupling, limited
+        if limited:
+            coupling.limits = STOPS
         self.energy = self.volume = self.fastest = self.defect = self.lost = 0.0
         self.retries = self.steps = 0
         self.record = None
 
     def run(self, time: float, dt: float | None = None, each=None) -> Flow:
-        """Advance by `time` [s] in steps of dt [s], or in those that the coupling chooses; each(record) is called after
-        each step."""
+        """Advance by `time` [s] in steps of dt [s], shorter after those that were halved, or in those that the coupling
+        chooses; each(record) is called after each step."""
         c = self.coupling
         end = c.time + time
         while c.time < end * (1.0 - 1e-12):
             left = end - c.time
-            self.step(c.step_size(left) if dt is None else min(dt, left))
+            self.step(c.step_size(left) if dt is None else min(dt * c.defects.share, left))
             if each is not None:
                 each(self.record)
         return self

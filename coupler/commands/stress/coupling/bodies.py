@@ -155,18 +155,20 @@ def collide() -> Iterator[Measure]:
 
 @scene("C07", "heavy on light under water, masses 1000 to 1")
 def masses() -> Iterator[Measure]:
-    """The net buoyancy of the light block is 9.7 times smaller than the submerged weight of the heavy one."""
+    """The net buoyancy of the light block is 9.7 times smaller than the submerged weight of the heavy one. The dashpots
+    depend on the effective mass of a pair, that of the light block, so that the heavy one oscillates: by 12 % of its
+    weight after 0.5 s and by 1 % after 1 s, in air with its buoyancy held as well."""
     edge, stiffness = 0.2, 1e7
     blocks = [
         Block("light", (0.52, 0.47, 0.5 * edge), size=edge, density=20.0),
         Block("heavy", (0.52, 0.47, 1.5 * edge), size=edge, density=20000.0),
     ]
     with Structure(blocks, ContactLaw(stiffness, 0.1), ground=0.0, planes=WALLS) as s:
-        flow = Flow(pool(s)).run(0.5)
+        flow = Flow(pool(s)).run(1.0)
         c = s.contacts()
         carried = np.abs(c.normal_force[c.b < 0, 2].sum())
         weight = (20020.0 - 2 * DENSITY) * edge**3 * G
-        yield Measure("bed carries, off weight less buoyancy", carried / weight - 1.0, 0.05)
+        yield Measure("bed carries, off weight less buoyancy", carried / weight - 1.0, 0.02)
         yield Measure("speed at the end", speed(s), 0.02, "m/s")
     yield Measure("error of the volume", flow.volume, 1e-3)
     yield Measure("largest defect", flow.defect, None)
