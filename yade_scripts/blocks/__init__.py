@@ -1,7 +1,7 @@
-"""Rigid blocks: geometry, faces that touch, motion of their points, generators of structures.
+"""Rigid blocks: geometry, touching faces, motion of their points, generators of structures.
 
 block, polyhedra         boxes and convex polyhedra with exact volume, centre and inertia
-faces, quadrature        faces that touch, and Gauss points on them
+faces, quadrature        touching faces, and Gauss points on them
 kinematics               points, velocities and forces of moving blocks
 tangent                  stiffness and damping of springs between blocks, as sparse matrices
 generators               columns, walls, arches, buildings, rubble

@@ -1,7 +1,7 @@
 """Rigid blocks: boxes and convex polyhedra, with exact volume, centre of mass and inertia.
 
-A block lives in its own frame: origin at the centre of mass, axes of the description it came from.
-World position of a body point:  x = c + R ξ.
+A block has its own frame, with the origin at the centre of mass and the axes of its description. The world position of
+a body point is x = c + R ξ.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from yade_scripts.blocks.polyhedra import (
 )
 
 MARGIN = 0.01
-"""In contact a face reaches beyond its edges by this share of the block's inner radius, so that flush blocks carry each
-other."""
+"""In contact a face extends beyond its edges by this share of the block's inner radius, so that flush blocks support
+each other."""
 
 BOX_CORNERS = np.array(
     [[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]],
@@ -39,7 +39,7 @@ BOX_NORMALS = np.repeat(np.eye(3), 2, axis=0) * np.array([-1.0, 1.0] * 3)[:, Non
 class Block:
     """One rigid block.
 
-    name: unique · group: free text for reports (wall, floor, ...) · material: what friction by pairs goes by
+    name: unique · group: free text for reports (wall, floor, ...) · material: name for friction by pairs
     centre (3,) [m] centre of mass, world
     size (3,) [m] of a box, or vertices (k, 3) [m] with faces (lists of rows of vertices, seen from outside)
     of a convex polyhedron; vertices may have any origin, they are moved to the centre of mass
@@ -98,13 +98,14 @@ class Block:
     ) -> Block:
         """The convex polyhedron whose corners are at vertices (k, 3) [m] in the world, turned by `rotation` if given.
 
-        tolerance [m]: what corners may lie off the planes of their faces, None: their rounding."""
+        tolerance [m]: largest distance of corners from the planes of their faces, None: their rounding.  Raises
+        BlockError."""
         vertices, faces = convex_polyhedron(name, vertices, faces, tolerance)
         centre = polyhedron_moments(vertices, faces)[1]
         return cls(name, centre, vertices=vertices - centre, faces=faces, **more)
 
     def changed(self, **changes) -> Block:
-        """The same block, changed in what is given."""
+        """The same block with the given fields changed."""
         if self.is_box:
             changes = {"vertices": None, "faces": None} | changes
         return replace(self, **changes)

@@ -1,7 +1,7 @@
-"""Faces that touch: between two blocks, or between a block and a fixed plane (ground, tank wall).
+"""Touching faces: of two blocks, or of a block and a fixed plane (ground, tank wall).
 
 Two faces touch where their normals are opposite, their planes coincide and their polygons overlap; the overlap is
-found by clipping one convex polygon by the other in the face plane (Sutherland and Hodgman 1974), so full faces,
+found by clipping one convex polygon by the other in the face plane (Sutherland and Hodgman 1974), so that full faces,
 running bond and offset courses are the same case.
 """
 
@@ -20,14 +20,14 @@ from yade_scripts.blocks.quadrature import Rule, gauss
 PARALLEL = 1e-6
 """Largest 1 + n_a·n_b of faces that count as opposite."""
 GAP = 1e-5
-"""Largest distance of touching planes, as a share of the smaller block's radius: single precision in files of blocks
-leaves a tenth of that."""
+"""Largest distance of touching planes, as a share of the smaller block's radius; single precision in files of blocks
+causes a tenth of it."""
 SLIVER = 1e-6
 """Smallest overlap, as a share of the smaller face, that counts."""
 SQUARE = 1e-5
-"""Share of its size by which a face may miss a parallelogram and count as one."""
+"""Deviation from a parallelogram, as a share of the size of a face, up to which the face counts as one."""
 DOUBLE = 1e-12
-"""Corners of an overlap closer than this share of a face's extent are one."""
+"""Corners of an overlap that are closer than this share of a face's extent are merged."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class FixedPlane:
     """A fixed half space: the solid is where normal·(x - point) < 0. point (3,) [m], normal (3,) unit.
 
     bonds: blocks that stand on it are joined to it where joints are asked for; False: only contact
-    material: what friction by pairs goes by."""
+    material: name for friction by pairs."""
 
     point: Floats
     normal: Floats
@@ -73,7 +73,7 @@ class TouchingFaces:
 
 
 def both_held(blocks: list[Block], face: TouchingFaces) -> bool:
-    """Whether both sides stand still for good: nothing between them can break. (Driven blocks may part.)"""
+    """Whether both sides are fixed, so that nothing between them can break. (Driven blocks may separate.)"""
     return all(blocks[row].fixed for row in (face.a, face.b) if row >= 0)
 
 
@@ -223,7 +223,7 @@ def _overlaps(pairs, radius, block_start, corner_start, normals, middles, areas,
 
 @inner
 def _opposite(n, m, of_n, of_m, gap):
-    """Whether two faces look at each other and lie in one plane; of_n, of_m: a point of each."""
+    """Whether two faces are opposite and lie in one plane; of_n, of_m: a point of each."""
     if n[0] * m[0] + n[1] * m[1] + n[2] * m[2] > -1.0 + PARALLEL:
         return False
     x, y, z = of_n[0] - of_m[0], of_n[1] - of_m[1], of_n[2] - of_m[2]
@@ -247,7 +247,7 @@ def _area(polygon):
 
 @inner
 def _between(polygon, i, j):
-    """From corner i of a polygon to its corner j."""
+    """Vector from corner i of a polygon to its corner j."""
     return polygon[j, 0] - polygon[i, 0], polygon[j, 1] - polygon[i, 1], polygon[j, 2] - polygon[i, 2]
 
 
@@ -317,10 +317,11 @@ def _without_doubles(polygon, same):
 
 
 def gauss_points(polygon: Array, rule: Rule | int) -> tuple[Array, Array]:
-    """Positions (q, 3) [m] and weights (q,) [m²] on a convex polygon (k, 3). rule: a number stands for that of Gauss.
+    """Positions (q, 3) [m] and weights (q,) [m²] on a convex polygon (k, 3). rule: a number q stands for the Gauss rule
+    with q points.
 
-    A parallelogram gets the tensor rule, with q Gauss points exact for polynomials of degree 2 q - 1 in each
-    direction; any other polygon a fan of triangles with the same rule collapsed on each.
+    A parallelogram gets the tensor rule, which with q Gauss points is exact for polynomials of degree 2 q - 1 in each
+    direction; any other polygon gets a fan of triangles with the same rule collapsed on each.
     """
     rule = gauss(rule) if isinstance(rule, int) else rule
     if len(polygon) == 4 and _is_parallelogram(polygon):
@@ -332,7 +333,7 @@ def gauss_points(polygon: Array, rule: Rule | int) -> tuple[Array, Array]:
 
 
 def _is_parallelogram(corners: Array) -> bool:
-    """Whether opposite sides of four corners (4, 3) are equal, by their own size wherever they lie."""
+    """Whether opposite sides of four corners (4, 3) are equal, relative to their size and not to their place."""
     left_over = np.abs(corners[0] - corners[1] + corners[2] - corners[3]).max()
     return bool(left_over <= SQUARE * np.ptp(corners, axis=0).max())
 

@@ -12,7 +12,7 @@ from kernel_decorators import inner, kernel, plain
 
 @inner
 def rotation_matrix(q, R):
-    """R (3, 3) of the unit quaternion q = (x, y, z, w)."""
+    """Write the rotation R (3, 3) of the unit quaternion q = (x, y, z, w)."""
     x, y, z, w = q[0], q[1], q[2], q[3]
     R[0, 0], R[0, 1], R[0, 2] = 1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)
     R[1, 0], R[1, 1], R[1, 2] = 2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)

@@ -1,4 +1,4 @@
-"""Convex polyhedra: plane faces from vertices, exact moments, and refusals that say where one is not convex.
+"""Convex polyhedra: plane faces from vertices, exact moments, and errors that name the place where one is not convex.
 
 A polyhedron is vertices (k, 3) and faces, lists of rows of vertices seen from outside.
 """
@@ -13,13 +13,13 @@ from array_types import Array
 Faces = tuple[tuple[int, ...], ...]
 
 FLAT = 1e-9
-"""Height of a vertex over a face, as a share of the polyhedron's extent, that is taken for rounding."""
+"""Height of a vertex over a face, as a share of the polyhedron's extent, that counts as rounding."""
 ROUNDING = 8.0 * np.finfo(float).eps
-"""The same as a share of the largest coordinate: what double precision loses far from the origin."""
+"""The same height as a share of the largest coordinate: the rounding of double precision far from the origin."""
 THICK = 10.0
-"""Least thickness of a block over what its corners may be off."""
+"""Least thickness of a block over the tolerance of its corners."""
 PLANE = 1e-12
-"""Faces are made plane to this share of the extent."""
+"""Distance from its plane, as a share of the extent, to which a face is made plane."""
 
 
 class BlockError(ValueError):
@@ -33,7 +33,7 @@ def polygon_area_vector(corners: Array) -> Array:
 
 
 def cross_products(a: Array, b: Array) -> Array:
-    """a × b of vectors (k, 3); numpy's own takes ten times as long for few of them."""
+    """a × b of vectors (k, 3); numpy.cross takes ten times as long for few of them."""
     ax, ay, az, bx, by, bz = *a.T, *b.T
     return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=1)
 
@@ -86,11 +86,11 @@ def rounding(vertices: Array) -> float:
 def convex_polyhedron(
     name: str, vertices: Array, faces: Faces | None = None, tolerance: float | None = None
 ) -> tuple[Array, Faces]:
-    """The polyhedron without vertices that no corner needs, its faces plane to rounding.
+    """The polyhedron without superfluous vertices, with faces plane to rounding.
 
-    faces None: those of the convex hull, coplanar triangles merged. tolerance [m]: what vertices may lie off the
-    planes of their faces (None: the rounding of their coordinates); they are moved by less than that on average.
-    Raises BlockError where vertices span no volume, lie inside the hull, or faces are open, bent or dented.
+    faces None: those of the convex hull, coplanar triangles merged. tolerance [m]: largest distance of vertices from
+    the planes of their faces (None: the rounding of their coordinates); they are moved by less than that on average.
+    Raises BlockError where vertices span no volume or lie inside the hull, or faces are open, bent or dented.
     """
     vertices = np.asarray(vertices, float)
     if vertices.ndim != 2 or vertices.shape[1:] != (3,) or not np.isfinite(vertices).all():
@@ -131,10 +131,11 @@ def _bend(vertices: Array, faces) -> float:
 
 
 def flattened(vertices: Array, faces, rounds: int = 4) -> Array:
-    """Vertices (k, 3) of the nearest polyhedron of the same make whose faces are plane.
+    """Vertices (k, 3) of the nearest polyhedron of the same topology whose faces are plane.
 
-    Newton on n_f·x_v = d_f for every corner v of every face f, in the unknowns x, n (unit) and d, with the smallest
-    change in the mean square. A solution is near: a polyhedron has more freedoms than corners (Steinitz).
+    Newton's method on n_f·x_v = d_f for every corner v of every face f, in the unknowns x, n (unit) and d, with the
+    smallest change in the mean square. A solution is near, since a polyhedron has more degrees of freedom than
+    conditions at corners (Steinitz).
     """
     origin, extent = vertices.mean(axis=0), np.ptp(vertices, axis=0).max()
     x = (vertices - origin) / extent
@@ -161,7 +162,7 @@ def flattened(vertices: Array, faces, rounds: int = 4) -> Array:
 
 def hull_faces(name: str, vertices: Array, tolerance: float) -> Faces:
     """Faces of the convex hull of vertices (k, 3), corners seen from outside; triangles within tolerance [m] of one
-    plane are one face. Raises BlockError for no volume, or a vertex deeper than the tolerance inside."""
+    plane are one face. Raises BlockError for no volume, or for a vertex deeper inside than the tolerance."""
     try:
         hull = ConvexHull(vertices)
     except (QhullError, ValueError) as error:
@@ -171,14 +172,15 @@ def hull_faces(name: str, vertices: Array, tolerance: float) -> Faces:
     shared = np.zeros(len(vertices), int)
     for _, corners in merged:
         shared[list(corners)] += 1
-    # A vertex of fewer than three faces lies within an edge or a face: no corner of the body.
+    # A vertex of fewer than three faces lies within an edge or a face and is no corner of the body.
     rings = [(n, np.array([c for c in sorted(corners) if shared[c] >= 3])) for n, corners in merged]
     rings = [(n, ring) for n, ring in rings if len(ring) >= 3]
     return tuple(_ordered(vertices, ring, n) for n, ring in rings)
 
 
 def _merged(vertices: Array, hull: ConvexHull, tolerance: float) -> list[tuple[Array, set]]:
-    """Normal and corners of each face; the largest triangles come first, small ones join the plane they lie in."""
+    """Normal and corners of each face; the largest triangles come first, and small ones join the plane that they lie
+    in."""
     p = vertices[hull.simplices]
     normals, offsets = hull.equations[:, :3], hull.equations[:, 3]
     size = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)
@@ -257,5 +259,5 @@ def _check_closed(name: str, vertices: Array, faces, origin) -> None:
 
 
 def shown(point: Array) -> str:
-    """A place for messages: (x, y, z) m."""
+    """Text of a place for messages: (x, y, z) m."""
     return "(" + ", ".join(f"{c:.7g}" for c in point) + ") m"

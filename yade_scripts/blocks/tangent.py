@@ -48,7 +48,7 @@ class Springs:
         )
 
     def and_(self, other: Springs) -> Springs:
-        """Both together."""
+        """The springs of both, concatenated."""
         return Springs(
             **{
                 field.name: np.concatenate([getattr(s, field.name) for s in (self, other)])
@@ -91,7 +91,7 @@ def _accumulate(pair, swap, arm_a, arm_b, D, out):
         _relative(B, 0, 1.0, first)
         _relative(B, 6, -1.0, second)
         product, k = B.T @ (D[s] @ B), pair[s]
-        # entry by entry: numba compiles for three seconds to name the shapes of arrays that might not fit each other
+        # entry by entry: numba takes three seconds to compile the messages on shapes of arrays that might not fit
         for i in range(12):
             for j in range(12):
                 out[k, i, j] += product[i, j]
@@ -99,7 +99,7 @@ def _accumulate(pair, swap, arm_a, arm_b, D, out):
 
 @inner
 def _relative(B, column, sign, r):
-    """Velocity of the point at arm r: v + ω x r, written into six columns of B."""
+    """Write the velocity of the point at arm r, v + ω x r, into six columns of B."""
     for k in range(3):
         B[k, column + k] = sign
     B[0, column + 4], B[0, column + 5] = sign * r[2], -sign * r[1]
@@ -145,9 +145,9 @@ def joint_springs(joints, x: Array, R: Array, index: Array | None = None) -> Spr
 
 def joint_tangent(joints, x: Array, R: Array, n: int, index: Array | None = None) -> sp.csr_array:
     """Tangent stiffness (6n, 6n) of the points `index` of joints, by default of all that are alive and do not rest,
-    while they open further; softening makes it indefinite.
+    on further opening; softening makes it indefinite.
 
-    The turning of the normals with the blocks is left out: it is of the order of the tractions times the openings."""
+    The rotation of the normals with the blocks is neglected: it is of the order of the tractions times the openings."""
     index = joints.visited_points() if index is None else index
     springs = joint_springs(joints, x, R, index)
     D = np.zeros((len(index), 3, 3))

@@ -15,7 +15,7 @@ VARIANTS = {
     "stiffness": ("G_c: T_max²/(2 K_0), 2/27 instead of 9/16 T_max δ_f",),
     "energy": ("stiffness: softer by 2 G_c K_0/T_max², 7.6 times",),
 }
-"""What of stiffness, strength and G_c each variant gives up; the first is the default."""
+"""The property (stiffness, strength or G_c) that each variant does not match; the first variant is the default."""
 NOT_MATCHED = ("no softening", "tension and shear fail independently")
 
 
@@ -32,7 +32,7 @@ def bond(area, joint, variant="stiffness"):
 
 
 def material(joint):
-    """Material of the spheres; bonds get their numbers one by one."""
+    """Material of the spheres; the numbers of each bond are set separately."""
     from yade.wrapper import CohFrictMat
 
     angle = math.atan(joint["friction"])

@@ -1,11 +1,13 @@
-"""Cpm, concrete particle model (public version): elastic, then tension softens with damage ω of the largest strain κ.
+"""Cpm, concrete particle model (public version): elastic, then softening in tension by the damage ω of the largest
+strain κ.
 
     σ = (1 - ω) E ε in tension, E ε in compression;  |τ| ≤ c (1 - ω) - σ tan φ, perfectly plastic
     exponential  1 - ω = (ε_0/κ) exp(-(κ - ε_0)/ε_f)         G_c = T_max (u_0/2 + u_f)
     linear       ω = (1 - ε_0/κ)/(1 - ε_0/ε_f), broken at ε_f   G_c = T_max u_f/2         (u = ε L, u_0 = T_max/K_0)
 
 YADE: Law2_ScGeom_CpmPhys_Cpm. Šmilauer, Cohesive particle model using the discrete element method on the Yade
-platform, PhD thesis, CTU Prague (2010). Stiffness, strength and G_c of tension are all matched; the curve is another.
+platform, PhD thesis, CTU Prague (2010). Stiffness, strength and G_c of tension are all matched; the softening curve
+differs.
 """
 
 import math
@@ -16,14 +18,14 @@ VARIANTS = {
     "exponential": ("the tail: 1 % of the strength is left at 2.4 δ_f, where the bond is taken out",),
     "linear": ("full loss at 9/8 δ_f",),
 }
-"""What of stiffness, strength and G_c each variant gives up; the first is the default."""
+"""The property (stiffness, strength or G_c) that each variant does not match; the first variant is the default."""
 NOT_MATCHED = (
     "shape of the softening curve",
     "shear does not soften: perfectly plastic under c = β T_max",
     "shear strength grows with compression (Coulomb) and falls with tension",
 )
 LEFT = 0.01
-"""Share of the strength at which an exponential bond counts as failed: it never ends by itself."""
+"""Share of the strength at which an exponential bond counts as failed, since it never breaks by itself."""
 
 
 def bond(area, joint, variant="exponential"):
@@ -54,7 +56,7 @@ def bond(area, joint, variant="exponential"):
 
 
 def material(joint):
-    """Material of the spheres; bonds get their numbers one by one."""
+    """Material of the spheres; the numbers of each bond are set separately."""
     from yade.wrapper import CpmMat
 
     angle = math.atan(joint["friction"])
@@ -87,7 +89,7 @@ def failed(phys):
 
 
 def stored(phys, numbers):
-    """Elastic energy [J]: the secant in tension, the first slope in compression and shear."""
+    """Elastic energy [J]: with the secant stiffness in tension, the initial one in compression and shear."""
     n, s = phys.normalForce, phys.shearForce
     left = 1.0 - phys.omega if phys.epsN > 0.0 else 1.0
     return 0.5 * (n.dot(n) / (left * phys.kn) + s.dot(s) / phys.ks)

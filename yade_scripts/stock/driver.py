@@ -1,12 +1,12 @@
-"""What all scripts share: bodies, one stock bond at each integration point of a joint, stepping, records.
+"""The part that all scripts share: bodies, one stock bond at each integration point of a joint, stepping, records.
 
-Text of this file, of one law and of the scene (`SCENE`, `LAW`) make a script for `yade -x -n script.py`. It needs
-nothing but YADE: a block is a clump of a core (exact mass and inertia, meets nobody) and of one small sphere for each
-of its bonds; two spheres that touch at an integration point hold the bond. Written are LAW.csv, a row a record, and
-LAW.json, the figures of the run.
+The text of this file, of one law and of the scene (`SCENE`, `LAW`) make a script for `yade -x -n script.py`. It needs
+only YADE: a block is a clump of a core (with exact mass and inertia, without contact) and of one small sphere for each
+of its bonds; two spheres that touch at an integration point carry the bond. The script writes LAW.csv, with a row for
+each record, and LAW.json, the figures of the run.
 """
 
-# The law and the head of the script define O, utils, SCENE, bond, ... ; the parts make sense only together.
+# The law and the head of the script define O, utils, SCENE, bond, ... ; the parts only work together.
 # ruff: noqa: F821
 
 import json
@@ -14,9 +14,9 @@ import math
 import time
 
 WEIGHTLESS = 1e-6
-"""Density of the spheres [kg/m³]: the core carries mass and inertia."""
+"""Density of the spheres [kg/m³], negligible since the core carries mass and inertia."""
 INITIAL = {"energy": 0.0}
-"""Kinetic, elastic and of weight, at the start [J]."""
+"""Kinetic, elastic and gravitational energy at the start [J]."""
 NOTHING_MOVES = 1e-200
 """Length [s] of the step in which YADE sets up its bonds."""
 
@@ -50,7 +50,7 @@ def build(scene):
     for p in scene["points"]:
         pair = []
         for end, sign in (("a", -1.0), ("b", 1.0)):
-            # sphere of a lies inside a, that of b inside b; they touch in the point
+            # the sphere of a lies inside a, that of b inside b; they touch at the point
             place = [x + sign * p["radius"] * n for x, n in zip(p["place"], p["normal"])]
             ball = utils.sphere(place, p["radius"], material=stuff, color=(1, 1, 1))
             if p[end] < 0:
@@ -67,7 +67,7 @@ def build(scene):
 
 
 def engines(scene):
-    """The engine list: spheres meet spheres, by the law; no damping of the integrator."""
+    """The engine list: contacts of spheres by the law, without numerical damping."""
     geometry, physics, law = functors(scene["joint"])
     return [
         ForceResetter(),
@@ -78,7 +78,7 @@ def engines(scene):
 
 
 def add_block(block, spheres, stuff):
-    """A clump of a core without contact and the spheres of a block; its number."""
+    """Add a clump of a core without contact and the spheres of a block → its number."""
     core = utils.box(block["centre"], [0.5 * e for e in block["size"]], material=stuff)
     state = core.state
     state.ori = Quaternion(*block["orientation"])
@@ -113,7 +113,7 @@ def make_bonds(scene, pairs):
 
 
 def measure(ids, members, bonds, last, failed_at):
-    """A record, see COLUMNS; joints without any bond left get their time in `failed_at`."""
+    """A record (see COLUMNS); the time at which a joint has lost all its bonds goes into `failed_at`."""
     now = O.time - NOTHING_MOVES
     speed = max([math.hypot(*b["velocity"]) for b in SCENE["blocks"] if b["held"]], default=0.0)
     pull, kinetic, potential = pull_and_energies(ids, members, speed)
@@ -137,7 +137,7 @@ def measure(ids, members, bonds, last, failed_at):
 
 
 def pull_and_energies(ids, members, speed):
-    """Force on the driven blocks along their motion [N]; of the others kinetic energy and that of weight [J]."""
+    """Force on the driven blocks along their motion [N]; kinetic and gravitational energy of the others [J]."""
     power, kinetic, potential = 0.0, 0.0, 0.0
     for block, number, force in zip(SCENE["blocks"], ids, force_on_blocks(members)):
         if block["held"]:
@@ -152,8 +152,8 @@ def pull_and_energies(ids, members, speed):
 COLUMNS = (
     "time", "displacement", "force", "kinetic", "stored", "work", "dissipated", "bonds_broken", "joints_broken"
 )  # fmt: skip
-"""[s, m, N, J, J, J, -, -]: force and displacement of the driven blocks along their motion, its work;
-dissipated is what the balance of energy leaves to the bonds (and to friction)."""
+"""[s, m, N, J, J, J, -, -]: force and displacement of the driven blocks along their motion, and its work; the
+dissipated energy is the remainder of the energy balance, lost in bonds (and friction)."""
 
 
 def force_on_blocks(members):
@@ -172,14 +172,14 @@ def force_on_blocks(members):
 
 
 def kinetic_energy(state):
-    """Of a body [J]."""
+    """Kinetic energy of a body [J]."""
     local = state.ori.toRotationMatrix().transpose() * state.angVel
     turning = sum(i * w * w for i, w in zip(state.inertia, local))
     return 0.5 * (state.mass * state.vel.dot(state.vel) + turning)
 
 
 def write(rows, cpu, bonds, failed_at):
-    """LAW.csv and LAW.json in the working directory."""
+    """Write LAW.csv and LAW.json to the working directory."""
     with open(LAW + ".csv", "w", encoding="utf-8") as table:
         print(",".join(COLUMNS), file=table)
         for row in rows:

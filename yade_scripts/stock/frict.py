@@ -1,4 +1,4 @@
-"""FrictPhys: contact without cohesion, the cheapest law: what any bonded law costs on top.
+"""FrictPhys: contact without cohesion, the cheapest law, from which the extra cost of a bonded law is measured.
 
     F_n = k_n u_n in compression, |F_s| ≤ F_n tan φ, nothing in tension
 
@@ -10,7 +10,7 @@ import math
 TITLE = "FrictPhys (no cohesion)"
 LAW2 = "Law2_ScGeom_FrictPhys_CundallStrack"
 VARIANTS = {"plain": ("strength and G_c: none",)}
-"""What of stiffness, strength and G_c each variant gives up; the first is the default."""
+"""The property (stiffness, strength or G_c) that each variant does not match; the first variant is the default."""
 NOT_MATCHED = ("holds no tension at all: for its cost only",)
 
 
@@ -46,7 +46,7 @@ def set_bond(phys, numbers):
 
 
 def failed(phys):
-    """Whether a contact holds no tension: always so, it is without cohesion."""
+    """Whether a contact holds no tension: always true, since it has no cohesion."""
     return False
 
 

@@ -3,7 +3,7 @@
     σ = K_n ε, τ = K_s γ while  σ ≤ f_t  and  τ ≤ c - σ tan φ  and  σ² + A² τ² ≤ f_c²  (σ > 0 in tension), then nothing
 
 YADE: Law2_ScGeom_MortarPhys_Lourenco, the envelope of Lourenço, Analysis of masonry structures with interface
-elements, TU Delft report 03-21-22-0-01 (1994). A broken bond leaves the scene, contact and all.
+elements, TU Delft report 03-21-22-0-01 (1994). A broken bond is removed from the scene together with its contact.
 """
 
 import math
@@ -14,7 +14,7 @@ VARIANTS = {
     "stiffness": ("G_c: T_max²/(2 K_0), 2/27 instead of 9/16 T_max δ_f",),
     "energy": ("stiffness: softer by 2 G_c K_0/T_max², 7.6 times",),
 }
-"""What of stiffness, strength and G_c each variant gives up; the first is the default."""
+"""The property (stiffness, strength or G_c) that each variant does not match; the first variant is the default."""
 NOT_MATCHED = (
     "no softening",
     "shear strength grows with compression (Coulomb) and falls with tension",
@@ -22,7 +22,7 @@ NOT_MATCHED = (
     "a broken joint has no contact either: blocks pass through each other",
 )
 COMPRESSIVE = 1e3
-"""f_c over T_max: out of the way."""
+"""f_c over T_max, so large that the cap has no influence."""
 
 
 def bond(area, joint, variant="stiffness"):
@@ -48,7 +48,7 @@ def bond(area, joint, variant="stiffness"):
 
 
 def inside(sigma, tau, tension, cohesion, friction, compression, aspect):
-    """Whether a stress (σ > 0 in tension) [Pa] lies inside Lourenço's envelope, its border included."""
+    """Whether a stress (σ > 0 in tension) [Pa] lies inside or on Lourenço's envelope."""
     return (
         sigma <= tension
         and tau <= cohesion - sigma * friction
@@ -57,7 +57,7 @@ def inside(sigma, tau, tension, cohesion, friction, compression, aspect):
 
 
 def material(joint):
-    """Material of the spheres; bonds get their numbers one by one."""
+    """Material of the spheres; the numbers of each bond are set separately."""
     from yade.wrapper import MortarMat
 
     angle = math.atan(joint["friction"])
@@ -85,7 +85,7 @@ def set_bond(phys, numbers):
 
 
 def failed(phys):
-    """Whether a bond still listed holds no tension: never, broken bonds are taken out."""
+    """Whether a bond still listed holds no tension: always false, since broken bonds are removed."""
     return False
 
 

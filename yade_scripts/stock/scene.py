@@ -12,10 +12,10 @@ from yade_scripts.joints.cohesion import JointParameters
 Array = np.ndarray
 
 INSET = 0.8
-"""Radius of a bond's spheres over the distance of its point from the border of the face: spheres stay inside their
-block and meet their partner alone."""
+"""Radius of a bond's spheres over the distance of its point from the border of the face: the spheres stay inside their
+block and touch only their partner."""
 THIN = 0.25
-"""The same over the smallest width of the block."""
+"""Largest radius of these spheres over the smallest width of the block."""
 
 
 def described(
@@ -43,8 +43,8 @@ def described(
 
 
 def timed(scene: dict, variant: str, end: float, substep: float, records: int) -> dict:
-    """A described scene with the variant of a law, the end [s], and equal records of whole substeps [s], none longer
-    than `substep`."""
+    """A described scene with the variant of a law, the end [s], and equal records of whole substeps of at most
+    `substep` [s]."""
     records = min(records, max(1, int(np.ceil(end / substep * (1.0 - 1e-12)))))
     count = max(1, int(np.ceil(end / records / substep * (1.0 - 1e-12))))
     return scene | {
@@ -78,7 +78,8 @@ def _width(block: Block) -> float:
 
 
 def joint_numbers(joints: JointParameters, friction: float, edge: float) -> dict:
-    """What a law may be matched to: K_0 [Pa/m], T_max [Pa], G_c [J/m²], β, tan φ; edge [m] scales later contacts."""
+    """The joint properties that a law may match: K_0 [Pa/m], T_max [Pa], G_c [J/m²], β, tan φ; edge [m] scales later
+    contacts."""
     return {
         "stiffness": float(joints.stiffness),
         "strength": float(joints.strength),

@@ -18,7 +18,7 @@ FOLDER = Path(__file__).parent
 
 
 class UnknownStockLaw(ValueError):
-    """A name that is no stock law, or a variant that the law does not have."""
+    """The name is no stock law, or the law has no such variant."""
 
 
 @dataclass(frozen=True)
@@ -99,14 +99,14 @@ class ScriptFailed(RuntimeError):
 
 @dataclass(frozen=True)
 class StockRun:
-    """What a script wrote: columns of its table by name, and its figures."""
+    """The results of a script: columns of its table by name, and its figures."""
 
     table: dict[str, np.ndarray]
     figures: dict
 
 
 def run_script(law: StockLaw, scene: dict, folder: Path) -> StockRun:
-    """Write the script of a law into a folder and run just that with `yade`, in a process of its own.
+    """Write the script of a law into a folder and run it with `yade`, in a separate process.
 
     Raises NoYadeCommand, ScriptFailed.
     """

@@ -1,1 +1,1 @@
-"""Generators: lists of blocks from a few numbers. Blocks that shall be joined touch face to face, wholly or in part."""
+"""Generators: lists of blocks from a few numbers. Blocks that are to be joined touch face to face, fully or in part."""

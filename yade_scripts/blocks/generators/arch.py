@@ -70,7 +70,7 @@ class Arch:
 
 
 def arch_blocks(arch: Arch, **more) -> list[Block]:
-    """Voussoirs NAME-0 .. from the side of the smaller coordinate on; more: for every Block."""
+    """Voussoirs NAME-0 .., from the side of the smaller coordinate; more: further fields of every Block."""
     angles = np.linspace(-arch.half_angle, arch.half_angle, arch.count + 1)
     rings = [
         np.stack([r * np.sin(angles), r * np.cos(angles) + arch.rise - arch.radius], axis=1)

@@ -18,14 +18,14 @@ from yade_scripts.blocks.generators.cuts import check_count, equal_cuts, pieces
 from yade_scripts.blocks.polyhedra import BlockError
 
 SAME = 1e-6
-"""Cuts closer than this share of a block's edge are one cut."""
+"""Cuts closer than this share of a block's edge are merged."""
 CLOSE = 1.0 / 3.0
-"""Cuts that nothing asks for give way to the border of an opening within this share of a block's edge."""
+"""Regular cuts are dropped within this share of a block's edge from the border of an opening."""
 
 
 @dataclass(frozen=True)
 class Opening:
-    """A door or window: what of the building lies in the box lower (3,) .. upper (3,) [m] is left out, exactly."""
+    """A door or window: the part of the building in the box lower (3,) .. upper (3,) [m] is left out, exactly."""
 
     lower: Floats
     upper: Floats
@@ -47,7 +47,7 @@ class Building:
     block: edge of a block along walls and slabs [m]
     course: height of a block in the walls [m] (None: as `block`)
     storeys: number of storeys (slabs between them) · roof: slab on top · openings: doors and windows
-    density [kg/m³] · material: of its blocks
+    density [kg/m³] · material: name for friction by pairs
     """
 
     lower: Floats
@@ -89,7 +89,7 @@ class Building:
 
     @property
     def storey_height(self) -> float:
-        """From the foot of one storey to the foot of the next [m]."""
+        """Height from the foot of one storey to the foot of the next [m]."""
         return self.height / self.storeys
 
 
@@ -97,7 +97,7 @@ class Building:
 class _Part:
     """A wall of one storey, or a slab: the box low (3,) .. high (3,) [m] and the wanted edges of its blocks (3,).
 
-    wished: coordinates along x, y, z at which to cut unless an opening is near.
+    wished: preferred cuts along x, y, z, dropped near an opening.
     """
 
     name: str
@@ -111,9 +111,10 @@ class _Part:
 def building_blocks(b: Building) -> list[Block]:
     """Walls, floor slabs and roof of a building, less its openings.
 
-    Slabs lie on the walls, over the whole footprint, and take the top of their storey; corner piers belong
-    to the walls along y, so walls along x fit between them. Where no opening is near, walls and slabs share one grid.
-    The borders of an opening are cuts of the parts it meets, so it has exactly the size asked for.
+    Slabs lie on the walls over the whole footprint and form the top of their storey; corner piers belong to the walls
+    along y, and walls along x fit between them. Where no opening is near, walls and slabs share one grid. The borders
+    of an opening are cuts of the parts it meets, so that it has exactly the given size.
+
     Raises BlockError for an opening that meets no part of the building.
     """
     parts = [part for storey in range(b.storeys) for part in _storey_parts(b, storey)]
@@ -154,7 +155,7 @@ def _storey_parts(b: Building, storey: int) -> list[_Part]:
 
 
 def _wanted_blocks(part: _Part) -> float:
-    """Blocks of a wall or slab without openings, about."""
+    """Approximate number of blocks of a wall or slab without openings."""
     return math.prod(pieces(h - l, edge) for l, h, edge in zip(part.low, part.high, part.edges))
 
 

@@ -1,4 +1,4 @@
-"""A column: drums on one another, as boxes or as prisms of many sides, straight or tapered."""
+"""A column: stacked drums, as boxes or as prisms of many sides, straight or tapered."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from yade_scripts.blocks.polyhedra import BlockError
 
 
 def column_of_boxes(name: str, foot, size, count: int, **more) -> list[Block]:
-    """`count` boxes on one another; size (3,) [m] of the whole column, foot (3,) [m] the middle of its underside."""
+    """A stack of `count` boxes; size (3,) [m] of the whole column, foot (3,) [m] the middle of its underside."""
     size = np.asarray(size, float)
     _check(name, count, size)
     drum = size / np.array([1.0, 1.0, count])

@@ -1,9 +1,9 @@
 """A building over a footprint of any shape without holes: walls as rings of convex strips, slabs of convex pieces.
 
-Each edge of the outline has a wall of the thickness t inside of it; two walls meet on the mitre of their corner. A
-wall is cut across into blocks, quadrilaterals that share whole faces.  A slab is cut along lines through the corners of
-the outline, in the frame of its longest edge, and evenly between them: of a footprint with right angles all pieces are
-rectangles.
+Each edge of the outline has a wall of thickness t on its inner side; two walls meet on the mitre of their corner. A
+wall is cut across into blocks: quadrilaterals in plan, which share whole faces.  A slab is cut along lines through the
+corners of the outline, in the frame of its longest edge, and evenly between them: all pieces of a footprint with right
+angles are rectangles.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from yade_scripts.blocks.polyhedra import BlockError
 SLIVER = 0.01
 """Share of a block's plan below which a piece of a slab beside a slanting edge is left out."""
 SAME = 1e-6
-"""Share of a block's edge within which two cuts are one."""
+"""Share of a block's edge within which two cuts are merged."""
 STRAIGHT = 1e-9
 """Share of the square of an edge below which three points lie on a line."""
 
@@ -78,7 +78,7 @@ def ring_blocks(r: Ring) -> list[Block]:
 
 
 def _wall_plans(r: Ring, inner: Array, storey: int) -> Iterator[tuple[str, Array]]:
-    """Names and plans (4, 2) of the blocks of a course."""
+    """Names and plans (4, 2) [m] of the blocks of a course."""
     for e in range(len(r.outline)):
         f = (e + 1) % len(r.outline)
         share = np.linspace(0.0, 1.0, int(pieces(np.linalg.norm(r.outline[f] - r.outline[e]), r.block)) + 1)[
@@ -92,7 +92,7 @@ def _wall_plans(r: Ring, inner: Array, storey: int) -> Iterator[tuple[str, Array
 
 
 def _inner(r: Ring) -> Array:
-    """Corners (k, 2) of the inside of the walls: where lines t inside of the edges meet."""
+    """Corners (k, 2) [m] of the inner side of the walls: the intersections of the lines at t inside the edges."""
     p, t = r.outline, r.thickness
     along = np.roll(p, -1, axis=0) - p
     along = along / np.linalg.norm(along, axis=1, keepdims=True)
@@ -158,7 +158,7 @@ def _clipped(polygon: Array, axis: int, value: float, sign: float) -> Array:
 
 
 def _clean(polygon: Array, block: float) -> Array:
-    """Without double points and points on straight edges."""
+    """The polygon without double points and points on straight edges."""
     for _ in range(2):
         if len(polygon) < 3:
             return polygon
@@ -190,7 +190,8 @@ def _prism(name: str, plan: Array, low: float, high: float, **more) -> Block:
 
 
 def prisms(name: str, outline: Array, low: float, high: float, **more) -> list[Block]:
-    """Blocks NAME-0 .. under an outline (k, 2) [m] between two levels: a footing; as large as they can be."""
+    """Blocks NAME-0 .. under an outline (k, 2) [m] between two levels [m], such as a footing; the blocks are as large
+    as possible."""
     return [
         _prism(f"{name}-{n}", plan, low, high, **more)
         for n, plan in enumerate(convex_pieces(outline, float(np.ptp(outline, axis=0).max()), name))

@@ -1,7 +1,7 @@
-"""Rubble: loose random blocks scattered in a box, none touching another, the same for the same seed.
+"""Rubble: loose random blocks scattered in a box without contact, the same for the same seed.
 
-Each block gets a free place for the sphere around it (random sequential addition, the large ones first), so it may
-turn freely where it lies. Spheres fill a third of a box at most this way; let them fall to get a denser heap.
+Each block gets a free place for the sphere around it (random sequential addition, the large ones first), so that it can
+turn freely there. Spheres fill a third of a box at most this way; let them fall to get a denser heap.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ TRIES, TRIES_IN_ALL = 5000, 400_000
 FLATTEST = 0.6
 """Smallest ratio of the axes of a stone, and of the edges of a box."""
 CANDIDATES = 8
-"""A corner is the one of so many random points that is farthest from the corners so far (Mitchell 1991)."""
+"""Random points for each corner, of which the one farthest from the corners so far is taken (Mitchell 1991)."""
 
 
 def rubble_blocks(
@@ -41,8 +41,9 @@ def rubble_blocks(
     """`count` blocks in the box lower (3,) + size (3,) [m].
 
     diameter [m]: smallest and largest of the spheres around them, evenly spread · shape: "polyhedra" with `corners`
-    corners on an ellipsoid, "boxes", or "mixed" half and half · more: for every Block
-    Raises BlockError when they find no room.
+    corners on an ellipsoid, "boxes", or "mixed", half of each · more: further fields of every Block
+
+    Raises BlockError when there is no room for them.
     """
     lower, size = np.asarray(lower, float), np.asarray(size, float)
     _check(name, size, count, diameter, shape, corners)
@@ -78,8 +79,8 @@ def _places(name: str, lower: Array, size: Array, radius: Array, random) -> Arra
 
 
 class _Spheres:
-    """Spheres that lie apart. Bins are as wide as the largest one, so only those of the same and the next bins can be
-    in the way of another."""
+    """Spheres that lie apart. Bins are as wide as the largest sphere, so that only spheres of the same and the adjacent
+    bins can overlap."""
 
     def __init__(self, lower: Array, radius: Array):
         self.lower, self.radius, self.width = lower, radius, 2.0 * radius.max()
@@ -87,7 +88,7 @@ class _Spheres:
         self._bins: dict[tuple[int, ...], list[int]] = {}
 
     def put(self, k: int, place: Array) -> bool:
-        """Put sphere k to a place (3,) [m] if it is free."""
+        """Put sphere k at a place (3,) [m] if this is free → whether it was."""
         own = tuple(((place - self.lower) / self.width).astype(int).tolist())
         around = itertools.product(*((i - 1, i, i + 1) for i in own))
         near = [n for key in around for n in self._bins.get(key, ())]

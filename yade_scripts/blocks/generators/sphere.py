@@ -1,7 +1,7 @@
 """Spheres as convex polyhedra: subdivided icosahedra with the volume of the sphere.
 
 With 20, 80 and 320 faces their moments of inertia, equal about all axes, are 1.1, 0.08 and 0.005 % larger than those of
-the sphere; their corners lie 18, 4.6 and 1.2 % beyond it, the middles of their faces 6, 2.3 and 0.6 % within.
+the sphere; their corners lie 18, 4.6 and 1.2 % outside it, the middles of their faces 6, 2.3 and 0.6 % inside.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ FACES = (20, 80, 320)
 
 
 def sphere_vertices(radius: float, faces: int = 80) -> np.ndarray:
-    """Corners (k, 3) [m] around the origin of a polyhedron of so many triangles, one of FACES, with the volume of the
-    sphere of this radius [m]."""
+    """Corners (k, 3) [m], about the origin, of a polyhedron with this number of triangles, one of FACES, and with the
+    volume of the sphere of this radius [m]."""
     golden = 0.5 * (1.0 + np.sqrt(5.0))
     corners = [(0, a, b * golden) for a in (-1, 1) for b in (-1, 1)]
     x = np.array([np.roll(c, s) for c in corners for s in range(3)], float)

@@ -21,7 +21,8 @@ def wall_of_blocks(
 
     bond: "stack" (joints in line) or "running": every other course along the wall is shifted by half a block, with
     half blocks at its ends; where the wall is several blocks thick, neighbouring wythes are shifted against each
-    other as well · along: "x" or "y", the length of the wall; None: its longer side · more: for every Block
+    other as well · along: "x" or "y", direction of the length of the wall; None: its longer side · more: further fields
+    of every Block
     """
     lower, size, block = (np.broadcast_to(np.asarray(v, float), (3,)) for v in (lower, size, block))
     _check(name, size, block, bond, along)
