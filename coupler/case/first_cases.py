@@ -22,7 +22,7 @@ class CannotBegin(SurgebreakError):
 
 @dataclass(frozen=True)
 class Question:
-    """What is asked for a $name: question · answer that is taken without one · unit, "" of a plain number, None of
+    """A question for a $name: its text · default answer · unit, "" of a plain number, None of
     the name of a material."""
 
     text: str
@@ -255,7 +255,7 @@ def _answer(question: Question, ask: Callable[[str, str], str] | None) -> str:
 
 
 def _checked(given: str, unit: str | None) -> str:
-    """With a unit; a plain number has that of the question."""
+    """An answer with its unit; a plain number has the unit of the question."""
     if unit is None:
         if given not in PRESETS:
             raise UnitError(f"{given!r} is no material{did_you_mean(given, list(PRESETS))}")

@@ -44,7 +44,7 @@ class Record:
 
     @property
     def varies(self) -> bool:
-        """Whether it says how the wave differs along the side."""
+        """Whether the record varies along the side."""
         return len(self.along) > 1
 
     def level_at(self, time: float) -> float:
@@ -185,7 +185,7 @@ def _into(spec: RecordInflow, turn: float, u: Array, v: Array) -> tuple[Array, A
 def _as_record(
     path: Path, spec: RecordInflow, turn: float, time: Array, level: Array, u: Array, v: Array
 ) -> Record:
-    """Of one place; times that a model wrote twice count once, the last time."""
+    """The record of one place; of a time that a model wrote twice, the last line counts."""
     last = np.concatenate([np.diff(time) > 0.0, [True]])
     if (np.diff(time) < 0.0).any():
         raise RecordError(f"{path}: its times run back; it holds two runs: keep one of them")

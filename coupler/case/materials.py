@@ -87,7 +87,7 @@ def with_strength(case: Case) -> tuple[Case, list[tuple[KeyPath, str]]]:
     """The case with strength and opening of all joints, and what is missing for that.
 
     Where every block that can move is of a preset, all joints follow from presets, and [joints] need not say them; the
-    weakest of the presets stands for them then. What is missing is made up, so that the rest can be checked too."""
+    weakest of the presets stands for them then. Missing values are filled in, so that the rest can be checked too."""
     j = case.joints
     if j is None or (j.strength is not None and j.opening_at_failure is not None):
         return case, []
@@ -106,7 +106,7 @@ def with_strength(case: Case) -> tuple[Case, list[tuple[KeyPath, str]]]:
 
 
 def _why(others: list[str], used: dict[str, Material]) -> str:
-    """Which material has no strength of its own."""
+    """The end of a message that names a material without a preset; empty without one."""
     if not others:
         return ""
     hint = did_you_mean(others[0], list(PRESETS))

@@ -91,7 +91,7 @@ def _near(value: object, expected: str) -> str:
 
 
 def _kind(path: KeyPath, kind: str, context: dict) -> tuple[KeyPath, str]:
-    """A gauge or an inflow of no kind, or of one that there is not."""
+    """A gauge or an inflow without a kind, or of an unknown kind."""
     what, kinds = (
         ("what comes in", INFLOW_KINDS) if path[0] == "water" else ("what the gauge measures", GAUGE_KINDS)
     )

@@ -23,9 +23,9 @@ class BadPath(SurgebreakError):
 
 
 def place_of(text: str | Path, directory: Path) -> Path:
-    """Where a path of the case leads, from `directory`; ~ is a home. What stands there is not looked at.
+    """Where a path of the case leads, from `directory`; ~ is a home. Whether it exists is not checked.
 
-    Raises BadPath for what no file can be called."""
+    Raises BadPath for a text that cannot be a file name."""
     try:
         path = (directory / Path(text).expanduser()).resolve()
         os.stat(path)
@@ -85,6 +85,6 @@ def _nearest(path: Path) -> str:
 
 
 def stamp(path: str) -> tuple[int, int]:
-    """Time of the last change [ns] and size [B] of a file: by these it is read again or not."""
+    """Time of the last change [ns] and size [B] of a file: a change of these means that it is read again."""
     there = os.stat(path)
     return there.st_mtime_ns, there.st_size

@@ -20,7 +20,7 @@ SHIPPED = Path(__file__).parent.parent / "reference"
 
 
 class NoSuchData(BadCase):
-    """A case names a record or a column that is not there."""
+    """A case names a record or a column that does not exist."""
 
 
 def find_record(file: str | Path, directory: Path) -> Path:

@@ -28,7 +28,8 @@ class Schedule:
 
     @classmethod
     def of(cls, case: Case) -> Schedule:
-        """That of a new run: with the interval of the case if it divides the end, else with one near it that does."""
+        """The schedule of a new run, with the interval of the case if it divides the end, else with a near one that
+        does."""
         end, every = case.time.end, case.time.output_every
         count = max(1, round(end / every)) if every else OUTPUTS
         if every is not None and abs(every * count - end) < ROUNDING * every:

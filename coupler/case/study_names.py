@@ -17,7 +17,7 @@ def without_places(name: str) -> tuple[str, ...]:
 
 
 def study_problems(study: Study) -> Iterator[tuple[KeyPath, str]]:
-    """(key path, message) of names in [study] that are not there."""
+    """(key path, message) of names in [study] that do not exist."""
     yield from _taken("quantity", study.quantity)
     yield from _taken("ladder", study.ladder)
     yield from _taken("off", study.off)

@@ -29,7 +29,7 @@ Problem = tuple[tuple[str | int, ...], str]
 
 
 def sweep_problems(sweep: Sweep) -> Iterator[Problem]:
-    """(key path, message) of everything in [sweep] that is not there, or there twice."""
+    """(key path, message) of every name in [sweep] that does not exist, or is used twice."""
     yield from _keys(sweep)
     yield from _amounts(sweep)
     yield from _columns(sweep)
@@ -37,7 +37,7 @@ def sweep_problems(sweep: Sweep) -> Iterator[Problem]:
 
 
 def design_problems(sweep: Sweep) -> Iterator[Problem]:
-    """What does not go together, once --vary has added to the section."""
+    """Combinations in [sweep] that are not allowed, checked after --vary has added to the section."""
     drawn = [v for v in sweep.vary if v.distribution]
     if sweep.samples > 1 and not drawn:
         yield (

@@ -8,14 +8,14 @@ from collections.abc import Mapping
 
 
 def document(table: Mapping) -> str:
-    """A whole file; tables get headers of their own. Raises TypeError for what TOML has no form of."""
+    """A whole file; tables get headers of their own. Raises TypeError for a value that TOML cannot express."""
     return "\n".join(_lines(table, ())).lstrip("\n") + "\n"
 
 
 def inline(value: object) -> str:
     """A value on one line, as it stands after a `=`; numpy numbers and arrays as numbers and lists.
 
-    Raises TypeError for what TOML has no form of (None among them).
+    Raises TypeError for a value that TOML cannot express, such as None.
     """
     if hasattr(value, "tolist"):
         value = value.tolist()

@@ -1,4 +1,4 @@
-"""Quantities at the door: text with a unit becomes a float in SI; plain numbers are SI already.
+"""Input of quantities: text with a unit becomes a float in SI; plain numbers are in SI already.
 
     to_si("24 kN/m3", "N/m3") = 24000.0        to_si(24000, "N/m3") = 24000.0
 
@@ -80,7 +80,7 @@ class InSI(GroupedMetadata):
 
 @dataclass(frozen=True)
 class _ForEditors:
-    """What a quantity is in the JSON Schema: a number, or a text that begins with one."""
+    """A quantity in the JSON Schema: a number, or a text that begins with one."""
 
     unit: str
 
@@ -164,7 +164,8 @@ def _near(given: str) -> str:
 
 
 def _is_angle(source: Any) -> bool:
-    """Pint counts angles as plain numbers; a friction of "30 deg" is a mistake all the same."""
+    """Whether a quantity contains an angle: pint treats angles as plain numbers, but a friction of "30 deg" is a
+    mistake."""
     return any(name == "radian" for name, _ in source.to_root_units().unit_items())
 
 

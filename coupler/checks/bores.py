@@ -6,8 +6,8 @@ has the head for the flow over the edge, critical there (the depth on dry ground
     u₃ = u₂ - (h₃ - h₂) sqrt(g (h₂ + h₃) / (2 h₂ h₃)),    h₃ u₃ = q,    h₃ + u₃²/2g = z + 3/2 (q²/g)^(1/3)
 
 A slower bore lowers the level in front of the edge instead, u₃ = u₂ + 2 (sqrt(g h₂) - sqrt(g h₃)); a faster one (u₂ >
-sqrt(g h₂)) whose head is enough passes without a bore back, with its own q and head. Stopped by a wall, h₃ is where u₃
-= 0. Stoker, Water Waves, 1957, 10.6 (shocks, drops); Henderson, Open Channel Flow, 1966, 2.5 (steps). On dry ground
+sqrt(g h₂)) whose head is enough passes without a bore back, with its own q and head. Stopped by a wall, h₃ follows from
+u₃ = 0. Stoker, Water Waves, 1957, 10.6 (shocks, drops); Henderson, Open Channel Flow, 1966, 2.5 (steps). On dry ground
 there is no shock: the water thins out to a tip that runs at u + 2 sqrt(g h) (Ritter, Z. VDI 36, 1892, 947-954). The
 theory has no friction or losses and assumes a structure as wide as the tank; it is an upper bound where water can flow
 around."""
@@ -55,8 +55,8 @@ class Bore:
 
 
 def bores(case: Case) -> Iterator[Bore]:
-    """Of every bore, on water or dry ground, where it meets the structure; none over terrain, where the bed
-    changes it on its way."""
+    """Every bore, on water or dry ground, where it meets the structure. There are none over terrain, whose bed changes
+    a bore on its way."""
     if case.water is None or case.tank is None or not case.tank.is_box or case.structure is None:
         return
     found = _structure(case)
@@ -124,7 +124,7 @@ def over_step(depth: float, velocity: float, step: float, g: float) -> tuple[flo
         return 0.0, 0.0
 
     def excess(back: float) -> float:
-        """Water that comes to the edge over what can pass it, where the water before it is `back` deep."""
+        """Discharge that reaches the edge in excess of what can pass it, where the water before it is `back` deep."""
         u = _behind_back(depth, velocity, back, g)
         head = max(back + u * u / (2.0 * g) - step, 0.0)
         return back * u - math.sqrt(g) * (2.0 / 3.0 * head) ** 1.5
@@ -140,7 +140,7 @@ def over_step(depth: float, velocity: float, step: float, g: float) -> tuple[flo
 
 
 def against_wall(depth: float, velocity: float, g: float) -> float:
-    """Depth [m] of water of this depth [m] and velocity [m/s] that a wall stops."""
+    """Depth [m] at a wall that stops water of this depth [m] and velocity [m/s]."""
     return _root(
         lambda back: _behind_back(depth, velocity, back, g), depth, depth + 4.0 * _rise(depth, velocity, g)
     )
@@ -158,7 +158,7 @@ def _behind_back(depth: float, velocity: float, back: float, g: float) -> float:
 
 
 def _passing(depth: float, velocity: float, step: float, g: float) -> tuple[float, float]:
-    """Fast water that keeps its discharge and its head over a step."""
+    """Depth [m] and velocity [m/s] of supercritical water over a step, with unchanged discharge and head."""
     q, head = depth * velocity, depth + velocity * velocity / (2.0 * g) - step
     critical = (q * q / g) ** (1.0 / 3.0)
     there = _root(lambda h: h + q * q / (2.0 * g * h * h) - head, 1e-6 * critical, critical)
@@ -166,7 +166,7 @@ def _passing(depth: float, velocity: float, step: float, g: float) -> tuple[floa
 
 
 def _root(value: Callable[[float], float], low: float, high: float) -> float:
-    """Where a falling function passes zero, by halving."""
+    """Zero of a decreasing function, by bisection."""
     for _ in range(80):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if value(middle) > 0.0 else (low, middle)
@@ -191,7 +191,8 @@ def _structure(case: Case) -> tuple[str, np.ndarray, np.ndarray] | None:
 
 
 def _edge(case: Case, axis: int, inward: float, top: float, face: float) -> float:
-    """Where the ground at this height [m] begins, as the bore comes; the face of the structure where nothing is."""
+    """Coordinate [m] at which the ground at this height [m] begins, seen from the bore; without any, the structure's
+    face."""
     ends = [
         solid.vertices[:, axis].min() if inward > 0 else solid.vertices[:, axis].max()
         for solid in solids_of(case)

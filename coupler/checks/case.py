@@ -45,7 +45,7 @@ WEAKEST = 1.0
 
 
 def problems(case: Case) -> list[Problem]:
-    """Everything that is wrong with a case whose sections are valid one by one."""
+    """All faults of a case whose sections are valid one by one."""
     wrong_frames = [*frame_problems(case), *refused_solids(case), *town_problems(case), *land_problems(case)]
     found = [*_sections(case), *_study(case), *wrong_frames]
     if wrong_frames or (case.tank is not None and not is_measured(case.tank)):
@@ -73,7 +73,7 @@ def _study(case: Case) -> Iterator[Problem]:
 
 
 def remarks(case: Case) -> list[str]:
-    """What is allowed but worth knowing before the run."""
+    """Remarks on what is allowed but should be known before the run."""
     found = [
         *thin_remarks(case),
         *_contact_remarks(case),
@@ -89,7 +89,7 @@ def remarks(case: Case) -> list[str]:
 
 
 def thin_remarks(case: Case) -> Iterator[str]:
-    """Bodies too thin for single covers, told once for the thinnest."""
+    """Bodies too thin for single covers, reported once for the thinnest."""
     if case.tank is None or case.water is None or case.water.covers != "single":
         return
     cell = finest_cell(case.tank)
@@ -153,7 +153,7 @@ def _law_remarks(case: Case) -> Iterator[str]:
 
 
 def _loose_remarks(case: Case) -> Iterator[str]:
-    """Walls and buildings are rarely meant to be dry."""
+    """Joints that are absent: walls and buildings are rarely meant to be dry-laid."""
     if case.structure is None or case.joints is not None:
         return
     for part in (*case.structure.wall, *case.structure.building):
@@ -169,7 +169,7 @@ def _contact_remarks(case: Case) -> Iterator[str]:
 
 
 def _unit_remarks(case: Case) -> Iterator[str]:
-    """Values that nobody builds with: most likely another unit was meant."""
+    """Implausible values, for which most likely another unit was meant."""
     blocks = [block for part in parts_of(case) for block in part.blocks]
     for block in blocks:
         if not LIGHTEST <= block.density <= HEAVIEST:
@@ -190,7 +190,7 @@ def _unit_remarks(case: Case) -> Iterator[str]:
 
 
 def _window_remarks(case: Case) -> Iterator[str]:
-    """Sums that never begin."""
+    """Windows of impulses that begin after the end of the run."""
     for gauge in case.gauge:
         window = getattr(gauge, "impulse", None)
         if window is not None and window[0] >= case.time.end:
@@ -219,7 +219,7 @@ def _sections(case: Case) -> Iterator[Problem]:
 
 
 def _outputs(case: Case) -> Iterator[Problem]:
-    """A step ends at each output, so that too many of them make a run endless and fill the disk."""
+    """Too many outputs: a step ends at each of them, so that a run would never end and would fill the disk."""
     end, every = case.time.end, case.time.output_every
     if every is not None and end > MOST_OUTPUTS * every:
         yield (
@@ -335,7 +335,7 @@ def _made(case: Case, skipped: set[KeyPath]) -> tuple[list[Part], list[Problem]]
 
 
 def _unique_names(case: Case, parts: list[Part]) -> Iterator[Problem]:
-    """One name for one body, group of blocks, or gauge of a kind."""
+    """Names that are used for more than one body, group of blocks, or gauge of a kind."""
     places: dict[str, KeyPath] = {}
     bodies = [(("solid", i), solid.name) for i, solid in enumerate(case.solid)]
     for path, name in [*bodies, *((r.path, r.name) for r in recipes(case))]:
@@ -359,7 +359,7 @@ def _unique_names(case: Case, parts: list[Part]) -> Iterator[Problem]:
 
 
 def _known_names(case: Case, parts: list[Part]) -> Iterator[Problem]:
-    """Motions and gauges name what there is; what could not be made is taken for granted."""
+    """Unknown names in motions and gauges; parts that could not be made are assumed to be known."""
     blocks = [block.name for part in parts for block in part.blocks]
     several = [part.name for part in parts] + [b.group for part in parts for b in part.blocks]
     moving, solids = list(dict.fromkeys([*several, *blocks])), [solid.name for solid in case.solid]

@@ -13,7 +13,8 @@ Problem = tuple[KeyPath, str]
 
 
 def joint_problems(case: Case, parts: list[Part]) -> Iterator[Problem]:
-    """Joints that give contact no stiffness, since no faces touch, and blocks that neither joint nor contact hold."""
+    """Cases in which no faces touch, so that joints give contact no stiffness; blocks held by neither joint nor
+    contact."""
     if case.joints is None or not parts or (case.contact and case.contact.stiffness is not None):
         return
     blocks, joined = joined_blocks(case, parts)

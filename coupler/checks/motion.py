@@ -40,7 +40,7 @@ def _passed(case: Case, path: KeyPath, motion, body: Body, walls) -> Iterator[Pr
 
 
 def _walls(case: Case) -> Iterator[tuple[str, int, float, float]]:
-    """What blocks cannot pass: its name, the axis across it, the sign of the way out, and its place [m]."""
+    """Boundaries that blocks cannot pass: name, axis normal to it, sign of the outward direction, and position [m]."""
     if case.structure.ground is not None:
         yield "the ground", 2, -1.0, case.structure.ground.level
     for axis, letter in enumerate("xyz" if case.tank is not None else ""):

@@ -44,8 +44,8 @@ def solid_bodies(case: Case) -> list[Placed]:
 
 
 def frame_problems(case: Case) -> Iterator[Problem]:
-    """Turns without a direction, boxes whose corners are in the wrong order, and parts on a terrain that is not there;
-    nothing else can be checked then."""
+    """Rotations without an axis, boxes whose corners are in the wrong order, and parts on a terrain that is absent;
+    with any of these, nothing else can be checked."""
     for path, _ in standing_on_terrain(case):
         if case.terrain is None:
             yield (*path, "on"), "there is no section [terrain] to stand on; write one, or leave `on` out"
@@ -61,7 +61,7 @@ def frame_problems(case: Case) -> Iterator[Problem]:
 
 
 def place_problems(case: Case, parts: list[Part]) -> Iterator[Problem]:
-    """Everything about places; parts: those of the structure that could be made."""
+    """All faults of positions; parts: those of the structure that could be made."""
     solids = solid_bodies(case)
     blocks = [(part.path, part.name, Body.of_block(b)) for part in parts for b in part.blocks]
     yield from _tank(case)
@@ -94,7 +94,7 @@ def _tank(case: Case) -> Iterator[Problem]:
 
 
 def _memory(case: Case) -> Iterator[Problem]:
-    """A mesh that this machine cannot hold: the system would kill the run without a word."""
+    """A mesh too large for the memory of this machine: the system would kill the run without a message."""
     cells, _ = mesh_size(case.tank)
     needed, there = BYTES_PER_CELL * cells, os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     if needed > there and case.tank.mesh is not None:
@@ -266,7 +266,7 @@ def _may_overlap(path: KeyPath, other: KeyPath) -> bool:
 
 
 def _submerged_fills(case: Case, bodies: list[Placed]) -> Iterator[Problem]:
-    """A body in the water displaces it; a fill that one body swallows whole is a mistake."""
+    """Fills that lie wholly inside one body. A body displaces water, but such a fill is a mistake."""
     for i, fill in enumerate(case.water.fill if case.water else ()):
         corners = Body.between(fill.lower, fill.upper).vertices
         for _, name, body in bodies:
@@ -331,7 +331,7 @@ def _gauges(case: Case, held: list[Placed]) -> Iterator[Problem]:
 
 
 def _patch(path: KeyPath, gauge) -> Iterator[Problem]:
-    """Patches have a shape and an area, windows a length."""
+    """Patches without a shape or an area, and windows without a length."""
     if gauge.kind == "patch" and (gauge.edges is None) == (gauge.radius is None):
         yield path, f"'{gauge.name}' needs either edges (a parallelogram) or radius and normal (a disc)"
     elif gauge.kind == "patch" and gauge.radius is not None and not np.any(gauge.normal or 0.0):

@@ -81,7 +81,8 @@ def load(
 
 
 def from_text(text: str, name: str, directory: Path, overrides: Iterable[str] = ()) -> CaseFile:
-    """A case that is no file, from its TOML text and the overrides; checked as a file is, but for `expected.toml`.
+    """A case that is not a file, from its TOML text and the overrides. It is checked like a file, without
+    `expected.toml`.
 
     name: what messages call it · directory: from which paths in the case are meant.
     Raises BadCase with one line for each mistake.
@@ -96,8 +97,8 @@ def from_text(text: str, name: str, directory: Path, overrides: Iterable[str] = 
 def changed(table: dict, override: str) -> dict:
     """The table of a case with one more override; the given one stays as it is.
 
-    Raises BadCase where the name is unknown, or the value nothing that the name may have; what it means beside the rest
-    of the case is left to `load` and `from_text`.
+    Raises BadCase where the name is unknown or the value is not allowed for it. Checks against the rest of the case
+    are left to `load` and `from_text`.
     """
     found, places = copy.deepcopy(table), _Places("", {})
     path = _apply(found, override)
@@ -122,8 +123,8 @@ def _checked(
 
 
 def _place_files(table: dict, directory: Path) -> list[tuple[KeyPath, str]]:
-    """Paths in the case are meant from its directory: those that lead nowhere, and why; what is no path is refused
-    later."""
+    """Resolve the paths in a case from its directory; return those that lead nowhere, with the reason. Values that are
+    no paths are refused later."""
     found = [((*path, "path"), entry, "path") for path, entry in _named_files(table)]
     found += [((*path, "tide", "path"), tide, "path") for path, tide in _tides(table)]
     found += [((*path, "surface"), fill, "surface") for path, fill in _tables_of_water(table, "fill")]
@@ -226,7 +227,7 @@ def _is_utf_8(text: str) -> bool:
 
 
 def _shown(path: Path) -> str:
-    """The path as the user is likely to write it: relative to here when it lies below."""
+    """The path as the user is likely to write it: relative to the working directory if it lies below."""
     here = Path.cwd()
     return str(path.relative_to(here) if path.is_absolute() and path.is_relative_to(here) else path)
 
@@ -257,7 +258,7 @@ def table_of(text: str, name: str) -> dict:
 
 
 def _check_readable(table: object, place: str) -> None:
-    """Refuse what no message could show: tables deeper in one another than any case, numbers of thousands of digits."""
+    """Refuse what no message could show: tables nested deeper than in any case, numbers of thousands of digits."""
     level = [table]
     for _ in range(DEEPEST):
         inner = [item.values() if isinstance(item, dict) else item for item in level]
@@ -303,7 +304,7 @@ def _apply(table: dict, override: str) -> KeyPath:
 
 
 def _leave_out(table: dict, path: KeyPath, override: str) -> None:
-    """Take a name of the schema out of the table, if it is there."""
+    """Remove a name of the schema from the table, if it is there."""
     if find(path) is None:
         name = shown(path)
         raise BadCase(
@@ -329,7 +330,7 @@ def parse_path(name: str) -> KeyPath:
 
 
 def _step_into(holder: dict | list, part: str | int, new: dict | list | None, override: str):
-    """The thing under `part`, made when a name is new; refuses places that do not exist."""
+    """The value under `part`, which is created for a new name; list places that do not exist are refused."""
     if part == NEW:
         raise BadCase([f"--set {_cut(override)}: [+] adds to a list, and this is none"])
     if isinstance(part, int):

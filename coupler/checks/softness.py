@@ -14,10 +14,10 @@ STANDING = ("wall", "building", "column", "arch", "town")
 
 
 def softness_remarks(case: Case) -> Iterator[str]:
-    """The block that sinks deepest for its thickness, if that is beyond `limits.overlap`.
+    """The block with the largest overlap relative to its thickness, if that is beyond `limits.overlap`.
 
-    A weight W sinks by W/K, and a mass m that lands with v by v sqrt(m/K); v is that at the start and of the free
-    fall to the ground or the floor of the tank."""
+    A weight W overlaps by W/K, and a mass m that lands with the speed v by v sqrt(m/K). The speed v is that at the
+    start and of the free fall to the ground or the floor of the tank."""
     if case.structure is None or case.contact is None:
         return
     worst, limit = None, case.limits.overlap
@@ -57,7 +57,7 @@ def _carried(part: Part) -> float:
 
 
 def _stiffness(case: Case, block) -> float | None:
-    """K [N/m] of a face of a block as the run will take it; None where there is nothing to take it from."""
+    """K [N/m] of a face of a block as the run will use it; None where nothing determines it."""
     if case.contact.stiffness is not None:
         return case.contact.stiffness
     j = case.joints
@@ -71,7 +71,7 @@ def _stiffness(case: Case, block) -> float | None:
 
 
 def _fall(case: Case, part: Part, block) -> float:
-    """Height [m] from which a block that nothing holds falls to the ground or the floor of the tank."""
+    """Height [m] from which a block without support falls to the ground or the floor of the tank."""
     floors = [case.structure.ground.level] if case.structure.ground else []
     floors += [case.tank.lower[2]] if case.tank is not None else []
     if not floors or part.path[1] in STANDING or (case.joints is not None and part.path[1] != "rubble"):

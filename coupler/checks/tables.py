@@ -43,7 +43,7 @@ def _places(gauge) -> list[str]:
 
 
 def column_names(gauge) -> list[str]:
-    """Columns of a gauge in the common table; on which bodies it is changes none of them."""
+    """Columns of a gauge in the common table; they do not depend on its bodies."""
     if gauge.kind == "patch":  # its shape may still be wrong
         gauge = gauge.model_copy(update={"edges": None, "radius": 1.0, "normal": (0.0, 0.0, 1.0)})
     rows = defaultdict(lambda: np.zeros(1, int))

@@ -49,7 +49,7 @@ BROUGHT_AT, LAYERS = 401, 8
 
 
 def water_problems(case: Case) -> Iterator[Problem]:
-    """Everything about [water] that needs more than one of its names."""
+    """All faults of [water] that involve more than one of its keys."""
     if case.water is None:
         return
     w = case.water
@@ -113,7 +113,7 @@ def _thin_water(case: Case) -> Iterator[str]:
 
 
 def _drops(case: Case) -> Iterator[Problem]:
-    """Boxes of water in the air that are thinner than the surface on both of their sides can be."""
+    """Boxes of water in the air that are too thin to hold a surface on each of their two sides."""
     for i, fill in enumerate(case.water.fill):
         edge = min(_free_edges(case, fill, ends=2), default=math.inf)
         if edge < LEAST_DROP * case.tank.cell * (1.0 - SLACK):
@@ -125,8 +125,8 @@ def _drops(case: Case) -> Iterator[Problem]:
 
 
 def _free_edges(case: Case, fill, ends: int = 1) -> Iterator[float]:
-    """Edges [m] of a box of water between two ends of which this many at least are free: neither at a wall nor in other
-    water. From wall to wall it is a slice, whatever its width; on the floor it is a layer."""
+    """Edges [m] of a box of water of whose two ends at least `ends` are free, that is neither at a wall nor in other
+    water. A box from wall to wall is a slice, whatever its width; one on the floor is a layer."""
     slack = SLACK * case.tank.cell
     for axis in range(3):
         low, high = fill.lower[axis], fill.upper[axis]
@@ -178,8 +178,8 @@ def _walls(w) -> Iterator[Problem]:
 
 
 def _filled_up(case: Case) -> Iterator[Problem]:
-    """Inflows into a tank without a way out but its open top, which they fill before the end: what they bring is given,
-    and no more than spray leaves by the top."""
+    """Inflows into a tank without a way out but its open top, which they fill before the end: their discharge is
+    given, and only spray leaves by the top."""
     if set(case.tank.open) - {"z+"} or case.water.sea:
         return
     way_out, share = ("no way out but its open top", SPRAY) if case.tank.open else ("no way out", 1.0)
@@ -244,7 +244,7 @@ def _depth_behind(ahead: float, speed: float, gravity: float) -> float:
 
 
 def _brought(case: Case, spec) -> float:
-    """Volume [m3] that an inflow brings until the end of the run, at the most that it has brought at any time."""
+    """Largest volume [m³] that an inflow has brought at any time until the end of the run."""
     along = bed_along(case.tank, spec.side)
     middle, bed = 0.5 * (along[1:] + along[:-1]).T
     axis, sign = "xyz".index(spec.side[0]), 1.0 if spec.side[1] == "-" else -1.0

@@ -1,8 +1,8 @@
-"""A basin from a mesh file as blocks see it: walls, which are planes around it, and the bed, a height map.
+"""A basin from a mesh file as blocks meet it: its walls, which are planes around it, and its bed, a height map.
 
-A face of the boundary steeper than the steepest bed, or one that looks down, is of a wall: its plane may have nothing
-of the basin behind it.  All other faces are the bed; no two of them may lie over one another.  A level bed is the floor
-of the box around the mesh, any other is sampled on a lattice of an eighth of the smallest cell.
+A boundary face that is steeper than the steepest bed, or that faces downwards, belongs to a wall; no part of the basin
+may lie behind its plane.  All other faces form the bed; no two of them may lie above one another.  A level bed is the
+floor of the box around the mesh, any other is sampled on a lattice of an eighth of the smallest cell.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ MOST_WALLS = 400
 
 
 class BasinError(ValueError):
-    """A basin in which blocks would not know where its walls are; the message names the place."""
+    """A basin whose walls are not well defined for blocks; the message names the place."""
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,7 @@ def _found(key: _Key) -> Basin:
 
 
 def _in_sides(mesh, normal: Array, centre: Array) -> Array:
-    """(B,) bool: faces in the sides of the box around the mesh."""
+    """(B,) bool: whether each face lies in a side of the box around the mesh."""
     flat = np.abs(normal).max(axis=1) > 1.0 - SAME_PLANE
     axis = np.abs(normal).argmax(axis=1)
     side = mesh.bounds[(normal[np.arange(len(axis)), axis] > 0.0).astype(int), axis]
@@ -143,7 +143,7 @@ def _plan_area(corners: Array) -> Array:
 
 
 def _covers_plan(mesh, bed: Array, steep_normal: Array, steep: Array) -> None:
-    """That the bed and the steep walls above it lie over every place of the plan once."""
+    """Check that the bed and the steep walls above it cover every place of the plan exactly once."""
     from scipy.spatial import ConvexHull
 
     hull = ConvexHull(mesh.nodes[:, :2]).volume

@@ -1,8 +1,8 @@
 """Blocks from mesh files: each volume cell, or each closed convex surface, is one block.
 
-The corners of all cells are first welded, so that faces which are one in the drawing are one to the bit, and joints
-are found from shared or touching faces. Formats, kinds of cells and units are meshio's and the user's affair; what
-is no convex block is refused with the number of the cell or surface and its place.
+The corners of all cells are first welded, so that faces shared in the drawing coincide to the last bit, and joints
+are found from shared or touching faces. meshio reads the formats and kinds of cells, and the user gives the unit. A
+body that is not a convex block is refused with the number of the cell or surface and its place.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def blocks_from_file(spec, **common) -> list:
 
 
 def _weld(path: Path, points: Array, cells: dict, single: bool, spec) -> float:
-    """Distance [m] within which corners are one; refuses coordinates that are too coarse for the blocks."""
+    """Distance [m] within which corners are merged; refuses coordinates that are too coarse for the blocks."""
     rings = [points[rows] for kind, rows in cells.items() if kind not in IGNORED and len(rows)]
     if not rings:
         raise MeshFileError(

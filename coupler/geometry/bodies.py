@@ -56,7 +56,7 @@ class Body:
         return float(np.ptp(self.vertices @ self.normals.T, axis=0).min())
 
     def depth(self, points: np.ndarray) -> np.ndarray:
-        """How far inside the points (n, 3) lie [m]; negative: outside."""
+        """Depth (n,) [m] of the points (n, 3) inside the body; negative: outside."""
         middle = self.vertices.mean(axis=0)
         offsets = ((self.vertices - middle) @ self.normals.T).max(axis=0)
         return (offsets - (points - middle) @ self.normals.T).min(axis=1)
@@ -76,12 +76,12 @@ def rotation_matrix(axis, angle: float) -> np.ndarray:
 
 
 def turned(rotation) -> np.ndarray:
-    """(3, 3) of a turn as cases give it, with axis and angle [rad]; None: along the axes."""
+    """Matrix (3, 3) of a rotation as cases give it, with axis and angle [rad]; None: no rotation."""
     return np.eye(3) if rotation is None else rotation_matrix(rotation.axis, rotation.angle)
 
 
 def overlap_depth(a: Body, b: Body, enough: float = 0.0) -> float:
-    """How far one body must move for the two to part [m]; ≤ 0: they do not overlap.
+    """Smallest displacement [m] of one body that separates the two; ≤ 0: they do not overlap.
 
     enough [m]: an overlap that is not larger is returned without looking for the axis that makes it smallest.
     """

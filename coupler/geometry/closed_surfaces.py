@@ -1,4 +1,4 @@
-"""Closed surfaces in a heap of polygons, and whether each bounds a convex body.
+"""Closed surfaces in an unordered set of polygons, and whether each bounds a convex body.
 
 Polygons join along edges. Where blocks stand edge to edge or face to face, four and more polygons share an edge: each
 block then lies between a polygon that runs along the edge forwards and the next one around it that runs backwards.
@@ -64,7 +64,7 @@ def _volume(points: Array, loops: list[Array]) -> float:
 
 
 def _without_repeats(loop: Array) -> Array:
-    """A polygon without corners that welding put on the one before."""
+    """A polygon without corners that welding merged with the one before."""
     return loop[loop != np.roll(loop, 1)]
 
 

@@ -172,7 +172,7 @@ def _convert(path: str, out: str, source: str = "", target: str = "") -> None:
 
 
 def _plain(value):
-    """A value of an attribute as JSON has it."""
+    """The value of an attribute as plain data for JSON."""
     return (
         value.item()
         if isinstance(value, np.generic)

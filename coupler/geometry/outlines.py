@@ -1,4 +1,4 @@
-"""Footprints of buildings that are no rectangles."""
+"""Footprints of buildings that are not rectangular."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which blocks are in one another, and how deep for their thickness."""
+"""Overlapping blocks, and the depth of overlap relative to their thickness."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ class Overlap:
 
 
 def deepest_overlap(structure, limit: float) -> Overlap | None:
-    """The pair that is deepest in one another, if that is more than `limit` of the thinner one; else None.
+    """The pair with the largest relative overlap, if that is more than `limit` of the thinner block; else None.
 
-    Depths that the contacts bound from above are found exactly where they seem too large."""
+    The contacts give upper bounds of the depths; those that seem too large are computed exactly."""
     a, b, depth, share = structure.deepest()
     for p in np.argsort(-share, kind="stable"):
         if share[p] <= limit:
@@ -37,7 +37,7 @@ def deepest_overlap(structure, limit: float) -> Overlap | None:
 
 
 def _exact(structure, a: int, b: int) -> float:
-    """Least way that parts two blocks where they are [m]."""
+    """Smallest displacement [m] that separates two blocks in their present positions."""
     centre, rotation = structure.centre(), structure.rotation()
     first, second = (
         Body.of_block(structure.blocks[row].changed(centre=centre[row], rotation=rotation[row]))

@@ -17,7 +17,7 @@ from coupler.geometry.bodies import turned
 
 @dataclass(frozen=True)
 class Part:
-    """What one table of the structure makes: where it is written, its name, and its blocks."""
+    """The blocks of one table of the structure, with its key path and its name."""
 
     path: KeyPath
     name: str
@@ -49,7 +49,7 @@ def _made(case: Case, stamps: tuple) -> tuple[Part, ...]:
 
 
 def recipes(case: Case) -> Iterator[Recipe]:
-    """Every part of the structure, not made yet."""
+    """Recipes of all parts of the structure."""
     if case.structure is None:
         return
     driven = {motion.block: motion.velocity for motion in case.motion}

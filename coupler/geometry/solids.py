@@ -1,6 +1,6 @@
 """The fixed solids of a case as convex bodies in space: boxes, hulls of points, bodies of files.
 
-To the water they are bodies that never move; in a case with a structure they are held blocks of it, behind the others.
+For the water they are bodies that never move; in a case with a structure they are its last blocks, which are held.
 """
 
 from __future__ import annotations
@@ -37,13 +37,15 @@ class FixedSolid:
 def solids_of(case: Case) -> tuple[FixedSolid, ...]:
     """All fixed bodies in the order of their rows; a file may hold several.
 
-    Raises BlockError or MeshFileError where a table makes none. Kept for the next call unless a file changed."""
+    Raises BlockError or MeshFileError where a table gives no convex body. Kept for the next call unless a file
+    changed."""
     solids = _made(case.solid, tuple(stamp(s.path) for s in case.solid if s.path))
     return solids + tuple(_as_solid(path, block) for path, block in _footings(case))
 
 
 def obstacle_blocks(case: Case) -> list:
-    """The fixed solids as held blocks, in the order of `solids_of`: what blocks meet and joints glue to."""
+    """The fixed solids as held blocks, in the order of `solids_of`: blocks may touch them, and joints may
+    glue blocks to them."""
     solids = [block for i, spec in enumerate(case.solid) for block in _held(case, spec)]
     return solids + [block for _, block in _footings(case)]
 
@@ -85,7 +87,7 @@ def _held(case: Case, spec) -> list:
 
 
 def refused_solids(case: Case) -> Iterator[tuple[KeyPath, str]]:
-    """Tables that are no solid, and why."""
+    """Tables that give no solid, with the reasons."""
     for i, spec in enumerate(case.solid):
         path = ("solid", i)
         ways = [spec.centre is not None or spec.size is not None, spec.vertices is not None, bool(spec.path)]

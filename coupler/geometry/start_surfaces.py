@@ -23,7 +23,7 @@ FINE = 129
 @dataclass(frozen=True, eq=False)
 class StartSurface:
     """heights: (x (n,), y (n,)) [m] → z (n,) [m] in the tank, the same object for boxes under one file · lower, upper
-    (3,) [m]: corners of its box. Beside the box the surface goes on as it is at the nearest place of it."""
+    (3,) [m]: corners of its box. Outside of the box the surface has the height of the nearest place in it."""
 
     heights: Callable[[Array, Array], Array]
     lower: Array
@@ -34,8 +34,8 @@ class StartSurface:
         return self._at(points[:, 0], points[:, 1])
 
     def distance(self, points: Array, step: float) -> Array:
-        """About the distance (n,) [m] of points (n, 3) to the surface, negative in the water: (z - η)/sqrt(1 + |∇η|²),
-        the gradient by differences over two steps [m]; of a plane exact."""
+        """Approximate distance (n,) [m] of points (n, 3) to the surface, negative in the water: (z - η)/sqrt(1 +
+        |∇η|²), the gradient by differences over two steps [m]; of a plane exact."""
         slopes = []
         for k in range(2):
             ahead, behind = points[:, :2].copy(), points[:, :2].copy()
@@ -55,11 +55,11 @@ class StartSurface:
         return X, Y, self._at(X, Y)
 
     def highest(self) -> float:
-        """Height z [m] of its highest place, of those looked up."""
+        """Height z [m] of the highest sampled place."""
         return float(np.nanmax(self.sampled()[2]))
 
     def volume(self) -> float:
-        """Volume [m³] of the water below it in its box, about."""
+        """Approximate volume [m³] of the water below the surface in its box."""
         depth = np.nanmean(np.maximum(self.sampled()[2] - self.lower[2], 0.0))
         return float(depth * np.prod(self.upper[:2] - self.lower[:2]))
 

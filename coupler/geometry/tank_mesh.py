@@ -104,7 +104,7 @@ def _with_finer_parts(case: Case) -> tuple[Case, list[Problem]]:
 
 
 def is_measured(tank: Tank) -> bool:
-    """Whether the place and the cells of a tank are known."""
+    """Whether the position and the cell size of a tank are known."""
     return None not in (tank.lower, tank.upper, tank.cell)
 
 
@@ -242,8 +242,8 @@ def is_basin(tank: Tank | None) -> bool:
 
 
 def mesh_remarks(tank: Tank) -> Iterator[str]:
-    """Cells of a file on which the flow was not tried: thinner, or less alike in size, than in its tests; land that
-    rises through the top of the tank."""
+    """Cells of a file for which the flow was not tested: thinner, or more uneven in size, than in its tests; and land
+    that rises through the top of the tank."""
     if tank.ground is not None and fitted_of(tank).lowered:
         reach = tank.upper[2] - 0.5 * fitted_of(tank).layer
         yield (
@@ -322,7 +322,7 @@ def beside_mesh(tank: Tank, place) -> bool:
 
 
 def what_of(tank: Tank) -> str:
-    """Its mesh in messages."""
+    """The name of a tank's mesh in messages."""
     return "tank.mesh" if tank.mesh is not None else "the mesh over the terrain"
 
 

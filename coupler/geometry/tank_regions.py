@@ -73,7 +73,7 @@ def stretch_problems(case: Case) -> Iterator[Problem]:
 
 
 def too_many(tank: Tank, regions: Regions) -> str | None:
-    """Why a mesh of this size cannot be made on this machine, before it is made; None: it can."""
+    """Why a mesh of this size cannot be made on this machine; None if it can. The mesh is not made."""
     cells = estimated_cells(tank, regions)
     needed, there = BYTES_PER_CELL * cells, os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     if needed <= there:
@@ -85,7 +85,7 @@ def too_many(tank: Tank, regions: Regions) -> str | None:
 
 
 def estimated_cells(tank: Tank, regions: Regions) -> float:
-    """About how many cells the mesh of a box will have, before it is made."""
+    """Approximate number of cells that the mesh of a box will have."""
     bricks = np.prod([float(len(axis) - 1) for axis in axes_of(tank)])
     volume = np.prod(np.subtract(tank.upper, tank.lower))
     found = 6.0 * bricks

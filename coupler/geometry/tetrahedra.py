@@ -1,7 +1,7 @@
 """Tetrahedra from a mesh file, as the flow needs them: one piece whose cells share whole faces.
 
-What the flow cannot run on is refused with the place: other kinds of cells, flat ones, nodes and cells that do not
-hang together. Points that no cell has are dropped; cells of either orientation are taken.
+Meshes that the flow cannot use are refused with the place of the fault: other kinds of cells, flat cells, and nodes or
+cells that are not connected. Points that no cell has are dropped; cells of either orientation are taken.
 """
 
 from __future__ import annotations
@@ -92,7 +92,7 @@ def _refuse_twins(name: str, nodes: Array, cells: Array) -> None:
 
 
 def _refuse_overlaps(name: str, mesh) -> None:
-    """Two cells that share a face must name each other and lie on its two sides."""
+    """Refuse overlapping cells: two cells that share a face must lie on opposite sides of it."""
     cell, corner = np.nonzero(mesh.neighbours >= 0)
     other = mesh.neighbours[cell, corner]
     mutual = (mesh.neighbours[other] == cell[:, None]).any(axis=1)
@@ -127,7 +127,7 @@ def _refuse_parts(name: str, mesh) -> None:
 
 
 def _refuse_gaps(name: str, mesh) -> None:
-    """Just before a face of the boundary there must be no other cell: hanging nodes make faces that seem free."""
+    """Refuse hanging nodes, which make faces that seem free: no other cell may lie just outside a boundary face."""
     x = mesh.nodes[mesh.boundary_faces]
     width = np.sqrt(np.linalg.norm(np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), axis=1))
     before = x.mean(axis=1) + BEYOND * width[:, None] * mesh.boundary_normal

@@ -86,7 +86,7 @@ def _is_here(name: str, footprint: Footprint, corners: Array, tank) -> bool:
 
 
 def _house(name: str, town, footprint: Footprint, corners: Array) -> Building | None:
-    """One building; None for what is smaller than a house."""
+    """One building; None for a footprint smaller than a house."""
     from coupler.geometry.footprints import area_of
 
     if area_of(corners) < town.least_area:
@@ -165,7 +165,7 @@ def _name(name: str, town, footprint: Footprint) -> str:
 
 
 def town_problems(case: Case) -> Iterator[tuple[tuple, str]]:
-    """Towns without terrain, files that cannot be used, rules that fit nothing, and houses that stand in the sea."""
+    """Towns without terrain, unusable files, rules that match no footprint, and houses that stand in the sea."""
     for i, town in enumerate(case.structure.town if case.structure else ()):
         path = ("structure", "town", i)
         if case.terrain is None or case.tank is None or case.tank.ground is None:
@@ -209,12 +209,12 @@ def town_remarks(case: Case) -> Iterator[str]:
 
 
 def _attributes(town) -> list[dict]:
-    """Of every footprint; not read where no rule asks for them."""
+    """Attributes of every footprint; the file is not read where no rule needs them."""
     return [f.attributes for f in read_footprints(Path(town.path))] if town.rule else []
 
 
 def _overlapping(case: Case, path, town) -> Iterator[tuple[tuple, str]]:
-    """Two houses that share ground."""
+    """Houses whose footprints overlap."""
     from coupler.geometry.bodies import overlap_depth
 
     houses = houses_of(case, town)

@@ -1,11 +1,11 @@
 """The same last digits on every processor: one thread in the libraries, and the instructions of x86-64-v3.
 
 NumPy, OpenBLAS and Numba choose their code by the processor: with AVX-512, products of matrices, hyperbolic functions
-and the sorting of equal numbers differ from those with AVX2, at first in the last digit and later in where drops and
-debris go. Here all three are set to use the instructions of processors since 2013 (Intel) and 2015 (AMD). The C library
-chooses between code with and without fused multiply-add, which gives the same on all of these. On an older processor
-each library uses what is available, and `missing` names what is not. Environment variables that the user has not set
-are set, so this must happen before numpy or numba is imported; processes started later inherit them."""
+and the sorting of equal numbers differ from those with AVX2, at first in the last digit and later in the paths of drops
+and debris. Here all three are set to use the instructions of processors since 2013 (Intel) and 2015 (AMD). The C
+library chooses between code with and without fused multiply-add, which gives the same on all of these. On an older
+processor each library uses what is available, and `missing` names what is not. Environment variables that the user has
+not set are set, so this must happen before numpy or numba is imported; processes started later inherit them."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def _has_more(cpuinfo: Path = Path("/proc/cpuinfo")) -> bool:
 
 
 def missing(cpuinfo: Path = Path("/proc/cpuinfo")) -> list[str]:
-    """What this processor lacks of the baseline, in the words of NEEDED; all of it on other families of processors."""
+    """Parts of the baseline that this processor lacks, in the words of NEEDED; all of them on other architectures."""
     if platform.machine() != "x86_64":
         return list(NEEDED)
     for line in cpuinfo.read_text(encoding="utf-8").splitlines():

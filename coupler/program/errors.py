@@ -67,7 +67,7 @@ class CannotWrite(SurgebreakError):
 
 
 class _Briefly(reprlib.Repr):
-    """Values as they were written, cut where they are long: a message is for reading."""
+    """Values as they were written, shortened where they are long, so that messages stay readable."""
 
     def __init__(self) -> None:
         super().__init__()

@@ -1,4 +1,4 @@
-"""Packages that only some commands need: the extras of pyproject.toml, and what to say where one is absent."""
+"""Packages that only some commands need: the extras of pyproject.toml, and the message where one is absent."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def absent(extra: str) -> list[str]:
 
 
 def _is_there(name: str) -> bool:
-    """Asked of the installer's records, not of the importer, which refuses VTK in a process that holds YADE."""
+    """Whether a package is installed, from the installer's records: the importer refuses VTK in a process with YADE."""
     try:
         metadata.distribution(name)
     except metadata.PackageNotFoundError:
@@ -60,7 +60,7 @@ def missing(extra: str) -> str:
 
 
 def need(extra: str) -> None:
-    """Raise NotInstalled, with the way out, where a package of the extra is absent."""
+    """Raise NotInstalled, with the remedy, where a package of the extra is absent."""
     message = missing(extra)
     if message:
         raise NotInstalled(message)

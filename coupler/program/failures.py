@@ -33,7 +33,7 @@ class Failure:
 
     @classmethod
     def of(cls, error: BaseException) -> Failure:
-        """What an exception means for the user."""
+        """The Failure that an exception means for the user."""
         if isinstance(error, KeyboardInterrupt):
             return cls(
                 ExitCode.STOPPED, "stopped at once by Ctrl-C; the last written state and checkpoint are sound"
@@ -123,7 +123,7 @@ class Failures:
 
 
 def _tell_mistakes(lines: list[str]) -> None:
-    """One line each, beginning with the place, as editors and people expect it of compilers."""
+    """Print one line for each mistake, beginning with the place as compilers do, which editors recognise."""
     for line in lines:
         print(line, file=sys.stderr)
     count = "1 mistake" if len(lines) == 1 else f"{len(lines)} mistakes"
@@ -131,5 +131,5 @@ def _tell_mistakes(lines: list[str]) -> None:
 
 
 def _is_click(error: BaseException) -> bool:
-    """Wrong options and early exits are reported by the command line library itself."""
+    """Whether the command line library reports the error itself (wrong options, early exits)."""
     return type(error).__module__.split(".")[0] in ("click", "typer")

@@ -1,8 +1,8 @@
-"""Processes: those that a command starts run the program that it is itself, wherever it is called from; and whether the
-one of a run is still there.
+"""Processes: a command starts child processes of its own program, wherever it is called from. Also: whether the process
+of a run still exists.
 
-A child would otherwise find the installed package, or one in the folder in which the user happens to stand: another
-checkout would then be checked, measured or drawn with than the one that was called.
+A child would otherwise find the installed package, or one in the working directory, and so run another checkout than
+the one that was called.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def end_with(parent: int, number: int = signal.SIGTERM) -> None:
 def rows_of_module(module: str, id: str, limit: float, *words: object) -> tuple[list[dict], str]:
     """Run `python -m module ID FILE words...`, which writes a line of JSON for each thing that it finds.
 
-    The rows, those before a crash among them, and how the process ended when not well; limit [s] of wall time."""
+    The rows, those before a crash among them, and how the process failed, if it did; limit [s] of wall time."""
     wrong = ""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "rows"
@@ -74,9 +74,9 @@ def environment() -> dict[str, str]:
 
 
 def was_killed(summary: dict) -> bool:
-    """Whether run.json (its content) says "running" although its process is gone: nothing could tell how the run ended.
+    """Whether run.json (its content) says "running" although its process is gone: it could not record its end.
 
-    Of a run on another machine that cannot be known.
+    For a run on another machine this cannot be known.
     """
     here = summary.get("machine", {}).get("host", platform.node()) == platform.node()
     if summary.get("status") != "running" or not here:

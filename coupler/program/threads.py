@@ -17,7 +17,7 @@ OWN_GROUP = Path("/proc/self/cgroup")
 
 
 class BadThreads(SurgebreakError):
-    """A number of threads that is none."""
+    """A number of threads that is not a positive whole number."""
 
     exit_code = ExitCode.BAD_CASE
 

@@ -62,7 +62,7 @@ def _row(body: dict, members: list[dict], watch: Watch, maps: Maps) -> tuple:
 
 
 def _walls(body: str, members: list[dict]) -> str:
-    """Its members that broke, in the order in which they began to."""
+    """Members of the body that broke, in the order of their first breaks."""
     own = [m for m in members if m["name"].startswith(f"{body}-") and m["joints_broken"]]
     own.sort(key=lambda m: m["first_break"]["time"])
     return " ".join(f"{m['name'][len(body) + 1 :]} {m['joints_broken']}/{m['joints']}" for m in own)

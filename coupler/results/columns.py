@@ -1,4 +1,4 @@
-"""Columns of the histories of a run: name, unit, meaning. They stand in the head of each file."""
+"""Columns of the histories of a run: name, unit, meaning. They are written in the header of each file."""
 
 from __future__ import annotations
 

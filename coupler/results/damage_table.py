@@ -1,4 +1,5 @@
-"""`blocks.csv`: a row per block, where it was, how far it went, when it left its place, the pressure it bore."""
+"""`blocks.csv`: one row per block with its initial position, displacement, time of leaving its place and largest
+pressure."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ from coupler.results.history import read_history
 
 @dataclass(frozen=True)
 class Verdict:
-    """One promise: the value expected and the value of the run."""
+    """One promise: the expected value and the value of the run."""
 
     what: str
     found: float
@@ -56,7 +56,7 @@ def _judge(entry: dict, run: Path) -> Verdict:
 
 
 def _columns(entry: dict, run: Path) -> tuple[dict, str]:
-    """The table that a promise is about; why there is nothing to take from it."""
+    """The table of a promise, or the reason why no value can be taken from it."""
     table, name = entry["table"], entry["column"]
     if not (run / table).is_file():
         return {}, f"the run has no table {table}"

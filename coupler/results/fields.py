@@ -23,7 +23,8 @@ NO_CELLS = (
 
 
 class WaterWriter:
-    """Water fields in time, on a mesh that may stay (written once) or change (written again) from step to step.
+    """Water fields in time, on a mesh that may stay the same (written once) or change (written again) from step to
+    step.
 
     keep: steps after which an existing file is continued.
     """
@@ -86,12 +87,12 @@ class WaterWriter:
         return cells is not old_cells and not np.array_equal(cells, old_cells)
 
     def _in_file(self, nodes):
-        """Coordinates as the file has them; those that were read from it are so already."""
+        """Coordinates as stored in the file; those that were read from it are returned unchanged."""
         return nodes if nodes.dtype == np.float32 else (nodes - self.origin).astype(np.float32)
 
 
 def _last_grid(path, steps):
-    """Where the grid of the last step begins, and its points (float32) and cells."""
+    """Start of the last step's grid in the arrays, and its points (float32) and cells."""
     with vtkhdf.opened(path, "r") as file:
         found = file["VTKHDF/Steps"]
         k = steps - 1
@@ -202,8 +203,8 @@ class BlockWriter:
 
 
 def write_solids(path, vertices, faces, tank=None, origin=(0.0, 0.0, 0.0), basin=None):
-    """Write what does not move: fixed solids (per solid (k, 3) [m] world and faces), the tank (lower, upper) [m] and,
-    of one that is no box, the ends (n, 2, 3) [m] of its edges."""
+    """Write the parts that do not move: fixed solids (per solid (k, 3) [m] world and faces), the tank (lower, upper)
+    [m] and, of one that is no box, the ends (n, 2, 3) [m] of its edges."""
     origin = np.asarray(origin, dtype=float)
     vtkhdf.create(path, "PolyData", origin)
     points = (
@@ -250,5 +251,5 @@ def _write_cells(root, kind, connectivity, ends):
 
 
 def readable(last_time):
-    """What a file holds so far, for messages."""
+    """The readable content of a file, for messages."""
     return "but holds no step yet" if last_time is None else f"up to t = {last_time:.6g} s"

@@ -4,7 +4,7 @@ mean.
 Values v_n hold over the step that ends at t_n:
 
     impulse   I(t) = Σ v_n |[t_n - dt_n, t_n] ∩ [from, to]|
-    mean      m(t) = 1/T ∫_{t-T}^{t} v dt,  T the time since the start if that is shorter
+    mean      m(t) = 1/T ∫_{t-T}^{t} v dt,  T at most the time since the start
     peak      max over the time so far of |m|
 
 A shorter mean gives a higher peak, so peaks of different runs can be compared only at the same `mean_over`. Steps
@@ -42,7 +42,7 @@ class Windows:
         return tuple(found)
 
     def add(self, time: float, dt: float, value) -> list[float]:
-        """Take the value(s) of the step that ends at `time`; what `columns` names, in that order."""
+        """Add the value(s) of the step that ends at `time`; return the values of `columns`, in that order."""
         value = np.atleast_1d(np.asarray(value, float))
         found: list[float] = []
         if self.impulse:
@@ -61,7 +61,7 @@ class Windows:
         return {"total": np.array(self.total), "peak": np.array(self.peak), "steps": np.array(steps)}
 
     def restore(self, saved: dict[str, Array]) -> None:
-        """Return to what `save` gave."""
+        """Restore the state that `save` returned."""
         self.total, self.peak = saved["total"][()], float(saved["peak"])
         self._steps = deque((float(row[0]), float(row[1]), row[2:].copy()) for row in saved["steps"])
 

@@ -151,7 +151,7 @@ def _air(spec, rows_of) -> Gauge:
 
 
 class Followed:
-    """The pocket of air that was at a place first, wherever it goes."""
+    """The pocket of air that was first found at a place; it is followed wherever it moves."""
 
     def __init__(self):
         self.name = 0
@@ -169,11 +169,11 @@ class Followed:
         return float(air.mean_pressure[there[0]]), float(water.pocket_volumes()[there[0]])
 
     def save(self) -> dict[str, Array]:
-        """What `restore` takes."""
+        """The state for `restore`."""
         return {"name": np.array(self.name)}
 
     def restore(self, saved: dict[str, Array]) -> None:
-        """Return to what `save` gave."""
+        """Restore the state that `save` returned."""
         self.name = int(saved["name"])
 
 
@@ -185,7 +185,7 @@ def free_mean(values) -> tuple[float, float]:
 
 
 def _in_time(spec, what: str, unit: str, meaning: str, value: Callable) -> Gauge:
-    """A gauge of one number with the windows that the case asks for."""
+    """A scalar gauge with the windows that the case asks for."""
     windows = Windows(getattr(spec, "impulse", None), spec.mean_over)
     name = f"{spec.name}_{what}"
     columns = ((name, unit, meaning), *windows.columns(spec.name, unit, ("",)))
@@ -209,7 +209,7 @@ def parallelogram(centre, edges, points: int = PATCH_POINTS) -> Array:
 
 
 def disc(centre, radius: float, normal, rings: int = PATCH_POINTS) -> Array:
-    """Points (m, 3) [m] of equal parts of a disc: ring k, 6 k - 3 points at sqrt(mean r²) of its area."""
+    """Points (m, 3) [m] of parts of a disc with equal area: ring k has 6 k - 3 points at the radius sqrt(mean r²)."""
     n = np.asarray(normal, float) / np.linalg.norm(normal)
     first = np.cross(n, np.eye(3)[np.argmin(np.abs(n))])
     first /= np.linalg.norm(first)

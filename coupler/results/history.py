@@ -29,7 +29,7 @@ class Column:
 
 
 class BadTable(SurgebreakError):
-    """A file that is no table of a run, or was changed since; the message names it."""
+    """A file that is not a table of a run, or that was changed since; the message names it."""
 
     exit_code = ExitCode.BAD_CASE
 
@@ -54,13 +54,13 @@ class History:
 
 
 class CannotContinue(SurgebreakError):
-    """A file of results is not as the run left it, so that it cannot be continued."""
+    """A result file is not as the run left it, so it cannot be continued."""
 
 
 class HistoryTable:
     """A growing CSV table; columns: Column or (name, unit, meaning).
 
-    keep: `place` at which an existing table is continued; what stands behind is cut off. Raises CannotContinue.
+    keep: `place` at which an existing table is continued; later rows are cut off. Raises CannotContinue.
     """
 
     def __init__(self, path, columns, title=None, keep=None):
@@ -82,7 +82,7 @@ class HistoryTable:
             self._file.seek(size)
 
     def _check_kept(self, keep):
-        """The table is there, has these columns, and is at least as long as it was."""
+        """Check that the table exists, has these columns, and is at least as long as it was."""
         if not self.path.exists() or self.path.stat().st_size < keep[1]:
             raise CannotContinue(f"{self.path} is shorter than it was when the checkpoint was written")
         with open(self.path, newline="", encoding="utf-8") as file:
@@ -117,7 +117,7 @@ class HistoryTable:
         return number(value)
 
     def _write(self, text):
-        """Write and flush; a full disk takes the half-written line back."""
+        """Write and flush; if the disk is full, the incomplete line is removed."""
         whole = self._file.tell()
         try:
             self._file.write(text)
@@ -129,7 +129,7 @@ class HistoryTable:
             raise DiskFull(self.path, len(text), f"and holds {self._rows} rows", error) from None
 
     def _abandon(self, whole):
-        """Cut the file back to its last whole row and let go of what Python still wants to write."""
+        """Cut the file back to its last complete row and discard what Python has buffered."""
         descriptor = os.dup(self._file.fileno())
         try:
             self._file.close()
@@ -189,7 +189,7 @@ def read_history(path):
 
 
 def _check_whole(columns, records):
-    """The line of names says what the head declares, each once, and every row has a value for each."""
+    """Check that the line of names agrees with the header, without repeats, and that every row has a value for each."""
     names = [c.name for c in columns]
     if not records or records[0] != names or len(set(names)) < len(names):
         raise ValueError("its columns are not those that its head declares")
@@ -211,9 +211,11 @@ def _values(column, cells):
 
 
 def write_table(path, title, columns, arrays):
-    """Write a whole table: columns of Column, arrays (n,) of numbers or texts; what is not finite leaves a cell empty.
+    """Write a whole table: columns of Column, arrays (n,) of numbers or texts; a value that is not finite leaves its
+    cell empty.
 
-    Written beside and then renamed, so that a killed run leaves the table before or that after. Raises DiskFull."""
+    The file is written under another name and renamed, so a killed run leaves either the old or the new table. Raises
+    DiskFull."""
     body = "".join(line([_table_cell(value) for value in row]) for row in zip(*arrays))
     _replace(Path(path), header(title, columns) + body)
 

@@ -1,4 +1,4 @@
-"""Loads on a group of blocks or on each of them, split by what they come from: tables `history/loads_NAME.csv`.
+"""Loads on a group of blocks or on each of them, split by their origin: tables `history/loads_NAME.csv`.
 
 Part        force on a block, mean over the step                          absent without
 pressure    -∫ p n dA over its wetted faces                               [water]
@@ -8,7 +8,7 @@ joint       joints with other blocks and the ground                       [joint
 weight      m g                                                           [structure]
 
 Moments are about one fixed point.  The sum of the parts over a step is the change of momentum, and of angular momentum
-about that point, of blocks that move freely, to round-off; of held blocks it is what their holder takes.
+about that point, of blocks that move freely, to round-off; for held blocks it is the load on their supports.
 """
 
 from __future__ import annotations
@@ -31,7 +31,8 @@ WHOLE_RUN = (0.0, np.inf)
 
 
 def loads(coupling, record, rows: Array, point: Array) -> dict[str, Array]:
-    """Mean over the step of each part on the bodies `rows` (k,): name → (k, 6) [N, N m], moments about `point` (3,)."""
+    """Mean over the step of each part of the loads on the bodies `rows` (k,): name → (k, 6) [N, N m], moments about
+    `point` (3,)."""
     n = 0 if coupling.structure is None else coupling.structure.n
     blocks, solids = rows[rows < n], rows[rows >= n]
     found = {name: np.zeros((len(rows), 6)) for name in PARTS}
@@ -140,7 +141,7 @@ class BlockLoads:
         return listed
 
     def read(self, coupling, record) -> list[dict]:
-        """The rows that are due, none or one a block."""
+        """The rows that are due: none, or one for each block."""
         found = loads(coupling, record, self.rows, np.zeros(3))
         for name in self.parts:
             force, moment = found[name][:, :3], found[name][:, 3:]
@@ -173,5 +174,6 @@ class BlockLoads:
 
 
 def _passed(since: float, now: float, every: float) -> bool:
-    """Whether a multiple of `every` [s] lies in (since, now]; a time a rounding before it counts as there."""
+    """Whether a multiple of `every` [s] lies in (since, now]; a time that is early by rounding alone counts as
+    equal."""
     return np.floor(now / every * (1.0 + 1e-9)) > np.floor(since / every * (1.0 + 1e-9))

@@ -1,4 +1,5 @@
-"""Maps of a flood over terrain: largest depth, speed and h v², and when the water came, at the columns of the mesh.
+"""Maps of a flood over terrain: largest depth, speed and h v², and the arrival of the water, at the columns of the
+mesh.
 
     h: wet length of a column · v: mean of its horizontal velocity over h · arrival: h passes FILM where it was dry
 
@@ -56,8 +57,8 @@ class Maps:
         return depth, speed
 
     def _on_mesh(self, water) -> tuple[Array, Array]:
-        """Level set (N,), dry where there is no water to be, and horizontal velocity (N, 2) at the nodes of the mesh;
-        of several copies of a node the wettest."""
+        """Level set (N,), dry at nodes that water cannot reach, and horizontal velocity (N, 2) at the nodes of the
+        mesh; of several copies of a node, the one with the lowest level set."""
         phi, u = np.full(len(self._node), np.inf), np.zeros((len(self._node), 2))
         parent = water.domain.parent_node
         own = np.where(water.topology.active, water.level_set, np.inf)
@@ -66,7 +67,7 @@ class Maps:
         return np.where(np.isfinite(phi), phi, 1e300), u
 
     def step(self, water, time: float) -> None:
-        """Take the water as it is now."""
+        """Update the maps with the present state of the water."""
         depth, speed = self._now(water)
         np.maximum(self.depth, depth, out=self.depth)
         np.maximum(self.speed, speed, out=self.speed)
@@ -74,17 +75,17 @@ class Maps:
         self.arrival[self._dry & (self.arrival == NEVER) & (depth > self.film)] = time
 
     def save(self) -> dict[str, Array]:
-        """Copies of what has been gathered."""
+        """Copies of the maps so far."""
         return {name: getattr(self, name).copy() for name in KEPT} | {"dry": self._dry.copy()}
 
     def restore(self, saved: dict[str, Array]) -> None:
-        """Return to what `save` gave."""
+        """Restore the state that `save` returned."""
         for name in KEPT:
             setattr(self, name, saved[name].copy())
         self._dry = saved["dry"].copy()
 
     def write(self, directory: Path) -> None:
-        """All maps, each file in place of the one before."""
+        """Write all maps; each file replaces the one before."""
         directory.mkdir(exist_ok=True)
         land = ~np.isfinite(self.fitted.bed)
         wet = (self.depth > self.film).reshape(self._shape)
@@ -157,8 +158,8 @@ def read_map(path: Path) -> Map:
 
 
 def _pairs(nodes: Array, fitted) -> tuple[Array, Array, Array, Array]:
-    """Nodes one above the other in the columns of the lattice: lower (p,), upper (p,), distance (p,) [m] and number of
-    the column (p,). Nodes between the columns, of a mesh that is finer in parts, are left out."""
+    """Pairs of neighbouring nodes in the columns of the lattice: lower (p,), upper (p,), distance (p,) [m] and number
+    of the column (p,). Nodes between the columns, of a mesh that is finer in parts, are left out."""
     X, Y = fitted.column_x, fitted.column_y
     i, j = (_nearest(axis, nodes[:, k]) for k, axis in enumerate((X, Y)))
     slack = 1e-6 * min(np.diff(X).min(), np.diff(Y).min())

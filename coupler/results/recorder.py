@@ -1,12 +1,12 @@
-"""What a run leaves behind: histories every step, fields at the output times, the crack table.
+"""Writing the results of a run: histories every step, fields at the output times, the crack table.
 
 `history/energy.csv`   energy               `history/momentum.csv`, `angular_momentum.csv`  the balance of momentum
 `history/coupling.csv` how each step went   `history/water.csv`     volume
 `history/gauges.csv`   the gauges           `history/structure.csv` joints, fastest block
 `maps/*.asc`           of a flood over terrain
 `history/air.csv`      pockets, where air is trapped
-`history/loads_*.csv`  loads by what they come from, where a case asks for them
-`cracks.csv`, `blocks.csv`  what became of each joint and block, with the verdict in run.json
+`history/loads_*.csv`  loads by their origin, where a case asks for them
+`cracks.csv`, `blocks.csv`  the final state of each joint and block; the verdict is in run.json
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from coupler.step.observe import block_damage, fastest_point, joint_counts
 
 
 class Recorder:
-    """Writes a run as it goes; absent sides leave no files.
+    """Writes the results of a run step by step; a side that is absent has no files.
 
     directory: of the run · coupling: CoupledStepper · gauges: list of Gauge
     solids: [(vertices, faces)] that never move, with a structure its last blocks ·
@@ -124,7 +124,7 @@ class Recorder:
         }
 
     def save(self) -> dict[str, Array]:
-        """Sums so far, and how far the files go: written states, rows and bytes of each table."""
+        """The sums so far and the lengths of the files: written states, rows and bytes of each table."""
         places = {f"table_{name}": np.array(table.place) for name, table in self._tables.items()}
         return (
             places
@@ -259,7 +259,7 @@ class Recorder:
         )
 
     def fields(self, time: float) -> None:
-        """Write water, blocks and the crack table as they are now."""
+        """Write the present water, blocks and crack table."""
         c = self.coupling
         if self._fields:
             w = c.water
@@ -285,7 +285,7 @@ class Recorder:
         self._written += 1
 
     def _write_tables(self) -> None:
-        """Tables of joints and blocks, as they are now."""
+        """Write the present tables of joints and blocks."""
         structure = self.coupling.structure
         if self.watch is not None:
             from coupler.results.damage_table import write_blocks
@@ -301,8 +301,8 @@ class Recorder:
             write_crack_surfaces(self.cracks.with_suffix(".vtu"), *structure.joint_polygons(), cracks)
 
     def verdict(self) -> dict | None:
-        """What the run says about its structure now (coupler/verdict/judge.py); None without one, or where no block
-        moves freely: what is driven apart does not stand or fall."""
+        """The present verdict on the structure (coupler/verdict/judge.py); None without one, or where no block
+        moves freely: the question whether it stands has no meaning for driven blocks."""
         if self.watch is None or not self.watch.judged.any():
             return None
         from coupler.verdict.judge import verdict
@@ -315,7 +315,7 @@ class Recorder:
 
 
 def _below(start: str, kept) -> dict[str, Array]:
-    """What was kept under names with this start, by the rest of the name."""
+    """The arrays whose names begin with `start`, by the rest of the name."""
     return {name.removeprefix(start): a for name, a in kept.items() if name.startswith(start)}
 
 

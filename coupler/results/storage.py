@@ -1,4 +1,4 @@
-"""Writing without harm: refuse what is not finite, and find out that the disk is full *before* a file is touched.
+"""Safe writing: refuse values that are not finite, and detect a full disk *before* a file is touched.
 
 An HDF5 file whose write fails half way cannot be opened again, so the room for the next step is claimed first
 (posix_fallocate past the end of the file, given back at once); a full disk, a quota or a file-size limit then
@@ -15,7 +15,7 @@ from coupler.program.errors import FULL
 
 
 class DiskFull(OSError):
-    """No room for what is to be written next; `path` holds what was written before and stays readable."""
+    """There is no room for the next write; `path` holds what was written before and stays readable."""
 
     def __init__(self, path, needed, readable, cause):
         self.path = Path(path)

@@ -1,9 +1,9 @@
-"""When and where the water reached the top of the tank: what is computed after that is of a tank that is too low.
+"""When and where the water reached the top of the tank: from then on the tank is too low for the flow.
 
 An open top lets water go, so that depths and loads come out too small; a closed one is a lid that the water presses
-against. Followed at the nodes at the level of the top, those aside at which water stood at the start. The surface
-creeps towards a wall that holds it and hardly passes the last node, so that a quarter of a cell below the top counts as
-there.
+against. The water is followed at the nodes at the level of the top, except those at which it stood at the start. The
+surface creeps towards a wall that holds it and hardly passes the last node, so a quarter of a cell below the top counts
+as reached.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ NEVER = -1.0
 
 
 class TankTop:
-    """Follows the water of a run; what it has seen goes into checkpoints."""
+    """Follows the water of a run; its findings are stored in checkpoints."""
 
     def __init__(self, water: Water):
         low, self.height = water.mesh.bounds[:, 2]
@@ -40,7 +40,7 @@ class TankTop:
         self.first, self.place, self.share, self.share_at = NEVER, np.zeros(2), 0.0, NEVER
 
     def _wet(self, water: Water) -> Array:
-        """(k,) bool, of the nodes at the top: water is there, at one of the copies of the node at least."""
+        """(k,) bool: whether each node at the top, or at least one of its copies, is wet."""
         parent, found = water.domain.parent_node, np.zeros(len(self._top), bool)
         first, last = (np.searchsorted(parent, self._top, side) for side in ("left", "right"))
         for copy in range(int((last - first).max(initial=0))):
@@ -50,7 +50,8 @@ class TankTop:
         return found
 
     def step(self, water: Water, time: float) -> bool:
-        """Take the water as it is at a time [s]; whether it has reached the top in this step for the first time."""
+        """Update with the water at a time [s]; return whether it has reached the top for the first time in this
+        step."""
         wet = np.flatnonzero(self._wet(water) & ~self._at_start)
         if not len(wet):
             return False
@@ -63,7 +64,7 @@ class TankTop:
         return True
 
     def reported(self, is_open: bool) -> dict[str, Any] | None:
-        """Plain data for run.json, None where water never came there: first [s], place [x, y] and height [m], open,
+        """Plain data for run.json, None if water never reached the top: first [s], place [x, y] and height [m], open,
         share: largest share of the top that was under water at once, share_at [s]."""
         if self.first == NEVER:
             return None
@@ -77,18 +78,18 @@ class TankTop:
         }
 
     def save(self) -> dict[str, Array]:
-        """Copies of what has been seen."""
+        """Copies of the findings so far."""
         numbers = np.array([self.first, *self.place, self.share, self.share_at])
         return {"numbers": numbers, "at_start": self._at_start.copy()}
 
     def restore(self, saved: dict[str, Array]) -> None:
-        """Return to what `save` gave."""
+        """Restore the state that `save` returned."""
         self.first, x, y, self.share, self.share_at = map(float, saved["numbers"])
         self.place, self._at_start = np.array([x, y]), saved["at_start"].copy()
 
 
 def reached(found: dict[str, Any]) -> str:
-    """What is told when the water reaches the top."""
+    """The message when the water reaches the top."""
     x, y = found["place"]
     return (
         f"water reached the {'open' if found['open'] else 'closed'} top of the tank (z = {found['height']:g} m) at "
@@ -97,7 +98,7 @@ def reached(found: dict[str, Any]) -> str:
 
 
 def in_all(found: dict[str, Any]) -> str:
-    """The same at the end of the run, with how much of the top it was."""
+    """The message at the end of the run, with the share of the top that was reached."""
     return (
         f"{reached(found)}. At most {100.0 * found['share']:.2g} % of the top was under water, at t = "
         f"{moment_of(found['share_at'])}"

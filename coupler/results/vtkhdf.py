@@ -9,7 +9,8 @@ again. Three rules keep a file readable whose writer is killed at any moment:
 * the count of steps, `NSteps`, is written after everything else has reached the file; only the time of the step
   comes later still, because VTK 9.7 writes past the end of its memory if a file has more times than steps.
 
-The file is opened, extended and closed for each step, without a lock: a viewer that looks on cannot stop the run.
+The file is opened, extended and closed for each step, without a lock: a viewer that reads at the same time cannot stop
+the run.
 
 Two HDF5 layouts are combined on purpose. The file itself has the oldest one (superblock 0), because newer ones are
 marked "open for writing" when their writer is killed, and VTK then refuses them. The arrays have the layout of HDF5
@@ -137,7 +138,7 @@ def write_data(root, kind, k, values, again=()):
 
 
 def publish(file, k, time):
-    """Make step k at `time` [s] visible: all else has to be in the file before the count says so."""
+    """Make step k at `time` [s] visible; all its data must be in the file before the count includes it."""
     steps = file["VTKHDF"]["Steps"]
     file.flush()
     steps.attrs.modify("NSteps", np.int64(k + 1))
@@ -146,7 +147,7 @@ def publish(file, k, time):
 
 
 def cut_back(path, steps):
-    """Take back all but the first `steps` steps; the rows that they left in the arrays stay unused.
+    """Remove all but the first `steps` steps; the rows that they left in the arrays stay unused.
 
     The times go first, because a reader must never find more of them than steps are counted."""
     with opened(path) as file:

@@ -23,7 +23,7 @@ HEADROOM = 1 << 16
 
 
 class Damaged(ValueError):
-    """The file is torn or was changed: its content cannot be trusted."""
+    """The file is incomplete or was changed: its content cannot be trusted."""
 
 
 def write_arrays(path: Path, arrays: dict[str, np.ndarray], text: str, unset=()) -> None:
@@ -61,7 +61,7 @@ def _write(path: Path, arrays: dict[str, np.ndarray], text: str) -> None:
 
 
 def _flush_directory(path: Path) -> None:
-    """So that the new name outlives a machine that loses power."""
+    """Flush a directory, so that the new name survives a power failure."""
     handle = os.open(path, os.O_RDONLY)
     try:
         os.fsync(handle)

@@ -133,17 +133,17 @@ class Checkpoints:
         return self.scene.coupling.time >= self._next * (1.0 - 1e-12)
 
     def write(self, figures: dict, cpu_seconds: dict[str, float]) -> None:
-        """One now, unless the last one is of this very step.  Raises NotFinite, DiskFull."""
+        """Write a checkpoint now, unless the last one is of this step.  Raises NotFinite, DiskFull."""
         if self.scene.coupling.time != self._last:
             self.put(self._state(figures, cpu_seconds))
 
     def hold(self, figures: dict, cpu_seconds: dict[str, float]) -> State:
-        """What stands now, copied, for `put` if the step that follows is left."""
+        """A copy of the present state, for `put` if the next step is abandoned."""
         state = self._state(figures, cpu_seconds)
         return replace(state, arrays={name: array.copy() for name, array in state.arrays.items()})
 
     def put(self, state: State) -> None:
-        """Write a state, unless the last one is of its step.  Raises NotFinite, DiskFull."""
+        """Write a state, unless the last checkpoint is of the same step.  Raises NotFinite, DiskFull."""
         if state.time == self._last:
             return
         write_arrays(self.folder / state.name, state.arrays, state.about, UNSET)
@@ -210,5 +210,5 @@ def listed(folder: Path) -> list[Path]:
 
 
 def _plain(value: object) -> object:
-    """Numbers of numpy as JSON knows them."""
+    """NumPy numbers as plain numbers for JSON."""
     return value.tolist()

@@ -150,7 +150,7 @@ class RunDirectory:
 
 
 def write_json(path: Path, content: object) -> None:
-    """Write to a neighbour first and rename it, which either happens as a whole or not at all."""
+    """Write to a temporary file beside `path` and rename it, which happens completely or not at all."""
     part = path.with_name(f".{path.name}.part")
     with part.open("w", encoding="utf-8", errors="backslashreplace") as stream:
         json.dump(_plain(content), stream, indent=1, ensure_ascii=False, allow_nan=False)
@@ -161,7 +161,7 @@ def write_json(path: Path, content: object) -> None:
 
 
 def _plain(value: object) -> object:
-    """What JSON knows: numpy numbers and arrays become numbers and lists, NaN and infinities null, paths text."""
+    """Plain data for JSON: numpy numbers and arrays become numbers and lists, NaN and infinities null, paths text."""
     if hasattr(value, "tolist"):
         value = value.tolist()
     if isinstance(value, Mapping):
@@ -194,7 +194,7 @@ def _make_named(output: Path) -> Path:
 
 
 def _claim(path: Path) -> None:
-    """Only one of two runs that begin in one directory at the same moment can make the folder of the histories."""
+    """Claim a directory: only one of two runs that begin there at the same moment can make the folder of histories."""
     try:
         (path / "history").mkdir()
     except FileExistsError as error:

@@ -64,7 +64,7 @@ def describe(file: CaseFile, tell: Callable[[str], object]) -> None:
 
 
 def drawn(case: Case) -> Iterator[str]:
-    """The extent of what comes from files, so that a wrong unit is seen."""
+    """The extent of bodies from files, so that a wrong unit is noticed."""
     if case.terrain is not None and case.tank is not None and case.tank.ground is not None:
         yield _ground(case)
     for part in parts_of(case):

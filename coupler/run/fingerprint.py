@@ -14,7 +14,7 @@ FREE = ("time.end", "time.step_max", "time.cfl", "time.checkpoint_every", "coupl
 
 
 def scene_parts(coupling) -> dict[str, str]:
-    """Mesh, blocks and joints with what tells them from others."""
+    """Digests of the mesh, the blocks and the joints of a scene."""
     parts = {}
     if coupling.water is not None:
         mesh = coupling.water.mesh
@@ -62,7 +62,7 @@ def case_differences(then: dict, now: dict) -> list[str]:
 
 
 def _as_written(case: dict) -> dict:
-    """Without what a tank has from its mesh file: a change of that is reported with the mesh itself."""
+    """The case without values that the tank takes from its mesh file; a change of these is reported with the mesh."""
     tank = case.get("tank") or {}
     if "mesh" not in tank:
         return case
@@ -70,7 +70,7 @@ def _as_written(case: dict) -> dict:
 
 
 def is_free(key: str, name: str) -> bool:
-    """Whether the key of a case is the given name, or inside it."""
+    """Whether the key of a case has the given name, or lies inside that section (a name that ends with a dot)."""
     return key.startswith(name) if name.endswith(".") else key == name
 
 

@@ -53,7 +53,7 @@ SECONDS_PER_STATE_CELL, SECONDS_PER_STATE_BLOCK = 5e-7, 7e-4
 
 @dataclass(frozen=True)
 class Forecast:
-    """rows: (name, value, unit, remark), in the order of the list · remarks: further sentences."""
+    """rows: (name, value, unit, remark), in the order of output · remarks: further sentences."""
 
     rows: list[Row]
     remarks: tuple[str, ...] = ()
@@ -123,7 +123,7 @@ def _disk_remark(wanted: float, free: float) -> str:
 
 
 def _checkpoint_bytes(case: Case) -> float:
-    """Those that stay [B]; none where the case wants none."""
+    """Size [B] of the checkpoints that are kept; 0 if the case asks for none."""
     if checkpoint_interval(case) == 0.0 or case.water is None:
         return 0.0
     from coupler.run.checkpoint import KEPT
@@ -132,7 +132,7 @@ def _checkpoint_bytes(case: Case) -> float:
 
 
 def _water_rows(case: Case, interval: float, rows: list[Row]) -> float:
-    """Rows of the water; the step [s] that its greatest speed allows."""
+    """Add the rows of the water; return the step [s] that its largest speed allows."""
     cells, nodes = mesh_size(case.tank)
     volume = sum(start_surfaces.volume(fill) for fill in case.water.fill)
     if not case.tank.is_box:
@@ -174,7 +174,7 @@ def structure_seconds(structure, substeps: int) -> float:
 
 
 def _time_rows(seconds: float) -> Iterator[Row]:
-    """Processor time, and what that is on the clock beside the programs that run now."""
+    """Rows of processor time, and of wall time beside the programs that run now."""
     busy = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
     share = min(1.0, (os.cpu_count() or 1) / (1.0 + busy))
     yield Row(
@@ -231,7 +231,7 @@ def _air_rows(case: Case, structure) -> list[Row]:
 
 
 def _row_at_rest(structure, rows: list[Row]) -> None:
-    """Row of the damage under the structure's own weight; raises CannotStand where that is too much."""
+    """Row of the damage under the structure's own weight; raises CannotStand where it cannot carry it."""
     from yade_scripts.dynamics.equilibrium import settle
 
     moved = settle(structure)

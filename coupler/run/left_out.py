@@ -20,7 +20,7 @@ HEAVY = (
 
 
 def imports() -> dict[str, bool]:
-    """Which of HEAVY this process has loaded."""
+    """Whether this process has loaded each module of HEAVY."""
     return {name: name in sys.modules for name in HEAVY}
 
 

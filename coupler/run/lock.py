@@ -32,8 +32,8 @@ class FileLock:
     """Holds a file until `release`, or until this process and those forked from it end in any way."""
 
     def __init__(self, file: Path, busy: str):
-        """busy: what is said where another process holds it (Busy). `known` is False where the file system has no
-        locks."""
+        """busy: the message of `Busy`, raised where another process holds the file. `known` is False where the file
+        system has no locks."""
         handle = os.open(file, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o644)
         self._close = weakref.finalize(self, os.close, handle)
         self.known = True
@@ -48,7 +48,7 @@ class FileLock:
             self.known = False
 
     def release(self) -> None:
-        """Let others in; may be called twice."""
+        """Release the file for other processes; may be called twice."""
         with contextlib.suppress(OSError):
             self._close()
 

@@ -31,7 +31,7 @@ Step = tuple[float, float, float]
 
 
 class Pace:
-    """end [s] of the simulated time; the first step is no measure, since it loads and compiles what it uses."""
+    """end [s] of the simulated time; the first step is ignored, since it loads and compiles code."""
 
     def __init__(self, end: float):
         self.end = end
@@ -41,7 +41,7 @@ class Pace:
 
     @property
     def calm(self) -> bool:
-        """Whether worse is to come (`Calm`)."""
+        """Whether the run is expected to become slower (`Calm`)."""
         return self._calm
 
     @calm.setter
@@ -51,14 +51,14 @@ class Pace:
         self._calm = calm
 
     def add(self, time: float, now: float, used: float | None = None) -> None:
-        """A step has ended: time [s] simulated, now [s] on the clock, used [s] of the processor (absent: of this
-        process)."""
+        """Record the end of a step: simulated time [s], wall clock `now` [s], and processor time `used` [s] (default:
+        of this process)."""
         self._seen.append((time, now, clock.process_time() if used is None else used))
         if len(self._seen) > MOST:
             self._seen = self._seen[::2]
 
     def left(self) -> float | None:
-        """Time to go [s] on the clock; None before the second step."""
+        """Wall time left [s]; None before the second step."""
         if len(self._seen) < 2:
             return None
         time, first = self._seen[-1][0], self._seen[0][0]
@@ -87,7 +87,7 @@ class Pace:
         return earlier + share * (later - earlier)
 
     def _busy(self) -> float:
-        """Time on the clock over that of the processor, lately."""
+        """Recent ratio of wall time to processor time."""
         _, now, used = self._seen[-1]
         k = min(bisect(self._seen, now - BUSY, key=itemgetter(1)), len(self._seen) - 2)
         _, then, before = self._seen[k]

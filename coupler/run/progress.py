@@ -26,7 +26,7 @@ class Reporter(Protocol):
         """After each coupled step: the time reached [s] and the figures that matter."""
 
     def expect(self, calm: bool) -> None:
-        """Before a step is reported: whether worse is to come (`coupler/run/pace.py`)."""
+        """Called before a step is reported: whether the run is expected to become slower (`coupler/run/pace.py`)."""
 
     def message(self, text: str) -> None:
         """A sentence for the user and the log (modules on and off, remarks, written files)."""
@@ -63,7 +63,7 @@ class ProgressFile:
             )
 
     def _write(self, reported: dict) -> None:
-        """As a whole; a full disk ends no run for this."""
+        """Replace the file as a whole; a full disk does not end the run."""
         beside = self.path.with_name(f".{PROGRESS}.part")
         with contextlib.suppress(OSError):
             beside.write_text(json.dumps(reported | {"written": clock.time()}), encoding="utf-8")
@@ -71,7 +71,7 @@ class ProgressFile:
 
 
 class _Base:
-    """What both reporters share: the log, the wish to stop and the clock."""
+    """Common part of the reporters: the log, the request to stop and the clock."""
 
     def __init__(self, end: float, log: Callable[[str], None], stop: Callable[[], str | None]):
         self.end, self.log, self.stop_requested = end, log, stop
@@ -87,7 +87,7 @@ class _Base:
         return f"{share:4.0%}  t {time:.3f} of {self.end:g} s  {reported}  {self._left(time)}".rstrip()
 
     def _left(self, time: float) -> str:
-        """Time to go, as text."""
+        """Wall time left, as text."""
         left = self.pace.left()
         return "" if left is None else f"left {duration(left)}"
 
@@ -173,6 +173,6 @@ class QuietReporter(LineReporter):
 
 
 def reporter(end: float, log: Callable[[str], None], stop: Callable[[], str | None], quiet: bool = False):
-    """The reporter that suits standard output, or nobody who looks on; a context manager that is a Reporter."""
+    """The reporter that suits standard output, or a quiet one; a Reporter that is a context manager."""
     kind = QuietReporter if quiet else BarReporter if console().is_terminal else LineReporter
     return kind(end, log, stop)

@@ -46,7 +46,7 @@ def prepare(
     """Find the checkpoint from which the run in the directory `path` can continue, and reopen the directory.
 
     overrides: KEY=VALUE, of names in `FREE` only · any_version: also continue with another version of the program.
-    Raises NoRun, Busy, CannotResume, BadCase; nothing was changed then.
+    Raises NoRun, Busy, CannotResume, BadCase; in these cases nothing is changed.
     """
     summary = read_summary(path)
     _check_idle(path, summary)
@@ -151,7 +151,7 @@ def _newest(path: Path) -> tuple[Checkpoint, list[str]]:
 
 
 def _wrong_with(path: Path, checkpoint: Checkpoint) -> str:
-    """Why a whole checkpoint cannot be used: its layout, or result files that end before it."""
+    """Why a complete checkpoint cannot be used: its layout, or result files that end before it."""
     if checkpoint.about["layout"] != LAYOUT:
         return f"written in layout {checkpoint.about['layout']}, this program reads {LAYOUT}"
     kept = checkpoint.part("recorder")

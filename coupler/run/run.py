@@ -201,7 +201,7 @@ def _note_top(case: Case, recorder: Recorder, coupling, figures: dict, reporter)
 def _tell_verdict(
     case: Case, recorder: Recorder, figures: dict, directory, reporter, is_coupled: bool
 ) -> None:
-    """Into run.json and the log, however the run ends, with what makes its loads wrong."""
+    """Write the verdict to run.json and the log, however the run ends, with the reasons to doubt its loads."""
     from coupler.verdict.words import sentences, unreached
 
     reported = recorder.verdict()
@@ -218,7 +218,7 @@ def _tell_verdict(
 
 
 def _long_steps(coupling, limits: Limits, reporter, clock: Clock, figures: dict, checkpoints) -> LongSteps:
-    """What leaves a long step where the run is to end, asked by both sides."""
+    """The object that both solvers call within a long step, to abandon it where the run is to end."""
 
     def hold():
         return None if checkpoints is None else checkpoints.hold(figures, clock.split())
@@ -231,7 +231,7 @@ def _long_steps(coupling, limits: Limits, reporter, clock: Clock, figures: dict,
 
 
 def _end(reporter) -> type[LimitReached]:
-    """What ends a run before its time: the wish of the user, or else a limit."""
+    """The exception that ends a run early: for a request of the user, or else for a limit."""
     return Stopped if reporter.stop_requested() else LimitReached
 
 
@@ -256,7 +256,7 @@ def _save(checkpoints, directory, figures: dict, clock: Clock) -> None:
 
 
 def _note(coupling, record, figures: dict) -> None:
-    """Carry the step into the figures of the run."""
+    """Add the step to the figures of the run."""
 
     def largest(name: str, value: float) -> None:
         figures[f"largest_{name}"] = max(figures.get(f"largest_{name}", 0.0), float(value))
@@ -289,7 +289,7 @@ def _note(coupling, record, figures: dict) -> None:
 
 def load_of_what_moves(coupling, record) -> np.ndarray:
     """Force (3,) [N] of the water on the blocks that can move; where none can, on all bodies. Ground, quays and
-    footings, which are held, bear many times the load of a house."""
+    footings, which are held, would hide the load of a house by their much larger ones."""
     force = record.load[:, :3]
     if coupling.structure is not None:
         free = np.flatnonzero(~coupling.structure.fixed)
@@ -298,7 +298,7 @@ def load_of_what_moves(coupling, record) -> np.ndarray:
 
 
 def _is_calm(calm: Calm, coupling, record) -> bool:
-    """Whether the run is still before what will make it slow."""
+    """Whether the event that will slow the run down is still to come."""
     if not coupling.coupled:
         return False
     joints = joint_counts(coupling.structure)
@@ -306,8 +306,8 @@ def _is_calm(calm: Calm, coupling, record) -> bool:
 
 
 def _force(case: Case, record, watch) -> tuple[str, float]:
-    """Whose force of the water is told while a run goes on, and that force [N]: of the judged body that bears most;
-    without one, of all."""
+    """Name and force of the water [N] that a run reports as it goes on: those of the judged body with the largest
+    force; without one, of all bodies."""
     strongest = None if watch is None else watch.strongest()
     if strongest is not None:
         return strongest

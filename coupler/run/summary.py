@@ -187,7 +187,7 @@ class _Summary(_Part):
 
 
 def read_summary(path: Path) -> dict[str, Any]:
-    """What run.json in a run directory says.  Raises NoRun."""
+    """The content of run.json in a run directory.  Raises NoRun."""
     if not (path / FILE_NAME).exists():
         raise NoRun(
             f"{path}: not the directory of a run, there is no {FILE_NAME}; runs are in runs/<time>-<hash> beside the "

@@ -21,11 +21,11 @@ INTERVAL = 0.2
 
 
 class StepLeft(LimitReached):
-    """The step under way was left; the state before it is sound."""
+    """The present step was abandoned; the state before it is valid."""
 
 
 class LongSteps:
-    """Called again and again within a step, between solves and substeps; `around` makes one step with that.
+    """Called repeatedly within a step, between solves and substeps; `around` makes one step under this watch.
 
     wish: why the run is to end now, or None · hold: keeps the state before a step, of which `held` is what it returned
     """
@@ -48,7 +48,7 @@ class LongSteps:
         return found
 
     def __call__(self) -> None:
-        """Raises StepLeft where the run is to end now, and the step has had its time."""
+        """Raises StepLeft if the run is to end now and the step has taken longer than the time allowed for it."""
         now = time.monotonic()
         if not self._may_leave or now < self._ask:
             return

@@ -1,7 +1,7 @@
 """Damage of groups of blocks: how many joints broke, how much weight left its place, and what state that is.
 
-Plain arrays in, one `Damage` a group out, for any division of the blocks: walls and floors of one building, storeys,
-buildings of a town. It knows neither a run nor YADE, so that a table of a finished run does as well.
+From plain arrays it makes one `Damage` for each group, for any division of the blocks: walls and floors of one
+building, storeys, buildings of a town. It needs neither a run nor YADE, so the table of a finished run is enough.
 
 State       rule (keys of [verdict])
 stands      no more than `damaged_joints` of the joined area is broken, and no block has left its place
@@ -76,7 +76,7 @@ class Joints:
 
     @classmethod
     def none(cls) -> Joints:
-        """Of blocks that are not glued."""
+        """Joints of blocks that are not glued: none."""
         return cls(np.zeros(0, int), np.zeros(0, int), np.zeros(0), np.zeros(0))
 
 
@@ -106,12 +106,12 @@ class Damage:
 
     @property
     def joined(self) -> bool:
-        """Whether anything of it was glued at the start."""
+        """Whether any block of the group was glued at the start."""
         return self.joints > 0
 
     @property
     def word(self) -> str:
-        """The state in words: what was never glued cannot break, it is moved in part or as a whole."""
+        """The state in words; a group that was never glued cannot break, and is called moved, in part or as a whole."""
         if self.joined:
             return self.state.word
         return ("in place", "partly moved", "moved")[self.state]

@@ -1,4 +1,4 @@
-"""The depth of the water around a body: at the corners and sides of what it covers in plan, just outside of it."""
+"""The depth of the water around a body: at the corners and sides of its footprint, just outside of it."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """How a structure is divided for its verdict: into bodies (tables of the case), walls and floors, and storeys.
 
-Names say what is what. A block is called after the wall it is in, with its place in it behind (`house-wall0x--3-0-1`,
-`pier-4`); walls, floors and roofs of a building carry their storey (`house-wall0x-`, `house-floor0`). A single block
-counts by its group.
+The names define the division. A block has the name of its wall followed by its place in the wall
+(`house-wall0x--3-0-1`, `pier-4`); walls, floors and roofs of a building include their storey (`house-wall0x-`,
+`house-floor0`). A single block belongs to its group.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Division:
 
 @dataclass(frozen=True)
 class Divisions:
-    """The three of them, and the names of all blocks."""
+    """The divisions into bodies, members and storeys, and the names of all blocks."""
 
     blocks: tuple[str, ...]
     bodies: Division
@@ -76,7 +76,7 @@ class Divisions:
 
 
 def member(block: str) -> str:
-    """Wall, floor or part that a block is in: its name without its place."""
+    """Wall, floor or part that a block belongs to: the block's name without its place."""
     return PLACE_IN_WALL.sub("", block)
 
 

@@ -21,9 +21,9 @@ MOST_LISTED = 25
 
 
 def verdict(structure: Structure, watch: Watch) -> dict:
-    """Everything that the verdict tells; times in s, places in m, forces in N, SI throughout; None where nothing was.
+    """The whole verdict; times in s, places in m, forces in N, SI throughout; None where there is no value.
 
-    structure: with its joint table as it is now."""
+    structure: with its present joint table."""
     blocks = Blocks(structure.mass, watch.facts.thickness, watch.moved)
     joints = joints_of(structure)
     places = places_of(structure)
@@ -51,7 +51,7 @@ def verdict(structure: Structure, watch: Watch) -> dict:
 
 
 def joints_of(structure: Structure) -> Joints:
-    """The joints as `damage` wants them: gone when they carry nothing any more."""
+    """The joints as input of `damage`; a joint is broken when it carries no load any more."""
     table = structure.joint_table()
     if table is None:
         return Joints.none()
@@ -104,7 +104,7 @@ def _add_loads(bodies: list[dict], watch: Watch) -> None:
 
 
 def _largest(watch: Watch, k: int, judged: bool = False) -> dict:
-    """Largest force and overturning moment of the water, and depth beside it; None for what was never there."""
+    """Largest force and overturning moment of the water, and depth beside it; None for values that never occurred."""
     force, moment = _peak(watch.force, k), _peak(watch.moment, k)
     if force:
         force["direction"] = watch.direction[k].tolist()

@@ -1,7 +1,7 @@
 """Quantities that a run follows for its verdict: displacements of blocks, largest loads, impacts of debris, depths.
 
-They are cheap beside a step, change nothing in it, and are stored in checkpoints, so that a continued run has the same
-verdict.
+They cost little compared with a step, do not affect it, and are stored in checkpoints, so that a continued run has the
+same verdict.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class Peaks:
         return cls(np.zeros(k), np.full(k, np.nan))
 
     def take(self, value: Array, time: float) -> Array:
-        """Keep what is larger; (k,) bool: where."""
+        """Keep the larger values; returns (k,) bool, where the new value was larger."""
         larger = value > self.value
         self.value[larger], self.time[larger] = value[larger], time
         return larger
@@ -51,7 +51,7 @@ class Peaks:
 
 @dataclass(frozen=True)
 class Facts:
-    """Of the blocks at the start, one row each, fixed solids too: centre (n, 3) [m] · thickness (n,) [m] ·
+    """Data of the blocks at the start, fixed solids included, one row each: centre (n, 3) [m] · thickness (n,) [m] ·
     across (n, 3): unit normal of the widest pair of faces · area (n,) [m²] that it stands for · radius (n,) [m]"""
 
     centre: Floats
@@ -113,7 +113,7 @@ class Watch:
         self._never_joined = ~joined(structure)
 
     def _feet(self) -> Array:
-        """Middle of the foot of each body, and behind them that of all that is judged (bodies + 1, 3) [m]."""
+        """Centre of the base of each body, and last that of all judged blocks (bodies + 1, 3) [m]."""
         label, f = self.divisions.bodies.label, self.facts
         groups = [label == k for k in range(len(self.divisions.bodies.names))]
         return np.array([_foot(f.lower[rows], f.upper[rows]) for rows in [*groups, self.judged]])
@@ -121,7 +121,7 @@ class Watch:
     # ---- every step
 
     def step(self, coupling: CoupledStepper, record: StepRecord) -> None:
-        """After a coupled step."""
+        """Update all quantities after a coupled step."""
         s = coupling.structure
         velocity = s.velocity()[:, :3]
         way = np.linalg.norm(s.centre() - self.facts.centre, axis=1)
@@ -160,7 +160,7 @@ class Watch:
         return self.divisions.bodies.names[k], float(self._force_now[k])
 
     def _hit(self, s: Structure, record: StepRecord, velocity: Array, in_place: Array) -> None:
-        """Debris that lost speed to a contact in this step, and what it met."""
+        """Record debris that lost speed in a contact in this step, and the block that it hit."""
         if record.impulses is None:
             return
         J = record.impulses.contact[:, :3]
@@ -187,14 +187,14 @@ class Watch:
     def _note_hit(
         self, i: int, j: int, record: StepRecord, speed: float, impulse: float, place: Array
     ) -> None:
-        """Of the hits of a pair the hardest stays."""
+        """Keep the hit of a pair that has the largest impulse."""
         old = self._hits.get((i, j))
         if old is None or impulse > old[4]:
             self._hits[i, j] = (record.time, i, j, speed, impulse, impulse / record.dt, *map(float, place))
 
     @property
     def hits(self) -> Array:
-        """(k, 9) the hardest hit of each pair, columns as HIT_COLUMNS, the hardest first."""
+        """(k, 9) the hit of each pair with the largest impulse, columns HIT_COLUMNS, largest first."""
         rows = np.array(list(self._hits.values())).reshape(-1, len(HIT_COLUMNS))
         return rows[np.argsort(-rows[:, 4], kind="stable")]
 
@@ -211,7 +211,7 @@ class Watch:
     # ---- checkpoints
 
     def save(self) -> dict[str, Array]:
-        """Copies of what has been gathered."""
+        """Copies of the quantities so far."""
         peaks = {
             f"{name}_{part}": getattr(getattr(self, name), part).copy()
             for name in ("pressure", "force", "moment", "depth")
@@ -221,7 +221,7 @@ class Watch:
         return {**peaks, **own, "before": self._before.copy(), "hits": self.hits}
 
     def restore(self, saved: dict[str, Array]) -> None:
-        """Return to what `save` gave."""
+        """Restore the state that `save` returned."""
         for name in ("pressure", "force", "moment", "depth"):
             setattr(self, name, Peaks(saved[f"{name}_value"].copy(), saved[f"{name}_time"].copy()))
         for name in _OWN:
@@ -243,7 +243,7 @@ def joined(structure: Structure) -> Array:
 
 
 def _foot(lower: Array, upper: Array) -> Array:
-    """(3,) [m] middle of what the blocks cover in plan, at the level of the lowest."""
+    """(3,) [m] centre of the blocks' extent in plan, at the level of the lowest block."""
     if not len(lower):
         return np.zeros(3)
     low, high = lower.min(axis=0), upper.max(axis=0)

@@ -27,7 +27,7 @@ def sentences(reported: dict) -> Iterator[str]:
 
 
 def unreached(reported: dict, time: float) -> str | None:
-    """A sentence where no water touched the structure until time [s], so that its verdict is one of its weight and
+    """A sentence where no water touched the structure until time [s], so that the verdict reflects its weight and
     contacts alone; None otherwise. For runs whose water can meet the structure."""
     if reported["largest"]["force"]:
         return None
@@ -62,7 +62,7 @@ def _first_break(reported: dict) -> Iterator[str]:
 
 
 def _order(reported: dict) -> Iterator[str]:
-    """Which wall, floor and storey broke first, and which after it."""
+    """The order in which walls, floors and storeys broke."""
     for what, key in (("walls and floors", "members"), ("storeys", "storeys")):
         found = [group for group in reported[key] if group["first_break"]]
         found.sort(key=lambda group: group["first_break"]["time"])

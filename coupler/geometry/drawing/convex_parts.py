@@ -1,10 +1,10 @@
 """Cuts a body with plane faces along planes into convex parts that fill it exactly.
 
 A body is convex where it has no reflex edge, one whose faces turn outwards. A plane through such an edge, along one of
-its two faces, ends it there; the body falls apart where the plane cuts it through. Of all these planes that is taken
-which ends most of reflex edges for the area that it cuts: it runs across walls rather than along them, and through the
-foot of a wall rather than through the slab it stands on. What is left of a neighbour's cut is closed again afterwards,
-where two parts make a convex one (`merged`).
+its two faces, ends it there; the body falls apart where the plane cuts it through. Of all these planes, the one that
+ends the greatest length of reflex edges per area cut is taken. It runs across walls rather than along them, and through
+the foot of a wall rather than through the slab below. Unnecessary cuts are closed again afterwards where two parts form
+a convex one (`merged`).
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ CROSSED = 0.5
 
 
 class CannotCut(ValueError):
-    """A body that has no convex parts; place (3,) [m] says where."""
+    """A body that cannot be cut into convex parts, at the place (3,) [m]."""
 
     def __init__(self, text: str, place: Array):
         super().__init__(text)
@@ -54,7 +54,8 @@ class Part:
 
 
 def convex_parts(body, tolerance: float) -> list[Part]:
-    """The convex parts of a manifold3d.Manifold; a dent less deep than `tolerance` [m] is none.  Raises CannotCut."""
+    """The convex parts of a manifold3d.Manifold; dents less deep than `tolerance` [m] are ignored.  Raises
+    CannotCut."""
     planes = face_planes(*mesh_of(body), tolerance)
     gap = GAP * float(np.ptp(mesh_of(body)[0], axis=0).max())
     waiting, found = fallen_apart(body), []
@@ -181,7 +182,7 @@ def face_planes(vertices: Array, triangles: Array, tolerance: float) -> tuple[Ar
 
 
 def _halves(piece, normal: Array, offset: float, gap: float) -> list:
-    """What lies on either side of a plane, `gap` [m] away from it."""
+    """The parts of a piece on either side of a plane, `gap` [m] away from it."""
     return [
         piece.trim_by_plane(normal.tolist(), offset + gap),
         piece.trim_by_plane((-normal).tolist(), -offset + gap),
@@ -245,7 +246,7 @@ def merged(parts: list[Part], tolerance: float, largest: float, least: float) ->
 
 
 def _merger(a: Part, b: Part, tolerance: float, largest: float, least: float) -> tuple[tuple, Part] | None:
-    """Both as one part, and its rank among all that could be made; None where they are not to be joined."""
+    """The union of both parts, and its rank among all possible ones; None where they are not to be joined."""
     joined = _together(a, b, tolerance)
     if joined is None:
         return None
@@ -259,7 +260,7 @@ def _merger(a: Part, b: Part, tolerance: float, largest: float, least: float) ->
 
 
 def _together(a: Part, b: Part, tolerance: float) -> Part | None:
-    """Both as one, None where that is not convex."""
+    """The union of both parts; None where it is not convex."""
     corners = np.concatenate([a.corners, b.corners])
     try:
         hull = ConvexHull(corners - corners.mean(axis=0))

@@ -32,7 +32,7 @@ def divided(body, part: Part, size: tuple[float, float], bond: str) -> list[Part
 
 
 def how_many(part: Part, size: tuple[float, float]) -> int:
-    """Into how many pieces `divided` cuts a part, about, before it does."""
+    """Approximate number of pieces into which `divided` would cut a part."""
     return math.prod(_counts(np.ptp(part.corners @ directions(part.corners).T, axis=0), size))
 
 
@@ -52,7 +52,7 @@ def _cuts(length: float, count: int, shifted: bool = False) -> Array:
 
 
 def _sliced(body, axis: Array, low: float, cuts: Array) -> list:
-    """The body cut across an axis at low + cuts, from the low end to the high one; nothing that is empty."""
+    """The body cut across an axis at low + cuts, from the low end to the high one; empty pieces are left out."""
     found, rest = [], body
     for cut in cuts:
         rest, piece = rest.split_by_plane(axis.tolist(), float(low + cut))

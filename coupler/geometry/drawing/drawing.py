@@ -108,7 +108,7 @@ def _parts_of(path: Path, layer: Layer, tolerance: float) -> list[Part]:
 
 
 def _usual(parts: list[Part]) -> float:
-    """Thickness [m] that half of the volume has at most."""
+    """Median thickness [m] of the parts, weighted by volume."""
     width = np.array([smallest_width(part.corners) for part in parts])
     order = np.argsort(width)
     volume = np.cumsum(np.array([part.volume for part in parts])[order])
@@ -122,7 +122,7 @@ def _solid(part: Part):
 
 
 def _extent(layers: list[Layer]) -> Array:
-    """Length along x, y and z (3,) [m] of all that is drawn."""
+    """Length along x, y and z (3,) [m] of the whole drawing."""
     boxes = np.array([layer.body.bounding_box() for layer in layers]).reshape(-1, 6)
     return boxes[:, 3:].max(axis=0) - boxes[:, :3].min(axis=0) if len(boxes) else np.zeros(3)
 
@@ -140,7 +140,7 @@ def _check_size(path: Path, spec, extent: Array, parts: list[tuple[Part, tuple[f
 
 
 def _likely_unit(spec, extent: Array) -> str:
-    """What to do about too many blocks."""
+    """The remedy for too many blocks."""
     for name, unit in UNITS.items():
         size = extent * unit / spec.scale
         if (

@@ -44,7 +44,7 @@ def read_layers(
     """The layers of a drawing in metres, and the distance [m] within which its points are one.  Raises MeshFileError,
     BadDrawing with the place, and NotInstalled.
 
-    Bodies of one layer that overlap are one; of two layers, the one that comes later in the file gives way.
+    Overlapping bodies of one layer are united; where two layers overlap, the one later in the file is cut.
     """
     need("drawing")
     drawn = _read(path)
@@ -70,7 +70,7 @@ def read_layers(
 
 
 def _placed(points: Array, scale: float, offset, up: str) -> Array:
-    """In metres, z up."""
+    """Points in metres with the z-axis up."""
     if up == "y":
         points = points[:, [0, 2, 1]] * np.array([1.0, -1.0, 1.0])
     return points * scale + np.asarray(offset, float)
@@ -211,7 +211,7 @@ def _holds(solid, inner) -> bool:
 
 
 def _manifold(points: Array, triangles: Array):
-    """The body within triangles, None where they do not bound one; turned if they face inwards."""
+    """The body bounded by triangles, inverted if they face inwards; None where they bound none."""
     from manifold3d import Error, Manifold, Mesh64
 
     used, rows = np.unique(triangles, return_inverse=True)
@@ -223,7 +223,7 @@ def _manifold(points: Array, triangles: Array):
 
 
 def _turned(body):
-    """A cavity, whose faces look inwards, as the body that fills it."""
+    """The body that fills a cavity, whose faces point inwards."""
     from coupler.geometry.drawing.convex_parts import mesh_of
 
     points, triangles = mesh_of(body)

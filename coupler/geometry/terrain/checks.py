@@ -33,7 +33,7 @@ def terrain_problems(case, ground: HeightMap) -> Iterator[Problem]:
 
 
 def _unknown(ground: HeightMap, X, Y, z) -> Iterator[Problem]:
-    """Places of the tank without a height: beside the terrain, or in a hole of it."""
+    """Places of the tank without a height: outside of the terrain, or in a hole of it."""
     unknown = ~np.isfinite(z)
     if not unknown.any():
         return

@@ -1,4 +1,4 @@
-"""A terrain as it stands in its file, before it has a place in a tank."""
+"""A terrain as stored in its file, before it is placed in a tank."""
 
 from __future__ import annotations
 

@@ -42,7 +42,7 @@ class LandMap:
         return np.where(np.isfinite(found), found, self.otherwise)
 
     def looked_up(self, x, y) -> tuple[Array, Array]:
-        """What the map itself has at the places (n,), NaN where nothing, and whether they lie on it (n,) bool."""
+        """Values (n,) of the map itself at the places, NaN where it has none, and whether they lie on it (n,) bool."""
         X, Y = self.ground.in_file(np.asarray(x, float), np.asarray(y, float))
         i, in_x = _nearest(X, self.x)
         j, in_y = _nearest(Y, self.y)
@@ -84,8 +84,8 @@ def _read(path: str, variable: str | None, _stamp) -> tuple[Array, Array, Array]
 
 
 def land_problems(case) -> Iterator[Problem]:
-    """A map without friction, tables of the wrong law, codes without a table, numbers that are no n, and a map that
-    lies elsewhere."""
+    """A map without friction, tables of the wrong law, codes without a table, values that are not
+    plausible for n, and a map that does not cover the tank."""
     land = case.terrain.land if case.terrain else None
     if land is None or case.tank is None or case.tank.ground is None:
         return

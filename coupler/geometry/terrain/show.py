@@ -20,7 +20,7 @@ MOST = 2e6
 
 
 def of_file(path: Path, more: dict) -> tuple[HeightMap, list[Row]]:
-    """Height map of a terrain file with options of [terrain], and what to say of it. Raises TerrainError."""
+    """Height map of a terrain file with options of [terrain], and remarks on it. Raises TerrainError."""
     from coupler.case.terrain import Terrain
     from coupler.geometry.terrain.site import terrain_of
 
@@ -85,7 +85,7 @@ def _ground_rows(ground: HeightMap) -> list[Row]:
 
 
 def resolved(ground: HeightMap) -> list[Row]:
-    """Root mean square and largest difference [m] of the ground from what a mesh of cells of a size makes of it:
+    """Root mean square and largest difference [m] between the ground and its form on a mesh of a given cell size:
     heights at the columns of its nodes, straight between them."""
     dx = max(ground.spacing)
     stride = max(1, int(np.sqrt(ground.z.size / MOST)))

@@ -2,7 +2,7 @@
 
     file → [re-project] → crop → units, datum → fill → smooth → limit of slope → height map at its place in the tank
 
-What comes out is kept in `.terrain/` beside the file, under a checksum of the file and of the options: a large GeoTIFF
+The result is kept in `.terrain/` beside the file, under a checksum of the file and of the options: a large GeoTIFF
 is read once.
 """
 
@@ -69,7 +69,8 @@ SLOW = (".tif", ".tiff", ".nc", ".grd", ".stl", ".ply", ".obj")
 
 
 def _keep(store: Path, x, y, z) -> None:
-    """Written whole or not at all; a folder that cannot be written costs time only."""
+    """Keep the edited raster; the file is written completely or not at all. A folder that is not writable costs only
+    time."""
     new = store.with_name(f"{store.stem}-{os.getpid()}.tmp.npz")
     try:
         store.parent.mkdir(exist_ok=True)
@@ -119,7 +120,7 @@ def _edited(name: str, grid: Grid, spec) -> tuple[Array, Array, Array]:
 
 
 def _refuse_degrees(name: str, grid: Grid, crs: str, spec) -> None:
-    """Degrees are no lengths."""
+    """Refuse coordinates in degrees, which are not lengths."""
     geographic = (
         crs.startswith("GEOGCS") or crs.startswith("GEOGCRS") or crs.upper() in ("EPSG:4326", "EPSG:4269")
     )

@@ -50,7 +50,7 @@ def bed_at(tank, x, y) -> Array:
 
 
 def on_ground(case, spec):
-    """A table of the structure with on = "terrain": its foot counts from the highest ground under it."""
+    """A table of the structure with on = "terrain": its heights count from the highest ground under it."""
     if case.tank is None or case.tank.ground is None:  # refused elsewhere
         return spec
     _, high = ground_under(case.tank, corners_of(spec.lower, spec.size, spec.turn))
