@@ -31,8 +31,8 @@ class Workspace(NamedTuple):
     """Scratch for one cell: a pool of vertices, a stack of convex pieces, a stack of polygons."""
 
     x: Floats  # (vertices, 7) barycentric coordinates, then position relative to node 0 of the cell
-    distance: Floats  # (vertices,) to the plane in hand, 0 where snapped
-    cap: Integers  # (2, edges, 2) edges of the cross-section in hand, for the outer and the inner half
+    distance: Floats  # (vertices,) to the current plane, 0 where snapped
+    cap: Integers  # (2, edges, 2) edges of the current cross-section, for the outer and the inner half
     edge: Integers  # (vertices, 2) the edge a new vertex lies on
     loop: Integers  # (pieces, faces, corners)
     size: Integers  # (pieces, faces) corners of each face
@@ -41,8 +41,8 @@ class Workspace(NamedTuple):
     label: Integers  # (pieces,) part of each live piece
     polygon: Floats  # (polygons, corners, 7)
     corners: Integers  # (polygons,)
-    height: Floats  # (corners,) distances of a polygon to the plane in hand
-    moments: Floats  # (10,) of the piece in hand
+    height: Floats  # (corners,) distances of a polygon to the current plane
+    moments: Floats  # (10,) of the current piece
     near_body: Ints  # (bodies,) bodies that meet or touch the cell
     near_start: Ints  # (bodies + 1,)
     near_plane: Ints  # (planes,) their planes that pass through or touch the cell
@@ -270,6 +270,7 @@ def split(w, piece, outer, inner, plane, n_vertices):
 
 @inner
 def copy_piece(w, source, target):
+    """Copy piece `source` to slot `target` of the stack."""
     w.faces[target] = w.faces[source]
     for f in range(w.faces[source]):
         w.tag[target, f] = w.tag[source, f]

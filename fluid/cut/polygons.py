@@ -75,6 +75,7 @@ def split_polygon(w, polygon, outer, inner, round_off):
 
 @inner
 def polygon_area(w, polygon):
+    """Area [m2] of the convex polygon in a slot."""
     sx, sy, sz = 0.0, 0.0, 0.0
     o = w.polygon[polygon, 0]
     for k in range(1, w.corners[polygon] - 1):

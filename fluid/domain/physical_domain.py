@@ -159,7 +159,9 @@ def cut_domain(
     previous: a domain of the same mesh and bodies. Only cells near bodies whose planes changed since (old or
     new position, growth too) are cut again, which gives the same domain bit for bit as a full cut.
     moved (n_bodies,) bool: bodies to cut again in any case (optional).
-    connection: thresholds of the multiple covers (default: connect over any area)."""
+    connection: thresholds of the multiple covers (default: connect over any area).
+
+    Raises ValueError for other covers, and for a previous domain of another mesh, other bodies or other thresholds."""
     if covers not in ("single", "multiple"):
         raise ValueError(f"covers = {covers!r} is unknown; choose 'single' or 'multiple'")
     connection = connection or Connection()

@@ -169,6 +169,7 @@ class _Columns:
         return np.column_stack([column // self.shape[1], column % self.shape[1], self.height]).astype(float)
 
     def of_cells(self):
+        """The first arguments of `_cells`."""
         return self.height, self.start, *self.shape
 
 

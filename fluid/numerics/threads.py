@@ -133,7 +133,9 @@ os.register_at_fork(after_in_child=_team.forget)
 
 
 def use(threads: int, least: int = LEAST_ROWS) -> None:
-    """Set the number of threads of kernels in this process, at first 1. least: least number of rows of a range."""
+    """Set the number of threads of kernels in this process, at first 1. least: least number of rows of a range.
+
+    Raises ValueError for fewer than one thread."""
     if threads < 1:
         raise ValueError(f"threads {threads}: at least 1")
     _team.size, _team.least = threads, least

@@ -131,6 +131,7 @@ class Side:
 
     @property
     def is_sea(self) -> bool:
+        """Whether the side is a sea and not an inflow."""
         return self.flow is None
 
     def hold(self, u, time: float, gravity: float) -> None:

@@ -68,10 +68,11 @@ class ViscousTerms(NamedTuple):
 
 @kernel
 def wall_stress(walls, mu, u, body_velocity, edges, strains, cells, out, load):
-    """The terms on Γ: those with hats added to out (N, 3), what the bodies get to load (n_bodies, 6), and those with
-    t(N_i) to the strains flux (n_edges, 6), for `spread_stress`.
+    """Add the terms on Γ: those with the hat functions to out (N, 3) [N], the loads on bodies to load (n_bodies, 6) [N,
+    N m], and those with t(N_i) to flux (n_edges, 6), from which `spread_stress` takes them to the nodes.
 
-    walls: Walls · body_velocity (n_bodies, 6) · edges: StrainEdges · strains: that of u (n_edges, 6), and flux."""
+    walls: Walls · body_velocity (n_bodies, 6) · edges: StrainEdges · strains: the strain of u (n_edges, 6), and
+    flux."""
     cell, row, body, normal, hat, arm, area, nitsche, drag = walls
     edge, edge_weight = edges
     strain, flux = strains

@@ -112,6 +112,7 @@ class Block:
 
     @property
     def is_box(self) -> bool:
+        """Whether the block is a box with edges along the axes of its frame."""
         return self.size is not None
 
     @cached_property

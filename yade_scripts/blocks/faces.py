@@ -69,6 +69,7 @@ class TouchingFaces:
 
     @property
     def area(self) -> float:
+        """Area of the overlap [m²]."""
         return float(np.linalg.norm(polygon_area_vector(self.polygon)))
 
 

@@ -34,6 +34,7 @@ class Springs:
 
     @classmethod
     def none(cls) -> Springs:
+        """No springs."""
         rows, vectors, scalars = np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros(0)
         return cls(
             a=rows,

@@ -22,7 +22,7 @@ NOTHING_MOVES = 1e-200
 
 
 def main():
-    """Build the scene of SCENE, pull, write LAW.csv and LAW.json."""
+    """Build the scene of SCENE, pull, write LAW.csv and LAW.json. Raises ArithmeticError for a record with NaN."""
     ids, members, bonds = build(SCENE)
     O.dt = SCENE["substep"]
     failed_at = {}

@@ -24,6 +24,9 @@ class Arch:
     thickness [m] along the joints · width [m] across · count: number of voussoirs · along: "x" or "y", of the span
     abutment: (length, depth) [m] of two blocks that the arch springs from, None for no abutments; each reaches
     `depth` below the springing, and its upper face continues the joint.
+
+    Raises BlockError for lengths that are not positive, a rise above half the span, fewer than two voussoirs, another
+    name of `along`, or an abutment shorter than the seat of the arch.
     """
 
     name: str

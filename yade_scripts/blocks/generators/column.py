@@ -10,7 +10,9 @@ from yade_scripts.blocks.polyhedra import BlockError
 
 
 def column_of_boxes(name: str, foot, size, count: int, **more) -> list[Block]:
-    """A stack of `count` boxes; size (3,) [m] of the whole column, foot (3,) [m] the middle of its underside."""
+    """A stack of `count` boxes; size (3,) [m] of the whole column, foot (3,) [m] the middle of its underside.
+
+    Raises BlockError for lengths that are not positive, or no boxes."""
     size = np.asarray(size, float)
     _check(name, count, size)
     drum = size / np.array([1.0, 1.0, count])
@@ -34,7 +36,8 @@ def column_of_drums(
     """`count` drums of equal height with `sides` sides, foot (3,) [m] the middle of the underside.
 
     radius [m]: of the circle through the corners at the foot · top_radius [m]: the same at the top (None: radius);
-    between the two the column tapers straight, so every drum is a frustum with plane sides.
+    between the two the column tapers straight, so that every drum is a frustum with plane sides.
+    Raises BlockError for lengths that are not positive, no drums, or fewer than three sides.
     """
     top_radius = radius if top_radius is None else top_radius
     _check(name, count, np.array([radius, top_radius, height]))

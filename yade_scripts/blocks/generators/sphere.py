@@ -15,7 +15,7 @@ FACES = (20, 80, 320)
 
 def sphere_vertices(radius: float, faces: int = 80) -> np.ndarray:
     """Corners (k, 3) [m], about the origin, of a polyhedron with this number of triangles, one of FACES, and with the
-    volume of the sphere of this radius [m]."""
+    volume of the sphere of this radius [m].  Raises ValueError for other numbers."""
     golden = 0.5 * (1.0 + np.sqrt(5.0))
     corners = [(0, a, b * golden) for a in (-1, 1) for b in (-1, 1)]
     x = np.array([np.roll(c, s) for c in corners for s in range(3)], float)

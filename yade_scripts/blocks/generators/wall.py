@@ -23,6 +23,8 @@ def wall_of_blocks(
     half blocks at its ends; where the wall is several blocks thick, neighbouring wythes are shifted against each
     other as well · along: "x" or "y", direction of the length of the wall; None: its longer side · more: further fields
     of every Block
+
+    Raises BlockError for lengths that are not positive, too many blocks, and other names of bond and along.
     """
     lower, size, block = (np.broadcast_to(np.asarray(v, float), (3,)) for v in (lower, size, block))
     _check(name, size, block, bond, along)
