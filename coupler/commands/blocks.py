@@ -27,11 +27,11 @@ from coupler.program.quantities import quantity
 from yade_scripts.blocks.polyhedra import fans, hull_faces, shown
 
 WATER = "water"
-"""The part of a picture that is seen through."""
+"""The transparent part of a picture."""
 BED, BED_POINTS = "ground", 121
 """Name of the ground of a terrain in a picture, and points along a side of it."""
 APART = 0.12
-"""Of their size by which blocks are pulled apart in a picture."""
+"""Share of their size by which blocks are pulled apart in a picture."""
 
 
 def blocks(path: Path, options: dict, joints: dict, picture: Path | None, to: Path | None) -> None:

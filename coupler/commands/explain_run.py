@@ -17,7 +17,7 @@ NEEDS = {
     "structure": ("yade_scripts", "yade"),
     "pictures": ("matplotlib", "pyvista", "vtkmodules"),
 }
-"""What is loaded for a part, and for no other."""
+"""Modules that are loaded for one part only."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Skipped:
     unit: str
     seconds: float | None
     parts: tuple[str, ...]
-    """The parts of the processor time that pay for it."""
+    """The parts of the processor time that contain this work."""
 
     @property
     def share(self) -> float:

@@ -9,9 +9,9 @@ from coupler.program import extras
 from coupler.program.process import run_module
 
 STILL = "800x450"
-"""Of a film of that camera; a still has twice the pixels each way."""
+"""Size [pixels] of a film; a still has twice as many each way."""
 LETTERS = "1.7"
-"""Times the usual size: two stills stand side by side on a page of paper."""
+"""Factor of the letter size, since two stills stand side by side on a printed page."""
 
 
 def missing() -> str:

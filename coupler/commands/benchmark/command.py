@@ -30,7 +30,7 @@ THREADS_NODES, THREADS_QUICK = (30_000, 205_000), (10_000,)
 MOST_ON_TWO, MOST_SERIAL = 1.0 / 1.7, 0.07
 """Targets at 1.2 million cells: time on two threads over that on one, share of the step that one thread does alone."""
 LEAST_TOLD = 0.01
-"""Share of a step from which a kernel is listed."""
+"""Least share of a step at which a kernel is listed."""
 SOLVER_UNKNOWNS, SOLVER_QUICK = (10_000, 100_000, 300_000), (10_000,)
 MOST_PER_100K_CELLS = 30_000.0
 """Target [us]: a step of the water at 100 000 nodes, a fifth of the tank wet."""
@@ -51,9 +51,9 @@ class Line:
 
     what: str
     blocks: int
-    """Of the water alone: nodes of its mesh."""
+    """Number of blocks; for the water alone, nodes of its mesh."""
     joints: int
-    """Of the water alone, and of solvers: unknowns of the pressure."""
+    """Number of joints; for the water alone and for solvers, unknowns of the pressure."""
     us: float
     of: str
     target: float | None = None
@@ -135,7 +135,7 @@ def _scenes(sizes):
 
 
 SLACK = 1.3
-"""Scatter allowed to the cost of what should cost nothing."""
+"""Allowed scatter of a cost that should be zero."""
 
 
 def _dead(sizes):

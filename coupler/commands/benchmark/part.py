@@ -27,11 +27,11 @@ STIFF = ContactLaw(stiffness=1e9, restitution=0.3, friction=0.5)
 HOUSE_LAW = JointParameters(0.15e6, 0.01)
 HOUSE_CONTACT = ContactLaw(restitution=0.2, friction=0.5)
 SHARE = 0.02
-"""Of the strength, by which sleeping joints may be off."""
+"""Share of the strength by which the tractions of sleeping joints may be wrong."""
 PUSH, HIT, HIT_STEP = 1e6, 0.2, 0.01
-"""Force on each block of the front of the first house [N], for how long, and in which steps [s]."""
+"""Force [N] on each block of the front of the first house, its duration [s] and the step [s]."""
 SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
-"""Of the blocks that are taken away, with all their joints."""
+"""Shares of the blocks that are removed with all their joints."""
 
 
 def best(work: Callable[[int], None]) -> float:

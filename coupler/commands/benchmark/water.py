@@ -44,7 +44,7 @@ class Stages:
         self.seconds = dict.fromkeys(STAGES, 0.0)
         self._replaced = []
         self._within = [0.0]
-        """Seconds of other stages inside each of the calls under way."""
+        """Seconds that other stages took within each of the active calls."""
 
     def __enter__(self) -> Stages:
         for stage, functions in STAGES.items():

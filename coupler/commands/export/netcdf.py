@@ -19,9 +19,9 @@ CONVENTIONS = "CF-1.10"
 
 
 FILL = 9.969209968386869e36
-"""Of places without a value: what NetCDF itself takes for doubles."""
+"""Value at places without data: the default of NetCDF for doubles."""
 UNITS = {"bed": "m", "depth": "m", "speed": "m s-1", "flux": "m3 s-2", "arrival": "s"}
-"""Of the maps, as CF writes them."""
+"""Units of the maps in the CF notation."""
 
 
 def write_netcdf(run: Path, to: Path, title: str) -> Iterator[Path]:

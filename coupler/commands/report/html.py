@@ -13,11 +13,11 @@ from coupler.program.quantities import quantity
 HERE = Path(__file__).parent
 KIND = {".png": "image/png", ".svg": "image/svg+xml", ".mp4": "video/mp4"}
 LARGEST_FILM = 8_000_000
-"""[bytes] of a film that is put into the page; a larger one is linked."""
+"""Size [bytes] up to which a film is embedded in the page; a larger one is linked."""
 SHORT = 16
-"""Rows of a table that paper does not break."""
+"""Number of rows up to which a table is not split between printed pages."""
 MOST_COLUMNS = 9
-"""Of a table in letters of the usual size; one of more has smaller ones."""
+"""Number of columns up to which a table has letters of the usual size; a wider one has smaller letters."""
 
 
 def document(title: str, parts: Iterable[str]) -> str:

@@ -34,11 +34,11 @@ CAPTIONS = {
     "angular_momentum": "Angular momentum: contribution of each term since the start",
     "coupling": "Steps: length, passes, iterations, defect",
 }
-"""Of the figures of the histories, in the order in which they are shown; other tables come behind the gauges."""
+"""Captions of the figures of the histories, in the order of display; other tables follow the gauges."""
 FLOOD = "flood_map"
 """The picture with the maps of a flood over terrain."""
 OF_SCHEME = ("momentum", "angular_momentum", "coupling")
-"""Histories that tell of the scheme rather than of the scene: towards the end of the page."""
+"""Histories of the numerical scheme rather than of the scene, which are shown towards the end of the page."""
 FIGURES = {
     "time": ("simulated time", "s"),
     "steps": ("steps", "1"),
@@ -53,7 +53,7 @@ FIGURES = {
     "numerical_dissipation": ("numerical dissipation, share of the energy put in", "%"),
     "numerical_impulse": ("impulse of numerical corrections, share of all impulses", "%"),
 }
-"""Figures of run.json that the page tells."""
+"""Values of run.json that the page shows."""
 NEEDS = {
     "substeps": ("structure",),
     "largest_water_force": ("structure", "fixed solids"),
@@ -61,7 +61,7 @@ NEEDS = {
     "joints_broken": ("joints",),
     "largest_opening_rate": ("joints",),
 }
-"""Figures that say something only where one of these modules is on."""
+"""Values that have a meaning only where one of these modules is on."""
 
 
 def run_page(run: Path, summary: dict, pictures: Path, remarks: list[str]) -> str:

@@ -14,7 +14,7 @@ FIGURES = {
     "cracks": "Cracks by the time at which they opened, in elevation and plan",
     "wall_pressure": "Envelope: the largest net pressure of the water that each block bore in its place",
 }
-"""Figures of a verdict (coupler/view/damage.py) and what stands below them."""
+"""Figures of a verdict (coupler/commands/view/damage.py) and their captions."""
 MOST = 30
 """Rows of a table of walls and floors."""
 

@@ -154,7 +154,7 @@ def _largest(values: np.ndarray) -> str:
 
 
 LITTLE = 1e-4
-"""Share of a limit below which its digits say nothing."""
+"""Share of a limit below which the digits of a value are not significant."""
 LIMITS = (
     ("volume_error", "largest_volume_error", "volume of water missing in the balance"),
     ("energy_error", "largest_energy_error", "energy missing in the balance, share of the energy put in"),

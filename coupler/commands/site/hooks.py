@@ -21,7 +21,7 @@ PROJECT = {
     "CONTRIBUTING.md": "contributing.md",
     "ARCHITECTURE.md": "architecture.md",
 }
-"""Pages at the top of the checkout, and what they are called in the site."""
+"""Pages at the top of the checkout, and their names in the site."""
 
 
 def on_config(config: Any) -> Any:

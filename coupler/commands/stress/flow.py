@@ -16,7 +16,7 @@ the volume of the water."""
 
 STOPS = Limits(volume_error=0.02, energy_error=0.05, cpu_seconds=None)
 DEFECT = 0.5
-"""Where a run of a case stops by default."""
+"""Largest defect, at which a run of a case stops by default."""
 
 
 class Flow:

@@ -23,7 +23,7 @@ class BadFormula(SurgebreakError):
 
 
 LONGEST = 1000
-"""Characters of a formula."""
+"""Largest number of characters of a formula."""
 _OPERATIONS = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,

@@ -12,9 +12,9 @@ import numpy as np
 from scipy.optimize import brentq
 
 ORDERS = (0.05, 12.0)
-"""Where p is looked for."""
+"""Interval in which p is sought."""
 ROUND_OFF = 1e-9
-"""Errors below this say nothing of the order."""
+"""Errors below this are round-off and are not used for the order."""
 
 
 def slope(size, error) -> float:

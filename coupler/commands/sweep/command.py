@@ -36,7 +36,7 @@ ENGINES = (
 )
 EXPORTS = ("snakemake",)
 SHOWN = 12
-"""Rows of a table on the terminal."""
+"""Largest number of rows of a table on the terminal."""
 
 
 @dataclass(frozen=True)

@@ -38,13 +38,13 @@ MEMORY = "2GB"
 WALLTIME = {"lsf": "01:00"}
 """Time limit of a job unless --option says otherwise; 01:00:00 where the batch system is not named here."""
 LISTS = ("job_extra_directives", "job_script_prologue", "job_directives_skip", "worker_extra_args")
-"""Options that may be given again and again."""
+"""Options that may be given several times."""
 HANDED_ON = ("PYTHONPATH", "LD_LIBRARY_PATH", "XDG_CACHE_HOME")
-"""Variables of this process that jobs get, beside all that begin with SURGEBREAK_."""
+"""Environment variables passed to the jobs, besides all that begin with SURGEBREAK_."""
 POLL = 2.0
 """Seconds between two looks at the jobs."""
 PATIENCE = 60.0
-"""Seconds without a worker after which it is said where to look."""
+"""Seconds without a worker after which a note says where to look."""
 
 
 def make_one(folder: str, id: str) -> dict:

@@ -20,7 +20,7 @@ Array = np.ndarray
 MOST_ITERATIONS = 60
 MOST_HALVINGS = 30
 ENOUGH = 1e-10
-"""Gain of the log-likelihood by a step, over the number of runs, at which it is found."""
+"""Increase of the log-likelihood in a step, over the number of runs, below which the maximum counts as found."""
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ from coupler.commands.sweep.results import FREE, Results
 
 Array = np.ndarray
 POINTS = 121
-"""Of a curve."""
+"""Number of points of a curve."""
 MOST_LEVELS = 20
 """Different intensities up to which each has a bar of its own; more are put into BARS."""
 BARS = 10
@@ -32,9 +32,9 @@ LEAST_FOUND = 0.9
 CONVERGENCE = (0.125, 0.25, 0.5, 0.75, 1.0)
 """Shares of the runs for which the width of the band is reported."""
 ORDERS = 5
-"""Random orders of the runs over which that is averaged."""
+"""Number of random orders of the runs over which the width is averaged."""
 AGREES = 1e-2
-"""By which β and θ may differ from those of statsmodels, over them."""
+"""Largest relative difference of β and θ from those of statsmodels."""
 
 
 @dataclass(frozen=True)

@@ -33,7 +33,7 @@ from coupler.run.lock import Busy, FileLock, RunLock
 from coupler.run.summary import read_summary
 
 Execute = Callable[[Sequence[str], Path], Cost]
-"""Runs `surgebreak WORDS` to its end, what it tells into a file."""
+"""Runs `surgebreak WORDS` to its end, with its output in a file."""
 
 LEFT = {
     "table": ("case.toml", "run.json", "log.txt", "report.html"),
@@ -47,7 +47,7 @@ LEFT = {
         "cracks.csv",
     ),
 }
-"""What stays in a run directory that is done."""
+"""Files that are kept in the directory of a completed run."""
 FINAL = ("done", "cannot stand", "refused", "diverged", "gave up")
 """Outcomes that would be the same again."""
 PATIENCE = 60.0

@@ -30,7 +30,7 @@ from coupler.run.directory import write_json
 from coupler.run.summary import read_summary
 
 MOST_ROWS = 400
-"""Of the table on the page; all are in table.csv."""
+"""Largest number of rows of the table on the page; table.csv holds all."""
 FAILED = ("refused", "diverged", "gave up", "stopped", "killed", "crashed", "lost")
 
 

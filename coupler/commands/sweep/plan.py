@@ -31,9 +31,9 @@ from coupler.commands.sweep.vary import varied
 from coupler.program.errors import BadCase, UnitError
 
 OFF = ("structure", "contact", "joints", "motion")
-"""Sections that the run of the free field does without."""
+"""Sections that are left out of the run without structure."""
 OF_STRUCTURE = ("force", "loads", "reaction", "motion")
-"""Kinds of gauges that go with them."""
+"""Kinds of gauges that are left out with them."""
 MOST_ROWS = 1_000_000
 
 

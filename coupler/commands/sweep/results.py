@@ -23,7 +23,7 @@ from coupler.results.history import number as shortest
 from coupler.run.summary import read_summary
 
 FREE = " (free field)"
-"""Behind the meaning of a quantity of the run without structure."""
+"""Suffix of the meaning of a quantity that is taken from the run without structure."""
 NOT_YET = "not yet"
 """Outcome of a row whose run has not been made."""
 

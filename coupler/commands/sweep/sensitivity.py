@@ -16,10 +16,10 @@ from coupler.commands.sweep.results import Results
 
 Array = np.ndarray
 SAMPLES = 1000
-"""Of a bootstrap."""
+"""Number of samples of a bootstrap."""
 CONFIDENCE = 0.9
 LEAST = 8
-"""Runs more than drawn quantities for rank correlations."""
+"""Number of runs in excess of the drawn quantities that rank correlations need."""
 
 
 def sensitivities(spec: Spec, results: Results) -> list[dict]:

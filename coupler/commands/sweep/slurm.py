@@ -29,11 +29,11 @@ Tell = Callable[[dict], None]
 POLL = 2.0
 """Seconds between two looks at the queue."""
 PATIENCE = 3
-"""Looks that a job may be missing from the queue before its run is reported as lost: files take a while to be seen."""
+"""Number of queries in which a job may be absent before its run is reported as lost: files appear with a delay."""
 MINUTES = 60
 """Time limit of a job unless --option time=... says otherwise."""
 LISTS = ("setup", "teardown", "srun_args")
-"""Options that may be given again and again."""
+"""Options that may be given several times."""
 REQUEUES = 100
 """Times that a job may reach its time limit and go on."""
 

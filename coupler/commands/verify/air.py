@@ -52,7 +52,7 @@ def plates(middle: float, top: float, bell=(INNER, WALL, HEIGHT)) -> tuple[list,
 
 TANK, CELL, LEVEL = 1.6, 0.1, 0.9
 DEEP, TIME = 0.5, 2.0
-"""The bell goes down by this [m] in this time [s]."""
+"""Distance [m] by which the bell is lowered, and the time [s] that this takes."""
 
 
 @check(
@@ -266,11 +266,11 @@ HEAVY = 1150.0
 ABOVE = 0.36
 """Height of the ceiling above the water at the start [m], when the air has the pressure of the atmosphere."""
 RAMP, SETTLED, END = 2.5, 4.0, 6.0
-"""The weight of the plates comes on until the first [s]; means from the second to the third."""
+"""Time [s] until which the weight of the plates grows, and begin and end [s] of the means."""
 HEAVE = 1.7
-"""Period of its heave [s], which it still does a little as it sinks: heights are means over it."""
+"""Period [s] of its heave, which persists a little while it sinks; heights are means over this period."""
 LEAK, HIGH, LOW = 5e-4, 0.035, 0.0
-"""Area of the leak [m²], and heights of the ceiling above the water [m] that its sinking is timed between."""
+"""Area of the leak [m²], and the heights [m] of the ceiling above the water between which its sinking is timed."""
 
 
 @check(

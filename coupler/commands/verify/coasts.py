@@ -44,9 +44,9 @@ class Coast:
 
 MONAI = {"lower": (0.0, 0.0, -0.14), "upper": (5.488, 3.402, 0.12), "cell": (0.12, 0.12, 0.024)}
 START, END = 6.0, 22.5
-"""[s] of the record that is run: the wave begins in its trough of 3 mm, a fifth of its crest; its end."""
+"""Begin and end [s] of the simulated part of the record; it begins in the trough of 3 mm, a fifth of the crest."""
 DEPTH = 0.13535
-"""[m] at the inlet."""
+"""Depth [m] at the inlet."""
 GAUGES = ((4.521, 1.196), (4.521, 2.196))
 ARRIVED = 0.01
 """[m] Level over the still water that counts as the arrival of the wave."""

@@ -10,7 +10,7 @@ from coupler.commands.verify.curves import Curve, Figure, Panel
 from coupler.commands.verify.registry import Finding
 
 NUMBERS = (0.5, 1.0, 2.0, 4.0)
-"""Courant numbers; the first is what the others are measured by."""
+"""Courant numbers; the first is the reference of the others."""
 WITHIN = 0.20
 """Tolerance of means and impulses for loads; peaks are reported, not judged."""
 WHAT = ("peak (reported, not judged)", "largest mean over {:g}", "impulse")

@@ -26,7 +26,7 @@ STEADY, ARRIVES = (0.8, 1.0), 45.0
 """Window [s], and the momentum [N] that the sheet brings over the width of a cube in it: ∫ ρ u² dA in the tank without
 cubes, on cells of either size."""
 ANY = 100.0
-"""Tolerance of what is reported, not judged."""
+"""Tolerance of values that are reported, not judged."""
 
 
 @check("P56", "three stacked cubes in a dam break", "Canelas et al. 2016 (experiment), digitised", "M")

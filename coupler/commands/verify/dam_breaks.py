@@ -160,9 +160,9 @@ def _impact_figure(rubbed: Impact, slipping: Impact, table, sph) -> Figure:
 LENGTH = 3.22
 """Tank of SPHERIC test 2 [m]; x runs from the wall of the reservoir here, from the other end in the records."""
 ANY = 10.0
-"""Tolerance of what is reported, not judged."""
+"""Tolerance of values that are reported, not judged."""
 ANY_PRESSURE = 98e3
-"""[Pa] how far the pressure may fall where no air has come yet."""
+"""Tolerance [Pa] of a pressure drop where no air has arrived yet."""
 PROBES = {"H1": 1.488, "H2": 0.992, "H3": 0.496, "H4": 2.638}
 
 
@@ -258,7 +258,7 @@ def clock(found) -> float:
 BOX_AT = (LENGTH - 0.8245 - 1.228) / 0.55
 """Where the face of the box stands, in depths of the reservoir from the dam."""
 TIP = 0.003
-"""Water before it [H²] at which the tip of a front is told from the rest."""
+"""Area of water [H²] ahead of a point that counts as the tip of the front."""
 
 
 def dry_front(n: int) -> tuple[float, float]:

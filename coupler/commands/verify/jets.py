@@ -25,7 +25,7 @@ SLUG = 8.0
 STEADY = (2.5, 6.0)
 """Window in D/U for the means: the jet has spread over the plate, and its end has not come yet."""
 GRAVITY = 1e-3
-"""[m/s²] so small that the speed of the jet is three hundred times that of its waves."""
+"""Gravity [m/s²], so small that the jet is three hundred times as fast as waves on it."""
 THICK = 0.5
 """Thickness of the plate in D."""
 PLACES = (0.0, 0.25, 0.5, 0.75, 0.9)
@@ -34,7 +34,7 @@ LIMITS = {8: 0.05, 4: 0.10, 2: 0.15, 1: 0.20}
 """Relative error of the force allowed, by cells over D."""
 SHEET_LIMITS = {8: 0.05, 4: 0.05, 2: 0.05, 1: 0.10}
 ANY = 10.0
-"""Tolerance of what is reported, not judged."""
+"""Tolerance of values that are reported, not judged."""
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ DRAUGHT = 0.02
 WIDE, DEEP = 2.4, 1.2
 """Half of the width of the basin and its depth [m]."""
 SPEEDS = (0.25, 0.5, 1.0, 2.0)
-"""Of the plate [m/s]; it keeps them, as a heavy one does."""
+"""Speeds of the plate [m/s], which stay constant as those of a heavy plate do."""
 CELL, UNTIL, STEPS = 0.05, 0.056, 64
 
 

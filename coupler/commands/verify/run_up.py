@@ -36,7 +36,7 @@ LAYERS, THINNEST, FLATTEST, LONGEST = 8, 0.2, 4.0, 0.25
 """Of the mesh that fits the bed: layers between bed and lid, least height of one over that in deep water, length of a
 cell over its height, and its largest length in depths."""
 REST = 2.0
-"""[s] over which still water is watched."""
+"""Duration [s] for which still water is observed."""
 
 
 @dataclass(frozen=True)

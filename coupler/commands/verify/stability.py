@@ -24,7 +24,7 @@ from coupler.scene.build import build
 
 STEPS = 600
 WINDOWS = 6
-"""The largest speed of each is what growth is read from."""
+"""Number of windows; growth follows from the largest speed in each."""
 GROWS = 1e-3
 """Growth a step above which a run counts as unstable."""
 

@@ -15,20 +15,20 @@ from coupler.commands.view.palette import INK, LINES
 from coupler.commands.view.plots import FORMATS, STYLE, WIDTH, _undated, plt
 
 PANEL_HEIGHT, SINGLE = 2.1, 2.9
-"""[inch] of a panel among others, and of one alone."""
+"""Height [inch] of a panel among others, and of one alone."""
 MARKERS = "osv^D"
-"""Of the measured points, in their order."""
+"""Markers of the measured points, in order."""
 MOST_POINTS = 60
 """Measured points drawn one by one; a denser record is a line."""
 FEW = 8
 """Computed values of a line up to which each is marked."""
 BAND = "#d9d9d9"
 OWN = LINES
-"""Computed curves, in their order."""
+"""Colours of the computed curves, in order."""
 DASHES = ("-", (0, (6, 1.2)), (0, (1.5, 0.9)), (0, (6, 1.2, 1.5, 1.2)))
-"""Of the computed curves, so that they can be distinguished in grey print."""
+"""Line styles of the computed curves, which distinguish them in grey print."""
 EXACT = ("--", (0, (1, 1.5)), "-.")
-"""Of the exact curves."""
+"""Style of the exact curves."""
 LEGEND_ROW = 0.16
 """[inch] of a row of the legend above the panels."""
 

@@ -21,12 +21,12 @@ NAMES = ("damage", "cracks", "wall_pressure")
 MOST_PARTS = 16
 """Walls and floors that are drawn: those that broke first, then the largest."""
 FROM_ABOVE = 0.7
-"""Of the upward component of the normal of a part, from which it is drawn in plan."""
+"""Upward component of the normal of a part from which it is drawn in plan."""
 INSTANTS = 400
 TALLEST = 8.2
-"""[inch] of a figure."""
+"""Largest height [inch] of a figure."""
 LEFT = "#f3d9cf"
-"""Fill of a block that left its place."""
+"""Colour of a block that left its place."""
 
 
 @dataclass(frozen=True)

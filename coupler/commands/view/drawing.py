@@ -21,7 +21,7 @@ from coupler.commands.view.scene import LETTERS
 
 SIZE = (1600, 1000)
 TINTS = ("#d9c7a8", "#9db8c9", "#c98f7a", "#b7b0a6", "#a9c5a0", "#cdb4d6", "#e0c060")
-"""Of parts in the order of their names, again from the first beyond the last."""
+"""Colours of parts in the order of their names, repeated cyclically."""
 TROUBLE = "#b3261e"
 
 

@@ -12,7 +12,7 @@ from coupler.commands.view.water_surface import right_handed
 
 TORN = (0.1, 0.4)
 FAST = (0.15, 0.4)
-"""Shares of U from which there is foam, and at which there is nothing else."""
+"""Shares of U at which foam begins, and at which it is complete."""
 
 
 def foam(nodes, cells, level_set, velocity, fastest):

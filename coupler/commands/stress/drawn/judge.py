@@ -21,11 +21,11 @@ VOLUME = 0.02
 MOMENTUM = 1e-6
 """Share of the largest line of momentum that the lines may miss in sum."""
 STILL = 1e-6
-"""Mean speed over sqrt(g H) of water that has no reason to move."""
+"""Limit of the mean speed over sqrt(g H) of water that should stay at rest."""
 OVERLAP = 0.1
 """Share of the thinner block by which two bodies may overlap, or a block may reach through a wall."""
 VAPOUR = -98e3
-"""[Pa] gauge below which water away from air parts."""
+"""Gauge pressure [Pa] below which water away from air separates."""
 PULL_SLACK = 1e-2
 """Share of it that the tolerance of the solver leaves."""
 LOOKED_AT = 4

@@ -15,16 +15,16 @@ from coupler.commands.stress.drawn.stream import Stream, stream
 from coupler.commands.stress.registry import GROUPS
 
 CPU_SECONDS = 10.0
-"""Processor time after which a scene ends by itself, sound as far as it went."""
+"""Processor time [s] after which a scene ends by itself, with valid results up to then."""
 SHARES = {"structure": 0.25, "water": 0.3, "coupling": 0.45}
 BRICK_STEP = 4e-6
-"""[CPU s] that a brick (six cells) of water takes a step, about; with blocks half as much again."""
+"""Approximate processor time [s] per step of a brick (six cells) of water; with blocks it is half as much again."""
 SUBSTEP = 4e-6
-"""[CPU s] that a block with its contacts and joints takes a substep, about."""
+"""Approximate processor time [s] per substep of a block with its contacts and joints."""
 TOUCHING = ("wall", "building", "column", "arch")
 """Kinds of parts in which faces touch for sure: from their joints [contact] can take its stiffness."""
 WANTED = 4.0
-"""[CPU s] that a scene is sized for."""
+"""Processor time [s] that a scene is sized for."""
 
 
 @dataclass

@@ -11,7 +11,7 @@ from coupler.commands.stress.drawn.basin import SIDES, Basin
 from coupler.commands.stress.drawn.dice import Dice, rounded
 
 SHALLOWEST = 3.0
-"""Cells of the shallowest water that is drawn: below, `check` says that the mesh does not resolve it."""
+"""Depth in cells of the shallowest water that is drawn; `check` reports shallower water as not resolved."""
 
 
 @dataclass

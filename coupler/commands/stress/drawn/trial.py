@@ -24,7 +24,7 @@ from coupler.program.process import run_module, trouble
 CPU_SECONDS = 120
 """Processor time after which a scene that does not end by itself is killed, and counts as failed."""
 WALL_SECONDS = 3600
-"""After which one counts as failed that waits for ever: beside other programs a sound one may take minutes."""
+"""Wall time [s] after which a scene that hangs counts as failed; beside other programs a good one may take minutes."""
 MISTAKE = re.compile(r"case\.toml(:\d+)?: [a-z][\w.\[\]-]*: .{20,}")
 """A message about a case: file, line, key and a reason."""
 TOO_WEAK = "the structure cannot carry its own weight and the load at the start"

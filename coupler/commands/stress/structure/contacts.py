@@ -34,7 +34,7 @@ def rebound(stiffness: float, e: float, size=1.0, density: float = DENSITY, fall
 
 
 ELASTIC_GAIN = 0.005
-"""At the accurate substep, where no dashpot takes what begin and end of a contact are off."""
+"""Energy gained at the accurate substep without a dashpot, which would absorb the errors at both ends of a contact."""
 
 
 def rebounds(cases) -> Iterator[Measure]:
