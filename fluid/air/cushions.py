@@ -17,7 +17,7 @@ at the crossing of every edge to its nodes as zero does where the air is open:
 
 with s = (dt/ρ) k_ij/ϑ_ij.  So neither a stiff cushion nor a soft one limits the step, and a pocket loads a body in the
 same way as water does.  θ_k is 1/2, which keeps the energy of a cushion that the steps resolve; where R changed its
-sign from one step to the next it is 1 for a step, so that a cushion too stiff for that comes to rest.
+sign from one step to the next it is 1 for a step, so that a cushion too stiff to be resolved comes to rest.
 """
 
 from __future__ import annotations
@@ -197,7 +197,7 @@ class Cushions:
         return 1.0 / (self.theta**2 * self.stiffness * dt)
 
     def source(self, dt: float) -> Array:
-        """Right hand side (K,) [m³/s] of (3) but for the flow of the water and the bodies."""
+        """Right hand side (K,) [m³/s] of (3) without the flow of the water and the bodies."""
         return self.compliance(dt) * (self.pressure - self.known) + self._carried_rate()
 
     def _carried_rate(self):

@@ -5,7 +5,7 @@ to V without exchange of heat (or, with γ = 1, at constant temperature) it has 
 
     P = p_a ((V_a/V)^γ - 1),        -dP/dV = γ (P + p_a)/V,                                                (1)
 
-and the energy, which the water can get back, of the work against the atmosphere outside:
+and the energy, net of the work of the atmosphere outside, which the water can recover:
 
     U = ∫_V^V_a P dV = p_a (V_a^γ V^(1-γ) - V_a)/(γ - 1) - p_a (V_a - V),                                  (2)
 

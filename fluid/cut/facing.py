@@ -8,7 +8,8 @@ from kernel_decorators import kernel
 
 
 def facing(bodies, polygons, reach, bounds, loose):
-    """(S,) bool: something lies within reach (S,) [m] ahead of the polygon; its plane (S,) among those of all bodies.
+    """(S,) bool: another surface lies within reach (S,) [m] in front of the polygon; plane (S,) of the polygon among
+    those of all bodies.
 
     polygons: body (S,), centroid (S, 3) [m], normal (S, 3) out of the body · bounds (2, 3) [m] of the tank · loose
     (n_bodies,) bool: a polygon counts only if its own body or the one opposite is loose; sides of the tank are not

@@ -1,4 +1,4 @@
-"""Parts of an earlier cut that are kept, together with parts cut anew, in the order of the cells."""
+"""Parts of an earlier cut that are kept, together with newly cut parts, in the order of the cells."""
 
 from __future__ import annotations
 

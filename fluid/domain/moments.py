@@ -35,7 +35,7 @@ def corner_moments(phi, a, out):
 def _prism_moments(phi, a, b, c, d, out):
     """∫ N_k / |e| over the wet side when a, b are wet and c, d dry.
 
-    The crossings ac, ad, bc, bd part the prism into the tetrahedra a ac ad bd, a ac bc bd and a b bc bd."""
+    The crossings ac, ad, bc, bd divide the prism into the tetrahedra a ac ad bd, a ac bc bd and a b bc bd."""
     ac, ad = phi[a] / (phi[a] - phi[c]), phi[a] / (phi[a] - phi[d])
     bc, bd = phi[b] / (phi[b] - phi[c]), phi[b] / (phi[b] - phi[d])
     first, second, third = 0.25 * ac * ad * (1.0 - bd), 0.25 * ac * (1.0 - bc) * bd, 0.25 * bc * bd

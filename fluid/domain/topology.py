@@ -153,7 +153,7 @@ class Topology:
     @cached_property
     def rows_of_background(self) -> tuple[Array, Array]:
         """First row and number of the cells of each background cell: none inside solids, several where a thin wall
-        parts it."""
+        divides it."""
         cells = np.arange(self.n_background)
         first = np.searchsorted(self.background, cells)
         return first, np.searchsorted(self.background, cells, side="right") - first
@@ -273,7 +273,7 @@ def _neighbours_in(mesh, nodes, cells, parent):
     """neighbours (M, 4); where every node is its background node, those of the parents, renumbered."""
     if len(nodes) > len(mesh.nodes):
         return _neighbours(mesh.neighbours, cells, parent, len(mesh.cells))
-    row = np.full(len(mesh.cells) + 1, -1, np.int32)  # the last entry answers for "no neighbour", -1
+    row = np.full(len(mesh.cells) + 1, -1, np.int32)  # the last entry stands for "no neighbour", -1
     row[parent] = np.arange(len(parent))
     return row[mesh.neighbours[parent]]
 

@@ -1,4 +1,4 @@
-"""Multigrid by aggregation: a preconditioner that is cheap enough to be built anew in every step, for its wet nodes.
+"""Multigrid by aggregation: a preconditioner that is cheap enough to be rebuilt in every step for its wet nodes.
 
 Pairs of pairs of pairs of the most strongly coupled unknowns (Notay, Electron. Trans. Numer. Anal. 37 (2010) 123)
 become one unknown of the coarser level: blocks of 2 x 2 x 2 nodes on a lattice, flat ones where cells are flat, and
@@ -41,7 +41,7 @@ SAME = 0.99
 
 
 class Matrix(NamedTuple):
-    """A symmetric matrix: as `Level`, without what its sweeps need."""
+    """A symmetric matrix with the fields of `Level`, except those that its sweeps need."""
 
     start: Integers
     middle: Integers

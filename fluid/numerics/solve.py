@@ -54,7 +54,7 @@ def solve(
     """x with ‖b - (A + extra) x‖ ≤ rtol ‖b‖ by preconditioned conjugate gradients from x0.
 
     A: csr (n, n), symmetric positive definite · b, x0 (n,) · extra: v ↦ S v, S symmetric positive semidefinite.
-    kept: an empty list takes the preconditioner; hand it in again with the same A.
+    kept: an empty list receives the preconditioner; pass it again with the same A.
     Raises NotConverged after `most` iterations or when A turns out not to be positive definite."""
     if np.linalg.norm(b) == 0.0:
         return SolveResult(np.zeros_like(b), 0, 0.0)

@@ -67,7 +67,7 @@ def _beside_solids(water, places, z, phi, is_open) -> Array:
 
 def pressure(water, points):
     """Pressure [Pa] at points (m, 3) or (3,) [m] → (m,) or a number; 0 in the open air, that of the pocket in trapped
-    air, NaN inside a solid."""
+    air, NaN inside a solid. Raises Outside for a point outside the mesh."""
     places = Places.of(water, points)
     in_air = places.read(water.level_set) >= 0.0
     p = np.where(in_air, 0.0, places.read(water.pressure))
@@ -86,14 +86,16 @@ def pocket_at(water, point) -> int | None:
 
 
 def velocity(water, points):
-    """Velocity [m/s] at points (m, 3) or (3,) [m] → the same shape; 0 in the air, NaN inside a solid."""
+    """Velocity [m/s] at points (m, 3) or (3,) [m] → the same shape; 0 in the air, NaN inside a solid. Raises Outside
+    for a point outside the mesh."""
     places = Places.of(water, points)
     u = np.where(places.read(water.level_set)[:, None] >= 0.0, 0.0, places.read(water.velocity))
     return u if np.ndim(points) == 2 else u[0]
 
 
 def level_set_at(water, points) -> Array:
-    """φ [m] at points (m, 3) [m] → (m,), negative in the water, NaN inside a solid."""
+    """φ [m] at points (m, 3) [m] → (m,), negative in the water, NaN inside a solid. Raises Outside for a point outside
+    the mesh."""
     return Places.of(water, points).read(water.level_set)
 
 
@@ -102,7 +104,7 @@ def flux(water, at, edges) -> float:
     product of the edges: ∫_{φ<0} u·n dA.
 
     φ and u are read on a lattice of triangles no longer than half a cell and taken as linear in each; a triangle whose
-    middle is inside a solid counts as dry."""
+    middle is inside a solid counts as dry. Raises Outside for a parallelogram outside the mesh."""
     edges = np.asarray(edges, float)
     m, n = (int(np.ceil(2.0 * np.linalg.norm(e) / water.mesh.finest)) for e in edges)
     i, j = np.meshgrid(np.arange(m + 1), np.arange(n + 1), indexing="ij")

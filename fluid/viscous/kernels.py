@@ -150,7 +150,7 @@ def unheld_rate(terms, u, body_velocity):
 
 @kernel
 def _restrict(r, node, projector, idle):
-    """Set the components that the sides of the tank hold to zero, in place."""
+    """Set to zero the components that the sides of the tank constrain, in place."""
     moved = np.empty(3)
     for s in range(node.shape[0]):
         for k in range(3):

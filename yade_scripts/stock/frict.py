@@ -29,7 +29,7 @@ def material(joint):
 
 
 def functors(joint):
-    """Geometry, physics and law functor; open contacts stay listed, so that each costs what a bond costs."""
+    """Geometry, physics and law functor; open contacts stay listed, so that each costs as much as a bond."""
     from yade.wrapper import (
         Ig2_Sphere_Sphere_ScGeom,
         Ip2_FrictMat_FrictMat_FrictPhys,

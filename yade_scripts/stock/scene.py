@@ -1,4 +1,4 @@
-"""Blocks, joints and motion as the plain description that a stock script holds: numbers and texts only."""
+"""Blocks, joints and motion as the plain description in a stock script: numbers and texts only."""
 
 from __future__ import annotations
 
