@@ -10,7 +10,7 @@ from coupler.case.case import Case
 ROUNDING = 1e-9
 """Share of an interval within which a time counts as reached."""
 OUTPUTS, CHECKPOINTS = 100, 10
-"""Of a run that does not say how many."""
+"""Default numbers of outputs and checkpoints of a run."""
 MOST_OUTPUTS = 100_000
 """More written states are a mistake of the unit: an hour of film has 90 000 pictures."""
 

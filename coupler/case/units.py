@@ -39,12 +39,12 @@ DIMENSIONS = {
     "rad": "an angle",
     "rad/s": "an angular velocity",
 }
-"""What a quantity of each unit of the case file is called."""
+"""Name of the dimension of each unit in the case file."""
 
 LEAST, MOST = 1e-30, 1e30
 """Sizes of numbers, zero aside, with whose products and powers the program can still count."""
 LONGEST = 100
-"""Characters of the text of a quantity."""
+"""Largest number of characters in the text of a quantity."""
 
 _QUANTITY = re.compile(r"\s*([-+]?(?:\d[\d_]*\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
 _FACTOR = r"[^\W\d_%°]*[A-Za-z%°](?:(?:\^|\*\*)?-?\d+)?"

@@ -39,7 +39,7 @@ LIGHTEST, HEAVIEST = 5.0, 25e3
 FALLEN = 0.01
 """Share of its strength that a law may carry at the opening at failure without a remark."""
 SHAPES = {"size": "box", "diameter": "sphere"}
-"""What a block is by the name that gives its shape, where it needs a centre."""
+"""Shape of a block by the key that gives it, where the block needs a centre."""
 WEAKEST = 1.0
 """Strength [Pa] below which a joint holds nothing: a millimetre of stone weighs more."""
 

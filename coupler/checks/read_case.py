@@ -32,11 +32,11 @@ from coupler.geometry.tank_mesh import measured
 from coupler.program.errors import BadCase, briefly, did_you_mean
 
 DEEPEST = 20
-"""Tables and lists inside of one another; the schema has six."""
+"""Largest depth of nested tables and lists; the schema has six."""
 MOST_BITS = 10_000
-"""Of a whole number; longer ones cannot be written in decimals."""
+"""Largest number of bits of a whole number; longer ones cannot be written in decimals."""
 LONGEST_SHOWN = 200
-"""Characters of an override in a message."""
+"""Largest number of characters of an override in a message."""
 _TOO_DEEP = f"more than {DEEPEST} lists or sections inside of one another; no case is so deep"
 NEW = -1
 """Place in a list, written [+]: behind its last item."""
@@ -50,10 +50,10 @@ class CaseFile:
 
     case: Case
     path: Path
-    """Of the file; of a case that a script made, a name in the directory from which its paths are meant."""
+    """Path of the file; for a case made by a script, a name in the directory from which its paths are resolved."""
     overrides: tuple[str, ...]
     text: str
-    """TOML, as it was before the overrides."""
+    """The TOML text without the overrides."""
 
     @property
     def directory(self) -> Path:

@@ -36,7 +36,7 @@ WELD = 1e-5
 STL_DIGITS = 2.0**-23
 """Relative resolution of a coordinate of an STL file (single precision)."""
 COARSEST = 1e-3
-"""Largest share of the usual edge that the coordinates of a file may leave open."""
+"""Largest uncertainty of a file's coordinates as a share of the usual edge."""
 
 
 def blocks_from_file(spec, **common) -> list:

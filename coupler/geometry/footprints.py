@@ -23,7 +23,7 @@ Array = np.ndarray
 SAME = 1e-6
 """Share of its extent within which two corners of a footprint are one."""
 STRAIGHT = 1e-3
-"""Sine of the turn at a corner below which it is none."""
+"""Sine of the turn at a corner below which the corner is dropped."""
 BY_PYOGRIO = (".shp", ".gpkg", ".fgb")
 
 

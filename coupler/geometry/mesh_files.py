@@ -39,7 +39,7 @@ UNREADABLE = (
     SyntaxError,
     AssertionError,
 )
-"""What meshio's readers raise on a file that is not what its name says; one of them leaves the program."""
+"""Exceptions of meshio's readers for a file that is not of the format of its ending; one reader raises SystemExit."""
 NEEDS_PACKAGE = {"exodus": "netCDF4", "cgns": "h5py", "h5m": "h5py", "hmf": "h5py", "med": "h5py"}
 """Formats whose reader needs a package that may be absent."""
 PATIENCE, PER_MEGABYTE = 3.0, 10.0

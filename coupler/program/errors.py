@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from enum import IntEnum
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-"""Numbers of an OSError that mean: no room, for this user or in this file."""
+"""Error numbers (errno) that mean that there is no room, for this user or in this file."""
 
 
 class ExitCode(IntEnum):
@@ -81,7 +81,7 @@ class _Briefly(reprlib.Repr):
 
 
 briefly = _Briefly().repr
-"""How a value was written, cut where it is long: a message is for reading."""
+"""A value as it was written, shortened where it is long, so that messages stay readable."""
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:

@@ -18,9 +18,9 @@ from coupler.program.errors import FULL, BadCase, ExitCode
 
 OURS = ("coupler", "fluid", "yade_scripts")
 CLOSED = (errno.EACCES, errno.EPERM, errno.EROFS)
-"""Numbers of an OSError that mean: not for this user."""
+"""Error numbers (errno) that mean that this user has no permission."""
 NO_MEMORY = ("cannot allocate memory", "failed to map segment", "not enough memory")
-"""What the loader of libraries says when there is no room for one, in small letters."""
+"""Messages of the dynamic loader when memory is short, in lower case."""
 
 
 @dataclass(frozen=True)

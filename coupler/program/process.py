@@ -21,11 +21,11 @@ from typing import Any
 from coupler.program.provenance import ROOT
 
 _LIBC = ctypes.CDLL(None)
-"""Looked up here, since a fork should not."""
+"""The C library, loaded here because a forked process should not load it."""
 PR_SET_PDEATHSIG = 1
 """prctl(2)"""
 LAST_LINES = 3
-"""Of what a process printed, in a message about how it ended."""
+"""Number of lines of a process's output in a message about its failure."""
 
 
 def run_module(module: str, *words: object, **options: Any) -> subprocess.CompletedProcess:

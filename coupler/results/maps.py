@@ -17,10 +17,10 @@ import numpy as np
 from array_types import Array
 
 FILM = 0.1
-"""Depth from which a place counts as wet, in layers of the mesh: thinner films have no speed to speak of."""
+"""Depth in layers of the mesh from which a place counts as wet; the speed of thinner films is not resolved."""
 UNKNOWN = -9999.0
 NEVER = -1.0
-"""In place of a time of arrival: checkpoints hold finite numbers."""
+"""Value in place of a time of arrival, since checkpoints hold finite numbers."""
 KEPT = ("depth", "speed", "flux", "arrival")
 
 

@@ -52,7 +52,7 @@ class Recorder:
         self.reinserted, self.clipped = 0.0, 0
         self.reinserted_net = self.left = self.parted = 0.0
         self.readings: dict[str, float | None] = {}
-        """What the gauges of the common table read in the last step."""
+        """Values of the gauges of the common table in the last step."""
         self._kept = kept
         self._tables: dict[str, HistoryTable] = {}
         self._energy = self._table("energy", ENERGY)

@@ -22,9 +22,9 @@ Array = np.ndarray
 NEAR = 1e-9
 """Share of the height of the tank within which a node is at its top."""
 REACHED = 0.25
-"""Of a cell: distance of the surface from the top at which it is there."""
+"""Share of a cell: distance of the surface from the top at which the top counts as reached."""
 NEVER = -1.0
-"""In place of a time: checkpoints hold finite numbers."""
+"""Value in place of a time, since checkpoints hold finite numbers."""
 
 
 class TankTop:

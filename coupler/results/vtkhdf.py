@@ -165,7 +165,7 @@ def single(array):
 
 
 UNREADABLE = (OSError, KeyError, RuntimeError, AttributeError, TypeError, ValueError, IndexError)
-"""What reading raises of a file that is not what a run writes: torn, another kind of file, a folder."""
+"""Errors from reading a file that no run wrote: an incomplete file, another kind of file, a folder."""
 
 
 def read_times(path):

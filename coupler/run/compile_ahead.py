@@ -22,7 +22,7 @@ from coupler.program.process import environment
 from coupler.program.provenance import ROOT
 
 MODULES = {"solids": "fluid/cut", "water": "fluid", "structure": "yade_scripts", "both": "coupler/step"}
-"""Where the kernels of each part are; those of fluid/cut count for solids alone."""
+"""Folders with the kernels of each part; those of fluid/cut count for solids alone."""
 CHAINS = (("solids", "water"), ("structure", "both"))
 """Parts that one process compiles one after the other, since the second uses kernels of the first. Both chains take
 about equally long."""

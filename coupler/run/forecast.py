@@ -28,14 +28,14 @@ BYTES_PER_BLOCK = 60_000
 BYTES_PER_WET_BLOCK = 300_000
 """The same with the cells that it cuts."""
 BYTES_PER_COUPLED_CELL = 1500
-"""Resident memory per cell where blocks move: now and then two domains are there at once."""
+"""Resident memory per cell where blocks move, since two domains exist at once at times."""
 PROGRAM_BYTES = {"base": 105e6, "water": 155e6, "structure": 330e6, "both": 375e6}
 """Resident memory of code and libraries: of every run, and what each side adds, kernels included."""
 DISK_BYTES_PER_NODE = 12
 """Compressed level set, velocity and pressure of one written state."""
 DISK_BYTES_PER_BLOCK = 150
 CHECKPOINT_BYTES_PER_CELL = 36
-"""Of one checkpoint, compressed; blocks take less than a tenth of it."""
+"""Size of one checkpoint per cell, compressed; blocks take less than a tenth of it."""
 HISTORY_BYTES_PER_STEP = 4000
 """Rows of all histories without gauges."""
 SECONDS_PER_SUBSTEP, SECONDS_PER_POINT, SECONDS_PER_LOOSE_BLOCK = 1.2e-4, 1.7e-7, 3e-6

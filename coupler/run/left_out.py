@@ -16,7 +16,7 @@ HEAVY = (
     "fluid", "yade_scripts", "yade", "scipy", "numba", "h5py", "skfem", "pint", "matplotlib", "pyvista",
     "vtkmodules",
 )  # fmt: skip
-"""Rooms of this program and packages that take time or memory to load."""
+"""Packages of this program and others that take time or memory to load."""
 
 
 def imports() -> dict[str, bool]:

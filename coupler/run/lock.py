@@ -19,7 +19,7 @@ from coupler.program.errors import ExitCode, SurgebreakError
 HELD = (errno.EAGAIN, errno.EACCES)
 LOG = "log.txt"
 NO_LOCKS = (errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS)
-"""Numbers of an OSError of file systems that know no locks."""
+"""Error numbers (errno) of file systems without locks."""
 
 
 class Busy(SurgebreakError):

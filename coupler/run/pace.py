@@ -17,14 +17,14 @@ from operator import itemgetter
 WINDOW = 0.5
 """Share of the simulated time so far that counts: its later half for the pace, both for the trend."""
 TREND, MOST_TREND = 0.3, 1.3
-"""Share of the trend that is taken to go on, and by how much it may change the pace."""
+"""Share of the trend that is assumed to continue, and the largest factor by which it may change the pace."""
 GROWTH = 2.2
 AFTER_ARRIVAL = 1.5
-"""Times the moment at which the water reached the structure: if nothing is broken by then, calm is over."""
+"""Multiple of the time of the water's arrival at the structure after which, if nothing has broken, calm is over."""
 BUSY = 60.0
-"""[s] on the clock over which the share of a core is looked at that the run gets."""
+"""Wall time [s] over which the run's share of a core is measured."""
 MOST = 2000
-"""Steps that are remembered; of longer runs every other one is dropped."""
+"""Largest number of stored steps; in longer runs every other one is dropped."""
 
 Step = tuple[float, float, float]
 """Time [s] simulated, on the clock, and of the processor."""

@@ -36,9 +36,9 @@ class Reporter(Protocol):
 
 
 PROGRESS = "progress.json"
-"""In the run directory: how far a run is, for those who look on."""
+"""File in the run directory with the progress of the run, for other programs."""
 EVERY = 1.0
-"""[s] between two of its versions."""
+"""Time [s] between two versions of that file."""
 
 
 class ProgressFile:

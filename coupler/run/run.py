@@ -28,7 +28,7 @@ from coupler.step.step_limits import check_step
 FAST_OPENING = 0.25
 """Growth of λ/δ_f in a substep from which tearing counts as averaged over it."""
 FAST_OPENING_NEEDLEMAN = 0.1
-"""The same where shear pushes the faces apart: the work of separation is half a per cent off there."""
+"""The same for laws in which shear pushes the faces apart; the error of the work of separation is 0.5 % there."""
 
 
 def run(case: Case, directory, reporter, checkpoint=None, each=None) -> ExitCode:

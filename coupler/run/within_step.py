@@ -13,11 +13,11 @@ from collections.abc import Callable
 from coupler.step.limits import LimitReached
 
 LONG = 0.5
-"""Time [s] of a step from which the next one may be left; before one that takes less nothing is held."""
+"""Duration [s] of a step from which the next one may be abandoned; after a shorter step no state is kept."""
 PATIENCE = 2.0
-"""Time [s] that the step under way has to end by itself."""
+"""Time [s] that the present step is given to end by itself."""
 INTERVAL = 0.2
-"""Time [s] between two questions."""
+"""Time [s] between two checks for a request to stop."""
 
 
 class StepLeft(LimitReached):

@@ -24,9 +24,9 @@ if TYPE_CHECKING:
 
 
 FALL = 0.1
-"""Of its thickness: the fall whose speed a block must lose in a step to count as a hit, unless the case says one."""
+"""Share of a block's thickness: a hit must cost the block the speed of a fall of this height in a step, by default."""
 ANSWERS = 0.2
-"""Share of the impulse on a block that another one must have got the other way round to be what it hit."""
+"""Least share of the impulse on a block that another block must have received in reverse to count as the one hit."""
 HIT_COLUMNS = ("time", "block", "other", "speed", "impulse", "force", "x", "y", "z")
 """Of a hit: [s] · rows · speed [m/s] lost in the step · impulse [N s] and its mean over the step [N] · place [m]."""
 

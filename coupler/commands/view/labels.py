@@ -20,7 +20,7 @@ ON_TEXT, ON_POINT, OUTSIDE, ON_LINE = 100.0, 60.0, 30.0, 4.0
 """Price of covering a text or a point, of leaving the axes, of each stretch of a line that is covered; that of an
 offset is its length over NEAR."""
 STRETCH = 4.0
-"""[pixels] between the places at which a line is looked at."""
+"""Distance [pixels] of the sampled places of a line."""
 
 
 def place_labels(drawing, axis, labels, size):

@@ -18,7 +18,7 @@ DAMAGE_ENDS = ((86.0, 3.0, 18.0), (34.0, 52.0, 36.0))
 # Okabe & Ito (2008), safe for colour-blind readers; the yellow is left out: too pale for a line on white.
 LINES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#000000")
 POCKETS = ("#009e73", "#e69f00", "#cc79a7", "#d55e00", "#8a2be2")
-"""Of trapped air by the number of the pocket, again from the first beyond the last: none of the blues of the water."""
+"""Colours of pockets of trapped air by number, repeated cyclically; none is among the blues of the water."""
 
 _WHITE = np.array([0.95047, 1.0, 1.08883])  # D65
 _TO_RGB = np.array(

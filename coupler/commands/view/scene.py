@@ -30,7 +30,7 @@ SAMPLED_STEPS = 25
 SEEN_THROUGH = 0.55
 """Opacity of blocks in a run with trapped air, which is behind them."""
 MOST_POCKETS = 6
-"""Named in the corner of a picture, those with most surface first."""
+"""Largest number of pockets named in the corner of a picture, those with most surface first."""
 BAR = 0.075  # height of a colour bar with its text, as a share of that of the picture
 
 
@@ -315,7 +315,7 @@ class Scene:
 
 
 CAPTION_LETTERS = 31
-"""Letters in a line of the caption for each picture height of width, so that it ends beside the time."""
+"""Letters in a line of the caption per width of one picture height, so that the caption ends beside the time."""
 
 
 def caption_of(run, width):

@@ -21,9 +21,9 @@ SIZE = (5.2, 3.5)
 """[inch] one and a half columns of a journal."""
 MARKS = "osD^vP*X"
 DASHES = ("-", (0, (5, 1.2)), (0, (1.2, 1)), "-.", (0, (3, 1, 1, 1, 1, 1)))
-"""Of the curves in their order, so that they can be distinguished in grey print."""
+"""Line styles of the curves in order, which distinguish them in grey print."""
 DARKER = 0.75
-"""Of a curve's colour, for the texts at its points: thin letters look paler than lines."""
+"""Factor on a curve's colour for the texts at its points, since thin letters look paler than lines."""
 LEVELS = (0.01, 0.05, 0.10)
 """Errors for which the cheapest setting is reported: thin lines."""
 LOWEST = 1e-6
@@ -31,7 +31,7 @@ LOWEST = 1e-6
 SHORTEST = 1e-5
 """[s] CPU times below this, also 0 where all was spent in the compiler, are drawn here."""
 SHORT = 24
-"""Letters in a name of which three stand side by side."""
+"""Largest number of letters of a name for which the legend has three columns."""
 NOTE_WIDTH = 105
 """Letters in a line below a figure."""
 

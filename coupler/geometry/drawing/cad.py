@@ -15,7 +15,7 @@ Array = np.ndarray
 TRIANGLE = 2
 """The kind of an element, as gmsh counts them."""
 UNNAMED = "Open CASCADE"
-"""How names begin that a body has only because its file gave it none."""
+"""Beginning of the default names of bodies without a name in the file."""
 ANGLE = 12
 """Straight pieces of a circle that is drawn in a STEP file: a curved wall becomes so many plane ones."""
 

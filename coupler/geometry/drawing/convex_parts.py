@@ -22,7 +22,7 @@ MOST_PARTS = 20_000
 ROUND_OFF = 1e-9
 """Share of the size of a body within which lengths are the same, and of its volume within which volumes are."""
 ALONG_AN_AXIS = 1e-9
-"""Component of a unit normal that is none."""
+"""Component of a unit normal below which it counts as zero."""
 ALIKE = 1e-6
 """Share by which a plane must be better than one before it: what is alike but for round-off goes by place."""
 GAP = 1e-10

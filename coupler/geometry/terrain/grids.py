@@ -19,9 +19,9 @@ Array = np.ndarray
 EVEN = 1e-3
 """Share of a spacing by which the points of a raster may be off."""
 MOST_BYTES = 512_000_000
-"""Of a terrain file that is read as text."""
+"""Largest size [B] of a terrain file that is read as text."""
 MOST_POINTS = 40_000_000
-"""Of a raster: a site of 6 km with points every metre."""
+"""Largest number of points of a raster: a site of 6 km with points every metre."""
 
 
 def read_grid(path: Path, variable: str | None = None) -> Grid:

@@ -26,10 +26,10 @@ Array = np.ndarray
 KEPT = ".terrain"
 """Folder beside the file."""
 FORMAT = 1
-"""Changes when the steps below do: what was kept before is made anew."""
+"""Version of the steps below; after a change, rasters kept before are made again."""
 FEET = re.compile(r'UNIT\["[^"]*f(?:oo|ee)t', re.IGNORECASE)
 PLACED = ("origin", "turn", "offset", "land")
-"""Options that only say where the terrain is, or what grows on it: nothing is kept anew for them."""
+"""Options of the position or the land use alone, which do not change the kept raster."""
 
 
 def terrain_of(spec) -> HeightMap:
