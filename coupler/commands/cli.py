@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from functools import partial
 from pathlib import Path
 from shlex import quote
 from typing import Annotated
@@ -38,6 +39,8 @@ app = typer.Typer(
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
+MANY_SOLIDS = 200
+"""Fixed solids from which the substep takes so long that `check` says it is at work."""
 PASS_ON = {"allow_extra_args": True, "ignore_unknown_options": True}
 
 CasePlace = Annotated[Path, typer.Argument(metavar="CASE", help="a case directory or a case.toml")]
@@ -214,12 +217,15 @@ def check(
     if picture is not None:
         need("view")
     found = Case.load(case, set or [])
-    describe(found.file(), print)
+    file = found.file()
+    describe(file, partial(print, flush=True))
     if picture is not None:
         from coupler.commands.blocks import draw_case
 
-        draw_case(found.file().case, picture)
+        draw_case(file.case, picture)
         print(f"picture: {picture}")
+    if file.case.structure is not None and len(file.case.solid) >= MANY_SOLIDS:
+        print(f"the substep, with {len(file.case.solid)} fixed solids that blocks can touch, ...", flush=True)
     terminal.table("forecast", found.check(exact).rows)
 
 

@@ -6,7 +6,7 @@ For the water they are bodies that never move; in a case with a structure they a
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -120,8 +120,20 @@ def _bodies(path: KeyPath, spec) -> Iterator[FixedSolid]:
         corners = np.array(spec.centre) + (0.5 * np.array(spec.size) * BOX_CORNERS) @ turn.T
         yield FixedSolid(path, spec.name, corners, BOX_FACES, Body.box(spec.centre, spec.size, turn))
         return
+    if spec.vertices is not None and not spec.path:
+        yield replace(_hull(spec.name, tuple(map(tuple, spec.vertices))), path=path)
+        return
     for block in _blocks(spec):
         yield FixedSolid(path, spec.name, block.world_vertices(), block.faces, Body.of_block(block))
+
+
+@lru_cache(maxsize=8192)
+def _hull(name: str, points: tuple) -> FixedSolid:
+    """The hull of points (k, 3) [m], kept because one command checks a case several times; its path is set by the
+    caller. Raises BlockError."""
+    from yade_scripts.blocks.block import Block
+
+    return _as_solid((), Block.standing(name, hull_corners(np.array(points))))
 
 
 def _blocks(spec, **common) -> list:

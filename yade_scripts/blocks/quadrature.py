@@ -8,6 +8,7 @@ is accurate where the closed strip is narrower than its first interval.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -32,8 +33,9 @@ class Rule:
         return len(self.places)
 
 
+@lru_cache
 def gauss(points: int) -> Rule:
-    """The Gauss-Legendre rule with q points, exact for polynomials of degree 2 q - 1."""
+    """The Gauss-Legendre rule with q points, exact for polynomials of degree 2 q - 1; every face uses it."""
     x, w = np.polynomial.legendre.leggauss(points)
     return Rule(0.5 * (x + 1.0), 0.5 * w)
 

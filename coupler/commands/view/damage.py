@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import ListedColormap
+from matplotlib.ticker import MaxNLocator
 
 from coupler.commands.view.palette import DAMAGE_ENDS, INK, SHADOW, WATER_ENDS, scale
 from coupler.commands.view.plots import FORMATS, STYLE, WIDTH, _undated, plt, prefixed
@@ -25,8 +26,8 @@ FROM_ABOVE = 0.7
 INSTANTS = 400
 TALLEST = 8.2
 """Largest height [inch] of a figure."""
-LEFT = "#f3d9cf"
-"""Colour of a block that left its place."""
+LEFT, STAYED = "#f3d9cf", "#e4e4e4"
+"""Colours of blocks that left their place, and of those that did not; openings are white."""
 
 
 @dataclass(frozen=True)
@@ -212,8 +213,11 @@ def elevations(found, parts, draw, coloured):
         axis.set_title(words(found)(part), fontsize=8, loc="left")
         axis.set_xlabel(view.axes[0], labelpad=1)
         axis.set_ylabel(view.axes[1], labelpad=1)
-        axis.set_aspect("equal", adjustable="datalim")
+        axis.set_aspect("equal", adjustable="box", anchor="SW")
+        for scale_of in (axis.xaxis, axis.yaxis):
+            scale_of.set_major_locator(MaxNLocator(7, steps=[1, 2, 5, 10]))
         axis.grid(False)
+        axis.margins(0.03)
         axis.autoscale_view()
     mappable, label = coloured
     if mappable is not None:
@@ -249,7 +253,7 @@ def cracks_on(axis, found, part, view, coloured):
     """Draw blocks with their joints: intact ones thin, broken ones thick in the colour of the time of failure."""
     rings, rows = outlines(found, part, view)
     gone = np.isfinite(found.blocks["left_at"])[rows]
-    fill = np.where(gone, LEFT, "#ffffff")
+    fill = np.where(gone, LEFT, STAYED)
     axis.add_collection(PolyCollection(rings, facecolors=fill, edgecolors=SHADOW, linewidths=0.4))
     c, member = found.cracks, found.blocks["member"]
     own = np.flatnonzero(of(member, c["a"].astype(int), part) | of(member, c["b"].astype(int), part))
@@ -285,7 +289,10 @@ def crack_colours(found):
     broke = c["time"][c["intact"] == 0]
     if not len(broke):
         return None, ""
-    label = "time at which the joint broke [s]; shaded blocks left their place"
+    label = (
+        "time at which the joint broke [s] (areas: joints parallel to the picture)\n"
+        "red blocks left their place, grey ones did not"
+    )
     return mapped(broke.min(), broke.max(), WATER_ENDS[::-1]), label
 
 
