@@ -67,7 +67,7 @@ def _unknown(path: KeyPath) -> str:
     name = str(path[-1])
     here = [known for known in names_in(path[:-1]) if known != name]
     elsewhere = [key.path for key in keys() if key.path.endswith(f".{name}") or key.path == name]
-    if elsewhere:  # the very name is surer than one that looks like it
+    if elsewhere:  # an exact name is a better hint than a similar one
         return f"unknown name here; did you mean '{elsewhere[0]}'?"
     hint = did_you_mean(name, here)
     if hint:

@@ -396,7 +396,7 @@ def _without_unknown(table: dict, found: list) -> Case | None:
         del holder[path[-1]]
     try:
         return Case.model_validate(rest)
-    except ValidationError:  # the unknown name was meant for one that its section cannot do without
+    except ValidationError:  # the unknown name was probably meant for a required one of its section
         return None
 
 

@@ -98,7 +98,7 @@ def serve(folder: Path, cold: bool) -> None:
     """Make the runs whose ids come in until there are no more."""
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
     nowhere = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, 1)  # YADE and the runs tell nothing where answers are expected
+    os.dup2(nowhere, 1)  # YADE and the runs must not print where answers are expected
     execute = Forked()
     signal.signal(signal.SIGTERM, execute.stop)
     for line in sys.stdin:
@@ -109,7 +109,7 @@ def serve(folder: Path, cold: bool) -> None:
             cold, began = True, time.process_time()
             try:
                 warm(spec, id)
-            except Exception as error:  # that run cannot begin, and says so itself when it is made
+            except Exception as error:  # that run cannot begin, and reports so itself when it is made
                 print(f"one step of run {id} went not well, nothing is loaded: {error}", file=sys.stderr)
             warmed = time.process_time() - began
             signal.signal(signal.SIGTERM, execute.stop)  # YADE has handlers of its own

@@ -57,7 +57,7 @@ def measured(case: Case) -> tuple[Case, list[Problem]]:
     wrong = list(_wrong_keys(tank))
     if case.terrain is not None and tank.mesh is not None:
         wrong.append((("tank", "mesh"), "with [terrain] the mesh is made on it; leave one of them out"))
-    if wrong and tank.mesh is not None:  # which of both is meant is not known: nothing of it is looked at
+    if wrong and tank.mesh is not None:  # it is unclear which of the two is meant, so neither is checked
         return case.model_copy(update={"tank": tank.model_copy(update={"lower": None})}), wrong
     if wrong:
         return case, wrong

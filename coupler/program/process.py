@@ -85,6 +85,6 @@ def was_killed(summary: dict) -> bool:
         os.kill(summary["process"], 0)
     except ProcessLookupError:
         return True
-    except PermissionError:  # somebody else's process: it lives
+    except PermissionError:  # the process belongs to another user, so it exists
         return False
     return False

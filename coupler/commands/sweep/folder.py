@@ -112,7 +112,7 @@ def _open(spec: Spec, id: str) -> Path:
 def _read(path: Path) -> dict | None:
     try:
         return json.loads(path.read_text(encoding="utf-8"))
-    except (FileNotFoundError, ValueError):  # absent, or torn by a machine that went down
+    except (FileNotFoundError, ValueError):  # absent, or incomplete after a crash of the machine
         return None
 
 

@@ -111,7 +111,7 @@ def _alone(spec: Spec, id: str) -> Iterator[None]:
     busy = f"{place}: a process of an earlier call still makes this run; call again when it is done, or end that one"
     lock = _patient(lambda: FileLock(log, busy))
     try:
-        if place.is_dir():  # a run whose maker was killed alone ends at its next step
+        if place.is_dir():  # a run whose parent process was killed ends at its next step
             _patient(lambda: RunLock(place)).release()
         yield
     finally:
@@ -139,7 +139,7 @@ def _make(spec: Spec, id: str, execute: Execute) -> dict:
     cost = None
     if any((place / CHECKPOINTS).glob("*")):
         cost = execute(["resume", str(place), "--any-version", "--set", limit], log)
-        cost = None if cost.exit_code == ExitCode.BAD_CASE else cost  # a torn checkpoint: from the start
+        cost = None if cost.exit_code == ExitCode.BAD_CASE else cost  # an incomplete checkpoint: start again
     if cost is None:
         shutil.rmtree(place, ignore_errors=True)
         log.write_bytes(b"")  # which is locked, so not removed

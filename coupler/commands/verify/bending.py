@@ -115,7 +115,7 @@ def _exact_moment(law: str, closing: float, n: float) -> float:
         trials = np.linspace(-0.5 * turn - 3.0 * n / closing - 1e-9, 0.5 * turn, 400)
         load = np.array([pressed(t, turn).sum() for t in trials]) + n
         first = np.flatnonzero((load[:-1] < 0.0) & (load[1:] >= 0.0))
-        if len(first):  # beyond the tension that the joint carries there is no balance
+        if len(first):  # no equilibrium exists beyond the tension that the joint carries
             middle = brentq(lambda t, turn=turn: pressed(t, turn).sum() + n, *trials[first[0] : first[0] + 2])
             best = max(best, float((pressed(middle, turn) * y).sum()))
     return best

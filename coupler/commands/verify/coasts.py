@@ -149,7 +149,7 @@ def conical_island():
         yield Finding(
             f"crest at {name} [m] {TOLD}", float(run.gauges[:, k].max()), float(level.max()), np.inf
         )
-        # the clock of the experiment is that of the wave maker: crests in front of the island are laid on each other
+        # the experiment's clock is that of the wave maker, so the crests in front of the island are aligned
         shift = lab["time"][(lab["g6"]).argmax()] - run.time[run.gauges[:, 0].argmax()]
         curves = (
             Curve(f"measured, {name}", "measured", lab["time"] - shift, 100 * level),

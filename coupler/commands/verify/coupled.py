@@ -75,7 +75,7 @@ def linear_elements(cells: int) -> float:
     own = water.facets_satisfying(lambda x: np.abs(x - 1.5).max(axis=0) < 0.5 + 1e-9, boundaries_only=True)
     g = LinearForm(lambda v, w: w.n[2] * v).assemble(FacetBasis(water, ElementTetP1(), facets=own))
     K = laplace.assemble(Basis(water, ElementTetP1()))
-    # the level of the potential is free: one node is held
+    # the potential is defined up to a constant, so one node is fixed
     potential = solve(csr_array(K[1:, 1:]), g[1:], np.zeros(len(g) - 1), 1e-10).x
     return float(g[1:] @ potential)
 

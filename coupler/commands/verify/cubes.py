@@ -21,7 +21,7 @@ from yade_scripts.dynamics.structure import Structure
 
 EDGE, RESERVOIR, DEPTH = 0.15, 3.5, 0.4
 FINER = InBox((RESERVOIR - 0.1, -1.0, -1.0), (5.9, 2.0, 0.3), 1)
-"""Where cells may be half as large: from the gate on, over the sheet of water and the cubes."""
+"""Region in which cells may be half as large: from the gate on, over the sheet of water and the cubes."""
 STEADY, ARRIVES = (0.8, 1.0), 45.0
 """Window [s], and the momentum [N] that the sheet brings over the width of a cube in it: ∫ ρ u² dA in the tank without
 cubes, on cells of either size."""

@@ -107,7 +107,7 @@ def _impact_findings(where: str, run: Impact, table):
     arrival = run.t[np.argmax(run.p[:, 1] > 0.1)]
     measured = table["tstar"][np.argmax((table["median"] > 0.1) & (table["tstar"] > 1.0))]
     yield Finding(f"{where}arrival t* (p* = 0.1)", arrival, measured, 0.15, False)
-    # the band of the repeats lies unevenly about the median: judged against its middle
+    # the band of the repeated runs is not symmetric about the median, so its middle is the reference
     ends = np.trapezoid(low, at), np.trapezoid(high, at)
     impulse, middle, half = np.trapezoid(found, at), 0.5 * sum(ends), 0.5 * (ends[1] - ends[0])
     yield Finding(f"{where}impulse {FROM} < t* < {TO:g}", impulse, middle, half, False)

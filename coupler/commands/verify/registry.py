@@ -56,7 +56,7 @@ class Check:
 
 
 TOLD = "(reported, not judged)"
-"""In the name of a quantity that is reported beside those that are judged."""
+"""Suffix of the name of a quantity that is reported beside those that are judged."""
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ def full(x):
 
 
 def across(axis: int):
-    """Chooses the sides of the tank that an axis pierces."""
+    """A function that selects the sides of the tank normal to an axis."""
     return lambda normal, centre: np.abs(normal[:, axis]) > 0.5
 
 

@@ -85,7 +85,7 @@ def wall_under_still_water():
 
 
 def _critical_depth(ratio: float) -> float:
-    """By bisection: does a start at rest find an equilibrium?"""
+    """Largest depth [m] at which a start at rest finds an equilibrium, by bisection."""
     low, high = 0.5, 1.5
     while high - low > 0.005:
         middle = 0.5 * (low + high)

@@ -212,7 +212,7 @@ def main(given=None):
     except SurgebreakError as error:
         print(f"surgebreak render: {error}", file=sys.stderr)
         return int(error.exit_code)
-    except BrokenPipeError:  # `| head` has read enough: end as quietly as other commands do
+    except BrokenPipeError:  # the reader, such as `| head`, has closed the pipe: end quietly
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return int(ExitCode.STOPPED)
     except OSError as error:

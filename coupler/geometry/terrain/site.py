@@ -57,7 +57,7 @@ def _kept(spec) -> tuple[Array, Array, Array]:
             with np.load(store) as file:
                 return file["x"], file["y"], file["z"]
         except (OSError, ValueError, KeyError, EOFError):
-            store.unlink(missing_ok=True)  # torn by a kill
+            store.unlink(missing_ok=True)  # incomplete after a kill
     x, y, z = _edited(path.name, read_grid(path, spec.variable), spec)
     if path.suffix.lower() in SLOW:
         _keep(store, x, y, z)
