@@ -22,9 +22,10 @@ along an axis, its normal component too.
 
 New velocities are kept within the range of the old ones upstream, those of the node and of the cell from which its
 water comes, as on paths: overshoots at an impact else add energy (7 % at six cells a column), and so does what lies
-downstream (a sheet thinner than a cell that spreads over a bed doubled its kinetic energy in 40 steps).  The level set stays on paths: it is a distance near the surface only and
-has a kink in every film, which (1) rounds off; a splash then gains energy too (8 % at six cells a column), and the
-volume correction has more to do.  The pressure has its own stabilisation (theory 2.5).
+downstream (a sheet thinner than a cell that spreads over a bed doubled its kinetic energy in 40 steps).  The level set
+stays on paths: it is a distance near the surface only and has a kink in every film, which (1) rounds off; a splash then
+gains energy too (8 % at six cells a column), and the volume correction has more to do.  The pressure has its own
+stabilisation (theory 2.5).
 """
 
 from __future__ import annotations

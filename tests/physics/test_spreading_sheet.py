@@ -26,8 +26,8 @@ def wedges():
 
 @pytest.mark.parametrize("advection", ["semi-lagrangian", "supg"])
 def test_a_sheet_on_a_bed_gains_no_motion(advection):
-    """518 m³ fall by 9 m onto a bed of 515 m², a sheet of 0.4 cells. By stabilised elements its kinetic energy rose from
-    27 to 57 MJ in half a second, as the range that a velocity was kept within held the faster water downstream."""
+    """518 m³ fall by 9 m onto a bed of 515 m², a sheet of 0.4 cells. By stabilised elements its kinetic energy rose
+    from 27 to 57 MJ in half a second, as the range that a velocity was kept within held the faster water downstream."""
     case = {
         "case": {"title": "sheet"},
         "tank": {"lower": [0, 0, 0], "upper": [25.88, 19.9, 27.5], "cell": CELL, "split": "mirrored"},
