@@ -18,7 +18,7 @@ from coupler.commands.view import palette
 from coupler.commands.view.camera import frame, side_of
 from coupler.commands.view.foam import foam
 from coupler.commands.view.inside import NoInside, inside
-from coupler.commands.view.water_surface import shading_normals, skin, surfaces_of_pockets
+from coupler.commands.view.water_surface import shading_normals, skin, some, surfaces_of_pockets
 
 WATER_OPACITY = 0.78
 SUN = np.array([-0.45, -0.75, 1.1])  # from the scene to the light, for a camera at azimuth -90 degree
@@ -51,20 +51,18 @@ class Scene:
     ):
         """run: RunFiles · size: (width, height) in pixels · azimuth, elevation of the camera in degrees, azimuth None:
         the side on which things happen · cut: (axis, place [m]), None for none: what lies before it is left out ·
-        soft: darken corners where little light comes (costs three times as much as all the rest) ·
+        soft: smooth edges, and darken corners where little light comes (three times the cost of all the rest); without
+        it edges are rough, and a picture has to be drawn larger and averaged ·
         letters: times the usual size, for a picture that is shown small · from_inside: from among the blocks, towards
         the azimuth · foam: white where fast water is torn."""
-        self.run, self.foam = run, foam
+        self.run, self.foam, self.soft = run, foam, soft
         eye = camera_inside(run, azimuth) if from_inside else None
         azimuth = side_of(where_it_happens(run)) if azimuth is None else azimuth
         self.size, self.letters = size, letters
         self.cut = None if cut is None else cut_of(cut, azimuth)
         self.lower, self.upper = bounds(run)
-        self.fastest = nice_ceiling(fastest_water(run)) if run.water else 0.0
+        self.fastest, self.traps_air = fastest_and_air(run) if run.water else (0.0, False)
         self.light, self.fill = turned(SUN, azimuth + 90.0), turned(FILL, azimuth + 90.0)
-        self.traps_air = bool(run.water) and any(
-            run.water.at(time).pocket.any() for time in sampled(run.water.times)
-        )
         self.caption = caption_of(run, round(CAPTION_LETTERS * size[0] / size[1] / letters))
         self.ground = ground(self.lower, self.upper, run.tank is None)
         self._pockets_drawn = 0
@@ -143,15 +141,17 @@ class Scene:
         camera.view_angle = view.view_angle
 
     def _smooth(self, soft):
-        """Smooth edges (2 x 2 samples per pixel) and, if `soft`, add screen-space ambient occlusion for depth."""
-        if soft:
-            span = np.linalg.norm(self.upper - self.lower)
-            self.plotter.enable_ssao(radius=0.045 * span, bias=0.003 * span, kernel_size=32, blur=True)
+        """Smooth edges (2 x 2 samples per pixel), and add screen-space ambient occlusion for depth; or neither."""
+        self.plotter.disable_anti_aliasing()  # a window has some from the start
+        if not soft:
+            return
+        span = np.linalg.norm(self.upper - self.lower)
+        self.plotter.enable_ssao(radius=0.045 * span, bias=0.003 * span, kernel_size=32, blur=True)
         self.plotter.enable_anti_aliasing("ssaa")
 
     def _line(self, width):
         """A line width that keeps its share of the picture's height; smoothing halves it."""
-        return 2 * width * self.size[1] / 720
+        return (2 if self.soft else 1) * width * self.size[1] / 720
 
     def _draw_still_parts(self):
         self.plotter.add_mesh(self.ground, color=palette.GROUND, lighting=False)
@@ -304,9 +304,13 @@ class Scene:
             mesh.points - (mesh.points[:, 2:] - self.lower[2]) * self.light / self.light[2], mesh.faces
         )
         flat.points[:, 2] = self.lower[2] + 1e-3 * (self.upper[2] - self.lower[2])
-        x0, x1, y0, y1, *_ = self.ground.bounds
-        for way, edge in (((1, 0, 0), x1), ((-1, 0, 0), x0), ((0, 1, 0), y1), ((0, -1, 0), y0)):
-            flat = flat.clip(normal=way, origin=np.abs(way) * edge)
+        low, high = corners(self.ground)
+        for axis in (0, 1):
+            way = np.eye(3)[axis]
+            if flat.n_cells and flat.points[:, axis].max() > high[axis]:
+                flat = flat.clip(normal=way, origin=way * high[axis])
+            if flat.n_cells and flat.points[:, axis].min() < low[axis]:
+                flat = flat.clip(normal=-way, origin=way * low[axis])
         self.plotter.remove_actor(name, reset_camera=False, render=False)
         if flat.n_cells:
             self.plotter.add_mesh(
@@ -456,18 +460,18 @@ def sampled(times):
     return times[np.unique(np.linspace(0, len(times) - 1, SAMPLED_STEPS).astype(int))]
 
 
-def fastest_water(run):
-    """Speed [m/s] below which 98 % of the nodes at the surface stay over the run. Nodes inside are not visible, and
-    spray should not set the colour scale."""
-    speeds = [np.zeros(1)]
+def fastest_and_air(run):
+    """Round speed [m/s] below which 98 % of the nodes at the surface stay over the run, and whether air is trapped in
+    it. Nodes inside are not visible, and spray should not set the colour scale."""
+    speeds, air = [np.zeros(1)], False
     for time in sampled(run.water.times):
         water = run.water.at(time)
-        wet = water.level_set[water.cells] < 0
-        seen = np.unique(water.cells[wet.any(axis=1) & ~wet.all(axis=1)])
-        seen = seen[water.level_set[seen] < 0]
-        if len(seen):
-            speeds.append(np.linalg.norm(water.velocity[seen], axis=1))
-    return float(np.percentile(np.concatenate(speeds), 98))
+        air = air or bool(water.pocket.any())
+        wet = (water.level_set < 0)[water.cells]
+        seen = np.zeros(len(water.nodes), bool)
+        seen[water.cells[some(wet) & some(~wet)]] = True
+        speeds.append(np.linalg.norm(water.velocity[seen & (water.level_set < 0)], axis=1))
+    return nice_ceiling(float(np.percentile(np.concatenate(speeds), 98))), air
 
 
 def nice_ceiling(value):

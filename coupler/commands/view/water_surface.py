@@ -37,7 +37,7 @@ def skin(nodes, cells, level_set, fraction=None, tank=None):
 
     fraction (m,): share of each cell outside solids, and tank (2, 3) [m]: with both, faces of cut cells that do not lie
     on a side of the tank are left out: they are inside a body, or stick out of one that is thinner than a cell."""
-    kept = np.any(level_set[cells] < 0, axis=1)
+    kept = some((level_set < 0)[cells])
     wet = right_handed(nodes, cells[kept])
     free = free_triangles(wet, level_set)
     outer, owner = outer_faces(wet, len(nodes))
@@ -61,6 +61,11 @@ def surfaces_of_pockets(nodes, cells, level_set, pocket, pressure):
     corners = found.of(nodes)[: found.free]
     known = sorted((int(k) for k in np.unique(number) if k > 0), key=lambda k: -int((number == k).sum()))
     return [(k, float(pressure[pocket == k][0]), corners[number == k]) for k in known]
+
+
+def some(flags):
+    """(m,) bool: rows of flags (m, k) with one that is true; an `any` along short rows is slow."""
+    return np.logical_or.reduce([column for column in flags.T])
 
 
 def right_handed(nodes, cells):
@@ -128,8 +133,9 @@ def nodal_slope(nodes, cells, values):
     Only cells around the zero level count; elsewhere it is zero.
     """
     at_surface = np.zeros(len(nodes), dtype=bool)
-    at_surface[cells[np.any(values[cells] < 0, axis=1) & np.any(values[cells] >= 0, axis=1)]] = True
-    cells = right_handed(nodes, cells[at_surface[cells].any(axis=1)])
+    wet = (values < 0)[cells]
+    at_surface[cells[some(wet) & some(~wet)]] = True
+    cells = right_handed(nodes, cells[some(at_surface[cells])])
     a, b, c = np.moveaxis(nodes[cells[:, 1:]] - nodes[cells[:, :1]], 1, 0)
     rise = values[cells[:, 1:]] - values[cells[:, :1]]
     # gradient = (rise_a b×c + rise_b c×a + rise_c a×b) / det, and weighting with the volume drops det
