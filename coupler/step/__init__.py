@@ -1,6 +1,7 @@
 """One coupled step (theory 3): water and structure, solved together for pressure and velocity.
 
 coupled_step                           the order of a step, its passes, and the choice of its length
+passes                                 the passes of a step and their relaxation
 immersion, cracks                      where the structure cuts the water
 pressure_with_structure                the pressure system with the blocks in it
 coupling_rows                          the matrix G of theory (10), a short row for each node and body

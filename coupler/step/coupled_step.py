@@ -21,9 +21,10 @@ from coupler.balance.energy import Ledger
 from coupler.balance.momentum import book_step, momentum_ledger
 from coupler.step.limits import Diverged, Limits, check_finite, check_pressure, no_room
 from coupler.step.observe import fastest_points, joint_counts
+from coupler.step.passes import CouplingPass, Passes
 from coupler.step.record import StepRecord
 from coupler.step.residual import RETRIES, Defects
-from coupler.step.step_limits import Attempt, attempt_of, best_of, volume_error
+from coupler.step.step_limits import Attempt, attempt_of, attempt_to_keep, volume_error
 from coupler.step.step_start import StepStart
 
 if TYPE_CHECKING:
@@ -38,17 +39,8 @@ if TYPE_CHECKING:
 
 BLOCK_COURANT = 0.5
 """Share of a cell that the fastest block may cross in one step: its cells are cut once a step."""
-STANDS_STILL = 1e-3
+DEFECT_FLOOR = 1e-3
 """Share of the energy of the scene below which the motion of the structure is no measure of the defect."""
-
-
-TO_AND_FRO = 0.9
-"""Share of the defect of the pass before above which passes go to and fro instead of coming closer: joints that hold
-while the water takes them to give way, and break under the load of water that takes them to hold."""
-HALF_WAY = 2
-"""Passes more in such a step, each half-way between the last two, which is the relaxation of Aitken for passes that
-alternate (Küttler and Wall 2008, doi:10.1007/s00466-008-0255-5). Where the last of them breaks no joint and one before
-it did, the load of that one counts: it was there before anything moved."""
 
 
 class CoupledStepper:
@@ -153,8 +145,8 @@ class CoupledStepper:
 
     def _take_until_good(self, dt: float, record: StepRecord) -> None:
         """Take a step of dt [s], or of its half, and so on, as long as it has no solution or breaks a limit. If the
-        shortest one breaks a limit too, the better of it and the longest (`best_of`) is kept; the caller decides
-        whether the run ends there.
+        shortest one breaks a limit too, the better of it and the longest is kept (`attempt_to_keep`); the caller
+        decides whether the run ends there.
 
         Raises Diverged if none has a solution."""
         start, volume = self._start(), volume_error(self)
@@ -175,7 +167,7 @@ class CoupledStepper:
                     break
             start.restore(self)
         record.bad = True
-        self._keep(best_of(tried), tried[-1], dt, record, start)
+        self._keep(attempt_to_keep(tried), tried[-1], dt, record, start)
 
     def _keep(self, best: Attempt, last: Attempt, dt: float, record: StepRecord, start: StepStart) -> None:
         """Take the best attempt once more, unless it is the one in which both sides stand."""
@@ -305,39 +297,34 @@ class CoupledStepper:
             wetting = Wetting.of(problem.coupling)
         record.wetted = problem.coupling.nnz > 0
         before = self._padded(structure.velocity())
+        floor = DEFECT_FLOOR * self.ledger.input_energy
         found: CoupledSolution | None = None
-        breaking: tuple[CoupledSolution, Array, float] | None = None
         whole = self._joints_broken()
-        most, last_defect, record.passes = (self.passes if record.wetted else 1), math.inf, 0
-        while record.passes < most:
-            record.passes += 1
+        passes = Passes(self.passes if record.wetted else 1, self.tolerance)
+        while not passes.done:
             self._pause()
             with self.clock("pressure"):
                 found = solve_coupled(problem, response, v_free, solve, self.rtol, found, wetting)
-            report = self._advance(problem.dt, found, start if record.passes > 1 else None)
+            report = self._advance(problem.dt, found, start if passes.number > 0 else None)
             record.iterations += found.iterations
             record.substeps += report.substeps
-            floor = STANDS_STILL * self.ledger.input_energy
             lead = response.lead(found.velocity, before, report.dt_s)
             assumed = (found.velocity - lead)[: structure.n]
             record.defect = defect(mass, assumed, report.mean_velocity, floor)
-            if record.defect <= self.tolerance:
-                break
-            held = self._joints_broken() == whole
-            if not held:
-                breaking = found, assumed, record.defect
-            moved = self._padded(report.mean_velocity)
-            if record.defect > TO_AND_FRO * last_defect or (held and breaking is not None):
-                most = self.passes + HALF_WAY
-                moved = 0.5 * (found.velocity - lead + moved)
-            last_defect = record.defect
-            if record.passes < most:
+            breaks = self._joints_broken() != whole
+            passes.add(
+                CouplingPass(solution=found, assumed=assumed, defect=record.defect, breaks_joints=breaks)
+            )
+            if not passes.done:
+                moved = passes.next_start(found.velocity - lead, self._padded(report.mean_velocity))
                 response = self._answer(mass, problem.dt, before, afloat)
                 after = response.at_end(moved, before, report.dt_s)
                 v_free = corrected_free_velocity(response, after, found.x, problem.coupling)
+        record.passes = passes.number
         assert found is not None  # there is one pass at least
-        if record.passes > self.passes and breaking is not None and self._joints_broken() == whole:
-            found, assumed, record.defect = breaking
+        instead = passes.replacement()
+        if instead is not None:
+            found, assumed, record.defect = instead.solution, instead.assumed, instead.defect
             report = self._advance(problem.dt, found, start)
             record.substeps += report.substeps
         record.substep, record.opening_rate = report.dt_s, report.opening_rate

@@ -71,7 +71,7 @@ def _ends(coupling: CoupledSides, record: StepRecord, limits: Limits) -> bool:
     return False
 
 
-def best_of(attempts: list[Attempt]) -> Attempt:
+def attempt_to_keep(attempts: list[Attempt]) -> Attempt:
     """Which of the bad attempts, longest first, is kept: the shortest if it is better in one of the limits that the
     longest breaks, or if only the longest ends the run; otherwise the longest."""
     longest, shortest = attempts[0], attempts[-1]

@@ -8,7 +8,7 @@ import pytest
 
 from coupler.geometry.overlaps import Overlap
 from coupler.step.limits import Diverged, Limits, check_air, check_momentum, check_overlap
-from coupler.step.step_limits import STEP_SHARE, Attempt, attempt_of, best_of
+from coupler.step.step_limits import STEP_SHARE, Attempt, attempt_of, attempt_to_keep
 
 
 def test_a_run_ends_just_beyond_its_limit_of_momentum():
@@ -51,15 +51,15 @@ def test_the_shortest_attempt_stays_where_it_is_better_in_one_thing_that_the_lon
     broken = frozenset({"defect", "volume"})
     longest = Attempt(0, {"defect": 0.4, "volume": 1.0}, broken, False)
     shortest = Attempt(3, {"defect": 0.1, "volume": 1.0}, broken, ends)
-    assert best_of([longest, shortest]) is shortest
+    assert attempt_to_keep([longest, shortest]) is shortest
 
 
 def test_the_longest_attempt_stays_where_no_shorter_one_helps_or_only_the_shorter_one_ends_the_run():
     longest = Attempt(0, {"defect": 0.4}, frozenset({"defect"}), False)
-    assert best_of([longest, Attempt(3, {"defect": 0.3}, frozenset({"defect"}), True)]) is longest
+    assert attempt_to_keep([longest, Attempt(3, {"defect": 0.3}, frozenset({"defect"}), True)]) is longest
     ends = Attempt(0, {"defect": 0.4}, frozenset({"defect"}), True)
     shortest = Attempt(3, {"defect": 0.3}, frozenset({"defect"}), False)
-    assert best_of([ends, shortest]) is shortest
+    assert attempt_to_keep([ends, shortest]) is shortest
 
 
 @pytest.mark.parametrize(("retries", "kept"), [(1, 0.75), (2, 0.6), (3, 0.45)])
@@ -69,8 +69,8 @@ def test_what_helps_goes_by_how_often_the_step_was_halved(retries, kept):
     longest = Attempt(0, {"defect": 1.0}, frozenset({"defect"}), False)
     shorter = Attempt(retries, {"defect": kept}, frozenset({"defect"}), False)
     worse = Attempt(retries, {"defect": kept + 0.06}, frozenset({"defect"}), False)
-    assert best_of([longest, shorter]) is shorter
-    assert best_of([longest, worse]) is longest
+    assert attempt_to_keep([longest, shorter]) is shorter
+    assert attempt_to_keep([longest, worse]) is longest
 
 
 def test_steps_of_all_lengths_are_compared_by_the_second():

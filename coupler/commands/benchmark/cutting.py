@@ -52,7 +52,7 @@ def cutting(size: int) -> dict:
     walls = []
     for count in WALLS:
         bodies = wall(count)
-        seconds = best_of(lambda bodies=bodies: cut(mesh, bodies, *search(mesh, bodies)))
+        seconds = shortest_time(lambda bodies=bodies: cut(mesh, bodies, *search(mesh, bodies)))
         cells = cut_cells(cut(mesh, bodies, *search(mesh, bodies)))
         walls.append((len(bodies), cells, seconds / cells))
     bodies, near = loose_boxes(BOXES), []
@@ -60,7 +60,7 @@ def cutting(size: int) -> dict:
     around = np.bincount(cell, minlength=len(mesh.cells))[cell]
     for count in NEAR:
         pairs = cell[around == count], body[around == count]
-        seconds = best_of(lambda pairs=pairs: cut(mesh, bodies, *pairs))
+        seconds = shortest_time(lambda pairs=pairs: cut(mesh, bodies, *pairs))
         cells = cut_cells(cut(mesh, bodies, *pairs))
         near.append((count, cells, seconds / cells))
     return {"walls": walls, "near": near}
@@ -93,7 +93,7 @@ def cut_cells(cuts) -> int:
     return len(np.unique(cuts.part_cell[~cuts.part_whole]))
 
 
-def best_of(work) -> float:
+def shortest_time(work) -> float:
     """Least CPU seconds of REPEATS calls after one that warms up."""
     work()
     spent = []
