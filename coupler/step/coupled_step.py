@@ -19,7 +19,7 @@ import numpy as np
 from array_types import Array
 from coupler.balance.energy import Ledger
 from coupler.balance.momentum import book_step, momentum_ledger
-from coupler.step.limits import Diverged, Limits, check_finite, check_pressure, no_room
+from coupler.step.limits import Diverged, Limits, check_finite, check_pressure, no_room, pressure_to_start
 from coupler.step.observe import fastest_points, joint_counts
 from coupler.step.passes import CouplingPass, Passes
 from coupler.step.record import StepRecord
@@ -208,7 +208,7 @@ class CoupledStepper:
             self._structure_step(dt, record)
         self.time += dt
         record.time = self.time
-        self._check_finite()
+        self._check_finite(dt)
         if self.water is not None and self.water.sides is not None:
             self.ledger.entered = self.water.energy_through_sides()
         if self.water is not None:
@@ -454,10 +454,12 @@ class CoupledStepper:
             text = f"{error} {no_room(place, *self._driven_by())}"
             raise NotConverged(text, error.history, error.unknown) from error
 
-    def _check_finite(self) -> None:
+    def _check_finite(self, dt: float) -> None:
         if self.water is not None:
             check_finite(self.time, "the velocity of the water", self.water.velocity, "node")
-            check_pressure(self.time, self.water.pressure, self.water.topology.nodes, *self._driven_by())
+            pressure, nodes = self.water.pressure, self.water.topology.nodes
+            to_start = partial(pressure_to_start, self.water, dt)
+            check_pressure(self.time, pressure, nodes, *self._driven_by(), to_start)
         if self.structure is not None:
             check_finite(self.time, "the velocity of the structure", self.structure.velocity(), "block")
 

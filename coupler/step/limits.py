@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -154,18 +155,31 @@ def no_room(place: Array, blocks: bool, sides: bool) -> str:
     return f"Water has no room to go at ({at}) m: {remedy}."
 
 
-def check_pressure(time: float, pressure: Array, nodes: Array, blocks: bool, sides: bool) -> None:
+def check_pressure(
+    time: float, pressure: Array, nodes: Array, blocks: bool, sides: bool, to_start: Callable[[], float]
+) -> None:
     """Stop if water has no room: a driven body reduces the volume of a chamber without a free surface.
 
-    pressure (N,) [Pa] at nodes (N, 3) [m]; blocks, sides as in `no_room`. Raises Diverged.
+    pressure (N,) [Pa] at nodes (N, 3) [m]; blocks, sides as in `no_room` · to_start(): `pressure_to_start`, asked where
+    the pressure is beyond that of any impact. Raises Diverged.
     """
     worst = int(np.argmax(np.abs(pressure))) if len(pressure) else 0
     if len(pressure) == 0 or abs(pressure[worst]) <= HIGHEST_PRESSURE:
         return
+    limit = max(HIGHEST_PRESSURE, to_start())
+    if abs(pressure[worst]) <= limit:
+        return
     raise Diverged(
-        f"the pressure is {pressure[worst]:.3g} Pa at t = {time:.4g} s; limit {HIGHEST_PRESSURE:.0e} Pa. "
+        f"the pressure is {pressure[worst]:.3g} Pa at t = {time:.4g} s; limit {limit:.0e} Pa. "
         f"{no_room(nodes[worst], blocks, sides)}"
     )
+
+
+def pressure_to_start(water: Water, dt: float) -> float:
+    """ρ U L / dt [Pa]: what sets the water of the whole tank, L [m] across, going at its largest speed U [m/s] within
+    one step dt [s]. An inflow or a body at full speed from the start has to do that in the first step."""
+    across = float(np.linalg.norm(np.diff(water.mesh.bounds, axis=0)))
+    return water.parameters.density * water.fastest() * across / dt
 
 
 def check_finite(time: float, what: str, values: Array, item: str) -> None:
