@@ -14,10 +14,11 @@ EXTRAS = {
     "ifc": ("ifcopenshell",),
     "terrain": ("rasterio", "pyproj", "pyogrio"),
     "offshore": ("anuga",),
-    "sweep": ("pandas", "pyarrow", "statsmodels", "matplotlib"),
+    "sweep": ("matplotlib",),
+    "parquet": ("pandas", "pyarrow"),
     "slurm": ("submitit",),
     "dask": ("dask-jobqueue",),
-    "test": ("pytest", "hypothesis", "manifold3d", "trimesh", "pyamg"),
+    "test": ("pytest", "hypothesis", "manifold3d", "trimesh", "pyamg", "statsmodels"),
     "pandas": ("pandas",),
     "docs": ("mkdocs-material", "latex2mathml"),
 }

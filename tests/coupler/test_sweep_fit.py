@@ -2,7 +2,9 @@
 
 import numpy as np
 import pytest
+import statsmodels.api as sm
 from scipy.special import ndtr
+from statsmodels.miscmodels.ordinal_model import OrderedModel
 
 from coupler.commands.sweep.fit import bootstrap, check, fit, separation
 
@@ -17,16 +19,36 @@ def runs(seed, levels=10, each=10, ratios=(1.0,)):
     return x, sum((x > ratio * capacity).astype(int) for ratio in ratios)
 
 
-@pytest.mark.parametrize("ratios", [(1.0,), (1.0, 1.4)])
-def test_the_maximum_is_that_of_statsmodels(ratios):
-    """Its generalised linear model with a probit link to eight digits, its ordered model to what it converges to."""
-    pytest.importorskip("statsmodels")
+@pytest.mark.parametrize("ratios", [(1.0,), (1.0, 1.4), (1.0, 1.2, 1.6)])
+def test_a_second_search_finds_the_same_maximum(ratios):
     x, state = runs(1, ratios=ratios)
     found = fit(x, state, len(ratios))
     dispersion, median = check(x, state, len(ratios))
-    rtol = 1e-7 if len(ratios) == 1 else 1e-4
-    assert found.dispersion[0] == pytest.approx(dispersion, rel=rtol)
-    assert found.median[0] == pytest.approx(median, rel=rtol)
+    assert found.dispersion[0] == pytest.approx(dispersion, rel=1e-6)
+    assert found.median[0] == pytest.approx(median, rel=1e-6)
+
+
+def test_the_curve_of_one_state_is_that_of_statsmodels():
+    """Its generalised linear model with a probit link, to seven digits."""
+    x, state = runs(1)
+    found = fit(x, state, 1)
+    link = sm.families.links.Probit()
+    model = sm.GLM(state.astype(float), sm.add_constant(np.log(x)), family=sm.families.Binomial(link=link))
+    const, slope = model.fit(tol=1e-12, maxiter=200).params
+    assert found.dispersion[0] == pytest.approx(1.0 / slope, rel=1e-7)
+    assert found.median[0, 0] == pytest.approx(np.exp(-const / slope), rel=1e-7)
+
+
+def test_the_curves_of_two_states_are_those_of_statsmodels():
+    """Its ordered model, to what that converges to."""
+    x, state = runs(1, ratios=(1.0, 1.4))
+    found = fit(x, state, 2)
+    logs = np.log(x)
+    model = OrderedModel(state, (logs - logs.mean())[:, None], distr="probit")
+    slope, first, gap = model.fit(method="bfgs", disp=False, maxiter=500, gtol=1e-8).params
+    median = np.exp(np.array([first, first + np.exp(gap)]) / slope + logs.mean())
+    assert found.dispersion[0] == pytest.approx(1.0 / slope, rel=1e-4)
+    assert found.median[0] == pytest.approx(median, rel=1e-4)
 
 
 def test_the_curve_of_very_many_runs_is_the_known_one():

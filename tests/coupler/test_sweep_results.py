@@ -144,7 +144,6 @@ def test_the_table_holds_keys_units_quantities_and_how_runs_ended(made):
 
 
 def test_pandas_reads_the_same_table_with_units(made):
-    pytest.importorskip("pyarrow")
     import pandas as pd
 
     spec, _ = made()
@@ -277,7 +276,6 @@ def test_a_state_that_nobody_reached_is_left_out_and_reported(made):
 
 
 def test_the_report_says_all_on_one_page_with_links_to_the_runs(made):
-    pytest.importorskip("statsmodels")
     spec, _ = made(ends={2: ("diverged", ExitCode.DIVERGED, "energy error 7 %")})
     results = collect(spec)
     analyse(spec, results)

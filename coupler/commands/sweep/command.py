@@ -227,12 +227,13 @@ def finish(spec: Spec, stopped: bool) -> ExitCode:
     results = collect(spec)
     for path in write_tables(spec, results):
         print(f"table: {path}")
-    absent = missing("sweep")
-    if absent:
-        print(f"note: no table in Parquet and no curves: {absent}")
-    elif any(record["outcome"] != "not yet" for record in results.records):
+    if any(record["outcome"] != "not yet" for record in results.records):
         page.analyse(spec, results)
-        run_module("coupler.commands.view.sweep", spec.folder, check=True)
+        absent = missing("sweep")
+        if absent:
+            print(f"note: no figures: {absent}")
+        else:
+            run_module("coupler.commands.view.sweep", spec.folder, check=True)
     print(f"report: {page.write(spec, results)}")
     print(_summary(results))
     left = any(record["outcome"] not in FINAL for record in results.records)

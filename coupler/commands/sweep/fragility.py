@@ -34,7 +34,7 @@ CONVERGENCE = (0.125, 0.25, 0.5, 0.75, 1.0)
 ORDERS = 5
 """Number of random orders of the runs over which the width is averaged."""
 AGREES = 1e-2
-"""Largest relative difference of β and θ from those of statsmodels."""
+"""Largest relative difference of β and θ from those of a second search."""
 
 
 @dataclass(frozen=True)
@@ -178,10 +178,10 @@ def _renumbered(state: Array, kept: list[int]) -> Array:
 
 
 def _agree(best: Fits, x: Array, state: Array) -> None:
-    """Raises AssertionError where statsmodels finds another curve: a mistake in the program."""
+    """Raises AssertionError where a second search (`check`) finds another curve: a mistake in the program."""
     dispersion, median = check(x, state, best.cut.shape[1])
     same = np.allclose([best.dispersion[0], *best.median[0]], [dispersion, *median], rtol=AGREES)
-    assert same, f"fit {best.dispersion[0]}, {best.median[0]}; statsmodels {dispersion}, {median}"
+    assert same, f"fit {best.dispersion[0]}, {best.median[0]}; second search {dispersion}, {median}"
 
 
 def _fitted(runs: Runs, f: Fragility, kept: list[int], best: Fits, samples: Fits) -> dict:

@@ -260,7 +260,7 @@ def _rows(spec: Spec, results: Results) -> Iterator[str]:
     left = len(results.records) - len(rows)
     yield note(
         ("" if left <= 0 else f"and {left} more. ")
-        + "All columns with units and meanings: table.csv, table.parquet; in Python surgebreak.sweep.open(DIRECTORY)."
+        + "All columns with units and meanings: table.csv; in Python surgebreak.sweep.open(DIRECTORY)."
     )
 
 

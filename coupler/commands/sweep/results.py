@@ -1,7 +1,7 @@
 """The table of all runs of a sweep: what was varied, seeds, how each run ended, what it cost, its quantities.
 
 `table.csv` says name, unit and meaning of every column in lines that begin with '#'; `table.parquet` holds the same
-with the units as attributes, where pyarrow is installed. `table` gives it as a pandas DataFrame.
+with the units as attributes, where the extra `parquet` is installed. `table` gives it as a pandas DataFrame.
 """
 
 from __future__ import annotations
@@ -160,13 +160,13 @@ def _derived(formula: str, names: dict) -> float:
 
 
 def write_tables(spec: Spec, results: Results) -> list[Path]:
-    """table.csv, and table.parquet where pyarrow is installed; their paths."""
+    """table.csv, and table.parquet where the extra `parquet` is installed; their paths."""
     path = spec.folder / "table.csv"
     rows = [line([_cell(record[c.name]) for c in results.columns]) for record in results.records]
     part = path.with_name(".table.csv.part")
     part.write_text(header(f"sweep of {spec.title}", results.columns) + "".join(rows), encoding="utf-8")
     part.replace(path)
-    if absent("sweep"):
+    if absent("parquet"):
         return [path]
     frame = as_frame(results)
     frame.to_parquet(path.with_suffix(".parquet"))
@@ -198,5 +198,5 @@ def open_sweep(folder: Path | str):
 
     `attrs["units"]` has the SI units of its columns. Raises NoRun, NotInstalled (without pandas).
     """
-    need("sweep")
+    need("pandas")
     return as_frame(collect(read_spec(Path(folder))))
