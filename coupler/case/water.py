@@ -198,7 +198,7 @@ class Air(Section):
     model: Literal["open", "trapped"] = Field(
         "open",
         description="open: all air has the pressure of the atmosphere; trapped: air that reaches no open side of the "
-        "tank is squeezed and acts on water, blocks and solids by its pressure",
+        "tank, nor one with a sea above its level, is squeezed and acts on water, blocks and solids by its pressure",
     )
     gamma: Annotated[float, InSI("", ge=1, le=1.4)] = Field(
         1.4,

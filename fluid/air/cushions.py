@@ -65,9 +65,9 @@ class Air:
     let_go: int = 0
 
     @classmethod
-    def at_start(cls, gas: Gas, topology, phi, open_to_air) -> Air:
+    def at_start(cls, gas: Gas, topology, phi, lets_air_out) -> Air:
         """Air at the pressure of the atmosphere everywhere; phi (N,) [m] of the water."""
-        label, count = labelled(topology, phi, open_to_air)
+        label, count = labelled(topology, phi, lets_air_out)
         reference = volumes(topology, phi, label, count)
         small = reference < gas.smallest * bricks(topology, label, count)
         (label, count), reference = without(label, small), reference[~small]
@@ -127,13 +127,13 @@ class Cushions:
     links: sp.csr_array | None = None
 
     @classmethod
-    def of(cls, air: Air, topology, before, phi, open_to_air, taken) -> Cushions:
+    def of(cls, air: Air, topology, before, phi, lets_air_out, taken) -> Cushions:
         """Pockets below the new surface phi (N,) [m] from those below `before` (N,) [m].
 
         taken (N,) [m³]: as in `Air.volumes`; the old pockets are measured with it."""
         t, gas = topology, air.gas
         before_volume = air.volumes(t, before, taken)
-        label, count = labelled(t, phi, open_to_air)
+        label, count = labelled(t, phi, lets_air_out)
         descent, reference, volume = _handed_on(air, before_volume, t, phi, label, count)
         small = reference < gas.smallest * bricks(t, label, count)
         let_go = air.let_go

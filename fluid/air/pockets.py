@@ -1,4 +1,4 @@
-"""Pockets: connected parts of the air that reach no open side of the tank.
+"""Pockets: connected parts of the air that reach no open side of the tank, nor one with a sea above its level.
 
 Two dry nodes of one cell have air in common.  Nodes inside a solid connect only the nodes of their own cells, so that a
 wall at least one cell thick separates the air on its two sides; thinner walls do so with multiple covers.  The volume
@@ -22,17 +22,17 @@ SLIVER = 0.1
 """Share of the volume of a pocket below which an overlap with another pocket, or with the open air, is neglected."""
 
 
-def labelled(topology, phi, open_to_air) -> tuple[Array, int]:
+def labelled(topology, phi, lets_air_out) -> tuple[Array, int]:
     """Label (N,) of the air at the nodes below the level set φ (N,) [m], and the number of pockets K.
 
-    open_to_air (N,) bool: nodes on open sides. Pockets are numbered by their first node."""
+    lets_air_out (N,) bool: nodes on open sides and on those with a sea. Pockets are numbered by their first node."""
     t = topology
     dry = (phi >= 0.0) & t.active
     root = _components(dry, t.covered, t.cells)
     label = np.full(len(phi), NO_AIR, np.int64)
     roots, first, place = np.unique(root[dry], return_index=True, return_inverse=True)
     outside = np.zeros(len(roots), bool)
-    outside[place[open_to_air[dry]]] = True
+    outside[place[lets_air_out[dry]]] = True
     number = np.zeros(len(roots), np.int64)
     closed = np.flatnonzero(~outside)
     number[closed[np.argsort(first[closed])]] = 1 + np.arange(len(closed))

@@ -259,7 +259,7 @@ def _problem(
         from fluid.air.cushions import Cushions
 
         taken = water.coupling @ water.moved_on.ravel()
-        cushions = Cushions.of(water.air, t, water.level_set, phi, water.open_to_air, taken)
+        cushions = Cushions.of(water.air, t, water.level_set, phi, water.lets_air_out, taken)
         cushions = cushions.beside(graph, phi, dofs, theta, kick, dt / density)
     kept = Predicted(
         level_set=phi,

@@ -122,7 +122,7 @@ class Water:
         if gas is not None:
             from fluid.air.cushions import Air
 
-            self.air = Air.at_start(gas, self.topology, self.level_set, self.open_to_air)
+            self.air = Air.at_start(gas, self.topology, self.level_set, self.lets_air_out)
         self.pressure = self._pressure_at_rest()
         self.end_pressure = self.pressure.copy()
         self.at_bound, self.ventilated = np.zeros(n, bool), np.zeros(n, bool)
@@ -394,6 +394,8 @@ class Water:
         self.open_to_air = np.zeros(len(domain.nodes), bool)
         """(N,) bool: nodes on open sides."""
         self.open_to_air[self.walls.open_faces] = True
+        self.lets_air_out = self.open_to_air | self.walls.open_node
+        """(N,) bool: nodes on open sides and on those with a sea, which is open above its level."""
         if self.sides is not None:
             self.sides.place(domain, self.topology.active)
         self._domain_is_new = True

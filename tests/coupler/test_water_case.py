@@ -477,6 +477,27 @@ def test_an_inflow_sets_the_water_going_in_a_step_however_short():
     assert np.abs(coupling.water.pressure).max() < 1e7
 
 
+@pytest.mark.parametrize(("level", "pockets"), [(0.3, 0), (0.8, 1)])
+def test_air_leaves_through_a_sea_above_its_level(level, pockets):
+    """A tank under a lid, half full: its air is trapped where the sea beside it stands up to the lid, and open air
+    where it does not."""
+    tables = {
+        "case": {"title": "air"},
+        "tank": {"lower": [0, 0, 0], "upper": [1, 0.5, 0.5], "cell": 0.125, "open": []},
+        "water": {
+            "fill": [{"lower": [0, 0, 0], "upper": [1, 0.5, 0.25]}],
+            "sea": [{"side": "x+", "level": level}],
+            "air": {"model": "trapped"},
+        },
+        "time": {"end": 0.1},
+    }
+    coupling = build(Case.model_validate(tables), no_clock).coupling
+    assert len(coupling.water.air) == pockets
+    for _ in range(3):
+        coupling.step(0.01)
+    assert len(coupling.water.air) == pockets
+
+
 # ---------------------------------------------------------------- records of other models, and tides
 
 GEOCLAW = """# gauge_id=   101 location=(   3.8823000000E+05   4.2530500000E+06 ) num_var=  4
