@@ -86,6 +86,15 @@ def _packages() -> Finding:
     import_names = {"scikit-fem": "skfem"}
     names = ("numpy", "scipy", "scikit-fem", "meshio", "h5py", "numba", "pydantic", "pint", "rich")
     lacking = [name for name in names if find_spec(import_names.get(name, name)) is None]
+    hurt = {} if lacking else mend.damaged()
+    if hurt:
+        name, file = next(iter(hurt.items()))
+        more = f" and {len(hurt) - 1} more packages" if len(hurt) > 1 else ""
+        return Finding(
+            "packages", f"damaged: {name} ({file} is not as it was installed){more}", False,
+            f"pip install --force-reinstall --no-deps -c constraints.txt {' '.join(hurt)}",
+            _installer(list(hurt), again=True),
+        )  # fmt: skip
     held = ", ".join(f"{name} {number}" for name, number in versions().items() if name in names)
     return Finding(
         "packages", f"missing: {' '.join(lacking)}" if lacking else held, not lacking,
@@ -93,9 +102,9 @@ def _packages() -> Finding:
     )  # fmt: skip
 
 
-def _installer(names: list[str]) -> Callable[[], str] | None:
-    """The command that installs packages; none outside of a virtual environment."""
-    return partial(mend.install, names) if mend.can_install() else None
+def _installer(names: list[str], again: bool = False) -> Callable[[], str] | None:
+    """The command that installs packages (`mend.install`); none outside of a virtual environment."""
+    return partial(mend.install, names, again) if mend.can_install() else None
 
 
 def _extras() -> Finding:
@@ -167,7 +176,9 @@ def _yade_run() -> Finding:
     """YADE must compute ten steps of a falling sphere: v = g t."""
     status, output = _in_process(_FALLING_SPHERE)
     if status != 0:
-        return Finding("ten steps of YADE", _last(output), False, "apt install --reinstall yade")
+        told = any(name in output for name in ("YadeNeedsPackage", "YadeMissing", "WrongYade"))
+        remedy = "as its message says" if told else "apt install --reinstall yade"
+        return Finding("ten steps of YADE", _last(output), False, remedy)
     result = json.loads(output.splitlines()[-1])
     good = abs(result["z"] + 9.81 * 0.01) < 1e-12
     return Finding(

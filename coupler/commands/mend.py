@@ -1,5 +1,5 @@
 """Repairs made by `surgebreak doctor --mend`: incomplete compiled kernels, folders of the user that are not writable,
-and packages that are missing in the virtual environment.
+and packages that are missing or damaged in the virtual environment.
 
 Only the cache and the virtual environment are changed, never a system package or the results of a run.
 """
@@ -12,6 +12,7 @@ import stat
 import subprocess
 import sys
 from collections.abc import Iterable, Iterator
+from importlib import metadata
 from pathlib import Path
 
 from coupler.program.provenance import ROOT
@@ -95,9 +96,33 @@ def can_install() -> bool:
     return sys.prefix != sys.base_prefix
 
 
-def install(names: Iterable[str]) -> str:
-    """Install packages with the pins of the checkout. Raises OSError with the last line of pip where that fails."""
+def damaged() -> dict[str, str]:
+    """Packages of the virtual environment with a file that is absent or has another size than the installer recorded,
+    and the first such file of each."""
+    found: dict[str, str] = {}
+    inside = [place for place in sys.path if Path(place).is_relative_to(sys.prefix)]
+    for package in metadata.distributions(path=inside):
+        for file in package.files or ():
+            if file.size is not None and _size(Path(str(file.locate()))) != file.size:
+                found[package.metadata["Name"]] = str(file)
+                break
+    return found
+
+
+def _size(path: Path) -> int | None:
+    try:
+        return path.stat().st_size
+    except OSError:
+        return None
+
+
+def install(names: Iterable[str], again: bool = False) -> str:
+    """Install packages with the pins of the checkout; again: also where pip takes them to be there.
+
+    Raises OSError with the last line of pip where that fails."""
     command = [sys.executable, "-m", "pip", "install", "--quiet", *names]
+    if again:
+        command += ["--force-reinstall", "--no-deps"]
     pins = ROOT / "constraints.txt"
     if pins.is_file():
         command += ["-c", str(pins)]

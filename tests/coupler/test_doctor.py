@@ -125,6 +125,40 @@ def test_missing_packages_are_installed_with_the_pins_and_only_in_a_virtual_envi
     assert doctor._installer(["pint"]) is None
 
 
+@pytest.mark.parametrize("harm", ["cut", "gone"])
+def test_a_damaged_package_is_found_and_fetched_again(harm, tmp_path, monkeypatch, capsys):
+    """A file of a package that was cut off or lost: pip itself takes the package to be there."""
+    from coupler.commands import mend
+
+    place, called = tmp_path / "lib", []
+    (place / "some-1.0.dist-info").mkdir(parents=True)
+    (place / "some-1.0.dist-info" / "METADATA").write_text(
+        "Metadata-Version: 2.1\nName: some\nVersion: 1.0\n"
+    )
+    (place / "some-1.0.dist-info" / "RECORD").write_text("some.py,sha256=x,5\nsome-1.0.dist-info/RECORD,,\n")
+    (place / "some.py").write_text("a = 1")
+    monkeypatch.setattr(mend.sys, "prefix", str(tmp_path))
+    monkeypatch.setattr(mend.sys, "path", [*mend.sys.path, str(place)])
+    assert mend.damaged() == {}
+    if harm == "cut":
+        (place / "some.py").write_text("a")
+    else:
+        (place / "some.py").unlink()
+
+    def run(command, **_):
+        called.append(command)
+        (place / "some.py").write_text("a = 1")
+        return doctor.subprocess.CompletedProcess(command, 0, "", "")
+
+    monkeypatch.setattr(mend.subprocess, "run", run)
+    monkeypatch.setattr(mend, "can_install", lambda: True)
+    monkeypatch.setattr(doctor, "CHECKS", (doctor._packages,))
+    assert doctor.examine() == 1
+    assert "damaged: some (some.py is not as it was installed)" in capsys.readouterr().out
+    assert doctor.examine(mending=True) == 0
+    assert called[0][4:8] == ["--quiet", "some", "--force-reinstall", "--no-deps"]
+
+
 def test_a_remedy_that_fails_leaves_the_finding_bad(monkeypatch, capsys):
     def fail():
         raise OSError("pip: no network")

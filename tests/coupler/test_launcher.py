@@ -33,7 +33,9 @@ TOOLS = (
 VENV = """#!/bin/sh
 # stands for python -m venv: a .venv whose python and surgebreak write down what they are asked
 mkdir -p "$1/bin"
-printf '#!/bin/sh\\n echo "python $*" >>"$CALLS"\\n case "$*" in *" pip install "*) [ -z "$PIP_FAILS" ];; esac\\n' \\
+printf '#!/bin/sh\\n echo "python $*" >>"$CALLS"\\n case "$*" in \\
+*--force-reinstall*) rm "$STATE/torn";; *" pip install "*) [ -z "$PIP_FAILS" ];; *"import coupler"*) [ ! -e "$STATE/torn" ];; \\
+esac\\n' \\
     >"$1/bin/python"
 printf '#!/bin/sh\\n echo "surgebreak $*" >>"$CALLS"\\n' >"$1/bin/surgebreak"
 chmod +x "$1/bin/python" "$1/bin/surgebreak"
@@ -96,14 +98,16 @@ class Machine:
         return self
 
     def __call__(self, *arguments, program=None, cwd=None, **environment):
-        """Exit code, messages and the calls of this call alone."""
+        """Exit code, messages and the calls of this call alone, without that by which `doctor` tries whether the
+        program starts."""
         calls = self.root.parent / "calls"
         calls.write_text("", encoding="utf-8")
         done = subprocess.run(
             [program or self.root / "surgebreak", *arguments],
             capture_output=True, text=True, check=False, cwd=cwd, env=self.environment | environment, timeout=30,
         )  # fmt: skip
-        return done.returncode, done.stderr, calls.read_text(encoding="utf-8").splitlines()
+        made = calls.read_text(encoding="utf-8").splitlines()
+        return done.returncode, done.stderr, [call for call in made if "import coupler" not in call]
 
 
 @pytest.fixture
@@ -354,6 +358,21 @@ def test_a_failing_pip_is_reported_and_repeated_without_starting_over(machine):
     code, reported, calls = machine("doctor")
     assert (code, calls[-1]) == (0, "surgebreak doctor")
     assert not any(call.startswith("system-python -m venv") for call in calls)
+
+
+def test_the_doctor_mends_a_program_that_does_not_start(machine):
+    """Of a damaged package pip says that it is there: only fetching it again helps. Without --mend nothing is changed."""
+    machine.ready()("doctor")
+    (machine.state / "torn").touch()
+    code, reported, calls = machine("doctor")
+    assert code == 1
+    assert "the program does not start" in reported
+    assert "./surgebreak doctor --mend installs its packages again" in reported
+    assert pip_installs(calls) == []
+    code, reported, calls = machine("doctor", "--mend")
+    assert (code, calls[-1]) == (0, "surgebreak doctor --mend")
+    assert "a package is damaged; fetching all of them again" in reported
+    assert [("--force-reinstall" in call) for call in calls if " pip install " in call] == [False, True]
 
 
 def test_packages_half_written_by_an_interrupted_set_up_are_thrown_away(machine):
