@@ -34,8 +34,8 @@ VENV = """#!/bin/sh
 # stands for python -m venv: a .venv whose python and surgebreak write down what they are asked
 mkdir -p "$1/bin"
 printf '#!/bin/sh\\n echo "python $*" >>"$CALLS"\\n case "$*" in \\
-*--force-reinstall*) rm "$STATE/torn";; *" pip install "*) [ -z "$PIP_FAILS" ];; *"import coupler"*) [ ! -e "$STATE/torn" ];; \\
-esac\\n' \\
+*--force-reinstall*) rm "$STATE/torn";; *" pip install "*) [ -z "$PIP_FAILS" ];; \\
+*"import coupler"*) [ ! -e "$STATE/torn" ];; esac\\n' \\
     >"$1/bin/python"
 printf '#!/bin/sh\\n echo "surgebreak $*" >>"$CALLS"\\n' >"$1/bin/surgebreak"
 chmod +x "$1/bin/python" "$1/bin/surgebreak"
@@ -361,7 +361,7 @@ def test_a_failing_pip_is_reported_and_repeated_without_starting_over(machine):
 
 
 def test_the_doctor_mends_a_program_that_does_not_start(machine):
-    """Of a damaged package pip says that it is there: only fetching it again helps. Without --mend nothing is changed."""
+    """Of a damaged package pip says that it is there: only fetching it again helps. Without --mend nothing changes."""
     machine.ready()("doctor")
     (machine.state / "torn").touch()
     code, reported, calls = machine("doctor")
