@@ -122,8 +122,8 @@ class Walls:
         return nodes, total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-300)
 
     def let_air_in(self, phi, u, dt: float, spacing) -> None:
-        """Let air enter at the open sides: where u (N, 3) [m/s] points into the tank, the surface was at the side at
-        most and lies |u·n| dt inside after dt [s]. φ (N,) [m] is raised to that, in place.
+        """Let air enter at the open sides: where u (N, 3) [m/s] points into the tank, the surface, which was at the
+        side at most, moves on by |u·n| dt in dt [s]. φ (N,) [m], carried by paths, is raised by that, in place.
 
         Paths that come from outside end at the side, where they would find the water that has just left: a drop that
         falls back from an open top would never end, and would run down the wall faster and faster.  Nodes at least one
@@ -131,7 +131,7 @@ class Walls:
         nodes, normal = self.outward
         inward = -dt * np.einsum("ij,ij->i", u[nodes], normal)
         coming = (inward > 0.0) & (phi[nodes] > -spacing[nodes])
-        phi[nodes[coming]] = np.maximum(phi[nodes[coming]], inward[coming])
+        phi[nodes[coming]] = np.maximum(phi[nodes[coming]], 0.0) + inward[coming]
         phi[nodes] = without_films(phi[nodes], spacing[nodes])  # water up to the brim, rounded
 
     def slip(self, u) -> None:
