@@ -32,17 +32,17 @@ from coupler.case.water import Solid, Water
 
 
 class About(Section):
-    """What the case is, and what holds everywhere in it."""
+    """Title and description of the case, and gravity."""
 
-    title: str = Field(description="one line for people")
-    description: str = Field("", description="what happens, where it comes from, what to look at")
+    title: str = Field(description="title in one line")
+    description: str = Field("", description="what the case shows, its source, and which results matter")
     gravity: Annotated[float, InSI("m/s2", ge=0)] = Field(
         9.81, description="acceleration of gravity, along -z; z points up"
     )
 
 
 class Time(Section):
-    """How long, in which steps, and how often results are written."""
+    """Duration, step sizes, and times of output."""
 
     end: PositiveTime = Field(description="the run ends at this time", examples=["4 s"])
     step_max: PositiveTime = Field(0.05, description="largest step of the coupled scheme")
@@ -58,8 +58,8 @@ class Time(Section):
     )
     checkpoint_every: Annotated[float, InSI("s", ge=0)] | None = Field(
         None,
-        description="time between two checkpoints, from which `surgebreak resume` goes on; absent: a tenth of the end "
-        "time; 0: none, also when the run is stopped",
+        description="time between two checkpoints, from which `surgebreak resume` continues; absent: a tenth of the "
+        "end time; 0: none, also when the run is stopped",
     )
 
 
@@ -75,7 +75,7 @@ class Stretch(Section):
         description="wanted length of the bricks along this axis", examples=["0.25 m"]
     )
     growth: Annotated[float, InSI("", gt=1, le=2)] = Field(
-        1.2, description="largest ratio of the lengths of bricks one after the other beyond its ends"
+        1.2, description="largest ratio of the lengths of adjacent bricks beyond its ends"
     )
 
 
@@ -87,8 +87,8 @@ class Refine(Section):
     upper: Point | None = Field(None, description="corner of a box with the largest coordinates")
     around: tuple[Name, ...] = Field(
         (),
-        description="what they are finer around, instead of a box: names of solids, blocks, groups or parts where they "
-        'stand at the start, or "solids", "blocks" and "terrain" for all of a kind',
+        description="around which bodies cells are finer, instead of a box: names of solids, blocks, groups or parts "
+        'at their initial positions, or "solids", "blocks" and "terrain" for all of a kind',
         examples=[["pier", "house"]],
     )
     margin: PositiveLength | None = Field(
@@ -105,8 +105,8 @@ class Refine(Section):
 
 
 class Tank(Section):
-    """Where water may be: a fixed mesh of tetrahedra, of a box (lower, upper, cell) or from a file (mesh). Closed sides
-    are walls for blocks too."""
+    """Domain of the water: a fixed mesh of tetrahedra, of a box (lower, upper, cell) or from a file (mesh). Closed
+    sides are walls for blocks too."""
 
     lower: Point | None = Field(
         None, description="corner with the smallest coordinates; needed without mesh", examples=[[0, 0, 0]]
@@ -122,7 +122,7 @@ class Tank(Section):
     split: Literal["kuhn", "mirrored"] = Field(
         "kuhn",
         description="how bricks become cells: all along the same diagonal, or each as the mirror image of those beside "
-        "it, so that what parts at an obstacle parts alike on both sides",
+        "it, so that a flow that divides at an obstacle stays symmetric",
     )
     mesh: Annotated[str, Field(min_length=1)] | None = Field(
         None,
@@ -147,7 +147,8 @@ class Tank(Section):
     )
     smooth: tuple[Side, ...] = Field(
         (),
-        description="closed sides along which water slips whatever water.walls says, for instance of a slice",
+        description="closed sides along which water slips whatever water.walls is, for instance the symmetry planes "
+        "of a slice",
     )
 
     _ground: object = PrivateAttr(None)
@@ -194,7 +195,7 @@ class ContactPair(Section):
     """Friction and uplift between two materials that differ from the rest."""
 
     materials: tuple[Name, Name] = Field(
-        description="names that blocks, ground (ground) or tank sides (tank) give as their material",
+        description="materials of blocks, of the ground (ground) or of tank sides (tank)",
         examples=[["brick", "ground"]],
     )
     friction: Annotated[float, InSI("", ge=0)] | None = Field(
@@ -217,8 +218,9 @@ class Contact(Section):
 
     stiffness: Annotated[float, InSI("N/m", gt=0)] | None = Field(
         None,
-        description="K of two faces of which the smaller lies on the other, whatever their sizes, and of one on the "
-        "ground; absent: that of the joints in closing, so that a face whose joint breaks goes on as it was",
+        description="K of two faces of which the smaller lies on the other, whatever their sizes, and of a face on "
+        "the ground; absent: the closing stiffness of the joints, so that a face whose joint breaks keeps its "
+        "stiffness",
         examples=["1 GN/m"],
     )
     restitution: Annotated[float, InSI("", gt=0, le=1)] = Field(
@@ -232,20 +234,22 @@ class Contact(Section):
     )
     tangential_restitution: Annotated[float, InSI("", gt=0, le=1)] | None = Field(
         None,
-        description="the same as restitution along the face; absent: the dashpot goes with the stiffness",
+        description="coefficient of restitution along the face; absent: the tangential dashpot is in proportion to "
+        "the stiffness",
     )
     rule: Literal["exact", "paper"] = Field(
         "exact",
-        description="dashpot that gives e exactly and never pulls, or the closed formula of the method",
+        description="dashpot that gives e exactly without tension, or the closed formula of the published method",
     )
     nodes_per_edge: Annotated[int, Field(strict=True, ge=3, le=33)] = Field(
-        3, description="contact nodes along an edge of a block; crossing edges hold each other whatever it is"
+        3,
+        description="contact nodes along an edge of a block; contact of crossing edges does not depend on it",
     )
     uplift: Literal["full", "none", "share"] = Field(
         "full",
-        description="pressure of the water between faces that touch at the start without a joint, for as long as they "
-        "lie on one another, on the ground or on the floor of the tank: that of the water around them, none (the faces "
-        "keep the water out), or uplift_share of it",
+        description="pressure of the water between faces that touch at the start without a joint, as long as they are "
+        "in contact with one another, with the ground or with the floor of the tank: that of the water around them, "
+        "none (the faces keep the water out), or uplift_share of it",
     )
     uplift_share: Annotated[float, InSI("", ge=0, le=1)] | None = Field(
         None, description="share of the pressure around that acts, needed with uplift = share", examples=[0.5]
@@ -260,21 +264,21 @@ class Contact(Section):
 
 
 class JointPair(Section):
-    """Joints between chosen blocks that differ from the rest, or none; of several that fit, the last counts."""
+    """Joints between chosen blocks that differ from the rest, or none; of several that fit, the last is used."""
 
     between: tuple[Name, Name] = Field(
         description="two names: of blocks, groups or materials, ground (the ground) or tank (its floor)",
         examples=[["wall", "ground"]],
     )
-    joined: Switch = Field(True, description="false: no joint, whatever else is said")
+    joined: Switch = Field(True, description="false: no joint")
     strength: Annotated[float, InSI("Pa", gt=0)] | None = Field(
         None, description="absent, like all below: that of [joints]"
     )
     opening_at_failure: PositiveLength | None = Field(
-        None, description="opening at which nothing holds any more"
+        None, description="opening at which the traction is zero"
     )
     law: Name | None = Field(
-        None, description="as in [joints]; with a law of its own, its peak is that law's"
+        None, description="as in [joints]; with a law of its own, the default of peak is that of the law"
     )
     peak: Annotated[float, InSI("", gt=0, lt=1)] | None = Field(
         None, description="opening at T_max over opening_at_failure"
@@ -296,7 +300,7 @@ class Joints(Section):
         examples=["0.5 MPa"],
     )
     opening_at_failure: PositiveLength | None = Field(
-        None, description="opening at which nothing holds any more; needed as strength is", examples=["5 mm"]
+        None, description="opening at which the traction is zero; needed as strength is", examples=["5 mm"]
     )
     law: Name = Field(
         "polynomial",
@@ -309,8 +313,8 @@ class Joints(Section):
     )
     mixed_mode: Literal["effective", "needleman"] = Field(
         "effective",
-        description="effective: one history for opening and sliding; needleman: his potential of 1987, polynomial "
-        "law only, shear does not soften without opening",
+        description="effective: one history for opening and sliding; needleman: potential of Needleman (1987), "
+        "polynomial law only, shear does not soften without opening",
     )
     shear_ratio: Annotated[float, InSI("", gt=0)] = Field(
         1.0,
@@ -330,18 +334,20 @@ class Joints(Section):
     )
     ground: Switch = Field(
         True,
-        description="blocks that stand on the ground are glued to it; a pair with the ground counts in any case",
+        description="true: blocks that stand on the ground are joined to it; a pair with the ground is used in any "
+        "case",
     )
     distribution: Literal["weibull", "lognormal"] | None = Field(
         None,
-        description="strengths are random, joint by joint, with strength as their mean; opening_at_failure stays, so "
-        "stiffness and work of separation go along; absent: all alike",
+        description="strengths are random, joint by joint, with strength as their mean; opening_at_failure is the "
+        "same, so that stiffness and work of separation are in proportion to the strength; absent: all strengths are "
+        "equal",
     )
     variation: Annotated[float, InSI("", ge=0.001, le=1)] | None = Field(
         None, description="standard deviation of the strengths over their mean, needed with distribution"
     )
     seed: Annotated[int, Field(strict=True, ge=0)] = Field(
-        1, description="of the random strengths; the same seed gives the same strengths"
+        1, description="seed of the random strengths; the same seed gives the same strengths"
     )
     pair: tuple[JointPair, ...] = Field((), description="joints between chosen blocks")
 
@@ -399,21 +405,25 @@ class RunLimits(Section):
 class Case(Section):
     """A whole case file."""
 
-    case: About = Field(description="what the case is")
-    time: Time = Field(description="how long and how often")
-    tank: Tank | None = Field(None, description="where water may be: a box, or a mesh from a file")
-    terrain: Terrain | None = Field(None, description="the ground from a file: bed of the water, and land")
+    case: About = Field(description="title, description and gravity")
+    time: Time = Field(description="duration, steps and output times")
+    tank: Tank | None = Field(None, description="domain of the water: a box, or a mesh from a file")
+    terrain: Terrain | None = Field(
+        None, description="the ground from a file: bed of the water, and dry land"
+    )
     water: Water | None = Field(None, description="the water")
     solid: tuple[Solid, ...] = Field((), description="fixed bodies in the water")
     structure: Structure | None = Field(None, description="rigid blocks")
-    contact: Contact | None = Field(None, description="what happens where blocks touch")
-    joints: Joints | None = Field(None, description="glue between touching faces, which may break")
-    gauge: tuple[Gauge, ...] = Field((), description="what is measured at every step")
-    motion: tuple[Motion, ...] = Field((), description="blocks that move as prescribed")
-    coupling: Coupling = Field(default_factory=Coupling, description="how water and blocks agree on a step")
-    limits: RunLimits = Field(default_factory=RunLimits, description="when a run stops early")
+    contact: Contact | None = Field(None, description="contact law of touching blocks")
+    joints: Joints | None = Field(None, description="cohesive joints between touching faces, which may break")
+    gauge: tuple[Gauge, ...] = Field((), description="quantities measured at every step")
+    motion: tuple[Motion, ...] = Field((), description="blocks with a prescribed motion")
+    coupling: Coupling = Field(
+        default_factory=Coupling, description="iteration between water and blocks in a step"
+    )
+    limits: RunLimits = Field(default_factory=RunLimits, description="limits at which a run stops early")
     verdict: Verdict = Field(
-        default_factory=Verdict, description="when a structure counts as damaged or collapsed"
+        default_factory=Verdict, description="criteria by which a structure is damaged or collapsed"
     )
     study: Study | None = Field(None, exclude=True, description="what `surgebreak study` varies and measures")
     sweep: Sweep | None = Field(None, exclude=True, description="what `surgebreak sweep` varies and measures")

@@ -15,7 +15,7 @@ Window = tuple[Time, Time]
 
 IMPULSE = Field(
     None,
-    description="from and to when to add up value times step: a column of the impulse so far",
+    description="start and end of the time integral: a column of the impulse so far",
     examples=[["0.35 s", "1 s"]],
 )
 MEAN_OVER = Field(
@@ -26,7 +26,7 @@ MEAN_OVER = Field(
 
 
 class LevelGauge(Section):
-    """Depth of water over a place: the wet length of the vertical through it."""
+    """Depth of water over a point: the wet length of the vertical through it."""
 
     kind: Literal["level"] = Field(description="what it measures: depth of water")
     name: Name = Field(description="column of the history")
@@ -45,7 +45,7 @@ class PressureGauge(Section):
 
 
 class PatchGauge(Section):
-    """Mean pressure over a plane patch, as a sensor of that size feels it: a parallelogram (edges) or a disc."""
+    """Mean pressure over a plane patch, as measured by a sensor of that size: a parallelogram (edges) or a disc."""
 
     kind: Literal["patch"] = Field(description="what it measures: mean pressure over a patch")
     name: Name = Field(description="columns of the history")
@@ -66,9 +66,7 @@ class AirGauge(Section):
 
     kind: Literal["air"] = Field(description="what it measures: a pocket of trapped air")
     name: Name = Field(description="columns of the history")
-    at: Point = Field(
-        description="point (x, y, z); the pocket that is there first is followed wherever it goes"
-    )
+    at: Point = Field(description="point (x, y, z); the first pocket at this point is followed from then on")
 
 
 class VelocityGauge(Section):
@@ -81,7 +79,7 @@ class VelocityGauge(Section):
 
 
 class FluxGauge(Section):
-    """Water that passes a plane patch in a second, positive along the cross product of its edges."""
+    """Volume flow through a plane patch, positive along the cross product of its edges."""
 
     kind: Literal["flux"] = Field(description="what it measures: flow through a patch")
     name: Name = Field(description="column of the history")
@@ -92,7 +90,7 @@ class FluxGauge(Section):
     )
     impulse: Window | None = Field(
         None,
-        description="from and to when to add up value times step: a column of the volume that has passed so far",
+        description="start and end of the time integral: a column of the volume that has passed so far",
         examples=[["0 s", "10 s"]],
     )
     mean_over: PositiveTime | None = MEAN_OVER
@@ -131,7 +129,7 @@ class LoadsGauge(Section):
     """All loads on a group of blocks or a solid, split into pressure, friction, contact, joint and weight, in a table
     of their own, history/loads_NAME.csv: force and moment as means over the step, impulses, peaks over mean_over."""
 
-    kind: Literal["loads"] = Field(description="what it measures: loads by what they come from")
+    kind: Literal["loads"] = Field(description="what it measures: loads by their origin")
     name: Name = Field(description="the table is history/loads_NAME.csv")
     on: Name = Field(
         description="name of a block, a group, a part of the structure (wall, arch, ...) or a solid"
@@ -142,7 +140,7 @@ class LoadsGauge(Section):
     )
     each_block: Switch = Field(
         False,
-        description="true: beside the sums a row for each block, in history/loads_NAME_blocks.csv, with moments about "
+        description="true: also a row for each block, in history/loads_NAME_blocks.csv, with moments about "
         "its own centre at the start",
     )
     every: PositiveTime | None = Field(
@@ -152,7 +150,7 @@ class LoadsGauge(Section):
     )
     impulse: Window | None = Field(
         None,
-        description="from and to when to add up force times step; absent: the whole run",
+        description="start and end of the time integral of the force; absent: the whole run",
         examples=[["0.35 s", "1 s"]],
     )
     mean_over: PositiveTime | None = MEAN_OVER

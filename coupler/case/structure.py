@@ -26,13 +26,13 @@ from coupler.case.units import InSI
 
 
 class Block(Section):
-    """One rigid block that moves: a box (size), a convex polyhedron (vertices), or one that stands for a sphere
+    """One rigid block that moves: a box (size), a convex polyhedron (vertices), or one that approximates a sphere
     (diameter)."""
 
     name: Name = Field(description="for joints, gauges, motions and results; one block a name")
     centre: Point | None = Field(
         None,
-        description="centre of mass at the start; a polyhedron without it stands where its vertices are",
+        description="centre of mass at the start; absent for a polyhedron: its vertices are the position",
     )
     size: Size | None = Field(None, description="edges of the box along its own axes")
     vertices: Annotated[tuple[Point, ...], Field(min_length=4)] | None = Field(
@@ -42,7 +42,7 @@ class Block(Section):
     )
     diameter: PositiveLength | None = Field(
         None,
-        description="of a sphere, made as a polyhedron with flat faces and the volume of the sphere; its inertia is "
+        description="diameter of a sphere, approximated by a polyhedron of the same volume; its inertia is "
         "that of the sphere within 0.1 % (20 faces: 1.1 %). It rolls over its edges",
         examples=["30 cm"],
     )
@@ -52,7 +52,7 @@ class Block(Section):
         "sphere; contact and cutting cost in proportion",
     )
     rotation: Rotation | None = Field(
-        None, description="turn about the centre of mass; absent: along the axes"
+        None, description="rotation about the centre of mass; absent: aligned with the axes"
     )
     velocity: VelocityVector = Field((0.0, 0.0, 0.0), description="velocity of the centre at the start")
     spin: SpinVector = Field((0.0, 0.0, 0.0), description="angular velocity at the start, world axes")
@@ -147,7 +147,7 @@ class MasonryWall(Section):
 
 
 class Column(Section):
-    """Equal drums on one another: boxes (size) or prisms of many sides (radius)."""
+    """A stack of equal drums: boxes (size) or prisms of many sides (radius)."""
 
     name: Name = Field("column", description="the group of its drums, NAME-0 the lowest")
     foot: Point = Field(description="middle of its underside")
@@ -160,7 +160,7 @@ class Column(Section):
         None, description="of the circle through the corners of round drums, at the foot"
     )
     top_radius: PositiveLength | None = Field(
-        None, description="the same at the top, of a column that tapers; absent: radius"
+        None, description="the same at the top, of a tapered column; absent: radius"
     )
     sides: Annotated[int, Field(strict=True, ge=3, le=64)] = Field(12, description="sides of a round drum")
     density: Density | None = Field(None, description="mass per volume; absent: structure.density")
@@ -174,7 +174,7 @@ class Arch(Section):
     foot: Point = Field(description="middle of the span, at the level where the inner edges spring")
     span: PositiveLength = Field(description="clear width between the springings")
     rise: PositiveLength | None = Field(
-        None, description="of the inner edge above the springing; absent: half the span, a half circle"
+        None, description="rise of the inner edge above the springing; absent: half the span, a semicircle"
     )
     thickness: PositiveLength = Field(description="of the ring, along the joints")
     width: PositiveLength = Field(description="across the span")
@@ -193,7 +193,7 @@ class Arch(Section):
 
 
 class Rubble(Section):
-    """Loose random blocks scattered in a box, none touching another."""
+    """Loose random blocks scattered in a box without contact."""
 
     name: Name = Field("rubble", description="the group of its blocks, NAME-0 and so on")
     lower: Point = Field(description="corner of the box with the smallest coordinates")
@@ -214,7 +214,7 @@ class Rubble(Section):
 
 
 class TownRule(Section):
-    """What holds for the footprints with a certain attribute; of several rules that fit, the last counts."""
+    """Values for the footprints with a certain attribute; of several rules that fit, the last is used."""
 
     attribute: str = Field(description="name of an attribute of the file", examples=["built"])
     equals: str | int | float | bool = Field(description="its value", examples=["brick"])
@@ -235,7 +235,7 @@ class Town(Section):
     """Houses on the terrain from a file of footprints: each is a building with walls, floors and a roof on its smallest
     rectangle or along its outline. They are called NAME-0, NAME-1, ... in the order of the file, or by name_from."""
 
-    name: Name = Field("town", description="beginning of the names of its houses")
+    name: Name = Field("town", description="prefix of the names of its houses")
     path: Annotated[str, Field(min_length=1)] = Field(
         description="polygons in coordinates of the terrain file: GeoJSON, or with the extra terrain Shapefile or "
         "GeoPackage; from the directory of the case",
@@ -271,9 +271,9 @@ class Town(Section):
         "it; outline: those that fill less than 98 % follow their footprint, as rings of convex strips",
     )
     least_area: Annotated[float, InSI("m2", ge=0)] = Field(
-        0.0, description="smaller footprints, sheds and bins, are left out"
+        0.0, description="smaller footprints, for instance of sheds, are left out"
     )
-    rule: tuple[TownRule, ...] = Field((), description="what differs, by attributes of the file")
+    rule: tuple[TownRule, ...] = Field((), description="values for some houses, by attributes of the file")
 
 
 class BlockFile(Section):
@@ -290,7 +290,7 @@ class BlockFile(Section):
     offset: Point = Field((0.0, 0.0, 0.0), description="added to all places, after the scale")
     weld: PositiveLength | None = Field(
         None,
-        description="corners closer than this are one; absent: a hundred-thousandth of the usual edge, or what the "
+        description="corners closer than this are merged; absent: a hundred-thousandth of the usual edge, or what the "
         "digits of the file resolve",
     )
     density: Density | None = Field(None, description="mass per volume; absent: structure.density")
@@ -339,7 +339,7 @@ class Drawing(Section):
     offset: Point = Field((0.0, 0.0, 0.0), description="added to all places, after the scale")
     up: Literal["z", "y"] = Field("z", description="axis of the file that points up")
     weld: PositiveLength | None = Field(
-        None, description="corners closer than this are one; absent: what the digits of the file resolve"
+        None, description="corners closer than this are merged; absent: what the digits of the file resolve"
     )
     sliver: PositiveLength | None = Field(
         None,
@@ -348,7 +348,8 @@ class Drawing(Section):
     )
     most_blocks: Annotated[int, Field(strict=True, ge=1, le=20_000)] = Field(
         5000,
-        description="more are refused before any is made: most often the unit of the file (scale) is another one",
+        description="largest number of blocks; more are refused before the cutting, most often because the unit of "
+        "the file (scale) is wrong",
     )
     density: Density | None = Field(None, description="mass per volume; absent: structure.density")
     material: Name = Field("block", description=MATERIAL)
@@ -357,31 +358,31 @@ class Drawing(Section):
 
 
 class Ground(Section):
-    """A flat, rough ground without end under the blocks. With a tank its floor is ground as well."""
+    """A horizontal, infinite ground with friction under the blocks. The floor of a tank is ground as well."""
 
     level: Length = Field(0.0, description="height of the ground")
-    material: Name = Field("ground", description="a name that contact.pair may go by")
+    material: Name = Field("ground", description="a name to which contact.pair may refer")
 
 
 class Sleep(Section):
-    """Buildings whose loads do not change take no substeps. Absent: every block takes every substep. What is asleep
-    stands still; it wakes before the load acts on it where this would change a traction in its joints by more than
-    `share` of their strength, or where something loose comes near. Only blocks that joints hold to the ground or to
-    held blocks, with nothing loose among them, fall asleep: at the start, or after a period of their slowest swing at
-    rest."""
+    """Buildings whose loads do not change make no substeps. Absent: every block makes every substep. What is asleep
+    does not move; it wakes before a load acts on it that would change a traction in its joints by more than
+    `share` of their strength, or when a loose block approaches. Only blocks that joints hold to the ground or to
+    held blocks, with nothing loose among them, fall asleep: at the start, or after a period of their slowest
+    oscillation at rest."""
 
     share: Annotated[float, InSI("", gt=0, le=0.5)] = Field(
         0.02,
-        description="largest error of a traction in a joint while it sleeps, over the strength of the joint; as much "
-        "again comes on when it wakes",
+        description="largest error of a traction in a joint while it sleeps, over the strength of the joint; waking "
+        "changes the traction by as much again",
         examples=["2 %"],
     )
 
 
 class Structure(Section):
-    """Rigid blocks. Absent: nothing moves but water, and YADE is never loaded."""
+    """Rigid blocks. Absent: only the water moves, and YADE is not loaded."""
 
-    density: Density = Field(2400.0, description="mass per volume of blocks that do not say their own")
+    density: Density = Field(2400.0, description="density of blocks that have no density of their own")
     block: tuple[Block, ...] = Field((), description="single blocks")
     wall: tuple[MasonryWall, ...] = Field((), description="walls of equal blocks")
     building: tuple[Building, ...] = Field((), description="buildings with floors, roof and openings")
@@ -391,22 +392,22 @@ class Structure(Section):
     file: tuple[BlockFile, ...] = Field((), description="blocks from files")
     drawing: tuple[Drawing, ...] = Field((), description="buildings from drawings, cut into blocks")
     town: tuple[Town, ...] = Field((), description="houses on the terrain from files of footprints")
-    ground: Ground | None = Field(None, description="flat ground under the blocks")
+    ground: Ground | None = Field(None, description="horizontal ground under the blocks")
     start: Literal["settled", "sudden", "ramp"] = Field(
         "settled",
         description="settled: joined blocks that reach the ground start in equilibrium with their weight and the "
-        "water around them; sudden: the weight comes on at once; ramp: the weight comes on gradually over the time "
-        "`ramp`, while water acts in full from the start",
+        "water around them; sudden: the full weight acts from the start; ramp: the weight increases gradually over "
+        "the time `ramp`, while the water acts in full from the start",
     )
     ramp: PositiveTime | None = Field(
         None,
-        description="with start = 'ramp', the time over which the weight of the blocks grows to its whole, as "
-        "tau^2 (3 - 2 tau); several periods of the structure leave it nearly at rest",
+        description="with start = 'ramp', the time over which the weight of the blocks increases to its full value, "
+        "as tau^2 (3 - 2 tau); after several periods of the structure it is nearly at rest",
         examples=["2 s"],
     )
     substep: PositiveTime | None = Field(
         None,
         description="longest step of the motion of the blocks; absent: the one at which energy is accurate. Longer "
-        "ones are taken up to the limit of stability, with a note, and refused beyond",
+        "ones are permitted, with a note, up to the limit of stability",
     )
-    sleep: Sleep | None = Field(None, description="buildings that nothing happens to cost nothing")
+    sleep: Sleep | None = Field(None, description="buildings whose loads do not change are not computed")

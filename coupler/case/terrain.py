@@ -14,7 +14,7 @@ class LandUse(Section):
     """A kind of ground: its code in the map, and its friction by the law that [water] has."""
 
     code: int = Field(description="its number in the map", examples=[41])
-    name: str = Field("", description="for people", examples=["forest"])
+    name: str = Field("", description="name in messages", examples=["forest"])
     manning: Annotated[float, InSI("", gt=0, le=1)] | None = Field(
         None, description="Manning's n [s/m^(1/3)], for water.manning", examples=[0.1]
     )
@@ -23,7 +23,7 @@ class LandUse(Section):
 
 class Land(Section):
     """The friction of the ground by a map: codes of land use with a table `use` for each, or the numbers themselves.
-    The nearest point of the map counts. Beside the map and in its holes water.manning or water.roughness holds."""
+    The nearest point of the map is used; outside the map and in its holes, water.manning or water.roughness is."""
 
     path: Annotated[str, Field(min_length=1)] = Field(
         description="a raster as terrain.path, in the same coordinates (after reproject)",
@@ -46,7 +46,7 @@ class Terrain(Section):
     )
     variable: Name | None = Field(None, description="of a NetCDF file with several")
     crs: str | None = Field(
-        None, description="coordinate system of a file that does not say it", examples=["EPSG:4326"]
+        None, description="coordinate system of a file that does not contain it", examples=["EPSG:4326"]
     )
     reproject: str | None = Field(
         None,
@@ -56,7 +56,7 @@ class Terrain(Section):
     scale: PositiveLength = Field(
         1.0, description="length of one unit of the file along x and y", examples=["1 ft"]
     )
-    height_scale: PositiveLength | None = Field(None, description="the same of its heights; absent: scale")
+    height_scale: PositiveLength | None = Field(None, description="the same for its heights; absent: scale")
     positive: Literal["up", "down"] = Field("up", description="down: the file holds depths")
     zero: Length = Field(
         0.0,
@@ -69,20 +69,22 @@ class Terrain(Section):
     )
     origin: tuple[Length, Length] | None = Field(
         None,
-        description="x, y of the file that come to lie at offset; absent: its corner with the lowest ones",
+        description="x, y of the file that are moved to offset; absent: its corner with the lowest coordinates",
     )
     turn: Annotated[float, InSI("rad")] = Field(
-        0.0, description="turn about origin, counter-clockwise", examples=["30 deg"]
+        0.0, description="rotation about origin, counter-clockwise", examples=["30 deg"]
     )
     offset: Point = Field(
-        (0.0, 0.0, 0.0), description="place of origin in the tank; z is added to all heights"
+        (0.0, 0.0, 0.0), description="position of origin in the tank; z is added to all heights"
     )
     fill: Switch = Field(False, description="true: holes are closed smoothly from their edges")
     smooth: PositiveLength | None = Field(
-        None, description="length over which heights are averaged (standard deviation of a Gauss curve)"
+        None, description="length over which heights are averaged (standard deviation of a Gaussian)"
     )
     steepest: Annotated[float, InSI("rad", gt=0, lt=1.5)] | None = Field(
-        None, description="steepest slope left; cliffs are cut back from their foot", examples=["60 deg"]
+        None,
+        description="steepest slope that is kept; cliffs are cut back from their foot",
+        examples=["60 deg"],
     )
     land: Land | None = Field(
         None, description='friction of the ground by a map, with water.walls = "friction"'

@@ -30,7 +30,7 @@ Switch = Annotated[bool, Field(strict=True)]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]*$", max_length=60)]
 
 MATERIAL = (
-    "concrete, brick-masonry or timber (presets), or any name that contact.pair and joints.pair may go by"
+    "concrete, brick-masonry or timber (presets), or any name to which contact.pair and joints.pair may refer"
 )
 """What the material of blocks is, for every table of them."""
 
@@ -42,7 +42,7 @@ class Section(BaseModel):
 
 
 class Rotation(Section):
-    """A turn about an axis through the centre, by the right-hand rule."""
+    """A rotation about an axis through the centre, by the right-hand rule."""
 
     axis: tuple[Number, Number, Number] = Field(description="direction of the axis; any length but zero")
-    angle: Annotated[float, InSI("rad")] = Field(description="angle of the turn", examples=["30 deg"])
+    angle: Annotated[float, InSI("rad")] = Field(description="angle of rotation", examples=["30 deg"])

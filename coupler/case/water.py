@@ -28,7 +28,7 @@ File = Annotated[str, Field(min_length=1)]
 
 
 class Fill(Section):
-    """A box of water at the start, full unless slope or surface say otherwise; solids and blocks in it displace the
+    """A box of water at the start, full unless slope or surface is given; solids and blocks in it displace the
     water."""
 
     lower: Point = Field(description="corner with the smallest coordinates", examples=[[0, 0, 0]])
@@ -38,30 +38,30 @@ class Fill(Section):
     )
     slope: tuple[Number, Number] | None = Field(
         None,
-        description="rise of its surface over a length along x and y, as shares; in the middle of the box the surface "
+        description="slope of its surface along x and y; in the middle of the box the surface "
         "is at upper[2]. Absent: level",
         examples=[[0.02, 0]],
     )
     surface: File | None = Field(
         None,
-        description="instead: heights z [m] of its surface in coordinates of the tank, as a wave that has come in, or "
-        "a mode of a basin: rows of x, y, z (.csv) or a raster as terrain.path, from the directory of the case. The "
-        "water fills the box up to them; upper[2] is the highest that they may be",
+        description="instead: heights z [m] of its surface in coordinates of the tank, for instance a wave that has "
+        "entered, or a mode of a basin: rows of x, y, z (.csv) or a raster as terrain.path, from the directory of the "
+        "case. The water fills the box up to them; upper[2] is the highest that they may be",
         examples=["start.csv"],
     )
 
 
 ABSORBS = Field(
     False,
-    description="true: what runs against it goes out, long waves wholly, short and oblique ones in part; false: it "
-    "comes back as from a wall that moves",
+    description="true: outgoing waves leave, long ones wholly, short and oblique ones in part; false: they are "
+    "reflected as by a moving wall",
 )
 
 
 class SteadyInflow(Section):
     """A stream of constant level and velocity."""
 
-    kind: Literal["steady"] = Field(description="what comes in: a steady stream")
+    kind: Literal["steady"] = Field(description="kind of inflow: a steady stream")
     side: Wall = Field(description="the side of the tank, across its whole width")
     level: Length = Field(description="height z of its surface")
     velocity: Velocity = Field(
@@ -72,9 +72,9 @@ class SteadyInflow(Section):
 
 
 class RecordInflow(Section):
-    """Level and velocity from a table or from a gauge of another model, straight lines between its times."""
+    """Level and velocity from a table or from a gauge of another model, linear between its times."""
 
-    kind: Literal["record"] = Field(description="what comes in: a record")
+    kind: Literal["record"] = Field(description="kind of inflow: a record")
     side: Wall = Field(description="the side of the tank, across its whole width")
     path: File = Field(
         description="CSV with the columns time [s], level (z) [m], velocity (into the tank) [m/s]; with a column "
@@ -88,8 +88,8 @@ class RecordInflow(Section):
     zero: Length = Field(0.0, description="level of the record that is z = 0")
     velocity: Literal["given", "long-wave"] = Field(
         "given",
-        description="where the velocity comes from: the record, or of a record of levels alone that of a long wave "
-        "into still water, 2 (sqrt(g h) - sqrt(g d)) over the mean bed along the side",
+        description="source of the velocity: the record, or, for a record of levels alone, a long wave that enters "
+        "still water, 2 (sqrt(g h) - sqrt(g d)) over the mean bed along the side",
     )
     still: Length | None = Field(
         None,
@@ -99,14 +99,14 @@ class RecordInflow(Section):
 
 
 class BoreInflow(Section):
-    """A bore: behind its front the water is deeper and moves, ahead of it it stands still; or a surge onto dry ground,
-    as behind a dam that vanishes."""
+    """A bore: the water behind its front is deeper and moves, the water ahead is at rest; or a surge onto dry ground,
+    as after an instantaneous dam break."""
 
-    kind: Literal["bore"] = Field(description="what comes in: a bore")
+    kind: Literal["bore"] = Field(description="kind of inflow: a bore")
     side: Wall = Field(description="the side of the tank, across its whole width")
     ahead: Length | None = Field(
         None,
-        description="height z of the still water; absent: the ground is dry, and water of depth h at the side comes in "
+        description="height z of the still water; absent: the ground is dry, and water of depth h at the side enters "
         "at sqrt(g h)",
     )
     absorbs: Switch = ABSORBS
@@ -116,7 +116,7 @@ class BoreInflow(Section):
 class SolitaryInflow(Section):
     """One solitary wave."""
 
-    kind: Literal["solitary"] = Field(description="what comes in: a solitary wave")
+    kind: Literal["solitary"] = Field(description="kind of inflow: a solitary wave")
     side: Wall = Field(description="the side of the tank, across its whole width")
     level: Length = Field(description="height z of the still water")
     height: PositiveLength = Field(description="height of the crest above the still water")
@@ -129,9 +129,9 @@ class SolitaryInflow(Section):
 
 
 class NWaveInflow(Section):
-    """One N-wave: a trough and a crest of one height, as tsunamis come ashore."""
+    """One N-wave: a trough and a crest of one height, a model of a tsunami at the coast."""
 
-    kind: Literal["n-wave"] = Field(description="what comes in: an N-wave")
+    kind: Literal["n-wave"] = Field(description="kind of inflow: an N-wave")
     side: Wall = Field(description="the side of the tank, across its whole width")
     level: Length = Field(description="height z of the still water")
     height: PositiveLength = Field(description="height of the crest above, and depth of the trough below it")
@@ -148,7 +148,7 @@ Inflow = Annotated[
 
 
 class Tide(Section):
-    """How the level of a sea changes, slowly: a harmonic, or a table."""
+    """Slow change of the level of a sea: a harmonic, or a table."""
 
     amplitude: PositiveLength | None = Field(None, description="half of the height from low to high water")
     period: PositiveTime | None = Field(
@@ -163,29 +163,29 @@ class Tide(Section):
 
 
 class Sea(Section):
-    """A side beyond which the water stands still at a level; water goes in and out there as it likes."""
+    """A side that borders on a sea of a given level; water enters and leaves freely."""
 
     side: Wall = Field(description="the side of the tank, across its whole width")
     level: Length = Field(
         description="height z of the still sea; with a tide its mean, with one from a table that at the start"
     )
-    tide: Tide | None = Field(None, description="how the level changes")
+    tide: Tide | None = Field(None, description="change of the level in time")
     absorbs: Switch = Field(
         False,
-        description="true: waves run out of it, long ones wholly, short and oblique ones in part; false: its level "
-        "stands, so that waves come back turned over",
+        description="true: waves leave, long ones wholly, short and oblique ones in part; false: its level is fixed, "
+        "so that waves are reflected with the opposite sign",
     )
 
 
 class Vent(Section):
-    """An orifice through which air leaves a pocket to the open air, or comes in; water does not pass."""
+    """An orifice through which air passes between a pocket and the open air; water does not pass."""
 
     at: Point = Field(
-        description="a place in the air of the pocket, a cell away from walls; with block: where it is at the start"
+        description="a point in the air of the pocket, a cell away from walls; with block: its initial position"
     )
     area: Annotated[float, InSI("m2", gt=0)] = Field(description="area of the opening", examples=["10 cm2"])
     discharge: Annotated[float, InSI("", gt=0, le=1)] = Field(
-        0.6, description="share of the area that the stream fills"
+        0.6, description="discharge coefficient: cross-section of the jet over the area"
     )
     block: Name | None = Field(
         None, description="block that the orifice moves with; absent: it is fixed in space"
@@ -193,24 +193,24 @@ class Vent(Section):
 
 
 class Air(Section):
-    """The air above and between the water. Absent: open, it comes and goes everywhere."""
+    """The air above the water and enclosed by it. Absent: all air is open."""
 
     model: Literal["open", "trapped"] = Field(
         "open",
         description="open: all air has the pressure of the atmosphere; trapped: air that reaches no open side of the "
-        "tank, nor one with a sea above its level, is squeezed and acts on water, blocks and solids by its pressure",
+        "tank, nor one with a sea above its level, is compressed and acts on water, blocks and solids by its pressure",
     )
     gamma: Annotated[float, InSI("", ge=1, le=1.4)] = Field(
         1.4,
-        description="exponent of p V^gamma of trapped air: 1.4 without exchange of heat, 1 at one temperature",
+        description="exponent of p V^gamma of trapped air: 1.4 adiabatic, 1 isothermal",
     )
     atmospheric: Annotated[float, InSI("Pa", gt=0)] = Field(
         101_325.0, description="absolute pressure of the open air"
     )
     smallest: Annotated[float, InSI("", ge=1)] = Field(
         8.0,
-        description="bricks of the mesh (tank.cell each way) that the air of a pocket fills at least at the pressure "
-        "of the open air; smaller bubbles become open air (counted in history/air.csv). The volume of one of 8 bricks "
+        description="smallest volume of a pocket at the pressure of the open air, in bricks of the mesh (cubes of "
+        "edge tank.cell); smaller bubbles become open air (counted in history/air.csv). The volume of one of 8 bricks "
         "is known to 0.1 %, its pressure to 0.1 kPa, of one of 3 to 1 % and 1.2 kPa",
     )
     vent: tuple[Vent, ...] = Field((), description="orifices of pockets")
@@ -227,34 +227,34 @@ class Water(Section):
     )
     walls: Literal["slip", "no-slip", "friction"] = Field(
         "slip",
-        description="what closed sides, solids and blocks do to the water along them: nothing, hold it (needs "
-        "viscosity), or rub it by roughness or manning; tank.smooth excepts sides",
+        description="wall condition on closed sides, solids and blocks: free slip, no slip (needs viscosity), or "
+        "friction by roughness or manning; sides in tank.smooth are excepted",
     )
     roughness: PositiveLength | None = Field(
         None, description="sand roughness k_s of all walls, for friction by the log law", examples=["3 mm"]
     )
     manning: Annotated[float, InSI("", gt=0, le=1)] | None = Field(
         None,
-        description="Manning's n [s/m^(1/3)] of the floor and of faces that look up, for friction of a bed",
+        description="Manning's n [s/m^(1/3)] of the floor and of faces that point upwards, for friction of a bed",
         examples=[0.025],
     )
     advection: Literal["semi-lagrangian", "supg"] = Field(
         "semi-lagrangian",
-        description="how the flow carries velocity and surface: along paths, or by stabilised finite elements, the "
-        "reference, which costs four to seven times as much a step",
+        description="transport of velocity and surface: along the paths of the flow, or by stabilised finite "
+        "elements, the reference, whose steps cost four to seven times as much",
     )
     theta: Annotated[float, InSI("", ge=0.5, le=1)] = Field(
-        0.6, description="weight of the new pressure in the projection; 0.5 damps least, 1 most"
+        0.6, description="weight of the new pressure in the projection; 0.5 has the least damping, 1 the most"
     )
     suction: Literal["bounded", "unlimited"] = Field(
         "bounded",
-        description="how far the pressure may fall: to that of the air where air can reach the water, and to "
-        "vapour_pressure elsewhere, where the water parts; or without any bound, for comparison",
+        description="lower bound of the pressure: that of the air where air can reach the water, elsewhere "
+        "vapour_pressure, at which the water separates; or no bound, for comparison",
     )
     vapour_pressure: Annotated[float, InSI("Pa", lt=0)] = Field(
         -98e3, description="pressure of the vapour of the water, relative to the air", examples=["-98 kPa"]
     )
-    air: Air = Field(default_factory=Air, description="what the air does")
+    air: Air = Field(default_factory=Air, description="model of the air")
     covers: Literal["single", "multiple"] = Field(
         "single",
         description="one set of unknowns per node, or one per part of the water that a thin wall separates",
@@ -273,22 +273,22 @@ class Water(Section):
     )
     fill: tuple[Fill, ...] = Field(
         (),
-        description="where the water stands at the start; at least one box, or an inflow or a sea, "
+        description="the water at the start; at least one box, or an inflow or a sea, "
         "which then begin with a strip of water one cell wide",
     )
-    inflow: tuple[Inflow, ...] = Field((), description="sides through which water comes in")
-    sea: tuple[Sea, ...] = Field((), description="sides with a still sea beyond")
+    inflow: tuple[Inflow, ...] = Field((), description="sides through which water enters")
+    sea: tuple[Sea, ...] = Field((), description="sides that border on a sea")
 
 
 class Solid(Section):
     """A fixed body in the water, for instance an obstacle: a box (centre, size), the hull of points (vertices), or the
-    convex bodies of a file (path). It takes forces and never moves. In a case with a structure it is one of its blocks,
-    held in place: blocks hit it, rest on it and, with joints, are glued to it where their faces touch."""
+    convex bodies of a file (path). It receives loads and never moves. In a case with a structure it is one of its
+    blocks, held in place: blocks hit it, rest on it and, with joints, are glued to it where their faces touch."""
 
     name: Name = Field("solid", description="for gauges and results")
     centre: Point | None = Field(None, description="centre of a box")
     size: Size | None = Field(None, description="edges of the box along its own axes")
-    rotation: Rotation | None = Field(None, description="turn of the box; absent: along the axes")
+    rotation: Rotation | None = Field(None, description="rotation of the box; absent: aligned with the axes")
     vertices: tuple[Point, ...] | None = Field(
         None,
         description="points whose convex hull is the body",
@@ -302,9 +302,9 @@ class Solid(Section):
     scale: PositiveLength = Field(1.0, description="length of one unit of the file", examples=["1 mm"])
     offset: Point = Field((0.0, 0.0, 0.0), description="added to all places of the file, after the scale")
     weld: PositiveLength | None = Field(
-        None, description="corners of the file closer than this are one; absent: found from its edges"
+        None, description="corners of the file closer than this are merged; absent: found from its edges"
     )
     material: Name = Field("solid", description=MATERIAL)
     density: Density | None = Field(
-        None, description="mass per volume, for its weight among the loads; absent: structure.density"
+        None, description="density, for its weight among the loads; absent: structure.density"
     )
