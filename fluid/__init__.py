@@ -14,5 +14,5 @@ Its chapters, each of which imports only those below it (import contracts in pyp
     mesh         the background mesh
     numerics     solvers, sums, compilation
 
-It knows neither YADE, nor files, nor the case: arrays come in and arrays go out.
+It knows neither YADE, nor files, nor the case: its input and output are arrays.
 """

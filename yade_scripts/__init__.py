@@ -9,5 +9,5 @@ Its chapters, each of which imports only those below it (import contracts in pyp
     yade_side    YADE: how it is loaded, its bodies and their motion
     blocks       blocks, their faces and the generators of structures
 
-It knows nothing of the water: loads come in as arrays, positions and velocities go out as arrays.
+It knows nothing of the water: its input is loads and its output positions and velocities, all of them arrays.
 """

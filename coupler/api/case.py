@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from coupler.api.execution import Callback, alone, execute
+from coupler.api.execution import Callback, execute, only_run
 from coupler.api.run import Run
 from coupler.api.step import Step
 from coupler.case import toml_text
@@ -157,7 +157,7 @@ class Case:
         file = self.file()
         from coupler.run.forecast import forecast
 
-        with alone():
+        with only_run():
             found = forecast(file.case, exact, file.directory)
         return replace(found, remarks=tuple(remarks(file.case)))
 
@@ -179,7 +179,7 @@ class Case:
         callback raises; the results written until then remain and can be read with `surgebreak.open`.
         """
         file = self.file()
-        with alone():
+        with only_run():
             directory = RunDirectory.create(file, None if output is None else Path(output))
             execute(file, directory, None, callback, stop, quiet)
         return Run(directory.path)

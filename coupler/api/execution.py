@@ -1,4 +1,4 @@
-"""Runs that a script makes in its own process: reports after each step, requests to stop, and one run at a time."""
+"""Runs in the process of a script: callbacks after each step, requests to stop, and one run at a time."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from coupler.api.step import Step
 from coupler.checks.read_case import CaseFile
 from coupler.program.errors import ExitCode, SurgebreakError
 from coupler.run.directory import RunDirectory
-from coupler.run.execute import carry_out
+from coupler.run.execute import execute_case
 from coupler.step.limits import Stopped
 
 if TYPE_CHECKING:
@@ -37,15 +37,16 @@ def execute(
     stop: Callable[[Step], object] | None,
     quiet: bool,
 ) -> None:
-    """Run in a directory, from the start or a checkpoint. A wish to stop is met, a limit raises."""
+    """Run in a directory, from the start or a checkpoint. A request to stop ends the run normally; an exceeded limit
+    raises."""
     watch = _Watch(callback, stop)
     each = watch.step if callback or stop else None
     with suppress(Stopped):  # as was asked; run.json says so
-        carry_out(file, directory, checkpoint, each, watch.wish, quiet)
+        execute_case(file, directory, checkpoint, each, watch.stop_reason, quiet)
 
 
 class _Watch:
-    """What callback and stop of a script say, step by step."""
+    """Calls the callback and the stop condition of a script after each step."""
 
     def __init__(self, callback: Callback | None, stop: Callable[[Step], object] | None) -> None:
         self._callback, self._stop = callback, stop
@@ -57,18 +58,18 @@ class _Watch:
         step = Step(coupling, record, figures, readings)
         if self._callback is not None:
             self._callback(step)
-        wish = self._stop(step) if self._stop is not None else None
-        if wish:
-            text = f": {wish}" if isinstance(wish, str) else ""
+        asked = self._stop(step) if self._stop is not None else None
+        if asked:
+            text = f": {asked}" if isinstance(asked, str) else ""
             self.reason = f"stopped by the script at t = {coupling.time:.6g} s{text}"
 
-    def wish(self) -> str | None:
+    def stop_reason(self) -> str | None:
         return self.reason
 
 
 @contextmanager
-def alone() -> Iterator[None]:
-    """YADE holds one scene a process: a second run, from a callback or another thread, is refused. Raises RunInRun."""
+def only_run() -> Iterator[None]:
+    """Refuse a second run from a callback or another thread, since YADE has one scene in a process. Raises RunInRun."""
     if not _one_at_a_time.acquire(blocking=False):
         raise RunInRun(
             "another run or check of this process is not over yet, and YADE holds one scene a process; wait for its "
@@ -91,10 +92,10 @@ def resume(
     """See `Run.resume`."""
     from coupler.run.resume import prepare
 
-    with alone():
-        found = prepare(directory, changes, any_version, _nowhere if quiet else print)
+    with only_run():
+        found = prepare(directory, changes, any_version, _discard if quiet else print)
         execute(found.file, found.directory, found.checkpoint, callback, stop, quiet)
 
 
-def _nowhere(text: str) -> None:
+def _discard(text: str) -> None:
     """Discard a line of report."""

@@ -10,11 +10,11 @@ if TYPE_CHECKING:
 
 
 def register_law(law: CohesiveLaw | Path | str, name: str | None = None) -> str:
-    """Make a cohesive law known, so that cases of this process may name it: `[joints] law = "NAME"`; its name.
+    """Register a cohesive law, so that cases of this process may use it, `[joints] law = "NAME"`, and return its name.
 
-    law: a file NAME.py that offers LAW, which is run, or a `CohesiveLaw`; then `name` must be given. Processes that
-    this one starts take a file too, an object they do not. Raises BadLaw for what lacks what a law must hold, and for
-    a name that surgebreak has a law of.
+    law: a file NAME.py that defines LAW and is executed, or a `CohesiveLaw`, for which `name` must be given. Processes
+    started by this one know the law of a file, but not an object. Raises BadLaw for a law that is incomplete, and for
+    the name of a law that surgebreak has.
     """
     from yade_scripts.joints import outside_laws
 

@@ -3,5 +3,5 @@
 energy       over water, interface and structure, each term of a step, and the volume of the water
 momentum     linear and angular, of the water and of the blocks that move freely
 
-They only add up what both sides report: nothing here changes a step.  Imports `fluid`, lazily.
+The balances only sum what both sides report and never change a step.  Imports `fluid`, lazily.
 """

@@ -1,4 +1,4 @@
-"""The ledger: energy over water, interface and structure, and the volume of the water.
+"""The energy balance of water, interface and structure.
 
 Structure:  Δ(kinetic + gravity + joints stored + contacts stored) + dissipated = W_received        residual r_s
 Interface:  W_given − W_received = r_i,  W_given = Σ dt F·V with the velocities V of the pressure solve,
@@ -32,13 +32,13 @@ DISSIPATED = ("joint_dissipated", "joint_damping", "dashpot", "friction")
 
 
 NEGLIGIBLE = 1e-5
-"""Share of the energy that water and blocks hold at the start below which nothing counts as put in: the volume of the
-water is corrected to 1e-6, and what comes and goes with that is 5 % of this (a box afloat in a tank)."""
+"""Share of the energy that water and blocks hold at the start below which no energy counts as input: the volume of the
+water is corrected to 1e-6, which changes the energy by 5 % of this (a floating box in a tank)."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Balance:
-    """One line of the ledger, all in joules but the last, a share of the input energy."""
+    """The balance at one time: energies [J], and the two errors as fractions of the input energy."""
 
     water_kinetic: float = 0.0
     water_potential: float = 0.0
@@ -54,7 +54,7 @@ class Balance:
     input_energy: float = 0.0
     energy_error: float = 0.0
     step_error: float = 0.0
-    """What the last step alone put out of balance, over the input energy."""
+    """The error of the last step alone over the input energy."""
 
     @property
     def interface_residual(self) -> float:
@@ -63,31 +63,32 @@ class Balance:
 
 @dataclass
 class Ledger:
-    """Accumulates the balances of a run. Either side may be absent (None)."""
+    """Accumulates the energy balance of a run. Either side may be absent (None)."""
 
     available: float = 0.0
     """Potential energy of the water above its level state at the start [J]."""
     coming: float = 0.0
-    """What inflows and seas can bring, the largest so far [J]."""
+    """The largest energy that inflows and seas could have brought so far [J]."""
     work_given: float = 0.0
     behind: float = 0.0
-    """Part of it that the blocks count half a substep later [J]."""
+    """The part of it that the blocks receive half a substep later [J]."""
     entered: float = 0.0
-    """Energy that came with water through inflows and seas so far, less what left there [J]."""
+    """Net energy that has entered through inflows and seas so far [J]."""
     left: float = 0.0
     """Energy of the water that fell out through open sides so far [J]."""
     shear: float = 0.0
-    """Energy that viscosity and friction of walls took out of the water so far [J]."""
+    """Energy dissipated so far by viscosity and wall friction [J]."""
     air: float = 0.0
-    """Energy that trapped air holds now and has lost so far [J]."""
+    """Recoverable energy of trapped air, and the energy that it has lost so far [J]."""
     parting: float = 0.0
-    """Energy spent so far on parting water from its vapour [J]."""
+    """Work done so far against the vapour pressure where water separates [J]."""
     _water_start: tuple[float, float] | None = None
     _structure_start: float | None = None
     _potential_start: float = 0.0
     _input: float = field(default=0.0)
     _before: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """Residuals of structure and interface, and what the water lost beyond the outflow, at the last balance [J]."""
+    """Residuals of structure and interface, and numerical dissipation plus outflow of the water, at the last balance
+    [J]."""
 
     def start(self, water: tuple[float, float] | None, structure: dict[str, float] | None) -> None:
         """Fix the reference state: water (kinetic, potential) [J], structure energies by name [J]."""
@@ -101,7 +102,7 @@ class Ledger:
         self._input = max(self.available + self.coming, thrown, NEGLIGIBLE * held)
 
     def save(self) -> dict[str, Array]:
-        """Everything that it holds, by name."""
+        """The state of the balance, by name."""
         return {name: np.array(value) for name, value in vars(self).items() if value is not None}
 
     def restore(self, saved: dict[str, Array]) -> None:
@@ -112,17 +113,17 @@ class Ledger:
 
     @property
     def input_energy(self) -> float:
-        """What the scene has put in so far [J], the scale of every error."""
+        """The energy that the scene has put in so far [J], the scale of every error."""
         return self._input
 
     def give(self, work: float, behind: float = 0.0) -> None:
-        """Add the work that the water gave to the bodies in a step [J]; behind: the part of it that belongs to the half
-        substep by which the kinetic energy of the blocks, and the work that they count, lag behind their places."""
+        """Add the work that the water gave to the bodies in a step [J]; behind: the part of it in the half substep
+        by which the kinetic energy of the blocks and the work on them lag behind their positions."""
         self.work_given += work
         self.behind += behind
 
     def balance(self, water: tuple[float, float] | None, structure: dict[str, float] | None) -> Balance:
-        """The ledger now."""
+        """The balance with the present energies: water (kinetic, potential) [J], structure energies by name [J]."""
         kinetic, potential = water or (0.0, 0.0)
         dissipation, potential_now = 0.0, potential
         if water is not None and self._water_start is not None:
@@ -161,7 +162,8 @@ class Ledger:
         )
 
     def _share(self, structure: float, interface: float, lost: float) -> float:
-        """Residuals of structure and interface and what the water lost [J] → the error over the input energy."""
+        """The error over the input energy, from the residuals of structure and interface and the loss of the water
+        [J]."""
         error = abs(structure) + max(0.0, -lost) + abs(interface)
         return error / self._input if self._input > 0.0 else 0.0
 

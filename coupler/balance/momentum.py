@@ -7,14 +7,14 @@ A line is the momentum added since the start: weight is negative in z, and the f
     water_weight, blocks_weight      weight
     tank, tank_shear                 sides of the tank on the water: pressure; viscosity and friction
     sides                            water that came in through open sides, inflows and seas, with the pressure there
-    openings                         what closes narrow openings (`openings = "wide"`) on the water
-    air                              trapped air on water and bodies: what the sides of the tank do to it
+    openings                         force on the water of the closed narrow openings (`openings = "wide"`)
+    air                              trapped air on water and bodies: the force of the sides of the tank on the air
     solids                           fixed solids on the water (with a structure they are held blocks)
     held_blocks                      blocks of prescribed motion on the water and on free blocks
     ground, ground_joints            ground and tank on free blocks: by contact, and through joints
-    transport ... shear_solve        what the scheme of the water adds (`fluid.step.momentum`)
-    recut                            handing the fields of the water to newly cut cells
-    lag                              moments only: a load is held while its block moves on under it
+    transport ... shear_solve        errors of the scheme of the water (`fluid.step.momentum`)
+    recut                            transfer of the fields of the water to newly cut cells
+    lag                              moments only: the load is constant while its block moves
 
 Impulses between water and free blocks, and between blocks, have no line, since they must cancel.  The residual, the
 change of momentum that the lines do not explain, is round-off in every step; `error` is its size over the impulses
@@ -65,7 +65,7 @@ LINES = (
 )
 SCHEME = tuple(name for name, meaning in LINES if meaning.startswith("scheme"))
 MOVING = 1e-3
-"""Share of the momentum there is that counts as exchanged: a block that flies freely exchanges nothing."""
+"""Fraction of the present momentum that counts as exchanged: a block in free flight exchanges nothing."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,12 +94,12 @@ class MomentumLedger:
         self.water, self.blocks = np.zeros(6), np.zeros(6)
 
     def start(self, water: Array | None, blocks: Array | None) -> None:
-        """Momenta (6,) at the start; None: no such side."""
+        """Set the momenta (6,) at the start; None: the scene lacks that side."""
         self.water = np.zeros(6) if water is None else water
         self.blocks = np.zeros(6) if blocks is None else blocks
 
     def save(self) -> dict[str, Array]:
-        """Everything that it holds, by name."""
+        """The state of the balance, by name."""
         own = {name: np.array(value) for name, value in vars(self).items() if name != "lines"}
         return own | {f"line_{name}": value.copy() for name, value in self.lines.items()}
 
@@ -110,8 +110,8 @@ class MomentumLedger:
         self.water, self.blocks = saved["water"].copy(), saved["blocks"].copy()
         self.reach, self.exchanged = float(saved["reach"]), float(saved["exchanged"])
 
-    def book(self, water: WaterStep | None, blocks: BlocksStep | None) -> MomentumBalance:
-        """Take a step of either side; they agree on which bodies are free blocks."""
+    def add_step(self, water: WaterStep | None, blocks: BlocksStep | None) -> MomentumBalance:
+        """Add the step of each side, None for a side that the scene lacks, and return the balance."""
         before, exchanged, given = self.water + self.blocks, 0.0, np.zeros(6)
         found: dict[str, Array] = {}
         if water is not None:
@@ -155,7 +155,8 @@ class WaterStep:
 
     @classmethod
     def of(cls, water: Water, load: Array, dt: float, free: Array) -> WaterStep:
-        """After a step: load (n_bodies, 6) that acts on the bodies, blocks first; free (n_blocks,) bool."""
+        """The contributions of a step that has ended under the load (n_bodies, 6) on the bodies, blocks first;
+        free (n_blocks,) bool."""
         from fluid.numerics.sums import about
         from fluid.step.momentum import NUMERICAL
 
@@ -194,7 +195,7 @@ class BlocksStep:
 
     @classmethod
     def of(cls, structure: Structure, impulses: Impulses, load: Array, about: Array) -> BlocksStep:
-        """After a step under the load (n, 6) with its Impulses."""
+        """The contributions of a step that has ended under the load (n, 6), with its Impulses."""
         free = ~structure.fixed
         contact, joint = (impulses.about(about, which) for which in (impulses.contact, impulses.joint))
         weight = impulses.of_weight(structure.gravity_force(), about)[free]
@@ -217,7 +218,8 @@ class BlocksStep:
 
 
 def momentum_ledger(water: Water | None, structure: Structure | None) -> MomentumLedger:
-    """The balance of a scene that starts: moments about the middle of the tank, or of the blocks; one may be None."""
+    """The balance at the start of a scene, with moments about the middle of the tank, or of the blocks without water;
+    either side may be None."""
     if water is not None:
         about, reach = water.reference, 0.5 * float(np.linalg.norm(np.ptp(water.mesh.bounds, axis=0)))
     else:
@@ -235,13 +237,13 @@ def momentum_ledger(water: Water | None, structure: Structure | None) -> Momentu
 
 
 def momentum_of_water(water: Water) -> Array:
-    """P, L (6,) of the water now."""
+    """Present linear and angular momentum (6,) of the water."""
     from fluid.step.momentum import momentum
 
     return momentum(water)
 
 
-def book_step(
+def add_step(
     ledger: MomentumLedger,
     water: Water | None,
     structure: Structure | None,
@@ -259,4 +261,4 @@ def book_step(
     if structure is not None and impulses is not None:
         on_blocks = load[: structure.n] if len(load) else np.zeros((structure.n, 6))
         of_blocks = BlocksStep.of(structure, impulses, on_blocks, ledger.about)
-    return ledger.book(of_water, of_blocks)
+    return ledger.add_step(of_water, of_blocks)

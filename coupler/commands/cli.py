@@ -127,15 +127,15 @@ def run(
     if dry:
         return
     from coupler.run.directory import RunDirectory
-    from coupler.run.execute import carry_out
+    from coupler.run.execute import execute_case
 
     directory = RunDirectory.create(file, output)
     if not watch:
-        raise typer.Exit(int(carry_out(file, directory)))
+        raise typer.Exit(int(execute_case(file, directory)))
     from coupler.commands.watch.command import beside
 
     with beside(directory.path):
-        code = carry_out(file, directory)
+        code = execute_case(file, directory)
     raise typer.Exit(int(code))
 
 
@@ -185,11 +185,11 @@ def resume(
     one_thread()
     take_threads(threads)
     take_laws(law)
-    from coupler.run.execute import carry_out
+    from coupler.run.execute import execute_case
     from coupler.run.resume import prepare
 
     found = prepare(run, [*(set or []), *([f"time.end={end}"] if end else [])], any_version)
-    raise typer.Exit(int(carry_out(found.file, found.directory, found.checkpoint)))
+    raise typer.Exit(int(execute_case(found.file, found.directory, found.checkpoint)))
 
 
 @app.command()
@@ -766,16 +766,16 @@ def sweep(
     """
     one_thread()
     take_laws(law)
-    from coupler.commands.sweep.command import Wish
+    from coupler.commands.sweep.command import SweepRequest
     from coupler.commands.sweep.command import sweep as make_sweep
 
-    wish = Wish(
+    request = SweepRequest(
         vary=tuple(vary or ()), set=tuple(set or ()), output=output, plan=plan, jobs=jobs, threads=threads,
         engine=engine, options=tuple(option or ()), chunk=chunk, detach=detach,
         cancel=None if cancel is None else tuple(part.strip() for part in cancel.split(",")), export=export,
         any_version=any_version,
     )  # fmt: skip
-    raise typer.Exit(int(make_sweep(case, wish)))
+    raise typer.Exit(int(make_sweep(case, request)))
 
 
 @app.command()

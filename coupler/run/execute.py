@@ -19,28 +19,28 @@ from coupler.run.compile_ahead import compile_ahead
 from coupler.run.directory import RunDirectory
 
 
-def carry_out(
+def execute_case(
     file: CaseFile,
     directory: RunDirectory,
     checkpoint=None,
     each: Callable | None = None,
-    wish: Callable[[], str | None] | None = None,
+    stop_reason: Callable[[], str | None] | None = None,
     quiet: bool = False,
 ) -> ExitCode:
     """Run a case in its directory to the end, from a checkpoint or from the start, and return how it ended.
 
-    each: see `run` · wish: called after every step, returns why the run is to end or None · quiet: report to the log
-    only."""
+    each: see `run` · stop_reason: called after every step, returns why the run is to end or None · quiet: report to
+    the log only."""
     # here, because `check` describes a case without what a run loads
     from coupler.run.progress import ProgressFile, reporter
     from coupler.run.run import run
     from coupler.run.stop import StopRequest
 
     with directory, StopRequest(directory.path) as stop:
-        asked = stop.requested if wish is None else lambda: stop.requested() or wish()
+        asked = stop.requested if stop_reason is None else lambda: stop.requested() or stop_reason()
         with reporter(file.case.time.end, directory.log, asked, quiet) as tell:
             describe(file, tell.message)
-            tell_laws(file, directory, tell.message)
+            report_laws(file, directory, tell.message)
             compile_ahead(file.case, tell.message)
             on_file = ProgressFile(tell, directory.path)
             code = ExitCode(run(file.case, directory, on_file, checkpoint, each))
@@ -90,7 +90,7 @@ NAMES_ITS_UNIT = (".tif", ".tiff", ".nc", ".grd")
 """Endings of terrain files that may say their coordinate system themselves."""
 
 
-def tell_laws(file: CaseFile, directory: RunDirectory, tell: Callable[[str], object]) -> None:
+def report_laws(file: CaseFile, directory: RunDirectory, tell: Callable[[str], object]) -> None:
     """Report laws that did not come with the program, and record their origin and checksum in run.json."""
     if file.case.joints is None:
         return

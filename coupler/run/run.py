@@ -62,12 +62,12 @@ def run(case: Case, directory, reporter, checkpoint=None, each=None) -> ExitCode
                 scene.coupling.structure.close()
     finally:
         directory.record(**figures, cpu_seconds=clock.split(), imports=imports())
-    _tell_fast_openings(case, figures, reporter)
-    _tell_split(clock, reporter)
+    _report_fast_openings(case, figures, reporter)
+    _report_split(clock, reporter)
     return ExitCode.DONE
 
 
-def _tell_fast_openings(case: Case, figures: dict, reporter) -> None:
+def _report_fast_openings(case: Case, figures: dict, reporter) -> None:
     rate = figures.get("largest_opening_rate", 0.0)
     joints = case.joints
     coupled = joints is not None and "needleman" in {law.mixed_mode for law in (joints, *joints.pair)}
@@ -88,7 +88,7 @@ def _restore(scene: Scene, checkpoint, clock: Clock) -> None:
         restore(scene.coupling, checkpoint)
 
 
-def _tell_split(clock: Clock, reporter) -> None:
+def _report_split(clock: Clock, reporter) -> None:
     parts = ", ".join(f"{name} {seconds:.1f}" for name, seconds in clock.split().items())
     reporter.message(f"processor time {clock.total():.1f} s: {parts}")
 
@@ -171,11 +171,11 @@ def _steps(
                     recorder.fields(coupling.time)
                     directory.record(**figures, verdict=recorder.verdict())
             at_end = _reached(coupling.time, schedule.end)
-            wish = None if at_end else _wish_to_stop(clock, limits, reporter)
-            if checkpoints is not None and (wish or at_end or checkpoints.due()):
+            reason = None if at_end else _stop_reason(clock, limits, reporter)
+            if checkpoints is not None and (reason or at_end or checkpoints.due()):
                 _save(checkpoints, directory, figures, clock)
-            if wish:
-                raise _end(reporter)(wish + way_on)
+            if reason:
+                raise _end(reporter)(reason + way_on)
     except StepLeft as left:
         if checkpoints is not None:
             with clock("output"):
@@ -183,7 +183,7 @@ def _steps(
         raise _end(reporter)(str(left) + way_on) from None
     finally:
         recorder.close()
-        _tell_verdict(case, recorder, figures, directory, reporter, coupling.coupled)
+        _report_verdict(case, recorder, figures, directory, reporter, coupling.coupled)
 
 
 def _note_top(case: Case, recorder: Recorder, coupling, figures: dict, reporter) -> None:
@@ -198,7 +198,7 @@ def _note_top(case: Case, recorder: Recorder, coupling, figures: dict, reporter)
         reporter.message(f"note: {reached(found)}")
 
 
-def _tell_verdict(
+def _report_verdict(
     case: Case, recorder: Recorder, figures: dict, directory, reporter, is_coupled: bool
 ) -> None:
     """Write the verdict to run.json and the log, however the run ends, with the reasons to doubt its loads."""
@@ -223,7 +223,7 @@ def _long_steps(coupling, limits: Limits, reporter, clock: Clock, figures: dict,
     def hold():
         return None if checkpoints is None else checkpoints.hold(figures, clock.split())
 
-    long = LongSteps(lambda: _wish_to_stop(clock, limits, reporter), hold)
+    long = LongSteps(lambda: _stop_reason(clock, limits, reporter), hold)
     coupling.pause = long
     if coupling.structure is not None:
         coupling.structure.pause = long
@@ -335,7 +335,7 @@ def _volume_error(coupling) -> float:
     return 0.0 if coupling.water is None else coupling.water.volume_error()
 
 
-def _wish_to_stop(clock: Clock, limits: Limits, reporter) -> str | None:
+def _stop_reason(clock: Clock, limits: Limits, reporter) -> str | None:
     """The reason why the run is to end now, or None."""
     if limits.cpu_seconds is not None and clock.here() > limits.cpu_seconds:
         return (

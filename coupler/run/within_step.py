@@ -27,11 +27,11 @@ class StepLeft(LimitReached):
 class LongSteps:
     """Called repeatedly within a step, between solves and substeps; `around` makes one step under this watch.
 
-    wish: why the run is to end now, or None · hold: keeps the state before a step, of which `held` is what it returned
+    stop_reason: why the run is to end now, or None · hold: keeps the state before a step; `held` is what it returned
     """
 
-    def __init__(self, wish: Callable[[], str | None], hold: Callable[[], object]):
-        self._wish, self._hold = wish, hold
+    def __init__(self, stop_reason: Callable[[], str | None], hold: Callable[[], object]):
+        self._stop_reason, self._hold = stop_reason, hold
         self._last = math.inf  # the first step loads and compiles what it uses
         self._may_leave, self._began, self._ask = False, 0.0, 0.0
         self.held: object = None
@@ -53,6 +53,6 @@ class LongSteps:
         if not self._may_leave or now < self._ask:
             return
         self._ask = now + INTERVAL
-        wish = self._wish()
-        if wish:
-            raise StepLeft(f"{wish}. The step under way was left")
+        reason = self._stop_reason()
+        if reason:
+            raise StepLeft(f"{reason}. The step under way was left")

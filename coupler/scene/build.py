@@ -1,6 +1,6 @@
-"""From a case to both sides of the scene, and nothing that the case does not ask for.
+"""Builds both sides of a scene from a case, and nothing that the case does not ask for.
 
-A case without `[water]` imports no fluid code here, one without `[structure]` never starts YADE.
+A case without `[water]` imports no code of `fluid`, and a case without `[structure]` does not start YADE.
 """
 
 from __future__ import annotations
@@ -33,22 +33,23 @@ PRESSURE_RTOL = 1e-8
 
 @dataclass(frozen=True, kw_only=True)
 class Scene:
-    """What a run works on: both sides, the gauges and what never moves (with a structure its last blocks too)."""
+    """The scene of a run: both sides, the gauges and the fixed solids (with a structure they are its last blocks
+    too)."""
 
     coupling: CoupledStepper
     gauges: list[Gauge]
     solids: list[tuple[Array, tuple]]
     tank: tuple | None
     watch: Watch | None = None
-    """What the verdict is made from; None without a structure."""
+    """The observations from which the verdict is made; None without a structure."""
     maps: Maps | None = None
-    """Of the flood over a terrain; None without one, or without water."""
+    """Maps of the flood over a terrain; None without terrain or without water."""
 
 
 def build(case: Case, clock, from_start: bool = True) -> Scene:
-    """Build the scene of a case. clock(name) is a context that books processor time to a part of the run.
+    """Build the scene of a case. clock(name) is a context that adds processor time to a part of the run.
 
-    from_start: bring the blocks to rest if the case says so; not before a state is restored."""
+    from_start: bring the blocks to equilibrium if the case asks for it; False where a state is restored afterwards."""
     solids = [(solid.vertices, solid.faces) for solid in solids_of(case)]
     with clock("set-up"), ExitStack() as on_failure:  # YADE holds one scene: the next build needs it free
         structure = build_structure(case) if case.structure else None
@@ -64,7 +65,7 @@ def build(case: Case, clock, from_start: bool = True) -> Scene:
 
 
 def _maps(case: Case, water) -> Maps | None:
-    """Maps of the flood, where there is ground for it."""
+    """Maps of the flood; None without terrain."""
     if water is None or case.tank.ground is None:
         return None
     from coupler.geometry.terrain.bed_mesh import fitted_of
@@ -74,8 +75,8 @@ def _maps(case: Case, water) -> Maps | None:
 
 
 def watch_of(case: Case, structure) -> Watch:
-    """What watches the blocks of a case for its verdict: those that it names, else all that are glued, else all that
-    can move."""
+    """The observer of the blocks that the verdict is about: those that the case names, else all with joints, else all
+    that can move."""
     from coupler.verdict.damage import Rules
     from coupler.verdict.divisions import Divisions
     from coupler.verdict.watch import Watch, joined
@@ -96,7 +97,7 @@ def watch_of(case: Case, structure) -> Watch:
 
 
 def _coupling(case: Case, structure, solids, clock, from_start: bool) -> CoupledStepper:
-    """Both sides, the structure at rest if the case says so."""
+    """Couple both sides, with the structure in equilibrium if the case asks for it."""
     water = immersion = None
     if case.water:
         water, immersion = water_of(case, structure, solids)
@@ -125,7 +126,7 @@ def limits_of(case: Case) -> Limits:
 
 
 def _coming_energy(case: Case) -> Callable[[float], float] | None:
-    """What inflows and seas can bring [J] at a time [s]; without any their code is not loaded."""
+    """The energy [J] that inflows and seas can bring by a time [s]; None, and their code is not loaded, without any."""
     if case.water is None or not (case.water.inflow or case.water.sea):
         return None
     from coupler.scene.side_energy import coming_energy
@@ -142,7 +143,7 @@ def _settled(structure, water) -> bool:
 
 
 def _load_at_rest(structure, water) -> Array:
-    """Force and moment (n, 6) of the water on the blocks while these are held."""
+    """Force and moment (n, 6) of the water on the blocks when they do not move."""
     from coupler.step.pressure_with_structure import water_load
     from fluid.numerics.bounded import solve_pressure
 
@@ -190,12 +191,13 @@ def build_structure(case: Case):
 
 
 def share_of(section) -> float | None:
-    """Share of the pressure between faces that `uplift` of [contact] or of one of its pairs asks for; None: nothing."""
+    """Share of the pressure between faces according to `uplift` of [contact] or of one of its pairs; None: not
+    given."""
     return {None: None, "full": 1.0, "none": 0.0, "share": section.uplift_share}[section.uplift]
 
 
 def joint_rules(joints):
-    """What a section [joints] says of all joints, of pairs and of the scatter of strengths."""
+    """The rules of a section [joints] for all joints, for pairs of materials, and for the scatter of strengths."""
     from yade_scripts.joints.rules import JointRules, PairJoints, Scatter
 
     pairs = tuple(
@@ -207,7 +209,7 @@ def joint_rules(joints):
 
 
 def of_pair(joints, pair):
-    """The section [joints] as it is for a pair."""
+    """The section [joints] with the values of a pair."""
     own = {name for name in pair.model_fields_set if getattr(pair, name) is not None}
     own -= {"between", "joined"}
     change = {name: getattr(pair, name) for name in own}
@@ -217,14 +219,14 @@ def of_pair(joints, pair):
 
 
 def joint_parameters(joints):
-    """The law of a section [joints]."""
+    """The parameters of the cohesive law of a section [joints]."""
     from yade_scripts.joints.cohesion import JointParameters
 
     return JointParameters(**{field.name: getattr(joints, field.name) for field in fields(JointParameters)})
 
 
 def planes_of(case: Case) -> list:
-    """What bounds the room of the blocks: the ground, even or not, and the closed sides of the tank."""
+    """The fixed boundaries for blocks: the ground, plane or not, and the closed sides of the tank."""
     uneven, walls = ground_surface(case), []
     if is_basin(case.tank):
         uneven, walls = basin_planes(mesh_of(case.tank))
@@ -233,7 +235,7 @@ def planes_of(case: Case) -> list:
 
 
 def _ground(case: Case) -> list:
-    """The ground as a plane, none without one."""
+    """The ground as a plane; an empty list without ground."""
     from yade_scripts.blocks.faces import FixedPlane
 
     ground = case.structure.ground
@@ -270,7 +272,7 @@ def _gauges(case: Case) -> list[Gauge]:
 
 
 def _bodies(case: Case) -> Bodies:
-    """Blocks and fixed solids as gauges know them."""
+    """The blocks and fixed solids in the form that gauges need."""
     parts, solids = parts_of(case), solids_of(case)
     blocks = [block for part in parts for block in part.blocks]
     centre = [block.centre for block in blocks] + [solid.vertices.mean(axis=0) for solid in solids]

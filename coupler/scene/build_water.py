@@ -1,4 +1,4 @@
-"""The water of a case: mesh, solids in it, walls, and the sides where it comes in or goes out."""
+"""Builds the water of a case: mesh, solids in it, walls, and the sides through which it enters or leaves."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from coupler.geometry.terrain.land import friction_of
 from coupler.program.errors import SurgebreakError
 from coupler.program.threads import threads
 
-HEARD = 16
-"""Places along a side at which the water is read that it lets go."""
+READING_POINTS = 16
+"""Places along an absorbing side at which depth and velocity of the water are read."""
 SLACK = 1e-3
 """Share of a cell within which a box of water reaches a side of the tank."""
 
 
-class NothingToHear(SurgebreakError):
-    """Beside a side that absorbs the tank has no room for water."""
+class AbsorbingSideBlocked(SurgebreakError):
+    """The tank has no room for water beside an absorbing side."""
 
 
 def water_of(case: Case, structure, solids, mesh=None):
@@ -79,7 +79,7 @@ def water_of(case: Case, structure, solids, mesh=None):
 
 
 def _trapped_air(air, structure, domain) -> dict:
-    """What `Water` wants of the air; nothing where it is open, and then its code is not loaded."""
+    """The arguments of `Water` for trapped air; none, and its code is not loaded, where all air is open."""
     if air.model == "open":
         return {}
     from fluid.air.gas import Gas
@@ -112,8 +112,8 @@ def _walls(tank) -> tuple:
 
 
 def _strips(case: Case) -> list[tuple]:
-    """Boxes (lower, upper) of water, one cell wide, beside inflows and seas that no fill reaches: without any water
-    beside it a side would begin with a film, in which neither pressure nor volume mean anything."""
+    """Boxes (lower, upper) of water, one cell wide, beside inflows and seas that no fill reaches. Without water
+    beside it a side would begin with a film, which is too thin to resolve pressure or volume."""
     found = []
     for spec in (*case.water.inflow, *case.water.sea):
         top = level_at_start(spec)
@@ -138,14 +138,14 @@ def level_at_start(spec) -> float:
 
 
 def fills_beside(case: Case, side: str) -> list:
-    """The boxes of water at the start that reach a side of the tank."""
+    """The boxes of the initial water that reach a side of the tank."""
     axis, end = "xyz".index(side[0]), "upper" if side[1] == "+" else "lower"
     wall, slack = getattr(case.tank, end)[axis], SLACK * case.tank.cell
     return [f for f in case.water.fill if f.lower[axis] - slack <= wall <= f.upper[axis] + slack]
 
 
 def _narrow_cracks(kind: str, structure, mesh):
-    """What keeps narrow cracks closed; None where they are open or nothing can break."""
+    """The rule for narrow cracks; None where all cracks are open or no joint can break."""
     if kind == "open" or structure is None or structure.joints is None:
         return None
     from coupler.step.cracks import NarrowCracks
@@ -173,7 +173,7 @@ def _outward(side: str) -> Array:
 
 
 def _flows(case: Case, mesh):
-    """Inflows and seas; None without any, and then their code is not loaded."""
+    """Inflows and seas; None, and their code is not loaded, without any."""
     if not (case.water.inflow or case.water.sea):
         return None
     from fluid.sides import waves
@@ -207,16 +207,18 @@ def sea_level(sea):
 
 
 def _absorbing(case: Case, spec, flow, mesh):
-    """The flow of a side that lets go what runs against it: the water is read a cell inside, at columns of the mesh.
+    """The flow of an absorbing side; the outgoing wave is read one cell inside, at columns of the mesh.
 
-    Raises NothingToHear."""
+    Raises AbsorbingSideBlocked."""
     from fluid.sides.absorbing import Absorber
 
     axis = "xyz".index(spec.side[0])
     along = bed_along(case.tank, spec.side)
     if len(along) == 2:  # of a box: its floor is level
-        along = np.column_stack([np.linspace(*along[:, 0], HEARD + 2), np.full(HEARD + 2, along[0, 1])])
-    along = along[1:-1][:: max(1, (len(along) - 2) // HEARD)]
+        along = np.column_stack(
+            [np.linspace(*along[:, 0], READING_POINTS + 2), np.full(READING_POINTS + 2, along[0, 1])]
+        )
+    along = along[1:-1][:: max(1, (len(along) - 2) // READING_POINTS)]
     places = np.empty((len(along), 2))
     inside = -_outward(spec.side)[axis] * mesh.spacing
     places[:, axis] = mesh.bounds[int(spec.side[1] == "+"), axis] + inside
@@ -224,7 +226,7 @@ def _absorbing(case: Case, spec, flow, mesh):
     bed = bed_under(mesh, places)  # there, not at the side: a bed that rises inwards is higher
     there = np.isfinite(bed)
     if not there.any():
-        raise NothingToHear(
+        raise AbsorbingSideBlocked(
             f"side {spec.side} absorbs, but {mesh.spacing:.3g} m inside of it, where the water is read, the tank has "
             f"no room for water: the ground reaches its upper side; let another side absorb, or move this one"
         )
@@ -232,8 +234,8 @@ def _absorbing(case: Case, spec, flow, mesh):
 
 
 def instants_of(case: Case, spec) -> np.ndarray:
-    """Times (k,) [s] from the start on at which an inflow of the case is looked at for the most that it brings: those
-    of its record, or around its wave."""
+    """Times (k,) [s] from the start on at which the largest energy of an inflow of the case is sought: those of its
+    record, or times around its wave."""
     if spec.kind in ("solitary", "n-wave"):
         return np.linspace(0.0, 4.0 * (spec.crest if spec.kind == "solitary" else spec.middle), 401)
     if spec.kind != "record":
@@ -245,7 +247,7 @@ def instants_of(case: Case, spec) -> np.ndarray:
 
 
 def flow_of(case: Case, spec):
-    """What an inflow of the case brings; waves count their depth over the bed along their side."""
+    """The flow of an inflow of the case; the depth of a wave is measured from the bed along its side."""
     from fluid.sides import waves
 
     inward, gravity = -_outward(spec.side), case.case.gravity
@@ -270,7 +272,7 @@ def flow_of(case: Case, spec):
 
 
 def _turn(case: Case) -> float:
-    """By which the axes of files are turned in the tank [rad]."""
+    """Angle [rad] between the axes of files and those of the tank."""
     return case.terrain.turn if case.terrain is not None else 0.0
 
 

@@ -1,4 +1,4 @@
-"""Where the water stands at the start: boxes of a case → level set at the nodes of the physical domain.
+"""The initial level set at the nodes of the physical domain, from the boxes of water in a case.
 
 The top of a box may be a surface that is not level (`StartSurface`). Such a box goes on upwards to the top of the tank,
 and its water ends at the surface, wherever solids are: level = max(that of the box, distance to the surface).
@@ -48,7 +48,7 @@ class _Box(NamedTuple):
     top: StartSurface | None = None
 
     def above(self, points: Array, slack: float = 0.0) -> Array:
-        """(n,) bool: points (n, 3) more than slack [m] above a surface that is not level."""
+        """Which of the points (n, 3) lie more than slack [m] above a surface that is not level, (n,) bool."""
         return np.zeros(len(points), bool) if self.top is None else points[:, 2] > self.top(points) + slack
 
 
@@ -81,8 +81,7 @@ def start_level(boxes, tank, mesh, domain, tops=()) -> Array:
 
 
 def _with_tops(boxes, tops, tank, slack: float) -> list[_Box]:
-    """Boxes under one surface that make one box together as that one; those whose surface is not level end above the
-    tank."""
+    """Adjacent boxes under the same surface are merged; boxes whose surface is not level end above the tank."""
     above = max(tank[1][2], *(high[2] for _, high in boxes)) + 1.0
     under: dict[object, list] = {}
     for (low, high), top in zip(boxes, [*tops, *[None] * (len(boxes) - len(tops))]):
@@ -153,8 +152,8 @@ def _behind(domain, corners) -> Array:
 
 
 def merged(boxes, slack: float) -> list:
-    """The boxes, those side by side that make one together as that one: it has no side where they touch, and between
-    nodes the distance to such a side would take water away. slack [m]: within which ends are the same."""
+    """Merge adjacent boxes that form one box together: the distance to a side where boxes touch would take water away
+    between nodes. slack [m]: tolerance within which bounds are equal."""
     found, before = [np.array(box, float) for box in boxes], len(boxes) + 1
     while len(found) < before:
         before = len(found)
@@ -164,7 +163,7 @@ def merged(boxes, slack: float) -> list:
 
 
 def _joined_along(axis: int, boxes: list[Array], slack: float) -> list[Array]:
-    """Boxes (2, 3) with the same ends across an axis that meet along it are one."""
+    """Merge boxes (2, 3) that meet along an axis and have the same bounds across it."""
     rows: dict[tuple, list[Array]] = {}
     for box in boxes:
         across = np.delete(box, axis, axis=1)
@@ -182,7 +181,7 @@ def _joined_along(axis: int, boxes: list[Array], slack: float) -> list[Array]:
 
 
 def start_velocity(boxes, velocities, nodes) -> Array | None:
-    """Velocity (N, 3) [m/s] at nodes (N, 3): that of the box in which a node lies deepest, or else of the nearest one.
+    """Velocity (N, 3) [m/s] at nodes (N, 3): of the box in which a node lies deepest, else of the nearest box.
 
     boxes: as in `start_level` · velocities: of the first of them, the others are at rest; None if all are."""
     if not np.any(velocities):
@@ -205,7 +204,7 @@ def _facing(domain) -> tuple[Array, Array]:
 
 
 def _without_seams(level, boxes, tank, nodes, edge: float) -> Array:
-    """The level (N,) with water where boxes touch: the distance to both is zero on the face that they share."""
+    """The level (N,), negative also where boxes touch: the distance to both is zero on their common face."""
     step = SEAM * edge
     at = np.flatnonzero(np.abs(level) < step)
     around = [nodes[at] + offset for offset in product((-step, step), repeat=3)]
@@ -266,7 +265,7 @@ def _box_level(box, tank, stars, edge: Array, hidden_low: Array, hidden_high: Ar
 
 
 def _goes_on(box, tank, hidden_low: Array, hidden_high: Array) -> Array:
-    """Nodes (N,) bool at which no side of a box is a surface."""
+    """Nodes (N,) bool at which no side of a box is a free surface."""
     sides_low, sides_high = np.array(box.lower) > tank[0], np.array(box.upper) < tank[1]
     if box.top is not None:
         return np.zeros(len(hidden_low), bool)
@@ -278,7 +277,7 @@ def _goes_on(box, tank, hidden_low: Array, hidden_high: Array) -> Array:
 
 
 def _side(s, s_low, s_high, cut_inner, cut_outer, edge: Array) -> Array:
-    """Distance to one side (N,), pushed away from the solids that stand there."""
+    """Distance (N,) to one side, modified at the solids that it ends at."""
     touch = TOUCHES * edge
     # a star below the surface, cut short by a slanting solid, keeps its distance
     wet = cut_outer & (s_high < touch) & ((s >= 0.0) | (s_high > -touch))
@@ -325,7 +324,7 @@ def _fluid_extent(domain) -> tuple[Array, Array]:
 
 
 def _reach(nodes, cells, low, high) -> tuple[Array, Array]:
-    """Bounds (N, 3) each of what the cells around every node reach."""
+    """Lower and upper bounds (N, 3) of the cells around every node."""
     node_low, node_high = np.full(nodes.shape, np.inf), np.full(nodes.shape, -np.inf)
     for a in range(4):
         np.minimum.at(node_low, cells[:, a], low)

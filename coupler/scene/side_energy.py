@@ -1,4 +1,4 @@
-"""The energy that inflows and seas can bring into a tank, by which errors are measured before it has come in."""
+"""The energy that inflows and seas can bring into a tank, the scale of errors before it has entered."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from coupler.geometry.tank_mesh import floor_along
 from coupler.scene.build_water import fills_beside, flow_of, instants_of, sea_level
 
 TIMES = 101
-"""Instants at the start at which a sea is looked at."""
+"""Number of instants at the start at which the energy of a sea is evaluated."""
 
 
 @dataclass(frozen=True)
 class SideEnergy:
-    """½ ρ b h (g Δz² + h v²) [J] of one side at an instant: what a step Δz in the level and a stream of speed v hold
-    over a stretch of the tank as long as the water is deep.
+    """½ ρ b h (g Δz² + h v²) [J] of one side at an instant: the energy of a step Δz in the level and of a stream of
+    speed v over a length of the tank equal to the depth of the water.
 
     level(time) z [m], speed(time) the largest v [m/s] there · width b [m] · floor, start: heights z [m] of the bed and
     of the water at the start, Δz is the difference from it · density ρ [kg/m³] · gravity g [m/s²]
@@ -46,9 +46,9 @@ class SideEnergy:
 def coming_energy(case: Case) -> Callable[[float], float]:
     """Energy [J] that all sides can bring as a function of the time [s].
 
-    Of an inflow the largest of all that is known of it. Of a sea, whose tide takes hours, what it brings after the time
-    of a wave through the tank; at 0 the largest until then. Nothing goes by the end of the run, so that a run with
-    another end has the same figures until then."""
+    For an inflow this is the largest energy over its whole record. For a sea, whose tide takes hours, it is the energy
+    after the time in which a wave crosses the tank; at time 0, the largest until then. The end of the run has no
+    influence, so that a run with another end has the same figures until then."""
     seas = [_of_sea(case, sea) for sea in case.water.sea]
     inflows = sum(max(map(_of_inflow(case, s).at, instants_of(case, s))) for s in case.water.inflow)
 
@@ -95,5 +95,5 @@ def _side(case: Case, side: str, level, speed) -> SideEnergy:
 
 
 def _level_at(case: Case, side: str) -> float:
-    """Height z [m] of the water beside a side at the start: of the highest box that reaches it, else the floor."""
+    """Initial height z [m] of the water beside a side: that of the highest box that reaches it, else of the floor."""
     return max([fill.upper[2] for fill in fills_beside(case, side)] + [case.tank.lower[2]])

@@ -18,7 +18,7 @@ import numpy as np
 
 from array_types import Array
 from coupler.balance.energy import Ledger
-from coupler.balance.momentum import book_step, momentum_ledger
+from coupler.balance.momentum import add_step, momentum_ledger
 from coupler.step.limits import Diverged, Limits, check_finite, check_pressure, no_room, pressure_to_start
 from coupler.step.observe import fastest_points, joint_counts
 from coupler.step.passes import CouplingPass, Passes
@@ -50,8 +50,9 @@ class CoupledStepper:
     passes: largest number of pressure solves in a step; after the first, the structure returns to the start of the step
     and takes it again as long as the defect is above `tolerance`.
     most_defect, limits: if a step exceeds a share of the first (`Defects`) or one of the others (`step_limits.py`), or
-    if no pressure is found, both sides return and take half of the step; without limits only non-finite results count.
-    expected: energy that inflows and seas can bring [J], a scale for errors.
+    if the pressure solver fails, both sides return to its start and take half of the step; without limits only results
+    that are not finite count.
+    coming: energy [J] that inflows and seas can bring by a time [s], a scale for errors; None: there are none.
     """
 
     def __init__(
@@ -71,7 +72,7 @@ class CoupledStepper:
     ) -> None:
         self.passes, self.tolerance = passes, tolerance
         self.pause: Callable[[], None] | None = None
-        """Called between the parts of a step, where the run may be ended by an exception."""
+        """Called between the parts of a step; it ends the run by raising an exception."""
         self.defects = Defects(most_defect)
         self.limits = limits
         # None where the scene lacks that side; what needs one is called only where there is one.
@@ -157,7 +158,7 @@ class CoupledStepper:
                 self._take(record, start)
             except self._failures() as error:
                 if record.retries == RETRIES and not tried:
-                    raise _no_way_on(self.time, error, record.dt) from error
+                    raise _no_solution(self.time, error, record.dt) from error
             else:
                 attempt = self._judge(record, volume)
                 if not attempt.broken:
@@ -170,7 +171,7 @@ class CoupledStepper:
         self._keep(attempt_to_keep(tried), tried[-1], dt, record, start)
 
     def _keep(self, best: Attempt, last: Attempt, dt: float, record: StepRecord, start: StepStart) -> None:
-        """Take the best attempt once more, unless it is the one in which both sides stand."""
+        """Repeat the best attempt, unless both sides are already in its state."""
         if best is last and record.retries == last.retries:
             return
         start.restore(self)
@@ -217,17 +218,17 @@ class CoupledStepper:
         energies = self._structure_energies()
         record.energies = energies or {}
         record.balance = self.ledger.balance(self._water_energy(), energies)
-        record.momentum = book_step(
+        record.momentum = add_step(
             self.momentum, self.water, self.structure, dt, record.load, record.impulses
         )
 
     def _look_ahead(self) -> None:
-        """The largest energy that sides could bring at any time so far."""
+        """Update the largest energy that inflows and seas could have brought so far."""
         if self._coming is not None:
             self.ledger.coming = max(self.ledger.coming, self._coming(self.time))
 
     def _cut(self, record: StepRecord) -> None:
-        """The domain outside of the bodies at their present positions, and their other effects on the water."""
+        """Update the domain outside of the bodies at their present positions, and their other effects on the water."""
         with self.clock("cut"):
             changed = self.immersion.update()
         with self.clock("carry over"):
@@ -263,7 +264,8 @@ class CoupledStepper:
         self._note_loads(problem, record, self._padded(assumed))
 
     def _note_loads(self, problem: PressureProblem, record: StepRecord, velocity: Array) -> None:
-        """The parts of the load, and the energy that shear and outflow take; velocity (n_bodies, 6) of the bodies."""
+        """Record the parts of the load and the energy that shear and outflow take from the water; velocity (n_bodies,
+        6) of the bodies."""
         shear = problem.predicted.shear
         record.shear_load = np.zeros_like(record.load) if shear is None else shear.load
         record.surface_load = problem.other_load - record.shear_load
@@ -277,8 +279,8 @@ class CoupledStepper:
     def _exchange(
         self, problem: PressureProblem, record: StepRecord, start: StepStart | None
     ) -> tuple[PressureProblem, CoupledSolution, Array, Array]:
-        """Pressure with the structure inside, then the structure under it, as often as the passes allow. One pass where
-        no block is wetted.
+        """Solve for the pressure with the structure inside and move the structure under it, as often as the passes
+        permit; once if no block is wetted.
 
         Returns the problem with all of its load, the solution, and the mean velocities (n, 6) with which the blocks
         moved and were assumed to move."""
@@ -337,7 +339,7 @@ class CoupledStepper:
         return 0 if self.structure.joints is None else joint_counts(self.structure).broken
 
     def _advance(self, dt: float, found: CoupledSolution, start: StepStart | None) -> AdvanceReport:
-        """The structure over dt [s] under the load of a solution; start: it goes back there first."""
+        """Advance the structure by dt [s] under the load of a solution; start: the state to which it returns before."""
         with self.clock("structure"):
             if start is not None and start.structure is not None:
                 self.structure.restore(start.structure)
@@ -351,7 +353,7 @@ class CoupledStepper:
     def _response(
         self, problem: PressureProblem, afloat: Array | None
     ) -> tuple[sp.csr_array, StructureResponse, Array]:
-        """Mass of the blocks, the answer of all bodies to forces, and V_free of the first pass."""
+        """Mass of the blocks, the response of all bodies to forces, and V_free of the first pass."""
         from coupler.step.pressure_with_structure import mass_matrix, water_load
 
         structure = self.structure
@@ -365,7 +367,7 @@ class CoupledStepper:
     def _answer(
         self, mass: sp.csr_array, dt: float, driven_velocity: Array, afloat: Array | None
     ) -> StructureResponse:
-        """The answer of all bodies to forces, with the springs of the joints and contacts that exist now."""
+        """The response of all bodies to forces, with the springs of the present joints and contacts."""
         from coupler.step.pressure_with_structure import StructureResponse
 
         structure = self.structure
@@ -437,12 +439,12 @@ class CoupledStepper:
         return None if self.structure is None else self.structure.energies()
 
     def _driven_by(self) -> tuple[bool, bool]:
-        """Whether blocks may move, and whether water comes in through sides."""
+        """Whether blocks may move, and whether water enters through sides."""
         return self.structure is not None and not self.structure.fixed.all(), self.water.sides is not None
 
     @contextmanager
     def _placed(self, problem: PressureProblem) -> Iterator[None]:
-        """A pressure of the problem that is not found is reported with its place and what may be the cause."""
+        """Add the place and the possible cause to the error of a pressure solve that fails."""
         from fluid.numerics.solve import NotConverged
 
         try:
@@ -464,6 +466,6 @@ class CoupledStepper:
             check_finite(self.time, "the velocity of the structure", self.structure.velocity(), "block")
 
 
-def _no_way_on(time: float, error: Exception, dt: float) -> Diverged:
+def _no_solution(time: float, error: Exception, dt: float) -> Diverged:
     at = "" if isinstance(error, Diverged) else f"t = {time:.4g} s: "
     return Diverged(f"{at}{error} Steps down to {dt:.3g} s did not help.")

@@ -1,4 +1,4 @@
-"""Narrow cracks between blocks: which broken joints the water still takes for closed, and what flows through them.
+"""Narrow cracks between blocks: which broken joints are still closed for the water, and the flow through them.
 
 An open crack in a wall thinner than about two cells acts on the water as an opening one cell wide, however narrow it
 is. So, unless the case asks for open cracks, a broken joint stays closed in the geometry of the water while its faces
@@ -23,13 +23,13 @@ if TYPE_CHECKING:
 WIDEST = 0.25
 """Largest opening in cells of a crack that is closed: below it a closed one is nearer to the truth than an open one."""
 THINNEST = 2.0
-"""Depth in cells from which a crack is open: the mesh sees the channel itself."""
+"""Depth, in cells, from which a crack is open, because the mesh resolves the channel."""
 NO_OPENING = 1e-6
 """Openings in cells below which nothing flows."""
 
 
 class NarrowCracks:
-    """The broken joints of a structure that the water takes for closed.
+    """The broken joints of a structure that are closed for the water.
 
     structure: blocks with joints · lumped: water flows through them ·
     spacing [m]: size of the cells at each joint, or one for all."""
@@ -48,7 +48,7 @@ class NarrowCracks:
         return block.ravel()[there], face.ravel()[there], half[there]
 
     def cracks(self) -> Cracks:
-        """The same for the water: where it may flow through."""
+        """The cracks as the water needs them, for the flow through them."""
         joint, block, _, opening = self._narrow()
         flows = opening[:, 0] > NO_OPENING * self.spacing[joint]
         joint, block, opening = joint[flows], block[flows], opening[flows]

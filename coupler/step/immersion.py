@@ -17,15 +17,15 @@ if TYPE_CHECKING:
 
 
 STILL = 1e-3
-"""Share of a cell edge that a block may move before its cells are cut again."""
+"""Fraction of a cell edge that a block may move before its cells are cut again."""
 STEPS = 4
-"""Steps of that in which sealed faces grow with the gap of their joint."""
+"""Number of steps, in units of STILL, by which sealed faces are extended as the gap of their joint grows."""
 FILM = 1e-4
 """Share of a cell edge by which loose blocks are drawn in, so that water reaches a face that rests on another:
 sealed or open must follow from the joints, not from the micrometres of a contact (a sealed face takes the
 buoyancy away). Faces that overlap others are drawn in by the overlap as well, in doubling steps."""
 MOST_FILM = 0.05
-"""Share of a cell edge by which a face is drawn in at most; in harder impacts it seals for a moment."""
+"""Largest inward shift of a face as a fraction of a cell edge; in a harder impact the face is sealed for a moment."""
 FACES_IT = 0.5
 """Least n·e of a face of a block that counts as the one which the contact along e is on."""
 SPANS = 0.02
@@ -70,7 +70,7 @@ class Immersion:
         self._radius = np.array([np.linalg.norm(v, axis=1).max() for v, _ in shapes])
         low, high = mesh.bounds
         self._long = np.flatnonzero(2.0 * self._radius[: self.n_blocks] > (high - low).min() - mesh.finest)
-        """Blocks long enough to reach across the tank."""
+        """Blocks that are long enough to reach from one side of the tank to the opposite one."""
         self._tolerance = STILL * mesh.finest
         self._centre, self._rotation = self._pose()
         self._growth = self._new_growth(np.zeros(len(self._body_of_plane)))
@@ -87,7 +87,7 @@ class Immersion:
         return np.where(np.isfinite(size), size, self.mesh.spacing)[: self.n_blocks]
 
     def update(self) -> bool:
-        """Cut again where blocks moved or came loose since they were last cut; True if the domain changed."""
+        """Cut the cells again where blocks have moved or come loose since the last cut; True if the domain changed."""
         if self.n_blocks == 0:
             return False
         centre, rotation = self._pose()
@@ -117,7 +117,7 @@ class Immersion:
         return loose, share
 
     def moved_on(self) -> Array:
-        """How far the bodies stand from where their cells were last cut (n + m, 6) [m, rad]."""
+        """Displacements and rotations (n + m, 6) [m, rad] of the bodies since their cells were last cut."""
         centre, rotation = self._pose()
         turn = rotation @ self._rotation.transpose(0, 2, 1)
         axial = 0.5 * np.stack(
@@ -127,7 +127,7 @@ class Immersion:
         return np.concatenate([centre - self._centre, axial], axis=1)
 
     def save(self) -> dict[str, Array]:
-        """Where the solids stood when their cells were last cut."""
+        """The positions of the solids when their cells were last cut."""
         return {
             "centre": self._centre.copy(),
             "rotation": self._rotation.copy(),
@@ -135,7 +135,7 @@ class Immersion:
         }
 
     def restore(self, saved: dict[str, Array]) -> None:
-        """Cut the domain outside of the bodies at these positions again; it is the same, bit for bit."""
+        """Cut the cells again with the bodies at the saved positions, which gives the same domain bit for bit."""
         self._centre, self._rotation = saved["centre"].copy(), saved["rotation"].copy()
         self._growth = saved["growth"].copy()
         self.bodies = self._placed()
@@ -143,7 +143,7 @@ class Immersion:
         self.cut_again = 0
 
     def _pose(self) -> tuple[Array, Array]:
-        """Centre (n + m, 3) and rotation (n + m, 3, 3) of blocks and fixed solids now."""
+        """Present centres (n + m, 3) and rotations (n + m, 3, 3) of the blocks and the fixed solids."""
         fixed = np.broadcast_to(np.eye(3), (self.n_solids, 3, 3))
         if self.structure is None:
             return self._solid_centre.copy(), fixed.copy()
@@ -182,7 +182,7 @@ class Immersion:
         return block, face, half
 
     def _films(self, loose: Array) -> Array:
-        """How far each plane (P,) [m] is drawn in for the contacts of the loose blocks (n,) bool."""
+        """Inward shift (P,) [m] of each plane for the contacts of the loose blocks (n,) bool."""
         film = np.zeros(len(self._body_of_plane))
         block, direction, depth = self.structure.overlaps()
         block, direction, depth = (a[loose[block]] for a in (block, direction, depth))

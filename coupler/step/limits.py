@@ -1,4 +1,5 @@
-"""When a run ends before its time: out of balance, not finite, or over a limit that the case set."""
+"""Reasons to end a run early: balances that are violated, values that are not finite, and exceeded limits of the
+case."""
 
 from __future__ import annotations
 
@@ -18,19 +19,19 @@ if TYPE_CHECKING:
 
 
 class Diverged(SurgebreakError):
-    """Not finite or out of balance: what comes after is not to be used."""
+    """The state is not finite or violates a balance; later results must not be used."""
 
     exit_code = ExitCode.DIVERGED
 
 
 class LimitReached(SurgebreakError):
-    """A budget that the case set; the results so far are sound."""
+    """A budget of the case is used up; the results so far are valid."""
 
     exit_code = ExitCode.STOPPED
 
 
 class Stopped(LimitReached):
-    """The user's own wish: Ctrl-C, a file named `stop`, a script."""
+    """The user asked the run to stop: Ctrl-C, a file named `stop`, a script."""
 
 
 @dataclass(frozen=True)
@@ -76,9 +77,9 @@ def check_momentum(time: float, momentum_error: float, limit: float) -> None:
 
 
 def check_defect(time: float, mean_defect: float, limit: float) -> None:
-    """Stop a run in which water and blocks no longer agree on how the blocks move.
+    """Stop a run in which the blocks move differently from what the pressure solve assumed.
 
-    mean_defect: over the last steps, since a joint that breaks makes a single step miss. Raises Diverged.
+    mean_defect: mean over the last steps, since a joint that breaks gives a single step a large one. Raises Diverged.
     """
     if not math.isfinite(mean_defect) or mean_defect > limit:
         raise Diverged(
@@ -89,7 +90,8 @@ def check_defect(time: float, mean_defect: float, limit: float) -> None:
 
 
 def check_misses(time: float, defects: list[float], most: int, limit: float, dt: float) -> None:
-    """Stop where the last `most` steps missed by more than the limit although they were halved as often as allowed.
+    """Stop if the defects of the last `most` steps exceed the limit although the steps were halved as often as
+    permitted.
 
     Raises Diverged.
     """
@@ -103,7 +105,7 @@ def check_misses(time: float, defects: list[float], most: int, limit: float, dt:
 
 
 def check_overlap(time: float, found: Overlap | None, limit: float) -> None:
-    """Stop where blocks are in one another, or in the ground, deeper than contact between solids can be.
+    """Stop if blocks overlap each other or the ground by more than a contact between solids can.
 
     found: Overlap (`coupler.geometry.overlaps`) or None. Raises Diverged.
     """
@@ -119,7 +121,7 @@ def check_overlap(time: float, found: Overlap | None, limit: float) -> None:
 
 
 def check_air(time: float, water: Water | None, limit: float) -> None:
-    """Stop where trapped air is squeezed, or drawn out, beyond what its law is good for. Raises Diverged."""
+    """Stop if trapped air is compressed or expanded beyond the range of validity of its law. Raises Diverged."""
     if water is None or water.air is None or len(water.air) == 0:
         return
     k = int(np.abs(water.air.mean_pressure).argmax())
@@ -137,7 +139,7 @@ def check_air(time: float, water: Water | None, limit: float) -> None:
 
 
 HIGHEST_PRESSURE = 1e8
-"""[Pa] beyond any impact: water hammer at 70 m/s."""
+"""[Pa], which exceeds that of any impact: water hammer at 70 m/s."""
 
 
 def no_room(place: Array, blocks: bool, sides: bool) -> str:
@@ -158,7 +160,7 @@ def no_room(place: Array, blocks: bool, sides: bool) -> str:
 def check_pressure(
     time: float, pressure: Array, nodes: Array, blocks: bool, sides: bool, to_start: Callable[[], float]
 ) -> None:
-    """Stop if water has no room: a driven body reduces the volume of a chamber without a free surface.
+    """Stop if the water cannot keep its volume, because a driven body reduces a chamber without a free surface.
 
     pressure (N,) [Pa] at nodes (N, 3) [m]; blocks, sides as in `no_room` · to_start(): `pressure_to_start`, asked where
     the pressure is beyond that of any impact. Raises Diverged.

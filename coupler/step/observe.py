@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 class JointCounts(NamedTuple):
-    """Joints that carry traction, joints that have failed, and the largest damage of those that carry."""
+    """Number of joints that carry traction, number of joints that have failed, and the largest damage of the former."""
 
     intact: int
     broken: int
@@ -22,15 +22,14 @@ class JointCounts(NamedTuple):
 
 
 def joint_counts(structure: Structure) -> JointCounts:
-    """The counts now; zeros without joints."""
+    """The present counts; zeros without joints."""
     damage, alive = structure.joint_damage()
     return JointCounts(int(alive.sum()), int((~alive).sum()), float(damage[alive].max(initial=0.0)))
 
 
 def size(coupling: CoupledSides) -> dict[str, int]:
-    """How large the scene is now: cells outside solids, those cut by them, those with water; blocks, joints.
-
-    Absent sides are left out."""
+    """The present size of the scene: cells outside the solids, cut cells and cells with water; blocks and joints. A
+    side that the scene does not have is left out."""
     found = {}
     if coupling.water is not None:
         water, topology = coupling.water, coupling.water.topology
@@ -44,7 +43,7 @@ def size(coupling: CoupledSides) -> dict[str, int]:
 
 
 def block_damage(structure: Structure) -> Array:
-    """(n,) area-weighted mean damage of the joints that each block had at the start; 0 for blocks without.
+    """Area-weighted mean damage (n,) of the joints that each block had at the start; 0 for blocks without joints.
 
     structure: with joints."""
     table = structure.joint_table()
@@ -59,7 +58,7 @@ def block_damage(structure: Structure) -> Array:
 
 
 def fastest_point(velocity: Array, radius: Array) -> float:
-    """Bound of the speed of any point of blocks with velocity (n, 6) and radius (n,) [m/s]."""
+    """Upper bound of the speed of any point of blocks with velocity (n, 6) and radius (n,) [m/s]."""
     return float(fastest_points(velocity, radius).max(initial=0.0))
 
 

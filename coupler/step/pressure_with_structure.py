@@ -31,10 +31,11 @@ V is the velocity at the end of the step.  Over the step the blocks move with th
 (dt_s: substep; the load acts from the first one on).  Stiff joints and contacts, for which D⁻¹ is small,
 oscillate within a step, so that only their mean velocity matters.  A second pass replaces the estimate (2) by the
 motion of the discrete elements under the first load x₁, with the mean velocity W over the step:
-V_free = V + D⁻¹ Gᵀ x₁ with the V of which W is the mean by (4), V = W + L(V).  With the L of the first pass instead,
-blocks that hit each other, whose V the first pass did not know, would come only half as near with every pass.  D and
-L are then those of the joints and contacts at the end of the first pass: a block that the water presses to the floor is
-held by contacts that begin within the step."""
+V_free = V + D⁻¹ Gᵀ x₁ with the V of which W is the mean by (4), V = W + L(V). With the L of the first pass instead, the
+error of blocks that collide within the step, which the first pass could not foresee, would only be halved in each pass.
+D and L are then those of the joints and contacts at the end of the first pass: a block that the water presses to the
+floor is held by contacts that begin within the step.
+"""
 
 from __future__ import annotations
 
@@ -54,7 +55,7 @@ if TYPE_CHECKING:
     from fluid.pressure.projection import PressureProblem
 
 LEAD_ROUNDS = 12
-"""Rounds for the velocity at the end of a step that belongs to a mean one: 2⁻¹² of it is left."""
+"""Number of iterations for the velocity at the end of a step from its mean; the error is reduced by 2⁻¹²."""
 
 
 def mass_matrix(mass: Array, inertia: Array) -> sp.csr_array:
@@ -70,7 +71,7 @@ class StructureResponse:
     """Equation (2): the velocities that a force held over the step gives to the bodies.
 
     mass, stiffness, damping: (6n, 6n) sparse, world axes · dt [s] · driven (n,) bool: bodies whose velocity
-    `driven_velocity` (n, 6) is imposed (fixed solids, prescribed motions); they take any load without answer ·
+    `driven_velocity` (n, 6) is imposed (fixed solids, prescribed motions); they do not respond to loads ·
     afloat (n, 3, 3): K_h for heave, roll and pitch, None: of no body.
     """
 
@@ -132,7 +133,8 @@ class StructureResponse:
         return -(self._restoring @ velocity.ravel()).reshape(-1, 6)
 
     def lead(self, velocity: Array, before: Array, substep: float) -> Array:
-        """L (n, 6) of (4) from V and V^n (n, 6): by how much V is ahead of the mean velocity; zero for driven bodies.
+        """L (n, 6) of (4) from V and V^n (n, 6): the difference between V and the mean velocity over the step; zero
+        for driven bodies.
 
         substep dt_s [s]."""
         held, change = self.mass / self.dt, (velocity - before).ravel()
@@ -140,8 +142,8 @@ class StructureResponse:
         return 0.5 * (1.0 - substep / self.dt) * self.compliance(gained).reshape(-1, 6)
 
     def at_end(self, mean: Array, before: Array, substep: float) -> Array:
-        """The V (n, 6) of (4) whose mean over the step is mean (n, 6), by V = mean + L(V), of which every round leaves
-        less than half of the error. before V^n (n, 6), substep dt_s [s]."""
+        """The V (n, 6) of (4) whose mean over the step is mean (n, 6), by the fixed-point iteration V = mean + L(V),
+        which reduces the error to less than half each time. before V^n (n, 6), substep dt_s [s]."""
         velocity = mean
         for _ in range(LEAD_ROUNDS):
             velocity = mean + self.lead(velocity, before, substep)
@@ -149,9 +151,9 @@ class StructureResponse:
 
 
 def _of_heave(blocks: Array, mass: Array) -> sp.csr_array:
-    """(6n, 6n) from blocks (n, 3, 3) for heave, roll and pitch; only what resists them, the rest left out.
+    """(6n, 6n) from blocks (n, 3, 3) for heave, roll and pitch; only the positive definite part of them is kept.
 
-    mass (n, 6) [kg, kg m²]: of every component; its radius of gyration makes lengths of angles."""
+    mass (n, 6) [kg, kg m²]: of every component; the radius of gyration converts angles to lengths."""
     n = len(blocks)
     gyration = np.sqrt(mass[:, 3:].mean(axis=1) / np.where(mass[:, 0] > 0.0, mass[:, 0], 1.0))
     length = np.ones((n, 3))
@@ -194,8 +196,8 @@ def _answer(bodies: Array, inverse: Array, force: Array, velocity: Array) -> Non
 @dataclass(frozen=True, kw_only=True)
 class CoupledSolution:
     """x (n_dofs,) [Pa] · velocity (n_bodies, 6) [m/s, rad/s] at the end of the step · load (n_bodies, 6) [N, N m] on
-    the bodies · restoring (n_bodies, 6): the part of it by which floating bodies are lifted less on their way ·
-    at_bound (n_dofs,) bool, parting (n_dofs,) [m³/s], lower (n_dofs,) [Pa]: see `fluid.numerics.bounded`."""
+    the bodies · restoring (n_bodies, 6): the change of the hydrostatic load on floating bodies over their displacement
+    · at_bound (n_dofs,) bool, parting (n_dofs,) [m³/s], lower (n_dofs,) [Pa]: see `fluid.numerics.bounded`."""
 
     x: Floats
     velocity: Floats
@@ -221,9 +223,11 @@ def solve_coupled(
     before: CoupledSolution | None = None,
     wetting: Wetting | None = None,
 ) -> CoupledSolution:
-    """Solve (3) with the bound of the pressure. `problem` is the water's PressureProblem, `solve` does the work of
-    `fluid.numerics.bounded.solve_bounded`, v_free (6 n_bodies,) · before: solution of the pass before, to start from ·
-    wetting: that of the problem unless given."""
+    """Solve (3) with the lower bound of the pressure.
+
+    problem: the PressureProblem of the water · v_free (6 n_bodies,) · solve: a function with the arguments of
+    `fluid.numerics.bounded.solve_bounded` · before: solution of the pass before, the initial guess · wetting: that of
+    the problem unless given."""
     wets = Wetting.of(problem.coupling) if wetting is None else wetting
     feels_water = len(response.free) > 0 and problem.coupling.nnz > 0
 
@@ -263,8 +267,8 @@ def corrected_free_velocity(
 
 
 def defect(mass: sp.csr_array, assumed: Array, found: Array, floor: float = 0.0) -> float:
-    """Coupling residual: how far the bodies missed the motion that the pressure solve assumed, from velocities (n, 6)
-    found and assumed:
+    """Coupling residual: the difference between the velocities (n, 6) that the bodies had and those that the pressure
+    solve assumed:
 
         sqrt( E(found − assumed) / max(E(found), E(assumed), floor) ),   E(V) = ½ V·M V
 

@@ -1,12 +1,13 @@
-"""Blocks that water sticks to: how they answer to shear within a step.
+"""Response of blocks to the wall shear of viscous water within a step.
 
-The viscous stage of the water (`fluid/viscous/viscosity.py`) holds the blocks with their own mass, and lets them be
-moved on by everything but shear, as in the last two steps: per component the smaller one if both have the same sign,
-else none,
+The viscous stage of the water (`fluid/viscous/viscosity.py`) includes the blocks with their mass. All other forces
+accelerate them as in the last two steps: for each component the smaller acceleration if both have the same sign, else
+none,
 
     a_k = (V_k - V_{k-1})/dt - M⁻¹ F_shear,        a = minmod(a_n, a_{n-1}).
 
-So a block that falls at a steady speed does so at any step, and the impulse of an impact is not carried on.
+A block that sinks at its terminal velocity therefore does so with any step size, and the impulse of an impact is not
+repeated in the next step.
 """
 
 from __future__ import annotations
@@ -23,14 +24,15 @@ if TYPE_CHECKING:
 
 
 class ShearedBlocks:
-    """n blocks of the structure, then fixed solids; remembers the last two accelerations without shear (2, n, 6)."""
+    """The n blocks of the structure, then the fixed solids, with the accelerations (2, n, 6) of the last two steps
+    without shear."""
 
     def __init__(self, structure: Structure, n_solids: int) -> None:
         self.structure, self.n_solids = structure, n_solids
         self.accelerations = np.zeros((2, structure.n, 6))
 
     def now(self) -> FreeBodies:
-        """As they stand, for the next step."""
+        """The blocks in their present state, for the next step."""
         n, s = self.structure.n + self.n_solids, self.structure
         found = FreeBodies.none(n)
         found.mass[: s.n] = self._mass()
@@ -39,7 +41,8 @@ class ShearedBlocks:
         return found
 
     def note(self, before: Array, load: Array, dt: float) -> None:
-        """After a step dt [s] that began with the velocities before (n, 6) and had the shear load (n, 6) [N, N m]."""
+        """Store the accelerations of a step of dt [s] that began with the velocities before (n, 6) and had the shear
+        load (n, 6) [N, N m]."""
         free = ~self.structure.fixed
         change = (self.structure.velocity() - before) / dt
         by_shear = np.linalg.solve(self._mass()[free], load[free, :, None])[..., 0]

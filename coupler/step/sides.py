@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 class CoupledSides(Protocol):
-    """Water and structure with the state of their coupling; `CoupledStepper` has it, and moves it on.
+    """Water and structure with the state of their coupling, as `CoupledStepper` has them.
 
     water, structure: either may be None, as the case has it · time [s] · ledger: of energy · momentum: of momentum ·
     defects: of the last steps."""

@@ -1,4 +1,4 @@
-"""Both sides and their balances as they stood before a step, so that a step can be taken again."""
+"""The state of both sides and of their balances before a step, so that the step can be repeated."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class StepStart:
-    """What `of` found; `restore` goes back to it, bit for bit, as often as wanted."""
+    """The state that `of` stored; `restore` returns to it, bit for bit, any number of times."""
 
     time: float
     water: dict | None
@@ -22,21 +22,21 @@ class StepStart:
 
     @classmethod
     def of(cls, coupling: CoupledSides) -> StepStart:
-        """Before a step. References, not copies, where a step replaces what it changes."""
+        """Store the present state: references instead of copies where a step replaces the arrays that it changes."""
         water, structure, momentum = coupling.water, coupling.structure, coupling.momentum
         return cls(
             time=coupling.time,
-            water=None if water is None else water.remember(),
+            water=None if water is None else water.snapshot(),
             structure=None if structure is None else structure.save(),
             ledger=dict(vars(coupling.ledger)),
             momentum=None if momentum is None else vars(momentum) | {"lines": dict(momentum.lines)},
         )
 
     def restore(self, coupling: CoupledSides) -> None:
-        """Back to the start of the step."""
+        """Return both sides and their balances to the start of the step."""
         coupling.time = self.time
         if self.water is not None:
-            coupling.water.go_back(self.water)
+            coupling.water.restore(self.water)
         if self.structure is not None:
             coupling.structure.restore(self.structure)
         vars(coupling.ledger).update(self.ledger)

@@ -168,7 +168,7 @@ class Topology:
         """`around`, and the number of cells that each of these neighbours shares with the node."""
         n = len(self.nodes)
         rows = (self.cells, self.node_start, self.node_cells)
-        return _one_behind_the_other(over(_nodes_around, n, *rows, weight=WORK))
+        return _concatenated(over(_nodes_around, n, *rows, weight=WORK))
 
     @cached_property
     def near_solids(self) -> Array:
@@ -304,7 +304,7 @@ def _neighbours(parent_neighbours, cells, parent, n_parents):
     return found
 
 
-def _one_behind_the_other(parts):
+def _concatenated(parts):
     """Concatenate rows that come in parts, each (start, values, values) → start (n + 1,) of all rows, and their
     values."""
     if len(parts) == 1:
@@ -409,9 +409,7 @@ class Graph:
         row = np.full(len(t.nodes), -1, np.int64)
         row[nodes] = np.arange(len(nodes))
         mesh = (t.cells, t.parent, t.products, t.volume, t.node_start, t.node_cells)
-        start, neighbour, stiffness = _one_behind_the_other(
-            over(_edges, len(nodes), nodes, *mesh, weight=WORK)
-        )
+        start, neighbour, stiffness = _concatenated(over(_edges, len(nodes), nodes, *mesh, weight=WORK))
         return cls(nodes, row, start, neighbour, stiffness)
 
     def without(self, topology: Topology, cell_list) -> Graph:

@@ -19,7 +19,7 @@ def level(water, xy) -> float:
     """Depth [m] of water over xy (2,) [m]: the wet length of a vertical line, as a wire gauge measures it.
 
     φ is sampled on the line, SAMPLES_PER_CELL times in a cell, and taken as linear between samples; the inside of
-    solids counts as dry. Spray and the space under an overturning crest do not count; over a solid that stands on the
+    solids counts as dry. Spray and the space under an overturning crest do not count; over a solid on the
     floor the depth is that above it. Raises Outside for a place outside the mesh."""
     return float(levels(water, [xy])[0])
 

@@ -1,8 +1,8 @@
-"""Sides of the tank: where water is held, comes in and goes out (theory 2.4).
+"""Sides of the tank: where water is held, enters and leaves (theory 2.4).
 
 walls        closed sides, with free slip or no slip, and open ones
 inflow       sides with a given velocity, or with the level of a still sea
-waves        streams, records, bores and solitary waves that come in
+waves        streams, records, bores and solitary waves that enter
 outflow      what leaves through open sides
 
 Imports nothing of the project.

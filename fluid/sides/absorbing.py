@@ -26,7 +26,7 @@ class Absorber:
     """flow: the given flow · inward (3,) unit · places (k, 2) [m] a cell inside the side · bed (k,) [m] there · gravity
 
     height, speed: corrections by (1) to the level [m] and to the velocity inwards [m/s] of the given flow, kept until
-    the next `hear`."""
+    the next `update`."""
 
     flow: Flow
     inward: Array
@@ -49,10 +49,10 @@ class Absorber:
         return Flow(lambda time: self.flow.level(time) + self.height, velocity, self, along)
 
     def points(self, depths) -> Array:
-        """Points (k, 3) [m] at which `hear` needs the velocity: at half the depths (k,) [m]."""
+        """Points (k, 3) [m] at which `update` needs the velocity: at half the depths (k,) [m]."""
         return np.column_stack([self.places, self.bed + 0.5 * depths])
 
-    def hear(self, depths, velocities, time: float) -> None:
+    def update(self, depths, velocities, time: float) -> None:
         """Update height and speed by equation (1) from the depths (k,) [m] and velocities (k, 3) [m/s] at the
         places."""
         level = self.flow.level_at(np.column_stack([self.places, self.bed]), time)

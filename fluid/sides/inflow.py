@@ -18,12 +18,12 @@ dry floor 2.3 to 2.8 times as fast as that fall, and the next one threw it out a
 water's own velocity, of either sign.  A sea is meant for sides far from waves: it partly reflects the waves that reach
 it, as any side does.
 
-The water that the pressure of a sea sets in motion comes in half a step later, and by then the pressure may have
+The water that the pressure of a sea sets in motion enters half a step later, and by then the pressure may have
 changed.  Its work by the end of a step beyond p V is therefore booked ahead, and taken back at the same pressure,
 
     E += Σ_i p_i (V_i + δ q_i' - δ_0 q_i),                                                               (3)
 
-V_i the volume that comes in during the step, q and q' of equation (1) at its beginning and its end, δ_0 and δ the times
+V_i the volume that enters during the step, q and q' of equation (1) at its beginning and its end, δ_0 and δ the times
 by which the surface lags behind the velocity then.  In a steady stream that is p V.
 """
 
@@ -236,7 +236,7 @@ def wet_shares(phi):
 class Sides:
     """All inflows and seas of a tank, as the step uses them.
 
-    entered, left [m³]: water that came in and went out through them so far · energy [J] that they brought: kinetic,
+    entered, left [m³]: water that has entered and left through them so far · energy [J] that they brought: kinetic,
     potential, and the work of the pressure, equation (3)."""
 
     def __init__(self, sides):
@@ -299,7 +299,7 @@ class Sides:
                 q += side.rate(phi, u)
         return q
 
-    def book(self, volume, head, ahead) -> None:
+    def add_step(self, volume, head, ahead) -> None:
         """Add the water that entered at the nodes in a step to the totals.
 
         volume (N,) [m³] · head (N,) [J/m³]: its energy and pressure · ahead [J]: work of the pressure of seas beyond

@@ -121,7 +121,7 @@ class Walls:
             np.add.at(total, corner, self.open_area)
         return nodes, total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-300)
 
-    def let_air_in(self, phi, u, dt: float, spacing) -> None:
+    def admit_air(self, phi, u, dt: float, spacing) -> None:
         """Let air enter at the open sides: where u (N, 3) [m/s] points into the tank, the surface, which was at the
         side at most, moves on by |u·n| dt in dt [s]. φ (N,) [m], carried by paths, is raised by that, in place.
 

@@ -30,7 +30,7 @@ from fluid.pressure.projection import (
 from fluid.step.momentum import Stages, momentum_change
 from fluid.step.report import StepReport
 from fluid.surface.extrapolation import extend_velocity
-from fluid.surface.gradient_jump_damping import damp_kinks
+from fluid.surface.gradient_jump_damping import damp_gradient_jumps
 from fluid.surface.volume import Flux, edge_flux
 from kernel_decorators import ranged, released
 
@@ -50,8 +50,8 @@ AT_REST = (0.002, 0.01)
 """Speeds in √(g h) between which the damping along water lines on slanting sides of the mesh, a bed, ends: at full
 strength it takes a tenth of the run-up of a wave (P42), and what is to be kept still is far slower."""
 KINK_DAMPING, KINK_DEPTH, SURFACE_DAMPING = 1.0 / 8.0, 2.0, 0.025
-"""On meshes with obtuse cells, in calm water: c of `damp_kinks` and how far below the surface it acts (cells of the
-surface reach 1.6 cell sizes down), and c of `damp_waterline` along the whole surface, for cells not wholly wet."""
+"""On meshes with obtuse cells, in calm water: c of `damp_gradient_jumps` and how far below the surface it acts (cells
+of the surface reach 1.6 cell sizes down), and c of `damp_waterline` along the whole surface, for partly wet cells."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -230,7 +230,7 @@ def _limit_and_damp(water, kept, u, a):
 
 
 def _damp_surface(water, kept, u) -> None:
-    """`damp_waterline`, and `damp_kinks` where there are obtuse cells, in calm water, in place."""
+    """`damp_waterline`, and `damp_gradient_jumps` where there are obtuse cells, in calm water, in place."""
     t, h, calm = water.topology, water.mesh.spacing, water.calm(kept.end - water.time)
     phi, wet = t.in_cells(kept.level_set), WetCells(kept.wet_cells, kept.wet_share)
 
@@ -240,17 +240,17 @@ def _damp_surface(water, kept, u) -> None:
 
     even_out(WATERLINE_DAMPING, t.beside_solid)
     if t.slanting.any():
-        slow = _hardly_moving(water, u)[:, None]
+        slow = _share_at_rest(water, u)[:, None]
         for _ in range(BED_ROUNDS):
             even_out(BED_DAMPING * slow, t.slanting)
     if t.is_obtuse:
         beside = np.where(t.near_obtuse, phi, -np.inf)
         weight, deep = KINK_DAMPING * calm, -KINK_DEPTH * h
-        damp_kinks(wet.rows, beside, kept.wet, weight, deep, u, t.fluid_cells, t.neighbours)
+        damp_gradient_jumps(wet.rows, beside, kept.wet, weight, deep, u, t.fluid_cells, t.neighbours)
         even_out(SURFACE_DAMPING, t.near_obtuse)
 
 
-def _hardly_moving(water, u):
+def _share_at_rest(water, u):
     """(N,): 1 where the velocity u (N, 3) [m/s] is next to nothing beside the shallow wave of one cell, 0 where it is
     more than that."""
     celerity = np.sqrt(water.parameters.gravity * water.topology.node_size)
@@ -282,7 +282,7 @@ def _continue(water, kept, listed, start, u, a, forced) -> None:
 
     forced: see `extend_velocity`."""
     calm = water.calm(kept.end - water.time)
-    rubbed = water.rubbed_nodes()
+    rubbed = water.nodes_at_rough_walls()
     extend_velocity(water.topology, (listed, start), kept.wet, kept.wet_cells, u, a, calm, forced, rubbed)
     _limit_speed(water, u, a)
     water.hold(u, kept.end)

@@ -46,7 +46,7 @@ class Predicted:
     wet (N,) bool, wet_cells (n,), wet_share (n,) and void (k,) of WetPart, cell_star (n, 3) [m/s] velocity of the wet
     cells, remainder (M, 3) [m/s], theta, conserved_volume and reinserted [m³], uncorrected_water (N,) [m³] before the
     volume correction, shear: ViscousChange by viscosity and friction, None without; end [s]: time at the end of the
-    step; left: what leaves through open sides, None if nothing; through (N,) [m³] that comes in through sides,
+    step; left: what leaves through open sides, None if nothing; through (N,) [m³] that enters through sides,
     None without any; held (N,) [Pa]: unknown part of the pressure on the nodes of seas, None without any side;
     displaced (N,) [m³]: part of nodal_water that the bodies take in this step; given_by_films: `films.Handed.given`;
     cushions: trapped air (`fluid.air.cushions`), None without any."""
@@ -145,7 +145,7 @@ def predicted(water, dt: float) -> PressureProblem:
 
 
 def _sheared(water, dt, theta, kick, surface, u_adv):
-    """What viscosity and walls change over the step, seen from where the last pressure would lead: ViscousChange."""
+    """Change by viscosity and walls over the step, relative to the motion under the last pressure: ViscousChange."""
     w = u_adv + theta * dt * kick[:, None] * water.acceleration
     water.hold(w, water.time + dt)
     return water.viscous.change(water, surface.level_set, surface.nodal_water, w, dt)
@@ -196,7 +196,7 @@ def _transported(water, dt, theta, kick):
         moved[places, 3] = levels
     near = np.abs(water.topology.in_cells(phi)[water.listed]) < TRANSPORT_WIDTH * water.mesh.spacing
     phi[water.listed[near]] = moved[near, 3]
-    water.walls.let_air_in(phi, u_m, dt, water.topology.node_size)
+    water.walls.admit_air(phi, u_m, dt, water.topology.node_size)
     water.hold(u_adv, water.time + dt)
     return u_adv, phi
 
@@ -388,8 +388,8 @@ def _carry_remainder(first, last, cell_list, held, numbers, u, cells, size, out)
 
 
 def _sealed(water, matrix, anchored, dofs, dt, pressure):
-    """Closed pockets get a compliance far below what the pressure differences in them feel, c ρ h²/dt ≪ (π h/L)²: real
-    water is softer than that in short steps, and its waves would take part in the added mass of bodies."""
+    """Closed pockets get a compliance far below that at which it affects their pressure differences, c ρ h²/dt ≪ (π
+    h/L)²: real water is softer than that in short steps, and its waves would take part in the added mass of bodies."""
     p = water.parameters
     compliance = (
         p.pocket_compliance * dt / (p.density * water.mesh.spacing**2) * water.topology.finer[dofs] ** 2

@@ -53,15 +53,16 @@ class Water:
     mesh: Background · domain: PhysicalDomain of it · fill: points (n, 3) [m] → signed distance (n,) [m], negative
     in the water, or the level set (N,) itself · is_open: (normals (B, 3), centres (B, 3)) → bool (B,), sides of
     the tank that let water out; None: all closed · is_smooth: the same, sides that stay smooth whatever
-    `parameters.walls` says · sides: `inflow.Sides`, where water is led in or a sea stands; None: nowhere ·
+    `parameters.walls` says · sides: `inflow.Sides`, inflows and seas; None: nowhere ·
     velocity (N, 3) [m/s] at the nodes of the domain at the start; None: at rest · gas: `fluid.air.gas.Gas` of the air
     that cannot leave; None: the air is open everywhere · vents: `fluid.air.leaks.Vent` of its pockets.
 
     State at the nodes of the domain: level_set (N,) [m], velocity (N, 3) [m/s], acceleration (N, 3) [m/s²],
     pressure (N,) [Pa] that acted over the last step, end_pressure (N,) [Pa] that goes with the acceleration at its end
     (the two differ by up to 1/θ in an impact), nodal_water (N,) [m³], at_bound and ventilated (N,) bool: where the
-    pressure was at its bound, and where that is the pressure of the air; at its cells: remainder (M, 3) [m/s], what
-    the nodes could not hold of the velocity correction.  Velocity goes on for some layers outside the water.
+    pressure was at its bound, and where that is the pressure of the air; at its cells: remainder (M, 3) [m/s], the part
+    of the velocity correction that nodal values cannot represent.  Velocity is extrapolated to some layers outside
+    the water.
 
     body_velocity (n_bodies, 6) [m/s, rad/s] about the centres: set it before `predict` where solids that move drag the
     water along (viscosity, friction); it is not used otherwise.
@@ -99,12 +100,12 @@ class Water:
         self.pushed_by = np.zeros((domain.n_bodies, 6))
         """Velocities (n_bodies, 6) [m/s, rad/s] of the bodies in the last pressure solve: set before `correct`."""
         self.moved_on = np.zeros((domain.n_bodies, 6))
-        """How far (n_bodies, 6) [m, rad] they stand from where the cells are cut: set before `predict`."""
+        """Displacement (n_bodies, 6) [m, rad] of the bodies since the cells were cut: set before `predict`."""
         self.farther = np.zeros((domain.n_bodies, 6))
         """How much farther (n_bodies, 6) [m, rad] they moved in the last step than `displacement` took for granted: the
         water that this takes has yet to rise to the surface. Set after a step, for the potential energy."""
         self.moved_by_end = np.zeros((domain.n_bodies, 6))
-        """How far (n_bodies, 6) [m, rad] they stand at the end of the step from where the cells are cut: set before
+        """Displacement (n_bodies, 6) [m, rad] of the bodies at the end of the step since the cells were cut: set before
         `correct`, for the volume of trapped air."""
         self.free_bodies: FreeBodies | None = None
         """`viscosity.FreeBodies` that answer to shear within the step; None: all keep their velocity."""
@@ -219,7 +220,7 @@ class Water:
         return np.maximum(p.kick_limit * p.gravity, 0.5 * self.fastest() ** 2 / size)
 
     def speed_cap(self) -> float:
-        """Largest speed [m/s] that is let stand: speed_limit sqrt(g H + v²/2) in a tank of height H whose water starts
+        """Largest speed [m/s] that is permitted: speed_limit sqrt(g H + v²/2) in a tank of height H whose water starts
         with at most v; twice what the fall of all of it could give."""
         p, (low, high) = self.parameters, self.mesh.bounds
         return float(p.speed_limit * np.sqrt(p.gravity * (high - low)[2] + 0.5 * self._start_speed**2))
@@ -229,11 +230,11 @@ class Water:
 
     def predict(self, dt: float) -> PressureProblem:
         """Advection, volume and gravity over dt [s], and the system for the pressure."""
-        self._hear()
+        self._read_absorbing_sides()
         return predicted(self, dt)
 
-    def _hear(self) -> None:
-        """Read the water beside the sides that absorb; as their memory is what they read, a restart finds it again."""
+    def _read_absorbing_sides(self) -> None:
+        """Read depth and velocity beside the absorbing sides, which keep what they read, so that a restart has it."""
         for absorber in () if self.sides is None else self.sides.absorbers():
             from fluid.readings.gauges import levels, velocity
 
@@ -241,7 +242,7 @@ class Water:
             wet, velocities = depths > 0.0, np.zeros((len(depths), 3))
             if wet.any():
                 velocities[wet] = velocity(self, absorber.points(depths)[wet])
-            absorber.hear(depths, velocities, self.time)
+            absorber.update(depths, velocities, self.time)
 
     def correct(self, problem: PressureProblem, x, parting=None) -> None:
         """Take over the pressure x (n,) [Pa] of the problem and end the step; parting (n,) [m³/s]: rate at which the
@@ -271,17 +272,17 @@ class Water:
         self._surface_lag = 0.5 * problem.dt * share
         if self.sides is not None:
             ahead = float((self._late() - late) @ self.pressure)
-            self.sides.book(problem.predicted.through, self.head(), ahead)
+            self.sides.add_step(problem.predicted.through, self.head(), ahead)
         self.time += problem.dt
         self.steps += 1
         self._domain_is_new, self.renumbered, self.left_behind = False, None, None
 
-    def remember(self) -> dict:
-        """The present state, for `go_back`: references, since a step replaces the arrays that it changes."""
+    def snapshot(self) -> dict:
+        """The present state, for `restore`: references, since a step replaces the arrays that it changes."""
         return vars(self) | {"sides": None if self.sides is None else dict(vars(self.sides))}
 
-    def go_back(self, remembered: dict) -> None:
-        """Back to what `remember` gave, bit for bit."""
+    def restore(self, remembered: dict) -> None:
+        """Back to what `snapshot` gave, bit for bit."""
         sides = self.sides
         vars(self).update(remembered)
         self.sides = sides
@@ -291,9 +292,9 @@ class Water:
     # ---- moving solids
 
     def move_solids(self, domain) -> None:
-        """Go over to the domain that the solids leave now: every field is carried, newly wet nodes are continued
-        from their neighbours.  The volume of water in the balance does not change; the next step lifts the surface
-        by what the solids displaced."""
+        """Change to the present domain outside of the solids: every field is transferred, and values of newly wet nodes
+        are extrapolated from their neighbours.  The volume of water in the balance does not change; the next step
+        lifts the surface by what the solids displaced."""
         old, old_topology = self.domain, self.topology
         source = carry(old, domain)
         self.set_domain(domain)
@@ -317,7 +318,7 @@ class Water:
         self.slits = Slits.of(self.domain, cracks, self.mesh.size_at(cracks.middle()), self.slits)
 
     def set_films(self, loose, share) -> None:
-        """Let films of water between loose bodies (n_bodies,) bool and what they lie on hand on the pressure of their
+        """Let films of water between loose bodies (n_bodies,) bool and their supports transmit the pressure of their
         rim (`films.py`), a share (P,) of it on each plane of the bodies: anew after every change of the domain."""
         from fluid.pressure.films import Films
 
@@ -406,7 +407,7 @@ class Water:
         self.listed, self.layer_start = self.layers((self.level_set < 0.0) & self.topology.active)
 
     def layers(self, wet):
-        """Wet nodes, then BAND layers around them: (list, layer_start)."""
+        """The wet nodes, then BAND layers around them: (list, layer_start)."""
         t = self.topology
         order, start = layers_around(wet, BAND, *t.around)
         if self.sides is None:
@@ -417,8 +418,8 @@ class Water:
         return np.concatenate([order, missing]), start
 
     def graph_for(self, nodes) -> Graph:
-        """A graph that lists these nodes: the one at hand if it does; of all nodes, once, when the solids have
-        stood still for a step."""
+        """A graph that lists these nodes: the present one if it does; a graph of all nodes, made once, when the
+        solids have been at rest for a step."""
         if self.graph is None or not self.graph.covers(nodes):
             every = nodes if self._domain_is_new else np.flatnonzero(self.topology.active)
             self.graph = Graph.of(self.topology, every)
@@ -450,7 +451,7 @@ class Water:
     def held_open(self, phi):
         """Nodes (N,) bool on open sides that have the pressure of the side: wet ones, φ (N,) < 0, and all of seas.
 
-        At a dry node of an open side the surface lies below it; the weight beyond a sea goes on above its level."""
+        At a dry node of an open side the surface lies below it; the weight beyond a sea acts above its level, too."""
         held = self.walls.open_node & (phi < 0.0)
         for side in self.sides.now if self.sides is not None else ():
             if side.is_sea:
@@ -461,7 +462,7 @@ class Water:
         """Nodes (n,) on the sides of the tank and projectors (n, 3, 3) onto what friction and viscosity may change."""
         return self.walls.restriction()
 
-    def rubbed_nodes(self):
+    def nodes_at_rough_walls(self):
         """Nodes (N,) bool on sides of the tank and beside solids that rub or hold the water; None if all are smooth."""
         if self.parameters.walls == "slip":
             return None
@@ -479,12 +480,12 @@ class Water:
     # ---- figures
 
     def volume(self) -> float:
-        """Water in the tank [m³]."""
+        """Volume of water in the tank [m³]."""
         return float(self.nodal_water.sum()) - float(self.displaced.sum())
 
     def displacement(self, dt: float) -> Array:
-        """Volume (N,) [m³] that the bodies have taken from the nodes at the end of a step dt [s], negative where they
-        left room, since they stood where the cells are cut.
+        """Volume (N,) [m³] that the bodies have displaced at the nodes since the cells were cut, at the end of a step
+        dt [s]; negative where they have left volume free.
 
         Surface and pressure are those at the end of a step. With the volume of the cut alone the level of a pool would
         follow a body that floats in it a step late, which lets it swing higher and higher."""
@@ -492,7 +493,7 @@ class Water:
         return self._taken_by(way)
 
     def _taken_by(self, way) -> Array:
-        """Volume (N,) [m³] that bodies take from the nodes on a way (n_bodies, 6) [m, rad]."""
+        """Volume (N,) [m³] that bodies displace at the nodes over a motion (n_bodies, 6) [m, rad]."""
         if not way.any():
             return np.zeros(len(self.level_set))
         return taken_from_nodes(self.domain, self.coupling, self.level_set, way)
@@ -551,7 +552,7 @@ class Water:
         return np.array([nodes.min(axis=0), nodes.max(axis=0)])
 
     def _let_air_out(self, dt: float) -> None:
-        """What leaves the pockets through vents and narrow cracks in dt [s]."""
+        """Let air leave the pockets through vents and narrow cracks for dt [s]."""
         if self.vents or (self.slits is not None and len(self.slits)):
             from fluid.air.leaks import leaked
 

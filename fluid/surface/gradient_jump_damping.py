@@ -23,7 +23,7 @@ from kernel_decorators import helper, inner, kernel
 
 
 @kernel
-def damp_kinks(cell_list, phi, wet, weight, deep, u, fluid, neighbours):
+def damp_gradient_jumps(cell_list, phi, wet, weight, deep, u, fluid, neighbours):
     """Equation (1) with c = weight, in place on u (N, 3) [m/s], over the listed cells that reach up to φ > deep [m].
 
     fluid: FluidCells · neighbours (M, 4) of the cells across their faces."""

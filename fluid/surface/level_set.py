@@ -203,7 +203,7 @@ def _closest(layers, surface, corner, mesh, around, exact, obtuse, cells_of_node
     tried = np.full(count, -1, np.int64)
     first = _first_triangles(surface.owner, mesh.cells.shape[0] if exact > 0 else 0)
     known = Nearest(closest, best, tried, np.zeros(n, np.int32), np.zeros(n, np.int32))
-    _hand_outward(layers, surface, corner, mesh, around, known)
+    _propagate_outward(layers, surface, corner, mesh, around, known)
     for s in range(layer_start[1], layer_start[exact + 1]):
         i = order[s]
         if closest[i] >= 0 and obtuse[i]:
@@ -243,7 +243,7 @@ def _descend(x, closest, best, surface, first, cells, cells_of_nodes):
 
 
 @inner
-def _hand_outward(layers, surface, corner, mesh, around_nodes, known):
+def _propagate_outward(layers, surface, corner, mesh, around_nodes, known):
     """Fill `known`, Nearest; corner as in `_of_corners`. In the second sweep only neighbours that have found another
     triangle since then are tested."""
     order, layer_start = layers

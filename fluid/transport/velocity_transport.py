@@ -26,8 +26,8 @@ def carry_velocity(nodes, edges: Edges, moved, water, u):
     size, reach = len(water), reach_of_rows(nodes, edges.row, edges.start, edges.neighbour)
     up, came = np.zeros(u.shape), np.zeros(size)
     change, volume = np.zeros(u.shape), np.zeros(size)
-    owning(_what_comes, size, reach, len(nodes), nodes, edges, moved, u, up, came)
-    over(_mean_of_it, len(nodes), nodes, came, u, up)
+    owning(_incoming, size, reach, len(nodes), nodes, edges, moved, u, up, came)
+    over(_mean_incoming, len(nodes), nodes, came, u, up)
     owning(_exchange, size, reach, len(nodes), nodes, edges, moved, water, u, up, change, volume)
     over(_new_velocity, len(nodes), nodes, water, change, volume, u)
 
@@ -42,7 +42,7 @@ def _new_velocity(first, last, nodes, water, change, volume, u):
 
 
 @ranged
-def _what_comes(first, last, runs, nodes, edges, moved, u, up, came):
+def _incoming(first, last, runs, nodes, edges, moved, u, up, came):
     """Σ w u (N, 3) [m⁴/s] and Σ w (N,) [m³] of what flows into a node."""
     row, start, neighbour = edges.row, edges.start, edges.neighbour
     for run in range(runs.shape[0]):
@@ -57,7 +57,7 @@ def _what_comes(first, last, runs, nodes, edges, moved, u, up, came):
 
 
 @ranged
-def _mean_of_it(first, last, nodes, came, u, up):
+def _mean_incoming(first, last, nodes, came, u, up):
     """u_up (N, 3) [m/s]: mean velocity of what flows into a node; its own where nothing does."""
     for s in range(first, last):
         i = nodes[s]

@@ -45,7 +45,7 @@ def carry_volume(flux: Flux, dt: float, u=None, total=None):
         over(_moved, count, flux.nodes, edges, flux.rate, water, capacity, share, dt / n_sub, moved)
         if u is not None:
             carry_velocity(flux.nodes, edges, moved, water, u)
-        owning(_hand_over, len(water), reach, count, flux.nodes, edges, moved, change)
+        owning(_transfer_volume, len(water), reach, count, flux.nodes, edges, moved, change)
         water += change
         if total is not None:
             over(_add, count, flux.nodes, g.row, g.start, moved, total)
@@ -115,7 +115,7 @@ def _moved(first, last, nodes, edges, rate, water, capacity, share, h, moved):
 
 
 @ranged
-def _hand_over(first, last, runs, nodes, edges, moved, change):
+def _transfer_volume(first, last, runs, nodes, edges, moved, change):
     """Subtract the volumes moved (edges,) [m³] from one node and add them to the other: change (N,) [m³]."""
     start, neighbour = edges.start, edges.neighbour
     for run in range(runs.shape[0]):

@@ -9,7 +9,7 @@ from coupler.checks.read_case import load
 from coupler.geometry.tank_mesh import bed_along, bed_under, mesh_of
 from coupler.run.clock import Clock
 from coupler.scene.build import build
-from coupler.scene.build_water import NothingToHear, _absorbing
+from coupler.scene.build_water import AbsorbingSideBlocked, _absorbing
 from fluid.mesh.background import box_mesh
 from fluid.mesh.fitted_mesh import fitted_mesh
 from fluid.readings.gauges import levels
@@ -129,5 +129,7 @@ def test_absorbing_side_goes_on_when_the_water_has_left_it(tmp_path):
 def test_absorbing_side_before_ground_up_to_the_lid_is_refused(tmp_path):
     case = beach(tmp_path, 0.3, 0.0)
     beyond = replace(mesh_of(case.tank), spacing=20.0)
-    with pytest.raises(NothingToHear, match=r"side x- absorbs, but 20 m inside.*reaches its upper side"):
+    with pytest.raises(
+        AbsorbingSideBlocked, match=r"side x- absorbs, but 20 m inside.*reaches its upper side"
+    ):
         _absorbing(case, case.water.sea[0], None, beyond)

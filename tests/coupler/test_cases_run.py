@@ -7,7 +7,7 @@ import pytest
 from coupler.checks.read_case import load
 from coupler.program.errors import ExitCode
 from coupler.run.directory import RunDirectory
-from coupler.run.execute import carry_out
+from coupler.run.execute import execute_case
 from tests.coupler.test_cases import CASES
 
 LONG = {
@@ -26,7 +26,7 @@ def marked(place):
 def test_a_case_keeps_what_it_promises(place, tmp_path):
     file = load(place)
     directory = RunDirectory.create(file, tmp_path / "run")
-    assert carry_out(file, directory) == ExitCode.DONE
+    assert execute_case(file, directory) == ExitCode.DONE
     kept = json.loads((directory.path / "run.json").read_text(encoding="utf-8"))["figures"]["expected"]
     assert kept
     assert [what for what, found in kept.items() if not found] == []

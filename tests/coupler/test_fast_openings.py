@@ -4,14 +4,14 @@ from types import SimpleNamespace
 
 import pytest
 
-from coupler.run.run import FAST_OPENING, FAST_OPENING_NEEDLEMAN, _tell_fast_openings
+from coupler.run.run import FAST_OPENING, FAST_OPENING_NEEDLEMAN, _report_fast_openings
 
 
 def told(rate, mode, pairs=()):
     messages = []
     joints = SimpleNamespace(mixed_mode=mode, pair=[SimpleNamespace(mixed_mode=m) for m in pairs])
     case, reporter = SimpleNamespace(joints=joints), SimpleNamespace(message=messages.append)
-    _tell_fast_openings(case, {"largest_opening_rate": rate}, reporter)
+    _report_fast_openings(case, {"largest_opening_rate": rate}, reporter)
     return messages
 
 
@@ -32,5 +32,5 @@ def test_fast_openings_are_told_from_the_limit_of_their_rule_on(mode, pairs, lim
 
 def test_a_run_without_joints_says_nothing():
     messages = []
-    _tell_fast_openings(SimpleNamespace(joints=None), {}, SimpleNamespace(message=messages.append))
+    _report_fast_openings(SimpleNamespace(joints=None), {}, SimpleNamespace(message=messages.append))
     assert messages == []

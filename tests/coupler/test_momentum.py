@@ -123,7 +123,7 @@ def test_a_load_that_does_not_arrive_is_an_error():
     ledger.start(None, np.zeros(6))
     got = np.array([2.0, 0, 0, 0, 0, 0])
     lines = {name: np.zeros(6) for name in ("blocks_weight", "ground", "ground_joints")}
-    balance = ledger.book(
+    balance = ledger.add_step(
         None,
         BlocksStep(
             after=got,
@@ -147,7 +147,7 @@ def test_a_moment_from_nowhere_is_an_error_by_its_arm():
         lines = {name: np.zeros(6) for name in ("blocks_weight", "ground", "ground_joints")}
         got = np.array(turned)
         step = BlocksStep(after=got, lines=lines, held=np.zeros(6), received=np.zeros(6), exchanged=3.0)
-        balance = ledger.book(None, step)
+        balance = ledger.add_step(None, step)
         assert balance.error == pytest.approx(0.5)
         assert balance.residual == pytest.approx(got)
 
@@ -159,7 +159,7 @@ def test_books_go_on_from_what_was_saved():
     step = BlocksStep(
         after=np.arange(6.0) + 1.0, lines=lines, held=np.zeros(6), received=np.zeros(6), exchanged=2.0
     )
-    ledger.book(None, step)
+    ledger.add_step(None, step)
     again = MomentumLedger(np.zeros(3), 1.0)
     again.restore(ledger.save())
     for name, value in ledger.save().items():

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from coupler.balance.momentum import book_step, momentum_ledger
+from coupler.balance.momentum import add_step, momentum_ledger
 from coupler.scene.build import build
 from coupler.step import coupled_step as loop
 from coupler.step.coupled_step import CoupledStepper
@@ -58,10 +58,10 @@ class Pipe:
         self.taken.append(problem.dt)
         self.energy += self.gains * (problem.dt > self.gains_above) + self.rate * problem.dt
 
-    def remember(self):
+    def snapshot(self):
         return {"energy": self.energy, "taken": list(self.taken)}
 
-    def go_back(self, remembered):
+    def restore(self, remembered):
         self.energy, self.taken = remembered["energy"], list(remembered["taken"])
 
     def available_energy(self):
@@ -96,7 +96,7 @@ class Piston(FreeBody):
 def _no_books_of_momentum(monkeypatch):
     """The pipe has no nodes to sum over, and no surface on the piston."""
     monkeypatch.setattr(loop, "momentum_ledger", lambda water, structure: None)
-    monkeypatch.setattr(loop, "book_step", lambda *given: None)
+    monkeypatch.setattr(loop, "add_step", lambda *given: None)
     monkeypatch.setattr(CoupledStepper, "_afloat", lambda self, problem: (problem, None))
 
 
@@ -280,7 +280,7 @@ BLOCK = {
 def test_a_step_taken_again_is_the_short_step_bit_for_bit(sections, monkeypatch):
     """Nothing of the step that was taken back is left in water, sea, structure and books, with and without blocks."""
     monkeypatch.setattr(loop, "momentum_ledger", momentum_ledger)
-    monkeypatch.setattr(loop, "book_step", book_step)
+    monkeypatch.setattr(loop, "add_step", add_step)
     monkeypatch.setattr(CoupledStepper, "_afloat", AFLOAT)
     again, straight = (after_steps(splash(**sections), good) for good in ([False, True], [True]))
     assert all(np.array_equal(a, b) for a, b in zip(again, straight))

@@ -26,7 +26,7 @@ from coupler.program.errors import BadCase, ExitCode
 from coupler.results.fields import BlockWriter
 from coupler.results.history import HistoryTable, read_history
 from coupler.run.directory import RunDirectory, write_json
-from coupler.run.execute import carry_out
+from coupler.run.execute import execute_case
 from coupler.step.limits import Diverged, check_overlap
 
 SEED = 2
@@ -118,7 +118,7 @@ def test_scenes_cover_the_case_format():
 @pytest.mark.parametrize("number", NUMBERS)
 def test_a_short_scene_keeps_what_it_must(tmp_path, number):
     file, still = made(tmp_path, number)
-    code = carry_out(file, RunDirectory.create(file, tmp_path / "out"))
+    code = execute_case(file, RunDirectory.create(file, tmp_path / "out"))
     assert code in (ExitCode.DONE, ExitCode.STOPPED)
     assert [m for m in measures(tmp_path / "out", still) if not m.kept] == []
 
@@ -214,7 +214,7 @@ def test_still_water_that_moves_or_pulls_is_seen(tmp_path):
     still = next(n for n in range(200) if draw(SEED, n).still)
     file, _ = made(tmp_path, still, 0.05)
     out = tmp_path / "out"
-    carry_out(file, RunDirectory.create(file, out))
+    execute_case(file, RunDirectory.create(file, out))
     speed = [m for m in measures(out, still=True) if m.quantity == "speed of still water"]
     assert [m.kept for m in speed] == [True]
     assert [m for m in measures(out, still=True) if not m.kept] == []

@@ -351,10 +351,10 @@ def test_the_snakefile_makes_every_run_by_its_id(made):
 
 
 def test_options_that_no_engine_knows_are_refused(tmp_path):
-    from coupler.commands.sweep.command import Wish, sweep
+    from coupler.commands.sweep.command import SweepRequest, sweep
 
     with pytest.raises(BadCase) as reported:
-        sweep(tmp_path, Wish(engine="slurn", export="make", options=("time",)))
+        sweep(tmp_path, SweepRequest(engine="slurn", export="make", options=("time",)))
     assert "--engine slurn: there are local, slurm" in str(reported.value)
     assert "--export make" in str(reported.value)
     assert "--option time: write KEY=VALUE" in str(reported.value)

@@ -9,7 +9,7 @@ from coupler.checks.read_case import load
 from coupler.commands.report.run_page import _doubts
 from coupler.results.tank_top import TankTop, in_all, reached
 from coupler.run.directory import RunDirectory
-from coupler.run.execute import carry_out
+from coupler.run.execute import execute_case
 from coupler.run.summary import read_summary
 
 CASE = """
@@ -41,7 +41,7 @@ def run_of(directory, text):
     (directory / "case.toml").write_text(text)
     file = load(directory)
     run = RunDirectory.create(file, directory / "run")
-    assert carry_out(file, run, quiet=True) == 0
+    assert execute_case(file, run, quiet=True) == 0
     return run.path
 
 

@@ -25,7 +25,7 @@ def simple_wave(height):
 def test_long_wave_of_any_height_goes_out_as_if_the_water_went_on(height):
     h, u = simple_wave(height)
     side = absorber(steady(INWARD, DEPTH - 5.0, 0.0), bed=-5.0)
-    side.hear(np.full(2, h), np.tile(-u * INWARD, (2, 1)), 0.0)
+    side.update(np.full(2, h), np.tile(-u * INWARD, (2, 1)), 0.0)
     flow = side.as_flow()
     assert flow.level(0.0) == pytest.approx(h - 5.0)
     np.testing.assert_allclose(flow.velocity(np.zeros((3, 3)), 0.0), np.tile(-u * INWARD, (3, 1)), atol=1e-12)
@@ -34,7 +34,7 @@ def test_long_wave_of_any_height_goes_out_as_if_the_water_went_on(height):
 def test_given_wave_alone_is_left_as_it_is():
     h, u = simple_wave(0.4)
     side = absorber(steady(INWARD, h, u))
-    side.hear(np.full(2, h), np.tile(u * INWARD, (2, 1)), 0.0)
+    side.update(np.full(2, h), np.tile(u * INWARD, (2, 1)), 0.0)
     assert side.height == pytest.approx(0.0, abs=1e-12)
     assert side.speed == pytest.approx(0.0, abs=1e-12)
 
@@ -45,7 +45,7 @@ def test_wave_that_comes_in_and_one_that_goes_out_pass_each_other():
     c = np.sqrt(G * DEPTH)
     side = absorber(steady(INWARD, DEPTH + a, c * a / DEPTH))
     velocity = c * (a - b) / DEPTH
-    side.hear(np.full(2, DEPTH + a + b), np.tile(velocity * INWARD, (2, 1)), 0.0)
+    side.update(np.full(2, DEPTH + a + b), np.tile(velocity * INWARD, (2, 1)), 0.0)
     assert side.height == pytest.approx(b, rel=1e-3)
     assert side.speed == pytest.approx(-c * b / DEPTH, rel=1e-3)
 
@@ -53,14 +53,14 @@ def test_wave_that_comes_in_and_one_that_goes_out_pass_each_other():
 def test_water_that_circulates_over_an_uneven_bed_brings_nothing():
     """Out over the deep half, back twice as fast over the shallow one: what counts is the flow, not the mean speed."""
     side = Absorber(steady(INWARD, DEPTH, 0.0), INWARD, PLACES, np.array([0.0, DEPTH / 2]), G)
-    side.hear(np.array([DEPTH, DEPTH / 2]), np.array([-1.0, 2.0])[:, None] * INWARD, 0.0)
+    side.update(np.array([DEPTH, DEPTH / 2]), np.array([-1.0, 2.0])[:, None] * INWARD, 0.0)
     assert side.height == pytest.approx(0.0, abs=1e-12)
     assert side.speed == pytest.approx(0.0, abs=1e-12)
 
 
 def test_dry_side_brings_nothing():
     side = absorber(steady(INWARD, -1.0, 0.0))
-    side.hear(np.zeros(2), np.zeros((2, 3)), 0.0)
+    side.update(np.zeros(2), np.zeros((2, 3)), 0.0)
     assert (side.height, side.speed) == (0.0, 0.0)
 
 

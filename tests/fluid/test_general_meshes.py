@@ -8,7 +8,7 @@ from fluid.domain.physical_domain import cut_domain
 from fluid.domain.topology import Topology
 from fluid.step.parameters import WaterParameters
 from fluid.step.water import Water
-from fluid.surface.gradient_jump_damping import damp_kinks
+from fluid.surface.gradient_jump_damping import damp_gradient_jumps
 from fluid.transport.paths_in_solids import levels_in_solids
 from tests.fluid.general import unstructured
 from tests.fluid.scenes import advance, load, rotation
@@ -76,11 +76,11 @@ def test_kinks_are_damped_and_linear_velocities_are_not(mesh):
     arrays = (t.fluid_cells, t.neighbours)
     linear = t.nodes @ np.array([[1.0, 2, -1], [0.3, -2, 1], [0.5, 0, 1]]) + [1, 2, 3]
     u = linear.copy()
-    damp_kinks(cells, *rest, u, *arrays)
+    damp_gradient_jumps(cells, *rest, u, *arrays)
     np.testing.assert_allclose(u, linear, atol=1e-12)
     noise = np.random.default_rng(0).standard_normal((n, 3))
     before, momentum = t.node_volume @ noise**2, t.node_volume @ noise
-    damp_kinks(cells, *rest, noise, *arrays)
+    damp_gradient_jumps(cells, *rest, noise, *arrays)
     assert (t.node_volume @ noise**2 < 0.8 * before).all()
     np.testing.assert_allclose(t.node_volume @ noise, momentum, atol=1e-12)
 

@@ -280,9 +280,9 @@ def test_a_step_that_is_taken_back_leaves_nothing_behind():
         return slug(1.0, 2.0, 0.5, 4, 4e-3, 6)[2]
 
     water, again = fresh(), fresh()
-    remembered = again.remember()
+    remembered = again.snapshot()
     step(again, 8e-3)
-    again.go_back(remembered)
+    again.restore(remembered)
     for w in (water, again):
         step(w, 4e-3, 1e-9)
     for name in ("velocity", "pressure", "level_set"):

@@ -90,7 +90,7 @@ def test_friction_that_is_let_go_takes_what_its_springs_hold():
         slide = 0.5 * limit / k
         s.advance(slide / SPEED)
         before = float(j.rubbed.sum())
-        held = j.let_go(np.array([0]), s._motion.x, s._motion.R)
+        held = j.release(np.array([0]), s._motion.x, s._motion.R)
         assert held == pytest.approx(0.5 * k * slide**2 * j.weight[failed].sum(), rel=0.02)
         assert float(j.rubbed.sum()) - before == pytest.approx(held)
 

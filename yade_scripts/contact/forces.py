@@ -112,7 +112,7 @@ class ContactForces:
         return near[~_among(self._key(*near.T), self._joined)]
 
     def _awake(self, near: Array) -> Array:
-        """The pairs in which something can move. Blocks that may come near to a sleeping group are noted on the way."""
+        """The pairs in which a block can move. Blocks that may approach a sleeping group are recorded as well."""
         moves = self._free[: self._n] | self._motion.v.any(axis=1)
         on = np.flatnonzero(self._on & moves & ~self._asleep[: self._n])
         row, group = np.indices((len(on), len(self._boxes))).reshape(2, -1)
@@ -126,15 +126,15 @@ class ContactForces:
         x, boxes = self._motion.x[rows], self._boxes[groups]
         return ((x - reach <= boxes[:, 1]) & (x + reach >= boxes[:, 0])).all(axis=1)
 
-    def roused(self) -> Array:
-        """(groups,) bool: sleeping groups of blocks that a loose body has come near to."""
+    def approached_groups(self) -> Array:
+        """(groups,) bool: sleeping groups of blocks that a loose body has approached."""
         rows, groups = self._comers.T
         found = np.zeros(len(self._boxes), bool)
         found[groups[self._within(rows, groups, 2.0 * self._reach)]] = True
         return found
 
-    def let_rest(self, asleep: Array, groups: list[Array]) -> None:
-        """asleep (n,) bool: blocks that stand still and meet nothing from now on; rows of each group of them."""
+    def set_asleep(self, asleep: Array, groups: list[Array]) -> None:
+        """asleep (n,) bool: blocks that do not move and have no contacts from now on; rows of each group of them."""
         self._asleep[: self._n] = asleep
         radius, x = self._shapes.radius[:, None], self._motion.x
         self._boxes = np.array(
@@ -172,7 +172,7 @@ class ContactForces:
         return np.concatenate(found)
 
     def _set_pairs(self, pairs: Array, parted: Array | None = None, as_deep: bool = False) -> None:
-        """Pairs (p, 2) in order; what known pairs remember goes on. Others begin with the depth there is where a joint
+        """Pairs (p, 2) in order; known pairs keep their history. Others begin with the depth there is where a joint
         has parted (keys `parted`) or as_deep."""
         a, b = pairs.T.copy()
         size = self._nodes[a] + self._nodes[b] + CROSSINGS

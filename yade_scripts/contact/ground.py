@@ -19,13 +19,13 @@ from kernel_decorators import inner, plain
 from yade_scripts.blocks.faces import FixedPlane
 from yade_scripts.contact.arrays import BEGINS
 from yade_scripts.contact.search import ALIGNED, write_row
-from yade_scripts.contact.springs import ARRIVED, let_go, stiffness_together, take_over, way_of
+from yade_scripts.contact.springs import ARRIVED, release, stiffness_together, take_over, way_of
 
 Array = np.ndarray
 
 
 class Ground(NamedTuple):
-    """What the kernel knows: row of the body, -1 without one · x (nx,), y (ny,), z (nx, ny) [m] from its point ·
+    """The ground for the kernel: row of the body, -1 without one · x (nx,), y (ny,), z (nx, ny) [m] from its point ·
     mirrored: diagonals turn from square to square · upright: least n_z of all triangles."""
 
     row: int
@@ -43,7 +43,7 @@ NO_GROUND = Ground(-1, np.zeros(2), np.zeros(2), np.zeros((2, 2)), False, 1.0)
 class GroundSurface(FixedPlane):
     """Uneven ground as a fixed body. x (nx,), y (ny,) increasing, z (nx, ny) [m]: corners of its triangles, counted
     from `point`, at or above it · mirrored: squares with i + j odd are split from (1, 0) to (0, 1), all others from
-    (0, 0) to (1, 1). Beyond its edges it goes on level."""
+    (0, 0) to (1, 1). Beyond its edges it is level."""
 
     x: Array = None
     y: Array = None
@@ -147,7 +147,7 @@ def scan_ground(
             lost += 0.5 * across**2 / (shear * slots.k[s])
             way_of(state, a, b, xi0, xi1, xi2, plane, scratch, way)
             if depth <= 0.0:
-                lost += let_go(slots, s, shear, depth, way, R, b)
+                lost += release(slots, s, shear, depth, way, R, b)
                 continue
         elif not known:
             own = _lowest_face(shapes, i, plane)

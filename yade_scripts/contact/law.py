@@ -47,7 +47,7 @@ class PairFriction:
 @dataclass(frozen=True)
 class ContactLaw:
     """stiffness K [N/m] of a whole face in contact; None: that of the joints in closing (k_c A), so that a face
-    that loses its joint goes on with the stiffness it had · restitution e in (0, 1] · friction μ ≥ 0
+    whose joint fails keeps its stiffness · restitution e in (0, 1] · friction μ ≥ 0
     shear_ratio: K_t/K_n (1 in the paper) · rule: "exact" returns e, "paper" uses equation (3) as printed
     tangential_restitution in (0, 1]: sets the tangential dashpot by equation (3), with the effective mass along the
     face; None: the normal dashpot times sqrt(shear_ratio) · pairs: what pairs of materials have of their own

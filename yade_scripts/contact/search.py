@@ -13,7 +13,7 @@ from kernel_decorators import inner, plain
 from yade_scripts.contact.arrays import BEGINS, CROSSINGS
 from yade_scripts.contact.edges import FLAT, PARALLEL, crossing, find_crossing, next_beside
 from yade_scripts.contact.overlap import share_of_overlap
-from yade_scripts.contact.springs import ARRIVED, let_go, stiffness_together, take_over, way_of
+from yade_scripts.contact.springs import ARRIVED, release, stiffness_together, take_over, way_of
 
 ALIGNED = 0.02
 """Least cosine between the normal of a face and the reversed normal of a face of the node: the node cannot have run
@@ -105,7 +105,7 @@ def scan(shapes, bodies, law, slots, slot, side, faces, state, rows, count, lost
             depth = _behind(planes, g, xi0, xi1, xi2)
             if depth <= 0.0 or smallest < -margin:
                 way_of(state, a, b, xi0, xi1, xi2, planes[g], scratch, way)
-                lost += let_go(slots, s, law.shear, depth, way, state.R, b)
+                lost += release(slots, s, law.shear, depth, way, state.R, b)
                 continue
         elif smallest < -margin or not side.begins:
             continue
@@ -153,7 +153,7 @@ def cross(
             depth, within = crossing(shapes, a, b, slots.face[s], state, plane, xi, scratch)
             if within < 0.0 or depth <= 0.0:
                 way_of(state, a, b, xi[0], xi[1], xi[2], plane, scratch, way)
-                lost += let_go(slots, s, shear, depth, way, R, b)
+                lost += release(slots, s, shear, depth, way, R, b)
             else:
                 _move_slot(slots, s, to)
                 count = _write_crossing(slots, to, side, plane, depth, xi, state, rows, count)

@@ -349,7 +349,7 @@ def take_over(slots, s, share, depth, into):
 
 
 @inner
-def let_go(slots, s, shear, depth, way, R, b):
+def release(slots, s, shear, depth, way, R, b):
     """End a contact; → energy [J] left in its springs, which is lost, at the time of the velocities half a substep ago.
 
     depth [m]: now · way (2, 3) [m]: motion over the last substep from `way_of`, by which the springs were shorter

@@ -55,22 +55,22 @@ class Contacts:
 
     def forces(self, v: Array, x: Array) -> Array:
         """Whole force on b (c, 3) [N] at block velocities v (n, 6): with the dashpots, as the law applies it."""
-        viscous = np.where(self.slides, 0.0, self.cs)[:, None] * self._rubbing_velocity(v, x)
+        viscous = np.where(self.slides, 0.0, self.cs)[:, None] * self._sliding_velocity(v, x)
         return self.normal_force + self.shear_force + viscous
 
-    def _rubbing_velocity(self, v: Array, x: Array) -> Array:
+    def _sliding_velocity(self, v: Array, x: Array) -> Array:
         """Velocity of a against b along the face where they rub (c, 3) [m/s]."""
         w = point_velocities(self.a, self.shear_point, v, x) - point_velocities(
             self.b, self.shear_point, v, x
         )
         return w - np.einsum("ci,ci->c", w, self.normal)[:, None] * self.normal
 
-    def goes_on_sliding(self, v: Array, x: Array, dt: float) -> Array:
+    def keeps_sliding(self, v: Array, x: Array, dt: float) -> Array:
         """(c,) bool: contacts whose spring would pull more than friction allows after a substep of dt [s] at the block
         velocities v (n, 6). One that slides has the friction of the substep that ended: where the normal force has
         grown since then, by however little, it is below what friction allows now."""
         limit = self.mu * np.linalg.norm(self.normal_force, axis=1)
-        pull = self.shear_force + dt * self.ks[:, None] * self._rubbing_velocity(v, x)
+        pull = self.shear_force + dt * self.ks[:, None] * self._sliding_velocity(v, x)
         return self.slides | (np.linalg.norm(pull, axis=1) >= SLIPS * limit)
 
     def closing_velocity(self, v: Array, x: Array) -> Array:
@@ -78,8 +78,8 @@ class Contacts:
         return point_velocities(self.a, self.point, v, x) - point_velocities(self.b, self.point, v, x)
 
     def springs(self, v: Array, x: Array, dt: float) -> Springs:
-        """Secant springs and dashpots; a contact that goes on sliding in a substep of dt [s] has no tangential ones."""
-        sticks, none = ~self.goes_on_sliding(v, x, dt), np.zeros(len(self))
+        """Secant springs and dashpots; a contact that keeps sliding in a substep of dt [s] has no tangential ones."""
+        sticks, none = ~self.keeps_sliding(v, x, dt), np.zeros(len(self))
         return self.pushing_springs(x).and_(
             self._springs_at(self.shear_point, x, none, self.ks * sticks, none, self.cs * sticks)
         )

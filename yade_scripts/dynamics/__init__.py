@@ -6,7 +6,7 @@ substep, spin             one substep; free rotation of bodies with unequal iner
 timestep                  how long a substep may be
 onset                     when a joint dies, contact takes over
 equilibrium               displacements and joint forces at rest under the load of the start
-sleep                     islands of blocks that nothing happens to; loaded where it is asked for
+sleep                     islands of blocks at rest that make no substeps; loaded if the case asks for it
 energy, impulses          what acted on the blocks, and the energy and momentum it changed
 state                     saved and restored, bit for bit
 

@@ -36,7 +36,7 @@ class Masses:
         return R @ self.body_inertia @ R.transpose(0, 2, 1)
 
 
-class Accounts:
+class EnergySums:
     """Running sums [J]: load_work · joint_work: what the joints did to the blocks · driving_work: done by what moves
     the driven blocks, against joints, and by what holds up weight that has not come on yet · handed_over: energy of
     compressed joints that went over to contacts.

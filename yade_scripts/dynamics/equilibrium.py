@@ -8,7 +8,8 @@ it. The joined blocks are therefore moved to their equilibrium first,
 by Newton's method with the tangent of the joints as they open. K is then the curvature of an energy that equilibrium
 makes smallest: where softening makes K indefinite the secant stiffness takes its place, whose step still goes
 downhill, and a is cut until f(u + a Δu)·Δu does not point back strongly (stiff closing flips points between open and
-closed). Contacts push by the depth there is and do not rub: moving blocks by hand stretches no spring of friction.
+closed). Contacts push in proportion to their depth and have no friction: displacing blocks directly stretches no spring
+of friction.
 Joints that cannot carry the load open beyond their opening at failure, or the search finds no end.
 """
 
@@ -78,7 +79,7 @@ class Search:
 
     def rounding(self) -> float:
         """Forces [N] that the rounding of positions makes in the stiffest joints."""
-        stiffest = self._structure.secant_by_hand().diagonal().reshape(-1, 6)[:, :3].max()
+        stiffest = self._structure.secant_without_friction().diagonal().reshape(-1, 6)[:, :3].max()
         extent = np.ptp(self._structure.centre(), axis=0).max() + max(
             b.radius for b in self._structure.blocks
         )
@@ -90,9 +91,9 @@ class Search:
 
     def direction(self, residual: Array) -> Array:
         """Newton's step where the tangent is positive definite, else the step of the secant stiffness."""
-        tangent = factors(self._part(self._structure.tangent_by_hand()))
+        tangent = factors(self._part(self._structure.tangent_without_friction()))
         if tangent is None:
-            tangent = factors(self._part(self._structure.secant_by_hand()))
+            tangent = factors(self._part(self._structure.secant_without_friction()))
         if tangent is None:
             raise CannotStand(_message(self._structure, "joints have lost their stiffness", self.damage))
         return tangent.solve(residual)

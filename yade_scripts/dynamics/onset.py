@@ -17,7 +17,7 @@ from yade_scripts.yade_side.motion import Motion
 from yade_scripts.yade_side.scene import Scene
 
 STANDS = 0.02
-"""A joined block stands in its place as long as it has moved less than this share of its radius."""
+"""A joined block counts as at rest as long as it has moved less than this share of its radius."""
 NONE = np.zeros(0, np.int64)
 
 
@@ -55,7 +55,7 @@ class ContactOnset:
         self.loosen(np.flatnonzero(loose), as_deep=True)
 
     def rest_here(self) -> None:
-        """Take the present positions as those in which the blocks stand."""
+        """Take the present positions as the positions of rest."""
         self._x_rest, self._R_rest = self._motion.x.copy(), self._motion.R.copy()
 
     def moved(self) -> Array:
@@ -87,7 +87,7 @@ class ContactOnset:
             self._contacts.switch_on(rows, as_deep)
 
     def save(self) -> dict[str, Array]:
-        """Which blocks are loose, and the positions in which the others stand."""
+        """Which blocks are loose, and the positions of rest of the others."""
         return {"loose": self.loose.copy(), "x_rest": self._x_rest.copy(), "R_rest": self._R_rest.copy()}
 
     def restore(self, saved: dict[str, Array]) -> None:

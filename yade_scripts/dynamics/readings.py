@@ -16,7 +16,7 @@ from array_types import Array
 from yade_scripts.blocks import tangent
 from yade_scripts.contact.forces import ContactForces
 from yade_scripts.contact.state import Contacts, no_contacts, sum_on_blocks
-from yade_scripts.dynamics.energy import Accounts, Masses
+from yade_scripts.dynamics.energy import EnergySums, Masses
 from yade_scripts.dynamics.onset import ContactOnset
 from yade_scripts.dynamics.spin import SpinCorrection
 from yade_scripts.dynamics.substep import Substepper
@@ -49,7 +49,7 @@ class StructureReadings:
     _seals: Seals | None
     _partly: Seals | None
     _shares: Array
-    _accounts: Accounts
+    _energy_sums: EnergySums
     _substepper: Substepper
     _sleep: Sleep | None
 
@@ -69,7 +69,7 @@ class StructureReadings:
         """Momentum, and angular momentum about a point (3,), of the blocks that move freely (6,) [N s, N m s].
 
         Of the velocities, half a substep before the places; with these it changes by the impulses to round-off."""
-        free = self._accounts.free
+        free = self._energy_sums.free
         if self._sleep is not None:
             free = free[~self._sleep.asleep[free]]
         p = self.mass[free, None] * self._motion.v[free, :3]
@@ -97,7 +97,7 @@ class StructureReadings:
 
     def weight_now(self) -> Array:
         """(n, 6) [N, N m]: as `gravity_force`, less the part of the weight that does not act yet."""
-        return self.gravity_force() - self._substepper.missing_weight(self.time) * self._accounts.weight
+        return self.gravity_force() - self._substepper.missing_weight(self.time) * self._energy_sums.weight
 
     def internal_force(self, viscous: bool = False) -> Array:
         """Forces of joints and contacts on the blocks at the present state, (n, 6).
@@ -137,14 +137,15 @@ class StructureReadings:
         springs = self.contacts().springs(self._motion.v, self._motion.x, self.substep())
         return tangent.assemble(self._with_joints(springs), self.n)
 
-    def secant_by_hand(self) -> sp.csr_array:
-        """(6n, 6n): K of `tangent` where blocks are moved by hand (`displace`), which stretches no spring of
-        friction: contacts push only."""
+    def secant_without_friction(self) -> sp.csr_array:
+        """(6n, 6n): K of `tangent` for blocks that are displaced directly (`displace`), which stretches no spring of
+        friction: contacts have their normal springs only."""
         springs = self._with_joints(self.contacts().pushing_springs(self._motion.x))
         return tangent.assemble(springs, self.n)[0]
 
-    def tangent_by_hand(self) -> sp.csr_array:
-        """(6n, 6n): as `secant_by_hand`, with the joints as they answer while they open further: softening counts."""
+    def tangent_without_friction(self) -> sp.csr_array:
+        """(6n, 6n): as `secant_without_friction`, with the tangent stiffness of joints that open further, including
+        their softening."""
         contacts = tangent.assemble(self.contacts().pushing_springs(self._motion.x), self.n)[0]
         if self.joints is None:
             return contacts
@@ -241,9 +242,9 @@ class StructureReadings:
         dashpot and friction are sums over substeps of force times velocity; friction holds the springs of contacts
         that ended as well.
         """
-        return self._accounts.energies()
+        return self._energy_sums.energies()
 
     def law_dissipation(self) -> float:
         """Energy Σ A D(λ) [J] that the damage has dissipated according to the law, for comparison with
         joint_dissipated."""
-        return self._accounts.law_dissipation()
+        return self._energy_sums.law_dissipation()

@@ -32,7 +32,7 @@ from scipy.spatial.transform import Rotation
 from array_types import Array
 from yade_scripts.blocks import tangent
 from yade_scripts.contact.forces import ContactForces
-from yade_scripts.dynamics.energy import Accounts, Masses
+from yade_scripts.dynamics.energy import EnergySums, Masses
 from yade_scripts.dynamics.equilibrium import factors
 from yade_scripts.dynamics.impulses import ImpulseSums
 from yade_scripts.dynamics.onset import ContactOnset
@@ -89,14 +89,14 @@ class Sleep:
         onset: ContactOnset,
         spin: SpinCorrection,
         masses: Masses,
-        accounts: Accounts,
+        energy_sums: EnergySums,
         impulses: ImpulseSums,
         relist: Callable[[], None],
     ):
         self.share = share
         self._scene, self._motion, self._joints, self._contacts = scene, motion, joints, contacts
         self._onset, self._spin, self._masses = onset, spin, masses
-        self._accounts, self._impulses, self._relist = accounts, impulses, relist
+        self._energy_sums, self._impulses, self._relist = energy_sums, impulses, relist
         n = len(masses.mass)
         self.asleep = np.zeros(n, bool)
         self.force = np.zeros((n, 6))
@@ -152,10 +152,11 @@ class Sleep:
             self._fall(time)
 
     def reached(self, time: float) -> bool:
-        """Wake the islands that a moving block has come near to since the last substep; whether there were any."""
+        """Wake the islands that a moving block has approached since the last substep, and return whether there were
+        any."""
         if self._contacts is None or not self._sleepers:
             return False
-        near = self._contacts.roused()
+        near = self._contacts.approached_groups()
         if not near.any():
             return False
         self._wake([s for s, woken in zip(self._sleepers, near) if woken], time)
@@ -261,14 +262,14 @@ class Sleep:
 
     def _stop(self, rows: Array) -> None:
         """Stop the blocks; their joints take up their momentum and energy."""
-        m, accounts = self._motion, self._accounts
+        m, energy_sums = self._motion, self._energy_sums
         if m.v[rows].any():
-            left = accounts.of_motion(rows)
+            left = energy_sums.of_motion(rows)
             p = self._masses.mass[rows, None] * m.v[rows, :3]
             spin = self._scene.angular_momentum(rows) - self._spin.save()[rows]
             self._impulses.give(rows, np.concatenate([-p, -spin, -np.cross(m.x[rows], p) - spin], axis=1))
             m.v[rows] = 0.0
-            accounts.joint_work -= left
+            energy_sums.joint_work -= left
             self.put_to_rest += abs(left)
         self._spin.forget(rows)
         self._scene.hold(rows)
@@ -341,7 +342,7 @@ class Sleep:
         self._hold(sleepers, time)
         for sleeper in sleepers:
             self._reference[sleeper.island.joints] = NEVER
-            self._scene.let_go(sleeper.island.rows)
+            self._scene.release(sleeper.island.rows)
         gone = {id(s) for s in sleepers}
         self._sleepers = [s for s in self._sleepers if id(s) not in gone]
         self.wakes += len(sleepers)
@@ -373,11 +374,11 @@ class Sleep:
             self.asleep[sleeper.island.rows] = True
             still[sleeper.island.joints] = True
             self.force += sleeper.force
-        self._joints.let_rest(still)
+        self._joints.set_asleep(still)
         self._motion.rest(self.asleep)
-        self._accounts.stored_asleep = float(sum(s.stored for s in self._sleepers))
+        self._energy_sums.stored_asleep = float(sum(s.stored for s in self._sleepers))
         if self._contacts is not None:
-            self._contacts.let_rest(self.asleep, [s.island.rows for s in self._sleepers])
+            self._contacts.set_asleep(self.asleep, [s.island.rows for s in self._sleepers])
         self._relist()
 
     # ---- saving and going back ------------------------------------------------------------------------------
@@ -410,5 +411,5 @@ class Sleep:
             sleeper = old if stands else self._sleeper(island)
             assert sleeper is not None  # it had stiffness when it fell asleep just here
             self._sleepers.append(sleeper)
-        self._scene.hold_again(asleep)
+        self._scene.set_held(asleep)
         self._changed()

@@ -41,7 +41,7 @@ class SpinCorrection:
         _correct(rows, R, v, self._inertia, self._inverse, dt, last_dt, self._lent, F)
 
     def forget(self, rows: Array) -> None:
-        """Drop the corrections of blocks that stand still."""
+        """Discard the corrections of blocks at rest."""
         self._lent[rows] = 0.0
 
     def save(self) -> Array:

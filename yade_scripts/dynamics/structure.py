@@ -17,7 +17,7 @@ from yade_scripts.blocks.faces import FixedPlane, TouchingFaces, both_held, touc
 from yade_scripts.contact.forces import ContactForces
 from yade_scripts.contact.law import ContactLaw
 from yade_scripts.dynamics.description import check_names, local_origin, matched_stiffness, moved_block
-from yade_scripts.dynamics.energy import Accounts, Masses
+from yade_scripts.dynamics.energy import EnergySums, Masses
 from yade_scripts.dynamics.impulses import Impulses, ImpulseSums
 from yade_scripts.dynamics.onset import ContactOnset, loose_at_start, moves
 from yade_scripts.dynamics.readings import StructureReadings
@@ -102,7 +102,7 @@ class Structure(StructureReadings):
         self._seals = Seals(local, faces.sealed) if faces.sealed else None
         self._partly = Seals(local, [face for face, _ in faces.partly]) if faces.partly else None
         self._shares = np.array([share for _, share in faces.partly])
-        self._rub_failed_points()
+        self._set_friction_of_failed_points()
         self.face_stiffness = self._face_stiffness()
         self._set_damping()
         self._substep = substep
@@ -118,7 +118,7 @@ class Structure(StructureReadings):
         self._onset = ContactOnset(
             self._scene, self._motion, self.joints, self._contacts, self._radius, loose
         )
-        self._start_accounts(ramp)
+        self._start_energy_sums(ramp)
         if sleep is not None and self.joints is not None:
             self._set_sleep(sleep)
 
@@ -144,7 +144,7 @@ class Structure(StructureReadings):
         self._spin = SpinCorrection(inertia, ~self.fixed)
         self._radius = np.array([b.radius for b in blocks])
 
-    def _rub_failed_points(self) -> None:
+    def _set_friction_of_failed_points(self) -> None:
         """Friction of contact where a joint has failed in part."""
         if self.joints is None or self.contact is None:
             return
@@ -188,9 +188,9 @@ class Structure(StructureReadings):
             omega = self.substep_limit().omega
             self.joints.eta = 2.0 * self.joints.parameters.damping / omega if omega > 0.0 else 0.0
 
-    def _start_accounts(self, ramp: float) -> None:
+    def _start_energy_sums(self, ramp: float) -> None:
         self.time = 0.0
-        self._accounts = Accounts(self._masses, self._motion, self.joints, self._contacts)
+        self._energy_sums = EnergySums(self._masses, self._motion, self.joints, self._contacts)
         self._impulses = ImpulseSums(self.n, self._origin)
         self._substepper = Substepper(
             self._scene,
@@ -198,7 +198,7 @@ class Structure(StructureReadings):
             self.joints,
             self._contacts,
             self._spin,
-            self._accounts,
+            self._energy_sums,
             self._impulses,
             ramp,
         )
@@ -216,9 +216,9 @@ class Structure(StructureReadings):
             self._onset,
             self._spin,
             self._masses,
-            self._accounts,
+            self._energy_sums,
             self._impulses,
-            self._who_sleeps_changed,
+            self._sleepers_changed,
         )
 
     def share_work(self, share: Callable[..., list]) -> None:
@@ -228,7 +228,7 @@ class Structure(StructureReadings):
         if self._contacts is not None:
             self._contacts.share = share
 
-    def _who_sleeps_changed(self) -> None:
+    def _sleepers_changed(self) -> None:
         self._limit = None
         self._list_bodies()
 
@@ -293,7 +293,7 @@ class Structure(StructureReadings):
         turn = m.turned_since(R0)
         if self._sleep is not None:
             self._sleep.end(self.time)
-        work = self._accounts.take_load(self._substepper.load, x0, half, turn, spin)
+        work = self._energy_sums.take_load(self._substepper.load, x0, half, turn, spin)
         mean = np.concatenate([m.x - x0, turn], axis=1) / dt
         failed = np.concatenate(broken).astype(np.int64)
         return AdvanceReport(
@@ -351,14 +351,14 @@ class Structure(StructureReadings):
 
     def _retire(self, broken: Array) -> None:
         """Remove failed joints; contact takes over the part of their energy that was compression."""
-        stored = self._accounts.joint_stored()
+        stored = self._energy_sums.joint_stored()
         self._motion.read()
-        stored -= self.joints.let_go(broken, self._motion.x, self._motion.R)
+        stored -= self.joints.release(broken, self._motion.x, self._motion.R)
         self.joints.retire(broken, self._motion.x, self._motion.R, self.time)
         self._limit = None
         self._onset.loosen(self._onset.of_failed(broken))
         self._onset.leave_out_joined()
-        self._accounts.handed_over += stored - self._accounts.joint_stored()
+        self._energy_sums.handed_over += stored - self._energy_sums.joint_stored()
         if self._sleep is not None:
             self._sleep.joints_failed()
         self._list_bodies()
@@ -372,7 +372,7 @@ class Structure(StructureReadings):
 
     def displace(self, rows: Array, shift: Array, turn: Array) -> None:
         """Move blocks at once: shift (m, 3) [m], turn (m, 3, 3) about their centres; the joints take note of what
-        opens, velocities stay, and the energy accounts start anew from here."""
+        opens, velocities stay, and the energy sums start anew from here."""
         m = self._motion
         if self._sleep is not None:
             self._sleep.wake_all(self.time)
@@ -383,7 +383,7 @@ class Structure(StructureReadings):
         self._onset.rest_here()
         if self._contacts is not None:
             self._contacts.moved()
-        self._accounts.start_here()
+        self._energy_sums.start_here()
 
     # ---- saving and going back ------------------------------------------------------------------------------
 
@@ -396,7 +396,7 @@ class Structure(StructureReadings):
             load=self._substepper.load.copy(),
             lent_spin=self._spin.save(),
             onset=self._onset.save(),
-            sums=self._accounts.sums(),
+            sums=self._energy_sums.sums(),
             joints=self.joints.history() if self.joints is not None else None,
             contacts=self._contacts.save() if self._contacts is not None else None,
             sleep=self._sleep.save() if self._sleep is not None else None,
@@ -411,7 +411,7 @@ class Structure(StructureReadings):
         self.time, self._motion.dt, self._limit = saved.time, saved.dt, None
         if self._sleep is not None and saved.sleep is not None:
             asleep = saved.sleep["asleep"].astype(bool)
-            self._scene.hold_again(asleep)
+            self._scene.set_held(asleep)
             self._motion.rest(asleep)
             self._motion.put(np.flatnonzero(asleep), saved.motion)
         self._scene.restore(saved.motion)
@@ -419,7 +419,7 @@ class Structure(StructureReadings):
         self._motion.read()
         self._spin.restore(saved.lent_spin)
         self._onset.restore(saved.onset)
-        self._accounts.restore(saved.sums)
+        self._energy_sums.restore(saved.sums)
         if self.joints is not None:
             self.joints.restore(saved.joints)
         if self._contacts is not None:

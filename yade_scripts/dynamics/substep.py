@@ -12,7 +12,7 @@ import numpy as np
 
 from array_types import Array
 from yade_scripts.contact.forces import ContactForces
-from yade_scripts.dynamics.energy import Accounts
+from yade_scripts.dynamics.energy import EnergySums
 from yade_scripts.dynamics.impulses import ImpulseSums
 from yade_scripts.dynamics.spin import SpinCorrection
 from yade_scripts.joints.joints import Joints
@@ -35,12 +35,12 @@ class Substepper:
         joints: Joints | None,
         contacts: ContactForces | None,
         spin: SpinCorrection,
-        accounts: Accounts,
+        energy_sums: EnergySums,
         impulses: ImpulseSums,
         ramp: float = 0.0,
     ):
         self._scene, self._motion, self._joints, self._contacts = scene, motion, joints, contacts
-        self._spin, self._accounts, self._impulses = spin, accounts, impulses
+        self._spin, self._energy_sums, self._impulses = spin, energy_sums, impulses
         self.load = np.zeros((len(scene.ids), 6))
         self.fastest = 0.0
         self._F = np.zeros_like(self.load)
@@ -59,7 +59,7 @@ class Substepper:
         self._joined = self._joints.rows() if self._joints is not None else none
         self._turning = np.flatnonzero(self._spin.unequal)
         meeting = np.flatnonzero(loose) if self._contacts is not None else none
-        watched = np.union1d(np.union1d(self._joined, meeting), self._accounts.free)
+        watched = np.union1d(np.union1d(self._joined, meeting), self._energy_sums.free)
         pushed = np.union1d(watched, np.flatnonzero(self.load.any(axis=1)))
         if asleep is not None and asleep.any():
             self._turning = self._turning[~asleep[self._turning]]
@@ -82,7 +82,7 @@ class Substepper:
         self._F[:] = self.load
         missing = self.missing_weight(time)
         if missing > 0.0:
-            self._lift[:] = -missing * self._accounts.weight
+            self._lift[:] = -missing * self._energy_sums.weight
             self._F += self._lift
             self._impulses.lift(dt, m.x, missing)
         self._joint_F[:] = 0.0
@@ -100,8 +100,8 @@ class Substepper:
         m.dt = dt
         m.read_watched()
         if missing > 0.0:
-            self._accounts.take_lift(self._lift, before, dt)
+            self._energy_sums.take_lift(self._lift, before, dt)
         if len(self._joined):
-            self._accounts.take_joints(self._joint_F, before, self._joined, dt)
+            self._energy_sums.take_joints(self._joint_F, before, self._joined, dt)
         if self._contacts is not None:
             self._contacts.settle(dt)

@@ -34,7 +34,7 @@ class JointParameters:
     """strength T_max [Pa] · opening_at_failure δ_f [m] · shear_ratio β · closing_ratio k_c/k_0
     damping: share of critical damping of the stiffest joint mode, acts as a stiffness-proportional dashpot
     points: Gauss points along each edge of a joined face, "auto": as many as the law and k_c/k_0 need
-    ground: join faces that stand on the ground too · law: file of `yade_scripts/joints/laws` · peak: opening at T_max
+    ground: join faces on the ground as well · law: file of `yade_scripts/joints/laws` · peak: opening at T_max
     over δ_f, None: that of the law · mixed_mode: how opening and sliding act together, see `mixed_modes`
     """
 
@@ -135,5 +135,5 @@ class JointParameters:
         return self._share(self.cohesive_law.work, r) * self.strength * self.opening_at_failure
 
     def dissipated(self, largest: Array) -> Array:
-        """D = W - k_s λ²/2, what damage λ (n,) [m] has taken for good   →   (n,) [J/m²]."""
+        """D = W - k_s λ²/2, the energy dissipated by the damage λ (n,) [m]   →   (n,) [J/m²]."""
         return self.work_of_opening(largest) - 0.5 * self.secant_stiffness(largest) * np.square(largest)

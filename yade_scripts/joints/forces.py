@@ -190,7 +190,7 @@ def stored_between(live, joints, memory, now, before, out):
 
 
 def lost(joints, largest, out):
-    """Energy out (J,) [J] that the damage of every joint has taken for good, Σ weight (W(λ) - k_s λ²/2)."""
+    """Energy out (J,) [J] dissipated by the damage of every joint, Σ weight (W(λ) - k_s λ²/2)."""
     start, weight, law, peak = joints.start, joints.weight, joints.law, joints.peak
     for j in range(len(out)):
         out[j] = 0.0

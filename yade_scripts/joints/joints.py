@@ -188,7 +188,7 @@ class Joints:
         """Numbers of the live joints that have failed since the last call of `retire`."""
         return self.visited[kernel.broken(self.visited, self.start, self.largest, self.df)]
 
-    def let_rest(self, resting: Array) -> None:
+    def set_asleep(self, resting: Array) -> None:
         """(J,) bool: joints that substeps pass by from now on."""
         self.resting = resting
         self._list_visited()
@@ -204,7 +204,7 @@ class Joints:
         """μ (J,) of points that have failed and are pressed, while the rest of their joint holds."""
         self.law[:, MU] = friction
 
-    def let_go(self, joints: Array, x: Array, R: Array) -> float:
+    def release(self, joints: Array, x: Array, R: Array) -> float:
         """End the friction of `joints` at the positions x (n, 3), R (n, 3, 3) and return the energy [J] that was left
         in its springs."""
         friction = self.law[joints, MU]

@@ -34,7 +34,7 @@ class Motion:
         self._awake: Array | None = None
 
     def rest(self, asleep: Array) -> None:
-        """Let the blocks asleep (n,) bool stand still from now on, where they were read last."""
+        """Keep the sleeping blocks (n,) bool from now on where they were read last."""
         awake = np.flatnonzero(~asleep)
         self._awake = None if len(awake) == len(asleep) else awake
         self._all = _Rows(awake, self._scene.ids)

@@ -1,8 +1,8 @@
 """The scene in YADE: one body for each block, which YADE moves under given forces.
 
 YADE keeps the bodies, integrates their motion (`NewtonIntegrator`) and looks for neighbours (`InsertionSortCollider`)
-when it is asked; the laws of contact and joints act through its Python interface: forces go in before each step. YADE's
-own contact geometries are not used, because none of them is right for blocks (docs/theory.md).
+when it is called; the laws of contact and joints act through its Python interface: forces go in before each step.
+YADE's own contact geometries are not used, because none of them is right for blocks (docs/theory.md).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from yade_scripts.blocks.block import MARGIN, Block
 from yade_scripts.yade_side.engine import Engine, YadeError
 
 STANDING, LOOSE = 5, 1
-"""Masks: two bodies are neighbours if they share a bit, unless both stand (equal masks that hold `APART`)."""
+"""Masks: two bodies are neighbours if they share a bit, unless both are fixed (equal masks that hold `APART`)."""
 APART = 4
 VERLET = 0.05
 """Margin of the search for neighbours as a share of the smallest edge of a block."""
@@ -157,14 +157,14 @@ class Scene:
             self._fix(row, True)
         self._still[rows], self._still_states[rows] = True, states
 
-    def let_go(self, rows: Array) -> None:
+    def release(self, rows: Array) -> None:
         """Release blocks that were held, at the positions where they were left."""
         self._write(rows, self._still_states[rows])
         for row in rows.tolist():
             self._fix(row, False)
         self._still[rows] = False
 
-    def hold_again(self, still: Array) -> None:
+    def set_held(self, still: Array) -> None:
         """still (n,) bool: those that are held; `restore` says where."""
         for row in np.flatnonzero(self._still != still).tolist():
             self._fix(row, bool(still[row]))

@@ -57,7 +57,7 @@ def threads(nodes: int) -> dict:
     from fluid.numerics.threads import use, watched
 
     scene = started(nodes)
-    start, wall = scene.remember(), {n: np.inf for n in numbers()}
+    start, wall = scene.snapshot(), {n: np.inf for n in numbers()}
     for _ in range(REPEATS):
         for n in wall:
             use(n)
@@ -79,7 +79,7 @@ def threads(nodes: int) -> dict:
 
 
 def _steps(scene, start) -> None:
-    scene.go_back(start)
+    scene.restore(start)
     for _ in range(STEPS):
         step(scene)
 
@@ -109,7 +109,7 @@ def roofline(nodes: int) -> dict:
 
     scene = started(nodes)
     use(1)
-    start, t = scene.remember(), scene.topology
+    start, t = scene.snapshot(), scene.topology
     least: dict[str, list[float]] = {}
     spent = np.inf
     for _ in range(REPEATS):

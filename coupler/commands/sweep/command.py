@@ -40,7 +40,7 @@ SHOWN = 12
 
 
 @dataclass(frozen=True)
-class Wish:
+class SweepRequest:
     """The request of the command line. options: KEY=VALUE for the engine; chunk: runs that a cluster job makes one
     after the other."""
 
@@ -65,43 +65,43 @@ class Busy(SurgebreakError):
     exit_code = ExitCode.BAD_CASE
 
 
-def sweep(case: Path, wish: Wish) -> ExitCode:
+def sweep(case: Path, request: SweepRequest) -> ExitCode:
     """Make the runs of a sweep that are still missing, and print the results; return DIVERGED if a run failed, STOPPED
     if runs are left. Raises BadCase, Busy, NotInstalled."""
-    _check(wish)
-    plan = make_plan(case, wish.vary, wish.set)
-    folder = wish.output or plan.file.directory / "runs" / "sweep"
-    spec = write_spec(folder, plan, wish.threads)
+    _check(request)
+    plan = make_plan(case, request.vary, request.set)
+    folder = request.output or plan.file.directory / "runs" / "sweep"
+    spec = write_spec(folder, plan, request.threads)
     for remark in plan.remarks:
         print(f"note: {remark}")
-    if wish.plan:
+    if request.plan:
         _show(plan)
-        terminal.table("forecast", forecast(spec, wish.jobs or free_cores(wish.threads)))
+        terminal.table("forecast", forecast(spec, request.jobs or free_cores(request.threads)))
         return ExitCode.DONE
-    if wish.export:
+    if request.export:
         from coupler.commands.sweep.snakemake import export
 
         print(f"wrote {export(spec)}")
         return ExitCode.DONE
-    if wish.cancel is not None:
+    if request.cancel is not None:
         from coupler.commands.sweep.slurm import cancel
 
-        print(cancel(spec, wish.cancel))
+        print(cancel(spec, request.cancel))
         return ExitCode.DONE
     with _alone(folder):
-        stopped = _make(spec, wish)
+        stopped = _make(spec, request)
     return finish(spec, stopped)
 
 
-def _check(wish: Wish) -> None:
+def _check(request: SweepRequest) -> None:
     wrong = []
-    if wish.engine not in ENGINES:
-        wrong.append(f"--engine {wish.engine}: there are {', '.join(ENGINES)}")
-    if wish.export is not None and wish.export not in EXPORTS:
-        wrong.append(f"--export {wish.export}: there are {', '.join(EXPORTS)}")
-    if wish.engine == "local" and (wish.options or wish.detach or wish.chunk != 1):
+    if request.engine not in ENGINES:
+        wrong.append(f"--engine {request.engine}: there are {', '.join(ENGINES)}")
+    if request.export is not None and request.export not in EXPORTS:
+        wrong.append(f"--export {request.export}: there are {', '.join(EXPORTS)}")
+    if request.engine == "local" and (request.options or request.detach or request.chunk != 1):
         wrong.append("--option, --chunk and --detach are for cluster engines; give --engine")
-    wrong += [f"--option {o}: write KEY=VALUE" for o in wish.options if "=" not in o]
+    wrong += [f"--option {o}: write KEY=VALUE" for o in request.options if "=" not in o]
     if wrong:
         raise BadCase(wrong)
 
@@ -121,32 +121,32 @@ def _alone(folder: Path) -> Iterator[None]:
         yield
 
 
-def _make(spec: Spec, wish: Wish) -> bool:
+def _make(spec: Spec, request: SweepRequest) -> bool:
     """Make the missing runs; returns whether this was stopped before the end."""
-    ids = _to_make(spec, wish.any_version)
+    ids = _to_make(spec, request.any_version)
     rows = len(spec.rows)
     print(f"{rows} rows, {len(spec.runs)} runs, {len(ids)} to make; results in {spec.folder}", flush=True)
     if not ids:
         return False
     summary = _Progress(spec, len(ids))
     try:
-        _engine(spec, wish).make(ids, summary)
+        _engine(spec, request).make(ids, summary)
     except KeyboardInterrupt:
         print("stopped by Ctrl-C; what was done is kept, and the same command goes on", flush=True)
         return True
-    return wish.detach
+    return request.detach
 
 
-def _engine(spec: Spec, wish: Wish):
-    if wish.engine == "local":
-        return Local(spec, wish.jobs or free_cores(spec.threads))
-    if wish.engine == "slurm":
+def _engine(spec: Spec, request: SweepRequest):
+    if request.engine == "local":
+        return Local(spec, request.jobs or free_cores(spec.threads))
+    if request.engine == "slurm":
         from coupler.commands.sweep.slurm import Slurm
 
-        return Slurm(spec, wish.jobs or 100, wish.chunk, wish.options, wish.detach)
+        return Slurm(spec, request.jobs or 100, request.chunk, request.options, request.detach)
     from coupler.commands.sweep.dask import Dask
 
-    return Dask(spec, wish.engine.removeprefix("dask-"), wish.jobs or 10, wish.options)
+    return Dask(spec, request.engine.removeprefix("dask-"), request.jobs or 10, request.options)
 
 
 def _to_make(spec: Spec, any_version: bool) -> list[str]:

@@ -58,7 +58,7 @@ def convex_parts(body, tolerance: float) -> list[Part]:
     CannotCut."""
     planes = face_planes(*mesh_of(body), tolerance)
     gap = GAP * float(np.ptp(mesh_of(body)[0], axis=0).max())
-    waiting, found = fallen_apart(body), []
+    waiting, found = connected_parts(body), []
     while waiting:
         piece = waiting.pop()
         if piece.is_empty() or piece.volume() <= tolerance * piece.surface_area():
@@ -146,10 +146,10 @@ def _cut(
             best, chosen = cost, halves
     if chosen is None:
         raise CannotCut("has a dent that no plane along its faces ends", 0.5 * (a[0] + b[0]))
-    return [piece for half in chosen for piece in fallen_apart(half)]
+    return [piece for half in chosen for piece in connected_parts(half)]
 
 
-def fallen_apart(body) -> list:
+def connected_parts(body) -> list:
     """The connected pieces of a body; a piece with a cavity is kept as it is until a cut opens the cavity."""
     pieces = body.decompose()
     return [body] if any(piece.volume() < 0.0 for piece in pieces) else pieces

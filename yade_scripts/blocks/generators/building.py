@@ -97,7 +97,7 @@ class Building:
 class _Part:
     """A wall of one storey, or a slab: the box low (3,) .. high (3,) [m] and the wanted edges of its blocks (3,).
 
-    wished: preferred cuts along x, y, z, dropped near an opening.
+    preferred: preferred cuts along x, y, z, omitted near an opening.
     """
 
     name: str
@@ -105,7 +105,7 @@ class _Part:
     low: Floats
     high: Floats
     edges: tuple[float, float, float]
-    wished: tuple[tuple[float, ...], ...]
+    preferred: tuple[tuple[float, ...], ...]
 
 
 def building_blocks(b: Building) -> list[Block]:
@@ -141,16 +141,18 @@ def _storey_parts(b: Building, storey: int) -> list[_Part]:
         "y-": ((x0 + t, y0), (x1 - t, y0 + t)),
         "y+": ((x0 + t, y1 - t), (x1 - t, y1)),
     }
-    wished = ((x0 + t, x1 - t), (y0 + t, y1 - t), ())
+    preferred = ((x0 + t, x1 - t), (y0 + t, y1 - t), ())
     parts = []
     for side, (low, high) in boxes.items():
         edges = (np.inf, b.block, course) if side[0] == "x" else (b.block, np.inf, course)
         name = f"{b.name}-wall{storey}{side}"
-        parts.append(_Part(name, "wall", np.array([*low, foot]), np.array([*high, head]), edges, wished))
+        parts.append(_Part(name, "wall", np.array([*low, foot]), np.array([*high, head]), edges, preferred))
     if with_slab:
         kind = "roof" if storey == b.storeys - 1 else "floor"
         low, high = np.array([x0, y0, head]), np.array([x1, y1, head + b.slab])
-        parts.append(_Part(f"{b.name}-{kind}{storey}", kind, low, high, (b.block, b.block, np.inf), wished))
+        parts.append(
+            _Part(f"{b.name}-{kind}{storey}", kind, low, high, (b.block, b.block, np.inf), preferred)
+        )
     return parts
 
 
@@ -175,15 +177,15 @@ def _part_blocks(part: _Part, b: Building) -> list[Block]:
 
 
 def _part_cuts(part: _Part, axis: int, openings: list[Opening]) -> Array:
-    """Cuts of a part along an axis: its ends, the borders of openings, wished cuts, and equal blocks between."""
+    """Cuts of a part along an axis: its ends, the borders of openings, preferred cuts, and equal blocks between."""
     low, high, edge = part.low[axis], part.high[axis], part.edges[axis]
     size = min(edge, high - low)
     fixed = [low, high]
     for opening in openings:
         fixed += [c for c in (opening.lower[axis], opening.upper[axis]) if low < c < high]
     fixed = _apart(fixed, SAME * size)
-    wished = [c for c in part.wished[axis] if low < c < high and np.abs(fixed - c).min() > CLOSE * size]
-    ends = _apart([*fixed, *wished], SAME * size)
+    preferred = [c for c in part.preferred[axis] if low < c < high and np.abs(fixed - c).min() > CLOSE * size]
+    ends = _apart([*fixed, *preferred], SAME * size)
     pieces = [equal_cuts(start, end, edge)[:-1] for start, end in pairwise(ends)]
     return np.concatenate([*pieces, [high]])
 
