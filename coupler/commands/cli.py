@@ -121,9 +121,9 @@ def run(
     one_thread()
     take_threads(threads)
     take_laws(law)
-    from coupler.api.case import Case
+    from coupler.checks.read_case import load
 
-    file = Case.load(case, [*(set or []), *([f"time.end={end}"] if end else [])]).file()
+    file = load(case, [*(set or []), *([f"time.end={end}"] if end else [])])
     if dry:
         return
     from coupler.run.directory import RunDirectory
@@ -210,14 +210,14 @@ def check(
     """
     one_thread()
     take_laws(law)
-    from coupler.api.case import Case
+    from coupler.checks.read_case import load
     from coupler.program import terminal
     from coupler.run.execute import describe
+    from coupler.run.forecast import forecast
 
     if picture is not None:
         need("view")
-    found = Case.load(case, set or [])
-    file = found.file()
+    file = load(case, set or [])
     describe(file, partial(print, flush=True))
     if picture is not None:
         from coupler.commands.blocks import draw_case
@@ -226,7 +226,7 @@ def check(
         print(f"picture: {picture}")
     if file.case.structure is not None and len(file.case.solid) >= MANY_SOLIDS:
         print(f"the substep, with {len(file.case.solid)} fixed solids that blocks can touch, ...", flush=True)
-    terminal.table("forecast", found.check(exact).rows)
+    terminal.table("forecast", forecast(file.case, exact, file.directory).rows)
 
 
 @app.command(context_settings=PASS_ON | {"help_option_names": []})

@@ -65,6 +65,18 @@ def test_a_bad_case_ends_with_two_and_one_line_for_each_mistake(tmp_path):
     assert not (tmp_path / "runs").exists()
 
 
+@pytest.mark.parametrize("words", [["check"], ["run", "--dry"]])
+def test_a_case_is_read_and_checked_once(words, tmp_path, monkeypatch):
+    """Twice or three times was the cost of a terrain or a drawing, which are read with it."""
+    from coupler.checks import read_case
+
+    write(tmp_path, WATER)
+    seen, problems = [], read_case.problems
+    monkeypatch.setattr(read_case, "problems", lambda *given: seen.append(given) or problems(*given))
+    cli.app([*words, str(tmp_path)], standalone_mode=False)
+    assert len(seen) == 1
+
+
 def test_set_and_end_are_checked_like_the_file(tmp_path):
     write(tmp_path, WATER)
     done = surgebreak("check", tmp_path, "--set", "water.density=-1")
