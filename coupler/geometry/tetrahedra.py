@@ -96,7 +96,8 @@ def _refuse_overlaps(name: str, mesh) -> None:
     cell, corner = np.nonzero(mesh.neighbours >= 0)
     other = mesh.neighbours[cell, corner]
     mutual = (mesh.neighbours[other] == cell[:, None]).any(axis=1)
-    far = mesh.cells[other].sum(axis=1) - mesh.cells[cell].sum(axis=1) + mesh.cells[cell, corner]
+    cells = mesh.cells.astype(np.int64)
+    far = cells[other].sum(axis=1) - cells[cell].sum(axis=1) + cells[cell, corner]
     reach = mesh.nodes[np.clip(far, 0, len(mesh.nodes) - 1)] - mesh.nodes[mesh.cells[cell, corner]]
     beyond = 1.0 + np.einsum("fk,fk->f", mesh.gradients[cell, corner], reach) < 0.0
     bad = np.flatnonzero(~mutual | ~beyond)

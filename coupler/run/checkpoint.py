@@ -138,9 +138,11 @@ class Checkpoints:
             self.put(self._state(figures, cpu_seconds))
 
     def hold(self, figures: dict, cpu_seconds: dict[str, float]) -> State:
-        """A copy of the present state, for `put` if the next step is abandoned."""
+        """The present state, for `put` if the next step is abandoned: copies but for the fields of the water, which a
+        step replaces by new ones."""
         state = self._state(figures, cpu_seconds)
-        return replace(state, arrays={name: array.copy() for name, array in state.arrays.items()})
+        own = {name: a if name.startswith("water/") else a.copy() for name, a in state.arrays.items()}
+        return replace(state, arrays=own)
 
     def put(self, state: State) -> None:
         """Write a state, unless the last checkpoint is of the same step.  Raises NotFinite, DiskFull."""

@@ -18,7 +18,9 @@ def scene_parts(coupling) -> dict[str, str]:
     parts = {}
     if coupling.water is not None:
         mesh = coupling.water.mesh
-        parts["mesh"] = _reported(f"{len(mesh.nodes)} nodes, {len(mesh.cells)} cells", mesh.nodes, mesh.cells)
+        parts["mesh"] = _reported(
+            f"{len(mesh.nodes)} nodes, {len(mesh.cells)} cells", mesh.nodes, mesh.cells.astype(np.int64)
+        )
     structure = coupling.structure
     if structure is not None:
         shapes = np.concatenate([np.zeros((0, 3)), *structure.shape_vertices])

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import sys
 
-import numpy as np
+from coupler.step.observe import wet_cells
 
 HEAVY = (
     "fluid", "yade_scripts", "yade", "scipy", "numba", "h5py", "skfem", "pint", "matplotlib", "pyvista",
@@ -40,17 +40,11 @@ def _of_water(coupling, record) -> dict[str, int]:
     return {
         "mesh_cells": len(water.mesh.cells),
         "cells": len(topology.cells),
-        "wet_cells": _wet_cells(water.level_set, topology.cells),
+        "wet_cells": wet_cells(water.level_set, topology.cells),
         "bodies": water.domain.n_bodies,
         "bodies_cut": record.bodies_cut,
         "passes": record.passes,
     }
-
-
-def _wet_cells(level_set: np.ndarray, cells: np.ndarray) -> int:
-    """Cells (M, 4) with a node in the water; four flags are read as one number, which takes a tenth of the time."""
-    flags = (level_set < 0.0).take(cells)
-    return int(np.count_nonzero(flags.view(np.uint32)))
 
 
 def _of_structure(structure, joints) -> dict[str, int]:

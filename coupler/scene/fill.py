@@ -29,6 +29,7 @@ import numpy as np
 from array_types import Array
 from coupler.geometry.start_surfaces import StartSurface
 from fluid.domain.quadrature import part_points
+from fluid.numerics.spans import spans
 
 TOUCHES = 0.1
 """Share of a cell edge within which the side of a box counts as the face of the solid."""
@@ -38,6 +39,7 @@ FLUSH = 0.01
 """Share of a cell edge by which a solid may stand beyond the end of a box that is meant to reach up to it."""
 SEAM = 1e-6
 """Share of a cell edge within which two boxes touch."""
+NO_CELLS, NO_BOUNDS = np.zeros(0, np.int64), np.zeros((0, 3))
 
 
 class _Box(NamedTuple):
@@ -61,7 +63,7 @@ def start_level(boxes, tank, mesh, domain, tops=()) -> Array:
     low, high = _reach(domain.nodes, domain.cells, *_fluid_extent(domain))
     edge = _cell_edge(mesh)
     boxes = _with_tops(boxes, tops, tank, SEAM * edge)
-    whole_low, whole_high = _reach(mesh.nodes, mesh.cells, *_extent(mesh.nodes[mesh.cells]))
+    whole_low, whole_high = _reach(mesh.nodes, mesh.cells)
     edges = edge * _relative_size(mesh)[domain.parent_node]
     cut_low = low - whole_low[domain.parent_node] > MISSING * edges[:, None]
     cut_high = whole_high[domain.parent_node] - high > MISSING * edges[:, None]
@@ -100,7 +102,7 @@ class _Corners:
 
     def __init__(self, domain) -> None:
         self._domain, d = domain, domain
-        self._shown = ~_behind(d, d.nodes[d.cells])
+        self._shown = ~_behind(d)
         self.points = np.concatenate([d.nodes, d.face_corners.reshape(-1, 3)])
         self.beside = np.zeros(len(d.nodes), bool)
         self.beside[d.cells[d.is_cut]] = True
@@ -143,10 +145,10 @@ def _hidden_sides(boxes, tank, domain, slack: float) -> list[tuple[Array, Array]
     return hidden
 
 
-def _behind(domain, corners) -> Array:
-    """Corners (M, 4) bool of cells (M, 4, 3) that a solid covers."""
+def _behind(domain) -> Array:
+    """Corners (M, 4) bool of the cells that a solid covers."""
     d, behind = domain, np.zeros(domain.cells.shape, bool)
-    to_corner = corners[d.face_cell] - d.face_centroid[:, None]
+    to_corner = d.nodes[d.cells[d.face_cell]] - d.face_centroid[:, None]
     np.logical_or.at(behind, d.face_cell, np.einsum("sak,sk->sa", to_corner, d.face_normal) < 0.0)
     return behind
 
@@ -290,8 +292,8 @@ def _side(s, s_low, s_high, cut_inner, cut_outer, edge: Array) -> Array:
 
 def _cell_edge(mesh) -> float:
     """Longest side of the bounding boxes of the cells, the typical one [m]."""
-    corners = mesh.nodes[mesh.cells]
-    return float(np.median(np.ptp(corners, axis=1).max(axis=1)))
+    longest = [np.ptp(mesh.nodes[mesh.cells[some]], axis=1).max(axis=1) for some in spans(len(mesh.cells))]
+    return float(np.median(np.concatenate(longest)))
 
 
 def _relative_size(mesh) -> Array:
@@ -303,30 +305,35 @@ def _extent(points) -> tuple[Array, Array]:
     return points.min(axis=1), points.max(axis=1)
 
 
-def _fluid_extent(domain) -> tuple[Array, Array]:
-    """Bounds (M, 3) each of the fluid part of every cell: its corners are those of its wetted polygons and the corners
-    of the cell in front of all of these; the points of its quadrature besides, for parts that are not convex."""
+def _fluid_extent(domain) -> tuple[Array, Array, Array]:
+    """The cut cells (n,), and bounds (n, 3) each of their fluid parts, whose corners are those of the wetted polygons
+    and the corners of the cell in front of all of these; the points of the quadrature besides, for parts that are not
+    convex."""
     d = domain
-    corners = d.nodes[d.cells]
-    low, high = _extent(corners)
-    behind = _behind(d, corners)
     cut = np.flatnonzero(d.is_cut)
-    points = part_points(corners[cut], d.volume[cut], d.centroid[cut], d.second_of(cut))
-    part_low, part_high = np.full(low.shape, np.inf), np.full(low.shape, -np.inf)
-    part_low[cut], part_high[cut] = _extent(points)
-    np.minimum.at(part_low, d.face_cell, d.face_corners.min(axis=1))
-    np.maximum.at(part_high, d.face_cell, d.face_corners.max(axis=1))
-    shown = ~behind[cut, :, None]
-    part_low[cut] = np.minimum(part_low[cut], np.where(shown, corners[cut], np.inf).min(axis=1))
-    part_high[cut] = np.maximum(part_high[cut], np.where(shown, corners[cut], -np.inf).max(axis=1))
-    low[cut], high[cut] = np.maximum(low[cut], part_low[cut]), np.minimum(high[cut], part_high[cut])
-    return low, high
+    corners = d.nodes[d.cells[cut]]
+    low, high = _extent(corners)
+    points = part_points(corners, d.volume[cut], d.centroid_of(cut), d.second_of(cut))
+    part_low, part_high = _extent(points)
+    at = np.searchsorted(cut, d.face_cell)
+    ours = np.flatnonzero(d.is_cut[d.face_cell])  # others touch a cell of which nothing is cut off
+    np.minimum.at(part_low, at[ours], d.face_corners[ours].min(axis=1))
+    np.maximum.at(part_high, at[ours], d.face_corners[ours].max(axis=1))
+    shown = ~_behind(d)[cut, :, None]
+    part_low = np.minimum(part_low, np.where(shown, corners, np.inf).min(axis=1))
+    part_high = np.maximum(part_high, np.where(shown, corners, -np.inf).max(axis=1))
+    return cut, np.maximum(low, part_low), np.minimum(high, part_high)
 
 
-def _reach(nodes, cells, low, high) -> tuple[Array, Array]:
-    """Lower and upper bounds (N, 3) of the cells around every node."""
+def _reach(nodes, cells, cut=NO_CELLS, cut_low=NO_BOUNDS, cut_high=NO_BOUNDS) -> tuple[Array, Array]:
+    """Lower and upper bounds (N, 3) of the cells around every node; those of some cells `cut` (n,), in order, are
+    given."""
     node_low, node_high = np.full(nodes.shape, np.inf), np.full(nodes.shape, -np.inf)
-    for a in range(4):
-        np.minimum.at(node_low, cells[:, a], low)
-        np.maximum.at(node_high, cells[:, a], high)
+    for some in spans(len(cells)):
+        low, high = _extent(nodes[cells[some]])
+        given = slice(*np.searchsorted(cut, [some.start, some.stop]))
+        low[cut[given] - some.start], high[cut[given] - some.start] = cut_low[given], cut_high[given]
+        for a in range(4):
+            np.minimum.at(node_low, cells[some, a], low)
+            np.maximum.at(node_high, cells[some, a], high)
     return node_low, node_high

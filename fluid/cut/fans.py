@@ -60,7 +60,7 @@ def fans(tet_part, tet, element_of_part, n_elements: int):
 def _sorted(element, n_elements):
     """start (n_elements + 1,), and the indices that sort the entries (T,) of `element`; negative entries are left
     out."""
-    start = np.zeros(n_elements + 1, np.int64)
+    start = np.zeros(n_elements + 1, np.int32)
     for t in range(len(element)):
         if element[t] >= 0:
             start[element[t] + 1] += 1

@@ -99,9 +99,20 @@ def _old_elements(old, new, chosen):
     first = np.searchsorted(old.parent_cell, cell)
     last = np.searchsorted(old.parent_cell, cell, side="right")
     before, after = (Placed(d.memory.bodies.centre, d.memory.bodies.rotation) for d in (old, new))
-    sought = Walled(new.centroid[chosen], _wall_of(new)[chosen])
-    found = Walled(old.centroid, _wall_of(old))
-    return _same_side(first, last, sought, found, before, after, old.memory.bodies.planes())
+    sought = Walled(new.centroid_of(chosen), _wall_of(new)[chosen])
+    rows = _joined(first, last, len(old.cells))
+    known = Walled(old.centroid_of(rows), _wall_of(old)[rows])
+    place = np.searchsorted(rows, first)
+    found = _same_side(place, place + last - first, sought, known, before, after, old.memory.bodies.planes())
+    return np.where(found >= 0, np.append(rows, -1)[found], -1)
+
+
+def _joined(first, last, n):
+    """All numbers below n from one of the `first` (k,) to before the `last` (k,) of its range, in order."""
+    change = np.zeros(n + 1, np.int32)
+    np.add.at(change, first, 1)
+    np.add.at(change, last, -1)
+    return np.flatnonzero(np.cumsum(change[:-1]))
 
 
 def _wall_of(domain):

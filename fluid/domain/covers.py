@@ -87,7 +87,8 @@ def virtual_cells(mesh, elements, contacts, connection, part_in_slit) -> tuple[A
     virtual = VirtualElements(elements.parent, elements.part, elements.start, in_slit)
     least = NO_AREA * mesh.spacing**2
     label = _unite_corners(mesh.cells, mesh.neighbours, virtual, several, contacts, connection.face, least)
-    return _numbered(mesh.cells, elements.parent, several, label, len(mesh.nodes))
+    number, parent_node = _numbered(mesh.cells, elements.parent, several, label, len(mesh.nodes))
+    return number.astype(np.uint32), parent_node
 
 
 def components(cells, n_nodes: int) -> Array:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from array_types import Floats, Integers, Ints
+from array_types import Floats, Integers
 from fluid.numerics.threads import found_over, over, owning, reach_of_cells
 from kernel_decorators import inner, kernel, plain, released
 
@@ -74,13 +74,15 @@ def wet_moments(phi, out):
 
 
 class FluidParts(NamedTuple):
-    """The fluid parts of the cells: cells (M, 4) · volume (M,) [m³] of their fluid part · share (M, 4), mean of N_a
-    over it · start (M + 1,), fan_volume (T,) [m³], corners (T, 4, 4): fans of the cut cells (`fans.py`)."""
+    """The fluid parts of the cells: cells (M, 4) · volume (M,) [m³] of their fluid part · share (K + 1, 4), share_row
+    (M,): mean of N_a over it, see `FluidCells` · start (M + 1,), fan_volume (T,) [m³], corners (T, 4, 4): fans of the
+    cut cells (`fans.py`)."""
 
     cells: Integers
     volume: Floats
     share: Floats
-    start: Ints
+    share_row: Integers
+    start: Integers
     fan_volume: Floats
     corners: Floats
 
@@ -99,7 +101,7 @@ def part_moments(e, phi, parts, total, local, out):
         return
     if n_wet == 4:
         for a in range(4):
-            total[a] = parts.volume[e] * parts.share[e, a]
+            total[a] = parts.volume[e] * parts.share[parts.share_row[e], a]
         return
     if parts.start[e] == parts.start[e + 1]:
         wet_moments(phi, out)
@@ -129,7 +131,7 @@ def nodal_water(cell_list, shift, phi, parts, n_nodes):
 @released
 def _nodal_water(first, last, runs, cell_list, shift, phi, parts, water):
     at, total, local, out = np.empty(4), np.empty(4), np.empty(4), np.empty(4)
-    cells, volume, share = parts.cells, parts.volume, parts.share
+    cells, volume, share, share_row = parts.cells, parts.volume, parts.share, parts.share_row
     for run in range(runs.shape[0]):
         for s in range(runs[run, 0], runs[run, 1]):
             e = cell_list[s]
@@ -140,7 +142,7 @@ def _nodal_water(first, last, runs, cell_list, shift, phi, parts, water):
             if n_wet == 4:  # most cells: not worth a call
                 for a in range(4):
                     if first <= cells[e, a] < last:
-                        water[cells[e, a]] += volume[e] * share[e, a]
+                        water[cells[e, a]] += volume[e] * share[share_row[e], a]
             elif n_wet > 0:
                 part_moments(e, at, parts, total, local, out)
                 for a in range(4):

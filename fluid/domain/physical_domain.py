@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from array_types import Array, Bools, Floats, Ints
+from array_types import Array, Bools, Floats, Integers, Ints
 from fluid.cut.bodies import ConvexBodies
 from fluid.cut.candidate_pairs import near_pairs
 from fluid.cut.cut_arrays import Cuts
@@ -32,10 +32,10 @@ from fluid.domain.continued_nodes import pick_old_nodes
 from fluid.domain.coupling_matrix import wetted_coupling
 from fluid.domain.covers import Connection, virtual_cells, without_pockets
 from fluid.mesh.arrays import Hats, WettedPolygons
-from fluid.mesh.background import Background, gradients
+from fluid.mesh.background import Background
 from kernel_decorators import kernel
 
-__all__ = ["PhysicalDomain", "carry", "cut_domain", "gradients", "wetted_coupling"]
+__all__ = ["PhysicalDomain", "carry", "cut_domain", "wetted_coupling"]
 
 # One absolute tolerance for the whole mesh, as a share of its spacing; the search takes ten times that.
 TOLERANCE = 1e-10
@@ -45,14 +45,6 @@ XX = np.array([0, 1, 2, 0, 0, 1])
 YY = np.array([0, 1, 2, 1, 2, 2])
 
 
-@dataclass(frozen=True)
-class WholeCells:
-    """Moments of the uncut background cells: volume (M,), centroid (M, 3)."""
-
-    volume: Floats
-    centroid: Floats
-
-
 @dataclass(frozen=True, kw_only=True)
 class Memory:
     """Data that the next cut reuses from this one: mesh, bodies, pairs sorted by (cell, body), cut parts; contacts
@@ -60,7 +52,6 @@ class Memory:
 
     mesh: Background
     bodies: ConvexBodies
-    whole: WholeCells
     pair_cell: Ints
     pair_body: Ints
     cuts: Cuts
@@ -73,8 +64,8 @@ class Elements(NamedTuple):
     part, -1 whole or nothing removed · start (cells + 1,) first element of each cell · of_part (K,) element of each cut
     part."""
 
-    parent: Ints
-    part: Ints
+    parent: Integers
+    part: Integers
     start: Ints
     of_part: Ints
 
@@ -84,7 +75,7 @@ class PhysicalDomain:
     """The part of the background tetrahedra outside the solids: N nodes, M cells, S wetted polygons.
 
     nodes (N, 3) [m] · cells (M, 4) · parent_node (N,), parent_cell (M,) in the background
-    volume (M,) [m3], centroid (M, 3) [m]: of the fluid part
+    volume (M,) [m3] of the fluid part
     part (M,) row of what is left of the cell among the parts of `memory.cuts`, -1 where nothing was removed
     fan_start (M + 1,), fan_volume (T,) [m3], fan_corners (T, 4, 4): tetrahedra that fill the cut cells (`fans.py`)
     face_cell (S,) row of `cells` · face_body (S,) · face_area (S,) [m2] · face_centroid (S, 3) [m]
@@ -95,13 +86,12 @@ class PhysicalDomain:
     """
 
     nodes: Floats
-    cells: Ints
+    cells: Integers
     parent_node: Ints
-    parent_cell: Ints
+    parent_cell: Integers
     volume: Floats
-    centroid: Floats
-    part: Ints
-    fan_start: Ints
+    part: Integers
+    fan_start: Integers
     fan_volume: Floats
     fan_corners: Floats
     face_cell: Ints
@@ -129,8 +119,12 @@ class PhysicalDomain:
 
     @cached_property
     def hats(self) -> Hats:
-        """The linear functions of the cells, as kernels take them."""
-        return Hats(self.cells, self.parent_cell, self.memory.mesh.gradients)
+        """The linear functions of the cells with wetted polygons, as kernels take them; other cells have no row."""
+        row = np.zeros(len(self.cells), np.int32)
+        row[self.face_cell] = 1
+        wetted = np.flatnonzero(row)
+        row[wetted] = np.arange(len(wetted))
+        return Hats(self.cells, row, self.memory.mesh.gradients_of(self.parent_cell[wetted]))
 
     @cached_property
     def is_cut(self) -> Array:
@@ -143,6 +137,23 @@ class PhysicalDomain:
         found, part = _whole_second(self.memory.mesh, self.parent_cell[rows]), self.part[rows]
         cut = part >= 0
         found[cut] = self.memory.cuts.moments[part[cut], 4:10]
+        return found
+
+    @property
+    def centroid(self) -> Array:
+        """(M, 3) [m] of the fluid part of each cell, computed at each call."""
+        return self.centroid_of(np.arange(len(self.cells)))
+
+    def centroid_of(self, rows) -> Array:
+        """Centroids (n, 3) [m] of the fluid part of cells (n,), not stored either."""
+        mesh, part = self.memory.mesh, self.part[rows]
+        corners = mesh.cells[self.parent_cell[rows]]
+        found = mesh.nodes[corners[:, 0]]
+        for a in range(1, 4):
+            found += mesh.nodes[corners[:, a]]
+        found /= 4
+        cut = part >= 0
+        found[cut] = self.memory.cuts.moments[part[cut], 1:4]
         return found
 
 
@@ -186,15 +197,6 @@ def changed_bodies(old: ConvexBodies, new: ConvexBodies) -> Array:
         return np.zeros(0, dtype=bool)
     planes = (old.normals != new.normals).any(axis=1) | (old.cut_offsets() != new.cut_offsets())
     return np.logical_or.reduceat(planes, new.plane_start[:-1])
-
-
-def whole_cells(mesh) -> WholeCells:
-    """Moments of the full tetrahedra."""
-    centroid = mesh.nodes[mesh.cells[:, 0]]
-    for a in range(1, 4):
-        centroid += mesh.nodes[mesh.cells[:, a]]
-    centroid /= 4
-    return WholeCells(mesh.cell_volume, centroid)
 
 
 def _whole_second(mesh, cells):
@@ -247,7 +249,6 @@ def _cut_all(mesh, bodies, covers, connection):
     return Memory(
         mesh=mesh,
         bodies=bodies,
-        whole=whole_cells(mesh),
         pair_cell=cell,
         pair_body=body,
         cuts=cuts,
@@ -321,7 +322,8 @@ def _with_neighbours(bodies, moved, memory):
 def _assembled(memory: Memory, elements: Elements, covers: str) -> PhysicalDomain:
     mesh, cuts = memory.mesh, memory.cuts
     if covers == "single":
-        cells, parent_node = mesh.cells[elements.parent], np.arange(len(mesh.nodes))
+        every = len(elements.parent) == len(mesh.cells)  # one element each, as parts of a cell are not parted
+        cells, parent_node = mesh.cells if every else mesh.cells[elements.parent], np.arange(len(mesh.nodes))
     else:
         cells, parent_node = virtual_cells(
             mesh,
@@ -347,14 +349,12 @@ def _assembled(memory: Memory, elements: Elements, covers: str) -> PhysicalDomai
         of_part = np.where(keep[of_part], renumbered[of_part], -1)
         parent, part, volume = parent[keep], part[keep], volume[keep]
     fan_start, fan_volume, fan_corners = fans(cuts.tet_part, cuts.tet, of_part, len(parent))
-    centroid = _centroids(parent, part, memory.whole.centroid, cuts.moments)
     return PhysicalDomain(
         nodes=mesh.nodes if covers == "single" else mesh.nodes[parent_node],
         cells=cells,
         parent_node=parent_node,
         parent_cell=parent,
         volume=volume,
-        centroid=centroid,
         part=part,
         fan_start=fan_start,
         fan_volume=fan_volume,
@@ -376,20 +376,10 @@ def _assembled(memory: Memory, elements: Elements, covers: str) -> PhysicalDomai
 
 def _volume(memory, elements):
     """Fluid volume (M,) [m3] of the elements: of the whole cell, or of the part."""
-    volume = memory.whole.volume[elements.parent]
+    volume = memory.mesh.cell_volume[elements.parent]
     cut = elements.part >= 0
     volume[cut] = memory.cuts.moments[elements.part[cut], 0]
     return volume
-
-
-@kernel
-def _centroids(parent, part, centroid, moments):
-    """Centroid (M, 3) [m] of the elements: of the whole cell, or of the part."""
-    c = np.empty((len(parent), 3))
-    for e in range(len(parent)):
-        for k in range(3):
-            c[e, k] = moments[part[e], 1 + k] if part[e] >= 0 else centroid[parent[e], k]
-    return c
 
 
 @kernel
@@ -405,7 +395,7 @@ def _compressed(cells, keep, n_nodes):
             for k in range(4):
                 used[cells[e, k]] = True
     number = np.cumsum(used) - 1
-    left = np.empty((n, 4), np.int64)
+    left = np.empty((n, 4), np.uint32)
     for e in range(len(cells)):
         if keep[e]:
             for k in range(4):
@@ -424,7 +414,7 @@ def _elements(memory) -> Elements:
 def _listed(met, part_cell, part_whole):
     """The Elements: every cell that no body meets, and every part of the others."""
     most = len(met) + len(part_cell)
-    parent, part, n = np.empty(most, np.int64), np.full(most, -1, np.int64), 0
+    parent, part, n = np.empty(most, np.uint32), np.full(most, -1, np.int32), 0
     start, of_part, k = np.empty(len(met) + 1, np.int64), np.empty(len(part_cell), np.int64), 0
     for cell in range(len(met)):
         start[cell] = n

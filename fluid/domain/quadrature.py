@@ -38,7 +38,7 @@ def quadrature_rule(domain) -> tuple[Array, Array]:
     cut = np.flatnonzero(domain.is_cut)
     corners = domain.nodes[domain.cells[cut]]
     edges = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
-    points = part_points(corners, domain.volume[cut], domain.centroid[cut], domain.second_of(cut))
+    points = part_points(corners, domain.volume[cut], domain.centroid_of(cut), domain.second_of(cut))
     offset = np.swapaxes(points - corners[:, :1], 1, 2)
     barycentric[cut] = np.swapaxes(np.linalg.solve(edges, offset), 1, 2)
     weight[cut] = (domain.volume[cut] / np.abs(np.linalg.det(edges)) / 4)[:, None]
@@ -67,7 +67,7 @@ def symmetric_root(S) -> Array:
 
 def cell_basis(domain) -> CellBasis:
     """scikit-fem basis (P1) whose integrals run over the fluid part of every cell."""
-    mesh = MeshTet(domain.nodes.T.copy(), domain.cells.T.copy(), sort_t=False, validate=False)
+    mesh = MeshTet(domain.nodes.T.copy(), domain.cells.T.astype(np.int64), sort_t=False, validate=False)
     return CellBasis(mesh, ElementTetP1(), quadrature=quadrature_rule(domain))
 
 
@@ -80,6 +80,6 @@ def surface_basis(domain) -> tuple[CellBasis, Array]:
     offset = np.swapaxes(domain.face_points - corners[:, :1], 1, 2)
     X = np.moveaxis(np.linalg.solve(edges, offset), 1, 0)
     W = np.repeat((domain.face_area / 3 / np.abs(np.linalg.det(edges)))[:, None], 3, axis=1)
-    mesh = MeshTet(domain.nodes.T.copy(), cells.T.copy(), sort_t=False, validate=False)
+    mesh = MeshTet(domain.nodes.T.copy(), cells.T.astype(np.int64), sort_t=False, validate=False)
     basis = CellBasis(mesh, ElementTetP1(), quadrature=(np.ascontiguousarray(X), W))
     return basis, np.repeat(domain.face_normal.T[:, :, None], 3, axis=2)

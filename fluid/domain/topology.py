@@ -18,6 +18,8 @@ from fluid.domain.coupling_matrix import polygons_of_nodes
 from fluid.domain.moments import FluidParts
 from fluid.mesh.arrays import Edges, FluidCells, Hats, Paths
 from fluid.mesh.background import Background
+from fluid.mesh.gradients import gradient_rows
+from fluid.numerics.spans import spans
 from fluid.numerics.threads import over
 from kernel_decorators import kernel, ranged, released
 
@@ -27,7 +29,8 @@ class Topology:
     """nodes (N, 3) [m] · cells (M, 4) · background (M,) cell of the background mesh, of n_background ·
     parent (M,) row of `gradients` (.., 4, 3) [1/m] and of their `products` ·
     volume (M,) [m³] of the fluid part · fraction (M,) fluid share of the cell ·
-    share (M, 4) mean of N_a over the fluid part (∫ N_a = volume · share_a) · size (M,) [m] (6 |e|)^(1/3) ·
+    share (K + 1, 4) mean of N_a over the fluid part (∫ N_a = volume · share_a), share_row (M,) its row for each cell:
+    the first, 1/4, for whole ones · size (M,) [m] (6 |e|)^(1/3) ·
     node_start (N+1,), node_cells (4M,) cells around each node · neighbours (M, 4) across faces, -1 none ·
     node_volume (N,) [m³] ∫ N_i · covered (N,) bool: nodes inside a solid · beside_solid (N,) bool: nodes of
     cut cells · parts: the fluid parts of the cells · obtuse (M,) bool: cells with obtuse dihedral
@@ -36,7 +39,7 @@ class Topology:
 
     nodes: Floats
     cells: Integers
-    background: Ints
+    background: Integers
     n_background: int
     parent: Integers
     gradients: Floats
@@ -44,6 +47,7 @@ class Topology:
     volume: Floats
     fraction: Floats
     share: Floats
+    share_row: Integers
     size: Floats
     node_start: Integers
     node_cells: Integers
@@ -62,13 +66,13 @@ class Topology:
     @classmethod
     def of(cls, mesh: Background, domain) -> Topology:
         """Lay out a PhysicalDomain of the background mesh."""
-        cells, background = domain.cells.astype(np.uint32), np.ascontiguousarray(domain.parent_cell)
+        cells, background = domain.cells, domain.parent_cell
         nodes = np.ascontiguousarray(domain.nodes)
         start, members = _cells_of_nodes(cells, len(nodes))
         shapes = mesh.shapes
-        share, fraction, size, node_volume, beside_solid = _measures(
-            nodes, cells, background, mesh.gradients, mesh.cell_volume, mesh.cell_size, domain.volume, domain.centroid,
-            domain.is_cut,
+        share, share_row, fraction, size, node_volume, beside_solid = _measures(
+            nodes, cells, background, mesh.cell_volume, mesh.cell_size, domain.volume, domain.part,
+            domain.memory.cuts.moments,
         )  # fmt: skip
         return cls(
             nodes=nodes,
@@ -81,6 +85,7 @@ class Topology:
             volume=domain.volume,
             fraction=fraction,
             share=share,
+            share_row=share_row,
             size=size,
             node_start=start,
             node_cells=members,
@@ -89,7 +94,13 @@ class Topology:
             covered=covered_nodes(domain),
             beside_solid=beside_solid,
             parts=FluidParts(
-                cells, domain.volume, share, domain.fan_start, domain.fan_volume, domain.fan_corners
+                cells,
+                domain.volume,
+                share,
+                share_row,
+                domain.fan_start,
+                domain.fan_volume,
+                domain.fan_corners,
             ),
             obtuse=mesh.obtuse[background],
             is_obtuse=mesh.is_obtuse,
@@ -103,7 +114,14 @@ class Topology:
     def fluid_cells(self) -> FluidCells:
         """The cells as kernels take them."""
         return FluidCells(
-            self.cells, self.parent, self.gradients, self.volume, self.share, self.size, self.upright
+            self.cells,
+            self.parent,
+            self.gradients,
+            self.volume,
+            self.share,
+            self.share_row,
+            self.size,
+            self.upright,
         )
 
     @cached_property
@@ -146,17 +164,16 @@ class Topology:
     @cached_property
     def row_of_background(self) -> Array:
         """Row of the (first) cell of each background cell, -1 inside solids; a final -1 stands for "no cell"."""
-        row = np.full(self.n_background + 1, -1, np.int64)
-        row[self.background[::-1]] = np.arange(len(self.background))[::-1]
+        row = np.full(self.n_background + 1, -1, np.int32)
+        row[self.background[::-1]] = np.arange(len(self.background), dtype=np.int32)[::-1]
         return row
 
     @cached_property
     def rows_of_background(self) -> tuple[Array, Array]:
         """First row and number of the cells of each background cell: none inside solids, several where a thin wall
         divides it."""
-        cells = np.arange(self.n_background)
-        first = np.searchsorted(self.background, cells)
-        return first, np.searchsorted(self.background, cells, side="right") - first
+        start = np.searchsorted(self.background, np.arange(self.n_background + 1)).astype(np.int32)
+        return start[:-1], np.diff(start)
 
     @property
     def around(self) -> tuple[Array, Array]:
@@ -230,25 +247,28 @@ def _covered(start, members, nodes, body, centroid, normal, n_bodies):
 
 
 @kernel
-def _measures(nodes, cells, parent, g, full, full_size, volume, centroid, is_cut):
-    """share (M, 4), fraction (M,), size (M,), node_volume (N,) and beside_solid (N,) of Topology.
+def _measures(nodes, cells, parent, full, full_size, volume, part, moments):
+    """share (K + 1, 4), share_row (M,), fraction (M,), size (M,), node_volume (N,) and beside_solid (N,) of Topology.
 
-    Mean of N_a over the fluid part of a cell: N_a at its centroid; exactly 1/4 in whole cells."""
-    share, fraction, size = np.empty(cells.shape), np.empty(len(cells)), np.empty(len(cells))
+    Mean of N_a over the fluid part of a cell: N_a at its centroid, which stands in the moments of the K cut parts;
+    exactly 1/4 in whole cells."""
+    share, row = np.full((len(moments) + 1, 4), 0.25), np.empty(len(cells), np.uint32)
+    fraction, size, g = np.empty(len(cells)), np.empty(len(cells)), np.empty((4, 3))
     node_volume, beside_solid = np.zeros(len(nodes)), np.zeros(len(nodes), np.bool_)
     for e in range(len(cells)):
-        p = parent[e]
-        fraction[e], size[e] = volume[e] / full[p], full_size[p]
+        p, r = parent[e], part[e] + 1
+        fraction[e], size[e], row[e] = volume[e] / full[p], full_size[p], r
+        if r > 0:
+            gradient_rows(nodes, cells, e, g)
         for a in range(4):
-            share[e, a] = 0.25
-            if is_cut[e]:
+            if r > 0:
                 at = 0.0
                 for k in range(3):
-                    at += g[p, a, k] * (centroid[e, k] - nodes[cells[e, 0], k])
-                share[e, a] = min(max(at + 1.0 if a == 0 else at, 0.0), 1.0)
+                    at += g[a, k] * (moments[r - 1, 1 + k] - nodes[cells[e, 0], k])
+                share[r, a] = min(max(at + 1.0 if a == 0 else at, 0.0), 1.0)
                 beside_solid[cells[e, a]] = True
-            node_volume[cells[e, a]] += volume[e] * share[e, a]
-    return share, fraction, size, node_volume, beside_solid
+            node_volume[cells[e, a]] += volume[e] * share[r, a]
+    return share, row, fraction, size, node_volume, beside_solid
 
 
 @kernel
@@ -273,9 +293,14 @@ def _neighbours_in(mesh, nodes, cells, parent):
     """neighbours (M, 4); where every node is its background node, those of the parents, renumbered."""
     if len(nodes) > len(mesh.nodes):
         return _neighbours(mesh.neighbours, cells, parent, len(mesh.cells))
+    if cells is mesh.cells:
+        return mesh.neighbours
     row = np.full(len(mesh.cells) + 1, -1, np.int32)  # the last entry stands for "no neighbour", -1
-    row[parent] = np.arange(len(parent))
-    return row[mesh.neighbours[parent]]
+    row[parent] = np.arange(len(parent), dtype=np.int32)
+    found = np.empty((len(parent), 4), np.int32)
+    for some in spans(len(parent)):
+        found[some] = row[mesh.neighbours[parent[some]]]
+    return found
 
 
 @kernel

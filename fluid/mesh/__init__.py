@@ -1,6 +1,8 @@
 """The background mesh: tetrahedra that cover water, air and solids alike (the mathematical mesh of theory 2.1).
 
-background       nodes, cells, neighbours, gradients; from a box, from arrays
+background       nodes, cells, volumes, bins for points; from a box, from arrays
+gradients        gradients of the linear functions of cells, from their corners
+neighbours       which cells share a face
 bricks           lattices of bricks, each split into six tetrahedra
 shapes           cells of one shape share their gradients
 fitted_mesh      a mesh whose boundary is the bed

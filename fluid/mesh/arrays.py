@@ -52,14 +52,16 @@ class Hats(NamedTuple):
 
 
 class FluidCells(NamedTuple):
-    """`Hats` of a domain with the fluid part of its cells: volume (M,) [m³] · share (M, 4) mean of each function over
-    it · size (M,) [m] · upright (rows of the gradients,) bool: see `Background.upright`."""
+    """`Hats` of a domain with the fluid part of its cells: volume (M,) [m³] · share (K + 1, 4) mean of each function
+    over it, 1/4 in the first row, that of all whole cells · share_row (M,) row of each cell · size (M,) [m] · upright
+    (rows of the gradients,) bool: see `Background.upright`."""
 
     cells: Integers
     parent: Integers
     gradients: Floats
     volume: Floats
     share: Floats
+    share_row: Integers
     size: Floats
     upright: Bools
 

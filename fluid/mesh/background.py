@@ -4,6 +4,9 @@ A cell with nodes x_0..x_3 carries the barycentric coordinates λ_a(x) = c_a + g
 gradients g_a = ∇N_a [1/m].  Neighbours are numbered by the opposite corner: neighbours[e, a] shares the
 face of cell e that does not hold corner a; -1 means the boundary of the mesh.
 
+Gradients are not stored: a table of the distinct shapes (`shapes.py`) serves the loops over all cells, and for a few
+cells they are computed from the corners.  Temporary arrays are made for some cells at a time (`spans.py`).
+
 Points are found through a lattice of bins (coordinate axes, graded allowed).  In a box mesh the bins are
 the bricks that were split into tetrahedra; for any other mesh they are uniform boxes of one mean spacing.
 """
@@ -16,10 +19,13 @@ from functools import cached_property
 import numpy as np
 from skfem import MeshTet
 
-from array_types import Array, Floats, Ints
+from array_types import Array, Floats, Integers, Ints
 from fluid.mesh.bricks import SPLITS, split_bricks
+from fluid.mesh.gradients import gradient_rows, gradients, products_of
+from fluid.mesh.neighbours import cell_neighbours
 from fluid.mesh.shapes import Shapes
 from fluid.numerics.cube_root import cube_root
+from fluid.numerics.spans import spans
 from kernel_decorators import inner, kernel
 
 CORNERS_OF_FACE = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])  # outward for a positive cell
@@ -42,24 +48,23 @@ class MeshError(ValueError):
 class Background:
     """Tetrahedra with the data that every step needs.  Cells are positively oriented.
 
-    nodes (N, 3) [m] · cells (M, 4) · spacing [m], mean edge of the equivalent brick (6 |e|)^(1/3) ·
-    gradients (M, 4, 3) [1/m] · cell_volume (M,) [m³] · neighbours (M, 4) ·
+    nodes (N, 3) [m] · cells (M, 4) uint32 · spacing [m], mean edge of the equivalent brick (6 |e|)^(1/3) ·
+    cell_volume (M,) [m³] · neighbours (M, 4) int32 ·
     boundary_faces (B, 3) · boundary_cell (B,) · boundary_normal (B, 3), outward, unit ·
     axes: three increasing arrays [m], the walls of the bins · bin_start, bin_cells: cells of each bin (CSR).
     """
 
     nodes: Floats
-    cells: Ints
+    cells: Integers
     spacing: float
-    gradients: Floats
     cell_volume: Floats
-    neighbours: Ints
+    neighbours: Integers
     boundary_faces: Ints
     boundary_cell: Ints
     boundary_normal: Floats
     axes: tuple[Array, Array, Array]
     bin_start: Ints
-    bin_cells: Ints
+    bin_cells: Integers
 
     @classmethod
     def from_arrays(cls, nodes, cells, axes=None, straddling: bool = False) -> Background:
@@ -69,8 +74,7 @@ class Background:
         may straddle the bins of `axes`.
         Raises MeshError for cells without volume or indices out of range."""
         nodes = np.ascontiguousarray(nodes, float)
-        cells = _oriented(nodes, _checked_cells(nodes, cells))
-        g, volume = gradients(nodes, cells)
+        cells, volume = _oriented(nodes, _checked_cells(nodes, cells))
         neighbours = cell_neighbours(cells, len(nodes))
         faces, owner = _boundary(cells, neighbours)
         spacing = float(cube_root(6.0 * volume.mean()))
@@ -82,7 +86,6 @@ class Background:
             nodes=nodes,
             cells=cells,
             spacing=spacing,
-            gradients=g,
             cell_volume=volume,
             neighbours=neighbours,
             boundary_faces=faces,
@@ -97,9 +100,17 @@ class Background:
         """Cell that holds each point (m, 3) [m] → (m,), -1 outside; ties go to the first cell of the bin."""
         points = np.ascontiguousarray(np.atleast_2d(points), float)
         x, y, z = self.axes
-        return _locate(
-            points, x, y, z, self.bin_start, self.bin_cells, self.nodes, self.cells, self.gradients
-        )
+        return _locate(points, x, y, z, self.bin_start, self.bin_cells, self.nodes, self.cells)
+
+    @property
+    def gradients(self) -> Array:
+        """∇N_a (M, 4, 3) [1/m] of all cells, computed at each call unless cells share none (`Shapes`)."""
+        shapes = self.shapes
+        return shapes.gradients if shapes.is_of_each_cell else gradients(self.nodes, self.cells)[0]
+
+    def gradients_of(self, cells) -> Array:
+        """∇N_a (n, 4, 3) [1/m] of some cells (n,)."""
+        return gradients(self.nodes, self.cells[cells])[0]
 
     @cached_property
     def bounds(self) -> Array:
@@ -109,19 +120,26 @@ class Background:
     @cached_property
     def cell_size(self) -> Array:
         """(M,) [m] edge of the brick that holds six such cells, (6 |e|)^(1/3)."""
-        return cube_root(6.0 * self.cell_volume)
+        size = np.empty(len(self.cells))
+        for some in spans(len(size)):
+            size[some] = cube_root(6.0 * self.cell_volume[some])
+        return size
 
     @cached_property
     def local_size(self) -> Array:
         """(M,) [m] `cell_size`; exactly the spacing where the two differ by round-off only, as in a box of equal
-        bricks."""
-        size = self.cell_size
-        return np.where(np.abs(size - self.spacing) <= SAME_SIZE * self.spacing, self.spacing, size)
+        bricks, for which one number is stored."""
+        size, h = self.cell_size, self.spacing
+        if all((np.abs(size[some] - h) <= SAME_SIZE * h).all() for some in spans(len(size))):
+            return np.broadcast_to(h, size.shape)
+        return np.where(np.abs(size - h) <= SAME_SIZE * h, h, size)
 
     @cached_property
     def node_size(self) -> Array:
         """Smallest `local_size` (N,) [m] of the cells around each node: the length scale of everything near the
         node."""
+        if self.local_size.strides == (0,):
+            return np.full(len(self.nodes), self.spacing)
         size = np.full(len(self.nodes), np.inf)
         np.minimum.at(size, self.cells.ravel(), np.repeat(self.local_size, 4))
         return np.where(np.isfinite(size), size, self.spacing)
@@ -153,13 +171,16 @@ class Background:
     @property
     def products(self) -> Array:
         """∇N_a·∇N_b (M, 6) [1/m²] of the pairs ab = 01, 02, 03, 12, 13, 23."""
-        return _products(self.gradients)
+        return products_of(self.gradients)
 
     @cached_property
     def obtuse(self) -> Array:
         """(M,) bool: some dihedral angle of the cell exceeds a right angle, ∇N_a·∇N_b > 0; this never occurs in
         `box_mesh`."""
-        return self.products.max(axis=1) * self.cell_size**2 > 1e-9
+        found = np.empty(len(self.cells), bool)
+        for some in spans(len(found)):
+            found[some] = products_of(self.gradients_of(some)).max(axis=1) * self.cell_size[some] ** 2 > 1e-9
+        return found
 
     @cached_property
     def is_obtuse(self) -> bool:
@@ -180,7 +201,8 @@ class Background:
     @cached_property
     def skfem(self) -> MeshTet:
         """The same mesh for scikit-fem (node and cell numbers unchanged)."""
-        return MeshTet(self.nodes.T.copy(), self.cells.T.copy(), sort_t=False, validate=False)
+        cells = self.cells.T.astype(np.int64)
+        return MeshTet(self.nodes.T.copy(), cells, sort_t=False, validate=False)
 
 
 def box_mesh(lower, upper, cell_size=None, axes=None, split: str = "kuhn") -> Background:
@@ -196,60 +218,32 @@ def box_mesh(lower, upper, cell_size=None, axes=None, split: str = "kuhn") -> Ba
     return Background.from_arrays(*split_bricks(axes, split), axes)
 
 
-def gradients(nodes, cells) -> tuple[Array, Array]:
-    """∇N_a (M, 4, 3) [1/m] and volume (M,) [m³] of cells (M, 4) with nodes (N, 3) [m].
-
-    ∇N_a is the row a of the inverse of the edge matrix; ∇N_0 = -Σ ∇N_a, so that they sum to zero exactly."""
-    x = nodes[cells]
-    e1, e2, e3 = x[:, 1] - x[:, 0], x[:, 2] - x[:, 0], x[:, 3] - x[:, 0]
-    n1, n2, n3 = np.cross(e2, e3), np.cross(e3, e1), np.cross(e1, e2)
-    six_volume = np.einsum("ij,ij->i", e1, n1)
-    g = np.empty((len(cells), 4, 3))
-    g[:, 1], g[:, 2], g[:, 3] = (n / six_volume[:, None] for n in (n1, n2, n3))
-    g[:, 0] = -(g[:, 1] + g[:, 2] + g[:, 3])
-    return g, six_volume / 6.0
-
-
-def cell_neighbours(cells, n_nodes: int) -> Array:
-    """neighbours (M, 4) of cells (M, 4): the cell across the face opposite to each corner, -1 = none."""
-    faces = np.sort(cells[:, CORNERS_OF_FACE].reshape(-1, 3), axis=1)
-    order = np.lexsort(faces.T[::-1])
-    same = np.all(faces[order[1:]] == faces[order[:-1]], axis=1)
-    first, second = order[:-1][same], order[1:][same]
-    neighbours = np.full(4 * len(cells), -1, np.int64)
-    neighbours[first], neighbours[second] = second // 4, first // 4
-    return neighbours.reshape(-1, 4)
-
-
 def _checked_cells(nodes, cells):
-    cells = np.ascontiguousarray(cells, np.int64)
+    cells = np.asarray(cells)
     if cells.ndim != 2 or cells.shape[1] != 4 or len(cells) == 0:
         raise MeshError(f"cells has shape {cells.shape}; tetrahedra need (M, 4) with M > 0")
     if cells.min() < 0 or cells.max() >= len(nodes):
         raise MeshError(f"cells name node {cells.max()} of {len(nodes)}; node numbers start at 0")
-    return cells
+    return np.array(cells, np.uint32, order="C")
 
 
 def _oriented(nodes, cells):
-    """Swap two corners of the cells of negative volume; refuse flat ones."""
-    volume = _signed_volume(nodes, cells)
+    """Swap two corners of the cells (M, 4) of negative volume, in place, and refuse flat ones; the cells and their
+    volume (M,) [m³]."""
+    volume = np.empty(len(cells))
+    for some in spans(len(cells)):
+        volume[some] = gradients(nodes, cells[some])[1]
     flat = np.flatnonzero(np.abs(volume) <= 1e-14 * np.abs(volume).max())
     if flat.size:
         raise MeshError(f"cell {flat[0]} (and {flat.size - 1} more) has no volume; remove or repair it")
-    cells = cells.copy()
     turned = volume < 0
     cells[turned, 2:] = cells[turned, 3:1:-1]
-    return cells
-
-
-def _signed_volume(nodes, cells):
-    x = nodes[cells]
-    return np.linalg.det(x[:, 1:] - x[:, :1]) / 6.0
+    return cells, np.abs(volume, out=volume)
 
 
 def _boundary(cells, neighbours):
     cell, corner = np.nonzero(neighbours < 0)
-    return cells[cell[:, None], CORNERS_OF_FACE[corner]], cell
+    return cells[cell[:, None], CORNERS_OF_FACE[corner]].astype(np.int64), cell
 
 
 def _face_normals(nodes, faces):
@@ -277,11 +271,18 @@ def _uniform_axes(nodes, spacing):
 
 def _bins(nodes, cells, axes, lattice):
     """Cells of each bin as CSR: of the centroid in a lattice, otherwise all whose box reaches into the bin."""
-    x = nodes[cells]
-    corners = (x.mean(axis=1), x.mean(axis=1)) if lattice else _shrunk(x.min(axis=1), x.max(axis=1))
-    low, high = (np.stack([bin_of(axes[k], c[:, k]) for k in range(3)], axis=1) for c in corners)
-    shape = [len(a) - 1 for a in axes]
-    return _fill_bins(low, high, *shape)
+    nx, ny, nz = (len(a) - 1 for a in axes)
+    low, high = np.empty((len(cells), 3), np.int32), np.empty((0 if lattice else len(cells), 3), np.int32)
+    for some in spans(len(cells)):
+        x = nodes[cells[some]]
+        corners = (x.mean(axis=1),) if lattice else _shrunk(x.min(axis=1), x.max(axis=1))
+        for reach, corner in zip((low, high), corners):
+            reach[some] = np.stack([bin_of(axes[k], corner[:, k]) for k in range(3)], axis=1)
+    if not lattice:
+        return _fill_bins(low.astype(np.int64), high.astype(np.int64), nx, ny, nz)
+    bins = (low[:, 0].astype(np.int64) * ny + low[:, 1]) * nz + low[:, 2]
+    start = np.concatenate([[0], np.cumsum(np.bincount(bins, minlength=nx * ny * nz))])
+    return start, np.argsort(bins, kind="stable").astype(np.uint32)
 
 
 def _shrunk(low, high):
@@ -306,19 +307,7 @@ def _fill_bins(low, high, nx, ny, nz):
     bin_of_entry = (i * ny + j) * nz + k
     order = np.argsort(bin_of_entry, kind="stable")
     start = np.concatenate([[0], np.cumsum(np.bincount(bin_of_entry, minlength=nx * ny * nz))])
-    return start, cell[order]
-
-
-@kernel
-def _products(g):
-    out = np.empty((g.shape[0], 6))
-    for e in range(g.shape[0]):
-        n = 0
-        for a in range(4):
-            for b in range(a + 1, 4):
-                out[e, n] = g[e, a, 0] * g[e, b, 0] + g[e, a, 1] * g[e, b, 1] + g[e, a, 2] * g[e, b, 2]
-                n += 1
-    return out
+    return start, cell[order].astype(np.uint32)
 
 
 @kernel
@@ -339,13 +328,14 @@ def _slenderness(x, cells):
 
 @inner
 def smallest_barycentric(p, e, nodes, cells, g):
-    """min_a λ_a of the point p (3,) in cell e: ≥ 0 inside."""
+    """min_a λ_a of the point p (3,) in cell e: ≥ 0 inside; g (4, 3): work space."""
+    gradient_rows(nodes, cells, e, g)
     lowest = 1.0
     last = 1.0
     for a in range(1, 4):
         lam = 0.0
         for k in range(3):
-            lam += g[e, a, k] * (p[k] - nodes[cells[e, 0], k])
+            lam += g[a, k] * (p[k] - nodes[cells[e, 0], k])
         last -= lam
         lowest = min(lowest, lam)
     return min(lowest, last)
@@ -364,8 +354,8 @@ def _bin_index(axis, x):
 
 
 @kernel
-def _locate(points, ax, ay, az, bin_start, bin_cells, nodes, cells, g):
-    found = np.full(points.shape[0], -1, np.int64)
+def _locate(points, ax, ay, az, bin_start, bin_cells, nodes, cells):
+    found, g = np.full(points.shape[0], -1, np.int64), np.empty((4, 3))
     for m in range(points.shape[0]):
         i, j, k = (_bin_index(ax, points[m, 0]), _bin_index(ay, points[m, 1]), _bin_index(az, points[m, 2]))
         b = (i * (ay.shape[0] - 1) + j) * (az.shape[0] - 1) + k
@@ -388,7 +378,7 @@ def _on_wall(axis, i, x):
 
 @inner
 def _seek(points, m, b, bin_start, bin_cells, nodes, cells, g, found):
-    """Set found[m] to the cell of bin b that contains point m, if there is one."""
+    """Set found[m] to the cell of bin b that contains point m, if there is one; g (4, 3): work space."""
     best = -1e-10  # round-off: a point on a shared face belongs to the first cell that holds it
     for s in range(bin_start[b], bin_start[b + 1]):
         lowest = smallest_barycentric(points[m], bin_cells[s], nodes, cells, g)

@@ -12,7 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from array_types import Bools, Floats, Integers
-from kernel_decorators import inner, kernel
+from fluid.mesh.gradients import gradients, products_of
+from fluid.numerics.spans import spans
+from kernel_decorators import inner, kernel, plain
 
 MOST_SHAPES = 64
 """Shapes that are compared one by one, 6 kB of gradients: those of a box of bricks."""
@@ -33,21 +35,39 @@ class Shapes:
     products: Floats
     upright: Bools
 
+    @property
+    def is_of_each_cell(self) -> bool:
+        """Whether every cell has its own row, since too few are alike."""
+        return len(self.gradients) == len(self.row)
+
     @classmethod
     def of(cls, mesh) -> Shapes:
         """The shapes of a `mesh.Background`."""
-        row, first = _shapes(mesh.gradients, MOST_SHAPES, SAME)
-        if len(first) == 0:
-            row, first = _kinds(mesh.gradients)
-        if len(first) == 0:
-            return cls(
-                np.arange(len(mesh.gradients), dtype=np.uint32), mesh.gradients, mesh.products, mesh.upright
-            )
-        return cls(row, mesh.gradients[first], mesh.products[first], mesh.upright[first])
+        row, first = _few(mesh)
+        if len(first):
+            g = mesh.gradients_of(first)
+            return cls(row, g, products_of(g), mesh.upright[first])
+        g = gradients(mesh.nodes, mesh.cells)[0]
+        row, first = _kinds(g)
+        if len(first):
+            g = g[first]
+            return cls(row, g, products_of(g), mesh.upright[first])
+        return cls(np.arange(len(g), dtype=np.uint32), g, products_of(g), mesh.upright)
+
+
+def _few(mesh):
+    """Shape (M,) of each cell and first cell (S,) of each shape; no shapes if there are more than MOST_SHAPES."""
+    row, first = np.empty(len(mesh.cells), np.uint32), np.empty(MOST_SHAPES, np.int64)
+    table, n = np.empty((MOST_SHAPES, 4, 3)), 0
+    for some in spans(len(row)):
+        n = _shapes(mesh.gradients_of(some), SAME, some.start, row, first, table, n)
+        if n < 0:
+            return row, first[:0]
+    return row, first[:n]
 
 
 def _kinds(g):
-    """The result of `_shapes` for many shapes: cells are sorted by their gradients in millionths of the largest of the
+    """The result of `_few` for many shapes: cells are sorted by their gradients in millionths of the largest of the
     cell."""
     largest = np.abs(g).max(axis=(1, 2))
     share, power = np.frexp(largest)
@@ -74,22 +94,25 @@ def _all_alike(g, first, row, same):
     return found
 
 
-@kernel
-def _shapes(g, most, same):
-    """Shape (M,) of each cell and first cell (S,) of each shape; no shapes if there are more than `most`."""
-    row, first, n = np.empty(g.shape[0], np.uint32), np.empty(most, np.int64), 0
+@plain
+def _shapes(g, same, before, row, first, table, n):
+    """Write the shapes `row` of the cells `before` and following ones, with gradients g, and append new shapes to the
+    n that are there, their first cell and gradients; the number of shapes, -1 if the table is too short for them."""
     for e in range(g.shape[0]):
         size = _largest(g[e])
         s = 0
-        while s < n and not _alike(g[e], g[first[s]], same * size):
+        while s < n and not _alike(g[e], table[s], same * size):
             s += 1
-        if s == most:
-            return row, first[:0].copy()
+        if s == table.shape[0]:
+            return -1
         if s == n:
-            first[n] = e
+            first[n] = before + e
+            for a in range(4):
+                for k in range(3):
+                    table[n, a, k] = g[e, a, k]
             n += 1
-        row[e] = s
-    return row, first[:n].copy()
+        row[before + e] = s
+    return n
 
 
 @inner

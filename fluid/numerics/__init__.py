@@ -4,7 +4,7 @@ solve, multigrid      conjugate gradients for symmetric positive definite system
 bounded               the same with a lower bound on the unknowns (theory 2.2)
 sums                  momentum, kinetic energy and loads of many points
 cube_root             with the same bits on every processor
-jit                   how small kernels are compiled
+spans                 rows of large arrays, some at a time
 threads               kernels on several threads, with the same bits at any number of them
 
 Imports nothing of the project.

@@ -250,23 +250,25 @@ def _reached(indptr, indices, seed):
     return reached
 
 
-def cell_velocity(cell_list, u, remainder, cells, share):
+def cell_velocity(cell_list, u, remainder, fluid):
     """u at the centroid of the fluid part of the listed cells plus the remainder of the cell, (n, 3).
 
-    remainder (M, 3), or (0, 3) for none."""
+    remainder (M, 3), or (0, 3) for none · fluid: FluidCells"""
     out = np.empty((len(cell_list), 3))
-    over(_cell_velocity, len(cell_list), cell_list, u, remainder, cells, share, out)
+    over(_cell_velocity, len(cell_list), cell_list, u, remainder, fluid, out)
     return out
 
 
 @ranged
-def _cell_velocity(first, last, cell_list, u, remainder, cells, share, out):
+def _cell_velocity(first, last, cell_list, u, remainder, fluid, out):
+    cells, share, share_row = fluid.cells, fluid.share, fluid.share_row
     for s in range(first, last):
         e = cell_list[s]
+        row = share_row[e]
         for k in range(3):
             out[s, k] = remainder[e, k] if remainder.shape[0] > 0 else 0.0
             for a in range(4):
-                out[s, k] += share[e, a] * u[cells[e, a], k]
+                out[s, k] += share[row, a] * u[cells[e, a], k]
 
 
 def inflow(cell_list, u_cell, fluid, n_nodes):
@@ -355,15 +357,15 @@ def nodal_mean(wet, value, fluid, n_nodes):
 @ranged
 def _nodal_mean(first, last, runs, wet, value, fluid, weight, out):
     cell_list, wet_share = wet
-    cells, share, volume = fluid.cells, fluid.share, fluid.volume
+    cells, share, share_row, volume = fluid.cells, fluid.share, fluid.share_row, fluid.volume
     for run in range(runs.shape[0]):
         for s in range(runs[run, 0], runs[run, 1]):
             e = cell_list[s]
-            w = volume[e] * max(wet_share[s], 1e-6)
+            w, row = volume[e] * max(wet_share[s], 1e-6), share_row[e]
             for a in range(4):
                 i = cells[e, a]
                 if first <= i < last:
-                    wa = w * max(share[e, a], 1e-9)
+                    wa = w * max(share[row, a], 1e-9)
                     weight[i] += wa
                     for k in range(3):
                         out[i, k] += wa * value[s, k]

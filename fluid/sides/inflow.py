@@ -99,7 +99,7 @@ class Side:
             level=flow.level if flow else cast("Callable", level),
             cell=cell,
             corner=np.argmin(beside, axis=1),
-            faces=mesh.cells[cell][beside].reshape(-1, 3),
+            faces=mesh.cells[cell][beside].reshape(-1, 3).astype(np.int64),
             hats=np.broadcast_to(np.eye(3), (len(cell), 3, 3)),
             area=area[there],
             nodes=nodes,
@@ -115,7 +115,7 @@ class Side:
         nodes = np.flatnonzero(row >= 0)
         face, element, hats, share = _open_triangles(domain, self.cell, self.corner)
         corners = beside_corner(self.corner[face])
-        faces = np.take_along_axis(domain.cells[element], corners, axis=1)
+        faces = np.take_along_axis(domain.cells[element].astype(np.int64), corners, axis=1)
         kept = active[faces].all(axis=1)
         return replace(
             self,

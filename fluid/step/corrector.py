@@ -186,7 +186,7 @@ def _leave(first, last, places, cell_list, slopes, before, time, fluid, made):
     cells at these places of the list, and, divided by a time [s], to its rate. slopes: Π∇x (N, 3) and ∇x of the listed
     cells (n, 3)."""
     mean, gradient = slopes
-    cells, share = fluid.cells, fluid.share
+    cells, share, share_row = fluid.cells, fluid.share, fluid.share_row
     remainder, rate = made
     for place in range(first, last):
         s = places[place]
@@ -194,7 +194,7 @@ def _leave(first, last, places, cell_list, slopes, before, time, fluid, made):
         for k in range(3):
             left = 0.0
             for a in range(4):
-                left += share[e, a] * mean[cells[e, a], k]
+                left += share[share_row[e], a] * mean[cells[e, a], k]
             left -= gradient[s, k]
             remainder[e, k] = before[e, k] + left
             rate[e, k] = left / time
@@ -296,7 +296,7 @@ def _flux(water, kept, listed, start, u, u_cell):
     near[reached] = True
     around = t.cells_around(near)
     cell_field = zeros(water.cell_velocity.shape)
-    put(around, cell_velocity(around, u, np.zeros((0, 3)), t.cells, t.share), cell_field)
+    put(around, cell_velocity(around, u, np.zeros((0, 3)), t.fluid_cells), cell_field)
     put(kept.wet_cells, u_cell, cell_field)
     # with implicit Euler the velocity at the end of the step is the stable choice
     middle = (

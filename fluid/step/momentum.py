@@ -249,7 +249,7 @@ def hat_forces(cell_list, x, p, at_side, reference, nodes, fluid):
 def _hat_forces(first, last, cell_list, fields, at_side, reference, nodes, fluid, partial):
     x, p = fields
     cells, parent, g = fluid.cells, fluid.parent, fluid.gradients
-    volume, share = fluid.volume, fluid.share
+    volume, share, share_row = fluid.volume, fluid.share, fluid.share_row
     arm, beside = np.empty(3), np.empty(4, np.bool_)
     for c in range(first, last):
         for s in range(c * CHUNK, min((c + 1) * CHUNK, cell_list.shape[0])):
@@ -263,7 +263,7 @@ def _hat_forces(first, last, cell_list, fields, at_side, reference, nodes, fluid
                 beside[a] = at_side[i]
                 at_any = at_any or beside[a]
                 for k in range(3):
-                    arm[k] += share[e, a] * nodes[i, k]
+                    arm[k] += share[share_row[e], a] * nodes[i, k]
             for m in range(3 if at_any else 2):
                 f0, f1, f2 = 0.0, 0.0, 0.0
                 for a in range(4):

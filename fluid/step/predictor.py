@@ -234,7 +234,7 @@ def _problem(
     wet, cells = part.nodes, part.cells
     graph = water.graph_for(water.listed).without(t, part.void)
     remainder = _carried_remainder(water, dt, theta, cells)
-    star = cell_velocity(cells, u_star, remainder, t.cells, t.share)
+    star = cell_velocity(cells, u_star, remainder, t.fluid_cells)
     rhs = inflow(cells, star, t.fluid_cells, len(phi))
     dofs = np.flatnonzero(wet & ~water.walls.open_node)
     matrix, anchored, held_back = _definite(water, graph, phi, cells, dofs, dt / density, theta)

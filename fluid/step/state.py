@@ -62,10 +62,11 @@ class OtherWater(ValueError):
 
 
 def save(water) -> dict[str, Array]:
-    """Everything of a Water that changes in time, by name.  Raises NotAfterAStep."""
+    """Everything of a Water that changes in time, by name: references, since a step replaces the arrays that it
+    changes.  Raises NotAfterAStep."""
     if water.flux.capacity is not water.topology.node_volume:
         raise NotAfterAStep("the state of the water can be saved after a step, before the solids move on")
-    arrays = {name: np.array(getattr(water, name)) for name in (*NODAL, *OF_CELLS, *OF_BODIES, *NUMBERS)}
+    arrays = {name: np.asarray(getattr(water, name)) for name in (*NODAL, *OF_CELLS, *OF_BODIES, *NUMBERS)}
     arrays |= {"listed": water.listed, "layer_start": water.layer_start}
     arrays |= {"graph_nodes": water.flux.graph.nodes, "flux_nodes": water.flux.nodes, "flux": water.flux.rate}
     arrays["flux_velocity"] = water.flux.velocity

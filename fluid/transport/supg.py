@@ -82,9 +82,9 @@ class Band:
         is_listed = np.zeros(len(domain.nodes), bool)
         is_listed[listed] = True
         rows = np.flatnonzero(is_listed[domain.cells].all(axis=1))
-        members, cells = np.unique(domain.cells[rows], return_inverse=True)
+        members, cells = np.unique(domain.cells[rows].astype(np.int64), return_inverse=True)
         d = domain
-        of_cells = (d.volume[rows], d.centroid[rows], d.second_of(rows), d.is_cut[rows])
+        of_cells = (d.volume[rows], d.centroid_of(rows), d.second_of(rows), d.is_cut[rows])
         return cls(rows, members, d.nodes[members], cells.reshape(-1, 4), *of_cells)
 
 
@@ -92,7 +92,8 @@ def midpoint_velocity(topology, band: Band, u_m, dt: float):
     """c (n, 3) [m/s] at the nodes of the band from u_m (n, 3) [m/s]."""
     t, rows = topology, band.rows
     weight = np.maximum(band.volume, SMALLEST_WEIGHT * t.size[rows] ** 3)
-    return u_m - 0.5 * dt * _rate_along(band.cells, t.share[rows], t.parent[rows], t.gradients, weight, u_m)
+    share = t.share[t.share_row[rows]]
+    return u_m - 0.5 * dt * _rate_along(band.cells, share, t.parent[rows], t.gradients, weight, u_m)
 
 
 @kernel

@@ -7,7 +7,7 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import spsolve
 
 from fluid.domain.coupling_matrix import wetted_coupling
-from fluid.domain.physical_domain import gradients
+from fluid.mesh.gradients import gradients
 
 RHO_G = 9810.0
 

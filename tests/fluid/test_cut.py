@@ -8,8 +8,9 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from fluid.cut.bodies import ConvexBodies
-from fluid.domain.physical_domain import cut_domain, gradients, wetted_coupling
+from fluid.domain.physical_domain import cut_domain, wetted_coupling
 from fluid.mesh.background import box_mesh
+from fluid.mesh.gradients import gradients
 
 MESH = box_mesh((0, 0, 0), (1, 1, 1), 0.25)
 

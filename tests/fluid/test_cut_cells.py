@@ -8,8 +8,9 @@ from scipy.spatial.transform import Rotation
 
 from fluid.cut.bodies import ConvexBodies
 from fluid.domain.covers import Connection
-from fluid.domain.physical_domain import cut_domain, gradients
+from fluid.domain.physical_domain import cut_domain
 from fluid.mesh.background import Background, box_mesh
+from fluid.mesh.gradients import gradients
 from tests.fluid import solid_modeller
 from tests.fluid.test_cut import divergence_defect
 

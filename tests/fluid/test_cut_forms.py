@@ -6,9 +6,10 @@ from skfem import BilinearForm, LinearForm
 from skfem.helpers import dot, grad
 
 from fluid.cut.bodies import ConvexBodies
-from fluid.domain.physical_domain import cut_domain, gradients
+from fluid.domain.physical_domain import cut_domain
 from fluid.domain.quadrature import cell_basis, surface_basis
 from fluid.mesh.background import Background
+from fluid.mesh.gradients import gradients
 from tests.fluid import solid_modeller
 from tests.fluid.test_cut_cells import anywhere, cell, in_special_place
 

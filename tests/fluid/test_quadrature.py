@@ -7,9 +7,10 @@ from skfem import BilinearForm, LinearForm
 from skfem.helpers import dot, grad
 
 from fluid.cut.bodies import ConvexBodies
-from fluid.domain.physical_domain import cut_domain, gradients, wetted_coupling
+from fluid.domain.physical_domain import cut_domain, wetted_coupling
 from fluid.domain.quadrature import cell_basis, quadrature_rule, surface_basis
 from fluid.mesh.background import box_mesh
+from fluid.mesh.gradients import gradients
 
 MESH = box_mesh((0, 0, 0), (1, 1, 1), 1 / 6)
 BODIES = ConvexBodies.boxes(

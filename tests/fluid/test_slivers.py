@@ -8,8 +8,9 @@ import scipy.sparse as sp
 from scipy.spatial.transform import Rotation
 
 from fluid.cut.bodies import ConvexBodies
-from fluid.domain.physical_domain import cut_domain, gradients, wetted_coupling
+from fluid.domain.physical_domain import cut_domain, wetted_coupling
 from fluid.mesh.background import box_mesh
+from fluid.mesh.gradients import gradients
 from fluid.numerics.solve import solve
 from tests.fluid.scenes import advance, tank
 

@@ -129,7 +129,7 @@ def _meshed(dice: Dice, found: Basin, counts: list[int], follows_bed: bool) -> N
         ends = np.concatenate([[0.0], np.cumsum(widths)]) / widths.sum()
         axes.append(found.lower[axis] + found.size[axis] * ends)
     mesh = box_mesh(None, None, axes=axes, split=dice.one(["kuhn", "mirrored"]))
-    nodes, cells = np.array(mesh.nodes), np.array(mesh.cells)
+    nodes, cells = np.array(mesh.nodes), np.array(mesh.cells, np.int64)
     if follows_bed:
         nodes[:, 2] = _over_bed(nodes, found)
     elif dice.chance(0.5):

@@ -295,7 +295,7 @@ def _file(dice: Dice, room: Slot, found: Bodies, k: int) -> None:
     name = f"blocks{k}.vtu"
     if dice.chance(0.5):
         mesh = box_mesh(None, None, axes=axes)
-        found.files[name] = (np.array(mesh.nodes), "tetra", np.array(mesh.cells))
+        found.files[name] = (np.array(mesh.nodes), "tetra", np.array(mesh.cells, np.int64))
         count = len(mesh.cells)
     else:
         found.files[name] = _bricks(axes)
