@@ -39,8 +39,6 @@ if TYPE_CHECKING:
 
 BLOCK_COURANT = 0.5
 """Share of a cell that the fastest block may cross in one step: its cells are cut once a step."""
-DEFECT_FLOOR = 1e-3
-"""Share of the energy of the scene below which the motion of the structure is no measure of the defect."""
 
 
 class CoupledStepper:
@@ -299,7 +297,6 @@ class CoupledStepper:
             wetting = Wetting.of(problem.coupling)
         record.wetted = problem.coupling.nnz > 0
         before = self._padded(structure.velocity())
-        floor = DEFECT_FLOOR * self.ledger.input_energy
         found: CoupledSolution | None = None
         whole = self._joints_broken()
         passes = Passes(self.passes if record.wetted else 1, self.tolerance)
@@ -312,7 +309,9 @@ class CoupledStepper:
             record.substeps += report.substeps
             lead = response.lead(found.velocity, before, report.dt_s)
             assumed = (found.velocity - lead)[: structure.n]
-            record.defect = defect(mass, assumed, report.mean_velocity, floor)
+            if record.wetted:
+                floor = self._standing_still(found.load, problem.dt)
+                record.defect = defect(mass, assumed, report.mean_velocity, floor)
             breaks = self._joints_broken() != whole
             passes.add(
                 CouplingPass(solution=found, assumed=assumed, defect=record.defect, breaks_joints=breaks)
@@ -334,6 +333,18 @@ class CoupledStepper:
         if found.restoring.any():
             problem = replace(problem, other_load=problem.other_load + found.restoring)
         return problem, found, report.mean_velocity, assumed
+
+    def _standing_still(self, load: Array, dt: float) -> float:
+        """`standing_still` of the blocks that may move and that water touches, under its load (n_bodies, 6) and their
+        weight over dt [s]."""
+        from coupler.step.pressure_with_structure import impulse_energy, standing_still
+
+        structure, load = self.structure, load[: self.structure.n]
+        touched = ~structure.still & load.any(axis=1)
+        mass, inertia = structure.mass[touched], structure.inertia()[touched]
+        forces = load[touched], structure.weight_now()[touched]
+        impulse = sum(impulse_energy(mass, inertia, force, dt) for force in forces)
+        return standing_still(impulse, self.ledger.input_energy)
 
     def _joints_broken(self) -> int:
         return 0 if self.structure.joints is None else joint_counts(self.structure).broken

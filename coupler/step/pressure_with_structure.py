@@ -54,6 +54,10 @@ from kernel_decorators import kernel, plain
 if TYPE_CHECKING:
     from fluid.pressure.projection import PressureProblem
 
+DEFECT_FLOOR = 1e-3
+"""Share of the energy of the scene below which a motion is too slow to be missed."""
+ROUND_OFF = 1e-12
+"""Share of the energy of the scene below which nothing moves, where neither load nor weight says how fast it might."""
 LEAD_ROUNDS = 12
 """Number of iterations for the velocity at the end of a step from its mean; the error is reduced by 2⁻¹²."""
 
@@ -272,11 +276,26 @@ def defect(mass: sp.csr_array, assumed: Array, found: Array, floor: float = 0.0)
 
         sqrt( E(found − assumed) / max(E(found), E(assumed), floor) ),   E(V) = ½ V·M V
 
-    floor [J]: a share of the energy of the scene, since a structure that hardly moves has no velocity to compare with.
+    floor [J], `standing_still`: a structure that hardly moves has no velocity to compare with.
     """
     energy = [_kinetic(mass, v) for v in (found - assumed, found, assumed)]
     scale = max(energy[1], energy[2], floor)
     return float(np.sqrt(energy[0] / scale)) if scale > 0.0 else 0.0
+
+
+def standing_still(impulse: float, scene: float) -> float:
+    """Kinetic energy [J] below which the motion of the blocks is no measure of the defect: `impulse_energy` or, where
+    that is less, a share of the energy of the scene [J]. A small swing of a body afloat is judged by that swing, a
+    structure in a wide sea by the water that reaches it."""
+    return max(min(impulse, DEFECT_FLOOR * scene), ROUND_OFF * scene)
+
+
+def impulse_energy(mass: Array, inertia: Array, load: Array, dt: float) -> float:
+    """Energy [J] that loads (n, 6) [N, N m] held over dt [s] would give to the blocks if they were loose and at rest,
+    from their mass (n,) [kg] and inertia (n, 3, 3) [kg m²]."""
+    force, moment = load[:, :3], load[:, 3:]
+    spin = np.linalg.solve(inertia, moment[:, :, None])[:, :, 0]
+    return 0.5 * dt**2 * float(np.sum(force**2 / mass[:, None]) + np.sum(moment * spin))
 
 
 def _kinetic(mass: sp.csr_array, velocity: Array) -> float:

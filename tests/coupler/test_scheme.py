@@ -15,8 +15,10 @@ from coupler.step.pressure_with_structure import (
     StructureResponse,
     corrected_free_velocity,
     defect,
+    impulse_energy,
     mass_matrix,
     solve_coupled,
+    standing_still,
 )
 from coupler.step.record import StepRecord
 from tests.fakes import direct_solve, no_clock, piston_column
@@ -155,6 +157,22 @@ def test_a_structure_that_hardly_moves_has_no_defect_to_speak_of():
     assert defect(M, 0.0 * found, found, floor=1.0) < 1e-4
 
 
+def test_the_motion_that_counts_as_none_goes_by_the_load_or_by_the_scene():
+    """Of 2 kg and 3 kg m2 under 10 N and 6 N m for 0.1 s: 0.25 J and 0.06 J. A thousandth of a small scene is less."""
+    load = np.array([[10.0, 0, 0, 0, 0, 6.0]])
+    impulse = impulse_energy(np.array([2.0]), 3.0 * np.eye(3)[None], load, 0.1)
+    assert impulse == pytest.approx(0.31)
+    assert standing_still(impulse, 1e9) == pytest.approx(0.31)
+    assert standing_still(impulse, 1.0) == pytest.approx(1e-3)
+
+
+def test_round_off_of_a_scene_at_rest_is_no_defect():
+    """No load, and velocities of 1e-12 m/s in a scene of 1 J: nothing was missed."""
+    M = mass_matrix(np.array([2.0]), np.eye(3)[None])
+    found = np.array([[1e-12, 0, 0, 0, 0, 0]])
+    assert defect(M, -found, found, standing_still(0.0, 1.0)) < 1e-5
+
+
 @given(st.integers(0, 2**31), st.integers(0, 6), st.integers(0, 4))
 @settings(max_examples=30, deadline=None)
 def test_short_rows_give_both_products_of_the_coupling(seed, dofs, bodies):
@@ -209,10 +227,17 @@ def test_defect_of_a_body_that_stood_still_is_whole():
 class _Gate:
     """A block of 1 kg whose joint breaks at 30 N; unbroken it does not move, broken it is free."""
 
-    n, fixed, joints = 1, np.zeros(1, bool), ()
+    n, fixed, still, joints = 1, np.zeros(1, bool), np.zeros(1, bool), ()
+    mass = np.ones(1)
 
     def __init__(self):
         self.restore(False)
+
+    def inertia(self):
+        return np.eye(3)[None]
+
+    def weight_now(self):
+        return np.zeros((1, 6))
 
     def restore(self, broken):
         self.broken, self.speed = broken, 0.0
@@ -235,14 +260,21 @@ class _Gate:
 
 @pytest.mark.parametrize(
     ("before_it_moves", "share", "sea", "broken"),
-    [(100.0, 1.0, 1.0, True), (35.0, 1.0, 1.0, True), (35.0, 0.5, 1e6, True), (25.0, 1.0, 1.0, False)],
+    [
+        (100.0, 1.0, 1.0, True),
+        (100.0, 1.0, 1e11, True),
+        (35.0, 1.0, 1.0, True),
+        (35.0, 0.5, 1e6, True),
+        (25.0, 1.0, 1.0, False),
+    ],
 )
 def test_a_wall_that_breaks_before_it_moves_does_not_hold_because_it_would_move(
     before_it_moves, share, sea, broken, monkeypatch
 ):
     """Water pushes with F before the gate moves, and with nothing once it moves as fast as F alone would make it: the
     second pass takes the gate to be gone, so that it holds. A house stood by that, under 1.4 MN on its timber wall.
-    share: of that speed that the solution assumes; with half of it, in a wide sea [J], a pass halves the defect."""
+    share: of that speed that the solution assumes; with half of it, in a wide sea [J], a pass halves the defect. The
+    widest sea changes nothing: a thousandth of its energy is far more than the gate can have, and once hid the miss."""
     gate, dt = _Gate(), 1.0
 
     def solution(problem, response, v_free, *_):
