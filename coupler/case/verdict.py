@@ -16,7 +16,7 @@ class Verdict(Section):
     on: tuple[Name, ...] = Field(
         (),
         description="what is judged: names of blocks, groups, walls and floors or tables of the structure; absent: all "
-        "blocks that are glued at the start, or, where none is, all that can move",
+        "blocks with joints at the start, or, where none is, all that can move",
         examples=[["house"]],
     )
     moved: Annotated[float, InSI("", gt=0, le=10)] = Field(

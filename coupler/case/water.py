@@ -283,7 +283,7 @@ class Water(Section):
 class Solid(Section):
     """A fixed body in the water, for instance an obstacle: a box (centre, size), the hull of points (vertices), or the
     convex bodies of a file (path). It receives loads and never moves. In a case with a structure it is one of its
-    blocks, held in place: blocks hit it, rest on it and, with joints, are glued to it where their faces touch."""
+    blocks, held in place: blocks hit it, rest on it and, with joints, are joined to it where their faces touch."""
 
     name: Name = Field("solid", description="for gauges and results")
     centre: Point | None = Field(None, description="centre of a box")

@@ -89,7 +89,8 @@ def _names(case: Case, parts: list[Part]) -> list[str]:
 
 
 def joined_blocks(case: Case, parts: list[Part]) -> tuple[list, set[int]]:
-    """All blocks with the fixed solids behind them, and the rows of those with a face that joints glue to another."""
+    """All blocks with the fixed solids behind them, and the rows of those with a face that a joint connects to
+    another."""
     from coupler.geometry.solids import obstacle_blocks
     from coupler.scene.build import joint_rules, planes_of
     from yade_scripts.blocks.faces import both_held, touching_faces
@@ -98,5 +99,5 @@ def joined_blocks(case: Case, parts: list[Part]) -> tuple[list, set[int]]:
     planes = planes_of(case)
     faces = touching_faces(blocks, planes)
     laws = joint_rules(case.joints).of_faces(faces, blocks, planes)
-    glued = [face for face, law in zip(faces, laws) if law is not None and not both_held(blocks, face)]
-    return blocks, {row for face in glued for row in (face.a, face.b) if row >= 0}
+    with_joint = [face for face, law in zip(faces, laws) if law is not None and not both_held(blocks, face)]
+    return blocks, {row for face in with_joint for row in (face.a, face.b) if row >= 0}

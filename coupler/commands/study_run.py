@@ -46,14 +46,14 @@ def watch(compilation: Compilation) -> None:
     one_thread()
     from numba.core import event
 
-    class Told(event.Listener):
+    class CompileEvents(event.Listener):
         def on_start(self, event):
             compilation.start()
 
         def on_end(self, event):
             compilation.end()
 
-    event.register("numba:compile", Told())
+    event.register("numba:compile", CompileEvents())
 
 
 if __name__ == "__main__":

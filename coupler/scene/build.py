@@ -88,8 +88,8 @@ def watch_of(case: Case, structure) -> Watch:
         judged[rows_by_name(case, parts_of(case)).get(name, divisions.rows_of(name))] = True
     if not reported.on:
         movable = ~structure.fixed & (divisions.bodies.label >= 0)
-        glued = movable & joined(structure)
-        judged = glued if glued.any() else movable
+        jointed = movable & joined(structure)
+        judged = jointed if jointed.any() else movable
     rules = Rules(
         reported.moved, reported.damaged_joints, reported.collapsed_weight, reported.collapsed_joints
     )

@@ -246,7 +246,7 @@ class CoupledStepper:
         n, before = self.structure.n, self.structure.velocity()
         with self.clock("water"):
             problem = self.water.predict(dt)
-        with self._placed(problem):
+        with self._with_place(problem):
             problem, found, moved, assumed = self._exchange(problem, record, start)
         self.water.farther = dt * (self._padded(moved) - self.water.pushed_by)
         self.water.moved_by_end = self.water.moved_on + dt * self._padded(moved)
@@ -413,7 +413,7 @@ class CoupledStepper:
         with self.clock("water"):
             problem = self.water.predict(dt)
         self._pause()
-        with self.clock("pressure"), self._placed(problem):
+        with self.clock("pressure"), self._with_place(problem):
             result = solve_pressure(problem, self.rtol)
         with self.clock("water"):
             self.water.correct(problem, result.x, result.parting)
@@ -454,7 +454,7 @@ class CoupledStepper:
         return self.structure is not None and not self.structure.fixed.all(), self.water.sides is not None
 
     @contextmanager
-    def _placed(self, problem: PressureProblem) -> Iterator[None]:
+    def _with_place(self, problem: PressureProblem) -> Iterator[None]:
         """Add the place and the possible cause to the error of a pressure solve that fails."""
         from fluid.numerics.solve import NotConverged
 

@@ -76,7 +76,7 @@ class Joints:
 
     @classmethod
     def none(cls) -> Joints:
-        """Joints of blocks that are not glued: none."""
+        """No joints, for blocks without any."""
         return cls(np.zeros(0, int), np.zeros(0, int), np.zeros(0), np.zeros(0))
 
 
@@ -106,12 +106,13 @@ class Damage:
 
     @property
     def joined(self) -> bool:
-        """Whether any block of the group was glued at the start."""
+        """Whether any block of the group had a joint at the start."""
         return self.joints > 0
 
     @property
     def word(self) -> str:
-        """The state in words; a group that was never glued cannot break, and is called moved, in part or as a whole."""
+        """The state in words; a group that never had joints cannot break, and is called moved, in part or as a
+        whole."""
         if self.joined:
             return self.state.word
         return ("in place", "partly moved", "moved")[self.state]

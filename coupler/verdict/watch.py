@@ -234,7 +234,7 @@ _OWN = ("moved", "left_at", "direction", "impulse", "depth_at")
 
 
 def joined(structure: Structure) -> Array:
-    """(n,) bool: blocks that were glued to anything at the start."""
+    """(n,) bool: blocks that had a joint at the start."""
     found = np.zeros(structure.n, bool)
     if structure.joints is not None:
         for side in (structure.joints.a, structure.joints.b):

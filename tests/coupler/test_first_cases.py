@@ -9,6 +9,7 @@ from coupler.case.first_cases import FIRST_CASES, CannotBegin, text_of, write_fi
 from coupler.checks.read_case import load
 from coupler.commands.cli import app
 from coupler.program.errors import UnknownName
+from coupler.program.provenance import ROOT
 
 
 @pytest.mark.parametrize("name", FIRST_CASES)
@@ -17,6 +18,16 @@ def test_every_first_case_is_a_case(tmp_path, name):
     case = load(tmp_path / name).case
     assert case.time.end > 0.0
     assert len(FIRST_CASES[name].questions) <= 6
+
+
+def test_the_start_page_shows_the_case_that_init_writes(tmp_path):
+    written = write_first_case(tmp_path).read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "index.md").read_text(encoding="utf-8")
+    shown = page.split("```toml\n")[1].split("```")[0]
+    assert shown == written
+    for wrong in ("cell =", "density ="):
+        line = next(i for i, text in enumerate(written.splitlines(), 1) if text.startswith(wrong))
+        assert f"first/case.toml:{line}: " in page
 
 
 def test_answers_stand_in_the_case_with_their_units(tmp_path):

@@ -1,10 +1,14 @@
 """Kernels compiled ahead: the small scenes touch every part, and a case gets the parts that it needs and lacks."""
 
+import subprocess
+import sys
+
 import pytest
 
 from coupler.case.case import modules
 from coupler.checks.read_case import from_text, load
 from coupler.commands.warm_up import CASE, PARTS
+from coupler.program.process import environment
 from coupler.run import compile_ahead as ahead
 
 
@@ -71,3 +75,39 @@ def test_every_part_has_modules_with_kernels_and_an_empty_cache_has_none(monkeyp
     monkeypatch.delenv("NUMBA_CACHE_LOCATOR_CLASSES")
     ahead.folder_of.cache_clear()
     assert ahead.is_compiled("water"), "a cache of the user's own is left alone"
+
+
+COMPILED_BY_SOLIDS = """
+from numba.core import event
+
+from coupler.commands.warm_up import warm_up
+
+warm_up("water")
+warm_up("both")
+compiled = []
+
+
+class Compilations(event.Listener):
+    def on_start(self, event):
+        compiled.append(event.data["dispatcher"].py_func.__module__)
+
+    def on_end(self, event):
+        return None
+
+
+event.register("numba:compile", Compilations())
+warm_up("solids")
+print(sorted({module for module in compiled if module.startswith(("fluid", "coupler", "yade_scripts"))}))
+"""
+
+
+def test_kernels_called_directly_have_the_arguments_that_a_run_gives_them():
+    """Another type of an argument would compile a kernel that no run uses, and leave the one that it does."""
+    done = subprocess.run(
+        [sys.executable, "-c", COMPILED_BY_SOLIDS],
+        env=environment(),
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.stdout.splitlines()[-1:] == ["[]"], done.stderr
