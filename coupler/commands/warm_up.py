@@ -94,7 +94,7 @@ class Silent:
     def step(self, time, figures) -> None:
         return None
 
-    def expect(self, calm: bool) -> None:
+    def expect(self, calm: bool, broken: bool) -> None:
         return None
 
     def message(self, text: str) -> None:

@@ -5,8 +5,10 @@ takes a few steps that cost ten times as much. The estimate is based on the rati
 over the last quarter of the run so far, with a part of its trend since the quarter before (`TREND`). It is converted to
 wall time by their recent ratio, since other programs come and go. The past pace says nothing about what has not begun
 yet: runs in which water reached blocks were GROWTH times slower afterwards. This factor is applied until the water
-arrives and, as long as nothing breaks, for half that time again (`Calm`); the pace before that is then dropped. TREND,
-MOST_TREND and GROWTH were chosen on fourteen of the shipped cases (docs/speed.md)."""
+arrives and, as long as nothing breaks, for half that time again (`Calm`); the pace before that is then dropped. Whether
+anything will break is not known then, and what breaks decides: the same house costs 1.2 times as much where it stands
+and 3 to 6 times where it falls. So long, `between` gives both ends, and after the first break until the new pace has
+shown itself. TREND, MOST_TREND and the factors were chosen on shipped cases (docs/speed.md)."""
 
 from __future__ import annotations
 
@@ -18,7 +20,10 @@ WINDOW = 0.5
 """Share of the simulated time so far that counts: its later half for the pace, both for the trend."""
 TREND, MOST_TREND = 0.3, 1.3
 """Share of the trend that is assumed to continue, and the largest factor by which it may change the pace."""
-GROWTH = 2.2
+GROWTH, MOST_GROWTH = 2.2, 6.0
+"""Factors on the pace before the water arrives: the likely one, and that of runs in which everything broke."""
+SETTLED = 0.1
+"""Share of the whole run after the first break in which its own pace replaces the expected one."""
 AFTER_ARRIVAL = 1.5
 """Multiple of the time of the water's arrival at the structure after which, if nothing has broken, calm is over."""
 BUSY = 60.0
@@ -38,15 +43,18 @@ class Pace:
         self._seen: list[Step] = []
         self._calm = False
         self._began = 0.0
+        self._before: float | None = None
 
     @property
     def calm(self) -> bool:
-        """Whether the run is expected to become slower (`Calm`)."""
+        """Whether the run is expected to become slower."""
         return self._calm
 
-    @calm.setter
-    def calm(self, calm: bool) -> None:
+    def expect(self, calm: bool, broken: bool) -> None:
+        """Set whether the run is expected to become slower (`Calm`) · broken: whether a joint has broken."""
         if self._calm and not calm and self._seen:
+            if broken:
+                self._before = self._own()
             self._began = self._seen[-1][0]
         self._calm = calm
 
@@ -61,6 +69,34 @@ class Pace:
         """Wall time left [s]; None before the second step."""
         if len(self._seen) < 2:
             return None
+        return self._wall(self._ahead()[1])
+
+    def between(self) -> tuple[float, float] | None:
+        """Least and most wall time left [s] while it is not known whether and how much breaks; None else."""
+        if len(self._seen) < 2:
+            return None
+        least, _, most = self._ahead()
+        return (self._wall(least), self._wall(most)) if most > least else None
+
+    def _wall(self, pace: float) -> float:
+        """Wall time [s] of the rest of the run at a pace."""
+        return pace * max(self.end - self._seen[-1][0], 0.0) * self._busy()
+
+    def _ahead(self) -> tuple[float, float, float]:
+        """Least, likely and largest pace of the rest of the run."""
+        own = self._own()
+        if self._calm:
+            return own, GROWTH * own, MOST_GROWTH * own
+        share = (self._seen[-1][0] - self._began) / (SETTLED * self.end)
+        if self._before is None or share >= 1.0:
+            return own, own, own
+        likely = share * own + (1.0 - share) * max(GROWTH * self._before, own)
+        return own, likely, max(likely, MOST_GROWTH * self._before)
+
+    def _own(self) -> float:
+        """Pace of the run by what it has shown."""
+        if len(self._seen) < 2:
+            return 0.0
         time, first = self._seen[-1][0], self._seen[0][0]
         window = min(WINDOW * (time - first), time - max(self._began, first))
         to_go = max(self.end - time, 0.0)
@@ -70,7 +106,7 @@ class Pace:
             ahead = 0.25 * window + 0.5 * min(to_go, 0.5 * window)
             pace += TREND * (newer - older) / (0.5 * window) * ahead
             pace = min(max(pace, newer / MOST_TREND), newer * MOST_TREND)
-        return pace * to_go * (GROWTH if self.calm else 1.0) * self._busy()
+        return pace
 
     def _pace(self, begin: float, end: float) -> float:
         """Processor time over simulated time between two times [s]; of the last step where they are one."""
@@ -101,7 +137,8 @@ class Calm:
         self._arrived: float | None = None
 
     def now(self, time: float, wet: bool, joints: int, broken: int) -> bool:
-        """After a step to time [s]; wet: water touches a block · joints that hold · broken ones."""
+        """After a step to time [s]; wet: the water has arrived at blocks that can move · joints that hold ·
+        broken ones."""
         if wet and self._arrived is None:
             self._arrived = time
         if broken:

@@ -25,8 +25,9 @@ class Reporter(Protocol):
     def step(self, time: float, figures: Mapping[str, str]) -> None:
         """After each coupled step: the time reached [s] and the figures that matter."""
 
-    def expect(self, calm: bool) -> None:
-        """Called before a step is reported: whether the run is expected to become slower (`coupler/run/pace.py`)."""
+    def expect(self, calm: bool, broken: bool) -> None:
+        """Called before a step is reported: whether the run is expected to become slower, and whether a joint has
+        broken (`coupler/run/pace.py`)."""
 
     def message(self, text: str) -> None:
         """A sentence for the user and the log (modules on and off, remarks, written files)."""
@@ -58,6 +59,7 @@ class ProgressFile:
                     "time": time,
                     "end": self.inner.end,
                     "left": self.inner.pace.left(),
+                    "left_between": self.inner.pace.between(),
                     "figures": dict(figures),
                 }
             )
@@ -78,8 +80,8 @@ class _Base:
         self.pace = Pace(end)
         self._tenth = 0
 
-    def expect(self, calm: bool) -> None:
-        self.pace.calm = calm
+    def expect(self, calm: bool, broken: bool) -> None:
+        self.pace.expect(calm, broken)
 
     def _line(self, time: float, figures: Mapping[str, str]) -> str:
         share = min(1.0, time / self.end)
@@ -87,7 +89,10 @@ class _Base:
         return f"{share:4.0%}  t {time:.3f} of {self.end:g} s  {reported}  {self._left(time)}".rstrip()
 
     def _left(self, time: float) -> str:
-        """Wall time left, as text."""
+        """Wall time left, as text; two times where what breaks decides."""
+        between = self.pace.between()
+        if between is not None:
+            return f"left {duration(between[0])} to {duration(between[1])}"
         left = self.pace.left()
         return "" if left is None else f"left {duration(left)}"
 

@@ -156,7 +156,7 @@ def _steps(
                 recorder.step(record)
             _note(coupling, record, figures)
             _note_top(case, recorder, coupling, figures, reporter)
-            reporter.expect(_is_calm(calm, coupling, record))
+            reporter.expect(*_calm_and_broken(calm, coupling, record))
             reporter.step(coupling.time, _reported(case, coupling, record, scene.watch))
             if each is not None:
                 each(coupling, record, figures, recorder.readings)
@@ -297,12 +297,25 @@ def load_of_what_moves(coupling, record) -> np.ndarray:
     return force.sum(axis=0)
 
 
-def _is_calm(calm: Calm, coupling, record) -> bool:
-    """Whether the event that will slow the run down is still to come."""
+def _calm_and_broken(calm: Calm, coupling, record) -> tuple[bool, bool]:
+    """Whether the event that will slow the run down is still to come, and whether a joint has broken."""
     if not coupling.coupled:
-        return False
+        return False, False
     joints = joint_counts(coupling.structure)
-    return calm.now(coupling.time, record.wetted, joints.intact, joints.broken)
+    return calm.now(
+        coupling.time, _has_arrived(coupling, record), joints.intact, joints.broken
+    ), joints.broken > 0
+
+
+ARRIVED = 1e-3
+"""Force of the water on the blocks that can move, over their weight, from which it has arrived: footings in a harbour
+are wet from the start."""
+
+
+def _has_arrived(coupling, record) -> bool:
+    structure = coupling.structure
+    weight = structure.mass[~structure.fixed].sum() * np.linalg.norm(structure.gravity)
+    return bool(record.wetted and np.linalg.norm(load_of_what_moves(coupling, record)) > ARRIVED * weight)
 
 
 def _force(case: Case, record, watch) -> tuple[str, float]:

@@ -14,7 +14,7 @@ from coupler.commands.watch.command import serving
 from coupler.commands.watch.state import Watched, runs_in
 from coupler.program.process import environment
 from coupler.results.history import HistoryTable
-from coupler.run.pace import GROWTH, Calm, Pace
+from coupler.run.pace import GROWTH, MOST_GROWTH, Calm, Pace
 from tests.coupler.browser import CHROMIUM, Browser
 from tests.coupler.fake_runs import SUMMARY
 from tests.coupler.resumed import DRY
@@ -143,24 +143,47 @@ def test_other_programs_that_come_make_the_time_to_go_longer():
 def test_the_time_to_go_is_known_at_the_moment_the_water_arrives():
     """Asked before the next step has ended, nothing has been seen of the new pace yet: the last step stands for it."""
     pace = Pace(1.0)
-    pace.calm = True
+    pace.expect(True, False)
     for k in range(1, 6):
         pace.add(0.1 * k, float(k), float(k))
-    pace.calm = False
+    pace.expect(False, False)
     assert pace.left() == pytest.approx(5.0)
+    assert pace.between() is None
+
+
+def test_two_times_are_told_until_it_is_known_how_much_breaks():
+    """1 s a tenth while the water comes, 4 s from the first break at half of the run: at first both ends are told,
+    after a tenth of the run its own pace alone."""
+    pace, used = Pace(10.0), 0.0
+    pace.expect(True, False)
+    for k in range(1, 51):
+        used += 1.0
+        pace.add(0.1 * k, used, used)
+    assert pace.between() == pytest.approx((50.0, MOST_GROWTH * 50.0))
+    pace.expect(False, True)
+    for k in range(51, 62):
+        used += 4.0
+        pace.add(0.1 * k, used, used)
+        left, between = 4.0 * (100 - k), pace.between()
+        if k < 60:
+            assert between[0] <= pace.left() <= between[1]
+            assert between[0] == pytest.approx(left)
+        else:
+            assert between is None
+    assert pace.left() == pytest.approx(4.0 * 39)
 
 
 def test_what_was_calm_is_forgotten_when_the_water_arrives():
     """1 s a tenth before, 3 s after: half a second later 1.4 of 2 s are to go, at 3 s a tenth; before, GROWTH stands
     for that."""
     pace, used = Pace(2.0), 0.0
-    pace.calm = True
+    pace.expect(True, False)
     for k in range(1, 11):
         used += 1.0 if k <= 5 else 3.0
         if k == 5:
             pace.add(0.1 * k, used, used)
             assert pace.left() == pytest.approx(GROWTH * 15.0)
-            pace.calm = False
+            pace.expect(False, False)
             continue
         pace.add(0.1 * k, used, used)
     assert pace.left() == pytest.approx(30.0)
@@ -182,7 +205,7 @@ def test_calm_ends_with_the_first_break_or_some_time_after_the_water():
     for k in (1, 2, 3):
         pace.add(0.1 * k, float(k), float(k))
     plain = pace.left()
-    pace.calm = True
+    pace.expect(True, False)
     assert pace.left() == pytest.approx(GROWTH * plain)
 
 

@@ -81,6 +81,7 @@ class Watched:
             "end": end,
             "share": min(1.0, time / end) if end else None,
             "left": progress.get("left") if running else None,
+            "left_between": progress.get("left_between") if running else None,
             "quiet": clock.time() - progress["written"] if running and "written" in progress else None,
             "figures": progress.get("figures", {}),
             "resumed": len(summary.get("resumed", [])),
