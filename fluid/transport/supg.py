@@ -72,6 +72,10 @@ class Band:
     second: np.ndarray
     is_cut: np.ndarray
 
+    def centroid_of(self, rows) -> np.ndarray:
+        """Centroids (k, 3) [m] of cells (k,)."""
+        return self.centroid[rows]
+
     def second_of(self, rows) -> np.ndarray:
         """Second moments (k, 6) [m⁵] of cells (k,)."""
         return self.second[rows]
