@@ -76,7 +76,9 @@ def sweep(case: Path, request: SweepRequest) -> ExitCode:
         print(f"note: {remark}")
     if request.plan:
         _show(plan)
-        terminal.table("forecast", forecast(spec, request.jobs or free_cores(request.threads)))
+        terminal.table(
+            "forecast", forecast(spec, request.jobs or free_cores(request.threads), request.engine == "local")
+        )
         return ExitCode.DONE
     if request.export:
         from coupler.commands.sweep.snakemake import export

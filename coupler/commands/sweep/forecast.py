@@ -1,7 +1,8 @@
 """The forecast cost of a sweep, from its completed runs or from the first steps of the first run.
 
 The processor time is that of one run times the number of remaining runs. Where only some steps of a run were made, it
-is (set-up) + (steps) (end time / time reached). Runs may differ, so this is a forecast and not a bound.
+is (set-up) + (steps) (end time / time reached), and once for each worker the start of the program, since workers of
+this machine fork their runs. Runs may differ, so this is a forecast and not a bound.
 """
 
 from __future__ import annotations
@@ -24,24 +25,32 @@ TRIALS = 5
 """Runs that are tried: some may not stand at the start."""
 
 
-def forecast(spec: Spec, jobs: int) -> list[Row]:
-    """Rows for the terminal; makes the trial where no run is done. Raises BadCase where that does not run."""
+def forecast(spec: Spec, jobs: int, forked: bool) -> list[Row]:
+    """Rows for the terminal; forked: runs are forked from workers that have started once.
+
+    Makes the trial where no run is done. Raises BadCase where that does not run."""
     done = [measured for id in spec.runs if (measured := ended(spec, id)) is not None]
     left = len(spec.runs) - len(done)
     if done:
         cpu, memory, disk = (
             sum(measured[n] for measured in done) / len(done) for n in ("cpu_seconds", "memory", "disk")
         )
-        source = f"mean of {len(done)} runs that are done"
+        source, start = f"mean of {len(done)} runs that are done", 0.0
     else:
-        cpu, memory, disk = _trial(spec)
-        source = "from the first steps of the first run"
+        start, cpu, memory, disk = _trial(spec)
+        source = "from the first steps of the first run, which also load the kernels: rather less"
+    once = start * min(jobs, left) if forked else start * left
     return [
         Row("rows", len(spec.rows)),
         Row("runs", len(spec.runs), "", f"{left} of them to make"),
         Row("a run", cpu, "CPU s", source),
-        Row("processor time", duration(cpu * left)),
-        Row("wall time", duration(cpu * left / jobs), "", f"{jobs} at a time, if each has a core for itself"),
+        Row("processor time", duration(cpu * left + once)),
+        Row(
+            "wall time",
+            duration((cpu * left + once) / jobs),
+            "",
+            f"{jobs} at a time, if each has a core for itself",
+        ),
         Row("memory", memory * jobs / 1e6, "MB", f"{memory / 1e6:.0f} MB each, {jobs} at a time"),
         Row("disk", disk * left / 1e6, "MB", f"keep = '{spec.sweep.keep}'; {_free(spec)}"),
     ]
@@ -51,8 +60,9 @@ def _free(spec: Spec) -> str:
     return f"{shutil.disk_usage(spec.folder).free / 1e6:.4g} MB are free"
 
 
-def _trial(spec: Spec) -> tuple[float, float, float]:
-    """CPU seconds, memory [B] and disk [B] of the first run that begins, from its first steps."""
+def _trial(spec: Spec) -> tuple[float, float, float, float]:
+    """CPU seconds of the start of the program and of the run itself, memory [B] and disk [B] of the first run
+    that begins, from its first steps."""
     measured = ""
     for id in list(spec.runs)[:TRIALS]:
         found = _first_steps(spec, id)
@@ -62,7 +72,7 @@ def _trial(spec: Spec) -> tuple[float, float, float]:
     raise BadCase([f"the first steps of the first run: {measured}"])
 
 
-def _first_steps(spec: Spec, id: str) -> tuple[float, float, float] | str:
+def _first_steps(spec: Spec, id: str) -> tuple[float, float, float, float] | str:
     """The same for the given run; how it ended where it failed earlier."""
     case = load(spec.case_file, spec.runs[id]).case
     end = case.time.end
@@ -76,5 +86,7 @@ def _first_steps(spec: Spec, id: str) -> tuple[float, float, float] | str:
         figures = read_summary(place)["figures"]
         disk = sum(f.stat().st_size for f in place.rglob("*") if f.is_file())
     more = end / figures["time"]
-    steps = sum(seconds for part, seconds in figures["cpu_seconds"].items() if part != "set-up")
-    return cost.cpu_seconds + steps * (more - 1.0), cost.peak_memory, disk * more
+    parts = figures["cpu_seconds"]
+    steps = sum(seconds for part, seconds in parts.items() if part != "set-up")
+    own = parts.get("set-up", 0.0) + steps
+    return cost.cpu_seconds - own, own + steps * (more - 1.0), cost.peak_memory, disk * more
