@@ -296,7 +296,7 @@ class CoupledStepper:
             mass, response, v_free = self._response(problem, afloat)
             wetting = Wetting.of(problem.coupling)
         record.wetted = problem.coupling.nnz > 0
-        before = self._padded(structure.velocity())
+        before, free = self._padded(structure.velocity()), ~structure.still
         found: CoupledSolution | None = None
         whole = self._joints_broken()
         passes = Passes(self.passes if record.wetted else 1, self.tolerance)
@@ -310,7 +310,7 @@ class CoupledStepper:
             lead = response.lead(found.velocity, before, report.dt_s)
             assumed = (found.velocity - lead)[: structure.n]
             if record.wetted:
-                floor = self._standing_still(found.load, problem.dt)
+                floor = self._defect_floor(found.load, problem.dt, free)
                 record.defect = defect(mass, assumed, report.mean_velocity, floor)
             breaks = self._joints_broken() != whole
             passes.add(
@@ -334,17 +334,19 @@ class CoupledStepper:
             problem = replace(problem, other_load=problem.other_load + found.restoring)
         return problem, found, report.mean_velocity, assumed
 
-    def _standing_still(self, load: Array, dt: float) -> float:
-        """`standing_still` of the blocks that may move and that water touches, under its load (n_bodies, 6) and their
-        weight over dt [s]."""
-        from coupler.step.pressure_with_structure import impulse_energy, standing_still
+    def _defect_floor(self, load: Array, dt: float, free: Array) -> float:
+        """`defect_floor` of the blocks that water touches, under its load (n_bodies, 6) and their weight over dt [s].
+
+        free (n,) bool: blocks that could move at the start of the step. Blocks that fall asleep in it count as well:
+        the pressure solve assumed that they answer to the load."""
+        from coupler.step.pressure_with_structure import defect_floor, impulse_energy
 
         structure, load = self.structure, load[: self.structure.n]
-        touched = ~structure.still & load.any(axis=1)
+        touched = free & load.any(axis=1)
         mass, inertia = structure.mass[touched], structure.inertia()[touched]
         forces = load[touched], structure.weight_now()[touched]
         impulse = sum(impulse_energy(mass, inertia, force, dt) for force in forces)
-        return standing_still(impulse, self.ledger.input_energy)
+        return defect_floor(impulse, self.ledger.input_energy)
 
     def _joints_broken(self) -> int:
         return 0 if self.structure.joints is None else joint_counts(self.structure).broken

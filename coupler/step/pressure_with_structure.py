@@ -55,9 +55,9 @@ if TYPE_CHECKING:
     from fluid.pressure.projection import PressureProblem
 
 DEFECT_FLOOR = 1e-3
-"""Share of the energy of the scene below which a motion is too slow to be missed."""
+"""Fraction of the energy of the scene below which the motion of blocks counts as rest."""
 ROUND_OFF = 1e-12
-"""Share of the energy of the scene below which nothing moves, where neither load nor weight says how fast it might."""
+"""The same for round-off, where neither load nor weight gives a larger energy."""
 LEAD_ROUNDS = 12
 """Number of iterations for the velocity at the end of a step from its mean; the error is reduced by 2⁻¹²."""
 
@@ -276,17 +276,17 @@ def defect(mass: sp.csr_array, assumed: Array, found: Array, floor: float = 0.0)
 
         sqrt( E(found − assumed) / max(E(found), E(assumed), floor) ),   E(V) = ½ V·M V
 
-    floor [J], `standing_still`: a structure that hardly moves has no velocity to compare with.
+    floor [J], `defect_floor`: a structure that hardly moves has no velocity to compare with.
     """
     energy = [_kinetic(mass, v) for v in (found - assumed, found, assumed)]
     scale = max(energy[1], energy[2], floor)
     return float(np.sqrt(energy[0] / scale)) if scale > 0.0 else 0.0
 
 
-def standing_still(impulse: float, scene: float) -> float:
+def defect_floor(impulse: float, scene: float) -> float:
     """Kinetic energy [J] below which the motion of the blocks is no measure of the defect: `impulse_energy` or, where
-    that is less, a share of the energy of the scene [J]. A small swing of a body afloat is judged by that swing, a
-    structure in a wide sea by the water that reaches it."""
+    that is less, a share of the energy of the scene [J]. A small oscillation of a floating body is compared
+    with that oscillation, a structure in a wide sea with the load of the water that reaches it."""
     return max(min(impulse, DEFECT_FLOOR * scene), ROUND_OFF * scene)
 
 

@@ -15,10 +15,10 @@ from coupler.step.pressure_with_structure import (
     StructureResponse,
     corrected_free_velocity,
     defect,
+    defect_floor,
     impulse_energy,
     mass_matrix,
     solve_coupled,
-    standing_still,
 )
 from coupler.step.record import StepRecord
 from tests.fakes import direct_solve, no_clock, piston_column
@@ -162,15 +162,15 @@ def test_the_motion_that_counts_as_none_goes_by_the_load_or_by_the_scene():
     load = np.array([[10.0, 0, 0, 0, 0, 6.0]])
     impulse = impulse_energy(np.array([2.0]), 3.0 * np.eye(3)[None], load, 0.1)
     assert impulse == pytest.approx(0.31)
-    assert standing_still(impulse, 1e9) == pytest.approx(0.31)
-    assert standing_still(impulse, 1.0) == pytest.approx(1e-3)
+    assert defect_floor(impulse, 1e9) == pytest.approx(0.31)
+    assert defect_floor(impulse, 1.0) == pytest.approx(1e-3)
 
 
 def test_round_off_of_a_scene_at_rest_is_no_defect():
     """No load, and velocities of 1e-12 m/s in a scene of 1 J: nothing was missed."""
     M = mass_matrix(np.array([2.0]), np.eye(3)[None])
     found = np.array([[1e-12, 0, 0, 0, 0, 0]])
-    assert defect(M, -found, found, standing_still(0.0, 1.0)) < 1e-5
+    assert defect(M, -found, found, defect_floor(0.0, 1.0)) < 1e-5
 
 
 @given(st.integers(0, 2**31), st.integers(0, 6), st.integers(0, 4))
