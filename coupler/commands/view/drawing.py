@@ -20,8 +20,10 @@ from coupler.commands.view.camera import frame
 from coupler.commands.view.scene import LETTERS
 
 SIZE = (1600, 1000)
-TINTS = ("#d9c7a8", "#9db8c9", "#c98f7a", "#b7b0a6", "#a9c5a0", "#cdb4d6", "#e0c060")
-"""Colours of parts in the order of their names, repeated cyclically."""
+TINTS = ("#d9c7a8", "#c98f7a", "#a9c5a0", "#cdb4d6", "#e0c060", "#8e7f76")
+"""Colours of parts in the order of their names, repeated cyclically; none is blue, which is the water's."""
+KNOWN = {"water": "#56a0d3", "ground": palette.BED, "solid": palette.SOLID}
+"""Colours of parts that are no blocks."""
 TROUBLE = "#b3261e"
 
 
@@ -32,13 +34,14 @@ def draw(place, picture):
         edges, lines = file["edges"], file["lines"]
     plotter = pv.Plotter(off_screen=True, window_size=SIZE, lighting="light kit")
     plotter.set_background(palette.PAPER)
+    of_blocks = [name for name in names if name not in KNOWN]
     for k, name in enumerate(names):
         own = triangles[part == k]
         if len(own):
             mesh = pv.PolyData.from_regular_faces(own.reshape(-1, 3), np.arange(3 * len(own)).reshape(-1, 3))
             wet = name == "water"
             faint = 0.35 if len(lines) or wet else 1.0
-            tint = "#56a0d3" if wet else palette.BED if name == "ground" else TINTS[k % len(TINTS)]
+            tint = KNOWN.get(name) or TINTS[of_blocks.index(name) % len(TINTS)]
             plotter.add_mesh(mesh, color=tint, ambient=0.25, opacity=faint, label=name)
     for ends, colour, width in ((edges, "#5b4a3a", 1.5), (lines, TROUBLE, 8)):
         if len(ends):
