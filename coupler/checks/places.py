@@ -18,7 +18,7 @@ from coupler.geometry.parts import Part, standing_on_terrain
 from coupler.geometry.solids import solids_of
 from coupler.geometry.start_surfaces import surface_of
 from coupler.geometry.tank_mesh import beside_mesh, is_basin, is_measured, mesh_of, tank_places, what_of
-from coupler.geometry.tank_regions import BYTES_PER_CELL
+from coupler.geometry.tank_regions import bytes_of_cells
 from coupler.geometry.terrain.grid import TerrainError
 
 Problem = tuple[KeyPath, str]
@@ -96,7 +96,10 @@ def _tank(case: Case) -> Iterator[Problem]:
 def _memory(case: Case) -> Iterator[Problem]:
     """A mesh too large for the memory of this machine: the system would kill the run without a message."""
     cells, _ = mesh_size(case.tank)
-    needed, there = BYTES_PER_CELL * cells, os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    needed, there = (
+        bytes_of_cells(cells, case.tank.mesh is not None),
+        os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"),
+    )
     if needed > there and case.tank.mesh is not None:
         yield (
             ("tank", "mesh"),

@@ -20,8 +20,12 @@ Problem = tuple[KeyPath, str]
 
 ALL = ("solids", "blocks", "terrain")
 """Names in `around` that stand for everything of a kind."""
-BYTES_PER_CELL = 1100
-"""Resident memory that a cell of the mesh takes in a run of water alone: topology, moments and fields."""
+BYTES_PER_CELL = 510
+"""Resident memory that a cell of the mesh takes in a run of water alone: topology, moments and fields ..."""
+BYTES_KEPT_PER_CELL, MOST_KEPT = 150, 700_000
+"""... and more for so many of the cells, since arrays of less than 32 MB stay in the process when they are freed."""
+BYTES_OF_SINGLE_SHAPE = 144
+"""Gradients and their products of a cell whose shape no other has, as in a mesh from a file."""
 MOST_SLENDER = 8.0
 """Longest over shortest edge of a brick."""
 MARGIN = 2.0
@@ -75,13 +79,19 @@ def stretch_problems(case: Case) -> Iterator[Problem]:
 def too_many(tank: Tank, regions: Regions) -> str | None:
     """Why a mesh of this size cannot be made on this machine; None if it can. The mesh is not made."""
     cells = estimated_cells(tank, regions)
-    needed, there = BYTES_PER_CELL * cells, os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    needed, there = bytes_of_cells(cells), os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     if needed <= there:
         return None
     return (
         f"about {cells:.2g} cells, which need {needed / 1e9:.3g} GB; this machine has {there / 1e9:.0f} GB: fewer "
         "levels, a smaller margin or box, or a larger tank.cell"
     )
+
+
+def bytes_of_cells(cells: float, own_shapes: bool = False) -> float:
+    """Resident memory [B] that the cells of a mesh take in a run of water alone; own_shapes: no two are alike."""
+    each = BYTES_PER_CELL + (BYTES_OF_SINGLE_SHAPE if own_shapes else 0)
+    return each * cells + BYTES_KEPT_PER_CELL * min(cells, MOST_KEPT)
 
 
 def estimated_cells(tank: Tank, regions: Regions) -> float:

@@ -16,9 +16,10 @@ from pathlib import Path
 from coupler.case.case import Case
 from coupler.case.inflow_records import record_of
 from coupler.case.schedule import Schedule, checkpoint_interval
-from coupler.checks.places import BYTES_PER_CELL, mesh_size
+from coupler.checks.places import mesh_size
 from coupler.geometry import start_surfaces
 from coupler.geometry.tank_mesh import finest_cell, water_in
+from coupler.geometry.tank_regions import bytes_of_cells
 from coupler.program.terminal import Row, lines
 from coupler.step.observe import joint_counts
 
@@ -27,9 +28,9 @@ BYTES_PER_BLOCK = 60_000
 """Resident memory per block, its contact nodes included."""
 BYTES_PER_WET_BLOCK = 300_000
 """The same with the cells that it cuts."""
-BYTES_PER_COUPLED_CELL = 1500
+BYTES_PER_COUPLED_CELL = 750
 """Resident memory per cell where blocks move, since two domains exist at once at times."""
-PROGRAM_BYTES = {"base": 105e6, "water": 155e6, "structure": 330e6, "both": 375e6}
+PROGRAM_BYTES = {"base": 105e6, "water": 155e6, "structure": 330e6, "both": 385e6}
 """Resident memory of code and libraries: of every run, and what each side adds, kernels included."""
 DISK_BYTES_PER_NODE = 12
 """Compressed level set, velocity and pressure of one written state."""
@@ -110,7 +111,8 @@ def memory(case: Case, cells: int, blocks: int) -> float:
     if case.water is None:
         return PROGRAM_BYTES["base"] + PROGRAM_BYTES["structure"] + BYTES_PER_BLOCK * blocks
     if case.structure is None:
-        return PROGRAM_BYTES["base"] + PROGRAM_BYTES["water"] + BYTES_PER_CELL * cells
+        held = bytes_of_cells(cells, case.tank.mesh is not None)
+        return PROGRAM_BYTES["base"] + PROGRAM_BYTES["water"] + held
     both = PROGRAM_BYTES["base"] + PROGRAM_BYTES["both"]
     return both + BYTES_PER_COUPLED_CELL * cells + BYTES_PER_WET_BLOCK * blocks
 
