@@ -43,8 +43,8 @@ NOTES = {
     "P53": "The period agrees, but each swing is smaller than the reference by 0.06 to 0.09 of the drop height. Cells "
     "of R/5 account for most of it: in a tank 1.4 m wide the first swing is 0.790 with R/5 and 0.802 with R/8, and the "
     "energy that the water loses up to then falls with the size of the cells (0.066 and 0.040 of what the drop gave). "
-    "A drop of a tenth as much gives 0.799, and the sphere lifts the mean level by 0.005. Steps of half the length, "
-    "the damping of divergence and of water lines, and theta change it by 0.002 or less. Up to version 0.1.0 all five "
+    "A drop of a tenth as much gives 0.799, and the sphere lifts the mean level by 0.005. The damping "
+    "of divergence and of water lines, and theta change it by 0.002 or less. Up to version 0.1.0 all five "
     "quantities were within their limits because the coupling let an oscillation grow by omega^2 dt^2 / 4 in a step, "
     "4 % in half a period, which hid the loss; with that growth put back the first swing is 0.824 instead of 0.790.",
     "P55": "With four cells over the diameter the speed is 5 to 6 % low, because linear velocities are too coarse "
