@@ -265,7 +265,7 @@ def _law(case: Case) -> Iterator[Problem]:
 
     law = case.joints.law
     if law not in laws.names():
-        yield ("joints", "law"), _no_such("law", law, laws.names())
+        yield ("joints", "law"), laws.unknown(law)
     if case.joints.mixed_mode == "needleman" and law != "polynomial":
         yield (
             ("joints", "mixed_mode"),

@@ -64,9 +64,7 @@ def _pair_law(case: Case, i: int, pair) -> Iterator[Problem]:
     from yade_scripts.joints.cohesion import JointParameterError
 
     if pair.law is not None and pair.law not in laws.names():
-        known = laws.names()
-        hint = did_you_mean(pair.law, known) or f"; there are {', '.join(known)}"
-        yield ("joints", "pair", i, "law"), f"there is no law '{pair.law}'{hint}"
+        yield ("joints", "pair", i, "law"), laws.unknown(pair.law)
     elif case.joints.law in laws.names():
         try:
             joint_parameters(of_pair(case.joints, pair))

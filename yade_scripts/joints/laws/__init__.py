@@ -39,6 +39,13 @@ def identity(name: str) -> dict[str, str]:
     return {"from": where, "checksum": f"{source_checksum(law.secant, law.work):08x}"}
 
 
+def unknown(name: str) -> str:
+    """What to say of a law that does not exist: the nearest name, all there are, and how to add one."""
+    near = difflib.get_close_matches(name, names(), n=1)
+    meant = f"; did you mean '{near[0]}'?" if near else "."
+    return f"there is no law '{name}'{meant} Laws: {', '.join(names())}; one of your own is named by --law FILE.py"
+
+
 def find(name: str) -> CohesiveLaw:
     """The law of that name. Raises UnknownLaw, and BadLaw for the law of a package that does not meet the
     requirements."""
@@ -46,11 +53,6 @@ def find(name: str) -> CohesiveLaw:
         found = outside_laws.find(name)
         if found is not None:
             return found
-    known = names()
-    if name not in known:
-        near = difflib.get_close_matches(name, known, n=1, cutoff=0.0)
-        raise UnknownLaw(
-            f"joints.law = '{name}': there is no such law; did you mean '{near[0]}'? Laws: {', '.join(known)}; "
-            "one of your own is named by --law FILE.py"
-        )
+    if name not in names():
+        raise UnknownLaw(f"joints.law: {unknown(name)}")
     return import_module(f"{__name__}.{name}").LAW
