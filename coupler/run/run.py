@@ -97,9 +97,10 @@ def _describe(scene: Scene, reporter) -> None:
     c = scene.coupling
     if c.water is not None:
         d = c.water.domain
+        divided = "; each side of one that a wall divides counts" if d.covers == "multiple" else ""
         reporter.message(
             f"water: {len(c.water.mesh.cells)} cells in the mesh, {len(d.cells)} outside the solids "
-            f"({int(d.is_cut.sum())} cut), {c.water.volume():.6g} m3"
+            f"({int(d.is_cut.sum())} cut{divided}), {c.water.volume():.6g} m3"
         )
     if c.water is not None and c.water.air is not None:
         from coupler.run.trapped_air import described_air
