@@ -248,6 +248,17 @@ class Sides:
         """The absorbing sides."""
         return [s.flow.absorber for s in self.every if s.flow is not None and s.flow.absorber is not None]
 
+    @property
+    def absorbed(self) -> Array:
+        """(k, 2) corrections to the level [m] and to the velocity inwards [m/s] of each absorbing side: what the side
+        holds until its next update, wherever a body moves in between."""
+        return np.array([(a.height, a.speed) for a in self.absorbers()]).reshape(-1, 2)
+
+    @absorbed.setter
+    def absorbed(self, corrections: Array) -> None:
+        for absorber, (height, speed) in zip(self.absorbers(), corrections.tolist()):
+            absorber.height, absorber.speed = height, speed
+
     def place(self, domain, active) -> None:
         """Follow a domain; active (N,) bool: its nodes with fluid around."""
         self.now = tuple(side.on_domain(domain, active) for side in self.every)

@@ -72,6 +72,7 @@ def save(water) -> dict[str, Array]:
     arrays["flux_velocity"] = water.flux.velocity
     if water.sides is not None:
         arrays |= {name: np.array(getattr(water.sides, name)) for name in SIDES}
+        arrays["absorbed"] = water.sides.absorbed
     if water.air is not None:
         arrays |= {f"air_{name}": np.array(getattr(water.air, name)) for name in OF_AIR}
     if water.slits is not None:
@@ -100,6 +101,7 @@ def restore(water, domain, arrays) -> None:
     if water.sides is not None:
         for name in SIDES:
             setattr(water.sides, name, float(arrays[name]))
+        water.sides.absorbed = np.array(arrays["absorbed"])
     if water.air is not None:
         held = {name: np.array(arrays[f"air_{name}"]) for name in OF_AIR}
         water.air = replace(water.air, **{name: v if v.ndim else v.item() for name, v in held.items()})
@@ -122,7 +124,7 @@ def _check(domain, arrays, sides, air) -> None:
         "flux",
         "flux_velocity",
     }
-    wanted |= set(SIDES) if sides is not None else set()
+    wanted |= {*SIDES, "absorbed"} if sides is not None else set()
     wanted |= {f"air_{name}" for name in OF_AIR} if air is not None else set()
     missing = sorted(wanted - set(arrays))
     if missing:

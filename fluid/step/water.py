@@ -279,7 +279,8 @@ class Water:
 
     def snapshot(self) -> dict:
         """The present state, for `restore`: references, since a step replaces the arrays that it changes."""
-        return vars(self) | {"sides": None if self.sides is None else dict(vars(self.sides))}
+        sides = None if self.sides is None else dict(vars(self.sides)) | {"absorbed": self.sides.absorbed}
+        return vars(self) | {"sides": sides}
 
     def restore(self, remembered: dict) -> None:
         """Back to what `snapshot` gave, bit for bit."""
@@ -287,7 +288,9 @@ class Water:
         vars(self).update(remembered)
         self.sides = sides
         if sides is not None:
-            vars(sides).update(remembered["sides"])
+            kept = dict(remembered["sides"])
+            sides.absorbed = kept.pop("absorbed")
+            vars(sides).update(kept)
 
     # ---- moving solids
 
