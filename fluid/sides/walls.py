@@ -14,6 +14,9 @@ from kernel_decorators import plain
 _SAME_DIRECTION = 0.3
 """Normals of one node that span less than this (singular value over the largest) count as one direction."""
 
+LYING_OVER = 0.7
+"""Cosine between the outward normal of an open side and upwards from which the side lies over the water."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Walls:
@@ -121,9 +124,12 @@ class Walls:
             np.add.at(total, corner, self.open_area)
         return nodes, total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-300)
 
-    def admit_air(self, phi, u, dt: float, spacing) -> None:
+    def admit_air(self, phi, u, dt: float, spacing, up) -> None:
         """Let air enter at the open sides: where u (N, 3) [m/s] points into the tank, the surface, which was at the
-        side at most, moves on by |u·n| dt in dt [s]. φ (N,) [m], carried by paths, is raised by that, in place.
+        side at most, lies at least |u·n| dt inside after dt [s]. φ (N,) [m], carried by paths, is raised to that, in
+        place. At a side that lies over the water, up (3,) [-], surface and side are parallel, and φ within a cell of
+        the surface is raised by that: the surface has gone on from where it was. At other sides the surface meets the
+        side, and a motion along it does not lower it.
 
         Paths that come from outside end at the side, where they would find the water that has just left: a drop that
         falls back from an open top would never end, and would run down the wall faster and faster.  Nodes at least one
@@ -131,7 +137,9 @@ class Walls:
         nodes, normal = self.outward
         inward = -dt * np.einsum("ij,ij->i", u[nodes], normal)
         coming = (inward > 0.0) & (phi[nodes] > -spacing[nodes])
-        phi[nodes[coming]] = np.maximum(phi[nodes[coming]], 0.0) + inward[coming]
+        over = (normal @ up > LYING_OVER) & (phi[nodes] < spacing[nodes])
+        gone = np.where(over, np.maximum(phi[nodes], 0.0) + inward, np.maximum(phi[nodes], inward))
+        phi[nodes[coming]] = gone[coming]
         phi[nodes] = without_films(phi[nodes], spacing[nodes])  # water up to the brim, rounded
 
     def slip(self, u) -> None:

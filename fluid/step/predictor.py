@@ -196,7 +196,7 @@ def _transported(water, dt, theta, kick):
         moved[places, 3] = levels
     near = np.abs(water.topology.in_cells(phi)[water.listed]) < TRANSPORT_WIDTH * water.mesh.spacing
     phi[water.listed[near]] = moved[near, 3]
-    water.walls.admit_air(phi, u_m, dt, water.topology.node_size)
+    water.walls.admit_air(phi, u_m, dt, water.topology.node_size, -np.asarray(water.parameters.down))
     water.hold(u_adv, water.time + dt)
     return u_adv, phi
 

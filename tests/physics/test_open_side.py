@@ -38,3 +38,17 @@ def test_a_slab_leaves_the_open_top_as_fast_as_it_falls():
     assert water.topology.nodes[:, 2] @ water.nodal_water / water.volume() == pytest.approx(
         0.5 * (level + base) - fallen, abs=0.05 * h
     )
+
+
+def test_air_that_enters_along_the_surface_does_not_lower_it():
+    """At a side that the surface meets at a right angle, a flow inwards moves the surface along itself: the distance of
+    a node above it stays what it was, however often air is let in."""
+    water = tank((2, 1, 1), (4, 2, 4), level_at(0.5), is_open=lambda normal, _: normal[:, 0] > 0.5).water
+    nodes = water.topology.nodes
+    above = (nodes[:, 0] > 1.99) & (nodes[:, 2] > 0.7)
+    phi, u = water.level_set.copy(), np.zeros_like(nodes)
+    u[:, 0] = -1.0
+    before = phi[above].copy()
+    for _ in range(5):
+        water.walls.admit_air(phi, u, 0.05, water.topology.node_size, np.array([0.0, 0.0, 1.0]))
+    np.testing.assert_array_equal(phi[above], before)
