@@ -67,7 +67,9 @@ def symmetric_root(S) -> Array:
 
 def cell_basis(domain) -> CellBasis:
     """scikit-fem basis (P1) whose integrals run over the fluid part of every cell."""
-    mesh = MeshTet(domain.nodes.T.copy(), domain.cells.T.astype(np.int64), sort_t=False, validate=False)
+    mesh = MeshTet(
+        domain.nodes.T.copy(), domain.cells.T.astype(np.int64, order="C"), sort_t=False, validate=False
+    )
     return CellBasis(mesh, ElementTetP1(), quadrature=quadrature_rule(domain))
 
 
@@ -80,6 +82,6 @@ def surface_basis(domain) -> tuple[CellBasis, Array]:
     offset = np.swapaxes(domain.face_points - corners[:, :1], 1, 2)
     X = np.moveaxis(np.linalg.solve(edges, offset), 1, 0)
     W = np.repeat((domain.face_area / 3 / np.abs(np.linalg.det(edges)))[:, None], 3, axis=1)
-    mesh = MeshTet(domain.nodes.T.copy(), cells.T.astype(np.int64), sort_t=False, validate=False)
+    mesh = MeshTet(domain.nodes.T.copy(), cells.T.astype(np.int64, order="C"), sort_t=False, validate=False)
     basis = CellBasis(mesh, ElementTetP1(), quadrature=(np.ascontiguousarray(X), W))
     return basis, np.repeat(domain.face_normal.T[:, :, None], 3, axis=2)

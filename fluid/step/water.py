@@ -34,7 +34,6 @@ from fluid.surface.level_set import FAR, redistance, without_films
 from fluid.surface.volume import edge_flux, nodal_volume, renumbering
 from fluid.transport.surface_momentum import Carried
 from fluid.transport.swept_volume import swept
-from fluid.transport.volume_transport import carry_volume
 from kernel_decorators import kernel
 
 if TYPE_CHECKING:
@@ -333,8 +332,7 @@ class Water:
             self._film_rules = rules
 
     def carried(self, dt: float, theta: float) -> Carried:
-        """What the fluxes make of volume and momentum in dt [s], carried on the domain of the last projection; of the
-        volume alone with `advection = "supg"`, where velocity does not go along paths."""
+        """What the fluxes make of volume and momentum in dt [s], carried on the domain of the last projection."""
         carried = self._carried(dt, theta)
         if self.given_by_films.any():
             carried = replace(carried, water=carried.water + dt * self.given_by_films)
@@ -348,11 +346,10 @@ class Water:
         u, a, phi, t = self.left_behind or (self.velocity, self.acceleration, self.level_set, self.topology)
         kick = dt * kick_factor(a, self._largest_kick(t.node_size))[:, None] * a
         total = zeros(flux.rate.shape)
+        u_hat = u + (1.0 - theta) * kick
+        found = Carried.by(flux, dt, u_hat, a, p.gravity, p.viscosity / p.density, t.node_size, total)
         if p.advection == "supg":
-            found = Carried(carry_volume(flux, dt, total=total))
-        else:
-            u_hat = u + (1.0 - theta) * kick
-            found = Carried.by(flux, dt, u_hat, a, p.gravity, p.viscosity / p.density, t.node_size, total)
+            found = found.near_the_surface()
         if t.is_obtuse:
             return replace(found, swept=np.zeros(len(phi)))
         u_m = u + 0.5 * kick if p.theta < 1.0 else u

@@ -35,7 +35,7 @@ head is conserved, and the speed of a bore varies by a tenth with the step; with
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -91,6 +91,12 @@ class Carried:
             return cls(carry_volume(flux, dt, total=total))
         u = velocity.copy()
         return cls(carry_volume(flux, dt, u, total), u, weight, fast)
+
+    def near_the_surface(self) -> Carried:
+        """The same with the velocity of fast water, too, only where that around jumps counts."""
+        if self.velocity is None:
+            return self
+        return replace(self, weight=np.maximum(self.weight, self.fast), fast=np.zeros_like(self.fast))
 
     def handed_on(self, heirs) -> Carried:
         """The same with another numbering of the nodes; heirs (N_new, N): from `volume.renumbering`."""

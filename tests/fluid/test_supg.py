@@ -6,6 +6,7 @@ import sys
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
@@ -275,9 +276,39 @@ def _stream(advection):
     return water
 
 
+@pytest.mark.parametrize("cells", [3, 4])
+def test_a_coarse_dam_break_gains_no_energy(cells):
+    """A column of three or four cells: the front is a sheet of one cell, which the forms do not resolve. Where its
+    velocity did not follow the momentum of the volume, the water gained 6.7 and 2.5 % of its energy."""
+    h = 0.8 / cells
+    water = tank([13 * h, 9 * h, 7 * h], h, column(1.07, 0.8), advection="supg")
+    energy = water.available_energy()
+    while water.time < 0.9:
+        advance(water, 0.12 / cells)
+        assert water.available_energy() < 1.02 * energy
+
+
+def test_nodes_that_are_tied_to_one_another_only_are_solved_for():
+    """Pairs of nodes whose difference counts 1 and whose sum 1e-7: GMRES with the diagonal alone stalls, as it did
+    beside thin blocks between the sides of cells."""
+    n, pairs = 400, 50 + 20 * np.arange(8)
+    matrix = sp.diags_array([-0.49, 1.0, -0.49], offsets=[-1, 0, 1], shape=(n, n)).tolil()
+    for k, one in enumerate(pairs):
+        both = [one, one + 1]
+        matrix[both, :] = matrix[:, both] = 0.0
+        matrix[one, one] = matrix[one + 1, one + 1] = 1.0 + 1e-7 * 4**k
+        matrix[one, one + 1] = matrix[one + 1, one] = -1.0
+    matrix, right = sp.csr_array(matrix), np.random.default_rng(1).standard_normal(n)
+    free = np.arange(n) > 5
+    x = supg._solved(matrix, 1.0 / matrix.diagonal(), right * free, free)
+    assert np.abs((matrix @ x - right)[free]).max() < 1e-6
+    assert (x[~free] == 0.0).all()
+
+
 def test_a_solver_that_does_not_converge_says_so(monkeypatch):
     monkeypatch.setattr(supg, "RESTART", 1)
     monkeypatch.setattr(supg, "MOST_RESTARTS", 1)
+    monkeypatch.setattr(supg, "_incomplete_factors", lambda matrix, inverse, free: None)
     water = tank([1, 0.25, 1], 0.125, column(0.5, 0.5), advection="supg")
     advance(water)
     with pytest.raises(
