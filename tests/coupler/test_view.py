@@ -154,15 +154,17 @@ def test_layers_of_water_are_drawn_from_far_to_near(tmp_path):
     code = (
         "import sys, numpy as np; from coupler.commands.view.run_files import open_run;"
         "from coupler.commands.view.scene import water_surface; eye = np.array([50.0, -80.0, 30.0]);"
-        "x = water_surface(open_run(sys.argv[1]).water.at(0.0), eye).points.reshape(-1, 3, 3).mean(axis=1);"
-        "print(np.diff(np.linalg.norm(x - eye, axis=1)).max(), len(x))"
+        "x = water_surface(open_run(sys.argv[1]).water.at(0.0), eye).points.reshape(-1, 3, 3).astype(float);"
+        "front = np.einsum('ti,ti->t', eye - x[:, 0], np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]));"
+        "print(np.diff(np.linalg.norm(x.mean(axis=1) - eye, axis=1)).max(), len(x), front.min())"
     )
     done = subprocess.run(
         [sys.executable, "-c", code, str(run)], cwd=ROOT, capture_output=True, text=True, check=True
     )
-    nearer, triangles = map(float, done.stdout.split())
+    nearer, triangles, front = map(float, done.stdout.split())
     assert nearer < 1e-4  # coordinates are 32-bit
     assert triangles > 100
+    assert front > -1e-3, "a triangle seen from behind is drawn for nothing"
 
 
 def test_round_off_is_not_drawn(tmp_path):

@@ -32,14 +32,16 @@ def film(run, folder, size, fps=20, tell=None, **camera):
     path, unfinished = folder / "film.mp4", folder / "unfinished.mp4"
     size = tuple(pixels - pixels % 2 for pixels in size)  # H.264 halves the colour planes
     scene = Scene(run, tuple(round(AVERAGED * pixels) for pixels in size), soft=False, **camera)
+    scale = f"scale={size[0]}:{size[1]}:flags=area"
     frames = imageio_ffmpeg.write_frames(
-        str(unfinished), size, fps=fps, codec="libx264", quality=None, macro_block_size=2, ffmpeg_log_level="error",
-        output_params=["-crf", "19", "-preset", "veryfast", "-movflags", "+faststart"],
+        str(unfinished), scene.size, fps=fps, codec="libx264", quality=None, macro_block_size=2,
+        ffmpeg_log_level="error",
+        output_params=["-vf", scale, "-crf", "19", "-preset", "veryfast", "-movflags", "+faststart"],
     )  # fmt: skip
     frames.send(None)
     for done, time in enumerate(run.times, start=1):
         scene.draw(time)
-        picture = Image.fromarray(scene.picture()).resize(size, Image.Resampling.HAMMING).tobytes()
+        picture = scene.picture()
         for _ in range(1 if done < len(run.times) else 1 + round(HOLD * fps)):
             frames.send(picture)
         if tell:

@@ -31,6 +31,10 @@ class Skin:
         w = self.share.reshape(self.share.shape + (1,) * (np.ndim(values) - 1))
         return (1 - w) * values[self.pair[..., 0]] + w * values[self.pair[..., 1]]
 
+    def of_triangles(self, kept):
+        """The skin of the triangles that are kept (t,) bool."""
+        return Skin(self.pair[kept], self.share[kept], int(np.count_nonzero(kept[: self.free])))
+
 
 def skin(nodes, cells, level_set, fraction=None, tank=None):
     """Skin of {level set < 0} on nodes (n, 3), tetrahedra cells (m, 4), level_set (n,) [m].
@@ -61,6 +65,12 @@ def surfaces_of_pockets(nodes, cells, level_set, pocket, pressure):
     corners = found.of(nodes)[: found.free]
     known = sorted((int(k) for k in np.unique(number) if k > 0), key=lambda k: -int((number == k).sum()))
     return [(k, float(pressure[pocket == k][0]), corners[number == k]) for k in known]
+
+
+def facing(corners, eye):
+    """(t,) bool: triangles (t, 3, 3) [m] whose front is seen from the eye (3,) [m]."""
+    a, b, c = np.moveaxis(corners, 1, 0)
+    return np.einsum("ti,ti->t", eye - a, np.cross(b - a, c - a)) > 0.0
 
 
 def some(flags):
