@@ -8,7 +8,8 @@ yet: runs in which water reached blocks were GROWTH times slower afterwards. Thi
 arrives and, as long as nothing breaks, for half that time again (`Calm`); the pace before that is then dropped. Whether
 anything will break is not known then, and what breaks decides: the same house costs 1.2 times as much where it stands
 and 3 to 6 times where it falls. So long, `between` gives both ends, and after the first break until the new pace has
-shown itself. TREND, MOST_TREND and the factors were chosen on shipped cases (docs/speed.md)."""
+shown itself. The same holds for loose blocks that fall, until they have hit one another (`Fall`). TREND, MOST_TREND and
+the factors were chosen on shipped cases (docs/speed.md)."""
 
 from __future__ import annotations
 
@@ -24,8 +25,11 @@ GROWTH, MOST_GROWTH = 2.2, 6.0
 """Factors on the pace before the water arrives: the likely one, and that of runs in which everything broke."""
 SETTLED = 0.1
 """Share of the whole run after the first break in which its own pace replaces the expected one."""
+LANDED = 0.5
+"""Share of the largest kinetic energy so far below which blocks that fell have hit something."""
 AFTER_ARRIVAL = 1.5
-"""Multiple of the time of the water's arrival at the structure after which, if nothing has broken, calm is over."""
+"""Multiple of the time of the water's arrival at the structure after which, if nothing has broken, calm is over; and of
+the time at which falling blocks were fastest, after which they have landed."""
 BUSY = 60.0
 """Wall time [s] over which the run's share of a core is measured."""
 MOST = 2000
@@ -41,7 +45,7 @@ class Pace:
     def __init__(self, end: float):
         self.end = end
         self._seen: list[Step] = []
-        self._calm = False
+        self._calm = self._broken = False
         self._began = 0.0
         self._before: float | None = None
 
@@ -51,12 +55,14 @@ class Pace:
         return self._calm
 
     def expect(self, calm: bool, broken: bool) -> None:
-        """Set whether the run is expected to become slower (`Calm`) · broken: whether a joint has broken."""
-        if self._calm and not calm and self._seen:
-            if broken:
+        """Set whether the run is expected to become slower (`Calm`, `Fall`) · broken: whether a joint has broken, or
+        what fell has hit something. A first break after the calm counts as one that ends it."""
+        breaks = broken and not self._broken
+        if self._seen and ((self._calm and not calm) or breaks):
+            if breaks:
                 self._before = self._own()
             self._began = self._seen[-1][0]
-        self._calm = calm
+        self._calm, self._broken = calm, broken
 
     def add(self, time: float, now: float, used: float | None = None) -> None:
         """Record the end of a step: simulated time [s], wall clock `now` [s], and processor time `used` [s] (default:
@@ -144,3 +150,21 @@ class Calm:
         if broken:
             return False
         return self._arrived is None or (joints > 0 and time < AFTER_ARRIVAL * self._arrived)
+
+
+class Fall:
+    """Whether loose blocks still fall: the pairs that will touch, which a structure costs most for, are to come."""
+
+    def __init__(self):
+        self._most = self._when = 0.0
+
+    def now(self, time: float, kinetic: float) -> bool:
+        """After a step to time [s] · kinetic: energy [J] of the blocks."""
+        if kinetic > self._most:
+            self._most, self._when = kinetic, time
+        return self._most > 0.0 and kinetic >= LANDED * self._most and time < AFTER_ARRIVAL * self._when
+
+    @property
+    def ended(self) -> bool:
+        """Whether anything fell at all; with `now` false: whether it has landed."""
+        return self._most > 0.0

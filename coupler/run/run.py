@@ -18,7 +18,7 @@ from coupler.results.recorder import Recorder
 from coupler.results.tank_top import in_all, reached
 from coupler.run.clock import Clock
 from coupler.run.left_out import imports, note_work
-from coupler.run.pace import Calm
+from coupler.run.pace import Calm, Fall
 from coupler.run.within_step import LongSteps, StepLeft
 from coupler.scene.build import Scene, build, limits_of
 from coupler.step.limits import LimitReached, Limits, Stopped, check_air, check_defect, check_overlap
@@ -144,7 +144,7 @@ def _steps(
     checkpoints = _checkpoints(case, scene, directory, recorder, schedule)
     way_on = f"; `surgebreak resume {quote(str(directory.path))}` goes on" if checkpoints is not None else ""
     long = _long_steps(coupling, limits, reporter, clock, figures, checkpoints)
-    calm = Calm()
+    calm, fall = Calm(), Fall()
     try:
         if checkpoint is None:
             with clock("output"):
@@ -157,7 +157,7 @@ def _steps(
                 recorder.step(record)
             _note(coupling, record, figures)
             _note_top(case, recorder, coupling, figures, reporter)
-            reporter.expect(*_calm_and_broken(calm, coupling, record))
+            reporter.expect(*_calm_and_broken(calm, fall, coupling, record))
             reporter.step(coupling.time, _reported(case, coupling, record, scene.watch))
             if each is not None:
                 each(coupling, record, figures, recorder.readings)
@@ -298,10 +298,14 @@ def load_of_what_moves(coupling, record) -> np.ndarray:
     return force.sum(axis=0)
 
 
-def _calm_and_broken(calm: Calm, coupling, record) -> tuple[bool, bool]:
-    """Whether the event that will slow the run down is still to come, and whether a joint has broken."""
-    if not coupling.coupled:
+def _calm_and_broken(calm: Calm, fall: Fall, coupling, record) -> tuple[bool, bool]:
+    """Whether the event that will slow the run down is still to come, and whether it has begun: a joint has broken, or
+    loose blocks without water have landed."""
+    if coupling.structure is None:
         return False, False
+    if not coupling.coupled:
+        falls = coupling.structure.joints is None and fall.now(coupling.time, record.energies["kinetic"])
+        return falls, fall.ended and not falls
     joints = joint_counts(coupling.structure)
     return calm.now(
         coupling.time, _has_arrived(coupling, record), joints.intact, joints.broken

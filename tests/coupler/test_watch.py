@@ -14,7 +14,7 @@ from coupler.commands.watch.command import serving
 from coupler.commands.watch.state import Watched, runs_in
 from coupler.program.process import environment
 from coupler.results.history import HistoryTable
-from coupler.run.pace import GROWTH, MOST_GROWTH, Calm, Pace
+from coupler.run.pace import GROWTH, MOST_GROWTH, Calm, Fall, Pace
 from tests.coupler.browser import CHROMIUM, Browser
 from tests.coupler.fake_runs import SUMMARY
 from tests.coupler.resumed import DRY
@@ -171,6 +171,41 @@ def test_two_times_are_told_until_it_is_known_how_much_breaks():
         else:
             assert between is None
     assert pace.left() == pytest.approx(4.0 * 39)
+
+
+def test_a_first_break_after_the_calm_is_an_event_of_its_own():
+    """Nothing broke for long after the water came, so that one time was told; then joints break after all."""
+    pace = Pace(10.0)
+    pace.expect(True, False)
+    for k in range(1, 51):
+        pace.add(0.1 * k, float(k), float(k))
+    pace.expect(False, False)
+    assert pace.between() is None
+    for k in range(51, 61):
+        pace.expect(False, False)
+        pace.add(0.1 * k, float(k), float(k))
+    pace.expect(False, True)
+    pace.add(6.1, 62.0, 62.0)
+    least, most = pace.between()
+    assert most == pytest.approx(MOST_GROWTH * 39.0, rel=0.05)
+    assert least < pace.left() < most
+    pace.expect(False, True)
+    pace.add(6.2, 64.0, 64.0)
+    assert pace.between() is not None, "a second break is no new event, and the first is still young"
+
+
+def test_what_falls_is_expected_to_hit():
+    """Kinetic energy grows until 0.6 s and is gone at 0.8 s; nothing that never moved is waited for."""
+    fall = Fall()
+    assert not fall.now(0.0, 0.0)
+    assert not fall.ended
+    assert [fall.now(0.1 * k, float(k * k)) for k in range(1, 7)] == [True] * 6
+    assert fall.now(0.7, 20.0)
+    assert not fall.now(0.8, 10.0)
+    assert fall.ended
+    slides = Fall()
+    assert slides.now(1.0, 5.0)
+    assert not slides.now(1.6, 5.0), "what goes on at one speed has nothing to hit"
 
 
 def test_what_was_calm_is_forgotten_when_the_water_arrives():
