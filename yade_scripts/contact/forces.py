@@ -180,17 +180,17 @@ class ContactForces:
         total = int(start[-1])
         slots = Slots.empty(total)
         known, touching, found = (np.zeros(len(a), bool) for _ in range(3))
-        fresh, overlap = np.zeros(len(a)), np.zeros(len(a))
+        fresh, overlap, calm = np.zeros(len(a)), np.zeros(len(a)), np.zeros(len(a))
         if hasattr(self, "_pairs") and len(self._pairs.a):
             known, spot = self._carry(a, b, start, slots)
-            for now, old in zip((fresh, touching, overlap, found), self._remembered()):
+            for now, old in zip((fresh, touching, overlap, found, calm), self._remembered()):
                 now[known] = old[spot]
         if as_deep:
             fresh[~known] = 1.0
         elif parted is not None:
             begins = ~known & np.isin(self._key(a, b), parted)
             fresh[begins] = self._joint_share(a[begins], b[begins])
-        self._pairs = Pairs(a, b, start, fresh, touching, np.zeros(len(a)), overlap, found)
+        self._pairs = Pairs(a, b, start, fresh, touching, calm, overlap, found)
         self._slots = slots
         if not hasattr(self, "_rows") or len(self._rows.a) < total:
             self._rows = empty_rows(total + total // 4)
@@ -201,9 +201,9 @@ class ContactForces:
         return (1.0 / K[a] + 1.0 / K[b]) / (1.0 / self._closing[a] + 1.0 / self._closing[b])
 
     def _remembered(self) -> tuple[Array, ...]:
-        """Copy the history of pairs that continue; their distance is found again."""
+        """Copy the history of pairs that continue; the distance of those that do not touch is found again."""
         p = self._pairs
-        return p.fresh, p.touching, p.overlap, p.found
+        return p.fresh, p.touching, p.overlap, p.found, np.where(p.touching, p.calm, 0.0)
 
     def _carry(self, a, b, start, slots: Slots) -> tuple[Array, Array]:
         """Copy the slots of pairs that were known before; (p,) bool, and which of the pairs before these are."""
@@ -283,6 +283,7 @@ class ContactForces:
             "spread": self._slots.spread[index],
             "push": self._slots.push[index],
             "speed": self._slots.speed[index],
+            "calm": self._pairs.calm[pair],
             "over_a": self._pairs.a[over],
             "over_b": self._pairs.b[over],
             "overlap": self._pairs.overlap[over],
@@ -299,7 +300,7 @@ class ContactForces:
         keys = self._key(self._pairs.a, self._pairs.b)
         pair = np.searchsorted(keys, self._key(saved["a"], saved["b"]))
         slot = self._pairs.start[pair] + saved["node"]
-        self._pairs.touching[pair] = True
+        self._pairs.touching[pair], self._pairs.calm[pair] = True, saved["calm"]
         self._pairs.overlap[np.searchsorted(keys, self._key(*over.T))] = saved["overlap"]
         self._pairs.found[:] = True  # `save` has found them
         for name in Slots._fields:

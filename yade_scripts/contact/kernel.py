@@ -31,9 +31,10 @@ from yade_scripts.contact.springs import Mode, add_up, apply, set_dashpots
 
 PAIR = 20
 """Cost of one pair, in rows of an ordinary loop: it decides how pairs are divided among threads."""
-SUNK = 0.01
-"""Overlap, in radii of the smaller block, below which the second limit is not tested: the search for edges is more
-expensive than that for nodes."""
+STEADY = 0.1
+"""Relative motion, in margins of the thinner block, within which the edges found last are taken to be the outermost
+still. Each change of edges leaves at most about that overlap without force: blocks that roll and slide on their edges
+would otherwise sink a little at each."""
 SAME = 1.0 + 1e-6
 """Largest ratio of the overlap of crossing edges to that of the faces at which edges carry where no node does. For
 flat beams the two overlaps are equal."""
@@ -81,7 +82,7 @@ def _contacts(first_pair, last_pair, shapes, bodies, law, pairs, slots, ground, 
             continue
         if finds and pairs.calm[p] > 0.0:
             pairs.calm[p] -= state.last_dt * closing_bound(v, a, b, shapes.radius[a], shapes.radius[b])
-            if pairs.calm[p] > 0.0:
+            if pairs.calm[p] > 0.0 and not pairs.touching[p]:
                 continue
         first, apart, forward = count, -np.inf, Direction(a, b, finds, pairs.fresh[p])
         if b == ground.row:
@@ -110,16 +111,16 @@ def _contacts(first_pair, last_pair, shapes, bodies, law, pairs, slots, ground, 
         for s in range(base, base + CROSSINGS):
             known = known or slots.face[s] >= 0
         meets = finds and apart < 0.0 and b < n
-        sunk = -apart > SUNK * min(shapes.radius[a], shapes.radius[b])
-        bare = count == first or (sunk and deepest_of(slots, rows, first, count) < -CROSSING * apart)
-        leads = meets and (bare or not pairs.touching[p])
+        bare = count == first or deepest_of(slots, rows, first, count) < -CROSSING * apart
+        due = count == first or not pairs.touching[p] or pairs.calm[p] <= 0.0
+        leads = meets and due and (bare or not pairs.touching[p])
         flat = meets and count > first and not known and lie_flat(shapes, slots, a, b, R, rows, first, count)
         if known or leads or flat:
             deepest = 0.0
             if leads:
                 deepest = -SAME * apart if bare else -CROSSING * apart
             count, taken, parted = cross(
-                shapes, bodies, law.shear, slots, base, forward, deepest, sunk, flat, state, rows,
+                shapes, bodies, law.shear, slots, base, forward, deepest, flat, state, rows,
                 first, count, taken, scratch,
             )  # fmt: skip
             apart = max(apart, parted)
@@ -128,7 +129,10 @@ def _contacts(first_pair, last_pair, shapes, bodies, law, pairs, slots, ground, 
             if count > nodes:
                 pairs.overlap[p] = min(pairs.overlap[p], deepest_of(slots, rows, first, count))
             pairs.fresh[p], pairs.touching[p] = 0.0, count > first
-            pairs.calm[p] = apart - _overhang(shapes, a, b) if count == first else 0.0
+            if count == first:
+                pairs.calm[p] = apart - _overhang(shapes, a, b)
+            elif leads or not bare:
+                pairs.calm[p] = STEADY * min(shapes.margin[a], shapes.margin[b]) if bare else 0.0
         if count > first:
             yields, K = set_dashpots(bodies, law, a, b, R, rows, first, count, scratch)
             mode = Mode(law.zeta, np.sqrt(yields * K))

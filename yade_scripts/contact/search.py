@@ -135,16 +135,15 @@ def scan(shapes, bodies, law, slots, slot, side, faces, state, rows, count, lost
 
 @inner
 def cross(
-    shapes, bodies, shear, slots, base, side, deepest, sunk, flat, state, rows, first, count, lost, scratch
+    shapes, bodies, shear, slots, base, side, deepest, flat, state, rows, first, count, lost, scratch
 ):  # fmt: skip
     """Contacts of edges of a with edges of b, both known and new. → (contacts, lost [J], distance [m] by which the
     blocks are found to be apart, if positive)
 
     Known contacts fill the first slots, in the order in which they began.
     rows first .. count: contacts of nodes of the pair · deepest [m]: edges begin a contact where they overlap by less,
-    0: none begins · sunk: edges may begin a contact beside known ones where these hold less than `CROSSING` of that
-    overlap, since other edges become the outermost as the blocks turn · flat: whether edges may cross in the faces of
-    these nodes."""
+    0: none begins. They do so beside known ones, too, since others become the outermost as the blocks turn and slide ·
+    flat: whether edges may cross in the faces of these nodes."""
     a, b, x, R = side.a, side.b, state.x, state.R
     nodes, parted, leading, to = count - first, -1.0, -1, base
     plane, xi, way, n = scratch[4], scratch[5], scratch[6:8], scratch[8]
@@ -160,12 +159,8 @@ def cross(
                 to += 1
     if not side.begins:
         return count, lost, parted
-    held = deepest_of(slots, rows, first, count)
-    if deepest > 0.0 and (count - first == nodes or (sunk and held < CROSSING * deepest)):
+    if deepest > 0.0:
         leading, parted = find_crossing(shapes, a, b, x, R, deepest, scratch)
-    if leading >= 0 and count - first > nodes:
-        depth, _ = crossing(shapes, a, b, leading, state, plane, xi, scratch)
-        leading = leading if held < CROSSING * depth else -1
     if leading >= 0:
         crossing(shapes, a, b, leading, state, plane, xi, scratch)
         for k in range(3):
