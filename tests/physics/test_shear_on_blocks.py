@@ -36,10 +36,12 @@ def test_the_spin_of_a_block_dies_away_at_any_step(density, dt):
         for _ in range(10):
             c.step(dt)
             spins.append(s.velocity()[0, 5])
-        energy = c.ledger.balance(c._water_energy(), c._structure_energies()).energy_error
+        balance = c.ledger.balance(c._water_energy(), c._structure_energies())
     assert np.abs(spins).max() < 0.9
     assert abs(spins[-1]) < 0.6
-    assert energy < 0.03  # of the spin: its first step, a jump, gains what is left of it
+    # work of the shear at the velocities of the viscous stages instead of the mean over the step: up to 0.034
+    assert balance.energy_error < 1e-6
+    assert balance.shear_dissipation > 0.0
 
 
 def test_a_sphere_that_falls_steadily_does_so_at_any_step():
