@@ -21,6 +21,7 @@ from coupler.geometry import start_surfaces
 from coupler.geometry.tank_mesh import finest_cell, water_in
 from coupler.geometry.tank_regions import bytes_of_cells
 from coupler.program.terminal import Row, lines
+from coupler.run.fast_openings import resolved_row
 from coupler.step.observe import joint_counts
 
 LONGEST_REST_STEP = 0.3
@@ -210,6 +211,9 @@ def _structure_rows(case: Case, rows: list[Row], exact: bool) -> tuple[int, int,
             limit.remark(substep) or f"set by {limit.what if case.structure.substep is None else 'the case'}"
         )
         rows.append(Row("substep", 1e6 * substep, "us", reason))
+        fall = _highest(case) - case.tank.lower[2] if case.water else 0.0
+        fastest = resolved_row(case, structure, substep, fall)
+        rows += [fastest] if fastest is not None else []
         if exact and structure.joints is not None:
             rows.append(_frequency_row(structure, limit.omega))
         rows.append(Row("substeps", math.ceil(case.time.end / substep), "", ""))

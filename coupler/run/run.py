@@ -16,6 +16,7 @@ from coupler.program.errors import ExitCode
 from coupler.program.terminal import newtons
 from coupler.results.recorder import Recorder
 from coupler.results.tank_top import in_all, reached
+from coupler.run import fast_openings
 from coupler.run.clock import Clock
 from coupler.run.left_out import imports, note_work
 from coupler.run.pace import Calm, Fall
@@ -24,11 +25,6 @@ from coupler.scene.build import Scene, build, limits_of
 from coupler.step.limits import LimitReached, Limits, Stopped, check_air, check_defect, check_overlap
 from coupler.step.observe import joint_counts, size
 from coupler.step.step_limits import check_step
-
-FAST_OPENING = 0.25
-"""Growth of λ/δ_f in a substep from which tearing counts as averaged over it."""
-FAST_OPENING_NEEDLEMAN = 0.1
-"""The same for laws in which shear pushes the faces apart; the error of the work of separation is 0.5 % there."""
 
 
 def run(case: Case, directory, reporter, checkpoint=None, each=None) -> ExitCode:
@@ -68,17 +64,9 @@ def run(case: Case, directory, reporter, checkpoint=None, each=None) -> ExitCode
 
 
 def _report_fast_openings(case: Case, figures: dict, reporter) -> None:
-    rate = figures.get("largest_opening_rate", 0.0)
-    joints = case.joints
-    coupled = joints is not None and "needleman" in {law.mixed_mode for law in (joints, *joints.pair)}
-    if rate > (FAST_OPENING_NEEDLEMAN if coupled else FAST_OPENING):
-        work = "is kept"
-        if coupled:
-            work = "is off by more than a per cent (mixed_mode 'needleman' keeps it in slow tearing only)"
-        reporter.message(
-            f"note: a joint opened by {rate:.2g} of joints.opening_at_failure in one substep: its work of "
-            f"separation {work}, its softening is not resolved in time. Reduce structure.substep where that matters"
-        )
+    message = fast_openings.note(case, figures.get("largest_opening_rate", 0.0))
+    if message:
+        reporter.message(message)
 
 
 def _restore(scene: Scene, checkpoint, clock: Clock) -> None:

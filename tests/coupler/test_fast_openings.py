@@ -1,18 +1,18 @@
-"""What a run says at its end about joints that opened faster than the substeps follow."""
-
-from types import SimpleNamespace
+"""What `check` and a run at its end say about joints that open faster than the substeps follow."""
 
 import pytest
 
-from coupler.run.run import FAST_OPENING, FAST_OPENING_NEEDLEMAN, _report_fast_openings
+from coupler.run.fast_openings import FAST_OPENING, FAST_OPENING_NEEDLEMAN, note
+from coupler.run.forecast import forecast
+from tests.physics.scenes import case
+
+JOINTS = {"strength": 1e5, "opening_at_failure": 1e-3}
 
 
-def told(rate, mode, pairs=()):
-    messages = []
-    joints = SimpleNamespace(mixed_mode=mode, pair=[SimpleNamespace(mixed_mode=m) for m in pairs])
-    case, reporter = SimpleNamespace(joints=joints), SimpleNamespace(message=messages.append)
-    _report_fast_openings(case, {"largest_opening_rate": rate}, reporter)
-    return messages
+def of_modes(mode, pairs=()):
+    """A case whose joints have this mixed mode, and those of its pairs these."""
+    pair = [{"between": ["a", "b"]} | ({"mixed_mode": m} if m else {}) for m in pairs]
+    return case(time={"end": 1.0}, joints=JOINTS | {"mixed_mode": mode, "pair": pair})
 
 
 @pytest.mark.parametrize(
@@ -24,13 +24,41 @@ def told(rate, mode, pairs=()):
     ],
 )
 def test_fast_openings_are_told_from_the_limit_of_their_rule_on(mode, pairs, limit, what):
-    assert told(limit, mode, pairs) == []
-    (message,) = told(1.01 * limit, mode, pairs)
+    found = of_modes(mode, pairs)
+    assert note(found, limit) == ""
+    message = note(found, 1.01 * limit)
     assert what in message
     assert f"{1.01 * limit:.2g}" in message
 
 
 def test_a_run_without_joints_says_nothing():
-    messages = []
-    _report_fast_openings(SimpleNamespace(joints=None), {}, SimpleNamespace(message=messages.append))
-    assert messages == []
+    assert note(case(time={"end": 1.0}), 0.0) == ""
+
+
+def two_blocks(speed, **joints):
+    """Two cubes joined, of which one flies off at a speed [m/s]; substep 0.1 ms."""
+    return case(
+        time={"end": 0.01},
+        structure={
+            "substep": 1e-4,
+            "start": "sudden",
+            "block": [
+                {"name": "a", "centre": [0, 0, 0.5], "size": [1, 1, 1], "density": 2000.0, "fixed": True},
+                {"name": "b", "centre": [0, 0, 1.5], "size": [1, 1, 1], "density": 2000.0}
+                | {"velocity": [0, 0, speed]},
+            ],
+        },
+        joints=JOINTS | joints,
+    )
+
+
+def test_check_says_how_fast_a_joint_with_a_potential_may_open():
+    """A tenth of a millimetre in a tenth of a millisecond."""
+    slow, fast = (forecast(two_blocks(v, mixed_mode="needleman")) for v in (0.9, 1.1))
+    assert slow["fastest opening"] == pytest.approx(1.0)
+    rows = [next(row for row in found.rows if row.name == "fastest opening") for found in (slow, fast)]
+    assert "structure.substep" not in rows[0].remark
+    assert "a block at the start has 1.1 m/s" in rows[1].remark
+    assert "structure.substep = 9.1e-05" in rows[1].remark
+    effective = forecast(two_blocks(1.1))
+    assert "fastest opening" not in [row.name for row in effective.rows]
