@@ -40,11 +40,14 @@ class Material:
 
 PRESETS = {
     "brick-masonry": Material(
-        1800.0, 0.25e6, 18.0, 0.75, 0.4,
-        "mortar joints of clay bricks: strength, energy and friction from Lourenco, Computational strategies for "
-        "masonry structures, TU Delft 1996 (walls of Raijmakers and Vermeltfoort); scatter as reported by van "
-        "der Pluijm, Out-of-plane bending of masonry, TU Eindhoven 1999; density usual for solid bricks",
-        "all but the density: strength 0.25 MPa, energy 18 J/m2, friction 0.75, scatter 0.4",
+        1800.0, 0.28e6, 18.0, 0.8, 0.4,
+        "mortar joints of clay bricks: strength, friction and scatter from the JCSS Probabilistic Model Code, part 3.2 "
+        "(masonry, jcss-pmc.github.io/PMC): mean cohesion 0.28 MPa in general purpose mortar of 5 to 9 MPa, from EN "
+        "1996-1-1, and mean flexural strength across the bed joints of perforated clay bricks 0.28 MPa (0.26 to "
+        "0.30), mean friction 0.8 (coefficient of variation 0.19), coefficient of variation of the cohesion of clay "
+        "bricks 0.4 (of flexural strengths 0.3 to 0.35); energy from Lourenco, Computational strategies for masonry "
+        "structures, TU Delft 1996 (walls of Raijmakers and Vermeltfoort); density usual for solid bricks",
+        "energy 18 J/m2; the density is of no single source",
     ),
     "concrete": Material(
         2400.0, 2.2e6, 133.0, 0.6, 0.18,
@@ -54,11 +57,12 @@ PRESETS = {
         "friction 0.6",
     ),
     "timber": Material(
-        420.0, 0.4e6, 300.0, 0.4, 0.2,
+        420.0, 0.4e6, 300.0, 0.4, 0.25,
         "softwood C24 across the grain: mean density and f_t,90,k of EN 338:2016, table 1; energy of spruce in "
         "opening, 0.2 to 0.3 N/mm, as in Gustafsson in Thelandersson and Larsen, Timber Engineering, Wiley 2003; "
-        "friction of EN 1995-2, table 6.1",
-        "energy 300 J/m2, friction 0.4, scatter 0.2 (an assumption)",
+        "friction of EN 1995-2, table 6.1; scatter from the JCSS Probabilistic Model Code, part 3.5 (timber, "
+        "jcss-pmc.github.io/PMC): 2.5 times the coefficient of variation of the density, 0.1",
+        "energy 300 J/m2, friction 0.4",
     ),
 }  # fmt: skip
 
