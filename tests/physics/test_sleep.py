@@ -6,6 +6,7 @@ import pytest
 from tests.physics.scenes import RHO, SLICE, G, run, standing_wall
 from tests.physics.test_wall_under_still_water import force_and_arm
 from yade_scripts.blocks.block import Block
+from yade_scripts.blocks.faces import FixedPlane
 from yade_scripts.blocks.generators.wall import wall_of_blocks
 from yade_scripts.contact.law import ContactLaw
 from yade_scripts.dynamics.equilibrium import settle
@@ -26,6 +27,16 @@ def walls(sleep, count=2, shot=None, substep=None):
     if shot:
         blocks.append(Block("shot", (-1.0, 0.5, 1.4), size=0.4, velocity=shot))
     s = Structure(blocks, ContactLaw(restitution=0.2), LAW, ground=0.0, sleep=sleep, substep=substep)
+    settle(s)
+    return s
+
+
+def leaning(sleep):
+    """A wall whose foot stands 1 mm deep in a bank beside it, to which no joint holds it."""
+    blocks = wall_of_blocks("wall0", (0.0, 0, 0), (0.25, 1.0, 2.0), (0.25, 0.5, 0.5))
+    slope = np.array([-0.2, 0.0, 1.0]) / np.hypot(0.2, 1.0)
+    bank = FixedPlane((0.25, 0.0, 1e-3), slope, "bank")
+    s = Structure(blocks, ContactLaw(restitution=0.2), LAW, ground=0.0, planes=[bank], sleep=sleep)
     settle(s)
     return s
 
@@ -150,20 +161,46 @@ def test_something_loose_wakes_what_it_comes_near_to_before_it_touches():
     np.testing.assert_allclose(found[SHARE][0], found[None][0], atol=0.02)
 
 
+def test_what_also_presses_on_the_ground_by_contact_sleeps_and_keeps_that_contact():
+    """It used to stay awake for good. Energy and momentum stay closed, and pushed over the bank it does as if it had
+    never slept."""
+    found = {}
+    for sleep in (SHARE, None):
+        with leaning(sleep) as s:
+            none, start = pushed(s, 0.0), None
+            for _ in range(40):
+                advance(s, none - 2000.0 * s.velocity() * [1, 1, 1, 0, 0, 0], 0.01)
+            assert len(s.contacts().a) > 0
+            pressed = s.contacts().normal_force.sum(axis=0)
+            assert s.asleep.all() == (sleep is not None)
+            if sleep:
+                start = total(s)
+                assert advance(s, none, 0.01).substeps == 1
+                assert total(s) == pytest.approx(start, abs=1e-12 * abs(start))
+                np.testing.assert_allclose(s.contacts().normal_force.sum(axis=0), pressed, rtol=1e-12)
+            else:
+                advance(s, none, 0.01)
+            broken = [len(advance(s, pushed(s, 8000.0)).broken) for _ in range(15)]
+            found[sleep] = sum(broken), s.centre()
+    assert found[SHARE][0] == found[None][0] > 0
+    np.testing.assert_allclose(found[SHARE][1], found[None][1], rtol=0, atol=1e-3)
+
+
+@pytest.mark.parametrize("make", [walls, leaning])
 @pytest.mark.parametrize("at", [1, 4, 12])
-def test_a_restart_goes_on_bit_for_bit_across_sleep(at):
+def test_a_restart_goes_on_bit_for_bit_across_sleep(at, make):
     """Saved while all sleep, while one is awake, and while it breaks; the second run begins from the saved numbers."""
 
     def go(s, first, last):
         for k in range(first, last):
             advance(s, pushed(s, 0.0 if k < 3 else 6000.0))
 
-    with walls(SHARE) as s:
+    with make(SHARE) as s:
         go(s, 0, at)
         saved = s.save().arrays()
         go(s, at, 20)
         whole = s.save().arrays()
-    with walls(SHARE) as s:
+    with make(SHARE) as s:
         s.restore(StructureState.of({name: np.array(value) for name, value in saved.items()}))
         again = s.save().arrays()
         assert all(np.array_equal(again[name], saved[name], equal_nan=True) for name in saved)

@@ -88,7 +88,7 @@ class ContactForces:
     def leave_out(self, joined: Array) -> None:
         """Exclude pairs (p, 2) that live joints hold, since these carry compression too. Pairs that were excluded
         before and are not now continue by contact, with the present depth."""
-        keys = np.unique(self._key(*np.sort(joined, axis=1).T))
+        keys = _once(self._key(*np.sort(joined, axis=1).T))
         parted = self._joined[~_among(self._joined, keys)]
         self._joined = keys
         if len(parted):
@@ -96,10 +96,15 @@ class ContactForces:
 
     def search(self, parted: Array | None = None, as_deep: bool = False) -> None:
         """Find the candidate pairs at the present positions."""
-        self._set_pairs(_in_order(self._near()), parted, as_deep)
+        self._set_pairs(self._in_order(self._near()), parted, as_deep)
 
     def _key(self, a: Array, b: Array) -> Array:
         return a * len(self._free) + b
+
+    def _in_order(self, pairs: Array) -> Array:
+        """Pairs (p, 2) with the smaller row first, sorted, each once."""
+        keys = _once(self._key(*np.sort(pairs, axis=1).T))
+        return np.stack(np.divmod(keys, len(self._free)), axis=1)
 
     def _near(self) -> Array:
         """Pairs that touch or may do so before the next search, (p, 2)."""
@@ -112,13 +117,16 @@ class ContactForces:
         return near[~_among(self._key(*near.T), self._joined)]
 
     def _awake(self, near: Array) -> Array:
-        """The pairs in which a block can move. Blocks that may approach a sleeping group are recorded as well."""
+        """The pairs in which a block can move, and those of sleeping blocks that press on planes. Blocks that may
+        approach a sleeping group are recorded as well."""
         moves = self._free[: self._n] | self._motion.v.any(axis=1)
         on = np.flatnonzero(self._on & moves & ~self._asleep[: self._n])
         row, group = np.indices((len(on), len(self._boxes))).reshape(2, -1)
         comes = self._within(on[row], group, 3.0 * self._reach)
         self._comers = np.stack([on[row], group], axis=1)[comes]
-        return near[(self._free & ~self._asleep)[near].any(axis=1)]
+        p = self._pairs
+        pressed = self._key(p.a, p.b)[p.touching & (p.b >= self._n)]
+        return near[(self._free & ~self._asleep)[near].any(axis=1) | _among(self._key(*near.T), pressed)]
 
     def _within(self, rows: Array, groups: Array, way: float) -> Array:
         """(k,) bool: whether the boxes around blocks `rows` (k,) are within `way` [m] of those of `groups` (k,)."""
@@ -134,7 +142,8 @@ class ContactForces:
         return found
 
     def set_asleep(self, asleep: Array, groups: list[Array]) -> None:
-        """asleep (n,) bool: blocks that do not move and have no contacts from now on; rows of each group of them."""
+        """asleep (n,) bool: blocks that do not move from now on and have no contacts but those with planes that they
+        touch; rows of each group of them."""
         self._asleep[: self._n] = asleep
         radius, x = self._shapes.radius[:, None], self._motion.x
         self._boxes = np.array(
@@ -144,9 +153,12 @@ class ContactForces:
         self.search()
 
     def busy(self) -> Array:
-        """(n,) bool: blocks that touch something by contact, or have another one near that can move too."""
+        """(n,) bool: blocks that touch another one by contact, or have one near that can move too."""
         pairs, found = self._pairs, np.zeros(len(self._free), bool)
-        near, both = pairs.touching.copy(), np.flatnonzero(self._free[pairs.a] & self._free[pairs.b])
+        near, both = (
+            pairs.touching & (pairs.b < self._n),
+            np.flatnonzero(self._free[pairs.a] & self._free[pairs.b]),
+        )
         low, high = self._bounds()
         a, b = pairs.a[both], pairs.b[both]
         near[both] |= ((low[a] <= high[b]) & (high[a] >= low[b])).all(axis=1)
@@ -229,6 +241,12 @@ class ContactForces:
         self.friction += lost
         self._read = None
 
+    def now_on_blocks(self) -> Array:
+        """Forces of the contacts at the present positions, (n, 6) [N, N m]."""
+        F = np.zeros((self._n, 6))
+        self.add_forces(0.0, F)
+        return F
+
     def settle(self, dt: float) -> None:
         """Account for the work of the contacts over the substep that has just ended, and search for neighbours if it is
         due."""
@@ -296,7 +314,7 @@ class ContactForces:
         self._set_pairs(np.zeros((0, 2), np.int64))
         in_contact = np.stack([saved["a"], saved["b"]], axis=1)
         over = np.stack([saved["over_a"], saved["over_b"]], axis=1)
-        self._set_pairs(_in_order(np.concatenate([self._near(), in_contact, over])))
+        self._set_pairs(self._in_order(np.concatenate([self._near(), in_contact, over])))
         keys = self._key(self._pairs.a, self._pairs.b)
         pair = np.searchsorted(keys, self._key(saved["a"], saved["b"]))
         slot = self._pairs.start[pair] + saved["node"]
@@ -316,9 +334,10 @@ def _among(keys: Array, of: Array) -> Array:
     return of[np.minimum(np.searchsorted(of, keys), len(of) - 1)] == keys
 
 
-def _in_order(pairs: Array) -> Array:
-    """Pairs (p, 2) with the smaller row first, sorted, each once."""
-    return np.unique(np.sort(pairs, axis=1), axis=0)
+def _once(keys: Array) -> Array:
+    """The numbers `keys` (k,) sorted, each once. Quicker than `np.unique`, which looks them up in a table first."""
+    keys = np.sort(keys)
+    return keys[np.append(True, keys[1:] != keys[:-1])] if len(keys) else keys
 
 
 def _bodies(blocks, planes: int, face_stiffness: Array, free: Array, material: Array) -> Bodies:

@@ -94,6 +94,10 @@ class ImpulseSums:
         """Add a further impulse (k, 9) of joints on the blocks `rows` (k,), as in `Impulses`."""
         self._sums.joint[rows] += impulse
 
+    def of_contacts(self, rows: Array) -> Array:
+        """Impulses of contacts on the blocks `rows` (k,) since `start`, (k, 9)."""
+        return self._sums.contact[rows]
+
     def taken(self) -> Impulses:
         """The impulses since `start`."""
         s = self._sums
@@ -124,6 +128,8 @@ def _add(dt, x, joint, before, whole, joint_sum, contact_sum, place):
 def _take(dt, x, r, force, moment, out):
     f0, f1, f2 = force
     m0, m1, m2 = moment
+    if f0 == f1 == f2 == m0 == m1 == m2 == 0.0:
+        return
     out[r, 0] += dt * f0
     out[r, 1] += dt * f1
     out[r, 2] += dt * f2

@@ -2,18 +2,19 @@
 
 Live joints tie blocks together into islands; held blocks and fixed planes part them. An island sleeps while every one
 of its blocks stands in its place, held by joints that reach the ground or a held block, with nothing loose in reach,
-and while the forces on it stay in balance. While it sleeps, its blocks stand still, its joints keep their history and
-carry the load, and for the water it is a rigid body.
+and while the forces on it stay in balance. While it sleeps, its blocks stand still, its joints and its contacts with
+the ground keep their history and carry the load, and for the water it is a rigid body.
 
-The distance from balance is measured with the forces f of the joints at the time the island fell asleep, weight and
-load F, and the tangent K of the joints as they open further,
+The distance from balance is measured with the forces f of the joints, and of contacts with the ground and other planes,
+at the time the island fell asleep, weight and load F, and the tangent K of the joints as they open further,
 
     K u = F + f,    change = max over joints of k_0 |δ(u) - δ(0)|/T_max
 
 with δ the largest and the mean normal opening and β times the mean sliding of each joint. Beyond `share` the island
 wakes before the load acts on it. So no traction is off by more than that share of the strength while it sleeps, and,
 since what was held back comes on at once, by as much again when it wakes (to first order in the share). The tangent
-softens towards the peak: the nearer a joint is to failure, the smaller the load that wakes its island.
+softens towards the peak: the nearer a joint is to failure, the smaller the load that wakes its island. Contacts would
+only stiffen K: without them the change is overestimated.
 
 At rest: for a whole period of its slowest mode no opening has changed by more than half of the share, or at the start,
 settled, nothing moves at all. What motion is left is taken by the joints, and booked there.
@@ -60,13 +61,17 @@ class Island:
 
 @dataclass(frozen=True)
 class Sleeper:
-    """An island asleep. x (k, 3), R (k, 3, 3): where · force (n, 6): of its joints on all blocks · factor: of its
-    tangent · stored [J] in its joints · openings (j, 3) [m] of its joints."""
+    """An island asleep. x (k, 3), R (k, 3, 3): where · force (k, 6): of its joints on its blocks · pressed (k, 6):
+    of its contacts with planes · holders (h,), held_by (h, 6): blocks of prescribed motion that hold it, and the force
+    of its joints on them · factor: of its tangent · stored [J] in its joints · openings (j, 3) [m] of its joints."""
 
     island: Island
     x: Array
     R: Array
     force: Array
+    pressed: Array
+    holders: Array
+    held_by: Array
     factor: object
     stored: float
     openings: Array
@@ -143,7 +148,7 @@ class Sleep:
         [s]: no island falls asleep before the weight acts in full."""
         self._began, self._outer, self._from = time, outer, ramp
         if self._sleepers and (self._seen is None or not np.array_equal(self._seen, outer)):
-            changes = [self._change(s, outer) for s in self._sleepers]
+            changes = self._changes(self._sleepers, outer)
             self._wake([s for s, change in zip(self._sleepers, changes) if change > self.share], time)
             self._seen = outer
         if time == 0.0:
@@ -221,7 +226,7 @@ class Sleep:
         return found
 
     def _quiet(self, island: Island) -> bool:
-        """Whether no block of the island is loose, in contact, or near another one by contact."""
+        """Whether no block of the island is loose, in contact with another one, or near one by contact."""
         return not self._onset.loose[island.rows].any() and (
             self._contacts is None or not self._contacts.busy()[island.rows].any()
         )
@@ -252,7 +257,7 @@ class Sleep:
     def _try(self, island: Island, time: float) -> bool:
         """Put an island to sleep if it is in balance."""
         sleeper = self._sleeper(island)
-        if sleeper is None or self._change(sleeper, self._outer) > FALLS * self.share:
+        if sleeper is None or self._changes([sleeper], self._outer)[0] > FALLS * self.share:
             self._since[island.joints] = time  # not again before another period
             return False
         self._stop(island.rows)
@@ -287,26 +292,37 @@ class Sleep:
         force, still = np.zeros((n, 6)), np.zeros_like(m.v)
         joints.forces(m.x, still, m.R, force, eta=0.0, which=island.joints)
         stored = joints.stored_between(m.x, m.R, m.x, m.R, which=island.joints)
+        holders = np.flatnonzero(force.any(axis=1) & ~self._masses.free)
         return Sleeper(
             island,
             m.x[island.rows].copy(),
             m.R[island.rows].copy(),
-            force,
+            force[island.rows],
+            self._pressed(island.rows),
+            holders,
+            force[holders],
             factor,
             float(stored[island.joints].sum()),
             joints.openings(island.joints, m.x, m.R),
         )
 
-    def _change(self, sleeper: Sleeper, outer: Array) -> float:
-        """Largest change of a traction over the strength if the island came to balance under `outer` (n, 6)."""
-        rows, m = sleeper.island.rows, self._motion
-        u = sleeper.factor.solve((outer + sleeper.force)[rows].ravel()).reshape(-1, 6)
+    def _pressed(self, rows: Array) -> Array:
+        """Forces (k, 6) of the contacts of the blocks `rows`, which touch planes only."""
+        return np.zeros((len(rows), 6)) if self._contacts is None else self._contacts.now_on_blocks()[rows]
+
+    def _changes(self, sleepers: list[Sleeper], outer: Array) -> list[float]:
+        """Largest change of a traction over the strength in each island if it came to balance under `outer` (n, 6)."""
+        m = self._motion
         x, R = m.x.copy(), m.R.copy()
-        x[rows] += u[:, :3]
-        R[rows] = Rotation.from_rotvec(u[:, 3:]).as_matrix() @ R[rows]
-        joints = sleeper.island.joints
-        change = np.abs(self._joints.openings(joints, x, R) - sleeper.openings) * self._scale[joints]
-        return float(change.max())
+        for s in sleepers:
+            rows = s.island.rows
+            u = s.factor.solve((outer[rows] + s.force + s.pressed).ravel()).reshape(-1, 6)
+            x[rows] += u[:, :3]
+            R[rows] = Rotation.from_rotvec(u[:, 3:]).as_matrix() @ R[rows]
+        joints = np.concatenate([s.island.joints for s in sleepers])
+        opened = np.abs(self._joints.openings(joints, x, R) - np.concatenate([s.openings for s in sleepers]))
+        first = np.cumsum([0, *(len(s.island.joints) for s in sleepers[:-1])])
+        return np.maximum.reduceat((opened * self._scale[joints]).max(axis=1), first).tolist()
 
     def _slowest(self, island: Island) -> float:
         """Period [s] of its slowest mode, by inverse iteration; NEVER where it has none."""
@@ -349,15 +365,17 @@ class Sleep:
         self._changed()
 
     def _hold(self, sleepers: list[Sleeper], time: float) -> None:
-        """Add the impulses of joints on the sleeping blocks since the step began: those that kept them still."""
+        """Add the impulses of joints on the sleeping blocks since the step began: those that, with the impulses of
+        their contacts, kept them still."""
         dt = time - self._began
         if dt <= 0.0 or not sleepers:
             return
-        for sleeper in sleepers:
-            rows = sleeper.island.rows
-            self._give(rows, -dt * self._outer[rows])
-            others = np.flatnonzero(sleeper.force.any(axis=1) & ~self._masses.free)
-            self._give(others, dt * sleeper.force[others])
+        rows = np.concatenate([s.island.rows for s in sleepers])
+        self._give(rows, -dt * self._outer[rows])
+        self._impulses.give(rows, -self._impulses.of_contacts(rows))
+        for sleeper in sleepers:  # two islands may hang on one block
+            if len(sleeper.holders):
+                self._give(sleeper.holders, dt * sleeper.held_by)
 
     def _give(self, rows: Array, impulse: Array) -> None:
         arm = np.cross(self._motion.x[rows], impulse[:, :3])
@@ -373,7 +391,8 @@ class Sleep:
         for sleeper in self._sleepers:
             self.asleep[sleeper.island.rows] = True
             still[sleeper.island.joints] = True
-            self.force += sleeper.force
+            self.force[sleeper.island.rows] += sleeper.force
+            self.force[sleeper.holders] += sleeper.held_by
         self._joints.set_asleep(still)
         self._motion.rest(self.asleep)
         self._energy_sums.stored_asleep = float(sum(s.stored for s in self._sleepers))

@@ -26,15 +26,11 @@ class SpinCorrection:
     def __init__(self, inertia: Array, free: Array):
         self._inertia = inertia
         self._inverse = np.array([np.linalg.inv(I) for I in inertia]).reshape(-1, 3, 3)
-        self._free = free
         self._lent = np.zeros((len(inertia), 3))
         """dt τ of the step before [N m s]."""
-
-    @property
-    def unequal(self) -> Array:
+        trace = np.trace(inertia, axis1=1, axis2=2)[:, None, None] / 3.0
+        self.unequal = free & (np.abs(inertia - trace * np.eye(3)) > 1e-9 * trace).any(axis=(1, 2))
         """(n,) bool: free blocks with unequal inertias."""
-        trace = np.trace(self._inertia, axis1=1, axis2=2)[:, None, None] / 3.0
-        return self._free & (np.abs(self._inertia - trace * np.eye(3)) > 1e-9 * trace).any(axis=(1, 2))
 
     def add(self, rows: Array, R: Array, v: Array, dt: float, last_dt: float, F: Array) -> None:
         """Add the correcting torques of the blocks `rows` to F (n, 6), which holds all other moments on them."""

@@ -58,14 +58,14 @@ class Substepper:
         none = np.zeros(0, np.int64)
         self._joined = self._joints.rows() if self._joints is not None else none
         self._turning = np.flatnonzero(self._spin.unequal)
-        meeting = np.flatnonzero(loose) if self._contacts is not None else none
-        watched = np.union1d(np.union1d(self._joined, meeting), self._energy_sums.free)
-        pushed = np.union1d(watched, np.flatnonzero(self.load.any(axis=1)))
+        watched = loose.copy() if self._contacts is not None else np.zeros(len(loose), bool)
+        watched[self._joined] = watched[self._energy_sums.free] = True
+        pushed = watched | self.load.any(axis=1)
         if asleep is not None and asleep.any():
             self._turning = self._turning[~asleep[self._turning]]
-            watched, pushed = watched[~asleep[watched]], pushed[~asleep[pushed]]
-        self._motion.watch(watched)
-        self._pushed = pushed
+            watched, pushed = watched & ~asleep, pushed & ~asleep
+        self._motion.watch(np.flatnonzero(watched))
+        self._pushed = np.flatnonzero(pushed)
         self._pushed_ids = [self._scene.ids[r] for r in self._pushed]
 
     def missing_weight(self, time: float) -> float:
