@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from array_types import Floats, Integers
-from fluid.numerics.threads import found_over, over, owning, reach_of_cells
+from fluid.numerics.threads import found_over, over, owning, reach_of_cells, zeros
 from kernel_decorators import inner, kernel, plain, released
 
 
@@ -122,7 +122,7 @@ def part_moments(e, phi, parts, total, local, out):
 
 def nodal_water(cell_list, shift, phi, parts, n_nodes):
     """∫_{φ+shift<0} N_i dV (N,) [m³] over the listed cells of the FluidParts; phi (N,) [m]."""
-    water = np.zeros(n_nodes)
+    water = zeros((n_nodes,))
     reach = reach_of_cells(cell_list, parts.cells)
     owning(_nodal_water, n_nodes, reach, len(cell_list), cell_list, shift, phi, parts, water)
     return water

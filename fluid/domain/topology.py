@@ -20,7 +20,7 @@ from fluid.mesh.arrays import Edges, FluidCells, Hats, Paths
 from fluid.mesh.background import Background
 from fluid.mesh.gradients import gradient_rows
 from fluid.numerics.spans import spans
-from fluid.numerics.threads import over
+from fluid.numerics.threads import marked, over
 from kernel_decorators import kernel, ranged, released
 
 
@@ -199,7 +199,7 @@ class Topology:
         only, apart from one byte a cell."""
         touched = np.zeros(len(self.cells), bool)
         over(_touched, len(nodes), nodes, self.node_start, self.node_cells, touched)
-        return np.flatnonzero(touched)
+        return marked(touched)
 
     def in_cells(self, length) -> Array:
         """Lengths (N,) [m] times `finer`; unchanged where all cells are equal."""
@@ -425,7 +425,7 @@ class Graph:
 
     def covers(self, nodes) -> bool:
         """Whether all these nodes (n,) are listed."""
-        return bool((self.row[nodes] >= 0).all())
+        return sum(over(_listed_among, len(nodes), nodes, self.row)) == len(nodes)
 
     @classmethod
     def of(cls, topology: Topology, nodes) -> Graph:
@@ -448,7 +448,7 @@ class Graph:
 
 
 WORK = 10
-"""Cost of finding the edges of a node, in visits of a node."""
+"""Cost of going through the neighbours of a node, or the cells around it, in visits of a node."""
 _PAIR = np.array([[-1, 0, 1, 2], [0, -1, 3, 4], [1, 3, -1, 5], [2, 4, 5, -1]])
 """Column of Background.products that holds the corners a, b."""
 
@@ -465,6 +465,14 @@ def _take_out(cell_list, cells, parent, products, volume, edges):
                 for b in range(4):
                     if b != a and neighbour[s] == cells[e, b]:
                         stiffness[s] -= volume[e] * products[parent[e], _PAIR[a, b]]
+
+
+@ranged
+def _listed_among(first, last, nodes, row):
+    count = 0
+    for s in range(first, last):
+        count += row[nodes[s]] >= 0
+    return count
 
 
 @released

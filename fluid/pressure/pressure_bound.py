@@ -13,7 +13,8 @@ import numpy as np
 
 from array_types import Array, Bools, Floats
 from fluid.numerics.bounded import at_air
-from kernel_decorators import kernel
+from fluid.numerics.threads import over
+from kernel_decorators import ranged
 
 
 def lowest_pressure(water, graph, dofs, phi, of_air: float = 0.0) -> Array | None:
@@ -25,9 +26,9 @@ def lowest_pressure(water, graph, dofs, phi, of_air: float = 0.0) -> Array | Non
     p = water.parameters
     if p.suction != "bounded":
         return None
-    vented = _beside_air(
-        dofs, graph.row, graph.start, graph.neighbour, phi, water.open_to_air, water.ventilated
-    )
+    vented = np.empty(len(dofs), bool)
+    state = (phi, water.open_to_air, water.ventilated)
+    over(_beside_air, len(dofs), dofs, graph.row, graph.start, graph.neighbour, *state, vented)
     return np.where(vented, max(of_air, p.vapour_pressure), p.vapour_pressure)
 
 
@@ -98,11 +99,10 @@ def wall_area(mesh, domain) -> Array:
     return of_tank[domain.parent_node] + of_bodies
 
 
-@kernel
-def _beside_air(dofs, graph_row, start, neighbour, phi, open_to_air, ventilated):
+@ranged
+def _beside_air(first, last, dofs, graph_row, start, neighbour, phi, open_to_air, ventilated, found):
     """(n,) bool: nodes at or next to dry nodes, open sides or water that has separated."""
-    found = np.zeros(dofs.shape[0], np.bool_)
-    for r in range(dofs.shape[0]):
+    for r in range(first, last):
         i = dofs[r]
         vented = open_to_air[i] or ventilated[i]
         row = graph_row[i]
@@ -110,4 +110,3 @@ def _beside_air(dofs, graph_row, start, neighbour, phi, open_to_air, ventilated)
             j = neighbour[s]
             vented = vented or phi[j] >= 0.0 or open_to_air[j] or ventilated[j]
         found[r] = vented
-    return found

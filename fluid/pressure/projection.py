@@ -26,7 +26,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from array_types import Array, Bools, Floats, Integers, Ints
-from fluid.numerics.threads import found_over, over, owning, reach_of_cells
+from fluid.numerics.threads import by_stretches, copied, found_over, over, owning, reach_of_cells, zeros
 from kernel_decorators import kernel, ranged, released
 
 SMALLEST_CUT = 1e-7
@@ -253,7 +253,7 @@ def _reached(indptr, indices, seed):
 def cell_velocity(cell_list, u, remainder, fluid):
     """u at the centroid of the fluid part of the listed cells plus the remainder of the cell, (n, 3).
 
-    remainder (M, 3), or (0, 3) for none · fluid: FluidCells"""
+    remainder (n, 3), or (0, 3) for none · fluid: FluidCells"""
     out = np.empty((len(cell_list), 3))
     over(_cell_velocity, len(cell_list), cell_list, u, remainder, fluid, out)
     return out
@@ -266,7 +266,7 @@ def _cell_velocity(first, last, cell_list, u, remainder, fluid, out):
         e = cell_list[s]
         row = share_row[e]
         for k in range(3):
-            out[s, k] = remainder[e, k] if remainder.shape[0] > 0 else 0.0
+            out[s, k] = remainder[s, k] if remainder.shape[0] > 0 else 0.0
             for a in range(4):
                 out[s, k] += share[row, a] * u[cells[e, a], k]
 
@@ -275,7 +275,7 @@ def inflow(cell_list, u_cell, fluid, n_nodes):
     """∫ u·∇N_i dV (N,) [m³/s] over the listed cells, u_cell (n, 3) one velocity each: exact for P1 velocities.
 
     fluid: FluidCells"""
-    out = np.zeros(n_nodes)
+    out = zeros((n_nodes,))
     reach = reach_of_cells(cell_list, fluid.cells)
     owning(_inflow, n_nodes, reach, len(cell_list), cell_list, u_cell, fluid, out)
     return out
@@ -300,7 +300,7 @@ def with_ghosts(pressure, air, wet, open_node, phi, cell_list, cells):
 
     p_j = a_j + φ_j Σ_i (p_i - a_j) φ_i / Σ_i φ_i²,    over the wet corners i beside j, once for each shared cell."""
     n = len(pressure)
-    out, up, down = pressure.copy(), np.zeros(n), np.zeros(n)
+    out, up, down = copied(pressure), zeros((n,)), zeros((n,))
     state = Outside(pressure, air, wet, open_node, phi)
     reach = reach_of_cells(cell_list, cells)
     owning(_with_ghosts, n, reach, len(cell_list), cell_list, state, cells, (up, down), out)
@@ -348,7 +348,7 @@ def _cell_gradient(first, last, cell_list, f, cells, parent, g, out):
 
 def nodal_mean(wet, value, fluid, n_nodes):
     """Σ_e w_e value_e / Σ_e w_e (N, 3), w_e = volume_e share_ea wet_e; value (n, 3) of the WetCells."""
-    out, weight = np.zeros((n_nodes, 3)), np.zeros(n_nodes)
+    out, weight = zeros((n_nodes, 3)), zeros((n_nodes,))
     reach = reach_of_cells(wet.rows, fluid.cells)
     owning(_nodal_mean, n_nodes, reach, len(wet.rows), wet, value, fluid, weight, out)
     return out
@@ -384,7 +384,7 @@ def damp_divergence(wet, weight, line, u, fluid):
 
     wet: WetCells · weight: c_L · line: Waterline · u (N, 3) [m/s] · fluid: FluidCells"""
     n = len(u)
-    mass, push = np.zeros(n), np.zeros((n, 3))
+    mass, push = zeros((n,)), zeros((n, 3))
     reach = reach_of_cells(wet.rows, fluid.cells)
     owning(_push_of_divergence, n, reach, len(wet.rows), wet, weight, line, u, fluid, (mass, push))
     over(_pushed, n, line.level_set, mass, push, u)
@@ -437,9 +437,13 @@ def damp_waterline(wet_cells, weight, line, wet, u, fluid):
     wet_cells: WetCells · weight: c, one or (N, 1) · line: Waterline · wet (N,) bool · u (N, 3) [m/s] ·
     fluid: FluidCells"""
     near = _around_waterline(wet_cells.rows, line, fluid.cells)
+    if len(near) == 0:
+        return
     around = WetCells(wet_cells.rows[near], wet_cells.share[near])
-    one = _unlike_neighbours(around, line, wet, u, fluid)
-    u -= weight * _unlike_neighbours(around, line, wet, one, fluid)
+    once = _unlike_neighbours(around, line, wet, u, fluid)
+    twice = _unlike_neighbours(around, line, wet, once, fluid)
+    each = np.broadcast_to(weight, (len(u), 1))
+    by_stretches(lambda rows: np.subtract(u[rows], each[rows] * twice[rows], out=u[rows]), u)
 
 
 def _around_waterline(cell_list, line, cells):
@@ -474,35 +478,42 @@ def _places_beside(first, last, cell_list, reached, cells):
     return found[:n].copy()
 
 
-@kernel
 def _unlike_neighbours(wet_cells, line, wet, u, fluid):
     """M⁻¹L u (N, 3), zero on dry nodes."""
+    mass, out = zeros((len(u),)), zeros(u.shape)
+    reach = reach_of_cells(wet_cells.rows, fluid.cells)
+    owning(_unlike, len(u), reach, len(wet_cells.rows), wet_cells, line, wet, u, fluid, mass, out)
+    return out
+
+
+@released
+def _unlike(first, last, runs, wet_cells, line, wet, u, fluid, mass, out):
     cell_list, wet_share = wet_cells
     phi, beside_solid, deep = line
-    cells, volume = fluid.cells, fluid.volume
-    mass, out, mean = np.zeros(u.shape[0]), np.zeros((u.shape[0], 3)), np.empty(3)
-    for s in range(cell_list.shape[0]):
-        e = cell_list[s]
-        w = volume[e] * max(wet_share[s], SMALLEST_WET_SHARE)
-        count, beside, highest = 0, False, -np.inf
-        mean[:] = 0.0
-        for a in range(4):
-            i = cells[e, a]
-            beside = beside or beside_solid[i]
-            highest = max(highest, phi[i])
-            if wet[i]:
-                count += 1
-                mass[i] += w
-                for k in range(3):
-                    mean[k] += u[i, k]
-        if beside and highest > deep:
+    cells, volume, mean = fluid.cells, fluid.volume, np.empty(3)
+    for run in range(runs.shape[0]):
+        for s in range(runs[run, 0], runs[run, 1]):
+            e = cell_list[s]
+            w = volume[e] * max(wet_share[s], SMALLEST_WET_SHARE)
+            count, beside, highest = 0, False, -np.inf
+            mean[:] = 0.0
             for a in range(4):
                 i = cells[e, a]
+                beside = beside or beside_solid[i]
+                highest = max(highest, phi[i])
                 if wet[i]:
+                    count += 1
+                    if first <= i < last:
+                        mass[i] += w
                     for k in range(3):
-                        out[i, k] += w * (u[i, k] - mean[k] / count)
-    for i in range(u.shape[0]):
+                        mean[k] += u[i, k]
+            if beside and highest > deep:
+                for a in range(4):
+                    i = cells[e, a]
+                    if wet[i] and first <= i < last:
+                        for k in range(3):
+                            out[i, k] += w * (u[i, k] - mean[k] / count)
+    for i in range(first, last):
         if mass[i] > 0.0:
             for k in range(3):
                 out[i, k] /= mass[i]
-    return out

@@ -8,8 +8,9 @@ from functools import cached_property
 import numpy as np
 
 from array_types import Bools, Floats, Ints
+from fluid.numerics.threads import over
 from fluid.surface.level_set import without_films
-from kernel_decorators import plain
+from kernel_decorators import ranged
 
 _SAME_DIRECTION = 0.3
 """Normals of one node that span less than this (singular value over the largest) count as one direction."""
@@ -144,13 +145,13 @@ class Walls:
 
     def slip(self, u) -> None:
         """Remove the velocity into the closed sides from u (N, 3) [m/s], in place."""
-        _project(self.nodes, self.projector, u)
+        over(_project, len(self.nodes), self.nodes, self.projector, u)
 
 
-@plain
-def _project(nodes, projector, u):
+@ranged
+def _project(first, last, nodes, projector, u):
     """u_i <- P_i u_i of the listed nodes, in place."""
-    for s in range(nodes.shape[0]):
+    for s in range(first, last):
         i = nodes[s]
         x, y, z = u[i, 0], u[i, 1], u[i, 2]
         for k in range(3):

@@ -14,14 +14,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from array_types import Bools, Floats, Ints
+from fluid.domain.cell_vectors import CellVectors, places_of
 from fluid.numerics.sums import kinetic_energy
-from fluid.numerics.threads import found_over, over, zeros
+from fluid.numerics.threads import copied, field, over
 from fluid.pressure.pressure_bound import BoundMet
 from fluid.pressure.projection import (
     Waterline,
     WetCells,
     cell_gradient,
-    cell_velocity,
     damp_divergence,
     damp_waterline,
     nodal_mean,
@@ -32,7 +32,7 @@ from fluid.step.report import StepReport
 from fluid.surface.extrapolation import extend_velocity
 from fluid.surface.gradient_jump_damping import damp_gradient_jumps
 from fluid.surface.volume import Flux, edge_flux
-from kernel_decorators import ranged, released
+from kernel_decorators import ranged
 
 FLUX_LAYERS = 3
 """Layers of dry nodes that water may reach within the next step."""
@@ -62,9 +62,9 @@ class Corrected:
     acceleration: Floats
     pressure: Floats
     end_pressure: Floats
-    remainder: Floats
-    kick_remainder: Floats
-    cell_velocity: Floats
+    remainder: CellVectors
+    kick_remainder: CellVectors
+    cell_velocity: CellVectors
     nodal_water: Floats
     flux: Flux
     listed: Ints
@@ -90,10 +90,10 @@ def corrected(water, problem, x, parting) -> Corrected:
     gradient = _pressure_gradient(water, kept, unknown, dt / problem.density)
     u, a, forced, mean = _projected(t, kept, gradient, dt)
     remainder, kick_remainder = _remainders(water, kept, gradient, mean, dt)
-    u_cell = kept.cell_star - gradient
-    projected = u.copy()
+    u_cell = field(len(gradient), lambda rows: kept.cell_star[rows] - gradient[rows], (3,))
+    projected = copied(u)
     clipped, limited, damped = _limit_and_damp(water, kept, u, a)
-    slipping = u.copy()
+    slipping = copied(u)
     listed, start = water.layers(kept.wet)
     _continue(water, kept, listed, start, u, a, forced)
     cell_field, flux = _flux(water, kept, listed, start, u, u_cell)
@@ -168,50 +168,37 @@ def _after_pressure(first, last, wet, u_star, mean, advected, time, made):
 
 
 def _remainders(water, kept, gradient, mean, dt):
-    """u' (M, 3) [m/s] after this step and its rate -(∇x - Π∇x)/(θ ρ) (M, 3) [m/s²] for the next kick."""
-    t = water.topology
-    remainder, rate = zeros(water.remainder.shape), zeros(water.remainder.shape)
-    if water.parameters.subscale_memory:
-        depth = t.in_cells(kept.level_set)
-        cells, deep, time = kept.wet_cells, -MEMORY_DEPTH * water.mesh.spacing, kept.theta * dt
-        whole = found_over(_all_below, len(cells), cells, depth, deep, t.cells)
-        state = ((mean, gradient), kept.remainder, time, t.fluid_cells)
-        over(_leave, len(whole), whole, cells, *state, (remainder, rate))
-    return remainder, rate
+    """u' [m/s] of the wet cells after this step and its rate -(∇x - Π∇x)/(θ ρ) [m/s²] for the next kick."""
+    t, cells = water.topology, kept.wet_cells
+    if not water.parameters.subscale_memory:
+        return CellVectors.none(), CellVectors.none()
+    remainder, rate = np.empty((len(cells), 3)), np.empty((len(cells), 3))
+    below = (t.in_cells(kept.level_set), -MEMORY_DEPTH * water.mesh.spacing)
+    state = (below, (mean, gradient), kept.remainder, kept.theta * dt, t.fluid_cells)
+    over(_leave, len(cells), cells, *state, (remainder, rate))
+    return CellVectors(cells, remainder), CellVectors(cells, rate)
 
 
 @ranged
-def _leave(first, last, places, cell_list, slopes, before, time, fluid, made):
-    """Add the part of the gradient that the nodes cannot represent, Π∇x - ∇x [m/s], to the subscale velocity of the
-    cells at these places of the list, and, divided by a time [s], to its rate. slopes: Π∇x (N, 3) and ∇x of the listed
-    cells (n, 3)."""
-    mean, gradient = slopes
+def _leave(first, last, cell_list, below, slopes, before, time, fluid, made):
+    """Add the part of the gradient that the nodes cannot represent, Π∇x - ∇x [m/s], to the subscale velocity (n, 3) of
+    the listed cells, and, divided by a time [s], to its rate; both zero where φ < deep does not hold at all corners.
+    below: φ (N,) and deep [m] · slopes: Π∇x (N, 3) and ∇x of the listed cells (n, 3)."""
+    (phi, deep), (mean, gradient) = below, slopes
     cells, share, share_row = fluid.cells, fluid.share, fluid.share_row
     remainder, rate = made
-    for place in range(first, last):
-        s = places[place]
-        e = cell_list[s]
-        for k in range(3):
-            left = 0.0
-            for a in range(4):
-                left += share[share_row[e], a] * mean[cells[e, a], k]
-            left -= gradient[s, k]
-            remainder[e, k] = before[e, k] + left
-            rate[e, k] = left / time
-
-
-@released
-def _all_below(first, last, cell_list, phi, deep, cells):
-    """Places in the list of the cells with φ < deep at all corners."""
-    found = np.empty(last - first, np.int64)
-    n = 0
     for s in range(first, last):
         e = cell_list[s]
         highest = max(max(phi[cells[e, 0]], phi[cells[e, 1]]), max(phi[cells[e, 2]], phi[cells[e, 3]]))
-        if highest < deep:
-            found[n] = s
-            n += 1
-    return found[:n].copy()
+        for k in range(3):
+            remainder[s, k], rate[s, k] = 0.0, 0.0
+            if highest < deep:
+                left = 0.0
+                for a in range(4):
+                    left += share[share_row[e], a] * mean[cells[e, a], k]
+                left -= gradient[s, k]
+                remainder[s, k] = before[s, k] + left
+                rate[s, k] = left / time
 
 
 def _limit_and_damp(water, kept, u, a):
@@ -219,12 +206,12 @@ def _limit_and_damp(water, kept, u, a):
     velocity (N, 3) after the first and after the second."""
     t, parameters = water.topology, water.parameters
     clipped = _limit_speed(water, u, a)
-    limited = u.copy()
+    limited = copied(u)
     line = Waterline(t.in_cells(kept.level_set), t.beside_solid, -MEMORY_DEPTH * water.mesh.spacing)
     wet = WetCells(kept.wet_cells, kept.wet_share)
     damp_divergence(wet, parameters.divergence_damping, line, u, t.fluid_cells)
     _damp_surface(water, kept, u)
-    damped = u.copy()
+    damped = copied(u)
     water.hold(u, kept.end)
     return clipped, limited, damped
 
@@ -289,51 +276,53 @@ def _continue(water, kept, listed, start, u, a, forced) -> None:
 
 
 def _flux(water, kept, listed, start, u, u_cell):
-    """Velocity of the cells (M, 3) and the volume flux of the next step, extrapolated to its middle."""
+    """Velocity of the cells, CellVectors, and the volume flux of the next step, extrapolated to its middle."""
     t = water.topology
     reached = listed[: start[FLUX_LAYERS + 1]]
     near = np.zeros(len(u), bool)
     near[reached] = True
     around = t.cells_around(near)
-    cell_field = zeros(water.cell_velocity.shape)
-    put(around, cell_velocity(around, u, np.zeros((0, 3)), t.fluid_cells), cell_field)
-    put(kept.wet_cells, u_cell, cell_field)
+    now, middle = np.empty((len(around), 3)), np.empty((len(t.cells), 3))
+    last = water.cell_velocity
     # with implicit Euler the velocity at the end of the step is the stable choice
-    middle = (
-        to_middle(around, cell_field, water.cell_velocity) if water.parameters.theta < 1.0 else cell_field
+    before = last if water.parameters.theta < 1.0 else CellVectors.none()
+    wet = (places_of(around, kept.wet_cells), u_cell)
+    over(
+        _cells_of_flux,
+        len(around),
+        around,
+        u,
+        wet,
+        (places_of(around, before.cells), before.values),
+        t.fluid_cells,
+        now,
+        middle,
     )
-    return cell_field, edge_flux(
-        t, water.graph_for(reached), reached, middle, kept.nodal_water - kept.displaced
-    )
-
-
-def put(rows, values, field):
-    """field[rows] = values, of (n, 3) in (M, 3), in place: a quarter of the time that indexing by a list takes."""
-    over(_put, len(rows), rows, values, field)
+    held = field(len(u), lambda rows: kept.nodal_water[rows] - kept.displaced[rows])
+    return CellVectors(around, now), edge_flux(t, water.graph_for(reached), reached, middle, held)
 
 
 @ranged
-def _put(first, last, rows, values, field):
+def _cells_of_flux(first, last, cell_list, u, wet, before, fluid, now, middle):
+    """Velocity (n, 3) of the listed cells: that of the projection in wet ones, elsewhere u (N, 3) at the centroid; and
+    (M, 3) half a step ahead, 1.5 u - 0.5 u_before, u where none was before. Other cells are not written to.
+
+    wet, before: place (n,) of each listed cell among the rows of the values (.., 3), -1 for none."""
+    (wet_place, u_wet), (place, u_before) = wet, before
+    cells, share, share_row = fluid.cells, fluid.share, fluid.share_row
     for s in range(first, last):
+        e, w, b = cell_list[s], wet_place[s], place[s]
+        row = share_row[e]
         for k in range(3):
-            field[rows[s], k] = values[s, k]
-
-
-def to_middle(cell_list, now, before):
-    """1.5 u - 0.5 u_before (M, 3) in the listed cells: the velocity half a step ahead; u where none was before. Zero in
-    the others."""
-    out = zeros(now.shape)
-    over(_to_middle, len(cell_list), cell_list, now, before, out)
-    return out
-
-
-@ranged
-def _to_middle(first, last, cell_list, now, before, out):
-    for s in range(first, last):
-        e = cell_list[s]
-        known = before[e, 0] != 0.0 or before[e, 1] != 0.0 or before[e, 2] != 0.0
+            if w >= 0:
+                now[s, k] = u_wet[w, k]
+            else:
+                now[s, k] = 0.0
+                for a in range(4):
+                    now[s, k] += share[row, a] * u[cells[e, a], k]
+        known = b >= 0 and (u_before[b, 0] != 0.0 or u_before[b, 1] != 0.0 or u_before[b, 2] != 0.0)
         for k in range(3):
-            out[e, k] = 1.5 * now[e, k] - 0.5 * before[e, k] if known else now[e, k]
+            middle[e, k] = 1.5 * now[s, k] - 0.5 * u_before[b, k] if known else now[s, k]
 
 
 def _report(water, problem, x, projected, u, clipped, momentum, bound):

@@ -31,7 +31,7 @@ import numpy as np
 
 from array_types import Array, Floats
 from fluid.numerics.sums import about, momentum_of, momentum_of_rows
-from fluid.numerics.threads import CHUNK, summed
+from fluid.numerics.threads import CHUNK, field, marked, summed
 from fluid.step.predictor import kick_factor
 from kernel_decorators import released
 
@@ -129,11 +129,12 @@ def momentum_change(water, problem, unknown, pressure, stages: Stages) -> Moment
 def _momenta(water, kept, dt, stages: Stages) -> dict[str, Array]:
     """Momentum (6,) after every stage of the step; "weight" [N, N m]: that of the water."""
     W0, own, W1 = water.nodal_water, kept.uncorrected_water, kept.nodal_water
-    rows = np.flatnonzero((W0 > 0.0) | (own > 0.0) | (W1 > 0.0))
-    nodes, parameters = water.topology.nodes, water.parameters
-    kicked = water.velocity.copy()
-    a = water.acceleration[rows]
-    kicked[rows] += (1.0 - kept.theta) * dt * kick_factor(a, water.largest_kick()[rows])[:, None] * a
+    rows = marked(
+        field(len(W0), lambda part: (W0[part] > 0.0) | (own[part] > 0.0) | (W1[part] > 0.0), (), bool)
+    )
+    nodes, parameters, a = water.topology.nodes, water.parameters, water.acceleration
+    kick = (1.0 - kept.theta) * dt * kick_factor(a, water.largest_kick())
+    kicked = field(len(a), lambda part: water.velocity[part] + kick[part, None] * a[part], (3,))
     unsheared = kept.advected if kept.shear is None else kept.advected - kept.shear.change
     found = {
         "before": (W0, water.velocity),

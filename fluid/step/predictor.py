@@ -14,8 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from array_types import Bools, Floats, Ints
+from fluid.domain.cell_vectors import places_of
 from fluid.domain.coupling_matrix import wetted_coupling
-from fluid.numerics.threads import over, zeros
+from fluid.numerics.threads import by_stretches, copied, over
 from fluid.pressure.active_cells import WetPart
 from fluid.pressure.indefinite_cells import about, reserve
 from fluid.pressure.pressure_bound import lowest_pressure
@@ -44,9 +45,9 @@ RESCALE_EVERY = 5
 class Predicted:
     """Between predict and correct: level_set (N,), nodal_water (N,) [m³], advected (N, 3) and u_star (N, 3) [m/s],
     wet (N,) bool, wet_cells (n,), wet_share (n,) and void (k,) of WetPart, cell_star (n, 3) [m/s] velocity of the wet
-    cells, remainder (M, 3) [m/s], theta, conserved_volume and reinserted [m³], uncorrected_water (N,) [m³] before the
-    volume correction, shear: ViscousChange by viscosity and friction, None without; end [s]: time at the end of the
-    step; left: what leaves through open sides, None if nothing; through (N,) [m³] that enters through sides,
+    cells, remainder (n, 3) [m/s] of them, theta, conserved_volume and reinserted [m³], uncorrected_water (N,) [m³]
+    before the volume correction, shear: ViscousChange by viscosity and friction, None without; end [s]: time at the end
+    of the step; left: what leaves through open sides, None if nothing; through (N,) [m³] that enters through sides,
     None without any; held (N,) [Pa]: unknown part of the pressure on the nodes of seas, None without any side;
     displaced (N,) [m³]: part of nodal_water that the bodies take in this step; given_by_films: `films.Handed.given`;
     cushions: trapped air (`fluid.air.cushions`), None without any."""
@@ -175,30 +176,40 @@ def _factor(first, last, a, limit, out):
 
 def _transported(water, dt, theta, kick):
     """u_adv (N, 3) and φ̃ (N,); nodes outside the list keep û and φ."""
-    u_hat, u_m = np.empty_like(water.velocity), np.empty_like(water.velocity)
     to_middle = 0.5 * dt if water.parameters.theta < 1.0 else 0.0
-    state = (water.velocity, water.acceleration, kick)
-    over(_kicked, len(u_hat), *state, (1.0 - theta) * dt, to_middle, u_hat, u_m)
+    u_hat, u_m = kicked(water.velocity, water.acceleration, kick, (1.0 - theta) * dt, to_middle)
     for u in (u_hat, u_m):
         water.hold(u, water.time + dt)
-    fields = np.column_stack([u_hat, water.level_set])
+    fields = np.empty((len(u_hat), 4))
+
+    def stack(rows):
+        fields[rows, :3], fields[rows, 3] = u_hat[rows], water.level_set[rows]
+
+    by_stretches(stack, fields)
     moved = transport(water.topology, water.listed, dt, u_m, fields, water.walls.open_node)
     if water.parameters.advection == "supg":
         from fluid.transport.supg import carried_velocity
 
         moved[:, :3] = carried_velocity(water, dt, u_m, u_hat)
-    u_adv, phi = u_hat, water.level_set.copy()
-    u_adv[water.listed] = moved[:, :3]
+    u_adv, phi = u_hat, copied(water.level_set)
     if water.topology.is_obtuse:
         places, levels = levels_in_solids(
             water.topology, water.listed, dt, u_m, phi, water.topology.node_size
         )
         moved[places, 3] = levels
-    near = np.abs(water.topology.in_cells(phi)[water.listed]) < TRANSPORT_WIDTH * water.mesh.spacing
-    phi[water.listed[near]] = moved[near, 3]
+    width = TRANSPORT_WIDTH * water.mesh.spacing
+    over(_taken_over, len(moved), water.listed, moved, water.topology.finer, width, u_adv, phi)
     water.walls.admit_air(phi, u_m, dt, water.topology.node_size, -np.asarray(water.parameters.down))
     water.hold(u_adv, water.time + dt)
     return u_adv, phi
+
+
+def kicked(velocity, acceleration, kick, whole: float, middle: float):
+    """Velocity (N, 3) [m/s] after the times `whole` and `middle` [s] at the acceleration (N, 3) [m/s²] times kick
+    (N,)."""
+    u_hat, u_m = np.empty_like(velocity), np.empty_like(velocity)
+    over(_kicked, len(velocity), velocity, acceleration, kick, whole, middle, u_hat, u_m)
+    return u_hat, u_m
 
 
 @ranged
@@ -209,6 +220,18 @@ def _kicked(first, last, velocity, acceleration, kick, whole, middle, u_hat, u_m
             a = kick[i] * acceleration[i, k]
             u_hat[i, k] = velocity[i, k] + whole * a
             u_m[i, k] = velocity[i, k] + middle * a
+
+
+@ranged
+def _taken_over(first, last, listed, moved, finer, width, u, phi):
+    """What paths brought to the listed nodes: u, and φ where it is within the width [m] of the surface, in local
+    cells."""
+    for s in range(first, last):
+        i = listed[s]
+        for k in range(3):
+            u[i, k] = moved[s, k]
+        if abs(phi[i] * finer[i]) < width:
+            phi[i] = moved[s, 3]
 
 
 def _new_surface(water, phi, carried, conserved):
@@ -351,40 +374,45 @@ def _coupling(water, void):
 
 
 def _carried_remainder(water, dt, theta, cells):
-    """u'_e = β (u'_e - (1-θ) dt r_e) (M, 3) with β = 1/(1 + (4 ν/l_e² + 2 |u_e|/l_e) dt): the remainder that lives on.
+    """u'_e = β (u'_e - (1-θ) dt r_e) (n, 3) of the listed cells, with β = 1/(1 + (4 ν/l_e² + 2 |u_e|/l_e) dt): the
+    remainder that lives on.
 
     It is swept out of the cell in the time that the water takes to cross it, and viscosity stops it (dynamic subscales;
     Codina, Principe, Guasch, Badia, Comput. Methods Appl. Mech. Eng. 196 (2007) 2413)."""
     t, p = water.topology, water.parameters
     if not p.subscale_memory:
-        return np.zeros_like(water.remainder)
-    rate = (1.0 - theta) * dt
-    out = zeros(water.remainder.shape)
+        return np.zeros((len(cells), 3))
+    held = (places_of(cells, water.remainder.cells), water.remainder.values, water.kick_remainder.values)
     nu = p.viscosity / p.density
-    state = (water.remainder, water.kick_remainder, rate, water.velocity, dt, nu, t.cells, t.size)
-    carry_remainder(cells, *state, out)
+    return carry_remainder(cells, held, (1.0 - theta) * dt, water.velocity, dt, nu, t.cells, t.size)
+
+
+def carry_remainder(cell_list, held, kick_time, u, dt, nu, cells, size):
+    """β (u' + kick_time r) (n, 3) of the listed cells (n,); nu: kinematic viscosity [m²/s].
+
+    held: place (n,) of each among the rows of u' (k, 3) [m/s] and of r (k, 3) [m/s²], -1 where both are zero."""
+    out = np.empty((len(cell_list), 3))
+    over(_carry_remainder, len(cell_list), cell_list, held, (kick_time, dt, nu), u, cells, size, out)
     return out
-
-
-def carry_remainder(cell_list, remainder, kick, kick_time, u, dt, nu, cells, size, out):
-    """β (u' + kick_time r) (M, 3) in the listed cells of `out`; nu: kinematic viscosity [m²/s]."""
-    state = ((remainder, kick), (kick_time, dt, nu), u, cells, size)
-    over(_carry_remainder, len(cell_list), cell_list, *state, out)
 
 
 @ranged
 def _carry_remainder(first, last, cell_list, held, numbers, u, cells, size, out):
-    remainder, kick = held
+    place, remainder, kick = held
     kick_time, dt, nu = numbers
-    for place in range(first, last):
-        e = cell_list[place]
+    for s in range(first, last):
+        e, row = cell_list[s], place[s]
+        if row < 0:
+            for k in range(3):
+                out[s, k] = 0.0
+            continue
         square = 0.0
         for k in range(3):
             mean = 0.25 * (u[cells[e, 0], k] + u[cells[e, 1], k] + u[cells[e, 2], k] + u[cells[e, 3], k])
             square += mean * mean
         beta = 1.0 / (1.0 + (4.0 * nu / size[e] + 2.0 * np.sqrt(square)) * dt / size[e])
         for k in range(3):
-            out[e, k] = beta * (remainder[e, k] + kick_time * kick[e, k])
+            out[s, k] = beta * (remainder[row, k] + kick_time * kick[row, k])
 
 
 def _sealed(water, matrix, anchored, dofs, dt, pressure):

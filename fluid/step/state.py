@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from array_types import Array
+from fluid.domain.cell_vectors import CellVectors
 from fluid.domain.topology import Graph
 from fluid.surface.volume import Flux
 
@@ -66,10 +67,18 @@ def save(water) -> dict[str, Array]:
     changes.  Raises NotAfterAStep."""
     if water.flux.capacity is not water.topology.node_volume:
         raise NotAfterAStep("the state of the water can be saved after a step, before the solids move on")
-    arrays = {name: np.asarray(getattr(water, name)) for name in (*NODAL, *OF_CELLS, *OF_BODIES, *NUMBERS)}
+    arrays = {name: np.asarray(getattr(water, name)) for name in (*NODAL, *OF_BODIES, *NUMBERS)}
+    for name in OF_CELLS:
+        listed = getattr(water, name)
+        arrays |= {f"{name}_cells": listed.cells, name: listed.values}
     arrays |= {"listed": water.listed, "layer_start": water.layer_start}
-    arrays |= {"graph_nodes": water.flux.graph.nodes, "flux_nodes": water.flux.nodes, "flux": water.flux.rate}
-    arrays["flux_velocity"] = water.flux.velocity
+    arrays |= {
+        "graph_nodes": water.flux.graph.nodes,
+        "flux_nodes": water.flux.nodes,
+        "flux": rate_of_listed(water.flux),
+    }
+    arrays["cells"] = np.array(len(water.topology.cells))
+    arrays["flux_velocity"] = water.flux.velocity[water.cell_velocity.cells]
     if water.sides is not None:
         arrays |= {name: np.array(getattr(water.sides, name)) for name in SIDES}
         arrays["absorbed"] = water.sides.absorbed
@@ -80,12 +89,22 @@ def save(water) -> dict[str, Array]:
     return arrays
 
 
+def rate_of_listed(flux) -> Array:
+    """Rates (edges,) [m³/s] of the flux, zero along edges out of nodes that it does not list."""
+    g, listed = flux.graph, np.zeros(len(flux.graph.nodes), bool)
+    listed[g.row[flux.nodes]] = True
+    return np.where(np.repeat(listed, np.diff(g.start)), flux.rate, 0.0)
+
+
 def restore(water, domain, arrays) -> None:
     """Back to a saved state on `domain`, the same as the one that it was saved on.  Raises OtherWater."""
     _check(domain, arrays, water.sides, water.air)
     water.set_domain(domain)
-    for name in (*NODAL, *OF_CELLS, *OF_BODIES, "listed", "layer_start"):
+    for name in (*NODAL, *OF_BODIES, "listed", "layer_start"):
         setattr(water, name, np.array(arrays[name]))
+    for name in OF_CELLS:
+        setattr(water, name, CellVectors(np.array(arrays[f"{name}_cells"]), np.array(arrays[name])))
+    of_flux = CellVectors(water.cell_velocity.cells, np.array(arrays["flux_velocity"]))
     for name, kind in NUMBERS.items():
         setattr(water, name, kind(arrays[name]))
     water.graph = Graph.of(water.topology, np.array(arrays["graph_nodes"]))
@@ -94,7 +113,7 @@ def restore(water, domain, arrays) -> None:
         nodes=np.array(arrays["flux_nodes"]),
         graph=water.graph,
         rate=np.array(arrays["flux"]),
-        velocity=np.array(arrays["flux_velocity"]),
+        velocity=of_flux.field(len(water.topology.cells)),
         water=water.nodal_water - water.displaced,
         capacity=water.topology.node_volume,
     )
@@ -115,8 +134,10 @@ def _check(domain, arrays, sides, air) -> None:
     wanted = {
         *NODAL,
         *OF_CELLS,
+        *(f"{name}_cells" for name in OF_CELLS),
         *OF_BODIES,
         *NUMBERS,
+        "cells",
         "listed",
         "layer_start",
         "graph_nodes",
@@ -129,7 +150,7 @@ def _check(domain, arrays, sides, air) -> None:
     missing = sorted(wanted - set(arrays))
     if missing:
         raise OtherWater(f"not the state of this water: {', '.join(missing)} missing")
-    nodes, cells = len(arrays["level_set"]), len(arrays["remainder"])
+    nodes, cells = len(arrays["level_set"]), int(arrays["cells"])
     if (nodes, cells) != (len(domain.nodes), len(domain.cells)):
         raise OtherWater(
             f"the state has {nodes} nodes and {cells} cells, the domain {len(domain.nodes)} and {len(domain.cells)}; "

@@ -21,7 +21,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from kernel_decorators import kernel, plain
+from fluid.numerics.threads import over
+from kernel_decorators import kernel, ranged
 
 SPRAY = 0.01
 """Largest share of the volume of water that is spray, ..."""
@@ -69,11 +70,15 @@ def gathered(counted, water, least, start, around):
     return found if n > 0 else counted
 
 
-@plain
-def largest_component(u, counted):
+def largest_component(u, counted) -> float:
     """max |u_ik| over the counted rows of u (N, 3), 0 without any."""
+    return max(over(_largest_component, len(u), u, counted))
+
+
+@ranged
+def _largest_component(first, last, u, counted):
     largest = 0.0
-    for i in range(u.shape[0]):
+    for i in range(first, last):
         if counted[i]:
             for k in range(3):
                 largest = max(largest, abs(u[i, k]))

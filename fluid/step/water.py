@@ -16,17 +16,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from array_types import Array
+from fluid.domain.cell_vectors import CellVectors
 from fluid.domain.physical_domain import carry, wetted_coupling
 from fluid.domain.topology import Graph, Topology, layers_around
 from fluid.mesh.background import Background
 from fluid.numerics.sums import kinetic_energy
-from fluid.numerics.threads import zeros
+from fluid.numerics.threads import field
 from fluid.pressure.displaced import taken_from_nodes
 from fluid.pressure.projection import PressureProblem
 from fluid.sides.walls import Walls
 from fluid.step.corrector import Corrected, corrected
 from fluid.step.parameters import WaterParameters
-from fluid.step.predictor import kick_factor, predicted
+from fluid.step.predictor import kick_factor, kicked, predicted
 from fluid.step.report import StepReport
 from fluid.step.time_step import LEAST_COUNTED, LEAST_GATHERED, gathered, largest_component, pace
 from fluid.surface.extrapolation import BAND, fill_missing
@@ -59,9 +60,9 @@ class Water:
     State at the nodes of the domain: level_set (N,) [m], velocity (N, 3) [m/s], acceleration (N, 3) [m/s²],
     pressure (N,) [Pa] that acted over the last step, end_pressure (N,) [Pa] that goes with the acceleration at its end
     (the two differ by up to 1/θ in an impact), nodal_water (N,) [m³], at_bound and ventilated (N,) bool: where the
-    pressure was at its bound, and where that is the pressure of the air; at its cells: remainder (M, 3) [m/s], the part
-    of the velocity correction that nodal values cannot represent.  Velocity is extrapolated to some layers outside
-    the water.
+    pressure was at its bound, and where that is the pressure of the air; at its cells (`CellVectors`): remainder
+    [m/s], the part of the velocity correction that nodal values cannot represent, and cell_velocity [m/s].  Velocity is
+    extrapolated to some layers outside the water.
 
     body_velocity (n_bodies, 6) [m/s, rad/s] about the centres: set it before `predict` where solids that move drag the
     water along (viscosity, friction); it is not used otherwise.
@@ -126,11 +127,7 @@ class Water:
         self.pressure = self._pressure_at_rest()
         self.end_pressure = self.pressure.copy()
         self.at_bound, self.ventilated = np.zeros(n, bool), np.zeros(n, bool)
-        self.cell_velocity = np.zeros((len(self.topology.cells), 3))
-        self.remainder, self.kick_remainder = (
-            np.zeros_like(self.cell_velocity),
-            np.zeros_like(self.cell_velocity),
-        )
+        self.cell_velocity = self.remainder = self.kick_remainder = CellVectors.none()
         self.nodal_water = nodal_volume(self.topology, self.level_set)
         self.displaced = np.zeros(n)
         """(N,) [m³], part of `nodal_water`: what the bodies take of it as they move on to where the surface is."""
@@ -143,8 +140,9 @@ class Water:
         if velocity is not None:
             self._start_moving(velocity)
         self.renumbered, self.left_behind = None, None
+        of_cells = self.cell_velocity.field(len(self.topology.cells))
         self.flux = edge_flux(
-            self.topology, self.graph_for(self.listed), self.listed, self.cell_velocity, self.nodal_water
+            self.topology, self.graph_for(self.listed), self.listed, of_cells, self.nodal_water
         )
 
     def _start_moving(self, velocity) -> None:
@@ -152,7 +150,14 @@ class Water:
         self._start_speed = float(np.sqrt((velocity**2).sum(axis=1).max()))
         self.velocity[self.listed] = velocity[self.listed]
         self.hold(self.velocity, 0.0)
-        self.cell_velocity = self.velocity[self.topology.cells].mean(axis=1)
+        near = np.zeros(len(velocity), bool)
+        near[self.listed] = True
+        cells = self.topology.cells_around(near)
+        self.cell_velocity = CellVectors(cells, self.velocity[self.topology.cells[cells]].mean(axis=1))
+
+    def set_cell_velocity(self, velocity) -> None:
+        """Velocity (M, 3) [m/s] of the cells before the first step, from which its fluxes are extrapolated."""
+        self.cell_velocity = CellVectors.of(velocity)
 
     # ---- the step
 
@@ -216,7 +221,8 @@ class Water:
 
     def _largest_kick(self, size):
         p = self.parameters
-        return np.maximum(p.kick_limit * p.gravity, 0.5 * self.fastest() ** 2 / size)
+        calm, fast = p.kick_limit * p.gravity, 0.5 * self.fastest() ** 2
+        return field(len(size), lambda rows: np.maximum(calm, fast / size[rows]))
 
     def speed_cap(self) -> float:
         """Largest speed [m/s] that is permitted: speed_limit sqrt(g H + v²/2) in a tank of height H whose water starts
@@ -344,16 +350,14 @@ class Water:
     def _carried(self, dt: float, theta: float) -> Carried:
         p, flux = self.parameters, self.flux
         u, a, phi, t = self.left_behind or (self.velocity, self.acceleration, self.level_set, self.topology)
-        kick = dt * kick_factor(a, self._largest_kick(t.node_size))[:, None] * a
-        total = zeros(flux.rate.shape)
-        u_hat = u + (1.0 - theta) * kick
-        found = Carried.by(flux, dt, u_hat, a, p.gravity, p.viscosity / p.density, t.node_size, total)
+        kick = dt * kick_factor(a, self._largest_kick(t.node_size))
+        u_hat, u_m = kicked(u, a, kick, 1.0 - theta, 0.5 if p.theta < 1.0 else 0.0)
+        found, moved = Carried.by(flux, dt, u_hat, a, p.gravity, p.viscosity / p.density, t.node_size)
         if p.advection == "supg":
             found = found.near_the_surface()
         if t.is_obtuse:
             return replace(found, swept=np.zeros(len(phi)))
-        u_m = u + 0.5 * kick if p.theta < 1.0 else u
-        return replace(found, swept=swept(t, flux, phi, u_m, total, dt))
+        return replace(found, swept=swept(t, flux, phi, u_m, moved, dt))
 
     def _carry_nodes(self, source, known):
         scalars = np.column_stack([self.level_set, self.pressure, self.end_pressure])
@@ -375,9 +379,10 @@ class Water:
             return
         source = same_cells(old.background, self.topology.background, len(self.mesh.cells))
         for name in ("cell_velocity", "remainder", "kick_remainder"):
-            setattr(self, name, carried_rows(source, getattr(self, name)))
+            setattr(self, name, getattr(self, name).carried(source, len(old.cells)))
         fresh = np.flatnonzero(source < 0)
-        self.cell_velocity[fresh] = self.velocity[self.topology.cells[fresh]].mean(axis=1)
+        of_nodes = self.velocity[self.topology.cells[fresh]].mean(axis=1)
+        self.cell_velocity = self.cell_velocity.joined(fresh, of_nodes)
 
     # ---- layout
 
@@ -614,14 +619,3 @@ def same_cells(old_parent, new_parent, n_parents):
     for e in range(old_parent.shape[0] - 1, -1, -1):
         row[old_parent[e]] = e
     return row[new_parent]
-
-
-@kernel
-def carried_rows(source, field):
-    """field[source] (n, 3), zero where source is -1."""
-    out = np.zeros((source.shape[0], 3))
-    for e in range(source.shape[0]):
-        if source[e] >= 0:
-            for k in range(3):
-                out[e, k] = field[source[e], k]
-    return out

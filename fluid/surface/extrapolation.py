@@ -13,8 +13,8 @@ import numpy as np
 
 from array_types import Bools, Floats
 from fluid.domain.moments import touching_among
-from fluid.domain.topology import layers_around
-from fluid.numerics.threads import over, owning, reach_of_cells
+from fluid.domain.topology import WORK, layers_around
+from fluid.numerics.threads import over, owning, reach_of_cells, zeros
 from kernel_decorators import inner, ranged, released
 
 LINEAR_LAYERS = 2
@@ -48,7 +48,7 @@ def continue_outward(order, layer_start, linear_layers, f, gradient, nodes, arou
     for layer in range(1, len(layer_start) - 1):
         nodes_of_it = order[layer_start[layer] : layer_start[layer + 1]]
         linear = layer <= linear_layers
-        over(_one_layer, len(nodes_of_it), nodes_of_it, linear, field, nodes, around)
+        over(_one_layer, len(nodes_of_it), nodes_of_it, linear, field, nodes, around, weight=WORK)
         done[nodes_of_it] = True
 
 
@@ -129,7 +129,7 @@ def mean_gradients(cell_list, marked, f, fluid, n_nodes):
     """Volume-weighted mean of ∇f over the cells around each node whose corners are all marked, (N, m, 3).
 
     f (N, m), marked (N,) bool · fluid: FluidCells; zero where there is no such cell."""
-    gradient, weight = np.zeros((n_nodes, f.shape[1], 3)), np.zeros(n_nodes)
+    gradient, weight = zeros((n_nodes, f.shape[1], 3)), zeros((n_nodes,))
     reach = reach_of_cells(cell_list, fluid.cells)
     owning(_mean_gradients, n_nodes, reach, len(cell_list), cell_list, marked, f, fluid, weight, gradient)
     return gradient
@@ -251,8 +251,7 @@ def _mark_layer(first, last, cell_list, nodes, cells, wider):
 
 def _averaged(cell_list, reach, has, field, cells):
     """Mean of the field (N, m, 3) over the corners that have one, of the listed cells around the nodes in reach."""
-    # not zeros_like, which would write to the pages of all nodes
-    mean, count = np.zeros(field.shape), np.zeros(len(field))
+    mean, count = zeros(field.shape), zeros((len(field),))
     listed = reach_of_cells(cell_list, cells)
     owning(_average, len(field), listed, len(cell_list), cell_list, (reach, has), field, cells, count, mean)
     return mean

@@ -28,7 +28,7 @@ import numpy as np
 from array_types import Array, Floats, Ints
 from fluid.domain.topology import layers_around
 from fluid.mesh.arrays import Corners
-from fluid.numerics.threads import found_over, over
+from fluid.numerics.threads import field, found_over, over
 from fluid.surface.extrapolation import continue_outward, mean_gradients
 from kernel_decorators import helper, inner, kernel, plain, ranged, released
 
@@ -175,10 +175,14 @@ class Nearest(NamedTuple):
 
 
 def _closest_in_layers(layers, surface, mesh, *more):
-    """Call `_closest`, after the distances at the corners of the cells of the triangles."""
-    corner = np.empty((len(surface.triangles), 4))
+    """Squared distance (N,) [m²] of `_closest`, after that at the corners of the cells of the triangles."""
+    n, corner = len(mesh.nodes), np.empty((len(surface.triangles), 4))
     over(_of_corners, len(corner), surface, mesh, corner)
-    return _closest(layers, surface, corner, mesh, *more)
+    closest, best = field(n, lambda _: -1, (), np.int64), field(n, lambda _: np.inf)
+    asked, found = (field(n, lambda _: 0, (), np.int32) for _ in range(2))
+    known = Nearest(closest, best, np.full(len(corner), -1), asked, found)
+    _closest(layers, surface, corner, mesh, *more, known)
+    return best
 
 
 @ranged
@@ -192,23 +196,27 @@ def _of_corners(first, last, surface, mesh, corner):
 
 
 @kernel
-def _closest(layers, surface, corner, mesh, around, exact, obtuse, cells_of_nodes):
-    """Distance (N,) [m] of the nodes in layers (order, start) to the surface, handed outward; two sweeps a layer.
+def _closest(layers, surface, corner, mesh, around, exact, obtuse, cells_of_nodes, known):
+    """Fill `known`, Nearest, at the nodes in layers (order, start), handed outward; two sweeps a layer.
 
     around: (start, neighbours) of each node · exact: first layers whose nodes, where `obtuse` (N,) bool, go on to the
     closest of all (`_descend`) among the cells_of_nodes (start, members)."""
     order, layer_start = layers
-    n, count = mesh.nodes.shape[0], surface.triangles.shape[0]
-    closest, best = np.full(n, -1, np.int64), np.full(n, np.inf)
-    tried = np.full(count, -1, np.int64)
+    closest, best = known.closest, known.best
     first = _first_triangles(surface.owner, mesh.cells.shape[0] if exact > 0 else 0)
-    known = Nearest(closest, best, tried, np.zeros(n, np.int32), np.zeros(n, np.int32))
     _propagate_outward(layers, surface, corner, mesh, around, known)
     for s in range(layer_start[1], layer_start[exact + 1]):
         i = order[s]
         if closest[i] >= 0 and obtuse[i]:
             best[i] = _descend(mesh.nodes[i], closest[i], best[i], surface, first, mesh.cells, cells_of_nodes)
-    return np.sqrt(best)
+
+
+@ranged
+def _signed(first, last, listed, square, farthest, phi, out):
+    """√square [m] with the sign of φ (N,) at the listed nodes, no farther than `farthest` (N,) [m], in `out` (N,)."""
+    for s in range(first, last):
+        i = listed[s]
+        out[i] = np.copysign(min(np.sqrt(square[i]), farthest[i]), phi[i])
 
 
 @helper
@@ -302,9 +310,9 @@ def redistance(topology, phi, spacing, rescale: bool, motion=None):
     rescale: also divide by the mean slope at the nodes of cut cells where it left [0.9, 1.1] ·
     motion: velocity (N, 3) [m/s] and gravity [m/s²], None: no surface goes on inside solids beyond its cells."""
     t = topology
-    cut = surface_cells(phi, t.cells_around(phi < 0.0), t.cells)
-    farthest = np.broadcast_to(FAR * np.asarray(spacing), phi.shape)
-    far = np.copysign(farthest, phi)
+    cut, size = surface_cells(phi, t.cells_around(phi < 0.0), t.cells), np.broadcast_to(spacing, phi.shape)
+    farthest = field(len(phi), lambda rows: FAR * size[rows])
+    far = field(len(phi), lambda rows: np.copysign(farthest[rows], phi[rows]))
     if len(cut) == 0:
         return far
     front = np.zeros(len(phi), bool)
@@ -314,9 +322,9 @@ def redistance(topology, phi, spacing, rescale: bool, motion=None):
     exact, obtuse = (EXACT_LAYERS, t.near_obtuse) if t.is_obtuse else (0, np.zeros(0, bool))
     surface, mesh = Surface(triangles, owner), Corners(t.nodes, t.cells)
     of_nodes = (t.node_start, t.node_cells)
-    distance = _closest_in_layers((order, start), surface, mesh, t.around, exact, obtuse, of_nodes)
+    square = _closest_in_layers((order, start), surface, mesh, t.around, exact, obtuse, of_nodes)
     listed = order[start[1] :]
-    far[listed] = np.copysign(np.minimum(distance[listed], farthest[listed]), phi[listed])
+    over(_signed, len(listed), listed, square, farthest, phi, far)
     far[front] = phi[front]
     if rescale:
         slope = _mean_slope(cut, phi, t.cells, t.parent, t.gradients, len(phi))

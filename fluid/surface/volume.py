@@ -32,8 +32,8 @@ import scipy.sparse as sp
 
 from array_types import Floats, Ints
 from fluid.domain.moments import nodal_water
-from fluid.domain.topology import Graph
-from fluid.numerics.threads import over, zeros
+from fluid.domain.topology import WORK, Graph
+from fluid.numerics.threads import copied, field, over
 from fluid.surface.level_set import without_films
 from kernel_decorators import kernel, ranged, released
 
@@ -74,7 +74,7 @@ def _edge_rates(first, last, listed, edges, u_cell, nodes, fluid, around, rate):
         i = listed[place]
         r = graph_row[i]
         for s in range(start[r], start[r + 1]):
-            slot[neighbour[s]] = s
+            slot[neighbour[s]], rate[s] = s, 0.0
         for t in range(node_start[i], node_start[i + 1]):
             e = node_cells[t]
             p, own = parent[e], 0
@@ -108,10 +108,11 @@ def edge_flux(topology, graph, listed, u_cell, water) -> Flux:
 
 
 def edge_rates(topology, graph, listed, u_cell):
-    """q (edges,) [m³/s] of (1) out of the listed nodes (n,) along the edges of the graph; u_cell (M, 3) [m/s]."""
-    t, rate = topology, zeros((len(graph.neighbour),))
+    """q (edges,) [m³/s] of (1) out of the listed nodes (n,) along the edges of the graph; u_cell (M, 3) [m/s]. Edges of
+    other nodes hold anything."""
+    t, rate = topology, np.empty(len(graph.neighbour))
     mesh = (t.nodes, t.fluid_cells, (t.node_start, t.node_cells))
-    over(_edge_rates, len(listed), listed, graph.edges, u_cell, *mesh, rate)
+    over(_edge_rates, len(listed), listed, graph.edges, u_cell, *mesh, rate, weight=WORK)
     return rate
 
 
@@ -162,35 +163,52 @@ def _rows_of_shift(begin, end, band, place, edges, kappa, made):
                 k += 1
 
 
-@kernel
 def _shift(first, column, entry, diagonal, residual, tolerance, most):
     """x (n,) of the rows first[r]:first[r + 1] of (column, entry) with their diagonal, which is overwritten."""
-    n = diagonal.shape[0]
-    typical = diagonal.mean() if n > 0 else 1.0
-    x, r_, Ap = np.zeros(n), residual.copy(), np.empty(n)
-    for r in range(n):
-        if diagonal[r] <= 1e-9 * typical:  # nothing to shift there and nobody to pass it to
-            diagonal[r], r_[r] = typical, 0.0
-    z = r_ / diagonal
-    p = z.copy()
-    rz = np.dot(r_, z)
-    goal = tolerance * tolerance * rz
+    n = len(diagonal)
+    x, r, z, Ap = np.zeros(n), residual.copy(), np.empty(n), np.empty(n)
+    rz = _first_way(diagonal, r, z)
+    goal, p = tolerance * tolerance * rz, z.copy()
     for _ in range(most):
         if rz <= goal or rz <= 0.0:
             break
-        for r in range(n):
-            total = diagonal[r] * p[r]
-            for s in range(first[r], first[r + 1]):
-                total += entry[s] * p[column[s]]
-            Ap[r] = total
-        alpha = rz / np.dot(p, Ap)
-        x += alpha * p
-        r_ -= alpha * Ap
-        z = r_ / diagonal
-        new = np.dot(r_, z)
-        p = z + (new / rz) * p
-        rz = new
+        over(_product, n, first, column, entry, diagonal, p, Ap)
+        rz = _next_way(rz, diagonal, Ap, x, r, z, p)
     return x
+
+
+@kernel
+def _first_way(diagonal, r, z):
+    """z = r/diagonal in place → r·z."""
+    typical = diagonal.mean() if len(diagonal) > 0 else 1.0
+    for i in range(len(diagonal)):
+        if diagonal[i] <= 1e-9 * typical:  # nothing to shift there and nobody to pass it to
+            diagonal[i], r[i] = typical, 0.0
+        z[i] = r[i] / diagonal[i]
+    return np.dot(r, z)
+
+
+@ranged
+def _product(begin, end, first, column, entry, diagonal, p, Ap):
+    for r in range(begin, end):
+        total = diagonal[r] * p[r]
+        for s in range(first[r], first[r + 1]):
+            total += entry[s] * p[column[s]]
+        Ap[r] = total
+
+
+@kernel
+def _next_way(rz, diagonal, Ap, x, r, z, p):
+    """x, r, z and the direction p (n,) of conjugate gradients after a step along p, in place → r·z."""
+    alpha = rz / np.dot(p, Ap)
+    for i in range(len(x)):
+        x[i] += alpha * p[i]
+        r[i] -= alpha * Ap[i]
+        z[i] = r[i] / diagonal[i]
+    new = np.dot(r, z)
+    for i in range(len(x)):
+        p[i] = z[i] + (new / rz) * p[i]
+    return new
 
 
 @dataclass(frozen=True)
@@ -223,37 +241,41 @@ def correct_volume(topology, graph, listed, phi, carried, target: float, kappa: 
     spacing = np.broadcast_to(np.asarray(spacing, float), phi.shape)
     seen = np.zeros(n, bool)
     seen[listed] = True
-    reach = (LARGEST_SHIFT + LARGEST_UNIFORM_SHIFT) * spacing
+    most = LARGEST_SHIFT + LARGEST_UNIFORM_SHIFT
+    reach = field(n, lambda rows: most * spacing[rows])
     whole, near = _split(topology.cells_around(seen), phi, topology.cells, reach)
     inner = nodal_water(whole, 0.0, phi, topology.parts, n)
-    own = inner + nodal_water(near, 0.0, phi, topology.parts, n)
+    of_near = nodal_water(near, 0.0, phi, topology.parts, n)
+    own = field(n, lambda rows: inner[rows] + of_near[rows])
     slope = _volume_slope(topology, near, phi, spacing)
     band = listed[np.abs(phi[listed]) < BAND_WIDTH * spacing[listed]]
     place = np.full(n, -1, np.int64)
     place[band] = np.arange(len(band))
+    spread = field(n, lambda rows: kappa * spacing[rows])
     shift = _diffused_shift(
         band,
         place,
         graph.edges,
         slope[band] + ANCHOR * topology.node_volume[band] / spacing[band],
-        (carried - own)[band],
-        kappa * spacing,
+        carried[band] - own[band],
+        spread,
         1e-2,
         40,
     )
-    phi = phi.copy()
+    phi = copied(phi)
     limit = LARGEST_SHIFT * spacing[band]
     phi[band] -= np.clip(shift, -limit, limit)
     left = target - float(inner.sum())
     phi, reinserted = _meet_total(
         topology, near, phi, band, slope.sum(), left, VOLUME_TOLERANCE * abs(target), spacing
     )
+    of_near = nodal_water(near, 0.0, phi, topology.parts, n)
     return VolumeCorrection(
         level_set=phi,
-        nodal_water=inner + nodal_water(near, 0.0, phi, topology.parts, n),
+        nodal_water=field(n, lambda rows: inner[rows] + of_near[rows]),
         uncorrected_water=own,
         reinserted=reinserted,
-        shift=Shift(band, shift, kappa * spacing),
+        shift=Shift(band, shift, spread),
     )
 
 
@@ -285,12 +307,16 @@ def _split_range(first, last, cell_list, phi, cells, reach):
 
 def _volume_slope(t, near, phi, spacing):
     """c (N,) [m²] by a central difference over the cells that the surface can reach."""
-    step = _PROBE * spacing
+    n = len(phi)
+    step = field(n, lambda rows: _PROBE * spacing[rows])
     cut = _split(near, phi, t.cells, step)[1]
-    wider = nodal_water(cut, 0.0, phi - step, t.parts, len(t.nodes))
-    slope = (wider - nodal_water(cut, 0.0, phi + step, t.parts, len(t.nodes))) / (2 * step)
+    lower, higher = (
+        field(n, lambda rows: phi[rows] - step[rows]),
+        field(n, lambda rows: phi[rows] + step[rows]),
+    )
+    wider, narrower = nodal_water(cut, 0.0, lower, t.parts, n), nodal_water(cut, 0.0, higher, t.parts, n)
     # in slivers beside solids the last corner to get wet moves water between nodes: no slope may be negative
-    return np.maximum(slope, 0.0)
+    return field(n, lambda rows: np.maximum((wider[rows] - narrower[rows]) / (2 * step[rows]), 0.0))
 
 
 def _meet_total(t, near, phi, band, area, target, tolerance, spacing):
@@ -309,7 +335,7 @@ def _meet_total(t, near, phi, band, area, target, tolerance, spacing):
         trial = np.clip(shift + (target - volume) / area, -most, most)
         if trial == shift:
             break
-        shifted = phi.copy()
+        shifted = copied(phi)
         shifted[band] -= np.clip(trial, -limit, limit)
         before, volume = volume, float(nodal_water(near, 0.0, shifted, t.parts, len(phi)).sum())
         area, shift = (volume - before) / (trial - shift), trial

@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 from fluid.mesh.arrays import Paths
-from fluid.numerics.threads import over
+from fluid.numerics.threads import copied, over
 from kernel_decorators import inner, ranged, released
 
 _LONGEST_WALK = 100
@@ -131,6 +131,14 @@ def _interpolate(first, last, cell, weight, cells, f, out):
 
 
 @ranged
+def _put(first, last, listed, values, out):
+    """out (N, m) at the listed nodes takes the values (n, m), in place: a quarter of the time of indexing by a list."""
+    for s in range(first, last):
+        for k in range(out.shape[1]):
+            out[listed[s], k] = values[s, k]
+
+
+@ranged
 def _limited(first, last, listed, on_open_side, foot, f, f1, f1_ahead, cells, out):
     """Set out (n, m) to f2 where this stays within the range of f over the cell of the foot, and to f1 elsewhere and on
     open sides. foot: its cell (n,) and weights (n, 4).
@@ -155,8 +163,8 @@ def transport(topology, listed, dt: float, u_m, f, on_open_side):
     t = topology
     cell, weight = feet(listed, -1.0, dt, 3, u_m, t.paths)
     f1 = interpolate(cell, weight, t.cells, f)
-    moved = f.copy()
-    moved[listed] = f1
+    moved = copied(f)
+    over(_put, len(listed), listed, f1, moved)
     ahead, ahead_weight = feet(listed, 1.0, dt, 0, u_m, t.paths)
     f1_ahead = interpolate(ahead, ahead_weight, t.cells, moved)
     out = np.empty_like(f1)

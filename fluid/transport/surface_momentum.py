@@ -39,8 +39,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from array_types import Array
 from fluid.domain.topology import Graph, Topology
-from fluid.numerics.threads import over
+from fluid.numerics.threads import copied, field, over
 from fluid.surface.volume import Flux, Shift
 from fluid.transport.velocity_transport import carry_velocity
 from fluid.transport.volume_transport import carry_volume
@@ -70,9 +71,12 @@ class Carried:
     swept: np.ndarray | None = None
 
     @classmethod
-    def by(cls, flux: Flux, dt: float, velocity, acceleration, gravity, viscosity, spacing, total) -> Carried:
-        """After dt [s] by the flux; velocity (N, 3) [m/s] before, acceleration (N, 3) [m/s²] then, gravity [m/s²],
-        viscosity: kinematic [m²/s], spacing (N,) [m]: size of the cells; total (edges,) [m³] as in `carry_volume`."""
+    def by(
+        cls, flux: Flux, dt: float, velocity, acceleration, gravity, viscosity, spacing
+    ) -> tuple[Carried, Array]:
+        """After dt [s] by the flux, and the volume (edges,) [m³] as in `carry_volume`; velocity (N, 3) [m/s] before,
+        acceleration (N, 3) [m/s²] then, gravity [m/s²], viscosity: kinematic [m²/s], spacing (N,) [m]: size of the
+        cells."""
         edges = flux.graph.edges
         n, size = len(flux.nodes), len(velocity)
         weight, fast = np.zeros(size), np.zeros(size)
@@ -80,17 +84,20 @@ class Carried:
         over(_jumps, n, flux.nodes, edges, *state, weight)
         if weight.any():
             for _ in range(RINGS):
-                before, weight = weight, weight.copy()
+                before, weight = weight, copied(weight)
                 over(_wider, n, flux.nodes, edges, before, weight)
-        over(_by_speed, n, flux.nodes, velocity, np.sqrt(gravity * spacing), FAST, fast)
+        celerity = field(size, lambda rows: np.sqrt(gravity * spacing[rows]))
+        over(_by_speed, n, flux.nodes, velocity, celerity, FAST, fast)
         if viscosity > 0.0:
             resolved = np.zeros(size)
             over(_by_speed, n, flux.nodes, velocity, viscosity / spacing, RESOLVED, resolved)
             fast *= resolved
         if not weight.any() and not fast.any():
-            return cls(carry_volume(flux, dt, total=total))
-        u = velocity.copy()
-        return cls(carry_volume(flux, dt, u, total), u, weight, fast)
+            volume, moved = carry_volume(flux, dt)
+            return cls(volume), moved
+        u = copied(velocity)
+        volume, moved = carry_volume(flux, dt, u)
+        return cls(volume, u, weight, fast), moved
 
     def near_the_surface(self) -> Carried:
         """The same with the velocity of fast water, too, only where that around jumps counts."""
@@ -113,24 +120,26 @@ class Carried:
 
         on_open_side (N,) bool: nodes that water leaves through: what the fluxes bring there is not yet all that came.
         Only where some water is fast, or there is a jump."""
-        carried = self.velocity.copy()
+        carried = copied(self.velocity)
         _pass_on(graph, shift, self.water, carried)
-        weight = self.weight[nodes] * np.clip(
-            (phi[nodes] / spacing[nodes] + DEEP) / (DEEP - SHALLOW), 0.0, 1.0
-        )
-        weight[t.near_solids[nodes]] = 0.0
-        weight = np.maximum(weight, np.where(on_open_side[nodes], 0.0, self.fast[nodes]))
-        weight[self.water[nodes] <= 0.0] = 0.0
-        over(_mixed, len(nodes), nodes, weight, carried, u)
+        at_surface = (phi, spacing, t.near_solids)
+        state = (self.water, (self.weight, self.fast), at_surface, on_open_side)
+        over(_mixed, len(nodes), nodes, *state, carried, u)
 
 
 @ranged
-def _mixed(first, last, nodes, weight, carried, u):
-    """Equation (1) in place; weight (n,) of the listed nodes."""
+def _mixed(first, last, nodes, water, weights, at_surface, on_open_side, carried, u):
+    """Equation (1) in place at the listed nodes that hold water.
+
+    weights (N,): around jumps, and in fast water · at_surface (N,): φ and size of the cells [m], near solids bool."""
+    (around_jumps, fast), (phi, spacing, near_solids) = weights, at_surface
     for s in range(first, last):
         i = nodes[s]
+        depth = (phi[i] / spacing[i] + DEEP) / (DEEP - SHALLOW)
+        weight = 0.0 if near_solids[i] else around_jumps[i] * min(max(depth, 0.0), 1.0)
+        weight = max(weight, 0.0 if on_open_side[i] else fast[i]) if water[i] > 0.0 else 0.0
         for k in range(3):
-            u[i, k] += weight[s] * (carried[i, k] - u[i, k])
+            u[i, k] += weight * (carried[i, k] - u[i, k])
 
 
 def _pass_on(graph: Graph, shift: Shift, water, u) -> None:

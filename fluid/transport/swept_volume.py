@@ -25,9 +25,10 @@ from __future__ import annotations
 import numpy as np
 
 from fluid.domain.moments import part_moments
-from fluid.numerics.threads import found_over, over
+from fluid.domain.topology import WORK
+from fluid.numerics.threads import copied, found_over, over, owning, reach_of_rows, zeros
 from fluid.surface.volume import Flux, edge_rates
-from kernel_decorators import kernel, ranged, released
+from kernel_decorators import ranged, released
 
 NEAR = 3.0
 """|φ| in cell sizes beyond which no node has a hat that the surface gets to in a step."""
@@ -45,22 +46,25 @@ def swept(topology, flux: Flux, phi, u, moved, dt: float) -> np.ndarray:
     All of the domain of the flux: φ (N,) [m] at the beginning · u (N, 3) [m/s] at mid-step · moved (edges,) [m³] what
     went out along each edge. Where no surface is slow enough, only the nodes are visited."""
     t, g = topology, flux.graph
-    weight, counted = np.zeros(len(phi)), np.zeros(len(phi), bool)
+    weight, counted = zeros((len(phi),)), np.zeros(len(phi), bool)
     over(_weights, len(flux.nodes), flux.nodes, phi, u, t.node_size, dt, weight, counted)
     if not counted.any():
         return np.zeros(len(phi))
     around = t.cells_around(counted)
-    velocity, beside = np.zeros(flux.velocity.shape), np.zeros(len(phi), bool)
+    velocity, beside = np.empty(flux.velocity.shape), np.zeros(len(phi), bool)
     reached = found_over(
         _in_reach, len(around), around, phi, t.node_size, t.cells, flux.velocity, velocity, beside
     )
-    after, near = phi.copy(), np.flatnonzero(beside)
-    over(_after, len(near), near, phi, u, dt, t.paths, t.volume, after)
+    after, near = copied(phi), np.flatnonzero(beside)
+    state = ((counted, velocity), phi, u, dt, t.paths, t.volume)
+    over(_after, len(near), near, *state, after, weight=WORK)
     beside[:] = False
     over(_by_share, len(reached), reached, phi, after, t.parts, flux.velocity, velocity, beside)
     nodes = flux.nodes[beside[flux.nodes]]
     rate = edge_rates(t, g, nodes, velocity)
-    return _difference(nodes, beside, weight, g.row, g.start, g.neighbour, dt * rate, moved)
+    out, reach = zeros((len(phi),)), reach_of_rows(nodes, g.row, g.start, g.neighbour)
+    owning(_difference, len(phi), reach, len(nodes), nodes, beside, weight, g.edges, (dt, rate), moved, out)
+    return out
 
 
 @ranged
@@ -76,7 +80,7 @@ def _weights(first, last, nodes, phi, u, size, dt, weight, counted):
 @released
 def _in_reach(first, last, cell_list, phi, size, cells, u, velocity, beside):
     """The listed cells that the surface may cut within the step, whose corners are marked (N,) bool; the others take
-    the velocity u (M, 3) if they are wet."""
+    the velocity u (M, 3) if they are wet, and zero if they are dry."""
     found, n = np.empty(last - first, np.int64), 0
     for s in range(first, last):
         e = cell_list[s]
@@ -88,7 +92,10 @@ def _in_reach(first, last, cell_list, phi, size, cells, u, velocity, beside):
         if wet:
             for k in range(3):
                 velocity[e, k] = u[e, k]
-        elif not dry:
+        elif dry:
+            for k in range(3):
+                velocity[e, k] = 0.0
+        else:
             found[n] = e
             n += 1
             for a in range(4):
@@ -97,11 +104,24 @@ def _in_reach(first, last, cell_list, phi, size, cells, u, velocity, beside):
 
 
 @ranged
-def _after(first, last, nodes, phi, u, dt, mesh, volume, out):
-    """φ (N,) [m] that u has carried on for dt at the listed nodes, with the mean of ∇φ over the cells around each."""
+def _after(first, last, nodes, cleared, phi, u, dt, mesh, volume, out):
+    """φ (N,) [m] that u has carried on for dt at the listed nodes, with the mean of ∇φ over the cells around each.
+
+    cleared: nodes (N,) bool, and a velocity (M, 3) that becomes zero in the cells around listed nodes that have none
+    of these among their corners."""
     cells, parent, g = mesh.cells, mesh.parent, mesh.gradients
+    counted, velocity = cleared
     for s in range(first, last):
         i, weight, rate = nodes[s], 0.0, 0.0
+        if not counted[i]:
+            for c in range(mesh.node_start[i], mesh.node_start[i + 1]):
+                e = mesh.node_cells[c]
+                n_counted = 0
+                for a in range(4):
+                    n_counted += counted[cells[e, a]]
+                if n_counted == 0:
+                    for k in range(3):
+                        velocity[e, k] = 0.0
         for c in range(mesh.node_start[i], mesh.node_start[i + 1]):
             e = mesh.node_cells[c]
             p = parent[e]
@@ -134,26 +154,31 @@ def _by_share(first, last, cell_list, phi, after, parts, u, velocity, beside):
                 beside[parts.cells[e, a]] = True
 
 
-@kernel
-def _difference(nodes, reached, weight, graph_row, start, neighbour, swept, moved):
-    """Volume (N,) [m³] that the listed nodes and their neighbours get if `swept` (edges,) [m³] leaves along the edges
-    instead of `moved`, by the lesser weight (N,) of both ends."""
-    out = np.zeros(reached.shape[0])
-    for i in nodes:
-        if weight[i] == 0.0:
-            continue
-        r = graph_row[i]
-        for s in range(start[r], start[r + 1]):
-            j = neighbour[s]
-            back = graph_row[j]
-            if weight[j] == 0.0 or back < 0:
+@ranged
+def _difference(first, last, runs, nodes, reached, weight, edges, swept, moved, out):
+    """Volume (N,) [m³] that the listed nodes and their neighbours get if in dt [s], by rates (edges,) [m³/s], both
+    `swept`, leaves along the edges instead of `moved` (edges,) [m³], by the lesser weight (N,) of both ends."""
+    graph_row, start, neighbour = edges.row, edges.start, edges.neighbour
+    dt, rate = swept
+    for run in range(runs.shape[0]):
+        for place in range(runs[run, 0], runs[run, 1]):
+            i = nodes[place]
+            own = first <= i < last
+            if weight[i] == 0.0:
                 continue
-            came = 0.0
-            for b in range(start[back], start[back + 1]):
-                if neighbour[b] == i:
-                    came = moved[b]
-            more = min(weight[i], weight[j]) * (swept[s] - (moved[s] - came))
-            out[i] -= more
-            if not reached[j]:
-                out[j] += more
-    return out
+            r = graph_row[i]
+            for s in range(start[r], start[r + 1]):
+                j = neighbour[s]
+                back = graph_row[j]
+                theirs = not reached[j] and first <= j < last
+                if weight[j] == 0.0 or back < 0 or not (own or theirs):
+                    continue
+                came = 0.0
+                for b in range(start[back], start[back + 1]):
+                    if neighbour[b] == i:
+                        came = moved[b]
+                more = min(weight[i], weight[j]) * (dt * rate[s] - (moved[s] - came))
+                if own:
+                    out[i] -= more
+                if theirs:
+                    out[j] += more

@@ -12,10 +12,8 @@ range around it.
 
 from __future__ import annotations
 
-import numpy as np
-
 from fluid.mesh.arrays import Edges
-from fluid.numerics.threads import over, owning, reach_of_rows
+from fluid.numerics.threads import over, owning, reach_of_rows, zeros
 from kernel_decorators import inner, ranged
 
 
@@ -24,8 +22,8 @@ def carry_velocity(nodes, edges: Edges, moved, water, u):
 
     water (N,) [m³] before they are moved; no node gives more than it holds."""
     size, reach = len(water), reach_of_rows(nodes, edges.row, edges.start, edges.neighbour)
-    up, came = np.zeros(u.shape), np.zeros(size)
-    change, volume = np.zeros(u.shape), np.zeros(size)
+    up, came = zeros(u.shape), zeros((size,))
+    change, volume = zeros(u.shape), zeros((size,))
     owning(_incoming, size, reach, len(nodes), nodes, edges, moved, u, up, came)
     over(_mean_incoming, len(nodes), nodes, came, u, up)
     owning(_exchange, size, reach, len(nodes), nodes, edges, moved, water, u, up, change, volume)

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fluid.numerics.threads import over, owning, reach_of_rows
+from fluid.numerics.threads import copied, field, over, owning, reach_of_rows, zeros
 from fluid.surface.volume import Flux
 from fluid.transport.velocity_transport import carry_velocity
 from kernel_decorators import inner, ranged, released
@@ -25,13 +25,14 @@ LEAST_COUNTED = 0.3
 """Courant number of a substep, and nodes that set it: those of at least this share of the median volume."""
 
 
-def carry_volume(flux: Flux, dt: float, u=None, total=None):
-    """W (N,) [m³] after dt [s] by the flux; Σ W is kept to round-off.
+def carry_volume(flux: Flux, dt: float, u=None):
+    """W (N,) [m³] after dt [s] by the flux, and the volume (edges,) [m³] that left along each edge of its nodes; Σ W is
+    kept to round-off. Edges of other nodes hold anything.
 
     u (N, 3) [m/s], if given, is carried with the volume, in place (`velocity_transport.py`); nodes without water keep
-    theirs. total (edges,) [m³], if given: the volume that leaves along each edge is added, in place."""
-    water = flux.water.copy()
-    capacity = np.maximum(flux.capacity, 1e-300)
+    theirs."""
+    water, total = copied(flux.water), None
+    capacity = field(len(water), lambda rows: np.maximum(flux.capacity[rows], 1e-300))
     least = LEAST_COUNTED * np.median(capacity[flux.nodes]) if len(flux.nodes) else 0.0
     g = flux.graph
     count = len(flux.nodes)
@@ -40,16 +41,23 @@ def carry_volume(flux: Flux, dt: float, u=None, total=None):
     edges, reach = g.edges, reach_of_rows(flux.nodes, g.row, g.start, g.neighbour)
     share = np.zeros(len(water))
     for _ in range(n_sub):
-        moved, change = np.empty(len(flux.rate)), np.zeros(len(water))
+        moved, change = np.empty(len(flux.rate)), zeros((len(water),))
         over(_share, count, flux.nodes, water, capacity, share)
         over(_moved, count, flux.nodes, edges, flux.rate, water, capacity, share, dt / n_sub, moved)
         if u is not None:
             carry_velocity(flux.nodes, edges, moved, water, u)
         owning(_transfer_volume, len(water), reach, count, flux.nodes, edges, moved, change)
-        water += change
-        if total is not None:
+        water = _sum(water, change)
+        if total is None:
+            total = moved
+        else:
             over(_add, count, flux.nodes, g.row, g.start, moved, total)
-    return water
+    return water, total
+
+
+def _sum(a, b):
+    """a + b (N,)."""
+    return field(len(a), lambda rows: a[rows] + b[rows])
 
 
 @ranged

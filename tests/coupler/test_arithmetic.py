@@ -41,10 +41,8 @@ random = np.random.default_rng(3)
 mesh = box_mesh((0, 0, 0), (1, 1, 1), 0.3)
 found = [mesh.locate(random.uniform(0, 1, (500, 3))), mesh.gradients, mesh.products]
 remainder, kick, velocity = random.normal(size=(3, len(mesh.cells), 3))
-out = np.zeros_like(remainder)
-sizes = np.full(len(mesh.cells), 0.3)
-carry_remainder(np.arange(len(mesh.cells)), remainder, kick, 0.01, velocity, 0.1, 1e-3, mesh.cells, sizes, out)
-found.append(out)
+every, sizes = np.arange(len(mesh.cells)), np.full(len(mesh.cells), 0.3)
+found.append(carry_remainder(every, (every, remainder, kick), 0.01, velocity, 0.1, 1e-3, mesh.cells, sizes))
 pair = Pair(JointParameters(1e6, 1e-3, law="exponential"))
 found += [pair.force(1e-3 * np.array(way), 1e-6, advance=True) for way in random.uniform(-0.1, 0.9, (50, 3))]
 print(b"".join(np.ascontiguousarray(a).tobytes() for a in found).hex())

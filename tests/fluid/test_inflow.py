@@ -196,7 +196,7 @@ def test_uniform_stream_from_inflow_to_sea():
     flow = waves.steady([1, 0, 0], depth, speed)
     water = tank([2, 0.1, 1], 0.1, lambda x: x[:, 2] - depth, inflow=flow, sea=depth)
     water.velocity[:, 0] = speed * (water.level_set < 0.3)
-    water.cell_velocity[:, 0] = speed
+    water.set_cell_velocity(np.tile([speed, 0.0, 0.0], (len(water.topology.cells), 1)))
     while water.time < 4.0:
         advance(water, rtol=1e-8)
     wet = water.level_set < 0.0

@@ -99,6 +99,7 @@ def test_the_remainder_of_a_cell_is_swept_out_as_fast_as_water_crosses_it(viscos
     u[0] += [1.0, -2.0, 6.0]
     u[1] -= [1.0, -2.0, 6.0]
     remainder, kick = np.array([[0.3, 0.0, -0.6]]), np.array([[3.0, 6.0, 0.0]])
-    cells, size, out = np.array([[0, 1, 2, 3]]), np.array([0.5]), np.zeros((1, 3))
-    carry_remainder(np.array([0]), remainder, kick, 0.02, u, 0.1, viscosity, cells, size, out)
+    cells, size = np.array([[0, 1, 2, 3]]), np.array([0.5])
+    held = (np.array([0]), remainder, kick)
+    out = carry_remainder(np.array([0]), held, 0.02, u, 0.1, viscosity, cells, size)
     np.testing.assert_allclose(out, [[0.36 * left, 0.12 * left, -0.6 * left]], rtol=1e-12)

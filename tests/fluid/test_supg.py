@@ -169,7 +169,7 @@ def vortex(n, advection, steps, end, speed=1.0, **parameters):
     x = np.pi * water.topology.nodes
     water.velocity[:, 0] = speed * np.sin(x[:, 0]) * np.cos(x[:, 2])
     water.velocity[:, 2] = -speed * np.cos(x[:, 0]) * np.sin(x[:, 2])
-    water.cell_velocity[:] = water.velocity[water.topology.cells].mean(axis=1)
+    water.set_cell_velocity(water.velocity[water.topology.cells].mean(axis=1))
     start = water.velocity.copy()
     for _ in range(steps):
         advance(water, end / steps, rtol=1e-8)
@@ -270,7 +270,7 @@ def _stream(advection):
     domain, parameters = cut_domain(mesh, ConvexBodies.empty()), WaterParameters(advection=advection)
     water = Water(mesh, domain, lambda x: x[:, 2] - 0.5, parameters, sides=sides)
     water.velocity[:, 0] = 0.5 * (water.level_set < 0.3)
-    water.cell_velocity[:, 0] = 0.5
+    water.set_cell_velocity(np.tile([0.5, 0.0, 0.0], (len(water.topology.cells), 1)))
     while water.time < 1.0:
         advance(water, rtol=1e-7)
     return water

@@ -29,8 +29,7 @@ def rising(normal, speed, place, size=(0.75, 0.5, 2.0), bodies=None):
     velocity = np.tile(speed * normal, (len(t.cells), 1))
     nodes = np.flatnonzero(t.active)
     flux = edge_flux(t, water.graph_for(nodes), nodes, velocity, nodal_volume(t, at))
-    total = np.zeros(len(flux.rate))
-    along = carry_volume(flux, DT, total=total)
+    along, total = carry_volume(flux, DT)
     more = swept(t, flux, at, np.tile(speed * normal, (len(at), 1)), total, DT)
     # what comes in and goes out through the sides of the tank, which the nodes below and above do not see
     return water, along, along + more, nodal_volume(t, at - speed * DT)

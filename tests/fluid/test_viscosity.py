@@ -84,7 +84,7 @@ def _vortex_error(n, steps, nu=0.05, k=np.pi):
     x, end = k * water.topology.nodes, 0.25 / (nu * k**2)
     water.velocity[:, 0] = 0.2 * np.sin(x[:, 0]) * np.cos(x[:, 2])
     water.velocity[:, 2] = -0.2 * np.cos(x[:, 0]) * np.sin(x[:, 2])
-    water.cell_velocity[:] = water.velocity[water.topology.cells].mean(axis=1)
+    water.set_cell_velocity(water.velocity[water.topology.cells].mean(axis=1))
     exact = water.velocity * np.exp(-2 * nu * k**2 * end)
     for _ in range(steps):
         advance(water, end / steps)

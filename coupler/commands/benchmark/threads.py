@@ -23,8 +23,8 @@ MORE = (8, 16, 64)
 TRIAD = 8_000_000
 """Numbers in each array of the triad: far more than caches hold."""
 ROWS_OF_CELLS = ("_nodal_water", "_wet_fraction", "_cell_velocity", "_inflow", "_with_ghosts", "_cell_gradient",
-    "_nodal_mean", "_push_of_divergence", "_mean_gradients", "_average", "_hat_forces", "_all_below", "_leave",
-    "_carry_remainder", "_put", "_to_middle", "_surface_cells", "_touching_among")  # fmt: skip
+    "_nodal_mean", "_push_of_divergence", "_mean_gradients", "_average", "_hat_forces", "_leave",
+    "_carry_remainder", "_cells_of_flux", "_unlike", "_places", "_surface_cells", "_touching_among")  # fmt: skip
 """Kernels that go over cells; the others go over nodes."""
 SUMS = ("_hat_forces", "_momentum", "_square_of")
 """Kernels whose range is one of chunks."""
@@ -157,6 +157,8 @@ def _bytes(name: str, args, nodes: int, cells: int, read=()) -> float:
     """Bytes of the arrays among the arguments, of those of the whole mesh the share that the rows are of it; read:
     names that the kernel uses, by which it takes what it reads out of a bundle of arrays."""
     arrays = [a for arg in args for a in _arrays(arg, read)]
+    if name == "_stretches":
+        return float(sum(a.nbytes for a in arrays))
     rows = _rows(name, args)
     whole = cells if name in ROWS_OF_CELLS else nodes
     share = min(1.0, rows / whole)

@@ -78,7 +78,7 @@ def _vortex(n: int, nu: float, k: float):
     x, end = k * water.topology.nodes, 0.25 / (nu * k**2)
     water.velocity[:, 0] = 0.2 * np.sin(x[:, 0]) * np.cos(x[:, 2])
     water.velocity[:, 2] = -0.2 * np.cos(x[:, 0]) * np.sin(x[:, 2])
-    water.cell_velocity[:] = water.velocity[water.topology.cells].mean(axis=1)
+    water.set_cell_velocity(water.velocity[water.topology.cells].mean(axis=1))
     start, steps = water.velocity.copy(), 3 * n // 8
 
     def square(u):
@@ -187,7 +187,7 @@ def _cylinder(h: float, end: float) -> tuple[float, float, float]:
     body = ConvexBodies.from_polyhedra([(_prism(0.2, 0.2, 0.05), None)])
     water = Water(mesh, cut_domain(mesh, body), full, settings, None, across(1), Sides(sides))
     water.velocity[:] = _parabola(water.topology.nodes, 0.0)
-    water.cell_velocity[:] = water.velocity[water.topology.cells].mean(axis=1)
+    water.set_cell_velocity(water.velocity[water.topology.cells].mean(axis=1))
     while water.time < end:
         load = step(water, h / 0.45, 1e-7)
     drag, lift = 2.0 * load[0, [0, 2]] / (0.2**2 * 0.1 * thickness)

@@ -1,0 +1,63 @@
+"""Vectors of a few of the cells against the same in an array of all cells."""
+
+import numpy as np
+import pytest
+
+from fluid.domain.cell_vectors import CellVectors, places_of
+from fluid.numerics.threads import copied, field, marked, use
+
+
+def random_field(seed, cells, share=0.3):
+    random = np.random.default_rng(seed)
+    return np.where(random.random((cells, 1)) < share, random.normal(size=(cells, 3)), 0.0)
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_places_in_a_list_are_those_of_a_dictionary(threads):
+    """Also where ranges of several threads begin between cells of the list, before the first and after the last."""
+    random = np.random.default_rng(4)
+    use(threads, least=7)
+    try:
+        for held, wanted in ((50, 200), (300, 200), (0, 30), (30, 0), (400, 400)):
+            cells = np.sort(random.choice(400, held, replace=False))
+            asked = np.sort(random.choice(400, wanted, replace=False))
+            place = {cell: k for k, cell in enumerate(cells.tolist())}
+            assert places_of(asked, cells).tolist() == [place.get(cell, -1) for cell in asked.tolist()]
+    finally:
+        use(1)
+
+
+def test_a_field_of_all_cells_comes_back():
+    whole = random_field(1, 60)
+    listed = CellVectors.of(whole)
+    assert 0 < len(listed.cells) < 60
+    np.testing.assert_array_equal(listed.field(60), whole)
+    np.testing.assert_array_equal(CellVectors.none().field(4), np.zeros((4, 3)))
+
+
+def test_carried_to_another_numbering_like_an_array():
+    """Cells that are gone, new ones, and two that continue the same one, as the covers of a cut cell do."""
+    whole, source = random_field(2, 60), np.random.default_rng(3).integers(-1, 60, 80)
+    expected = np.where(source[:, None] >= 0, whole[source], 0.0)
+    carried = CellVectors.of(whole).carried(source, 60)
+    np.testing.assert_array_equal(carried.field(80), expected)
+    assert (np.diff(carried.cells) > 0).all()
+    fresh = np.flatnonzero(source < 0)
+    more = np.ones((len(fresh), 3))
+    expected[fresh] = more
+    joined = carried.joined(fresh, more)
+    np.testing.assert_array_equal(joined.field(80), expected)
+    assert (np.diff(joined.cells) > 0).all()
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_fields_that_threads_share_are_those_of_numpy(threads):
+    a = np.random.default_rng(5).normal(size=(100_003, 2))
+    use(threads, least=1)
+    try:
+        np.testing.assert_array_equal(field(len(a), lambda rows: 2.0 * a[rows] - 1.0, (2,)), 2.0 * a - 1.0)
+        np.testing.assert_array_equal(copied(a), a)
+        np.testing.assert_array_equal(marked(a[:, 0] > 0.5), np.flatnonzero(a[:, 0] > 0.5))
+        assert len(marked(np.zeros(9, bool))) == 0
+    finally:
+        use(1)
