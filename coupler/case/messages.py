@@ -68,11 +68,25 @@ def _unknown(path: KeyPath) -> str:
     here = [known for known in names_in(path[:-1]) if known != name]
     elsewhere = [key.path for key in keys() if key.path.endswith(f".{name}") or key.path == name]
     if elsewhere:  # an exact name is a better hint than a similar one
-        return f"unknown name here; did you mean '{elsewhere[0]}'?"
+        nearest = max(elsewhere, key=lambda known: _shared(known, path))
+        inside = _shared(nearest, path) == nearest.count(".")
+        other = "" if inside or not here else f" Known here: {', '.join(here)}"
+        return f"unknown name here; did you mean '{nearest}'?{other}"
     hint = did_you_mean(name, here)
     if hint:
         return f"unknown name{hint}"
     return f"unknown name; known here: {', '.join(here)}" if here else "unknown name"
+
+
+def _shared(known: str, path: KeyPath) -> int:
+    """How many sections, from the first on, a name has in common with a place in the file."""
+    wanted = [part for part in path[:-1] if not isinstance(part, int)]
+    common = 0
+    for one, other in zip(known.split(".")[:-1], wanted):
+        if one != other:
+            break
+        common += 1
+    return common
 
 
 def _is(key: Key | None) -> str:

@@ -77,7 +77,7 @@ def test_absent_sections_switch_modules_off(tmp_path):
         (
             "friction = 1",
             "density = 1000",
-            "case.toml:10: water.friction: unknown name here; did you mean 'contact.",
+            "case.toml:10: water.friction: unknown name here; did you mean 'contact.friction'? Known here: density,",
         ),
         ("[watr]\nx = 1\n[water]", "[water]", "case.toml:9: watr: unknown name; did you mean 'water'?"),
         # missing
