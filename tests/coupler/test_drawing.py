@@ -72,6 +72,19 @@ def test_a_building_with_two_storeys_and_a_stair(tmp_path):
     assert not any(name.startswith("house-floor2") for name in members(found))
 
 
+def test_storeys_are_counted_from_the_ground_however_high_the_building(tmp_path):
+    """Five storeys of 3 m on a slab between the walls: the slab lies on the ground, and ends no storey."""
+    body = box((0, 0, 0), (6, 4, 15.25))
+    for k in range(5):
+        body -= box((0.3, 0.3, 0.25 + 3 * k), (5.7, 3.7, 3.0 + 3 * k))
+    found = cut(write(tmp_path / "tower.obj", house=body), size=2.0)
+    check_whole(found, body)
+    slabs = {name for name in members(found) if "wall" not in name and "pier" not in name}
+    assert slabs == {"house-base0", "house-floor0", "house-floor1", "house-floor2", "house-floor3", "house-roof4"}
+    walls = {name.rstrip("xy+-") for name in members(found) if "wall" in name}
+    assert walls == {f"house-wall{k}" for k in range(5)}
+
+
 @pytest.mark.parametrize("ending", ["stl", "ply"])
 def test_single_precision_gives_the_same_blocks(tmp_path, ending, house_of_blocks):
     """Coordinates such as 6.7 are not exact in these files; they are read as they were typed."""

@@ -1,6 +1,6 @@
 """Names of the blocks of a drawing: walls, floors, roofs and other parts, storey by storey.
 
-A part that is thin vertically is a floor (the highest one is the roof), one that is thin horizontally is a wall in the
+A part that is thin vertically is a floor (the highest one is the roof, one at the foot of the walls the base), one that is thin horizontally is a wall in the
 plane across its thickness, and any other is a pier. Storeys lie between floors. Walls in one plane are one wall; x-,
 x+, y-, y+ are the outermost ones along the axes, the rest are numbered.
 """
@@ -22,7 +22,8 @@ UPWARDS = 0.7
 ALONG = 0.999
 """Component of the normal of a wall along an axis from which it lies along that axis."""
 SAME_STOREY = 0.3
-"""Share of the highest wall within which the heights of floors are those of one storey."""
+"""Share of the highest storey within which the heights of floors are those of one storey; a floor as near to the foot
+of the walls lies on the ground."""
 WIDE = 4.0
 """Widths of a floor over its thickness, both, from which it parts two storeys: steps of stairs do not."""
 
@@ -39,15 +40,15 @@ def member_names(
     kinds = [_kind(own, span) for own, span in zip(axes, spans)]
     centres = np.array([0.5 * (c.min(axis=0) + c.max(axis=0)) for c in parts]).reshape(-1, 3)
     standing = [k for k, kind in enumerate(kinds) if kind != "floor"]
-    levels = _levels(kinds, spans, parts, centres)
     foot = min((parts[k][:, 2].min() for k in standing), default=-np.inf)
+    levels, ground = _levels(kinds, spans, centres, foot)
     top = max((parts[k][:, 2].max() for k in standing), default=-np.inf)
     planes = _planes(kinds, axes, centres, tolerance)
     found = []
     for k, kind in enumerate(kinds):
         if kind == "floor":
             storey = int(np.sum(levels < centres[k, 2] - tolerance))
-            if centres[k, 2] < foot:
+            if centres[k, 2] < ground:
                 kind = "base"
             elif storey >= len(levels) - 1 and centres[k, 2] >= top - spans[k].min():
                 kind = "roof"
@@ -65,12 +66,9 @@ def _kind(axes: Array, span: Array) -> str:
     return "floor" if abs(axes[0][2]) > UPWARDS else "wall"
 
 
-def _levels(kinds, spans, parts, middles) -> Array:
-    """Heights (s,) [m] of the middles of the floors and roofs that end a storey, from below."""
-    tall = [np.ptp(corners[:, 2]) for corners, kind in zip(parts, kinds) if kind != "floor"]
-    foot = min(
-        (corners[:, 2].min() for corners, kind in zip(parts, kinds) if kind != "floor"), default=-np.inf
-    )
+def _levels(kinds, spans, middles, foot: float) -> tuple[Array, float]:
+    """Heights (s,) [m] of the middles of the floors and roofs that end a storey, from below, and the height below which
+    a floor lies on the ground · foot: of the walls [m], -inf without walls."""
     wide = np.sort(
         [
             z
@@ -79,9 +77,11 @@ def _levels(kinds, spans, parts, middles) -> Array:
         ]
     )
     if not len(wide):
-        return np.zeros(0)
-    apart = SAME_STOREY * max(tall, default=0.0)
-    return wide[np.concatenate([[True], np.diff(wide) > apart])]
+        return np.zeros(0), foot
+    from_ground = wide if np.isinf(foot) else np.insert(wide, 0, foot)
+    apart = SAME_STOREY * np.diff(from_ground).max(initial=0.0)
+    wide = wide[wide > foot + apart]
+    return wide[np.diff(wide, prepend=-np.inf) > apart], foot + apart
 
 
 def _planes(kinds, axes, middles, tolerance: float) -> list[str]:
