@@ -69,7 +69,7 @@ def _order(reported: dict) -> Iterator[str]:
         if len(reported[key]) < 2 or not found:
             continue
         listed = [
-            f"{name_of(reported, group['name'])} {moment_of(group['first_break']['time'])}"
+            f"{name_of(reported, group['name'])} at {moment_of(group['first_break']['time'])}"
             for group in found[:MOST_IN_ORDER]
         ]
         more = len(found) - len(listed)
