@@ -80,7 +80,14 @@ def test_storeys_are_counted_from_the_ground_however_high_the_building(tmp_path)
     found = cut(write(tmp_path / "tower.obj", house=body), size=2.0)
     check_whole(found, body)
     slabs = {name for name in members(found) if "wall" not in name and "pier" not in name}
-    assert slabs == {"house-base0", "house-floor0", "house-floor1", "house-floor2", "house-floor3", "house-roof4"}
+    assert slabs == {
+        "house-base0",
+        "house-floor0",
+        "house-floor1",
+        "house-floor2",
+        "house-floor3",
+        "house-roof4",
+    }
     walls = {name.rstrip("xy+-") for name in members(found) if "wall" in name}
     assert walls == {f"house-wall{k}" for k in range(5)}
 

@@ -1,8 +1,8 @@
 """Names of the blocks of a drawing: walls, floors, roofs and other parts, storey by storey.
 
-A part that is thin vertically is a floor (the highest one is the roof, one at the foot of the walls the base), one that is thin horizontally is a wall in the
-plane across its thickness, and any other is a pier. Storeys lie between floors. Walls in one plane are one wall; x-,
-x+, y-, y+ are the outermost ones along the axes, the rest are numbered.
+A part that is thin vertically is a floor (the highest one is the roof, one at the foot of the walls the base), one that
+is thin horizontally is a wall in the plane across its thickness, and any other is a pier. Storeys lie between floors.
+Walls in one plane are one wall; x-, x+, y-, y+ are the outermost ones along the axes, the rest are numbered.
 """
 
 from __future__ import annotations
