@@ -20,7 +20,7 @@ Problem = tuple[KeyPath, str]
 
 ALL = ("solids", "blocks", "terrain")
 """Names in `around` that stand for everything of a kind."""
-BYTES_PER_CELL = 510
+BYTES_PER_CELL = 420
 """Resident memory that a cell of the mesh takes in a run of water alone: topology, moments and fields ..."""
 BYTES_KEPT_PER_CELL, MOST_KEPT = 150, 700_000
 """... and more for so many of the cells, since arrays of less than 32 MB stay in the process when they are freed."""

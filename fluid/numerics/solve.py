@@ -140,6 +140,11 @@ def _advance(first, last, share, p, Ap, x, r):
         r[i] -= share * Ap[i]
 
 
+def product(A, v):
+    """A v (n,) of a csr matrix."""
+    return _product(*unsigned(A), A.data, v)
+
+
 def _product(indptr, indices, data, v):
     """A v (n,): for small systems scipy spends most of its time before it multiplies."""
     out = np.empty(len(v))

@@ -184,14 +184,15 @@ def found_over(kernel: Callable, count: int, *args) -> Array:
     return found[0] if len(found) == 1 else np.concatenate(found)
 
 
-def owning(kernel: Callable, nodes: int, reach: Callable, count: int, *args) -> None:
+def owning(kernel: Callable, nodes: int, reach: Callable, count: int, *args, weight: int = 1) -> None:
     """Run kernel(first, last, runs, *args) on ranges that together cover the nodes 0 ... `nodes`.
 
     runs (k, 2): first and last + 1 of the stretches of a list of `count` entries that can have a node of the range.
-    reach: () → lowest and highest node (B,) of each BLOCK of the list; called on several threads only."""
-    parts = _parts(count)
+    reach: () → lowest and highest node (B,) of each BLOCK of the list; called on several threads only · weight: as in
+    `over`."""
+    parts = _parts(count * weight)
     if parts == 1:
-        _alone(kernel, count, (0, nodes, np.array([[0, count]]), *args))
+        _alone(kernel, count * weight, (0, nodes, np.array([[0, count]]), *args))
         return
     low, high = reach()
     middle = np.sort(low)[[len(low) * k // parts for k in range(1, parts)]]

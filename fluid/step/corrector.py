@@ -15,6 +15,7 @@ import numpy as np
 
 from array_types import Bools, Floats, Ints
 from fluid.domain.cell_vectors import CellVectors, places_of
+from fluid.numerics.solve import product
 from fluid.numerics.sums import kinetic_energy
 from fluid.numerics.threads import copied, field, over
 from fluid.pressure.pressure_bound import BoundMet
@@ -346,7 +347,7 @@ def _report(water, problem, x, projected, u, clipped, momentum, bound):
         change["viscosity and friction"] = kept.shear.energy
     volume = float(kept.nodal_water.sum()) - float(kept.displaced.sum())
     left = kept.left
-    moved_by_bodies = problem.matrix @ x - problem.rhs - bound.rate
+    moved_by_bodies = product(problem.matrix, x) - problem.rhs - bound.rate
     return StepReport(
         dt=problem.dt,
         volume=volume,

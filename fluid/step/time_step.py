@@ -53,21 +53,27 @@ def _bulk(least, u, water, counted) -> float:
     return float(speed[order[rest]]) if rest < len(order) else least
 
 
-@kernel
 def gathered(counted, water, least, start, around):
     """The counted nodes (N,) bool that hold at least so much water together with their neighbours; all of them where
     none does.
 
     water (N,) [m³] at the nodes · least [m³] · start (N + 1,), around: `Topology.around`."""
-    found, n = np.zeros(counted.shape[0], np.bool_), 0
-    for i in range(counted.shape[0]):
+    found = np.zeros(len(counted), bool)
+    n = sum(over(_gathered, len(counted), counted, water, least, start, around, found))
+    return found if n > 0 else counted
+
+
+@ranged
+def _gathered(first, last, counted, water, least, start, around, found):
+    n = 0
+    for i in range(first, last):
         if counted[i]:
             held = water[i]
             for t in range(start[i], start[i + 1]):
                 held += water[around[t]]
             found[i] = held >= least
             n += found[i]
-    return found if n > 0 else counted
+    return n
 
 
 def largest_component(u, counted) -> float:

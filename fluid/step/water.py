@@ -231,7 +231,8 @@ class Water:
         return float(p.speed_limit * np.sqrt(p.gravity * (high - low)[2] + 0.5 * self._start_speed**2))
 
     def _counted(self):
-        return (self.level_set < 0.0) & self._roomy
+        level, roomy = self.level_set, self._roomy
+        return field(len(level), lambda rows: (level[rows] < 0.0) & roomy[rows], (), bool)
 
     def predict(self, dt: float) -> PressureProblem:
         """Advection, volume and gravity over dt [s], and the system for the pressure."""

@@ -125,11 +125,12 @@ def _pass_gradient(i, m, gradient, start, around, shared, done):
             gradient[i, k, d] /= max(count, 1)
 
 
-def mean_gradients(cell_list, marked, f, fluid, n_nodes):
-    """Volume-weighted mean of ∇f over the cells around each node whose corners are all marked, (N, m, 3).
+def mean_gradients(cell_list, marked, f, fluid, gradient):
+    """Volume-weighted mean of ∇f over the cells around each node whose corners are all marked: what is added to
+    `gradient` (N, m, 3), zero at first.
 
-    f (N, m), marked (N,) bool · fluid: FluidCells; zero where there is no such cell."""
-    gradient, weight = zeros((n_nodes, f.shape[1], 3)), zeros((n_nodes,))
+    f (N, m), marked (N,) bool · fluid: FluidCells; it stays zero where there is no such cell."""
+    n_nodes, weight = len(gradient), zeros((len(gradient),))
     reach = reach_of_cells(cell_list, fluid.cells)
     owning(_mean_gradients, n_nodes, reach, len(cell_list), cell_list, marked, f, fluid, weight, gradient)
     return gradient
@@ -184,14 +185,15 @@ def smoothed_slope(topology, cell_list, marked, u, calm: float):
         # each sweep reads one layer of nodes farther in than it is to be right on
         reach.append(_one_layer_more(cell_list, reach[-1], t.cells))
     near = touching_among(cell_list, reach.pop(), t.cells)
-    slope = mean_gradients(near, marked, u, t.fluid_cells, len(u))
-    once = before = slope = _averaged(near, reach.pop(), has, slope, t.cells)
-    while reach:
-        before, slope = slope, _averaged(near, reach.pop(), has, slope, t.cells)
-    if slope is once:
-        return once
     there = np.zeros(len(u), bool)
     over(_mark_nodes, len(near), near, t.cells, there)
+    slope = mean_gradients(near, marked, u, t.fluid_cells, _zero_at(there, u.shape[1]))
+    once = before = slope = _averaged(near, reach.pop(), has, slope, t.cells, zeros(slope.shape))
+    while reach:
+        mean = _zero_at(there, u.shape[1])
+        before, slope = slope, _averaged(near, reach.pop(), has, slope, t.cells, mean)
+    if slope is once:
+        return once
     over(_combined, len(u), there, calm, once, before, slope)
     return once
 
@@ -249,9 +251,26 @@ def _mark_layer(first, last, cell_list, nodes, cells, wider):
                 wider[cells[e, a]] = True
 
 
-def _averaged(cell_list, reach, has, field, cells):
-    """Mean of the field (N, m, 3) over the corners that have one, of the listed cells around the nodes in reach."""
-    mean, count = zeros(field.shape), zeros((len(field),))
+def _zero_at(there, m: int):
+    """(N, m, 3), zero at marked nodes; the others hold anything."""
+    out = np.empty((len(there), m, 3))
+    over(_clear_rows, len(there), there, out)
+    return out
+
+
+@ranged
+def _clear_rows(first, last, there, out):
+    for i in range(first, last):
+        if there[i]:
+            for k in range(out.shape[1]):
+                for d in range(3):
+                    out[i, k, d] = 0.0
+
+
+def _averaged(cell_list, reach, has, field, cells, mean):
+    """Mean of the field (N, m, 3) over the corners that have one, of the listed cells around the nodes in reach: what
+    is added to `mean` (N, m, 3), zero at first."""
+    count = zeros((len(field),))
     listed = reach_of_cells(cell_list, cells)
     owning(_average, len(field), listed, len(cell_list), cell_list, (reach, has), field, cells, count, mean)
     return mean

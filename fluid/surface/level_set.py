@@ -28,7 +28,7 @@ import numpy as np
 from array_types import Array, Floats, Ints
 from fluid.domain.topology import layers_around
 from fluid.mesh.arrays import Corners
-from fluid.numerics.threads import field, found_over, over
+from fluid.numerics.threads import field, found_over, over, zeros
 from fluid.surface.extrapolation import continue_outward, mean_gradients
 from kernel_decorators import helper, inner, kernel, plain, ranged, released
 
@@ -347,7 +347,7 @@ def _past_the_last_polygon(t, cut, front, beside, motion, phi) -> None:
     if len(inside) == 0:
         return
     value = phi[:, None].copy()
-    slope = mean_gradients(cut, front, value, t.fluid_cells, len(phi))
+    slope = mean_gradients(cut, front, value, t.fluid_cells, zeros((len(phi), 1, 3)))
     layers, no_limit = np.array([0, 0, len(inside)]), np.zeros(0)
     continue_outward(inside, layers, 1, value, slope, t.nodes, t.around_by_cells, front.copy(), no_limit)
     phi[inside] = np.clip(value[inside, 0], -phi[inside], phi[inside])

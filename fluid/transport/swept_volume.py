@@ -63,7 +63,8 @@ def swept(topology, flux: Flux, phi, u, moved, dt: float) -> np.ndarray:
     nodes = flux.nodes[beside[flux.nodes]]
     rate = edge_rates(t, g, nodes, velocity)
     out, reach = zeros((len(phi),)), reach_of_rows(nodes, g.row, g.start, g.neighbour)
-    owning(_difference, len(phi), reach, len(nodes), nodes, beside, weight, g.edges, (dt, rate), moved, out)
+    state = (nodes, beside, weight, g.edges, (dt, rate), moved)
+    owning(_difference, len(phi), reach, len(nodes), *state, out, weight=WORK)
     return out
 
 
