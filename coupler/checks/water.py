@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 
@@ -83,6 +84,8 @@ def water_remarks(case: Case) -> Iterator[str]:
     for spec in case.water.inflow if case.water and case.tank else ():
         if spec.kind in ("solitary", "n-wave") or getattr(spec, "ahead", None) is not None:
             yield from _still_water(case, spec)
+        if spec.kind == "record":
+            yield from _held_ends(case, spec)
         if spec.kind == "solitary":
             share = _share_at_start(spec, _depth(case, spec), case.case.gravity)
             if share > EARLY:
@@ -339,6 +342,24 @@ def _tide(case: Case, path: KeyPath, sea, bed: float, top: float) -> Iterator[Pr
             place,
             f"its level varies from z = {found.min():.4g} to {found.max():.4g} m in the run, which is not between the "
             f"floor ({bed:g} m) and the top ({top:g} m)",
+        )
+
+
+def _held_ends(case: Case, spec) -> Iterator[str]:
+    """Records that do not cover the run: their ends are held."""
+    try:
+        found = record_of(spec)
+    except RecordError:
+        return
+    first, last = float(found.time[0]), float(found.time[-1])
+    name = Path(spec.path).name
+    if first > 0.0:
+        yield f"{name} begins at {first:g} s of the run: its first level and velocity are held from 0 to then"
+    if last < case.time.end:
+        level, velocity = float(found.level[-1].mean()), float(found.velocity[-1].mean())
+        yield (
+            f"{name} ends at {last:g} s, before the run does ({case.time.end:g} s): its last level ({level:.4g} m) and "
+            f"velocity ({velocity:.4g} m/s) are held from then on"
         )
 
 

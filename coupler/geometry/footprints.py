@@ -8,6 +8,7 @@ GeoJSON is read here; what else pyogrio reads (Shapefile, GeoPackage) in a proce
 from __future__ import annotations
 
 import json
+import re
 import sys
 import tempfile
 from dataclasses import dataclass
@@ -35,11 +36,13 @@ class FootprintError(SurgebreakError):
 
 @dataclass(frozen=True)
 class Footprint:
-    """corners (k, 2), counter-clockwise, each once, in units of the file · attributes · number in the file."""
+    """corners (k, 2), counter-clockwise, each once, in units of the file · attributes · number in the file · system:
+    coordinate system that the file names, "" for none."""
 
     corners: Array
     attributes: dict
     number: int
+    system: str = ""
 
     @property
     def area(self) -> float:
@@ -79,7 +82,7 @@ def _geojson(name: str, path: Path) -> list[Footprint]:
     features = data.get("features") if isinstance(data, dict) else None
     if not isinstance(features, list):
         raise FootprintError(f"{name}: no list `features`; a FeatureCollection of polygons is needed")
-    found = []
+    found, system = [], _named_system(data)
     for number, feature in enumerate(features):
         geometry = (feature.get("geometry") if isinstance(feature, dict) else None) or {}
         kind, rings = geometry.get("type"), geometry.get("coordinates")
@@ -88,10 +91,27 @@ def _geojson(name: str, path: Path) -> list[Footprint]:
                 f"{name}: feature {number} is a {kind or 'nothing'}; footprints are polygons"
             )
         for polygon in [rings] if kind == "Polygon" else rings:
-            found.append(Footprint(_corners(name, number, polygon), feature.get("properties") or {}, number))
+            attributes = feature.get("properties") or {}
+            found.append(Footprint(_corners(name, number, polygon), attributes, number, system))
     if not found:
         raise FootprintError(f"{name}: no polygons in it")
     return found
+
+
+def _named_system(data: dict) -> str:
+    """The member `crs` of GeoJSON, which most programs still write: the name of a coordinate system, "" without one."""
+    crs = data.get("crs")
+    properties = crs.get("properties") if isinstance(crs, dict) else None
+    name = properties.get("name") if isinstance(properties, dict) else None
+    return name if isinstance(name, str) else ""
+
+
+def epsg_code(system: str) -> str | None:
+    """The EPSG code of a coordinate system given as a name or as WKT; None where it has none."""
+    if system.endswith("CRS84"):
+        return "4326"
+    found = re.findall(r'EPSG(?:::?|",\s*"?)(\d+)', system)
+    return found[-1] if found else None  # of WKT the outermost, which comes last
 
 
 def _corners(name: str, number: int, polygon) -> Array:
@@ -112,7 +132,29 @@ def _corners(name: str, number: int, polygon) -> Array:
     corners = corners[turns]
     if len(corners) < 3 or abs(area_of(corners)) <= SAME * extent**2:
         raise FootprintError(f"{name}: feature {number} has no area")
+    place = _crossing(corners)
+    if place is not None:
+        raise FootprintError(
+            f"{name}: the outline of feature {number} crosses itself at ({place[0]:.9g}, {place[1]:.9g}); put its "
+            "corners in order"
+        )
     return corners if area_of(corners) > 0.0 else corners[::-1]
+
+
+def _crossing(corners: Array) -> Array | None:
+    """A place (2,) where two edges of a polygon (k, 2) that are not neighbours cross; None for a simple one."""
+    k, middle = len(corners), corners.mean(axis=0)
+    start = corners - middle
+    along = np.roll(start, -1, axis=0) - start
+    i, j = np.triu_indices(k, 2)
+    i, j = i[(i > 0) | (j < k - 1)], j[(i > 0) | (j < k - 1)]
+    gap = start[j] - start[i]
+    cross = along[i, 0] * along[j, 1] - along[i, 1] * along[j, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        s = (gap[:, 0] * along[j, 1] - gap[:, 1] * along[j, 0]) / cross
+        t = (gap[:, 0] * along[i, 1] - gap[:, 1] * along[i, 0]) / cross
+    meet = np.flatnonzero((s > SAME) & (s < 1.0 - SAME) & (t > SAME) & (t < 1.0 - SAME))
+    return middle + start[i[meet[0]]] + s[meet[0]] * along[i[meet[0]]] if len(meet) else None
 
 
 def best_rectangle(corners: Array) -> tuple[Array, Array, float, float]:
@@ -168,7 +210,9 @@ def _convert(path: str, out: str, source: str = "", target: str = "") -> None:
         features.append(
             {"type": "Feature", "properties": own, "geometry": json.loads(shapely.to_geojson(shape))}
         )
-    Path(out).write_text(json.dumps({"type": "FeatureCollection", "features": features}), encoding="utf-8")
+    system = {"type": "name", "properties": {"name": target or meta["crs"] or ""}}
+    text = json.dumps({"type": "FeatureCollection", "crs": system, "features": features})
+    Path(out).write_text(text, encoding="utf-8")
 
 
 def _plain(value):
@@ -177,7 +221,7 @@ def _plain(value):
         value.item()
         if isinstance(value, np.generic)
         else value
-        if isinstance(value, int | float | str)
+        if value is None or isinstance(value, int | float | str)
         else str(value)
     )
 

@@ -12,7 +12,13 @@ import numpy as np
 from coupler.case.case import Case
 from coupler.case.structure import Building
 from coupler.case.types import Rotation
-from coupler.geometry.footprints import Footprint, FootprintError, best_rectangle, read_footprints
+from coupler.geometry.footprints import (
+    Footprint,
+    FootprintError,
+    best_rectangle,
+    epsg_code,
+    read_footprints,
+)
 from coupler.program.errors import did_you_mean
 
 Array = np.ndarray
@@ -51,8 +57,10 @@ def _houses(town, tank, terrain, _stamp) -> tuple[Building, ...]:
                 f"{path.name}: in {town.crs}; say the system of the terrain (terrain.crs) to change it"
             )
         change = (town.crs, target)
-    found, names = [], set()
-    for footprint in read_footprints(path, change):
+    found, names, footprints = [], set(), read_footprints(path, change)
+    if change is None:
+        _same_system(path.name, footprints[0].system, terrain)
+    for footprint in footprints:
         corners = np.column_stack(tank.ground.in_tank(*(terrain.scale * footprint.corners).T))
         if _is_here(path.name, footprint, corners, tank):
             house = _house(path.name, town, footprint, corners)
@@ -68,9 +76,34 @@ def _houses(town, tank, terrain, _stamp) -> tuple[Building, ...]:
         low, high = tank.lower, tank.upper
         raise FootprintError(
             f"{path.name}: none of its footprints lies in the tank (x {low[0]:g} to {high[0]:g}, y {low[1]:g} to "
-            f"{high[1]:g} m); they are taken in coordinates of the terrain file: check terrain.origin and town.crs"
+            f"{high[1]:g} m); {_advice(footprints, town)}"
         )
     return tuple(found)
+
+
+def _same_system(name: str, system: str, terrain) -> None:
+    """Refuse footprints in a coordinate system other than that of the terrain, where both name theirs."""
+    from coupler.geometry.terrain.grids import sidecar
+
+    own, ground = epsg_code(system), terrain.reproject or terrain.crs or sidecar(Path(terrain.path))
+    other = epsg_code(ground)
+    if own is not None and other is not None and own != other:
+        raise FootprintError(
+            f"{name}: its coordinate system is EPSG:{own}, that of the terrain EPSG:{other}; write crs = "
+            f'"EPSG:{own}" in [[structure.town]] (and terrain.crs = "EPSG:{other}"), which changes them'
+        )
+
+
+def _advice(footprints: list[Footprint], town) -> str:
+    """What to do about footprints that all lie elsewhere."""
+    corners = np.concatenate([footprint.corners for footprint in footprints])
+    if town.crs is None and (np.abs(corners) <= (180.0, 90.0)).all():
+        x, y = corners[0]
+        return (
+            f"their coordinates, such as ({x:.6g}, {y:.6g}), look like degrees: write "
+            'crs = "EPSG:4326", and terrain.crs'
+        )
+    return "they are taken in coordinates of the terrain file: check terrain.origin and town.crs"
 
 
 def _is_here(name: str, footprint: Footprint, corners: Array, tank) -> bool:
@@ -183,20 +216,30 @@ def town_problems(case: Case) -> Iterator[tuple[tuple, str]]:
 
 
 def _idle_rules(path, town) -> Iterator[tuple[tuple, str]]:
-    """Rules by an attribute that no footprint of the file has."""
+    """Rules, and numbers of storeys, by an attribute that no footprint of the file has."""
     known = _attributes(town)
-    for k, rule in enumerate(town.rule):
-        if not any(rule.attribute in attributes for attributes in known):
+    asked = [((*path, "rule", k, "attribute"), rule.attribute) for k, rule in enumerate(town.rule)]
+    if town.storeys_from is not None:
+        asked.append(((*path, "storeys_from"), town.storeys_from))
+    for key, wanted in asked:
+        if not any(wanted in attributes for attributes in known):
             names = sorted({str(name) for attributes in known for name in attributes})
-            hint = did_you_mean(rule.attribute, names) or f"; there are {', '.join(names) or 'none'}"
-            yield (*path, "rule", k, "attribute"), f"no footprint has '{rule.attribute}'{hint}"
+            hint = did_you_mean(wanted, names) or f"; there are {', '.join(names) or 'none'}"
+            yield key, f"no footprint has '{wanted}'{hint}"
 
 
 def town_remarks(case: Case) -> Iterator[str]:
     """Rules for a value that no footprint has: allowed, since one set of rules may serve many files, but often a
-    slip."""
+    slip; and footprints that do not say their number of storeys."""
     for i, town in enumerate(case.structure.town if case.structure else ()):
         known = _attributes(town)
+        silent = [k for k, a in enumerate(known) if town.storeys_from and a.get(town.storeys_from) is None]
+        if silent:
+            yield (
+                f"structure.town[{i}]: {len(silent)} of {len(known)} footprints say nothing under "
+                f"'{town.storeys_from}' (the first is feature {silent[0]}): they get storeys = {town.storeys}, or what "
+                "a rule says"
+            )
         for k, rule in enumerate(town.rule):
             values = {a[rule.attribute] for a in known if rule.attribute in a}
             if rule.equals not in values:
@@ -210,7 +253,8 @@ def town_remarks(case: Case) -> Iterator[str]:
 
 def _attributes(town) -> list[dict]:
     """Attributes of every footprint; the file is not read where no rule needs them."""
-    return [f.attributes for f in read_footprints(Path(town.path))] if town.rule else []
+    wanted = town.rule or town.storeys_from is not None
+    return [f.attributes for f in read_footprints(Path(town.path))] if wanted else []
 
 
 def _overlapping(case: Case, path, town) -> Iterator[tuple[tuple, str]]:

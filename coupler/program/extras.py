@@ -12,7 +12,7 @@ EXTRAS = {
     "drawing": ("manifold3d", "trimesh"),
     "cad": ("gmsh",),
     "ifc": ("ifcopenshell",),
-    "terrain": ("rasterio", "pyproj", "pyogrio"),
+    "terrain": ("rasterio", "pyproj", "pyogrio", "shapely"),
     "offshore": ("anuga",),
     "sweep": ("matplotlib",),
     "parquet": ("pandas", "pyarrow"),

@@ -1,7 +1,11 @@
 """Houses from footprints: rectangles, rules, and what is refused."""
 
+import ast
 import json
 import re
+import sys
+import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,13 +13,16 @@ from scipy.spatial import ConvexHull
 
 from coupler.checks.case import remarks
 from coupler.checks.read_case import load
-from coupler.geometry.footprints import best_rectangle, read_footprints
+from coupler.geometry.footprints import best_rectangle, epsg_code, read_footprints
 from coupler.geometry.parts import parts_of
 from coupler.geometry.solids import solids_of
 from coupler.program.errors import BadCase
+from coupler.program.extras import EXTRAS
 from coupler.run.clock import Clock
 from coupler.run.execute import drawn
 from coupler.scene.build import build
+
+ROOT = Path(__file__).resolve().parents[2]
 
 CASE = """
 [case]
@@ -159,6 +166,21 @@ ELL = [[0, 0], [10, 0], [10, 3], [3, 3], [3, 10], [0, 10], [0, 0]]
             r"houses from footprints stand on the terrain; write a section \[terrain\]",
         ),
         (HOUSES, ["structure.town[0].path=houses.shape"], "no footprints are read from .shape"),
+        (
+            HOUSES,
+            ["structure.town[0].storeys_from=level"],
+            r"storeys_from: no footprint has 'level'; did you mean 'levels'\?",
+        ),
+        (
+            [feature([[1026, 2005], [1034, 2011], [1034, 2005], [1026, 2012], [1026, 2005]], id="a")],
+            [],
+            r"the outline of feature 0 crosses itself at \(1030\.\d+, 2008",
+        ),
+        (
+            [feature(ring((12.5, 41.9), (1e-4, 1e-4), at=(0.0, 0.0)), id="a")],
+            [],
+            r"coordinates, such as \(12\.\d+, 41\.\d+\), look like degrees: write crs = \"EPSG:4326\"",
+        ),
     ],
 )
 def test_footprints_that_cannot_be_houses_are_refused(houses, sets, reported, tmp_path):
@@ -187,7 +209,9 @@ def placed(shape, middle=(30.0, 15.0), degrees=0.0):
 def test_footprint_that_is_no_rectangle_becomes_a_ring_of_walls_and_slabs(tmp_path, degrees):
     """An L: walls of 0.4 m along its outline, 3 m high with a slab of 0.4 m over all of it; nothing overlaps, and all
     faces between blocks are joined."""
-    case = loaded(tmp_path, OUTLINE, houses=[feature(placed(L, degrees=degrees), id="L1", built="brick")])
+    case = loaded(
+        tmp_path, OUTLINE, houses=[feature(placed(L, degrees=degrees), id="L1", built="brick", levels=1)]
+    )
     blocks = [block for part in parts_of(case) for block in part.blocks]
     plan, length = 56.0, 34.0
     wall = plan - (plan - 0.4 * length + 0.16 * 4)  # inside: five corners take t², one gives it back
@@ -207,7 +231,7 @@ def test_footprint_that_is_no_rectangle_becomes_a_ring_of_walls_and_slabs(tmp_pa
 
 
 def test_wall_that_leaves_no_room_is_refused_with_the_edge(tmp_path):
-    houses = [feature(placed(L), id="L1", built="brick")]
+    houses = [feature(placed(L), id="L1", built="brick", levels=1)]
     with pytest.raises(BadCase, match="'L1': no room between walls of 3 m at the edge from"):
         loaded(
             tmp_path,
@@ -220,7 +244,9 @@ def test_wall_that_leaves_no_room_is_refused_with_the_edge(tmp_path):
 
 def test_footing_reaches_beyond_the_walls_as_a_pad(tmp_path):
     case = loaded(
-        tmp_path, "structure.town[0].pad=1.5", houses=[feature(ring((30, 15), (8, 6)), id="a", built="brick")]
+        tmp_path,
+        "structure.town[0].pad=1.5",
+        houses=[feature(ring((30, 15), (8, 6)), id="a", built="brick", levels=1)],
     )
     (footing,) = solids_of(case)
     np.testing.assert_allclose(np.ptp(footing.vertices, axis=0)[:2], [11, 9])
@@ -269,3 +295,60 @@ def test_a_rule_for_a_value_that_no_footprint_has_is_told(tmp_path, value, says)
         f"rule[0] changes nothing: no footprint has built = '{value}'; {says}" in line for line in found
     )
     assert not any("changes nothing" in line for line in remarks(loaded(tmp_path)))
+
+
+def test_footprints_without_a_number_of_storeys_are_told(tmp_path):
+    one, other = HOUSES
+    silent = {**other, "properties": {**other["properties"], "levels": None}}
+    found = remarks(loaded(tmp_path, houses=[one, silent]))
+    assert any(
+        "1 of 2 footprints say nothing under 'levels' (the first is feature 1): they get storeys = 1" in line
+        for line in found
+    )
+    assert not any("say nothing" in line for line in remarks(loaded(tmp_path)))
+
+
+UTM_54 = 'PROJCS["WGS 84 / UTM zone 54N",GEOGCS["WGS 84",AUTHORITY["EPSG","4326"]],AUTHORITY["EPSG","32654"]]'
+
+
+@pytest.mark.parametrize(
+    ("crs", "refused"),
+    [
+        ("urn:ogc:def:crs:EPSG::32654", None),
+        ("EPSG:32653", "32653"),
+        ("urn:ogc:def:crs:OGC:1.3:CRS84", "4326"),
+    ],
+)
+def test_footprints_in_another_coordinate_system_than_the_terrain_are_refused(tmp_path, crs, refused):
+    case = loaded(tmp_path, "terrain.crs=EPSG:32654")
+    path = tmp_path / "houses.geojson"
+    data = json.loads(path.read_text())
+    path.write_text(json.dumps(data | {"crs": {"type": "name", "properties": {"name": crs}}}))
+    if refused is None:
+        assert len(parts_of(load(tmp_path, ["terrain.crs=EPSG:32654"]).case)) == len(parts_of(case)) == 2
+        return
+    with pytest.raises(
+        BadCase, match=f'EPSG:{refused}, that of the terrain EPSG:32654; write crs = "EPSG:{refused}"'
+    ):
+        load(tmp_path, ["terrain.crs=EPSG:32654"])
+
+
+def test_code_of_a_coordinate_system_is_the_outermost_of_its_text():
+    assert epsg_code(UTM_54) == "32654"
+    assert epsg_code('PROJCRS["x",BASEGEOGCRS["y",ID["EPSG",4326]],ID["EPSG",32610]]') == "32610"
+    assert epsg_code('PROJCS["WGS_1984_UTM_Zone_10N"]') is None
+
+
+def test_every_package_that_reads_maps_is_in_the_extra():
+    """What is imported in the processes that read rasters and footprints must come with `pip install .[terrain]`."""
+    used = set()
+    for module in ("footprints", "terrain/raster"):
+        tree = ast.parse((ROOT / "coupler" / "geometry" / f"{module}.py").read_text())
+        for node in ast.walk(tree):
+            names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
+            names += [node.module] if isinstance(node, ast.ImportFrom) and node.module else []
+            used |= {name.split(".")[0] for name in names}
+    outside = used - set(sys.stdlib_module_names) - {"coupler", "numpy", "scipy", "__future__"}
+    assert outside == set(EXTRAS["terrain"])
+    told = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]["terrain"]
+    assert {re.match(r"[a-z]+", line)[0] for line in told} == outside

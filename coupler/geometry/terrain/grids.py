@@ -71,7 +71,7 @@ def _esri(path: Path, _variable) -> Grid:
     half = {name: 0.5 * size[name] if f"{name}llcorner" in head else 0.0 for name in "xy"}
     x0 = head.get("xllcorner", head.get("xllcenter", 0.0)) + half["x"]
     y0 = head.get("yllcorner", head.get("yllcenter", 0.0)) + half["y"]
-    return Grid(x0 + size["x"] * np.arange(nx), y0 + size["y"] * np.arange(ny), z, crs=_sidecar(path))
+    return Grid(x0 + size["x"] * np.arange(nx), y0 + size["y"] * np.arange(ny), z, crs=sidecar(path))
 
 
 def _esri_head(path: Path) -> tuple[dict[str, float], str]:
@@ -93,7 +93,7 @@ def _esri_head(path: Path) -> tuple[dict[str, float], str]:
         text = rest
 
 
-def _sidecar(path: Path) -> str:
+def sidecar(path: Path) -> str:
     """The coordinate system from a .prj beside a file."""
     beside = path.with_suffix(".prj")
     try:
