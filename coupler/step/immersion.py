@@ -73,7 +73,7 @@ class Immersion:
         """Blocks that are long enough to reach from one side of the tank to the opposite one."""
         self._tolerance = STILL * mesh.finest
         self._centre, self._rotation = self._pose()
-        self._growth = self._new_growth(np.zeros(len(self._body_of_plane)))
+        self._growth = self._new_growth(np.full(len(self._body_of_plane), -np.inf))
         self.bodies = self._placed()
         self.domain = cut_domain(mesh, self.bodies, covers, connection=connection)
         self.cut_again = 0
@@ -153,9 +153,10 @@ class Immersion:
         )
 
     def _new_growth(self, before: Array) -> Array:
-        """Outward shift of each plane (P,) [m]: sealed faces reach over the gap to the other block, loose blocks
-        that touch something are drawn in by a film. The shift changes in steps and never decreases while a face stays
-        sealed, so that the planes of a block at rest keep their bits and its cells are not cut again."""
+        """Outward shift of each plane (P,) [m]: sealed faces reach over the gap to the other block, or are drawn in where
+        the joint is so soft that they overlap; loose blocks that touch something are drawn in by a film. The shift
+        changes in steps and never decreases while a face stays sealed, so that the planes of a block at rest keep their
+        bits and its cells are not cut again."""
         growth = np.zeros(len(self._body_of_plane))
         if self.n_blocks == 0:
             return growth
@@ -168,7 +169,11 @@ class Immersion:
         # one, not where it opens by anything at all: a whole face grows by it, of which the joint may be a small part,
         # and lifts the water around a block that stands still.
         steps = np.floor(STEPS * np.maximum(2.0 * half_gap, 0.0) / self._tolerance) + 1.0
-        np.maximum.at(growth, rows, (1.0 + steps / STEPS) * self._tolerance)
+        # Over the height of an overlap the pressure acts on the block that protrudes. While joints vibrate, that is
+        # now one, now the other, which kept a block on soft joints vibrating.
+        overlap = np.floor(np.maximum(-half_gap, 0.0) / self._tolerance)
+        growth[rows] = -np.inf
+        np.maximum.at(growth, rows, (1.0 + steps / STEPS - overlap) * self._tolerance)
         growth[rows] = np.maximum(growth[rows], before[rows])
         growth[self._closing_planes()] = 2.0 * SPANS * self.mesh.finest
         return growth
