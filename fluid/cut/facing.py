@@ -21,27 +21,43 @@ def facing(bodies, polygons, reach, bounds, loose):
     return _facing(polygons, bodies.planes(), loose, near, bounds, reach)
 
 
-@kernel
 def near_bodies(low, high, loose, reach):
-    """start (n + 1,), members: bodies whose bounds low, high (n, 3) [m] come within reach [m] of those of each body;
-    only pairs with at least one loose body."""
+    """start (n + 1,), members, in order: bodies whose bounds low, high (n, 3) [m] come within reach [m] of those of
+    each body; only pairs with at least one loose body. Bodies are passed through along the longest axis of them all, so
+    that a town of houses far apart is not compared block by block."""
+    if len(low) == 0:
+        return np.zeros(1, np.int64), np.zeros(0, np.int64)
+    axis = int(np.argmax(high.max(axis=0) - low.min(axis=0)))
+    order = np.argsort(low[:, axis], kind="stable")
+    one, other = _near_pairs(low, high, loose, reach, axis, order)
+    first, second = np.concatenate([one, other]), np.concatenate([other, one])
+    keys = np.sort(first * len(low) + second)
+    start = np.concatenate([[0], np.cumsum(np.bincount(first, minlength=len(low)))])
+    return start, keys % len(low)
+
+
+@kernel
+def _near_pairs(low, high, loose, reach, axis, order):
+    """one (p,), other (p,): each pair of `near_bodies` once. order (n,): of the bodies by low[:, axis]."""
     n = low.shape[0]
-    start = np.zeros(n + 1, np.int64)
-    members, count = np.empty(16 * n + 16, np.int64), 0
-    for a in range(n):
-        for b in range(n):
-            if a == b or not (loose[a] or loose[b]):
+    pairs, count = np.empty((2, 8 * n + 16), np.int64), 0
+    for i in range(n):
+        a = order[i]
+        for j in range(i + 1, n):
+            b = order[j]
+            if low[b, axis] > high[a, axis] + reach:
+                break
+            if not (loose[a] or loose[b]):
                 continue
             apart = False
             for k in range(3):
                 apart = apart or low[a, k] > high[b, k] + reach or low[b, k] > high[a, k] + reach
             if not apart:
-                if count == members.shape[0]:
-                    members = np.concatenate((members, np.empty_like(members)))
-                members[count] = b
+                if count == pairs.shape[1]:
+                    pairs = np.concatenate((pairs, np.empty_like(pairs)), axis=1)
+                pairs[0, count], pairs[1, count] = a, b
                 count += 1
-        start[a + 1] = count
-    return start, members[:count].copy()
+    return pairs[0, :count].copy(), pairs[1, :count].copy()
 
 
 @kernel
