@@ -153,10 +153,10 @@ class Immersion:
         )
 
     def _new_growth(self, before: Array) -> Array:
-        """Outward shift of each plane (P,) [m]: sealed faces reach over the gap to the other block, or are drawn in where
-        the joint is so soft that they overlap; loose blocks that touch something are drawn in by a film. The shift
-        changes in steps and never decreases while a face stays sealed, so that the planes of a block at rest keep their
-        bits and its cells are not cut again."""
+        """Outward shift of each plane (P,) [m]: sealed faces reach over the gap to the other block, or are drawn in
+        where the joint is so soft that they overlap; loose blocks that touch something are drawn in by a film. The
+        shift changes in steps and never decreases while a face stays sealed, so that the planes of a block at rest keep
+        their bits and its cells are not cut again."""
         growth = np.zeros(len(self._body_of_plane))
         if self.n_blocks == 0:
             return growth
