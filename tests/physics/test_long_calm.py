@@ -28,7 +28,12 @@ def scene(length, level, blocks, slope=0.0, **more):
 
 def block(name, x, z, size, **more):
     """A block as wide as the tank, of half the density of water unless given."""
-    return {"name": name, "centre": [x, 0.5 * CELL, z], "size": [size[0], CELL, size[1]], "density": 500.0} | more
+    return {
+        "name": name,
+        "centre": [x, 0.5 * CELL, z],
+        "size": [size[0], CELL, size[1]],
+        "density": 500.0,
+    } | more
 
 
 def floating(density=500.0):
