@@ -138,6 +138,9 @@ class FreeBody:
     def overlaps(self):
         return np.zeros(0, int), np.zeros((0, 3)), np.zeros(0)
 
+    def touching_at_start(self):
+        return np.zeros(0, int), np.zeros((0, 3))
+
     def set_load(self, load):
         self._load = load
 

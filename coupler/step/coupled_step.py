@@ -87,6 +87,8 @@ class CoupledStepper:
 
             self.sheared = ShearedBlocks(self.structure, self.immersion.n_solids)
         self.ledger = Ledger()
+        if self.coupled:
+            self.water.leave_films_out(*self.immersion.films())
         if water is not None:
             self.ledger.available = water.available_energy()
         self._coming = coming

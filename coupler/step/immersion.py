@@ -73,6 +73,9 @@ class Immersion:
         """Blocks that are long enough to reach from one side of the tank to the opposite one."""
         self._tolerance = STILL * mesh.finest
         self._centre, self._rotation = self._pose()
+        self._first_pose = self._centre, self._rotation
+        none = np.zeros(0, np.int64), np.zeros((0, 3))
+        self._flush = none if structure is None else structure.touching_at_start()
         self._growth = self._new_growth(np.full(len(self._body_of_plane), -np.inf))
         self.bodies = self._placed()
         self.domain = cut_domain(mesh, self.bodies, covers, connection=connection)
@@ -189,7 +192,7 @@ class Immersion:
     def _films(self, loose: Array) -> Array:
         """Inward shift (P,) [m] of each plane for the contacts of the loose blocks (n,) bool."""
         film = np.zeros(len(self._body_of_plane))
-        block, direction, depth = self.structure.overlaps()
+        block, direction, depth = self._touching()
         block, direction, depth = (a[loose[block]] for a in (block, direction, depth))
         if len(block) == 0:
             return film
@@ -206,6 +209,24 @@ class Immersion:
         doubled = least * 2.0 ** np.ceil(np.log2(1.0 + np.maximum(depth, 0.0) / least))
         np.maximum.at(film, plane[on], np.minimum(doubled, MOST_FILM * self.mesh.finest)[contact[on]])
         return film
+
+    def _touching(self) -> tuple[Array, Array, Array]:
+        """Contacts as `Structure.overlaps`, and faces that touched at the start, at depth 0, of blocks that still stand
+        there: their contact may have yet to begin."""
+        block, direction, depth = self.structure.overlaps()
+        rows, outward = self._flush
+        if len(rows) == 0:
+            return block, direction, depth
+        (centre, rotation), (first, turned) = self._pose(), self._first_pose
+        way = (
+            np.linalg.norm(centre - first, axis=1) + np.abs(rotation - turned).max(axis=(1, 2)) * self._radius
+        )
+        there = way[rows] <= self._tolerance
+        return (
+            np.concatenate([block, rows[there]]),
+            np.concatenate([direction, outward[there]]),
+            np.concatenate([depth, np.zeros(there.sum())]),
+        )
 
     def _closing_planes(self) -> Array:
         """(P,) bool: faces along the tank sides of blocks that reach from one side to the opposite one."""

@@ -7,7 +7,8 @@ pressure_bound          how far the pressure may fall: to that of the air, to va
 displaced               the water that bodies take from the nodes as they move on
 waterline               the load on solids where the surface passes through their cells
 slits                   cracks narrower than the mesh, as conductances
-films                   water under blocks that transmits the pressure of its rim
+films                   water under blocks that hands on the pressure of its rim
+film_volume             volume and weight of that water, which count as those of the blocks
 
 Imports `domain` and the chapters below it, never a step.
 """

@@ -33,7 +33,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
-from array_types import Bools
+from array_types import Bools, Floats
 from fluid.cut.facing import facing
 from fluid.domain.coupling_matrix import wetted_coupling
 from fluid.pressure.projection import inflow
@@ -46,10 +46,11 @@ NARROW = 0.25
 @dataclass(frozen=True)
 class Films:
     """Films of a domain. node (N,) bool: all cells around it lie in films · thinned csr (N, 6 n_bodies): reduction of
-    G by shares below 1."""
+    G by shares below 1 · drawn_in (S,) [m]: how far the plane of each wetted polygon is cut within its body."""
 
     node: Bools
     thinned: sp.csr_array
+    drawn_in: Floats
 
     @classmethod
     def of(cls, domain, topology, loose, share) -> Films:
@@ -68,7 +69,7 @@ class Films:
         for value in np.unique(share[plane[partly]]):
             rows = partly[share[plane[partly]] == value]
             thinned = thinned + (1.0 - value) * sp.csr_array(wetted_coupling(domain, rows))
-        return cls(node, sp.csr_array(thinned))
+        return cls(node, sp.csr_array(thinned), np.maximum(-bodies.growth[plane], 0.0))
 
     def handed_on(self, water, problem):
         """The PressureProblem in which films transmit the pressure at their rim; the same one if no film takes part."""

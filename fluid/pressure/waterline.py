@@ -55,7 +55,7 @@ def waterline_load(domain, faces, left_out, phi, wet, pressure, open_node, air=N
     acting[len(mixed) :] = 0.0
     body = domain.face_body[at]
     arm = domain.face_corners[at] - domain.body_centre[body][:, None]
-    force, first = _differences(height, full, acting, arm, domain.face_area[at])
+    force, first = differences(height, full, acting, arm, domain.face_area[at])
     normal = domain.face_normal[at]
     np.add.at(load[:, :3], body, force[:, None] * normal)
     np.add.at(load[:, 3:], body, np.cross(first, normal))
@@ -87,7 +87,7 @@ def hydrostatic_stiffness(water, phi, bodies) -> Array | None:
     arm = domain.face_corners[at] - domain.body_centre[body][:, None]
     nothing = np.zeros_like(height)
     for k, lift in enumerate((np.ones_like(height), arm[:, :, 1], -arm[:, :, 0])):
-        force, first = _differences(height, np.ascontiguousarray(lift), nothing, arm, area)
+        force, first = differences(height, np.ascontiguousarray(lift), nothing, arm, area)
         moment = np.cross(first, normal)
         for row, value in enumerate((force * normal[:, 2], moment[:, 0], moment[:, 1])):
             np.add.at(stiffness[:, row, k], body, weight * value)
@@ -95,7 +95,7 @@ def hydrostatic_stiffness(water, phi, bodies) -> Array | None:
 
 
 @kernel
-def _differences(height, full, acting, arm, area):
+def differences(height, full, acting, arm, area):
     """∫ p_acting - ∫_{height<0} p_full over triangles with corner values (k, 3): (k,), and times the arm: (k, 3)."""
     n = height.shape[0]
     force, first = np.zeros(n), np.zeros((n, 3))

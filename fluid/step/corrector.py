@@ -345,7 +345,7 @@ def _report(water, problem, x, projected, u, clipped, momentum, bound):
     if water.viscous is not None:
         change["transport and gravity"] -= kept.shear.energy
         change["viscosity and friction"] = kept.shear.energy
-    volume = float(kept.nodal_water.sum()) - float(kept.displaced.sum())
+    volume = float(kept.nodal_water.sum()) - float(kept.displaced.sum()) - kept.in_films[0]
     left = kept.left
     moved_by_bodies = product(problem.matrix, x) - problem.rhs - bound.rate
     return StepReport(

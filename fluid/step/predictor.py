@@ -49,7 +49,8 @@ class Predicted:
     before the volume correction, shear: ViscousChange by viscosity and friction, None without; end [s]: time at the end
     of the step; left: what leaves through open sides, None if nothing; through (N,) [m³] that enters through sides,
     None without any; held (N,) [Pa]: unknown part of the pressure on the nodes of seas, None without any side;
-    displaced (N,) [m³]: part of nodal_water that the bodies take in this step; given_by_films: `films.Handed.given`;
+    displaced (N,) [m³]: part of nodal_water that the bodies take in this step; in_films: that in films, as
+    `Water.in_films` gives it; given_by_films: `films.Handed.given`;
     cushions: trapped air (`fluid.air.cushions`), None without any."""
 
     level_set: Floats
@@ -72,6 +73,7 @@ class Predicted:
     through: Floats | None
     held: Floats | None
     displaced: Floats
+    in_films: tuple[float, float]
     cushions: object | None = None
     given_by_films: object | None = None
 
@@ -95,7 +97,7 @@ def predicted(water, dt: float) -> PressureProblem:
         through, inflow_rate = water.sides.through(phi, u_now, dt, carried)
         carried += through
         conserved += float(through.sum())
-    displaced = water.displacement(dt)
+    displaced, in_films = water.displacement(dt), water.in_films()
     phi = redistance(
         water.topology,
         phi,
@@ -108,7 +110,8 @@ def predicted(water, dt: float) -> PressureProblem:
         through += exchanged
         carried += exchanged
         conserved += float(exchanged.sum())
-    surface = _new_surface(water, phi, carried + displaced, conserved + float(displaced.sum()))
+    beside = float(displaced.sum()) + in_films[0]
+    surface = _new_surface(water, phi, carried + displaced, conserved + beside)
     if found.velocity is not None:
         graph = water.graph_for(water.listed)
         found.into(
@@ -142,6 +145,7 @@ def predicted(water, dt: float) -> PressureProblem:
         through,
         inflow_rate,
         displaced,
+        in_films,
     )
 
 
@@ -249,7 +253,20 @@ def _new_surface(water, phi, carried, conserved):
 
 
 def _problem(
-    water, dt, theta, kick, surface, conserved, u_adv, u_star, shear, left, through, inflow_rate, displaced
+    water,
+    dt,
+    theta,
+    kick,
+    surface,
+    conserved,
+    u_adv,
+    u_star,
+    shear,
+    left,
+    through,
+    inflow_rate,
+    displaced,
+    in_films,
 ):
     t, density = water.topology, water.parameters.density
     phi = surface.level_set
@@ -305,6 +322,7 @@ def _problem(
         through=through,
         held=held,
         displaced=displaced,
+        in_films=in_films,
         cushions=cushions,
     )
     acted, unheld = _known_pressure(water, water.pressure, phi), water.walls.open_node

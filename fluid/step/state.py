@@ -34,6 +34,8 @@ NUMBERS = {
     "steps": int,
     "conserved_volume": float,
     "initial_volume": float,
+    "film_volume": float,
+    "film_potential": float,
     "_surface_lag": float,
     "_domain_is_new": bool,
 }

@@ -31,7 +31,7 @@ from fluid.step.predictor import kick_factor, kicked, predicted
 from fluid.step.report import StepReport
 from fluid.step.time_step import LEAST_COUNTED, LEAST_GATHERED, gathered, largest_component, pace
 from fluid.surface.extrapolation import BAND, fill_missing
-from fluid.surface.level_set import FAR, redistance, without_films
+from fluid.surface.level_set import FAR, no_steeper, redistance, without_films
 from fluid.surface.volume import edge_flux, nodal_volume, renumbering
 from fluid.transport.surface_momentum import Carried
 from fluid.transport.swept_volume import swept
@@ -115,9 +115,8 @@ class Water:
         if sides is not None:
             sides.surface(level, 0.0)
         level = self._dry_if_inactive(level)
-        self.level_set = without_films(
-            redistance(self.topology, level, self.topology.node_size, rescale=False), self.topology.node_size
-        )
+        level = redistance(self.topology, level, self.topology.node_size, rescale=False)
+        self.level_set = without_films(no_steeper(self.topology, level), self.topology.node_size)
         self.velocity, self.acceleration = np.zeros((n, 3)), np.zeros((n, 3))
         self.air, self.vents = None, tuple(vents)
         if gas is not None:
@@ -131,6 +130,8 @@ class Water:
         self.nodal_water = nodal_volume(self.topology, self.level_set)
         self.displaced = np.zeros(n)
         """(N,) [m³], part of `nodal_water`: what the bodies take of it as they move on to where the surface is."""
+        self.film_volume = self.film_potential = 0.0
+        """Part of `nodal_water` [m³] in films between bodies, and its ∫ g·x dV [m⁵/s²]."""
         self.conserved_volume = float(self.nodal_water.sum())
         self.initial_volume = self.conserved_volume
         self.given_by_films = np.zeros(n)
@@ -257,6 +258,7 @@ class Water:
         late = self._late()
         self.level_set, self.nodal_water = problem.predicted.level_set, new.nodal_water
         self.displaced = problem.predicted.displaced
+        self.film_volume, self.film_potential = problem.predicted.in_films
         self.velocity, self.acceleration = new.velocity, new.acceleration
         self.pressure, self.end_pressure = new.pressure, new.end_pressure
         self.remainder, self.kick_remainder = new.remainder, new.kick_remainder
@@ -337,6 +339,21 @@ class Water:
         if not same or not all(np.array_equal(a, b) for a, b in zip(known[1:], rules[1:])):
             self.films = Films.of(self.domain, self.topology, *rules[1:])
             self._film_rules = rules
+
+    def leave_films_out(self, loose, share) -> None:
+        """`set_films` before the first step: what the films at the start hold is no water of the scene."""
+        self.set_films(loose, share)
+        self.film_volume, self.film_potential = self.in_films()
+        self.conserved_volume -= self.film_volume
+        self.initial_volume = self.conserved_volume
+
+    def in_films(self) -> tuple[float, float]:
+        """Volume [m³] of the films below the surface, and ∫ g·x dV [m⁵/s²] over it (`film_volume.py`)."""
+        if self.films is None or not self.films.drawn_in.any():
+            return 0.0, 0.0
+        from fluid.pressure.film_volume import film_volume
+
+        return film_volume(self.domain, self.films.drawn_in, self.level_set, self.nodes_below_floor)
 
     def carried(self, dt: float, theta: float) -> Carried:
         """What the fluxes make of volume and momentum in dt [s], carried on the domain of the last projection."""
@@ -486,8 +503,8 @@ class Water:
     # ---- figures
 
     def volume(self) -> float:
-        """Volume of water in the tank [m³]."""
-        return float(self.nodal_water.sum()) - float(self.displaced.sum())
+        """Water in the tank [m³]."""
+        return float(self.nodal_water.sum()) - float(self.displaced.sum()) - self.film_volume
 
     def displacement(self, dt: float) -> Array:
         """Volume (N,) [m³] that the bodies have displaced at the nodes since the cells were cut, at the end of a step
@@ -526,7 +543,7 @@ class Water:
         What the volume is off by within the tolerance of its correction counts as if it were put right at the surface:
         a millionth of a deep pool would outweigh a small wave."""
         p, held = self.parameters, self.nodal_water - self.displaced
-        found = -p.density * float(held @ self.nodes_below_floor)
+        found = -p.density * (float(held @ self.nodes_below_floor) - self.film_potential)
         found -= self._surface_lag * float(self.momentum() @ p.weight)
         surface, farther = self._surface_potential(), self._taken_by(self.farther)
         found += p.density * float(farther @ (self.nodes_below_floor - surface))

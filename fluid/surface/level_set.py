@@ -37,6 +37,11 @@ EXACT_LAYERS = 2
 """Layers that look for their own closest polygon on meshes with obtuse cells: those next to the surface."""
 FAR = 7.0
 FILM = 1e-7
+FLATTEST, STEEPEST = 0.9, 1.1
+"""Mean slopes around a node between which φ is not divided by them."""
+LEAST_LEFT = 0.05
+"""Share of the distance of two nodes at a start that φ keeps on either side of the surface between them."""
+EDGES = np.array([(a, b) for a in range(4) for b in range(a)])
 
 
 def without_films(phi, spacing):
@@ -328,11 +333,34 @@ def redistance(topology, phi, spacing, rescale: bool, motion=None):
     far[front] = phi[front]
     if rescale:
         slope = _mean_slope(cut, phi, t.cells, t.parent, t.gradients, len(phi))
-        off = front & ((slope > 1.1) | (slope < 0.9)) & (slope > 0.0)
+        off = front & ((slope > STEEPEST) | (slope < FLATTEST)) & (slope > 0.0)
         far[off] /= slope[off]
     if motion is not None and not t.is_obtuse:
         _past_the_last_polygon(t, cut, front, order[start[1] : start[2]], motion, far)
     return far
+
+
+def no_steeper(topology, phi):
+    """φ (N,) of a start, with smaller sizes where those of two corners of a cell on both sides of the surface add up to
+    more than STEEPEST times their distance; the signs stay, and so does what is a distance.
+
+    What lies beyond a solid is dry at the start, and what ends at one is wet, however near the surface; φ is as large
+    there as it takes to say so. Copies of such nodes can share a cell with others (between stones). Left as steep as
+    that, the first `redistance` with `rescale` would change the volume of these cells."""
+    t = topology
+    cut = t.cells[surface_cells(phi, t.cells_around(phi < 0.0), t.cells)].astype(np.int64)
+    one, other = cut[:, EDGES[:, 0]].ravel(), cut[:, EDGES[:, 1]].ravel()
+    apart = (phi[one] < 0.0) != (phi[other] < 0.0)
+    one, other = one[apart], other[apart]
+    one, other = np.concatenate([one, other]), np.concatenate([other, one])
+    length = np.linalg.norm(t.nodes[one] - t.nodes[other], axis=1)
+    size = np.abs(phi)
+    steep = size[one] > STEEPEST * length
+    np.minimum.at(size, one[steep], length[steep])
+    steep = (size[one] + size[other] > STEEPEST * length) & (size[one] >= size[other])
+    left = np.maximum(length - size[other], LEAST_LEFT * length)
+    np.minimum.at(size, one[steep], left[steep])
+    return np.where(size < np.abs(phi), np.copysign(size, phi), phi)
 
 
 def _past_the_last_polygon(t, cut, front, beside, motion, phi) -> None:

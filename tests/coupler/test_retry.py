@@ -48,6 +48,8 @@ class Pipe:
     def set_films(self, loose, share):
         """There are none."""
 
+    leave_films_out = set_films
+
     def predict(self, dt):
         if dt > self.fails_above or dt < self.fails_below:
             raise NotConverged("pressure solver did not converge.", np.zeros(1))

@@ -9,7 +9,7 @@ from fluid.cut.bodies import ConvexBodies
 from fluid.domain.physical_domain import cut_domain
 from fluid.domain.topology import Topology
 from fluid.mesh.background import box_mesh
-from fluid.surface.level_set import FAR, redistance, squared_distance
+from fluid.surface.level_set import FAR, no_steeper, redistance, squared_distance
 from fluid.surface.volume import nodal_volume
 
 H = 0.1
@@ -72,3 +72,24 @@ def test_distance_to_a_triangle_against_sampling(p, corners):
     found = np.sqrt(squared_distance(p, t))
     assert found <= nearest + 1e-7
     assert found >= nearest - 0.13
+
+
+def test_a_start_is_as_flat_as_a_distance(cube):
+    """Dry nodes among wet ones and wet ones among dry ones that lie farther off by their value than their neighbours on
+    the other side are: nodes of pockets between stones. A plane keeps its bits."""
+    plane = cube.nodes[:, 2] - 0.43
+    assert (no_steeper(cube, plane) == plane).all()
+    near = np.hypot(*(cube.nodes[:, :2] - 0.5).T) < 0.01
+    level = np.where(near & (np.abs(plane) < H), -np.sign(plane) * 2 * H, plane)
+    flat = no_steeper(cube, level)
+    assert (np.sign(flat) == np.sign(level)).all()
+    assert (np.abs(flat) <= np.abs(level)).all()
+    changed = cube.nodes[flat != level]
+    beside = np.linalg.norm(changed[:, None] - cube.nodes[level != plane], axis=2).min(axis=1)
+    assert beside.max() < 1.8 * H
+    a, b = cube.cells[:, [0, 0, 0, 1, 1, 2]].ravel(), cube.cells[:, [1, 2, 3, 2, 3, 3]].ravel()
+    over = np.flatnonzero((flat[a] < 0.0) != (flat[b] < 0.0))
+    a, b = a[over], b[over]
+    assert (
+        np.abs(flat[a]) + np.abs(flat[b]) <= 1.1 * np.linalg.norm(cube.nodes[a] - cube.nodes[b], axis=1)
+    ).all()

@@ -14,6 +14,7 @@ import scipy.sparse as sp
 
 from array_types import Array
 from yade_scripts.blocks import tangent
+from yade_scripts.blocks.faces import touching_faces
 from yade_scripts.contact.forces import ContactForces
 from yade_scripts.contact.state import Contacts, no_contacts, sum_on_blocks
 from yade_scripts.dynamics.energy import EnergySums, Masses
@@ -188,6 +189,23 @@ class StructureReadings:
         other = c.b >= 0
         rows = np.concatenate([c.a, c.b[other]])
         return rows, np.concatenate([c.normal, -c.normal[other]]), np.concatenate([c.depth, c.depth[other]])
+
+    def touching_at_start(self) -> tuple[Array, Array]:
+        """Faces that touched other blocks or fixed planes as the scene began, seen from each block: block (m,),
+        direction to the other body (m, 3). None where blocks have no contact, nor those between bodies that are held,
+        which have none either."""
+        if self.contact is None:
+            return np.zeros(0, np.int64), np.zeros((0, 3))
+        free = [not block.fixed for block in self.blocks]
+        found = [
+            face
+            for face in touching_faces(self.blocks, self.planes)
+            if free[face.a] or (face.b >= 0 and free[face.b])
+        ]
+        both = [face for face in found if face.b >= 0]
+        rows = [face.a for face in found] + [face.b for face in both]
+        outward = [face.normal for face in found] + [-face.normal for face in both]
+        return np.array(rows, np.int64), np.array(outward, float).reshape(-1, 3)
 
     def deepest(self) -> tuple[Array, Array, Array, Array]:
         """Pairs that are in one another: blocks a (p,) and b (p,), -1 - number for a fixed plane, depth (p,) [m] and
