@@ -71,6 +71,7 @@ def water_problems(case: Case) -> Iterator[Problem]:
         yield from wrong
         if not wrong:
             yield from _filled_up(case)
+            yield from _over_its_crest(case)
             yield from _struck(case)
         yield from _without_air(case)
         yield from _drops(case)
@@ -197,6 +198,27 @@ def _filled_up(case: Case) -> Iterator[Problem]:
                 f"brings {brought:.3g} m3 until the end of the run ({case.time.end:g} s) into a tank that has "
                 f"room for {room:.3g} m3 and {way_out}: name open sides (tank.open), let it take back what returns "
                 "(absorbs = true), or end before the tank is full",
+            )
+
+
+def _over_its_crest(case: Case) -> Iterator[Problem]:
+    """Waves into a tank of walls that they fill to above their own crest: the surface at their side is given, and the
+    water of the tank would fall into the trough there."""
+    if set(case.tank.open) - {"z+"} or case.water.sea:
+        return
+    for i, spec in enumerate(case.water.inflow):
+        if spec.kind not in ("solitary", "n-wave") or spec.absorbs or not case.tank.is_box:
+            continue
+        crest = min(spec.level + abs(spec.height), case.tank.upper[2])
+        under = case.tank.model_copy(update={"upper": (*case.tank.upper[:2], crest)})
+        brought, room = _brought(case, spec), room_beside(under, case.water.fill)
+        if brought > room:
+            yield (
+                ("water", "inflow", i),
+                f"brings {brought:.3g} m3 until the end of the run ({case.time.end:g} s) into a tank without another "
+                f"side to leave by, which has room for {room:.3g} m3 under the crest (z = {crest:.3g} m): the water "
+                f"would stand above the surface that the wave has at {spec.side}; let it take back what returns "
+                "(absorbs = true), name open sides or a sea, take a longer tank, or end earlier",
             )
 
 

@@ -93,6 +93,23 @@ def test_a_tank_that_its_inflow_fills_is_refused():
     assert filled(2.1, closed, sea=[{"side": "x+", "level": 0.5}]) == []
 
 
+def test_a_wave_that_lifts_its_tank_above_its_crest_is_refused():
+    """A crest of 0.1 m on 0.5 m brings sqrt(16/3 0.5³ 0.1) 0.2 m3 in all; a tank of 1 m has room for 0.02 m3 up to the
+    crest, one of 3 m for 0.06."""
+    wave = {"kind": "solitary", "side": "x-", "level": 0.5, "height": 0.1, "crest": 2.0}
+
+    def found(length, end=5.0, **more):
+        fill = [{"lower": [0, 0, 0], "upper": [length, 0.2, 0.5]}]
+        tank = TANK | {"upper": [length, 0.2, 1]}
+        with_fill = {"inflow": [wave | more], "fill": fill}
+        return [text for _, text in problems(case(with_fill, tank=tank, time={"end": end}))]
+
+    assert "room for 0.02 m3 under the crest (z = 0.6 m)" in found(1.0)[0]
+    assert found(1.0, end=1.0) == []
+    assert found(1.0, absorbs=True) == []
+    assert found(3.0) == []
+
+
 def test_what_a_record_takes_back_leaves_room(tmp_path):
     """To and fro: 0.2 m x 0.5 m x 2/pi x 1 m/s, 0.0637 m3, come in within a second and leave in the next."""
     rows = [f"{t:.2f},0.5,{np.sin(np.pi * t):.6f}" for t in np.arange(0.0, 20.01, 0.05)]
