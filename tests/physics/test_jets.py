@@ -15,6 +15,12 @@ def test_a_jet_of_a_few_cells_gives_a_plate_its_force(width, n):
     assert jet(width, n).force == pytest.approx(EXACT[width], rel=LIMITS[n])
 
 
+@pytest.mark.parametrize("width", [1.0, 2.0])
+def test_a_jet_loses_nothing_where_finer_cells_begin(width):
+    """Cells halved up to D around the plate give it the force that the same mesh halved everywhere does."""
+    assert jet(width, 4, finer=1.0).force == pytest.approx(jet(width, 4, finer=12.0).force, rel=0.015)
+
+
 def test_without_the_bound_the_edges_of_a_plate_are_pulled_at():
     """Suction at the edges takes force off the plate; the bound lets air in there, as it is."""
     bounded, pulled = jet(1.0, 4), jet(1.0, 4, suction="unlimited")
