@@ -26,8 +26,9 @@ def explanation(name: str | None) -> str:
     """
     if not name:
         return "\n".join(_entry(key) for key in keys() if "." not in key.path)
-    if name in PRESETS:
-        return described(name)
+    presets = [preset for preset in PRESETS if name.lower() in (preset, *preset.split("-"))]
+    if presets:
+        return "\n".join(map(described, presets))
     plain = name.strip("[]").replace("[]", "")
     key = find(tuple(plain.split(".")))
     if key is None:

@@ -66,6 +66,11 @@ def test_a_preset_counts_less_than_what_the_case_says_and_more_than_what_it_says
     assert friction[frozenset({"brick-masonry", "ground"})] == 0.8
 
 
+def test_explain_knows_a_preset_by_a_word_of_its_name():
+    assert explanation("Masonry") == explanation("brick") == explanation("brick-masonry")
+    assert explanation("masonry").startswith('material = "brick-masonry"')
+
+
 @pytest.mark.parametrize("name", PRESETS)
 def test_explain_gives_numbers_and_sources(name):
     text = explanation(name)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from coupler.commands.view.__main__ import main, pixels, rate
-from coupler.commands.view.plots import grouped
+from coupler.commands.view.plots import common, grouped
 from coupler.program import extras
 from coupler.results.fields import WaterWriter
 from coupler.results.history import HistoryTable, read_history
@@ -167,6 +167,38 @@ def test_layers_of_water_are_drawn_from_far_to_near(tmp_path):
     assert front > -1e-3, "a triangle seen from behind is drawn for nothing"
 
 
+def test_a_section_is_filled():
+    """Half of a cube of water of 2 m, of a block and of a solid, each cut in its middle; ground of 1 m under a bed."""
+    code = """
+import numpy as np, pyvista as pv
+from types import SimpleNamespace as S
+from coupler.commands.view import section
+grid = pv.ImageData(dimensions=(3, 3, 3)).to_tetrahedra()
+n = grid.n_points
+x = np.array(grid.points, float)
+water = S(nodes=x, cells=grid.cells_dict[10].astype(int), level_set=x[:, 2] - 1.5,
+          velocity=np.ones((n, 3)), fraction=np.ones(grid.n_cells))
+y, at = np.array([0.0, 1.0, 0.0]), np.array([1.0, 0.7, 0.0])
+cut = section.with_section(pv.PolyData(), water, y, at)
+print(round(cut.area, 6), round(float(cut["speed"].max()), 6))
+block = pv.Box((0, 2, 0, 1, 0, 3))
+block.cell_data["block"] = np.zeros(6, int)
+block.cell_data["damage"] = np.full(6, 0.5)
+half = section.solid_behind_cut(block, (y, at))
+print(round(half.area - 2 * (2 * 0.7 + 3 * 0.7) - 2 * 3, 6), half.cell_data["damage"].min())
+print(round(section.closed_behind_cut(pv.Box((0, 2, 0, 1, 0, 3)).triangulate(), (y, at)).volume, 6))
+bed = pv.Plane(center=(1, 1, 1), i_size=2, j_size=2)
+print(round(section.ground_behind_cut(bed, (y, at), 0.0).area, 6))
+"""
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    cut, half, solid, ground = (tuple(map(float, line.split())) for line in done.stdout.splitlines())
+    assert cut == (3.0, pytest.approx(3**0.5, rel=1e-5)), "2 m of width, 1.5 m of depth"
+    assert half == (pytest.approx(6.0, abs=1e-5), 0.5), "the face of the cut has the damage of its block"
+    assert solid == (pytest.approx(2 * 0.7 * 3),)
+    assert ground == (pytest.approx(2 * 0.7 + 2 * 1),), "the bed that is kept, and the ground in the plane"
+
+
 def test_round_off_is_not_drawn(tmp_path):
     """A block that moves along z alone has 1e-17 m in x and y: no lines for those."""
     table = HistoryTable(tmp_path / "gauges.csv", [(n, "m", n) for n in ("time", "x", "z")])
@@ -174,6 +206,13 @@ def test_round_off_is_not_drawn(tmp_path):
         table.append(time=k, x=1e-17 * k, z=0.1 * k)
     table.close()
     assert grouped(read_history(tmp_path / "gauges.csv")) == [("m", ["z"])]
+
+
+def test_an_axis_says_what_its_lines_have_in_common():
+    assert common(["house_force_x", "house_force_z"]) == "house force"
+    assert common(["front_level", "beside_level"]) == "level"
+    assert common(["first_x", "second_x"]) == ""
+    assert common(["largest_damage"]) == "largest damage"
 
 
 def test_missing_extra_is_named_with_the_command_that_adds_it(tmp_path, monkeypatch, capsys):

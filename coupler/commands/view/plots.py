@@ -21,6 +21,8 @@ LEVEL = 0.01
 TALLEST = 8.4  # [inch] of the panels of one figure: with its caption it fits on a page of A4
 ROUND_OFF = 1e-12  # pure numbers below this all the time are not shown
 FORMATS = ("pdf", "svg", "png")
+QUANTITY = {"J": "energy", "N": "force", "Pa": "pressure", "m3": "volume", "m/s": "speed"}
+"""Of a panel whose lines have no word in common."""
 UNIT_TEXT = {"1": "–", "m3": "m³", "m2": "m²", "N s": "N·s", "N m s": "N·m·s"}
 PREFIXED = ("J", "N", "N s", "N m s", "Pa", "W", "m", "m/s", "s")
 PREFIXES = {-2: "µ", -1: "m", 0: "", 1: "k", 2: "M", 3: "G", 4: "T"}
@@ -131,6 +133,8 @@ def figure(history, panels, stem):
         for axis, (unit, names) in zip(axes[:, 0], panels):
             panel(axis, history, unit, names)
         axes[-1, 0].set_xlabel("time [s]")
+        drawing.get_layout_engine().execute(drawing)  # once, and not again for every format
+        drawing.set_layout_engine("none")
         for ending in FORMATS:
             drawing.savefig(stem.with_suffix("." + ending), metadata=_undated(ending))
         plt.close(drawing)
@@ -144,12 +148,23 @@ def panel(axis, history, unit, names):
     for name, value in values.items():
         axis.plot(history["time"], value / 1000.0**power, label=name.replace("_", " "))
     since = "change since start" if history.title in SINCE_START and unit == "J" else ""
-    what = names[0].replace("_", " ") if len(names) == 1 else since
+    alone = len(names) == 1
+    what = (not alone and since) or common(names) or QUANTITY.get(unit, "")
     axis.set_ylabel(f"{what} [{text}]".strip())
     axis.margins(x=0)
     _keep_flat(axis)
-    if len(names) > 1:
+    if not alone:
         axis.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0)
+
+
+def common(names):
+    """The words that all names of lines have in common, without x, y and z where there are several."""
+    words = [name.split("_") for name in names]
+    if len(words) == 1:
+        return " ".join(words[0])
+    return " ".join(
+        word for word in words[0] if word not in ("x", "y", "z") and all(word in other for other in words)
+    )
 
 
 def _keep_flat(axis):

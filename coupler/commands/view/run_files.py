@@ -154,7 +154,9 @@ def _bed(directory):
     found = read_map(path)
     x, y = np.meshgrid(*in_tank(directory, found))
     z = np.asarray(found.z, float)
-    return pv.StructuredGrid(x, y, np.where(np.isfinite(z), z, np.nanmin(z))).extract_surface()
+    return pv.StructuredGrid(x, y, np.where(np.isfinite(z), z, np.nanmin(z))).extract_surface(
+        algorithm="dataset_surface"
+    )
 
 
 def _series(kind, path):

@@ -17,6 +17,12 @@ from matplotlib.colors import ListedColormap
 from coupler.commands.view import palette
 from coupler.commands.view.camera import frame, side_of
 from coupler.commands.view.foam import foam
+from coupler.commands.view.section import (
+    closed_behind_cut,
+    ground_behind_cut,
+    solid_behind_cut,
+    with_section,
+)
 from coupler.commands.view.water_surface import facing, shading_normals, skin, some, surfaces_of_pockets
 
 WATER_OPACITY = 0.78
@@ -81,7 +87,7 @@ class Scene:
         """Put the stored step nearest to `time` [s] into the window; return its time [s]."""
         time = self.run.nearest(time)
         if self.run.blocks:
-            self._draw_blocks(self._behind_cut(self.run.blocks.at(time)))
+            self._draw_blocks(solid_behind_cut(self.run.blocks.at(time), self.cut))
         if self.run.water:
             water = self.run.water.at(time)
             self._draw_water(water)
@@ -156,13 +162,16 @@ class Scene:
 
     def _draw_still_parts(self):
         self.plotter.add_mesh(self.ground, color=palette.GROUND, lighting=False)
-        if self.run.bed is not None:
-            self.plotter.add_mesh(self.run.bed, color=palette.BED, ambient=0.25, smooth_shading=True)
-        if self.run.solids is not None:
+        bed = None if self.run.bed is None else ground_behind_cut(self.run.bed, self.cut, self.lower[2])
+        if bed is not None and bed.n_cells:
+            drawn = self.plotter.add_mesh(bed, color=palette.BED, ambient=0.25, smooth_shading=True)
+            behind(drawn.mapper)
+        solids = None if self.run.solids is None else closed_behind_cut(self.run.solids, self.cut)
+        if solids is not None and solids.n_cells:
             self.plotter.add_mesh(
-                self.run.solids, color=palette.SOLID, show_edges=True, edge_color="#6b6b6b", ambient=0.3
+                solids, color=palette.SOLID, show_edges=True, edge_color="#6b6b6b", ambient=0.3
             )
-            self._draw_shadow(self.run.solids, "solid_shadow")
+            self._draw_shadow(solids, "solid_shadow")
         if self.run.tank is not None:
             if self.run.basin is None:
                 tank = pv.Box(np.ravel(self.run.tank, order="F")).extract_all_edges()
@@ -226,6 +235,8 @@ class Scene:
         white = self.fastest if self.foam else None
         surface = water_surface(grid, np.array(self.plotter.camera.position), self._sides(), white)
         surface = self._behind_cut(surface)
+        if self.cut is not None:
+            surface = with_section(surface, grid, *self.cut)
         if surface.n_cells == 0:
             self.plotter.remove_actor("water", reset_camera=False, render=False)
             return
