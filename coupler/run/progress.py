@@ -91,8 +91,9 @@ class _Base:
     def _left(self, time: float) -> str:
         """Wall time left, as text; two times where what breaks decides."""
         between = self.pace.between()
-        if between is not None:
-            return f"left {duration(between[0])} to {duration(between[1])}"
+        least, most = map(duration, between or (0.0, 0.0))
+        if least != most:
+            return f"left {least} to {most}"
         left = self.pace.left()
         return "" if left is None else f"left {duration(left)}"
 

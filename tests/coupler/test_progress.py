@@ -108,3 +108,16 @@ def test_tables_without_a_terminal_are_aligned_lines(capsys):
 def test_forces_have_the_unit_that_suits_them(force, text):
     """A small flume has newtons, a quay meganewtons; what is below a tenth of a newton is round-off."""
     assert newtons(force) == text
+
+
+def test_two_times_that_read_alike_are_told_as_one():
+    """At the end of a run that may still break both are zero."""
+    lines = []
+    reporter = LineReporter(10.0, lines.append, lambda: None, stream=io.StringIO())
+    reporter.expect(True, False)
+    for time in (1.0, 2.0):
+        reporter.step(time, {})
+    assert reporter.pace.between() is not None
+    reporter.step(10.0, {})
+    assert lines[-1].endswith("left 0 s")
+    assert " to " not in lines[-1]
