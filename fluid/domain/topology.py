@@ -35,7 +35,8 @@ class Topology:
     node_volume (N,) [m³] ∫ N_i · covered (N,) bool: nodes inside a solid · beside_solid (N,) bool: nodes of
     cut cells · parts: the fluid parts of the cells · obtuse (M,) bool: cells with obtuse dihedral
     angles, is_obtuse: the mesh has such cells · upright (rows of `gradients`,) bool: `Background.upright` ·
-    node_size (N,) [m]: `Background.node_size`, slanting (N,) bool: `Background.slanting` · spacing [m] of the mesh."""
+    node_size (N,) [m]: `Background.node_size`, slanting, sloping_bed (N,) bool: as in `Background` ·
+    spacing [m] of the mesh."""
 
     nodes: Floats
     cells: Integers
@@ -61,6 +62,7 @@ class Topology:
     upright: Bools
     node_size: Floats
     slanting: Bools
+    sloping_bed: Bools
     spacing: float
 
     @classmethod
@@ -107,6 +109,7 @@ class Topology:
             upright=shapes.upright,
             node_size=mesh.node_size[domain.parent_node],
             slanting=mesh.slanting[domain.parent_node],
+            sloping_bed=mesh.sloping_bed[domain.parent_node],
             spacing=mesh.spacing,
         )
 

@@ -36,6 +36,8 @@ SAME_SIZE = 1e-9
 """Difference of sizes over the spacing that counts as round-off."""
 ALONG = 1e-9
 """Largest 1 - |n·e| of a face that counts as normal to an axis: round-off."""
+STEEPEST_BED = 1.0
+"""Largest slope of a side that counts as a bed on which water runs out thin; water on a steeper one ends on a wall."""
 MOST_BRICKS = 3e8
 """Most bricks of a box: with more, the numbers of the tetrahedra, six a brick, exceed 32 bits."""
 
@@ -155,6 +157,14 @@ class Background:
         along = np.abs(self.boundary_normal).max(axis=1) > 1.0 - ALONG
         found = np.zeros(len(self.nodes), bool)
         found[self.boundary_faces[~along]] = True
+        return found
+
+    @cached_property
+    def sloping_bed(self) -> Array:
+        """(N,) bool: nodes of slanting boundary faces that look down and are no steeper than STEEPEST_BED."""
+        down = -self.boundary_normal[:, 2]
+        found = np.zeros(len(self.nodes), bool)
+        found[self.boundary_faces[(down < 1.0 - ALONG) & (down > 1.0 / np.hypot(1.0, STEEPEST_BED))]] = True
         return found
 
     @cached_property

@@ -9,6 +9,7 @@ from fluid.cut.bodies import ConvexBodies
 from fluid.domain.physical_domain import cut_domain
 from fluid.domain.topology import Topology
 from fluid.mesh.background import box_mesh
+from fluid.mesh.fitted_mesh import fitted_mesh
 from fluid.surface.level_set import FAR, no_steeper, redistance, squared_distance
 from fluid.surface.volume import nodal_volume
 
@@ -93,3 +94,76 @@ def test_a_start_is_as_flat_as_a_distance(cube):
     assert (
         np.abs(flat[a]) + np.abs(flat[b]) <= 1.1 * np.linalg.norm(cube.nodes[a] - cube.nodes[b], axis=1)
     ).all()
+
+
+@pytest.fixture(scope="module")
+def beach():
+    """A bed of 1:20 with layers that follow it; the topology, and the nodes on the bed (N,) bool."""
+    fitted = fitted_mesh((0, 0, 0), (4.0, 0.3, 0.6), (0.1, 0.1, 0.05), lambda x, y: x / 20)
+    return Topology.of(fitted.mesh, cut_domain(fitted.mesh, ConvexBodies.empty())), fitted.on_bed
+
+
+def at_tip(topology, on_bed, tip):
+    """Nodes (N,) bool on the bed in the column before and after x = tip [m]."""
+    x = topology.nodes[:, 0]
+    return on_bed & (x < tip) & (x > tip - H), on_bed & (x > tip) & (x < tip + H)
+
+
+def test_a_thin_tongue_ends_where_its_plane_meets_the_bed(beach):
+    """Its last node is 5 mm below the surface, the second one ahead of it 15 mm above its plane and 0.15 m from its
+    end: with that distance the surface stands upright beside the last wet node once the tip gets there."""
+    t, on_bed = beach
+    tip, tangent = 2.05, 0.1
+    plane = t.nodes[:, 2] - t.nodes[:, 0] / 20 + tangent * (t.nodes[:, 0] - tip)
+    plane /= np.linalg.norm([tangent - 0.05, 1.0])
+    at_rest = (np.zeros_like(t.nodes), 9.81)
+    phi = redistance(t, plane, t.node_size, rescale=False, motion=at_rest)
+    wet, dry = at_tip(t, on_bed, tip)
+    np.testing.assert_allclose(phi[wet | dry], plane[wet | dry])
+    _, ahead = at_tip(t, on_bed, tip + H)
+    assert ahead.sum() == 4
+    np.testing.assert_allclose(phi[ahead], plane[ahead], rtol=0.02)
+
+
+def test_a_dry_node_before_a_thin_tongue_does_not_grow(beach):
+    """Water 5 mm deep before a node on the bed at which φ is 50 mm, and hardly more above it: the mean slope there is
+    below 0.9. In fast water it is restored as elsewhere."""
+    t, on_bed = beach
+    _, dry = at_tip(t, on_bed, 2.05)
+    height = t.nodes[:, 2] - t.nodes[:, 0] / 20
+    phi = np.where(t.nodes[:, 0] < 2.05, height - 0.005, 0.05 + 0.3 * height)
+    at_rest, fast = np.zeros_like(t.nodes), np.full_like(t.nodes, 2.0)
+    again = redistance(t, phi, t.node_size, rescale=True, motion=(at_rest, 9.81))
+    assert dry.sum() == 4
+    np.testing.assert_array_equal(again[dry], phi[dry])
+    assert (redistance(t, phi, t.node_size, rescale=True, motion=(fast, 9.81))[dry] > 1.1 * phi[dry]).all()
+
+
+def test_a_splash_over_a_bed_keeps_its_distance(beach):
+    """In fast water the plane of the surface is not that of the next cell."""
+    t, on_bed = beach
+    plane = t.nodes[:, 2] - t.nodes[:, 0] / 20 + 0.1 * (t.nodes[:, 0] - 2.05)
+    _, ahead = at_tip(t, on_bed, 2.15)
+    slow, fast = (
+        redistance(t, plane, t.node_size, rescale=False, motion=(np.full_like(t.nodes, u), 9.81))[ahead]
+        for u in (0.0, 2.0)
+    )
+    assert (slow < 0.2 * fast).all()
+    np.testing.assert_array_equal(fast, redistance(t, plane, t.node_size, rescale=False)[ahead])
+
+
+def test_only_gentle_slopes_count_as_beds():
+    """Sides of a basin: a slope of 1:20 is a bed, one of 3:2 and level ground are not."""
+    mesh = fitted_mesh(
+        (0, 0, 0),
+        (4.0, 0.3, 2.0),
+        (0.1, 0.1, 0.1),
+        lambda x, y: np.maximum(np.maximum(x - 1.0, 0.0) / 20, 1.5 * (x - 3.5)),
+    ).mesh
+    x, z = mesh.nodes[:, 0], mesh.nodes[:, 2]
+    steep = np.isclose(z, 1.5 * (x - 3.5)) & (x > 3.75)
+    assert mesh.slanting[steep].all()
+    assert not mesh.sloping_bed[steep].any()
+    gentle = np.isclose(z, (x - 1.0) / 20) & (x < 3.5) & (x > 0.95)
+    assert mesh.sloping_bed[gentle].all()
+    assert not mesh.sloping_bed[~gentle & (x < 3.5)].any()

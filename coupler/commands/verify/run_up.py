@@ -9,7 +9,7 @@ import numpy as np
 from coupler.commands.verify.curves import Curve, Figure, Panel
 from coupler.commands.verify.figures import columns, named_values
 from coupler.commands.verify.losses import Losses
-from coupler.commands.verify.registry import Finding, check
+from coupler.commands.verify.registry import TOLD, Finding, check
 from coupler.commands.verify.scenes import DENSITY, G
 from coupler.run.clock import Clock
 from coupler.step.coupled_step import CoupledStepper
@@ -35,6 +35,8 @@ FILM = 0.1
 LAYERS, THINNEST, FLATTEST, LONGEST = 8, 0.2, 4.0, 0.25
 """Of the mesh that fits the bed: layers between bed and lid, least height of one over that in deep water, length of a
 cell over its height, and its largest length in depths."""
+MOVED = 1e-6
+"""Distance in depths by which the beach is moved on the mesh that fits it, to see how far round-off changes R/d."""
 REST = 2.0
 """Duration [s] for which still water is observed."""
 
@@ -63,6 +65,9 @@ def run_up():
     yield Finding(
         f"the same on a mesh that fits the bed, {LAYERS} layers", float(on_bed.R.max()), exact, 0.10
     )
+    moved = _on_bed(_end(), by=MOVED)
+    change = abs(float(moved.R.max() - on_bed.R.max()))
+    yield Finding(f"change of it with the beach moved by {MOVED:g} d {TOLD}", change, 0.0, np.inf, False)
     lab = columns("synolakis_runup_lab")
     heights = np.geomspace(0.005, 0.05, 40)
     law = 2.831 * np.sqrt(SLOPE) * heights**1.25
@@ -98,16 +103,19 @@ def _beach(until: float, waves: bool = True) -> RunUp:
     return _run(until, waves, mesh, immersion, FILM / CELLS)
 
 
-def _on_bed(until: float) -> RunUp:
-    """The same slice on columns of LAYERS cells from the bed to the lid, shorter and flatter towards the shore."""
+def _on_bed(until: float, by: float = 0.0) -> RunUp:
+    """The same slice on columns of LAYERS cells from the bed to the lid, shorter and flatter towards the shore,
+    with the beach moved by a distance [m] away from the inflow."""
     lid = 1.0 + ABOVE
     layer = lid / LAYERS
     x = _columns(FLAT + SLOPE * (1.0 + 0.8 * ABOVE), lid, layer)
     width = layer * THINNEST * FLATTEST
     upper, across = [x[-1], 2 * width, lid], np.array([0.0, width, 2 * width])
-    fitted = fitted_mesh(np.zeros(3), upper, layer, _bed, axes=(x, across), thinnest=THINNEST)
+    fitted = fitted_mesh(
+        np.zeros(3), upper, layer, lambda x, y: _bed(x - by, y), axes=(x, across), thinnest=THINNEST
+    )
     immersion = Immersion(fitted.mesh, None, [], "single")
-    return _run(until, True, fitted.mesh, immersion, FILM * THINNEST * layer)
+    return _run(until, True, fitted.mesh, immersion, FILM * THINNEST * layer, by)
 
 
 def _bed(x, _):
@@ -124,14 +132,15 @@ def _columns(length: float, lid: float, layer: float):
     return x
 
 
-def _run(until: float, waves: bool, mesh, immersion, film: float) -> RunUp:
-    """Water of the depth 1 m in a slice, with or without the wave; film [m]: depth from which the beach is wet."""
+def _run(until: float, waves: bool, mesh, immersion, film: float, by: float = 0.0) -> RunUp:
+    """Water of the depth 1 m in a slice, with or without the wave; film [m]: depth from which the beach is wet ·
+    by [m]: how far the beach is moved."""
     sides = Sides([Side.of(mesh, lambda normal, _: normal[:, 0] < -0.5, _wave())]) if waves else None
     settings = WaterParameters(density=DENSITY, gravity=G)
     water = Water(mesh, immersion.domain, lambda x: x[:, 2] - 1.0, settings, None, None, sides)
     c = CoupledStepper(water, None, immersion, rtol=1e-7, step_max=1.0, clock=Clock())
     x = np.linspace(FLAT + 0.8 * SLOPE, mesh.bounds[1, 0] - 1e-6, 2000)
-    bed = (x - FLAT) / SLOPE
+    bed = (x - FLAT - by) / SLOPE
     line = np.column_stack([x, np.full_like(x, 0.5 * mesh.bounds[1, 1]), bed + film])
     t, R, losses = [0.0], [0.0], Losses(water)
     while c.time < until:
