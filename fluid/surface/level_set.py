@@ -347,7 +347,7 @@ def redistance(topology, phi, spacing, rescale: bool, motion=None):
         slope = _mean_slope(cut, phi, t.cells, t.parent, t.gradients, len(phi))
         off = front & ((slope > STEEPEST) | (slope < FLATTEST)) & (slope > 0.0)
         if motion is not None:
-            off &= ~(t.sloping_bed & (phi > 0.0) & ((motion[0] ** 2).sum(axis=1) < motion[1] * t.node_size))
+            off[_slow(np.flatnonzero(off & t.sloping_bed & (phi > 0.0)), t, motion)] = False
         far[off] /= slope[off]
     if motion is not None:
         _past_the_last_polygon(t, cut, front, order[start[1] : start[2]], motion, far)
@@ -375,6 +375,10 @@ def no_steeper(topology, phi):
     left = np.maximum(length - size[other], LEAST_LEFT * length)
     np.minimum.at(size, one[steep], left[steep])
     return np.where(size < np.abs(phi), np.copysign(size, phi), phi)
+def _slow(nodes, t, motion):
+    """Those of the nodes (n,) whose velocity is below that of the wave of a cell; motion as in `redistance`."""
+    velocity, gravity = motion
+    return nodes[(velocity[nodes] ** 2).sum(axis=1) < gravity * t.node_size[nodes]]
 
 
 def _past_the_last_polygon(t, cut, front, beside, motion, phi) -> None:
@@ -385,8 +389,7 @@ def _past_the_last_polygon(t, cut, front, beside, motion, phi) -> None:
     front (N,) bool: corners of the cut cells. Not inside solids on meshes with obtuse cells, where the paths of such
     nodes are continued (`paths_in_solids.py`)."""
     ahead = t.sloping_bed if t.is_obtuse else t.sloping_bed | t.covered
-    (velocity, gravity), found = motion, beside[ahead[beside] & (phi[beside] > 0.0)]
-    found = found[(velocity[found] ** 2).sum(axis=1) < gravity * t.node_size[found]]
+    found = _slow(beside[ahead[beside] & (phi[beside] > 0.0)], t, motion)
     if len(found) == 0:
         return
     value = phi[:, None].copy()
