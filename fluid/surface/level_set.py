@@ -375,6 +375,8 @@ def no_steeper(topology, phi):
     left = np.maximum(length - size[other], LEAST_LEFT * length)
     np.minimum.at(size, one[steep], left[steep])
     return np.where(size < np.abs(phi), np.copysign(size, phi), phi)
+
+
 def _slow(nodes, t, motion):
     """Those of the nodes (n,) whose velocity is below that of the wave of a cell; motion as in `redistance`."""
     velocity, gravity = motion
