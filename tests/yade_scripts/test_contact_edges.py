@@ -166,6 +166,29 @@ def test_other_edges_take_over_from_crossing_ones_that_are_not_the_outermost_any
         assert s.deepest()[2].max() > 0.9 * deep
 
 
+def test_plates_that_fold_touch_where_they_overlap_and_not_at_their_far_sides():
+    """Two panels of a roof side by side fold inwards, 22 mm deep in each other at one corner, which lies 5 mm from the
+    side of the other panel and is all but parallel to it. The edges of their far sides cross as well, 3.3 m deep."""
+    turns = (
+        [[0.998297, 0.046506, -0.035219], [-0.05359, 0.969621, -0.238671], [0.023049, 0.240151, 0.970462]],
+        [
+            [0.997953, 0.062485, 0.013619],
+            [-0.063883, 0.964116, 0.257682],
+            [0.002971, -0.258025, 0.966134],
+        ],
+    )
+    place, size = np.array([0.19472, 3.47767, 0.00248]), (3.33496295, 3.49989283, 0.4)
+    panels = [
+        Block(name, (0, y, 0), size, rotation=Rotation.from_matrix(R).as_matrix(), density=600.0)
+        for name, y, R in zip(("left", "right"), (0.0, 5.0), turns)
+    ]
+    with Structure(panels, ContactLaw(2e9, 0.3, 0.4), gravity=STILL) as s:
+        s.displace(np.array([1]), (place - panels[1].centre)[None], np.eye(3)[None])
+        contacts = s.contacts()
+        assert 0.0 < contacts.depth.max() < 1.1 * overlap(panels, s.centre(), s.rotation())
+        assert np.abs(contacts.normal[:, 0]).max() < 0.1, "nothing pushes them along their common side"
+
+
 @pytest.mark.parametrize("seed", [2, 7, 8])
 def test_a_plate_that_rolls_over_the_edges_of_another_does_not_sink_at_each_change_of_edges(seed):
     """It comes down slowly, slides and turns about one edge after another. Its speed alone makes 1 to 2 mm; where the

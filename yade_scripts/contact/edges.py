@@ -122,9 +122,10 @@ def crossing(shapes, a, b, number, state, plane, point, scratch):
 
 
 @inner
-def next_beside(shapes, side, n, number, leading, level, state, plane, point, scratch):
+def next_beside(shapes, side, n, number, leading, level, most, state, plane, point, scratch):
     """Find the next pair of edges after `number` that is `leading`, or that cross between their ends and bound faces
-    perpendicular to n (3,), which points out of b. level: whether both blocks have such faces.
+    perpendicular to n (3,), which points out of b. level: whether both blocks have such faces · most [m]: depth up to
+    which edges count as beside others.
 
     plane, point, scratch: as in `crossing`   →   (number of the pair or -1, depth [m], negative where they are apart)
     """
@@ -142,7 +143,7 @@ def next_beside(shapes, side, n, number, leading, level, state, plane, point, sc
             along = 0.0
             for k in range(3):
                 along += n[k] * (R[a, k, 0] * plane[0] + R[a, k, 1] * plane[1] + R[a, k, 2] * plane[2])
-            if i * count_b + j == leading or (level and within > ENDS and along > FLAT):
+            if i * count_b + j == leading or (level and within > ENDS and along > FLAT and depth <= most):
                 return i * count_b + j, depth
     return -1, 0.0
 

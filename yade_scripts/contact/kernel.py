@@ -116,11 +116,11 @@ def _contacts(first_pair, last_pair, shapes, bodies, law, pairs, slots, ground, 
         leads = meets and due and (bare or not pairs.touching[p])
         flat = meets and count > first and not known and lie_flat(shapes, slots, a, b, R, rows, first, count)
         if known or leads or flat:
-            deepest = 0.0
+            share = 0.0
             if leads:
-                deepest = -SAME * apart if bare else -CROSSING * apart
+                share = SAME if bare else CROSSING
             count, taken, parted = cross(
-                shapes, bodies, law.shear, slots, base, forward, deepest, flat, state, rows,
+                shapes, bodies, law.shear, slots, base, forward, -apart, share, flat, state, rows,
                 first, count, taken, scratch,
             )  # fmt: skip
             apart = max(apart, parted)

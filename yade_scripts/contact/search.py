@@ -22,6 +22,9 @@ CROSSING = 0.5
 """Two limits in one. Where the overlap of crossing edges is below this share of that of the faces, the edges carry the
 contact together with nodes that touch. Where the depth of contacts is below this share of the overlap, they do not hold
 the blocks apart: a corner may just touch the side of an edge that crosses the edges beside it."""
+BESIDE = 2.0
+"""Largest depth of edges that cross beside others, in overlaps along the faces: the far sides of two blocks that lie
+side by side cross, too, a whole width deep."""
 SHALLOW = 2.0
 """Depth, in margins, up to which a node just beside a face still counts as on it."""
 
@@ -135,17 +138,17 @@ def scan(shapes, bodies, law, slots, slot, side, faces, state, rows, count, lost
 
 @inner
 def cross(
-    shapes, bodies, shear, slots, base, side, deepest, flat, state, rows, first, count, lost, scratch
+    shapes, bodies, shear, slots, base, side, overlap, share, flat, state, rows, first, count, lost, scratch
 ):  # fmt: skip
     """Contacts of edges of a with edges of b, both known and new. → (contacts, lost [J], distance [m] by which the
     blocks are found to be apart, if positive)
 
     Known contacts fill the first slots, in the order in which they began.
-    rows first .. count: contacts of nodes of the pair · deepest [m]: edges begin a contact where they overlap by less,
-    0: none begins. They do so beside known ones, too, since others become the outermost as the blocks turn and slide ·
-    flat: whether edges may cross in the faces of these nodes."""
+    rows first .. count: contacts of nodes of the pair · overlap [m] along the faces · share: edges begin a contact
+    where they overlap by less than that share of it, 0: none begins. They do so beside known ones, too, since others
+    become the outermost as the blocks turn and slide · flat: whether edges may cross in the faces of these nodes."""
     a, b, x, R = side.a, side.b, state.x, state.R
-    nodes, parted, leading, to = count - first, -1.0, -1, base
+    nodes, parted, leading, to, most = count - first, -1.0, -1, base, BESIDE * max(overlap, 0.0)
     plane, xi, way, n = scratch[4], scratch[5], scratch[6:8], scratch[8]
     for s in range(base, base + CROSSINGS):
         if slots.face[s] >= 0:
@@ -159,8 +162,8 @@ def cross(
                 to += 1
     if not side.begins:
         return count, lost, parted
-    if deepest > 0.0:
-        leading, parted = find_crossing(shapes, a, b, x, R, deepest, scratch)
+    if share > 0.0:
+        leading, parted = find_crossing(shapes, a, b, x, R, share * overlap, scratch)
     if leading >= 0:
         crossing(shapes, a, b, leading, state, plane, xi, scratch)
         for k in range(3):
@@ -173,13 +176,13 @@ def cross(
     level = _has_face(shapes, a, n, R) and _has_face(shapes, b, n, R)
     there, number = 0, -1
     while True:
-        number, _ = next_beside(shapes, side, n, number, leading, level, state, plane, xi, scratch)
+        number, _ = next_beside(shapes, side, n, number, leading, level, most, state, plane, xi, scratch)
         if number < 0:
             break
         there += 1
     k = 2.0 * stiffness_together(bodies.stiffness[a], bodies.stiffness[b]) / (max(there, 2) + nodes)
     while True:
-        number, depth = next_beside(shapes, side, n, number, leading, level, state, plane, xi, scratch)
+        number, depth = next_beside(shapes, side, n, number, leading, level, most, state, plane, xi, scratch)
         if number < 0:
             return count, lost, -1.0
         s = _free_slot(slots, base, number)
@@ -291,20 +294,23 @@ def _behind(planes, g, xi0, xi1, xi2):
 def _entered(shapes, i, xi0, xi1, xi2, faces, smallest):
     """Face g of b that node i of a has entered, and the face of a opposite to it; -1, -1 if the node is outside.
 
-    It is the nearest of the faces that the node can have run into; if the node is still in front of that one, it is
-    outside."""
+    It is the one of the faces that the node can have run into through which the way back is shortest, against the
+    normal of its own face that looks at it most: a node of a plate that slides into the corner of another is nearer to
+    the side along which it slides. If the node is still in front of that face, it is outside."""
     planes, normal = faces.planes, shapes.normal
-    face, own, best = -1, -1, np.inf
+    face, own, best, way = -1, -1, np.inf, np.inf
     for g in range(faces.count):
         depth = _behind(planes, g, xi0, xi1, xi2)
-        if depth >= best:
+        if depth >= way:
             continue
-        cosine = ALIGNED
+        cosine, opposite = ALIGNED, -1
         for at in range(shapes.of_start[i], shapes.of_start[i + 1]):
             f = shapes.of[at]
             c = -(planes[g, 0] * normal[f, 0] + planes[g, 1] * normal[f, 1] + planes[g, 2] * normal[f, 2])
             if c > cosine:
-                cosine, face, own, best = c, g, f, depth
+                cosine, opposite = c, f
+        if opposite >= 0 and depth / cosine < way:
+            face, own, best, way = g, opposite, depth, depth / cosine
     if best <= 0.0 or (smallest < 0.0 and best > SHALLOW * faces.margin):
         return -1, -1
     return face, own
