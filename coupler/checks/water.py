@@ -202,22 +202,30 @@ def _filled_up(case: Case) -> Iterator[Problem]:
 
 
 def _over_its_crest(case: Case) -> Iterator[Problem]:
-    """Waves into a tank of walls that they fill to above their own crest: the surface at their side is given, and the
-    water of the tank would fall into the trough there."""
-    if set(case.tank.open) - {"z+"} or case.water.sea:
+    """Waves and bores into a tank of walls that they fill to above their own crest, or to above the bore that the far
+    side throws back: the surface at their side is given, and the water of the tank would fall into the trough there."""
+    if set(case.tank.open) - {"z+"} or case.water.sea or not case.tank.is_box:
         return
     for i, spec in enumerate(case.water.inflow):
-        if spec.kind not in ("solitary", "n-wave") or spec.absorbs or not case.tank.is_box:
+        if spec.kind not in ("solitary", "n-wave", "bore") or spec.absorbs:
             continue
-        crest = min(spec.level + abs(spec.height), case.tank.upper[2])
-        under = case.tank.model_copy(update={"upper": (*case.tank.upper[:2], crest)})
+        if spec.kind == "bore" and spec.ahead is None:
+            continue
+        if spec.kind == "bore":
+            bed, name = floor_along(case.tank, spec.side), "what the far side throws back"
+            speed = _bore_speed(spec.ahead - bed, spec.level - bed, case.case.gravity)
+            highest = bed + _depth_behind(spec.level - bed, speed, case.case.gravity)
+        else:
+            highest, name = spec.level + abs(spec.height), "the crest"
+        highest = min(highest, case.tank.upper[2])
+        under = case.tank.model_copy(update={"upper": (*case.tank.upper[:2], highest)})
         brought, room = _brought(case, spec), room_beside(under, case.water.fill)
         if brought > room:
             yield (
                 ("water", "inflow", i),
                 f"brings {brought:.3g} m3 until the end of the run ({case.time.end:g} s) into a tank without another "
-                f"side to leave by, which has room for {room:.3g} m3 under the crest (z = {crest:.3g} m): the water "
-                f"would stand above the surface that the wave has at {spec.side}; let it take back what returns "
+                f"side to leave by, which has room for {room:.3g} m3 under {name} (z = {highest:.3g} m): the water "
+                f"would stand above the surface that is given at {spec.side}; let it take back what returns "
                 "(absorbs = true), name open sides or a sea, take a longer tank, or end earlier",
             )
 
@@ -257,13 +265,18 @@ def _struck(case: Case) -> Iterator[Problem]:
             )
 
 
+def _bore_speed(ahead: float, behind: float, gravity: float) -> float:
+    """Speed [m/s] of the water behind a bore between two depths [m] (Stoker 1957, 10.6)."""
+    return (behind - ahead) * math.sqrt(0.5 * gravity * (ahead + behind) / (ahead * behind))
+
+
 def _depth_behind(ahead: float, speed: float, gravity: float) -> float:
     """Depth [m] behind the bore that a piston of this speed [m/s] pushes into still water of depth `ahead` [m]:
     u = (h₂ - h₁) sqrt(g (h₁ + h₂) / (2 h₁ h₂))    (Stoker 1957, 10.6)."""
     low, high = ahead, ahead + max(speed, 0.0) * math.sqrt(2.0 * ahead / gravity)
     for _ in range(60):
         middle = 0.5 * (low + high)
-        reached = (middle - ahead) * math.sqrt(gravity * (ahead + middle) / (2.0 * ahead * middle))
+        reached = _bore_speed(ahead, middle, gravity)
         low, high = (middle, high) if reached < speed else (low, middle)
     return high
 

@@ -279,6 +279,18 @@ def test_a_scene_may_ask_too_much_of_its_joints_but_not_of_its_contact():
     assert not asked_too_much("the energy balance is off by 6 %", {})
 
 
+def test_a_start_that_asks_too_much_counts_as_refused_whatever_the_exit_code(tmp_path, monkeypatch):
+    """A structure that cannot stand ends a run with the code of a bad case; what else does must name file and key."""
+    said = f"surgebreak: {trials.TOO_WEAK}: a joint opens beyond its opening at failure.\n"
+    for code, stderr, verdict in (
+        (ExitCode.BAD_CASE, said, "refused"),
+        (ExitCode.BAD_CASE, "surgebreak: something else\n", "failed"),
+    ):
+        ended = subprocess.CompletedProcess([], code, "", stderr)
+        monkeypatch.setattr(trials, "run_module", lambda *args, ended=ended, **more: ended)
+        assert trials.trial(tmp_path, tmp_path / "out", False).verdict == verdict
+
+
 def test_a_failure_is_kept_as_a_case_with_its_story(tmp_path, monkeypatch):
     """A run that fails as long as its scene has joints."""
 

@@ -110,6 +110,23 @@ def test_a_wave_that_lifts_its_tank_above_its_crest_is_refused():
     assert found(3.0) == []
 
 
+def test_a_bore_may_run_until_its_reflection_is_back():
+    """0.6 m behind a bore into 0.5 m: water of 0.42 m/s, 0.25 m2/s. A wall throws back 0.71 m; a tank of 1 m that
+    is 0.2 m wide has room for 0.042 m3 up to there."""
+    bore = {"kind": "bore", "side": "x-", "level": 0.6, "ahead": 0.5}
+
+    def found(end, **more):
+        fill = [{"lower": [0, 0, 0], "upper": [1.0, 0.2, 0.5]}]
+        in_tank = case(
+            {"inflow": [bore | more], "fill": fill}, tank=TANK | {"upper": [1, 0.2, 1]}, time={"end": end}
+        )
+        return [text for _, text in problems(in_tank)]
+
+    assert found(0.75) == []
+    assert "m3 under what the far side throws back (z = 0.709" in found(0.95)[0]
+    assert found(0.95, absorbs=True) == []
+
+
 def test_what_a_record_takes_back_leaves_room(tmp_path):
     """To and fro: 0.2 m x 0.5 m x 2/pi x 1 m/s, 0.0637 m3, come in within a second and leave in the next."""
     rows = [f"{t:.2f},0.5,{np.sin(np.pi * t):.6f}" for t in np.arange(0.0, 20.01, 0.05)]

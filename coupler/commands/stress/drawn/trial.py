@@ -75,7 +75,8 @@ def trial(case: Path, output: Path, still: bool) -> Trial:
     figures = summary.get("figures", {})
     spent = (summary.get("cpu_seconds", 0.0), time.perf_counter() - began, figures.get("time"))
     if done.returncode == ExitCode.BAD_CASE:
-        return Trial(*_refusal(done.stderr), [], *spent)
+        refused, why = _refusal(done.stderr)
+        return Trial("refused" if asked_too_much(why, summary.get("case", {})) else refused, why, [], *spent)
     if done.returncode in (ExitCode.DONE, ExitCode.STOPPED):
         found = list(measures(output, still))
         verdict: Verdict = "passed" if all(m.kept for m in found) else "failed"
