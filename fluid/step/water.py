@@ -112,11 +112,13 @@ class Water:
         self.set_domain(domain)
         n = len(self.topology.nodes)
         level = fill(self.topology.nodes) if callable(fill) else np.asarray(fill, float)
+        given = np.zeros(n, bool)
         if sides is not None:
             sides.surface(level, 0.0)
+            given[np.concatenate([side.nodes for side in sides.now])] = True
         level = self._dry_if_inactive(level)
         level = redistance(self.topology, level, self.topology.node_size, rescale=False)
-        self.level_set = without_films(no_steeper(self.topology, level), self.topology.node_size)
+        self.level_set = without_films(no_steeper(self.topology, level, given), self.topology.node_size)
         self.velocity, self.acceleration = np.zeros((n, 3)), np.zeros((n, 3))
         self.air, self.vents = None, tuple(vents)
         if gas is not None:

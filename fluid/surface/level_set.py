@@ -354,9 +354,10 @@ def redistance(topology, phi, spacing, rescale: bool, motion=None):
     return far
 
 
-def no_steeper(topology, phi):
+def no_steeper(topology, phi, given):
     """φ (N,) of a start, with smaller sizes where those of two corners of a cell on both sides of the surface add up to
-    more than STEEPEST times their distance; the signs stay, and so does what is a distance.
+    more than STEEPEST times their distance; the signs stay, and so does what is a distance. given (N,) bool: nodes of
+    sides that give φ; it stays there and beside them, where the depth of a sea over a dry bed may well be steep.
 
     What lies beyond a solid is dry at the start, and what ends at one is wet, however near the surface; φ is as large
     there as it takes to say so. Copies of such nodes can share a cell with others (between stones). Left as steep as
@@ -364,7 +365,7 @@ def no_steeper(topology, phi):
     t = topology
     cut = t.cells[surface_cells(phi, t.cells_around(phi < 0.0), t.cells)].astype(np.int64)
     one, other = cut[:, EDGES[:, 0]].ravel(), cut[:, EDGES[:, 1]].ravel()
-    apart = (phi[one] < 0.0) != (phi[other] < 0.0)
+    apart = ((phi[one] < 0.0) != (phi[other] < 0.0)) & ~given[one] & ~given[other]
     one, other = one[apart], other[apart]
     one, other = np.concatenate([one, other]), np.concatenate([other, one])
     length = np.linalg.norm(t.nodes[one] - t.nodes[other], axis=1)
