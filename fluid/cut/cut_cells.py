@@ -9,7 +9,7 @@ splitting and faces of a body that coincide with faces of the mesh, so each is c
 side, and never between two bodies that touch.
 
 Two tolerances: mesh nodes nearer to a plane than `tolerance` [m], one for the whole mesh, lie in it; at
-vertices made by splitting only round-off is snapped (see `pieces.py`).  Planes that agree in a cell are one (`_align`).
+vertices made by splitting only round-off is snapped (see `pieces.py`).
 """
 
 from __future__ import annotations
@@ -44,8 +44,6 @@ from kernel_decorators import inner, released
 
 # A piece too thin for its cross-section to close goes to one side whole; thicker ones are an error.
 THIN = 1e-6
-# Planes of the same direction that agree at the nodes of a cell to this share of the spacing are one.
-FLUSH = 1e-8
 # Wetted polygons below this share of h^2 are round-off.
 NO_AREA = 1e-15
 # Cost of cutting a cell, in visits of a node.
@@ -57,11 +55,10 @@ class CutFailed(RuntimeError):
 
 
 class Limits(NamedTuple):
-    """tolerance [m]: nodes of the mesh nearer to a plane lie in it · flush [m]: see FLUSH · round_off [m]: vertices
-    made by splitting nearer to a plane lie in it · thin [m]: see THIN · least [m²]: see NO_AREA."""
+    """tolerance [m]: nodes of the mesh nearer to a plane lie in it · round_off [m]: vertices made by splitting do ·
+    thin [m]: see THIN · least [m²]: see NO_AREA."""
 
     tolerance: float
-    flush: float
     round_off: float
     thin: float
     least: float
@@ -69,9 +66,7 @@ class Limits(NamedTuple):
     @classmethod
     def of(cls, tolerance: float, spacing: float) -> Limits:
         """The limits for a mesh with that spacing [m]."""
-        return cls(
-            tolerance, FLUSH * spacing, ROUND_OFF * spacing, THIN * spacing, NO_AREA * spacing * spacing
-        )
+        return cls(tolerance, ROUND_OFF * spacing, THIN * spacing, NO_AREA * spacing * spacing)
 
 
 class Cutting(NamedTuple):
@@ -94,7 +89,7 @@ class Chosen(NamedTuple):
 
 
 @inner
-def _nearby(w, x, bodies, planes, limits):
+def _nearby(w, x, bodies, planes, tolerance):
     """Bodies that meet or touch the cell x (4, 3), with the planes of each that separate some of its nodes.
 
     -> number of bodies, or -1 when one body contains the whole cell."""
@@ -113,7 +108,7 @@ def _nearby(w, x, bodies, planes, limits):
                     + planes.normal[g, 2] * x[k, 2]
                 )
                 d = n_x - planes.offset[g]
-                if abs(d) <= limits.tolerance:
+                if abs(d) <= tolerance:
                     d = 0.0
                 w.near_distance[end, k] = d
                 low = min(low, d)
@@ -122,7 +117,7 @@ def _nearby(w, x, bodies, planes, limits):
                 apart = True
                 break
             if high > 0.0:
-                _align(w, end, limits)
+                _align(w, end, tolerance)
                 w.near_plane[end] = g
                 end += 1
         if apart:
@@ -136,17 +131,14 @@ def _nearby(w, x, bodies, planes, limits):
 
 
 @inner
-def _align(w, row, limits):
-    """Give a plane the distances of an earlier one (or their negatives) if the two agree, so that touching and flush
-    faces of two bodies lie in exactly one plane: touching ones in spite of round-off, flush ones also where they cross
-    at so small an angle that the place is lost in round-off. Two pieces would find it at two places, and the area
-    between them, round-off over that angle, would bound water on neither side."""
+def _align(w, row, tolerance):
+    """Give a plane the distances of an earlier one (or their negatives) if the two agree within the tolerance, so that
+    touching and flush faces of two bodies lie in exactly one plane in spite of round-off."""
     for r in range(row):
         for sign in (1.0, -1.0):
             same = True
-            most = limits.flush if sign > 0.0 else limits.tolerance
             for k in range(4):
-                if abs(w.near_distance[row, k] - sign * w.near_distance[r, k]) > most:
+                if abs(w.near_distance[row, k] - sign * w.near_distance[r, k]) > tolerance:
                     same = False
                     break
             if same:
@@ -286,7 +278,7 @@ def _cut_cells(last, mesh, chosen, cut, at):
             for c in range(3):
                 x[k, c] = nodes[cells[cell, k], c]
         bodies = chosen.bodies[chosen.start[row] : chosen.start[row + 1]]
-        near = _nearby(w, x, bodies, planes, limits)
+        near = _nearby(w, x, bodies, planes, limits.tolerance)
         if near >= 0:
             start_piece(w, x)
             state, count, whole = _fluid_pieces(w, near, limits.round_off, limits.thin)
