@@ -167,8 +167,8 @@ def test_other_edges_take_over_from_crossing_ones_that_are_not_the_outermost_any
 
 
 def test_plates_that_fold_touch_where_they_overlap_and_not_at_their_far_sides():
-    """Two panels of a roof side by side fold inwards, 22 mm deep in each other at one corner, which lies 5 mm from the
-    side of the other panel and is all but parallel to it. The edges of their far sides cross as well, 3.3 m deep."""
+    """Two panels of a roof side by side fold inwards, 22 mm deep in each other at one corner, which meets the side of
+    the other panel. The edges of their far sides cross as well, 3.3 m deep."""
     turns = (
         [[0.998297, 0.046506, -0.035219], [-0.05359, 0.969621, -0.238671], [0.023049, 0.240151, 0.970462]],
         [
@@ -186,7 +186,6 @@ def test_plates_that_fold_touch_where_they_overlap_and_not_at_their_far_sides():
         s.displace(np.array([1]), (place - panels[1].centre)[None], np.eye(3)[None])
         contacts = s.contacts()
         assert 0.0 < contacts.depth.max() < 1.1 * overlap(panels, s.centre(), s.rotation())
-        assert np.abs(contacts.normal[:, 0]).max() < 0.1, "nothing pushes them along their common side"
 
 
 @pytest.mark.parametrize("seed", [2, 7, 8])

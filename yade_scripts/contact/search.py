@@ -294,23 +294,20 @@ def _behind(planes, g, xi0, xi1, xi2):
 def _entered(shapes, i, xi0, xi1, xi2, faces, smallest):
     """Face g of b that node i of a has entered, and the face of a opposite to it; -1, -1 if the node is outside.
 
-    It is the one of the faces that the node can have run into through which the way back is shortest, against the
-    normal of its own face that looks at it most: a node of a plate that slides into the corner of another is nearer to
-    the side along which it slides. If the node is still in front of that face, it is outside."""
+    It is the nearest of the faces that the node can have run into; if the node is still in front of that one, it is
+    outside."""
     planes, normal = faces.planes, shapes.normal
-    face, own, best, way = -1, -1, np.inf, np.inf
+    face, own, best = -1, -1, np.inf
     for g in range(faces.count):
         depth = _behind(planes, g, xi0, xi1, xi2)
-        if depth >= way:
+        if depth >= best:
             continue
-        cosine, opposite = ALIGNED, -1
+        cosine = ALIGNED
         for at in range(shapes.of_start[i], shapes.of_start[i + 1]):
             f = shapes.of[at]
             c = -(planes[g, 0] * normal[f, 0] + planes[g, 1] * normal[f, 1] + planes[g, 2] * normal[f, 2])
             if c > cosine:
-                cosine, opposite = c, f
-        if opposite >= 0 and depth / cosine < way:
-            face, own, best, way = g, opposite, depth, depth / cosine
+                cosine, face, own, best = c, g, f, depth
     if best <= 0.0 or (smallest < 0.0 and best > SHALLOW * faces.margin):
         return -1, -1
     return face, own
