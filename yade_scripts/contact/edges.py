@@ -17,7 +17,10 @@ import numpy as np
 from kernel_decorators import helper, inner
 
 PARALLEL = 0.05
-"""Sine of the angle below which two edges do not cross."""
+"""Sine of the angle below which lines count as parallel to a face or to one another."""
+CROSSES = 0.002
+"""Sine of the angle below which two edges do not cross: long edges that cross at a small angle, next to an end of the
+other block, may have no node within it."""
 ROUND_OFF = 1e-9
 """Sine of the angle below which two edges have no common normal."""
 SUPPORT = 1e-6
@@ -68,7 +71,7 @@ def find_crossing(shapes, a, b, x, R, deepest, scratch):
             b0, b1 = shapes.edge[first_b + j, 0], shapes.edge[first_b + j, 1]
             for k in range(3):
                 db[k] = B[b1, k] - B[b0, k]
-            if _normal(da, db, n) < PARALLEL:
+            if _normal(da, db, n) < CROSSES:
                 continue
             if n[0] * d[0] + n[1] * d[1] + n[2] * d[2] < 0.0:
                 for k in range(3):
@@ -118,7 +121,7 @@ def crossing(shapes, a, b, number, state, plane, point, scratch):
         point[k] = 0.0
         for j in range(3):
             point[k] += R[a, j, k] * (pa[j] + s * da[j])
-    return depth, min(min(s, 1.0 - s), min(t, 1.0 - t)) if sine >= PARALLEL else -1.0
+    return depth, min(min(s, 1.0 - s), min(t, 1.0 - t)) if sine >= CROSSES else -1.0
 
 
 @inner
