@@ -188,6 +188,25 @@ def test_plates_that_fold_touch_where_they_overlap_and_not_at_their_far_sides():
         assert 0.0 < contacts.depth.max() < 1.1 * overlap(panels, s.centre(), s.rotation())
 
 
+def test_a_wall_across_the_corner_of_its_footing_at_a_small_angle_is_held():
+    """It overlaps the footing by 75 mm, least along the normal of two long edges that cross at less than 3 degrees;
+    neither has a node within the other."""
+    footing = Block("footing", (0, 0, 0), (10.00182, 7.994247, 1.914474), density=2000.0, fixed=True)
+    turn = Rotation.from_matrix([[0.978123, 0.208026, 0.0], [-0.208026, 0.978123, 0.0], [0.0, 0.0, 1.0]])
+    tilt = Rotation.from_matrix(
+        [[0.810052, 0.182601, 0.5572], [-0.144971, 0.983141, -0.11143], [-0.568154, 0.009486, 0.822868]]
+    )
+    place = turn.inv().apply([5.878085, 0.806345, 2.057842])
+    wall = Block(
+        "wall", (20, 0, 0), (0.4, 3.997124, 2.6), rotation=(turn.inv() * tilt).as_matrix(), density=600.0
+    )
+    with Structure([footing, wall], ContactLaw(2e9, 0.3, 0.4), gravity=STILL) as s:
+        s.displace(np.array([1]), (place - wall.centre)[None], np.eye(3)[None])
+        deep = overlap([footing, wall], s.centre(), s.rotation())
+        assert deep == pytest.approx(0.075, abs=0.005)
+        assert s.contacts().depth.max() == pytest.approx(deep, rel=0.05)
+
+
 @pytest.mark.parametrize("seed", [2, 7, 8])
 def test_a_plate_that_rolls_over_the_edges_of_another_does_not_sink_at_each_change_of_edges(seed):
     """It comes down slowly, slides and turns about one edge after another. Its speed alone makes 1 to 2 mm; where the
