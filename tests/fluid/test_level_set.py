@@ -77,12 +77,14 @@ def test_distance_to_a_triangle_against_sampling(p, corners):
 
 def test_a_start_is_as_flat_as_a_distance(cube):
     """Dry nodes among wet ones and wet ones among dry ones that lie farther off by their value than their neighbours on
-    the other side are: nodes of pockets between stones. A plane keeps its bits."""
+    the other side are: nodes of pockets between stones. A plane keeps its bits, and so does what a side gives."""
     plane = cube.nodes[:, 2] - 0.43
-    assert (no_steeper(cube, plane) == plane).all()
+    free, given = np.zeros(len(plane), bool), np.ones(len(plane), bool)
+    assert (no_steeper(cube, plane, free) == plane).all()
     near = np.hypot(*(cube.nodes[:, :2] - 0.5).T) < 0.01
     level = np.where(near & (np.abs(plane) < H), -np.sign(plane) * 2 * H, plane)
-    flat = no_steeper(cube, level)
+    assert (no_steeper(cube, level, given) == level).all()
+    flat = no_steeper(cube, level, free)
     assert (np.sign(flat) == np.sign(level)).all()
     assert (np.abs(flat) <= np.abs(level)).all()
     changed = cube.nodes[flat != level]
