@@ -115,7 +115,7 @@ class Water:
         given = np.zeros(n, bool)
         if sides is not None:
             sides.surface(level, 0.0)
-            given[np.concatenate([side.nodes for side in sides.now])] = True
+            given[sides.nodes()] = True
         level = self._dry_if_inactive(level)
         level = redistance(self.topology, level, self.topology.node_size, rescale=False)
         self.level_set = without_films(no_steeper(self.topology, level, given), self.topology.node_size)

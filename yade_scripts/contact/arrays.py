@@ -82,8 +82,8 @@ class Pairs(NamedTuple):
     over the present overlap; 0 where it starts without force · touching (p,) bool: the pair had contacts at the last
     evaluation · calm (p,) [m]: relative motion below which the two cannot touch or, where they touch, below which the
     outermost edges need not be sought again · overlap (p,) [m]: smallest displacement that separates them, zero if they
-    are apart · found (p,) bool: the contacts at the present positions
-    are known. Contacts begin and end once for each position, however often they are evaluated there.
+    are apart · found (p,) bool: the contacts at the present positions are known. Contacts begin and end once for each
+    position, however often they are evaluated there.
     """
 
     a: Array
