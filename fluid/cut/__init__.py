@@ -4,7 +4,7 @@ bodies, candidate_pairs                convex bodies as half spaces; the cells t
 cut_cells, cut_arrays, recut           the cut of all cells, and the new cut of cells whose bodies moved
 pieces, polygons, fans                 convex pieces, polygons on their faces, tetrahedra of a piece
 parts_of_cell                          connected parts of the water in a cell
-wetted_polygons                        the faces of a piece that are surfaces of bodies
+wetted_polygons, unclaimed_faces       the faces of a piece that are surfaces of bodies
 openings                               areas over which parts of neighbouring cells touch
 
 Imports `mesh` and `numerics`.

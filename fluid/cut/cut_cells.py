@@ -6,7 +6,8 @@ part inside goes on to the next plane. If nothing is left inside, P does not mee
 replaced by the parts set aside. The *wetted surface* is then read off the pieces: a face of a piece that lies in a
 plane of B, with the piece on the outer side, clipped by the other planes of B. This one rule serves faces made by
 splitting and faces of a body that coincide with faces of the mesh, so each is counted once, in the cell on its water
-side, and never between two bodies that touch.
+side, and never between two bodies that touch.  Faces made by splitting that none claims lie between two pieces, or
+are given to the nearest body (`unclaimed_faces.py`).
 
 Two tolerances: mesh nodes nearer to a plane than `tolerance` [m], one for the whole mesh, lie in it; at
 vertices made by splitting only round-off is snapped (see `pieces.py`).
@@ -37,6 +38,7 @@ from fluid.cut.pieces import (
     start_piece,
     workspace,
 )
+from fluid.cut.unclaimed_faces import claim_rest
 from fluid.cut.wetted_polygons import wetted
 from fluid.mesh.arrays import Corners, Planes
 from fluid.numerics.threads import over
@@ -46,6 +48,8 @@ from kernel_decorators import inner, released
 THIN = 1e-6
 # Wetted polygons below this share of h^2 are round-off.
 NO_AREA = 1e-15
+# Faces made by splitting that cancel but for this share of h^2 all lie between two pieces.
+UNMATCHED = 1e-12
 # Cost of cutting a cell, in visits of a node.
 WORK = 500
 
@@ -56,17 +60,19 @@ class CutFailed(RuntimeError):
 
 class Limits(NamedTuple):
     """tolerance [m]: nodes of the mesh nearer to a plane lie in it · round_off [m]: vertices made by splitting do ·
-    thin [m]: see THIN · least [m²]: see NO_AREA."""
+    thin [m]: see THIN · least [m²]: see NO_AREA · unmatched [m²]: see UNMATCHED."""
 
     tolerance: float
     round_off: float
     thin: float
     least: float
+    unmatched: float
 
     @classmethod
     def of(cls, tolerance: float, spacing: float) -> Limits:
         """The limits for a mesh with that spacing [m]."""
-        return cls(tolerance, ROUND_OFF * spacing, THIN * spacing, NO_AREA * spacing * spacing)
+        area = spacing * spacing
+        return cls(tolerance, ROUND_OFF * spacing, THIN * spacing, NO_AREA * area, UNMATCHED * area)
 
 
 class Cutting(NamedTuple):
@@ -161,12 +167,15 @@ def _subtract(w, piece, at, round_off, thin, top, n_vertices):
     current, fresh, spare = piece, top, len(w.faces) - 1
     for r in range(start, end):
         low, high = classify(w, current, w.near_distance[r], round_off)
-        if low == 0.0:
-            return DONE, True, top, n_vertices
-        if high == 0.0:
-            continue
         if fresh + 3 > len(w.faces):
             return WORKSPACE_FULL, False, top, n_vertices
+        if low == 0.0:
+            if current == piece or not _has_flat_face(w, current):
+                return DONE, True, top, n_vertices
+            copy_piece(w, current, fresh)
+            return DONE, False, fresh + 1, n_vertices
+        if high == 0.0:
+            continue
         state, n_vertices = split(w, current, fresh, spare, w.near_plane[r], n_vertices)
         if state == BROKEN_CAP and (min(high, -low) < thin or _is_thin(w, current, thin)):
             if high >= -low:
@@ -178,6 +187,19 @@ def _subtract(w, piece, at, round_off, thin, top, n_vertices):
         current = spare
         spare = 2 * len(w.faces) - 3 - spare
     return DONE, False, fresh, n_vertices
+
+
+@inner
+def _has_flat_face(w, piece):
+    """Whether a face of a piece lies in the plane whose distances are in w.distance: a body that only touches the piece
+    there may touch but a part of a face of the whole."""
+    for f in range(w.faces[piece]):
+        flat = True
+        for k in range(w.size[piece, f]):
+            flat = flat and w.distance[w.loop[piece, f, k]] == 0.0
+        if flat:
+            return True
+    return False
 
 
 @inner
@@ -246,6 +268,8 @@ def _emit(cut, cell, origin, count, n_near, whole, link_area, at):
         out.part_whole[part] = whole
         for c in range(10):
             out.part_moments[part, c] = 0.0
+    for r in range(w.near_start[n_near]):
+        w.unclaimed[r] = 0.0
     for piece in range(count):
         part = n_part + w.label[piece]
         piece_moments(w, piece, w.moments)
@@ -257,6 +281,9 @@ def _emit(cut, cell, origin, count, n_near, whole, link_area, at):
             state, n_tet = fan(w, piece, part, out, n_tet)
         if state != DONE:
             return state
+    state, n_wet = claim_rest(cut, count, n_near, n_part, origin, n_wet)
+    if state != DONE:
+        return state
     for part in range(n_part, n_part + parts):
         for c in range(3):
             out.part_moments[part, 1 + c] += origin[c]

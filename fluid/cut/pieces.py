@@ -47,6 +47,7 @@ class Workspace(NamedTuple):
     near_start: Ints  # (bodies + 1,)
     near_plane: Ints  # (planes,) their planes that pass through or touch the cell
     near_distance: Floats  # (planes, 4) distances of the nodes of the cell to them
+    unclaimed: Floats  # (planes,) area [m²] of faces in them that no body claims, outside less inside
 
 
 def workspace(scale: int, n_bodies: int, n_planes: int) -> Workspace:
@@ -70,6 +71,7 @@ def workspace(scale: int, n_bodies: int, n_planes: int) -> Workspace:
         np.zeros(n_bodies + 2, dtype=np.int64),
         np.zeros(n_planes + 1, dtype=np.int64),
         np.zeros((n_planes + 1, 4)),
+        np.zeros(n_planes + 1),
     )
 
 

@@ -74,17 +74,31 @@ def split_polygon(w, polygon, outer, inner, round_off):
 
 
 @inner
+def _doubled_area(o, a, b):
+    """Twice the area vector (3,) of a triangle of corners given as in the polygons."""
+    ax, ay, az = a[4] - o[4], a[5] - o[5], a[6] - o[6]
+    bx, by, bz = b[4] - o[4], b[5] - o[5], b[6] - o[6]
+    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+
+
+@inner
 def polygon_area(w, polygon):
     """Area [m2] of the convex polygon in a slot."""
     sx, sy, sz = 0.0, 0.0, 0.0
-    o = w.polygon[polygon, 0]
     for k in range(1, w.corners[polygon] - 1):
-        a, b = w.polygon[polygon, k], w.polygon[polygon, k + 1]
-        ax, ay, az = a[4] - o[4], a[5] - o[5], a[6] - o[6]
-        bx, by, bz = b[4] - o[4], b[5] - o[5], b[6] - o[6]
-        sx += ay * bz - az * by
-        sy += az * bx - ax * bz
-        sz += ax * by - ay * bx
+        x, y, z = _doubled_area(w.polygon[polygon, 0], w.polygon[polygon, k], w.polygon[polygon, k + 1])
+        sx, sy, sz = sx + x, sy + y, sz + z
+    return np.sqrt(sx * sx + sy * sy + sz * sz) / 2.0
+
+
+@inner
+def face_area(w, piece, f):
+    """Area [m2] of a face of a piece."""
+    sx, sy, sz = 0.0, 0.0, 0.0
+    for k in range(1, w.size[piece, f] - 1):
+        o, a, b = w.loop[piece, f, 0], w.loop[piece, f, k], w.loop[piece, f, k + 1]
+        x, y, z = _doubled_area(w.x[o], w.x[a], w.x[b])
+        sx, sy, sz = sx + x, sy + y, sz + z
     return np.sqrt(sx * sx + sy * sy + sz * sz) / 2.0
 
 
@@ -102,23 +116,37 @@ def _turn(w, polygon, nx, ny, nz):
 
 
 @inner
+def split_by_edge(w, polygon, face, k, normal, outer, inner, round_off):
+    """Split a convex polygon by edge k of a coplanar one in slot `face`, as `split_polygon` does; normal: (3,) that
+    `sense` gave. Edges no longer than round-off split nothing."""
+    a, b = w.polygon[face, k], w.polygon[face, (k + 1) % w.corners[face]]
+    ex, ey, ez = b[4] - a[4], b[5] - a[5], b[6] - a[6]
+    nx, ny, nz = normal
+    mx, my, mz = ey * nz - ez * ny, ez * nx - ex * nz, ex * ny - ey * nx
+    length = np.sqrt(mx * mx + my * my + mz * mz)
+    if length <= round_off:
+        return False, True
+    for j in range(w.corners[polygon]):
+        p = w.polygon[polygon, j]
+        w.height[j] = (mx * (p[4] - a[4]) + my * (p[5] - a[5]) + mz * (p[6] - a[6])) / length
+    return split_polygon(w, polygon, outer, inner, round_off)
+
+
+@inner
+def sense(w, polygon, nx, ny, nz):
+    """The unit normal n, or -n, about which the corners of a polygon go counter-clockwise."""
+    way = 1.0 if _turn(w, polygon, nx, ny, nz) > 0.0 else -1.0
+    return way * nx, way * ny, way * nz
+
+
+@inner
 def shared_area(w, one, two, nx, ny, nz, round_off):
     """Area common to the coplanar convex polygons in slots `one` and `two` (unit normal n); uses the two
     slots behind them and overwrites `one`."""
-    corners = w.corners[two]
-    way = 1.0 if _turn(w, two, nx, ny, nz) > 0.0 else -1.0
+    normal = sense(w, two, nx, ny, nz)
     spare = max(one, two) + 1
-    for k in range(corners):
-        a, b = w.polygon[two, k], w.polygon[two, (k + 1) % corners]
-        ex, ey, ez = b[4] - a[4], b[5] - a[5], b[6] - a[6]
-        mx, my, mz = way * (ey * nz - ez * ny), way * (ez * nx - ex * nz), way * (ex * ny - ey * nx)
-        length = np.sqrt(mx * mx + my * my + mz * mz)
-        if length <= round_off:
-            continue
-        for j in range(w.corners[one]):
-            p = w.polygon[one, j]
-            w.height[j] = (mx * (p[4] - a[4]) + my * (p[5] - a[5]) + mz * (p[6] - a[6])) / length
-        outside, inside = split_polygon(w, one, spare, spare + 1, round_off)
+    for k in range(w.corners[two]):
+        outside, inside = split_by_edge(w, one, two, k, normal, spare, spare + 1, round_off)
         if not inside:
             return 0.0
         if outside:

@@ -2,13 +2,14 @@
 body.
 
 A face of a piece that lies in a plane of a body, with the piece on the outer side, is clipped by the other planes of
-the body. Polygons 0..top of the stack are the parts that no body has claimed yet.
+the body. Polygons 0..top of the stack are the parts that no body has claimed yet; those of faces made by splitting lie
+between two pieces, and cancel over the pieces of a cell (else see `unclaimed_faces.py`).
 """
 
 from __future__ import annotations
 
 from fluid.cut.pieces import DONE, OUTPUT_FULL, WORKSPACE_FULL, interpolated
-from fluid.cut.polygons import copy_polygon, load_face, polygon_rule, split_polygon
+from fluid.cut.polygons import copy_polygon, face_area, load_face, polygon_area, polygon_rule, split_polygon
 from kernel_decorators import inner
 
 
@@ -69,7 +70,8 @@ def _claim_face(cut, at, r, origin, top, part, n_wet):
         claimed, top = _claim(w, polygon, at, r, cut.limits.round_off, top)
         if not claimed:
             continue
-        state, n_wet = _append(cut, polygon, at, g, origin, part, n_wet)
+        n = cut.planes.normal[g]
+        state, n_wet = append_polygon(cut, polygon, at, (n[0], n[1], n[2]), origin, part, n_wet)
         if state != DONE:
             return state, top, n_wet
         if polygon != top:
@@ -79,11 +81,11 @@ def _claim_face(cut, at, r, origin, top, part, n_wet):
 
 
 @inner
-def _append(cut, polygon, at, g, origin, part, n_wet):
-    """Write a polygon in plane g of body number `at` as triangles -> (state, triangles written).
+def append_polygon(cut, polygon, at, n, origin, part, n_wet):
+    """Write a polygon of normal n (3,), a surface of body number `at`, as triangles -> (state, triangles written).
 
     Triangles, because the water surface may clip them later."""
-    w, out, normal = cut.work, cut.out, cut.planes.normal
+    w, out = cut.work, cut.out
     triangle = len(w.corners) - 1
     w.corners[triangle] = 3
     for second in range(1, w.corners[polygon] - 1):
@@ -96,7 +98,7 @@ def _append(cut, polygon, at, g, origin, part, n_wet):
                 w.polygon[triangle, k, c] = w.polygon[polygon, corner, c]
             for c in range(3):
                 row[16 + 3 * k + c] = w.polygon[polygon, corner, 4 + c]
-        polygon_rule(w, triangle, normal[g, 0], normal[g, 1], normal[g, 2], cut.limits.least, row)
+        polygon_rule(w, triangle, n[0], n[1], n[2], cut.limits.least, row)
         if row[0] > 0.0:
             for c in range(3):
                 for q in (1, 7, 10, 13, 16, 19, 22):
@@ -108,22 +110,43 @@ def _append(cut, polygon, at, g, origin, part, n_wet):
 
 
 @inner
-def wetted(cut, piece, origin, n_near, part, n_wet):
-    """Append the wetted polygons of a piece -> (state, number of polygons).
+def claim_face(cut, piece, f, n_near, origin, part, n_wet):
+    """Let the bodies claim their shares of a face of a piece -> (state, loaded, top, number of polygons written).
 
-    Polygons 0..top of the stack are the part of a face that no body has claimed yet; only bodies that
-    overlap and share a plane compete for the same part."""
+    If loaded, polygons 0..top of the stack are left, else the whole face is; only bodies that overlap and share a plane
+    compete for the same part."""
     w, normals, round_off = cut.work, cut.planes.normal, cut.limits.round_off
+    top, loaded = 0, False
+    for at in range(n_near):
+        for r in range(w.near_start[at], w.near_start[at + 1]):
+            if top < 0 or not _lies_in(w, piece, f, r, normals, round_off):
+                continue
+            if not loaded:
+                load_face(w, piece, f, 0)
+                loaded = True
+            state, top, n_wet = _claim_face(cut, at, r, origin, top, part, n_wet)
+            if state != DONE:
+                return state, loaded, top, n_wet
+    return DONE, loaded, top, n_wet
+
+
+@inner
+def wetted(cut, piece, origin, n_near, part, n_wet):
+    """Append the wetted polygons of a piece -> (state, number of polygons), and add up in w.unclaimed what is left of
+    its faces in the near planes, outside less inside [m²]."""
+    w = cut.work
     for f in range(w.faces[piece]):
-        top, loaded = 0, False
-        for at in range(n_near):
-            for r in range(w.near_start[at], w.near_start[at + 1]):
-                if top < 0 or not _lies_in(w, piece, f, r, normals, round_off):
-                    continue
-                if not loaded:
-                    load_face(w, piece, f, 0)
-                    loaded = True
-                state, top, n_wet = _claim_face(cut, at, r, origin, top, part, n_wet)
-                if state != DONE:
-                    return state, n_wet
+        state, loaded, top, n_wet = claim_face(cut, piece, f, n_near, origin, part, n_wet)
+        if state != DONE:
+            return state, n_wet
+        tag = w.tag[piece, f]
+        if tag >= 0 and top >= 0:
+            r = 0
+            while w.near_plane[r] != tag // 2:
+                r += 1
+            area = 0.0 if loaded else face_area(w, piece, f)
+            if loaded:
+                for polygon in range(top + 1):
+                    area += polygon_area(w, polygon)
+            w.unclaimed[r] += area if tag % 2 == 0 else -area
     return DONE, n_wet

@@ -3,7 +3,7 @@
 import manifold3d
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
@@ -79,6 +79,9 @@ def test_volume_and_surface_of_unions_of_boxes(family):
 
 
 @settings(max_examples=40, deadline=None)
+@example(
+    tilt=1e-5, exponent=-5, shift=-1.0
+)  # tilted by 1e-10, so that a strip of a side lies in a mesh plane
 @given(
     tilt=st.floats(-1, 1),
     exponent=st.integers(-16, -2),
@@ -151,3 +154,16 @@ def test_noisy_brick_walls_lose_no_face(exponent):
         bodies = ConvexBodies.boxes(centre, np.full(at.shape, 0.25), turn)
         for growth in (0.0, 1e-6, -1e-6):
             assert divergence_defect(cut_domain(MESH, bodies.grown(growth))) < 1e-8
+
+
+@pytest.mark.parametrize("exponent", range(-12, -5))
+def test_flush_faces_that_cross_at_any_angle_lose_none(exponent):
+    """Two blocks of a wall that overlap by 0.003 cells and are turned by 10^exponent about their joint. Where their
+    faces cross is known to round-off over that angle only: at 1e-10, 1e-4 of a cell's face bounded no water."""
+    rng, arm = np.random.default_rng(-exponent), np.array([[0, 0, 0.5], [0, 0, -0.5]])
+    for _ in range(40):
+        thick, at, level = rng.uniform(0.02, 0.2), rng.uniform(0.4, 0.6), rng.uniform(0.4, 0.6)
+        turn = Rotation.from_rotvec(10.0**exponent * rng.normal(size=(2, 3))).as_matrix()
+        centre = [at, 0.5, level] - np.einsum("bij,bj->bi", turn, arm) + 8e-4 * arm
+        bodies = ConvexBodies.boxes(centre, [[thick, 0.9, 1.0]] * 2, turn)
+        assert divergence_defect(cut_domain(MESH, bodies)) < 1e-9
