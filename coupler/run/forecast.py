@@ -217,7 +217,7 @@ def _structure_rows(case: Case, rows: list[Row], exact: bool) -> tuple[int, int,
         if exact and structure.joints is not None:
             rows.append(_frequency_row(structure, limit.omega))
         rows.append(Row("substeps", math.ceil(case.time.end / substep), "", ""))
-        if case.joints and case.structure.start == "settled":
+        if structure.joints is not None and case.structure.start == "settled":
             _row_at_rest(structure, rows)
         if case.water:
             rows += _air_rows(case, structure)

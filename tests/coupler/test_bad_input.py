@@ -17,6 +17,7 @@ from coupler.commands.study.formula import BadFormula, evaluate
 from coupler.geometry.mesh_files import MeshFileError, read_mesh, readable
 from coupler.geometry.solids import solids_of
 from coupler.program.errors import BadCase, briefly
+from coupler.run.forecast import forecast
 from fluid.mesh.background import MeshError, box_mesh
 from tests.coupler.test_case_file import BLOCKS, WATER, mistakes, write
 
@@ -299,6 +300,15 @@ def test_joints_without_faces_give_no_stiffness(tmp_path):
         in line
     )
     assert load(write(tmp_path, text + "[structure.ground]\n"))
+
+
+def test_joints_without_faces_are_settled_without_any(tmp_path):
+    """Rubble that its joints do not reach: the forecast has a row of no joint, and none of the damage at rest."""
+    case = load(write(tmp_path, DRY + BLOCK + GLUE)).case
+    assert case.structure.start == "settled"
+    rows = {row.name: row.value for row in forecast(case, False, tmp_path).rows}
+    assert rows["joints"] == 0
+    assert "damage at rest" not in rows
 
 
 def test_contact_is_asked_for_only_where_blocks_lie_loose(tmp_path):

@@ -12,7 +12,7 @@ from coupler.balance.momentum import add_step, momentum_ledger
 from coupler.scene.build import build
 from coupler.step import coupled_step as loop
 from coupler.step.coupled_step import CoupledStepper
-from coupler.step.limits import Diverged, Limits
+from coupler.step.limits import HIGHEST_PRESSURE, Diverged, Limits
 from coupler.step.residual import MISSES, RETRIES, SHORTEST, Defects
 from coupler.step.step_limits import Attempt, check_step
 from fluid.numerics.solve import NotConverged
@@ -33,10 +33,19 @@ class Pipe:
     volume_off = 0.0
     body_velocity = pushed_by = moved_on = np.zeros((1, 6))
 
-    def __init__(self, fails_above=np.inf, gains_above=np.inf, gains=0.0, rate=0.0, fails_below=0.0):
-        """gains [J] in every step longer than gains_above; rate [W] in all."""
+    def __init__(
+        self,
+        fails_above=np.inf,
+        gains_above=np.inf,
+        gains=0.0,
+        rate=0.0,
+        fails_below=0.0,
+        high_above=np.inf,
+    ):
+        """gains [J] in every step longer than gains_above; rate [W] in all; a pressure beyond that of any impact in
+        steps longer than high_above."""
         self.fails_above, self.gains_above, self.gains = fails_above, gains_above, gains
-        self.fails_below, self.rate = fails_below, rate
+        self.fails_below, self.rate, self.high_above = fails_below, rate, high_above
         self.energy, self.taken = 0.0, []
 
     def stable_step(self):
@@ -59,6 +68,7 @@ class Pipe:
     def correct(self, problem, x, parting):
         self.taken.append(problem.dt)
         self.energy += self.gains * (problem.dt > self.gains_above) + self.rate * problem.dt
+        self.pressure = np.full(1, 2.0 * HIGHEST_PRESSURE * (problem.dt > self.high_above))
 
     def snapshot(self):
         return {"energy": self.energy, "taken": list(self.taken)}
@@ -183,6 +193,28 @@ def test_a_limit_that_shorter_steps_do_not_keep_is_reported_with_the_place():
     assert (record.retries, record.bad) == (0, True)
     with pytest.raises(Diverged, match=r"energy balance.*fastest, 3 m/s, at \(0\.1, 0\.2, 0\.3\) m\. Reduce"):
         check_step(c, record, LIMITS)
+
+
+def test_a_step_whose_pressure_is_beyond_that_of_any_impact_is_taken_again(monkeypatch):
+    """0.1 -> 0.05 -> 0.025; in the last one the pressure is what it may be."""
+    monkeypatch.setattr(loop, "pressure_to_start", lambda water, dt: 0.0)
+    c = coupling(Pipe(high_above=0.03), Piston())
+    record = c.step(0.1)
+    assert (record.retries, record.dt, c.water.taken) == (2, 0.025, [0.025])
+    with pytest.raises(Diverged, match=r"the pressure is 2e\+08 Pa.*Steps down to 0\.0125 s did not help"):
+        coupling(Pipe(high_above=0.0), Piston()).step(0.1)
+
+
+def test_a_step_that_breaks_the_balance_of_momentum_is_taken_again(monkeypatch):
+    """Of the shares missed only that of the step that stays counts."""
+    missed = {0.1: 2e-8, 0.05: 1.1e-8, 0.025: 0.9e-8}
+    monkeypatch.setattr(
+        loop, "add_step", lambda ledger, water, structure, dt, *given: SimpleNamespace(error=missed[dt])
+    )
+    c = alone(Pipe())
+    record = c.step(0.1)
+    assert (record.retries, record.dt, record.bad) == (2, 0.025, False)
+    assert LIMITS.momentum_error == 1e-8
 
 
 def test_water_that_lost_its_volume_is_stepped_again():
