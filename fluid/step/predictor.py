@@ -10,6 +10,7 @@ u* = u_adv + θ dt g
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -31,10 +32,13 @@ from fluid.pressure.projection import (
 from fluid.pressure.waterline import waterline_load
 from fluid.sides.outflow import Outflow
 from fluid.surface.level_set import redistance
-from fluid.surface.volume import correct_volume
+from fluid.surface.volume import VolumeCorrection, correct_volume
 from fluid.transport.advection import transport
 from fluid.transport.paths_in_solids import levels_in_solids
 from kernel_decorators import ranged
+
+if TYPE_CHECKING:
+    from fluid.viscous.viscosity import ViscousChange
 
 TRANSPORT_WIDTH = 5.0
 """|φ| in cell sizes within which the level set moves; beyond, only its sign matters."""
@@ -46,7 +50,7 @@ class Predicted:
     """Between predict and correct: level_set (N,), nodal_water (N,) [m³], advected (N, 3) and u_star (N, 3) [m/s],
     wet (N,) bool, wet_cells (n,), wet_share (n,) and void (k,) of WetPart, cell_star (n, 3) [m/s] velocity of the wet
     cells, remainder (n, 3) [m/s] of them, theta, conserved_volume and reinserted [m³], uncorrected_water (N,) [m³]
-    before the volume correction, shear: ViscousChange by viscosity and friction, None without; end [s]: time at the end
+    before the volume correction, shear: by viscosity and friction, None without; end [s]: time at the end
     of the step; left: what leaves through open sides, None if nothing; through (N,) [m³] that enters through sides,
     None without any; held (N,) [Pa]: unknown part of the pressure on the nodes of seas, None without any side;
     displaced (N,) [m³]: part of nodal_water that the bodies take in this step; in_films: that in films, as
@@ -67,7 +71,7 @@ class Predicted:
     conserved_volume: float
     reinserted: float
     uncorrected_water: Floats
-    shear: object | None
+    shear: ViscousChange | None
     end: float
     left: Outflow | None
     through: Floats | None
@@ -76,6 +80,25 @@ class Predicted:
     in_films: tuple[float, float]
     cushions: object | None = None
     given_by_films: object | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Moved:
+    """What transport, sides, volume and shear of a step have found before its pressure problem is set up.
+
+    surface: VolumeCorrection · conserved_volume [m³] · advected, u_star (N, 3) [m/s], shear, left, through, displaced,
+    in_films: as in `Predicted` · inflow_rate (N,) [m³/s] through sides at given velocity, None without any."""
+
+    surface: VolumeCorrection
+    conserved_volume: float
+    advected: Floats
+    u_star: Floats
+    shear: ViscousChange | None
+    left: Outflow | None
+    through: Floats | None
+    inflow_rate: Floats | None
+    displaced: Floats
+    in_films: tuple[float, float]
 
 
 def predicted(water, dt: float) -> PressureProblem:
@@ -131,22 +154,19 @@ def predicted(water, dt: float) -> PressureProblem:
         u_adv = u_adv + shear.change
     u_star = np.empty_like(u_adv)
     over(_fallen, len(u_adv), u_adv, theta * dt * parameters.weight, water.topology.active, u_star)
-    return _problem(
-        water,
-        dt,
-        theta,
-        kick,
-        surface,
-        conserved,
-        u_adv,
-        u_star,
-        shear,
-        left,
-        through,
-        inflow_rate,
-        displaced,
-        in_films,
+    moved = Moved(
+        surface=surface,
+        conserved_volume=conserved,
+        advected=u_adv,
+        u_star=u_star,
+        shear=shear,
+        left=left,
+        through=through,
+        inflow_rate=inflow_rate,
+        displaced=displaced,
+        in_films=in_films,
     )
+    return _problem(water, dt, theta, kick, moved)
 
 
 def _sheared(water, dt, theta, kick, surface, u_adv):
@@ -252,36 +272,21 @@ def _new_surface(water, phi, carried, conserved):
     )
 
 
-def _problem(
-    water,
-    dt,
-    theta,
-    kick,
-    surface,
-    conserved,
-    u_adv,
-    u_star,
-    shear,
-    left,
-    through,
-    inflow_rate,
-    displaced,
-    in_films,
-):
+def _problem(water, dt: float, theta: float, kick, moved: Moved) -> PressureProblem:
+    """The pressure problem of a step of dt [s]; kick (N,): `kick_factor`."""
     t, density = water.topology, water.parameters.density
-    phi = surface.level_set
+    phi, held = moved.surface.level_set, None
     part = WetPart.of(t, water.domain, phi, water.mesh.spacing)
     wet, cells = part.nodes, part.cells
     graph = water.graph_for(water.listed).without(t, part.void)
     remainder = _carried_remainder(water, dt, theta, cells)
-    star = cell_velocity(cells, u_star, remainder, t.fluid_cells)
+    star = cell_velocity(cells, moved.u_star, remainder, t.fluid_cells)
     rhs = inflow(cells, star, t.fluid_cells, len(phi))
     dofs = np.flatnonzero(wet & ~water.walls.open_node)
     matrix, anchored, held_back = _definite(water, graph, phi, cells, dofs, dt / density, theta)
     rhs[dofs] += held_back
-    held = None
     if water.sides is not None:
-        rhs += inflow_rate
+        rhs += moved.inflow_rate
         gravity = water.parameters.gravity
         held = theta * water.sides.pressure(density, gravity, water.velocity, water.time + dt)
         # at the edge that a sea shares with an inflow the pressure is sought, not held
@@ -303,9 +308,9 @@ def _problem(
         cushions = cushions.beside(graph, phi, dofs, theta, kick, dt / density)
     kept = Predicted(
         level_set=phi,
-        nodal_water=surface.nodal_water,
-        advected=u_adv,
-        u_star=u_star,
+        nodal_water=moved.surface.nodal_water,
+        advected=moved.advected,
+        u_star=moved.u_star,
         wet=wet,
         wet_cells=cells,
         wet_share=part.share,
@@ -313,16 +318,16 @@ def _problem(
         cell_star=star,
         remainder=remainder,
         theta=theta,
-        conserved_volume=conserved,
-        reinserted=surface.reinserted,
-        uncorrected_water=surface.uncorrected_water,
-        shear=shear,
+        conserved_volume=moved.conserved_volume,
+        reinserted=moved.surface.reinserted,
+        uncorrected_water=moved.surface.uncorrected_water,
+        shear=moved.shear,
         end=water.time + dt,
-        left=left,
-        through=through,
+        left=moved.left,
+        through=moved.through,
         held=held,
-        displaced=displaced,
-        in_films=in_films,
+        displaced=moved.displaced,
+        in_films=moved.in_films,
         cushions=cushions,
     )
     acted, unheld = _known_pressure(water, water.pressure, phi), water.walls.open_node
@@ -335,8 +340,8 @@ def _problem(
     if held is not None:
         beside = np.flatnonzero(wet & (held != 0.0))
         other -= (coupling[beside].T @ acted[beside]).reshape(-1, 6)
-    if shear is not None:
-        other += shear.load
+    if moved.shear is not None:
+        other += moved.shear.load
     problem = PressureProblem(
         matrix=matrix,
         rhs=rhs[dofs] + extra,
