@@ -6,9 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from kernel_decorators import kernel
 from yade_scripts.blocks.block import Block
+from yade_scripts.contact.edges import CROSSES, find_crossing, pair_scratch
 from yade_scripts.contact.law import ContactLaw
-from yade_scripts.contact.nodes import block_edges
+from yade_scripts.contact.nodes import block_edges, contact_shapes
 from yade_scripts.dynamics.structure import Structure
 
 STILL = (0.0, 0.0, 0.0)
@@ -263,3 +265,64 @@ def test_beams_that_are_nearly_parallel_may_lie_on_one_another(turn):
         with Structure([low, high], ContactLaw(1e8, 0.3, 0.5)) as s:
             s.advance(0.05)
             assert abs(0.2 - s.centre()[1, 2]) < 5.0 * s.mass[1] * 9.81 / 1e8
+
+
+@kernel
+def found_crossing(shapes, x, R):
+    """Pair of edges of bodies 0 and 1 with the smallest overlap, and the distance by which they are apart."""
+    return find_crossing(shapes, 0, 1, x, R, np.inf, pair_scratch(shapes))
+
+
+def pointed(name, random, sides, top):
+    """A block over a regular polygon: a prism with top = 1, else a frustum, of which only the rims are parallel."""
+    turn = 2.0 * np.pi * np.arange(sides) / sides
+    ring = random.uniform(0.4, 0.6) * np.stack([np.cos(turn), np.sin(turn), 0.0 * turn], axis=1)
+    return Block(
+        name, STILL, vertices=np.concatenate([ring - [0, 0, 0.5], top * ring + [0, 0, 0.5]]), density=DENSITY
+    )
+
+
+def crossings_of_all_edges(blocks, x, R):
+    """Overlap along the normal of each pair of edges, and which of these are outermost and cross between their ends."""
+    points = [b.vertices @ turn.T + at for b, turn, at in zip(blocks, R, x)]
+    edges = [[e for e, _ in block_edges(b)] for b in blocks]
+    overlaps, crosses = [], []
+    for a0, a1 in edges[0]:
+        for b0, b1 in edges[1]:
+            p, da, q, db = (
+                points[0][a0],
+                points[0][a1] - points[0][a0],
+                points[1][b0],
+                points[1][b1] - points[1][b0],
+            )
+            n = np.cross(da, db)
+            if np.linalg.norm(n) < CROSSES * np.linalg.norm(da) * np.linalg.norm(db):
+                overlaps.append(np.inf)
+                crosses.append(False)
+                continue
+            n *= np.sign(n @ (x[0] - x[1])) / np.linalg.norm(n)
+            low, high = (points[0] @ n).min(), (points[1] @ n).max()
+            s, t, _ = np.linalg.solve(np.stack([da, -db, n], axis=1), q - p)
+            overlaps.append(high - low)
+            crosses.append(p @ n < low + 1e-9 and q @ n > high - 1e-9 and 0.0 <= s <= 1.0 and 0.0 <= t <= 1.0)
+    return np.array(overlaps), np.array(crosses)
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.integers(0, 10_000))
+def test_parallel_edges_share_a_normal_and_the_outermost_pair_is_found(seed):
+    """As by going through all pairs of edges, of which two boxes have 144 with nine normals."""
+    random = np.random.default_rng(seed)
+    blocks = [pointed(name, random, random.integers(3, 6), random.choice([1.0, 0.6])) for name in "ab"]
+    R, way = Rotation.random(2, random_state=random).as_matrix(), random.normal(size=3)
+    x = np.array([np.zeros(3), random.uniform(0.5, 1.2) * way / np.linalg.norm(way)])
+    number, apart = found_crossing(contact_shapes(blocks, [], 3), x, R)
+    overlaps, crosses = crossings_of_all_edges(blocks, x, R)
+    if overlaps.min() < 0.0:
+        assert number == -1
+        assert apart > 0.0
+    elif crosses.any():
+        assert apart == -1.0
+        assert overlaps[number] == pytest.approx(overlaps[crosses].min(), abs=1e-12)
+    else:
+        assert (number, apart) == (-1, -1.0)

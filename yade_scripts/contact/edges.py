@@ -45,7 +45,7 @@ def pair_scratch(shapes):
 @inner
 def find_crossing(shapes, a, b, x, R, deepest, scratch):
     """Find the edges of a and b with the smallest overlap, if that is less than `deepest` [m]; scratch: see
-    `pair_scratch`.
+    `pair_scratch`. Parallel edges of a block share one normal with each edge of the other: a box has three directions.
 
     → (number of the pair of edges or -1, distance by which the blocks are apart [m], or -1)
     """
@@ -64,13 +64,13 @@ def find_crossing(shapes, a, b, x, R, deepest, scratch):
     first_a, first_b = shapes.edge_start[a], shapes.edge_start[b]
     count_a, count_b = shapes.edge_start[a + 1] - first_a, shapes.edge_start[b + 1] - first_b
     for i in range(count_a):
-        a0, a1 = shapes.edge[first_a + i, 0], shapes.edge[first_a + i, 1]
-        for k in range(3):
-            da[k] = A[a1, k] - A[a0, k]
+        if shapes.edge_like[first_a + i] != i:
+            continue
+        _along(shapes, first_a + i, A, da)
         for j in range(count_b):
-            b0, b1 = shapes.edge[first_b + j, 0], shapes.edge[first_b + j, 1]
-            for k in range(3):
-                db[k] = B[b1, k] - B[b0, k]
+            if shapes.edge_like[first_b + j] != j:
+                continue
+            _along(shapes, first_b + j, B, db)
             if _normal(da, db, n) < CROSSES:
                 continue
             if n[0] * d[0] + n[1] * d[1] + n[2] * d[2] < 0.0:
@@ -79,13 +79,42 @@ def find_crossing(shapes, a, b, x, R, deepest, scratch):
             low, high = _least(A, n, 1.0), -_least(B, n, -1.0)
             if low > high:
                 return -1, low - high
-            at_a = n[0] * A[a0, 0] + n[1] * A[a0, 1] + n[2] * A[a0, 2]
-            at_b = n[0] * B[b0, 0] + n[1] * B[b0, 1] + n[2] * B[b0, 2]
-            if high - low < deepest and at_a - low < off and high - at_b < off:
-                s, t = _nearest(A[a0], da, B[b0], db)
-                if 0.0 <= s <= 1.0 and 0.0 <= t <= 1.0:
-                    found, deepest = i * count_b + j, high - low
+            if high - low < deepest:
+                number = _outermost(shapes, a, b, i, j, A, B, n, low + off, high - off, scratch)
+                if number >= 0:
+                    found, deepest = number, high - low
     return found, -1.0
+
+
+@inner
+def _along(shapes, edge, points, d):
+    """Set d (3,) to the vector along an edge of a block with vertices `points`."""
+    first, second = shapes.edge[edge, 0], shapes.edge[edge, 1]
+    for k in range(3):
+        d[k] = points[second, k] - points[first, k]
+
+
+@inner
+def _outermost(shapes, a, b, like_a, like_b, A, B, n, low, high, scratch):
+    """First pair of an edge of a parallel to like_a and one of b parallel to like_b that lie outermost, below `low` and
+    above `high` along n (3,), and cross between their ends: its number, or -1."""
+    da, db = scratch[4], scratch[5]
+    first_a, first_b = shapes.edge_start[a], shapes.edge_start[b]
+    count_b = shapes.edge_start[b + 1] - first_b
+    for i in range(shapes.edge_start[a + 1] - first_a):
+        p = shapes.edge[first_a + i, 0]
+        if shapes.edge_like[first_a + i] != like_a or _dot(n, A[p]) >= low:
+            continue
+        _along(shapes, first_a + i, A, da)
+        for j in range(count_b):
+            q = shapes.edge[first_b + j, 0]
+            if shapes.edge_like[first_b + j] != like_b or _dot(n, B[q]) <= high:
+                continue
+            _along(shapes, first_b + j, B, db)
+            s, t = _nearest(A[p], da, B[q], db)
+            if 0.0 <= s <= 1.0 and 0.0 <= t <= 1.0:
+                return i * count_b + j
+    return -1
 
 
 @inner
@@ -135,6 +164,13 @@ def next_beside(shapes, side, n, number, leading, level, most, state, plane, poi
     a, b, R = side.a, side.b, state.R
     count_b = shapes.edge_start[b + 1] - shapes.edge_start[b]
     count_a = shapes.edge_start[a + 1] - shapes.edge_start[a]
+    if not level:
+        ea, eb = shapes.edge_start[a] + leading // count_b, shapes.edge_start[b] + leading % count_b
+        if leading <= number or not (
+            _across(shapes, a, ea, R, n, -1.0) and _across(shapes, b, eb, R, n, 1.0)
+        ):
+            return -1, 0.0
+        return leading, crossing(shapes, a, b, leading, state, plane, point, scratch)[0]
     start = number + 1
     for i in range(start // count_b, count_a):
         if not _across(shapes, a, shapes.edge_start[a] + i, R, n, -1.0):
@@ -146,7 +182,7 @@ def next_beside(shapes, side, n, number, leading, level, most, state, plane, poi
             along = 0.0
             for k in range(3):
                 along += n[k] * (R[a, k, 0] * plane[0] + R[a, k, 1] * plane[1] + R[a, k, 2] * plane[2])
-            if i * count_b + j == leading or (level and within > ENDS and along > FLAT and depth <= most):
+            if i * count_b + j == leading or (within > ENDS and along > FLAT and depth <= most):
                 return i * count_b + j, depth
     return -1, 0.0
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from yade_scripts.blocks.block import MARGIN, Block
 from yade_scripts.blocks.faces import FixedPlane, gauss_points
+from yade_scripts.contact.edges import ROUND_OFF
 
 Array = np.ndarray
 
@@ -30,7 +31,8 @@ class Shapes(NamedTuple):
     face_start (n+m+1,) · normal (F, 3) outward · offset (F,) [m]: inside is normal·x < offset
     face_nodes (F,): nodes on a face · face_spread (F,): mean distance of its points from its middle over that of its
     nodes radius, margin (n+m,) [m]
-    edge_start (n+m+1,) · edge (E, 2) vertices of the block · edge_out (E, 3): sum of the normals of its two faces.
+    edge_start (n+m+1,) · edge (E, 2) vertices of the block · edge_out (E, 3): sum of the normals of its two faces
+    edge_like (E,): the first edge of the block that is parallel, counted from its first one.
     """
 
     node_start: Array
@@ -48,6 +50,7 @@ class Shapes(NamedTuple):
     edge_start: Array
     edge: Array
     edge_out: Array
+    edge_like: Array
 
 
 def block_nodes(block: Block, per_edge: int) -> tuple[Array, list[list[int]]]:
@@ -81,7 +84,7 @@ def block_edges(block: Block) -> list[tuple[tuple[int, int], list[int]]]:
 def contact_shapes(blocks: list[Block], planes: list[FixedPlane], per_edge: int) -> Shapes:
     """Nodes and faces of all blocks and planes in one set of arrays."""
     nodes, holders, normals, offsets, counts, spreads = [], [], [], [], [], []
-    edges: list[tuple[Array, Array]] = []
+    edges: list[tuple[Array, Array, Array]] = []
     faces_before = 0
     known: dict[tuple, tuple] = {}
     for block in blocks:
@@ -122,9 +125,10 @@ def contact_shapes(blocks: list[Block], planes: list[FixedPlane], per_edge: int)
         np.concatenate(spreads) if spreads else np.zeros(0),
         radius,
         MARGIN * inner,
-        _starts([len(ends) for ends, _ in edges] + [0] * len(planes)),
-        np.concatenate([np.zeros((0, 2), np.int64), *(ends for ends, _ in edges)]),
-        np.concatenate([np.zeros((0, 3)), *(out for _, out in edges)]),
+        _starts([len(ends) for ends, _, _ in edges] + [0] * len(planes)),
+        np.concatenate([np.zeros((0, 2), np.int64), *(ends for ends, _, _ in edges)]),
+        np.concatenate([np.zeros((0, 3)), *(out for _, out, _ in edges)]),
+        np.concatenate([np.zeros(0, np.int64), *(like for _, _, like in edges)]),
     )
 
 
@@ -142,12 +146,19 @@ def _spreads(block: Block, points: Array, holders: list[list[int]]) -> Array:
     return found
 
 
-def _edges(block: Block) -> tuple[Array, Array]:
-    """Ends (e, 2) of the edges, and the sum of the normals (e, 3) on both sides."""
+def _edges(block: Block) -> tuple[Array, Array, Array]:
+    """Ends (e, 2) of edges, the sum of the normals (e, 3) on both sides, and the first parallel edge (e,) of each."""
     found = block_edges(block)
     normals = block.planes[0]
     ends = np.array([ends for ends, _ in found], np.int64)
-    return ends, np.array([normals[faces].sum(axis=0) for _, faces in found])
+    along = np.diff(block.vertices[ends], axis=1)[:, 0]
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    sine = np.linalg.norm(np.cross(along[:, None], along), axis=2)
+    return (
+        ends,
+        np.array([normals[faces].sum(axis=0) for _, faces in found]),
+        np.argmax(sine < ROUND_OFF, axis=1),
+    )
 
 
 def _starts(counts) -> Array:

@@ -174,19 +174,18 @@ def cross(
     else:
         return count, lost, parted
     level = _has_face(shapes, a, n, R) and _has_face(shapes, b, n, R)
-    there, number = 0, -1
-    while True:
-        number, _ = next_beside(shapes, side, n, number, leading, level, most, state, plane, xi, scratch)
-        if number < 0:
-            break
-        there += 1
-    k = 2.0 * stiffness_together(bodies.stiffness[a], bodies.stiffness[b]) / (max(there, 2) + nodes)
+    if leading < 0 and not level:
+        return count, lost, -1.0
+    k, number = 0.0, -1
     while True:
         number, depth = next_beside(shapes, side, n, number, leading, level, most, state, plane, xi, scratch)
         if number < 0:
             return count, lost, -1.0
         s = _free_slot(slots, base, number)
         if depth > 0.0 and s >= 0:
+            if k == 0.0:
+                k = _stiffness_of_edges(shapes, bodies, side, n, leading, level, most, nodes, state, scratch)
+                crossing(shapes, a, b, number, state, plane, xi, scratch)
             slots.face[s], slots.k[s], slots.spread[s] = number, k, 1.0
             slots.shear[s, 0] = slots.shear[s, 1] = slots.shear[s, 2] = 0.0
             slots.push[s] = BEGINS
@@ -196,6 +195,22 @@ def cross(
             else:
                 slots.rest[s] = max(0.0, depth - ARRIVED * max(way[1, 0], 0.0))
             count = _write_crossing(slots, s, side, plane, depth, xi, state, rows, count)
+
+
+@inner
+def _stiffness_of_edges(shapes, bodies, side, n, leading, level, most, nodes, state, scratch):
+    """Stiffness [N/m] of each of the edges that cross beside one another, with `nodes` contacts of nodes."""
+    there, number = 0, -1
+    while True:
+        number, _ = next_beside(
+            shapes, side, n, number, leading, level, most, state, scratch[4], scratch[5], scratch
+        )
+        if number < 0:
+            break
+        there += 1
+    return (
+        2.0 * stiffness_together(bodies.stiffness[side.a], bodies.stiffness[side.b]) / (max(there, 2) + nodes)
+    )
 
 
 @inner
