@@ -136,7 +136,7 @@ def _contacts(first_pair, last_pair, shapes, bodies, law, pairs, slots, ground, 
         if count > first:
             yields, K = set_dashpots(bodies, law, a, b, R, rows, first, count, scratch)
             mode = Mode(law.zeta, np.sqrt(yields * K))
-            taken += apply(slots, state, mode, a, rows, first, count, scratch)
+            taken += apply(slots, state, mode, a, rows, first, nodes, count, scratch)
             for c in range(first, count if all_pairs else first):
                 add_up(rows, c, F, S)
         lost[p] = taken

@@ -4,7 +4,8 @@ The force on a at the middle of node and face is
 
     N n + S,   N = max(0, k δ + c δ'),   S: spring k_t over the slip, |S| ≤ μ N, dashpot c_t while it sticks,
 
-with -(N n + S) on b, so momentum is exact. S is kept in the frame of b, where n does not turn.
+with -(N n + S) on b, so momentum is exact. S is kept in the frame of b, where the normal of a face does not turn; that
+of two edges does, and S with it.
 
 A force that acts over a substep of dt is the mean of N over it (`normal_force`), to the second order in dt: the speed
 δ' is that at the time of δ, and where contact begins or ends within the substep only the part in contact counts.
@@ -107,9 +108,10 @@ def _all_turning(bodies, a, R, arm, axis, u):
 
 
 @inner
-def apply(slots, state, mode, pair_a, rows, first, count, scratch):
+def apply(slots, state, mode, pair_a, rows, first, crossings, count, scratch):
     """Compute the forces of the contacts first .. count of a pair; → work of friction [J]. pair_a: the first block of
-    the pair · scratch (6, 3): work space, whose first two rows are the middles of the contacts seen from both blocks.
+    the pair · crossings: first contact of edges, whose normals turn against both blocks · scratch (6, 3): work space,
+    whose first two rows are the middles of the contacts seen from both blocks.
 
     The work of friction is the distance slipped times the mean of the forces before and after, as the leapfrog scheme
     integrates it. A spring that began within the last substep is stretched only over the time since the touch, and acts
@@ -140,12 +142,15 @@ def apply(slots, state, mode, pair_a, rows, first, count, scratch):
         size = before = 0.0
         rows.held[c] = 0.0
         for k in range(3):
-            rows.velocity[c, k] = w[k]
             old[k] = (
                 R[b, k, 0] * slots.shear[s, 0]
                 + R[b, k, 1] * slots.shear[s, 1]
                 + R[b, k, 2] * slots.shear[s, 2]
             )
+        if c >= crossings:
+            _turn_into_face(old, n)
+        for k in range(3):
+            rows.velocity[c, k] = w[k]
             S[k] = old[k] - touched * rows.kt[c] * (w[k] - wn * n[k])
             rows.held[c] += 0.5 * old[k] * (old[k] / rows.kt[c] - last_dt * (w[k] - wn * n[k]))
             size += S[k] ** 2
@@ -170,6 +175,20 @@ def apply(slots, state, mode, pair_a, rows, first, count, scratch):
                 slots.shear[s, k] = R[b, 0, k] * S[0] + R[b, 1, k] * S[1] + R[b, 2, k] * S[2]
         rows.push[c] = N
     return lost if dt > 0.0 else 0.0
+
+
+@inner
+def _turn_into_face(S, n):
+    """Turn the force S (3,) of a spring until it is perpendicular to the normal n (3,), with the energy that it holds.
+    What is along n would do work that no spring gives."""
+    along = S[0] * n[0] + S[1] * n[1] + S[2] * n[2]
+    size = S[0] ** 2 + S[1] ** 2 + S[2] ** 2
+    across = size - along * along
+    if across <= 0.0:
+        return
+    share = np.sqrt(size / across)
+    for k in range(3):
+        S[k] = share * (S[k] - along * n[k])
 
 
 @inner
