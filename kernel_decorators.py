@@ -7,9 +7,10 @@ There are several, since what numba builds around a function takes as long to co
   handed, and to every view of one, such a function runs up to twice as fast.
 - `inner`: the same for functions that only other kernels call; without a Python entry they compile a third faster.
 - `helper`: like `kernel`, for functions that only other kernels call.
-- `ranged`: like `plain`, for functions that `fluid.numerics.threads` runs on several threads: they take a range first
-  and let other threads of Python run meanwhile.
+- `ranged`: like `plain`, for functions that `fluid.numerics.threads` runs on several threads: they take a range first,
+  let other threads of Python run meanwhile, and have the entry of `kernel_ranges.py`.
 - `released`: like `kernel`, for functions of several threads that make arrays, for work space or for what they return.
+- `nogil`: like `plain`, for functions that wait, or work beside other threads of Python, but have no range.
 
 All are kept on disk (`coupler/program/kernel_cache.py`), and compiled once for an argument that is a constant in the
 call: numba would compile them anew for each constant (`split(w, 0, 1)`, `split(w, 1, 0)`, ...). Of several processes
@@ -29,6 +30,8 @@ from pathlib import Path
 from typing import Any
 
 from numba import njit, types
+
+from kernel_ranges import Compiler
 
 PATIENCE = 60.0
 """Seconds for which a process waits for another one that compiles a kernel: none takes as long, but a process may be
@@ -57,15 +60,26 @@ def helper(function: Callable) -> Any:
 
 def ranged(function: Callable) -> Any:
     """Compile a function of a range, which several threads call at once; it neither makes nor returns arrays."""
-    return _compiled(function, _nrt=False, nogil=True)
+    return _shared(function, _nrt=False)
 
 
 def released(function: Callable) -> Any:
-    """Compile a function that several threads call at once; it may make arrays."""
-    return _compiled(function, nogil=True)
+    """Compile a function of a range, which several threads call at once; it may make arrays."""
+    return _shared(function)
 
 
-def _compiled(function: Callable, **options: bool) -> Any:
+def nogil(function: Callable) -> Any:
+    """Compile a function that makes no arrays and lets other threads of Python run meanwhile."""
+    return _compiled(function, _nrt=False, nogil=True)
+
+
+def _shared(function: Callable, **options: bool) -> Any:
+    dispatcher = _compiled(function, nogil=True, pipeline_class=Compiler, **options)
+    dispatcher.shared = True
+    return dispatcher
+
+
+def _compiled(function: Callable, **options: Any) -> Any:
     """Numba's dispatcher of a function, for which a constant in a call has the type of a variable, and which one
     process at a time compiles."""
     decorate: Any = njit  # whose stubs lack these options

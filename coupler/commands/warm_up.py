@@ -128,11 +128,15 @@ def call_last_kernels(water: Water) -> None:
     import scipy.sparse as sp
 
     from coupler.step.coupling_rows import Wetting
+    from fluid.numerics import threads
     from fluid.numerics.solve import MULTIGRID_FROM, solve
     from fluid.pressure.waterline import hydrostatic_stiffness
     from fluid.readings import gauges
     from fluid.surface.extrapolation import extend_velocity
 
+    threads.use(2, least=1)
+    threads.zeros((1000,))
+    threads.use(1)
     ones = np.ones(MULTIGRID_FROM)
     matrix = sp.diags_array([-ones, 2.1 * ones, -ones], offsets=(-1, 0, 1), shape=(len(ones), len(ones)))
     solve(matrix.tocsr(), ones, np.zeros(len(ones)), 1e-6)

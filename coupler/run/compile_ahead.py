@@ -26,7 +26,7 @@ MODULES = {"solids": "fluid/cut", "water": "fluid", "structure": "yade_scripts",
 CHAINS = (("solids", "water"), ("structure", "both"))
 """Parts that one process compiles one after the other, since the second uses kernels of the first. Both chains take
 about equally long."""
-KERNEL = re.compile(r"^@(kernel|inner|plain|ranged|released)$", re.MULTILINE)
+KERNEL = re.compile(r"^@(kernel|helper|inner|plain|ranged|released|nogil)$", re.MULTILINE)
 ENOUGH = 0.5
 """Share of the modules of a part with kernels in the cache, from which it counts as compiled."""
 

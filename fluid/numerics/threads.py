@@ -12,17 +12,15 @@ unchanged. The result of a row must not depend on where the ranges end. There ar
   nearby numbers.
 
 Numba's own `prange` would take three times as long to compile and bring a second pool beside that of YADE's OpenMP.
-The threads here are those of Python, wait without using the processor, and start when they are first needed; a process
-that is forked off starts its own.
+The threads here wait in compiled code (`team.py`), and start when they are first needed; a process that is forked off
+starts its own.
 """
 
 from __future__ import annotations
 
 import math
-import os
-import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -30,10 +28,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from array_types import Array
-from kernel_decorators import kernel, ranged
+from fluid.numerics.team import Team
+from kernel_decorators import kernel, ranged, released
+from kernel_ranges import MOST, is_shared
 
-LEAST_ROWS = 2_000
-"""Least number of rows that is worth a thread: waking one takes as long as some hundred rows."""
+LEAST_ROWS = 1_000
+"""Least number of rows that is worth a thread: handing them over takes as long as two hundred of them."""
 BLOCK = 256
 """Number of consecutive entries of a list that are skipped, or kept, together."""
 CHUNK = 16_384
@@ -48,91 +48,16 @@ KEPT = 8
 """Number of lists whose reach is remembered: those of one step."""
 
 
-class _Worker:
-    """A thread that waits for work."""
-
-    def __init__(self) -> None:
-        self._given, self._done = threading.Lock(), threading.Lock()
-        self._given.acquire()
-        self._done.acquire()
-        self._job: Callable[[], Any] = _nothing
-        self._result: Any = None
-        self._failure: BaseException | None = None
-        threading.Thread(target=self._work, daemon=True, name="surgebreak-kernels").start()
-
-    def _work(self) -> None:
-        while True:
-            self._given.acquire()
-            try:
-                self._result, self._failure = self._job(), None
-            except BaseException as failure:
-                self._result, self._failure = None, failure
-            self._job = _nothing
-            self._done.release()
-
-    def begin(self, job: Callable[[], Any]) -> None:
-        self._job = job
-        self._given.release()
-
-    def end(self) -> tuple[Any, BaseException | None]:
-        """Return the result of the job, or raise its exception; waits for it even if Ctrl-C is pressed meanwhile."""
-        interruption = None
-        while True:
-            try:
-                self._done.acquire()
-                break
-            except BaseException as caught:
-                interruption = caught
-        found, self._result = (self._result, interruption or self._failure), None
-        return found
-
-
-def _nothing() -> None:
-    return None
-
-
-class _Team:
-    """The threads of this process; one caller at a time uses them, others work on their own thread alone."""
+class _Settings:
+    """How many threads share a loop, and which calls are watched."""
 
     def __init__(self) -> None:
         self.size, self.least = 1, LEAST_ROWS
         self.calls: list[Call] | None = None
-        self.forget()
-
-    def forget(self) -> None:
-        """Drop all threads, which a process that has just been forked off does not have."""
-        self.workers: list[_Worker] = []
-        self.at_work = threading.Lock()
-
-    def together(self, jobs: Sequence[Callable[[], Any]]) -> list:
-        """Results of the jobs, of which one runs on this thread and the others beside it."""
-        if len(jobs) == 1 or not self.at_work.acquire(blocking=False):
-            return [job() for job in jobs]
-        try:
-            while len(self.workers) < len(jobs) - 1:
-                self.workers.append(_Worker())
-            return self._run(jobs)
-        finally:
-            self.at_work.release()
-
-    def _run(self, jobs) -> list:
-        busy = self.workers[: len(jobs) - 1]
-        for worker, job in zip(busy, jobs[1:]):
-            worker.begin(job)
-        own, failure = None, None
-        try:
-            own = jobs[0]()
-        except BaseException as caught:
-            failure = caught
-        ended = [worker.end() for worker in busy]
-        failure = failure or next((raised for _, raised in ended if raised is not None), None)
-        if failure is not None:
-            raise failure
-        return [own, *(result for result, _ in ended)]
 
 
-_team = _Team()
-os.register_at_fork(after_in_child=_team.forget)
+_team = Team()
+_settings = _Settings()
 
 
 def use(threads: int, least: int = LEAST_ROWS) -> None:
@@ -141,12 +66,12 @@ def use(threads: int, least: int = LEAST_ROWS) -> None:
     Raises ValueError for fewer than one thread."""
     if threads < 1:
         raise ValueError(f"threads {threads}: at least 1")
-    _team.size, _team.least = threads, least
+    _settings.size, _settings.least = threads, least
 
 
 def in_use() -> int:
     """Number of threads that kernels run on."""
-    return _team.size
+    return _settings.size
 
 
 class Call(NamedTuple):
@@ -160,20 +85,24 @@ class Call(NamedTuple):
 @contextmanager
 def watched() -> Iterator[list[Call]]:
     """Calls of kernels that more threads would share, while one does all the work: a list that grows."""
-    _team.calls = []
+    _settings.calls = []
     try:
-        yield _team.calls
+        yield _settings.calls
     finally:
-        _team.calls = None
+        _settings.calls = None
 
 
-def over(kernel: Callable, count: int, *args, weight: int = 1) -> list:
+def over(kernel: Callable, count: int, *args, weight: float = 1) -> list:
     """Run kernel(first, last, *args) on ranges that together cover 0 ... count; returns their results in order.
 
-    weight: cost of a row, in usual rows, which take some ten nanoseconds."""
+    kernel: `ranged` or `released`, or Python code · weight: cost of a row, in usual rows, which take some ten
+    nanoseconds."""
     parts = min(_parts(count * weight), max(count, 1))
     if parts == 1:
         return [_alone(kernel, count * weight, (0, count, *args))]
+    if is_shared(kernel):
+        found = _team.share(kernel, parts, count, args)
+        return [kernel(0, count, *args)] if found is None else found
     ends = [count * k // parts for k in range(parts + 1)]
     return _team.together([_call(kernel, (first, last), args) for first, last in pairwise(ends)])
 
@@ -184,25 +113,18 @@ def found_over(kernel: Callable, count: int, *args) -> Array:
     return found[0] if len(found) == 1 else np.concatenate(found)
 
 
-def owning(kernel: Callable, nodes: int, reach: Callable, count: int, *args, weight: int = 1) -> None:
+def owning(kernel: Callable, nodes: int, reach: Callable, count: int, *args, weight: float = 1) -> None:
     """Run kernel(first, last, runs, *args) on ranges that together cover the nodes 0 ... `nodes`.
 
     runs (k, 2): first and last + 1 of the stretches of a list of `count` entries that can have a node of the range.
-    reach: () → lowest and highest node (B,) of each BLOCK of the list; called on several threads only · weight: as in
-    `over`."""
+    reach: () → `Reach` of the list; called on several threads only · weight: as in `over`."""
     parts = _parts(count * weight)
     if parts == 1:
         _alone(kernel, count * weight, (0, nodes, np.array([[0, count]]), *args))
         return
-    low, high = reach()
-    middle = np.sort(low)[[len(low) * k // parts for k in range(1, parts)]]
-    ends = [0, *(int(end) for end in middle), nodes]
-    _team.together(
-        [
-            _call(kernel, (first, last, _runs(low, high, first, last, count)), args)
-            for first, last in pairwise(ends)
-        ]
-    )
+    ends, runs, cuts = reach().divided(nodes, parts, count)
+    if not _team.share_runs(kernel, ends, runs, cuts, args):
+        kernel(0, nodes, np.array([[0, count]]), *args)
 
 
 def summed(kernel: Callable, count: int, shape: tuple[int, ...], *args) -> Array:
@@ -242,7 +164,17 @@ def field(
 
 def copied(array) -> np.ndarray:
     """A copy of an array, made by all threads."""
-    return field(len(array), array.__getitem__, array.shape[1:], array.dtype)
+    if array.dtype != float or not array.flags.c_contiguous:
+        return field(len(array), array.__getitem__, array.shape[1:], array.dtype)
+    out = np.empty(array.shape)
+    over(_copy, -(-array.size // FILLED), array.reshape(-1), out.reshape(-1))
+    return out
+
+
+@ranged
+def _copy(first, last, array, out):
+    for i in range(first * FILLED, min(last * FILLED, out.shape[0])):
+        out[i] = array[i]
 
 
 def marked(mask) -> Array:
@@ -250,9 +182,17 @@ def marked(mask) -> Array:
     return found_over(_marked, len(mask), mask)
 
 
+@released
 def _marked(first, last, mask):
-    found = np.flatnonzero(mask[first:last])
-    return found + first if first else found
+    """Every number is written, and the next one over it if its entry is not set: no branch that is hard to foresee."""
+    count, k = 0, 0
+    for i in range(first, last):
+        count += 1 if mask[i] else 0
+    found = np.empty(count + 1, np.int64)
+    for i in range(first, last):
+        found[k] = i
+        k += 1 if mask[i] else 0
+    return found[:count]
 
 
 def zeros(shape: tuple[int, ...]) -> np.ndarray:
@@ -271,17 +211,17 @@ def _fill(first, last, out):
         out[i] = 0.0
 
 
-def _parts(count: int) -> int:
-    return max(1, min(_team.size, count // _team.least))
+def _parts(count: float) -> int:
+    return max(1, min(_settings.size, MOST, int(count) // _settings.least))
 
 
 def _alone(kernel, count, args):
     """kernel(*args) on this thread."""
-    if _team.calls is None or count < 2 * _team.least:
+    if _settings.calls is None or count < 2 * _settings.least:
         return kernel(*args)
     began = time.process_time()
     found = kernel(*args)
-    _team.calls.append(Call(kernel.__name__, count, time.process_time() - began))
+    _settings.calls.append(Call(kernel.__name__, count, time.process_time() - began))
     return found
 
 
@@ -289,7 +229,26 @@ def _call(kernel, span, args):
     return lambda: kernel(*span, *args)
 
 
-_reaches: list[tuple[tuple, tuple[Array, Array]]] = []
+class Reach:
+    """Lowest and highest node (B,) of each BLOCK of a list."""
+
+    def __init__(self, low: Array, high: Array) -> None:
+        self.low, self.high = low, high
+        self._known: dict[tuple[int, int], tuple[list[int], Array, list[int]]] = {}
+
+    def divided(self, nodes: int, parts: int, count: int) -> tuple[list[int], Array, list[int]]:
+        """Ends of as many ranges of 0 ... `nodes`, runs (k, 2) of the list of `count` entries that can have a node of
+        a range, those of one range after those of the other, and where the runs of each begin and end."""
+        if (nodes, parts) not in self._known:
+            low = self.low
+            places = [len(low) * k // parts for k in range(1, parts)]
+            ends = np.array([0, *np.partition(low, places)[places], nodes])
+            runs, cuts = _runs(low, self.high, ends, count)
+            self._known[nodes, parts] = ends.tolist(), runs, cuts.tolist()
+        return self._known[nodes, parts]
+
+
+_reaches: list[tuple[tuple, Reach]] = []
 
 
 def reach_of_cells(cell_list, cells) -> Callable:
@@ -312,9 +271,9 @@ def _remembered(key, kernel, count, *args):
     blocks = -(-count // BLOCK)
     low, high = np.empty(blocks, np.int64), np.empty(blocks, np.int64)
     over(kernel, blocks, *args, low, high, weight=BLOCK)
-    _reaches.insert(0, (key, (low, high)))
+    _reaches.insert(0, (key, Reach(low, high)))
     del _reaches[KEPT:]
-    return low, high
+    return _reaches[0][1]
 
 
 @ranged
@@ -342,16 +301,23 @@ def _row_reach(first, last, nodes, row, start, neighbour, low, high):
 
 
 @kernel
-def _runs(low, high, first, last, count):
-    """Joined blocks with a node from `first` to before `last`, (k, 2): where each run begins and ends."""
-    runs, k = np.empty((low.shape[0] + 1, 2), np.int64), 0
-    for b in range(low.shape[0]):
-        if low[b] >= last or high[b] < first:
-            continue
-        begin, end = b * BLOCK, min((b + 1) * BLOCK, count)
-        if k > 0 and runs[k - 1, 1] == begin:
-            runs[k - 1, 1] = end
-        else:
+def _runs(low, high, ends, count):
+    """Joined blocks with a node from one of the ends to before the next, (k, 2): where each run begins and ends; and
+    how many there are before each of the ends."""
+    runs, cuts, k = np.empty((low.shape[0] + 1, 2), np.int64), np.zeros(ends.shape[0], np.int64), 0
+    for part in range(ends.shape[0] - 1):
+        for b in range(low.shape[0]):
+            if low[b] >= ends[part + 1] or high[b] < ends[part]:
+                continue
+            begin, end = b * BLOCK, min((b + 1) * BLOCK, count)
+            if k > cuts[part] and runs[k - 1, 1] == begin:
+                runs[k - 1, 1] = end
+                continue
+            if k == runs.shape[0]:
+                longer = np.empty((2 * k, 2), np.int64)
+                longer[:k] = runs
+                runs = longer
             runs[k, 0], runs[k, 1] = begin, end
             k += 1
-    return runs[:k].copy()
+        cuts[part + 1] = k
+    return runs[:k].copy(), cuts

@@ -1,7 +1,13 @@
 """Threads share the work of a step and change nothing: a run has the same bits at any number of them."""
 
 import os
+import signal
+import subprocess
+import sys
+import threading
+import time
 import tomllib
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 
 import numpy as np
@@ -12,8 +18,9 @@ import surgebreak
 from coupler.commands.benchmark import threads as measured
 from coupler.commands.warm_up import CASE
 from coupler.program import threads
+from coupler.program.provenance import ROOT
 from fluid.mesh.arrays import Corners
-from kernel_decorators import ranged
+from kernel_decorators import ranged, released
 
 SCENE = tomllib.loads(CASE)
 SCENE["time"] = {"end": "0.12 s", "step_max": "20 ms", "output_every": "60 ms"}
@@ -88,15 +95,160 @@ def test_a_kernel_that_fails_on_another_thread_fails_here(divided):
     assert kernels.over(lambda first, last: (first, last), 12) == [(0, 4), (4, 8), (8, 12)]
 
 
+@released
+def _squares(first, last, failing, out):
+    """The squares of a range, and its length."""
+    found = np.empty(last - first)
+    for i in range(first, last):
+        if i == failing:
+            raise ValueError("a row that fails")
+        found[i - first] = float(i) * i
+        out[i] = found[i - first]
+    return found, last - first
+
+
+def _squares_are_right():
+    out = np.zeros(100)
+    found = kernels.over(_squares, 100, -1, out)
+    expected = np.arange(100.0) ** 2
+    assert len(found) == kernels.in_use()
+    assert sum(length for _, length in found) == 100
+    np.testing.assert_array_equal(np.concatenate([part for part, _ in found]), expected)
+    np.testing.assert_array_equal(out, expected)
+
+
+def test_what_parts_return_comes_in_their_order(divided):
+    """Arrays and numbers, at any number of threads, more than there are rows or cores as well."""
+    for number in (1, 2, 3, 7, 2, 1):
+        kernels.use(number)
+        _squares_are_right()
+    assert [length for _, length in kernels.over(_squares, 0, -1, np.zeros(0))] == [0]
+    kernels.use(5)
+    assert [length for _, length in kernels.over(_squares, 3, -1, np.zeros(3))] == [1, 1, 1]
+
+
+def test_a_compiled_kernel_that_fails_on_another_thread_fails_here(divided):
+    """In its first, its middle and its last part; the threads are there for the next one."""
+    kernels.use(3)
+    for failing in (0, 40, 99):
+        with pytest.raises(ValueError, match="a row that fails"):
+            kernels.over(_squares, 100, failing, np.zeros(100))
+        _squares_are_right()
+
+
+def test_python_code_on_the_threads_may_share_loops_itself(divided):
+    """Those loops run on the thread that asks, as long as the threads are in use."""
+    kernels.use(3)
+
+    def inner(first, last):
+        out = np.zeros(100)
+        kernels.over(_squares, 100, -1, out)
+        return out[first:last].sum()
+
+    assert sum(kernels.over(inner, 100)) == (np.arange(100.0) ** 2).sum()
+
+
+def test_two_callers_at_once_get_what_each_asked_for(divided):
+    """One of them has the threads at a time."""
+    kernels.use(3)
+
+    def call(k):
+        for _ in range(300):
+            out = np.zeros(50 + k)
+            kernels.over(_squares, 50 + k, -1, out)
+            np.testing.assert_array_equal(out, np.arange(50.0 + k) ** 2)
+        return k
+
+    with ThreadPoolExecutor(4) as callers:
+        assert list(callers.map(call, range(4))) == [0, 1, 2, 3]
+
+
+@ranged
+def _slow(first, last, turns, out):
+    for i in range(first, last):
+        x = 1.0
+        for _ in range(turns):
+            x = x * 1.0000001 + 1e-9
+        out[i] = x
+
+
+def test_ctrl_c_ends_a_loop_when_all_of_its_parts_are_done(divided):
+    """No thread goes on writing into fields that the caller may change."""
+    kernels.use(3)
+    whole, out = np.zeros(3), np.zeros(3)
+    kernels.over(_slow, 3, 1000, whole)
+    kernels.over(_slow, 3, 100_000_000, whole)
+    for python in (False, True):
+        out[:] = 0.0
+        loop = (lambda *args: _slow(*args)) if python else _slow
+        press = threading.Timer(0.1, signal.raise_signal, [signal.SIGINT])
+        press.start()
+        with pytest.raises(KeyboardInterrupt):
+            kernels.over(loop, 3, 100_000_000, out)
+        press.join()
+        np.testing.assert_array_equal(out, whole)
+        _squares_are_right()
+
+
+def test_threads_without_work_do_not_use_the_processor(divided):
+    """They look for a fraction of a millisecond, and then sleep; the next loop wakes them."""
+    kernels.use(3)
+    for _ in range(3):
+        _squares_are_right()
+        began = time.process_time()
+        time.sleep(0.3)
+        assert time.process_time() - began < 0.1
+    _squares_are_right()
+
+
+IN_ANOTHER_PROCESS = """
+import numpy as np
+from fluid.numerics import threads
+threads.use(3, least=1)
+threads.zeros((100,))
+assert (threads.marked(np.arange(100) % 3 == 0) == np.arange(0, 100, 3)).all()
+print(sum(threads._marked.stats.cache_hits.values()), len(threads._team.workers))
+"""
+
+
+def test_kernels_in_the_cache_hold_no_addresses_of_the_process_that_compiled_them(tmp_path):
+    """The second process takes them from there, shares their loops among threads of its own, and ends by itself."""
+    place = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
+    for hits in (0, 1):
+        done = subprocess.run(
+            [sys.executable, "-c", IN_ANOTHER_PROCESS], env=place, cwd=ROOT, capture_output=True, timeout=200
+        )
+        assert done.returncode == 0, done.stderr.decode()
+        assert done.stdout.split() == [str(hits).encode(), b"2"]
+
+
 def test_a_process_that_is_forked_off_has_threads_of_its_own(divided):
     """Those of its parent are not there; waiting for them would never end."""
     kernels.use(3)
     kernels.over(lambda first, last: last, 9)
+    _squares_are_right()
     child = os.fork()
     if child == 0:
         same = kernels.over(lambda first, last: last - first, 9) == [3, 3, 3]
+        _squares_are_right()
         os._exit(0 if same and len(kernels._team.workers) == 2 else 1)
     assert os.waitpid(child, 0)[1] == 0
+    _squares_are_right()
+
+
+def test_lists_of_marked_entries_and_copies_are_those_of_numpy(divided):
+    """Copies of every type and order of fields, and lists of none, some and all of the entries."""
+    rng = np.random.default_rng(3)
+    for number in (1, 3):
+        kernels.use(number)
+        for share in (0.0, 0.3, 1.0):
+            mask = rng.random(500) < share
+            np.testing.assert_array_equal(kernels.marked(mask), np.flatnonzero(mask))
+        for given in (rng.normal(size=(200, 3)), rng.normal(size=333)[::2], mask, np.arange(70)):
+            copy = kernels.copied(given)
+            np.testing.assert_array_equal(copy, given)
+            assert copy.dtype == given.dtype
+            assert not np.shares_memory(copy, given)
 
 
 def test_the_command_s_number_counts_before_the_variable_and_that_before_the_cores(monkeypatch):
