@@ -1,4 +1,7 @@
-"""Sides of the tank: closed (u·n = 0 on their nodes and the water slips, or u = 0) or open (p = 0, water leaves)."""
+"""Sides of the tank: closed (u·n = 0 on their nodes and the water slips, or u = 0) or open (p = 0, water leaves).
+
+Where u = 0 holds in the water, dry nodes let it slip: the edge of the water would never come forth along such a side
+otherwise, nor water from above reach it."""
 
 from __future__ import annotations
 
@@ -21,7 +24,8 @@ LYING_OVER = 0.7
 
 @dataclass(frozen=True, kw_only=True)
 class Walls:
-    """nodes (n,) on closed sides · projector (n, 3, 3) onto the directions they leave free ·
+    """nodes (n,) on closed sides · projector (n, 3, 3) onto the directions they leave free to water ·
+    sticking (k,) rows of those where u = 0, slipping (k, 3, 3) onto the directions they leave free where they are dry ·
     open_node (N,) bool, p = 0; open_nodes (k,) their numbers, open_projector (k, 3, 3) onto their normals ·
     open_faces (F, 3) nodes, open_area (F, 3) [m²] outward area vectors ·
     rough_faces (C, 3), rough_area (C, 3) [m²], rough_cell (C,) background cell: the same for closed sides with no slip
@@ -29,6 +33,8 @@ class Walls:
 
     nodes: Ints
     projector: Floats
+    sticking: Ints
+    slipping: Floats
     open_node: Bools
     open_nodes: Ints
     open_projector: Floats
@@ -61,12 +67,15 @@ class Walls:
         faces, closed = mesh.boundary_faces, ~opened
         nodes, projector = _projectors(faces[closed], area[closed])
         rough = closed & ~smooth & ~flowing
-        if no_slip:
-            projector[np.isin(nodes, faces[rough])] = 0.0
+        sticking = np.flatnonzero(np.isin(nodes, faces[rough]) & no_slip)
+        slipping = projector[sticking]
+        projector[sticking] = 0.0
         free = opened & ~sea
         return cls(
             nodes=nodes,
             projector=projector,
+            sticking=sticking,
+            slipping=slipping,
             open_node=open_node,
             open_nodes=open_nodes,
             open_projector=np.eye(3) - tangential,
@@ -84,6 +93,7 @@ class Walls:
             return self
         copies, row = _copies(self.nodes, parent_node)
         open_copies, open_row = _copies(self.open_nodes, parent_node)
+        sticking, sticking_row = _copies(self.sticking, row)
         first = np.full(len(self.open_node), -1)
         first[parent_node[::-1]] = np.arange(len(parent_node))[::-1]
         faces, rough = first[self.open_faces], first[self.rough_faces]
@@ -91,6 +101,8 @@ class Walls:
         return Walls(
             nodes=copies,
             projector=self.projector[row],
+            sticking=sticking,
+            slipping=self.slipping[sticking_row],
             open_node=self.open_node[parent_node],
             open_nodes=open_copies,
             open_projector=self.open_projector[open_row],
@@ -143,9 +155,14 @@ class Walls:
         phi[nodes[coming]] = gone[coming]
         phi[nodes] = without_films(phi[nodes], spacing[nodes])  # water up to the brim, rounded
 
-    def slip(self, u) -> None:
-        """Remove the velocity into the closed sides from u (N, 3) [m/s], in place."""
+    def slip(self, u, wet=None) -> None:
+        """Remove the velocity into the closed sides from u (N, 3) [m/s], in place, and where u = 0 all of it, but for
+        nodes that are not wet (N,) bool; None: all are."""
+        dry = np.zeros(0, np.int64) if wet is None else np.flatnonzero(~wet[self.nodes[self.sticking]])
+        nodes = self.nodes[self.sticking[dry]]
+        kept = u[nodes]
         over(_project, len(self.nodes), self.nodes, self.projector, u)
+        u[nodes] = np.einsum("nij,nj->ni", self.slipping[dry], kept)
 
 
 @ranged
@@ -169,7 +186,7 @@ def _chosen(sides, mesh, x, of_sea: bool):
 
 def _copies(nodes, parent_node):
     """Copies (m,) of the background nodes, in order, and the row in `nodes` of each."""
-    place = np.full(max(parent_node.max(), nodes.max(initial=0)) + 1, -1)
+    place = np.full(max(parent_node.max(initial=0), nodes.max(initial=0)) + 1, -1)
     place[nodes] = np.arange(len(nodes))
     copies = np.flatnonzero(place[parent_node] >= 0)
     return copies, place[parent_node[copies]]

@@ -213,7 +213,7 @@ def _limit_and_damp(water, kept, u, a):
     damp_divergence(wet, parameters.divergence_damping, line, u, t.fluid_cells)
     _damp_surface(water, kept, u)
     damped = copied(u)
-    water.hold(u, kept.end)
+    water.hold(u, kept.end, kept.wet)
     return clipped, limited, damped
 
 
@@ -273,7 +273,7 @@ def _continue(water, kept, listed, start, u, a, forced) -> None:
     rubbed = water.nodes_at_rough_walls()
     extend_velocity(water.topology, (listed, start), kept.wet, kept.wet_cells, u, a, calm, forced, rubbed)
     _limit_speed(water, u, a)
-    water.hold(u, kept.end)
+    water.hold(u, kept.end, kept.wet)
 
 
 def _flux(water, kept, listed, start, u, u_cell):

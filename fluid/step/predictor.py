@@ -147,7 +147,7 @@ def predicted(water, dt: float) -> PressureProblem:
             water.topology,
             water.walls.open_node,
         )
-        water.hold(u_adv, water.time + dt)
+        water.hold(u_adv, water.time + dt, surface.level_set < 0.0)
     shear = None
     if water.viscous is not None:
         shear = _sheared(water, dt, theta, kick, surface, u_adv)
@@ -203,7 +203,7 @@ def _transported(water, dt, theta, kick):
     to_middle = 0.5 * dt if water.parameters.theta < 1.0 else 0.0
     u_hat, u_m = kicked(water.velocity, water.acceleration, kick, (1.0 - theta) * dt, to_middle)
     for u in (u_hat, u_m):
-        water.hold(u, water.time + dt)
+        water.hold(u, water.time + dt, water.level_set < 0.0)
     fields = np.empty((len(u_hat), 4))
 
     def stack(rows):
@@ -224,7 +224,7 @@ def _transported(water, dt, theta, kick):
     width = TRANSPORT_WIDTH * water.mesh.spacing
     over(_taken_over, len(moved), water.listed, moved, water.topology.finer, width, u_adv, phi)
     water.walls.admit_air(phi, u_m, dt, water.topology.node_size, -np.asarray(water.parameters.down))
-    water.hold(u_adv, water.time + dt)
+    water.hold(u_adv, water.time + dt, phi < 0.0)
     return u_adv, phi
 
 

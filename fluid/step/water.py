@@ -41,6 +41,8 @@ if TYPE_CHECKING:
     from fluid.viscous.viscosity import FreeBodies
 
 LEVEL_HALVINGS = 40
+START_STEPS = 2
+"""Steps of a start, which are implicit, and after which the surface lags by no more than by half of each."""
 LONGEST_STEP = 0.3
 """dt ≤ LONGEST_STEP sqrt(h/g): a step at rest, h the least size of the cells at the surface ..."""
 AT_SURFACE = 3.0
@@ -169,7 +171,7 @@ class Water:
         crosses a cell in a step; 1 for the first two steps, so that a start at rest does not ring, and always where
         `theta` is 1."""
         p = self.parameters
-        if self.steps < 2 or p.theta == 1.0:
+        if self.steps < START_STEPS or p.theta == 1.0:
             return 1.0
         return min(p.theta, p.theta - (p.theta - p.calm_theta) * self.calm(dt))
 
@@ -279,7 +281,8 @@ class Water:
             self.slits = self.slits.advanced(dofs, pressure, p.weight, problem.dt, p.density)
         self.report = new.report
         share = 1.0 - self.calm(problem.dt) if self.pushed_by.any() else 1.0
-        self._surface_lag = 0.5 * problem.dt * share
+        before = self._surface_lag if self.steps >= START_STEPS else 0.0
+        self._surface_lag = lag_after(before, 0.5 * problem.dt * share, problem.dt)
         if self.sides is not None:
             ahead = float((self._late() - late) @ self.pressure)
             self.sides.add_step(problem.predicted.through, self.head(), ahead)
@@ -462,9 +465,11 @@ class Water:
 
     # ---- sides of the tank
 
-    def hold(self, u, time: float) -> None:
-        """Impose the conditions of the sides of the tank on u (N, 3) [m/s] at a time [s], in place."""
-        self.walls.slip(u)
+    def hold(self, u, time: float, wet=None) -> None:
+        """Impose the conditions of the sides of the tank on u (N, 3) [m/s] at a time [s], in place.
+
+        wet (N,) bool: nodes where a side without slip holds it, None: all."""
+        self.walls.slip(u, wet)
         if self.sides is not None:
             self.sides.hold(u, time, self.parameters.gravity)
 
@@ -621,6 +626,15 @@ class Water:
         if high > spill:
             held = nodal_volume(t, height - spill)
         return -p.density * float(held @ self.nodes_below_floor)
+
+
+def lag_after(lag: float, whole: float, dt: float) -> float:
+    """How far [s] the surface lags behind the velocity after a step of dt [s], from the lag before; whole [s]: that of
+    many equal steps, up to dt/2.
+
+    The flux is that of the velocity half of the *last* step ahead.  After a step shorter than those before it the
+    surface therefore still lags by as much as it did, and catches up within about twice the time that it lags by."""
+    return whole if whole >= lag else lag + (whole - lag) * min(1.0, 0.5 * dt / lag)
 
 
 def _viscosity(parameters: WaterParameters):

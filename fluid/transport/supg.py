@@ -241,7 +241,7 @@ def carried_velocity(water, dt: float, u_m, u_hat):
     free = ~rim(water, u_m)[members, None] & _along_sides(water)[members]
     c = u_m.copy()
     c[members] = midpoint_velocity(t, band, u_m[members], dt)
-    water.hold(c, water.time + 0.5 * dt)
+    water.hold(c, water.time + 0.5 * dt, water.level_set < 0.0)
     old = u_hat[members]
     new = old + Transport.of(t, band, c[members], dt).change(old, free)
     moved = u_hat.copy()

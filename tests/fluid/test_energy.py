@@ -80,3 +80,16 @@ def test_a_wave_of_fourteen_cells_keeps_most_of_its_energy():
         energy.append((water.kinetic_energy() + water.potential_energy()) / held)
     first, last = np.interp([period, 4.0 * period], time, energy)
     assert 0.0 < (first - last) / 3.0 < 0.06
+
+
+@pytest.mark.parametrize("shorter", [2.0, 8.0])
+def test_a_shorter_step_puts_no_energy_into_falling_water(shorter):
+    """The potential energy is that at the time of the velocity, half a step after the surface. Taken for half of the
+    new step at once, the lag gave falling water 1.7 % of its energy in the first step of an eighth: shorter steps never
+    helped."""
+    water = tank([0.6, 0.2, 1.6], 0.1, lambda x: np.abs(x[:, 2] - 1.2) - 0.2)
+    for _ in range(12):
+        advance(water, 0.018)
+    energy = water.available_energy()
+    advance(water, 0.018 / shorter)
+    assert abs(water.available_energy() / energy - 1.0) < 0.005
