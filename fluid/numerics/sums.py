@@ -14,26 +14,37 @@ def momentum_of(weight, u, place) -> Array:
     return momentum_of_rows(np.arange(len(weight)), 1.0, weight, u, place, np.zeros(3))
 
 
-def momentum_of_rows(rows, density, volume, u, nodes, reference):
+def momentum_of_rows(rows, density, volume, u, nodes, reference) -> Array:
     """ρ Σ W_i [u_i; (x_i - x_0) × u_i] (6,) over `rows`; volume W (n,) [m³], nodes x (n, 3), reference x_0 (3,)."""
-    return summed(_momentum, len(rows), (6,), rows, density, volume, u, nodes, reference)
+    return momenta_of_rows(rows, density, [(volume, u)], nodes, reference)[0]
+
+
+def momenta_of_rows(rows, density, fields, nodes, reference) -> Array:
+    """`momentum_of_rows` (k, 6) of each of k pairs (W (n,) [m³], u (n, 3) [m/s])."""
+    volumes, velocities = (tuple(np.ascontiguousarray(f) for f in each) for each in zip(*fields))
+    return summed(_momenta, len(rows), (len(fields), 6), rows, density, volumes, velocities, nodes, reference)
 
 
 @ranged
-def _momentum(first, last, rows, density, volume, u, nodes, reference, partial):
+def _momenta(first, last, rows, density, volumes, velocities, nodes, reference, partial):
+    x0, y0, z0 = reference[0], reference[1], reference[2]
     for c in range(first, last):
-        out = partial[c]
-        for s in range(c * CHUNK, min((c + 1) * CHUNK, rows.shape[0])):
-            i = rows[s]
-            m = density * volume[i]
-            r0, r1, r2 = nodes[i, 0] - reference[0], nodes[i, 1] - reference[1], nodes[i, 2] - reference[2]
-            p0, p1, p2 = m * u[i, 0], m * u[i, 1], m * u[i, 2]
-            out[0] += p0
-            out[1] += p1
-            out[2] += p2
-            out[3] += r1 * p2 - r2 * p1
-            out[4] += r2 * p0 - r0 * p2
-            out[5] += r0 * p1 - r1 * p0
+        for field in range(len(volumes)):
+            volume, u = volumes[field], velocities[field]
+            x, y, z, turn_x, turn_y, turn_z = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+            for s in range(c * CHUNK, min((c + 1) * CHUNK, rows.shape[0])):
+                i = np.uint64(rows[s])
+                m = density * volume[i]
+                r0, r1, r2 = nodes[i, 0] - x0, nodes[i, 1] - y0, nodes[i, 2] - z0
+                p0, p1, p2 = m * u[i, 0], m * u[i, 1], m * u[i, 2]
+                x += p0
+                y += p1
+                z += p2
+                turn_x += r1 * p2 - r2 * p1
+                turn_y += r2 * p0 - r0 * p2
+                turn_z += r0 * p1 - r1 * p0
+            out = partial[c, field]
+            out[0], out[1], out[2], out[3], out[4], out[5] = x, y, z, turn_x, turn_y, turn_z
 
 
 def about(point, load, centre) -> Array:

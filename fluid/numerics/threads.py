@@ -23,7 +23,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -41,9 +41,6 @@ CHUNK = 16_384
 FILLED, LAZY = 64, 32 << 20
 """Numbers that are filled as one row, and bytes from which the C library returns pages that are zero already and are
 allocated only when they are written to."""
-STRETCH, PLAIN = 8_192, 8
-"""Rows that `field` takes at a time, whose temporary arrays stay in the caches, and how many of them take as long as
-one usual row."""
 KEPT = 8
 """Number of lists whose reach is remembered: those of one step."""
 
@@ -139,44 +136,6 @@ def summed(kernel: Callable, count: int, shape: tuple[int, ...], *args) -> Array
     return total
 
 
-def by_stretches(action: Callable[[slice], Any], out) -> None:
-    """Call action(rows) for stretches of the rows of `out`, which it writes to: for NumPy on whole fields."""
-    over(_stretches, -(-len(out) // STRETCH), action, out, weight=STRETCH // PLAIN)
-
-
-def _stretches(first, last, action, out):
-    for begin in range(first * STRETCH, min(last * STRETCH, len(out)), STRETCH):
-        action(slice(begin, min(begin + STRETCH, len(out))))
-
-
-def field(
-    count: int, expression: Callable[[slice], Any], shape: tuple[int, ...] = (), dtype=float
-) -> np.ndarray:
-    """Array (count, *shape) of expression(rows), which is evaluated for stretches of its rows."""
-    out = np.empty((count, *shape), dtype)
-
-    def evaluate(rows):
-        out[rows] = expression(rows)
-
-    by_stretches(evaluate, out)
-    return out
-
-
-def copied(array) -> np.ndarray:
-    """A copy of an array, made by all threads."""
-    if array.dtype != float or not array.flags.c_contiguous:
-        return field(len(array), array.__getitem__, array.shape[1:], array.dtype)
-    out = np.empty(array.shape)
-    over(_copy, -(-array.size // FILLED), array.reshape(-1), out.reshape(-1))
-    return out
-
-
-@ranged
-def _copy(first, last, array, out):
-    for i in range(first * FILLED, min(last * FILLED, out.shape[0])):
-        out[i] = array[i]
-
-
 def marked(mask) -> Array:
     """Numbers of the entries of a mask (n,) bool that are set, in order."""
     return found_over(_marked, len(mask), mask)
@@ -207,8 +166,8 @@ def zeros(shape: tuple[int, ...]) -> np.ndarray:
 
 @ranged
 def _fill(first, last, out):
-    for i in range(first * FILLED, min(last * FILLED, out.shape[0])):
-        out[i] = 0.0
+    for j in range(first * FILLED, min(last * FILLED, out.shape[0])):
+        out[np.uint64(j)] = 0.0
 
 
 def _parts(count: float) -> int:

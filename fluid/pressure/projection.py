@@ -26,7 +26,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from array_types import Array, Bools, Floats, Integers, Ints
-from fluid.numerics.threads import by_stretches, copied, found_over, over, owning, reach_of_cells, zeros
+from fluid.numerics.fields import copied
+from fluid.numerics.threads import found_over, over, owning, reach_of_cells, zeros
 from kernel_decorators import kernel, ranged, released
 
 SMALLEST_CUT = 1e-7
@@ -328,22 +329,24 @@ def _with_ghosts(first, last, runs, cell_list, state, cells, sums, out):
             out[j] = air[j] + (phi[j] * up[j] / down[j] if down[j] > 0.0 else 0.0)
 
 
-def cell_gradient(cell_list, f, cells, parent, g):
-    """∇f (n, 3) of nodal f (N,) in the listed cells."""
+def cell_gradient(cell_list, f, cells, parent, g, scale: float = 1.0):
+    """scale ∇f (n, 3) of nodal f (N,) in the listed cells."""
     out = np.empty((len(cell_list), 3))
-    over(_cell_gradient, len(cell_list), cell_list, f, cells, parent, g, out)
+    over(_cell_gradient, len(cell_list), cell_list, f, cells, parent, g, scale, out)
     return out
 
 
 @ranged
-def _cell_gradient(first, last, cell_list, f, cells, parent, g, out):
+def _cell_gradient(first, last, cell_list, f, cells, parent, g, scale, out):
     for s in range(first, last):
         e = cell_list[s]
-        for k in range(3):
-            out[s, k] = 0.0
+        x, y, z = 0.0, 0.0, 0.0
         for a in range(4):
-            for k in range(3):
-                out[s, k] += f[cells[e, a]] * g[parent[e], a, k]
+            value = f[cells[e, a]]
+            x += value * g[parent[e], a, 0]
+            y += value * g[parent[e], a, 1]
+            z += value * g[parent[e], a, 2]
+        out[s, 0], out[s, 1], out[s, 2] = x * scale, y * scale, z * scale
 
 
 def nodal_mean(wet, value, fluid, n_nodes):
@@ -442,8 +445,16 @@ def damp_waterline(wet_cells, weight, line, wet, u, fluid):
     around = WetCells(wet_cells.rows[near], wet_cells.share[near])
     once = _unlike_neighbours(around, line, wet, u, fluid)
     twice = _unlike_neighbours(around, line, wet, once, fluid)
-    each = np.broadcast_to(weight, (len(u), 1))
-    by_stretches(lambda rows: np.subtract(u[rows], each[rows] * twice[rows], out=u[rows]), u)
+    over(_evened, len(u), np.reshape(weight, -1), twice, u)
+
+
+@ranged
+def _evened(first, last, weight, twice, u):
+    """u - weight · twice (N, 3) in place; weight (1,) or (N,)."""
+    for i in range(first, last):
+        w = weight[i] if weight.shape[0] > 1 else weight[0]
+        for k in range(3):
+            u[i, k] -= w * twice[i, k]
 
 
 def _around_waterline(cell_list, line, cells):

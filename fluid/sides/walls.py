@@ -12,7 +12,7 @@ import numpy as np
 
 from array_types import Bools, Floats, Ints
 from fluid.numerics.threads import over
-from fluid.surface.level_set import without_films
+from fluid.surface.level_set import drain_films
 from kernel_decorators import ranged
 
 _SAME_DIRECTION = 0.3
@@ -153,7 +153,9 @@ class Walls:
         over = (normal @ up > LYING_OVER) & (phi[nodes] < spacing[nodes])
         gone = np.where(over, np.maximum(phi[nodes], 0.0) + inward, np.maximum(phi[nodes], inward))
         phi[nodes[coming]] = gone[coming]
-        phi[nodes] = without_films(phi[nodes], spacing[nodes])  # water up to the brim, rounded
+        level = phi[nodes]
+        drain_films(level, spacing[nodes])  # water up to the brim, rounded
+        phi[nodes] = level
 
     def slip(self, u, wet=None) -> None:
         """Remove the velocity into the closed sides from u (N, 3) [m/s], in place, and where u = 0 all of it, but for

@@ -15,9 +15,10 @@ import numpy as np
 
 from array_types import Bools, Floats, Ints
 from fluid.domain.cell_vectors import CellVectors, places_of
+from fluid.numerics.fields import copied_at, less
 from fluid.numerics.solve import product
 from fluid.numerics.sums import kinetic_energy
-from fluid.numerics.threads import copied, field, over
+from fluid.numerics.threads import over
 from fluid.pressure.pressure_bound import BoundMet
 from fluid.pressure.projection import (
     Waterline,
@@ -28,7 +29,7 @@ from fluid.pressure.projection import (
     nodal_mean,
     with_ghosts,
 )
-from fluid.step.momentum import Stages, momentum_change
+from fluid.step.momentum import Stages, holding_water, momentum_change
 from fluid.step.report import StepReport
 from fluid.surface.extrapolation import extend_velocity
 from fluid.surface.gradient_jump_damping import damp_gradient_jumps
@@ -91,22 +92,23 @@ def corrected(water, problem, x, parting) -> Corrected:
     gradient = _pressure_gradient(water, kept, unknown, dt / problem.density)
     u, a, forced, mean = _projected(t, kept, gradient, dt)
     remainder, kick_remainder = _remainders(water, kept, gradient, mean, dt)
-    u_cell = field(len(gradient), lambda rows: kept.cell_star[rows] - gradient[rows], (3,))
-    projected = copied(u)
-    clipped, limited, damped = _limit_and_damp(water, kept, u, a)
-    slipping = copied(u)
+    held, projected_energy = holding_water(water, kept), kinetic_energy(problem.density, kept.nodal_water, u)
+    projected, calm = copied_at(held, u), water.calm(kept.end - water.time)
+    clipped, limited, damped = _limit_and_damp(water, kept, u, a, held, projected, calm)
+    slipping = copied_at(held, u)
     listed, start = water.layers(kept.wet)
-    _continue(water, kept, listed, start, u, a, forced)
-    cell_field, flux = _flux(water, kept, listed, start, u, u_cell)
+    _continue(water, kept, listed, start, u, a, forced, calm)
+    cell_field, flux = _flux(water, kept, listed, start, u, gradient)
     momentum = momentum_change(
         water,
         problem,
         unknown,
         pressure,
+        held,
         Stages(projected=projected, limited=limited, damped=damped, slipping=slipping, end=u),
     )
     bound = BoundMet.of(water, problem, x, parting)
-    report = _report(water, problem, x, projected, u, clipped, momentum, bound)
+    report = _report(water, problem, x, projected_energy, u, clipped, momentum, bound)
     return Corrected(
         velocity=u,
         acceleration=a,
@@ -140,9 +142,7 @@ def _pressure_gradient(water, kept, pressure, scale):
     unheld = water.walls.open_node if kept.held is None else water.walls.open_node & (kept.held == 0.0)
     air = np.zeros(len(pressure)) if kept.cushions is None else np.where(kept.wet, 0.0, pressure)
     full = with_ghosts(pressure, air, kept.wet, unheld, kept.level_set, kept.wet_cells, t.cells)
-    gradient = cell_gradient(kept.wet_cells, full, t.cells, t.parent, t.gradients)
-    gradient *= scale
-    return gradient
+    return cell_gradient(kept.wet_cells, full, t.cells, t.parent, t.gradients, scale)
 
 
 def _projected(t, kept, gradient, dt):
@@ -202,24 +202,26 @@ def _leave(first, last, cell_list, below, slopes, before, time, fluid, made):
                 rate[s, k] = left / time
 
 
-def _limit_and_damp(water, kept, u, a):
+def _limit_and_damp(water, kept, u, a, held, projected, calm):
     """Speed limit, damping of divergence and along water lines, slip, in place; the number of clipped nodes, and the
-    velocity (N, 3) after the first and after the second."""
+    velocity (N, 3) at the nodes `held` (n,) after the first and after the second.
+
+    projected (N, 3): u before, at these nodes · calm: `Water.calm`"""
     t, parameters = water.topology, water.parameters
     clipped = _limit_speed(water, u, a)
-    limited = copied(u)
+    limited = copied_at(held, u) if clipped else projected
     line = Waterline(t.in_cells(kept.level_set), t.beside_solid, -MEMORY_DEPTH * water.mesh.spacing)
     wet = WetCells(kept.wet_cells, kept.wet_share)
     damp_divergence(wet, parameters.divergence_damping, line, u, t.fluid_cells)
-    _damp_surface(water, kept, u)
-    damped = copied(u)
+    _damp_surface(water, kept, u, calm)
+    damped = copied_at(held, u)
     water.hold(u, kept.end, kept.wet)
     return clipped, limited, damped
 
 
-def _damp_surface(water, kept, u) -> None:
+def _damp_surface(water, kept, u, calm) -> None:
     """`damp_waterline`, and `damp_gradient_jumps` where there are obtuse cells, in calm water, in place."""
-    t, h, calm = water.topology, water.mesh.spacing, water.calm(kept.end - water.time)
+    t, h = water.topology, water.mesh.spacing
     phi, wet = t.in_cells(kept.level_set), WetCells(kept.wet_cells, kept.wet_share)
 
     def even_out(weight, where):
@@ -265,19 +267,19 @@ def _clip(first, last, u, a, limit, weight):
     return count
 
 
-def _continue(water, kept, listed, start, u, a, forced) -> None:
+def _continue(water, kept, listed, start, u, a, forced, calm) -> None:
     """Velocity and acceleration outside the water, in place; limited again, slipping again.
 
-    forced: see `extend_velocity`."""
-    calm = water.calm(kept.end - water.time)
+    forced: see `extend_velocity` · calm: `Water.calm`"""
     rubbed = water.nodes_at_rough_walls()
     extend_velocity(water.topology, (listed, start), kept.wet, kept.wet_cells, u, a, calm, forced, rubbed)
     _limit_speed(water, u, a)
     water.hold(u, kept.end, kept.wet)
 
 
-def _flux(water, kept, listed, start, u, u_cell):
-    """Velocity of the cells, CellVectors, and the volume flux of the next step, extrapolated to its middle."""
+def _flux(water, kept, listed, start, u, gradient):
+    """Velocity of the cells, CellVectors, and the volume flux of the next step, extrapolated to its middle; gradient:
+    (dt/ρ) ∇x (n, 3) [m/s] of the wet cells."""
     t = water.topology
     reached = listed[: start[FLUX_LAYERS + 1]]
     near = np.zeros(len(u), bool)
@@ -287,7 +289,7 @@ def _flux(water, kept, listed, start, u, u_cell):
     last = water.cell_velocity
     # with implicit Euler the velocity at the end of the step is the stable choice
     before = last if water.parameters.theta < 1.0 else CellVectors.none()
-    wet = (places_of(around, kept.wet_cells), u_cell)
+    wet = (places_of(around, kept.wet_cells), kept.cell_star, gradient)
     over(
         _cells_of_flux,
         len(around),
@@ -299,7 +301,7 @@ def _flux(water, kept, listed, start, u, u_cell):
         now,
         middle,
     )
-    held = field(len(u), lambda rows: kept.nodal_water[rows] - kept.displaced[rows])
+    held = less(kept.nodal_water, kept.displaced)
     return CellVectors(around, now), edge_flux(t, water.graph_for(reached), reached, middle, held)
 
 
@@ -308,15 +310,16 @@ def _cells_of_flux(first, last, cell_list, u, wet, before, fluid, now, middle):
     """Velocity (n, 3) of the listed cells: that of the projection in wet ones, elsewhere u (N, 3) at the centroid; and
     (M, 3) half a step ahead, 1.5 u - 0.5 u_before, u where none was before. Other cells are not written to.
 
-    wet, before: place (n,) of each listed cell among the rows of the values (.., 3), -1 for none."""
-    (wet_place, u_wet), (place, u_before) = wet, before
+    wet: place (n,) of each listed cell among the rows of u* (.., 3) and of what the pressure takes from it, -1 for none
+    before: the same of the values (.., 3)."""
+    (wet_place, star, taken), (place, u_before) = wet, before
     cells, share, share_row = fluid.cells, fluid.share, fluid.share_row
     for s in range(first, last):
         e, w, b = cell_list[s], wet_place[s], place[s]
         row = share_row[e]
         for k in range(3):
             if w >= 0:
-                now[s, k] = u_wet[w, k]
+                now[s, k] = star[w, k] - taken[w, k]
             else:
                 now[s, k] = 0.0
                 for a in range(4):
@@ -326,19 +329,22 @@ def _cells_of_flux(first, last, cell_list, u, wet, before, fluid, now, middle):
             middle[e, k] = 1.5 * now[s, k] - 0.5 * u_before[b, k] if known else now[s, k]
 
 
-def _report(water, problem, x, projected, u, clipped, momentum, bound):
+def _report(water, problem, x, projected_energy, u, clipped, momentum, bound):
     kept, p = problem.predicted, water.parameters
-    g_x = water.nodes_below_floor
+
+    def potential(volume):
+        return -p.density * float(volume @ water.nodes_below_floor)
 
     def energy(volume, velocity):
-        return kinetic_energy(p.density, volume, velocity) - p.density * float(volume @ g_x)
+        return kinetic_energy(p.density, volume, velocity) + potential(volume)
 
+    of_water = potential(kept.nodal_water)
     stages = [
         energy(water.nodal_water, water.velocity),
         energy(kept.uncorrected_water, kept.u_star),
-        energy(kept.nodal_water, kept.u_star),
-        energy(kept.nodal_water, projected),
-        energy(kept.nodal_water, u),
+        kinetic_energy(p.density, kept.nodal_water, kept.u_star) + of_water,
+        projected_energy + of_water,
+        kinetic_energy(p.density, kept.nodal_water, u) + of_water,
     ]
     names = ("transport and gravity", "volume correction", "pressure", "damping and limit")
     change = dict(zip(names, np.diff(stages)))

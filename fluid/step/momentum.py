@@ -30,10 +30,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from array_types import Array, Floats
-from fluid.numerics.sums import about, momentum_of, momentum_of_rows
-from fluid.numerics.threads import CHUNK, field, marked, summed
-from fluid.step.predictor import kick_factor
-from kernel_decorators import released
+from fluid.numerics.sums import about, momenta_of_rows, momentum_of, momentum_of_rows
+from fluid.numerics.threads import CHUNK, found_over, over, summed
+from kernel_decorators import ranged, released
 
 NUMERICAL = (
     "transport",
@@ -63,8 +62,8 @@ class MomentumChange:
 
 @dataclass(frozen=True, kw_only=True)
 class Stages:
-    """Velocities (N, 3) [m/s] through the second half of the step: after the pressure, the speed limit, the damping,
-    the slip along the sides, and at the end."""
+    """Velocities (N, 3) [m/s] through the second half of the step, at the nodes that hold water: after the pressure,
+    the speed limit, the damping, the slip along the sides, and at the end."""
 
     projected: Floats
     limited: Floats
@@ -80,13 +79,13 @@ def momentum(water) -> Array:
     return momentum_of_rows(wet, water.parameters.density, *state)
 
 
-def momentum_change(water, problem, unknown, pressure, stages: Stages) -> MomentumChange:
+def momentum_change(water, problem, unknown, pressure, rows, stages: Stages) -> MomentumChange:
     """The lines of a step that ends; `water` still holds the state at its beginning.
 
-    unknown, pressure (N,) [Pa]: x and x + known on wet nodes and seas."""
+    unknown, pressure (N,) [Pa]: x and x + known on wet nodes and seas · rows: `holding_water`."""
     kept, dt = problem.predicted, problem.dt
     x, p = np.where(kept.wet, unknown, 0.0), np.where(kept.wet, pressure, 0.0)
-    at = _momenta(water, kept, dt, stages)
+    at = _momenta(water, kept, dt, rows, stages)
     cells, tank, held = _reactions(water, kept, x, p, dt)
     openings = _at_closed_openings(water, kept, p, dt)
     on_bodies, shear_on_bodies, tank_shear = _loads(water, problem, p)
@@ -126,15 +125,29 @@ def momentum_change(water, problem, unknown, pressure, stages: Stages) -> Moment
     )
 
 
-def _momenta(water, kept, dt, stages: Stages) -> dict[str, Array]:
-    """Momentum (6,) after every stage of the step; "weight" [N, N m]: that of the water."""
+def holding_water(water, kept) -> Array:
+    """Numbers (n,) of the nodes that hold water before the step, after transport or after the volume correction."""
+    W0 = water.nodal_water
+    return found_over(_holding, len(W0), W0, kept.uncorrected_water, kept.nodal_water)
+
+
+@released
+def _holding(first, last, before, carried, corrected):
+    found, n = np.empty(last - first, np.int64), 0
+    for i in range(first, last):
+        if before[i] > 0.0 or carried[i] > 0.0 or corrected[i] > 0.0:
+            found[n] = i
+            n += 1
+    return found[:n].copy()
+
+
+def _momenta(water, kept, dt, rows, stages: Stages) -> dict[str, Array]:
+    """Momentum (6,) after every stage of the step; "weight" [N, N m]: that of the water. rows: `holding_water`."""
     W0, own, W1 = water.nodal_water, kept.uncorrected_water, kept.nodal_water
-    rows = marked(
-        field(len(W0), lambda part: (W0[part] > 0.0) | (own[part] > 0.0) | (W1[part] > 0.0), (), bool)
-    )
-    nodes, parameters, a = water.topology.nodes, water.parameters, water.acceleration
-    kick = (1.0 - kept.theta) * dt * kick_factor(a, water.largest_kick())
-    kicked = field(len(a), lambda part: water.velocity[part] + kick[part, None] * a[part], (3,))
+    nodes, parameters, u = water.topology.nodes, water.parameters, water.velocity
+    kicked, weight = np.empty_like(u), np.empty_like(u)
+    step, g = (1.0 - kept.theta) * dt, parameters.weight
+    over(_kicked, len(rows), rows, u, water.acceleration, kept.kick, step, g, (kicked, weight))
     unsheared = kept.advected if kept.shear is None else kept.advected - kept.shear.change
     found = {
         "before": (W0, water.velocity),
@@ -143,14 +156,22 @@ def _momenta(water, kept, dt, stages: Stages) -> dict[str, Array]:
         "advected": (W1, unsheared),
         "sheared": (W1, kept.advected),
         "star": (W1, kept.u_star),
+        "weight": (W1, weight),
     }
     found |= {name: (W1, u) for name, u in vars(stages).items()}
-    density, about_point = parameters.density, water.reference
-    at = {name: momentum_of_rows(rows, density, W, u, nodes, about_point) for name, (W, u) in found.items()}
-    at["weight"] = momentum_of_rows(
-        rows, density, W1, np.broadcast_to(parameters.weight, nodes.shape), nodes, about_point
-    )
-    return at
+    momenta = momenta_of_rows(rows, parameters.density, list(found.values()), nodes, water.reference)
+    return dict(zip(found, momenta))
+
+
+@ranged
+def _kicked(first, last, rows, u, a, kick, dt, g, made):
+    """made: u after dt [s] at the acceleration times kick (N,), and g (3,), both (N, 3) at the listed rows."""
+    kicked, weight = made
+    for s in range(first, last):
+        i = rows[s]
+        factor = dt * kick[i]
+        for k in range(3):
+            kicked[i, k], weight[i, k] = u[i, k] + factor * a[i, k], g[k]
 
 
 def _reactions(water, kept, x, p, dt):

@@ -19,7 +19,7 @@ class WaterParameters:
     courant: cells crossed per step by the fastest water, spray apart (`time_step.py`); 1 for loads, 2 to 4 for drafts.
     divergence_damping: weight c_L of the element grad-div term.
     correction_length: κ/h, length over which the volume correction is spread.
-    kick_limit: largest acceleration carried over to the next step in slow water, in g (`Water.largest_kick`).
+    kick_limit: largest acceleration carried over to the next step in slow water, in g (`Water.kick_factor`).
     speed_limit: cap of the speed in units of sqrt(g H), H the height of the tank (`Water.speed_cap`); clipped nodes are
         counted.
     subscale_memory: keep the element-wise remainder of the velocity correction (added mass of bodies).

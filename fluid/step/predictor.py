@@ -17,7 +17,8 @@ import numpy as np
 from array_types import Bools, Floats, Ints
 from fluid.domain.cell_vectors import places_of
 from fluid.domain.coupling_matrix import wetted_coupling
-from fluid.numerics.threads import by_stretches, copied, over
+from fluid.numerics.fields import copied
+from fluid.numerics.threads import over
 from fluid.pressure.active_cells import WetPart
 from fluid.pressure.indefinite_cells import about, reserve
 from fluid.pressure.pressure_bound import lowest_pressure
@@ -47,20 +48,21 @@ RESCALE_EVERY = 5
 
 @dataclass(frozen=True, kw_only=True)
 class Predicted:
-    """Between predict and correct: level_set (N,), nodal_water (N,) [m³], advected (N, 3) and u_star (N, 3) [m/s],
-    wet (N,) bool, wet_cells (n,), wet_share (n,) and void (k,) of WetPart, cell_star (n, 3) [m/s] velocity of the wet
-    cells, remainder (n, 3) [m/s] of them, theta, conserved_volume and reinserted [m³], uncorrected_water (N,) [m³]
-    before the volume correction, shear: by viscosity and friction, None without; end [s]: time at the end
-    of the step; left: what leaves through open sides, None if nothing; through (N,) [m³] that enters through sides,
-    None without any; held (N,) [Pa]: unknown part of the pressure on the nodes of seas, None without any side;
-    displaced (N,) [m³]: part of nodal_water that the bodies take in this step; in_films: that in films, as
-    `Water.in_films` gives it; given_by_films: `films.Handed.given`;
-    cushions: trapped air (`fluid.air.cushions`), None without any."""
+    """Between predict and correct: level_set (N,), nodal_water (N,) [m³], advected (N, 3) and u_star (N, 3) [m/s], kick
+    (N,): `Water.kick_factor`, wet (N,) bool, wet_cells (n,), wet_share (n,) and void (k,) of WetPart, cell_star (n, 3)
+    [m/s] velocity of the wet cells, remainder (n, 3) [m/s] of them, theta, conserved_volume and reinserted [m³],
+    uncorrected_water (N,) [m³] before the volume correction, shear: by viscosity and friction, None
+    without; end [s]: time at the end of the step; left: what leaves through open sides, None if nothing; through (N,)
+    [m³] that enters through sides, None without any; held (N,) [Pa]: unknown part of the pressure on the nodes of seas,
+    None without any side; displaced (N,) [m³]: part of nodal_water that the bodies take in this step; in_films: that in
+    films, as `Water.in_films` gives it; given_by_films: `films.Handed.given`; cushions: trapped air
+    (`fluid.air.cushions`), None without any."""
 
     level_set: Floats
     nodal_water: Floats
     advected: Floats
     u_star: Floats
+    kick: Floats
     wet: Bools
     wet_cells: Ints
     wet_share: Floats
@@ -104,9 +106,9 @@ class Moved:
 def predicted(water, dt: float) -> PressureProblem:
     """Carry out the step up to the pressure solve; reads the state of `water` and changes nothing."""
     theta, parameters = water.theta(dt), water.parameters
-    kick = kick_factor(water.acceleration, water.largest_kick())
+    kick = water.kick_factor()
     u_adv, phi = _transported(water, dt, theta, kick)
-    found = water.carried(dt, theta)
+    found = water.carried(dt, theta, kick)
     carried = found.water + found.swept
     conserved, left = water.conserved_volume, Outflow.of(water, dt, carried)
     if left is not None:
@@ -184,32 +186,30 @@ def _fallen(first, last, u, gained, active, out):
             out[i, k] = u[i, k] + gained[k] if active[i] else 0.0
 
 
-def kick_factor(acceleration, most):
-    """f = min(1, most / |a|) (N,), most (N,) [m/s²]: see `Water.largest_kick`."""
+def kick_factor(acceleration, calm: float, fast: float, size):
+    """f = min(1, a_max / |a|) (N,) with a_max = max(calm [m/s²], fast [m²/s²] / size (N,) [m]): see
+    `Water.kick_factor`."""
     out = np.empty(len(acceleration))
-    over(_factor, len(out), acceleration, most, out)
+    over(_factor, len(out), acceleration, calm, fast, size, out)
     return out
 
 
 @ranged
-def _factor(first, last, a, limit, out):
+def _factor(first, last, a, calm, fast, size, out):
     for i in range(first, last):
-        size = np.sqrt(a[i, 0] * a[i, 0] + a[i, 1] * a[i, 1] + a[i, 2] * a[i, 2])
-        out[i] = min(1.0, limit[i] / max(size, 1e-300))
+        square, out[i] = a[i, 0] * a[i, 0] + a[i, 1] * a[i, 1] + a[i, 2] * a[i, 2], 1.0
+        if square > 0.0:  # most of a tank is air at rest
+            out[i] = min(1.0, max(calm, fast / size[i]) / max(np.sqrt(square), 1e-300))
 
 
 def _transported(water, dt, theta, kick):
     """u_adv (N, 3) and φ̃ (N,); nodes outside the list keep û and φ."""
     to_middle = 0.5 * dt if water.parameters.theta < 1.0 else 0.0
-    u_hat, u_m = kicked(water.velocity, water.acceleration, kick, (1.0 - theta) * dt, to_middle)
+    u_hat, u_m = kicked(water.velocity, water.acceleration, kick, 1.0, (1.0 - theta) * dt, to_middle)
     for u in (u_hat, u_m):
         water.hold(u, water.time + dt, water.level_set < 0.0)
     fields = np.empty((len(u_hat), 4))
-
-    def stack(rows):
-        fields[rows, :3], fields[rows, 3] = u_hat[rows], water.level_set[rows]
-
-    by_stretches(stack, fields)
+    over(_stacked, len(fields), u_hat, water.level_set, fields)
     moved = transport(water.topology, water.listed, dt, u_m, fields, water.walls.open_node)
     if water.parameters.advection == "supg":
         from fluid.transport.supg import carried_velocity
@@ -228,20 +228,29 @@ def _transported(water, dt, theta, kick):
     return u_adv, phi
 
 
-def kicked(velocity, acceleration, kick, whole: float, middle: float):
-    """Velocity (N, 3) [m/s] after the times `whole` and `middle` [s] at the acceleration (N, 3) [m/s²] times kick
-    (N,)."""
+@ranged
+def _stacked(first, last, u, phi, out):
+    """out (N, 4): u (N, 3) and φ (N,)."""
+    for i in range(first, last):
+        for k in range(3):
+            out[i, k] = u[i, k]
+        out[i, 3] = phi[i]
+
+
+def kicked(velocity, acceleration, kick, dt: float, whole: float, middle: float):
+    """Velocity (N, 3) [m/s] after the shares `whole` and `middle` of a time dt [s] at the acceleration (N, 3) [m/s²]
+    times kick (N,)."""
     u_hat, u_m = np.empty_like(velocity), np.empty_like(velocity)
-    over(_kicked, len(velocity), velocity, acceleration, kick, whole, middle, u_hat, u_m)
+    over(_kicked, len(velocity), velocity, acceleration, kick, dt, whole, middle, u_hat, u_m)
     return u_hat, u_m
 
 
 @ranged
-def _kicked(first, last, velocity, acceleration, kick, whole, middle, u_hat, u_m):
-    """Velocity (N, 3) [m/s] after the times `whole` and `middle` [s] at the limited acceleration."""
+def _kicked(first, last, velocity, acceleration, kick, dt, whole, middle, u_hat, u_m):
     for i in range(first, last):
+        factor = dt * kick[i]
         for k in range(3):
-            a = kick[i] * acceleration[i, k]
+            a = factor * acceleration[i, k]
             u_hat[i, k] = velocity[i, k] + whole * a
             u_m[i, k] = velocity[i, k] + middle * a
 
@@ -311,6 +320,7 @@ def _problem(water, dt: float, theta: float, kick, moved: Moved) -> PressureProb
         nodal_water=moved.surface.nodal_water,
         advected=moved.advected,
         u_star=moved.u_star,
+        kick=kick,
         wet=wet,
         wet_cells=cells,
         wet_share=part.share,

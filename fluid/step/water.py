@@ -21,7 +21,7 @@ from fluid.domain.physical_domain import carry, wetted_coupling
 from fluid.domain.topology import Graph, Topology, layers_around
 from fluid.mesh.background import Background
 from fluid.numerics.sums import kinetic_energy
-from fluid.numerics.threads import field
+from fluid.numerics.threads import over
 from fluid.pressure.displaced import taken_from_nodes
 from fluid.pressure.projection import PressureProblem
 from fluid.sides.walls import Walls
@@ -31,11 +31,11 @@ from fluid.step.predictor import kick_factor, kicked, predicted
 from fluid.step.report import StepReport
 from fluid.step.time_step import LEAST_COUNTED, LEAST_GATHERED, gathered, largest_component, pace
 from fluid.surface.extrapolation import BAND, fill_missing
-from fluid.surface.level_set import FAR, no_steeper, redistance, without_films
+from fluid.surface.level_set import FAR, drain_films, no_steeper, redistance
 from fluid.surface.volume import edge_flux, nodal_volume, renumbering
 from fluid.transport.surface_momentum import Carried
 from fluid.transport.swept_volume import swept
-from kernel_decorators import kernel
+from kernel_decorators import kernel, ranged
 
 if TYPE_CHECKING:
     from fluid.viscous.viscosity import FreeBodies
@@ -120,7 +120,8 @@ class Water:
             given[sides.nodes()] = True
         level = self._dry_if_inactive(level)
         level = redistance(self.topology, level, self.topology.node_size, rescale=False)
-        self.level_set = without_films(no_steeper(self.topology, level, given), self.topology.node_size)
+        self.level_set = no_steeper(self.topology, level, given)
+        drain_films(self.level_set, self.topology.node_size)
         self.velocity, self.acceleration = np.zeros((n, 3)), np.zeros((n, 3))
         self.air, self.vents = None, tuple(vents)
         if gas is not None:
@@ -219,15 +220,15 @@ class Water:
         worst = int(speed.argmax())
         return float(speed[worst]), self.topology.nodes[counted[worst]]
 
-    def largest_kick(self) -> Array:
-        """Largest acceleration (N,) [m/s²] that is carried over to the next step: kick_limit g, or what turns the
-        fastest stream aside within two cells, v²/(2 h).  More would throw spray on by the acceleration of an impact."""
-        return self._largest_kick(self.topology.node_size)
+    def kick_factor(self) -> Array:
+        """Share (N,) of the acceleration that is carried over to the next step, no more than kick_limit g, or what
+        turns the fastest stream aside within two cells, v²/(2 h). More would throw spray on by the acceleration of an
+        impact."""
+        return self._kick_factor(self.acceleration, self.topology.node_size)
 
-    def _largest_kick(self, size):
+    def _kick_factor(self, acceleration, size):
         p = self.parameters
-        calm, fast = p.kick_limit * p.gravity, 0.5 * self.fastest() ** 2
-        return field(len(size), lambda rows: np.maximum(calm, fast / size[rows]))
+        return kick_factor(acceleration, p.kick_limit * p.gravity, 0.5 * self.fastest() ** 2, size)
 
     def speed_cap(self) -> float:
         """Largest speed [m/s] that is permitted: speed_limit sqrt(g H + v²/2) in a tank of height H whose water starts
@@ -236,8 +237,9 @@ class Water:
         return float(p.speed_limit * np.sqrt(p.gravity * (high - low)[2] + 0.5 * self._start_speed**2))
 
     def _counted(self):
-        level, roomy = self.level_set, self._roomy
-        return field(len(level), lambda rows: (level[rows] < 0.0) & roomy[rows], (), bool)
+        counted = np.empty(len(self.level_set), bool)
+        over(_wet_and_roomy, len(counted), self.level_set, self._roomy, counted)
+        return counted
 
     def predict(self, dt: float) -> PressureProblem:
         """Advection, volume and gravity over dt [s], and the system for the pressure."""
@@ -360,9 +362,10 @@ class Water:
 
         return film_volume(self.domain, self.films.drawn_in, self.level_set, self.nodes_below_floor)
 
-    def carried(self, dt: float, theta: float) -> Carried:
-        """What the fluxes make of volume and momentum in dt [s], carried on the domain of the last projection."""
-        carried = self._carried(dt, theta)
+    def carried(self, dt: float, theta: float, kick) -> Carried:
+        """What the fluxes make of volume and momentum in dt [s], carried on the domain of the last projection; kick
+        (N,): `kick_factor`."""
+        carried = self._carried(dt, theta, kick)
         if self.given_by_films.any():
             carried = replace(carried, water=carried.water + dt * self.given_by_films)
         carried = carried if self.renumbered is None else carried.handed_on(self.renumbered)
@@ -370,11 +373,12 @@ class Water:
             return carried
         return replace(carried, water=carried.water + self.slits.carried(dt))
 
-    def _carried(self, dt: float, theta: float) -> Carried:
+    def _carried(self, dt: float, theta: float, kick) -> Carried:
         p, flux = self.parameters, self.flux
         u, a, phi, t = self.left_behind or (self.velocity, self.acceleration, self.level_set, self.topology)
-        kick = dt * kick_factor(a, self._largest_kick(t.node_size))
-        u_hat, u_m = kicked(u, a, kick, 1.0 - theta, 0.5 if p.theta < 1.0 else 0.0)
+        if self.left_behind is not None:
+            kick = self._kick_factor(a, t.node_size)
+        u_hat, u_m = kicked(u, a, kick, dt, 1.0 - theta, 0.5 if p.theta < 1.0 else 0.0)
         found, moved = Carried.by(flux, dt, u_hat, a, p.gravity, p.viscosity / p.density, t.node_size)
         if p.advection == "supg":
             found = found.near_the_surface()
@@ -635,6 +639,12 @@ def lag_after(lag: float, whole: float, dt: float) -> float:
     The flux is that of the velocity half of the *last* step ahead.  After a step shorter than those before it the
     surface therefore still lags by as much as it did, and catches up within about twice the time that it lags by."""
     return whole if whole >= lag else lag + (whole - lag) * min(1.0, 0.5 * dt / lag)
+
+
+@ranged
+def _wet_and_roomy(first, last, phi, roomy, found):
+    for i in range(first, last):
+        found[i] = phi[i] < 0.0 and roomy[i]
 
 
 def _viscosity(parameters: WaterParameters):

@@ -168,15 +168,15 @@ def _mean_gradients(first, last, runs, cell_list, marked, f, fluid, weight, grad
 
 def smoothed_slope(topology, cell_list, marked, u, calm: float):
     """∇u (N, m, 3) of `mean_gradients`, averaged over the corners of the listed cells, each cell counts: at the nodes
-    beside cells that are not all marked, from which values are continued (elsewhere it is not to be read).  Once in
-    fast water, calm = 0; (SWEEPS + 1) Aⁿ - SWEEPS Aⁿ⁺¹ at rest, calm = 1, with the average A and n = SWEEPS; between,
-    in between.  A wave of many cells passes with an error of the second order of what an average takes off it, one of a
-    few cells as little as through Aⁿ, which alone took the slope a cell too deep: 2.5 % of the energy of waves of 14
-    cells a period.
+    beside cells that are not all marked, from which values are continued (elsewhere it is not to be read). Once in fast
+    water, calm = 0; (SWEEPS + 1) Aⁿ - SWEEPS Aⁿ⁺¹ at rest, calm = 1, with the average A and n = SWEEPS; between, in
+    between; zero at other marked nodes. A wave of many cells passes with an error of the second order of what an
+    average takes off it, one of a few cells as little as through Aⁿ, which alone took the slope a cell too deep: 2.5 %
+    of the energy of waves of 14 cells a period.
 
-    Only nodes of cells whose corners are all marked have a field, the averages run over these.  Waves of a few cells,
+    Only nodes of cells whose corners are all marked have a field, the averages run over these. Waves of a few cells,
     whose slope the continuation carries to the surface many times too large, grow without it: by 0.01 to 0.02 a step
-    where the surface lies just below a layer of nodes, by 0.005 after one sweep.  More than one slows a bore into two
+    where the surface lies just below a layer of nodes, by 0.005 after one sweep. More than one slows a bore into two
     cells of water by 15 %."""
     t = topology
     has, beside = _with_field(cell_list, marked, t.cells)
@@ -187,10 +187,11 @@ def smoothed_slope(topology, cell_list, marked, u, calm: float):
     near = touching_among(cell_list, reach.pop(), t.cells)
     there = np.zeros(len(u), bool)
     over(_mark_nodes, len(near), near, t.cells, there)
-    slope = mean_gradients(near, marked, u, t.fluid_cells, _zero_at(there, u.shape[1]))
-    once = before = slope = _averaged(near, reach.pop(), has, slope, t.cells, zeros(slope.shape))
+    slope = mean_gradients(near, marked, u, t.fluid_cells, _zero_at(there, there, u.shape[1]))
+    mean = _zero_at(there, marked, u.shape[1])
+    once = before = slope = _averaged(near, reach.pop(), has, slope, t.cells, mean)
     while reach:
-        mean = _zero_at(there, u.shape[1])
+        mean = _zero_at(there, there, u.shape[1])
         before, slope = slope, _averaged(near, reach.pop(), has, slope, t.cells, mean)
     if slope is once:
         return once
@@ -207,7 +208,7 @@ def _mark_nodes(first, last, cell_list, cells, marked):
 
 @ranged
 def _combined(first, last, there, calm, once, before, slope):
-    """once (N, m, 3) + calm (before + SWEEPS (before - slope) - once) in place at marked nodes; elsewhere all are 0."""
+    """once (N, m, 3) + calm (before + SWEEPS (before - slope) - once) in place at marked nodes."""
     for i in range(first, last):
         if there[i]:
             for k in range(once.shape[1]):
@@ -251,17 +252,17 @@ def _mark_layer(first, last, cell_list, nodes, cells, wider):
                 wider[cells[e, a]] = True
 
 
-def _zero_at(there, m: int):
-    """(N, m, 3), zero at marked nodes; the others hold anything."""
+def _zero_at(there, also, m: int):
+    """(N, m, 3), zero at nodes that one of the two marks; the others hold anything."""
     out = np.empty((len(there), m, 3))
-    over(_clear_rows, len(there), there, out)
+    over(_clear_rows, len(there), there, also, out)
     return out
 
 
 @ranged
-def _clear_rows(first, last, there, out):
+def _clear_rows(first, last, there, also, out):
     for i in range(first, last):
-        if there[i]:
+        if there[i] or also[i]:
             for k in range(out.shape[1]):
                 for d in range(3):
                     out[i, k, d] = 0.0

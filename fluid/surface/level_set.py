@@ -37,7 +37,7 @@ import numpy as np
 from array_types import Array, Floats, Ints
 from fluid.domain.topology import layers_around
 from fluid.mesh.arrays import Corners
-from fluid.numerics.threads import field, found_over, over, zeros
+from fluid.numerics.threads import found_over, over, zeros
 from fluid.surface.extrapolation import continue_outward, mean_gradients
 from kernel_decorators import helper, inner, kernel, plain, ranged, released
 
@@ -55,12 +55,21 @@ LEAST_LEFT = 0.05
 EDGES = np.array([(a, b) for a in range(4) for b in range(a)])
 
 
-def without_films(phi, spacing):
-    """φ (N,) in which water thinner than FILM h at a node counts as none, since its pressure at the surface would be
-    0/0.
+def drain_films(phi, spacing) -> int:
+    """Water thinner than FILM h at a node counts as none in φ (N,), in place, since its pressure at the surface would
+    be 0/0; at how many nodes there is such water. spacing (N,) [m]: h at each node."""
+    return sum(over(_drain, len(phi), phi, spacing))
 
-    spacing [m]: h at each node (N,), or one for all."""
-    return np.where((phi < 0.0) & (phi > -FILM * spacing), 0.0, phi)
+
+@ranged
+def _drain(first, last, phi, spacing):
+    count = 0
+    for j in range(first, last):
+        i = np.uint64(j)
+        if phi[i] < 0.0 and phi[i] > -FILM * spacing[i]:
+            phi[i] = 0.0
+            count += 1
+    return count
 
 
 def surface_cells(phi, cell_list, cells):
@@ -179,9 +188,9 @@ class Surface(NamedTuple):
 
 
 class Nearest(NamedTuple):
-    """The closest triangle of each node found so far: closest (N,) its number, -1 none · best (N,) [m²] squared
-    distance · tried (T,) the last node that tested the triangle · asked, found (N,): sweeps in which a node last tested
-    triangles, and in which it found its closest one."""
+    """The closest triangle of each node found so far: closest (N,) its number · best (N,) [m²] squared distance, ∞ for
+    none · tried (T,) the last node that tested the triangle · asked, found (N,): sweeps in which a node last tested
+    triangles, and in which it found its closest one, 0 for none."""
 
     closest: Array
     best: Array
@@ -194,11 +203,10 @@ def _closest_in_layers(layers, surface, mesh, *more):
     """Squared distance (N,) [m²] of `_closest`, after that at the corners of the cells of the triangles."""
     n, corner = len(mesh.nodes), np.empty((len(surface.triangles), 4))
     over(_of_corners, len(corner), surface, mesh, corner)
-    closest, best = field(n, lambda _: -1, (), np.int64), field(n, lambda _: np.inf)
-    asked, found = (field(n, lambda _: 0, (), np.int32) for _ in range(2))
-    known = Nearest(closest, best, np.full(len(corner), -1), asked, found)
+    asked, found = np.zeros(n, np.int32), np.zeros(n, np.int32)
+    known = Nearest(np.empty(n, np.int64), np.full(n, np.inf), np.full(len(corner), -1), asked, found)
     _closest(layers, surface, corner, mesh, *more, known)
-    return best
+    return known.best
 
 
 @ranged
@@ -223,16 +231,24 @@ def _closest(layers, surface, corner, mesh, around, exact, obtuse, cells_of_node
     _propagate_outward(layers, surface, corner, mesh, around, known)
     for s in range(layer_start[1], layer_start[exact + 1]):
         i = order[s]
-        if closest[i] >= 0 and obtuse[i]:
+        if known.found[i] > 0 and obtuse[i]:
             best[i] = _descend(mesh.nodes[i], closest[i], best[i], surface, first, mesh.cells, cells_of_nodes)
 
 
 @ranged
-def _signed(first, last, listed, square, farthest, phi, out):
-    """√square [m] with the sign of φ (N,) at the listed nodes, no farther than `farthest` (N,) [m], in `out` (N,)."""
+def _far(first, last, phi, size, out):
+    """±FAR·size [m] with the sign of φ (N,)."""
+    for j in range(first, last):
+        i = np.uint64(j)
+        out[i] = np.copysign(FAR * size[i], phi[i])
+
+
+@ranged
+def _signed(first, last, listed, square, phi, out):
+    """√square [m] with the sign of φ (N,) at the listed nodes, in `out` (N,) where it is less than the length there."""
     for s in range(first, last):
         i = listed[s]
-        out[i] = np.copysign(min(np.sqrt(square[i]), farthest[i]), phi[i])
+        out[i] = np.copysign(min(np.sqrt(square[i]), abs(out[i])), phi[i])
 
 
 @helper
@@ -327,9 +343,8 @@ def redistance(topology, phi, spacing, rescale: bool, motion=None):
     motion: velocity (N, 3) [m/s] and gravity [m/s²], None: no surface goes on beyond its last cells at solids and
     beds."""
     t = topology
-    cut, size = surface_cells(phi, t.cells_around(phi < 0.0), t.cells), np.broadcast_to(spacing, phi.shape)
-    farthest = field(len(phi), lambda rows: FAR * size[rows])
-    far = field(len(phi), lambda rows: np.copysign(farthest[rows], phi[rows]))
+    cut, far = surface_cells(phi, t.cells_around(phi < 0.0), t.cells), np.empty(len(phi))
+    over(_far, len(phi), phi, np.full(len(phi), spacing) if np.ndim(spacing) == 0 else spacing, far)
     if len(cut) == 0:
         return far
     front = np.zeros(len(phi), bool)
@@ -341,7 +356,7 @@ def redistance(topology, phi, spacing, rescale: bool, motion=None):
     of_nodes = (t.node_start, t.node_cells)
     square = _closest_in_layers((order, start), surface, mesh, t.around, exact, obtuse, of_nodes)
     listed = order[start[1] :]
-    over(_signed, len(listed), listed, square, farthest, phi, far)
+    over(_signed, len(listed), listed, square, phi, far)
     far[front] = phi[front]
     if rescale:
         slope = _mean_slope(cut, phi, t.cells, t.parent, t.gradients, len(phi))

@@ -31,10 +31,11 @@ import numpy as np
 import scipy.sparse as sp
 
 from array_types import Floats, Ints
-from fluid.domain.moments import nodal_water
+from fluid.domain.moments import nodal_water, part_moments
 from fluid.domain.topology import WORK, Graph
-from fluid.numerics.threads import copied, field, over
-from fluid.surface.level_set import without_films
+from fluid.numerics.fields import added, copied
+from fluid.numerics.threads import found_over, over, owning, reach_of_cells, zeros
+from fluid.surface.level_set import drain_films
 from kernel_decorators import kernel, ranged, released
 
 BAND_WIDTH = 3.0
@@ -116,14 +117,15 @@ def edge_rates(topology, graph, listed, u_cell):
     return rate
 
 
-def _diffused_shift(band, place, edges, c, residual, kappa, tolerance, most):
-    """Equation (2) on the band nodes by conjugate gradients with the diagonal as preconditioner, (n,)."""
+def _diffused_shift(band, place, edges, c, residual, kappa, spacing, tolerance, most):
+    """Equation (2) on the band nodes by conjugate gradients with the diagonal as preconditioner, (n,); κ = kappa times
+    the spacing (N,) [m]."""
     n, diagonal = len(band), c.copy()
     found = np.zeros(n + 1, np.uint32)
     over(_length_of_rows, n, band, place, edges, found[1:])
     first = np.cumsum(found, dtype=np.uint32)
     made = MadeRows(first, np.empty(first[-1], np.uint32), np.empty(first[-1]), diagonal)
-    over(_rows_of_shift, n, band, place, edges, kappa, made)
+    over(_rows_of_shift, n, band, place, edges, kappa, spacing, made)
     return _shift(first, made.column, made.entry, diagonal, residual, tolerance, most)
 
 
@@ -148,7 +150,7 @@ def _length_of_rows(begin, end, band, place, edges, found):
 
 
 @ranged
-def _rows_of_shift(begin, end, band, place, edges, kappa, made):
+def _rows_of_shift(begin, end, band, place, edges, kappa, spacing, made):
     """κ K of the edges within the band, and c + Σ κ K on the diagonal, in place."""
     graph_row, start, neighbour, stiffness = edges
     first, column, entry, diagonal = made
@@ -158,7 +160,8 @@ def _rows_of_shift(begin, end, band, place, edges, kappa, made):
             q = place[neighbour[s]]
             if q >= 0 and stiffness[s] != 0.0:
                 column[k] = q
-                entry[k] = 0.5 * (kappa[band[r]] + kappa[neighbour[s]]) * stiffness[s]
+                both = kappa * spacing[band[r]] + kappa * spacing[neighbour[s]]
+                entry[k] = 0.5 * both * stiffness[s]
                 diagonal[r] -= entry[k]
                 k += 1
 
@@ -213,11 +216,12 @@ def _next_way(rz, diagonal, Ap, x, r, z, p):
 
 @dataclass(frozen=True)
 class Shift:
-    """ψ of (2): value (n,) [m] at the nodes of the band (n,), with κ (N,) [m]."""
+    """ψ of (2): value (n,) [m] at the nodes of the band (n,), with κ = kappa times the spacing (N,) [m]."""
 
     band: Ints
     value: Floats
-    kappa: Floats
+    kappa: float
+    spacing: Floats
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -235,59 +239,76 @@ class VolumeCorrection:
 def correct_volume(topology, graph, listed, phi, carried, target: float, kappa: float, spacing):
     """Equation (2) and the uniform shift. φ (N,), carried W (N,) [m³], target total [m³] → VolumeCorrection.
 
-    kappa in cell sizes · spacing [m]: size of the cells at each node (N,), or one for all ·
+    kappa in cell sizes · spacing (N,) [m]: size of the cells at each node ·
     listed (n,) nodes of the graph to look at, all with water and |φ| small among them."""
     n = len(phi)
-    spacing = np.broadcast_to(np.asarray(spacing, float), phi.shape)
     seen = np.zeros(n, bool)
     seen[listed] = True
     most = LARGEST_SHIFT + LARGEST_UNIFORM_SHIFT
-    reach = field(n, lambda rows: most * spacing[rows])
-    whole, near = _split(topology.cells_around(seen), phi, topology.cells, reach)
+    whole, near = _split(topology.cells_around(seen), phi, topology.cells, most, spacing)
     inner = nodal_water(whole, 0.0, phi, topology.parts, n)
-    of_near = nodal_water(near, 0.0, phi, topology.parts, n)
-    own = field(n, lambda rows: inner[rows] + of_near[rows])
+    own = added(inner, nodal_water(near, 0.0, phi, topology.parts, n))
     slope = _volume_slope(topology, near, phi, spacing)
-    band = listed[np.abs(phi[listed]) < BAND_WIDTH * spacing[listed]]
+    band = found_over(_in_band, len(listed), listed, phi, spacing)
     place = np.full(n, -1, np.int64)
     place[band] = np.arange(len(band))
-    spread = field(n, lambda rows: kappa * spacing[rows])
-    shift = _diffused_shift(
-        band,
-        place,
-        graph.edges,
-        slope[band] + ANCHOR * topology.node_volume[band] / spacing[band],
-        carried[band] - own[band],
-        spread,
-        1e-2,
-        40,
-    )
+    c, residual = np.empty(len(band)), np.empty(len(band))
+    over(_equation, len(band), band, slope, topology.node_volume, spacing, (carried, own), c, residual)
+    shift = _diffused_shift(band, place, graph.edges, c, residual, kappa, spacing, 1e-2, 40)
     phi = copied(phi)
-    limit = LARGEST_SHIFT * spacing[band]
-    phi[band] -= np.clip(shift, -limit, limit)
+    over(_lower, len(band), band, phi, shift, LARGEST_SHIFT, spacing, phi)
     left = target - float(inner.sum())
-    phi, reinserted = _meet_total(
+    phi, of_near, reinserted = _meet_total(
         topology, near, phi, band, slope.sum(), left, VOLUME_TOLERANCE * abs(target), spacing
     )
-    of_near = nodal_water(near, 0.0, phi, topology.parts, n)
     return VolumeCorrection(
         level_set=phi,
-        nodal_water=field(n, lambda rows: inner[rows] + of_near[rows]),
+        nodal_water=added(inner, of_near),
         uncorrected_water=own,
         reinserted=reinserted,
-        shift=Shift(band, shift, spread),
+        shift=Shift(band, shift, kappa, spacing),
     )
 
 
-def _split(cell_list, phi, cells, reach):
-    """The listed cells that are all water whatever shift within ±reach (N,) φ takes, and those that a surface can
-    reach."""
-    parts = over(_split_range, len(cell_list), cell_list, phi, cells, reach)
+@released
+def _in_band(first, last, listed, phi, spacing):
+    """Those of the listed nodes near the surface, in order."""
+    found, n = np.empty(last - first, np.int64), 0
+    for s in range(first, last):
+        i = listed[s]
+        if abs(phi[i]) < BAND_WIDTH * spacing[i]:
+            found[n] = i
+            n += 1
+    return found[:n].copy()
+
+
+@ranged
+def _equation(first, last, band, slope, capacity, spacing, water, c, residual):
+    """c and the right hand side (n,) of (2); water (N,): carried, and of φ itself."""
+    carried, own = water
+    for s in range(first, last):
+        i = band[s]
+        c[s] = slope[i] + ANCHOR * capacity[i] / spacing[i]
+        residual[s] = carried[i] - own[i]
+
+
+@ranged
+def _lower(first, last, band, phi, shift, most, spacing, out):
+    """φ (N,) less the shift (n,), or (1,) for all, within ± most cells, in `out` (N,) at the nodes of the band (n,)."""
+    for s in range(first, last):
+        i, limit = band[s], most * spacing[band[s]]
+        out[i] = phi[i] - min(max(shift[s if shift.shape[0] > 1 else 0], -limit), limit)
+
+
+def _split(cell_list, phi, cells, most, spacing):
+    """The listed cells that are all water whatever shift within ± most times the spacing (N,) φ takes, and those that a
+    surface can reach."""
+    parts = over(_split_range, len(cell_list), cell_list, phi, cells, most, spacing)
     return parts[0] if len(parts) == 1 else tuple(np.concatenate(lists) for lists in zip(*parts))
 
 
 @released
-def _split_range(first, last, cell_list, phi, cells, reach):
+def _split_range(first, last, cell_list, phi, cells, most, spacing):
     whole, near = np.empty(last - first, np.int64), np.empty(last - first, np.int64)
     n_whole, n_near = 0, 0
     for s in range(first, last):
@@ -295,7 +316,8 @@ def _split_range(first, last, cell_list, phi, cells, reach):
         under, beyond = True, True
         for a in range(4):
             i = cells[e, a]
-            under, beyond = under and phi[i] < -reach[i], beyond and phi[i] >= reach[i]
+            reach = most * spacing[i]
+            under, beyond = under and phi[i] < -reach, beyond and phi[i] >= reach
         if under:
             whole[n_whole] = e
             n_whole += 1
@@ -307,27 +329,45 @@ def _split_range(first, last, cell_list, phi, cells, reach):
 
 def _volume_slope(t, near, phi, spacing):
     """c (N,) [m²] by a central difference over the cells that the surface can reach."""
-    n = len(phi)
-    step = field(n, lambda rows: _PROBE * spacing[rows])
-    cut = _split(near, phi, t.cells, step)[1]
-    lower, higher = (
-        field(n, lambda rows: phi[rows] - step[rows]),
-        field(n, lambda rows: phi[rows] + step[rows]),
-    )
-    wider, narrower = nodal_water(cut, 0.0, lower, t.parts, n), nodal_water(cut, 0.0, higher, t.parts, n)
-    # in slivers beside solids the last corner to get wet moves water between nodes: no slope may be negative
-    return field(n, lambda rows: np.maximum((wider[rows] - narrower[rows]) / (2 * step[rows]), 0.0))
+    cut = _split(near, phi, t.cells, _PROBE, spacing)[1]
+    wider, narrower = zeros((len(phi),)), zeros((len(phi),))
+    reach = reach_of_cells(cut, t.cells)
+    owning(_probed, len(phi), reach, len(cut), cut, phi, spacing, t.parts, wider, narrower)
+    return wider
+
+
+@released
+def _probed(first, last, runs, cell_list, phi, spacing, parts, wider, narrower):
+    """Volumes of the nodes (N,) with φ half a step lower and higher, and, in place of the first, their slope."""
+    at, total, local, out = np.empty(4), np.empty(4), np.empty(4), np.empty(4)
+    cells = parts.cells
+    for run in range(runs.shape[0]):
+        for s in range(runs[run, 0], runs[run, 1]):
+            e = cell_list[s]
+            for side, held in ((-_PROBE, wider), (_PROBE, narrower)):
+                for a in range(4):
+                    at[a] = phi[cells[e, a]] + side * spacing[cells[e, a]]
+                part_moments(e, at, parts, total, local, out)
+                for a in range(4):
+                    if first <= cells[e, a] < last:
+                        held[cells[e, a]] += total[a]
+    for i in range(first, last):
+        if wider[i] != narrower[i]:
+            # in slivers beside solids the last corner to get wet moves water between nodes: no slope may be negative
+            wider[i] = max((wider[i] - narrower[i]) / (2 * (_PROBE * spacing[i])), 0.0)
+        else:
+            wider[i] = 0.0
 
 
 def _meet_total(t, near, phi, band, area, target, tolerance, spacing):
     """φ after a uniform shift of the band that brings the water in the cells `near` to a target [m³] within a
-    tolerance [m³], and the volume [m³] that it moved.
+    tolerance [m³], that water (N,) [m³], and the volume [m³] that the shift moved.
 
     Secant steps on the shift, from the slope `area`; the shift stays within LARGEST_UNIFORM_SHIFT of the cells at each
     node, and is one length wherever that allows it."""
-    limit, shift = LARGEST_UNIFORM_SHIFT * spacing[band], 0.0
-    most = limit.max(initial=0.0)
-    start = volume = float(nodal_water(near, 0.0, phi, t.parts, len(phi)).sum())
+    most, shift = LARGEST_UNIFORM_SHIFT * spacing[band].max(initial=0.0), 0.0
+    held = nodal_water(near, 0.0, phi, t.parts, len(phi))
+    start = volume = float(held.sum())
     shifted = phi
     for _ in range(MOST_SECANTS):
         if abs(target - volume) <= tolerance or area <= 0.0:
@@ -335,11 +375,14 @@ def _meet_total(t, near, phi, band, area, target, tolerance, spacing):
         trial = np.clip(shift + (target - volume) / area, -most, most)
         if trial == shift:
             break
-        shifted = copied(phi)
-        shifted[band] -= np.clip(trial, -limit, limit)
-        before, volume = volume, float(nodal_water(near, 0.0, shifted, t.parts, len(phi)).sum())
+        shifted = copied(phi) if shifted is phi else shifted
+        over(_lower, len(band), band, phi, np.array([trial]), LARGEST_UNIFORM_SHIFT, spacing, shifted)
+        held = nodal_water(near, 0.0, shifted, t.parts, len(phi))
+        before, volume = volume, float(held.sum())
         area, shift = (volume - before) / (trial - shift), trial
-    return without_films(shifted, spacing), volume - start
+    if drain_films(shifted, spacing):
+        held = nodal_water(near, 0.0, shifted, t.parts, len(phi))
+    return shifted, held, volume - start
 
 
 def nodal_volume(topology, phi):

@@ -16,7 +16,8 @@ from __future__ import annotations
 import numpy as np
 
 from fluid.mesh.arrays import Paths
-from fluid.numerics.threads import copied, over
+from fluid.numerics.fields import copied
+from fluid.numerics.threads import over
 from kernel_decorators import inner, ranged, released
 
 _LONGEST_WALK = 100

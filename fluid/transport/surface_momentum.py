@@ -41,7 +41,8 @@ import numpy as np
 
 from array_types import Array
 from fluid.domain.topology import Graph, Topology
-from fluid.numerics.threads import copied, field, over
+from fluid.numerics.fields import copied
+from fluid.numerics.threads import over
 from fluid.surface.volume import Flux, Shift
 from fluid.transport.velocity_transport import carry_velocity
 from fluid.transport.volume_transport import carry_volume
@@ -75,29 +76,23 @@ class Carried:
         cls, flux: Flux, dt: float, velocity, acceleration, gravity, viscosity, spacing
     ) -> tuple[Carried, Array]:
         """After dt [s] by the flux, and the volume (edges,) [m³] as in `carry_volume`; velocity (N, 3) [m/s] before,
-        acceleration (N, 3) [m/s²] then, gravity [m/s²], viscosity: kinematic [m²/s], spacing (N,) [m]: size of the
-        cells."""
+        which is overwritten, acceleration (N, 3) [m/s²] then, gravity [m/s²], viscosity: kinematic [m²/s], spacing (N,)
+        [m]: size of the cells."""
         edges = flux.graph.edges
         n, size = len(flux.nodes), len(velocity)
         weight, fast = np.zeros(size), np.zeros(size)
         state = (flux.rate, flux.water, flux.capacity, velocity, acceleration, gravity, spacing)
-        over(_jumps, n, flux.nodes, edges, *state, weight)
-        if weight.any():
+        jumps = sum(over(_jumps, n, flux.nodes, edges, *state, weight))
+        if jumps:
             for _ in range(RINGS):
                 before, weight = weight, copied(weight)
                 over(_wider, n, flux.nodes, edges, before, weight)
-        celerity = field(size, lambda rows: np.sqrt(gravity * spacing[rows]))
-        over(_by_speed, n, flux.nodes, velocity, celerity, FAST, fast)
-        if viscosity > 0.0:
-            resolved = np.zeros(size)
-            over(_by_speed, n, flux.nodes, velocity, viscosity / spacing, RESOLVED, resolved)
-            fast *= resolved
-        if not weight.any() and not fast.any():
+        n_fast = sum(over(_by_speed, n, flux.nodes, velocity, gravity, viscosity, spacing, fast))
+        if not jumps and not n_fast:
             volume, moved = carry_volume(flux, dt)
             return cls(volume), moved
-        u = copied(velocity)
-        volume, moved = carry_volume(flux, dt, u)
-        return cls(volume, u, weight, fast), moved
+        volume, moved = carry_volume(flux, dt, velocity)
+        return cls(volume, velocity, weight, fast), moved
 
     def near_the_surface(self) -> Carried:
         """The same with the velocity of fast water, too, only where that around jumps counts."""
@@ -119,12 +114,11 @@ class Carried:
         """Equations (1) and (2) for u (N, 3) [m/s] at the listed nodes (n,) that hold water, in place; φ (N,) [m].
 
         on_open_side (N,) bool: nodes that water leaves through: what the fluxes bring there is not yet all that came.
-        Only where some water is fast, or there is a jump."""
-        carried = copied(self.velocity)
-        _pass_on(graph, shift, self.water, carried)
+        Only where some water is fast, or there is a jump; `velocity` is overwritten."""
+        _pass_on(graph, shift, self.water, self.velocity)
         at_surface = (phi, spacing, t.near_solids)
         state = (self.water, (self.weight, self.fast), at_surface, on_open_side)
-        over(_mixed, len(nodes), nodes, *state, carried, u)
+        over(_mixed, len(nodes), nodes, *state, self.velocity, u)
 
 
 @ranged
@@ -147,14 +141,25 @@ def _pass_on(graph: Graph, shift: Shift, water, u) -> None:
     edges = graph.edges
     psi, inside, moved = np.zeros(len(water)), np.zeros(len(water), bool), np.empty(len(graph.neighbour))
     psi[shift.band], inside[shift.band] = shift.value, water[shift.band] > 0.0
-    over(_corrected, len(shift.band), shift.band, edges, psi, inside, shift.kappa, water, moved)
+    over(
+        _corrected,
+        len(shift.band),
+        shift.band,
+        edges,
+        psi,
+        inside,
+        (shift.kappa, shift.spacing),
+        water,
+        moved,
+    )
     carry_velocity(shift.band, edges, moved, water, u)
 
 
 @ranged
 def _corrected(first, last, band, edges, psi, inside, kappa, water, moved):
-    """v_ij (edges,) [m³] of (2) out of each node of the band, κ (N,), where both hold water; none gives more than it
-    holds. ψ (N,), inside (N,): where the band holds water."""
+    """v_ij (edges,) [m³] of (2) out of each node of the band, where both hold water; none gives more than it holds.
+    ψ (N,), inside (N,): where the band holds water · kappa: κ as in `Shift`."""
+    share, spacing = kappa
     start, neighbour, stiffness = edges.start, edges.neighbour, edges.stiffness
     for place in range(first, last):
         i = band[place]
@@ -168,7 +173,9 @@ def _corrected(first, last, band, edges, psi, inside, kappa, water, moved):
             if inside[neighbour[s]]:
                 moved[s] = max(
                     0.0,
-                    -(0.5 * (kappa[i] + kappa[neighbour[s]])) * stiffness[s] * (psi[i] - psi[neighbour[s]]),
+                    -(0.5 * (share * spacing[i] + share * spacing[neighbour[s]]))
+                    * stiffness[s]
+                    * (psi[i] - psi[neighbour[s]]),
                 )
                 total += moved[s]
         if total > water[i]:
@@ -178,7 +185,8 @@ def _corrected(first, last, band, edges, psi, inside, kappa, water, moved):
 
 @released
 def _jumps(first, last, nodes, edges, rate, water, capacity, u, a, gravity, spacing, weight):
-    """Equation (3), (N,); zero at nodes that nothing flows into."""
+    """Equation (3), (N,), in `weight`, zero at first, and at how many nodes it is not zero."""
+    n_jumps = 0
     row, start, neighbour = edges.row, edges.start, edges.neighbour
     up, push = np.empty(3), np.empty(3)
     for place in range(first, last):
@@ -202,14 +210,23 @@ def _jumps(first, last, nodes, edges, rate, water, capacity, u, a, gravity, spac
                 work = (up[0] * push[0] + up[1] * push[1] + up[2] * push[2]) / (came * came * speed)
                 lost = 1.0 + (spacing[i] * work - own * own) / (speed * speed)
                 weight[i] = drop * _ramp(lost, LOST) * _ramp(water[i] / max(capacity[i], 1e-300), FULL)
+                n_jumps += weight[i] != 0.0
+    return n_jumps
 
 
 @ranged
-def _by_speed(first, last, nodes, u, celerity, ends, weight):
-    """(N,): R(|u|/celerity) between two ends at the listed nodes; celerity (N,) [m/s]: √(g h), or ν/h."""
+def _by_speed(first, last, nodes, u, gravity, viscosity, spacing, weight):
+    """(N,): R(|u|/√(g h); FAST), times R(|u| h/ν; RESOLVED) where ν > 0, at the listed nodes; at how many it is not
+    zero."""
+    n_fast = 0
     for s in range(first, last):
         i = nodes[s]
-        weight[i] = _ramp(_size(u[i]) / celerity[i], ends)
+        speed = _size(u[i])
+        weight[i] = _ramp(speed / np.sqrt(gravity * spacing[i]), FAST)
+        if viscosity > 0.0:
+            weight[i] *= _ramp(speed / (viscosity / spacing[i]), RESOLVED)
+        n_fast += weight[i] != 0.0
+    return n_fast
 
 
 @ranged

@@ -26,7 +26,8 @@ import numpy as np
 
 from fluid.domain.moments import part_moments
 from fluid.domain.topology import WORK
-from fluid.numerics.threads import copied, found_over, over, owning, reach_of_rows, zeros
+from fluid.numerics.fields import copied
+from fluid.numerics.threads import found_over, over, owning, reach_of_rows, zeros
 from fluid.surface.volume import Flux, edge_rates
 from kernel_decorators import ranged, released
 

@@ -12,8 +12,10 @@ range around it.
 
 from __future__ import annotations
 
+import numpy as np
+
 from fluid.mesh.arrays import Edges
-from fluid.numerics.threads import over, owning, reach_of_rows, zeros
+from fluid.numerics.threads import over, owning, reach_of_rows
 from kernel_decorators import inner, ranged
 
 
@@ -22,12 +24,22 @@ def carry_velocity(nodes, edges: Edges, moved, water, u):
 
     water (N,) [m³] before they are moved; no node gives more than it holds."""
     size, reach = len(water), reach_of_rows(nodes, edges.row, edges.start, edges.neighbour)
-    up, came = zeros(u.shape), zeros((size,))
-    change, volume = zeros(u.shape), zeros((size,))
+    up, came, change, volume = (np.empty(shape) for shape in (u.shape, size, u.shape, size))
+    over(_begin, len(nodes), nodes, up, came, change, volume)  # what others get is not read
     owning(_incoming, size, reach, len(nodes), nodes, edges, moved, u, up, came)
     over(_mean_incoming, len(nodes), nodes, came, u, up)
     owning(_exchange, size, reach, len(nodes), nodes, edges, moved, water, u, up, change, volume)
     over(_new_velocity, len(nodes), nodes, water, change, volume, u)
+
+
+@ranged
+def _begin(first, last, nodes, up, came, change, volume):
+    """Zeros at the listed nodes."""
+    for s in range(first, last):
+        i = nodes[s]
+        came[i], volume[i] = 0.0, 0.0
+        for k in range(3):
+            up[i, k], change[i, k] = 0.0, 0.0
 
 
 @ranged

@@ -15,7 +15,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fluid.numerics.threads import copied, field, over, owning, reach_of_rows, zeros
+from fluid.numerics.fields import copied
+from fluid.numerics.threads import over, owning, reach_of_rows
 from fluid.surface.volume import Flux
 from fluid.transport.velocity_transport import carry_velocity
 from kernel_decorators import inner, ranged, released
@@ -31,23 +32,22 @@ def carry_volume(flux: Flux, dt: float, u=None):
 
     u (N, 3) [m/s], if given, is carried with the volume, in place (`velocity_transport.py`); nodes without water keep
     theirs."""
-    water, total = copied(flux.water), None
-    capacity = field(len(water), lambda rows: np.maximum(flux.capacity[rows], 1e-300))
+    water, total, capacity = copied(flux.water), None, flux.capacity
     least = LEAST_COUNTED * np.median(capacity[flux.nodes]) if len(flux.nodes) else 0.0
     g = flux.graph
     count = len(flux.nodes)
     turnover = max(over(_largest_turnover, count, flux.nodes, g.row, g.start, flux.rate, capacity, least))
     n_sub = int(np.ceil(dt * turnover / LARGEST_COURANT)) or 1
     edges, reach = g.edges, reach_of_rows(flux.nodes, g.row, g.start, g.neighbour)
-    share = np.zeros(len(water))
+    share, change = np.zeros(len(water)), np.zeros(len(water))
     for _ in range(n_sub):
-        moved, change = np.empty(len(flux.rate)), zeros((len(water),))
+        moved = np.empty(len(flux.rate))
         over(_share, count, flux.nodes, water, capacity, share)
         over(_moved, count, flux.nodes, edges, flux.rate, water, capacity, share, dt / n_sub, moved)
         if u is not None:
             carry_velocity(flux.nodes, edges, moved, water, u)
         owning(_transfer_volume, len(water), reach, count, flux.nodes, edges, moved, change)
-        water = _sum(water, change)
+        over(_changed, len(water), change, water)
         if total is None:
             total = moved
         else:
@@ -55,9 +55,13 @@ def carry_volume(flux: Flux, dt: float, u=None):
     return water, total
 
 
-def _sum(a, b):
-    """a + b (N,)."""
-    return field(len(a), lambda rows: a[rows] + b[rows])
+@ranged
+def _changed(first, last, change, water):
+    """Add the change (N,) to the water (N,), and begin anew with no change."""
+    for j in range(first, last):
+        i = np.uint64(j)
+        water[i] += change[i]
+        change[i] = 0.0
 
 
 @ranged
@@ -76,7 +80,7 @@ def _largest_turnover(first, last, nodes, graph_row, start, rate, capacity, leas
     for place in range(first, last):
         i = nodes[place]
         if capacity[i] > least:
-            largest = max(largest, _out(graph_row[i], start, rate) / capacity[i])
+            largest = max(largest, _out(graph_row[i], start, rate) / max(capacity[i], 1e-300))
     return largest
 
 
@@ -94,7 +98,7 @@ def _share(first, last, nodes, water, capacity, share):
     """s (N,) at the listed nodes."""
     for place in range(first, last):
         i = nodes[place]
-        share[i] = min(max(water[i], 0.0) / capacity[i], 1.0)
+        share[i] = min(max(water[i], 0.0) / max(capacity[i], 1e-300), 1.0)
 
 
 @ranged
@@ -111,7 +115,7 @@ def _moved(first, last, nodes, edges, rate, water, capacity, share, h, moved):
         if out <= 0.0 or water[i] <= 0.0:
             continue
         behind = share[i] - _upstream(r, start, neighbour, rate, share)
-        second = 0.5 * max(1.0 - out / capacity[i], 0.0)
+        second = 0.5 * max(1.0 - out / max(capacity[i], 1e-300), 0.0)
         total = 0.0
         for s in range(start[r], start[r + 1]):
             if rate[s] > 0.0:

@@ -20,6 +20,7 @@ from coupler.commands.warm_up import CASE
 from coupler.program import threads
 from coupler.program.provenance import ROOT
 from fluid.mesh.arrays import Corners
+from fluid.numerics.fields import copied
 from kernel_decorators import ranged, released
 
 SCENE = tomllib.loads(CASE)
@@ -245,7 +246,7 @@ def test_lists_of_marked_entries_and_copies_are_those_of_numpy(divided):
             mask = rng.random(500) < share
             np.testing.assert_array_equal(kernels.marked(mask), np.flatnonzero(mask))
         for given in (rng.normal(size=(200, 3)), rng.normal(size=333)[::2], mask, np.arange(70)):
-            copy = kernels.copied(given)
+            copy = copied(given)
             np.testing.assert_array_equal(copy, given)
             assert copy.dtype == given.dtype
             assert not np.shares_memory(copy, given)

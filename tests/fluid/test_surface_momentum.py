@@ -33,13 +33,13 @@ def test_momentum_counts_at_jumps_and_in_fast_water_only():
         while water.time < 0.25:
             advance(water)
     dt = wave.stable_step()
-    assert wave.carried(dt, 0.6).weight is None
-    front = dry.carried(dt, 0.6)
+    assert wave.carried(dt, 0.6, wave.kick_factor()).weight is None
+    front = dry.carried(dt, 0.6, dry.kick_factor())
     assert front.weight.max() == 0.0
     assert front.fast.max() > 0.5
     slow = np.linalg.norm(dry.velocity, axis=1) < np.sqrt(9.81 * 0.125)
     assert front.fast[slow].max() == 0.0
-    assert bore.carried(dt, 0.6).weight.max() > 0.5
+    assert bore.carried(dt, 0.6, bore.kick_factor()).weight.max() > 0.5
 
 
 def test_a_thick_liquid_keeps_its_own_viscosity_however_fast_it_is():

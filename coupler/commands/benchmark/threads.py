@@ -157,8 +157,6 @@ def _bytes(name: str, args, nodes: int, cells: int, read=()) -> float:
     """Bytes of the arrays among the arguments, of those of the whole mesh the share that the rows are of it; read:
     names that the kernel uses, by which it takes what it reads out of a bundle of arrays."""
     arrays = [a for arg in args for a in _arrays(arg, read)]
-    if name == "_stretches":
-        return float(sum(a.nbytes for a in arrays))
     rows = _rows(name, args)
     whole = cells if name in ROWS_OF_CELLS else nodes
     share = min(1.0, rows / whole)

@@ -1,0 +1,68 @@
+"""Fields that a step makes anew, in compiled loops that all threads share."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from array_types import Array
+from fluid.numerics.threads import over
+from kernel_decorators import ranged
+
+PLAIN = 0.1
+"""Cost of a number that is copied or added, in usual rows."""
+
+
+def copied(array) -> np.ndarray:
+    """A copy of an array of any shape, contiguous."""
+    given, out = np.ascontiguousarray(array), np.empty(array.shape, array.dtype)
+    over(_copy, given.size, given.reshape(-1), out.reshape(-1), weight=PLAIN)
+    return out
+
+
+def copied_at(rows, array) -> np.ndarray:
+    """An array like `array` (N, 3) with its values at the listed rows (n,); the others hold anything."""
+    out = np.empty_like(array)
+    over(_copy_rows, len(rows), rows, array, out)
+    return out
+
+
+def added(a, b) -> Array:
+    """a + b (N,)."""
+    out = np.empty(len(a))
+    over(_add, len(a), a, b, out, weight=PLAIN)
+    return out
+
+
+def less(a, b) -> Array:
+    """a - b (N,)."""
+    out = np.empty(len(a))
+    over(_subtract, len(a), a, b, out, weight=PLAIN)
+    return out
+
+
+@ranged
+def _copy(first, last, array, out):
+    for j in range(first, last):
+        i = np.uint64(j)  # signed, numba asks each time whether it counts from the end: three times as long
+        out[i] = array[i]
+
+
+@ranged
+def _copy_rows(first, last, rows, array, out):
+    for s in range(first, last):
+        for k in range(3):
+            out[rows[s], k] = array[rows[s], k]
+
+
+@ranged
+def _add(first, last, a, b, out):
+    for j in range(first, last):
+        i = np.uint64(j)
+        out[i] = a[i] + b[i]
+
+
+@ranged
+def _subtract(first, last, a, b, out):
+    for j in range(first, last):
+        i = np.uint64(j)
+        out[i] = a[i] - b[i]
