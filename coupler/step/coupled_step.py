@@ -319,7 +319,7 @@ class CoupledStepper:
                 CouplingPass(solution=found, assumed=assumed, defect=record.defect, breaks_joints=breaks)
             )
             if not passes.done:
-                moved = passes.next_start(found.velocity - lead, self._padded(report.mean_velocity))
+                moved = passes.next_start(self._padded(assumed), self._padded(report.mean_velocity))
                 response = self._answer(mass, problem.dt, before, afloat)
                 after = response.at_end(moved, before, report.dt_s)
                 v_free = corrected_free_velocity(response, after, found.x, problem.coupling)

@@ -33,6 +33,10 @@ def test_boxes_that_touch_are_one_pool(seam):
     assert np.abs(water.velocity).max() < 1e-9
 
 
+def test_a_tank_full_of_water_has_no_surface():
+    assert (water_in([TANK]).level_set < -0.8).all()
+
+
 def test_boxes_on_top_of_each_other_keep_their_own_surfaces():
     """A step of two boxes: water to 0.25 m over one half, to 0.375 m over the other; only the seam goes."""
     low, high = ((0.0, 0.0, 0.0), (1.0, 0.5, 0.25)), ((0.0, 0.0, 0.25), (0.5, 0.5, 0.375))
@@ -142,6 +146,20 @@ def test_a_curved_surface_comes_to_its_volume_with_the_square_of_the_cells():
     ]
     assert off[0] < 0.01 * exact
     assert off[1] < 0.35 * off[0]
+
+
+def test_the_level_under_a_curved_surface_is_a_distance():
+    """η = 0.1 + 0.35 x², as steep as 0.7 at x = 1: within a tenth of the distance to the nearest of its points."""
+    mesh = box_mesh(*TANK, CELL)
+    domain = cut_domain(mesh, ConvexBodies.empty())
+    tops = [sloped(lambda x, y: 0.1 + 0.35 * x**2, WHOLE)]
+    level = start_level([WHOLE], TANK, mesh, domain, tops)
+    x = np.linspace(0.0, 1.0, 4001)
+    way = domain.nodes[:, None, [0, 2]] - np.stack([x, 0.1 + 0.35 * x**2], axis=1)
+    nearest = np.linalg.norm(way, axis=2).min(axis=1)
+    near = (nearest < 0.5 * CELL) & (domain.nodes[:, 0] > 0.5) & (domain.nodes[:, 0] < 1.0)
+    assert near.sum() > 5
+    np.testing.assert_allclose(np.abs(level[near]), nearest[near], rtol=0.1)
 
 
 def test_a_surface_from_a_file_that_is_level_stays_level_around_a_hull():

@@ -27,3 +27,20 @@ def test_sealed_faces_reach_beyond_a_block_that_has_moved_since_it_was_cut(gap):
         reaches = (bodies.offsets + bodies.growth)[plane] * bodies.normals[plane, 2]
         assert reaches[0] >= 0.5 + gap * still + still * (1 - 1e-9)
         assert reaches[1] <= 0.5 + still * 1e-9 - still + (gap * still if gap > 1.0 else 0.0)
+
+
+def test_a_sealed_face_that_comes_back_keeps_what_it_reached():
+    """A joint that opens and closes: its faces reach as far as before, so that nothing is cut again for it."""
+    blocks = [Block(name, (0.5, 0.5, z), size=0.3) for name, z in (("low", 0.35), ("high", 0.65))]
+    up = np.array([[0.0, 0.0, 3.0 * STILL * CELL]])
+    with Structure(blocks, None, JointParameters(1e6, 0.1, damping=0.0), gravity=(0, 0, 0)) as s:
+        immersion = Immersion(box_mesh((0, 0, 0), (1, 1, 1), CELL), s, [], "single")
+        sealed = immersion.bodies.growth > 0.0
+        s.displace(np.array([1]), up, np.eye(3)[None])
+        immersion.update()
+        reached = immersion.bodies.growth.copy()
+        s.displace(np.array([1]), -up, np.eye(3)[None])
+        immersion.update()
+        assert sealed.sum() == 2
+        assert (reached[sealed] > 2.0 * STILL * CELL).all()
+        np.testing.assert_array_equal(immersion.bodies.growth, reached)

@@ -166,6 +166,22 @@ def test_the_motion_that_counts_as_none_goes_by_the_load_or_by_the_scene():
     assert defect_floor(impulse, 1.0) == pytest.approx(1e-3)
 
 
+def test_the_floor_of_a_step_counts_load_and_weight_of_free_blocks_that_water_touches():
+    """Of three blocks of 2 kg one is held and one is dry: 0.1 s of 30 N of water and of 20 N of weight, (3² + 2²)/4 J,
+    and nothing of the others."""
+    stepper = object.__new__(CoupledStepper)
+    weight = np.zeros((3, 6))
+    weight[:, 2] = -20.0
+    stepper.structure = SimpleNamespace(
+        n=3, mass=np.full(3, 2.0), inertia=lambda: np.tile(np.eye(3), (3, 1, 1)), weight_now=lambda: weight
+    )
+    stepper.ledger = SimpleNamespace(input_energy=1e9)
+    load = np.zeros((4, 6))  # of a fixed solid, too
+    load[[0, 1, 3], 0] = 30.0
+    free = np.array([True, False, True])
+    assert stepper._defect_floor(load, 0.1, free) == pytest.approx((3.0**2 + 2.0**2) / 4.0)
+
+
 def test_round_off_of_a_scene_at_rest_is_no_defect():
     """No load, and velocities of 1e-12 m/s in a scene of 1 J: nothing was missed."""
     M = mass_matrix(np.array([2.0]), np.eye(3)[None])

@@ -133,6 +133,14 @@ def test_the_largest_load_stays_with_its_time_and_the_moment_is_about_the_foot(s
     assert watch.impulse[0] == pytest.approx([1.5e3, 0.0, 0.0])  # 10 ms of the whole and of half
 
 
+def test_displaced_blocks_are_listed_from_the_farthest_on(scene):
+    s, watch, coupling = scene
+    s.x = s.x + np.array([[0.2, 0, 0], [0.5, 0, 0], [0, 0, 0]])
+    watch.step(coupling, record(0.4))
+    reported = verdict(s, watch)["displaced"]["list"]
+    assert [found["block"] for found in reported] == ["wall-1", "wall-0"]
+
+
 def test_a_block_that_comes_back_has_left_its_place_all_the_same(scene):
     s, watch, coupling = scene
     s.x = s.x + np.array([[0, 0, 0], [0.3, 0, 0], [0, 0, 0]])

@@ -115,16 +115,19 @@ def test_a_bore_may_run_until_its_reflection_is_back():
     is 0.2 m wide has room for 0.042 m3 up to there."""
     bore = {"kind": "bore", "side": "x-", "level": 0.6, "ahead": 0.5}
 
-    def found(end, **more):
+    def found(end, top=1.0, **more):
         fill = [{"lower": [0, 0, 0], "upper": [1.0, 0.2, 0.5]}]
         in_tank = case(
-            {"inflow": [bore | more], "fill": fill}, tank=TANK | {"upper": [1, 0.2, 1]}, time={"end": end}
+            {"inflow": [bore | more], "fill": fill}, tank=TANK | {"upper": [1, 0.2, top]}, time={"end": end}
         )
         return [text for _, text in problems(in_tank)]
 
     assert found(0.75) == []
     assert "m3 under what the far side throws back (z = 0.709" in found(0.95)[0]
     assert found(0.95, absorbs=True) == []
+    # 0.03 m3 up to a lid at 0.65 m
+    assert any("room for 0.03 m3 under what the far side" in text for text in found(0.7, 0.65))
+    assert not any("far side" in text for text in found(0.5, 0.65))
 
 
 def test_what_a_record_takes_back_leaves_room(tmp_path):
