@@ -104,6 +104,52 @@ def test_a_load_wakes_when_it_changes_a_traction_by_the_share_of_the_strength():
         assert 0.5 < woke_at < 3.0
 
 
+def test_it_wakes_where_the_equilibrium_under_the_load_changes_a_traction_by_the_share():
+    """By the equilibrium of the same wall without sleep: it sleeps at 0.97 of that load, and wakes at 1.03 of it."""
+    with walls(None, count=1) as s:
+        rows, joints = np.flatnonzero(s.centre()[:, 2] > 1.5), s.joints
+        load = np.zeros((s.n, 6))
+        load[rows, 0] = 50.0
+        every, opened = np.arange(len(joints)), []
+        for force in (0.0, 1.0):
+            settle(s, force * load)
+            opened.append(joints.openings(every, s._motion.x, s._motion.R))
+        per_strength = (joints.k0 / LAW.strength)[:, None] * np.array([1.0, 1.0, 1.0])
+        per_strength[:, 1] *= joints.beta
+        change = (np.abs(opened[1] - opened[0]) * per_strength).max()
+    for part, asleep in ((0.97, True), (1.03, False)):
+        with walls(SHARE, count=1) as s:
+            advance(s, 0.0 * load)
+            advance(s, part * SHARE / change * load)
+            assert s.asleep.all() == asleep
+
+
+def test_what_hangs_on_a_driven_block_does_not_sleep():
+    """Its joint moves its end without any load on the block."""
+    blocks = [
+        Block("foot", (0, 0, 0.25), size=0.5),
+        Block("head", (0, 0, 0.75), size=0.5, driven=True, velocity=(0, 0, 1e-3)),
+    ]
+    with Structure(blocks, None, LAW, ground=0.0, sleep=SHARE) as s:
+        settle(s)
+        for _ in range(20):
+            s.advance(5e-3)
+            assert not s.asleep.any()
+        assert s.centre()[0, 2] > 0.25 + 2e-5
+
+
+def test_what_was_displaced_stays_awake_for_a_period():
+    """However little: what holds it has to be seen at its new place first."""
+    with walls(SHARE, count=1) as s:
+        for _ in range(10):
+            advance(s, pushed(s, 0.0), 0.05)
+        assert s.asleep.all()
+        s.displace(np.array([s.n - 1]), np.array([[1e-9, 0.0, 0.0]]), np.eye(3)[None])
+        assert not s.asleep.any()
+        advance(s, pushed(s, 0.0), 1e-3)
+        assert not s.asleep.any()
+
+
 def test_energy_and_momentum_stay_closed_while_asleep_at_waking_and_at_falling_asleep():
     """Pushed by so little that nothing breaks, released, slowed down as water does it, asleep again."""
     with walls(SHARE) as s:
