@@ -33,7 +33,7 @@ class Connection:
     inner: pieces of a cell touch over more than inner h^2 (see WIDE_OPENINGS)
     face: parts of two cells overlap by more than this share of the face (0.2 for thin plates)
     spares: any area counts beside slits, where a face of a solid lies opposite to another one or to a side of the tank
-    within this number of cell sizes; 0: nowhere
+    within this number of cell sizes, and away from nodes of cells of several parts; 0: nowhere
     pocket: components of the water with less than pocket h^3 are dropped (their own pressure is insignificant, and a
     closed one makes the pressure system singular)."""
 
@@ -84,6 +84,11 @@ def virtual_cells(mesh, elements, contacts, connection, part_in_slit) -> tuple[A
     -> cells (M, 4), parent_node (N,)."""
     several = _nodes_with_choice(mesh.cells, elements.part, elements.start, len(mesh.nodes))
     in_slit = np.append(part_in_slit, False)[elements.part]
+    if connection.spares > 0.0:
+        # Free edges lie beside cells that they divide: along a face far from them nothing is narrow.
+        divided = np.zeros(len(mesh.nodes), bool)
+        divided[mesh.cells[np.diff(elements.start) > 1]] = True
+        in_slit |= ~divided[mesh.cells].any(axis=1)[elements.parent]
     virtual = VirtualElements(elements.parent, elements.part, elements.start, in_slit)
     least = NO_AREA * mesh.spacing**2
     label = _unite_corners(mesh.cells, mesh.neighbours, virtual, several, contacts, connection.face, least)
