@@ -150,6 +150,26 @@ def test_what_was_displaced_stays_awake_for_a_period():
         assert not s.asleep.any()
 
 
+def test_what_was_displaced_before_it_slept_is_watched_for_another_period():
+    """A wall that was displaced falls asleep after a period, but not if it was displaced again in between."""
+    found, way = {}, (np.array([[1e-9, 0.0, 0.0]]), np.eye(3)[None])
+    for again in (False, True):
+        with walls(SHARE, count=1) as s:
+            top = np.array([s.n - 1])
+            advance(s, pushed(s, 0.0))
+            s.displace(top, *way)
+            steps = 0
+            while not s.asleep.any():
+                assert steps < 300, "it never sleeps"
+                if again and steps == found[False] - 1:
+                    s.displace(top, *way)
+                s.advance(5e-3)
+                steps += 1
+            found[again] = steps
+    assert found[False] > 3
+    assert found[True] >= 2 * found[False] - 2
+
+
 def test_energy_and_momentum_stay_closed_while_asleep_at_waking_and_at_falling_asleep():
     """Pushed by so little that nothing breaks, released, slowed down as water does it, asleep again."""
     with walls(SHARE) as s:
