@@ -18,12 +18,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from array_types import Array, Bools, Ints
+from array_types import Array, Bools, Floats, Ints
 from fluid.cut.parts_of_cell import root as find
 from kernel_decorators import inner, kernel
 
 # Areas of contact below this share of h^2 are round-off.
 NO_AREA = 1e-12
+# Cosine of the angle within which the normals of polygons belong to one face.
+ONE_SIDE = 0.5
 
 
 @dataclass(frozen=True)
@@ -33,7 +35,7 @@ class Connection:
     inner: pieces of a cell touch over more than inner h^2 (see WIDE_OPENINGS)
     face: parts of two cells overlap by more than this share of the face (0.2 for thin plates)
     spares: any area counts beside slits, where a face of a solid lies opposite to another one or to a side of the tank
-    within this number of cell sizes, and away from nodes of cells of several parts; 0: nowhere
+    within this number of cell sizes; 0: nowhere
     pocket: components of the water with less than pocket h^3 are dropped (their own pressure is insignificant, and a
     closed one makes the pressure system singular)."""
 
@@ -68,32 +70,44 @@ OPENINGS = {"all": Connection(), "wide": WIDE_OPENINGS, "edges": EDGES_APART}
 
 class VirtualElements(NamedTuple):
     """parent (M,) background cell of each element, ascending · part (M,) row of its cut part, -1 whole · start
-    (cells + 1,) first element of each cell · in_slit (M,) bool: its contacts count over any area."""
+    (cells + 1,) first element of each cell · in_slit (M,) bool: its contacts count over any area · beside (M, 3): of
+    `lies_on`."""
 
     parent: Ints
     part: Ints
     start: Ints
     in_slit: Bools
+    beside: Floats
 
 
-def virtual_cells(mesh, elements, contacts, connection, part_in_slit) -> tuple[Array, Array]:
+def virtual_cells(mesh, elements, contacts, connection, part_in_slit, part_beside) -> tuple[Array, Array]:
     """Nodes of the virtual elements.
 
     mesh: Background · elements: `physical_domain.Elements` · contacts: Contacts · connection: Connection
     part_in_slit (K,) bool: cut parts beside slits, whose contacts count over any area
+    part_beside (K, 3): normal of the face that each cut part lies on, zero beside an edge (`lies_on`)
     -> cells (M, 4), parent_node (N,)."""
     several = _nodes_with_choice(mesh.cells, elements.part, elements.start, len(mesh.nodes))
     in_slit = np.append(part_in_slit, False)[elements.part]
-    if connection.spares > 0.0:
-        # Free edges lie beside cells that they divide: along a face far from them nothing is narrow.
-        divided = np.zeros(len(mesh.nodes), bool)
-        divided[mesh.cells[np.diff(elements.start) > 1]] = True
-        in_slit |= ~divided[mesh.cells].any(axis=1)[elements.parent]
-    virtual = VirtualElements(elements.parent, elements.part, elements.start, in_slit)
+    beside = np.append(part_beside, np.zeros((1, 3)), axis=0)[elements.part]
+    virtual = VirtualElements(elements.parent, elements.part, elements.start, in_slit, beside)
     least = NO_AREA * mesh.spacing**2
     label = _unite_corners(mesh.cells, mesh.neighbours, virtual, several, contacts, connection.face, least)
     number, parent_node = _numbered(mesh.cells, elements.parent, several, label, len(mesh.nodes))
     return number.astype(np.uint32), parent_node
+
+
+def lies_on(part, normal, area, n_parts: int) -> Array:
+    """(K, 3): mean normal of the wetted polygons of each cut part where all lie within 60 degrees of it, else zero.
+
+    part (S,) row of the part of each polygon, normal (S, 3), area (S,) [m2]."""
+    mean = np.zeros((n_parts, 3))
+    for k in range(3):
+        mean[:, k] = np.bincount(part, area * normal[:, k], minlength=n_parts)
+    mean /= np.maximum(np.linalg.norm(mean, axis=1), 1e-300)[:, None]
+    turned = np.einsum("sk,sk->s", normal, mean[part]) < ONE_SIDE
+    mean[part[turned]] = 0.0
+    return mean
 
 
 def components(cells, n_nodes: int) -> Array:
@@ -165,7 +179,7 @@ def _unite_corners(cells, neighbours, elements, several, contacts, share, least)
     elements: VirtualElements · contacts: Contacts of cut parts, in the order of this search.
     With a threshold, groups of cut parts without a whole cell are then joined across their widest opening, until
     nothing changes: a threshold closes openings but creates no pockets."""
-    parent, part, start, slit = elements
+    parent, part, start, slit, beside = elements
     areas, fulls = contacts.area, contacts.full
     label = np.arange(4 * len(parent))
     group = np.arange(len(parent) if share > 0.0 else 0)
@@ -205,7 +219,9 @@ def _unite_corners(cells, neighbours, elements, several, contacts, share, least)
                         widest[a] = max(widest[a], area)
                         widest[b] = max(widest[b], area)
                         joined = True
-                    elif area > (0.0 if slit[e] or slit[other] else share) * full or (
+                    elif area > (
+                        0.0 if slit[e] or slit[other] or _same_side(beside, e, other) else share
+                    ) * full or (
                         sweep > 0
                         and (
                             (area == widest[a] and not anchored[a]) or (area == widest[b] and not anchored[b])
@@ -220,6 +236,15 @@ def _unite_corners(cells, neighbours, elements, several, contacts, share, least)
         if sweep % 2 == 1:
             widest[:] = 0.0
     return label
+
+
+@inner
+def _same_side(beside, e, other):
+    """True if both elements lie on faces of solids that look the same way; beside (M, 3)."""
+    along = 0.0
+    for k in range(3):
+        along += beside[e, k] * beside[other, k]
+    return along > ONE_SIDE
 
 
 @inner

@@ -30,7 +30,7 @@ from fluid.cut.openings import Contacts, find_contacts
 from fluid.cut.recut import joined
 from fluid.domain.continued_nodes import pick_old_nodes
 from fluid.domain.coupling_matrix import wetted_coupling
-from fluid.domain.covers import Connection, virtual_cells, without_pockets
+from fluid.domain.covers import Connection, lies_on, virtual_cells, without_pockets
 from fluid.mesh.arrays import Hats, WettedPolygons
 from fluid.mesh.background import Background
 from kernel_decorators import kernel
@@ -331,6 +331,7 @@ def _assembled(memory: Memory, elements: Elements, covers: str) -> PhysicalDomai
             memory.contacts,
             memory.connection,
             _parts_in_slits(mesh, memory.bodies, cuts, memory.connection),
+            lies_on(cuts.wet_part, cuts.wet[:, 4:7], cuts.wet[:, 0], len(cuts.part_cell)),
         )
     volume = _volume(memory, elements)
     of_part = elements.of_part
