@@ -311,6 +311,13 @@ def _parts_in_slits(mesh, bodies, cuts, connection):
     return found
 
 
+def _normal_beside(cuts, connection):
+    """(K, 3): of `lies_on` where a threshold of the covers asks for it, else zero."""
+    if connection.face == 0.0:
+        return np.zeros((len(cuts.part_cell), 3))
+    return lies_on(cuts.wet_part, cuts.wet[:, 4:7], cuts.wet[:, 0], len(cuts.part_cell))
+
+
 def _with_neighbours(bodies, moved, memory):
     """(n,) bool: moved bodies, and those within reach of a slit to them."""
     box, reach = bodies.bounds(), memory.connection.spares * float(memory.mesh.local_size.max())
@@ -331,7 +338,7 @@ def _assembled(memory: Memory, elements: Elements, covers: str) -> PhysicalDomai
             memory.contacts,
             memory.connection,
             _parts_in_slits(mesh, memory.bodies, cuts, memory.connection),
-            lies_on(cuts.wet_part, cuts.wet[:, 4:7], cuts.wet[:, 0], len(cuts.part_cell)),
+            _normal_beside(cuts, memory.connection),
         )
     volume = _volume(memory, elements)
     of_part = elements.of_part

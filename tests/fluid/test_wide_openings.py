@@ -63,6 +63,24 @@ def test_full_walls_stay_exact(thickness, tilt, yaw):
     assert error < 1e-13 * RHO_G
 
 
+@pytest.mark.parametrize("behind", [0.1, 0.3, 0.5, 0.7])
+@pytest.mark.parametrize("turned", [False, True])
+def test_water_before_a_wall_is_one(behind, turned):
+    """Wherever a wall of many cells lies between the nodes, each node has one copy, but within two cells of its edges:
+    slivers that the wall leaves of cells stay with the water before it."""
+    turn = Rotation.from_euler("yz", [30, 12], degrees=True).as_matrix() if turned else np.eye(3)
+    h, size = 1 / 16, np.array([0.4, 0.7, 0.7])
+    mesh = box_mesh((0, 0, 0), (1, 1, 1), h)
+    centre = np.array([0.5 + behind * h, 0.5, 0.5])
+    domain = cut_domain(
+        mesh, ConvexBodies.boxes([centre], [size], turn[None]), "multiple", connection=WIDE_OPENINGS
+    )
+    there = np.abs((domain.nodes - centre) @ turn)
+    off_edges = (there < size / 2 - 2 * h).sum(axis=1) >= 2
+    number = np.bincount(domain.parent_node[off_edges])
+    assert number.max() == 1
+
+
 @pytest.mark.parametrize("gap", [0.0, 1e-9, 1e-3])
 def test_films_under_blocks_stay_connected(gap):
     """A film far thinner than the thresholds still has the pressure of the water around: full buoyancy."""
