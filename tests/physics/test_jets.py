@@ -30,5 +30,6 @@ def test_without_the_bound_the_edges_of_a_plate_are_pulled_at():
 
 
 def test_an_inclined_plate_takes_the_part_of_the_momentum_across_it():
-    force = jet(12.0, 2, angle=60.0).force
-    assert force == pytest.approx(np.sin(np.radians(60.0)), rel=0.08)
+    """Along the plate the sheets push nowhere: with water of its own behind slivers it took 7 % too much."""
+    force = jet(12.0, 4, angle=60.0).force
+    assert force == pytest.approx(np.sin(np.radians(60.0)), rel=0.05)
