@@ -22,12 +22,12 @@ def same(one, other):
 
 
 def test_the_faces_of_a_plate_and_of_a_box_are_apart_at_their_edges():
-    """A plate 0.3 cells thick: as with wide openings, bit for bit. Either has more nodes than where any opening
+    """As with wide openings, bit for bit: a plate 0.3 cells thick and a box have more nodes than where any opening
     counts."""
     plate = ConvexBodies.boxes([[0.537, 0.48, 0.46]], [[0.03, 0.31, 0.33]])
     box = ConvexBodies.boxes([[0.537, 0.48, 0.46]], [[0.35, 0.31, 0.33]])
-    assert same(cut(plate, "edges"), cut(plate, "wide"))
     for body in (plate, box):
+        assert same(cut(body, "edges"), cut(body, "wide"))
         assert len(cut(body, "edges").nodes) > len(cut(body, "all").nodes)
 
 
@@ -35,8 +35,8 @@ def test_a_face_without_edges_closes_nothing():
     """A slab from side to side leaves a fifth of the cells at its face: water moves along it as where any opening
     counts. Closed as narrow openings, the fifth stood still beside a sheet that fell past it."""
     slab = ConvexBodies.boxes([[0.28, 0.5, 0.5]], [[0.4, 2.0, 2.0]])
-    assert same(cut(slab, "edges"), cut(slab, "all"))
-    assert not same(cut(slab, "wide"), cut(slab, "all"))
+    for openings in ("edges", "wide"):
+        assert same(cut(slab, openings), cut(slab, "all"))
 
 
 @pytest.mark.parametrize("opening", [1e-5, 0.2 * H, 0.7 * H])
