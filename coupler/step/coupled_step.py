@@ -395,6 +395,7 @@ class CoupledStepper:
             driven=np.append(structure.still, np.ones(self.immersion.n_solids, bool)),
             driven_velocity=driven_velocity,
             afloat=afloat,
+            substep=0.0 if afloat is None else dt / structure.count_substeps(dt),
         )
 
     def _afloat(self, problem: PressureProblem) -> tuple[PressureProblem, Array | None]:

@@ -20,13 +20,14 @@ water through the wetted surfaces equals the power received by the velocities V,
 (wall shear; its surface in the cells of a body) is part of f.
 
 The blocks move while the load is held constant, and the buoyancy of a floating block decreases as it rises. The
-hydrostatic stiffness K_h (`fluid.pressure.waterline`, 3) therefore acts over half of the displacement: (dt/2) K_h is
-added to D, and the load is reduced by (dt/2) K_h V. With the load at the initial position an oscillation would grow by
-ω² dt²/4 in every step.
+hydrostatic stiffness K_h (`fluid.pressure.waterline`, 3) therefore acts over half of the displacement: h K_h with
+h = (dt - dt_s)/2 is added to D, and the load is reduced by h K_h V (dt_s: substep, which moves a block with the
+velocity at its end, so that a step of one substep needs nothing). With h = 0 an oscillation would grow by ω² dt²/4 in
+every step of many substeps; with h = dt/2 it decays by as much in steps of one.
 
 V is the velocity at the end of the step.  Over the step the blocks move with the mean
 
-    V − L,    L = ½ (1 − dt_s/dt) D⁻¹ (M/dt + dt/2 K_h) (V − V^n)                                         (4)
+    V − L,    L = ½ (1 − dt_s/dt) D⁻¹ (M/dt + h K_h) (V − V^n)                                         (4)
 
 (dt_s: substep; the load acts from the first one on).  Stiff joints and contacts, for which D⁻¹ is small,
 oscillate within a step, so that only their mean velocity matters.  A second pass replaces the estimate (2) by the
@@ -76,7 +77,7 @@ class StructureResponse:
 
     mass, stiffness, damping: (6n, 6n) sparse, world axes · dt [s] · driven (n,) bool: bodies whose velocity
     `driven_velocity` (n, 6) is imposed (fixed solids, prescribed motions); they do not respond to loads ·
-    afloat (n, 3, 3): K_h for heave, roll and pitch, None: of no body.
+    afloat (n, 3, 3): K_h for heave, roll and pitch, None: of no body · substep dt_s [s]: of the blocks afloat.
     """
 
     def __init__(
@@ -88,13 +89,16 @@ class StructureResponse:
         driven: Array,
         driven_velocity: Array,
         afloat: Array | None = None,
+        substep: float = 0.0,
     ) -> None:
         self.dt = dt
         self.mass = mass
         self.imposed = np.where(driven[:, None], driven_velocity, 0.0).ravel()
         self.free = np.flatnonzero(np.repeat(~driven, 6))
         self._restoring = (
-            None if afloat is None else _of_heave(0.5 * dt * afloat, mass.diagonal().reshape(-1, 6))
+            None
+            if afloat is None
+            else _of_heave(0.5 * (dt - substep) * afloat, mass.diagonal().reshape(-1, 6))
         )
         self.matrix = sp.csr_array(mass / dt)
         for part in (damping, dt * stiffness, self._restoring):
@@ -131,7 +135,7 @@ class StructureResponse:
         return self.velocity(self.mass @ velocity.ravel() / self.dt + force.ravel())
 
     def restoring_load(self, velocity: Array) -> Array:
-        """-(dt/2) K_h V (n, 6) [N, N m] of V (n, 6): change of the load over the first half of the displacement."""
+        """-h K_h V (n, 6) [N, N m] of V (n, 6): change of the load over the first half of the displacement."""
         if self._restoring is None:
             return np.zeros_like(velocity)
         return -(self._restoring @ velocity.ravel()).reshape(-1, 6)

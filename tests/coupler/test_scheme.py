@@ -232,6 +232,32 @@ def test_the_velocity_at_the_end_is_the_one_whose_mean_was_found(stiffness):
         assert end[0, 0] == pytest.approx(0.0, abs=0.05)
 
 
+@pytest.mark.parametrize("substeps", [1, 2, 100])
+def test_a_body_afloat_swings_alike_whatever_its_substeps(substeps):
+    """ω dt = 0.3 over 400 steps: the load is that of the place at the start, less what half of the way takes off. Taken
+    off over half of the way in steps of one substep too, it was left with a hundredth of a hundredth of its swing."""
+    dt, mass, k, place, velocity, reached = 0.01, 2.0, 1800.0, 0.01, np.zeros((1, 6)), []
+    heave = np.zeros((1, 3, 3))
+    heave[0, 0, 0] = k
+    nothing = sp.csr_array((6, 6))
+    M = mass_matrix(np.array([mass]), np.eye(3)[None])
+    response = StructureResponse(
+        M, nothing, nothing, dt, np.zeros(1, bool), np.zeros((1, 6)), heave, dt / substeps
+    )
+    load = np.zeros((1, 6))
+    for _ in range(400):
+        load[0, 2] = -k * place
+        end = response.free_velocity(velocity, load).reshape(1, 6)
+        force = load + response.restoring_load(end)
+        mean = velocity + 0.5 * (1.0 + 1.0 / substeps) * dt * force / mass
+        assert mean[0, 2] == pytest.approx(
+            (end - response.lead(end, velocity, dt / substeps))[0, 2], rel=1e-9
+        )
+        velocity, place = velocity + dt * force / mass, place + dt * mean[0, 2]
+        reached.append(abs(place))
+    assert max(reached[-40:]) == pytest.approx(max(reached[:40]), rel=0.02)
+
+
 def test_defect_of_a_body_that_stood_still_is_whole():
     """The larger of what was found and what was assumed is the measure: neither alone may vanish."""
     M = mass_matrix(np.array([2.0]), np.eye(3)[None])

@@ -103,3 +103,17 @@ def test_the_remainder_of_a_cell_is_swept_out_as_fast_as_water_crosses_it(viscos
     held = (np.array([0]), remainder, kick)
     out = carry_remainder(np.array([0]), held, 0.02, u, 0.1, viscosity, cells, size)
     np.testing.assert_allclose(out, [[0.36 * left, 0.12 * left, -0.6 * left]], rtol=1e-12)
+
+
+def test_water_that_has_hardly_moved_since_it_turned_keeps_the_remainder_of_its_cell():
+    """The pressure changes the remainder by 18 m/s², sweeping in full by 0.02 · 20 = 0.4 m/s²: a 45th of that counts,
+    β = 1/(1 + 20/45 · 0.1). Viscosity, 20/s more, acts in full, and twice as much of it counts as steady."""
+    u, remainder, kick = (
+        np.array([[3.0, 4.0, 0.0]] * 4),
+        np.array([[0.0, 0.02, 0.0]]),
+        np.array([[0.0, 0.0, 18.0]]),
+    )
+    cells, size, held = np.array([[0, 1, 2, 3]]), np.array([0.5]), (np.array([0]), remainder, kick)
+    for viscosity, left in ((0.0, 1.0 / (1.0 + 2.0 / 45.0)), (1.25, 1.0 / (3.0 + 4.0 / 45.0))):
+        out = carry_remainder(np.array([0]), held, 0.02, u, 0.1, viscosity, cells, size)
+        np.testing.assert_allclose(out, [[0.0, 0.02 * left, 0.36 * left]], rtol=1e-12)

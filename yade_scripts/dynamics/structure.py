@@ -283,7 +283,7 @@ class Structure(StructureReadings):
         self._turn_on_contacts()
         if self._sleep is not None:
             self._sleep.begin(self.weight_now() + self._substepper.load, self.time, self._substepper.ramp)
-        count = self._count(dt, substep)
+        count = self.count_substeps(dt, substep)
         x0, R0, half, spin = m.x.copy(), m.R.copy(), m.half_step_back(), m.v[:, 3:].copy()
         self._substepper.fastest = 0.0
         self._impulses.start()
@@ -306,8 +306,8 @@ class Structure(StructureReadings):
             impulses=self._impulses.taken(),
         )
 
-    def _count(self, dt: float, substep: float | None) -> int:
-        """Number of equal substeps in a time dt [s]."""
+    def count_substeps(self, dt: float, substep: float | None = None) -> int:
+        """Number of equal substeps in which `advance` takes a time dt [s]. Raises SubstepTooLong as it does."""
         limit = self.substep() if substep is None else substep
         self.substep_limit().check(min(limit, dt))
         if self._sleep is not None and self.still.all() and not self._motion.v.any():
@@ -324,7 +324,7 @@ class Structure(StructureReadings):
             left -= 1
             if self._sleep is not None and self._sleep.reached(self.time) and left:
                 rest = left * length
-                left = self._count(rest, substep)
+                left = self.count_substeps(rest, substep)
                 length = rest / left
         return broken, len(broken)
 

@@ -40,13 +40,10 @@ NOTES = {
     "columns moved by 0, 1e-6, 0.001 and 0.01 d it is 0.089, 0.089, 0.101 and 0.074 d, and with the beach alone moved "
     "by 1e-6 d 0.085 d (0.101, 0.090, 0.078 and 0.083 d for both when the tip stood upright). The "
     "shallow-water equations give 0.080 d where a tenth of a cell counts as dry.",
-    "P53": "The period agrees, but each swing is smaller than the reference by 0.06 to 0.09 of the drop height. Cells "
-    "of R/5 account for most of it: in a tank 1.4 m wide the first swing is 0.790 with R/5 and 0.802 with R/8, and the "
-    "energy that the water loses up to then falls with the size of the cells (0.066 and 0.040 of what the drop gave). "
-    "A drop of a tenth as much gives 0.799, and the sphere lifts the mean level by 0.005. The damping "
-    "of divergence and of water lines, and theta change it by 0.002 or less. Up to version 0.1.0 all five "
-    "quantities were within their limits because the coupling let an oscillation grow by omega^2 dt^2 / 4 in a step, "
-    "4 % in half a period, which hid the loss; with that growth put back the first swing is 0.824 instead of 0.790.",
+    "P53": "Each swing is smaller than the reference by 0.02 to 0.03 of the drop height. Half of the step changes the "
+    "first swing by 0.002 (in a tank 0.9 m wide). It was 0.03 smaller, and the third one 0.06, while the load of a "
+    "sphere that moves in one substep a step was reduced over half of its way as if it took many; cells of R/8 gave "
+    "0.006 more at that time.",
     "P55": "With four cells over the diameter the speed is 5 to 6 % low, because linear velocities are too coarse "
     "there (a spinning sphere is subject to 1.04 times the moment of Stokes; 1.003 times with eight cells). "
     "At Re 1.5 the digitised records contradict each other: the integral of the speed gives a gap of 4 D at "
