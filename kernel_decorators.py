@@ -31,7 +31,7 @@ from typing import Any
 
 from numba import njit, types
 
-from kernel_ranges import Compiler
+from kernel_ranges import shared
 
 PATIENCE = 60.0
 """Seconds for which a process waits for another one that compiles a kernel: none takes as long, but a process may be
@@ -73,19 +73,20 @@ def nogil(function: Callable) -> Any:
     return _compiled(function, _nrt=False, nogil=True)
 
 
-def _shared(function: Callable, **options: bool) -> Any:
-    dispatcher = _compiled(function, nogil=True, pipeline_class=Compiler, **options)
-    dispatcher.shared = True
-    return dispatcher
+def _shared(function: Callable, **options: Any) -> Any:
+    return _in_turn(shared(njit, function, cache=True, no_cfunc_wrapper=True, **options))
 
 
 def _compiled(function: Callable, **options: Any) -> Any:
-    """Numba's dispatcher of a function, for which a constant in a call has the type of a variable, and which one
-    process at a time compiles."""
     decorate: Any = njit  # whose stubs lack these options
-    dispatcher = decorate(cache=True, no_cfunc_wrapper=True, **options)(function)
+    return _in_turn(decorate(cache=True, no_cfunc_wrapper=True, **options)(function))
+
+
+def _in_turn(dispatcher: Any) -> Any:
+    """Numba's dispatcher of a function, for which a constant in a call gets the type of a variable, and which one
+    process at a time compiles."""
     given, compile_alone = dispatcher.get_call_template, dispatcher.compile
-    name = f"{function.__module__}.{function.__qualname__}"
+    name = f"{dispatcher.py_func.__module__}.{dispatcher.py_func.__qualname__}"
 
     def get_call_template(args: tuple, kws: dict) -> tuple:
         return given(

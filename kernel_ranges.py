@@ -16,6 +16,7 @@ compiling it takes a fortieth of a second.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from llvmlite import ir
@@ -48,21 +49,37 @@ class _Places(NamedTuple):
     """What is being run; of the threads' own."""
     clock: int = 6
     """Room for the time, two numbers; of the threads' own."""
-    ends: int = 8
+    threads: int = 8
+    """Number of threads, of which each has one part of its own; of the threads' own."""
+    next: int = 16
+    """The first of the other parts that no thread has taken; of the threads' own."""
+    ends: int = 24
     """Where parts begin and end."""
-    cuts: int = 8 + MOST + 1
+    cuts: int = 24 + MOST + 1
     """Where the runs of a part begin and end."""
-    boxes: int = 8 + 2 * (MOST + 1)
+    boxes: int = 24 + 2 * (MOST + 1)
     """Addresses of what each thread looks at; of the threads' own."""
-    size: int = 8 + 3 * (MOST + 1)
+    size: int = 24 + 3 * (MOST + 1)
 
 
 Plan = _Places()
 
 
+def shared(decorate: Any, function: Callable, **options: Any) -> Any:
+    """A function of a range, compiled by numba's decorator with this entry."""
+    made = decorate(nogil=True, pipeline_class=Compiler, **options)(function)
+    made.shared = True
+    return made
+
+
 def is_shared(kernel: Any) -> bool:
     """Whether a kernel has this entry."""
     return getattr(kernel, "shared", False)
+
+
+def alone(kernel: Callable, count: int, *args: Any, weight: float = 1, pieces: int = 1) -> list:
+    """What [kernel(0, count, *args)] returns: one thread's form of `fluid.numerics.threads.over`."""
+    return [kernel(0, count, *args)]
 
 
 def _constant(value: int) -> ir.Constant:

@@ -19,6 +19,7 @@ from coupler.geometry.parts import Part, parts_of
 from coupler.geometry.solids import obstacle_blocks, solids_of
 from coupler.geometry.tank_mesh import is_basin, mesh_of
 from coupler.geometry.terrain.standing import ground_surface
+from coupler.program.threads import threads
 from coupler.results.gauges import Bodies, Gauge, make_gauges
 from coupler.scene.build_water import water_of
 from coupler.step.coupled_step import CoupledStepper
@@ -155,6 +156,7 @@ def _load_at_rest(structure, water) -> Array:
 
 def build_structure(case: Case):
     """The structure of a case, in a new YADE scene."""
+    from fluid.numerics.threads import over, use
     from yade_scripts.contact.law import ContactLaw, PairFriction
     from yade_scripts.dynamics.structure import Structure
 
@@ -177,7 +179,7 @@ def build_structure(case: Case):
     gravity = (0.0, 0.0, -case.case.gravity)
     planes = planes_of(case)
     blocks = [block for part in parts_of(case) for block in part.blocks] + obstacle_blocks(case)
-    return Structure(
+    structure = Structure(
         blocks,
         contact,
         joints,
@@ -188,6 +190,9 @@ def build_structure(case: Case):
         ramp=case.structure.ramp or 0.0,
         sleep=case.structure.sleep and case.structure.sleep.share,
     )
+    use(threads())
+    structure.share_work(over)
+    return structure
 
 
 def share_of(section) -> float | None:

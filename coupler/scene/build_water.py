@@ -31,13 +31,11 @@ def water_of(case: Case, structure, solids, mesh=None):
     from coupler.scene.fill import start_level, start_velocity
     from coupler.step.immersion import Immersion
     from fluid.domain.covers import OPENINGS
-    from fluid.numerics.threads import over, use
+    from fluid.numerics.threads import use
     from fluid.step.parameters import WaterParameters
     from fluid.step.water import Water
 
     use(threads())
-    if structure is not None:
-        structure.share_work(over)
     w = case.water
     mesh = mesh_of(case.tank) if mesh is None else mesh
     cracks = _narrow_cracks(w.cracks, structure, mesh)

@@ -1,9 +1,10 @@
 """Threads that wait for work in compiled code, and share the range of a kernel without the interpreter.
 
 The thread that calls puts the work into a box of each other thread, does its own part, takes back what no other thread
-has begun yet, and waits for the rest. A thread without work looks at its box for a while (SPIN), which takes 1 µs to
-notice, and then sleeps, which takes some 20 to 50 µs to end; so it costs nothing where nothing is shared, and a thread
-that has to wait for a core delays nobody. A part that is Python code sends its thread back to the interpreter.
+has begun yet, and waits for the rest. Of more parts than threads, each takes the next one when it is through. A thread
+without work looks at its box for a while (SPIN), which takes 1 µs to notice, and then sleeps, which takes some 20 to
+50 µs to end; so it costs nothing where nothing is shared, and a thread that has to wait for a core delays nobody. A
+part that is Python code sends its thread back to the interpreter.
 
 A box has the states of BOX; each change from one to the next is one atomic operation, so that either side of it wins:
 begun by its thread or taken back, asleep or given work.
@@ -87,6 +88,16 @@ def _swap(typingctx, address, value):
 
 
 @intrinsic
+def _taken(typingctx, address):
+    """Count up; → the number before."""
+
+    def code(context, builder, signature, args):
+        return builder.atomic_rmw("add", _pointer(builder, args[0]), ir.IntType(64)(1), "seq_cst")
+
+    return types.int64(types.int64), code
+
+
+@intrinsic
 def _replace(typingctx, address, expected, value):
     """Store a number where the expected one is; → whether it was."""
 
@@ -161,11 +172,20 @@ def _serve(box, spin):
             body = _load(plan + 8 * Plan.body)
             if body == 0:
                 return True
-            _call(body, _load(box + 8 * PART), _load(plan + 8 * Plan.pack))
+            _work(plan, body, _load(box + 8 * PART), _load(plan + 8 * Plan.pack))
             _finish(box)
         elif _replace(box, IDLE, ASLEEP):
             while _load(box) == ASLEEP:
                 _wait(box + 8 * WAKE)
+
+
+@inner
+def _work(plan, body, part, pack):
+    """Do a part, and others for as long as there are any."""
+    parts = _load(plan + 8 * Plan.parts)
+    while part < parts:
+        _call(body, part, pack)
+        part = _taken(plan + 8 * Plan.next)
 
 
 @inner
@@ -183,8 +203,10 @@ def _finished(box):
 
 @inner
 def _give(plan, spin):
-    """Put parts 1 and on of a plan into the boxes."""
-    for k in range(1, _load(plan + 8 * Plan.parts)):
+    """Put a part into each box: part k into that of thread k, of which the first is the one that calls."""
+    threads = _load(plan + 8 * Plan.threads)
+    _store(plan + 8 * Plan.next, threads)
+    for k in range(1, threads):
         box = _load(plan + 8 * (Plan.boxes + k - 1))
         if _load(box) == BEGUN:  # of a call that Ctrl-C ended before it had waited
             _await(plan, box, spin)
@@ -212,9 +234,19 @@ def _begin(plan, spin):
 
 
 @nogil
+def _took_back(plan, k):
+    """Whether thread k has not begun its part, and shall not."""
+    box = _load(plan + 8 * (Plan.boxes + k - 1))
+    if _replace(box, GIVEN, IDLE):
+        _store(box + 8 * FINISHED, DONE)
+        return True
+    return False
+
+
+@nogil
 def _end(plan, spin):
     """Wait for all parts that were given."""
-    for k in range(1, _load(plan + 8 * Plan.parts)):
+    for k in range(1, _load(plan + 8 * Plan.threads)):
         _await(plan, _load(plan + 8 * (Plan.boxes + k - 1)), spin)
 
 
@@ -234,14 +266,12 @@ def _run():
         _store(plan + 8 * Plan.body, body)
         _store(plan + 8 * Plan.pack, pack)
         _give(plan, SPIN)
-        _call(body, 0, pack)
-        parts = _load(plan + 8 * Plan.parts)
-        for k in range(parts - 1, 0, -1):
-            box = _load(plan + 8 * (Plan.boxes + k - 1))
-            if _replace(box, GIVEN, IDLE):
+        _work(plan, body, 0, pack)
+        threads = _load(plan + 8 * Plan.threads)
+        for k in range(threads - 1, 0, -1):
+            if _took_back(plan, k):
                 _call(body, k, pack)
-                _store(box + 8 * FINISHED, DONE)
-        for k in range(1, parts):
+        for k in range(1, threads):
             _await(plan, _load(plan + 8 * (Plan.boxes + k - 1)), SPIN)
 
     return run.address, run
@@ -310,9 +340,8 @@ class Team:
         for worker in workers:
             worker.thread.join(PATIENCE)
 
-    def _take(self, parts: int) -> Any:
-        """The plan, with as many threads as its parts need, until `_at_work` is released; None while another caller
-        has it."""
+    def _take(self, threads: int) -> Any:
+        """The plan of that many threads, until `_at_work` is released; None while another caller has it."""
         if not self._at_work.acquire(blocking=False):
             return None
         try:
@@ -320,23 +349,23 @@ class Team:
             if plan is None:
                 plan = self._plan = _numbers(Plan.size)
                 plan[Plan.run] = _run()[0]
-            while len(self.workers) < parts - 1:
+            while len(self.workers) < threads - 1:
                 self.workers.append(_Worker())
                 plan[Plan.boxes + len(self.workers) - 1] = self.workers[-1].box
-            plan[Plan.parts] = parts
+            plan[Plan.threads] = threads
         except BaseException:
             self._at_work.release()
             raise
         return plan
 
-    def share(self, kernel: Callable, parts: int, count: int, args: tuple) -> list | None:
-        """What a kernel of a shared range returns for each of as many equal parts of 0 ... count; None while another
-        caller has the threads."""
-        plan = self._take(parts)
+    def share(self, kernel: Callable, threads: int, parts: int, count: int, args: tuple) -> list | None:
+        """What a kernel of a shared range returns for each of as many equal parts of 0 ... count, at least one for
+        each thread; None while another caller has the threads."""
+        plan = self._take(threads)
         if plan is None:
             return None
         try:
-            plan[Plan.uneven] = 0
+            plan[Plan.parts], plan[Plan.uneven] = parts, 0
             return kernel(-ctypes.addressof(plan), count, *args)
         finally:
             self._at_work.release()
@@ -348,7 +377,7 @@ class Team:
         if plan is None:
             return False
         try:
-            plan[Plan.uneven] = 1
+            plan[Plan.parts], plan[Plan.uneven] = len(ends) - 1, 1
             plan[Plan.ends : Plan.ends + len(ends)] = ends
             plan[Plan.cuts : Plan.cuts + len(cuts)] = cuts
             kernel(-ctypes.addressof(plan), ends[-1], runs, *args)
@@ -370,15 +399,15 @@ class Team:
         busy = self.workers[: len(jobs) - 1]
         for worker, job in zip(busy, jobs[1:]):
             worker.job = job
-        own, failure = None, None
         try:
             _begin(plan, SPIN)
             own = jobs[0]()
-        except BaseException as caught:
-            failure = caught
+            for k, worker in enumerate(busy, 1):
+                if _took_back(plan, k):
+                    worker.found = worker.job(), None
         finally:
             _end(plan, SPIN)
-        failure = failure or next((raised for _, raised in (w.found for w in busy) if raised), None)
-        if failure is not None:
-            raise failure
+        for _, failure in (worker.found for worker in busy):
+            if failure is not None:
+                raise failure
         return [own, *(worker.found[0] for worker in busy)]

@@ -41,6 +41,9 @@ CHUNK = 16_384
 FILLED, LAZY = 64, 32 << 20
 """Numbers that are filled as one row, and bytes from which the C library returns pages that are zero already and are
 allocated only when they are written to."""
+PYTHON = 10
+"""How many times as long as a compiled loop Python code takes to be handed over: for the interpreter, which one thread
+has at a time."""
 KEPT = 8
 """Number of lists whose reach is remembered: those of one step."""
 
@@ -89,16 +92,17 @@ def watched() -> Iterator[list[Call]]:
         _settings.calls = None
 
 
-def over(kernel: Callable, count: int, *args, weight: float = 1) -> list:
+def over(kernel: Callable, count: int, *args, weight: float = 1, pieces: int = 1) -> list:
     """Run kernel(first, last, *args) on ranges that together cover 0 ... count; returns their results in order.
 
     kernel: `ranged` or `released`, or Python code · weight: cost of a row, in usual rows, which take some ten
-    nanoseconds."""
-    parts = min(_parts(count * weight), max(count, 1))
+    nanoseconds · pieces: number of ranges for each thread, more than one for rows of unequal cost."""
+    shared = is_shared(kernel)
+    parts = min(_parts(count * weight if shared else count * weight / PYTHON), max(count, 1))
     if parts == 1:
         return [_alone(kernel, count * weight, (0, count, *args))]
-    if is_shared(kernel):
-        found = _team.share(kernel, parts, count, args)
+    if shared:
+        found = _team.share(kernel, parts, min(parts * pieces, count, MOST), count, args)
         return [kernel(0, count, *args)] if found is None else found
     ends = [count * k // parts for k in range(parts + 1)]
     return _team.together([_call(kernel, (first, last), args) for first, last in pairwise(ends)])
@@ -171,7 +175,7 @@ def _fill(first, last, out):
 
 
 def _parts(count: float) -> int:
-    return max(1, min(_settings.size, MOST, int(count) // _settings.least))
+    return max(1, min(_settings.size, MOST, math.ceil(count) // _settings.least))
 
 
 def _alone(kernel, count, args):

@@ -15,8 +15,9 @@ import pytest
 
 import fluid.numerics.threads as kernels
 import surgebreak
+from coupler.commands.benchmark import command, machine
 from coupler.commands.benchmark import threads as measured
-from coupler.commands.warm_up import CASE
+from coupler.commands.warm_up import CASE, PARTS
 from coupler.program import threads
 from coupler.program.provenance import ROOT
 from fluid.mesh.arrays import Corners
@@ -38,11 +39,11 @@ def divided(monkeypatch):
     kernels.use(1)
 
 
-def _bytes_of(number, place, divided):
+def _bytes_of(number, place, divided, scene=SCENE, least=5):
     divided.setenv(threads.VARIABLE, str(number))
-    surgebreak.Case(SCENE).run(place / str(number))
+    surgebreak.Case(scene).run(place / str(number))
     histories = sorted((place / str(number) / "history").glob("*.csv"))
-    assert len(histories) >= 5
+    assert len(histories) >= least
     return {path.name: path.read_bytes() for path in histories}
 
 
@@ -52,6 +53,24 @@ def test_a_coupled_run_has_the_same_bytes_at_one_to_four_threads(tmp_path, divid
     for number in (2, 3, 4):
         assert _bytes_of(number, tmp_path, divided) == alone
         assert len(kernels._team.workers) >= number - 1
+
+
+FALL = tomllib.loads(PARTS["structure"])
+FALL["time"] = {"end": "0.1 s", "step_max": "10 ms", "output_every": "50 ms"}
+FALL["joints"]["strength"] = "2 kPa"
+FALL["structure"]["block"] = [
+    {"name": f"falling{k}", "centre": [1.0 + 0.1 * k, 0.5, 0.75 + 0.31 * k], "size": [0.3] * 3, "density": 500,
+     "velocity": [0, 0, -3]} for k in range(3)
+]  # fmt: skip
+
+
+def test_a_structure_without_water_has_the_same_bytes_at_one_to_four_threads(tmp_path, divided):
+    """Blocks fall upon a wall whose joints break: contacts in several ranges for each thread, and joints."""
+    alone = _bytes_of(1, tmp_path, divided, FALL, 3)
+    broken = surgebreak.Run(tmp_path / "1").history("structure")
+    assert any(b"joint" in text.split(b"\n")[0] for text in alone.values()), broken
+    for number in (2, 3, 4):
+        assert _bytes_of(number, tmp_path, divided, FALL, 3) == alone
 
 
 def test_sums_into_nodes_do_not_depend_on_where_ranges_end(divided):
@@ -92,8 +111,8 @@ def test_a_kernel_that_fails_on_another_thread_fails_here(divided):
         return last
 
     with pytest.raises(ValueError, match="row 4"):
-        kernels.over(kernel, 12)
-    assert kernels.over(lambda first, last: (first, last), 12) == [(0, 4), (4, 8), (8, 12)]
+        kernels.over(kernel, 12, weight=10)
+    assert kernels.over(lambda first, last: (first, last), 12, weight=10) == [(0, 4), (4, 8), (8, 12)]
 
 
 @released
@@ -128,6 +147,17 @@ def test_what_parts_return_comes_in_their_order(divided):
     assert [length for _, length in kernels.over(_squares, 3, -1, np.zeros(3))] == [1, 1, 1]
 
 
+def test_more_ranges_than_threads_come_in_their_order(divided):
+    """As for rows of unequal cost: whichever thread is through takes the next range."""
+    for number, pieces, parts in ((3, 4, 12), (2, 4, 8), (3, 50, 100), (1, 4, 1)):
+        kernels.use(number)
+        out = np.zeros(100)
+        for _ in range(20):
+            found = kernels.over(_squares, 100, -1, out, pieces=pieces)
+            assert len(found) == parts
+            np.testing.assert_array_equal(np.concatenate([part for part, _ in found]), np.arange(100.0) ** 2)
+
+
 def test_a_compiled_kernel_that_fails_on_another_thread_fails_here(divided):
     """In its first, its middle and its last part; the threads are there for the next one."""
     kernels.use(3)
@@ -146,7 +176,7 @@ def test_python_code_on_the_threads_may_share_loops_itself(divided):
         kernels.over(_squares, 100, -1, out)
         return out[first:last].sum()
 
-    assert sum(kernels.over(inner, 100)) == (np.arange(100.0) ** 2).sum()
+    assert sum(kernels.over(inner, 100, weight=10)) == (np.arange(100.0) ** 2).sum()
 
 
 def test_two_callers_at_once_get_what_each_asked_for(divided):
@@ -185,7 +215,7 @@ def test_ctrl_c_ends_a_loop_when_all_of_its_parts_are_done(divided):
         press = threading.Timer(0.1, signal.raise_signal, [signal.SIGINT])
         press.start()
         with pytest.raises(KeyboardInterrupt):
-            kernels.over(loop, 3, 100_000_000, out)
+            kernels.over(loop, 3, 100_000_000, out, weight=10)
         press.join()
         np.testing.assert_array_equal(out, whole)
         _squares_are_right()
@@ -226,11 +256,11 @@ def test_kernels_in_the_cache_hold_no_addresses_of_the_process_that_compiled_the
 def test_a_process_that_is_forked_off_has_threads_of_its_own(divided):
     """Those of its parent are not there; waiting for them would never end."""
     kernels.use(3)
-    kernels.over(lambda first, last: last, 9)
+    kernels.over(lambda first, last: last, 9, weight=10)
     _squares_are_right()
     child = os.fork()
     if child == 0:
-        same = kernels.over(lambda first, last: last - first, 9) == [3, 3, 3]
+        same = kernels.over(lambda first, last: last - first, 9, weight=10) == [3, 3, 3]
         _squares_are_right()
         os._exit(0 if same and len(kernels._team.workers) == 2 else 1)
     assert os.waitpid(child, 0)[1] == 0
@@ -291,10 +321,16 @@ def test_the_benchmark_counts_what_threads_share_and_what_kernels_move(monkeypat
     monkeypatch.setattr(measured, "STEPS", 1)
     monkeypatch.setattr(measured, "BEFORE", 0.02)
     monkeypatch.setattr(measured, "TRIAD", 1000)
+    monkeypatch.setattr(machine, "TURNS", 100)
+    monkeypatch.setattr(machine, "EMPTY", 5)
     monkeypatch.setattr(measured, "cores", lambda: 2)
     found = measured.threads(9000)
     assert found["wall"].keys() == {"1", "2"}
     assert 0.0 < found["serial"] < 1.0
+    assert found["machine"].keys() == {"1", "2"}
+    assert all(seconds > 0.0 for spent in found["machine"].values() for seconds in spent.values())
+    told = [line.what for line in command._machine(found["machine"])]
+    assert len(told) == 4
     assert measured.amdahl(0.0, 16) == 16.0
     assert measured.amdahl(0.1, 10) == pytest.approx(1.0 / 0.19)
     found = measured.roofline(1500)

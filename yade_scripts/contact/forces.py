@@ -6,11 +6,12 @@ from collections.abc import Callable
 
 import numpy as np
 
+from kernel_ranges import alone
 from yade_scripts.blocks.block import Block
 from yade_scripts.blocks.faces import FixedPlane
 from yade_scripts.contact.arrays import CROSSINGS, Bodies, Kinematics, Law, Pairs, Slots, empty_rows
 from yade_scripts.contact.ground import NO_GROUND, GroundSurface
-from yade_scripts.contact.kernel import alone, carry_slots, contact_forces
+from yade_scripts.contact.kernel import carry_slots, contact_forces
 from yade_scripts.contact.law import ContactLaw
 from yade_scripts.contact.nodes import contact_shapes
 from yade_scripts.contact.search import fastest

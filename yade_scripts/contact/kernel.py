@@ -8,8 +8,6 @@ that cross.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from kernel_decorators import inner, kernel, released
@@ -29,8 +27,9 @@ from yade_scripts.contact.search import (
 )
 from yade_scripts.contact.springs import Mode, add_up, apply, set_dashpots
 
-PAIR = 20
-"""Cost of one pair, in rows of an ordinary loop: it decides how pairs are divided among threads."""
+PAIR, PIECES = 20, 4
+"""Cost of one pair, in rows of an ordinary loop, and ranges of pairs for each thread, since those that touch cost most:
+they decide how pairs are divided among threads."""
 STEADY = 0.1
 """Relative motion, in margins of the thinner block, within which the edges found last are taken to be the outermost
 still. Each change of edges leaves at most about that overlap without force: blocks that roll and slide on their edges
@@ -40,23 +39,18 @@ SAME = 1.0 + 1e-6
 flat beams the two overlaps are equal."""
 
 
-def alone(kernel: Callable, count: int, *args, weight: int = 1) -> list:
-    """Run kernel(0, count, *args) on this thread: the value of `share` in `contact_forces` for one thread."""
-    return [kernel(0, count, *args)]
-
-
 def contact_forces(share, shapes, bodies, law, pairs, slots, ground, state, rows, F):
     """Find the contacts at the present places and add their forces to F (n, 6).
 
-    share: `alone`, or a function that runs ranges of the pairs on several threads. In that case the forces are added
-    afterwards in the order of the pairs, so that the result has the same bits; a range of all pairs adds them as it
-    finds them · ground: `Ground`, or NO_GROUND.
+    share: `kernel_ranges.alone`, or a function that runs ranges of the pairs on several threads. In that case the
+    forces are added afterwards in the order of the pairs, so that the result has the same bits; a range of all pairs
+    adds them as it finds them · ground: `Ground`, or NO_GROUND.
     Pairs in the list that do not touch change neither the contacts nor their forces.
     → (number of contacts, energy [J] taken by friction and by springs of contacts that ended)
     """
     lost = np.zeros(len(pairs.a))
     scene = (shapes, bodies, law, pairs, slots, ground, F, state, rows, lost)
-    spans = np.array(share(_contacts, len(pairs.a), *scene, weight=PAIR))
+    spans = np.array(share(_contacts, len(pairs.a), *scene, weight=PAIR, pieces=PIECES))
     return _added_up(spans, rows, lost, F)
 
 

@@ -222,11 +222,12 @@ class Structure(StructureReadings):
         )
 
     def share_work(self, share: Callable[..., list]) -> None:
-        """Run the loop over pairs of blocks by share(kernel, count, *arguments, weight=...), which may call
-        kernel(first, last, *arguments) on several threads and gives what the calls return, in order. The bits are the
-        same."""
-        if self._contacts is not None:
-            self._contacts.share = share
+        """Run the loops over pairs of blocks and over joints by share(kernel, count, *arguments, weight=...,
+        pieces=...), which may call kernel(first, last, *arguments) on several threads and gives what the calls return,
+        in order. The bits are the same."""
+        for loop in (self._contacts, self.joints):
+            if loop is not None:
+                loop.share = share
 
     def _sleepers_changed(self) -> None:
         self._limit = None

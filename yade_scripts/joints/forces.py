@@ -19,7 +19,7 @@ from functools import cache
 import numpy as np
 
 from kernel_decorators import plain
-from yade_scripts.blocks.kinematics import add_forces, arm, cross, dot, parting, place, turned
+from yade_scripts.blocks.kinematics import arm, cross, dot, parting, place, turned
 from yade_scripts.joints import laws, mixed_modes
 from yade_scripts.joints.kernel import facing, split
 from yade_scripts.joints.law import CohesiveLaw
@@ -105,18 +105,21 @@ def torn_traction(before, now, move, ks, unit, df, peak, paid):
     return pull
 
 
-def joint_forces(live, joints, memory, motion, eta, dt, advance, F, taken_by):
-    """Forces of the live joints on the blocks; with `advance` also their history and what their dashpots take.
+def joint_forces(begin, end, live, joints, memory, motion, eta, dt, advance, given, taken_by):
+    """Forces of a range of the live joints on their blocks; with `advance` also their history and what their dashpots
+    take.
 
     live (l,) joints to visit · joints: JointPoints · memory: PointMemory · motion: Motion · eta [s] dashpot time ·
-    dt [s] · F (n, 6) is added to · taken_by: Taken, too   →   largest growth of λ/δ_f in this call
+    dt [s] · given (l, 6): force and moment on block a about its centre, filled · taken_by: Taken, is added to
+    →   largest growth of λ/δ_f in this call
     """
     a, b, start, xi_a, xi_b, weight, normal, law, peak = joints
     largest, paid, rub = memory
     x, v, R = motion
     damped, rubbed = taken_by
     fastest = 0.0
-    for j in live:
+    for i in range(begin, end):
+        j = live[i]
         ra, rb = a[j], b[j]
         unit, df, beta, k0 = law[j, UNIT], law[j, DF], law[j, BETA], law[j, K0]
         kc = law[j, KC]
@@ -160,7 +163,8 @@ def joint_forces(live, joints, memory, motion, eta, dt, advance, F, taken_by):
             t = (weight[p] * t0, weight[p] * t1, weight[p] * t2)
             c0, c1, c2 = cross(arm(ra, x, mid), t)
             f0, f1, f2, m0, m1, m2 = f0 + t[0], f1 + t[1], f2 + t[2], m0 + c0, m1 + c1, m2 + c2
-        add_forces(ra, rb, x, (f0, f1, f2), (m0, m1, m2), F)
+        given[i, 0], given[i, 1], given[i, 2] = f0, f1, f2
+        given[i, 3], given[i, 4], given[i, 5] = m0, m1, m2
     return fastest
 
 
@@ -298,5 +302,8 @@ def _kernels(law: str, chosen: CohesiveLaw, mixed_mode: str) -> JointKernels:
     names["separation_work"] = inner(separation_work, **names)
     names["torn_traction"] = inner(torn_traction, **names)
     names |= {part: getattr(mode, part) for part in ("measure", "pace", "response", "stored")}
-    parts = (joint_forces, stored_between, lost, point_springs, point_tangents)
-    return JointKernels(*(specialised(part, name, **names) for part in parts))
+    parts = (stored_between, lost, point_springs, point_tangents)
+    return JointKernels(
+        specialised(joint_forces, name, ranged=True, **names),
+        *(specialised(part, name, **names) for part in parts),
+    )

@@ -3,18 +3,22 @@ reports."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from array_types import Array, Bools, Floats, Ints
+from kernel_ranges import alone
 from yade_scripts.blocks.block import Block
 from yade_scripts.blocks.faces import TouchingFaces, gauss_points, to_body
 from yade_scripts.joints import kernel
 from yade_scripts.joints.arrays import JointPoints, Placement, PointMemory, Taken
 from yade_scripts.joints.cohesion import JointParameters
 from yade_scripts.joints.forces import MU, NOT_GROWING, PULL, JointKernels, kernels_of
+
+JOINT = 20
+"""Cost of a joint, in rows of an ordinary loop: it decides how joints are divided among threads."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,6 +67,8 @@ class Joints:
         parameters: JointParameters,
         laws: list[JointParameters] | None = None,
     ):
+        self.share: Callable[..., list] = alone
+        """As in `contact_forces`."""
         self.parameters = parameters
         n = len(faces)
         laws = [parameters] * n if laws is None else laws
@@ -135,13 +141,14 @@ class Joints:
         which: Array | None = None,
     ) -> float:
         """Add the forces of the joints `which`, by default of all live ones that do not rest, on the blocks to F
-        (n, 6); see `joint_forces.joint_forces`."""
+        (n, 6); see `joint_forces`."""
         eta, fastest = self.eta if eta is None else eta, 0.0
         memory, motion = self._memory(), Placement(x, v, R)
         for kernels, own, points in self._families_of(self.visited if which is None else which):
-            taken = Taken(self.damped, self.rubbed)
-            growth = kernels.joint_forces(own, points, memory, motion, eta, dt, advance, F, taken)
-            fastest = max(fastest, growth)
+            taken, given = Taken(self.damped, self.rubbed), np.empty((len(own), 6))
+            state = (own, points, memory, motion, eta, dt, advance, given, taken)
+            fastest = max(fastest, *self.share(kernels.joint_forces, len(own), *state, weight=JOINT))
+            kernel.add_up(own, self.a, self.b, x, given, F)
         return fastest
 
     def _of_law(self, peak: float) -> JointPoints:

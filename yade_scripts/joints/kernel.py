@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from kernel_decorators import kernel, plain
-from yade_scripts.blocks.kinematics import dot, place, turned
+from yade_scripts.blocks.kinematics import add_forces, dot, place, turned
 
 
 @plain
@@ -39,6 +39,14 @@ def facing(a, b, R, normal):
     if size == 0.0:  # turned by half a turn against one another
         return n0, n1, n2
     return m0 / size, m1 / size, m2 / size
+
+
+@plain
+def add_up(live, a, b, x, given, F):
+    """Add the forces and moments of the live joints on their blocks a, given (l, 6), to F (n, 6) in their order."""
+    for i, j in enumerate(live):
+        f = (given[i, 0], given[i, 1], given[i, 2])
+        add_forces(a[j], b[j], x, f, (given[i, 3], given[i, 4], given[i, 5]), F)
 
 
 @kernel

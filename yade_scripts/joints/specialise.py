@@ -13,15 +13,20 @@ from zlib import crc32
 
 from numba import njit
 
+from kernel_ranges import shared
 
-def specialised(kernel: Callable, name: str, cache: bool = True, **chosen: Callable) -> Callable:
+
+def specialised(
+    kernel: Callable, name: str, cache: bool = True, ranged: bool = False, **chosen: Callable
+) -> Callable:
     """`kernel`, a plain function, compiled with `chosen` in place of the globals of these names.
 
-    name: must differ for every choice, since it names the compiled code on disk.
+    name: must differ for every choice, since it names the compiled code on disk · ranged: it takes a range first, which
+    several threads may share (`kernel_ranges.py`)
     """
     copy = FunctionType(kernel.__code__, kernel.__globals__ | chosen, kernel.__name__, kernel.__defaults__)
     copy.__qualname__, copy.__module__ = f"{kernel.__qualname__}_{name}", kernel.__module__
-    return njit(cache=cache)(copy)
+    return shared(njit, copy, cache=cache) if ranged else njit(cache=cache)(copy)
 
 
 def source_checksum(*functions: Callable) -> int:

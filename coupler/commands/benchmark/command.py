@@ -242,6 +242,7 @@ def _threads(sizes):
     for nodes in THREADS_QUICK if sizes == QUICK_SIZES else THREADS_NODES:
         found = _part("threads", nodes)
         n, one = found["nodes"], found["wall"]["1"]
+        yield from _machine(found["machine"])
         for number, seconds in found["wall"].items():
             yield Line(f"step of the water, {number} threads", n, 0, 1e6 * seconds, "a step, wall clock")
             if number != "1":
@@ -264,6 +265,20 @@ def _threads(sizes):
                 threads.amdahl(found["serial"], cores),
                 "times as fast",
             )
+
+
+def _machine(found):
+    """What threads give on this machine: speed-ups of two loops, and the time to hand over a loop."""
+    for number, spent in found.items():
+        if number != "1":
+            compute, triad = (found["1"][name] / spent[name] for name in ("compute", "triad"))
+            yield Line(
+                f"this machine, {number} threads: a loop that only computes", 0, 0, compute, "times as fast"
+            )
+            yield Line(f"this machine, {number} threads: a triad in memory", 0, 0, triad, "times as fast")
+        yield Line(
+            f"this machine, {number} threads: an empty loop", 0, 0, 1e6 * spent["empty"], "a call, wall clock"
+        )
 
 
 def _roofline(sizes):

@@ -53,7 +53,9 @@ def started(nodes: int):
 
 
 def threads(nodes: int) -> dict:
-    """Wall time [s] of a step by number of threads, the serial share, and the size of the scene."""
+    """Wall time [s] of a step by number of threads, the serial share, the size of the scene, and what threads give on
+    this machine (`machine.py`)."""
+    from coupler.commands.benchmark.machine import machine
     from fluid.numerics.threads import use, watched
 
     scene = started(nodes)
@@ -75,6 +77,7 @@ def threads(nodes: int) -> dict:
         "wall": {str(n): seconds for n, seconds in wall.items()},
         "step": spent / STEPS,
         "serial": 1.0 - sum(call.seconds for call in calls) / spent,
+        "machine": machine(numbers()),
     }
 
 
