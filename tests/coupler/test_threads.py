@@ -59,7 +59,7 @@ FALL = tomllib.loads(PARTS["structure"])
 FALL["time"] = {"end": "0.1 s", "step_max": "10 ms", "output_every": "50 ms"}
 FALL["joints"]["strength"] = "2 kPa"
 FALL["structure"]["block"] = [
-    {"name": f"falling{k}", "centre": [1.0 + 0.1 * k, 0.5, 0.75 + 0.31 * k], "size": [0.3] * 3, "density": 500,
+    {"name": f"falling{k}", "centre": [1.0 + 0.1 * k, 0.5, 0.8 + 0.4 * k], "size": [0.3] * 3, "density": 500,
      "velocity": [0, 0, -3]} for k in range(3)
 ]  # fmt: skip
 
