@@ -106,6 +106,9 @@ class FreeBody:
 
     def uplift_shares(self):
         """The water has all of its faces."""
+        return np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros(0)
+
+    def wet_joints(self):
         return np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0)
 
     def centre(self):

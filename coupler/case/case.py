@@ -288,6 +288,7 @@ class JointPair(Section):
     closing_ratio: Annotated[float, InSI("", gt=0)] | None = Field(
         None, description="stiffness in compression over the first in tension"
     )
+    uplift: Literal["none", "damage", "full"] | None = Field(None, description="as in [joints]")
 
 
 class Joints(Section):
@@ -326,6 +327,12 @@ class Joints(Section):
     )
     damping: Annotated[float, InSI("", ge=0, lt=1)] = Field(
         0.02, description="share of critical damping, proportional to the stiffness of the joint"
+    )
+    uplift: Literal["none", "damage", "full"] = Field(
+        "none",
+        description="pressure of the surrounding water between joined faces at least two cells wide: none, the joint "
+        "keeps water out until it has failed; damage, a share that rises at each place from none at the largest "
+        "traction to all at failure; full, all of it from the start. After failure it is full in each case",
     )
     points: Literal["auto"] | Annotated[int, Field(strict=True, ge=2, le=12)] = Field(
         "auto",

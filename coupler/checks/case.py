@@ -18,7 +18,7 @@ from coupler.case.toml_lines import shown
 from coupler.case.types import KeyPath
 from coupler.case.verdict import Verdict
 from coupler.checks.air import air_problems
-from coupler.checks.joints import joint_problems, pair_problems
+from coupler.checks.joints import joint_problems, pair_problems, uplift_problems
 from coupler.checks.motion import motion_problems
 from coupler.checks.places import frame_problems, opening_problems, place_problems, solid_bodies
 from coupler.checks.softness import softness_remarks
@@ -58,7 +58,7 @@ def problems(case: Case) -> list[Problem]:
     found += air_problems(case, [block.name for part in parts for block in part.blocks])
     if case.structure is not None:
         found += motion_problems(case, parts)
-    return found if found else list(joint_problems(case, parts))
+    return found if found else [*joint_problems(case, parts), *uplift_problems(case, parts)]
 
 
 def _study(case: Case) -> Iterator[Problem]:

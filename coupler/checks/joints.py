@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from coupler.case.case import Case
 from coupler.case.types import KeyPath
 from coupler.geometry.parts import Part
+from coupler.geometry.tank_mesh import finest_cell, is_measured
 from coupler.program.errors import did_you_mean
 
 Problem = tuple[KeyPath, str]
@@ -58,6 +59,38 @@ def pair_problems(case: Case, parts: list[Part]) -> Iterator[Problem]:
         yield from _pair_law(case, i, pair)
 
 
+def uplift_problems(case: Case, parts: list[Part]) -> Iterator[Problem]:
+    """Joints that let water between their faces, but are too narrow for the cells: reported for the narrowest."""
+    j = case.joints
+    if j is None or case.water is None or case.tank is None or not is_measured(case.tank):
+        return
+    if j.uplift == "none" and all(pair.uplift in (None, "none") for pair in j.pair):
+        return
+    from coupler.step.cracks import THINNEST, least_width
+    from yade_scripts.blocks.faces import both_held
+
+    blocks, planes, faces, laws = _joined_faces(case, parts)
+    wet = [
+        face
+        for face, law in zip(faces, laws)
+        if law is not None and law.uplift != "none" and not both_held(blocks, face)
+    ]
+    cell = finest_cell(case.tank)
+    narrow = [
+        (width, face) for face in wet if (width := least_width(face.polygon)) < THINNEST * cell * (1 - 1e-9)
+    ]
+    if narrow:
+        width, face = min(narrow, key=lambda item: item[0])
+        other = blocks[face.b].name if face.b >= 0 else planes[-1 - face.b].name
+        yield (
+            ("joints", "uplift"),
+            f"the joint of '{blocks[face.a].name}' with '{other}' is {width:.3g} m wide ({len(narrow)} of {len(wet)} "
+            f"such joints are under {THINNEST:g} cells of {cell:.3g} m): water between so narrow faces would flow as "
+            f"through an opening a cell wide; take cells of {width / THINNEST:.2g} m, or give uplift in a joints.pair for wide "
+            'joints alone, and "none" elsewhere',
+        )
+
+
 def _pair_law(case: Case, i: int, pair) -> Iterator[Problem]:
     from coupler.scene.build import joint_parameters, of_pair
     from yade_scripts.joints import laws
@@ -89,13 +122,20 @@ def _names(case: Case, parts: list[Part]) -> list[str]:
 def joined_blocks(case: Case, parts: list[Part]) -> tuple[list, set[int]]:
     """All blocks with the fixed solids behind them, and the rows of those with a face that a joint connects to
     another."""
+    from yade_scripts.blocks.faces import both_held
+
+    blocks, _, faces, laws = _joined_faces(case, parts)
+    with_joint = [face for face, law in zip(faces, laws) if law is not None and not both_held(blocks, face)]
+    return blocks, {row for face in with_joint for row in (face.a, face.b) if row >= 0}
+
+
+def _joined_faces(case: Case, parts: list[Part]) -> tuple[list, list, list, list]:
+    """All blocks with the fixed solids behind them, planes, faces that touch, and the law of each pair of these."""
     from coupler.geometry.solids import obstacle_blocks
     from coupler.scene.build import joint_rules, planes_of
-    from yade_scripts.blocks.faces import both_held, touching_faces
+    from yade_scripts.blocks.faces import touching_faces
 
     blocks = [block for part in parts for block in part.blocks] + obstacle_blocks(case)
     planes = planes_of(case)
     faces = touching_faces(blocks, planes)
-    laws = joint_rules(case.joints).of_faces(faces, blocks, planes)
-    with_joint = [face for face, law in zip(faces, laws) if law is not None and not both_held(blocks, face)]
-    return blocks, {row for face in with_joint for row in (face.a, face.b) if row >= 0}
+    return blocks, planes, faces, joint_rules(case.joints).of_faces(faces, blocks, planes)

@@ -103,7 +103,7 @@ def _coupling(case: Case, structure, solids, clock, from_start: bool) -> Coupled
     if case.water:
         water, immersion = water_of(case, structure, solids)
     settles = from_start and case.joints and case.structure.start == "settled"
-    if settles and _settled(structure, water) and immersion is not None:
+    if settles and _settled(structure, water, immersion) and immersion is not None:
         water, immersion = water_of(case, structure, solids, immersion.mesh)
     return CoupledStepper(
         water,
@@ -135,11 +135,14 @@ def _coming_energy(case: Case) -> Callable[[float], float] | None:
     return coming_energy(case)
 
 
-def _settled(structure, water) -> bool:
+def _settled(structure, water, immersion) -> bool:
     """Move the joined blocks to their equilibrium with weight and still water; True if any moved."""
     from yade_scripts.dynamics.equilibrium import settle
 
-    load = None if water is None else _load_at_rest(structure, water)
+    load = None
+    if water is not None:
+        water.leave_films_out(*immersion.films())
+        load = _load_at_rest(structure, water)
     return settle(structure, load) > 0.0
 
 

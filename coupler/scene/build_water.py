@@ -57,7 +57,9 @@ def water_of(case: Case, structure, solids, mesh=None):
     velocity = None
     if boxes:
         tops = [surface_of(fill) for fill in w.fill]
-        level = start_level(boxes, _walls(case.tank), mesh, immersion.domain, tops)
+        level = _level_beside_films(
+            immersion, lambda of: start_level(boxes, _walls(case.tank), mesh, of, tops)
+        )
         velocity = start_velocity(boxes, [fill.velocity for fill in w.fill], immersion.domain.nodes)
     opened, smooth = sides_named(case.tank.open, mesh), sides_named(case.tank.smooth, mesh)
     water = Water(
@@ -74,6 +76,22 @@ def water_of(case: Case, structure, solids, mesh=None):
     if immersion.cracks is not None and immersion.cracks.lumped:
         water.set_cracks(immersion.cracks.cracks())
     return water, immersion
+
+
+def _level_beside_films(immersion, level_of) -> Array:
+    """Level set (N,) of the start, level_of(domain), as if no films lay between blocks that touch and what they lie on:
+    a side of a box of water that ends at a block would have its surface in the film under this block."""
+    from fluid.domain.physical_domain import carry
+
+    level, sealed = level_of(immersion.domain), immersion.sealed_domain()
+    if sealed is immersion.domain:
+        return level
+    source = carry(sealed, immersion.domain)
+    active = np.zeros(len(sealed.nodes), bool)
+    active[sealed.cells] = True
+    there = (source >= 0) & active[source]
+    level[there] = level_of(sealed)[source[there]]
+    return level
 
 
 def _trapped_air(air, structure, domain) -> dict:

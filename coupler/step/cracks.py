@@ -38,7 +38,7 @@ class NarrowCracks:
         self.structure, self.lumped = structure, lumped
         corners, start = structure.joint_polygons()
         self.spacing = np.broadcast_to(np.asarray(spacing, float), len(start) - 1)
-        self._width = np.array([_least_width(corners[first:last]) for first, last in pairwise(start)])
+        self._width = np.array([least_width(corners[first:last]) for first, last in pairwise(start)])
 
     def faces(self) -> tuple[Array, Array, Array]:
         """Faces to be closed: block (m,), face (m,), half of the largest opening (m,) [m]."""
@@ -68,7 +68,7 @@ class NarrowCracks:
         return joint[near], block[near], face[near], opening[near]
 
 
-def _least_width(corners: Array) -> float:
+def least_width(corners: Array) -> float:
     """Smallest width [m] of a convex polygon (k, 3) across one of its edges."""
     ahead = np.roll(corners, -1, axis=0) - corners
     normal = np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)

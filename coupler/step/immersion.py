@@ -9,7 +9,8 @@ import numpy as np
 
 from array_types import Array
 from fluid.cut.bodies import ConvexBodies
-from fluid.domain.physical_domain import cut_domain
+from fluid.domain.physical_domain import PhysicalDomain, cut_domain
+from fluid.pressure.partly_wet import PartlyWet
 
 if TYPE_CHECKING:
     from fluid.mesh.background import Background
@@ -109,15 +110,22 @@ class Immersion:
         self.domain = cut_domain(self.mesh, self.bodies, self.covers, self.domain, connection=self.connection)
         return True
 
-    def films(self) -> tuple[Array, Array]:
-        """Which bodies may move (n + m,) bool, so that films under them transmit the pressure around, and the share of
-        that pressure (P,) that acts on each plane."""
+    def sealed_domain(self) -> PhysicalDomain:
+        """The domain without the films by which blocks are drawn in: what touches has no water between."""
+        if (self._growth >= 0.0).all():
+            return self.domain
+        closed = np.where(self._growth < 0.0, self._tolerance, self._growth)
+        bodies = self._reference.moved(self._centre, self._rotation).grown(closed)
+        return cut_domain(self.mesh, bodies, self.covers, connection=self.connection)
+
+    def films(self) -> tuple[Array, PartlyWet]:
+        """Which bodies may move (n + m,) bool, so that films under them transmit the pressure around, and where only a
+        share of that pressure acts."""
         held = [block.fixed for block in self.structure.blocks]
         loose = ~np.append(np.array(held, bool), np.ones(self.n_solids, bool))
-        share = np.ones(len(self._body_of_plane))
-        block, plane, of_pressure = self.structure.uplift_shares()
-        np.minimum.at(share, self._reference.plane_start[block] + plane, of_pressure)
-        return loose, share
+        block, plane, place, share = self.structure.uplift_shares()
+        place = self._centre[block] + np.einsum("kij,kj->ki", self._rotation[block], place)
+        return loose, PartlyWet(self._reference.plane_start[block] + plane, place, share)
 
     def moved_on(self) -> Array:
         """Displacements and rotations (n + m, 6) [m, rad] of the bodies since their cells were last cut."""
@@ -190,25 +198,33 @@ class Immersion:
         return block, face, half
 
     def _films(self, loose: Array) -> Array:
-        """Inward shift (P,) [m] of each plane for the contacts of the loose blocks (n,) bool."""
+        """Inward shift (P,) [m] of each plane for the contacts of the loose blocks (n,) bool, and for joints that let
+        water between their faces."""
         film = np.zeros(len(self._body_of_plane))
         block, direction, depth = self._touching()
         block, direction, depth = (a[loose[block]] for a in (block, direction, depth))
-        if len(block) == 0:
+        joined, joined_plane, closing = self.structure.wet_joints()
+        if len(block) == 0 and len(joined) == 0:
             return film
-        least = FILM * self.mesh.finest
+        least, start = FILM * self.mesh.finest, self._reference.plane_start
         touching = np.zeros(self.n_blocks + self.n_solids, bool)
         touching[block] = True
+        touching[joined[loose[joined]]] = True
         film[touching[self._body_of_plane]] = least
-        start = self._reference.plane_start
+        np.maximum.at(film, start[joined] + joined_plane, self._doubled(closing))
         count = np.diff(start)[block]
         contact = np.repeat(np.arange(len(block)), count)
         plane = np.arange(len(contact)) - np.repeat(np.cumsum(count) - count, count) + start[block][contact]
         local = np.einsum("kij,ki->kj", self.structure.rotation()[block], direction)
         on = np.einsum("ki,ki->k", self._reference.normals[plane], local[contact]) > FACES_IT
-        doubled = least * 2.0 ** np.ceil(np.log2(1.0 + np.maximum(depth, 0.0) / least))
-        np.maximum.at(film, plane[on], np.minimum(doubled, MOST_FILM * self.mesh.finest)[contact[on]])
+        np.maximum.at(film, plane[on], self._doubled(depth)[contact[on]])
         return film
+
+    def _doubled(self, depth: Array) -> Array:
+        """Film (k,) [m] for an overlap of `depth` (k,) [m], in doubling steps."""
+        least = FILM * self.mesh.finest
+        doubled = least * 2.0 ** np.ceil(np.log2(1.0 + np.maximum(depth, 0.0) / least))
+        return np.minimum(doubled, MOST_FILM * self.mesh.finest)
 
     def _touching(self) -> tuple[Array, Array, Array]:
         """Contacts as `Structure.overlaps`, and faces that touched at the start, at depth 0, of blocks that still stand

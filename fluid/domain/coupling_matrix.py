@@ -8,14 +8,15 @@ import scipy.sparse as sp
 from kernel_decorators import kernel
 
 
-def wetted_coupling(domain, polygons=slice(None)) -> sp.csr_matrix:
+def wetted_coupling(domain, polygons=slice(None), weight=1.0) -> sp.csr_matrix:
     """G (N, 6 n_bodies): G[i, 6b:6b+3] = ∫ N_i n dA [m2], G[i, 6b+3:6b+6] = ∫ N_i (x - x_b) x n dA [m3].
 
     n points out of body b, so a pressure field p loads it by force and torque -G^T p, and G V is the flux
     that the body's motion V = (v, omega) pushes into the test functions. Exact: the integrands are of
-    degree 2. domain: PhysicalDomain; polygons: rows of its wetted polygons to sum over."""
+    degree 2. domain: PhysicalDomain; polygons: rows of its wetted polygons to sum over, each with its weight."""
     shape = (len(domain.nodes), 6 * domain.n_bodies)
     wetted = domain.polygons(polygons)
+    wetted = wetted._replace(area=weight * wetted.area)
     if len(wetted.cell) == 0:
         return sp.csr_matrix(shape)
     block = _blocks(wetted, domain.body_centre, domain.nodes, domain.hats)

@@ -22,7 +22,8 @@ film,
     dW_r/dt = (Rᵀ G_f V)_r,     dW_f/dt = -(R 1)_f (G_f V)_f.                                             (3)
 
 A film that touches no other water keeps its own balance.  A face may receive only a share of the
-pressure (uplift of contacts that keep part of the water out): its polygons in films then count in G with that share.
+pressure (uplift of contacts and joints that keep part of the water out): its polygons in films then count in G with
+that share.
 """
 
 from __future__ import annotations
@@ -33,43 +34,47 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
-from array_types import Bools, Floats
+from array_types import Bools, Floats, Ints
 from fluid.cut.facing import facing
 from fluid.domain.coupling_matrix import wetted_coupling
 from fluid.pressure.projection import inflow
+from fluid.surface.level_set import FAR
 from kernel_decorators import kernel
 
 NARROW = 0.25
 """Widest film, in cells: narrower ones are no channels that the mesh could see."""
+THIN = 0.01
+"""Room of a film, in cells, besides that by which bodies are drawn in, up to which it fills with water at once."""
 
 
 @dataclass(frozen=True)
 class Films:
     """Films of a domain. node (N,) bool: all cells around it lie in films · thinned csr (N, 6 n_bodies): reduction of
-    G by shares below 1 · drawn_in (S,) [m]: how far the plane of each wetted polygon is cut within its body."""
+    G by shares below 1 · drawn_in (S,) [m]: how far the plane of each wetted polygon is cut within its body ·
+    thin: the parts of films without room for water."""
 
     node: Bools
     thinned: sp.csr_array
     drawn_in: Floats
+    thin: ThinFilms
 
     @classmethod
     def of(cls, domain, topology, loose, share) -> Films:
         """The films between loose bodies (n_bodies,) bool and whatever lies opposite to their faces: other bodies, or
         the sides of the box around the mesh.
 
-        share (P,): of the pressure that acts on each plane of the bodies where it faces a film."""
+        share: PartlyWet, of the pressure that acts on the planes of the bodies where they face a film."""
         bodies, mesh = domain.memory.bodies, domain.memory.mesh
         reach = NARROW * mesh.local_size[domain.parent_cell]
         polygons = (domain.face_body, domain.face_centroid, domain.face_normal)
         in_film, plane = facing(bodies, polygons, reach[domain.face_cell], mesh.bounds, loose)
         films = _film_cells(domain.face_cell, domain.face_area, in_film, domain.volume, reach)
         node = _all_around(topology.node_start, topology.node_cells, films)
-        partly = np.flatnonzero(in_film & (share[plane] < 1.0))
-        thinned = sp.csr_array((len(domain.nodes), 6 * domain.n_bodies))
-        for value in np.unique(share[plane[partly]]):
-            rows = partly[share[plane[partly]] == value]
-            thinned = thinned + (1.0 - value) * sp.csr_array(wetted_coupling(domain, rows))
-        return cls(node, sp.csr_array(thinned), np.maximum(-bodies.growth[plane], 0.0))
+        partly = np.flatnonzero(in_film & np.isin(plane, share.plane))
+        kept_out = 1.0 - share.at(plane[partly], domain.face_centroid[partly])
+        thinned = sp.csr_array(wetted_coupling(domain, partly, kept_out))
+        drawn_in = np.maximum(-bodies.growth[plane], 0.0)
+        return cls(node, thinned, drawn_in, ThinFilms.of(domain, topology, in_film, drawn_in, films))
 
     def handed_on(self, water, problem):
         """The PressureProblem in which films transmit the pressure at their rim; the same one if no film takes part."""
@@ -118,6 +123,72 @@ class Films:
             cells = np.setdiff1d(cells, kept.void, assume_unique=True)
         g = np.broadcast_to(problem.dt * water.parameters.weight, (len(cells), 3))
         return inflow(cells, g, t.fluid_cells, len(self.node))
+
+
+@dataclass(frozen=True)
+class ThinFilms:
+    """Films without room for water of their own: wet at once wherever water stands higher at their rim.
+
+    node (n,) · part (n,) of it, of the connected ones · rim (m,): nodes beside them, beside (m,): the part each touches.
+
+    Else they fill as the level set is carried along them: a dam of 1 m with water on one side had a third of its uplift
+    after 0.3 s, and as long as the film was dry, the surface of this water lay at the heel of the dam."""
+
+    node: Ints
+    part: Ints
+    rim: Ints
+    beside: Ints
+
+    @classmethod
+    def of(cls, domain, topology, in_film, drawn_in, films) -> ThinFilms:
+        """films (M,) bool: cells in films · in_film (S,) bool, drawn_in (S,) [m] of the wetted polygons."""
+        area = domain.face_area * in_film
+        covered = np.bincount(domain.face_cell, area, len(films))
+        room = domain.volume - np.bincount(domain.face_cell, area * drawn_in, len(films))
+        thin = films & (room <= THIN * topology.size * covered)
+        found = _all_around(topology.node_start, topology.node_cells, thin)
+        node = np.flatnonzero(found)
+        if len(node) == 0:
+            return cls(node, node, node, node)
+        start, around = topology.around
+        first, last = (start[at].astype(np.int64) for at in (node, node + 1))
+        row = np.repeat(np.arange(len(node)), last - first)
+        other = np.concatenate([around[a:b] for a, b in zip(first, last)]).astype(np.int64)
+        place = np.full(len(found), -1)
+        place[node] = np.arange(len(node))
+        inner = found[other]
+        links = sp.csr_array(
+            (np.ones(inner.sum()), (row[inner], place[other[inner]])), (len(node), len(node))
+        )
+        part = connected_components(links, directed=False)[1]
+        pairs = np.unique(np.column_stack([other[~inner], part[row[~inner]]]), axis=0)
+        return cls(node, part, pairs[:, 0], pairs[:, 1])
+
+    def filled(self, phi, height, size, among=None) -> tuple[Floats, Ints]:
+        """φ (N,) [m] with water wherever the rim of a film holds some to a higher level, and the nodes that this made
+        wet; the same φ if there are none. height (N,) [m] above any level · size (N,) [m] of the cells · among (k,):
+        nodes that may be filled, None: all."""
+        wet = phi[self.rim] < 0.0
+        if not wet.any():
+            return phi, np.zeros(0, np.int64)
+        rim, level = self.rim[wet], np.full(self.part.max() + 1, -np.inf)
+        np.maximum.at(level, self.beside[wet], height[rim] - phi[rim])
+        depth = level[self.part] - height[self.node]
+        found = (depth > 0.0) & (phi[self.node] >= 0.0)
+        if among is not None and found.any():
+            may = np.zeros(len(phi), bool)
+            may[among] = True
+            found &= may[self.node]
+        node = self.node[found]
+        if len(node) == 0:
+            return phi, node
+        phi = phi.copy()
+        phi[node] = -np.clip(depth[found], LEAST_DEPTH * size[node], FAR * size[node])
+        return phi, node
+
+
+LEAST_DEPTH = 1e-3
+"""Least -φ in cells of nodes of films that have filled."""
 
 
 def _placed(block, rows, columns, shape):

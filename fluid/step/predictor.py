@@ -122,7 +122,7 @@ def predicted(water, dt: float) -> PressureProblem:
         through, inflow_rate = water.sides.through(phi, u_now, dt, carried)
         carried += through
         conserved += float(through.sum())
-    displaced, in_films = water.displacement(dt), water.in_films()
+    displaced = water.displacement(dt)
     phi = redistance(
         water.topology,
         phi,
@@ -135,6 +135,11 @@ def predicted(water, dt: float) -> PressureProblem:
         through += exchanged
         carried += exchanged
         conserved += float(exchanged.sum())
+    in_films = water.in_films(water.level_set)
+    phi, filled = water.in_thin_films(phi, water.listed[: water.layer_start[-2]])
+    if len(filled):
+        carried[filled] = water.topology.node_volume[filled]
+        in_films = water.in_films(phi)
     beside = float(displaced.sum()) + in_films[0]
     surface = _new_surface(water, phi, carried + displaced, conserved + beside)
     if found.velocity is not None:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from array_types import Array
+from array_types import Array, Floats, Ints
 from fluid.domain.cell_vectors import CellVectors
 from fluid.domain.physical_domain import carry, wetted_coupling
 from fluid.domain.topology import Graph, Topology, layers_around
@@ -146,10 +146,12 @@ class Water:
         if velocity is not None:
             self._start_moving(velocity)
         self.renumbered, self.left_behind = None, None
+        self.flux = self._flux_at_start()
+
+    def _flux_at_start(self):
+        """The fluxes of the velocity of the cells at the start."""
         of_cells = self.cell_velocity.field(len(self.topology.cells))
-        self.flux = edge_flux(
-            self.topology, self.graph_for(self.listed), self.listed, of_cells, self.nodal_water
-        )
+        return edge_flux(self.topology, self.graph_for(self.listed), self.listed, of_cells, self.nodal_water)
 
     def _start_moving(self, velocity) -> None:
         """Velocity (N, 3) [m/s] of the nodes that the step works on, and of the cells between them."""
@@ -337,30 +339,45 @@ class Water:
 
     def set_films(self, loose, share) -> None:
         """Let films of water between loose bodies (n_bodies,) bool and their supports transmit the pressure of their
-        rim (`films.py`), a share (P,) of it on each plane of the bodies: anew after every change of the domain."""
+        rim (`films.py`), where `share`, PartlyWet, says so a share of it: anew after every change of the domain."""
         from fluid.pressure.films import Films
 
-        rules = (self.domain, np.array(loose), np.array(share))
+        rules = (self.domain, np.array(loose), *share)
         known = self._film_rules
         same = known is not None and known[0] is self.domain
         if not same or not all(np.array_equal(a, b) for a, b in zip(known[1:], rules[1:])):
-            self.films = Films.of(self.domain, self.topology, *rules[1:])
+            self.films = Films.of(self.domain, self.topology, rules[1], share)
             self._film_rules = rules
 
     def leave_films_out(self, loose, share) -> None:
         """`set_films` before the first step: what the films at the start hold is no water of the scene."""
         self.set_films(loose, share)
-        self.film_volume, self.film_potential = self.in_films()
-        self.conserved_volume -= self.film_volume
+        self.level_set, filled = self.in_thin_films(self.level_set)
+        if len(filled):
+            self.pressure = self._pressure_at_rest()
+            self.end_pressure = self.pressure.copy()
+            self.nodal_water = nodal_volume(self.topology, self.level_set)
+            self._find_band()
+            self.flux = self._flux_at_start()
+        self.film_volume, self.film_potential = self.in_films(self.level_set)
+        self.conserved_volume = float(self.nodal_water.sum()) - self.film_volume
         self.initial_volume = self.conserved_volume
 
-    def in_films(self) -> tuple[float, float]:
-        """Volume [m³] of the films below the surface, and ∫ g·x dV [m⁵/s²] over it (`film_volume.py`)."""
+    def in_thin_films(self, phi, among=None) -> tuple[Floats, Ints]:
+        """φ (N,) [m] with the water that films without room take in at once, and their newly wet nodes (n,), of those
+        `among` (.., ) them, None: all."""
+        if self.films is None or len(self.films.thin.node) == 0:
+            return phi, np.zeros(0, np.int64)
+        height = -self.nodes_below_floor / self.parameters.gravity
+        return self.films.thin.filled(phi, height, self.topology.node_size, among)
+
+    def in_films(self, phi) -> tuple[float, float]:
+        """Volume [m³] of the films below the surface φ (N,) [m], and ∫ g·x dV [m⁵/s²] over it (`film_volume.py`)."""
         if self.films is None or not self.films.drawn_in.any():
             return 0.0, 0.0
         from fluid.pressure.film_volume import film_volume
 
-        return film_volume(self.domain, self.films.drawn_in, self.level_set, self.nodes_below_floor)
+        return film_volume(self.domain, self.films.drawn_in, phi, self.nodes_below_floor)
 
     def carried(self, dt: float, theta: float, kick) -> Carried:
         """What the fluxes make of volume and momentum in dt [s], carried on the domain of the last projection; kick

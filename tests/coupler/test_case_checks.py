@@ -201,6 +201,19 @@ def test_buildings_that_cannot_be(changes, says):
     assert says in found
 
 
+def test_joints_that_let_water_in_are_two_cells_wide():
+    """Reported for the narrowest, and not where they keep it out, by themselves or by pairs."""
+    row = structure(*({"size": [2, 2, 0.5], "centre": [3 + 2 * i, 5, 0.25]} for i in range(3)))
+    wet = {"strength": 1e5, "opening_at_failure": 1e-3, "uplift": "full"}
+    (found,) = reported(case(**row, joints=wet))
+    assert found.startswith(
+        "joints.uplift: the joint of 'b0' with 'b1' is 0.5 m wide (2 of 5 such joints are under 2"
+    )
+    across = {"between": ["block", "block"], "uplift": "none"}
+    assert reported(case(**row, joints=wet | {"uplift": "damage", "pair": [across]})) == []
+    assert reported(case(**row, joints=wet | {"uplift": "none"})) == []
+
+
 def test_a_block_in_a_room_is_free_and_one_in_the_wall_is_not():
     house = {"lower": [4, 2, 0], "size": [6, 6, 8], "wall_thickness": 0.5, "block": [1, 1]}
     joints = {"strength": 1e5, "opening_at_failure": 1e-3}

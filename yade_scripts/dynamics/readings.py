@@ -233,13 +233,26 @@ class StructureReadings:
         lying = none if self._seals is None else self._seals.closed_faces(m.x, m.R)
         return tuple(np.concatenate(two) for two in zip(glued, lying))
 
-    def uplift_shares(self) -> tuple[Array, Array, Array]:
-        """Faces that rest on one another and between which a share of the pressure of the surrounding water acts: block
-        (m,), face (m,), share (m,)."""
-        if self._partly is None:
+    def wet_joints(self) -> tuple[Array, Array, Array]:
+        """Faces between which a live joint lets water: block (m,), face (m,), depth (m,) [m] by which they are in one
+        another."""
+        if self.joints is None:
             return np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0)
-        on = self._partly.closed(self._motion.x, self._motion.R)
-        return self._partly.both_faces(on, self._shares[on])
+        return self.joints.wet_faces(self._motion.x, self._motion.R)
+
+    def uplift_shares(self) -> tuple[Array, Array, Array, Array]:
+        """Where a share of the pressure of the surrounding water acts between faces that rest on one another or that a
+        live joint holds: block (m,), face (m,), point of the face in the frame of the block (m, 3) [m], share (m,) at
+        all places of the face that are nearest to this point."""
+        found = [(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros(0))]
+        if self._partly is not None:
+            on = self._partly.closed(self._motion.x, self._motion.R)
+            block, face, share = self._partly.both_faces(on, self._shares[on])
+            found.append((block, face, self._partly.middles(on), share))
+        if self.joints is not None:
+            found.append(self.joints.uplift_points())
+        block, face, place, share = (np.concatenate(arrays) for arrays in zip(*found))
+        return block, face, place, share
 
     def broken_joints(self) -> tuple[Array, Array, Array, Array]:
         """Joints that have failed: number (m,), blocks and their faces (m, 2), -1 a fixed plane, and now

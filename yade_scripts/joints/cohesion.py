@@ -22,6 +22,8 @@ from yade_scripts.blocks import quadrature
 from yade_scripts.joints import laws, mixed_modes
 from yade_scripts.joints.law import CohesiveLaw
 
+UPLIFTS = ("none", "damage", "full")
+
 
 class JointParameterError(ValueError):
     """A joint parameter out of range; the message names it, its value and the range."""
@@ -36,6 +38,7 @@ class JointParameters:
     points: Gauss points along each edge of a joined face, "auto": as many as the law and k_c/k_0 need
     ground: join faces on the ground as well · law: file of `yade_scripts/joints/laws` · peak: opening at T_max
     over δ_f, None: that of the law · mixed_mode: how opening and sliding act together, see `mixed_modes`
+    uplift: pressure of the surrounding water between the joined faces, see `Joints.uplift_points`
     """
 
     strength: float
@@ -48,6 +51,7 @@ class JointParameters:
     law: str = "polynomial"
     peak: float | None = None
     mixed_mode: str = "effective"
+    uplift: Literal["none", "damage", "full"] = "none"
 
     def __post_init__(self):
         for name in ("strength", "opening_at_failure", "shear_ratio", "closing_ratio"):
@@ -59,6 +63,10 @@ class JointParameters:
         if self.points != "auto" and not 1 <= self.points <= quadrature.MOST:
             raise JointParameterError(
                 f"joints.points = {self.points}; it must be 'auto' or lie in 1..{quadrature.MOST}"
+            )
+        if self.uplift not in UPLIFTS:
+            raise JointParameterError(
+                f"joints.uplift = '{self.uplift}'; it must be one of {', '.join(UPLIFTS)}"
             )
         self._check_law()
 

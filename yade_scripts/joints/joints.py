@@ -104,6 +104,9 @@ class Joints:
         self.law = np.stack([unit, self.df, self.beta, self.kc, self.k0, np.zeros(n)], axis=1)
         """Columns as in `joint_forces`."""
         self._points = [self._of_law(peak) for _, peak in self.families]
+        self._keeps_out = np.array([law.uplift == "none" for law in laws], bool)
+        self._by_damage = np.array([law.uplift == "damage" for law in laws], bool)
+        self._peak = np.array([law.peak_share for law in laws])
         self.eta = 0.0
         """Time constant of the stiffness-proportional dashpot [s]."""
         self.stiffness_on: tuple[Array, Array] | None = None
@@ -241,14 +244,45 @@ class Joints:
         return out[joints]
 
     def sealed_faces(self, x: Array, R: Array) -> tuple[Array, Array, Array]:
-        """Both faces of each live joint: block (m,), face (m,), half of the joint's largest opening (m,) [m]."""
-        live = self.live
+        """Both faces of each live joint that keeps water out: block (m,), face (m,), half of the joint's largest
+        opening (m,) [m]."""
+        live = self.live[self._keeps_out[self.live]]
         half = 0.5 * self.openings(live, x, R)[:, 2]
-        inner = self.b[live] >= 0
+        return self._both_faces(live, half)
+
+    def wet_faces(self, x: Array, R: Array) -> tuple[Array, Array, Array]:
+        """Both faces of each live joint that lets water between them: block (m,), face (m,), depth (m,) [m] by which
+        they are in one another where they are most, zero where they are nowhere."""
+        live = self.live[~self._keeps_out[self.live]]
+        opening = self.openings(live, x, R)
+        return self._both_faces(live, np.maximum(opening[:, 2] - 2.0 * opening[:, 0], 0.0))
+
+    def uplift_points(self) -> tuple[Array, Array, Array, Array]:
+        """Where live joints whose `uplift` is damage let a share of the pressure of the surrounding water act: block
+        (m,), face (m,), points (m, 3) [m] in the frame of the block, share (m,).
+
+        The share of a point is (λ/δ_f - p)/(1 - p): none up to the largest traction, since a joint that has not
+        cracked keeps water out, the whole pressure once the point has failed. It rises in between as the traction
+        falls (Brühwiler and Saouma, ACI Mater. J. 92 (1995) 383, measured pressures that rise with the opening)."""
+        points = np.flatnonzero((self.alive & self._by_damage)[self.joint_of])
+        joint = self.joint_of[points]
+        peak = self._peak[joint]
+        share = np.clip((self._ratio()[points] - peak) / (1.0 - peak), 0.0, 1.0)
+        inner = self.b[joint] >= 0
         return (
-            np.concatenate([self.a[live], self.b[live][inner]]),
-            np.concatenate([self.face_a[live], self.face_b[live][inner]]),
-            np.concatenate([half, half[inner]]),
+            np.concatenate([self.a[joint], self.b[joint][inner]]),
+            np.concatenate([self.face_a[joint], self.face_b[joint][inner]]),
+            np.concatenate([self.xi_a[points], self.xi_b[points][inner]]),
+            np.concatenate([share, share[inner]]),
+        )
+
+    def _both_faces(self, joints: Array, values: Array) -> tuple[Array, Array, Array]:
+        """Both faces of `joints` (k,), with values (k,) of theirs: block (m,), face (m,), value (m,)."""
+        inner = self.b[joints] >= 0
+        return (
+            np.concatenate([self.a[joints], self.b[joints][inner]]),
+            np.concatenate([self.face_a[joints], self.face_b[joints][inner]]),
+            np.concatenate([values, values[inner]]),
         )
 
     def rows(self) -> Array:

@@ -55,6 +55,12 @@ class Seals:
         opened, slid = (np.maximum.reduceat(values, self._start[:-1]) for values in (opening, sliding))
         return opened, np.flatnonzero((opened < OPENED * self._size) & (slid < SLID * self._size))
 
+    def middles(self, on) -> Array:
+        """A point of each of the faces that `both_faces` lists, in the frame of its block (m, 3) [m]."""
+        first, count = self._start[:-1], np.diff(self._start)[:, None]
+        in_a, in_b = (np.add.reduceat(local, first) / count for local in (self._in_a, self._in_b))
+        return np.concatenate([in_a[on], in_b[on][self.b[on] >= 0]])
+
     def both_faces(self, on, values) -> tuple[Array, Array, Array]:
         """Both faces of the pairs `on` (k,), with values (k,) of theirs: block (m,), face (m,), value (m,)."""
         inner = self.b[on] >= 0
