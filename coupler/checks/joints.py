@@ -86,8 +86,8 @@ def uplift_problems(case: Case, parts: list[Part]) -> Iterator[Problem]:
             ("joints", "uplift"),
             f"the joint of '{blocks[face.a].name}' with '{other}' is {width:.3g} m wide ({len(narrow)} of {len(wet)} "
             f"such joints are under {THINNEST:g} cells of {cell:.3g} m): water between so narrow faces would flow as "
-            f"through an opening a cell wide; take cells of {width / THINNEST:.2g} m, or give uplift in a joints.pair for wide "
-            'joints alone, and "none" elsewhere',
+            f"through an opening a cell wide; take cells of {width / THINNEST:.2g} m, or give uplift in a joints.pair "
+            'for wide joints alone, and "none" elsewhere',
         )
 
 

@@ -129,9 +129,9 @@ class Films:
 class ThinFilms:
     """Films without room for water of their own: wet at once wherever water stands higher at their rim.
 
-    node (n,) · part (n,) of it, of the connected ones · rim (m,): nodes beside them, beside (m,): the part each touches.
+    node (n,) · part (n,) of it, of the connected ones · rim (m,): nodes beside, beside (m,): the part each touches.
 
-    Else they fill as the level set is carried along them: a dam of 1 m with water on one side had a third of its uplift
+    Else they fill as the level set runs along them: a dam of 1 m with water on one side had a third of its uplift
     after 0.3 s, and as long as the film was dry, the surface of this water lay at the heel of the dam."""
 
     node: Ints
