@@ -51,8 +51,9 @@ NOTES = {
     "plateau of 0.0366 m/s.",
     "P56": "The sheet of water that reaches the cubes is 3 to 5 cm deep, less than a cell of edge/3. Of the momentum "
     "that it carries over the width of a cube, 45 N from 0.8 to 1.0 s, a held column receives less than half "
-    "on these cells and two thirds on cells of half the size; the rest is lost where the level set is "
-    "corrected ([water](water.md#weak)). Cubes whose lower faces are sealed and cubes whose lower faces are "
+    "on these cells and two thirds on cells of half the size; on a wall across the tank 82 N of 210 N are lost where "
+    "the level set is corrected, 43 N in the transport on the nodes of the wall, and 62 N outside the surface "
+    "([theory](theory.md#3-coupling)). Cubes whose lower faces are sealed and cubes whose lower faces are "
     "wet move in the same way. The stack slides at a force of 28 N and more; its lowest cube separates from "
     "it at 52 N and more.",
     "P52": "The period is measured over few oscillations and changes by 1 to 2 % with the substep and the number of "
