@@ -38,12 +38,14 @@ BLOCK = 256
 """Number of consecutive entries of a list that are skipped, or kept, together."""
 CHUNK = 16_384
 """Number of entries that are summed as one chunk; shorter sums have one chunk."""
-FILLED, LAZY = 64, 32 << 20
-"""Numbers that are filled as one row, and bytes from which the C library returns pages that are zero already and are
-allocated only when they are written to."""
+ROW, LAZY = 64, 32 << 20
+"""Numbers that are filled or passed by as one row, and bytes from which the C library returns pages that are zero
+already and are allocated only when they are written to."""
 PYTHON = 10
 """How many times as long as a compiled loop Python code takes to be handed over: for the interpreter, which one thread
 has at a time."""
+PASSED = 0.1
+"""Cost of an entry of a mask, in usual rows."""
 KEPT = 8
 """Number of lists whose reach is remembered: those of one step."""
 
@@ -108,9 +110,9 @@ def over(kernel: Callable, count: int, *args, weight: float = 1, pieces: int = 1
     return _team.together([_call(kernel, (first, last), args) for first, last in pairwise(ends)])
 
 
-def found_over(kernel: Callable, count: int, *args) -> Array:
+def found_over(kernel: Callable, count: int, *args, weight: float = 1) -> Array:
     """The arrays that `over` returns, concatenated."""
-    found = over(kernel, count, *args)
+    found = over(kernel, count, *args, weight=weight)
     return found[0] if len(found) == 1 else np.concatenate(found)
 
 
@@ -142,20 +144,28 @@ def summed(kernel: Callable, count: int, shape: tuple[int, ...], *args) -> Array
 
 def marked(mask) -> Array:
     """Numbers of the entries of a mask (n,) bool that are set, in order."""
-    return found_over(_marked, len(mask), mask)
+    return found_over(_marked, len(mask), np.asarray(mask, bool), weight=PASSED)
 
 
 @released
 def _marked(first, last, mask):
-    """Every number is written, and the next one over it if its entry is not set: no branch that is hard to foresee."""
-    count, k = 0, 0
-    for i in range(first, last):
-        count += 1 if mask[i] else 0
-    found = np.empty(count + 1, np.int64)
-    for i in range(first, last):
-        found[k] = i
-        k += 1 if mask[i] else 0
-    return found[:count]
+    """Entries are passed by ROW at a time where none of them is set. Elsewhere every number is written, and the next
+    one over it if its entry is not set: no branch that is hard to foresee."""
+    at, end = np.uint64(first), np.uint64(last)
+    count, k = np.uint64(0), np.uint64(0)
+    for i in range(at, end):
+        count += np.uint64(mask[i])
+    found = np.empty(np.int64(count) + 1, np.int64)
+    while at < end:
+        stop, some = min(at + np.uint64(ROW), end), np.uint64(0)
+        for i in range(at, stop):
+            some |= np.uint64(mask[i])
+        if some:
+            for i in range(at, stop):
+                found[k] = i
+                k += np.uint64(mask[i])
+        at = stop
+    return found[: np.int64(count)]
 
 
 def zeros(shape: tuple[int, ...]) -> np.ndarray:
@@ -164,13 +174,13 @@ def zeros(shape: tuple[int, ...]) -> np.ndarray:
     if 8 * count >= LAZY:
         return np.zeros(shape)
     out = np.empty(shape)
-    over(_fill, -(-count // FILLED), out.reshape(-1))
+    over(_fill, -(-count // ROW), out.reshape(-1))
     return out
 
 
 @ranged
 def _fill(first, last, out):
-    for j in range(first * FILLED, min(last * FILLED, out.shape[0])):
+    for j in range(first * ROW, min(last * ROW, out.shape[0])):
         out[np.uint64(j)] = 0.0
 
 

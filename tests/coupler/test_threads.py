@@ -272,8 +272,8 @@ def test_lists_of_marked_entries_and_copies_are_those_of_numpy(divided):
     rng = np.random.default_rng(3)
     for number in (1, 3):
         kernels.use(number)
-        for share in (0.0, 0.3, 1.0):
-            mask = rng.random(500) < share
+        for count, share in ((500, 0.3), (500, 1.0), (0, 0.0), (64, 1.0), (1000, 0.01), (500, 0.0)):
+            mask = rng.random(count) < share
             np.testing.assert_array_equal(kernels.marked(mask), np.flatnonzero(mask))
         for given in (rng.normal(size=(200, 3)), rng.normal(size=333)[::2], mask, np.arange(70)):
             copy = copied(given)
