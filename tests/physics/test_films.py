@@ -160,6 +160,21 @@ def test_a_film_does_not_push_or_hold_a_block(scene, speed):
     assert np.abs(np.array(loads[2:]) - buoyancy).max() < most
 
 
+@pytest.mark.parametrize("degrees", [1.0, 5.0, 10.0])
+def test_a_block_tilted_on_its_edge_has_the_pressure_of_the_depth_in_its_wedge(scene, degrees):
+    """Held there: where the wedge is narrower than a quarter of a cell it is film, the rest is resolved. Buoyancy of the
+    whole block, no thrust and no moment."""
+    angle = np.radians(degrees)
+    centre = [PLACE, PLACE, 0.5 * (EDGE * np.sin(angle) + HEIGHT * np.cos(angle))]
+    tilted = block() | {"centre": centre, "rotation": {"axis": [0, 1, 0], "angle": -angle}}
+    coupling = scene([tilted], motion=[{"block": "block", "velocity": [0, 0, 0]}])
+    for _ in range(3):
+        load = coupling.step(0.01).load[0]
+    buoyancy = RHO * G * HEIGHT * AREA
+    assert load[:3] == pytest.approx([0.0, 0.0, buoyancy], abs=1e-6 * buoyancy)
+    assert load[3:] == pytest.approx(np.zeros(3), abs=1e-6 * buoyancy * EDGE)
+
+
 def test_uplift_and_its_share_go_together():
     """One without the other is refused, and so is a share above 1."""
     for contact in ({"uplift": "share"}, {"uplift_share": 0.5}, {"uplift": "share", "uplift_share": 1.5}):
