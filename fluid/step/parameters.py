@@ -37,7 +37,7 @@ class WaterParameters:
     down: tuple[float, float, float] = (0.0, 0.0, -1.0)
     """Unit vector of gravity."""
     theta: float = 0.6
-    calm_theta: float = 0.51
+    calm_theta: float = 0.535
     courant: float = 1.0
     divergence_damping: float = 0.05
     correction_length: float = 5.0
