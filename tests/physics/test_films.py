@@ -162,7 +162,7 @@ def test_a_film_does_not_push_or_hold_a_block(scene, speed):
 
 @pytest.mark.parametrize("degrees", [1.0, 5.0, 10.0])
 def test_a_block_tilted_on_its_edge_has_the_pressure_of_the_depth_in_its_wedge(scene, degrees):
-    """Held there: where the wedge is narrower than a quarter of a cell it is film, the rest is resolved. Buoyancy of the
+    """Held there: where the wedge is narrower than a quarter of a cell it is film, elsewhere resolved. Buoyancy of the
     whole block, no thrust and no moment."""
     angle = np.radians(degrees)
     centre = [PLACE, PLACE, 0.5 * (EDGE * np.sin(angle) + HEIGHT * np.cos(angle))]
