@@ -231,23 +231,22 @@ def seal_pockets(matrix, anchored, volume, compliance: float, pressure):
 
 @kernel
 def _reached(indptr, indices, seed):
-    """Rows (n,) bool that the entries of a symmetric matrix connect to a row of the seed (n,) bool."""
-    reached = seed.copy()
-    waiting = np.empty(seed.shape[0], np.int64)
-    count = 0
-    for i in range(seed.shape[0]):
-        if seed[i]:
-            waiting[count] = i
-            count += 1
-    while count > 0:
-        count -= 1
-        i = waiting[count]
-        for s in range(indptr[i], indptr[i + 1]):
-            j = indices[s]
-            if not reached[j]:
-                reached[j] = True
-                waiting[count] = j
-                count += 1
+    """Rows (n,) bool that the entries of a symmetric matrix connect to a row of the seed (n,) bool.
+
+    By sweeps to and fro: rows of nearby nodes have nearby numbers, so that two or three reach all."""
+    reached, left = seed.copy(), np.flatnonzero(~seed)
+    before = len(left) + 1
+    while len(left) < before:
+        before, k = len(left), 0
+        for i in left:
+            for s in range(indptr[i], indptr[i + 1]):
+                if reached[indices[s]]:
+                    reached[i] = True
+                    break
+            if not reached[i]:
+                left[k] = i
+                k += 1
+        left = left[:k][::-1].copy()  # the next sweep runs back
     return reached
 
 

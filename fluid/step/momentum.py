@@ -180,7 +180,7 @@ def _reactions(water, kept, x, p, dt):
     cells = np.concatenate([kept.wet_cells, kept.void])
     mesh = (t.nodes, t.fluid_cells)
     of_x, of_p, of_sides = hat_forces(cells, x, p, at_side, water.reference, *mesh)
-    of_sides += _on_bodies(water, np.where(at_side, p, 0.0))
+    of_sides += _on_bodies(water, p, at_side)
     return (-dt * of_x, -dt * (of_p - of_x)), -dt * of_sides, dt * _on_bodies(water, p)
 
 
@@ -193,7 +193,7 @@ def _at_closed_openings(water, kept, p, dt):
     cells = np.concatenate([kept.wet_cells, kept.void])
     mesh = (t.nodes, t.fluid_cells)
     total = hat_forces(cells, p, p, beside, water.reference, *mesh)[2]
-    return -dt * (total + _on_bodies(water, np.where(beside, p, 0.0)))
+    return -dt * (total + _on_bodies(water, p, beside))
 
 
 def _of_air(water, problem, unknown, pressure):
@@ -213,9 +213,11 @@ def _of_air(water, problem, unknown, pressure):
     return -dt * np.array([of_x, of_p - of_x]), on_bodies
 
 
-def _on_bodies(water, p):
-    """Gᵀ p about the reference (6,) [N, N m]."""
-    return about(water.reference, water.coupling.T @ p, water.domain.body_centre)
+def _on_bodies(water, p, where=None):
+    """Gᵀ p about the reference (6,) [N, N m], of the nodes `where` (N,) bool only; None: of all."""
+    beside, coupling = water.beside_bodies
+    held = p[beside] if where is None else np.where(where[beside], p[beside], 0.0)
+    return about(water.reference, coupling.T @ held, water.domain.body_centre)
 
 
 def _loads(water, problem, p):

@@ -17,7 +17,7 @@ import numpy as np
 from array_types import Bools, Floats, Ints
 from fluid.domain.cell_vectors import places_of
 from fluid.domain.coupling_matrix import wetted_coupling
-from fluid.numerics.fields import copied
+from fluid.numerics.fields import added, copied
 from fluid.numerics.threads import over
 from fluid.pressure.active_cells import WetPart
 from fluid.pressure.indefinite_cells import about, reserve
@@ -109,7 +109,7 @@ def predicted(water, dt: float) -> PressureProblem:
     kick = water.kick_factor()
     u_adv, phi = _transported(water, dt, theta, kick)
     found = water.carried(dt, theta, kick)
-    carried = found.water + found.swept
+    carried = added(found.water, found.swept)
     conserved, left = water.conserved_volume, Outflow.of(water, dt, carried)
     if left is not None:
         carried -= left.volume
@@ -141,7 +141,7 @@ def predicted(water, dt: float) -> PressureProblem:
         carried[filled] = water.topology.node_volume[filled]
         in_films = water.in_films(phi)
     beside = float(displaced.sum()) + in_films[0]
-    surface = _new_surface(water, phi, carried + displaced, conserved + beside)
+    surface = _new_surface(water, phi, added(carried, displaced), conserved + beside)
     if found.velocity is not None:
         graph = water.graph_for(water.listed)
         found.into(

@@ -438,6 +438,9 @@ class Water:
         self.nodes_below_floor = self.below_floor(t.nodes)
         """g·x (N,) [m²/s²] of the nodes."""
         self.coupling = wetted_coupling(domain).tocsr()
+        beside = np.flatnonzero(np.diff(self.coupling.indptr))
+        self.beside_bodies = beside, self.coupling[beside]
+        """Nodes (n,) with an entry in the coupling, and their rows of it."""
         self.walls = self._sides.on_copies(domain.parent_node)
         self.on_sides = self._on_sides[domain.parent_node]
         """(N,) bool: nodes on the sides of the tank."""

@@ -271,16 +271,17 @@ def _clear_rows(first, last, there, also, out):
 def _averaged(cell_list, reach, has, field, cells, mean):
     """Mean of the field (N, m, 3) over the corners that have one, of the listed cells around the nodes in reach: what
     is added to `mean` (N, m, 3), zero at first."""
-    count = zeros((len(field),))
-    listed = reach_of_cells(cell_list, cells)
-    owning(_average, len(field), listed, len(cell_list), cell_list, (reach, has), field, cells, count, mean)
+    count, n = zeros((len(field),)), len(field)
+    listed, flat = reach_of_cells(cell_list, cells), (field.reshape(n, -1), mean.reshape(n, -1))
+    owning(_average, n, listed, len(cell_list), cell_list, (reach, has), flat[0], cells, count, flat[1])
     return mean
 
 
 @released
 def _average(first, last, runs, cell_list, marks, field, cells, count, mean):
+    """field, mean: the entries of each node in one row."""
     reach, has = marks
-    total = np.empty(field.shape[1:])
+    total = np.empty(field.shape[1])
     for run in range(runs.shape[0]):
         for s in range(runs[run, 0], runs[run, 1]):
             e = cell_list[s]
@@ -293,19 +294,16 @@ def _average(first, last, runs, cell_list, marks, field, cells, count, mean):
                 if has[cells[e, a]]:
                     known += 1
                     for k in range(field.shape[1]):
-                        for d in range(field.shape[2]):
-                            total[k, d] += field[cells[e, a], k, d]
+                        total[k] += field[cells[e, a], k]
             for a in range(4):
                 if has[cells[e, a]] and first <= cells[e, a] < last:
                     count[cells[e, a]] += known
                     for k in range(field.shape[1]):
-                        for d in range(field.shape[2]):
-                            mean[cells[e, a], k, d] += total[k, d]
+                        mean[cells[e, a], k] += total[k]
     for i in range(first, last):
         if count[i] > 0.0:
             for k in range(field.shape[1]):
-                for d in range(field.shape[2]):
-                    mean[i, k, d] /= count[i]
+                mean[i, k] /= count[i]
 
 
 def _own_speed(nodes, factor, forced):

@@ -74,6 +74,7 @@ def _edge_rates(first, last, listed, edges, u_cell, nodes, fluid, around, rate):
     for place in range(first, last):
         i = listed[place]
         r = graph_row[i]
+        xi, yi, zi = nodes[i, 0], nodes[i, 1], nodes[i, 2]
         for s in range(start[r], start[r + 1]):
             slot[neighbour[s]], rate[s] = s, 0.0
         for t in range(node_start[i], node_start[i + 1]):
@@ -93,9 +94,7 @@ def _edge_rates(first, last, listed, edges, u_cell, nodes, fluid, around, rate):
                     slopes = gx * g[p, a, 0] + gy * g[p, a, 1] + gz * g[p, a, 2]
                     if slopes != 0.0:  # it is zero along half of the edges of a split brick
                         rate[slot[j]] -= slopes * (
-                            (nodes[j, 0] - nodes[i, 0]) * x
-                            + (nodes[j, 1] - nodes[i, 1]) * y
-                            + (nodes[j, 2] - nodes[i, 2]) * z
+                            (nodes[j, 0] - xi) * x + (nodes[j, 1] - yi) * y + (nodes[j, 2] - zi) * z
                         )
 
 
