@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from yade_scripts.blocks.block import Block
 from yade_scripts.contact.law import ContactLaw
+from yade_scripts.contact.springs import _turn_into_face
 from yade_scripts.dynamics.structure import Structure
 
 K = 1e8
@@ -67,3 +68,14 @@ def test_blocks_thrown_at_each_other(seed, e, friction):
             assert energies["friction"] > -5e-3 * start
         assert np.abs(s.mass @ s.velocity()[:, :3] - P).max() < 1e-12 * size
         assert np.abs(angular_momentum(s) - L).max() < 1e-3 * size
+
+
+@pytest.mark.parametrize("turn", [0.0, 1e-6, 0.3, 1.2])
+def test_a_spring_turns_with_the_normal_of_its_edges_and_keeps_its_energy(turn):
+    """It lies across the former normal z, partly in the plane in which that turns."""
+    spring, normal = np.array([3.0, 4.0, 0.0]), np.array([np.sin(turn), 0.0, np.cos(turn)])
+    _turn_into_face.py_func(spring, normal)  # compiled, it is for other kernels alone
+    assert spring @ normal == pytest.approx(0.0, abs=1e-12)
+    assert np.linalg.norm(spring) == pytest.approx(5.0, rel=1e-12)
+    assert spring[1] > 0.0
+    assert spring[0] > 0.0
