@@ -6,6 +6,7 @@ import pytest
 from coupler.step.immersion import STILL, Immersion
 from fluid.mesh.background import box_mesh
 from yade_scripts.blocks.block import Block
+from yade_scripts.contact.law import ContactLaw
 from yade_scripts.dynamics.structure import Structure
 from yade_scripts.joints.cohesion import JointParameters
 
@@ -44,3 +45,29 @@ def test_a_sealed_face_that_comes_back_keeps_what_it_reached():
         assert sealed.sum() == 2
         assert (reached[sealed] > 2.0 * STILL * CELL).all()
         np.testing.assert_array_equal(immersion.bodies.growth, reached)
+
+
+def test_only_a_loose_block_is_drawn_in_where_it_stands_on_another():
+    """Three blocks in a row on a slab that no joint holds them to: two are joined to each other, one is alone. The lone
+    one is drawn in by a film, by which water reaches the faces that rest on something. The joined ones have their sizes
+    to the last bit: films around each of them would take from the volume, hence from the buoyancy, of a building."""
+    blocks = [Block("slab", (1.0, 0.5, 0.1), size=(1.6, 0.6, 0.2), fixed=True)]
+    blocks += [Block(name, (x, 0.5, 0.4), size=(0.4, 0.4, 0.4)) for name, x in (("a", 0.5), ("b", 0.9))]
+    blocks += [Block("alone", (1.5, 0.5, 0.4), size=(0.4, 0.4, 0.4))]
+    joints = JointParameters(1e6, 0.1, damping=0.0)
+    with Structure(blocks, ContactLaw(1e8), joints, gravity=(0, 0, 0)) as s:
+        names = list(s.names)
+        to_slab = (s.joints.a == 0) | (s.joints.b == 0)
+        s.joints.largest[to_slab[s.joints.joint_of]] = 10.0  # wide open: they fail
+        s.advance(1e-5)
+        immersion = Immersion(box_mesh((0, 0, 0), (2, 1, 1), CELL), s, [], "single")
+        bodies, (block, _, _) = immersion.bodies, s.joined_planes()
+        assert {names[b] for b in block} == {"a", "b"}
+        for name in ("a", "b", "alone"):
+            own = slice(*bodies.plane_start[[names.index(name), names.index(name) + 1]])
+            growth = bodies.growth[own]
+            if name == "alone":
+                assert (growth < 0.0).all()
+            else:
+                assert (growth > 0.0).sum() == 1
+                assert (growth == 0.0).sum() == len(growth) - 1

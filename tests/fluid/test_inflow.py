@@ -52,6 +52,25 @@ def test_still_water_beside_a_sea_of_its_level_stays(level):
     assert water.volume() == pytest.approx(start, abs=1e-9)
 
 
+def test_still_water_in_the_corner_of_an_inflow_and_a_sea_stays():
+    """An inflow that brings nothing yet meets a sea along an upright edge: at its nodes the pressure is sought, since
+    the inflow fixes the velocity there. Held by the sea as well, it would count twice, and push the water."""
+    mesh, level = box_mesh(np.zeros(3), [0.6, 0.6, 0.8], 0.1), 0.537
+    sides = [Side.of(mesh, left, waves.steady([1, 0, 0], level, 0.0))]
+    sides.append(Side.of(mesh, lambda normal, _: normal[:, 1] > 0.5, level=lambda time: level))
+    domain = cut_domain(mesh, ConvexBodies.empty())
+    water = Water(mesh, domain, lambda x: x[:, 2] - level, WaterParameters(), sides=Sides(sides))
+    inflow, sea = water.sides.now
+    shared = np.intersect1d(inflow.nodes, sea.nodes)
+    assert (water.level_set[shared] < 0.0).sum() > 3
+    for _ in range(3):
+        advance(water, 0.02)
+    assert np.abs(water.velocity).max() < 1e-8
+    deep = water.level_set < 0.0
+    depth = level - water.topology.nodes[deep, 2]
+    np.testing.assert_allclose(water.pressure[deep], 1000.0 * G * depth, atol=1e-4)
+
+
 @pytest.mark.parametrize("covers", ["single", "multiple"])
 @pytest.mark.parametrize(("foot", "width"), [(0.0, 2.0), (-0.03, 2.0), (-0.2, 0.15), (-0.2, 2.0)])
 def test_what_comes_in_comes_through_what_solids_leave_open(covers, foot, width):
