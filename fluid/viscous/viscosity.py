@@ -140,7 +140,6 @@ class Viscosity:
         """Changes (d, D) of the velocity of the water and of the bodies: (M + γ dt K) (d, D) = γ dt r(start, V)."""
         tau = GAMMA * dt
         rate, load = momentum_rate(terms, start, V)
-        load[~bodies.moves] = 0.0
         d, D, count, left = implicit_change(
             terms, mass, tau, tau * rate, (bodies.mass, bodies.moves), tau * load, TOLERANCE, MOST_ITERATIONS
         )
