@@ -216,14 +216,15 @@ def write_table(path, title, columns, arrays):
 
     The file is written under another name and renamed, so a killed run leaves either the old or the new table. Raises
     DiskFull."""
-    body = "".join(line([_table_cell(value) for value in row]) for row in zip(*arrays))
-    _replace(Path(path), header(title, columns) + body)
+    body = io.StringIO()
+    csv.writer(body, lineterminator="\n").writerows(zip(*(_table_cells(values) for values in arrays)))
+    _replace(Path(path), header(title, columns) + body.getvalue())
 
 
-def _table_cell(value):
-    if isinstance(value, str):
-        return value
-    return number(value) if np.isfinite(value) else ""
+def _table_cells(values):
+    """The texts of a column of numbers or texts."""
+    values = values.tolist() if isinstance(values, np.ndarray) else values
+    return [v if isinstance(v, str) else number(v) if np.isfinite(v) else "" for v in values]
 
 
 def _replace(path, text):
