@@ -160,6 +160,24 @@ def test_a_film_does_not_push_or_hold_a_block(scene, speed):
     assert np.abs(np.array(loads[2:]) - buoyancy).max() < most
 
 
+@pytest.mark.parametrize("speed", [-0.02, 0.02])
+def test_the_water_that_a_film_takes_up_comes_from_its_rim(scene, speed):
+    """A plate moves away from the bed or towards it, 5 mm above: what is carried into its film is the room that it has
+    at the end of the step, and the rim loses just that. Left out, the water would appear below the plate by the
+    correction of the volume, which takes it from the whole surface."""
+    gap, dt = 0.005, 0.01
+    coupling = scene([block(gap, name="plate")], motion=[{"block": "plate", "velocity": [0, 0, speed]}])
+    water, start = coupling.water, coupling.water.nodal_water.copy()
+    film = water.films.node
+    for _ in range(4):
+        coupling.step(dt)
+    given = water.given_by_films
+    assert given[film].sum() == pytest.approx(start[film].sum() * speed / gap, rel=1e-9)
+    assert given.sum() == pytest.approx(0.0, abs=1e-12 * np.abs(given).sum())
+    carried = water.carried(dt, 0.5, np.ones(len(film))).water[film].sum()
+    assert carried == pytest.approx(start[film].sum() * (1.0 + speed * (water.time + dt) / gap), rel=1e-3)
+
+
 @pytest.mark.parametrize("degrees", [1.0, 5.0, 10.0])
 def test_a_block_tilted_on_its_edge_has_the_pressure_of_the_depth_in_its_wedge(scene, degrees):
     """Held there: where the wedge is narrower than a quarter of a cell it is film, elsewhere resolved. Buoyancy of the
