@@ -98,6 +98,23 @@ class WettedWalls:
         """Middles (S, 3) [m] of the polygons."""
         return self.domain.face_points.mean(axis=1)
 
+    def rubbing(self, phi):
+        """hat (S, 3, 4) and arm (S, 3, 3) [m] of the points with the hats of the wet corners alone, φ (N,) < 0, scaled
+        to a sum of one, and moved to the place that these stand for, so that a rigid motion does not slip and angular
+        momentum is kept.
+
+        A dry corner may hold next to no water. Its hat at a wet point is small, and the friction would give it the
+        velocity, without bound, that makes the slip at the point vanish: 16 km/s where the water ran at 10 m/s."""
+        corner = self.domain.cells[self.cell]
+        some = (phi[corner] >= 0.0).any(axis=1)
+        hat, arm = self.hat.copy(), self.arm.copy()
+        corner, kept = corner[some], self.hat[some] * (phi[corner[some]] < 0.0)[:, None, :]
+        total = kept.sum(axis=2, keepdims=True)
+        hat[some] = np.where(total > 0.0, kept / np.where(total > 0.0, total, 1.0), hat[some])
+        place = np.einsum("sqa,sak->sqk", hat[some], self.domain.nodes[corner])
+        arm[some] = place - self.domain.body_centre[self.body[some]][:, None]
+        return hat, arm
+
     def at_points(self, f, cells):
         """P1 values (S, 3) or (S, 3, k) of nodal f (N,) or (N, k) at the points of the polygons."""
         return np.einsum("sqa,sa...->sq...", self.hat, f[cells[self.cell]])
@@ -183,7 +200,7 @@ class Viscosity:
 
     def _wall_terms(self, water, phi, columns, w, wet_cells, share):
         """The polygons that the water touches, with λ and C; λ is larger where the free surface leaves less water in a
-        cell."""
+        cell. Friction acts on wet nodes alone, as it does on the sides of the tank."""
         p, k, cells = self.parameters, self.walls, water.topology.cells
         water_share = np.ones(len(cells))
         water_share[wet_cells] = np.maximum(share, 1.0 / STEEPEST)
@@ -195,7 +212,8 @@ class Viscosity:
         row = np.full(len(cells), -1, np.int64)
         row[wet_cells] = np.arange(len(wet_cells))
         use = (area > 0.0).any(axis=1) & ((nitsche > 0.0) | (drag > 0.0))
-        found = Walls(k.cell, row[k.cell], k.body, k.normal, k.hat, k.arm, area, nitsche, drag)
+        hat, arm = (k.hat, k.arm) if self.friction is None else k.rubbing(phi)
+        found = Walls(k.cell, row[k.cell], k.body, k.normal, hat, arm, area, nitsche, drag)
         return Walls(*(np.ascontiguousarray(a[use]) for a in found))
 
 
