@@ -13,7 +13,7 @@ from fluid.domain.moments import nodal_water
 from fluid.domain.physical_domain import cut_domain, wetted_coupling
 from fluid.domain.quadrature import surface_basis
 from fluid.domain.topology import Graph, Topology
-from fluid.mesh.background import box_mesh
+from fluid.mesh.background import Background, box_mesh
 from fluid.numerics.solve import solve
 from fluid.pressure.projection import (
     Waterline,
@@ -125,6 +125,38 @@ def test_divergence_damping(n, seed, covers):
     np.testing.assert_allclose(
         (damped - u) * mass[:, None], expected.reshape(-1, 3), rtol=0, atol=1e-13 * scale
     )
+
+
+@pytest.mark.parametrize("split", ["kuhn", "mirrored"])
+@pytest.mark.parametrize("flat", [1.0, 10.0, 100.0])
+def test_divergence_damping_gains_no_energy_in_flat_cells(flat, split):
+    """The motion that it amplifies most, found by applying it again and again, does not grow, and any motion keeps its
+    momentum."""
+    even = np.linspace(0.0, 1.0, 5)
+    mesh = box_mesh(None, None, axes=(even / flat, even, even), split=split)
+    t = Topology.of(mesh, cut_domain(mesh, ConvexBodies.empty(), "single"))
+    u = np.random.default_rng(0).normal(size=(len(t.nodes), 3))
+    cells, line = np.arange(len(t.cells)), Waterline(-np.ones(len(u)), t.beside_solid, -np.inf)
+    momentum, energy = t.node_volume @ u, t.node_volume @ (u * u).sum(axis=1)
+    for _ in range(40):
+        before = energy
+        damp_divergence(WetCells(cells, np.ones(len(cells))), 0.05, line, u, t.fluid_cells)
+        energy = t.node_volume @ (u * u).sum(axis=1)
+        assert energy <= before * (1.0 + 1e-13)
+    np.testing.assert_allclose(t.node_volume @ u, momentum, rtol=0, atol=1e-13 * t.node_volume.sum())
+
+
+def test_divergence_damping_of_a_flat_cell_is_the_term_at_its_bound():
+    """Nodes of a single flat cell: the change is -|e| c (div u) ∇N / m with c = 1/(2 Σ|∇N|²) instead of c_L l²."""
+    nodes = np.array([[0.0, 0, 0], [0.01, 0, 0], [0, 1, 0], [0, 0, 1]])
+    mesh = Background.from_arrays(nodes, np.array([[0, 1, 2, 3]]))
+    t = Topology.of(mesh, cut_domain(mesh, ConvexBodies.empty(), "single"))
+    u = np.random.default_rng(0).normal(size=(4, 3))
+    steep = np.array([[-100.0, -1, -1], [100, 0, 0], [0, 1, 0], [0, 0, 1]])[np.argsort(t.cells[0])]
+    expected = u - 4.0 * (u * steep).sum() * steep / (2.0 * (steep**2).sum())
+    line = Waterline(-np.ones(4), t.beside_solid, -np.inf)
+    damp_divergence(WetCells(np.arange(1), np.ones(1)), 0.05, line, u, t.fluid_cells)
+    np.testing.assert_allclose(u, expected, rtol=0, atol=1e-12)
 
 
 @EXAMPLES
