@@ -110,6 +110,27 @@ def test_a_wave_that_lifts_its_tank_above_its_crest_is_refused():
     assert found(3.0) == []
 
 
+def test_a_wave_whose_still_water_runs_out_is_refused():
+    """0.5 m of water leave a tank 1 m long by its open end at 8/27 sqrt(g d³): an eighth of a metre is left when
+    4/27 sqrt(g 0.5 m) t = 1 m, at 3.05 s. The crest is far away and brings nothing."""
+    wave = {"kind": "solitary", "side": "x-", "level": 0.5, "height": 0.1, "crest": 50.0}
+    fill = [{"lower": [0, 0, 0], "upper": [1, 0.2, 0.5]}]
+
+    def found(end, sides=("z+", "x+"), **more):
+        tank = TANK | {"upper": [1, 0.2, 1], "open": list(sides)}
+        read = case({"inflow": [wave], "fill": fill} | more, tank=tank, time={"end": end})
+        return [text for path, text in problems(read) if path == ("water", "inflow", 0)]
+
+    assert found(3.0) == []
+    assert "runs out by x+ (tank.open): about 0.119 m are left" in found(3.2)[0]
+    assert "end before 3 s" in found(3.2)[0]
+    assert "runs out by x+ and y+" in found(3.0, ["z+", "x+", "y+"])[0]
+    assert found(9.0, ["z+"]) == []
+    assert found(9.0, inflow=[wave | {"absorbs": True}]) == []
+    assert found(9.0, inflow=[{"kind": "steady", "side": "x-", "level": 0.5, "velocity": 1.0}]) == []
+    assert found(9.0, ["z+", "y+"], sea=[{"side": "x+", "level": 0.5}]) == []
+
+
 def test_a_bore_may_run_until_its_reflection_is_back():
     """0.6 m behind a bore into 0.5 m: water of 0.42 m/s, 0.25 m2/s. A wall throws back 0.71 m; a tank of 1 m that
     is 0.2 m wide has room for 0.042 m3 up to there."""
