@@ -77,6 +77,7 @@ def remarks(case: Case) -> list[str]:
     found = [
         *thin_remarks(case),
         *_contact_remarks(case),
+        *_pass_remarks(case),
         *softness_remarks(case),
         *water_remarks(case),
         *material_remarks(case),
@@ -165,6 +166,22 @@ def _contact_remarks(case: Case) -> Iterator[str]:
         yield (
             "there is no section [contact]: blocks whose joints break pass through one another, the ground and the "
             "sides of the tank; with [joints] an empty section [contact] will do"
+        )
+
+
+def _pass_remarks(case: Case) -> Iterator[str]:
+    """One pass where blocks are lighter than the water: P58 has the growth of their vibration."""
+    if case.structure is None or case.water is None or case.coupling.passes > 1:
+        return
+    driven = {motion.block for motion in case.motion}
+    free = [b for part in parts_of(case) for b in part.blocks if not b.fixed and b.name not in driven]
+    lightest = min(free, key=lambda block: block.density, default=None)
+    if lightest is not None and lightest.density < case.water.density:
+        yield (
+            f"coupling.passes = 1 with '{lightest.name}' of {lightest.density:g} kg/m3, lighter than the water "
+            f"({case.water.density:g} kg/m3): with a single pass such blocks miss the water's work, their vibration "
+            "can grow, and limits.energy_error may end the run; leave coupling.passes at 2, which is stable, or give "
+            "a short time.step_max"
         )
 
 

@@ -100,8 +100,10 @@ def worst_place(coupling: CoupledSides, record: StepRecord) -> str:
     if len(record.missed_work) and abs(record.missed_work).max() > 0.0:
         worst = int(abs(record.missed_work).argmax())
         name = coupling.structure.names[worst]
+        single = record.passes == 1 and coupling.defects.too_large(record.defect)
         parts.append(
             f"block '{name}' missed {abs(record.missed_work[worst]):.3g} J of the water's work in this step"
+            + (", which had a single pass: raise coupling.passes" if single else "")
         )
     if coupling.water is not None:
         speed, place = coupling.water.fastest_place()

@@ -278,6 +278,26 @@ def test_walls_thinner_than_a_cell_are_remarked():
     assert remarks(case(**structure(thin)))[0].startswith("b0 is 0.2 m thick, thinner than a cell (1 m)")
 
 
+def test_a_single_pass_with_blocks_lighter_than_the_water_is_remarked():
+    """Of the free blocks the lightest is named; stone needs no second pass, nor a block that is held or driven."""
+    stone, wood = {"centre": [7, 5, 0.5]}, {"centre": [7, 7, 0.5], "density": 500.0}
+    single = {"coupling": {"passes": 1}}
+    (found,) = remarks(
+        case(**single, **structure(stone, wood, wood | {"centre": [7, 2, 0.5], "density": 400.0}))
+    )
+    assert found.startswith("coupling.passes = 1 with 'b2' of 400 kg/m3, lighter than the water (1000 kg/m3)")
+    assert "leave coupling.passes at 2" in found
+    driven = {"motion": [{"block": "b1", "velocity": [0, 0, 0.1]}]}
+    for silent in (
+        structure(stone, wood),
+        single | structure(stone),
+        single | structure(stone, wood | {"fixed": True}),
+        single | driven | structure(stone, wood),
+        single | {"water": None} | structure(stone, wood),
+    ):
+        assert not [text for text in remarks(case(**silent)) if "passes" in text]
+
+
 def test_a_mesh_beyond_the_memory_of_the_machine_is_refused(monkeypatch):
     """6000 cells do not fit into 1 MB; the message names a cell that fits."""
     content = {

@@ -8,7 +8,7 @@ import pytest
 
 from coupler.geometry.overlaps import Overlap
 from coupler.step.limits import Diverged, Limits, check_air, check_momentum, check_overlap
-from coupler.step.step_limits import STEP_SHARE, Attempt, attempt_of, attempt_to_keep
+from coupler.step.step_limits import STEP_SHARE, Attempt, attempt_of, attempt_to_keep, worst_place
 
 
 def test_a_run_ends_just_beyond_its_limit_of_momentum():
@@ -71,6 +71,19 @@ def test_what_helps_goes_by_how_often_the_step_was_halved(retries, kept):
     worse = Attempt(retries, {"defect": kept + 0.06}, frozenset({"defect"}), False)
     assert attempt_to_keep([longest, shorter]) is shorter
     assert attempt_to_keep([longest, worse]) is longest
+
+
+@pytest.mark.parametrize(("passes", "defect", "advised"), [(1, 0.4, True), (2, 0.4, False), (1, 0.2, False)])
+def test_a_run_that_ends_on_its_energy_names_a_single_pass_that_missed(passes, defect, advised):
+    coupling = SimpleNamespace(
+        water=None,
+        structure=SimpleNamespace(names=["a", "b"]),
+        defects=SimpleNamespace(too_large=lambda defect: defect > 0.3),
+    )
+    record = SimpleNamespace(passes=passes, defect=defect, missed_work=np.array([1.0, -2.5]))
+    found = worst_place(coupling, record)
+    assert found.startswith("block 'b' missed 2.5 J of the water's work in this step")
+    assert found.endswith("which had a single pass: raise coupling.passes") == advised
 
 
 def test_steps_of_all_lengths_are_compared_by_the_second():
