@@ -51,3 +51,27 @@ def test_neither_force_nor_energy_jumps(ratio):
             s.advance(0.02)
             assert s.centre()[1, 2] == pytest.approx(1.5 - DEPTH, abs=1e-3 * DEPTH), "it stays at rest"
             assert s.energies()["kinetic"] < 1e-6 * held
+
+
+@pytest.mark.parametrize("ratio", [0.5, 1.0])
+def test_edges_that_cross_take_over_the_force_of_a_joint(ratio):
+    """Two beams across each other, where neither has a node in the other: the corners of what lies on one another carry
+    the force of the joint at once, or what a softer contact bears at that depth. From nothing, the beam would be let
+    fall by a depth and swing."""
+    area = 0.4**2
+    stiffness = JOINT.closing_stiffness * area
+    depth = PUSH / stiffness
+    low = Block("low", (0.5, 0.0, -0.2), size=(4.0, 0.4, 0.4), density=2000.0, fixed=True)
+    high = Block("high", (0.0, 0.7, 0.2), size=(0.4, 4.0, 0.4), density=2000.0)
+    with Structure([low, high], ContactLaw(ratio * stiffness), JOINT, gravity=(0.0, 0.0, 0.0)) as s:
+        s.displace(np.array([1]), np.array([[0.0, 0.0, -depth]]), np.eye(3)[None])
+        s.set_load(np.array([np.zeros(6), [0.0, 0.0, -PUSH, 0.0, 0.0, 0.0]]))
+        s.advance(DT, DT)
+        s.joints.largest[:] = 2.0 * JOINT.opening_at_failure
+        s.advance(2 * DT, DT)
+        assert not s.joints.alive.any()
+        contacts = s.contacts()
+        corners = [(x, y) for x in (-0.2, 0.2) for y in (-0.2, 0.2)]
+        assert sorted(map(tuple, contacts.point[:, :2].round(5))) == sorted(corners)
+        assert (contacts.kn * contacts.depth).sum() == pytest.approx(ratio * PUSH, rel=0.01)
+        assert s.energies()["contact_stored"] == pytest.approx(0.5 * ratio * PUSH * depth, rel=0.01)
