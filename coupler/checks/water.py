@@ -260,10 +260,10 @@ def _run_out(case: Case) -> Iterator[Problem]:
             end = (LEFT_TO_RUN_ON**-0.5 - 1.0) / rate
             yield (
                 ("water", "inflow", i),
-                f"is a wave on still water {depth:.3g} m deep, which runs out by {' and '.join(open_sides)} (tank.open): "
-                f"about {left:.3g} m are left at the end of the run ({case.time.end:g} s), while the surface that is "
-                f"given at {spec.side} stands; give {open_sides[0]} to a sea of that level (water.sea) or close it, "
-                f"or end before {end:.2g} s",
+                f"is a wave on still water {depth:.3g} m deep, which runs out by {' and '.join(open_sides)} "
+                f"(tank.open): about {left:.3g} m are left at the end of the run ({case.time.end:g} s), while the "
+                f"surface that is given at {spec.side} stands; give {open_sides[0]} to a sea of that level "
+                f"(water.sea) or close it, or end before {end:.2g} s",
             )
 
 
