@@ -228,10 +228,11 @@ def test_a_wall_across_the_corner_of_its_footing_at_a_small_angle_is_held():
         assert s.contacts().depth.max() == pytest.approx(deep, rel=0.05)
 
 
-@pytest.mark.parametrize("seed", [2, 7, 8])
-def test_a_plate_that_rolls_over_the_edges_of_another_does_not_sink_at_each_change_of_edges(seed):
-    """It comes down slowly, slides and turns about one edge after another. Its speed alone makes 1 to 2 mm; where the
-    next pair of edges is found late, the overlap of that time stays, and the one after it adds to that: 4 to 15 mm."""
+@pytest.mark.parametrize(("seed", "most"), [(2, 2.5e-3), (7, 2.5e-3), (8, 1e-3)])
+def test_a_plate_that_rolls_over_the_edges_of_another_does_not_sink_at_each_change_of_edges(seed, most):
+    """It comes down slowly, slides and turns about one edge after another. Its speed alone makes 0.5 to 2.4 mm; where
+    the next pair of edges is found late, the overlap of that time stays, and the one after it adds to that: 4 to 15 mm,
+    and still 1.7 mm of the third if edges are looked for again after a way of ten margins."""
     random = np.random.default_rng(seed)
     plates = []
     for name, height, fixed in (("low", 0.0, True), ("high", 3.2, False)):
@@ -245,7 +246,7 @@ def test_a_plate_that_rolls_over_the_edges_of_another_does_not_sink_at_each_chan
         for _ in range(250):
             s.advance(0.04)
             deepest = max(deepest, overlap(plates, s.centre(), s.rotation()))
-        assert 2e-4 < deepest < 2.5e-3
+        assert 2e-4 < deepest < most
 
 
 @settings(max_examples=8, deadline=None)
