@@ -43,6 +43,8 @@ if TYPE_CHECKING:
 LEVEL_HALVINGS = 40
 START_STEPS = 2
 """Steps of a start, which are implicit, and after which the surface lags by no more than by half of each."""
+AT_LEVEL = 1e-6
+"""Share of a cell by which water at the start may be off the level of an absorbing side and still count as level."""
 LONGEST_STEP = 0.3
 """dt ≤ LONGEST_STEP sqrt(h/g): a step at rest, h the least size of the cells at the surface ..."""
 AT_SURFACE = 3.0
@@ -116,6 +118,7 @@ class Water:
         level = fill(self.topology.nodes) if callable(fill) else np.asarray(fill, float)
         given = np.zeros(n, bool)
         if sides is not None:
+            self._find_what_leaves(level, velocity)
             sides.surface(level, 0.0)
             given[sides.nodes()] = True
         level = self._dry_if_inactive(level)
@@ -147,6 +150,15 @@ class Water:
             self._start_moving(velocity)
         self.renumbered, self.left_behind = None, None
         self.flux = self._flux_at_start()
+
+    def _find_what_leaves(self, level, velocity) -> None:
+        """Set the absorbing sides to the water at the start, which may be lower beside them: a side at its own level at
+        the start would give water that it takes back in the first step."""
+        self.level_set, self.velocity = level, np.zeros((len(level), 3)) if velocity is None else velocity
+        self._read_absorbing_sides()
+        for absorber in self.sides.absorbers():
+            if abs(absorber.height) < AT_LEVEL * self.mesh.spacing:
+                absorber.height = absorber.speed = 0.0
 
     def _flux_at_start(self):
         """The fluxes of the velocity of the cells at the start."""

@@ -133,3 +133,42 @@ def test_absorbing_side_before_ground_up_to_the_lid_is_refused(tmp_path):
         AbsorbingSideBlocked, match=r"side x- absorbs, but 20 m inside.*reaches its upper side"
     ):
         _absorbing(case, case.water.sea[0], None, beyond)
+
+
+HALF_FULL = """
+[case]
+title = "a sea beside a tank that is partly dry"
+[time]
+end = "1 s"
+[tank]
+lower = [0, 0, 0]
+upper = [13, 2, 6.5]
+cell = "0.5 m"
+[water]
+[[water.fill]]
+lower = [0, 0, 0]
+upper = [4.5, 2, 4]
+[[water.sea]]
+side = "y-"
+level = 5
+absorbs = true
+"""
+
+
+def test_an_absorbing_sea_stands_at_the_start_as_the_water_beside_it_lets_it(tmp_path):
+    """It was at its own level for the start, and sank to what the dry floor leaves of it in the first step: a twentieth
+    of the water was gone, and the run ended."""
+    (tmp_path / "case.toml").write_text(HALF_FULL)
+    coupling = build(load(tmp_path).case, Clock()).coupling
+    water = coupling.water
+    for _ in range(3):
+        coupling.step(1e-3)
+    assert water.volume() == pytest.approx(water.conserved_volume, rel=1e-3)
+    assert water.sides.absorbers()[0].height < -0.5
+
+
+def test_an_absorbing_sea_beside_water_at_its_level_is_left_at_it(tmp_path):
+    """To the last digit: reading the level rounds."""
+    (tmp_path / "case.toml").write_text(HALF_FULL.replace("upper = [4.5, 2, 4]", "upper = [13, 2, 5]"))
+    side = build(load(tmp_path).case, Clock()).coupling.water.sides.absorbers()[0]
+    assert (side.height, side.speed) == (0.0, 0.0)
