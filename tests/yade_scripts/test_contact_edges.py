@@ -209,6 +209,22 @@ def test_plates_that_fold_touch_where_they_overlap_and_not_at_their_far_sides():
         assert 0.0 < contacts.depth.max() < 1.1 * overlap(panels, s.centre(), s.rotation())
 
 
+@pytest.mark.parametrize("inwards", [0.0, 0.05, 0.1])
+def test_a_beam_beside_a_column_meets_its_side_and_not_its_far_end(inwards):
+    """A beam is 0.11 to 0.21 m within the side of a column, and about level with its top. An edge of the beam crosses
+    edges of the column's other end as well, 1.7 m deep along the column, which is 8 to 15 overlaps: no force may come
+    from there."""
+    column = Block("column", (0, 0, 0), (0.376, 0.511, 1.669), density=600.0)
+    turn = Rotation.from_rotvec([-0.9804, 1.2954, 1.0094]).as_matrix()
+    beam = Block("beam", (0, 5, 0), (0.705, 2.747, 0.394), rotation=turn, density=600.0)
+    with Structure([column, beam], ContactLaw(2e9, 0.3, 0.4), gravity=STILL) as s:
+        place = np.array([-0.1513, 0.4526 - inwards, 0.4895])
+        s.displace(np.array([1]), (place - beam.centre)[None], np.eye(3)[None])
+        deep = overlap([column, beam], s.centre(), s.rotation())
+        assert 0.1 < deep < 0.22
+        assert 0.0 < s.contacts().depth.max() < 1.1 * deep
+
+
 def test_a_wall_across_the_corner_of_its_footing_at_a_small_angle_is_held():
     """It overlaps the footing by 75 mm, least along the normal of two long edges that cross at less than 3 degrees;
     neither has a node within the other."""
