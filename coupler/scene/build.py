@@ -159,7 +159,6 @@ def _load_at_rest(structure, water) -> Array:
 
 def build_structure(case: Case):
     """The structure of a case, in a new YADE scene."""
-    from fluid.numerics.threads import over, use
     from yade_scripts.contact.law import ContactLaw, PairFriction
     from yade_scripts.dynamics.structure import Structure
 
@@ -193,8 +192,11 @@ def build_structure(case: Case):
         ramp=case.structure.ramp or 0.0,
         sleep=case.structure.sleep and case.structure.sleep.share,
     )
-    use(threads())
-    structure.share_work(over)
+    if threads() > 1:
+        from fluid.numerics.threads import over, use
+
+        use(threads())
+        structure.share_work(over)
     return structure
 
 

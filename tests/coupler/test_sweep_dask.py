@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from coupler.commands.sweep import time_limit
-from coupler.commands.sweep.dask import CLUSTERS, Dask
+from coupler.commands.sweep.dask import CLUSTERS, Dask, jobqueue
 from coupler.commands.sweep.folder import read_spec
 from coupler.commands.sweep.options import keywords
 from coupler.commands.sweep.results import collect
@@ -50,11 +50,19 @@ class Spec:
 
 
 def script(kind, tmp_path, *options, threads=1):
-    import dask_jobqueue
-
     words = Dask(Spec(tmp_path, threads), kind, 2, options).words()
-    job = getattr(dask_jobqueue, CLUSTERS[kind]).job_cls
+    job = getattr(jobqueue(), CLUSTERS[kind]).job_cls
     return job(scheduler="tcp://there:1", name="worker", **words).job_script()
+
+
+@needs_dask
+def test_ctrl_c_is_still_a_keyboard_interrupt_with_dask_jobqueue(monkeypatch):
+    """Its import has Ctrl-C end the program with code 0, as if the sweep were done."""
+    for name in [name for name in sys.modules if name.startswith("dask_jobqueue")]:
+        monkeypatch.delitem(sys.modules, name)
+    before = signal.getsignal(signal.SIGINT)
+    jobqueue()
+    assert signal.getsignal(signal.SIGINT) is before
 
 
 @needs_dask

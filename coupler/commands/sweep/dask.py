@@ -10,12 +10,14 @@ from __future__ import annotations
 import itertools
 import math
 import os
+import signal
 import threading
 import time
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from pathlib import Path
 from shlex import quote
+from types import ModuleType
 
 from coupler.commands.sweep import time_limit
 from coupler.commands.sweep.folder import Spec, read_spec
@@ -142,10 +144,8 @@ class Dask:
             return LocalCluster(
                 n_workers=self.jobs, threads_per_worker=1, dashboard_address=None, **self.options
             )
-        import dask_jobqueue
-
         try:
-            return getattr(dask_jobqueue, CLUSTERS[self.kind])(**self.words())
+            return getattr(jobqueue(), CLUSTERS[self.kind])(**self.words())
         except (TypeError, ValueError) as error:
             raise BadCase([f"--engine dask-{self.kind}: {error}"]) from error
 
@@ -182,3 +182,12 @@ def _gained(found: dict, reached: dict[str, float]) -> bool:
         return "outcome" not in found
     before, reached[found["id"]] = reached.get(found["id"], -math.inf), found["time"]
     return found["time"] > before
+
+
+def jobqueue() -> ModuleType:
+    """The package dask-jobqueue. Its import takes Ctrl-C over, so that this would end the program with code 0."""
+    on_ctrl_c = signal.getsignal(signal.SIGINT)
+    import dask_jobqueue
+
+    signal.signal(signal.SIGINT, on_ctrl_c)
+    return dask_jobqueue
