@@ -131,6 +131,18 @@ def test_a_wave_whose_still_water_runs_out_is_refused():
     assert found(9.0, ["z+", "y+"], sea=[{"side": "x+", "level": 0.5}]) == []
 
 
+def test_a_side_that_absorbs_is_three_cells_from_the_one_opposite():
+    def found(width, absorbs=True):
+        sea = {"side": "y-", "level": 0.5, "absorbs": absorbs}
+        tank = TANK | {"upper": [1, width, 1], "cell": 0.1}
+        read = case({"sea": [sea], "fill": [{"lower": [0, 0, 0], "upper": [1, width, 0.5]}]}, tank=tank)
+        return [text for path, text in problems(read) if path == ("water", "sea", 0, "absorbs")]
+
+    assert found(0.3) == []
+    assert found(0.2, absorbs=False) == []
+    assert "the side opposite to y- is only 2 cells away" in found(0.2)[0]
+
+
 def test_a_bore_may_run_until_its_reflection_is_back():
     """0.6 m behind a bore into 0.5 m: water of 0.42 m/s, 0.25 m2/s. A wall throws back 0.71 m; a tank of 1 m that
     is 0.2 m wide has room for 0.042 m3 up to there."""
