@@ -118,7 +118,7 @@ class Water:
         level = fill(self.topology.nodes) if callable(fill) else np.asarray(fill, float)
         given = np.zeros(n, bool)
         if sides is not None:
-            self._find_what_leaves(level, velocity)
+            self._start_absorbing_sides(level, velocity)
             sides.surface(level, 0.0)
             given[sides.nodes()] = True
         level = self._dry_if_inactive(level)
@@ -151,7 +151,7 @@ class Water:
         self.renumbered, self.left_behind = None, None
         self.flux = self._flux_at_start()
 
-    def _find_what_leaves(self, level, velocity) -> None:
+    def _start_absorbing_sides(self, level, velocity) -> None:
         """Set the absorbing sides to the water at the start, which may be lower beside them: a side at its own level at
         the start would give water that it takes back in the first step."""
         self.level_set, self.velocity = level, np.zeros((len(level), 3)) if velocity is None else velocity
