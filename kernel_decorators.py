@@ -7,7 +7,7 @@ There are several, since what numba builds around a function takes as long to co
   handed, and to every view of one, such a function runs up to twice as fast.
 - `inner`: the same for functions that only other kernels call; without a Python entry they compile a third faster.
 - `helper`: like `kernel`, for functions that only other kernels call.
-- `ranged`: like `plain`, for functions that `fluid.numerics.threads` runs on several threads: they take a range first,
+- `ranged`: like `plain`, for functions that `kernel_threads` runs on several threads: they take a range first,
   let other threads of Python run meanwhile, and have the entry of `kernel_ranges.py`.
 - `released`: like `kernel`, for functions of several threads that make arrays, for work space or for what they return.
 - `nogil`: like `plain`, for functions that wait, or work beside other threads of Python, but have no range.

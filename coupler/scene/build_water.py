@@ -31,9 +31,9 @@ def water_of(case: Case, structure, solids, mesh=None):
     from coupler.scene.fill import start_level, start_velocity
     from coupler.step.immersion import Immersion
     from fluid.domain.covers import OPENINGS
-    from fluid.numerics.threads import use
     from fluid.step.parameters import WaterParameters
     from fluid.step.water import Water
+    from kernel_threads import use
 
     use(threads())
     w = case.water

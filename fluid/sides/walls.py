@@ -11,9 +11,9 @@ from functools import cached_property
 import numpy as np
 
 from array_types import Bools, Floats, Ints
-from fluid.numerics.threads import over
 from fluid.surface.level_set import drain_films
 from kernel_decorators import ranged
+from kernel_threads import over
 
 _SAME_DIRECTION = 0.3
 """Normals of one node that span less than this (singular value over the largest) count as one direction."""

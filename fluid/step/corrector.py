@@ -18,7 +18,6 @@ from fluid.domain.cell_vectors import CellVectors, places_of
 from fluid.numerics.fields import copied_at, less
 from fluid.numerics.solve import product
 from fluid.numerics.sums import kinetic_energy
-from fluid.numerics.threads import over
 from fluid.pressure.pressure_bound import BoundMet
 from fluid.pressure.projection import (
     Waterline,
@@ -35,6 +34,7 @@ from fluid.surface.extrapolation import extend_velocity
 from fluid.surface.gradient_jump_damping import damp_gradient_jumps
 from fluid.surface.volume import Flux, edge_flux
 from kernel_decorators import ranged
+from kernel_threads import over
 
 FLUX_LAYERS = 3
 """Layers of dry nodes that water may reach within the next step."""

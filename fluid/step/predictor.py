@@ -18,7 +18,6 @@ from array_types import Bools, Floats, Ints
 from fluid.domain.cell_vectors import places_of
 from fluid.domain.coupling_matrix import wetted_coupling
 from fluid.numerics.fields import added, copied
-from fluid.numerics.threads import over
 from fluid.pressure.active_cells import WetPart
 from fluid.pressure.indefinite_cells import about, reserve
 from fluid.pressure.pressure_bound import lowest_pressure
@@ -37,6 +36,7 @@ from fluid.surface.volume import VolumeCorrection, correct_volume
 from fluid.transport.advection import transport
 from fluid.transport.paths_in_solids import levels_in_solids
 from kernel_decorators import ranged
+from kernel_threads import over
 
 if TYPE_CHECKING:
     from fluid.viscous.viscosity import ViscousChange

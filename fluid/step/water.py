@@ -21,7 +21,6 @@ from fluid.domain.physical_domain import carry, wetted_coupling
 from fluid.domain.topology import Graph, Topology, layers_around
 from fluid.mesh.background import Background
 from fluid.numerics.sums import kinetic_energy
-from fluid.numerics.threads import over
 from fluid.pressure.displaced import taken_from_nodes
 from fluid.pressure.projection import PressureProblem
 from fluid.sides.walls import Walls
@@ -36,6 +35,7 @@ from fluid.surface.volume import edge_flux, nodal_volume, renumbering
 from fluid.transport.surface_momentum import Carried
 from fluid.transport.swept_volume import swept
 from kernel_decorators import kernel, ranged
+from kernel_threads import over
 
 if TYPE_CHECKING:
     from fluid.viscous.viscosity import FreeBodies

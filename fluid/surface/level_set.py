@@ -37,9 +37,9 @@ import numpy as np
 from array_types import Array, Floats, Ints
 from fluid.domain.topology import layers_around
 from fluid.mesh.arrays import Corners
-from fluid.numerics.threads import found_over, over, zeros
 from fluid.surface.extrapolation import continue_outward, mean_gradients
 from kernel_decorators import helper, inner, kernel, plain, ranged, released
+from kernel_threads import found_over, over, zeros
 
 LAYERS = 6
 EXACT_LAYERS = 2

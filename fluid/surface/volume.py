@@ -34,9 +34,9 @@ from array_types import Floats, Ints
 from fluid.domain.moments import nodal_water, part_moments
 from fluid.domain.topology import WORK, Graph
 from fluid.numerics.fields import added, copied
-from fluid.numerics.threads import found_over, over, owning, reach_of_cells, zeros
 from fluid.surface.level_set import drain_films
 from kernel_decorators import kernel, ranged, released
+from kernel_threads import found_over, over, owning, reach_of_cells, zeros
 
 BAND_WIDTH = 3.0
 LARGEST_SHIFT = 0.3

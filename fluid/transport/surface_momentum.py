@@ -42,11 +42,11 @@ import numpy as np
 from array_types import Array
 from fluid.domain.topology import Graph, Topology
 from fluid.numerics.fields import copied
-from fluid.numerics.threads import over
 from fluid.surface.volume import Flux, Shift
 from fluid.transport.velocity_transport import carry_velocity
 from fluid.transport.volume_transport import carry_volume
 from kernel_decorators import inner, ranged, released
+from kernel_threads import over
 
 SHALLOW, DEEP = 2.0, 3.0
 """Depths in cell sizes down to which momentum counts in full, and at all."""

@@ -16,10 +16,10 @@ from __future__ import annotations
 import numpy as np
 
 from fluid.numerics.fields import copied
-from fluid.numerics.threads import over, owning, reach_of_rows
 from fluid.surface.volume import Flux
 from fluid.transport.velocity_transport import carry_velocity
 from kernel_decorators import inner, ranged, released
+from kernel_threads import over, owning, reach_of_rows
 
 LARGEST_COURANT = 0.8
 LEAST_COUNTED = 0.3

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from coupler.program.kernel_cache import ROOMS
 from coupler.program.provenance import ROOT
 
 ALLOWED = {
@@ -14,8 +15,9 @@ ALLOWED = {
     "yade_scripts": {"yade_scripts", "yade"},
     "coupler": {"coupler", "fluid", "yade_scripts"},
     "coupler/commands/view": {"coupler"},
+    **{f"{name}.py": set() for name in ("array_types", *ROOMS) if (ROOT / f"{name}.py").exists()},
 }
-"""Packages of this project, and YADE, that each room may import."""
+"""Packages of this project, and YADE, that each room, or a module beside them, may import."""
 
 
 def imports(path):
@@ -28,6 +30,8 @@ def imports(path):
 
 
 def files(room):
+    if room.endswith(".py"):
+        return [ROOT / room]
     found = (ROOT / room).rglob("*.py")
     return [path for path in found if room != "coupler" or "view" not in path.relative_to(ROOT).parts]
 

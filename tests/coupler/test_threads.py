@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-import fluid.numerics.threads as kernels
+import kernel_threads as kernels
 import surgebreak
 from coupler.commands.benchmark import command, machine
 from coupler.commands.benchmark import threads as measured
@@ -234,7 +234,7 @@ def test_threads_without_work_do_not_use_the_processor(divided):
 
 IN_ANOTHER_PROCESS = """
 import numpy as np
-from fluid.numerics import threads
+import kernel_threads as threads
 threads.use(3, least=1)
 threads.zeros((100,))
 assert (threads.marked(np.arange(100) % 3 == 0) == np.arange(0, 100, 3)).all()

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
+import kernel_threads as threads
 from fluid.cut.bodies import ConvexBodies
-from fluid.numerics import multigrid, threads
+from fluid.numerics import multigrid
 from fluid.numerics.multigrid import Multigrid
 from fluid.numerics.solve import solve
 from tests.fluid.scenes import tank

@@ -8,8 +8,8 @@ import time
 
 import numpy as np
 
-from fluid.numerics.threads import over, use
 from kernel_decorators import ranged
+from kernel_threads import over, use
 
 ROWS, TURNS = 1_000, 20_000
 """Rows of the loop that computes, and its turns for each."""

@@ -12,8 +12,8 @@ unchanged. The result of a row must not depend on where the ranges end. There ar
   nearby numbers.
 
 Numba's own `prange` would take three times as long to compile and bring a second pool beside that of YADE's OpenMP.
-The threads here wait in compiled code (`team.py`), and start when they are first needed; a process that is forked off
-starts its own.
+The threads here wait in compiled code (`kernel_team.py`), and start when they are first needed; a process that is
+forked off starts its own.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ from typing import NamedTuple
 import numpy as np
 
 from array_types import Array
-from fluid.numerics.team import Team
 from kernel_decorators import kernel, ranged, released
 from kernel_ranges import MOST, is_shared
+from kernel_team import Team
 
 LEAST_ROWS = 1_000
 """Least number of rows that is worth a thread: handing them over takes as long as two hundred of them."""
