@@ -15,6 +15,7 @@ import numpy as np
 
 from array_types import Array, Bools, Floats, Integers, Ints
 from fluid.domain.coupling_matrix import polygons_of_nodes
+from fluid.domain.layers import WORK, layers_around
 from fluid.domain.moments import FluidParts
 from fluid.mesh.arrays import Edges, FluidCells, Hats, Paths
 from fluid.mesh.background import Background
@@ -161,7 +162,7 @@ class Topology:
         """(N,) bool: nodes of cells with obtuse dihedral angles and three layers around them."""
         near = np.zeros(len(self.nodes), bool)
         near[self.cells[self.obtuse]] = True
-        near[layers_around(near, 3, *self.around)[0]] = True
+        near[layers_around(near, 3, *self.around).order] = True
         return near
 
     @cached_property
@@ -194,7 +195,7 @@ class Topology:
     def near_solids(self) -> Array:
         """(N,) bool: nodes of cut cells and two layers around them."""
         near = self.beside_solid.copy()
-        near[layers_around(near, 2, *self.around)[0]] = True
+        near[layers_around(near, 2, *self.around).order] = True
         return near
 
     def cells_around(self, nodes) -> Array:
@@ -381,33 +382,6 @@ def _touched(first, last, nodes, node_start, node_cells, touched):
                 touched[node_cells[t]] = True
 
 
-@kernel
-def layers_around(seed, depth, start, around):
-    """Nodes in order of distance from the seed nodes (bool (N,)): (list, layer_start (depth + 2,)).
-
-    Layer 0 is the seed; layer k + 1 shares a cell with layer k. start, around: `Topology.around`."""
-    n = seed.shape[0]
-    order = np.empty(n, np.int64)
-    layer_start = np.zeros(depth + 2, np.int64)
-    seen = seed.copy()
-    count = 0
-    for i in range(n):
-        if seed[i] and start[i + 1] > start[i]:
-            order[count] = i
-            count += 1
-    layer_start[1] = count
-    for layer in range(depth):
-        for s in range(layer_start[layer], layer_start[layer + 1]):
-            for t in range(start[order[s]], start[order[s] + 1]):
-                j = around[t]
-                if not seen[j]:
-                    seen[j] = True
-                    order[count] = j
-                    count += 1
-        layer_start[layer + 2] = count
-    return order[:count].copy(), layer_start
-
-
 @dataclass(frozen=True)
 class Graph:
     """Edges of the listed nodes with the stiffness of the physical domain.
@@ -450,8 +424,6 @@ class Graph:
         return found
 
 
-WORK = 10
-"""Cost of going through the neighbours of a node, or the cells around it, in visits of a node."""
 _PAIR = np.array([[-1, 0, 1, 2], [0, -1, 3, 4], [1, 3, -1, 5], [2, 4, 5, -1]])
 """Column of Background.products that holds the corners a, b."""
 

@@ -17,8 +17,9 @@ import numpy as np
 
 from array_types import Array, Floats, Ints
 from fluid.domain.cell_vectors import CellVectors
+from fluid.domain.layers import layers_around
 from fluid.domain.physical_domain import carry, wetted_coupling
-from fluid.domain.topology import Graph, Topology, layers_around
+from fluid.domain.topology import Graph, Topology
 from fluid.mesh.background import Background
 from fluid.numerics.sums import kinetic_energy
 from fluid.pressure.displaced import taken_from_nodes
@@ -473,7 +474,7 @@ class Water:
     def layers(self, wet):
         """The wet nodes, then BAND layers around them: (list, layer_start)."""
         t = self.topology
-        order, start = layers_around(wet, BAND, *t.around)
+        order, start, _ = layers_around(wet, BAND, *t.around)
         if self.sides is None:
             return order, start
         # sides count with the last layer wherever they are: water may come in far from all water

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from array_types import Bools, Floats
+from fluid.domain.layers import WORK, layers_around
 from fluid.domain.moments import touching_among
-from fluid.domain.topology import WORK, layers_around
 from kernel_decorators import inner, ranged, released
 from kernel_threads import over, owning, reach_of_cells, zeros
 
@@ -186,7 +186,7 @@ def smoothed_slope(topology, cell_list, marked, u, calm: float):
         reach.append(_one_layer_more(cell_list, reach[-1], t.cells))
     near = touching_among(cell_list, reach.pop(), t.cells)
     there = np.zeros(len(u), bool)
-    over(_mark_nodes, len(near), near, t.cells, there)
+    over(mark_nodes, len(near), near, t.cells, there)
     slope = mean_gradients(near, marked, u, t.fluid_cells, _zero_at(there, there, u.shape[1]))
     mean = _zero_at(there, marked, u.shape[1])
     once = before = slope = _averaged(near, reach.pop(), has, slope, t.cells, mean)
@@ -200,7 +200,7 @@ def smoothed_slope(topology, cell_list, marked, u, calm: float):
 
 
 @ranged
-def _mark_nodes(first, last, cell_list, cells, marked):
+def mark_nodes(first, last, cell_list, cells, marked):
     for s in range(first, last):
         for a in range(4):
             marked[cells[cell_list[s], a]] = True
@@ -340,7 +340,7 @@ def fill_missing(topology, known, *fields):
     while missing.any():
         before = missing.sum()
         seed = known & topology.active
-        order, start = layers_around(seed, 4, *topology.around)
+        order, start, _ = layers_around(seed, 4, *topology.around)
         for f in fields:
             _fill(topology, order, start, 0, f, np.zeros((1, f.shape[1], 3)), seed.copy(), _NO_LIMIT)
         known = known.copy()

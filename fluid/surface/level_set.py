@@ -30,15 +30,13 @@ the tip stops before it (72 mm at 0.1 m from water 7 mm deep).
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
-from array_types import Array, Floats, Ints
-from fluid.domain.topology import layers_around
+from fluid.domain.layers import Layers, layers_around
 from fluid.mesh.arrays import Corners
-from fluid.surface.extrapolation import continue_outward, mean_gradients
-from kernel_decorators import helper, inner, kernel, plain, ranged, released
+from fluid.surface.closest_triangles import Descent, Surface, squared_distances
+from fluid.surface.extrapolation import continue_outward, mark_nodes, mean_gradients
+from kernel_decorators import kernel, ranged, released
 from kernel_threads import found_over, over, zeros
 
 LAYERS = 6
@@ -140,101 +138,6 @@ def _surface_triangles(first, last, cut, phi, nodes, cells):
     return triangles[:n].copy(), owner[:n].copy()
 
 
-@plain
-def squared_distance(p, t):
-    """Squared distance [m²] from the point p (3,) to the triangle t (3, 3) (Ericson, Real-Time Collision
-    Detection (2005), 5.1.5).  It uses scalars only, since it is called millions of times a second."""
-    abx, aby, abz = t[1, 0] - t[0, 0], t[1, 1] - t[0, 1], t[1, 2] - t[0, 2]
-    acx, acy, acz = t[2, 0] - t[0, 0], t[2, 1] - t[0, 1], t[2, 2] - t[0, 2]
-    apx, apy, apz = p[0] - t[0, 0], p[1] - t[0, 1], p[2] - t[0, 2]
-    d1 = abx * apx + aby * apy + abz * apz
-    d2 = acx * apx + acy * apy + acz * apz
-    ab2 = abx * abx + aby * aby + abz * abz
-    ac2 = acx * acx + acy * acy + acz * acz
-    abac = abx * acx + aby * acy + abz * acz
-    d3, d4, d5, d6 = d1 - ab2, d2 - abac, d1 - abac, d2 - ac2
-    va, vb, vc = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
-    v, w = 0.0, 0.0
-    if d1 <= 0.0 and d2 <= 0.0:
-        pass
-    elif d3 >= 0.0 and d4 <= d3:
-        v = 1.0
-    elif d6 >= 0.0 and d5 <= d6:
-        w = 1.0
-    elif vc <= 0.0 and d1 >= 0.0 and d3 <= 0.0 and ab2 > 0.0:
-        v = _ratio(d1, d1 - d3)
-    elif vb <= 0.0 and d2 >= 0.0 and d6 <= 0.0 and ac2 > 0.0:
-        w = _ratio(d2, d2 - d6)
-    elif va <= 0.0 and d4 >= d3 and d5 >= d6:
-        w = _ratio(d4 - d3, (d4 - d3) + (d5 - d6))
-        v = 1.0 - w
-    else:
-        v, w = _ratio(vb, va + vb + vc), _ratio(vc, va + vb + vc)
-    x, y, z = apx - v * abx - w * acx, apy - v * aby - w * acy, apz - v * abz - w * acz
-    return x * x + y * y + z * z
-
-
-@inner
-def _ratio(part, whole):
-    """part / whole; 0 for an edge or a triangle without extent."""
-    return part / whole if whole > 0.0 else 0.0
-
-
-class Surface(NamedTuple):
-    """triangles (T, 3, 3) [m] · owner (T,) the cell of each; those of a cell follow each other."""
-
-    triangles: Floats
-    owner: Ints
-
-
-class Nearest(NamedTuple):
-    """The closest triangle of each node found so far: closest (N,) its number · best (N,) [m²] squared distance, ∞ for
-    none · tried (T,) the last node that tested the triangle · asked, found (N,): sweeps in which a node last tested
-    triangles, and in which it found its closest one, 0 for none."""
-
-    closest: Array
-    best: Array
-    tried: Array
-    asked: Array
-    found: Array
-
-
-def _closest_in_layers(layers, surface, mesh, *more):
-    """Squared distance (N,) [m²] of `_closest`, after that at the corners of the cells of the triangles."""
-    n, corner = len(mesh.nodes), np.empty((len(surface.triangles), 4))
-    over(_of_corners, len(corner), surface, mesh, corner)
-    asked, found = np.zeros(n, np.int32), np.zeros(n, np.int32)
-    known = Nearest(np.empty(n, np.int64), np.full(n, np.inf), np.full(len(corner), -1), asked, found)
-    _closest(layers, surface, corner, mesh, *more, known)
-    return known.best
-
-
-@ranged
-def _of_corners(first, last, surface, mesh, corner):
-    """Squared distance (T, 4) [m²] of each triangle from the corners of its cell."""
-    triangles, owner = surface
-    nodes, cells = mesh
-    for t in range(first, last):
-        for a in range(4):
-            corner[t, a] = squared_distance(nodes[cells[owner[t], a]], triangles[t])
-
-
-@kernel
-def _closest(layers, surface, corner, mesh, around, exact, obtuse, cells_of_nodes, known):
-    """Fill `known`, Nearest, at the nodes in layers (order, start), handed outward; two sweeps a layer.
-
-    around: (start, neighbours) of each node · exact: first layers whose nodes, where `obtuse` (N,) bool, go on to the
-    closest of all (`_descend`) among the cells_of_nodes (start, members)."""
-    order, layer_start = layers
-    closest, best = known.closest, known.best
-    first = _first_triangles(surface.owner, mesh.cells.shape[0] if exact > 0 else 0)
-    _propagate_outward(layers, surface, corner, mesh, around, known)
-    for s in range(layer_start[1], layer_start[exact + 1]):
-        i = order[s]
-        if known.found[i] > 0 and obtuse[i]:
-            best[i] = _descend(mesh.nodes[i], closest[i], best[i], surface, first, mesh.cells, cells_of_nodes)
-
-
 @ranged
 def _far(first, last, phi, size, out):
     """±FAR·size [m] with the sign of φ (N,)."""
@@ -244,76 +147,14 @@ def _far(first, last, phi, size, out):
 
 
 @ranged
-def _signed(first, last, listed, square, phi, out):
-    """√square [m] with the sign of φ (N,) at the listed nodes, in `out` (N,) where it is less than the length there."""
+def _signed(first, last, layers, square, phi, out):
+    """√square (n,) [m] with the sign of φ (N,) at the nodes in layers, in `out` (N,) where it is less than the length
+    there; φ itself in layer 0."""
+    order, start, _ = layers
     for s in range(first, last):
-        i = listed[s]
-        out[i] = np.copysign(min(np.sqrt(square[i]), abs(out[i])), phi[i])
-
-
-@helper
-def _first_triangles(owner, n_cells):
-    """First triangle of each cell (n_cells,), -1 none; those of a cell follow each other."""
-    first = np.full(n_cells, -1, np.int64)
-    if n_cells > 0:
-        for t in range(owner.shape[0] - 1, -1, -1):
-            first[owner[t]] = t
-    return first
-
-
-@inner
-def _descend(x, closest, best, surface, first, cells, cells_of_nodes):
-    """Squared distance [m²] of x (3,) to the closest triangle that can be reached from `closest`, at the squared
-    distance `best`, through cells with a common node, always coming closer."""
-    triangles, owner = surface
-    node_start, node_cells = cells_of_nodes
-    before = -1
-    while closest != before:
-        before = closest
-        for a in range(4):
-            i = cells[owner[before], a]
-            for s in range(node_start[i], node_start[i + 1]):
-                t = first[node_cells[s]]
-                while 0 <= t < owner.shape[0] and owner[t] == node_cells[s]:
-                    d = squared_distance(x, triangles[t])
-                    if d < best:
-                        best, closest = d, t
-                    t += 1
-    return best
-
-
-@inner
-def _propagate_outward(layers, surface, corner, mesh, around_nodes, known):
-    """Fill `known`, Nearest; corner as in `_of_corners`. In the second sweep only neighbours that have found another
-    triangle since then are tested."""
-    order, layer_start = layers
-    triangles, owner = surface
-    nodes, cells = mesh
-    start, around = around_nodes
-    closest, best, tried, asked, found = known
-    now = 1
-    for t in range(triangles.shape[0]):
-        for a in range(4):
-            i, d = cells[owner[t], a], corner[t, a]
-            if d < best[i]:
-                best[i], closest[i], found[i] = d, t, now
-    for layer in range(1, layer_start.shape[0] - 1):
-        for _ in range(2):
-            for s in range(layer_start[layer], layer_start[layer + 1]):
-                i = order[s]
-                now += 1
-                for t in range(start[i], start[i + 1]):
-                    j = around[t]
-                    if found[j] <= asked[i]:
-                        continue
-                    c = closest[j]
-                    if tried[c] == i:
-                        continue
-                    tried[c] = i
-                    d = squared_distance(nodes[i], triangles[c])
-                    if d < best[i]:
-                        best[i], closest[i], found[i] = d, c, now
-                asked[i] = now
+        i = np.uint64(order[s])
+        size = min(np.sqrt(square[s]), abs(out[i]))
+        out[i] = phi[i] if s < start[1] else np.copysign(size, phi[i])
 
 
 @kernel
@@ -348,16 +189,11 @@ def redistance(topology, phi, spacing, rescale: bool, motion=None):
     if len(cut) == 0:
         return far
     front = np.zeros(len(phi), bool)
-    front[t.cells[cut]] = True
-    order, start = layers_around(front, LAYERS, *t.around)
-    triangles, owner = surface_triangles(cut, phi, t.nodes, t.cells)
-    exact, obtuse = (EXACT_LAYERS, t.near_obtuse) if t.is_obtuse else (0, np.zeros(0, bool))
-    surface, mesh = Surface(triangles, owner), Corners(t.nodes, t.cells)
-    of_nodes = (t.node_start, t.node_cells)
-    square = _closest_in_layers((order, start), surface, mesh, t.around, exact, obtuse, of_nodes)
-    listed = order[start[1] :]
-    over(_signed, len(listed), listed, square, phi, far)
-    far[front] = phi[front]
+    over(mark_nodes, len(cut), cut, t.cells, front)
+    layers = layers_around(front, LAYERS, *t.around)
+    surface, mesh = Surface(*surface_triangles(cut, phi, t.nodes, t.cells)), Corners(t.nodes, t.cells)
+    square = squared_distances(layers, surface, mesh, t.around, _descent(t, layers))
+    over(_signed, len(layers.order), layers, square, phi, far)
     if rescale:
         slope = _mean_slope(cut, phi, t.cells, t.parent, t.gradients, len(phi))
         off = front & ((slope > STEEPEST) | (slope < FLATTEST)) & (slope > 0.0)
@@ -365,8 +201,17 @@ def redistance(topology, phi, spacing, rescale: bool, motion=None):
             off[_slow(np.flatnonzero(off & t.sloping_bed & (phi > 0.0)), t, motion)] = False
         far[off] /= slope[off]
     if motion is not None:
-        _past_the_last_polygon(t, cut, front, order[start[1] : start[2]], motion, far)
+        beside = layers.order[layers.start[1] : layers.start[2]]
+        _past_the_last_polygon(t, cut, front, beside, motion, far)
     return far
+
+
+def _descent(t, layers: Layers) -> Descent | None:
+    """Which nodes go on to the closest triangle of all; None where no cell of the mesh is obtuse."""
+    if not t.is_obtuse:
+        return None
+    places = np.arange(layers.start[1], layers.start[EXACT_LAYERS + 1])
+    return Descent(places[t.near_obtuse[layers.order[places]]], t.node_start, t.node_cells)
 
 
 def no_steeper(topology, phi, given):

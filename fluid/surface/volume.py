@@ -31,8 +31,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from array_types import Floats, Ints
+from fluid.domain.layers import WORK
 from fluid.domain.moments import nodal_water, part_moments
-from fluid.domain.topology import WORK, Graph
+from fluid.domain.topology import Graph
 from fluid.numerics.fields import added, copied
 from fluid.surface.level_set import drain_films
 from kernel_decorators import kernel, ranged, released

@@ -24,8 +24,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from fluid.domain.layers import WORK
 from fluid.domain.moments import part_moments
-from fluid.domain.topology import WORK
 from fluid.numerics.fields import copied
 from fluid.surface.volume import Flux, edge_rates
 from kernel_decorators import ranged, released

@@ -10,7 +10,8 @@ from fluid.domain.physical_domain import cut_domain
 from fluid.domain.topology import Topology
 from fluid.mesh.background import box_mesh
 from fluid.mesh.fitted_mesh import fitted_mesh
-from fluid.surface.level_set import FAR, no_steeper, redistance, squared_distance
+from fluid.surface.closest_triangles import squared_distance
+from fluid.surface.level_set import FAR, no_steeper, redistance
 from fluid.surface.volume import nodal_volume
 
 H = 0.1

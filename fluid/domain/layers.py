@@ -1,0 +1,86 @@
+"""Layers of nodes around others, in an order that does not depend on the threads.
+
+Layer k + 1 holds the nodes that share a cell with layer k and are in no layer before it, in the order in which a walk
+through layer k and the neighbours of its nodes comes to them. Each thread walks through a part of layer k and lists
+what it finds; the lists are then gone through one after the other, and of a node that several of them hold the first
+one counts."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from array_types import Array, Ints
+from kernel_decorators import plain, ranged, released
+from kernel_threads import found_over, marked, over
+
+WORK = 10
+"""Cost of going through the neighbours of a node, or the cells around it, in visits of a node."""
+
+
+class Layers(NamedTuple):
+    """order (n,): nodes, layer by layer · start (depth + 2,): layer k is order[start[k] : start[k + 1]] · place (N,)
+    int32: where each node stands in `order`, -1 if it does not."""
+
+    order: Ints
+    start: Ints
+    place: Array
+
+
+def layers_around(seed, depth: int, start, around) -> Layers:
+    """The seed nodes (N,) bool that have neighbours, in their order, as layer 0, and `depth` layers around them.
+
+    start, around: `Topology.around`."""
+    place, layer_start = np.empty(len(seed), np.int32), np.zeros(depth + 2, np.int64)
+    over(_nowhere, len(seed), place)
+    order, found, count = np.empty(len(seed), np.int64), marked(seed), 0
+    for layer in range(depth + 1):
+        if layer > 0:
+            before = order[layer_start[layer - 1] : count]
+            rows = (layer_start[layer - 1], before, place, start, around)
+            found = found_over(_beyond, len(before), *rows, weight=WORK)
+        count = _append(found, start, count, order, place)
+        layer_start[layer + 1] = count
+    return Layers(order[:count].copy(), layer_start, place)
+
+
+@ranged
+def _nowhere(first, last, place):
+    for i in range(first, last):
+        place[np.uint64(i)] = -1
+
+
+@plain
+def _append(found, start, count, order, place):
+    """Number of nodes in `order` (n,) after those of the list that have neighbours and stand nowhere yet."""
+    for s in range(found.shape[0]):
+        i = np.uint64(found[s])
+        if place[i] < 0 and start[i + np.uint64(1)] > start[i]:
+            order[count], place[i] = found[s], count
+            count += 1
+    return count
+
+
+@released
+def _beyond(first, last, begun, layer, place, start, around):
+    """Neighbours of the nodes of a layer that stand nowhere yet. `begun`: place of the first node of the layer.
+
+    What a range has listed it marks as its own in `place`. Another thread may write over the mark; the node is then
+    listed twice, which `_append` sees."""
+    own = np.int32(-2 - begun - first)
+    found, n = np.empty(4 * (last - first) + 64, np.int64), 0
+    for s in range(first, last):
+        i = np.uint64(layer[np.uint64(s)])
+        most = n + np.int64(start[i + np.uint64(1)]) - np.int64(start[i])
+        if most > found.shape[0]:
+            longer = np.empty(2 * most, np.int64)
+            longer[:n] = found[:n]
+            found = longer
+        for t in range(start[i], start[i + np.uint64(1)]):
+            j = around[t]
+            if place[j] < 0 and place[j] != own:
+                place[j] = own
+                found[n] = j
+                n += 1
+    return found[:n]

@@ -1,0 +1,120 @@
+"""Layers of nodes and distances handed on through them: what one loop finds, on any number of threads."""
+
+import numpy as np
+import pytest
+
+import kernel_threads as threads
+from fluid.cut.bodies import ConvexBodies
+from fluid.domain.layers import layers_around
+from fluid.domain.physical_domain import cut_domain
+from fluid.domain.topology import Topology
+from fluid.mesh.arrays import Corners
+from fluid.mesh.background import Background, box_mesh
+from fluid.surface import closest_triangles
+from fluid.surface.closest_triangles import Surface, squared_distance, squared_distances
+from fluid.surface.level_set import redistance, surface_cells, surface_triangles
+
+H = 1.0 / 14
+DEPTH = 6
+
+
+@pytest.fixture
+def number():
+    """Sets the number of threads, which divide every loop, however short."""
+    yield lambda n: threads.use(n, least=1)
+    threads.use(1)
+
+
+def _rough(x):
+    """A surface with drops and holes, of waves of a few cells."""
+    wave = np.random.default_rng(3).uniform(4.0, 30.0, (12, 3))
+    return x[:, 2] - 0.5 + 0.06 * np.sin(x @ wave.T + np.arange(12)).sum(axis=1)
+
+
+@pytest.fixture(scope="module", params=["bricks", "moved"])
+def topology(request):
+    """Cells of bricks; and the same with moved nodes, some of them obtuse."""
+    mesh = box_mesh((0, 0, 0), (1, 1, 1), H)
+    if request.param == "moved":
+        x = mesh.nodes.copy()
+        move = np.random.default_rng(1).uniform(-0.25 * H, 0.25 * H, x.shape)
+        move[(x < 1e-9) | (x > 1 - 1e-9)] = 0
+        mesh = Background.from_arrays(x + move, mesh.cells)
+    t = Topology.of(mesh, cut_domain(mesh, ConvexBodies.empty()))
+    assert t.is_obtuse == (request.param == "moved")
+    return t
+
+
+def _of_one_loop(seed, start, around):
+    order, ends = [int(i) for i in np.flatnonzero(seed)], [0, int(seed.sum())]
+    for layer in range(DEPTH):
+        for i in order[ends[layer] : ends[layer + 1]]:
+            order += [j for j in dict.fromkeys(around[start[i] : start[i + 1]].tolist()) if j not in order]
+        ends.append(len(order))
+    return order, ends
+
+
+def test_layers_have_the_order_of_one_loop(topology, number):
+    seed = np.abs(_rough(topology.nodes)) < 0.2 * H
+    order, ends = _of_one_loop(seed, *topology.around)
+    for n in (1, 2, 3, 4, 7):
+        number(n)
+        found = layers_around(seed, DEPTH, *topology.around)
+        assert found.order.tolist() == order
+        assert found.start.tolist() == ends
+        place = np.full(len(seed), -1)
+        place[order] = np.arange(len(order))
+        np.testing.assert_array_equal(found.place, place)
+
+
+def _scene(t):
+    phi = _rough(t.nodes)
+    cut = surface_cells(phi, np.arange(len(t.cells)), t.cells)
+    front = np.zeros(len(phi), bool)
+    front[t.cells[cut]] = True
+    return layers_around(front, DEPTH, *t.around), Surface(*surface_triangles(cut, phi, t.nodes, t.cells))
+
+
+def _handed_on(t, layers, surface):
+    """Two sweeps over each layer, node by node: what each holds is seen by all that come later."""
+    start, around = t.around
+    best, closest = np.full(len(t.nodes), np.inf), np.full(len(t.nodes), -1)
+
+    def test(i, k):
+        d = squared_distance(t.nodes[i], surface.triangles[k])
+        if d < best[i]:
+            best[i], closest[i] = d, k
+
+    for k, e in enumerate(surface.owner):
+        for i in t.cells[e]:
+            test(i, k)
+    for begin, end in zip(layers.start[1:], layers.start[2:]):
+        for i in 2 * layers.order[begin:end].tolist():
+            for j in around[start[i] : start[i + 1]]:
+                if closest[j] >= 0:
+                    test(i, closest[j])
+    return best[layers.order]
+
+
+def test_distances_are_those_of_one_loop(topology, number, monkeypatch):
+    """Bit for bit, although the parts of a layer begin at other nodes each time. Without the second look at nodes
+    behind other parts they would not be."""
+    t = topology
+    layers, surface = _scene(t)
+    expected, mesh = _handed_on(t, layers, surface), Corners(t.nodes, t.cells)
+    for n in (1, 2, 3, 4, 7):
+        number(n)
+        found = squared_distances(layers, surface, mesh, t.around, None)
+        np.testing.assert_array_equal(found, expected)
+    monkeypatch.setattr(closest_triangles, "_mend", lambda *_: None)
+    assert (squared_distances(layers, surface, mesh, t.around, None) != expected).any()
+
+
+def test_a_level_set_has_the_same_bits_on_any_number_of_threads(topology, number):
+    """On the mesh with obtuse cells nodes go on from the triangle handed to them."""
+    t, found = topology, []
+    for n in (1, 2, 3, 4):
+        number(n)
+        found.append(redistance(t, _rough(t.nodes), t.node_size, rescale=True))
+    for other in found[1:]:
+        np.testing.assert_array_equal(other, found[0])
