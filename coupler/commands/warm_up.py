@@ -127,7 +127,7 @@ def call_last_kernels(water: Water) -> None:
     import numpy as np
     import scipy.sparse as sp
 
-    import kernel_threads as threads
+    import kernels.threads as threads
     from coupler.step.coupling_rows import Wetting
     from fluid.numerics.solve import MULTIGRID_FROM, solve
     from fluid.pressure.waterline import hydrostatic_stiffness

@@ -24,15 +24,7 @@ from pathlib import Path
 from coupler.program.errors import SurgebreakError
 from coupler.program.provenance import ROOT
 
-ROOMS = (
-    "fluid",
-    "yade_scripts",
-    "coupler",
-    "kernel_decorators",
-    "kernel_ranges",
-    "kernel_threads",
-    "kernel_team",
-)
+ROOMS = ("fluid", "yade_scripts", "coupler", "kernels")
 KEPT = 8  # states of a module: those of the last few versions, or of checkouts side by side
 NUMBA_S_OWN = "UserProvidedCacheLocator"  # for functions in other files, such as laws from elsewhere
 

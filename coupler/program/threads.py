@@ -1,6 +1,6 @@
 """The number of threads of a run: from the command, from SURGEBREAK_THREADS, or the number of cores of this process.
 
-The results have the same bits with any number (`kernel_threads.py`). A run and the processes that it starts
+The results have the same bits with any number (`kernels/threads.py`). A run and the processes that it starts
 read the variable; without it, as in scripts and tests, there is one thread."""
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 A part of the program counts as compiled if most of its modules have their folder in the cache. Kernels that are still
 missing, after an edit for instance, are compiled by the run when it first calls them. Processes that need the same
-kernel wait for one another (`kernel_decorators.py`), so none is compiled twice.
+kernel wait for one another (`kernels/decorators.py`), so none is compiled twice.
 """
 
 from __future__ import annotations

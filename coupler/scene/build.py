@@ -193,7 +193,7 @@ def build_structure(case: Case):
         sleep=case.structure.sleep and case.structure.sleep.share,
     )
     if threads() > 1:
-        from kernel_threads import over, use
+        from kernels.threads import over, use
 
         use(threads())
         structure.share_work(over)

@@ -33,7 +33,7 @@ def water_of(case: Case, structure, solids, mesh=None):
     from fluid.domain.covers import OPENINGS
     from fluid.step.parameters import WaterParameters
     from fluid.step.water import Water
-    from kernel_threads import use
+    from kernels.threads import use
 
     use(threads())
     w = case.water

@@ -50,7 +50,7 @@ from scipy.sparse.linalg import splu
 
 from array_types import Array, Bools, Floats
 from coupler.step.coupling_rows import Wetting
-from kernel_decorators import kernel, plain
+from kernels.decorators import kernel, plain
 
 if TYPE_CHECKING:
     from fluid.pressure.projection import PressureProblem

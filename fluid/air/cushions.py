@@ -32,7 +32,7 @@ from fluid.air.gas import Gas
 from fluid.air.pockets import OPEN_AIR, SLIVER, Descent, bricks, labelled, volumes, without
 from fluid.domain.coupling_matrix import wetted_coupling
 from fluid.pressure.projection import SMALLEST_CUT
-from kernel_decorators import kernel
+from kernels.decorators import kernel
 
 RESOLVED, SETTLING = 0.5, 1.0
 """θ_k of (2)."""

@@ -14,7 +14,7 @@ import numpy as np
 from array_types import Array
 from fluid.cut.parts_of_cell import root as find
 from fluid.domain.moments import wet_fraction
-from kernel_decorators import inner, kernel
+from kernels.decorators import inner, kernel
 
 NO_AIR, OPEN_AIR = -1, 0
 """Labels of nodes without air and of nodes that the open air reaches; the labels of pockets begin with 1."""

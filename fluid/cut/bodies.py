@@ -14,7 +14,7 @@ from scipy.spatial import ConvexHull
 
 from array_types import Array, Floats, Ints
 from fluid.mesh.arrays import Planes
-from kernel_decorators import kernel
+from kernels.decorators import kernel
 
 # Two facets of a hull belong to one plane below this difference of (normal, offset / size).
 SAME_PLANE = 1e-9

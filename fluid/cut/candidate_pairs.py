@@ -12,7 +12,7 @@ import numpy as np
 from array_types import Array
 from fluid.mesh.arrays import Bins, Boxes
 from fluid.mesh.background import bin_of
-from kernel_decorators import inner, plain
+from kernels.decorators import inner, plain
 
 
 def near_pairs(mesh, solids, chosen, margin) -> tuple[Array, Array]:

@@ -41,8 +41,8 @@ from fluid.cut.pieces import (
 from fluid.cut.unclaimed_faces import claim_rest
 from fluid.cut.wetted_polygons import wetted
 from fluid.mesh.arrays import Corners, Planes
-from kernel_decorators import inner, released
-from kernel_threads import over
+from kernels.decorators import inner, released
+from kernels.threads import over
 
 # A piece too thin for its cross-section to close goes to one side whole; thicker ones are an error.
 THIN = 1e-6

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kernel_decorators import kernel
+from kernels.decorators import kernel
 
 
 def facing(bodies, polygons, reach, bounds, loose):

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from fluid.cut.pieces import DONE, OUTPUT_FULL, has_vertex
-from kernel_decorators import inner, kernel
+from kernels.decorators import inner, kernel
 
 
 @inner

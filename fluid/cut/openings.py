@@ -15,8 +15,8 @@ from fluid.cut.cut_arrays import Cuts
 from fluid.cut.pieces import workspace
 from fluid.cut.polygons import shared_area
 from fluid.mesh.arrays import Corners
-from kernel_decorators import inner, kernel, released
-from kernel_threads import over
+from kernels.decorators import inner, kernel, released
+from kernels.threads import over
 
 CLIP = 1e-12
 """Tolerance for clipping the open polygons, as a share of h."""

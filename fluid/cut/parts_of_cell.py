@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fluid.cut.polygons import load_face, shared_area
-from kernel_decorators import inner
+from kernels.decorators import inner
 
 
 @inner

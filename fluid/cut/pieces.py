@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from array_types import Floats, Integers, Ints
-from kernel_decorators import inner
+from kernels.decorators import inner
 
 DONE, OUTPUT_FULL, WORKSPACE_FULL, BROKEN_CAP = 0, 1, 2, 3
 

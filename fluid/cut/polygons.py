@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kernel_decorators import inner
+from kernels.decorators import inner
 
 # Corners of the equilateral triangle with unit second moment about its centre.
 SQRT2 = np.sqrt(2.0)

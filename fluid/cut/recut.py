@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fluid.cut.cut_arrays import Cuts
-from kernel_decorators import kernel
+from kernels.decorators import kernel
 
 
 def joined(old: Cuts, again, new: Cuts) -> Cuts:

@@ -14,7 +14,7 @@ import numpy as np
 from fluid.cut.pieces import DONE, WORKSPACE_FULL, interpolated
 from fluid.cut.polygons import copy_polygon, load_face, polygon_area, sense, split_by_edge
 from fluid.cut.wetted_polygons import append_polygon, claim_face
-from kernel_decorators import inner
+from kernels.decorators import inner
 
 
 @inner

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from fluid.cut.pieces import DONE, OUTPUT_FULL, WORKSPACE_FULL, interpolated
 from fluid.cut.polygons import copy_polygon, face_area, load_face, polygon_area, polygon_rule, split_polygon
-from kernel_decorators import inner
+from kernels.decorators import inner
 
 
 @inner

@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from array_types import Array, Floats, Ints
-from kernel_decorators import ranged
-from kernel_threads import over
+from kernels.decorators import ranged
+from kernels.threads import over
 
 
 class CellVectors(NamedTuple):

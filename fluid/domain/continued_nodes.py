@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from array_types import Array
-from kernel_decorators import inner, kernel
+from kernels.decorators import inner, kernel
 
 
 class Walled(NamedTuple):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from kernel_decorators import kernel
+from kernels.decorators import kernel
 
 
 def wetted_coupling(domain, polygons=slice(None), weight=1.0) -> sp.csr_matrix:

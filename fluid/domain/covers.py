@@ -23,7 +23,7 @@ import numpy as np
 
 from array_types import Array, Bools, Floats, Ints
 from fluid.cut.parts_of_cell import root as find
-from kernel_decorators import inner, kernel
+from kernels.decorators import inner, kernel
 
 # Areas of contact below this share of h^2 are round-off.
 NO_AREA = 1e-12

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from array_types import Array, Ints
-from kernel_decorators import plain, ranged, released
-from kernel_threads import found_over, marked, over
+from kernels.decorators import plain, ranged, released
+from kernels.threads import found_over, marked, over
 
 WORK = 10
 """Cost of going through the neighbours of a node, or the cells around it, in visits of a node."""

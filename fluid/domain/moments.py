@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from array_types import Floats, Integers
-from kernel_decorators import inner, kernel, plain, released
-from kernel_threads import found_over, over, owning, reach_of_cells, zeros
+from kernels.decorators import inner, kernel, plain, released
+from kernels.threads import found_over, over, owning, reach_of_cells, zeros
 
 
 @inner

@@ -33,7 +33,7 @@ from fluid.domain.coupling_matrix import wetted_coupling
 from fluid.domain.covers import Connection, lies_on, virtual_cells, without_pockets
 from fluid.mesh.arrays import Hats, WettedPolygons
 from fluid.mesh.background import Background
-from kernel_decorators import kernel
+from kernels.decorators import kernel
 
 __all__ = ["PhysicalDomain", "carry", "cut_domain", "wetted_coupling"]
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from array_types import Array, Bools, Floats, Integers
-from kernel_decorators import inner, kernel
+from kernels.decorators import inner, kernel
 
 SKIN = 0.05
 """Share of a cell edge within which a point inside a body still counts as on its face: blocks creep under load."""

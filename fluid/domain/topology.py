@@ -21,8 +21,8 @@ from fluid.mesh.arrays import Edges, FluidCells, Hats, Paths
 from fluid.mesh.background import Background
 from fluid.mesh.gradients import gradient_rows
 from fluid.numerics.spans import spans
-from kernel_decorators import kernel, ranged, released
-from kernel_threads import marked, over
+from kernels.decorators import kernel, ranged, released
+from kernels.threads import marked, over
 
 
 @dataclass(frozen=True)

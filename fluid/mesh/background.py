@@ -26,7 +26,7 @@ from fluid.mesh.neighbours import cell_neighbours
 from fluid.mesh.shapes import Shapes
 from fluid.numerics.cube_root import cube_root
 from fluid.numerics.spans import spans
-from kernel_decorators import inner, kernel
+from kernels.decorators import inner, kernel
 
 CORNERS_OF_FACE = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])  # outward for a positive cell
 MOST_SLENDER = 2.5

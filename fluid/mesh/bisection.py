@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from array_types import Array
-from kernel_decorators import helper, inner, kernel
+from kernels.decorators import helper, inner, kernel
 
 PER_LEVEL = 3
 """Bisections that halve all edges of a brick."""

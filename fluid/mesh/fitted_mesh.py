@@ -28,7 +28,7 @@ import numpy as np
 
 from array_types import Array
 from fluid.mesh.background import Background, MeshError
-from kernel_decorators import helper, kernel
+from kernels.decorators import helper, kernel
 
 FOLLOW = 0.2
 """Steepest slope that layers follow: one in five. With more shear, disturbances of still water at a shore grow (by 0.01

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from array_types import Array
-from kernel_decorators import inner, kernel
+from kernels.decorators import inner, kernel
 
 
 def cell_neighbours(cells, n_nodes: int) -> Array:

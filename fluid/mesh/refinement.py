@@ -13,7 +13,7 @@ from array_types import Array
 from fluid.mesh.arrays import Boxes, Planes
 from fluid.mesh.background import Background, MeshError, bin_of
 from fluid.mesh.bisection import MOST_LEVELS, Tetrahedra, refined
-from kernel_decorators import kernel
+from kernels.decorators import kernel
 
 MOST_ENTRIES = 6
 """Largest mean number of bins in which a cell is listed."""

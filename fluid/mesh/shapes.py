@@ -14,7 +14,7 @@ import numpy as np
 from array_types import Bools, Floats, Integers
 from fluid.mesh.gradients import gradients, products_of
 from fluid.numerics.spans import spans
-from kernel_decorators import inner, kernel, plain
+from kernels.decorators import inner, kernel, plain
 
 MOST_SHAPES = 64
 """Shapes that are compared one by one, 6 kB of gradients: those of a box of bricks."""

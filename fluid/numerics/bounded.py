@@ -19,7 +19,7 @@ import numpy as np
 
 from array_types import Bools, Floats
 from fluid.numerics.solve import MOST_ITERATIONS, NotConverged, conjugate_gradients, operators, solve
-from kernel_decorators import kernel
+from kernels.decorators import kernel
 
 LOOSE = 1e-3
 """Residual at which a round with unknowns far below their bound ends; the next one continues from there."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from array_types import Array
-from kernel_decorators import ranged
-from kernel_threads import over
+from kernels.decorators import ranged
+from kernels.threads import over
 
 PLAIN = 0.1
 """Cost of a number that is copied or added, in usual rows."""

@@ -19,8 +19,8 @@ from typing import NamedTuple
 import numpy as np
 
 from array_types import Array, Floats, Integers
-from kernel_decorators import kernel, plain, ranged, released
-from kernel_threads import over
+from kernels.decorators import kernel, plain, ranged, released
+from kernels.threads import over
 
 PAIRINGS = 3
 """Pairs of pairs of pairs: about eight unknowns become one."""

@@ -14,8 +14,8 @@ import numpy as np
 
 from array_types import Array, Floats
 from fluid.numerics.multigrid import Multigrid, unsigned
-from kernel_decorators import ranged
-from kernel_threads import over
+from kernels.decorators import ranged
+from kernels.threads import over
 
 MULTIGRID_FROM = 1_000
 MULTIGRID_FROM_WITH_EXTRA = 300

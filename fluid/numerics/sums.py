@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from array_types import Array
-from kernel_decorators import ranged
-from kernel_threads import CHUNK, summed
+from kernels.decorators import ranged
+from kernels.threads import CHUNK, summed
 
 
 def momentum_of(weight, u, place) -> Array:

@@ -15,7 +15,7 @@ import numpy as np
 from array_types import Bools, Floats, Ints
 from fluid.domain.moments import wet_fraction
 from fluid.pressure.indefinite_cells import without_indefinite
-from kernel_decorators import kernel
+from kernels.decorators import kernel
 
 DRY = 1e-9
 """A fluid part that lies above φ = -DRY h holds no water."""

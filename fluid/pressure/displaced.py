@@ -12,7 +12,7 @@ import numpy as np
 
 from array_types import Array
 from fluid.pressure.waterline import relative_area, wet_triangles
-from kernel_decorators import inner, kernel
+from kernels.decorators import inner, kernel
 
 
 def taken_from_nodes(domain, coupling, phi: Array, way: Array) -> Array:

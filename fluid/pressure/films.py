@@ -39,7 +39,7 @@ from fluid.cut.facing import facing
 from fluid.domain.coupling_matrix import wetted_coupling
 from fluid.pressure.projection import inflow
 from fluid.surface.level_set import FAR
-from kernel_decorators import kernel
+from kernels.decorators import kernel
 
 NARROW = 0.25
 """Widest film, in cells: narrower ones are no channels that the mesh could see."""

@@ -28,7 +28,7 @@ from __future__ import annotations
 import numpy as np
 
 from fluid.pressure.projection import SMALLEST_CUT
-from kernel_decorators import inner, kernel
+from kernels.decorators import inner, kernel
 
 LEAST = 0.05
 """Least share of a row's positive and negative entries on the diagonal that is to be left."""

@@ -13,8 +13,8 @@ import numpy as np
 
 from array_types import Array, Bools, Floats
 from fluid.numerics.bounded import at_air
-from kernel_decorators import ranged
-from kernel_threads import over
+from kernels.decorators import ranged
+from kernels.threads import over
 
 
 def lowest_pressure(water, graph, dofs, phi, of_air: float = 0.0) -> Array | None:

@@ -27,8 +27,8 @@ import scipy.sparse as sp
 
 from array_types import Array, Bools, Floats, Integers, Ints
 from fluid.numerics.fields import copied
-from kernel_decorators import kernel, ranged, released
-from kernel_threads import found_over, over, owning, reach_of_cells, zeros
+from kernels.decorators import kernel, ranged, released
+from kernels.threads import found_over, over, owning, reach_of_cells, zeros
 
 SMALLEST_CUT = 1e-7
 SMALLEST_WET_SHARE = 1e-6

@@ -32,7 +32,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from array_types import Array
-from kernel_decorators import kernel
+from kernels.decorators import kernel
 
 DISCHARGE = 0.6
 """C_d of a sharp opening."""

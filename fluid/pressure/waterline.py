@@ -23,7 +23,7 @@ from array_types import Array
 from fluid.domain.moments import cells_touching
 from fluid.domain.physical_domain import hat_values
 from fluid.pressure.projection import with_ghosts
-from kernel_decorators import helper, inner, kernel
+from kernels.decorators import helper, inner, kernel
 
 
 def waterline_load(domain, faces, left_out, phi, wet, pressure, open_node, air=None) -> Array:

@@ -37,7 +37,7 @@ import numpy as np
 
 from array_types import Array, Floats, Ints
 from fluid.domain.moments import nodal_water
-from kernel_decorators import kernel
+from kernels.decorators import kernel
 
 ON_FACE = 1e-9
 """Hat value below which a corner of a tetrahedron lies on the face of its cell."""

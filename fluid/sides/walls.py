@@ -12,8 +12,8 @@ import numpy as np
 
 from array_types import Bools, Floats, Ints
 from fluid.surface.level_set import drain_films
-from kernel_decorators import ranged
-from kernel_threads import over
+from kernels.decorators import ranged
+from kernels.threads import over
 
 _SAME_DIRECTION = 0.3
 """Normals of one node that span less than this (singular value over the largest) count as one direction."""

@@ -33,8 +33,8 @@ from fluid.step.report import StepReport
 from fluid.surface.extrapolation import extend_velocity
 from fluid.surface.gradient_jump_damping import damp_gradient_jumps
 from fluid.surface.volume import Flux, edge_flux
-from kernel_decorators import ranged
-from kernel_threads import over
+from kernels.decorators import ranged
+from kernels.threads import over
 
 FLUX_LAYERS = 3
 """Layers of dry nodes that water may reach within the next step."""

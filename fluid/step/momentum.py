@@ -31,8 +31,8 @@ import numpy as np
 
 from array_types import Array, Floats
 from fluid.numerics.sums import about, momenta_of_rows, momentum_of, momentum_of_rows
-from kernel_decorators import ranged, released
-from kernel_threads import CHUNK, found_over, over, summed
+from kernels.decorators import ranged, released
+from kernels.threads import CHUNK, found_over, over, summed
 
 NUMERICAL = (
     "transport",

@@ -35,8 +35,8 @@ from fluid.surface.level_set import redistance
 from fluid.surface.volume import VolumeCorrection, correct_volume
 from fluid.transport.advection import transport
 from fluid.transport.paths_in_solids import levels_in_solids
-from kernel_decorators import ranged
-from kernel_threads import over
+from kernels.decorators import ranged
+from kernels.threads import over
 
 if TYPE_CHECKING:
     from fluid.viscous.viscosity import ViscousChange

@@ -21,8 +21,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from kernel_decorators import kernel, ranged
-from kernel_threads import over
+from kernels.decorators import kernel, ranged
+from kernels.threads import over
 
 SPRAY = 0.01
 """Largest share of the volume of water that is spray, ..."""

@@ -35,8 +35,8 @@ from fluid.surface.level_set import FAR, drain_films, no_steeper, redistance
 from fluid.surface.volume import edge_flux, nodal_volume, renumbering
 from fluid.transport.surface_momentum import Carried
 from fluid.transport.swept_volume import swept
-from kernel_decorators import kernel, ranged
-from kernel_threads import over
+from kernels.decorators import kernel, ranged
+from kernels.threads import over
 
 if TYPE_CHECKING:
     from fluid.viscous.viscosity import FreeBodies

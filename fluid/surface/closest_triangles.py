@@ -17,8 +17,8 @@ import numpy as np
 
 from array_types import Array, Floats, Integers, Ints
 from fluid.domain.layers import WORK, Layers
-from kernel_decorators import inner, kernel, plain, ranged, released
-from kernel_threads import over, owning, reach_of_cells
+from kernels.decorators import inner, kernel, plain, ranged, released
+from kernels.threads import over, owning, reach_of_cells
 
 TESTED = 64
 """Number of places in which the triangles that a node has tested are noted."""

@@ -14,8 +14,8 @@ import numpy as np
 from array_types import Bools, Floats
 from fluid.domain.layers import WORK, layers_around
 from fluid.domain.moments import touching_among
-from kernel_decorators import inner, ranged, released
-from kernel_threads import over, owning, reach_of_cells, zeros
+from kernels.decorators import inner, ranged, released
+from kernels.threads import over, owning, reach_of_cells, zeros
 
 LINEAR_LAYERS = 2
 SWEEPS = 3

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kernel_decorators import helper, inner, kernel
+from kernels.decorators import helper, inner, kernel
 
 
 @kernel

@@ -36,8 +36,8 @@ from fluid.domain.layers import Layers, layers_around
 from fluid.mesh.arrays import Corners
 from fluid.surface.closest_triangles import Descent, Surface, squared_distances
 from fluid.surface.extrapolation import continue_outward, mark_nodes, mean_gradients
-from kernel_decorators import kernel, ranged, released
-from kernel_threads import found_over, over, zeros
+from kernels.decorators import kernel, ranged, released
+from kernels.threads import found_over, over, zeros
 
 LAYERS = 6
 EXACT_LAYERS = 2

@@ -36,8 +36,8 @@ from fluid.domain.moments import nodal_water, part_moments
 from fluid.domain.topology import Graph
 from fluid.numerics.fields import added, copied
 from fluid.surface.level_set import drain_films
-from kernel_decorators import kernel, ranged, released
-from kernel_threads import found_over, over, owning, reach_of_cells, zeros
+from kernels.decorators import kernel, ranged, released
+from kernels.threads import found_over, over, owning, reach_of_cells, zeros
 
 BAND_WIDTH = 3.0
 LARGEST_SHIFT = 0.3

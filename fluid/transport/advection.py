@@ -17,8 +17,8 @@ import numpy as np
 
 from fluid.mesh.arrays import Paths
 from fluid.numerics.fields import copied
-from kernel_decorators import inner, ranged, released
-from kernel_threads import over
+from kernels.decorators import inner, ranged, released
+from kernels.threads import over
 
 _LONGEST_WALK = 100
 

@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 from fluid.transport.advection import feet
-from kernel_decorators import kernel
+from kernels.decorators import kernel
 
 FARTHEST = 0.1
 """Cell sizes that φ is continued by: enough for calm water; a slope says nothing about what is farther."""

@@ -42,7 +42,7 @@ from skfem import asm
 from fluid.numerics.solve import NotConverged
 from fluid.transport import forms
 from fluid.transport.advection import feet
-from kernel_decorators import kernel
+from kernels.decorators import kernel
 
 GHOST_PENALTY = 1e-4
 """Weight γ of the jumps across the faces of cut cells."""

@@ -45,8 +45,8 @@ from fluid.numerics.fields import copied
 from fluid.surface.volume import Flux, Shift
 from fluid.transport.velocity_transport import carry_velocity
 from fluid.transport.volume_transport import carry_volume
-from kernel_decorators import inner, ranged, released
-from kernel_threads import over
+from kernels.decorators import inner, ranged, released
+from kernels.threads import over
 
 SHALLOW, DEEP = 2.0, 3.0
 """Depths in cell sizes down to which momentum counts in full, and at all."""

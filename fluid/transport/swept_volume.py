@@ -28,8 +28,8 @@ from fluid.domain.layers import WORK
 from fluid.domain.moments import part_moments
 from fluid.numerics.fields import copied
 from fluid.surface.volume import Flux, edge_rates
-from kernel_decorators import ranged, released
-from kernel_threads import found_over, over, owning, reach_of_rows, zeros
+from kernels.decorators import ranged, released
+from kernels.threads import found_over, over, owning, reach_of_rows, zeros
 
 NEAR = 3.0
 """|φ| in cell sizes beyond which no node has a hat that the surface gets to in a step."""

@@ -15,8 +15,8 @@ from __future__ import annotations
 import numpy as np
 
 from fluid.mesh.arrays import Edges
-from kernel_decorators import inner, ranged
-from kernel_threads import over, owning, reach_of_rows
+from kernels.decorators import inner, ranged
+from kernels.threads import over, owning, reach_of_rows
 
 
 def carry_velocity(nodes, edges: Edges, moved, water, u):

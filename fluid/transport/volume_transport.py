@@ -18,8 +18,8 @@ import numpy as np
 from fluid.numerics.fields import copied
 from fluid.surface.volume import Flux
 from fluid.transport.velocity_transport import carry_velocity
-from kernel_decorators import inner, ranged, released
-from kernel_threads import over, owning, reach_of_rows
+from kernels.decorators import inner, ranged, released
+from kernels.threads import over, owning, reach_of_rows
 
 LARGEST_COURANT = 0.8
 LEAST_COUNTED = 0.3

@@ -29,7 +29,7 @@ from fluid.viscous.strain import (
     mean_strain,
     spread_stress,
 )
-from kernel_decorators import kernel
+from kernels.decorators import kernel
 
 
 class Walls(NamedTuple):

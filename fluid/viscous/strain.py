@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from array_types import Floats, Ints
-from kernel_decorators import kernel
+from kernels.decorators import kernel
 
 PAIRS = np.array([(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)])
 """Corners at the ends of the edges of a cell."""

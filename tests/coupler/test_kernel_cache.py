@@ -175,7 +175,7 @@ def test_code_that_looks_like_words_counts(checkout, old, new):
 def test_what_is_left_of_the_program_without_words_is_the_same_program():
     """Judged by Python's own parser, for all files of the packages that have kernels."""
     files = [file for room in kernel_cache.ROOMS for file in (kernel_cache.ROOT / room).rglob("*.py")]
-    with_kernels = [file for file in files if "kernel_decorators import" in file.read_text()]
+    with_kernels = [file for file in files if "kernels.decorators import" in file.read_text()]
     assert len(with_kernels) > 50
     for file in with_kernels:
         text = file.read_text()

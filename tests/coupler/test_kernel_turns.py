@@ -7,12 +7,12 @@ import time
 
 import pytest
 
-import kernel_decorators
 from coupler.program.kernel_cache import ROOT
+from kernels import decorators
 
 CHILD = """\
 import sys
-import kernel_decorators as decorators
+import kernels.decorators as decorators
 decorators.PATIENCE = float(sys.argv[2])
 print("ready", flush=True)
 with decorators._turn(sys.argv[1]):
@@ -24,7 +24,7 @@ with decorators._turn(sys.argv[1]):
 def child(tmp_path, monkeypatch):
     """Starts a process that takes its turn with a kernel of that name, in the folder of this one; it is ready then."""
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    kernel_decorators._locks.cache_clear()
+    decorators._locks.cache_clear()
     started = []
 
     def start(name, patience):
@@ -36,7 +36,7 @@ def child(tmp_path, monkeypatch):
         return process
 
     yield start
-    kernel_decorators._locks.cache_clear()
+    decorators._locks.cache_clear()
     for process in started:
         process.kill()
         process.wait()
@@ -44,7 +44,7 @@ def child(tmp_path, monkeypatch):
 
 
 def test_another_process_waits_for_the_one_that_compiles(child):
-    with kernel_decorators._turn("fluid.f"):
+    with decorators._turn("fluid.f"):
         waiting = child("fluid.f", 60)
         time.sleep(0.5)
         assert waiting.poll() is None
@@ -53,17 +53,17 @@ def test_another_process_waits_for_the_one_that_compiles(child):
 
 
 def test_other_kernels_are_compiled_meanwhile(child):
-    with kernel_decorators._turn("fluid.f"):
+    with decorators._turn("fluid.f"):
         assert child("fluid.g", 60).wait(20) == 0
 
 
 def test_a_process_that_hangs_holds_nobody_up_for_ever(child):
-    with kernel_decorators._turn("fluid.f"):
+    with decorators._turn("fluid.f"):
         assert child("fluid.f", 0.1).wait(20) == 0
 
 
 def test_a_kernel_that_fails_to_compile_gives_its_turn_back(child):
-    @kernel_decorators.kernel
+    @decorators.kernel
     def wrong(x):
         return x.nothing
 

@@ -51,7 +51,7 @@ def figures(run):
 def test_a_dry_case_loads_neither_the_water_nor_pictures(threads, tmp_path):
     """Nor does it book time to the water, count its cells or write its tables; run.json says so."""
     names = modules(DRY, "--end", "2 ms", "--output", tmp_path / "run", "--threads", threads)
-    assert ("kernel_threads" in names) == (threads > 1)
+    assert ("kernels.threads" in names) == (threads > 1)
     packages = {name.split(".")[0] for name in names}
     assert "yade" in packages
     assert "yade_scripts.dynamics.sleep" not in names

@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-import kernel_threads as kernels
+import kernels.threads as kernels
 import surgebreak
 from coupler.commands.benchmark import command, machine
 from coupler.commands.benchmark import threads as measured
@@ -22,7 +22,7 @@ from coupler.program import threads
 from coupler.program.provenance import ROOT
 from fluid.mesh.arrays import Corners
 from fluid.numerics.fields import copied
-from kernel_decorators import ranged, released
+from kernels.decorators import ranged, released
 
 SCENE = tomllib.loads(CASE)
 SCENE["time"] = {"end": "0.12 s", "step_max": "20 ms", "output_every": "60 ms"}
@@ -234,7 +234,7 @@ def test_threads_without_work_do_not_use_the_processor(divided):
 
 IN_ANOTHER_PROCESS = """
 import numpy as np
-import kernel_threads as threads
+import kernels.threads as threads
 threads.use(3, least=1)
 threads.zeros((100,))
 assert (threads.marked(np.arange(100) % 3 == 0) == np.arange(0, 100, 3)).all()

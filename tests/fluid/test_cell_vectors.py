@@ -5,7 +5,7 @@ import pytest
 
 from fluid.domain.cell_vectors import CellVectors, places_of
 from fluid.numerics.fields import added, copied_at, less
-from kernel_threads import use
+from kernels.threads import use
 
 
 def random_field(seed, cells, share=0.3):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-import kernel_threads as threads
+import kernels.threads as threads
 from fluid.cut.bodies import ConvexBodies
 from fluid.domain.layers import layers_around
 from fluid.domain.physical_domain import cut_domain

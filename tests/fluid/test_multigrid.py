@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-import kernel_threads as threads
+import kernels.threads as threads
 from fluid.cut.bodies import ConvexBodies
 from fluid.numerics import multigrid
 from fluid.numerics.multigrid import Multigrid

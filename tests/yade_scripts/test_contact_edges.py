@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from kernel_decorators import kernel
+from kernels.decorators import kernel
 from yade_scripts.blocks.block import Block
 from yade_scripts.contact.edges import CROSSES, find_crossing, pair_scratch
 from yade_scripts.contact.law import ContactLaw

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from array_types import Array, Floats, Ints
-from kernel_decorators import helper, inner, kernel
+from kernels.decorators import helper, inner, kernel
 from yade_scripts.blocks.block import Block
 from yade_scripts.blocks.polyhedra import cross_products, face_areas, polygon_area_vector
 from yade_scripts.blocks.quadrature import Rule, gauss

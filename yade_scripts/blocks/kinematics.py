@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kernel_decorators import inner, kernel, plain
+from kernels.decorators import inner, kernel, plain
 
 
 @inner

@@ -12,7 +12,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from array_types import Array, Floats, Ints
-from kernel_decorators import inner, kernel
+from kernels.decorators import inner, kernel
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kernel_decorators import helper, inner
+from kernels.decorators import helper, inner
 
 PARALLEL = 0.05
 """Sine of the angle below which lines count as parallel to a face or to one another."""

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from kernel_ranges import alone
+from kernels.ranges import alone
 from yade_scripts.blocks.block import Block
 from yade_scripts.blocks.faces import FixedPlane
 from yade_scripts.contact.arrays import CROSSINGS, Bodies, Kinematics, Law, Pairs, Slots, empty_rows

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kernel_decorators import inner, plain
+from kernels.decorators import inner, plain
 from yade_scripts.blocks.faces import FixedPlane
 from yade_scripts.contact.arrays import BEGINS
 from yade_scripts.contact.search import ALIGNED, write_row

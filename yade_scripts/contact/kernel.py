@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kernel_decorators import inner, kernel, released
+from kernels.decorators import inner, kernel, released
 from yade_scripts.blocks.block import MARGIN
 from yade_scripts.contact.arrays import CROSSINGS, Direction, Faces
 from yade_scripts.contact.edges import pair_scratch
@@ -42,7 +42,7 @@ flat beams the two overlaps are equal."""
 def contact_forces(share, shapes, bodies, law, pairs, slots, ground, state, rows, F):
     """Find the contacts at the present places and add their forces to F (n, 6).
 
-    share: `kernel_ranges.alone`, or a function that runs ranges of the pairs on several threads. In that case the
+    share: `kernels.ranges.alone`, or a function that runs ranges of the pairs on several threads. In that case the
     forces are added afterwards in the order of the pairs, so that the result has the same bits; a range of all pairs
     adds them as it finds them · ground: `Ground`, or NO_GROUND.
     Pairs in the list that do not touch change neither the contacts nor their forces.

@@ -11,7 +11,7 @@ which adds up to K times the larger share, and leaves equal faces as they are.
 
 from __future__ import annotations
 
-from kernel_decorators import inner
+from kernels.decorators import inner
 
 
 @inner

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kernel_decorators import inner, plain
+from kernels.decorators import inner, plain
 from yade_scripts.contact.arrays import BEGINS, CROSSINGS
 from yade_scripts.contact.edges import FLAT, PARALLEL, crossing, find_crossing, next_beside
 from yade_scripts.contact.overlap import share_of_overlap

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kernel_decorators import inner, kernel
+from kernels.decorators import inner, kernel
 from yade_scripts.contact.arrays import BEGINS
 
 SHARP = 1e-3

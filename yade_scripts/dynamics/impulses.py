@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from array_types import Array, Floats
-from kernel_decorators import inner, plain
+from kernels.decorators import inner, plain
 
 
 @dataclass(frozen=True, kw_only=True)

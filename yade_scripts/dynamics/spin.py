@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from array_types import Array
-from kernel_decorators import inner, kernel, plain
+from kernels.decorators import inner, kernel, plain
 
 STILL = 1e-7
 """Turn in a substep [rad] below which nothing is corrected."""

@@ -18,7 +18,7 @@ from functools import cache
 
 import numpy as np
 
-from kernel_decorators import plain
+from kernels.decorators import plain
 from yade_scripts.blocks.kinematics import arm, cross, dot, parting, place, turned
 from yade_scripts.joints import laws, mixed_modes
 from yade_scripts.joints.kernel import facing, split

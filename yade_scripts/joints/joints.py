@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from array_types import Array, Bools, Floats, Ints
-from kernel_ranges import alone
+from kernels.ranges import alone
 from yade_scripts.blocks.block import Block
 from yade_scripts.blocks.faces import TouchingFaces, gauss_points, to_body
 from yade_scripts.joints import kernel

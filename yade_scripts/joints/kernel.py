@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kernel_decorators import kernel, plain
+from kernels.decorators import kernel, plain
 from yade_scripts.blocks.kinematics import add_forces, dot, place, turned
 
 

@@ -13,7 +13,7 @@ from zlib import crc32
 
 from numba import njit
 
-from kernel_ranges import shared
+from kernels.ranges import shared
 
 
 def specialised(
@@ -22,7 +22,7 @@ def specialised(
     """`kernel`, a plain function, compiled with `chosen` in place of the globals of these names.
 
     name: must differ for every choice, since it names the compiled code on disk · ranged: it takes a range first, which
-    several threads may share (`kernel_ranges.py`)
+    several threads may share (`kernels/ranges.py`)
     """
     copy = FunctionType(kernel.__code__, kernel.__globals__ | chosen, kernel.__name__, kernel.__defaults__)
     copy.__qualname__, copy.__module__ = f"{kernel.__qualname__}_{name}", kernel.__module__

@@ -8,8 +8,8 @@ import time
 
 import numpy as np
 
-from kernel_decorators import ranged
-from kernel_threads import over, use
+from kernels.decorators import ranged
+from kernels.threads import over, use
 
 ROWS, TURNS = 1_000, 20_000
 """Rows of the loop that computes, and its turns for each."""

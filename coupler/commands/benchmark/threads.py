@@ -43,7 +43,7 @@ def numbers() -> list[int]:
 
 def started(nodes: int):
     """The dam break while the water runs through the tank."""
-    from kernel_threads import use
+    from kernels.threads import use
 
     use(cores())
     scene = dam_break(nodes)
@@ -56,7 +56,7 @@ def threads(nodes: int) -> dict:
     """Wall time [s] of a step by number of threads, the serial share, the size of the scene, and what threads give on
     this machine (`machine.py`)."""
     from coupler.commands.benchmark.machine import machine
-    from kernel_threads import use, watched
+    from kernels.threads import use, watched
 
     scene = started(nodes)
     start, wall = scene.snapshot(), {n: np.inf for n in numbers()}
@@ -108,7 +108,7 @@ def bandwidth() -> float:
 
 def roofline(nodes: int) -> dict:
     """Bandwidth [B/s]; by kernel: seconds and bytes a step; seconds of a step."""
-    from kernel_threads import use
+    from kernels.threads import use
 
     scene = started(nodes)
     use(1)
@@ -135,7 +135,7 @@ def roofline(nodes: int) -> dict:
 @contextmanager
 def _traffic(nodes: int, cells: int) -> Iterator[dict[str, list[float]]]:
     """Seconds and bytes of every shared kernel that runs meanwhile, by its name."""
-    import kernel_threads as team
+    import kernels.threads as team
 
     found: dict[str, list[float]] = {}
     given = team._alone

@@ -7,8 +7,8 @@ There are several, since what numba builds around a function takes as long to co
   handed, and to every view of one, such a function runs up to twice as fast.
 - `inner`: the same for functions that only other kernels call; without a Python entry they compile a third faster.
 - `helper`: like `kernel`, for functions that only other kernels call.
-- `ranged`: like `plain`, for functions that `kernel_threads` runs on several threads: they take a range first,
-  let other threads of Python run meanwhile, and have the entry of `kernel_ranges.py`.
+- `ranged`: like `plain`, for functions that `kernels.threads` runs on several threads: they take a range first,
+  let other threads of Python run meanwhile, and have the entry of `kernels/ranges.py`.
 - `released`: like `kernel`, for functions of several threads that make arrays, for work space or for what they return.
 - `nogil`: like `plain`, for functions that wait, or work beside other threads of Python, but have no range.
 
@@ -31,7 +31,7 @@ from typing import Any
 
 from numba import njit, types
 
-from kernel_ranges import shared
+from kernels.ranges import shared
 
 PATIENCE = 60.0
 """Seconds for which a process waits for another one that compiles a kernel: none takes as long, but a process may be

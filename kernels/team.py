@@ -26,8 +26,8 @@ from numba import cfunc, types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from kernel_decorators import inner, nogil
-from kernel_ranges import Plan
+from kernels.decorators import inner, nogil
+from kernels.ranges import Plan
 
 IDLE, GIVEN, BEGUN, ASLEEP, OVER = range(5)
 """States of a thread's box. IDLE: its thread looks at it; GIVEN: work lies in it; OVER: the thread is to end."""

@@ -1,6 +1,6 @@
 """Kernels on several threads, with the same bits at any number of them.
 
-A kernel of this kind takes a range as its first arguments, releases the interpreter (`kernel_decorators.ranged`), and
+A kernel of this kind takes a range as its first arguments, releases the interpreter (`kernels.decorators.ranged`), and
 writes to what belongs to the range only. Each thread gets one range; a single thread gets all of it and runs the loop
 unchanged. The result of a row must not depend on where the ranges end. There are two forms:
 
@@ -12,7 +12,7 @@ unchanged. The result of a row must not depend on where the ranges end. There ar
   nearby numbers.
 
 Numba's own `prange` would take three times as long to compile and bring a second pool beside that of YADE's OpenMP.
-The threads here wait in compiled code (`kernel_team.py`), and start when they are first needed; a process that is
+The threads here wait in compiled code (`kernels/team.py`), and start when they are first needed; a process that is
 forked off starts its own.
 """
 
@@ -28,9 +28,9 @@ from typing import NamedTuple
 import numpy as np
 
 from array_types import Array
-from kernel_decorators import kernel, ranged, released
-from kernel_ranges import MOST, is_shared
-from kernel_team import Team
+from kernels.decorators import kernel, ranged, released
+from kernels.ranges import MOST, is_shared
+from kernels.team import Team
 
 LEAST_ROWS = 1_000
 """Least number of rows that is worth a thread: handing them over takes as long as two hundred of them."""

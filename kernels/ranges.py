@@ -78,7 +78,7 @@ def is_shared(kernel: Any) -> bool:
 
 
 def alone(kernel: Callable, count: int, *args: Any, weight: float = 1, pieces: int = 1) -> list:
-    """What [kernel(0, count, *args)] returns: one thread's form of `kernel_threads.over`."""
+    """What [kernel(0, count, *args)] returns: one thread's form of `kernels.threads.over`."""
     return [kernel(0, count, *args)]
 
 
