@@ -1,28 +1,53 @@
-"""Contact that goes on where a pressed joint fails begins with the force that the joint had, whatever its stiffness."""
+"""Contact that goes on where a pressed joint fails begins with the force that the joint had, whatever its stiffness,
+and with no more energy than the springs of the joint held; what they held beyond that is booked once."""
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from yade_scripts.blocks.block import Block
+from yade_scripts.blocks.faces import FixedPlane
 from yade_scripts.contact.law import ContactLaw
 from yade_scripts.dynamics.structure import Structure
 from yade_scripts.joints.cohesion import JointParameters
 
 JOINT = JointParameters(1e5, 1e-3, damping=0.0)
+KC = JOINT.closing_stiffness
 PUSH, DT = 1e5, 5e-6
-DEPTH = PUSH / JOINT.closing_stiffness
+DEPTH = PUSH / KC
 
 
-def pressed(ratio):
-    """A cube of 1 m on a fixed one, at rest under PUSH; contact `ratio` times as stiff as the joint."""
-    blocks = [
-        Block("low", (0, 0, 0.5), size=1.0, fixed=True),
-        Block("high", (0, 0, 1.5), size=1.0, density=2000.0),
-    ]
-    s = Structure(blocks, ContactLaw(ratio * JOINT.closing_stiffness), JOINT, gravity=(0.0, 0.0, 0.0))
-    s.displace(np.array([1]), np.array([[0.0, 0.0, -DEPTH]]), np.eye(3)[None])
-    s.set_load(np.array([np.zeros(6), [0.0, 0.0, -PUSH, 0.0, 0.0, 0.0]]))
+def scene(low, high, stiffness, depth, turn=None, friction=0.5, push=(0.0, 0.0, -PUSH)):
+    """Block `high` on `low`, pressed `depth` into it and turned by a rotation vector, under a push."""
+    s = Structure([low, high], ContactLaw(stiffness, friction=friction), JOINT, gravity=(0.0, 0.0, 0.0))
+    turned = Rotation.from_rotvec(np.zeros(3) if turn is None else turn).as_matrix()
+    s.displace(np.array([1]), np.array([[0.0, 0.0, -depth]]), turned[None])
+    s.set_load(np.array([np.zeros(6), [*push, 0.0, 0.0, 0.0]]))
     return s
+
+
+def cubes(ratio, **more):
+    """A cube of 1 m on a fixed one; contact `ratio` times as stiff as the joint."""
+    low = Block("low", (0, 0, 0.5), size=1.0, fixed=True)
+    return scene(low, Block("high", (0, 0, 1.5), size=1.0, density=2000.0), ratio * KC, DEPTH, **more)
+
+
+def beams(ratio, push=(0.0, 0.0, -PUSH), friction=0.5):
+    """Two beams across each other, where neither has a node in the other."""
+    low = Block("low", (0.5, 0.0, -0.2), size=(4.0, 0.4, 0.4), density=2000.0, fixed=True)
+    high = Block("high", (0.0, 0.7, 0.2), size=(0.4, 4.0, 0.4), density=2000.0)
+    stiffness = KC * 0.4**2
+    return scene(low, high, ratio * stiffness, PUSH / stiffness, push=push, friction=friction)
+
+
+def fail(s):
+    """Let the joint fail within the next substep. → energies before"""
+    s.advance(DT, DT)
+    before = s.energies()
+    s.joints.largest[:] = 2.0 * JOINT.opening_at_failure
+    s.advance(2 * DT, DT)
+    assert not s.joints.alive.any()
+    return before
 
 
 def balance(e):
@@ -30,18 +55,19 @@ def balance(e):
     return sum(v for k, v in e.items() if k not in works) - sum(e[k] for k in works)
 
 
+def pressing(s):
+    c = s.contacts()
+    return float((c.kn * np.maximum(c.depth, 0.0)).sum())
+
+
 @pytest.mark.parametrize("ratio", [0.5, 1.0, 5.0, 25.0])
 def test_neither_force_nor_energy_jumps(ratio):
-    with pressed(ratio) as s:
-        s.advance(DT, DT)
-        held = s.energies()["joint_stored"]
-        start = balance(s.energies())
+    with cubes(ratio) as s:
+        before = fail(s)
+        held = before["joint_stored"]
         assert held == pytest.approx(0.5 * PUSH * DEPTH, rel=1e-3)
-        s.joints.largest[:] = 2.0 * JOINT.opening_at_failure
-        s.advance(2 * DT, DT)
-        assert not s.joints.alive.any()
         e = s.energies()
-        assert balance(e) == pytest.approx(start, abs=0.01 * held)
+        assert balance(e) == pytest.approx(balance(before), abs=0.01 * held)
         stiffer = max(ratio, 1.0)
         assert e["contact_stored"] == pytest.approx(held * min(ratio, 1.0) / stiffer, rel=0.01)
         assert e["friction"] == pytest.approx(
@@ -53,25 +79,90 @@ def test_neither_force_nor_energy_jumps(ratio):
             assert s.energies()["kinetic"] < 1e-6 * held
 
 
-@pytest.mark.parametrize("ratio", [0.5, 1.0])
+@pytest.mark.parametrize("ratio", [0.5, 1.0, 5.0])
 def test_edges_that_cross_take_over_the_force_of_a_joint(ratio):
-    """Two beams across each other, where neither has a node in the other: the corners of what lies on one another carry
-    the force of the joint at once, or what a softer contact bears at that depth. From nothing, the beam would be let
-    fall by a depth and swing."""
-    area = 0.4**2
-    stiffness = JOINT.closing_stiffness * area
-    depth = PUSH / stiffness
-    low = Block("low", (0.5, 0.0, -0.2), size=(4.0, 0.4, 0.4), density=2000.0, fixed=True)
-    high = Block("high", (0.0, 0.7, 0.2), size=(0.4, 4.0, 0.4), density=2000.0)
-    with Structure([low, high], ContactLaw(ratio * stiffness), JOINT, gravity=(0.0, 0.0, 0.0)) as s:
-        s.displace(np.array([1]), np.array([[0.0, 0.0, -depth]]), np.eye(3)[None])
-        s.set_load(np.array([np.zeros(6), [0.0, 0.0, -PUSH, 0.0, 0.0, 0.0]]))
-        s.advance(DT, DT)
-        s.joints.largest[:] = 2.0 * JOINT.opening_at_failure
-        s.advance(2 * DT, DT)
-        assert not s.joints.alive.any()
+    """The corners of what lies on one another carry the force of the joint at once, or what a softer contact bears at
+    that depth. From nothing, the beam would be let fall by a depth and swing."""
+    with beams(ratio) as s:
+        before = fail(s)
+        held = before["joint_stored"]
         contacts = s.contacts()
         corners = [(x, y) for x in (-0.2, 0.2) for y in (-0.2, 0.2)]
         assert sorted(map(tuple, contacts.point[:, :2].round(5))) == sorted(corners)
-        assert (contacts.kn * contacts.depth).sum() == pytest.approx(ratio * PUSH, rel=0.01)
-        assert s.energies()["contact_stored"] == pytest.approx(0.5 * ratio * PUSH * depth, rel=0.01)
+        assert pressing(s) == pytest.approx(min(ratio, 1.0) * PUSH, rel=0.01)
+        e = s.energies()
+        assert e["contact_stored"] == pytest.approx(held * min(ratio, 1.0 / ratio), rel=0.01)
+        assert balance(e) == pytest.approx(balance(before), abs=0.01 * held)
+
+
+@pytest.mark.parametrize("ratio", [1.0, 5.0, 100.0])
+@pytest.mark.parametrize("edge", [1.0, 4.0])
+def test_a_small_joint_between_large_faces(ratio, edge):
+    """Only the area that was joined counts, not the faces of the blocks."""
+    low = Block("low", (0.0, 0.0, -0.5), size=(edge, edge, 1.0), fixed=True)
+    high = Block("high", (0.5 * edge, 0.0, 0.5), size=(1.0, 1.0, 1.0), density=2000.0)
+    depth = PUSH / (0.5 * KC)
+    with scene(low, high, ratio * KC, depth) as s:
+        assert s.joints.area.sum() == pytest.approx(0.5)
+        before = fail(s)
+        held = before["joint_stored"]
+        assert held == pytest.approx(0.5 * PUSH * depth, rel=2e-3)
+        assert pressing(s) == pytest.approx(PUSH, rel=0.02)
+        assert balance(s.energies()) == pytest.approx(balance(before), abs=0.01 * held)
+
+
+@pytest.mark.parametrize("turn", [(2e-4, 0.0, 0.0), (1e-3, 0.0, 0.0), (6e-4, 4e-4, 1e-4)])
+@pytest.mark.parametrize("ratio", [0.5, 1.0, 5.0, 100.0])
+def test_a_bent_joint(ratio, turn):
+    """Nodes lie on the rim, where a bent joint is pressed most: they must not hold more than it did."""
+    with cubes(ratio, turn=turn) as s:
+        force = s.joints.pressing(np.array([0]), s._motion.x, s._motion.R)[0]
+        before = fail(s)
+        held, e = before["joint_stored"], s.energies()
+        assert balance(e) == pytest.approx(balance(before), abs=0.02 * held)
+        assert e["contact_stored"] <= 1.02 * held
+        assert e["friction"] >= -1e-12 * held
+        if ratio >= 5.0:
+            assert pressing(s) == pytest.approx(force, rel=0.03)
+
+
+@pytest.mark.parametrize("build", [cubes, beams])
+@pytest.mark.parametrize("ratio", [1.0, 5.0])
+@pytest.mark.parametrize("friction", [0.0, 0.2, 0.8])
+def test_a_push_along_the_joint(build, ratio, friction):
+    """What slides and what sticks after the take-over keeps the balance, and slides as friction lets it."""
+    along = 0.5 * PUSH
+    with build(ratio, push=(along, 0.0, -PUSH), friction=friction) as s:
+        before = fail(s)
+        held, v = before["joint_stored"], s._motion.v[1, 0]
+        s.advance(2e-3, DT)
+        e = s.energies()
+        assert balance(e) == pytest.approx(balance(before), abs=0.02 * (held + e["load_work"]))
+        if build is cubes and friction < 0.5:
+            mass = s.blocks[1].mass
+            rate = (s._motion.v[1, 0] - v) / 2e-3
+            assert rate == pytest.approx((along - friction * PUSH) / mass, rel=0.05)
+
+
+def test_on_the_ground():
+    """The same on a fixed plane, with a block turned into it."""
+    high = Block("high", (0, 0, 0.5), size=1.0, density=2000.0)
+    floor = FixedPlane((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+    contact = ContactLaw(20.0 * KC, friction=0.0)
+    with Structure([high], contact, JOINT, planes=[floor], gravity=(0.0, 0.0, 0.0)) as s:
+        turned = Rotation.from_rotvec((1e-3, 0.0, 0.0)).as_matrix()
+        s.displace(np.array([0]), np.array([[0.0, 0.0, -DEPTH]]), turned[None])
+        s.set_load(np.array([[0.0, 0.0, -PUSH, 0.0, 0.0, 0.0]]))
+        before = fail(s)
+        held, e = before["joint_stored"], s.energies()
+        assert balance(e) == pytest.approx(balance(before), abs=0.01 * held)
+        assert 0.0 < e["friction"] <= held
+
+
+def test_without_contact_the_springs_are_lost():
+    """In a scene without contact a joint that fails under compression takes its energy along."""
+    low = Block("low", (0, 0, 0.5), size=1.0, fixed=True)
+    with Structure([low, Block("high", (0, 0, 1.5), size=1.0)], None, JOINT, gravity=(0.0, 0.0, 0.0)) as s:
+        s.displace(np.array([1]), np.array([[0.0, 0.0, -DEPTH]]), np.eye(3)[None])
+        before = fail(s)
+        assert balance(s.energies()) == pytest.approx(balance(before), abs=1e-3 * before["joint_stored"])

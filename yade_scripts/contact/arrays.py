@@ -55,12 +55,12 @@ class Direction(NamedTuple):
     """One direction of a pair: the nodes or edges of body a against the faces or edges of body b.
 
     begins: whether contacts may begin here; they may not where those of the present places are known already ·
-    fresh: as in `Pairs`."""
+    whole: whether they begin with the whole present depth, not from it on."""
 
     a: int
     b: int
     begins: bool
-    fresh: float
+    whole: bool
 
 
 class Faces(NamedTuple):
@@ -78,22 +78,32 @@ class Pairs(NamedTuple):
     """a < b (p,) bodies; b may be a plane · start (p+1,) first slot: the nodes of a, those of b, then
     `CROSSINGS` for edges that cross
 
-    fresh (p,): stiffness of what held the two bodies until now, over that of their contact, where a new contact takes
-    over the present overlap; 0 where it starts without force · touching (p,) bool: the pair had contacts at the last
-    evaluation · calm (p,) [m]: relative motion below which the two cannot touch or, where they touch, below which the
-    outermost edges need not be sought again · overlap (p,) [m]: smallest displacement that separates them, zero if they
-    are apart · found (p,) bool: the contacts at the present positions are known. Contacts begin and end once for each
-    position, however often they are evaluated there.
+    force (p,) [N]: normal force of the joint that held the two bodies until now, with which a new contact begins; 0: it
+    begins without force, inf: with the force of its whole depth · held (p,) [J]: energy of the springs of that joint ·
+    touching (p,) bool: the pair had contacts at the last evaluation · calm (p,) [m]: relative motion below which the
+    two cannot touch or, where they touch, below which the outermost edges need not be sought again · overlap (p,) [m]:
+    smallest displacement that separates them, zero if they are apart · found (p,) bool: the contacts at the present
+    positions are known. Contacts begin and end once for each position, however often they are evaluated there.
     """
 
     a: Array
     b: Array
     start: Array
-    fresh: Array
+    force: Array
+    held: Array
     touching: Array
     calm: Array
     overlap: Array
     found: Array
+
+
+class Parted(NamedTuple):
+    """What joints that have just failed hand over to contact: pairs (k, 2) of bodies, normal force (k,) [N] under which
+    each was compressed, energy (k,) [J] in its springs."""
+
+    pairs: Array
+    force: Array
+    energy: Array
 
 
 class Slots(NamedTuple):

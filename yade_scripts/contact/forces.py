@@ -9,7 +9,7 @@ import numpy as np
 from kernels.ranges import alone
 from yade_scripts.blocks.block import Block
 from yade_scripts.blocks.faces import FixedPlane
-from yade_scripts.contact.arrays import CROSSINGS, Bodies, Kinematics, Law, Pairs, Slots, empty_rows
+from yade_scripts.contact.arrays import CROSSINGS, Bodies, Kinematics, Law, Pairs, Parted, Slots, empty_rows
 from yade_scripts.contact.ground import NO_GROUND, GroundSurface
 from yade_scripts.contact.kernel import carry_slots, contact_forces
 from yade_scripts.contact.law import ContactLaw
@@ -27,8 +27,7 @@ class ContactForces:
 
     blocks, planes: in the coordinates of the scene · face_stiffness (n,) K [N/m] · neighbours(): the pairs (p, 2) of
     rows whose bounding boxes can meet while no point of a block moves by more than reach [m]; after that it is called
-    again · closing (n,) [N/m]: stiffness of the faces as long as joints hold them
-    free (n,) bool: motion not prescribed.
+    again · free (n,) bool: motion not prescribed.
 
     Running sums [J]: dashpot and friction, the energy taken by dashpots, and by friction and springs of contacts that
     ended; driving, the energy put in by driven blocks.
@@ -40,7 +39,6 @@ class ContactForces:
         planes: list[FixedPlane],
         law: ContactLaw,
         face_stiffness: Array,
-        closing: Array,
         free: Array,
         motion: Motion,
         neighbours: Callable[[], Array],
@@ -65,7 +63,6 @@ class ContactForces:
             law.friction_table(materials),
             law.stiffness is not None,
         )
-        self._closing = np.concatenate([closing, np.full(len(planes), np.inf)])
         self._free = np.concatenate([free, np.zeros(len(planes), bool)])
         self._nodes = np.diff(self._shapes.node_start)
         self._on = np.zeros(self._n, bool)
@@ -86,18 +83,31 @@ class ContactForces:
         self._on[rows] = True
         self.search(as_deep=as_deep)
 
-    def leave_out(self, joined: Array) -> None:
+    def leave_out(self, joined: Array, failed: Parted | None = None) -> None:
         """Exclude pairs (p, 2) that live joints hold, since these carry compression too. Pairs that were excluded
-        before and are not now continue by contact, with the present depth."""
+        before and are not now continue by contact, with the force of the joints that have `failed`."""
         keys = _once(self._key(*np.sort(joined, axis=1).T))
         parted = self._joined[~_among(self._joined, keys)]
         self._joined = keys
         if len(parted):
-            self.search(parted)
+            self.search()
+        if failed is not None:
+            self._take_over(failed)
 
-    def search(self, parted: Array | None = None, as_deep: bool = False) -> None:
-        """Find the candidate pairs at the present positions."""
-        self._set_pairs(self._in_order(self._near()), parted, as_deep)
+    def _take_over(self, failed: Parted) -> None:
+        """Have the contacts that begin where joints have failed take over their force. The energy of joints whose pair
+        another joint still holds, or whose blocks are apart, is lost."""
+        p, own = self._pairs, self._key(*np.sort(failed.pairs, axis=1).T)
+        keys = self._key(p.a, p.b)
+        found = _among(own, keys)
+        at = np.searchsorted(keys, own[found])
+        np.add.at(p.force, at, failed.force[found])
+        np.add.at(p.held, at, failed.energy[found])
+        self.friction += float(failed.energy[~found].sum())
+
+    def search(self, as_deep: bool = False) -> None:
+        """Find the candidate pairs at the present positions. as_deep: as in `switch_on`."""
+        self._set_pairs(self._in_order(self._near()), as_deep)
 
     def _key(self, a: Array, b: Array) -> Array:
         return a * len(self._free) + b
@@ -184,39 +194,30 @@ class ContactForces:
             found.append(np.stack([near, np.full(len(near), self._n + number)], axis=1))
         return np.concatenate(found)
 
-    def _set_pairs(self, pairs: Array, parted: Array | None = None, as_deep: bool = False) -> None:
-        """Pairs (p, 2) in order; known pairs keep their history. Others begin with the depth there is where a joint
-        has parted (keys `parted`) or as_deep."""
+    def _set_pairs(self, pairs: Array, as_deep: bool = False) -> None:
+        """Pairs (p, 2) in order; known pairs keep their history. as_deep: others begin with the whole present depth."""
         a, b = pairs.T.copy()
         size = self._nodes[a] + self._nodes[b] + CROSSINGS
         start = np.concatenate([[0], np.cumsum(size)]).astype(np.int64)
         total = int(start[-1])
         slots = Slots.empty(total)
         known, touching, found = (np.zeros(len(a), bool) for _ in range(3))
-        fresh, overlap, calm = np.zeros(len(a)), np.zeros(len(a)), np.zeros(len(a))
+        force, held, overlap, calm = (np.zeros(len(a)) for _ in range(4))
         if hasattr(self, "_pairs") and len(self._pairs.a):
             known, spot = self._carry(a, b, start, slots)
-            for now, old in zip((fresh, touching, overlap, found, calm), self._remembered()):
+            for now, old in zip((force, held, touching, overlap, found, calm), self._remembered()):
                 now[known] = old[spot]
         if as_deep:
-            fresh[~known] = 1.0
-        elif parted is not None:
-            begins = ~known & np.isin(self._key(a, b), parted)
-            fresh[begins] = self._joint_share(a[begins], b[begins])
-        self._pairs = Pairs(a, b, start, fresh, touching, calm, overlap, found)
+            force[~known] = np.inf
+        self._pairs = Pairs(a, b, start, force, held, touching, calm, overlap, found)
         self._slots = slots
         if not hasattr(self, "_rows") or len(self._rows.a) < total:
             self._rows = empty_rows(total + total // 4)
 
-    def _joint_share(self, a: Array, b: Array) -> Array:
-        """Stiffness of the joints that held the pairs a, b (k,), over that of their contact."""
-        K = self._bodies.stiffness
-        return (1.0 / K[a] + 1.0 / K[b]) / (1.0 / self._closing[a] + 1.0 / self._closing[b])
-
     def _remembered(self) -> tuple[Array, ...]:
         """Copy the history of pairs that continue; the distance of those that do not touch is found again."""
         p = self._pairs
-        return p.fresh, p.touching, p.overlap, p.found, np.where(p.touching, p.calm, 0.0)
+        return p.force, p.held, p.touching, p.overlap, p.found, np.where(p.touching, p.calm, 0.0)
 
     def _carry(self, a, b, start, slots: Slots) -> tuple[Array, Array]:
         """Copy the slots of pairs that were known before; (p,) bool, and which of the pairs before these are."""
@@ -278,7 +279,7 @@ class ContactForces:
         """Note that blocks have been displaced directly. Contacts that begin there have the full present depth, so that
         their forces depend on the positions alone and not on the path to them."""
         self.search()
-        self._pairs.found[:], self._pairs.fresh[:] = False, 1.0
+        self._pairs.found[:], self._pairs.force[:] = False, np.inf
         self._read = None
 
     # ---- saving and going back ------------------------------------------------------------------------------

@@ -19,7 +19,7 @@ from kernels.decorators import inner, plain
 from yade_scripts.blocks.faces import FixedPlane
 from yade_scripts.contact.arrays import BEGINS
 from yade_scripts.contact.search import ALIGNED, write_row
-from yade_scripts.contact.springs import ARRIVED, release, stiffness_together, take_over, way_of
+from yade_scripts.contact.springs import ARRIVED, release, stiffness_together, way_of
 
 Array = np.ndarray
 
@@ -159,10 +159,8 @@ def scan_ground(
             slots.shear[s, 0] = slots.shear[s, 1] = slots.shear[s, 2] = 0.0
             slots.push[s] = BEGINS
             way_of(state, a, b, xi0, xi1, xi2, plane, scratch, way)
-            if side.fresh > 0.0:
-                lost += take_over(slots, s, side.fresh, depth, way[1, 0])
-            else:
-                slots.rest[s] = max(0.0, depth - ARRIVED * max(way[1, 0], 0.0))
+            came = ARRIVED * max(way[1, 0], 0.0)
+            slots.rest[s] = 0.0 if side.whole else max(0.0, depth - came)
         slots.rest[s] = min(slots.rest[s], depth)
         write_row(rows, count, side, s, plane, depth, xi0, xi1, xi2, state)
         rows.depth[count], rows.kn[count] = depth - slots.rest[s], slots.k[s]

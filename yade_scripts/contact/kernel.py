@@ -25,7 +25,7 @@ from yade_scripts.contact.search import (
     scan,
     separation,
 )
-from yade_scripts.contact.springs import Mode, add_up, apply, set_dashpots
+from yade_scripts.contact.springs import Mode, add_up, apply, set_dashpots, take_over
 
 PAIR, PIECES = 20, 4
 """Cost of one pair, in rows of an ordinary loop, and ranges of pairs for each thread, since those that touch cost most:
@@ -78,7 +78,8 @@ def _contacts(first_pair, last_pair, shapes, bodies, law, pairs, slots, ground, 
             pairs.calm[p] -= state.last_dt * closing_bound(v, a, b, shapes.radius[a], shapes.radius[b])
             if pairs.calm[p] > 0.0 and not pairs.touching[p]:
                 continue
-        first, apart, forward = count, -np.inf, Direction(a, b, finds, pairs.fresh[p])
+        whole = pairs.force[p] > 0.0
+        first, apart, forward = count, -np.inf, Direction(a, b, finds, whole)
         if b == ground.row:
             count, taken, apart = scan_ground(
                 shapes, bodies, law.shear, slots, pairs.start[p], forward, ground, state,
@@ -97,7 +98,7 @@ def _contacts(first_pair, last_pair, shapes, bodies, law, pairs, slots, ground, 
             if gap <= margin or pairs.touching[p]:
                 slot = pairs.start[p] if node_body == a else pairs.start[p + 1] - CROSSINGS - (end - begin)
                 count, taken = scan(
-                    shapes, bodies, law, slots, slot, Direction(node_body, face_body, finds, pairs.fresh[p]),
+                    shapes, bodies, law, slots, slot, Direction(node_body, face_body, finds, whole),
                     Faces(planes, faces, farthest, margin), state, rows, count, taken, scratch,
                 )  # fmt: skip
         base, nodes = pairs.start[p + 1] - CROSSINGS, count
@@ -122,7 +123,10 @@ def _contacts(first_pair, last_pair, shapes, bodies, law, pairs, slots, ground, 
             pairs.overlap[p] = max(0.0, -apart)
             if count > nodes:
                 pairs.overlap[p] = min(pairs.overlap[p], deepest_of(slots, rows, first, count))
-            pairs.fresh[p], pairs.touching[p] = 0.0, count > first
+            pairs.touching[p] = count > first
+            if whole and pairs.force[p] < np.inf:
+                taken += take_over(slots, rows, first, count, pairs.force[p], pairs.held[p], state)
+            pairs.force[p] = pairs.held[p] = 0.0
             if count == first:
                 pairs.calm[p] = apart - _overhang(shapes, a, b)
             elif leads or not bare:

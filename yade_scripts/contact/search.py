@@ -13,7 +13,7 @@ from kernels.decorators import inner, plain
 from yade_scripts.contact.arrays import BEGINS, CROSSINGS
 from yade_scripts.contact.edges import FLAT, PARALLEL, crossing, find_crossing, next_beside
 from yade_scripts.contact.overlap import share_of_overlap
-from yade_scripts.contact.springs import ARRIVED, release, stiffness_together, take_over, way_of
+from yade_scripts.contact.springs import ARRIVED, release, stiffness_together, way_of
 
 ALIGNED = 0.02
 """Least cosine between the normal of a face and the reversed normal of a face of the node: the node cannot have run
@@ -125,10 +125,8 @@ def scan(shapes, bodies, law, slots, slot, side, faces, state, rows, count, lost
             slots.shear[s, 0] = slots.shear[s, 1] = slots.shear[s, 2] = 0.0
             slots.push[s] = BEGINS
             way_of(state, a, b, xi0, xi1, xi2, planes[g], scratch, way)
-            if side.fresh > 0.0:
-                lost += take_over(slots, s, side.fresh, depth, way[1, 0])
-            else:
-                slots.rest[s] = max(0.0, depth - ARRIVED * max(way[1, 0], 0.0))
+            came = ARRIVED * max(way[1, 0], 0.0)
+            slots.rest[s] = 0.0 if side.whole else max(0.0, depth - came)
         slots.rest[s] = min(slots.rest[s], depth)
         write_row(rows, count, side, s, planes[g], depth, xi0, xi1, xi2, state)
         rows.depth[count], rows.kn[count] = depth - slots.rest[s], slots.k[s]
@@ -190,10 +188,8 @@ def cross(
             slots.shear[s, 0] = slots.shear[s, 1] = slots.shear[s, 2] = 0.0
             slots.push[s] = BEGINS
             way_of(state, a, b, xi[0], xi[1], xi[2], plane, scratch, way)
-            if side.fresh > 0.0:
-                lost += take_over(slots, s, side.fresh, depth, way[1, 0])
-            else:
-                slots.rest[s] = max(0.0, depth - ARRIVED * max(way[1, 0], 0.0))
+            came = ARRIVED * max(way[1, 0], 0.0)
+            slots.rest[s] = 0.0 if side.whole else max(0.0, depth - came)
             count = _write_crossing(slots, s, side, plane, depth, xi, state, rows, count)
 
 

@@ -32,6 +32,8 @@ CATCH_UP = 0.7
 integrating an impact at substeps of 0.05 to 0.2/ω, e of 0.05 to 1, any time of touch)."""
 TERMS = 12
 """Of the series of `since_touch`."""
+HALVINGS = 50
+"""Of the interval in which `take_over` seeks the share of the depths that holds the energy of a joint."""
 
 
 class Mode(NamedTuple):
@@ -355,16 +357,46 @@ def stiffness_together(K_a, K_b):
 
 
 @inner
-def take_over(slots, s, share, depth, into):
-    """Begin a contact at the present depth [m] where a spring with `share` of its stiffness acted until now. The
-    contact takes over the force of that spring, or the whole depth if the contact is softer. → energy lost [J], at the
-    time of the velocities half a substep ago.
+def take_over(slots, rows, first, count, force, held, state):
+    """Begin the contacts first .. count of a pair, which have their whole depth, with the normal force [N] of the joint
+    that has just failed there and with no more energy than its springs held [J]; contacts that are too soft for that
+    keep their whole depth. → energy lost [J], at the time of the velocities half a substep ago.
 
-    into [m]: motion into the face over the last substep, from `way_of`. A stiffer spring with the whole depth would
-    push the blocks apart with energy that was never put in."""
-    u = min(share, 1.0) * depth
-    slots.rest[s] = depth - u
-    return 0.5 * slots.k[s] * (share * depth * max(depth - into, 0.0) - u * max(u - into, 0.0))
+    Nodes lie on the rim of a face, where a joint that was bent is deeper than on average: with the force of the joint
+    they could hold more than it did."""
+    full = 0.0
+    for c in range(first, count):
+        full += rows.kn[c] * rows.depth[c]
+    if full <= 0.0:
+        return held
+    share = min(force / full, 1.0)
+    if _stored(rows, first, count, share, state) > held:
+        low, high = 0.0, share
+        for _ in range(HALVINGS):
+            share = 0.5 * (low + high)
+            if _stored(rows, first, count, share, state) > held:
+                high = share
+            else:
+                low = share
+        share = low
+    left = held - _stored(rows, first, count, share, state)
+    for c in range(first, count):
+        rest = (1.0 - share) * rows.depth[c]
+        slots.rest[rows.slot[c]] = rest
+        rows.depth[c] -= rest  # to the last bit as when the contact is read again
+    return left
+
+
+@inner
+def _stored(rows, first, count, share, state):
+    """Energy [J] in the springs of contacts with a share of their depths, half a substep ago."""
+    total = 0.0
+    for c in range(first, count):
+        w = slip(state.v, rows.a[c], rows.b[c], rows.arm_a[c], rows.arm_b[c])
+        n, u = rows.normal[c], share * rows.depth[c]
+        into = -state.last_dt * (w[0] * n[0] + w[1] * n[1] + w[2] * n[2])
+        total += 0.5 * rows.kn[c] * u * max(u - into, 0.0)
+    return total
 
 
 @inner

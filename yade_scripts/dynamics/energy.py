@@ -39,7 +39,7 @@ class Masses:
 class EnergySums:
     """Running sums [J]: load_work · joint_work: what the joints did to the blocks · driving_work: done by what moves
     the driven blocks, against joints, and by what holds up weight that has not come on yet · handed_over: energy of
-    compressed joints that went over to contacts.
+    compressed joints that went over to contacts; lost in a scene without contact.
 
     contacts: they keep the account of their own work; None in a scene without contact.
     """
@@ -100,7 +100,9 @@ class EnergySums:
         e["joint_dissipated"] = -self.joint_work - e["joint_stored"] - e["joint_damping"] - self.handed_over
         e["dashpot"], e["friction"] = 0.0, 0.0 if self._joints is None else float(self._joints.rubbed.sum())
         e["joint_dissipated"] -= e["friction"]
-        if self._contacts is not None:
+        if self._contacts is None:
+            e["friction"] += self.handed_over
+        else:
             e["driving_work"] += self._contacts.driving
             e["dashpot"] = self._contacts.dashpot
             e["friction"] += self._contacts.friction

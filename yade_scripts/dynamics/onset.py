@@ -11,6 +11,7 @@ import numpy as np
 
 from array_types import Array
 from yade_scripts.blocks.block import Block
+from yade_scripts.contact.arrays import Parted
 from yade_scripts.contact.forces import ContactForces
 from yade_scripts.joints.joints import Joints
 from yade_scripts.yade_side.motion import Motion
@@ -72,11 +73,11 @@ class ContactOnset:
         ends = np.unique(ends[ends >= 0])
         return ends[~self.loose[ends]]
 
-    def leave_out_joined(self) -> None:
-        """Exclude pairs with a live joint, which carries compression itself, from contact; failed joints give way to
-        it."""
+    def leave_out_joined(self, failed: Parted | None = None) -> None:
+        """Exclude pairs with a live joint, which carries compression itself, from contact; joints that have just
+        `failed` give way to it."""
         if self._contacts is not None and self._joints is not None:
-            self._contacts.leave_out(self._joints.joined_pairs(len(self.loose)))
+            self._contacts.leave_out(self._joints.pairs(self._joints.live, len(self.loose)), failed)
 
     def loosen(self, rows: Array, as_deep: bool = False) -> None:
         """Let the blocks `rows` have contacts with all others from now on; as_deep: with their full present

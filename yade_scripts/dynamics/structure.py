@@ -14,6 +14,7 @@ import numpy as np
 from array_types import Array, Floats, Ints
 from yade_scripts.blocks.block import Block, BlockError
 from yade_scripts.blocks.faces import FixedPlane, TouchingFaces, both_held, touching_faces
+from yade_scripts.contact.arrays import Parted
 from yade_scripts.contact.forces import ContactForces
 from yade_scripts.contact.law import ContactLaw
 from yade_scripts.dynamics.description import check_names, local_origin, matched_stiffness, moved_block
@@ -174,7 +175,6 @@ class Structure(StructureReadings):
             planes,
             self.contact,
             self.face_stiffness,
-            self.face_stiffness if self.joints is None else matched_stiffness(self.blocks, self.joints),
             ~self.fixed,
             self._motion,
             scene.neighbours,
@@ -352,14 +352,16 @@ class Structure(StructureReadings):
 
     def _retire(self, broken: Array) -> None:
         """Remove failed joints; contact takes over the part of their energy that was compression."""
-        stored = self._energy_sums.joint_stored()
-        self._motion.read()
-        stored -= self.joints.release(broken, self._motion.x, self._motion.R)
-        self.joints.retire(broken, self._motion.x, self._motion.R, self.time)
+        m, j = self._motion, self.joints
+        m.read()
+        energy = j.stored_between(m.x, m.R, *m.before(), which=broken)[broken]
+        energy -= j.release(broken, m.x, m.R)
+        failed = Parted(j.pairs(broken, self.n), j.pressing(broken, m.x, m.R), energy)
+        j.retire(broken, m.x, m.R, self.time)
         self._limit = None
         self._onset.loosen(self._onset.of_failed(broken))
-        self._onset.leave_out_joined()
-        self._energy_sums.handed_over += stored - self._energy_sums.joint_stored()
+        self._onset.leave_out_joined(failed)
+        self._energy_sums.handed_over += float(energy.sum())
         if self._sleep is not None:
             self._sleep.joints_failed()
         self._list_bodies()

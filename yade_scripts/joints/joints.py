@@ -214,16 +214,16 @@ class Joints:
         """μ (J,) of points that have failed and are pressed, while the rest of their joint holds."""
         self.law[:, MU] = friction
 
-    def release(self, joints: Array, x: Array, R: Array) -> float:
-        """End the friction of `joints` at the positions x (n, 3), R (n, 3, 3) and return the energy [J] that was left
-        in its springs."""
+    def release(self, joints: Array, x: Array, R: Array) -> Array:
+        """End the friction of `joints` (k,) at the positions x (n, 3), R (n, 3, 3) and return the energy (k,) [J] that
+        was left in its springs."""
         friction = self.law[joints, MU]
         whole = self.stored_between(x, R, x, R, which=joints)[joints]
         self.law[joints, MU] = 0.0
         held = whole - self.stored_between(x, R, x, R, which=joints)[joints]
         self.law[joints, MU] = friction
         self.rubbed[joints] += held
-        return float(held.sum())
+        return held
 
     def retire(self, joints: Array, x: Array, R: Array, time: float) -> None:
         """Remove failed joints from the live ones: they have dissipated G_c A and are not visited any more."""
@@ -233,13 +233,21 @@ class Joints:
         self.live = self.live[self.alive[self.live]]
         self._list_visited()
 
-    def joined_pairs(self, n: int) -> Array:
-        """Pairs of bodies (p, 2) with a live joint; fixed planes are bodies n, n + 1, ..."""
-        return np.stack([self.a[self.live], np.where(self.b < 0, n + self.plane, self.b)[self.live]], axis=1)
+    def pairs(self, joints: Array, n: int) -> Array:
+        """Pairs of bodies (k, 2) that `joints` (k,) hold; fixed planes are bodies n, n + 1, ..."""
+        return np.stack([self.a[joints], np.where(self.b < 0, n + self.plane, self.b)[joints]], axis=1)
 
     def openings(self, joints: Array, x: Array, R: Array) -> Array:
         """Mean normal opening, mean sliding, largest normal opening of the points of `joints`, (len, 3) [m]."""
-        out = np.zeros((len(self), 3))
+        return self._openings(joints, x, R)[:, :3]
+
+    def pressing(self, joints: Array, x: Array, R: Array) -> Array:
+        """Normal force (k,) [N] of the points of `joints` (k,) that are pressed."""
+        return self.kc[joints] * self.area[joints] * self._openings(joints, x, R)[:, 3]
+
+    def _openings(self, joints: Array, x: Array, R: Array) -> Array:
+        """Columns as in `joint_openings`, (k, 4) [m]."""
+        out = np.zeros((len(self), 4))
         kernel.joint_openings(np.asarray(joints), self._of_law(0.0), x, R, out)
         return out[joints]
 

@@ -65,17 +65,19 @@ def broken(live, start, largest, df):
 
 @plain
 def joint_openings(live, joints, x, R, out):
-    """Mean normal opening, mean sliding and largest normal opening of joints, out (J, 3) [m]; joints: JointPoints."""
+    """Mean normal opening, mean sliding, largest normal opening and mean overlap of joints, out (J, 4) [m]; joints:
+    JointPoints."""
     a, b, start, weight, normal = joints.a, joints.b, joints.start, joints.weight, joints.normal
     xi_a, xi_b = joints.xi_a, joints.xi_b
     for j in live:
         n = facing(a[j], b[j], R, normal[j])
-        total = open_ = slide = 0.0
+        total = open_ = slide = over = 0.0
         widest = -np.inf
         for p in range(start[j], start[j + 1]):
             dn, s = split(place(a[j], R, x, xi_a[p]), place(b[j], R, x, xi_b[p]), n)
             total += weight[p]
             widest = max(widest, dn)
             open_ += weight[p] * dn
+            over += weight[p] * max(-dn, 0.0)
             slide += weight[p] * np.sqrt(dot(s, s))
-        out[j, 0], out[j, 1], out[j, 2] = open_ / total, slide / total, widest
+        out[j, 0], out[j, 1], out[j, 2], out[j, 3] = open_ / total, slide / total, widest, over / total
