@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from fluid.sides.outflow import Outflow
+from fluid.surface.extrapolation import extend_velocity
 from fluid.transport.volume_transport import carry_volume
 from tests.fluid.scenes import advance, column, tank
 
@@ -93,3 +94,19 @@ def test_a_shorter_step_puts_no_energy_into_falling_water(shorter):
     energy = water.available_energy()
     advance(water, 0.018 / shorter)
     assert abs(water.available_energy() / energy - 1.0) < 0.005
+
+
+def test_what_falls_on_spreading_water_is_not_pulled_down():
+    """Two layers of nodes in water that parts at 1.4 to both sides and sinks at 1 a cell above the floor; what is above
+    falls at 0.9. Continued by the slope of the layer to the floor, and no faster than the fastest node in whichever
+    direction, it came down at 1.7: 8 % of the energy of a splash of three cells in one step, however short."""
+    cell = 0.1
+    water = tank([0.8, 0.4, 0.6], cell, lambda x: x[:, 2] - 1.5 * cell)
+    wet, z = water.level_set < 0.0, water.topology.nodes[:, 2] / cell
+    cells = np.flatnonzero(wet[water.topology.cells].any(axis=1))
+    from_middle = water.topology.nodes[:, 0] - 0.4
+    u = np.where(wet[:, None], np.column_stack((1.4 * np.sign(from_middle), 0.0 * z, -z)), 0.0)
+    layers, falling = (water.listed, water.layer_start), np.full(len(z), 0.9)[:, None] * [0.0, 0.0, -1.0]
+    extend_velocity(water.topology, layers, wet, cells, u, np.zeros_like(u), 0.0, falling)
+    above = (np.abs(z - 2.0) < 1e-9) & (np.abs(from_middle) < 1e-9)
+    assert -1.1 < u[above, 2].min() < -0.89
