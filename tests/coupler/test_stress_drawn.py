@@ -108,6 +108,8 @@ def test_scenes_cover_the_case_format():
         'kind = "n-wave"',
         'openings = "edges"',
         "uplift_share",
+        'uplift = "damage"',
+        'uplift = "full"',
         "distribution",
         "[structure.sleep]",
         'start = "ramp"',

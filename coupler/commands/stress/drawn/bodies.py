@@ -9,6 +9,8 @@ import numpy as np
 
 from coupler.commands.stress.drawn.dice import Dice, rounded
 
+DRUM = 1.2
+"""Diameter of a drum of five corners or more over the least width of its face, at most."""
 MARGIN = 0.1
 """Share of a slot left free at each of its ends."""
 SMALLEST, LARGEST = 0.3, 6.0
@@ -17,11 +19,13 @@ SMALLEST, LARGEST = 0.3, 6.0
 
 @dataclass
 class Slot:
-    """Room for one body or group: corners low, high (3,) [m], the lower one on the floor."""
+    """Room for one body or group: corners low, high (3,) [m], the lower one on the floor; least [m]: least width of the
+    faces that its blocks join, as far as it has room for that."""
 
     low: np.ndarray
     high: np.ndarray
     cell: float
+    least: float = 0.0
 
     @property
     def size(self) -> np.ndarray:
@@ -33,13 +37,15 @@ class Slot:
 
     def edges(self, dice: Dice) -> np.ndarray:
         """Edges (3,) [m] of a box that fits, 0.3 to 6 cells."""
-        return np.minimum([self.cell * dice.decades(SMALLEST, LARGEST) for _ in range(3)], 0.85 * self.size)
+        drawn = [max(self.least, self.cell * dice.decades(SMALLEST, LARGEST)) for _ in range(3)]
+        return np.minimum(drawn, 0.85 * self.size)
 
 
 @dataclass
 class Bodies:
     """tables: [structure] without its own values, by kind · solids · files by name · names of single blocks with the
-    room above them [m] · smallest, largest [m]: edges of blocks · count: of blocks · tallest [m]: pile of blocks"""
+    room above them [m] · smallest, largest [m]: edges of blocks · narrowest [m]: about the least width of a face that
+    may be joined; least [m]: that asked for · count: of blocks · tallest [m]: pile of blocks"""
 
     tables: dict[str, list[dict]] = field(default_factory=dict)
     solids: list[dict] = field(default_factory=list)
@@ -47,13 +53,24 @@ class Bodies:
     singles: list[tuple[str, float]] = field(default_factory=list)
     groups: list[str] = field(default_factory=list)
     smallest: float = np.inf
+    narrowest: float = np.inf
+    least: float = 0.0
     largest: float = 0.0
     tallest: float = 0.0
     count: int = 0
 
-    def add(self, kind: str, table: dict, edges, count: int, height: float) -> None:
-        """Add a table of [structure] whose blocks have these edges [m] and are piled up to a height [m]."""
+    @property
+    def wide(self) -> bool:
+        """Whether a width was asked for, and every face that may be joined has it."""
+        return 0.0 < self.least <= self.narrowest < np.inf
+
+    def add(
+        self, kind: str, table: dict, edges, count: int, height: float, width: float | None = None
+    ) -> None:
+        """Add a table of [structure] whose blocks have these edges [m] and are piled up to a height [m]; width [m]: of
+        the faces that they join, that of their least edge if absent."""
         self.tables.setdefault(kind, []).append(table)
+        self.narrowest = min(self.narrowest, min(map(float, edges)) if width is None else width)
         self.groups.append(table["name"])
         self.smallest = min(self.smallest, *map(float, edges))
         self.largest = max(self.largest, *map(float, edges))
@@ -61,8 +78,9 @@ class Bodies:
         self.count += count
 
 
-def slots(dice: Dice, low, high, cell: float, floor, count: int) -> list[Slot]:
-    """`count` rooms side by side along the longer of x and y; floor(low, high) [m]: height of the ground below one."""
+def slots(dice: Dice, low, high, cell: float, floor, count: int, least: float = 0.0) -> list[Slot]:
+    """`count` rooms side by side along the longer of x and y; floor(low, high) [m]: height of the ground below one ·
+    least [m]: as in Slot."""
     axis = 0 if high[0] - low[0] >= high[1] - low[1] else 1
     ends = np.linspace(low[axis], high[axis], count + 1)
     found = []
@@ -76,7 +94,7 @@ def slots(dice: Dice, low, high, cell: float, floor, count: int) -> list[Slot]:
         b[across] -= share * (high[across] - low[across])
         a[2] = floor(a, b)
         if b[2] - a[2] > cell:
-            found.append(Slot(a, b, cell))
+            found.append(Slot(a, b, cell, least))
     return found
 
 
@@ -152,7 +170,7 @@ def _block(dice: Dice, room: Slot, found: Bodies, k: int) -> None:
         table |= {"centre": _listed(centre), "size": _listed(edges)}
     if dice.chance(0.1):
         table["fixed"] = True
-    found.add("block", table, edges, 1, edges[2])
+    found.add("block", table, edges, 1, edges[2], np.inf if free else float(min(edges[:2])))
     found.singles.append((table["name"], float(room.high[2] - centre[2]) - float(np.linalg.norm(edges))))
 
 
@@ -169,9 +187,10 @@ def _stack(dice: Dice, room: Slot, found: Bodies, k: int) -> None:
             "centre": _listed(centre),
             "size": _listed(edges),
         }
-        found.add("block", table, edges, 1, z + edges[2] - room.low[2])
+        found.add("block", table, edges, 1, z + edges[2] - room.low[2], float(min(edges[:2])))
         z = centre[2] + 0.5 * edges[2]
-        edges = edges * [dice.between(0.5, 1.0), dice.between(0.5, 1.0), 1.0]
+        smaller = edges * [dice.between(0.5, 1.0), dice.between(0.5, 1.0), 1.0]
+        edges = np.maximum(smaller, np.minimum(edges, [room.least, room.least, 0.0]))
 
 
 def _wall(dice: Dice, room: Slot, found: Bodies, k: int) -> None:
@@ -179,12 +198,14 @@ def _wall(dice: Dice, room: Slot, found: Bodies, k: int) -> None:
     cell = room.cell
     height = min(0.9 * room.size[2], cell * dice.between(1.5, 6.0))
     long = 0 if room.size[0] > room.size[1] and dice.chance(0.5) else 1
-    thick = min(cell * dice.decades(0.2, 2.5), 0.5 * room.size[1 - long])
+    thick = min(max(room.least, cell * dice.decades(0.2, 2.5)), 0.5 * room.size[1 - long])
     size = np.array([0.0, 0.0, height])
     size[long], size[1 - long] = room.size[long] * dice.one([1.0, 0.7]), thick
     counts = np.array([dice.whole(2, 6), dice.whole(1, 2), dice.whole(2, 5)])
     if long == 1:
         counts = counts[[1, 0, 2]]
+    if room.least > 0.0:
+        counts = np.clip((size / room.least).astype(int), 1, counts)
     lower = room.middle - 0.5 * size
     lower[2] = room.low[2]
     table = {
@@ -193,7 +214,7 @@ def _wall(dice: Dice, room: Slot, found: Bodies, k: int) -> None:
         "size": _listed(size),
         "block": _listed(size / counts),
     }
-    if dice.chance(0.4):
+    if dice.chance(0.4) and room.least == 0.0:  # half a block long are the joints of a running bond
         table["bond"] = "running"
     found.add("wall", table, size / counts, int(np.prod(counts)), height)
 
@@ -226,7 +247,8 @@ def _building(dice: Dice, room: Slot, found: Bodies, k: int) -> None:
 def _column(dice: Dice, room: Slot, found: Bodies, k: int) -> None:
     """Drums on one another, square or round, straight or tapered."""
     height = min(0.9 * room.size[2], room.cell * dice.between(2.0, 8.0))
-    width = min(0.8 * float(room.size[:2].min()), room.cell * dice.between(0.7, 2.5), height)
+    drawn = max(DRUM * room.least, room.cell * dice.between(0.7, 2.5))
+    width = min(0.8 * float(room.size[:2].min()), drawn, height)
     drums = dice.whole(2, 6)
     foot = [room.middle[0], room.middle[1], room.low[2]]
     table = {"name": f"column{k}", "foot": _listed(foot), "height": rounded(height), "drums": drums}
@@ -236,7 +258,8 @@ def _column(dice: Dice, room: Slot, found: Bodies, k: int) -> None:
         table |= {"radius": rounded(0.5 * width), "sides": dice.whole(5, 10)}
         if dice.chance(0.4):
             table["top_radius"] = rounded(0.5 * width * dice.between(0.5, 0.95))
-    found.add("column", table, [width, height / drums], drums, height)
+    narrow = width if "size" in table else 2.0 * table.get("top_radius", 0.5 * width) / DRUM
+    found.add("column", table, [width, height / drums], drums, height, narrow)
 
 
 def _arch(dice: Dice, room: Slot, found: Bodies, k: int) -> None:
@@ -280,7 +303,7 @@ def _rubble(dice: Dice, room: Slot, found: Bodies, k: int) -> None:
         "corners": dice.whole(6, 12),
         "seed": dice.whole(0, 999),
     }
-    found.add("rubble", table, [0.4 * smallest, largest], count, largest)
+    found.add("rubble", table, [0.4 * smallest, largest], count, largest, np.inf)
 
 
 def _file(dice: Dice, room: Slot, found: Bodies, k: int) -> None:

@@ -11,10 +11,10 @@ DIGITS = 6
 
 
 class Dice:
-    """Random numbers of scene `number` of `seed`, both ≥ 0."""
+    """Random numbers of scene `number` of `seed`, both ≥ 0; another stream leaves the first as it is."""
 
-    def __init__(self, seed: int, number: int):
-        self._rng = np.random.Generator(np.random.PCG64([seed, number]))
+    def __init__(self, seed: int, number: int, *stream: int):
+        self._rng = np.random.Generator(np.random.PCG64([seed, number, *stream]))
 
     def chance(self, share: float) -> bool:
         """True with the probability `share`."""

@@ -23,6 +23,9 @@ SUBSTEP = 4e-6
 """Approximate processor time [s] per substep of a block with its contacts and joints."""
 TOUCHING = ("wall", "building", "column", "arch")
 """Kinds of parts in which faces touch for sure: from their joints [contact] can take its stiffness."""
+WIDE, WIDE_KINDS = 2.3, ("block", "stack", "wall", "column")
+"""Cells that the joined faces of such parts are wide in a fifth of the scenes with water, blocks and a flat bed in a
+roomy tank: water between narrower ones is refused."""
 WANTED = 4.0
 """Processor time [s] that a scene is sized for."""
 
@@ -51,7 +54,10 @@ def draw(seed: int, number: int, seconds: float = WANTED) -> Drawn:
         terrain = dice.one({"solids": 1.0, "mesh": 1.0 if group == "water" else 0.0})
     place = basin(dice, terrain)
     flow = stream(dice, place, gravity) if group != "structure" else None
-    found = _bodies(dice, place, group, flow)
+    beside = Dice(seed, number, 1)
+    roomy = group == "coupling" and terrain == "flat" and float(place.size.min()) > 2.0 * WIDE * place.cell
+    least = WIDE * place.cell if roomy and beside.chance(0.2) else 0.0
+    found = _bodies(dice, place, group, least)
     title = _title(place, flow, found)
     about = {"title": f"random scene {number} of seed {seed}: {title}"}
     if gravity != 9.81:
@@ -60,6 +66,8 @@ def draw(seed: int, number: int, seconds: float = WANTED) -> Drawn:
     if flow is not None:
         _air(dice, place, flow, found, table)
     add_options(dice, place, table)
+    if found.wide:
+        table["joints"]["uplift"] = beside.one({"none": 1.0, "damage": 2.0, "full": 2.0})
     still = flow is not None and flow.still and not found.tables
     files = place.files | found.files | (flow.files if flow else {})
     return Drawn(f"R{seed}-{number}", group, title, table, files, still)
@@ -96,8 +104,8 @@ def group_of(dice: Dice) -> str:
     return dice.one(SHARES)
 
 
-def _bodies(dice: Dice, place: Basin, group: str, flow: Stream | None) -> Bodies:
-    """Solids and blocks; a terrain of wedges counts as solids."""
+def _bodies(dice: Dice, place: Basin, group: str, least: float) -> Bodies:
+    """Solids and blocks; a terrain of wedges counts as solids. least [m]: as in `Slot`."""
     count = {"water": dice.whole(0, 2), "structure": dice.whole(1, 3), "coupling": dice.whole(1, 3)}[group]
     if group == "water" and place.meshed:
         count = 0
@@ -109,15 +117,17 @@ def _bodies(dice: Dice, place: Basin, group: str, flow: Stream | None) -> Bodies
         place.cell,
         place.floor,
         max(count, 1),
+        least,
     )[:count]
-    found = bodies(dice, rooms, group != "water")
+    found = bodies(dice, rooms, group != "water", WIDE_KINDS if least > 0.0 else None)
+    found.least = least
     if group != "water" and not found.tables:
         high = slots(dice, place.lower + gap, place.upper - gap, place.cell, place.floor, 1)
         low = place.lower + np.array([gap, gap, 0.6 * place.size[2]])
         rooms = high or slots(dice, low, place.upper - gap, 0.1 * place.cell, lambda a, b: low[2], 1)
         found.tables |= (more := bodies(dice, rooms, True, ("block",))).tables
         found.singles, found.groups, found.count = more.singles, more.groups, found.count + more.count
-        found.smallest, found.largest = more.smallest, more.largest
+        found.smallest, found.largest, found.narrowest = more.smallest, more.largest, more.narrowest
         found.tallest, found.solids = more.tallest, [] if high else found.solids
     if place.bed is not None and not place.meshed:
         found.solids = [*terrain_solids(place), *found.solids]
@@ -206,7 +216,7 @@ def _structure(dice: Dice, place: Basin, flow: Stream | None, found: Bodies, gra
         other = dice.one(["block", "tank" if "tank" in tables else "block"])
         pair = {"materials": ["block", other], "friction": rounded(dice.between(0.0, 1.5), 3)}
         contact["pair"] = [pair]
-    glued = dice.chance(0.7 if found.count > 3 else 0.15)
+    glued = dice.chance(0.7 if found.count > 3 else 0.15) or found.wide
     if glued:
         tables["joints"] = _joints(dice, place, found, density, gravity)
         if flow is not None and dice.chance(0.3):
