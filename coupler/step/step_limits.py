@@ -23,6 +23,8 @@ HELPS = 0.5 ** (1.0 / 3.0)
 """Share to which every halving must bring what the longest attempt broke, over the same time, so that three of them
 bring it to a half: an error of the first order in the step falls to an eighth in three halvings, one that the step has
 no part in stays."""
+ONE_PASS = "which had a single pass: raise coupling.passes"
+"""Part of a message about a step with coupling.passes = 1."""
 
 
 @dataclass(frozen=True)
@@ -103,7 +105,7 @@ def worst_place(coupling: CoupledSides, record: StepRecord) -> str:
         single = record.passes == 1 and coupling.defects.too_large(record.defect)
         parts.append(
             f"block '{name}' missed {abs(record.missed_work[worst]):.3g} J of the water's work in this step"
-            + (", which had a single pass: raise coupling.passes" if single else "")
+            + (f", {ONE_PASS}" if single else "")
         )
     if coupling.water is not None:
         speed, place = coupling.water.fastest_place()

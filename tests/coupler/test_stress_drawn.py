@@ -28,6 +28,7 @@ from coupler.results.history import HistoryTable, read_history
 from coupler.run.directory import RunDirectory, write_json
 from coupler.run.execute import execute_case
 from coupler.step.limits import Diverged, check_overlap
+from coupler.step.step_limits import ONE_PASS
 
 SEED = 2
 NUMBERS = range(20)
@@ -279,6 +280,18 @@ def test_a_scene_may_ask_too_much_of_its_joints_but_not_of_its_contact():
     assert asked_too_much(reported, {"contact": {"friction": 0.5}})
     assert not asked_too_much(reported, {"contact": {"stiffness": 1e6}})
     assert not asked_too_much("the energy balance is off by 6 %", {})
+
+
+def test_one_pass_may_end_a_scene_of_blocks_lighter_than_the_water():
+    """As `check` remarks beforehand; the message is that of the run."""
+    said = f"off by 9.82%. Block 'b' missed 6e-06 J of the water's work in this step, {ONE_PASS};"
+    heavy = {"structure": {"density": 2000.0, "block": [{"density": None}]}, "water": {}}
+    assert not asked_too_much(said, heavy)
+    assert asked_too_much(said, heavy | {"structure": {"density": 2000.0, "block": [{"density": 900.0}]}})
+    assert asked_too_much(said, heavy | {"structure": {"density": 300.0, "block": []}})
+    assert not asked_too_much(
+        "the energy balance is off by 9.82%.", heavy | {"structure": {"density": 300.0}}
+    )
 
 
 def test_a_start_that_asks_too_much_counts_as_refused_whatever_the_exit_code(tmp_path, monkeypatch):
