@@ -98,8 +98,8 @@ def _within_processor_time() -> None:
 
 
 def asked_too_much(message: str, case: dict) -> bool:
-    """Whether a run was refused for what a drawn scene may ask; contact with a stiffness of its own is stiff enough, and
-    so is one pass for blocks heavier than the water (`check` remarks on lighter ones, P58 has the growth)."""
+    """Whether a run was refused for what a drawn scene may ask. A stiffness of its own makes contact stiff enough, and
+    one pass is enough for blocks heavier than the water (`check` remarks on lighter ones, P58 has the growth)."""
     return (
         TOO_WEAK in message
         or (TOO_SOFT in message and "stiffness" not in case.get("contact", {}))
