@@ -42,6 +42,8 @@ SPIN = 200_000
 """Nanoseconds for which a thread looks before it sleeps: longer than what lies between most loops."""
 BRIEF = 5_000
 """Nanoseconds from which a thread that looks lets others have its core, who may be waiting for it."""
+CROWDED = 20_000
+"""Nanoseconds after which a core that was let to others has been needed there."""
 BETWEEN = 16
 """How often a thread looks between two glances at the clock."""
 PATIENCE = 1.0
@@ -142,7 +144,8 @@ def _now(clock):
 
 @inner
 def _look(place, value, spin, clock):
-    """Look at a place until something else than `value` is there, for at most `spin` nanoseconds."""
+    """Look at a place until something else than `value` is there, for at most `spin` nanoseconds, and no longer once
+    others have used the core meanwhile: where there are more of them than cores, looking takes time from them."""
     for _ in range(BETWEEN):
         if _load(place) != value:
             return
@@ -154,6 +157,8 @@ def _look(place, value, spin, clock):
             return
         if passed > BRIEF:
             _yield()
+            if _now(clock) - begun - passed > CROWDED:
+                return
         for _ in range(BETWEEN):
             if _load(place) != value:
                 return

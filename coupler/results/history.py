@@ -224,7 +224,13 @@ def write_table(path, title, columns, arrays):
 def _table_cells(values):
     """The texts of a column of numbers or texts."""
     values = values.tolist() if isinstance(values, np.ndarray) else values
-    return [v if isinstance(v, str) else number(v) if np.isfinite(v) else "" for v in values]
+    return [_table_cell(value) for value in values]
+
+
+def _table_cell(value):
+    if type(value) is float:
+        return repr(value) if math.isfinite(value) else ""
+    return value if isinstance(value, str) else number(value) if np.isfinite(value) else ""
 
 
 def _replace(path, text):

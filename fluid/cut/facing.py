@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from kernels.decorators import kernel
+from kernels.decorators import kernel, ranged
+from kernels.threads import over
+
+WORK = 30
+"""Cost of a polygon, in usual rows."""
 
 
 def facing(bodies, polygons, reach, bounds, loose):
@@ -18,7 +22,11 @@ def facing(bodies, polygons, reach, bounds, loose):
     box = bodies.bounds()
     near = near_bodies(box[:, 0], box[:, 1], loose, float(reach.max(initial=0.0)))
     polygons = (body, np.ascontiguousarray(centroid), np.ascontiguousarray(normal))
-    return _facing(polygons, bodies.planes(), loose, near, bounds, reach)
+    in_film, plane = np.zeros(len(body), bool), np.empty(len(body), np.int64)
+    over(
+        _facing, len(body), polygons, bodies.planes(), loose, near, bounds, reach, in_film, plane, weight=WORK
+    )
+    return in_film, plane
 
 
 def near_bodies(low, high, loose, reach):
@@ -60,14 +68,13 @@ def _near_pairs(low, high, loose, reach, axis, order):
     return pairs[0, :count].copy(), pairs[1, :count].copy()
 
 
-@kernel
-def _facing(polygons, planes, loose, near, bounds, reach):
-    """near: (start, members) of `near_bodies`."""
+@ranged
+def _facing(begin, end, polygons, planes, loose, near, bounds, reach, in_film, plane):
+    """What `facing` returns for the polygons from `begin` to before `end`; near: (start, members) of `near_bodies`."""
     face_body, centroid, normal = polygons
     normals, offsets, plane_start = planes
     near_start, members = near
-    in_film, plane = np.zeros(face_body.shape[0], np.bool_), np.empty(face_body.shape[0], np.int64)
-    for s in range(face_body.shape[0]):
+    for s in range(begin, end):
         b = face_body[s]
         best = -2.0
         for g in range(plane_start[b], plane_start[b + 1]):
@@ -99,4 +106,3 @@ def _facing(polygons, planes, loose, near, bounds, reach):
                 elif room < 0.0:
                     last = -1.0
             in_film[s] = first <= last
-    return in_film, plane

@@ -61,9 +61,10 @@ def _take_off_dry(faces, hats, nodes, centre, phi, way, taken):
                 + (way[b, 1] + way[b, 5] * x0 - way[b, 3] * x2) * normal[s, 1]
                 + (way[b, 2] + way[b, 3] * x1 - way[b, 4] * x0) * normal[s, 2]
             )
+        triangles = wet_triangles(height, share)
         for a in range(4):
             found = -_product(area[s], whole, hat, a, flux)
-            for k in range(wet_triangles(height, share)):
+            for k in range(triangles):
                 found += _product(area[s] * relative_area(share[k]), share[k], hat, a, flux)
             taken[cells[e, a]] += found
 

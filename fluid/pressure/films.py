@@ -217,11 +217,18 @@ def _solved(own, right):
     count, part = connected_components(own, directed=False)
     order = np.argsort(part, kind="stable")
     start = np.searchsorted(part[order], np.arange(count + 1))
+    place = np.empty(len(order), np.int64)
+    place[order] = np.arange(len(order)) - start[part[order]]
     out = np.zeros(right.shape)
     for p in range(count):
         rows = order[start[p] : start[p + 1]]
         used = np.flatnonzero(right[rows].any(axis=0))
-        out[np.ix_(rows, used)] = _one_solved(own, rows, right[np.ix_(rows, used)])
+        chosen = np.ix_(rows, used)
+        if len(rows) <= LARGE:
+            block = _block(own.indptr, own.indices, own.data, rows, part, place)
+            out[chosen] = np.linalg.solve(block, right[chosen])
+        else:
+            out[chosen] = sp.linalg.splu(sp.csc_array(own[rows][:, rows])).solve(right[chosen])
     return out
 
 
@@ -229,11 +236,16 @@ LARGE = 300
 """Unknowns of a film from which it is solved as a sparse matrix."""
 
 
-def _one_solved(own, rows, right):
-    block = own[rows][:, rows]
-    if len(rows) <= LARGE:
-        return np.linalg.solve(block.toarray(), right)
-    return sp.linalg.splu(sp.csc_array(block)).solve(right)
+@kernel
+def _block(indptr, indices, data, rows, part, place):
+    """Rows (k,) of a csr matrix that are one part, and its columns, as a full matrix (k, k); place: of each row among
+    those of its part."""
+    block = np.zeros((len(rows), len(rows)))
+    for i in range(len(rows)):
+        for s in range(indptr[rows[i]], indptr[rows[i] + 1]):
+            if part[indices[s]] == part[rows[i]]:
+                block[i, place[indices[s]]] += data[s]
+    return block
 
 
 @kernel

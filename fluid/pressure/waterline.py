@@ -23,7 +23,7 @@ from array_types import Array
 from fluid.domain.moments import cells_touching
 from fluid.domain.physical_domain import hat_values
 from fluid.pressure.projection import with_ghosts
-from kernels.decorators import helper, inner, kernel
+from kernels.decorators import inner, kernel
 
 
 def waterline_load(domain, faces, left_out, phi, wet, pressure, open_node, air=None) -> Array:
@@ -85,13 +85,28 @@ def hydrostatic_stiffness(water, phi, bodies) -> Array | None:
     height = np.einsum("kqa,ka->kq", hats, phi[corners[at]])
     body, normal, area = domain.face_body[at], domain.face_normal[at], domain.face_area[at]
     arm = domain.face_corners[at] - domain.body_centre[body][:, None]
-    nothing = np.zeros_like(height)
-    for k, lift in enumerate((np.ones_like(height), arm[:, :, 1], -arm[:, :, 0])):
-        force, first = differences(height, np.ascontiguousarray(lift), nothing, arm, area)
-        moment = np.cross(first, normal)
-        for row, value in enumerate((force * normal[:, 2], moment[:, 0], moment[:, 1])):
-            np.add.at(stiffness[:, row, k], body, weight * value)
+    _add_stiffness(height, arm, area, normal, body, weight, stiffness)
     return stiffness
+
+
+@kernel
+def _add_stiffness(height, arm, area, normal, body, weight, stiffness):
+    """Add (3) of triangles with corner values `height` (k, 3) and arms (k, 3, 3) to that of their bodies."""
+    share, room, lift = np.empty((2, 3, 3)), np.empty((5, 3)), np.ones((3, 3))
+    force, first = np.empty(3), np.empty((3, 3))
+    for s in range(height.shape[0]):
+        n, b = normal[s], body[s]
+        for q in range(3):
+            lift[1, q], lift[2, q] = arm[s, q, 1], -arm[s, q, 0]
+        force[:], first[:] = 0.0, 0.0
+        for t in range(wet_triangles(height[s], share)):
+            wet = area[s] * relative_area(share[t])
+            for k in range(3):
+                _add(-1.0, wet, share[t], lift[k], arm[s], room, force, first, k)
+        for k in range(3):
+            stiffness[b, 0, k] += weight * (force[k] * n[2])
+            stiffness[b, 1, k] += weight * (first[k, 1] * n[2] - first[k, 2] * n[1])
+            stiffness[b, 2, k] += weight * (first[k, 2] * n[0] - first[k, 0] * n[2])
 
 
 @kernel
@@ -99,13 +114,14 @@ def differences(height, full, acting, arm, area):
     """∫ p_acting - ∫_{height<0} p_full over triangles with corner values (k, 3): (k,), and times the arm: (k, 3)."""
     n = height.shape[0]
     force, first = np.zeros(n), np.zeros((n, 3))
-    share = np.empty((2, 3, 3))
+    share, room = np.empty((2, 3, 3)), np.empty((5, 3))
     corner = np.eye(3)
     for s in range(n):
-        _add(1.0, area[s], corner, acting[s], arm[s], force, first, s)
+        if acting[s, 0] != 0.0 or acting[s, 1] != 0.0 or acting[s, 2] != 0.0:
+            _add(1.0, area[s], corner, acting[s], arm[s], room, force, first, s)
         for k in range(wet_triangles(height[s], share)):
             part = share[k]
-            _add(-1.0, area[s] * relative_area(part), part, full[s], arm[s], force, first, s)
+            _add(-1.0, area[s] * relative_area(part), part, full[s], arm[s], room, force, first, s)
     return force, first
 
 
@@ -149,17 +165,20 @@ def relative_area(part):
     return abs(d)
 
 
-@helper
-def _add(sign, area, part, p, arm, force, first, s):
+@inner
+def _add(sign, area, part, p, arm, room, force, first, s):
     """force[s] += sign ∫ p dA, first[s] += sign ∫ p arm dA over the part with barycentric corners (3, 3).
 
-    Products of linear functions f, g over a triangle: A/12 (Σ f_k g_k + Σ f_k Σ g_k)."""
+    Products of linear functions f, g over a triangle: A/12 (Σ f_k g_k + Σ f_k Σ g_k) · room (5, 3): work space."""
     total = 0.0
-    value, place, sum_place = np.empty(3), np.zeros((3, 3)), np.zeros(3)
+    value, sum_place, place = room[0], room[1], room[2:]
+    for c in range(3):
+        sum_place[c] = 0.0
     for k in range(3):
         value[k] = part[k, 0] * p[0] + part[k, 1] * p[1] + part[k, 2] * p[2]
         total += value[k]
         for c in range(3):
+            place[k, c] = 0.0
             for q in range(3):
                 place[k, c] += part[k, q] * arm[q, c]
             sum_place[c] += place[k, c]

@@ -113,3 +113,17 @@ def work_of(F, v_before, v_after, dt):
         for k in range(6):
             total += F[i, k] * (v_before[i, k] + v_after[i, k])
     return 0.5 * total * dt
+
+
+@plain
+def work_on_rows(F, v_before, v_after, rows, free, dt):
+    """`work_of` the forces on the blocks `rows`, and the part of it on those that are not free (n,) bool, [J]."""
+    total = driven = 0.0
+    for i in range(len(rows)):
+        r = rows[i]
+        for k in range(6):
+            work = F[r, k] * (v_before[r, k] + v_after[r, k])
+            total += work
+            if not free[r]:
+                driven += work
+    return 0.5 * total * dt, 0.5 * driven * dt

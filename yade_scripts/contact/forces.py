@@ -89,8 +89,10 @@ class ContactForces:
         keys = _once(self._key(*np.sort(joined, axis=1).T))
         parted = self._joined[~_among(self._joined, keys)]
         self._joined = keys
-        if len(parted):
+        if len(parted) and self._asleep.any():
             self.search()
+        elif len(parted):
+            self._add_pairs(parted)
         if failed is not None:
             self._take_over(failed)
 
@@ -108,6 +110,16 @@ class ContactForces:
     def search(self, as_deep: bool = False) -> None:
         """Find the candidate pairs at the present positions. as_deep: as in `switch_on`."""
         self._set_pairs(self._in_order(self._near()), as_deep)
+
+    def _add_pairs(self, parted: Array) -> None:
+        """Add the pairs (keys `parted`) that joints have held until now to the others, which the last search found for
+        a while to come."""
+        more = np.stack(np.divmod(parted, len(self._free)), axis=1)
+        to_plane = more[:, 1] >= self._n
+        on = to_plane | self._on[more[:, 0]] | self._on[np.where(to_plane, 0, more[:, 1])]
+        more = more[on & self._free[more].any(axis=1)]
+        now = np.stack([self._pairs.a, self._pairs.b], axis=1)
+        self._set_pairs(self._in_order(np.concatenate([now, more])), searched=False)
 
     def _key(self, a: Array, b: Array) -> Array:
         return a * len(self._free) + b
@@ -194,8 +206,9 @@ class ContactForces:
             found.append(np.stack([near, np.full(len(near), self._n + number)], axis=1))
         return np.concatenate(found)
 
-    def _set_pairs(self, pairs: Array, as_deep: bool = False) -> None:
-        """Pairs (p, 2) in order; known pairs keep their history. as_deep: others begin with the whole present depth."""
+    def _set_pairs(self, pairs: Array, as_deep: bool = False, searched: bool = True) -> None:
+        """Pairs (p, 2) in order; known pairs keep their history. as_deep: others begin with the whole present depth ·
+        searched: the distance of pairs that do not touch is to be found anew."""
         a, b = pairs.T.copy()
         size = self._nodes[a] + self._nodes[b] + CROSSINGS
         start = np.concatenate([[0], np.cumsum(size)]).astype(np.int64)
@@ -205,7 +218,7 @@ class ContactForces:
         force, held, overlap, calm = (np.zeros(len(a)) for _ in range(4))
         if hasattr(self, "_pairs") and len(self._pairs.a):
             known, spot = self._carry(a, b, start, slots)
-            for now, old in zip((force, held, touching, overlap, found, calm), self._remembered()):
+            for now, old in zip((force, held, touching, overlap, found, calm), self._remembered(searched)):
                 now[known] = old[spot]
         if as_deep:
             force[~known] = np.inf
@@ -214,10 +227,11 @@ class ContactForces:
         if not hasattr(self, "_rows") or len(self._rows.a) < total:
             self._rows = empty_rows(total + total // 4)
 
-    def _remembered(self) -> tuple[Array, ...]:
-        """Copy the history of pairs that continue; the distance of those that do not touch is found again."""
+    def _remembered(self, searched: bool) -> tuple[Array, ...]:
+        """The history of pairs that continue; after a search the distance of those that do not touch is found again."""
         p = self._pairs
-        return p.force, p.held, p.touching, p.overlap, p.found, np.where(p.touching, p.calm, 0.0)
+        calm = np.where(p.touching, p.calm, 0.0) if searched else p.calm
+        return p.force, p.held, p.touching, p.overlap, p.found, calm
 
     def _carry(self, a, b, start, slots: Slots) -> tuple[Array, Array]:
         """Copy the slots of pairs that were known before; (p,) bool, and which of the pairs before these are."""

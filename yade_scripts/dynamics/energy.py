@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from array_types import Array, Bools, Floats
-from yade_scripts.blocks.kinematics import work_of
+from yade_scripts.blocks.kinematics import work_of, work_on_rows
 from yade_scripts.contact.forces import ContactForces
 from yade_scripts.joints.joints import Joints
 from yade_scripts.yade_side.motion import Motion
@@ -71,9 +71,10 @@ class EnergySums:
 
     def take_joints(self, F: Array, before: Array, rows: Array, dt: float) -> None:
         """Work of the joint forces F (n, 6) on `rows` in a substep dt that began with velocities `before` (n, 6)."""
-        self.joint_work += work_of(F[rows], before[rows], self._motion.v[rows], dt)
-        held = rows[~self._masses.free[rows]]
-        self.driving_work -= work_of(F[held], before[held], self._motion.v[held], dt)
+        free = self._masses.free
+        work, driven = work_on_rows(F, before, self._motion.v, rows, free, dt)
+        self.joint_work += work
+        self.driving_work -= driven
 
     def take_lift(self, F: Array, before: Array, dt: float) -> None:
         """Work in a substep dt, begun with velocities `before` (n, 6), of the forces F (n, 6) that hold blocks up."""
