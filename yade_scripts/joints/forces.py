@@ -21,7 +21,7 @@ import numpy as np
 from kernels.decorators import plain
 from yade_scripts.blocks.kinematics import arm, cross, dot, parting, place, turned
 from yade_scripts.joints import laws, mixed_modes
-from yade_scripts.joints.kernel import facing, split
+from yade_scripts.joints.kernel import facing, facing_and_lean, split
 from yade_scripts.joints.law import CohesiveLaw
 from yade_scripts.joints.specialise import source_checksum, specialised
 
@@ -123,8 +123,8 @@ def joint_forces(begin, end, live, joints, memory, motion, eta, dt, advance, giv
         ra, rb = a[j], b[j]
         unit, df, beta, k0 = law[j, UNIT], law[j, DF], law[j, BETA], law[j, K0]
         kc = law[j, KC]
-        n = facing(ra, rb, R, normal[j])
-        f0 = f1 = f2 = m0 = m1 = m2 = 0.0
+        n, lean = facing_and_lean(ra, rb, R, normal[j])
+        f0 = f1 = f2 = m0 = m1 = m2 = g0 = g1 = g2 = 0.0
         for p in range(start[j], start[j + 1]):
             pa, pb = place(ra, R, x, xi_a[p]), place(rb, R, x, xi_b[p])
             mid = (0.5 * (pa[0] + pb[0]), 0.5 * (pa[1] + pb[1]), 0.5 * (pa[2] + pb[2]))
@@ -144,6 +144,8 @@ def joint_forces(begin, end, live, joints, memory, motion, eta, dt, advance, giv
                     paid[p, PULL] = NOT_GROWING
             tn, kn, kt = response(ks, dn, ss, after, k0, df, beta, kc)
             t0, t1, t2 = tn * n[0] + kt * s[0], tn * n[1] + kt * s[1], tn * n[2] + kt * s[2]
+            g = weight[p] * (tn - kt * dn)
+            g0, g1, g2 = g0 + g * s[0], g1 + g * s[1], g2 + g * s[2]
             if eta > 0.0:
                 c, power = dashpot(eta, kn, kt, parting(ra, rb, x, v, mid), n)
                 t0, t1, t2 = t0 + c[0], t1 + c[1], t2 + c[2]
@@ -163,6 +165,8 @@ def joint_forces(begin, end, live, joints, memory, motion, eta, dt, advance, giv
             t = (weight[p] * t0, weight[p] * t1, weight[p] * t2)
             c0, c1, c2 = cross(arm(ra, x, mid), t)
             f0, f1, f2, m0, m1, m2 = f0 + t[0], f1 + t[1], f2 + t[2], m0 + c0, m1 + c1, m2 + c2
+        c0, c1, c2 = cross(lean, (g0, g1, g2))
+        m0, m1, m2 = m0 - 0.5 * c0, m1 - 0.5 * c1, m2 - 0.5 * c2
         given[i, 0], given[i, 1], given[i, 2] = f0, f1, f2
         given[i, 3], given[i, 4], given[i, 5] = m0, m1, m2
     return fastest

@@ -3,11 +3,17 @@ here.
 
 A point of a joint sits at ξ_a in block a and ξ_b in block b (or at a fixed place). With the separation d = x_b - x_a
 and the normal n half way between those that turn with block a and block b:  δ_n = d·n, δ_t = d - δ_n n. The traction
-acts on both blocks at the mid point of the pair, so linear and angular momentum are exact, and so is energy: n turns at
-the mean of both spins ω, and at the mid point the velocities differ by the rate of d as seen from axes that turn with
-this mean, d' - ω x d. (With a normal that turns with block a alone, pressed joints that shear while their blocks spin
-gained or lost a hundredth of their stored energy.) Separations are computed from absolute positions, so they do not
-drift."""
+acts on both blocks at the mid point of the pair, so linear and angular momentum are exact. At the mid point the
+velocities differ by the rate of d as seen from axes that turn with the mean of both spins ω, d' - ω x d. The normal n
+turns with these axes only as long as the blocks have turned alike; beyond that by the rate of its energy (t_n - k_t
+δ_n) δ_t·n' a pair of moments belongs to every point,
+
+    on a and -on b:   -1/2 (n_a - n_b)/|n_a + n_b| x (t_n - k_t δ_n) δ_t
+
+with which energy is exact for any turn of the blocks. (With a normal that turns with block a alone, pressed joints that
+shear while their blocks spin gained or lost a hundredth of their stored energy; without the moments 6e-5 of it, a
+thirteenth of G_c in a wall that flies apart at 100 m/s.) Separations are computed from absolute positions, so they
+do not drift."""
 
 from __future__ import annotations
 
@@ -27,18 +33,26 @@ def split(pa, pb, n):
 
 @plain
 def facing(a, b, R, normal):
-    """Present normal of a joint as a tuple: half way between normal[0], turned with block a, and normal[1], turned with
-    b."""
-    n0, n1, n2 = turned(a, R, normal[0])
-    if b < 0:
-        m0, m1, m2 = n0 + normal[1, 0], n1 + normal[1, 1], n2 + normal[1, 2]
-    else:
-        k0, k1, k2 = turned(b, R, normal[1])
-        m0, m1, m2 = n0 + k0, n1 + k1, n2 + k2
+    """Present normal of a joint as a tuple: half way between n_a = normal[0], turned with block a, and n_b = normal[1],
+    turned with b."""
+    n, _ = facing_and_lean(a, b, R, normal)
+    return n
+
+
+@plain
+def facing_and_lean(a, b, R, normal):
+    """As `facing`, and (n_a - n_b)/|n_a + n_b| as a tuple, 0 where the blocks are half a turn apart."""
+    n = turned(a, R, normal[0])
+    k = turned(b, R, normal[1]) if b >= 0 else (normal[1, 0], normal[1, 1], normal[1, 2])
+    m0, m1, m2 = n[0] + k[0], n[1] + k[1], n[2] + k[2]
     size = np.sqrt(m0 * m0 + m1 * m1 + m2 * m2)
-    if size == 0.0:  # turned by half a turn against one another
-        return n0, n1, n2
-    return m0 / size, m1 / size, m2 / size
+    if size == 0.0:
+        return n, (0.0, 0.0, 0.0)
+    return (m0 / size, m1 / size, m2 / size), (
+        (n[0] - k[0]) / size,
+        (n[1] - k[1]) / size,
+        (n[2] - k[2]) / size,
+    )
 
 
 @plain
