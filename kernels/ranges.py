@@ -77,7 +77,7 @@ def is_shared(kernel: Any) -> bool:
     return getattr(kernel, "shared", False)
 
 
-def alone(kernel: Callable, count: int, *args: Any, weight: float = 1, pieces: int = 1) -> list:
+def alone(kernel: Callable, count: int, *args: Any, weight: float = 1, pieces: int | None = None) -> list:
     """What [kernel(0, count, *args)] returns: one thread's form of `kernels.threads.over`."""
     return [kernel(0, count, *args)]
 

@@ -44,6 +44,9 @@ already and are allocated only when they are written to."""
 PYTHON = 10
 """How many times as long as a compiled loop Python code takes to be handed over: for the interpreter, which one thread
 has at a time."""
+PIECES = 4
+"""Number of ranges for each thread where there are enough rows: whoever is through takes the next one, since rows in
+the air cost less than those in the water, and other programs may take the core of a thread."""
 PASSED = 0.1
 """Cost of an entry of a mask, in usual rows."""
 KEPT = 8
@@ -94,25 +97,28 @@ def watched() -> Iterator[list[Call]]:
         _settings.calls = None
 
 
-def over(kernel: Callable, count: int, *args, weight: float = 1, pieces: int = 1) -> list:
+def over(kernel: Callable, count: int, *args, weight: float = 1, pieces: int | None = None) -> list:
     """Run kernel(first, last, *args) on ranges that together cover 0 ... count; returns their results in order.
 
     kernel: `ranged` or `released`, or Python code · weight: cost of a row, in usual rows, which take some ten
-    nanoseconds · pieces: number of ranges for each thread, more than one for rows of unequal cost."""
+    nanoseconds · pieces: number of ranges for each thread, more than one for rows of unequal cost; None: PIECES where
+    each range has enough rows, one for Python code."""
     shared = is_shared(kernel)
     parts = min(_parts(count * weight if shared else count * weight / PYTHON), max(count, 1))
     if parts == 1:
         return [_alone(kernel, count * weight, (0, count, *args))]
     if shared:
+        if pieces is None:
+            pieces = max(1, min(PIECES, int(count * weight) // (parts * _settings.least)))
         found = _team.share(kernel, parts, min(parts * pieces, count, MOST), count, args)
         return [kernel(0, count, *args)] if found is None else found
     ends = [count * k // parts for k in range(parts + 1)]
     return _team.together([_call(kernel, (first, last), args) for first, last in pairwise(ends)])
 
 
-def found_over(kernel: Callable, count: int, *args, weight: float = 1) -> Array:
+def found_over(kernel: Callable, count: int, *args, weight: float = 1, pieces: int | None = None) -> Array:
     """The arrays that `over` returns, concatenated."""
-    found = over(kernel, count, *args, weight=weight)
+    found = over(kernel, count, *args, weight=weight, pieces=pieces)
     return found[0] if len(found) == 1 else np.concatenate(found)
 
 

@@ -39,7 +39,7 @@ def layers_around(seed, depth: int, start, around) -> Layers:
         if layer > 0:
             before = order[layer_start[layer - 1] : count]
             rows = (layer_start[layer - 1], before, place, start, around)
-            found = found_over(_beyond, len(before), *rows, weight=WORK)
+            found = found_over(_beyond, len(before), *rows, weight=WORK, pieces=1)
         count = _append(found, start, count, order, place)
         layer_start[layer + 1] = count
     return Layers(order[:count].copy(), layer_start, place)

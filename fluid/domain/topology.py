@@ -189,7 +189,7 @@ class Topology:
         """`around`, and the number of cells that each of these neighbours shares with the node."""
         n = len(self.nodes)
         rows = (self.cells, self.node_start, self.node_cells)
-        return _concatenated(over(_nodes_around, n, *rows, weight=WORK))
+        return _concatenated(over(_nodes_around, n, *rows, weight=WORK, pieces=1))
 
     @cached_property
     def near_solids(self) -> Array:
@@ -411,7 +411,9 @@ class Graph:
         row = np.full(len(t.nodes), -1, np.int64)
         row[nodes] = np.arange(len(nodes))
         mesh = (t.cells, t.parent, t.products, t.volume, t.node_start, t.node_cells)
-        start, neighbour, stiffness = _concatenated(over(_edges, len(nodes), nodes, *mesh, weight=WORK))
+        start, neighbour, stiffness = _concatenated(
+            over(_edges, len(nodes), nodes, *mesh, weight=WORK, pieces=1)
+        )
         return cls(nodes, row, start, neighbour, stiffness)
 
     def without(self, topology: Topology, cell_list) -> Graph:

@@ -19,7 +19,8 @@ import numpy as np
 
 from array_types import Bools, Floats
 from fluid.numerics.solve import MOST_ITERATIONS, NotConverged, conjugate_gradients, operators, solve
-from kernels.decorators import kernel
+from kernels.decorators import kernel, ranged
+from kernels.threads import over
 
 LOOSE = 1e-3
 """Residual at which a round with unknowns far below their bound ends; the next one continues from there."""
@@ -172,6 +173,15 @@ def _beside(indptr, indices, source):
     return found
 
 
+@ranged
+def _some_below(first, last, x, lower, held):
+    """How many x lie below their bound and are not held."""
+    count = 0
+    for i in range(first, last):
+        count += x[i] < lower[i] and not held[i]
+    return count
+
+
 class _Signs:
     """The unknowns of wrong sign, and the choice of those to exchange."""
 
@@ -183,7 +193,9 @@ class _Signs:
 
     def early(self, x, residual: float, held) -> bool:
         """Whether to end a round early: it is solved to a loose tolerance, and some value lies far below its bound."""
-        return residual <= LOOSE and bool(self._below(x, held, FAR_BELOW).any())
+        if residual > LOOSE or not any(over(_some_below, len(x), x, self.lower, held)):
+            return False
+        return bool(self._below(x, held, FAR_BELOW).any())
 
     def wrong(self, x, held, parting, tolerance: float):
         """(n,) bool: below the bound, or held there although water converges."""

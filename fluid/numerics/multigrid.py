@@ -34,8 +34,10 @@ SWEEPS = 4
 """Double sweeps on a last level that is too large for its inverse."""
 BLOCK, MOST_BLOCKS = 4096, 64
 """Least number of unknowns in a block of a sweep, and largest number of blocks."""
-COARSE_ROW = 20
-"""Cost of summing a row of a coarser level, in rows of a loop."""
+COARSE_ROW, AGGREGATE = 20, 4
+"""Cost of summing a row of a coarser level, and the values of an aggregate, in rows of a loop."""
+ROW = 10
+"""Cost of going through a row of the matrix twice."""
 SAME = 0.99
 """Share of the strongest coupling from which one counts as equally strong: round-off must not choose the pairs."""
 
@@ -54,7 +56,8 @@ class Level(NamedTuple):
     """Rows of A: start[i]:middle[i] of (column, entry) lie left of the diagonal, middle[i]:start[i+1] right of it.
 
     diagonal (n,) and its inverse · aggregate (n,) unknown of the coarser level, -1 none (an unknown without
-    neighbours, which one sweep solves) · start, middle, column: unsigned, see `topology.py`."""
+    neighbours, which one sweep solves) · first, member: unknowns of each aggregate, as `_members` gives them · start,
+    middle, column: unsigned, see `topology.py`."""
 
     start: Integers
     middle: Integers
@@ -63,6 +66,8 @@ class Level(NamedTuple):
     diagonal: Floats
     inverse: Floats
     aggregate: Integers
+    first: Integers
+    member: Integers
 
     def blocks(self) -> Array:
         """Where the blocks of its sweeps begin and end (b + 1,)."""
@@ -86,10 +91,12 @@ class Multigrid:
             aggregate, count = _aggregates(parts)
             if count > LEAST_GAIN * len(aggregate):
                 break
-            self.levels.append(Level(*parts, 1.0 / parts[-1], aggregate))
-            parts = _split(*_galerkin(Matrix(*parts), aggregate, count, SCALE))
+            members = _members(aggregate, count)
+            self.levels.append(Level(*parts, 1.0 / parts[-1], aggregate, *members))
+            parts = _split(*_galerkin(Matrix(*parts), aggregate, members, SCALE))
         n = len(parts[-1])
-        self._last = Level(*parts, 1.0 / parts[-1], np.full(n, -1, np.int32))
+        none = np.zeros(1, np.uint32)
+        self._last = Level(*parts, 1.0 / parts[-1], np.full(n, -1, np.int32), none, none[:0])
         self._dense = _dense_inverse(self._last) if n <= COARSEST else None
 
     def __call__(self, r) -> Array:
@@ -112,13 +119,14 @@ class Multigrid:
 
     def _by_blocks(self, depth: int, at: Level, n_coarse: int, r):
         """`_cycle` on a large level."""
-        bounds, x, left = at.blocks(), np.empty(len(r)), np.empty(len(r))
+        bounds, (x, before, left), coarse = at.blocks(), np.empty((3, len(r))), np.empty(n_coarse)
         count, work = len(bounds) - 1, BLOCK
         over(_down_blocks, count, bounds, at, r, x, weight=work)
         over(_left_over, count, bounds, at, x, left, weight=work)
-        coarse = self._cycle(depth + 1, _restricted(at.aggregate, left, n_coarse))
-        over(_add, len(r), at.aggregate, coarse, x)
-        over(_up_blocks, count, bounds, at, r, x.copy(), x, weight=work)
+        over(_restricted, n_coarse, at.first, at.member, left, coarse, weight=AGGREGATE)
+        coarse = self._cycle(depth + 1, coarse)
+        over(_add, len(r), at.aggregate, coarse, x, before)
+        over(_up_blocks, count, bounds, at, r, before, x, weight=work)
         return x
 
     def _at_the_bottom(self, r):
@@ -139,9 +147,45 @@ def _dense_inverse(level: Level):
     return np.linalg.inv(A)
 
 
-@kernel
 def _split(indptr, indices, data):
     """start, middle, column, entry, diagonal of Level from the rows of a csr matrix."""
+    n, most = len(indptr) - 1, max(len(indices) - len(indptr) + 1, 0)
+    start, middle, diagonal = np.empty(n + 1, np.uint32), np.empty(n, np.uint32), np.empty(n)
+    column, entry = np.empty(most, np.uint32), np.empty(most)
+    start[0] = 0
+    if all(over(_parted, n, indptr, indices, data, start[1:], middle, column, entry, diagonal, weight=ROW)):
+        return start, middle, column, entry, diagonal
+    return _split_any(indptr, indices, data)
+
+
+@ranged
+def _parted(first, last, indptr, indices, data, end, middle, column, entry, diagonal):
+    """Rows of `_split`, each of which has one entry on the diagonal; → whether that is so."""
+    for i in range(first, last):
+        k, below, right = indptr[i] - i, np.int64(0), np.int64(0)
+        for s in range(indptr[i], indptr[i + 1]):
+            below += indices[s] < i
+            right += indices[s] > i
+        after = k + below
+        wrong = below + right + 1 != np.int64(indptr[i + 1]) - np.int64(indptr[i])
+        if wrong or k < 0 or after + right > column.shape[0]:
+            return False
+        middle[i], end[i] = after, after + right
+        for s in range(indptr[i], indptr[i + 1]):
+            if indices[s] < i:
+                column[k], entry[k] = indices[s], data[s]
+                k += 1
+            elif indices[s] > i:
+                column[after], entry[after] = indices[s], data[s]
+                after += 1
+            else:
+                diagonal[i] = data[s]
+    return True
+
+
+@kernel
+def _split_any(indptr, indices, data):
+    """`_split` where a row may have several entries on the diagonal, or none."""
     n = len(indptr) - 1
     start, middle = np.zeros(n + 1, np.uint32), np.empty(n, np.uint32)
     column, entry = np.empty(len(indices), np.uint32), np.empty(len(indices))
@@ -168,7 +212,7 @@ def _aggregates(parts):
     aggregate, count = _matched(*parts)
     pairs = aggregate
     for _ in range(PAIRINGS - 1):
-        parts = _split(*_galerkin(Matrix(*parts), pairs, count, 1.0))
+        parts = _split(*_galerkin(Matrix(*parts), pairs, _members(pairs, count), 1.0))
         pairs, count = _matched(*parts)
         aggregate = _chained(aggregate, pairs)
     return aggregate, count
@@ -208,10 +252,11 @@ def _chained(first, second):
     return out
 
 
-def _galerkin(fine: Matrix, aggregate, n, scale):
-    """scale Pᵀ A P as csr (indptr, indices, data), the diagonal first in every row."""
-    first, member = _members(aggregate, n)
-    parts = over(_coarse_rows, n, first, member, fine, aggregate, n, scale, weight=COARSE_ROW)
+def _galerkin(fine: Matrix, aggregate, members, scale):
+    """scale Pᵀ A P as csr (indptr, indices, data), the diagonal first in every row; members: those of `_members`."""
+    n = len(members[0]) - 1
+    rows = (*members, fine, aggregate, n, scale)
+    parts = over(_coarse_rows, n, *rows, weight=COARSE_ROW, pieces=1)
     if len(parts) == 1:
         return parts[0]
     lengths, indices, data = zip(*parts)
@@ -322,22 +367,23 @@ def _left_over(first, last, bounds, at, x, left):
             left[i] = total
 
 
-@kernel
-def _restricted(aggregate, left, n_coarse):
+@ranged
+def _restricted(begin, end, first, member, left, coarse):
     """Pᵀ left."""
-    coarse = np.zeros(n_coarse)
-    for i in range(len(aggregate)):
-        if aggregate[i] >= 0:
-            coarse[aggregate[i]] += left[i]
-    return coarse
+    for k in range(begin, end):
+        total = 0.0
+        for t in range(first[k], first[k + 1]):
+            total += left[member[t]]
+        coarse[k] = total
 
 
 @ranged
-def _add(first, last, aggregate, coarse, x):
-    """x + P coarse in place."""
+def _add(first, last, aggregate, coarse, x, copy):
+    """x + P coarse in place, and a copy of it."""
     for i in range(first, last):
         if aggregate[i] >= 0:
             x[i] += coarse[aggregate[i]]
+        copy[i] = x[i]
 
 
 @ranged

@@ -15,7 +15,8 @@ import numpy as np
 from array_types import Bools, Floats, Ints
 from fluid.domain.moments import wet_fraction
 from fluid.pressure.indefinite_cells import without_indefinite
-from kernels.decorators import kernel
+from kernels.decorators import kernel, released
+from kernels.threads import found_over
 
 DRY = 1e-9
 """A fluid part that lies above φ = -DRY h holds no water."""
@@ -37,16 +38,31 @@ class WetPart:
         t = topology
         below = (phi < 0.0) & t.active
         cells = t.cells_around(below)
-        holds = ~domain.is_cut[cells] | _holding(domain, t, phi, -DRY * spacing)[cells]
+        holding = _holding(domain, t, phi, -DRY * spacing)
+        dry = found_over(_dry, len(cells), cells, domain.is_cut, holding)
         if t.is_obtuse:
+            holds = np.ones(len(cells), bool)
+            holds[dry] = False
             holds[holds] = without_indefinite(t, cells[holds], below, phi)
-        void = cells[~holds]
+            dry = np.flatnonzero(~holds)
+        void = cells[dry]
         if len(void) > 0:
-            cells = cells[holds]
+            cells = np.delete(cells, dry)
             reached = np.zeros(len(phi), bool)
             reached[t.cells[cells]] = True
             below &= reached
         return cls(below, cells, wet_fraction(cells, phi, t.parts), void)
+
+
+@released
+def _dry(first, last, cells, is_cut, holding):
+    """Places in the list of the cells that are cut and hold no water."""
+    found, n = np.empty(last - first, np.int64), 0
+    for s in range(first, last):
+        if is_cut[cells[s]] and not holding[cells[s]]:
+            found[n] = s
+            n += 1
+    return found[:n].copy()
 
 
 def _holding(d, t, phi, dry):

@@ -26,6 +26,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from array_types import Array, Bools, Floats, Integers, Ints
+from fluid.domain.layers import WORK
 from fluid.numerics.fields import copied
 from kernels.decorators import kernel, ranged, released
 from kernels.threads import found_over, over, owning, reach_of_cells, zeros
@@ -229,25 +230,36 @@ def seal_pockets(matrix, anchored, volume, compliance: float, pressure):
     return sp.csr_array(matrix + sp.diags_array(added)), added * pressure
 
 
-@kernel
 def _reached(indptr, indices, seed):
     """Rows (n,) bool that the entries of a symmetric matrix connect to a row of the seed (n,) bool.
 
-    By sweeps to and fro: rows of nearby nodes have nearby numbers, so that two or three reach all."""
-    reached, left = seed.copy(), np.flatnonzero(~seed)
-    before = len(left) + 1
-    while len(left) < before:
-        before, k = len(left), 0
-        for i in left:
-            for s in range(indptr[i], indptr[i + 1]):
-                if reached[indices[s]]:
+    By sweeps to and fro: rows of nearby nodes have nearby numbers, so that two or three reach all. Threads see what
+    others have reached sooner or later; which rows are reached in the end does not depend on it."""
+    reached, left, before = seed.copy(), len(seed), len(seed) + 1
+    while 0 < left < before:
+        before = left
+        left = sum(over(_reach_on, len(seed), indptr, indices, reached, weight=WORK))
+    return reached
+
+
+@ranged
+def _reach_on(first, last, indptr, indices, reached):
+    """Mark rows of a range from its end and from its beginning; → how many are not reached."""
+    left = 0
+    for way in range(2):
+        left = 0
+        for k in range(last - first):
+            i = np.uint64(first + k if way else last - 1 - k)
+            if reached[i]:
+                continue
+            for s in range(indptr[i], indptr[i + np.uint64(1)]):
+                if reached[np.uint64(indices[s])]:
                     reached[i] = True
                     break
-            if not reached[i]:
-                left[k] = i
-                k += 1
-        left = left[:k][::-1].copy()  # the next sweep runs back
-    return reached
+            left += not reached[i]
+        if left == 0:
+            break
+    return left
 
 
 def cell_velocity(cell_list, u, remainder, fluid):

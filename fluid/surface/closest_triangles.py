@@ -106,7 +106,7 @@ def squared_distances(layers: Layers, surface: Surface, mesh, around, descent: D
     for layer, count in enumerate(np.diff(layers.start).tolist()[1:], 1):
         for sweep in (FIRST, SECOND):
             rows = (layer, sweep, layers, surface.triangles, mesh.nodes, around, once, known, behind)
-            starts = over(_sweep, count, *rows, weight=TESTS * WORK)
+            starts = over(_sweep, count, *rows, weight=TESTS * WORK, pieces=1)
             if len(starts) > 1:
                 _mend(starts[1], count, *rows)
     if descent is not None:

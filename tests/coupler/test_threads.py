@@ -129,7 +129,7 @@ def _squares(first, last, failing, out):
 
 def _squares_are_right():
     out = np.zeros(100)
-    found = kernels.over(_squares, 100, -1, out)
+    found = kernels.over(_squares, 100, -1, out, pieces=1)
     expected = np.arange(100.0) ** 2
     assert len(found) == kernels.in_use()
     assert sum(length for _, length in found) == 100

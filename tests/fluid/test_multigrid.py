@@ -131,3 +131,39 @@ def applied_whole(A, monkeypatch):
     with monkeypatch.context() as without:
         without.setattr(multigrid, "BLOCK", 10**9)
         return applied(A)
+
+
+def _parts_of(A):
+    """The parts of `multigrid._split` from dense rows."""
+    n, rows = A.shape[0], [A[[i]].toarray()[0] for i in range(A.shape[0])]
+    left = [[(j, r[j]) for j in np.flatnonzero(r) if j < i] for i, r in enumerate(rows)]
+    right = [[(j, r[j]) for j in np.flatnonzero(r) if j > i] for i, r in enumerate(rows)]
+    start = np.cumsum([0, *(len(a) + len(b) for a, b in zip(left, right))])
+    entries = [entry for a, b in zip(left, right) for entry in a + b]
+    middle = start[:-1] + [len(a) for a in left]
+    return start, middle, [j for j, _ in entries], [v for _, v in entries], [rows[i][i] for i in range(n)]
+
+
+@pytest.mark.parametrize("diagonal", ["one", "missing", "double"])
+def test_rows_are_parted_at_the_diagonal(diagonal):
+    """On any number of threads; also where a row has no entry there, or two that add up."""
+    A = laplace(6, 5, 4)
+    if diagonal == "missing":
+        A = sp.csr_array(A - sp.diags_array(A.diagonal() * (np.arange(A.shape[0]) % 7 == 3)))
+        A.eliminate_zeros()
+    expected, rows = _parts_of(A), (A.indptr, A.indices, A.data)
+    if diagonal == "double":
+        one = A.tocoo()
+        on = one.row == one.col
+        row, col = np.concatenate([one.row, one.row[on]]), np.concatenate([one.col, one.col[on]])
+        data = np.concatenate([np.where(on, 0.75, 1.0) * one.data, 0.25 * one.data[on]])
+        order = np.argsort(row, kind="stable")
+        indptr = np.concatenate([[0], np.cumsum(np.bincount(row))]).astype(np.int32)
+        rows = (indptr, col[order].astype(np.int32), data[order])
+    indptr, indices, data = rows
+    for number in (1, 2, 3, 4):
+        threads.use(number, least=1)
+        found = multigrid._split(indptr.view(np.uint32), indices.view(np.uint32), data)
+        threads.use(1)
+        for part, given in zip(found, expected):
+            np.testing.assert_array_equal(part, given)

@@ -2,10 +2,14 @@
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
 
+import kernels.threads as threads
 from coupler.commands.verify.figures import columns
 from fluid.cut.bodies import ConvexBodies
 from fluid.domain.moments import cells_touching
+from fluid.pressure import projection
 from fluid.pressure.projection import cell_gradient
 from fluid.step.predictor import carry_remainder
 from tests.fluid.scenes import advance, column, rotation, tank
@@ -117,3 +121,23 @@ def test_water_that_has_hardly_moved_since_it_turned_keeps_the_remainder_of_its_
     for viscosity, left in ((0.0, 1.0 / (1.0 + 2.0 / 45.0)), (1.25, 1.0 / (3.0 + 4.0 / 45.0))):
         out = carry_remainder(np.array([0]), held, 0.02, u, 0.1, viscosity, cells, size)
         np.testing.assert_allclose(out, [[0.0, 0.02 * left, 0.36 * left]], rtol=1e-12)
+
+
+def test_water_that_hangs_together_with_a_surface_is_found_on_any_number_of_threads():
+    """Rows that a sweep to and fro does not reach at once: chains whose numbers are in no order."""
+    rng = np.random.default_rng(2)
+    ends = [rng.permutation(3000)[:500] for _ in range(4)]
+    row, col = (np.concatenate([e[a] for e in ends]) for a in (slice(None, -1), slice(1, None)))
+    A = sp.coo_array((np.ones(len(row)), (row, col)), shape=(3000, 3000))
+    A = sp.csr_array(A + A.T + sp.eye_array(3000))
+    seed = np.zeros(3000, bool)
+    seed[ends[0][7]] = True
+    part = connected_components(A)[1]
+    expected = part == part[ends[0][7]]
+    assert 500 < expected.sum() < 2900
+    for number in (1, 2, 3, 4):
+        threads.use(number, least=1)
+        found = projection._reached(A.indptr, A.indices, seed)
+        threads.use(1)
+        np.testing.assert_array_equal(found, expected)
+    assert not projection._reached(A.indptr, A.indices, np.zeros(3000, bool)).any()
