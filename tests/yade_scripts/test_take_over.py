@@ -166,3 +166,34 @@ def test_without_contact_the_springs_are_lost():
         s.displace(np.array([1]), np.array([[0.0, 0.0, -DEPTH]]), np.eye(3)[None])
         before = fail(s)
         assert balance(s.energies()) == pytest.approx(balance(before), abs=1e-3 * before["joint_stored"])
+
+
+def row_that_breaks(seek):
+    """Four cubes in a row, bonded to one another and to the floor, whose joints fail one after the other → places and
+    velocities, work that friction took, and how often neighbours were looked for. seek: looked for at each failure."""
+    blocks = [
+        Block(f"cube {k}", (k, 0, 0.5), size=1.0, density=2000.0, velocity=(v, 0.0, -0.2))
+        for k, v in enumerate((0.3, 0.1, -0.1, -0.3))
+    ]
+    with Structure(blocks, ContactLaw(2.0 * JOINT.closing_stiffness), JOINT, ground=0.0) as s:
+        searches, contacts = [], s._contacts
+        look = contacts._neighbours
+        contacts._neighbours = lambda: searches.append(None) or look()
+        if seek:
+            contacts._add_pairs = lambda parted: contacts.search()
+        for joint in range(len(s.joints)):
+            s.advance(40 * DT, DT)
+            s.joints.largest[s.joints.joint_of == joint] = 2.0 * JOINT.opening_at_failure
+            s.advance(40 * DT, DT)
+        assert not s.joints.alive.any()
+        assert len(s.contacts()) > 0
+        return s.centre().copy(), s.velocity().copy(), s.energies()["friction"], len(searches)
+
+
+def test_a_joint_that_fails_adds_its_blocks_to_the_known_neighbours():
+    """The same bits as from looking for all neighbours anew, without looking."""
+    *kept, few = row_that_breaks(seek=False)
+    *anew, many = row_that_breaks(seek=True)
+    assert all((a == b).all() for a, b in zip(map(np.asarray, kept), map(np.asarray, anew)))
+    assert kept[2] > 0.0
+    assert (few, many) == (0, 7)
