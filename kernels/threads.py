@@ -1,8 +1,8 @@
 """Kernels on several threads, with the same bits at any number of them.
 
 A kernel of this kind takes a range as its first arguments, releases the interpreter (`kernels.decorators.ranged`), and
-writes to what belongs to the range only. Each thread gets one range; a single thread gets all of it and runs the loop
-unchanged. The result of a row must not depend on where the ranges end. There are two forms:
+writes to what belongs to the range only. Each thread gets one range or several; a single thread gets all of it and runs
+the loop unchanged. The result of a row must not depend on where the ranges end. There are two forms:
 
 - `over`: rows that may read everything and write only their own entries.
 - `owning`: sums over cells, or along edges, into nodes. The range is one of nodes: every thread goes through the cells
