@@ -25,6 +25,9 @@ NOTES = {
     "rest is missing in the first 40 ms. The front is late by this time according to the clock of the record, "
     "which is ahead of a dam that vanishes at t = 0, and because the tip of the front is thinner than a cell "
     "([water](water.md#against-measurements)).",
+    "P61": "The run-up in the lee hangs on small differences, as that of P42 does: with the island moved by 1e-6 m it "
+    "is 0.094 m instead of 0.0775 m, 0.075 instead of 0.071 m on the side that faces the wave, and the crest at g22 is "
+    "0.038 m instead of 0.048 m. The run-up of P60 does not change by such a shift.",
     "P62": "Next to an edge the pressure varies with the square root of the distance; linear cells spread this "
     "variation over two cells. With a quarter of the step the plate of width D receives 5 % more; 2 % of that are "
     "due to the inner node beside the edge, whose share of the water is closed off behind the plate.",
@@ -35,7 +38,9 @@ NOTES = {
     "P42": "The wave is less than half a cell high, and its run-up is one to two cells of water. Up to 0.054 d the tip "
     "follows the shallow-water equations within 0.002 d; from there noise of the level set inside the bed breaks the "
     "tongue, a fifth to a half of a cell deep, into lumps. Variants of damping, step and correction give 0.064 to "
-    "0.083 d; the exact tongue is a tenth of a cell deep, which counts as dry here, at 0.079 d. On the fitted bed "
+    "0.083 d, and runs that differ by 1e-5 m/s before the wave climbs the beach 0.066 to 0.081 d "
+    "([theory](theory.md#24a-cells-of-several-sizes-and-meshes-that-end-on-a-bed)); "
+    "the exact tongue is a tenth of a cell deep, which counts as dry here, at 0.079 d. On the fitted bed "
     "with 8 layers the figure still hangs on small differences, as the tongue is thinner than a cell: with beach and "
     "columns moved by 0, 1e-6, 0.001 and 0.01 d it is 0.089, 0.089, 0.101 and 0.074 d, and with the beach alone moved "
     "by 1e-6 d 0.085 d (0.101, 0.090, 0.078 and 0.083 d for both when the tip stood upright). The "
