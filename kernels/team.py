@@ -3,8 +3,9 @@
 The thread that calls puts the work into a box of each other thread, does its own part, takes back what no other thread
 has begun yet, and waits for the rest. Of more parts than threads, each takes the next one when it is through. A thread
 without work looks at its box for a while (SPIN), which takes 1 µs to notice, and then sleeps, which takes some 20 to
-50 µs to end; so it costs nothing where nothing is shared, and a thread that has to wait for a core delays nobody. A
-part that is Python code sends its thread back to the interpreter.
+50 µs to end; it sleeps at once where others have used its core meanwhile. So it costs nothing where nothing is shared,
+and a thread that has to wait for a core delays nobody. A part that is Python code sends its thread back to the
+interpreter.
 
 A box has the states of BOX; each change from one to the next is one atomic operation, so that either side of it wins:
 begun by its thread or taken back, asleep or given work.
