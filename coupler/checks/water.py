@@ -90,8 +90,7 @@ def water_problems(case: Case) -> Iterator[Problem]:
 def water_remarks(case: Case) -> Iterator[str]:
     """Water that the mesh does not resolve, waves that are under way at the start, and waves without the still water
     that they run into."""
-    if case.water and case.tank:
-        yield from _thin_water(case)
+    yield from thin_water_remarks(case)
     for spec in case.water.inflow if case.water and case.tank else ():
         if spec.kind in ("solitary", "n-wave") or getattr(spec, "ahead", None) is not None:
             yield from _still_water(case, spec)
@@ -106,8 +105,10 @@ def water_remarks(case: Case) -> Iterator[str]:
                 )
 
 
-def _thin_water(case: Case) -> Iterator[str]:
+def thin_water_remarks(case: Case) -> Iterator[str]:
     """Boxes of water, inflows and seas that are thinner than a few cells; walls and other water lengthen a box."""
+    if case.tank is None or case.water is None:
+        return
     tank, cell = case.tank, finest_cell(case.tank)
     found = []
     if tank.is_box:

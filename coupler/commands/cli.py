@@ -588,10 +588,10 @@ def stress(
     A scene passes, is refused with a message, or fails. The exit code is 3 if one fails.
     """
     one_thread()
-    from coupler.commands.stress.drawn.command import is_drawn, named, numbered, stress_drawn
+    from coupler.commands.stress.drawn.command import are_drawn, named, numbered, stress_drawn
 
     words = [*(scenes or []), *(group or [])]
-    if random is not None or (words and all(map(is_drawn, words))):
+    if random is not None or are_drawn(words):
         asked = named(words) if random is None else numbered(seed, random, first, words)
         raise typer.Exit(int(stress_drawn(asked, keep, shrink, as_json=json, only_list=list_)))
     from coupler.commands.stress.report import stress as run_scenes

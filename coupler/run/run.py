@@ -11,6 +11,7 @@ from coupler.case.case import Case, effective
 from coupler.case.schedule import Schedule, checkpoint_interval
 from coupler.checks.bores import bores
 from coupler.checks.case import remarks, thin_remarks
+from coupler.checks.water import thin_water_remarks
 from coupler.geometry.overlaps import deepest_overlap
 from coupler.program.errors import ExitCode
 from coupler.program.terminal import newtons
@@ -194,7 +195,8 @@ def _report_verdict(
     from coupler.verdict.words import sentences, unreached
 
     reported = recorder.verdict()
-    doubts = [*thin_remarks(case), *([in_all(figures["tank_top"])] if "tank_top" in figures else [])]
+    doubts = [*thin_remarks(case), *thin_water_remarks(case)]
+    doubts += [in_all(figures["tank_top"])] if "tank_top" in figures else []
     if reported is not None and is_coupled and figures["steps"]:
         doubts += filter(None, [unreached(reported, figures["time"])])
     directory.record(doubts=doubts)

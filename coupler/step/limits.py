@@ -45,11 +45,11 @@ class Limits:
 
 
 def check_balance(
-    time: float, volume_error: float, energy_error: float, limits: Limits, where: str = ""
+    time: float, volume_error: float, energy_error: float, limits: Limits, advice: Callable[[], str] = str
 ) -> None:
     """Stop a run whose water volume or energy no longer balances.
 
-    where: what to look at, a clause without a full stop.
+    advice: gives the sentences on which part of the energy is off, where to look, and what to try.
     Raises Diverged with the quantity, its value, its limit and the remedy.
     """
     if not math.isfinite(volume_error) or abs(volume_error) > limits.volume_error:
@@ -58,12 +58,13 @@ def check_balance(
             f"{limits.volume_error:.2%} (limits.volume_error). Reduce time.cfl or tank.cell."
         )
     if not math.isfinite(energy_error) or energy_error > limits.energy_error:
-        place = f" {where[0].upper()}{where[1:]}." if where else ""
-        raise Diverged(
+        told = (
             f"the energy balance is off by {energy_error:.2%} of the input energy at t = {time:.4g} s; limit "
-            f"{limits.energy_error:.2%} (limits.energy_error).{place} Reduce time.step_max, raise joints.damping, "
-            "or see history/energy.csv for the line that grows."
+            f"{limits.energy_error:.2%} (limits.energy_error).",
+            advice(),
+            "See history/energy.csv for the line that grows.",
         )
+        raise Diverged(" ".join(filter(None, told)))
 
 
 def check_momentum(time: float, momentum_error: float, limit: float) -> None:

@@ -23,6 +23,8 @@ HELPS = 0.5 ** (1.0 / 3.0)
 """Share to which every halving must bring what the longest attempt broke, over the same time, so that three of them
 bring it to a half: an error of the first order in the step falls to an eighth in three halvings, one that the step has
 no part in stays."""
+A_PART = 0.01
+"""Share of the energy [J] that a step puts out of balance from which a block's missing work is named as its place."""
 ONE_PASS = "which had a single pass: raise coupling.passes"
 """Part of a message about a step with coupling.passes = 1."""
 
@@ -89,17 +91,39 @@ def volume_error(coupling: CoupledSides) -> float:
 
 def check_step(coupling: CoupledSides, record: StepRecord, limits: Limits) -> None:
     """Raises Diverged with the limit that the step broke, or the run with it."""
-    where = worst_place(coupling, record)
-    check_balance(record.time, volume_error(coupling), record.balance.energy_error, limits, where)
+    error = record.balance.energy_error
+    check_balance(record.time, volume_error(coupling), error, limits, lambda: energy_advice(coupling, record))
     if record.momentum is not None:
         check_momentum(record.time, record.momentum.error, limits.momentum_error)
 
 
+def energy_advice(coupling: CoupledSides, record: StepRecord) -> str:
+    """Sentences for a run whose energy is out of balance: which side has most of it, where to look, what to try."""
+    balance = record.balance
+    gained = max(0.0, -balance.numerical_dissipation - balance.left)
+    structure, between = abs(balance.structure_residual), abs(balance.interface_residual)
+    if gained > max(structure, between):
+        part = f"The water has gained {gained:.3g} J"
+        remedy = "Take a smaller tank.cell where the water is thin, or reduce time.step_max or time.cfl."
+    else:
+        part = (
+            f"The blocks with their joints and contacts are off by {structure:.3g} J"
+            if structure >= between
+            else f"The work that the water gave and that the blocks received differ by {between:.3g} J"
+        )
+        remedy = "Reduce time.step_max, or raise joints.damping."
+    place = worst_place(coupling, record)
+    return " ".join(
+        [f"{part}, of {balance.input_energy:.3g} J put in.", f"Now {place}." if place else "", remedy]
+    )
+
+
 def worst_place(coupling: CoupledSides, record: StepRecord) -> str:
-    """Where to look if the energy does not balance: the block with the largest missing work in the last step, and the
-    place where the water is fastest; "" if there is neither."""
+    """Where to look if the energy does not balance: the block with the largest missing work in the last step, where
+    that is a part of the step's error, and the place where the water is fastest; "" if there is neither."""
     parts = []
-    if len(record.missed_work) and abs(record.missed_work).max() > 0.0:
+    off = record.balance.step_error * record.balance.input_energy
+    if len(record.missed_work) and abs(record.missed_work).max() > A_PART * off:
         worst = int(abs(record.missed_work).argmax())
         name = coupling.structure.names[worst]
         single = record.passes == 1 and coupling.defects.too_large(record.defect)

@@ -6,9 +6,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from coupler.balance.energy import Balance
 from coupler.geometry.overlaps import Overlap
 from coupler.step.limits import Diverged, Limits, check_air, check_momentum, check_overlap
-from coupler.step.step_limits import STEP_SHARE, Attempt, attempt_of, attempt_to_keep, worst_place
+from coupler.step.step_limits import (
+    STEP_SHARE,
+    Attempt,
+    attempt_of,
+    attempt_to_keep,
+    energy_advice,
+    worst_place,
+)
 
 
 def test_a_run_ends_just_beyond_its_limit_of_momentum():
@@ -80,10 +88,45 @@ def test_a_run_that_ends_on_its_energy_names_a_single_pass_that_missed(passes, d
         structure=SimpleNamespace(names=["a", "b"]),
         defects=SimpleNamespace(too_large=lambda defect: defect > 0.3),
     )
-    record = SimpleNamespace(passes=passes, defect=defect, missed_work=np.array([1.0, -2.5]))
+    balance = SimpleNamespace(step_error=0.1, input_energy=249.0)
+    record = SimpleNamespace(passes=passes, defect=defect, missed_work=np.array([1.0, -2.5]), balance=balance)
     found = worst_place(coupling, record)
     assert found.startswith("block 'b' missed 2.5 J of the water's work in this step")
     assert found.endswith("which had a single pass: raise coupling.passes") == advised
+    balance.input_energy = 2501.0
+    assert worst_place(coupling, record) == "", "what is a hundredth of the error is not its place"
+
+
+@pytest.mark.parametrize(
+    ("residuals", "told", "advised"),
+    [
+        ((-12.0, 1.0, 2.0, 3.0), "The water has gained 11 J, of 50 J put in.", "smaller tank.cell"),
+        (
+            (-12.0, 14.0, 0.1, 0.0),
+            "are off by 0.1 J",
+            "joints.damping",
+        ),  # what left with the water is no gain
+        (
+            (12.0, 0.0, -4.0, 3.0),
+            "blocks with their joints and contacts are off by 4 J, of 50 J",
+            "joints.damping",
+        ),
+        ((0.0, 0.0, 2.0, -3.0), "the blocks received differ by 3 J, of 50 J", "joints.damping"),
+    ],
+)
+def test_a_run_that_ends_on_its_energy_says_which_side_is_off_and_what_helps_there(residuals, told, advised):
+    lost, left, structure, between = residuals
+    balance = Balance(
+        numerical_dissipation=lost,
+        left=left,
+        structure_residual=structure,
+        work_given=between,
+        input_energy=50.0,
+    )
+    coupling = SimpleNamespace(water=None, structure=None)
+    found = energy_advice(coupling, SimpleNamespace(balance=balance, missed_work=np.zeros(0)))
+    assert told in found
+    assert advised in found
 
 
 def test_steps_of_all_lengths_are_compared_by_the_second():

@@ -326,6 +326,14 @@ def test_a_failure_is_kept_as_a_case_with_its_story(tmp_path, monkeypatch):
     assert document(draw(*row).table) == document(drawn.table)
 
 
+def test_random_scenes_are_named_in_a_call_of_their_own():
+    assert command.are_drawn(["R1-12", "r2-3"])
+    assert not command.are_drawn(["S01", "water"])
+    assert not command.are_drawn([])
+    with pytest.raises(BadCase, match="R1-12: a random scene, and S01 is none"):
+        command.are_drawn(["S01", "R1-12"])
+
+
 def test_scenes_of_a_group_keep_their_numbers():
     water = list(command.numbered(SEED, 3, 0, ["water"]))
     assert [draw(*row).group for row in water] == ["water"] * 3

@@ -74,6 +74,15 @@ def test_water_that_stays_below_is_not_told(tmp_path):
     assert "tank_top" not in summary["figures"]
 
 
+def test_water_too_thin_for_the_cells_is_told_again_at_the_end(tmp_path):
+    """What was remarked before the run is a reason to doubt its loads; lines at the start are out of sight by then."""
+    thin = CASE.replace("upper = [0.5, 0.2, 0.3]", "upper = [0.5, 0.2, 0.25]").replace("0.5 s", "0.02 s")
+    run = run_of(tmp_path, thin)
+    told = [line for line in read_summary(run)["figures"]["doubts"] if "cells water is not resolved" in line]
+    assert len(told) == 1
+    assert f"but: {told[0]}" in (run / "log.txt").read_text()
+
+
 def test_a_verdict_without_water_at_the_structure_is_doubtful(tmp_path):
     """STANDS means nothing for a run that ended before the water came."""
     run = run_of(tmp_path, CASE.replace("0.5 s", "20 ms"))

@@ -21,9 +21,15 @@ from coupler.program.errors import BadCase, ExitCode
 ID = re.compile(r"R(\d+)-(\d+)", re.IGNORECASE)
 
 
-def is_drawn(word: str) -> bool:
-    """Whether a word on the command line names a drawn scene."""
-    return ID.fullmatch(word) is not None
+def are_drawn(words: list[str]) -> bool:
+    """Whether the words on the command line name drawn scenes. Raises BadCase where only some of them do."""
+    drawn = [word for word in words if ID.fullmatch(word)]
+    if drawn and len(drawn) < len(words):
+        other = next(word for word in words if word not in drawn)
+        raise BadCase(
+            [f"{drawn[0]}: a random scene, and {other} is none; give random scenes in a call of their own"]
+        )
+    return bool(drawn)
 
 
 def numbered(seed: int, count: int, first: int, groups: list[str]) -> Iterator[tuple[int, int]]:
