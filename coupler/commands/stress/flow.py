@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 
 from coupler.commands.stress.registry import Measure
 from coupler.step.limits import Limits, check_balance, check_defect
+from coupler.step.step_limits import energy_advice
 
 ENERGY, VOLUME = 0.02, 1e-3
 """Shares that a scene may miss of the energy put in (both residuals of the ledger, and what the water gained), and of
@@ -58,7 +60,13 @@ class Flow:
         self.defect = max(self.defect, record.defect)
         self.lost = balance.numerical_dissipation / max(balance.input_energy, 1e-300)
         if self.limited:
-            check_balance(record.time, water.volume_error(), balance.energy_error, STOPS)
+            check_balance(
+                record.time,
+                water.volume_error(),
+                balance.energy_error,
+                STOPS,
+                partial(energy_advice, self.coupling, record),
+            )
             check_defect(record.time, self.coupling.defects.mean, DEFECT)
         return record
 
