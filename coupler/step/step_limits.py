@@ -113,9 +113,9 @@ def energy_advice(coupling: CoupledSides, record: StepRecord) -> str:
         )
         remedy = "Reduce time.step_max, or raise joints.damping."
     place = worst_place(coupling, record)
-    return " ".join(
-        [f"{part}, of {balance.input_energy:.3g} J put in.", f"Now {place}." if place else "", remedy]
-    )
+    said = [f"{part}, of {balance.input_energy:.3g} J put in."]
+    said += [f"{place[0].upper()}{place[1:]}."] if place else []
+    return " ".join([*said, remedy])
 
 
 def worst_place(coupling: CoupledSides, record: StepRecord) -> str:
