@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from kernels.decorators import kernel
+from kernels.decorators import kernel, ranged
+from kernels.threads import over
 
 
 def wetted_coupling(domain, polygons=slice(None), weight=1.0) -> sp.csr_matrix:
@@ -24,6 +25,34 @@ def wetted_coupling(domain, polygons=slice(None), weight=1.0) -> sp.csr_matrix:
     row = _distinct(start, members, wetted.body, domain.n_bodies)
     values, columns = _summed(start, members, wetted.body, block, row, domain.n_bodies)
     return sp.csr_matrix((values.ravel(), columns.ravel(), 6 * row), shape=shape)
+
+
+def rows_of(coupling, rows) -> sp.csr_matrix:
+    """The listed rows (n,) of a csr matrix, in their order."""
+    start = np.zeros(len(rows) + 1, coupling.indptr.dtype)
+    over(_lengths, len(rows), rows, coupling.indptr, start[1:])
+    np.cumsum(start, out=start)
+    column, entry = np.empty(start[-1], coupling.indices.dtype), np.empty(start[-1])
+    given = (coupling.indptr, coupling.indices, coupling.data)
+    over(_copy_rows, len(rows), rows, given, (start, column, entry))
+    return sp.csr_matrix((entry, column, start), shape=(len(rows), coupling.shape[1]))
+
+
+@ranged
+def _lengths(first, last, rows, start, length):
+    for r in range(first, last):
+        length[r] = start[rows[r] + 1] - start[rows[r]]
+
+
+@ranged
+def _copy_rows(first, last, rows, given, made):
+    """given, made: start, column and entry of each row of a csr matrix."""
+    start, column, entry = given
+    to, column_there, entry_there = made
+    for r in range(first, last):
+        at = start[rows[r]]
+        for k in range(to[r + 1] - to[r]):
+            column_there[to[r] + k], entry_there[to[r] + k] = column[at + k], entry[at + k]
 
 
 @kernel

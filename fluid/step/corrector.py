@@ -34,7 +34,7 @@ from fluid.surface.extrapolation import extend_velocity
 from fluid.surface.gradient_jump_damping import damp_gradient_jumps
 from fluid.surface.volume import Flux, edge_flux
 from kernels.decorators import ranged
-from kernels.threads import over
+from kernels.threads import over, zeros
 
 FLUX_LAYERS = 3
 """Layers of dry nodes that water may reach within the next step."""
@@ -80,8 +80,8 @@ class Corrected:
 def corrected(water, problem, x, parting) -> Corrected:
     """End the step with the pressure x (n,) [Pa]; parting (n,) [m³/s] or None, as in `Water.correct`."""
     t, kept, dt = water.topology, problem.predicted, problem.dt
-    unknown, pressure = np.zeros(len(kept.wet)), np.zeros(len(kept.wet))
-    unknown[problem.dofs], pressure[problem.dofs] = x, x + problem.known
+    unknown, pressure = zeros((len(kept.wet),)), zeros((len(kept.wet),))
+    over(_placed, len(problem.dofs), problem.dofs, x, problem.known, unknown, pressure)
     if kept.held is not None:
         unknown += kept.held
         pressure += kept.held / kept.theta
@@ -128,6 +128,14 @@ def corrected(water, problem, x, parting) -> Corrected:
     )
 
 
+@ranged
+def _placed(first, last, dofs, x, known, unknown, pressure):
+    """x and x + known (n,) at the nodes dofs (n,) of two fields (N,)."""
+    for s in range(first, last):
+        i = dofs[s]
+        unknown[i], pressure[i] = x[s], x[s] + known[s]
+
+
 def _given_by_films(water, problem):
     """Rate (N,) [m³/s] at which films take water from their rims as the bodies move."""
     found, given = np.zeros(len(problem.predicted.wet)), problem.predicted.given_by_films
@@ -140,7 +148,7 @@ def _pressure_gradient(water, kept, pressure, scale):
     """(dt/ρ) ∇x (n, 3) [m/s] of the wet cells."""
     t = water.topology
     unheld = water.walls.open_node if kept.held is None else water.walls.open_node & (kept.held == 0.0)
-    air = np.zeros(len(pressure)) if kept.cushions is None else np.where(kept.wet, 0.0, pressure)
+    air = zeros((len(pressure),)) if kept.cushions is None else np.where(kept.wet, 0.0, pressure)
     full = with_ghosts(pressure, air, kept.wet, unheld, kept.level_set, kept.wet_cells, t.cells)
     return cell_gradient(kept.wet_cells, full, t.cells, t.parent, t.gradients, scale)
 
@@ -150,7 +158,7 @@ def _projected(t, kept, gradient, dt):
     gradient (N, 3)."""
     n = len(kept.wet)
     mean = nodal_mean(WetCells(kept.wet_cells, kept.wet_share), gradient, t.fluid_cells, n)
-    u, a, forced = np.empty((n, 3)), np.zeros((n, 3)), np.empty((n, 3))
+    u, a, forced = np.empty((n, 3)), zeros((n, 3)), np.empty((n, 3))
     over(_after_pressure, n, kept.wet, kept.u_star, mean, kept.advected, kept.theta * dt, (u, a, forced))
     return u, a, forced, mean
 

@@ -84,7 +84,8 @@ def momentum_change(water, problem, unknown, pressure, rows, stages: Stages) -> 
 
     unknown, pressure (N,) [Pa]: x and x + known on wet nodes and seas · rows: `holding_water`."""
     kept, dt = problem.predicted, problem.dt
-    x, p = np.where(kept.wet, unknown, 0.0), np.where(kept.wet, pressure, 0.0)
+    x, p = np.empty(len(unknown)), np.empty(len(unknown))
+    over(_in_water, len(x), kept.wet, unknown, pressure, x, p)
     at = _momenta(water, kept, dt, rows, stages)
     cells, tank, held = _reactions(water, kept, x, p, dt)
     openings = _at_closed_openings(water, kept, p, dt)
@@ -123,6 +124,14 @@ def momentum_change(water, problem, unknown, pressure, rows, stages: Stages) -> 
         lines=lines,
         pressure_closure=cells[0] + cells[1] - tank - held - openings,
     )
+
+
+@ranged
+def _in_water(first, last, wet, unknown, pressure, x, p):
+    """x, p (N,): unknown and pressure (N,) at wet nodes, zero elsewhere."""
+    for i in range(first, last):
+        x[i] = unknown[i] if wet[i] else 0.0
+        p[i] = pressure[i] if wet[i] else 0.0
 
 
 def holding_water(water, kept) -> Array:
@@ -174,10 +183,15 @@ def _kicked(first, last, rows, u, a, kick, dt, g, made):
             kicked[i, k], weight[i, k] = u[i, k] + factor * a[i, k], g[k]
 
 
+def _all_cells(kept) -> Array:
+    """Cells with water, and void ones (n,)."""
+    return np.concatenate([kept.wet_cells, kept.void]) if len(kept.void) else kept.wet_cells
+
+
 def _reactions(water, kept, x, p, dt):
     """Impulses on the water: by the cells, of x and of p - x; by the sides of the tank and by the bodies, of p."""
     t, at_side = water.topology, water.on_sides
-    cells = np.concatenate([kept.wet_cells, kept.void])
+    cells = _all_cells(kept)
     mesh = (t.nodes, t.fluid_cells)
     of_x, of_p, of_sides = hat_forces(cells, x, p, at_side, water.reference, *mesh)
     of_sides += _on_bodies(water, p, at_side)
@@ -190,7 +204,7 @@ def _at_closed_openings(water, kept, p, dt):
     if connection is None or connection.face == 0.0:
         return np.zeros(6)
     beside = water.domain.several & ~water.on_sides
-    cells = np.concatenate([kept.wet_cells, kept.void])
+    cells = _all_cells(kept)
     mesh = (t.nodes, t.fluid_cells)
     total = hat_forces(cells, p, p, beside, water.reference, *mesh)[2]
     return -dt * (total + _on_bodies(water, p, beside))
@@ -205,7 +219,7 @@ def _of_air(water, problem, unknown, pressure):
         return np.zeros((2, 6)), np.zeros(6)
     in_pocket = kept.cushions.air.label > 0
     x, p = np.where(in_pocket, unknown, 0.0), np.where(in_pocket, pressure, 0.0)
-    cells = np.concatenate([kept.wet_cells, kept.void])
+    cells = _all_cells(kept)
     mesh = (t.nodes, t.fluid_cells)
     of_x, of_p, _ = hat_forces(cells, x, p, np.zeros(len(x), bool), water.reference, *mesh)
     acting = problem.of_air(problem.coupling).T @ kept.cushions.air.at_pockets(pressure)

@@ -16,7 +16,7 @@ import numpy as np
 
 from array_types import Bools, Floats, Ints
 from fluid.domain.cell_vectors import places_of
-from fluid.domain.coupling_matrix import wetted_coupling
+from fluid.domain.coupling_matrix import rows_of, wetted_coupling
 from fluid.numerics.fields import added, copied
 from fluid.pressure.active_cells import WetPart
 from fluid.pressure.indefinite_cells import about, reserve
@@ -36,7 +36,7 @@ from fluid.surface.volume import VolumeCorrection, correct_volume
 from fluid.transport.advection import transport
 from fluid.transport.paths_in_solids import levels_in_solids
 from kernels.decorators import ranged
-from kernels.threads import over
+from kernels.threads import over, zeros
 
 if TYPE_CHECKING:
     from fluid.viscous.viscosity import ViscousChange
@@ -298,7 +298,8 @@ def _problem(water, dt: float, theta: float, kick, moved: Moved) -> PressureProb
     rhs = inflow(cells, star, t.fluid_cells, len(phi))
     dofs = np.flatnonzero(wet & ~water.walls.open_node)
     matrix, anchored, held_back = _definite(water, graph, phi, cells, dofs, dt / density, theta)
-    rhs[dofs] += held_back
+    if held_back is not None:
+        rhs[dofs] += held_back
     if water.sides is not None:
         rhs += moved.inflow_rate
         gravity = water.parameters.gravity
@@ -306,8 +307,8 @@ def _problem(water, dt: float, theta: float, kick, moved: Moved) -> PressureProb
         # at the edge that a sea shares with an inflow the pressure is sought, not held
         held[~water.walls.open_node] = 0.0
         rhs[dofs] += pull_of_held(graph, dofs, held, dt / density)
-    known = (1.0 - theta) * kick[dofs] * water.end_pressure[dofs]
-    guess = theta * water.end_pressure[dofs]
+    known, guess = np.empty(len(dofs)), np.empty(len(dofs))
+    over(_of_last_step, len(dofs), dofs, theta, kick, water.end_pressure, known, guess)
     coupling, faces, left_out = _coupling(water, part.void)
     matrix, extra = _sealed(water, matrix, anchored, dofs, dt, guess)
     if water.slits is not None:
@@ -360,7 +361,7 @@ def _problem(water, dt: float, theta: float, kick, moved: Moved) -> PressureProb
     problem = PressureProblem(
         matrix=matrix,
         rhs=rhs[dofs] + extra,
-        coupling=coupling[dofs],
+        coupling=rows_of(coupling, dofs),
         known=known,
         guess=guess,
         dofs=dofs,
@@ -377,17 +378,28 @@ def _problem(water, dt: float, theta: float, kick, moved: Moved) -> PressureProb
     return problem if cushions is None else cushions.within(problem, rhs, coupling, part.void, water.domain)
 
 
+@ranged
+def _of_last_step(first, last, dofs, theta, kick, pressure, known, guess):
+    """What the pressure (N,) [Pa] at the end of the last step gives the nodes dofs (n,): its part that goes on, by
+    kick (N,), and a first guess of what is sought."""
+    for s in range(first, last):
+        i = dofs[s]
+        known[s] = (1.0 - theta) * kick[i] * pressure[i]
+        guess[s] = theta * pressure[i]
+
+
 def _known_pressure(water, pressure, phi):
     """A pressure (N,) [Pa] of the last step; before the first step that of still water."""
     return pressure if water.steps else -water.parameters.density * water.parameters.gravity * phi
 
 
 def _definite(water, graph, phi, cells, dofs, scale, theta):
-    """The matrix, rows beside p = 0, and what rows behind obtuse angles at the surface add to the right hand side."""
+    """The matrix, rows beside p = 0, and what rows behind obtuse angles at the surface add to the right hand side,
+    None without obtuse angles."""
     open_node = water.held_open(phi)
     if not water.topology.is_obtuse:
-        matrix, anchored, _ = pressure_matrix(graph, phi, dofs, open_node, scale, np.zeros(len(phi)))
-        return matrix, anchored, 0.0
+        matrix, anchored, _ = pressure_matrix(graph, phi, dofs, open_node, scale, zeros((len(phi),)))
+        return matrix, anchored, None
     unknown = np.zeros(len(phi), bool)
     unknown[dofs] = True
     spare = reserve(water.topology, cells, unknown)

@@ -46,7 +46,7 @@ from fluid.surface.volume import Flux, Shift
 from fluid.transport.velocity_transport import carry_velocity
 from fluid.transport.volume_transport import carry_volume
 from kernels.decorators import inner, ranged, released
-from kernels.threads import over
+from kernels.threads import over, zeros
 
 SHALLOW, DEEP = 2.0, 3.0
 """Depths in cell sizes down to which momentum counts in full, and at all."""
@@ -80,7 +80,7 @@ class Carried:
         [m]: size of the cells."""
         edges = flux.graph.edges
         n, size = len(flux.nodes), len(velocity)
-        weight, fast = np.zeros(size), np.zeros(size)
+        weight, fast = zeros((size,)), zeros((size,))
         state = (flux.rate, flux.water, flux.capacity, velocity, acceleration, gravity, spacing)
         jumps = sum(over(_jumps, n, flux.nodes, edges, *state, weight))
         if jumps:
@@ -139,7 +139,7 @@ def _mixed(first, last, nodes, water, weights, at_surface, on_open_side, carried
 def _pass_on(graph: Graph, shift: Shift, water, u) -> None:
     """Velocity u (N, 3) [m/s] carried along with the volumes (2), in place; water (N,) [m³] before them."""
     edges = graph.edges
-    psi, inside, moved = np.zeros(len(water)), np.zeros(len(water), bool), np.empty(len(graph.neighbour))
+    psi, inside, moved = zeros((len(water),)), np.zeros(len(water), bool), np.empty(len(graph.neighbour))
     psi[shift.band], inside[shift.band] = shift.value, water[shift.band] > 0.0
     over(
         _corrected,

@@ -18,17 +18,21 @@ from fluid.mesh.arrays import Edges
 from kernels.decorators import inner, ranged
 from kernels.threads import over, owning, reach_of_rows
 
+NONE = np.empty(0)
+"""No field (N,)."""
 
-def carry_velocity(nodes, edges: Edges, moved, water, u):
+
+def carry_velocity(nodes, edges: Edges, moved, water, u, gain=NONE):
     """Equation (1): u (N, 3) [m/s] after the volumes moved (edges,) [m³] left the listed nodes, in place.
 
-    water (N,) [m³] before they are moved; no node gives more than it holds."""
+    water (N,) [m³] before they are moved; no node gives more than it holds · gain (N,) [m³], if given: what came to
+    each node less what left it is added, in place."""
     size, reach = len(water), reach_of_rows(nodes, edges.row, edges.start, edges.neighbour)
     up, came, change, volume = (np.empty(shape) for shape in (u.shape, size, u.shape, size))
     over(_begin, len(nodes), nodes, up, came, change, volume)  # what others get is not read
     owning(_incoming, size, reach, len(nodes), nodes, edges, moved, u, up, came)
     over(_mean_incoming, len(nodes), nodes, came, u, up)
-    owning(_exchange, size, reach, len(nodes), nodes, edges, moved, water, u, up, change, volume)
+    owning(_exchange, size, reach, len(nodes), nodes, edges, moved, water, u, up, change, volume, gain)
     over(_new_velocity, len(nodes), nodes, water, change, volume, u)
 
 
@@ -76,9 +80,10 @@ def _mean_incoming(first, last, nodes, came, u, up):
 
 
 @ranged
-def _exchange(first, last, runs, nodes, edges, moved, water, u, up, change, volume):
-    """Change of Σ W u (N, 3) [m⁴/s] and the volume afterwards (N,) [m³]."""
+def _exchange(first, last, runs, nodes, edges, moved, water, u, up, change, volume, gain):
+    """Change of Σ W u (N, 3) [m⁴/s], the volume afterwards (N,) [m³] and, unless it is empty, `gain` (N,) [m³]."""
     start, neighbour = edges.start, edges.neighbour
+    counted = gain.shape[0] > 0
     for run in range(runs.shape[0]):
         for place in range(runs[run, 0], runs[run, 1]):
             i = nodes[place]
@@ -98,6 +103,10 @@ def _exchange(first, last, runs, nodes, edges, moved, water, u, up, change, volu
                 if moved[s] > 0.0 and (own or theirs):
                     if theirs:
                         volume[j] += moved[s]
+                    if counted and own:
+                        gain[i] -= moved[s]
+                    if counted and theirs:
+                        gain[j] += moved[s]
                     for k in range(3):
                         limited = _van_leer(u[j, k] - u[i, k], u[i, k] - up[i, k])
                         momentum = moved[s] * (u[i, k] + second * limited)

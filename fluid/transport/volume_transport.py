@@ -16,10 +16,11 @@ from __future__ import annotations
 import numpy as np
 
 from fluid.numerics.fields import copied
+from fluid.numerics.median import median_of
 from fluid.surface.volume import Flux
 from fluid.transport.velocity_transport import carry_velocity
 from kernels.decorators import inner, ranged, released
-from kernels.threads import over, owning, reach_of_rows
+from kernels.threads import over, owning, reach_of_rows, zeros
 
 LARGEST_COURANT = 0.8
 LEAST_COUNTED = 0.3
@@ -33,20 +34,21 @@ def carry_volume(flux: Flux, dt: float, u=None):
     u (N, 3) [m/s], if given, is carried with the volume, in place (`velocity_transport.py`); nodes without water keep
     theirs."""
     water, total, capacity = copied(flux.water), None, flux.capacity
-    least = LEAST_COUNTED * np.median(capacity[flux.nodes]) if len(flux.nodes) else 0.0
+    least = LEAST_COUNTED * median_of(capacity, flux.nodes) if len(flux.nodes) else 0.0
     g = flux.graph
     count = len(flux.nodes)
     turnover = max(over(_largest_turnover, count, flux.nodes, g.row, g.start, flux.rate, capacity, least))
     n_sub = int(np.ceil(dt * turnover / LARGEST_COURANT)) or 1
     edges, reach = g.edges, reach_of_rows(flux.nodes, g.row, g.start, g.neighbour)
-    share, change = np.zeros(len(water)), np.zeros(len(water))
+    share, change = zeros((len(water),)), zeros((len(water),))
     for _ in range(n_sub):
         moved = np.empty(len(flux.rate))
         over(_share, count, flux.nodes, water, capacity, share)
         over(_moved, count, flux.nodes, edges, flux.rate, water, capacity, share, dt / n_sub, moved)
         if u is not None:
-            carry_velocity(flux.nodes, edges, moved, water, u)
-        owning(_transfer_volume, len(water), reach, count, flux.nodes, edges, moved, change)
+            carry_velocity(flux.nodes, edges, moved, water, u, change)
+        else:
+            owning(_transfer_volume, len(water), reach, count, flux.nodes, edges, moved, change)
         over(_changed, len(water), change, water)
         if total is None:
             total = moved
