@@ -6,6 +6,8 @@ There are several, since what numba builds around a function takes as long to co
 - `plain`: makes and returns no arrays; called from Python too. Without counting references to the arrays that it is
   handed, and to every view of one, such a function runs up to twice as fast.
 - `inner`: the same for functions that only other kernels call; without a Python entry they compile a third faster.
+- `inlined`: like `inner`, for long functions that are called in one or two places: their code stands there. Else each
+  call copies hundreds of words, since records of arrays are handed over by value.
 - `helper`: like `kernel`, for functions that only other kernels call.
 - `ranged`: like `plain`, for functions that `kernels.threads` runs on several threads: they take a range first,
   let other threads of Python run meanwhile, and have the entry of `kernels/ranges.py`.
@@ -51,6 +53,11 @@ def plain(function: Callable) -> Any:
 def inner(function: Callable) -> Any:
     """Compile a function that neither makes nor returns arrays. Only other kernels may call it."""
     return _compiled(function, _nrt=False, no_cpython_wrapper=True)
+
+
+def inlined(function: Callable) -> Any:
+    """Compile a function that neither makes nor returns arrays into the kernels that call it, which alone may do so."""
+    return _compiled(function, _nrt=False, no_cpython_wrapper=True, forceinline=True)
 
 
 def helper(function: Callable) -> Any:

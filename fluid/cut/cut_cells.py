@@ -41,7 +41,7 @@ from fluid.cut.pieces import (
 from fluid.cut.unclaimed_faces import claim_rest
 from fluid.cut.wetted_polygons import wetted
 from fluid.mesh.arrays import Corners, Planes
-from kernels.decorators import inner, released
+from kernels.decorators import inlined, inner, released
 from kernels.threads import over
 
 # A piece too thin for its cross-section to close goes to one side whole; thicker ones are an error.
@@ -94,7 +94,7 @@ class Chosen(NamedTuple):
     link_area: Floats
 
 
-@inner
+@inlined
 def _nearby(w, x, bodies, planes, tolerance):
     """Bodies that meet or touch the cell x (4, 3), with the planes of each that separate some of its nodes.
 
@@ -153,7 +153,7 @@ def _align(w, row, tolerance):
                 return
 
 
-@inner
+@inlined
 def _subtract(w, piece, at, round_off, thin, top, n_vertices):
     """Take body number `at` of the cell away from a piece.
 
@@ -210,7 +210,7 @@ def _is_thin(w, piece, thin):
     return w.moments[0] < thin * (thin / THIN) ** 2 * 0.01
 
 
-@inner
+@inlined
 def _fluid_pieces(w, n_near, round_off, thin):
     """Subtract all bodies near the cell -> (state, number of pieces, nothing removed)."""
     count, n_vertices, whole_cell = 1, 4, True
@@ -235,7 +235,7 @@ def _fluid_pieces(w, n_near, round_off, thin):
     return DONE, count, whole_cell
 
 
-@inner
+@inlined
 def _openings(w, piece, origin, part, out, n_open):
     """Append the faces of a piece that lie on faces of the cell -> (state, number of openings)."""
     for f in range(w.faces[piece]):
@@ -255,7 +255,7 @@ def _openings(w, piece, origin, part, out, n_open):
     return DONE, n_open
 
 
-@inner
+@inlined
 def _emit(cut, cell, origin, count, n_near, whole, link_area, at):
     """Write the parts of one cell, their moments, wetted polygons and tetrahedra (and openings if link_area >= 0)."""
     w, out = cut.work, cut.out

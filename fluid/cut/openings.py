@@ -15,7 +15,7 @@ from fluid.cut.cut_arrays import Cuts
 from fluid.cut.pieces import workspace
 from fluid.cut.polygons import shared_area
 from fluid.mesh.arrays import Corners
-from kernels.decorators import inner, kernel, released
+from kernels.decorators import inlined, inner, kernel, released
 from kernels.threads import over
 
 CLIP = 1e-12
@@ -205,7 +205,7 @@ def _open_area(key, openings):
     return area
 
 
-@inner
+@inlined
 def _contact_area(mesh, cell, f, ours, theirs, openings, limits, w):
     """Area over which two parts touch across the face opposite to corner f of `cell`, area of the face.
 

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from array_types import Floats, Integers, Ints
-from kernels.decorators import inner
+from kernels.decorators import inlined, inner
 
 DONE, OUTPUT_FULL, WORKSPACE_FULL, BROKEN_CAP = 0, 1, 2, 3
 
@@ -103,7 +103,7 @@ def interpolated(x, d):
     return x[0] * d[0] + x[1] * d[1] + x[2] * d[2] + x[3] * d[3]
 
 
-@inner
+@inlined
 def classify(w, piece, d, round_off):
     """Fill w.distance for the vertices of a piece -> lowest, highest (0 where snapped)."""
     low, high = 0.0, 0.0
@@ -221,7 +221,7 @@ def _close_half(w, piece, target, side, edges, tag):
     return state
 
 
-@inner
+@inlined
 def split(w, piece, outer, inner, plane, n_vertices):
     """Split a piece by the plane whose distances are in w.distance -> (state, number of vertices)."""
     capacity = w.loop.shape[2]

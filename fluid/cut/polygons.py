@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kernels.decorators import inner
+from kernels.decorators import inlined, inner
 
 # Corners of the equilateral triangle with unit second moment about its centre.
 SQRT2 = np.sqrt(2.0)
@@ -154,7 +154,7 @@ def shared_area(w, one, two, nx, ny, nz, round_off):
     return polygon_area(w, one)
 
 
-@inner
+@inlined
 def polygon_rule(w, polygon, nx, ny, nz, least, row):
     """row (16,) <- area, centroid, normal and three points, weight area / 3, exact to degree 2.
 

@@ -10,10 +10,10 @@ from __future__ import annotations
 
 from fluid.cut.pieces import DONE, OUTPUT_FULL, WORKSPACE_FULL, interpolated
 from fluid.cut.polygons import copy_polygon, face_area, load_face, polygon_area, polygon_rule, split_polygon
-from kernels.decorators import inner
+from kernels.decorators import inlined
 
 
-@inner
+@inlined
 def _lies_in(w, piece, f, r, normals, round_off):
     """Whether a face lies in near plane r, with the piece on the outer side of it."""
     g = w.near_plane[r]
@@ -34,7 +34,7 @@ def _lies_in(w, piece, f, r, normals, round_off):
     return facing < 0.0
 
 
-@inner
+@inlined
 def _claim(w, polygon, at, plane, round_off, top):
     """Clip a polygon in near plane `plane` by the other planes of body number `at` -> (claimed, new top).
 
@@ -58,7 +58,7 @@ def _claim(w, polygon, at, plane, round_off, top):
     return True, new_top
 
 
-@inner
+@inlined
 def _claim_face(cut, at, r, origin, top, part, n_wet):
     """Let one body claim its share of the polygons 0..top of a face -> (state, new top, polygons written)."""
     w = cut.work
@@ -80,7 +80,7 @@ def _claim_face(cut, at, r, origin, top, part, n_wet):
     return DONE, top, n_wet
 
 
-@inner
+@inlined
 def append_polygon(cut, polygon, at, n, origin, part, n_wet):
     """Write a polygon of normal n (3,), a surface of body number `at`, as triangles -> (state, triangles written).
 
@@ -109,7 +109,7 @@ def append_polygon(cut, polygon, at, n, origin, part, n_wet):
     return DONE, n_wet
 
 
-@inner
+@inlined
 def claim_face(cut, piece, f, n_near, origin, part, n_wet):
     """Let the bodies claim their shares of a face of a piece -> (state, loaded, top, number of polygons written).
 
@@ -130,7 +130,7 @@ def claim_face(cut, piece, f, n_near, origin, part, n_wet):
     return DONE, loaded, top, n_wet
 
 
-@inner
+@inlined
 def wetted(cut, piece, origin, n_near, part, n_wet):
     """Append the wetted polygons of a piece -> (state, number of polygons), and add up in w.unclaimed what is left of
     its faces in the near planes, outside less inside [m²]."""

@@ -208,11 +208,40 @@ def _whole_second(mesh, cells):
 
 def hat_values(corners, points) -> Array:
     """P1 functions of tetrahedra corners (k, 4, 3) at points (k, q, 3) -> (k, q, 4)."""
-    e1, e2, e3 = (corners[:, a] - corners[:, 0] for a in (1, 2, 3))
-    normals = np.stack([np.cross(e2, e3), np.cross(e3, e1), np.cross(e1, e2)], axis=2)
-    normals /= np.einsum("ki,ki->k", e1, normals[:, :, 0])[:, None, None]
-    rest = (points - corners[:, :1]) @ normals
-    return np.concatenate([1.0 - rest.sum(axis=2, keepdims=True), rest], axis=2)
+    rest = (points - corners[:, :1]) @ _gradients(corners)
+    return _with_first(rest)
+
+
+@kernel
+def _gradients(corners):
+    """Gradients of the last three P1 functions of tetrahedra corners (k, 4, 3), as columns (k, 3, 3)."""
+    found, e = np.empty((len(corners), 3, 3)), np.empty((3, 3))
+    for i in range(len(corners)):
+        for a in range(3):
+            for k in range(3):
+                e[a, k] = corners[i, a + 1, k] - corners[i, 0, k]
+        for a in range(3):
+            u, w = e[(a + 1) % 3], e[(a + 2) % 3]
+            for k in range(3):
+                m, n = (k + 1) % 3, (k + 2) % 3
+                found[i, k, a] = u[m] * w[n] - u[n] * w[m]
+        volume = e[0, 0] * found[i, 0, 0] + e[0, 1] * found[i, 1, 0] + e[0, 2] * found[i, 2, 0]
+        for k in range(3):
+            for a in range(3):
+                found[i, k, a] /= volume
+    return found
+
+
+@kernel
+def _with_first(rest):
+    """All four P1 functions (k, q, 4) at points from the last three `rest` (k, q, 3): their sum is one."""
+    hats = np.empty((rest.shape[0], rest.shape[1], 4))
+    for i in range(rest.shape[0]):
+        for q in range(rest.shape[1]):
+            hats[i, q, 0] = 1.0 - ((rest[i, q, 0] + rest[i, q, 1]) + rest[i, q, 2])
+            for a in range(3):
+                hats[i, q, a + 1] = rest[i, q, a]
+    return hats
 
 
 def carry(old: PhysicalDomain, new: PhysicalDomain) -> Array:

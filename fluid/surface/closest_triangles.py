@@ -17,7 +17,7 @@ import numpy as np
 
 from array_types import Array, Floats, Integers, Ints
 from fluid.domain.layers import WORK, Layers
-from kernels.decorators import inner, kernel, plain, ranged, released
+from kernels.decorators import inlined, inner, kernel, plain, ranged, released
 from kernels.threads import over, owning, reach_of_cells
 
 TESTED = 64
@@ -176,7 +176,7 @@ def _mended(first, last, layer, sweep, layers, triangles, nodes, around, once, k
                     behind[p] = True
 
 
-@inner
+@inlined
 def _tested(s, part, layer, sweep, layers, triangles, nodes, around, once, known, tested):
     """Number of the closest triangle that the node at place s finds, and the squared distance; and whether it has
     neighbours in its layer before the place `part`, which are left out.
@@ -244,7 +244,7 @@ def _first_triangles(owner, n_cells):
     return first
 
 
-@inner
+@inlined
 def _descend(x, closest, best, surface, first, cells, cells_of_nodes):
     """Squared distance [m²] of x (3,) to the closest triangle that can be reached from `closest`, at the squared
     distance `best`, through cells with a common node, always coming closer."""

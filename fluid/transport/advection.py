@@ -17,13 +17,13 @@ import numpy as np
 
 from fluid.mesh.arrays import Paths
 from fluid.numerics.fields import copied
-from kernels.decorators import inner, ranged, released
+from kernels.decorators import inlined, inner, ranged, released
 from kernels.threads import over
 
 _LONGEST_WALK = 100
 
 
-@inner
+@inlined
 def walk(x, e, mesh, lam):
     """Cell that holds x (3,), walking from cell e; its barycentric coordinates in lam (4,).
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kernels.decorators import helper, inner
+from kernels.decorators import helper, inlined, inner
 
 PARALLEL = 0.05
 """Sine of the angle below which lines count as parallel to a face or to one another."""
@@ -42,7 +42,7 @@ def pair_scratch(shapes):
     return np.empty((SCRATCH + 2 * most, 3))
 
 
-@inner
+@inlined
 def find_crossing(shapes, a, b, x, R, deepest, scratch):
     """Find the edges of a and b with the smallest overlap, if that is less than `deepest` [m]; scratch: see
     `pair_scratch`. Parallel edges of a block share one normal with each edge of the other: a box has three directions.
@@ -117,7 +117,7 @@ def _outermost(shapes, a, b, like_a, like_b, A, B, n, low, high, scratch):
     return -1
 
 
-@inner
+@inlined
 def crossing(shapes, a, b, number, state, plane, point, scratch):
     """Depth of a pair of edges [m], and the distance of their crossing from the nearest end as a share of that edge,
     which is negative past the end or where the edges no longer cross.

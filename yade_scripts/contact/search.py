@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kernels.decorators import inner, plain
+from kernels.decorators import inlined, inner, plain
 from yade_scripts.contact.arrays import BEGINS, CROSSINGS
 from yade_scripts.contact.edges import FLAT, PARALLEL, crossing, find_crossing, next_beside
 from yade_scripts.contact.overlap import share_of_overlap
@@ -72,7 +72,7 @@ def planes_seen_from(face_start, normal, offset, a, b, x, R, planes):
     return count
 
 
-@inner
+@inlined
 def separation(node, begin, end, planes, faces):
     """The plane in front of which all nodes begin .. end lie farthest out, and their distance [m] from it, by which the
     two bodies are at least apart. It is enough to pass the vertices. → (distance, plane)"""
@@ -87,7 +87,7 @@ def separation(node, begin, end, planes, faces):
     return best, witness
 
 
-@inner
+@inlined
 def scan(shapes, bodies, law, slots, slot, side, faces, state, rows, count, lost, scratch):
     """Contacts of the nodes of a with the faces of b, which `slots` remembers from `slot` on; the energy of springs
     whose contacts end is added to `lost`. → (contacts, lost [J])
@@ -134,7 +134,7 @@ def scan(shapes, bodies, law, slots, slot, side, faces, state, rows, count, lost
     return count, lost
 
 
-@inner
+@inlined
 def cross(
     shapes, bodies, shear, slots, base, side, overlap, share, flat, state, rows, first, count, lost, scratch
 ):  # fmt: skip

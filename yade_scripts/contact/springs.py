@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kernels.decorators import inner, kernel
+from kernels.decorators import inlined, inner, kernel
 from yade_scripts.contact.arrays import BEGINS
 
 SHARP = 1e-3
@@ -43,7 +43,7 @@ class Mode(NamedTuple):
     omega: float
 
 
-@inner
+@inlined
 def set_dashpots(bodies, law, a, b, R, rows, first, count, scratch):
     """Dashpots of all contacts of a pair, c = 2 ζ sqrt(m K) k/K with K = Σ k and the effective mass m at their middle.
 
@@ -109,7 +109,7 @@ def _all_turning(bodies, a, R, arm, axis, u):
     return total
 
 
-@inner
+@inlined
 def apply(slots, state, mode, pair_a, rows, first, crossings, count, scratch):
     """Compute the forces of the contacts first .. count of a pair; → work of friction [J]. pair_a: the first block of
     the pair · crossings: first contact of edges, whose normals turn against both blocks · scratch (6, 3): work space,

@@ -26,7 +26,7 @@ def specialised(
     """
     copy = FunctionType(kernel.__code__, kernel.__globals__ | chosen, kernel.__name__, kernel.__defaults__)
     copy.__qualname__, copy.__module__ = f"{kernel.__qualname__}_{name}", kernel.__module__
-    return shared(njit, copy, cache=cache) if ranged else njit(cache=cache)(copy)
+    return shared(njit, copy, cache=cache, _nrt=False) if ranged else njit(cache=cache)(copy)
 
 
 def source_checksum(*functions: Callable) -> int:

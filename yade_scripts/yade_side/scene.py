@@ -26,6 +26,8 @@ WHITE = (1.0, 1.0, 1.0)
 """Colour of bodies; left to itself, YADE seeds a random generator for each."""
 STATE = 13
 """Numbers of a body: position 3, velocity 3, angular velocity 3, orientation 4 (x y z w)."""
+_SAVED = [0, 1, 2, 12, 9, 10, 11, 3, 4, 5, 6, 7, 8]
+"""Of these, in the order of a saved state: position, orientation (w x y z), velocity, spin."""
 
 
 class SceneInUse(YadeError):
@@ -205,11 +207,10 @@ class Scene:
 
     def _states(self, of) -> Array:
         """The same of the rows `of`, (k, 16)."""
-        states = [self._bodies[row].state for row in of]
-        rows = [
-            (*s.pos, s.ori[3], s.ori[0], s.ori[1], s.ori[2], *s.vel, *s.angVel, *s.angMom) for s in states
-        ]
-        return np.array(rows, float).reshape(-1, 16)
+        rows = np.asarray(of, np.int64)
+        ids = [self.ids[row] for row in rows]
+        read = self.read(ids, bytearray(8 * STATE * len(ids)))
+        return np.concatenate([read[:, _SAVED], self.angular_momentum(rows)], axis=1)
 
     def restore(self, saved: Array) -> None:
         """Return to a saved state, bit for bit."""
