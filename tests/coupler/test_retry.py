@@ -191,7 +191,7 @@ def test_a_limit_that_shorter_steps_do_not_keep_is_reported_with_the_place():
     c = alone(Pipe(gains_above=0.0, gains=0.1))
     record = c.step(0.1)
     assert (record.retries, record.bad) == (0, True)
-    told = r"energy balance.*The water has gained 0\.1 J, of 1 J put in.*fastest, 3 m/s, at \(0\.1, 0\.2, 0\.3\) m\. Take"
+    told = r"energy balance.*water has gained 0\.1 J, of 1 J put in.*fastest, 3 m/s, at \(0\.1, 0\.2, 0\.3\) m\. Take"
     with pytest.raises(Diverged, match=told):
         check_step(c, record, LIMITS)
 
