@@ -207,14 +207,14 @@ def _whole_second(mesh, cells):
 
 
 def hat_values(corners, points) -> Array:
-    """P1 functions of tetrahedra corners (k, 4, 3) at points (k, q, 3) -> (k, q, 4)."""
+    """P1 functions of tetrahedra corners (k, 4, 3) [m] at points (k, q, 3) [m] -> (k, q, 4)."""
     rest = (points - corners[:, :1]) @ _gradients(corners)
     return _with_first(rest)
 
 
 @kernel
 def _gradients(corners):
-    """Gradients of the last three P1 functions of tetrahedra corners (k, 4, 3), as columns (k, 3, 3)."""
+    """Gradients [1/m] of the last three P1 functions of tetrahedra, as columns (k, 3, 3); corners (k, 4, 3) [m]."""
     found, e = np.empty((len(corners), 3, 3)), np.empty((3, 3))
     for i in range(len(corners)):
         for a in range(3):

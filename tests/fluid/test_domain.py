@@ -4,10 +4,13 @@ import dataclasses
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
+import skfem
 from scipy.spatial.transform import Rotation
 
 from fluid.cut.bodies import ConvexBodies
-from fluid.domain.physical_domain import cut_domain, wetted_coupling
+from fluid.domain.coupling_matrix import rows_of
+from fluid.domain.physical_domain import cut_domain, hat_values, wetted_coupling
 from fluid.mesh.background import box_mesh
 
 MESH = box_mesh((0, 0, 0), (4, 4, 4), 1.0)
@@ -129,3 +132,28 @@ def test_a_foreign_previous_domain_is_refused():
         cut_domain(MESH, two, "multiple", previous=domain)
     with pytest.raises(ValueError, match="choose 'single' or 'multiple'"):
         cut_domain(MESH, two, "double")
+
+
+def test_values_of_hat_functions_are_those_of_scikit_fem():
+    """The last three hats of a tetrahedron are the coordinates of its reference cell."""
+    random = np.random.default_rng(5)
+    corners, points = random.normal(size=(30, 4, 3)), random.normal(size=(30, 7, 3))
+    mesh = skfem.MeshTet(
+        corners.reshape(-1, 3).T.copy(), np.arange(120).reshape(30, 4).T.copy(), sort_t=False
+    )
+    reference = mesh.mapping().invF(points.transpose(2, 0, 1), tind=np.arange(30)).transpose(1, 2, 0)
+    found = hat_values(corners, points)
+    np.testing.assert_allclose(found[:, :, 1:], reference, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(found.sum(axis=2), 1.0, atol=1e-9)
+
+
+def test_rows_of_a_coupling_are_those_of_scipy():
+    """In the order asked for, empty and repeated ones too."""
+    random = np.random.default_rng(6)
+    coupling = sp.random_array((50, 12), density=0.1, format="csr", rng=random)
+    rows = random.integers(0, 50, 40)
+    found, expected = rows_of(coupling, rows), sp.csr_matrix(coupling)[rows]
+    for name in ("indptr", "indices", "data"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(expected, name))
+    assert found.shape == expected.shape
+    assert rows_of(coupling, rows[:0]).shape == (0, 12)
