@@ -87,12 +87,17 @@ def volumes(topology, phi, label, count: int) -> Array:
 
 
 def bricks(topology, label, count: int) -> Array:
-    """Mean volume (K,) [m³] of the bricks, of six cells each, around the nodes of the pockets."""
+    """Mean volume (K,) [m³] of the bricks, of six cells each, around the nodes of the pockets.
+
+    A cell counts for the pocket of each of its corners: nodes inside of solids may belong to pockets that have no cell
+    to themselves."""
     t = topology
     cells = t.cells_around(label > OPEN_AIR)
-    pocket = label[t.cells[cells]].max(axis=1) - 1
-    total = np.bincount(pocket, t.size[cells] ** 3, minlength=count)[:count]
-    return total / np.maximum(np.bincount(pocket, minlength=count)[:count], 1)
+    at_corners = label[t.cells[cells]]
+    cell, corner = np.nonzero(at_corners > OPEN_AIR)
+    pocket = at_corners[cell, corner] - 1
+    total = np.bincount(pocket, t.size[cells[cell]] ** 3, minlength=count)[:count]
+    return total / np.bincount(pocket, minlength=count)[:count]
 
 
 def without(label, small) -> tuple[Array, int]:

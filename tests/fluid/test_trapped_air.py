@@ -8,7 +8,7 @@ from scipy.integrate import quad, solve_ivp
 
 from fluid.air.gas import AIR_DENSITY, Gas
 from fluid.air.leaks import Vent, pockets_at
-from fluid.air.pockets import NO_AIR, OPEN_AIR, Descent, labelled, volumes
+from fluid.air.pockets import NO_AIR, OPEN_AIR, Descent, bricks, labelled, volumes
 from fluid.cut.bodies import ConvexBodies
 from fluid.domain.physical_domain import cut_domain
 from fluid.mesh.background import box_mesh
@@ -364,6 +364,18 @@ def test_bubbles_that_the_mesh_does_not_see_are_let_go():
     assert pockets(0.14, Gas()) == 0
     assert pockets(0.14, Gas(smallest=1.0)) == 1
     assert pockets(0.3, Gas()) == 1
+
+
+def test_the_bricks_of_a_pocket_that_shares_all_of_its_cells_are_those_around_it():
+    """A single node inside of a solid whose cells all have a corner in another pocket: with a size of zero it would
+    never be too small, and its air of some mm³ would expand until it pulled with 100 kPa."""
+    mesh = box_mesh(np.zeros(3), (1.0, 1.0, 1.0), 0.25)
+    domain = cut_domain(mesh, ConvexBodies.empty(), "single")
+    topology = Water(mesh, domain, lambda x: x[:, 2] - 0.4, WaterParameters()).topology
+    for first, second in ((1, 2), (2, 1)):
+        label = np.full(len(mesh.nodes), first)
+        label[0] = second
+        np.testing.assert_allclose(bricks(topology, label, 2), 0.25**3, rtol=1e-12)
 
 
 def test_a_pocket_that_becomes_too_small_is_counted_and_its_energy_booked():
