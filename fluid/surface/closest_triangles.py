@@ -3,7 +3,9 @@
 The corners of the cells that the surface passes through test the triangles of these cells. A node of a farther layer
 tests those that its neighbours hold as their closest, in two sweeps over its layer: in the first, neighbours of earlier
 layers and those before it in its own; in the second, neighbours of its own layer that hold another triangle than it has
-tested. So each node depends on those before it in its layer.
+tested. So each node depends on those before it in its layer. What is handed on need not be the closest of all; nodes
+that are told to (`Descent`) go on from there through cells with a common node, unless they stand right above the
+triangle.
 
 Threads share a sweep nevertheless, and find what one thread finds, bit for bit. Each takes a part of the layer and does
 without the neighbours in the parts before it, and marks the nodes that have any. These few are then done again in the
@@ -22,7 +24,11 @@ from kernels.threads import over, owning, reach_of_cells
 
 TESTED = 64
 """Number of places in which the triangles that a node has tested are noted."""
+NOTED = 256
+"""The same of the cells that a descent has gone through."""
 FIRST, SECOND = 0, 1
+BESIDE = 1e-6
+"""Share by which a squared distance may exceed that from the plane of the triangle and still count as the same."""
 TESTS = 5
 """Cost of a node and a sweep, in visits of its neighbours."""
 
@@ -222,16 +228,32 @@ def _tested(s, part, layer, sweep, layers, triangles, nodes, around, once, known
     return closest, square, behind
 
 
-@ranged
+@released
 def _descended(first, last, order, surface, triangle_of, mesh, descent, known):
+    _descend_all(first, last, order, surface, triangle_of, mesh, descent, known, np.full(NOTED, -1))
+
+
+@inner
+def _descend_all(first, last, order, surface, triangle_of, mesh, descent, known, noted):
+    """The loop over places in the descent; noted (NOTED,): work space."""
     for k in range(first, last):
         s = descent.places[k]
-        if known.closest[s] >= 0:
+        x, closest, square = mesh.nodes[order[s]], known.closest[s], known.square[s]
+        if closest >= 0 and not _above(x, surface.triangles[closest], square):
             of_nodes = (descent.node_start, descent.node_cells)
-            x = mesh.nodes[order[s]]
             known.square[s] = _descend(
-                x, known.closest[s], known.square[s], surface, triangle_of, mesh.cells, of_nodes
+                x, k, closest, square, surface, triangle_of, mesh.cells, of_nodes, noted
             )
+
+
+@inner
+def _above(p, t, square):
+    """Whether the squared distance [m²] of the point p (3,) from the triangle t (3, 3) is that from its plane."""
+    abx, aby, abz = t[1, 0] - t[0, 0], t[1, 1] - t[0, 1], t[1, 2] - t[0, 2]
+    acx, acy, acz = t[2, 0] - t[0, 0], t[2, 1] - t[0, 1], t[2, 2] - t[0, 2]
+    nx, ny, nz = aby * acz - abz * acy, abz * acx - abx * acz, abx * acy - aby * acx
+    height = (p[0] - t[0, 0]) * nx + (p[1] - t[0, 1]) * ny + (p[2] - t[0, 2]) * nz
+    return square * (nx * nx + ny * ny + nz * nz) <= (1.0 + BESIDE) * height * height
 
 
 @kernel
@@ -245,9 +267,11 @@ def _first_triangles(owner, n_cells):
 
 
 @inlined
-def _descend(x, closest, best, surface, first, cells, cells_of_nodes):
+def _descend(x, own, closest, best, surface, first, cells, cells_of_nodes, noted):
     """Squared distance [m²] of x (3,) to the closest triangle that can be reached from `closest`, at the squared
-    distance `best`, through cells with a common node, always coming closer."""
+    distance `best`, through cells with a common node, always coming closer.
+
+    noted: places where cells that were gone through are noted, with the number `own` of x."""
     triangles, owner = surface
     node_start, node_cells = cells_of_nodes
     before = -1
@@ -256,8 +280,13 @@ def _descend(x, closest, best, surface, first, cells, cells_of_nodes):
         for a in range(4):
             i = cells[owner[before], a]
             for s in range(node_start[i], node_start[i + 1]):
-                t = first[node_cells[s]]
-                while 0 <= t < owner.shape[0] and owner[t] == node_cells[s]:
+                e = np.int64(node_cells[s])
+                t = first[e]
+                mark = own * first.shape[0] + e
+                if t < 0 or noted[e % NOTED] == mark:
+                    continue
+                noted[e % NOTED] = mark
+                while t < owner.shape[0] and owner[t] == e:
                     d = squared_distance(x, triangles[t])
                     if d < best:
                         best, closest = d, t

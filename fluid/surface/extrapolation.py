@@ -25,6 +25,8 @@ BAND = 5
 WAVE_SLACK = 0.05
 """Share by which velocity in calm water may be continued beyond what the forces make of it: below that, waves lose
 0.5 % of their height a period."""
+AHEAD = 0.5
+"""Sine of the angle ahead of a node within which the speed of a neighbour ceases to count as that of one beside."""
 _NO_LIMIT = np.zeros(0)
 
 
@@ -94,29 +96,39 @@ def _continue(first, last, layer, linear, field, nodes, around_by_cells, total):
 
 @inner
 def _shorten(i, least, f, nodes, around_by_cells, done):
-    """Shorten row i of f (N, 3) [m/s] to `least`, to the speed of the fastest of its known neighbours that do not go
-    before it, or to what the mean of all of them has in its direction, whichever is most."""
+    """Shorten row i of f (N, 3) [m/s] to what its neighbours allow: the most of `least`, m and m + w (|f_j| - m), with
+    the mean m of what all known neighbours have in its direction, and w of the neighbour j: 1 where it lies behind or
+    beside, 0 where it lies ahead, farther from beside than by the angle whose sine is AHEAD, in between in between."""
     start, around, shared = around_by_cells
     length = np.sqrt(_square(f[i]))
-    most, mean, weight = least * length, 0.0, 0.0
+    mean, weight = 0.0, 0.0
     for t in range(start[i], start[i + 1]):
         j = around[t]
         if not done[j]:
             continue
-        along, ahead, square = 0.0, 0.0, 0.0
+        along, square = 0.0, 0.0
         for k in range(3):
             dx = nodes[i, k] - nodes[j, k]
             along += f[j, k] * f[i, k]
-            ahead += dx * f[i, k]
             square += dx * dx
         weight += shared[t] / square
         mean += shared[t] / square * along
-        if ahead >= 0.0:
-            most = max(most, np.sqrt(_square(f[j])) * length)
-    if weight > 0.0:
-        most = max(most, mean / weight)
+    mean /= max(weight * length, 1e-300)
+    most = max(least, mean)
+    for t in range(start[i], start[i + 1]):
+        j = around[t]
+        if not done[j]:
+            continue
+        behind, square = 0.0, 0.0
+        for k in range(3):
+            dx = nodes[i, k] - nodes[j, k]
+            behind += dx * f[i, k]
+            square += dx * dx
+        counts = 1.0 + behind / (AHEAD * np.sqrt(square) * length)
+        if counts > 0.0:
+            most = max(most, mean + min(counts, 1.0) * (np.sqrt(_square(f[j])) - mean))
     for k in range(3):
-        f[i, k] *= min(1.0, most / (length * length))
+        f[i, k] *= min(1.0, most / length)
 
 
 @inner

@@ -5,12 +5,13 @@ closest point pulls the surface off the walls (0.2 m/s in a tilted tank at rest)
 such a node has left [0.9, 1.1] is φ divided by it, and not at dry nodes of a bed (see below).  All other nodes take the
 distance to the closest polygon of the surface, which is passed on from layer to layer; beyond the layers φ = ±FAR h.
 
-A node takes over the closest polygon of a neighbour.  Where cells are obtuse this may lie some polygons away from the
-closest one of the node itself. There φ is too large by 0.02 h to 0.15 h, and its gradient in the cells above and below
-the surface deviates so much from the normal that velocity along still water lifts the surface (growth of 0.005 a step).
-In such cells, and up to three layers of nodes around them (between coarse and fine bricks, not inside them), the nodes
-of the first layers therefore search the polygons around the one taken over until none is closer. On a surface that is
-nearly flat over a cell, this finds the closest of all.
+A node takes over the closest polygon of a neighbour, which may lie some polygons away from its own closest one. There φ
+is too large by 0.02 h to 0.15 h. Where cells are obtuse, its gradient in the cells above and below the surface then
+deviates so much from the normal that velocity along still water lifts the surface (growth of 0.005 a step). And which
+polygon a neighbour hands on, of two that are as close to it, is a matter of the last digit: two dam breaks that
+differed by 1e-16 m differed by 0.02 h in the step after. The nodes of the first layers therefore search the polygons
+around the one taken over until none is closer, unless they stand right above it. On a surface that is nearly flat over
+a cell, this finds the closest of all.
 
 A surface that meets a solid goes on inside it as far as cells reach that the solid cuts. Where a bed that climbs passes
 a layer of nodes these cells end, and the first node of the next layer, inside the bed, is a cell or more from the last
@@ -41,7 +42,7 @@ from kernels.threads import found_over, over, zeros
 
 LAYERS = 6
 EXACT_LAYERS = 2
-"""Layers that look for their own closest polygon on meshes with obtuse cells: those next to the surface."""
+"""Layers that look for their own closest polygon: those next to the surface, which transport reads in a step."""
 FAR = 7.0
 LEAST_SLOPE = 0.05
 """Least share of its distance from the last polygon that a dry node on a sloping bed of the mesh keeps."""
@@ -206,12 +207,9 @@ def redistance(topology, phi, spacing, rescale: bool, motion=None):
     return far
 
 
-def _descent(t, layers: Layers) -> Descent | None:
-    """Which nodes go on to the closest triangle of all; None where no cell of the mesh is obtuse."""
-    if not t.is_obtuse:
-        return None
-    places = np.arange(layers.start[1], layers.start[EXACT_LAYERS + 1])
-    return Descent(places[t.near_obtuse[layers.order[places]]], t.node_start, t.node_cells)
+def _descent(t, layers: Layers) -> Descent:
+    """The nodes that go on to the closest triangle of all."""
+    return Descent(np.arange(layers.start[1], layers.start[EXACT_LAYERS + 1]), t.node_start, t.node_cells)
 
 
 def no_steeper(topology, phi, given):

@@ -176,7 +176,7 @@ def _shift(first, column, entry, diagonal, residual, tolerance, most):
         if rz <= goal or rz <= 0.0:
             break
         over(_product, n, first, column, entry, diagonal, p, Ap)
-        rz = _next_way(rz, diagonal, Ap, x, r, z, p)
+        rz = _next_way(rz, goal, diagonal, Ap, x, r, z, p)
     return x
 
 
@@ -201,15 +201,19 @@ def _product(begin, end, first, column, entry, diagonal, p, Ap):
 
 
 @kernel
-def _next_way(rz, diagonal, Ap, x, r, z, p):
-    """x, r, z and the direction p (n,) of conjugate gradients after a step along p, in place → r·z."""
+def _next_way(rz, goal, diagonal, Ap, x, r, z, p):
+    """x, r, z and the direction p (n,) of conjugate gradients after a step along p, in place → r·z.
+
+    Of the step in which r·z falls below its goal, x takes the share in which a line would: taken as a whole, one step
+    more or less by the last digit of r·z changes x by the tolerance."""
     alpha = rz / np.dot(p, Ap)
     for i in range(len(x)):
-        x[i] += alpha * p[i]
         r[i] -= alpha * Ap[i]
         z[i] = r[i] / diagonal[i]
     new = np.dot(r, z)
+    taken = alpha if new >= goal else alpha * (rz - goal) / (rz - new)
     for i in range(len(x)):
+        x[i] += taken * p[i]
         p[i] = z[i] + (new / rz) * p[i]
     return new
 

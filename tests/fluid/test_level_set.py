@@ -12,7 +12,7 @@ from fluid.mesh.background import box_mesh
 from fluid.mesh.fitted_mesh import fitted_mesh
 from fluid.surface.closest_triangles import squared_distance
 from fluid.surface.level_set import FAR, no_steeper, redistance
-from fluid.surface.volume import nodal_volume
+from fluid.surface.volume import _shift, nodal_volume
 
 H = 0.1
 
@@ -170,3 +170,22 @@ def test_only_gentle_slopes_count_as_beds():
     gentle = np.isclose(z, (x - 1.0) / 20) & (x < 3.5) & (x > 0.95)
     assert mesh.sloping_bed[gentle].all()
     assert not mesh.sloping_bed[~gentle & (x < 3.5)].any()
+
+
+def test_the_correction_of_the_volume_does_not_jump_with_the_number_of_its_steps():
+    """A chain of 200 unknowns, for tolerances that differ by 0.2 %: with the last step of conjugate gradients as a
+    whole, one step more changed the result by up to 4.5 % of it."""
+    n, rng = 200, np.random.default_rng(2)
+    residual = rng.normal(size=n)
+    links = [[j for j in (i - 1, i + 1) if 0 <= j < n] for i in range(n)]
+    first = np.cumsum([0] + [len(row) for row in links]).astype(np.uint32)
+    column = np.concatenate(links).astype(np.uint32)
+
+    def solved(tolerance):
+        diagonal = 0.3 + np.diff(first).astype(float)
+        return _shift(first, column, np.full(len(column), -1.0), diagonal, residual.copy(), tolerance, 100)
+
+    found = np.array([solved(tolerance) for tolerance in 10.0 ** np.arange(-1.0, -3.0, -0.001)])
+    jump = np.abs(np.diff(found, axis=0)).max() / np.abs(found[-1]).max()
+    assert jump < 5e-4, jump
+    assert np.abs(found[-1] - solved(1e-10)).max() < 5e-3 * np.abs(found[-1]).max()
