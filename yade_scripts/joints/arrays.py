@@ -24,8 +24,8 @@ class JointPoints(NamedTuple):
 
 
 class PointMemory(NamedTuple):
-    """History of the points: largest (P,) λ [m] · paid (P, 2), columns WORK and PULL · rub (P, 3) [m]: where failed
-    points stick, in the frame of a."""
+    """History of the points: largest (P,) λ [m] · paid (P, 4), columns WORK, PULL, LAST and OLDER · rub (P, 3) [m]:
+    where failed points stick, in the frame of a."""
 
     largest: Floats
     paid: Floats

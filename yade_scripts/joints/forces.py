@@ -8,7 +8,11 @@ move after it. While λ grows, every point keeps the work W* that it has taken, 
 
 so that a joint torn in a few substeps, or in one, takes G_c. For Δ << δ_f that is T(λ_n); there T itself is used, with
 the weight 1 - min(1, (8 Δ/δ_f)²), since the account would amplify what a vibrating joint gains from round to round.
-"""
+
+The normal traction is that of a spring through δ_n = 0 and of one, k, on the stiffer side alone. The second holds
+k δ_n δ_{n+1}/2 half a substep after n while both are on its side, and nothing otherwise. Its force that gives this
+difference is k δ_n times (1 + |δ_n|/Δ)/2 where the point came to this side within the last substep or leaves it within
+the next, |δ_n| < Δ. What a closed point gives beyond δ_n = 0 as it opens, W* takes back."""
 
 from __future__ import annotations
 
@@ -29,8 +33,9 @@ UNIT, DF, BETA, KC, K0, MU = range(6)
 """Columns of the law of a joint (J, 6): T_max/δ_f [Pa/m], δ_f [m], β, k_c [Pa/m], k_0 [Pa/m], μ where it has failed."""
 STICKS = 1.0 - 1e-9
 """Share of μ |t_n| below which a failed point sticks."""
-WORK, PULL = 0, 1
-"""Columns of `paid` (P, 2): work taken [J/m²], traction of the last substep [Pa], NOT_GROWING before."""
+WORK, PULL, LAST, OLDER = 0, 1, 2, 3
+"""Columns of `paid` (P, 4): work taken [J/m²], traction of the last substep [Pa], NOT_GROWING before, δ_n in the last
+substep and in the one before it [m]."""
 NOT_GROWING = -1.0
 SHARP = 8.0
 """The mean traction has its full weight from Δ = δ_f/SHARP on."""
@@ -47,6 +52,29 @@ def dashpot(eta, kn, kt, w, n):
     along, across = eta * (kn - kt) * wn, eta * kt
     t = (along * n[0] + across * w[0], along * n[1] + across * w[1], along * n[2] + across * w[2])
     return t, dot(t, w)
+
+
+@plain
+def fast(move, df):
+    """Weight of what belongs to the moves of a substep, here of `move` [m], instead of to its time alone."""
+    return min(1.0, (SHARP * move / df) ** 2) if abs(move) >= SLOW * df else 0.0
+
+
+@plain
+def beyond_the_kink(dn, move, df):
+    """Part [m] of δ_n that does not count for a spring on one side of δ_n = 0, as the point is on the other side half a
+    substep before or after: moves of `move` [m] a substep."""
+    size, way = abs(move), abs(dn)
+    return 0.5 * dn * (1.0 - way / size) * fast(size, df) if size > way else 0.0
+
+
+@plain
+def given_beyond(dn, last, older, ks, kc, df):
+    """Energy [J/m²] that a point closed in the last substep, δ_n = `last`, and open now, dn, has taken since δ_n = 0:
+    what its spring held half a substep before `last`, less the work of its force then."""
+    held = (kc if older < 0.0 else min(ks, kc)) * last * older
+    traction = kc * last - max(kc - ks, 0.0) * beyond_the_kink(last, last - older, df)
+    return 0.5 * (held + traction * (dn - older))
 
 
 @plain
@@ -85,8 +113,8 @@ def separation_work(unit, df, r, peak):
     return unit * df * df * work(min(r, 1.0), peak)
 
 
-def torn_traction(before, now, move, ks, unit, df, peak, paid):
-    """Traction [Pa] of a substep in which λ grows from `before` to `now`, the measure by `move`; paid (2,) changes."""
+def torn_traction(before, now, move, ks, dn, kc, unit, df, peak, paid):
+    """Traction [Pa] of a substep in which λ grows from `before` to `now`, the measure by `move`; paid (4,) changes."""
     move = max(move, now - before)
     if move < SLOW * df:
         paid[PULL] = NOT_GROWING
@@ -96,9 +124,12 @@ def torn_traction(before, now, move, ks, unit, df, peak, paid):
         k = softened(unit, before / df, peak)
         paid[PULL] = k * was
         paid[WORK] = separation_work(unit, df, before / df, peak) - 0.5 * k * (before * before - was * was)
+    if paid[LAST] < 0.0 < dn:
+        k = softened(unit, before / df, peak)
+        paid[WORK] += given_beyond(dn, paid[LAST], paid[OLDER], k, kc, df)
     paid[WORK] += 0.5 * paid[PULL] * move
     mean = max(separation_work(unit, df, (now + 0.5 * move) / df, peak) - paid[WORK], 0.0) / move
-    share = min(1.0, (SHARP * move / df) ** 2)
+    share = fast(move, df)
     pull = (1.0 - share) * ks * now + share * mean
     paid[WORK] += 0.5 * pull * move
     paid[PULL] = pull
@@ -139,10 +170,16 @@ def joint_forces(begin, end, live, joints, memory, motion, eta, dt, advance, giv
                 if before < now and before < df and dt > 0.0:
                     w = parting(ra, rb, x, v, mid)
                     move = dt * pace(dn, ss, dot(w, n), dot(w, s), beta)
-                    ks = torn_traction(before, now, move, ks, unit, df, peak, paid[p]) / now
+                    ks = torn_traction(before, now, move, ks, dn, kc, unit, df, peak, paid[p]) / now
                 else:
                     paid[p, PULL] = NOT_GROWING
             tn, kn, kt = response(ks, dn, ss, after, k0, df, beta, kc)
+            if advance:
+                one_sided = kc - ks if dn < 0.0 else ks - kc
+                if one_sided > 0.0 and dt > 0.0 and (dn < 0.0 or paid[p, PULL] == NOT_GROWING):
+                    tn -= one_sided * beyond_the_kink(dn, dn - paid[p, LAST], df)
+                paid[p, OLDER] = paid[p, LAST]
+                paid[p, LAST] = dn
             t0, t1, t2 = tn * n[0] + kt * s[0], tn * n[1] + kt * s[1], tn * n[2] + kt * s[2]
             g = weight[p] * (tn - kt * dn)
             g0, g1, g2 = g0 + g * s[0], g1 + g * s[1], g2 + g * s[2]

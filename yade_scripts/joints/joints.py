@@ -118,7 +118,7 @@ class Joints:
         self.visited = self.live
         """Live joints that are not resting."""
         self.largest = np.zeros(len(self.weight))
-        self.paid = np.zeros((len(self.weight), 2))
+        self.paid = np.zeros((len(self.weight), 4))
         self.paid[:, PULL] = NOT_GROWING
         self.damped = np.zeros(n)
         """Energy that the dashpots of each joint have taken [J]."""

@@ -71,9 +71,18 @@ def effective_response(ks, dn, ss, largest, k0, df, beta, kc):
 
 
 @njit
+def _stiffness_between(ks, dn, en, kc):
+    """Normal stiffness [Pa/m] between the openings dn and en [m]: on both sides of zero only a spring through zero
+    holds energy."""
+    if dn < 0.0 and en < 0.0:
+        return kc
+    return ks if dn > 0.0 and en > 0.0 else min(ks, kc)
+
+
+@njit
 def effective_stored(ks, dn, en, slide, largest, k0, df, beta, kc):
     """Elastic energy [J/m²] between the openings dn and en [m]; slide [m²]: scalar product of their slidings."""
-    kn = ks if dn + en > 0.0 else kc
+    kn = _stiffness_between(ks, dn, en, kc)
     return 0.5 * (kn * dn * en + beta**2 * ks * slide)
 
 
@@ -107,7 +116,7 @@ def _needleman_shear(dn, largest, k0, df, beta):
 @njit
 def needleman_stored(ks, dn, en, slide, largest, k0, df, beta, kc):
     """As `effective_stored`."""
-    kn = ks if dn + en > 0.0 else kc
+    kn = _stiffness_between(ks, dn, en, kc)
     return 0.5 * (kn * dn * en + _needleman_shear(0.5 * (dn + en), largest, k0, df, beta) * slide)
 
 
