@@ -102,16 +102,26 @@ def _in_turn(dispatcher: Any) -> Any:
         )
 
     def compile(sig: Any) -> Any:
-        with _turn(name):
+        with _turn(name, lambda: _is_kept(dispatcher, sig)):
             return compile_alone(sig)
 
     dispatcher.get_call_template, dispatcher.compile = get_call_template, compile
     return dispatcher
 
 
+def _is_kept(dispatcher: Any, sig: Any) -> bool:
+    """Whether the folder of kernels has the code of a function for these types of arguments."""
+    cache = dispatcher._cache
+    key = cache._index_key(sig, dispatcher.targetctx.codegen())
+    file = cache._cache_file
+    name = file._load_index().get(key)
+    return name is not None and os.path.exists(file._data_path(name))  # numba writes the index first
+
+
 @contextlib.contextmanager
-def _turn(name: str) -> Iterator[None]:
-    """While no other process compiles the kernel `name` into the same folder, or after PATIENCE; numba then looks in
+def _turn(name: str, is_kept: Callable[[], bool]) -> Iterator[None]:
+    """While no other process compiles the kernel `name` into the same folder, or when is_kept() says that the code is
+    there (the other process only loads it too, and may be stopped meanwhile), or after PATIENCE; numba then looks in
     the folder first. The lock is one byte of a file there, which the system releases if the process ends."""
     at = int.from_bytes(hashlib.sha256(name.encode()).digest()[:7], "big")
     file = _locks(os.environ.get("NUMBA_CACHE_DIR"))
@@ -122,6 +132,8 @@ def _turn(name: str) -> Iterator[None]:
                 fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, at)
                 break
             except (BlockingIOError, PermissionError):
+                if is_kept():
+                    break
                 time.sleep(0.02)
     try:
         yield

@@ -26,7 +26,7 @@ def near_pairs(mesh, solids, chosen, margin) -> tuple[Array, Array]:
     high = np.stack([bin_of(a, bounds[:, 1, k] + margin) for k, a in enumerate(mesh.axes)], axis=1)
     bins = Bins(mesh.bin_start, mesh.bin_cells, len(mesh.axes[1]) - 1, len(mesh.axes[2]) - 1)
     planes, reach = solids.planes(), Boxes(low, high)
-    capacity = 64 * len(chosen) + 1024
+    capacity = 256 * len(chosen) + 1024
     while True:
         cell, body = np.empty(capacity, dtype=np.int64), np.empty(capacity, dtype=np.int64)
         n = _search(mesh.nodes, mesh.cells, bins, chosen, reach, planes, margin, cell, body)

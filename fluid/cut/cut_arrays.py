@@ -9,6 +9,21 @@ import numpy as np
 from array_types import Bools, Floats, Ints
 
 
+class Room(NamedTuple):
+    """Rows for a number of cells, before there is more: twice what cells take where a broken building lies in them."""
+
+    parts: int = 3
+    polygons: int = 10
+    openings: int = 14
+    corners: int = 56
+    tetrahedra: int = 18
+
+
+ROOM = Room()
+SPARE = 256
+"""Rows beyond these, for single cells with many pieces."""
+
+
 class Output(NamedTuple):
     """Arrays that the kernel fills; rows beyond the returned counts are unused."""
 
@@ -26,23 +41,27 @@ class Output(NamedTuple):
     tet: Floats  # (tetrahedra, 17) volume, barycentric coordinates of the four corners
 
 
-def output(parts: int, polygons: int, with_openings: bool) -> Output:
-    """Arrays with ample room for that many parts and polygons; memory that is never written to takes no space."""
-    openings, tetrahedra = polygons * 4 if with_openings else 64, polygons * 4
-    return Output(
-        np.zeros(parts, dtype=np.int64),
-        np.zeros(parts, dtype=np.bool_),
-        np.zeros((parts, 10)),
-        np.zeros(polygons, dtype=np.int64),
-        np.zeros(polygons, dtype=np.int64),
-        np.zeros((polygons, 25)),
-        np.zeros(openings, dtype=np.int64),
-        np.zeros(openings, dtype=np.int64),
-        np.zeros(openings + 1, dtype=np.int64),
-        np.zeros((openings * 5, 3)),
-        np.zeros(tetrahedra, dtype=np.int64),
-        np.zeros((tetrahedra, 17)),
+def output(cells: int, with_openings: bool) -> Output:
+    """Arrays, not filled, with room for what that many cells usually become; `doubled` where it is more."""
+    parts, polygons, openings, corners, tetrahedra = (SPARE + rows * cells for rows in ROOM)
+    if not with_openings:
+        openings = corners = 1
+    out = Output(
+        np.empty(parts, dtype=np.int64),
+        np.empty(parts, dtype=np.bool_),
+        np.empty((parts, 10)),
+        np.empty(polygons, dtype=np.int64),
+        np.empty(polygons, dtype=np.int64),
+        np.empty((polygons, 25)),
+        np.empty(openings, dtype=np.int64),
+        np.empty(openings, dtype=np.int64),
+        np.empty(openings + 1, dtype=np.int64),
+        np.empty((corners, 3)),
+        np.empty(tetrahedra, dtype=np.int64),
+        np.empty((tetrahedra, 17)),
     )
+    out.open_start[0] = 0
+    return out
 
 
 class Cuts(NamedTuple):
@@ -111,7 +130,7 @@ def behind(parts: list[Cuts]) -> Cuts:
 def doubled(out, at) -> Output:
     """Arrays of twice the length with the rows that were filled; at (5,) as in `trimmed`."""
     filled = _filled(out, at)
-    grown = Output(*(np.zeros((2 * len(a), *a.shape[1:]), a.dtype) for a in out))
+    grown = Output(*(np.empty((2 * len(a), *a.shape[1:]), a.dtype) for a in out))
     for new, old, count in zip(grown, out, filled):
         new[:count] = old[:count]
     return grown

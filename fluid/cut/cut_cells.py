@@ -341,7 +341,7 @@ def _cut_range(first, last, mesh: Corners, chosen: Chosen, planes: Planes, limit
     most_planes = int(np.diff(planes.start).max(initial=0))
     w = workspace(scale, most_bodies, most_bodies * most_planes)
     count = last - first
-    out = output(count * 4 + 64, count * 32 + 256, bool((chosen.link_area >= 0).all()))
+    out = output(count, bool((chosen.link_area >= 0).all()))
     while True:
         state = _cut_cells(last, mesh, chosen, Cutting(w, planes, limits, out), at)
         if state == DONE:

@@ -52,8 +52,20 @@ def fans(tet_part, tet, element_of_part, n_elements: int):
     -> start (n_elements + 1,), none in whole cells · volume (T,) [m³] · corners (T, 4, 4), the barycentric coordinates
     of the four corners in their cell."""
     start, order = _sorted(element_of_part[tet_part], n_elements)
-    rows = tet[order]
-    return start, np.ascontiguousarray(rows[:, 0]), np.ascontiguousarray(rows[:, 1:]).reshape(-1, 4, 4)
+    return start, *_rows(tet, order)
+
+
+@kernel
+def _rows(tet, order):
+    """Volumes (n,) and corners (n, 4, 4) of the tetrahedra `order` (n,)."""
+    volume, corners = np.empty(len(order)), np.empty((len(order), 4, 4))
+    for t in range(len(order)):
+        row = tet[order[t]]
+        volume[t] = row[0]
+        for j in range(4):
+            for k in range(4):
+                corners[t, j, k] = row[1 + 4 * j + k]
+    return volume, corners
 
 
 @kernel

@@ -90,6 +90,8 @@ def _merged(old: Contacts, searched, fresh: Contacts) -> Contacts:
     there = np.zeros(max(old.cell.max(initial=-1), searched.max(initial=-1)) + 1, bool)
     there[searched] = True
     keep = ~there[old.cell]
+    if not keep.any():
+        return fresh
     joined = [np.concatenate([a[keep], b]) for a, b in zip(old, fresh)]
     order = np.argsort(joined[0], kind="stable")
     return Contacts(*(a[order] for a in joined))

@@ -11,6 +11,8 @@ from kernels.decorators import kernel
 def joined(old: Cuts, again, new: Cuts) -> Cuts:
     """Parts of `old` in cells that were not cut `again` (cells,) bool, with those of `new`, all of which were."""
     take, kept, fresh = _merged(old.part_cell, new.part_cell, again)
+    if len(take) == len(new.part_cell):  # nothing of the old is left
+        return new
     wet = _of_parts(kept, fresh, old.wet_part, new.wet_part)
     opened = _of_parts(kept, fresh, old.open_part, new.open_part)
     tets = _of_parts(kept, fresh, old.tet_part, new.tet_part)

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from array_types import Array
+from fluid.domain.topology import first_rows
 from kernels.decorators import inner, kernel
 
 
@@ -96,8 +97,8 @@ def _elected(voters, matched, cells, old_cells, volume, old_volume, parent_node,
 def _old_elements(old, new, chosen):
     """Old element in the same background cell for each chosen new one, -1 where there is none."""
     cell = new.parent_cell[chosen]
-    first = np.searchsorted(old.parent_cell, cell)
-    last = np.searchsorted(old.parent_cell, cell, side="right")
+    start = first_rows(old.parent_cell, len(old.memory.mesh.cells))
+    first, last = start[cell], start[cell + 1]
     before, after = (Placed(d.memory.bodies.centre, d.memory.bodies.rotation) for d in (old, new))
     sought = Walled(new.centroid_of(chosen), _wall_of(new)[chosen])
     rows = _joined(first, last, len(old.cells))
@@ -107,12 +108,14 @@ def _old_elements(old, new, chosen):
     return np.where(found >= 0, np.append(rows, -1)[found], -1)
 
 
+@kernel
 def _joined(first, last, n):
     """All numbers below n from one of the `first` (k,) to before the `last` (k,) of its range, in order."""
-    change = np.zeros(n + 1, np.int32)
-    np.add.at(change, first, 1)
-    np.add.at(change, last, -1)
-    return np.flatnonzero(np.cumsum(change[:-1]))
+    within = np.zeros(n, np.bool_)
+    for k in range(len(first)):
+        for i in range(first[k], last[k]):
+            within[i] = True
+    return np.flatnonzero(within)
 
 
 def _wall_of(domain):

@@ -186,6 +186,16 @@ def cells_touching(marked, cells):
     return found[:n].copy()
 
 
+@kernel
+def marked_corners(cell_list, marked, cells):
+    """How many corners of each of the listed cells (k,) are marked; marked (N,) bool."""
+    found = np.zeros(len(cell_list), np.uint8)
+    for k in range(len(cell_list)):
+        for a in range(4):
+            found[k] += marked[cells[cell_list[k], a]]
+    return found
+
+
 def touching_among(cell_list, marked, cells):
     """Those of the listed cells (k,) with at least one marked corner, in their order; marked (N,) bool."""
     return found_over(_touching_among, len(cell_list), cell_list, marked, cells)

@@ -146,15 +146,9 @@ class PhysicalDomain:
 
     def centroid_of(self, rows) -> Array:
         """Centroids (n, 3) [m] of the fluid part of cells (n,), not stored either."""
-        mesh, part = self.memory.mesh, self.part[rows]
-        corners = mesh.cells[self.parent_cell[rows]]
-        found = mesh.nodes[corners[:, 0]]
-        for a in range(1, 4):
-            found += mesh.nodes[corners[:, a]]
-        found /= 4
-        cut = part >= 0
-        found[cut] = self.memory.cuts.moments[part[cut], 1:4]
-        return found
+        mesh = self.memory.mesh
+        moments = self.memory.cuts.moments
+        return _centroids(np.asarray(rows), self.parent_cell, self.part, mesh.cells, mesh.nodes, moments)
 
 
 def cut_domain(
@@ -197,6 +191,21 @@ def changed_bodies(old: ConvexBodies, new: ConvexBodies) -> Array:
         return np.zeros(0, dtype=bool)
     planes = (old.normals != new.normals).any(axis=1) | (old.cut_offsets() != new.cut_offsets())
     return np.logical_or.reduceat(planes, new.plane_start[:-1])
+
+
+@kernel
+def _centroids(rows, parent, part, cells, nodes, moments):
+    """Centroids (n, 3) [m] of the listed elements (n,)."""
+    found = np.empty((len(rows), 3))
+    for k in range(len(rows)):
+        cell, cut = parent[rows[k]], part[rows[k]]
+        for c in range(3):
+            if cut >= 0:
+                found[k, c] = moments[cut, 1 + c]
+            else:
+                total = nodes[cells[cell, 0], c] + nodes[cells[cell, 1], c] + nodes[cells[cell, 2], c]
+                found[k, c] = (total + nodes[cells[cell, 3], c]) / 4.0
+    return found
 
 
 def _whole_second(mesh, cells):

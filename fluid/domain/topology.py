@@ -176,7 +176,7 @@ class Topology:
     def rows_of_background(self) -> tuple[Array, Array]:
         """First row and number of the cells of each background cell: none inside solids, several where a thin wall
         divides it."""
-        start = np.searchsorted(self.background, np.arange(self.n_background + 1)).astype(np.int32)
+        start = first_rows(self.background, self.n_background)
         return start[:-1], np.diff(start)
 
     @property
@@ -273,6 +273,17 @@ def _measures(nodes, cells, parent, full, full_size, volume, part, moments):
                 beside_solid[cells[e, a]] = True
             node_volume[cells[e, a]] += volume[e] * share[r, a]
     return share, row, fraction, size, node_volume, beside_solid
+
+
+@kernel
+def first_rows(parent, n):
+    """First row (n + 1,) of each number below n in an ascending list (M,) of numbers; M at the end."""
+    start = np.zeros(n + 1, np.int32)
+    for e in range(len(parent)):
+        start[parent[e] + 1] += 1
+    for i in range(n):
+        start[i + 1] += start[i]
+    return start
 
 
 @kernel

@@ -16,6 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 from array_types import Array
+from fluid.domain.moments import marked_corners
 from fluid.domain.physical_domain import hat_values
 from fluid.pressure.waterline import differences
 
@@ -26,11 +27,10 @@ def film_volume(domain, drawn_in: Array, phi: Array, potential: Array) -> tuple[
     domain: PhysicalDomain · drawn_in (S,) [m] of its wetted polygons · phi (N,) [m] · potential (N,) [m²/s²]: g·x of
     the nodes, from the floor."""
     at = np.flatnonzero(drawn_in)
-    corners = domain.cells[domain.face_cell[at]]
-    below = (phi[corners] < 0.0).any(axis=1)
-    at, corners = at[below], corners[below]
+    at = at[marked_corners(domain.face_cell[at], phi < 0.0, domain.cells) > 0]
     if len(at) == 0:
         return 0.0, 0.0
+    corners = domain.cells[domain.face_cell[at]]
     hats = hat_values(domain.nodes[corners], domain.face_corners[at])
     height, weight = (np.einsum("kqa,ka->kq", hats, f[corners]) for f in (phi, potential))
     depth = np.repeat(drawn_in[at, None], 3, axis=1)

@@ -20,7 +20,7 @@ from __future__ import annotations
 import numpy as np
 
 from array_types import Array
-from fluid.domain.moments import cells_touching
+from fluid.domain.moments import cells_touching, marked_corners
 from fluid.domain.physical_domain import hat_values
 from fluid.pressure.projection import with_ghosts
 from kernels.decorators import inner, kernel
@@ -34,7 +34,7 @@ def waterline_load(domain, faces, left_out, phi, wet, pressure, open_node, air=N
     air (N,) [Pa]: pressure of trapped air at dry nodes, None: there is none. It acts on both sides of the surface, so
     that the correction is that of the pressure above it."""
     load = np.zeros((domain.n_bodies, 6))
-    count = wet[domain.cells[domain.face_cell[faces]]].sum(axis=1)
+    count = marked_corners(domain.face_cell[faces], wet, domain.cells)
     mixed = faces[(count > 0) & (count < 4)]
     at = np.concatenate([mixed, left_out])
     if len(at) == 0:
@@ -72,17 +72,16 @@ def hydrostatic_stiffness(water, phi, bodies) -> Array | None:
 
     phi (N,) [m] of the surface · bodies (n_bodies,) bool: the others get zeros."""
     domain, weight = water.domain, water.parameters.density * water.parameters.gravity
-    corners = domain.cells[domain.face_cell]
-    below = phi[corners] < 0.0
-    cut = np.unique(domain.face_body[below.any(axis=1) & ~below.all(axis=1)])
-    chosen = np.zeros(domain.n_bodies, bool)
-    chosen[cut] = bodies[cut]
-    at = np.flatnonzero(chosen[domain.face_body] & below.any(axis=1))
+    below = marked_corners(domain.face_cell, phi < 0.0, domain.cells)
+    cut = np.zeros(domain.n_bodies, bool)
+    cut[domain.face_body[(below > 0) & (below < 4)]] = True
+    at = np.flatnonzero((cut & bodies)[domain.face_body] & (below > 0))
     if len(at) == 0:
         return None
+    corners = domain.cells[domain.face_cell[at]]
     stiffness = np.zeros((domain.n_bodies, 3, 3))
-    hats = hat_values(domain.nodes[corners[at]], domain.face_corners[at])
-    height = np.einsum("kqa,ka->kq", hats, phi[corners[at]])
+    hats = hat_values(domain.nodes[corners], domain.face_corners[at])
+    height = np.einsum("kqa,ka->kq", hats, phi[corners])
     body, normal, area = domain.face_body[at], domain.face_normal[at], domain.face_area[at]
     arm = domain.face_corners[at] - domain.body_centre[body][:, None]
     _add_stiffness(height, arm, area, normal, body, weight, stiffness)

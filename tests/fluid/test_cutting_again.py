@@ -1,6 +1,7 @@
 """Domains that are cut, and whose covers are searched, only near moved bodies: the same as made afresh, bit for bit."""
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,10 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from fluid.cut import cut_arrays
 from fluid.cut import openings as contacts
 from fluid.cut.bodies import ConvexBodies
 from fluid.domain.covers import Connection, components, without_pockets
 from fluid.domain.physical_domain import cut_domain
+from fluid.domain.topology import first_rows
 from fluid.mesh.background import Background, box_mesh
 
 N = 6
@@ -120,3 +123,31 @@ def test_bodies_that_leave_the_tank_leave_the_whole_mesh(covers):
     gone = cut_domain(BOX, inside.moved([[5.0, 5.0, 5.0]]), covers, previous=domain)
     np.testing.assert_array_equal(gone.volume, BOX.cell_volume)
     np.testing.assert_array_equal(gone.cells, BOX.cells)
+
+
+@pytest.mark.parametrize("covers", ["single", "multiple"])
+def test_a_domain_does_not_depend_on_the_room_that_the_cut_begins_with(covers, monkeypatch):
+    """Room that is too small is doubled in the middle of a cell; what stood in it before is in nothing that is
+    returned."""
+    random = np.random.default_rng(5)
+    bodies = ConvexBodies.boxes(random.uniform(0, 1, (9, 3)), random.uniform(0.1, 0.5, (9, 3)))
+    full = cut_domain(GENERAL, bodies, covers)
+    monkeypatch.setattr(cut_arrays, "ROOM", cut_arrays.Room(0, 0, 0, 0, 0))
+    monkeypatch.setattr(cut_arrays, "SPARE", 1)
+    monkeypatch.setattr(cut_arrays, "np", SimpleNamespace(**(vars(np) | {"empty": np.ones})))
+    domain = cut_domain(GENERAL, bodies, covers)
+    for f in dataclasses.fields(full):
+        if f.name != "memory":
+            np.testing.assert_array_equal(getattr(domain, f.name), getattr(full, f.name), err_msg=f.name)
+
+
+def test_old_rows_and_new_rows_are_those_of_the_cells():
+    """First rows of cells in an ascending list, against a search; centroids, against means of corners and moments."""
+    parents = np.sort(np.random.default_rng(1).integers(0, 50, 80)).astype(np.uint32)
+    np.testing.assert_array_equal(first_rows(parents, 60), np.searchsorted(parents, np.arange(61)))
+    domain = cut_domain(GENERAL, ConvexBodies.boxes([[0.5, 0.5, 0.5]], [[0.3, 0.3, 0.3]]), "multiple")
+    whole = domain.part < 0
+    corners = GENERAL.nodes[GENERAL.cells[domain.parent_cell[whole]]]
+    np.testing.assert_allclose(domain.centroid[whole], corners.mean(axis=1), rtol=1e-14)
+    moments = domain.memory.cuts.moments[domain.part[~whole], 1:4]
+    np.testing.assert_array_equal(domain.centroid[~whole], moments)

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fluid.domain.moments import wet_moments
+from fluid.domain.moments import marked_corners, wet_moments
 
 values = st.floats(-1, 1).filter(lambda v: abs(v) > 1e-6)
 
@@ -41,3 +41,15 @@ def _samples(n=4000):
     alpha = 1.0 / 1.2207440846057596 ** np.arange(1, 4)
     cube = np.sort((0.5 + np.outer(np.arange(n), alpha)) % 1.0, axis=1)
     return np.diff(np.column_stack([np.zeros(n), cube, np.ones(n)]), axis=1)
+
+
+def test_marked_corners_are_counted_for_the_listed_cells():
+    random = np.random.default_rng(2)
+    cells, marked, listed = (
+        random.integers(0, 30, (40, 4)),
+        random.random(30) < 0.4,
+        random.integers(0, 40, 25),
+    )
+    count = marked[cells[listed]].sum(axis=1)
+    assert set(count) > {0, 1, 2}
+    np.testing.assert_array_equal(marked_corners(listed, marked, cells), count)

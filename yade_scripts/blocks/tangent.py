@@ -7,6 +7,7 @@ With the relative velocity w = B [v_a ω_a v_b ω_b] it adds Bᵀ (k_n nnᵀ + k
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -60,8 +61,9 @@ class Springs:
 
 def assemble(springs: Springs, n: int) -> tuple[sp.csr_array, sp.csr_array]:
     """Stiffness and damping, each (6n, 6n), symmetric and positive semi-definite."""
-    K = _assembled(springs, _across(springs.normal, springs.kn, springs.kt), n)
-    return K, _assembled(springs, _across(springs.normal, springs.cn, springs.ct), n)
+    layout = _Layout.of(springs, n)
+    K = _assembled(springs, _across(springs.normal, springs.kn, springs.kt), layout)
+    return K, _assembled(springs, _across(springs.normal, springs.cn, springs.ct), layout)
 
 
 def _across(normal: Array, kn: Array, kt: Array) -> Array:
@@ -71,14 +73,40 @@ def _across(normal: Array, kn: Array, kt: Array) -> Array:
     return D
 
 
-def _assembled(springs: Springs, D: Array, n: int) -> sp.csr_array:
+class _Layout(NamedTuple):
+    """Where springs stand in a matrix: pair (s,) of bodies of each · two (p,) bool: the pair has a second body that is
+    not the fixed world · rows, columns (e,) of the entries · n bodies."""
+
+    pair: Ints
+    two: Array
+    rows: Ints
+    columns: Ints
+    n: int
+
+    @classmethod
+    def of(cls, springs: Springs, n: int) -> _Layout:
+        """That of the springs between n bodies."""
+        first = np.maximum(springs.a, springs.b)
+        second = np.minimum(springs.a, springs.b)
+        keys, pair = np.unique(first * (n + 1) + second + 1, return_inverse=True)
+        row_a, row_b = keys // (n + 1), keys % (n + 1) - 1
+        two = row_b >= 0
+        rows = np.concatenate([row_a, row_b[two], row_a[two], row_b[two]])
+        columns = np.concatenate([row_a, row_b[two], row_b[two], row_a[two]])
+        six, shape = np.arange(6), (len(rows), 6, 6)
+        i = np.broadcast_to(6 * rows[:, None, None] + six[None, :, None], shape)
+        j = np.broadcast_to(6 * columns[:, None, None] + six[None, None, :], shape)
+        return cls(pair, two, i.ravel(), j.ravel(), n)
+
+
+def _assembled(springs: Springs, D: Array, layout: _Layout) -> sp.csr_array:
     """Sum of Bᵀ D B over the springs, (6n, 6n)."""
-    first = np.maximum(springs.a, springs.b)
-    second = np.minimum(springs.a, springs.b)
-    keys, pair = np.unique(first * (n + 1) + second + 1, return_inverse=True)
-    blocks = np.zeros((len(keys), 12, 12))
-    _accumulate(pair, springs.a < springs.b, springs.arm_a, springs.arm_b, D, blocks)
-    return _sparse(blocks, keys // (n + 1), keys % (n + 1) - 1, n)
+    two, size = layout.two, 6 * layout.n
+    blocks = np.zeros((len(two), 12, 12))
+    _accumulate(layout.pair, springs.a < springs.b, springs.arm_a, springs.arm_b, D, blocks)
+    parts = [blocks[:, :6, :6], blocks[two][:, 6:, 6:], blocks[two][:, :6, 6:], blocks[two][:, 6:, :6]]
+    values = np.concatenate(parts).ravel()
+    return sp.csr_array((values, (layout.rows, layout.columns)), shape=(size, size))
 
 
 @kernel
@@ -106,18 +134,6 @@ def _relative(B, column, sign, r):
     B[0, column + 4], B[0, column + 5] = sign * r[2], -sign * r[1]
     B[1, column + 3], B[1, column + 5] = -sign * r[2], sign * r[0]
     B[2, column + 3], B[2, column + 4] = sign * r[1], -sign * r[0]
-
-
-def _sparse(blocks: Array, row_a: Array, row_b: Array, n: int) -> sp.csr_array:
-    two = row_b >= 0
-    values = [blocks[:, :6, :6], blocks[two][:, 6:, 6:], blocks[two][:, :6, 6:], blocks[two][:, 6:, :6]]
-    rows = np.concatenate([row_a, row_b[two], row_a[two], row_b[two]])
-    columns = np.concatenate([row_a, row_b[two], row_b[two], row_a[two]])
-    values = np.concatenate(values)
-    six = np.arange(6)
-    i = np.broadcast_to(6 * rows[:, None, None] + six[None, :, None], values.shape)
-    j = np.broadcast_to(6 * columns[:, None, None] + six[None, None, :], values.shape)
-    return sp.csr_array((values.ravel(), (i.ravel(), j.ravel())), shape=(6 * n, 6 * n))
 
 
 def joint_springs(joints, x: Array, R: Array, index: Array | None = None) -> Springs:
@@ -157,4 +173,4 @@ def joint_tangent(joints, x: Array, R: Array, n: int, index: Array | None = None
         kernels.point_tangents(*arrays, (x, R), found)
         D[own] = found
     D = 0.5 * (D + D.transpose(0, 2, 1)) * joints.weight[index][:, None, None]
-    return _assembled(springs, D, n)
+    return _assembled(springs, D, _Layout.of(springs, n))

@@ -70,7 +70,8 @@ def _contacts(first_pair, last_pair, shapes, bodies, law, pairs, slots, ground, 
         most = max(most, shapes.face_start[body + 1] - shapes.face_start[body])
     planes, scratch = np.empty((most, 4)), pair_scratch(shapes)
     for p in range(first_pair, last_pair):
-        a, b, finds, taken = pairs.a[p], pairs.b[p], not pairs.found[p], 0.0
+        a, b = np.uint32(pairs.a[p]), np.uint32(pairs.b[p])
+        finds, taken = not pairs.found[p], 0.0
         pairs.found[p] = state.dt == 0.0
         if not finds and not pairs.touching[p]:
             continue

@@ -96,13 +96,16 @@ def scan(shapes, bodies, law, slots, slot, side, faces, state, rows, count, lost
     a, b, planes, margin = side.a, side.b, faces.planes, faces.margin
     begin, base, way = shapes.node_start[a], shapes.face_start[b], scratch[6:8]
     for i in range(begin, shapes.node_start[a + 1]):
-        s = slot + i - begin
+        s = np.uint32(slot + i - begin)
         xi0, xi1, xi2 = shapes.node[i, 0], shapes.node[i, 1], shapes.node[i, 2]
-        smallest = _behind(planes, faces.farthest, xi0, xi1, xi2)
+        nearest = faces.farthest
+        smallest = _behind(planes, nearest, xi0, xi1, xi2)
         for g in range(faces.count):
             if smallest < -margin:
                 break
-            smallest = min(smallest, _behind(planes, g, xi0, xi1, xi2))
+            depth = _behind(planes, g, xi0, xi1, xi2)
+            if depth < smallest:
+                smallest, nearest = depth, g
         g = slots.face[s] - base if slots.face[s] >= 0 else -1
         if g >= 0:
             depth = _behind(planes, g, xi0, xi1, xi2)
@@ -112,6 +115,8 @@ def scan(shapes, bodies, law, slots, slot, side, faces, state, rows, count, lost
                 continue
         elif smallest < -margin or not side.begins:
             continue
+        elif smallest <= 0.0 and _faces(shapes, i, planes, nearest):
+            continue  # still in front of a face that it can run into: `_entered` would find as much
         else:
             g, own = _entered(shapes, i, xi0, xi1, xi2, faces, smallest)
             if g < 0:
@@ -299,6 +304,17 @@ def _has_face(shapes, a, n, R):
 def _behind(planes, g, xi0, xi1, xi2):
     """Depth of the point ξ behind a plane [m]."""
     return planes[g, 3] - planes[g, 0] * xi0 - planes[g, 1] * xi1 - planes[g, 2] * xi2
+
+
+@inner
+def _faces(shapes, i, planes, g):
+    """Whether node i of a can have run into face g of b: a face of it looks the other way."""
+    for at in range(shapes.of_start[i], shapes.of_start[i + 1]):
+        f = shapes.of[at]
+        m0, m1, m2 = shapes.normal[f, 0], shapes.normal[f, 1], shapes.normal[f, 2]
+        if -(planes[g, 0] * m0 + planes[g, 1] * m1 + planes[g, 2] * m2) > ALIGNED:
+            return True
+    return False
 
 
 @inner

@@ -122,7 +122,7 @@ def apply(slots, state, mode, pair_a, rows, first, crossings, count, scratch):
     v, R, dt, last_dt = state.v, state.R, state.dt, state.last_dt
     lost, w, S, n, old = 0.0, scratch[2], scratch[3], scratch[4], scratch[5]
     for c in range(first, count):
-        a, b, s = rows.a[c], rows.b[c], rows.slot[c]
+        a, b, s = np.uint32(rows.a[c]), np.uint32(rows.b[c]), np.uint32(rows.slot[c])
         w[0], w[1], w[2] = slip(v, a, b, rows.arm_a[c], rows.arm_b[c])
         for k in range(3):
             n[k] = rows.normal[c, k]

@@ -60,6 +60,8 @@ class Scene:
         """Those of all rows. The bodies of blocks that are held still are taken out of YADE's scene: its loops and its
         search for neighbours pass them by."""
         self._loose = np.zeros(len(blocks), bool)
+        self._spins, self._spin_is_read = np.zeros((len(blocks), 3)), np.zeros(len(blocks), bool)
+        """Angular momenta, and which of them were read since the bodies moved."""
         self._subdomain = engine.wrapper.Subdomain()
         self._set_engines(gravity, meets)
         for row, block in enumerate(blocks):
@@ -127,7 +129,11 @@ class Scene:
 
     def angular_momentum(self, rows: Array) -> Array:
         """About their own centres, as the integrator keeps it, of the blocks `rows` (k,) → (k, 3) [N m s]."""
-        return np.array([tuple(self._bodies[r].state.angMom) for r in rows], float).reshape(-1, 3)
+        fresh = rows[~self._spin_is_read[rows]]
+        if len(fresh):
+            self._spins[fresh] = [tuple(self._bodies[r].state.angMom) for r in fresh.tolist()]
+            self._spin_is_read[fresh] = True
+        return self._spins[rows]
 
     def step(self, dt: float, ids: list[int], F: Array) -> None:
         """Advance by dt [s] under the forces and moments F (k, 6) on the bodies `ids`.
@@ -137,6 +143,7 @@ class Scene:
         deque(map(forces.addF, ids, F[:, :3].tolist()), maxlen=0)
         deque(map(forces.addT, ids, F[:, 3:].tolist()), maxlen=0)
         self.O.dt = dt
+        self._spin_is_read[:] = False
         self.O.step()
 
     def set_motion(self, row: int, motion: Array) -> None:
@@ -222,6 +229,7 @@ class Scene:
     def _write(self, rows: Array, saved: Array) -> None:
         """States (k, 16) of the blocks `rows`."""
         V, Q = self.engine.Vector3, self.engine.Quaternion
+        self._spin_is_read[rows] = False
         for i, row in zip(rows.tolist(), saved.tolist()):
             state = self._bodies[i].state
             state.pos, state.ori = V(*row[:3]), Q(*row[3:7])
