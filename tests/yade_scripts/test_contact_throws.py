@@ -44,6 +44,7 @@ def angular_momentum(s):
 @settings(max_examples=6, deadline=None)
 @example(61, 1.0, 0.0)  # edges that cross for one substep, then a node that leaves past an edge
 @example(116, 1.0, 0.5)  # sliding until the contact ends
+@example(460, 1.0, 0.0)  # far from the middles of both: eight substeps a contact
 @example(460, 1.0, 1.5)  # edges that cross and turn with a stretched spring along them
 @given(st.integers(0, 10_000), st.sampled_from([1.0, 0.8, 0.3]), st.sampled_from([0.0, 0.5, 1.5]))
 def test_blocks_thrown_at_each_other(seed, e, friction):

@@ -24,9 +24,8 @@ SHARP = 1e-3
 """Sum of the normals of a pair below which they have no mean direction."""
 ARRIVED = 1.5
 """Depth in paths of one substep up to which a node counts as having come through the face."""
-ENDS = 2.1
-"""Forces up to this many halves of their fall in a substep end within the next one. (At 2 they end with it; the rest
-covers the curvature.)"""
+LEAST_TURN = 1e-4
+"""1 - ζ² from which on a contact counts as an oscillator; below, and beyond critical damping, as critically damped."""
 CATCH_UP = 0.7
 """Speed in ω times the depth of free flight ahead of the oscillator's that leaves restitution within 0.001 (by
 integrating an impact at substeps of 0.05 to 0.2/ω, e of 0.05 to 1, any time of touch)."""
@@ -236,7 +235,8 @@ def normal_force(slots, s, rows, c, closing, dt, last_dt, mode):
 
         N = [k δ + c (3 w - w')/2 + q N']/(1 + q),   q = c dt/(2 m) = ζ ω dt.
 
-    Where N falls to zero before the end of the next substep, its straight fall is what is left to push."""
+    Where N falls to zero before the end of the next substep, as an oscillator does that went from N' to N, what is
+    left of its fall pushes."""
     k, depth = rows.kn[c], rows.depth[c]
     if slots.push[s] == BEGINS:
         if 0.0 < depth <= 1.01 * ARRIVED * last_dt * closing:
@@ -252,12 +252,30 @@ def normal_force(slots, s, rows, c, closing, dt, last_dt, mode):
         N = (k * depth + rows.cn[c] * (1.5 * closing - 0.5 * slots.speed[s]) + q * push) / (1.0 + q)
         N = max(N, 0.0)
         slots.push[s] = N
-        fall = 0.5 * (push - N)
-        if 0.0 < N < ENDS * fall:
-            N = 0.25 * (N + fall) ** 2 / fall
-            slots.push[s] = 0.0
+        phase = mode.omega * dt
+        if 0.0 < (2.0 - phase * phase) * N < push:  # else it is the next one's to end
+            left, ends = rest_of_the_fall(mode.zeta, phase, push / N)
+            if ends:
+                N *= left
+                slots.push[s] = 0.0
     slots.speed[s] = closing
     return N
+
+
+@inner
+def rest_of_the_fall(zeta, phase, before):
+    """Of a force that falls as that of an oscillator of damping ratio zeta, A e^(ζωτ) sin(ω'τ) at a time τ before it
+    ends with ω' = ω sqrt(1 - ζ²), and that was `before` times the present one a substep ago, ω dt = phase:
+
+    → (impulse from half a substep ago to its end, over the present force and dt · whether it ends within a substep)"""
+    turn = np.sqrt(max(1.0 - zeta * zeta, LEAST_TURN))
+    step, growth = turn * phase, zeta / turn
+    now = np.arctan2(np.sin(step), before * np.exp(-zeta * phase) - np.cos(step))
+    if now >= step:
+        return 1.0, False
+    start = now + 0.5 * step
+    impulse = np.exp(growth * start) * (growth * np.sin(start) - np.cos(start)) + 1.0
+    return impulse / ((1.0 + growth * growth) * step * np.exp(growth * now) * np.sin(now)), True
 
 
 @inner
