@@ -18,7 +18,9 @@ class WaterParameters:
         crosses a cell in a step; calm_theta: in water that hardly moves, where it is what damps waves.
     courant: cells crossed per step by the fastest water, spray apart (`time_step.py`); 1 for loads, 2 to 4 for drafts.
     divergence_damping: weight c_L of the element grad-div term.
-    correction_length: κ/h, length over which the volume correction is spread.
+    correction_length: κ/h, length over which the volume correction is spread, in water that crosses a cell in a step;
+        calm_correction_length: in water that hardly moves, where what is left of the correction is a lag of the
+        surface behind the water, which feeds waves (`volume.py`).
     kick_limit: largest acceleration carried over to the next step in slow water, in g (`Water.kick_factor`).
     speed_limit: cap of the speed in units of sqrt(g H), H the height of the tank (`Water.speed_cap`); clipped nodes are
         counted.
@@ -37,10 +39,11 @@ class WaterParameters:
     down: tuple[float, float, float] = (0.0, 0.0, -1.0)
     """Unit vector of gravity."""
     theta: float = 0.6
-    calm_theta: float = 0.535
+    calm_theta: float = 0.51
     courant: float = 1.0
     divergence_damping: float = 0.05
     correction_length: float = 5.0
+    calm_correction_length: float = 1.0
     kick_limit: float = 3.0
     speed_limit: float = 2.0 * np.sqrt(2.0)
     subscale_memory: bool = True

@@ -141,7 +141,7 @@ def predicted(water, dt: float) -> PressureProblem:
         carried[filled] = water.topology.node_volume[filled]
         in_films = water.in_films(phi)
     beside = float(displaced.sum()) + in_films[0]
-    surface = _new_surface(water, phi, added(carried, displaced), conserved + beside)
+    surface = _new_surface(water, dt, phi, added(carried, displaced), conserved + beside)
     if found.velocity is not None:
         graph = water.graph_for(water.listed)
         found.into(
@@ -272,8 +272,10 @@ def _taken_over(first, last, listed, moved, finer, width, u, phi):
             phi[i] = moved[s, 3]
 
 
-def _new_surface(water, phi, carried, conserved):
+def _new_surface(water, dt, phi, carried, conserved):
     """φ corrected: VolumeCorrection."""
+    p = water.parameters
+    length = p.correction_length + (p.calm_correction_length - p.correction_length) * water.calm(dt)
     return correct_volume(
         water.topology,
         water.graph_for(water.listed),
@@ -281,7 +283,7 @@ def _new_surface(water, phi, carried, conserved):
         phi,
         carried,
         conserved,
-        water.parameters.correction_length,
+        length,
         water.topology.node_size,
     )
 

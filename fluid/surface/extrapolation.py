@@ -27,7 +27,7 @@ WAVE_SLACK = 0.05
 0.5 % of their height a period."""
 AHEAD = 0.5
 """Sine of the angle ahead of a node within which the speed of a neighbour ceases to count as that of one beside."""
-_NO_LIMIT = np.zeros(0)
+_NO_LIMIT, _NO_SLOPE = np.zeros(0), np.zeros((1, 3, 3))
 
 
 class Continued(NamedTuple):
@@ -389,8 +389,9 @@ def _fill(t, order, start, linear, f, gradient, done, least):
 
 
 def extend_velocity(topology, layers, wet, wet_cells, u, a, calm: float, forced, rubbed=None):
-    """Continue u (linear, then constant) and a (constant), each (N, 3), over layers (order, start), in place; calm as
-    in `smoothed_slope`. rubbed (N,) bool: nodes on walls that rub or hold the water, None: there are none.
+    """Continue u and a (linear, then constant; a with its slope times calm), each (N, 3), over layers (order, start),
+    in place; calm as in `smoothed_slope`. rubbed (N,) bool: nodes on walls that rub or hold the water, None: there are
+    none.
 
     No slope is taken from cells beside such walls: the shear of the layer along a bed, extrapolated through the surface
     of a film, made the air above it 1.6 times as fast as the water, so that its tip ran ahead of one without friction.
@@ -403,6 +404,10 @@ def extend_velocity(topology, layers, wet, wet_cells, u, a, calm: float, forced,
     deep that spreads under what falls on it pulled the rest down 1.5 times as fast as it fell: 8 % of the energy in one
     step, however short.
 
+    The next step begins with u + (1 - θ) dt a.  With a constant a beyond the surface, cells that it cuts late received
+    less of a wave's acceleration there than of its velocity, which fed the wave: by up to 1.2 % of its amplitude per
+    period with 28 cells a wavelength and 45 steps a period, the more, the fuller these cells are.
+
     Nodes outside the layers are set to zero."""
     t, (order, start) = topology, layers
     if rubbed is not None:
@@ -411,4 +416,7 @@ def extend_velocity(topology, layers, wet, wet_cells, u, a, calm: float, forced,
     least = _own_speed(order[start[1] :], 1.0 + WAVE_SLACK * calm, forced)
     _clear_outside(order, u, a)
     _fill(t, order, start, LINEAR_LAYERS, u, gradient, wet.copy(), least)
-    _fill(t, order, start, 0, a, np.zeros((1, 3, 3)), wet.copy(), _NO_LIMIT)
+    linear, slope = (
+        (LINEAR_LAYERS, smoothed_slope(t, wet_cells, wet, calm * a, calm)) if calm > 0.0 else (0, _NO_SLOPE)
+    )
+    _fill(t, order, start, linear, a, slope, wet.copy(), _NO_LIMIT)

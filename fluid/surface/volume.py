@@ -18,8 +18,10 @@ Then φ takes the shift ψ that brings its own volume there,
 
     (c + κ K) ψ = W - ∫_{φ<0} N dV,        c_i = d/dψ ∫_{φ<ψ} N_i dV,                                       (2)
 
-which spreads over a length of the order of κ.  The remaining difference of the total volume is corrected by one uniform
-shift, which is counted and reported.
+which spreads over a length of the order of κ. That evens out splashes, but of what paths and volumes differ by in a
+long wave a step corrects only a part, and a surface that lags behind its water feeds the wave (2 % of its amplitude a
+period at 28 cells a length and κ = 5 h): κ falls to h in calm water. The remaining difference of the total volume is
+corrected by one uniform shift, which is counted and reported.
 """
 
 from __future__ import annotations

@@ -107,12 +107,12 @@ def tenths(time, values):
 
 @pytest.mark.nightly
 def test_a_box_afloat_for_a_hundred_periods():
-    """Theory knows no loss. The cells take 1.4 % of the amplitude a period, of which two fifths are the weight of the
-    new pressure, a fifth the damping of divergence, and a fourteenth what is swept out at the edges of the box."""
+    """Theory knows no loss. The cells take 1.1 % of the amplitude a period, of which a sixth is the weight of the
+    new pressure, a fifth the damping of divergence, and a tenth what is swept out at the edges of the box."""
     time, centre, _, _, error = moves(floating(), 83.0)
     largest = tenths(time, np.abs(centre[:, 2] - centre[time > 60.0, 2].mean()))
     assert np.all(largest[1:] < largest[:-1])
-    assert (largest[-1] / largest[0]) ** (1.0 / 90.0) == pytest.approx(0.985, abs=0.006)
+    assert (largest[-1] / largest[0]) ** (1.0 / 90.0) == pytest.approx(0.989, abs=0.006)
     assert error < 0.01
 
 
