@@ -29,6 +29,7 @@ import numpy as np
 
 from array_types import Array
 from kernels.decorators import kernel, ranged, released
+from kernels.memory import OWN
 from kernels.ranges import MOST, is_shared
 from kernels.team import Team
 
@@ -38,7 +39,7 @@ BLOCK = 256
 """Number of consecutive entries of a list that are skipped, or kept, together."""
 CHUNK = 16_384
 """Number of entries that are summed as one chunk; shorter sums have one chunk."""
-ROW, LAZY = 64, 32 << 20
+ROW, LAZY = 64, OWN
 """Numbers that are filled or passed by as one row, and bytes from which the C library returns pages that are zero
 already and are allocated only when they are written to."""
 PYTHON = 10
@@ -141,7 +142,7 @@ def summed(kernel: Callable, count: int, shape: tuple[int, ...], *args) -> Array
     `first` to before `last`: the sums of chunks, which do not depend on the threads, are added in their order."""
     chunks = max(1, -(-count // CHUNK))
     partial = np.zeros((chunks, *shape))
-    over(kernel, chunks, *args, partial, weight=CHUNK)
+    over(kernel, chunks, *args, partial, weight=CHUNK, pieces=chunks)
     total = partial[0]
     for part in partial[1:]:
         total += part

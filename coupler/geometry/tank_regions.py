@@ -22,8 +22,8 @@ ALL = ("solids", "blocks", "terrain")
 """Names in `around` that stand for everything of a kind."""
 BYTES_PER_CELL = 420
 """Resident memory that a cell of the mesh takes in a run of water alone: topology, moments and fields ..."""
-BYTES_KEPT_PER_CELL, MOST_KEPT = 150, 700_000
-"""... and more for so many of the cells, since arrays of less than 32 MB stay in the process when they are freed."""
+BYTES_KEPT_PER_CELL, MOST_KEPT = 130, 5_600_000
+"""... and more for so many of the cells, since arrays of less than 256 MB stay in the process when they are freed."""
 BYTES_OF_SINGLE_SHAPE = 144
 """Gradients and their products of a cell whose shape no other has, as in a mesh from a file."""
 MOST_SLENDER = 8.0

@@ -69,7 +69,9 @@ def _places(first, last, wanted, cells, place):
             low = middle + 1
         else:
             high = middle
-    for s in range(first, last):
-        while low < cells.shape[0] and cells[low] < wanted[s]:
-            low += 1
-        place[s] = low if low < cells.shape[0] and cells[low] == wanted[s] else -1
+    at, end = np.uint64(low), np.uint64(cells.shape[0])
+    for k in range(first, last):
+        s = np.uint64(k)
+        while at < end and cells[at] < wanted[s]:
+            at += np.uint64(1)
+        place[s] = np.int64(at) if at < end and cells[at] == wanted[s] else -1

@@ -437,7 +437,7 @@ class Graph:
         return found
 
 
-_PAIR = np.array([[-1, 0, 1, 2], [0, -1, 3, 4], [1, 3, -1, 5], [2, 4, 5, -1]])
+PAIR = np.array([[-1, 0, 1, 2], [0, -1, 3, 4], [1, 3, -1, 5], [2, 4, 5, -1]])
 """Column of Background.products that holds the corners a, b."""
 
 
@@ -452,7 +452,7 @@ def _take_out(cell_list, cells, parent, products, volume, edges):
             for s in range(start[r], start[r + 1]):
                 for b in range(4):
                     if b != a and neighbour[s] == cells[e, b]:
-                        stiffness[s] -= volume[e] * products[parent[e], _PAIR[a, b]]
+                        stiffness[s] -= volume[e] * products[parent[e], PAIR[a, b]]
 
 
 @ranged
@@ -489,7 +489,7 @@ def _edges(first, last, rows, cells, parent, products, volume, node_start, node_
                 if b == la:
                     continue
                 j = cells[e, b]
-                k = volume[e] * products[p, _PAIR[la, b]]
+                k = volume[e] * products[p, PAIR[la, b]]
                 if slot[j] < start[r]:
                     slot[j] = count
                     neighbour[count] = j

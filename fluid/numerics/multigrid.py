@@ -34,6 +34,8 @@ SWEEPS = 4
 """Double sweeps on a last level that is too large for its inverse."""
 BLOCK, MOST_BLOCKS = 4096, 64
 """Least number of unknowns in a block of a sweep, and largest number of blocks."""
+SHARED = 2048
+"""Least number of unknowns of a level of one block of which threads share what is left after its forward sweep."""
 COARSE_ROW, AGGREGATE = 20, 4
 """Cost of summing a row of a coarser level, and the values of an aggregate, in rows of a loop."""
 ROW = 10
@@ -109,24 +111,33 @@ class Multigrid:
         at = self.levels[depth]
         below = self.levels[depth + 1] if depth + 1 < len(self.levels) else self._last
         if len(at.diagonal) < 2 * BLOCK:
-            x, coarse = _down(
-                at.start, at.middle, at.column, at.entry, at.inverse, at.aggregate, len(below.diagonal), r
-            )
+            x, coarse = self._down(at, len(below.diagonal), r)
             coarse = self._cycle(depth + 1, coarse)
             _up(at.start, at.column, at.entry, at.inverse, at.aggregate, coarse, r, x)
             return x
         return self._by_blocks(depth, at, len(below.diagonal), r)
 
+    def _down(self, at: Level, n_coarse: int, r):
+        """Forward sweep from zero as one block → x, and Pᵀ (r - A x)."""
+        n = len(r)
+        if n < SHARED:
+            return _down(at.start, at.middle, at.column, at.entry, at.inverse, at.aggregate, n_coarse, r)
+        (x, left), coarse = np.empty((2, n)), np.empty(n_coarse)
+        _from_zero(at.start, at.middle, at.column, at.entry, at.inverse, r, x)
+        over(_right_over, n, at, x, left, weight=ROW)
+        over(_restricted, n_coarse, at.first, at.member, left, coarse, weight=AGGREGATE)
+        return x, coarse
+
     def _by_blocks(self, depth: int, at: Level, n_coarse: int, r):
         """`_cycle` on a large level."""
         bounds, (x, before, left), coarse = at.blocks(), np.empty((3, len(r))), np.empty(n_coarse)
         count, work = len(bounds) - 1, BLOCK
-        over(_down_blocks, count, bounds, at, r, x, weight=work)
-        over(_left_over, count, bounds, at, x, left, weight=work)
+        over(_down_blocks, count, bounds, at, r, x, weight=work, pieces=count)
+        over(_left_over, count, bounds, at, x, left, weight=work, pieces=count)
         over(_restricted, n_coarse, at.first, at.member, left, coarse, weight=AGGREGATE)
         coarse = self._cycle(depth + 1, coarse)
         over(_add, len(r), at.aggregate, coarse, x, before)
-        over(_up_blocks, count, bounds, at, r, before, x, weight=work)
+        over(_up_blocks, count, bounds, at, r, before, x, weight=work, pieces=count)
         return x
 
     def _at_the_bottom(self, r):
@@ -309,16 +320,33 @@ def _coarse_rows(begin_row, end_row, first, member, fine, aggregate, n, scale):
     return indptr, indices[:k].copy(), data[:k].copy()
 
 
+@plain
+def _from_zero(start, middle, column, entry, inverse, r, x):
+    """Forward sweep from zero → x."""
+    for i in range(len(r)):
+        total = r[i]
+        for s in range(start[i], middle[i]):
+            total -= entry[s] * x[column[s]]
+        x[i] = total * inverse[i]
+
+
+@ranged
+def _right_over(first, last, at, x, left):
+    """r - A x after `_from_zero`: what lies right of the diagonal."""
+    start, middle, column, entry = at.start, at.middle, at.column, at.entry
+    for i in range(first, last):
+        total = 0.0
+        for s in range(middle[i], start[i + 1]):
+            total -= entry[s] * x[column[s]]
+        left[i] = total
+
+
 @kernel
 def _down(start, middle, column, entry, inverse, aggregate, n_coarse, r):
     """Forward sweep from zero → x, and Pᵀ (r - A x), for which only the entries right of the diagonal are needed."""
     n = len(r)
     x, coarse = np.empty(n), np.zeros(n_coarse)
-    for i in range(n):
-        total = r[i]
-        for s in range(start[i], middle[i]):
-            total -= entry[s] * x[column[s]]
-        x[i] = total * inverse[i]
+    _from_zero(start, middle, column, entry, inverse, r, x)
     for i in range(n):
         left = 0.0
         for s in range(middle[i], start[i + 1]):

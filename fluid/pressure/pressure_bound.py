@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from array_types import Array, Bools, Floats
-from fluid.numerics.bounded import at_air
+from fluid.numerics.bounded import SLACK
 from kernels.decorators import ranged
 from kernels.threads import over
 
@@ -51,9 +51,10 @@ class BoundMet:
     @classmethod
     def of(cls, water, problem, x, parting) -> BoundMet:
         """After a step with x (n,) [Pa] and parting (n,) [m³/s] or None, as in `Water.correct`."""
-        n_nodes, pressure = len(problem.predicted.wet), x + problem.known
+        n_nodes, n = len(problem.predicted.wet), len(x)
         at_bound, ventilated = np.zeros(n_nodes, bool), np.zeros(n_nodes, bool)
-        lowest = float(pressure.min(initial=0.0))
+        least, largest = zip(*over(_extremes, n, x, problem.known))
+        lowest = float(min(least))
         if problem.bound is None:
             return cls(
                 at_bound=at_bound,
@@ -64,17 +65,16 @@ class BoundMet:
                 lowest=lowest,
                 wall=0.0,
             )
-        vented = x == problem.air  # also where air came to within the step
-        met = vented | (x <= problem.lower)
-        open_ = at_air(x, problem.air) & (vented | (problem.bound == problem.of_open_air))
-        at_bound[problem.dofs[met]] = True
-        ventilated[problem.dofs[open_]] = True
+        vented, limits = np.empty(n, bool), (problem.known, problem.bound, problem.of_open_air)
+        state = (problem.dofs, x, *limits, n - problem.pockets, SLACK * max(largest))
+        met = sum(over(_met, n, *state, vented, at_bound, ventilated))
         rate = 0.0 if parting is None else parting
         opened = problem.dt * float(np.sum(rate))
-        parted_at = problem.of_water(np.where(vented, problem.of_open_air, problem.bound))
-        work = -problem.dt * float(np.sum(problem.of_water(rate) * parted_at)) if opened else 0.0
-        wall = 0.0
-        if met.any():
+        work = wall = 0.0
+        if opened:
+            parted_at = problem.of_water(np.where(vented, problem.of_open_air, problem.bound))
+            work = -problem.dt * float(np.sum(problem.of_water(rate) * parted_at))
+        if met:
             area = wall_area(water.mesh, water.domain)
             wall = float(area[at_bound].sum()) / max(float(area[problem.dofs].sum()), 1e-300)
         return cls(
@@ -86,6 +86,34 @@ class BoundMet:
             lowest=lowest,
             wall=wall,
         )
+
+
+@ranged
+def _extremes(first, last, x, known):
+    """Least x + known, 0 where none is below, and largest |x|."""
+    least, largest = 0.0, 0.0
+    for k in range(first, last):
+        i = np.uint64(k)
+        least, largest = min(least, x[i] + known[i]), max(largest, abs(x[i]))
+    return least, largest
+
+
+@ranged
+def _met(first, last, dofs, x, known, bound, of_air, in_water, slack, vented, at_bound, ventilated):
+    """vented (n,): unknowns with the pressure of the air, also where it came to within the step. Marks the nodes of
+    those at their bound, and, within the slack, at that of the air; how many are at their bound. The unknowns from
+    `in_water` on are those of air."""
+    count = 0
+    for k in range(first, last):
+        i = np.uint64(k)
+        air = of_air - known[i] if k < in_water else -np.inf
+        vented[i] = x[i] == air
+        if vented[i] or x[i] <= bound[i] - known[i]:
+            at_bound[dofs[i]] = True
+            count += 1
+        if x[i] <= air + slack and (vented[i] or bound[i] == of_air):
+            ventilated[dofs[i]] = True
+    return count
 
 
 def wall_area(mesh, domain) -> Array:

@@ -217,15 +217,17 @@ def _pull(dofs, edges, held, scale):
     return out
 
 
-def seal_pockets(matrix, anchored, volume, compliance: float, pressure):
+def cut_off(matrix, anchored) -> Array:
+    """Rows (n,) bool of the components of a symmetric matrix without an anchored row."""
+    return ~_reached(matrix.indptr, matrix.indices, anchored)
+
+
+def seal_pockets(matrix, floating, volume, compliance, pressure):
     """Give water that is cut off from every surface a compressibility, since its pressure level is undetermined.
 
-    Adds V_i · compliance [1/(Pa s)] to the diagonal of the components without an anchored row and the same times
-    `pressure` (n,) [Pa] to the right hand side, so that a state at rest is unchanged.  volume (n,) [m³].
+    Adds V_i · compliance [1/(Pa s)] to the diagonal of the `floating` rows (n,) bool and the same times `pressure` (n,)
+    [Pa] to the right hand side, so that a state at rest is unchanged.  volume (n,) [m³].
     Returns (matrix, addition to the right hand side (n,))."""
-    floating = ~_reached(matrix.indptr, matrix.indices, anchored)
-    if not floating.any():
-        return matrix, np.zeros(len(anchored))
     added = np.where(floating, volume * compliance, 0.0)
     return sp.csr_array(matrix + sp.diags_array(added)), added * pressure
 

@@ -31,7 +31,7 @@ import numpy as np
 
 from array_types import Array, Floats
 from fluid.numerics.sums import about, momenta_of_rows, momentum_of, momentum_of_rows
-from kernels.decorators import ranged, released
+from kernels.decorators import inner, ranged, released
 from kernels.threads import CHUNK, found_over, over, summed
 
 NUMERICAL = (
@@ -229,9 +229,9 @@ def _of_air(water, problem, unknown, pressure):
 
 def _on_bodies(water, p, where=None):
     """Gᵀ p about the reference (6,) [N, N m], of the nodes `where` (N,) bool only; None: of all."""
-    beside, coupling = water.beside_bodies
+    beside, of_bodies = water.beside_bodies
     held = p[beside] if where is None else np.where(where[beside], p[beside], 0.0)
-    return about(water.reference, coupling.T @ held, water.domain.body_centre)
+    return about(water.reference, of_bodies @ held, water.domain.body_centre)
 
 
 def _loads(water, problem, p):
@@ -288,33 +288,50 @@ def _hat_forces(first, last, cell_list, fields, at_side, reference, nodes, fluid
     x, p = fields
     cells, parent, g = fluid.cells, fluid.parent, fluid.gradients
     volume, share, share_row = fluid.volume, fluid.share, fluid.share_row
-    arm, beside = np.empty(3), np.empty(4, np.bool_)
+    beside = np.empty(4, np.bool_)
     for c in range(first, last):
+        total_x, total_p, total_side = partial[c, 0], partial[c, 1], partial[c, 2]
         for s in range(c * CHUNK, min((c + 1) * CHUNK, cell_list.shape[0])):
-            e = cell_list[s]
-            q = parent[e]
-            for k in range(3):
-                arm[k] = -reference[k]
+            e = np.uint64(cell_list[s])
+            q, row = parent[e], share_row[e]
+            arm0, arm1, arm2 = -reference[0], -reference[1], -reference[2]
+            x0, x1, x2, p0, p1, p2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
             at_any = False
             for a in range(4):
                 i = cells[e, a]
                 beside[a] = at_side[i]
                 at_any = at_any or beside[a]
-                for k in range(3):
-                    arm[k] += share[share_row[e], a] * nodes[i, k]
-            for m in range(3 if at_any else 2):
-                f0, f1, f2 = 0.0, 0.0, 0.0
+                part = share[row, a]
+                arm0 += part * nodes[i, 0]
+                arm1 += part * nodes[i, 1]
+                arm2 += part * nodes[i, 2]
+                x0 += x[i] * g[q, a, 0]
+                x1 += x[i] * g[q, a, 1]
+                x2 += x[i] * g[q, a, 2]
+                p0 += p[i] * g[q, a, 0]
+                p1 += p[i] * g[q, a, 1]
+                p2 += p[i] * g[q, a, 2]
+            arm = (arm0, arm1, arm2)
+            _add_force(arm, volume[e], x0, x1, x2, total_x)
+            _add_force(arm, volume[e], p0, p1, p2, total_p)
+            if at_any:
+                p0, p1, p2 = 0.0, 0.0, 0.0
                 for a in range(4):
-                    if m == 2 and not beside[a]:
-                        continue
-                    value = x[cells[e, a]] if m == 0 else p[cells[e, a]]
-                    f0 += value * g[q, a, 0]
-                    f1 += value * g[q, a, 1]
-                    f2 += value * g[q, a, 2]
-                f0, f1, f2 = volume[e] * f0, volume[e] * f1, volume[e] * f2
-                partial[c, m, 0] += f0
-                partial[c, m, 1] += f1
-                partial[c, m, 2] += f2
-                partial[c, m, 3] += arm[1] * f2 - arm[2] * f1
-                partial[c, m, 4] += arm[2] * f0 - arm[0] * f2
-                partial[c, m, 5] += arm[0] * f1 - arm[1] * f0
+                    if beside[a]:
+                        value = p[cells[e, a]]
+                        p0 += value * g[q, a, 0]
+                        p1 += value * g[q, a, 1]
+                        p2 += value * g[q, a, 2]
+                _add_force(arm, volume[e], p0, p1, p2, total_side)
+
+
+@inner
+def _add_force(arm, volume, f0, f1, f2, total):
+    """Add the volume times f, and its moment with the arm, to a total (6,)."""
+    f0, f1, f2 = volume * f0, volume * f1, volume * f2
+    total[0] += f0
+    total[1] += f1
+    total[2] += f2
+    total[3] += arm[1] * f2 - arm[2] * f1
+    total[4] += arm[2] * f0 - arm[0] * f2
+    total[5] += arm[0] * f1 - arm[1] * f0

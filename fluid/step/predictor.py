@@ -24,6 +24,7 @@ from fluid.pressure.pressure_bound import lowest_pressure
 from fluid.pressure.projection import (
     PressureProblem,
     cell_velocity,
+    cut_off,
     inflow,
     pressure_matrix,
     pull_of_held,
@@ -478,8 +479,11 @@ def _carry_remainder(first, last, cell_list, held, numbers, u, cells, size, out)
 def _sealed(water, matrix, anchored, dofs, dt, pressure):
     """Closed pockets get a compliance far below that at which it affects their pressure differences, c ρ h²/dt ≪ (π
     h/L)²: real water is softer than that in short steps, and its waves would take part in the added mass of bodies."""
+    floating = cut_off(matrix, anchored)
+    if not floating.any():
+        return matrix, np.zeros(len(dofs))
     p = water.parameters
     compliance = (
         p.pocket_compliance * dt / (p.density * water.mesh.spacing**2) * water.topology.finer[dofs] ** 2
     )
-    return seal_pockets(matrix, anchored, water.topology.node_volume[dofs], compliance, pressure)
+    return seal_pockets(matrix, floating, water.topology.node_volume[dofs], compliance, pressure)

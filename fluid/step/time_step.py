@@ -91,6 +91,21 @@ def _largest_component(first, last, u, counted):
     return largest
 
 
+def fastest_wet(u, phi, roomy) -> float:
+    """max |u_ik| over the rows of u (N, 3) below the surface, φ (N,) < 0, that are roomy (N,) bool; 0 without any."""
+    return max(over(_fastest_wet, len(u), u, phi, roomy))
+
+
+@ranged
+def _fastest_wet(first, last, u, phi, roomy):
+    largest = 0.0
+    for k in range(first, last):
+        i = np.uint64(k)
+        if phi[i] < 0.0 and roomy[i]:
+            largest = max(largest, abs(u[i, 0]), abs(u[i, 1]), abs(u[i, 2]))
+    return largest
+
+
 @kernel
 def _faster_than(least, u, water, counted):
     """Largest component (n,) and volume (n,) of the counted nodes faster than `least`, and the volume of all."""

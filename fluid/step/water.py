@@ -29,7 +29,7 @@ from fluid.step.corrector import Corrected, corrected
 from fluid.step.parameters import WaterParameters
 from fluid.step.predictor import kick_factor, kicked, predicted
 from fluid.step.report import StepReport
-from fluid.step.time_step import LEAST_COUNTED, LEAST_GATHERED, gathered, largest_component, pace
+from fluid.step.time_step import LEAST_COUNTED, LEAST_GATHERED, fastest_wet, gathered, pace
 from fluid.surface.extrapolation import BAND, fill_missing
 from fluid.surface.level_set import FAR, drain_films, no_steeper, redistance
 from fluid.surface.volume import edge_flux, nodal_volume, renumbering
@@ -193,9 +193,8 @@ class Water:
 
     def calm(self, dt: float) -> float:
         """1 for water at rest, 0 where the fastest crosses a cell in a step dt [s]."""
-        return 1.0 - min(
-            1.0, largest_component(self._cells_crossed(), self._counted()) * dt / self.mesh.spacing
-        )
+        crossed = fastest_wet(self._cells_crossed(), self.level_set, self._roomy)
+        return 1.0 - min(1.0, crossed * dt / self.mesh.spacing)
 
     def stable_step(self) -> float:
         """dt [s]: Courant number of all but spray and trickles (`time_step.py`), and LONGEST_STEP sqrt(h/g)."""
@@ -224,7 +223,7 @@ class Water:
 
     def fastest(self) -> float:
         """Largest component of the velocity of the water [m/s], films beside solids left out."""
-        return largest_component(self.velocity, self._counted())
+        return fastest_wet(self.velocity, self.level_set, self._roomy)
 
     def fastest_place(self) -> tuple[float, Array]:
         """Speed [m/s] and place (3,) [m] of the fastest water, films beside solids left out; zeros without water."""
@@ -452,8 +451,8 @@ class Water:
         """g·x (N,) [m²/s²] of the nodes."""
         self.coupling = wetted_coupling(domain).tocsr()
         beside = np.flatnonzero(np.diff(self.coupling.indptr))
-        self.beside_bodies = beside, self.coupling[beside]
-        """Nodes (n,) with an entry in the coupling, and their rows of it."""
+        self.beside_bodies = beside, self.coupling[beside].T
+        """Nodes (n,) with an entry in the coupling, and their rows of it as columns."""
         self.walls = self._sides.on_copies(domain.parent_node)
         self.on_sides = self._on_sides[domain.parent_node]
         """(N,) bool: nodes on the sides of the tank."""

@@ -116,7 +116,8 @@ def squared_distances(layers: Layers, surface: Surface, mesh, around, descent: D
             if len(starts) > 1:
                 _mend(starts[1], count, *rows)
     if descent is not None:
-        triangle_of, count = _first_triangles(surface.owner, len(mesh.cells)), len(descent.places)
+        triangle_of, count = np.empty(len(mesh.cells), np.int32), len(descent.places)
+        over(_first_triangles, len(surface.owner), surface.owner, triangle_of)
         over(_descended, count, layers.order, surface, triangle_of, mesh, descent, known, weight=TESTS * WORK)
     return known.square
 
@@ -256,14 +257,12 @@ def _above(p, t, square):
     return square * (nx * nx + ny * ny + nz * nz) <= (1.0 + BESIDE) * height * height
 
 
-@kernel
-def _first_triangles(owner, n_cells):
-    """First triangle of each cell (n_cells,), -1 none; those of a cell follow each other."""
-    first = np.full(n_cells, -1, np.int64)
-    if n_cells > 0:
-        for t in range(owner.shape[0] - 1, -1, -1):
-            first[owner[t]] = t
-    return first
+@ranged
+def _first_triangles(first, last, owner, found):
+    """The first triangle of each cell that has one, in `found` (n_cells,); the others hold anything."""
+    for k in range(first, last):
+        if k == 0 or owner[k - 1] != owner[k]:
+            found[owner[k]] = k
 
 
 @inlined
@@ -271,21 +270,24 @@ def _descend(x, own, closest, best, surface, first, cells, cells_of_nodes, noted
     """Squared distance [m²] of x (3,) to the closest triangle that can be reached from `closest`, at the squared
     distance `best`, through cells with a common node, always coming closer.
 
-    noted: places where cells that were gone through are noted, with the number `own` of x."""
+    first (n_cells,): the first triangle of each cell that has one; others hold anything · noted: places where cells
+    that were gone through are noted, with the number `own` of x."""
     triangles, owner = surface
     node_start, node_cells = cells_of_nodes
     before = -1
     while closest != before:
         before = closest
         for a in range(4):
-            i = cells[owner[before], a]
-            for s in range(node_start[i], node_start[i + 1]):
+            i = np.uint64(cells[owner[before], a])
+            for s in range(node_start[i], node_start[i + np.uint64(1)]):
                 e = np.int64(node_cells[s])
-                t = first[e]
-                mark = own * first.shape[0] + e
-                if t < 0 or noted[e % NOTED] == mark:
+                mark, note = own * first.shape[0] + e, np.uint64(e % NOTED)
+                if noted[note] == mark:
                     continue
-                noted[e % NOTED] = mark
+                noted[note] = mark
+                t = np.int64(first[np.uint64(e)])
+                if not 0 <= t < owner.shape[0] or owner[t] != e:
+                    continue
                 while t < owner.shape[0] and owner[t] == e:
                     d = squared_distance(x, triangles[t])
                     if d < best:

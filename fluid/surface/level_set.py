@@ -35,10 +35,11 @@ import numpy as np
 
 from fluid.domain.layers import Layers, layers_around
 from fluid.mesh.arrays import Corners
+from fluid.numerics.fields import copied
 from fluid.surface.closest_triangles import Descent, Surface, squared_distances
 from fluid.surface.extrapolation import continue_outward, mark_nodes, mean_gradients
-from kernels.decorators import kernel, ranged, released
-from kernels.threads import found_over, over, zeros
+from kernels.decorators import ranged, released
+from kernels.threads import found_over, over, owning, reach_of_cells, zeros
 
 LAYERS = 6
 EXACT_LAYERS = 2
@@ -71,9 +72,25 @@ def _drain(first, last, phi, spacing):
     return count
 
 
-def surface_cells(phi, cell_list, cells):
-    """Those of the listed cells with water on one corner and air on another."""
-    return found_over(_surface_cells, len(cell_list), phi, cell_list, cells)
+def surface_cells(phi, t):
+    """Numbers of the cells with water, φ (N,) < 0, on one corner and air on another, in order."""
+    shore = np.empty(len(phi), bool)
+    over(_beside_air, len(phi), phi, *t.around, shore)
+    cell_list = t.cells_around(shore)
+    return found_over(_surface_cells, len(cell_list), phi, cell_list, t.cells)
+
+
+@ranged
+def _beside_air(first, last, phi, start, neighbours, shore):
+    """Nodes (N,) bool with water beside nodes without."""
+    for k in range(first, last):
+        i = np.uint64(k)
+        shore[i] = False
+        if phi[i] < 0.0:
+            for t in range(start[i], start[i + np.uint64(1)]):
+                if not phi[neighbours[t]] < 0.0:
+                    shore[i] = True
+                    break
 
 
 @released
@@ -158,22 +175,33 @@ def _signed(first, last, layers, square, phi, out):
         out[i] = phi[i] if s < start[1] else np.copysign(size, phi[i])
 
 
-@kernel
-def _mean_slope(cut, phi, cells, parent, g, n_nodes):
-    """Mean |∇φ| over the cut cells around each node, (N,); zero elsewhere."""
-    total, count = np.zeros(n_nodes), np.zeros(n_nodes)
-    for s in range(cut.shape[0]):
-        e = cut[s]
-        square = 0.0
-        for k in range(3):
-            slope = 0.0
+def _mean_slope(t, cut, phi):
+    """Mean |∇φ| over the cut cells (n,) around each node, (N,); zero elsewhere."""
+    total, count = zeros((len(phi),)), zeros((len(phi),))
+    reach = reach_of_cells(cut, t.cells)
+    owning(_slopes, len(phi), reach, len(cut), cut, phi, t.hats, total, count)
+    return total
+
+
+@ranged
+def _slopes(first, last, runs, cut, phi, hats, total, count):
+    """The means of `_mean_slope` in `total`; total, count (N,): zero at first."""
+    cells, parent, g = hats.cells, hats.parent, hats.gradients
+    for run in range(runs.shape[0]):
+        for s in range(runs[run, 0], runs[run, 1]):
+            e = cut[s]
+            square = 0.0
+            for k in range(3):
+                slope = 0.0
+                for a in range(4):
+                    slope += phi[cells[e, a]] * g[parent[e], a, k]
+                square += slope * slope
             for a in range(4):
-                slope += phi[cells[e, a]] * g[parent[e], a, k]
-            square += slope * slope
-        for a in range(4):
-            total[cells[e, a]] += np.sqrt(square)
-            count[cells[e, a]] += 1.0
-    return total / np.maximum(count, 1.0)
+                if first <= cells[e, a] < last:
+                    total[cells[e, a]] += np.sqrt(square)
+                    count[cells[e, a]] += 1.0
+    for i in range(first, last):
+        total[i] /= max(count[i], 1.0)
 
 
 def redistance(topology, phi, spacing, rescale: bool, motion=None):
@@ -185,7 +213,7 @@ def redistance(topology, phi, spacing, rescale: bool, motion=None):
     motion: velocity (N, 3) [m/s] and gravity [m/s²], None: no surface goes on beyond its last cells at solids and
     beds."""
     t = topology
-    cut, far = surface_cells(phi, t.cells_around(phi < 0.0), t.cells), np.empty(len(phi))
+    cut, far = surface_cells(phi, t), np.empty(len(phi))
     over(_far, len(phi), phi, np.full(len(phi), spacing) if np.ndim(spacing) == 0 else spacing, far)
     if len(cut) == 0:
         return far
@@ -196,10 +224,11 @@ def redistance(topology, phi, spacing, rescale: bool, motion=None):
     square = squared_distances(layers, surface, mesh, t.around, _descent(t, layers))
     over(_signed, len(layers.order), layers, square, phi, far)
     if rescale:
-        slope = _mean_slope(cut, phi, t.cells, t.parent, t.gradients, len(phi))
-        off = front & ((slope > STEEPEST) | (slope < FLATTEST)) & (slope > 0.0)
+        corners, slope = layers.order[: layers.start[1]], _mean_slope(t, cut, phi)
+        at = slope[corners]
+        off = corners[((at > STEEPEST) | (at < FLATTEST)) & (at > 0.0)]
         if motion is not None:
-            off[_slow(np.flatnonzero(off & t.sloping_bed & (phi > 0.0)), t, motion)] = False
+            off = np.setdiff1d(off, _slow(off[t.sloping_bed[off] & (phi[off] > 0.0)], t, motion))
         far[off] /= slope[off]
     if motion is not None:
         beside = layers.order[layers.start[1] : layers.start[2]]
@@ -221,7 +250,7 @@ def no_steeper(topology, phi, given):
     there as it takes to say so. Copies of such nodes can share a cell with others (between stones). Left as steep as
     that, the first `redistance` with `rescale` would change the volume of these cells."""
     t = topology
-    cut = t.cells[surface_cells(phi, t.cells_around(phi < 0.0), t.cells)].astype(np.int64)
+    cut = t.cells[surface_cells(phi, t)].astype(np.int64)
     one, other = cut[:, EDGES[:, 0]].ravel(), cut[:, EDGES[:, 1]].ravel()
     apart = ((phi[one] < 0.0) != (phi[other] < 0.0)) & ~given[one] & ~given[other]
     one, other = one[apart], other[apart]
@@ -253,7 +282,7 @@ def _past_the_last_polygon(t, cut, front, beside, motion, phi) -> None:
     found = _slow(beside[ahead[beside] & (phi[beside] > 0.0)], t, motion)
     if len(found) == 0:
         return
-    value = phi[:, None].copy()
+    value = copied(phi).reshape(-1, 1)
     slope = mean_gradients(cut, front, value, t.fluid_cells, zeros((len(phi), 1, 3)))
     layers, no_limit = np.array([0, 0, len(found)]), np.zeros(0)
     continue_outward(found, layers, 1, value, slope, t.nodes, t.around_by_cells, front.copy(), no_limit)

@@ -35,8 +35,8 @@ import scipy.sparse as sp
 from array_types import Floats, Ints
 from fluid.domain.layers import WORK
 from fluid.domain.moments import nodal_water, part_moments
-from fluid.domain.topology import Graph
-from fluid.numerics.fields import added, copied
+from fluid.domain.topology import PAIR, Graph
+from fluid.numerics.fields import PLAIN, added, copied
 from fluid.surface.level_set import drain_films
 from kernels.decorators import kernel, ranged, released
 from kernels.threads import found_over, over, owning, reach_of_cells, zeros
@@ -47,6 +47,8 @@ LARGEST_UNIFORM_SHIFT = 0.1
 ANCHOR = 1e-3
 MOST_SECANTS = 4
 VOLUME_TOLERANCE = 1e-6
+DIVIDED = 0.3
+"""Cost of a row of a vector that is divided by the diagonal, in usual rows."""
 _PROBE = 0.05
 """Half width of the band of (2), limits of the shifts and step of the difference for c, in cell sizes; share of V/h
 added to c, so that regions without surface stay where they are; secant steps for the total volume and their
@@ -68,37 +70,41 @@ class Flux:
 
 
 @released
-def _edge_rates(first, last, listed, edges, u_cell, nodes, fluid, around, rate):
+def _edge_rates(first, last, listed, edges, u_cell, nodes, fluid, products, around, rate):
     graph_row, start, neighbour = edges.row, edges.start, edges.neighbour
     cells, parent, g = fluid.cells, fluid.parent, fluid.gradients
     volume, upright = fluid.volume, fluid.upright
-    slot = np.empty(nodes.shape[0], np.int64)
+    slot = np.empty(nodes.shape[0], np.uint32)
     node_start, node_cells = around
     for place in range(first, last):
-        i = listed[place]
-        r = graph_row[i]
+        i = np.uint64(listed[place])
+        r = np.uint64(graph_row[i])
         xi, yi, zi = nodes[i, 0], nodes[i, 1], nodes[i, 2]
-        for s in range(start[r], start[r + 1]):
+        for s in range(start[r], start[r + np.uint64(1)]):
             slot[neighbour[s]], rate[s] = s, 0.0
-        for t in range(node_start[i], node_start[i + 1]):
+        for t in range(node_start[i], node_start[i + np.uint64(1)]):
             e = node_cells[t]
             p, own = parent[e], 0
             x, y, z = volume[e] * u_cell[e, 0], volume[e] * u_cell[e, 1], volume[e] * u_cell[e, 2]
             while cells[e, own] != i:
                 own += 1
-            gx, gy, gz = g[p, own, 0], g[p, own, 1], g[p, own, 2]
-            for a in range(4):
-                j = cells[e, a]
-                if a != own and not upright[p]:
-                    rate[slot[j]] += 0.25 * (
-                        (g[p, a, 0] - gx) * x + (g[p, a, 1] - gy) * y + (g[p, a, 2] - gz) * z
-                    )
-                elif a != own:
-                    slopes = gx * g[p, a, 0] + gy * g[p, a, 1] + gz * g[p, a, 2]
+            if upright[p]:
+                for a in range(4):
+                    if a == own:
+                        continue
+                    slopes = products[p, PAIR[own, a]]
                     if slopes != 0.0:  # it is zero along half of the edges of a split brick
+                        j = cells[e, a]
                         rate[slot[j]] -= slopes * (
                             (nodes[j, 0] - xi) * x + (nodes[j, 1] - yi) * y + (nodes[j, 2] - zi) * z
                         )
+                continue
+            gx, gy, gz = g[p, own, 0], g[p, own, 1], g[p, own, 2]
+            for a in range(4):
+                if a != own:
+                    rate[slot[cells[e, a]]] += 0.25 * (
+                        (g[p, a, 0] - gx) * x + (g[p, a, 1] - gy) * y + (g[p, a, 2] - gz) * z
+                    )
 
 
 def edge_flux(topology, graph, listed, u_cell, water) -> Flux:
@@ -114,7 +120,7 @@ def edge_rates(topology, graph, listed, u_cell):
     """q (edges,) [m³/s] of (1) out of the listed nodes (n,) along the edges of the graph; u_cell (M, 3) [m/s]. Edges of
     other nodes hold anything."""
     t, rate = topology, np.empty(len(graph.neighbour))
-    mesh = (t.nodes, t.fluid_cells, (t.node_start, t.node_cells))
+    mesh = (t.nodes, t.fluid_cells, t.products, (t.node_start, t.node_cells))
     over(_edge_rates, len(listed), listed, graph.edges, u_cell, *mesh, rate, weight=WORK)
     return rate
 
@@ -178,7 +184,14 @@ def _shift(first, column, entry, diagonal, residual, tolerance, most):
         if rz <= goal or rz <= 0.0:
             break
         over(_product, n, first, column, entry, diagonal, p, Ap)
-        rz = _next_way(rz, goal, diagonal, Ap, x, r, z, p)
+        alpha = rz / _dot(p, Ap)
+        over(_stepped, n, alpha, diagonal, Ap, r, z, weight=DIVIDED)
+        new = _dot(r, z)
+        # as much of the last step as a line to the goal would take: taken as a whole, one step more or less by the last
+        # digit of r·z changes x by the tolerance
+        taken = alpha if new >= goal else alpha * (rz - goal) / (rz - new)
+        over(_turned, n, taken, z, new / rz, x, p, weight=PLAIN)
+        rz = new
     return x
 
 
@@ -203,21 +216,26 @@ def _product(begin, end, first, column, entry, diagonal, p, Ap):
 
 
 @kernel
-def _next_way(rz, goal, diagonal, Ap, x, r, z, p):
-    """x, r, z and the direction p (n,) of conjugate gradients after a step along p, in place → r·z.
+def _dot(a, b):
+    return np.dot(a, b)
 
-    Of the step in which r·z falls below its goal, x takes the share in which a line would: taken as a whole, one step
-    more or less by the last digit of r·z changes x by the tolerance."""
-    alpha = rz / np.dot(p, Ap)
-    for i in range(len(x)):
-        r[i] -= alpha * Ap[i]
+
+@ranged
+def _stepped(first, last, share, diagonal, Ap, r, z):
+    """r - share Ap and z = r/diagonal of conjugate gradients, in place."""
+    for k in range(first, last):
+        i = np.uint64(k)
+        r[i] -= share * Ap[i]
         z[i] = r[i] / diagonal[i]
-    new = np.dot(r, z)
-    taken = alpha if new >= goal else alpha * (rz - goal) / (rz - new)
-    for i in range(len(x)):
+
+
+@ranged
+def _turned(first, last, taken, z, share, x, p):
+    """x + taken p, and the direction z + share p, in place."""
+    for k in range(first, last):
+        i = np.uint64(k)
         x[i] += taken * p[i]
-        p[i] = z[i] + (new / rz) * p[i]
-    return new
+        p[i] = z[i] + share * p[i]
 
 
 @dataclass(frozen=True)
@@ -251,10 +269,9 @@ def correct_volume(topology, graph, listed, phi, carried, target: float, kappa: 
     seen = np.zeros(n, bool)
     seen[listed] = True
     most = LARGEST_SHIFT + LARGEST_UNIFORM_SHIFT
-    whole, near = _split(topology.cells_around(seen), phi, topology.cells, most, spacing)
-    inner = nodal_water(whole, 0.0, phi, topology.parts, n)
+    inner, near = _parted(topology, seen, phi, most, spacing)
     own = added(inner, nodal_water(near, 0.0, phi, topology.parts, n))
-    slope = _volume_slope(topology, near, phi, spacing)
+    slope = _volume_slope(topology, near, phi, spacing, seen)
     band = found_over(_in_band, len(listed), listed, phi, spacing)
     place = np.full(n, -1, np.int64)
     place[band] = np.arange(len(band))
@@ -306,36 +323,76 @@ def _lower(first, last, band, phi, shift, most, spacing, out):
         out[i] = phi[i] - min(max(shift[s if shift.shape[0] > 1 else 0], -limit), limit)
 
 
-def _split(cell_list, phi, cells, most, spacing):
-    """The listed cells that are all water whatever shift within ± most times the spacing (N,) φ takes, and those that a
-    surface can reach."""
-    parts = over(_split_range, len(cell_list), cell_list, phi, cells, most, spacing)
-    return parts[0] if len(parts) == 1 else tuple(np.concatenate(lists) for lists in zip(*parts))
+def _parted(t, seen, phi, most, spacing):
+    """Volume (N,) [m³] at the nodes of those cells around the nodes `seen` (N,) bool that are all water whatever shift
+    within ± most times the spacing (N,) φ takes, and the numbers of those that a surface can reach.
+
+    A node that has only such cells around it has its whole volume: the same sum as over these cells."""
+    n = len(phi)
+    inner, beside = np.empty(n), np.empty(n, bool)
+    mesh = (t.node_start, t.node_cells, t.fluid_cells, t.node_volume)
+    over(_inside, n, phi, most, spacing, seen, t.around, mesh, inner, beside, weight=0.3 * WORK)
+    return inner, _in_reach(t.cells_around(beside), phi, t.cells, most, spacing, seen)
+
+
+@ranged
+def _inside(first, last, phi, most, spacing, seen, around, mesh, inner, beside):
+    """The volume of `_parted`, and the nodes (N,) bool within reach of the surface, or under it and beside such."""
+    start, neighbours = around
+    node_start, node_cells, fluid, capacity = mesh
+    cells, volume, share, share_row = fluid.cells, fluid.volume, fluid.share, fluid.share_row
+    for k in range(first, last):
+        i = np.uint64(k)
+        reach = most * spacing[i]
+        inner[i], beside[i] = 0.0, phi[i] < reach
+        if not phi[i] < -reach:
+            continue
+        whole = True
+        for t in range(start[i], start[i + np.uint64(1)]):
+            j = neighbours[t]
+            if not phi[j] < -most * spacing[j]:
+                whole = False
+                break
+        beside[i] = not whole
+        if whole and seen[i]:
+            inner[i] = capacity[i]
+            continue
+        for t in range(node_start[i], node_start[i + np.uint64(1)]):
+            e, own, under, near = node_cells[t], np.uint64(0), True, False
+            for a in range(4):
+                j = cells[e, a]
+                under, near = under and phi[j] < -most * spacing[j], near or seen[j]
+                own = np.uint64(a) if j == i else own
+            if under and near:
+                inner[i] += volume[e] * share[share_row[e], own]
+
+
+def _in_reach(cell_list, phi, cells, most, spacing, seen):
+    """Those of the listed cells around the nodes `seen` (N,) bool that a surface can reach, in order, whatever shift
+    within ± most times the spacing (N,) φ takes."""
+    return found_over(_reached, len(cell_list), cell_list, phi, cells, most, spacing, seen)
 
 
 @released
-def _split_range(first, last, cell_list, phi, cells, most, spacing):
-    whole, near = np.empty(last - first, np.int64), np.empty(last - first, np.int64)
-    n_whole, n_near = 0, 0
+def _reached(first, last, cell_list, phi, cells, most, spacing, seen):
+    found, n = np.empty(last - first, np.int64), 0
     for s in range(first, last):
         e = cell_list[s]
-        under, beyond = True, True
+        under, beyond, near = True, True, False
         for a in range(4):
             i = cells[e, a]
             reach = most * spacing[i]
             under, beyond = under and phi[i] < -reach, beyond and phi[i] >= reach
-        if under:
-            whole[n_whole] = e
-            n_whole += 1
-        elif not beyond:
-            near[n_near] = e
-            n_near += 1
-    return whole[:n_whole].copy(), near[:n_near].copy()
+            near = near or seen[i]
+        if near and not under and not beyond:
+            found[n] = e
+            n += 1
+    return found[:n].copy()
 
 
-def _volume_slope(t, near, phi, spacing):
+def _volume_slope(t, near, phi, spacing, seen):
     """c (N,) [m²] by a central difference over the cells that the surface can reach."""
-    cut = _split(near, phi, t.cells, _PROBE, spacing)[1]
+    cut = _in_reach(near, phi, t.cells, _PROBE, spacing, seen)
     wider, narrower = zeros((len(phi),)), zeros((len(phi),))
     reach = reach_of_cells(cut, t.cells)
     owning(_probed, len(phi), reach, len(cut), cut, phi, spacing, t.parts, wider, narrower)

@@ -61,8 +61,9 @@ def _incoming(first, last, runs, nodes, edges, moved, u, up, came):
     row, start, neighbour = edges.row, edges.start, edges.neighbour
     for run in range(runs.shape[0]):
         for place in range(runs[run, 0], runs[run, 1]):
-            i = nodes[place]
-            for s in range(start[row[i]], start[row[i] + 1]):
+            i = np.uint64(nodes[place])
+            r = np.uint64(row[i])
+            for s in range(start[r], start[r + np.uint64(1)]):
                 j = neighbour[s]
                 if moved[s] > 0.0 and first <= j < last:
                     came[j] += moved[s]
@@ -86,10 +87,11 @@ def _exchange(first, last, runs, nodes, edges, moved, water, u, up, change, volu
     counted = gain.shape[0] > 0
     for run in range(runs.shape[0]):
         for place in range(runs[run, 0], runs[run, 1]):
-            i = nodes[place]
-            r = edges.row[i]
+            i = np.uint64(nodes[place])
+            r = np.uint64(edges.row[i])
+            end = r + np.uint64(1)
             out = 0.0
-            for s in range(start[r], start[r + 1]):
+            for s in range(start[r], start[end]):
                 out += moved[s]
             own = first <= i < last
             if own:
@@ -97,7 +99,7 @@ def _exchange(first, last, runs, nodes, edges, moved, water, u, up, change, volu
             if out <= 0.0:
                 continue
             second = 0.5 * max(1.0 - out / water[i], 0.0)
-            for s in range(start[r], start[r + 1]):
+            for s in range(start[r], start[end]):
                 j = neighbour[s]
                 theirs = first <= j < last
                 if moved[s] > 0.0 and (own or theirs):

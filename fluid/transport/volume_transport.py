@@ -82,7 +82,7 @@ def _largest_turnover(first, last, nodes, graph_row, start, rate, capacity, leas
     for place in range(first, last):
         i = nodes[place]
         if capacity[i] > least:
-            largest = max(largest, _out(graph_row[i], start, rate) / max(capacity[i], 1e-300))
+            largest = max(largest, _out(np.uint64(graph_row[i]), start, rate) / max(capacity[i], 1e-300))
     return largest
 
 
@@ -90,7 +90,7 @@ def _largest_turnover(first, last, nodes, graph_row, start, rate, capacity, leas
 def _out(r, start, rate):
     """Σ of the fluxes [m³/s] that leave the node of row r."""
     out = 0.0
-    for s in range(start[r], start[r + 1]):
+    for s in range(start[r], start[r + np.uint64(1)]):
         out += max(rate[s], 0.0)
     return out
 
@@ -109,22 +109,23 @@ def _moved(first, last, nodes, edges, rate, water, capacity, share, h, moved):
     other nodes are not written to."""
     start, neighbour = edges.start, edges.neighbour
     for place in range(first, last):
-        i = nodes[place]
-        r = edges.row[i]
+        i = np.uint64(nodes[place])
+        r = np.uint64(edges.row[i])
+        end = r + np.uint64(1)
         out = h * _out(r, start, rate)
-        for s in range(start[r], start[r + 1]):
+        for s in range(start[r], start[end]):
             moved[s] = 0.0
         if out <= 0.0 or water[i] <= 0.0:
             continue
         behind = share[i] - _upstream(r, start, neighbour, rate, share)
         second = 0.5 * max(1.0 - out / max(capacity[i], 1e-300), 0.0)
         total = 0.0
-        for s in range(start[r], start[r + 1]):
+        for s in range(start[r], start[end]):
             if rate[s] > 0.0:
                 moved[s] = h * rate[s] * _leaving(share[i], behind, share[neighbour[s]], second)
                 total += moved[s]
         if total > water[i]:
-            for s in range(start[r], start[r + 1]):
+            for s in range(start[r], start[end]):
                 moved[s] *= water[i] / total
 
 
@@ -148,7 +149,7 @@ def _transfer_volume(first, last, runs, nodes, edges, moved, change):
 def _upstream(r, start, neighbour, rate, share):
     """Mean share of what flows into the node of row r."""
     weight, total = 0.0, 0.0
-    for s in range(start[r], start[r + 1]):
+    for s in range(start[r], start[r + np.uint64(1)]):
         if rate[s] < 0.0:
             weight += rate[s]
             total += rate[s] * share[neighbour[s]]

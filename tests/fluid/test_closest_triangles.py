@@ -69,7 +69,7 @@ def test_layers_have_the_order_of_one_loop(topology, number):
 
 def _scene(t):
     phi = _rough(t.nodes)
-    cut = surface_cells(phi, np.arange(len(t.cells)), t.cells)
+    cut = surface_cells(phi, t)
     front = np.zeros(len(phi), bool)
     front[t.cells[cut]] = True
     return layers_around(front, DEPTH, *t.around), Surface(*surface_triangles(cut, phi, t.nodes, t.cells))
@@ -125,7 +125,7 @@ def test_the_layers_beside_the_surface_find_the_closest_triangle_of_all(topology
     beyond the closest; what neighbours hand on is too far from two of three nodes, by up to 0.24 cells."""
     t = topology
     phi = np.linalg.norm(t.nodes - [0.47, 0.52, 0.49], axis=1) - 4.5 * H
-    cut = surface_cells(phi, np.arange(len(t.cells)), t.cells)
+    cut = surface_cells(phi, t)
     front = np.zeros(len(phi), bool)
     front[t.cells[cut]] = True
     layers, surface = (
