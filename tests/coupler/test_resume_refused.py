@@ -10,7 +10,7 @@ import pytest
 
 from coupler.program.errors import BadCase, ExitCode, NoRun
 from coupler.run.array_file import write_arrays
-from coupler.run.checkpoint import FOLDER, UNSET, Checkpoint, OtherScene, listed
+from coupler.run.checkpoint import FOLDER, LAYOUT, UNSET, Checkpoint, OtherScene, listed
 from coupler.run.resume import CannotResume, prepare
 from tests.coupler.resumed import command, go_on
 
@@ -62,7 +62,7 @@ def test_another_program_is_refused_with_the_difference(stopped):
 
 def test_another_layout_is_refused(stopped):
     rewritten(listed(stopped / FOLDER)[0], layout=99)
-    with pytest.raises(CannotResume, match="written in layout 99, this program reads 4"):
+    with pytest.raises(CannotResume, match=f"written in layout 99, this program reads {LAYOUT}"):
         prepare(stopped)
 
 
