@@ -83,10 +83,10 @@ def test_no_density_swings_higher(density):
 @pytest.mark.nightly
 @pytest.mark.parametrize("step", [0.005, 0.01, 0.02])
 def test_a_swing_dies_alike_at_any_step(step):
-    """Over 17 periods, let go by 20 mm: the loss, 7 % a period, is that of cells and sharp edges, not of the step."""
+    """Over 17 periods, let go by 20 mm: the loss, 10 % a period, is that of cells and sharp edges, not of the step."""
     time, height, balance = swing(16.0, lift=0.02, step=step)
     size = sizes(time, height)
-    assert (size[-1] / size[2]) ** (1.0 / (len(size) - 3)) == pytest.approx(0.94, abs=0.03)
+    assert (size[-1] / size[2]) ** (1.0 / (len(size) - 3)) == pytest.approx(0.90, abs=0.02)
     assert max(b.energy_error for b in balance) < 0.02
 
 
