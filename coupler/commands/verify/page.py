@@ -40,12 +40,14 @@ NOTES = {
     "P42": "The wave is less than half a cell high, and its run-up is one to two cells of water. Up to 0.054 d the tip "
     "follows the shallow-water equations within 0.002 d; from there noise of the level set inside the bed breaks the "
     "tongue, a fifth to a half of a cell deep, into lumps. Variants of damping, step and correction give 0.064 to "
-    "0.083 d, and the versions of the program so far 0.066 to 0.085 d "
-    "([theory](theory.md#24a-cells-of-several-sizes-and-meshes-that-end-on-a-bed)); "
+    "0.083 d, and the versions of the program so far 0.066 to 0.085 d; waves of this height ran up 0.075 d in the "
+    "laboratory ([theory](theory.md#24a-cells-of-several-sizes-and-meshes-that-end-on-a-bed)); "
     "the exact tongue is a tenth of a cell deep, which counts as dry here, at 0.079 d. On the fitted bed "
     "with 8 layers the tongue is thinner than a cell, and the figure depends on where the columns lie: with beach and "
     "columns moved by 0 to 0.02 d it is 0.074 to 0.089 d. The "
     "shallow-water equations give 0.080 d where a tenth of a cell counts as dry.",
+    "P41": "The bore into two cells of still water is 5.5 % too slow (4.6 % before calm water took the new pressure "
+    "with a smaller weight), the one into four cells 4.4 %.",
     "P53": "Each swing is smaller than the reference by 0.02 to 0.03 of the drop height. Half of the step changes the "
     "first swing by 0.002 (in a tank 0.9 m wide). It was 0.03 smaller, and the third one 0.06, while the load of a "
     "sphere that moves in one substep a step was reduced over half of its way as if it took many; cells of R/8 gave "

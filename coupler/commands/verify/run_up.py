@@ -79,7 +79,7 @@ def run_up():
     line = (
         Curve("largest of the law", "exact", run.t[[0, -1]], np.full(2, exact)),
         Curve(f"computed, cells d/{CELLS}", "computed", run.t, run.R),
-        Curve(f"computed, {LAYERS} layers over the bed", "other", on_bed.t, on_bed.R),
+        Curve("fitted bed", "other", on_bed.t, on_bed.R),
     )
     panels = (
         Panel("time $t\\sqrt{g/d}$ [–]", "height of the water line $R/d$ [–]", line),
