@@ -496,6 +496,14 @@ def test_a_checkout_that_one_may_only_read(machine):
     assert "SURGEBREAK_VENV=$HOME/surgebreak-venv" in reported
 
 
+def test_doctor_looks_at_an_installation_that_one_may_only_read(machine):
+    """It wrote a log of whether the program starts beside the packages, and ended there."""
+    machine.ready()("doctor")
+    code, reported, calls = as_a_user_who_may_only_read(machine, "doctor")
+    assert (code, reported) == (0, "")
+    assert calls[-1] == "surgebreak doctor"
+
+
 def test_the_packages_may_go_elsewhere(machine):
     elsewhere = machine.state / "my venv"
     code, _, calls = machine.ready()("doctor", SURGEBREAK_VENV=str(elsewhere))
