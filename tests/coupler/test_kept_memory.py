@@ -23,5 +23,5 @@ def _faults(keep: str) -> int:
 
 
 def test_fields_of_the_next_step_take_no_new_pages():
-    assert _faults("") > 10_000
-    assert _faults("import kernels") < 100
+    """Against the same without it: how many pages there are depends on the system, which may hand out large ones."""
+    assert _faults("import kernels") < 0.1 * _faults("")

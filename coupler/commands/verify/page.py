@@ -30,7 +30,7 @@ NOTES = {
     "0.087 m, and 0.078 m with the bed moved by 0.1 mm. Since distances to the surface and the correction of its "
     "volume have no jumps ([theory](theory.md#last-digits)), differences of last digits stay small.",
     "P62": "Next to an edge the pressure varies with the square root of the distance; linear cells spread this "
-    "variation over two cells. With a quarter of the step the plate of width D receives 5 % more; 2 % of that are "
+    "variation over two cells. With a quarter of the step the plate of width D receives 6 % more; 2 % of that are "
     "due to the inner node beside the edge, whose share of the water is closed off behind the plate.",
     "P63": "What is missed are sheets thinner than a cell: of a jet at 30 degrees one fifteenth runs back along the "
     "plate, a quarter of a cell with four cells over the jet. For eight places of plate and jet within the cells the "
