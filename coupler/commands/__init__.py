@@ -1,6 +1,9 @@
 """The commands `surgebreak NAME`, each in a module or package of its own.  No other chapter may import them.
 
-cli                        the command line: words and options of every command
+cli                        the command line: which commands there are
+run, resume, check, ...    a short command: its arguments and what it calls, in one module
+NAME/arguments             the arguments of a command that has a package, which its other modules carry out
+shared_options             arguments that several commands have
 doctor, explain_run        is this machine ready; what a run computed
 warm_up                    compiles the kernels
 verify                     exact solutions and measured records (docs/benchmarks.md)

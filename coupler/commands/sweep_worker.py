@@ -19,11 +19,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from coupler.commands.cli import main as command
-from coupler.commands.cli import one_thread
 from coupler.commands.study.runner import Cost
 from coupler.commands.sweep.folder import Spec, read_spec
 from coupler.commands.sweep.one import make
 from coupler.program.process import end_with
+from coupler.program.start import one_thread
 
 
 class Forked:

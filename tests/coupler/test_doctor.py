@@ -2,7 +2,7 @@
 
 import pytest
 
-from coupler.commands import doctor
+from coupler.commands.doctor import command as doctor
 
 pytestmark = pytest.mark.before_yade
 
@@ -103,7 +103,7 @@ def test_folders_that_were_locked_are_opened_again(place, capsys):
 
 
 def test_missing_packages_are_installed_with_the_pins_and_only_in_a_virtual_environment(monkeypatch, capsys):
-    from coupler.commands import mend
+    from coupler.commands.doctor import mend
 
     called = []
 
@@ -128,7 +128,7 @@ def test_missing_packages_are_installed_with_the_pins_and_only_in_a_virtual_envi
 @pytest.mark.parametrize("harm", ["cut", "gone"])
 def test_a_damaged_package_is_found_and_fetched_again(harm, tmp_path, monkeypatch, capsys):
     """A file of a package that was cut off or lost: pip itself takes the package to be there."""
-    from coupler.commands import mend
+    from coupler.commands.doctor import mend
 
     place, called = tmp_path / "lib", []
     (place / "some-1.0.dist-info").mkdir(parents=True)

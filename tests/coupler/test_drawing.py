@@ -9,7 +9,7 @@ import pytest
 from manifold3d import Manifold
 
 from coupler.case.structure import BlockFile, Drawing
-from coupler.commands.blocks import write_bodies
+from coupler.commands.blocks.command import write_bodies
 from coupler.geometry.block_files import blocks_from_file
 from coupler.geometry.bodies import Body
 from coupler.geometry.drawing.drawing import cut_drawing

@@ -96,7 +96,7 @@ def test_a_case_is_drawn_before_it_is_run(tmp_path):
     pytest.importorskip("PIL")
     from PIL import Image
 
-    from coupler.commands.blocks import draw_case
+    from coupler.commands.blocks.command import draw_case
 
     write_first_case(tmp_path, "quay")
     draw_case(load(tmp_path).case, tmp_path / "quay.png")
@@ -105,7 +105,7 @@ def test_a_case_is_drawn_before_it_is_run(tmp_path):
 
 
 def test_a_case_over_terrain_is_drawn_with_its_ground_and_the_water_above_it(tmp_path):
-    from coupler.commands.blocks import _bed_triangles, _surface_over
+    from coupler.commands.blocks.command import _bed_triangles, _surface_over
 
     case = load(write_first_case(tmp_path / "town", "town")).case
     bed = _bed_triangles(case)

@@ -15,7 +15,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
 
-from coupler.commands import mend
+from coupler.commands.doctor import mend
 from coupler.program import terminal
 from coupler.program.arithmetic import BASELINE, missing, remark
 from coupler.program.errors import ExitCode

@@ -1,0 +1,1 @@
+"""Cuts a drawing into blocks, and draws the blocks of a case at its start."""

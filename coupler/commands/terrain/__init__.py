@@ -1,0 +1,1 @@
+"""Tables and maps of a terrain, and of the flood of a run."""
