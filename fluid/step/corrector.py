@@ -148,7 +148,10 @@ def _pressure_gradient(water, kept, pressure, scale):
     """(dt/ρ) ∇x (n, 3) [m/s] of the wet cells."""
     t = water.topology
     unheld = water.walls.open_node if kept.held is None else water.walls.open_node & (kept.held == 0.0)
-    air = zeros((len(pressure),)) if kept.cushions is None else np.where(kept.wet, 0.0, pressure)
+    air = zeros((len(pressure),))
+    if kept.cushions is not None:  # dry nodes of a sea have its pressure below zero, not that of air
+        in_pocket = kept.cushions.air.label > 0
+        air[in_pocket] = pressure[in_pocket]
     full = with_ghosts(pressure, air, kept.wet, unheld, kept.level_set, kept.wet_cells, t.cells)
     return cell_gradient(kept.wet_cells, full, t.cells, t.parent, t.gradients, scale)
 
