@@ -90,6 +90,8 @@ WORDS = {
     "house": ("structure.building", "structure.drawing", "structure.town"),
     "drawing": ("structure.drawing", "structure.file"),
     "container": ("structure.block",),
+    "box": ("structure.block", "solid", "water.fill"),
+    "cube": ("structure.block",),
     "sphere": ("structure.block.diameter", "structure.block.faces", "structure.rubble"),
     "ball": ("structure.block.diameter", "structure.block.faces"),
     "boulder": ("structure.block.diameter", "structure.rubble"),
@@ -125,7 +127,7 @@ def meant(word: str) -> list[Key]:
     known = {key.path: key for key in keys()}
     plain = word.lower().rstrip("s") if word.lower() not in WORDS else word.lower()
     asked = [known[path] for path in WORDS.get(plain, ()) if path in known]
-    ends = [key for path, key in known.items() if path.rsplit(".", 1)[-1] == plain]
+    ends = [key for path, key in known.items() if path.rsplit(".", 1)[-1] in (plain, f"{plain}s")]
     entries = [key for key in known.values() if len(plain) > 3 and plain in key.description.lower()]
     return list({key.path: key for key in [*asked, *ends, *entries]}.values())[:MOST_MEANT]
 

@@ -216,9 +216,8 @@ def write_first_case(
 
     ask(question, usual) gives the answers, None: the usual ones. Raises CannotBegin."""
     if name not in FIRST_CASES:
-        raise CannotBegin(
-            f"--template {name}: there is none{did_you_mean(name, list(FIRST_CASES))}: {all_summaries()}"
-        )
+        hint = did_you_mean(name, list(FIRST_CASES)) or "."
+        raise CannotBegin(f"--template {name}: there is none{hint} The templates are {all_summaries()}")
     path = directory / "case.toml"
     if path.exists():
         raise CannotBegin(f"{path}: exists and is left as it is; name another directory")

@@ -27,9 +27,10 @@ def check(
         Path | None, typer.Option(metavar="PNG", help="draw the blocks, solids and water at the start")
     ] = None,
 ) -> None:
-    """Check a case, and forecast its steps, processor time, memory and disk space.
+    """Check a case, and forecast what its run will take.
 
-    Nothing is run, but YADE is loaded to compute the substep of a structure.
+    The forecast gives steps, processor time, memory and disk space. Nothing is run, but YADE is loaded to compute the
+    substep of a structure.
     """
     one_thread()
     take_laws(law)

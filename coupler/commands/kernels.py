@@ -26,9 +26,10 @@ def kernels(
         ),
     ] = None,
 ) -> None:
-    """Show, pack or unpack the compiled kernels, so that other machines need not compile them.
+    """Show, pack or unpack compiled kernels for other machines.
 
-    Without an option it shows where they are, and how many modules of this version have compiled kernels.
+    A machine that unpacks them need not compile them. Without an option it shows where they are, and how many modules
+    of this version have compiled kernels.
     """
     one_thread()
     from coupler.program import kernel_pack

@@ -48,7 +48,7 @@ def _commands() -> Iterator[str]:
 
 def _argument(parameter: Any) -> str:
     shown = parameter.metavar or parameter.name.upper()
-    return shown if parameter.required else f"[{shown}]"
+    return (shown if parameter.required else f"[{shown}]") + ("..." if parameter.nargs == -1 else "")
 
 
 def _option(parameter: Any) -> tuple[str, str]:

@@ -52,6 +52,16 @@ def percent(value: float | None) -> str:
     return "–" if value is None else f"{100.0 * value:.3g} %"
 
 
+def counted(number: int, noun: str) -> str:
+    """1 block, 2 blocks: a number of things, noun: one of them."""
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
+def signed_percent(value: float) -> str:
+    """A share with its sign in hundredths of a percent, +0.02%; none is +0.00% from either side."""
+    return f"{round(value, 4) + 0.0:+.2%}"
+
+
 def moment_of(seconds: float | None) -> str:
     """A time of a run [s] as people say it: 0.568 s rather than 568 ms, so that times of one list compare at sight."""
     if seconds is None or not seconds >= 0.01:

@@ -14,6 +14,7 @@ from coupler.checks.read_case import CaseFile
 from coupler.geometry.parts import parts_of
 from coupler.program import arithmetic
 from coupler.program.errors import ExitCode
+from coupler.program.quantities import counted
 from coupler.results.expected import verdicts
 from coupler.run.compile_ahead import compile_ahead
 from coupler.run.directory import RunDirectory
@@ -71,7 +72,8 @@ def drawn(case: Case) -> Iterator[str]:
         if part.path[1] in ("drawing", "file") and part.blocks:
             corners = np.concatenate([block.world_vertices() for block in part.blocks])
             lengths = " x ".join(f"{length:.4g}" for length in np.ptp(corners, axis=0))
-            yield f"structure.{part.path[1]} '{part.name}': {lengths} m along x, y and z, {len(part.blocks)} blocks"
+            number = counted(len(part.blocks), "block")
+            yield f"structure.{part.path[1]} '{part.name}': {lengths} m along x, y and z, {number}"
 
 
 def _ground(case: Case) -> str:

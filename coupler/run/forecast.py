@@ -20,7 +20,8 @@ from coupler.checks.places import mesh_size
 from coupler.geometry import start_surfaces
 from coupler.geometry.tank_mesh import finest_cell, water_in
 from coupler.geometry.tank_regions import bytes_of_cells
-from coupler.program.terminal import Row, lines
+from coupler.program.quantities import counted
+from coupler.program.terminal import Row, duration, lines
 from coupler.run.fast_openings import resolved_row
 from coupler.step.observe import joint_counts
 
@@ -186,8 +187,9 @@ def _time_rows(seconds: float) -> Iterator[Row]:
         "s",
         "about, to a factor of two; more where much breaks or fast water splashes",
     )
-    beside = f"beside {busy:.0f} other programs" if busy >= 1.0 else "on this machine as it is"
-    yield Row("wall time", seconds / share / 60.0, "min", beside)
+    wall = seconds / share
+    beside = f"beside {counted(round(busy), 'other program')}" if busy >= 1.0 else "on this machine as it is"
+    yield Row("wall time", wall, "s", beside if wall < 60.0 else f"{duration(wall)}, {beside}")
 
 
 def _structure_rows(case: Case, rows: list[Row], exact: bool) -> tuple[int, int, float]:

@@ -14,6 +14,7 @@ from coupler.checks.case import remarks, thin_remarks
 from coupler.checks.water import thin_water_remarks
 from coupler.geometry.overlaps import deepest_overlap
 from coupler.program.errors import ExitCode
+from coupler.program.quantities import counted, signed_percent
 from coupler.program.terminal import newtons
 from coupler.results.recorder import Recorder
 from coupler.results.tank_top import in_all, reached
@@ -100,7 +101,8 @@ def _describe(scene: Scene, reporter) -> None:
         joints = joint_counts(c.structure).intact
         held = f" ({int(c.structure.fixed.sum())} held or driven)" if c.structure.fixed.any() else ""
         reporter.message(
-            f"structure: {c.structure.n} blocks{held}, {joints} joints, substep {substep:.3g} s ({limit.what})"
+            f"structure: {counted(c.structure.n, 'block')}{held}, {counted(joints, 'joint')}, "
+            f"substep {substep:.3g} s ({limit.what})"
         )
         if c.structure.sleeps is not None:
             reporter.message(f"sleep: {c.structure.sleeps.described()}")
@@ -332,7 +334,7 @@ def _reported(case: Case, coupling, record, watch) -> dict[str, str]:
         if len(record.load):
             whose, force = _force(case, record, watch)
             reported[f"force on {whose}"] = newtons(force)
-        reported["volume"] = f"{_volume_error(coupling):+.2%}"
+        reported["volume"] = signed_percent(_volume_error(coupling))
     if coupling.coupled:
         reported["defect"] = f"{record.defect:.1e}"
     reported["energy"] = f"{record.balance.energy_error:.2%}"

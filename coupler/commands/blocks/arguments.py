@@ -24,19 +24,29 @@ def blocks(
         str | None,
         typer.Option(metavar="M", help="intended height of the blocks in walls; default: the size"),
     ] = None,
-    bond: Annotated[str, typer.Option(help="bond of the blocks in walls: stack or running")] = "stack",
-    scale: Annotated[str, typer.Option(help="length of one unit of the file, for instance '1 mm'")] = "1 m",
-    up: Annotated[str, typer.Option(help="axis of the file that points up: z or y")] = "z",
+    bond: Annotated[
+        str, typer.Option(metavar="NAME", help="bond of the blocks in walls: stack or running")
+    ] = "stack",
+    scale: Annotated[
+        str, typer.Option(metavar="M", help="length of one unit of the file, for instance '1 mm'")
+    ] = "1 m",
+    up: Annotated[str, typer.Option(metavar="AXIS", help="axis of the file that points up: z or y")] = "z",
     sliver: Annotated[
         str | None,
         typer.Option(metavar="M", help="parts narrower than this are merged with their neighbours"),
     ] = None,
-    most_blocks: Annotated[int | None, typer.Option(help="more blocks are refused; default: 5000")] = None,
-    density: Annotated[
-        str | None, typer.Option(help="density of the blocks, for instance '1800 kg/m3'")
+    most_blocks: Annotated[
+        int | None, typer.Option(metavar="N", help="more blocks are refused; default: 5000")
     ] = None,
-    strength: Annotated[str, typer.Option(help="strength of the joints, for the forecast")] = "0.5 MPa",
-    opening: Annotated[str, typer.Option(help="opening of the joints at failure, for the forecast")] = "1 mm",
+    density: Annotated[
+        str | None, typer.Option(metavar="KG/M3", help="density of the blocks, for instance '1800 kg/m3'")
+    ] = None,
+    strength: Annotated[
+        str, typer.Option(metavar="PA", help="strength of the joints, for the forecast")
+    ] = "0.5 MPa",
+    opening: Annotated[
+        str, typer.Option(metavar="M", help="opening of the joints at failure, for the forecast")
+    ] = "1 mm",
     picture: Annotated[
         Path | None,
         typer.Option(metavar="PNG", help="file of the picture; default: FILE_blocks.png beside the drawing"),

@@ -41,11 +41,11 @@ def compare(
         typer.Option("--list", help="list the laws, and the properties that the laws of YADE cannot match"),
     ] = False,
 ) -> None:
-    """Run a case without water with the cohesive laws of this program and with those of YADE.
+    """Compare the cohesive laws of this program with those of YADE.
 
-    A case with [water] is refused: YADE's own scenes know no water. For such a case run each law by
-    `run --set joints.law=NAME`. The parameters of the laws are matched as far as possible. The results are a table, a
-    figure, CSV, JSON, and scripts for YADE.
+    A case without water is run with each of them. A case with [water] is refused: YADE's own scenes know no water. For
+    such a case run each law by `run --set joints.law=NAME`. The parameters of the laws are matched as far as possible.
+    The results are a table, a figure, CSV, JSON, and scripts for YADE.
     """
     one_thread()
     take_laws(law)

@@ -27,7 +27,7 @@ def stress(
         int | None,
         typer.Option(min=1, metavar="N", help="run N random scenes from the whole case format instead"),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="seed of the random scenes")] = 1,
+    seed: Annotated[int, typer.Option(min=0, metavar="N", help="seed of the random scenes")] = 1,
     first: Annotated[
         int, typer.Option("--from", min=0, metavar="K", help="number of the first random scene")
     ] = 0,

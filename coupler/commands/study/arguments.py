@@ -14,7 +14,9 @@ from coupler.program.start import one_thread
 def study(
     words: Annotated[
         list[Path],
-        typer.Argument(metavar="CASE|compare A B", help="a case with a section [study], or two studies"),
+        typer.Argument(
+            metavar="CASE", help="a case with a section [study]; or: compare A B, with two studies"
+        ),
     ],
     ladder: Annotated[
         str,

@@ -69,9 +69,10 @@ def sweep(
         bool, typer.Option("--any-version", help="keep runs that another version of the program made")
     ] = False,
 ) -> None:
-    """Make many runs of a case: grids, samples, repeats; fragility curves.
+    """Make many runs of a case: grids, samples, fragility curves.
 
-    Completed runs are not repeated, and a killed run is continued. The results are a table, curves and a report.
+    The runs differ by values on a grid, samples of a distribution, or repeats. Completed runs are not repeated, and a
+    killed run is continued. The results are a table, curves and a report.
     """
     one_thread()
     take_laws(law)

@@ -30,9 +30,10 @@ def terrain(
         Path | None, typer.Option("--map", metavar="PNG", help="draw a map; needs the extra `view`")
     ] = None,
 ) -> None:
-    """Show a terrain: its extent, heights and slopes, and how cells of a given size represent it.
+    """Show a terrain, and how well cells represent it.
 
-    For a run it lists the maps of the flood; --map draws them in one picture with the state of the buildings.
+    Tables give its extent, heights and slopes, and how much of the ground is lost with cells of several sizes. For a
+    run it lists the maps of the flood; --map draws them in one picture with the state of the buildings.
     """
     one_thread()
     if map_ is not None:

@@ -24,6 +24,7 @@ from coupler.commands.view.section import (
     with_section,
 )
 from coupler.commands.view.water_surface import facing, shading_normals, skin, some, surfaces_of_pockets
+from coupler.program.quantities import counted
 
 WATER_OPACITY = 0.78
 SUN = np.array([-0.45, -0.75, 1.1])  # from the scene to the light, for a camera at azimuth -90 degree
@@ -338,9 +339,9 @@ def caption_of(run, width):
     """Title of the case, then number of cells and blocks, in lines of at most width letters, broken between words."""
     counts = []
     if run.water:
-        counts.append(f"{len(run.water.at(run.water.times[0]).cells)} cells")
+        counts.append(counted(len(run.water.at(run.water.times[0]).cells), "cell"))
     if run.blocks:
-        counts.append(f"{int(run.blocks.at(run.blocks.times[0])['block'].max()) + 1} blocks")
+        counts.append(counted(int(run.blocks.at(run.blocks.times[0])["block"].max()) + 1, "block"))
     title = _entry(run, "case", "case", "title") or run.directory.name
     return "\n".join([*textwrap.wrap(title, max(width, 1)), *([", ".join(counts)] if counts else [])])
 

@@ -9,10 +9,10 @@ import typer
 
 
 def watch(
-    places: Annotated[
-        list[Path], typer.Argument(metavar="RUN...", help="runs, sweeps, or folders with runs")
-    ],
-    port: Annotated[int, typer.Option(min=0, max=65535, help="port of the page; 0 takes any free one")] = 0,
+    places: Annotated[list[Path], typer.Argument(metavar="RUN", help="runs, sweeps, or folders with runs")],
+    port: Annotated[
+        int, typer.Option(min=0, max=65535, metavar="N", help="port of the page; 0 takes any free one")
+    ] = 0,
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="open the browser")] = False,
     pictures: Annotated[
         bool, typer.Option("--pictures/--no-pictures", help="draw a new picture from time to time")
