@@ -11,8 +11,8 @@ from __future__ import annotations
 import numpy as np
 
 from kernels.decorators import inner, kernel, released
-from yade_scripts.blocks.block import MARGIN
 from yade_scripts.contact.arrays import CROSSINGS, Direction, Faces
+from yade_scripts.contact.boxes import CLEAR, between_boxes, planes_of_box
 from yade_scripts.contact.edges import pair_scratch
 from yade_scripts.contact.ground import scan_ground
 from yade_scripts.contact.search import (
@@ -34,6 +34,8 @@ STEADY = 0.1
 """Relative motion, in margins of the thinner block, within which the edges found last are taken to be the outermost
 still. Each change of edges leaves at most about that overlap without force: blocks that roll and slide on their edges
 would otherwise sink a little at each."""
+BEYOND = 1.0 + 1e-6
+"""Factor on a distance within which contact is looked for, for rounding."""
 SAME = 1.0 + 1e-6
 """Largest ratio of the overlap of crossing edges to that of the faces at which edges carry where no node does. For
 flat beams the two overlaps are equal."""
@@ -69,6 +71,7 @@ def _contacts(first_pair, last_pair, shapes, bodies, law, pairs, slots, ground, 
     for body in range(len(shapes.face_start) - 1):
         most = max(most, shapes.face_start[body + 1] - shapes.face_start[body])
     planes, scratch = np.empty((most, 4)), pair_scratch(shapes)
+    cosines, shift, half = np.empty((3, 3)), np.empty((2, 3)), shapes.half
     for p in range(first_pair, last_pair):
         a, b = np.uint32(pairs.a[p]), np.uint32(pairs.b[p])
         finds, taken = not pairs.found[p], 0.0
@@ -86,17 +89,31 @@ def _contacts(first_pair, last_pair, shapes, bodies, law, pairs, slots, ground, 
                 shapes, bodies, law.shear, slots, pairs.start[p], forward, ground, state,
                 rows, count, taken, scratch, planes[0],
             )  # fmt: skip
+        boxes = half[a, 0] > 0.0 and half[b, 0] > 0.0
+        clear, gap_a, gap_b, face_a, face_b = 0.0, 0.0, 0.0, 0, 0
+        if boxes:
+            gap_a, face_b, gap_b, face_a = between_boxes(shapes, a, b, x, R, cosines, shift)
+            clear = CLEAR * (shapes.radius[a] + shapes.radius[b])
         for node_body, face_body in ((a, b), (b, a)):
             begin, end = shapes.node_start[node_body], shapes.node_start[node_body + 1]
             if begin == end or b == ground.row:
                 continue
-            faces = planes_seen_from(
-                shapes.face_start, shapes.normal, shapes.offset, node_body, face_body, x, R, planes
-            )
+            if boxes and node_body == a:
+                faces, gap, farthest = 6, gap_a, face_b
+            elif boxes:
+                faces, gap, farthest = 6, gap_b, face_a
+            else:
+                faces = planes_seen_from(
+                    shapes.face_start, shapes.normal, shapes.offset, node_body, face_body, x, R, planes
+                )
+                gap, farthest = separation(shapes.node, begin, shapes.vertex_end[node_body], planes, faces)
             margin = min(shapes.margin[node_body], shapes.margin[face_body])
-            gap, farthest = separation(shapes.node, begin, shapes.vertex_end[node_body], planes, faces)
             apart = max(apart, gap)
-            if gap <= margin or pairs.touching[p]:
+            if gap <= (clear if boxes else margin) or pairs.touching[p]:
+                if boxes:
+                    planes_of_box(
+                        half[face_body], cosines, shift[0 if node_body == a else 1], node_body == b, planes
+                    )
                 slot = pairs.start[p] if node_body == a else pairs.start[p + 1] - CROSSINGS - (end - begin)
                 count, taken = scan(
                     shapes, bodies, law, slots, slot, Direction(node_body, face_body, finds, whole),
@@ -104,7 +121,7 @@ def _contacts(first_pair, last_pair, shapes, bodies, law, pairs, slots, ground, 
                 )  # fmt: skip
         base, nodes = pairs.start[p + 1] - CROSSINGS, count
         known = False
-        for s in range(base, base + CROSSINGS):
+        for s in range(base, base + CROSSINGS if pairs.touching[p] else base):
             known = known or slots.face[s] >= 0
         meets = finds and apart < 0.0 and b < n
         bare = count == first or deepest_of(slots, rows, first, count) < -CROSSING * apart
@@ -187,10 +204,9 @@ def _move(rows, c, to):
 
 @inner
 def _overhang(shapes, a, b):
-    """Upper bound [m] of the distance beside the faces of two blocks at which nodes may still count as on them: planes
-    moved outwards by `MARGIN` times the inner radius lie within the block scaled up by that share."""
-    other = shapes.radius[b] if shapes.radius[b] < np.inf else 0.0
-    return MARGIN * max(shapes.radius[a], other)
+    """Upper bound [m] of the distance at which nodes of one of two blocks may still count as on faces of the other,
+    which extend beyond their edges by the smaller margin of the two."""
+    return BEYOND * min(shapes.margin[a], shapes.margin[b]) * max(shapes.swell[a], shapes.swell[b])
 
 
 @kernel

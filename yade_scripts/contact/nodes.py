@@ -8,6 +8,7 @@ other (`contact_edges`).
 
 from __future__ import annotations
 
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -30,7 +31,9 @@ class Shapes(NamedTuple):
     of_start (N+1,), of (.,): faces that hold a node
     face_start (n+m+1,) · normal (F, 3) outward · offset (F,) [m]: inside is normal·x < offset
     face_nodes (F,): nodes on a face · face_spread (F,): mean distance of its points from its middle over that of its
-    nodes radius, margin (n+m,) [m]
+    nodes
+    radius, margin (n+m,) [m] · swell (n+m,): bound of how far a corner moves as all faces move outwards by 1
+    half (n+m, 3) [m]: half the edges of a box, nan for other bodies
     edge_start (n+m+1,) · edge (E, 2) vertices of the block · edge_out (E, 3): sum of the normals of its two faces
     edge_like (E,): the first edge of the block that is parallel, counted from its first one.
     """
@@ -47,6 +50,8 @@ class Shapes(NamedTuple):
     face_spread: Array
     radius: Array
     margin: Array
+    swell: Array
+    half: Array
     edge_start: Array
     edge: Array
     edge_out: Array
@@ -83,7 +88,7 @@ def block_edges(block: Block) -> list[tuple[tuple[int, int], list[int]]]:
 
 def contact_shapes(blocks: list[Block], planes: list[FixedPlane], per_edge: int) -> Shapes:
     """Nodes and faces of all blocks and planes in one set of arrays."""
-    nodes, holders, normals, offsets, counts, spreads = [], [], [], [], [], []
+    nodes, holders, normals, offsets, counts, spreads, swells = [], [], [], [], [], [], []
     edges: list[tuple[Array, Array, Array]] = []
     faces_before = 0
     known: dict[tuple, tuple] = {}
@@ -91,8 +96,9 @@ def contact_shapes(blocks: list[Block], planes: list[FixedPlane], per_edge: int)
         key = (block.vertices.tobytes(), block.faces)
         if key not in known:
             nodes_of = block_nodes(block, per_edge)
-            known[key] = (*nodes_of, *block.planes, _edges(block), _spreads(block, *nodes_of))
-        points, holding, normal, offset, along, spread = known[key]
+            known[key] = (*nodes_of, *block.planes, _edges(block), _spreads(block, *nodes_of), _swell(block))
+        points, holding, normal, offset, along, spread, swell = known[key]
+        swells.append(swell)
         spreads.append(spread)
         edges.append(along)
         nodes.append(points)
@@ -105,12 +111,14 @@ def contact_shapes(blocks: list[Block], planes: list[FixedPlane], per_edge: int)
         normals.append(plane.normal[None])
         offsets.append(np.zeros(1))
         spreads.append(np.ones(1))
+        swells.append(0.0)
         counts.append((0, 1, 0))
     node_count, face_count, vertex_count = np.array(counts, np.int64).reshape(-1, 3).T
     node_start = _starts(node_count)
     of = np.array([f for held in holders for f in held], np.int64)
     number_of_faces = int(face_count.sum())
     inner = np.array([b.planes[1].min() for b in blocks] + [np.inf] * len(planes))
+    half = [0.5 * b.size if b.is_box else np.full(3, np.nan) for b in blocks]
     radius = np.array([b.radius for b in blocks] + [np.inf] * len(planes))
     return Shapes(
         node_start,
@@ -125,11 +133,30 @@ def contact_shapes(blocks: list[Block], planes: list[FixedPlane], per_edge: int)
         np.concatenate(spreads) if spreads else np.zeros(0),
         radius,
         MARGIN * inner,
+        np.array(swells),
+        np.array([*half, *np.full((len(planes), 3), np.nan)]).reshape(-1, 3),
         _starts([len(ends) for ends, _, _ in edges] + [0] * len(planes)),
         np.concatenate([np.zeros((0, 2), np.int64), *(ends for ends, _, _ in edges)]),
         np.concatenate([np.zeros((0, 3)), *(out for _, out, _ in edges)]),
         np.concatenate([np.zeros(0, np.int64), *(like for _, _, like in edges)]),
     )
+
+
+def _swell(block: Block) -> float:
+    """Upper bound of how far the support of a block, max n·x over its points for a unit vector n, grows when all faces
+    move outwards by 1.
+
+    Where the faces with the normals N meet in a corner it is n·w with N w = 1. Of more than three faces those three
+    count whose normals have n between them, one of all threes that are no two parallel; it never exceeds the
+    growth of the block scaled up until its nearest face has moved so far."""
+    normals, offsets = block.planes
+    ways = []
+    for corner in range(len(block.vertices)):
+        at = [number for number, face in enumerate(block.faces) if corner in face]
+        for three in combinations(at, 3):
+            if abs(np.linalg.det(normals[list(three)])) > ROUND_OFF:
+                ways.append(np.linalg.norm(np.linalg.solve(normals[list(three)], np.ones(3))))
+    return float(min(max(ways), block.radius / offsets.min()))
 
 
 def _spreads(block: Block, points: Array, holders: list[list[int]]) -> Array:
