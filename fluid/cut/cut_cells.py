@@ -256,26 +256,52 @@ def _openings(w, piece, origin, part, out, n_open):
 
 
 @inlined
+def _wetted(cut, origin, count, n_near, n_wet):
+    """Append the wetted polygons of all pieces, with the piece in place of the part, and fill w.beside -> (state,
+    number of polygons)."""
+    w, out = cut.work, cut.out
+    for r in range(w.near_start[n_near]):
+        w.unclaimed[r] = 0.0
+    for piece in range(count):
+        first = n_wet
+        state, n_wet = wetted(cut, piece, origin, n_near, piece, n_wet)
+        if state != DONE:
+            return state, n_wet
+        area = 0.0
+        w.beside[piece, 0], w.beside[piece, 1], w.beside[piece, 2] = 0.0, 0.0, 0.0
+        for row in range(first, n_wet):
+            area += out.wet[row, 0]
+            for c in range(3):
+                w.beside[piece, c] += out.wet[row, 0] * out.wet[row, 4 + c]
+        if area > 0.0:
+            for c in range(3):
+                w.beside[piece, c] /= area
+    return DONE, n_wet
+
+
+@inlined
 def _emit(cut, cell, origin, count, n_near, whole, link_area, at):
     """Write the parts of one cell, their moments, wetted polygons and tetrahedra (and openings if link_area >= 0)."""
-    w, out = cut.work, cut.out
-    n_part, n_wet, n_open, n_tet = at[1], at[2], at[3], at[4]
-    parts = label_parts(w, count, cut.planes.normal, cut.limits.round_off, link_area)
+    w, out, limits = cut.work, cut.out, cut.limits
+    n_part, n_open, n_tet = at[1], at[3], at[4]
+    state, n_wet = _wetted(cut, origin, count, n_near, at[2])
+    if state != DONE:
+        return state
+    parts = label_parts(w, count, cut.planes.normal, limits.round_off, link_area, limits.unmatched)
     if n_part + parts > len(out.part_cell):
         return OUTPUT_FULL
+    for row in range(at[2], n_wet):
+        out.wet_part[row] = n_part + w.label[out.wet_part[row]]
     for part in range(n_part, n_part + parts):
         out.part_cell[part] = cell
         out.part_whole[part] = whole
         for c in range(10):
             out.part_moments[part, c] = 0.0
-    for r in range(w.near_start[n_near]):
-        w.unclaimed[r] = 0.0
     for piece in range(count):
         part = n_part + w.label[piece]
         piece_moments(w, piece, w.moments)
         merge_moments(out.part_moments[part], w.moments)
-        state, n_wet = wetted(cut, piece, origin, n_near, part, n_wet)
-        if state == DONE and link_area >= 0.0:
+        if link_area >= 0.0:
             state, n_open = _openings(w, piece, origin, part, out, n_open)
         if state == DONE and not whole:
             state, n_tet = fan(w, piece, part, out, n_tet)

@@ -1,9 +1,17 @@
-"""Connected parts of the water in a cell: pieces that touch across the planes they were split by."""
+"""Connected parts of the water in a cell: pieces that touch across the planes they were split by.
+
+A piece is one with what lies before it, over whatever area: bodies in a row whose sides are not quite flush leave
+slivers between the side of one and the extended side of the next. As a part of its own, such a sliver would be a film a
+thousandth of a cell thick and as long as the row, out of which moving bodies press water with any pressure.
+"""
 
 from __future__ import annotations
 
 from fluid.cut.polygons import load_face, shared_area
 from kernels.decorators import inner
+
+BEFORE = 0.5
+"""Cosine of the angle to the normal of a surface within which a plane lies before it."""
 
 
 @inner
@@ -16,8 +24,18 @@ def root(label, i):
 
 
 @inner
-def _linked_area(w, one, two, normals, round_off):
-    """Area over which two pieces touch: caps of one plane, one from each side."""
+def _in_front(w, piece, f, normals):
+    """Whether a face that a plane of a body cut into a piece lies before the surface that the piece lies on."""
+    g, along = w.tag[piece, f] // 2, 0.0
+    for k in range(3):
+        along += w.beside[piece, k] * normals[g, k]
+    return w.tag[piece, f] % 2 == 1 and along > BEFORE
+
+
+@inner
+def _linked(w, one, two, normals, round_off, enough, least):
+    """Whether two pieces touch over more than an area, `enough`, or over more than `least` before the surface that one
+    of them lies on: caps of one plane, one from each side."""
     area = 0.0
     for f in range(w.faces[one]):
         tag = w.tag[one, f]
@@ -28,8 +46,11 @@ def _linked_area(w, one, two, normals, round_off):
                 g = tag // 2
                 load_face(w, one, f, 0)
                 load_face(w, two, k, 1)
-                area += shared_area(w, 0, 1, normals[g, 0], normals[g, 1], normals[g, 2], round_off)
-    return area
+                shared = shared_area(w, 0, 1, normals[g, 0], normals[g, 1], normals[g, 2], round_off)
+                if shared > least and (_in_front(w, one, f, normals) or _in_front(w, two, k, normals)):
+                    return True
+                area += shared
+    return area > enough
 
 
 @inner
@@ -42,9 +63,9 @@ def _reaches_faces(w, piece):
 
 
 @inner
-def label_parts(w, count, normals, round_off, link_area):
+def label_parts(w, count, normals, round_off, link_area, least):
     """Number the connected parts of the fluid in w.label and return how many there are; with link_area < 0, one
-    part."""
+    part. Over areas up to least [m²] pieces touch by round-off only. w.beside is read."""
     for piece in range(count):
         w.label[piece] = 0 if link_area < 0.0 else piece
     if link_area < 0.0:
@@ -56,7 +77,7 @@ def label_parts(w, count, normals, round_off, link_area):
                 continue
             # A piece away from the faces of the cell must belong to one that is not.
             limit = link_area if _reaches_faces(w, one) and _reaches_faces(w, two) else 0.0
-            if _linked_area(w, one, two, normals, round_off) > limit:
+            if _linked(w, one, two, normals, round_off, limit, least):
                 w.label[max(a, b)] = min(a, b)
     for piece in range(count):
         w.label[piece] = root(w.label, piece)

@@ -39,6 +39,7 @@ class Workspace(NamedTuple):
     tag: Ints  # (pieces, faces) -1..-4 face of the cell; 2g outside plane g; 2g + 1 inside it
     faces: Integers  # (pieces,)
     label: Integers  # (pieces,) part of each live piece
+    beside: Floats  # (pieces, 3) mean normal of the faces of bodies that it lies on, by area; 0: none
     polygon: Floats  # (polygons, corners, 7)
     corners: Integers  # (polygons,)
     height: Floats  # (corners,) distances of a polygon to the current plane
@@ -63,6 +64,7 @@ def workspace(scale: int, n_bodies: int, n_planes: int) -> Workspace:
         np.zeros((pieces, loops), dtype=np.int64),
         np.zeros(pieces, dtype=np.int32),
         np.zeros(pieces, dtype=np.int32),
+        np.zeros((pieces, 3)),
         np.empty((polygons, 3 * corners, 7)),
         np.zeros(polygons, dtype=np.int32),
         np.empty(3 * corners),

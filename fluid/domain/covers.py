@@ -29,6 +29,8 @@ from kernels.decorators import inner, kernel
 NO_AREA = 1e-12
 # Cosine of the angle within which the normals of polygons belong to one face.
 ONE_SIDE = 0.5
+# Share of the area of a part's polygons that may look another way.
+TURNED = 0.01
 
 
 @dataclass(frozen=True)
@@ -101,7 +103,8 @@ def virtual_cells(mesh, elements, contacts, connection, part_in_slit, part_besid
 
 
 def lies_on(part, normal, area, n_parts: int) -> Array:
-    """(K, 3): mean normal of the wetted polygons of each cut part where all lie within 60 degrees of it, else zero.
+    """(K, 3): mean normal of the wetted polygons of each cut part where all but TURNED of their area lies within 60
+    degrees of it, else zero.
 
     part (S,) row of the part of each polygon, normal (S, 3), area (S,) [m2]."""
     mean = np.zeros((n_parts, 3))
@@ -109,7 +112,8 @@ def lies_on(part, normal, area, n_parts: int) -> Array:
         mean[:, k] = np.bincount(part, area * normal[:, k], minlength=n_parts)
     mean /= np.maximum(np.linalg.norm(mean, axis=1), 1e-300)[:, None]
     turned = np.einsum("sk,sk->s", normal, mean[part]) < ONE_SIDE
-    mean[part[turned]] = 0.0
+    away = np.bincount(part[turned], area[turned], minlength=n_parts)
+    mean[away > TURNED * np.bincount(part, area, minlength=n_parts)] = 0.0
     return mean
 
 

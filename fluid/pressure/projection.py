@@ -309,20 +309,23 @@ def _inflow(first, last, runs, cell_list, u_cell, fluid, out):
                     )
 
 
-def with_ghosts(pressure, air, wet, open_node, phi, cell_list, cells):
+def with_ghosts(pressure, air, wet, open_node, phi, cell_list, cells, volume):
     """Pressure (N,) continued to the dry corners of the listed cells through that of the air (N,) at the surface:
 
-    p_j = a_j + φ_j Σ_i (p_i - a_j) φ_i / Σ_i φ_i²,    over the wet corners i beside j, once for each shared cell."""
+    p_j = a_j + φ_j Σ_e |e| Σ_i (p_i - a_j) φ_i / Σ_e |e| Σ_i φ_i²,    over the wet corners i of the cells e at j.
+
+    volume (M,) [m³]: |e| of the fluid part. With each cell counted alike, the water of a crack of a thousandth of the
+    room, at 3 MPa as its sides met, pushed the surface beside the crack with that pressure: 12 J in one step."""
     n = len(pressure)
     out, up, down = copied(pressure), zeros((n,)), zeros((n,))
     state = Outside(pressure, air, wet, open_node, phi)
     reach = reach_of_cells(cell_list, cells)
-    owning(_with_ghosts, n, reach, len(cell_list), cell_list, state, cells, (up, down), out)
+    owning(_with_ghosts, n, reach, len(cell_list), cell_list, state, cells, volume, (up, down), out)
     return out
 
 
 @ranged
-def _with_ghosts(first, last, runs, cell_list, state, cells, sums, out):
+def _with_ghosts(first, last, runs, cell_list, state, cells, volume, sums, out):
     pressure, air, wet, open_node, phi = state
     up, down = sums
     for run in range(runs.shape[0]):
@@ -335,8 +338,8 @@ def _with_ghosts(first, last, runs, cell_list, state, cells, sums, out):
                 for b in range(4):
                     i = cells[e, b]
                     if wet[i] and not open_node[i]:
-                        up[j] += (pressure[i] - air[j]) * phi[i]
-                        down[j] += phi[i] * phi[i]
+                        up[j] += volume[e] * (pressure[i] - air[j]) * phi[i]
+                        down[j] += volume[e] * phi[i] * phi[i]
     for j in range(first, last):
         if not wet[j]:
             out[j] = air[j] + (phi[j] * up[j] / down[j] if down[j] > 0.0 else 0.0)

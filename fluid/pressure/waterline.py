@@ -45,7 +45,7 @@ def waterline_load(domain, faces, left_out, phi, wet, pressure, open_node, air=N
     reached[corners] = True
     beside = cells_touching(reached, domain.cells)
     outside = np.zeros(len(phi)) if air is None else air
-    ghosts = with_ghosts(p, outside, wet, open_node, phi, beside, domain.cells)
+    ghosts = with_ghosts(p, outside, wet, open_node, phi, beside, domain.cells, domain.volume)
     hats = hat_values(domain.nodes[corners], domain.face_corners[at])
     full, acting = ghosts[corners], p[corners]
     if air is not None:

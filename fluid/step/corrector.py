@@ -152,7 +152,8 @@ def _pressure_gradient(water, kept, pressure, scale):
     if kept.cushions is not None:  # dry nodes of a sea have its pressure below zero, not that of air
         in_pocket = kept.cushions.air.label > 0
         air[in_pocket] = pressure[in_pocket]
-    full = with_ghosts(pressure, air, kept.wet, unheld, kept.level_set, kept.wet_cells, t.cells)
+    phi, cells = kept.level_set, (t.cells, t.volume)
+    full = with_ghosts(pressure, air, kept.wet, unheld, phi, kept.wet_cells, *cells)
     return cell_gradient(kept.wet_cells, full, t.cells, t.parent, t.gradients, scale)
 
 

@@ -10,7 +10,7 @@ from coupler.commands.verify.figures import columns
 from fluid.cut.bodies import ConvexBodies
 from fluid.domain.moments import cells_touching
 from fluid.pressure import projection
-from fluid.pressure.projection import cell_gradient
+from fluid.pressure.projection import cell_gradient, with_ghosts
 from fluid.step.predictor import carry_remainder
 from tests.fluid.scenes import advance, column, rotation, tank
 
@@ -121,6 +121,20 @@ def test_water_that_has_hardly_moved_since_it_turned_keeps_the_remainder_of_its_
     for viscosity, left in ((0.0, 1.0 / (1.0 + 2.0 / 45.0)), (1.25, 1.0 / (3.0 + 4.0 / 45.0))):
         out = carry_remainder(np.array([0]), held, 0.02, u, 0.1, viscosity, cells, size)
         np.testing.assert_allclose(out, [[0.0, 0.02 * left, 0.36 * left]], rtol=1e-12)
+
+
+def test_a_sliver_of_water_does_not_decide_the_pressure_beyond_the_surface():
+    """Two cells share a dry corner. The water of one, a millionth of the room of the other, has a thousand times its
+    pressure: beyond the surface goes on what the other one has (-ρ g φ, to a thousandth)."""
+    phi = np.array([-0.1, -0.2, -0.3, 0.4, -0.1, -0.2, -0.3])
+    pressure, wet = -9810.0 * phi, phi < 0.0
+    pressure[4:] *= 1000.0
+    pressure[3] = 0.0
+    cells = np.array([[0, 1, 2, 3], [4, 5, 6, 3]], np.uint32)
+    volume = np.array([1e-3, 1e-9])
+    out = with_ghosts(pressure, np.zeros(7), wet, np.zeros(7, bool), phi, np.arange(2), cells, volume)
+    assert out[3] == pytest.approx(-9810.0 * 0.4, rel=2e-3)
+    np.testing.assert_array_equal(out[wet], pressure[wet])
 
 
 def test_water_that_hangs_together_with_a_surface_is_found_on_any_number_of_threads():
