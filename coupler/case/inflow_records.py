@@ -217,10 +217,10 @@ def _geoclaw(path: Path, spec: RecordInflow, turn: float) -> Record:
         raise RecordError(f"{path}: a gauge that moves with the water; a stationary one is needed")
     if any("binary" in line.lower() for line in head):
         raise RecordError(f"{path}: its numbers are in a binary file; let GeoClaw write gauges as ascii")
-    told = re.search(r"q\[\s*([\d\s]*?)\]\s*,\s*eta", " ".join(head))
-    if told is not None and told[1].split() != ["1", "2", "3"]:
+    header = re.search(r"q\[\s*([\d\s]*?)\]\s*,\s*eta", " ".join(head))
+    if header is not None and header[1].split() != ["1", "2", "3"]:
         raise RecordError(
-            f"{path}: it holds q[{' '.join(told[1].split())}]; depth and both momenta, q[1 2 3], and eta are needed"
+            f"{path}: it holds q[{' '.join(header[1].split())}]; depth and both momenta, q[1 2 3], and eta are needed"
         )
     rows = []
     for n, line in enumerate(text.split("\n"), 1):

@@ -100,7 +100,7 @@ def with_strength(case: Case) -> tuple[Case, list[tuple[KeyPath, str]]]:
     mistakes: list[tuple[KeyPath, str]] = []
     for name, example in (("strength", "0.5 MPa"), ("opening_at_failure", "5 mm")):
         if getattr(j, name) is None and (others or not used):
-            mistakes.append((("joints", name), f'missing; for instance "{example}"{_why(others, used)}'))
+            mistakes.append((("joints", name), f'missing; for instance "{example}"{_why(others)}'))
     weakest = _weakest(used.values()) if used else PRESETS["brick-masonry"]
     given = {
         "strength": weakest.strength if j.strength is None else j.strength,
@@ -109,7 +109,7 @@ def with_strength(case: Case) -> tuple[Case, list[tuple[KeyPath, str]]]:
     return case.model_copy(update={"joints": j.model_copy(update=given)}), mistakes
 
 
-def _why(others: list[str], used: dict[str, Material]) -> str:
+def _why(others: list[str]) -> str:
     """The end of a message that names a material without a preset; empty without one."""
     if not others:
         return ""

@@ -58,13 +58,13 @@ def check_balance(
             f"{limits.volume_error:.2%} (limits.volume_error). Reduce time.cfl or tank.cell."
         )
     if not math.isfinite(energy_error) or energy_error > limits.energy_error:
-        told = (
+        sentences = (
             f"the energy balance is off by {energy_error:.2%} of the input energy at t = {time:.4g} s; limit "
             f"{limits.energy_error:.2%} (limits.energy_error).",
             advice(),
             "See history/energy.csv for the line that grows.",
         )
-        raise Diverged(" ".join(filter(None, told)))
+        raise Diverged(" ".join(filter(None, sentences)))
 
 
 def check_momentum(time: float, momentum_error: float, limit: float) -> None:

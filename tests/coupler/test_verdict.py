@@ -274,7 +274,7 @@ def test_a_run_tells_that_a_shot_broke_a_column(tmp_path):
     rows = read_history(run / "blocks.csv")
     assert list(rows["member"]) == ["shot", "column", "column", "column"]
     assert np.nanmin(rows["first_break"][1:]) == reported["first_break"]["time"]
-    assert stands(run, read_summary(run), tmp_path)[0].startswith('<p class="verdict state-damaged">DAMAGED')
+    assert stands(read_summary(run), tmp_path)[0].startswith('<p class="verdict state-damaged">DAMAGED')
 
 
 CASE = {

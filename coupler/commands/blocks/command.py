@@ -61,7 +61,7 @@ def blocks(path: Path, options: dict, joints: dict, picture: Path | None, to: Pa
     if problems:
         print(f"no picture: {problems}")
     else:
-        _draw_blocks(cut, spec.name, picture)
+        _draw_blocks(cut, picture)
         print(f"picture: {picture}")
     print(_snippet(path, options))
 
@@ -152,7 +152,7 @@ def write_bodies(path: Path, cut: Cut) -> None:
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
-def _draw_blocks(cut: Cut, name: str, picture: Path) -> None:
+def _draw_blocks(cut: Cut, picture: Path) -> None:
     groups = sorted({b.group for b in cut.blocks})
     triangles, part, edges = [], [], []
     for block in cut.blocks:

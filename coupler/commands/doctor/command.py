@@ -176,8 +176,8 @@ def _yade_run() -> Finding:
     """YADE must compute ten steps of a falling sphere: v = g t."""
     status, output = _in_process(_FALLING_SPHERE)
     if status != 0:
-        told = any(name in output for name in ("YadeNeedsPackage", "YadeMissing", "WrongYade"))
-        remedy = "as its message says" if told else "apt install --reinstall yade"
+        explained = any(name in output for name in ("YadeNeedsPackage", "YadeMissing", "WrongYade"))
+        remedy = "as its message says" if explained else "apt install --reinstall yade"
         return Finding("ten steps of YADE", _last(output), False, remedy)
     result = json.loads(output.splitlines()[-1])
     good = abs(result["z"] + 9.81 * 0.01) < 1e-12

@@ -37,14 +37,14 @@ def offshore(path: Path) -> Path:
     places = _places(found, case, str(path))
     given = _arrays(found, case, str(path)) | {"places": places - np.array(found.sea.lower)}
     with tempfile.TemporaryDirectory() as folder:
-        there, out = Path(folder) / "sea.npz", Path(folder) / "told.npz"
+        there, out = Path(folder) / "sea.npz", Path(folder) / "at_the_side.npz"
         np.savez(there, **given)
         done = run_module("coupler.commands.offshore.in_anuga", there, out, cwd=folder, stderr=-1, text=True)
         if done.returncode != 0:
             raise OffshoreFailed([f"{path}: ANUGA: {trouble(done.returncode, done.stderr)}"])
         with np.load(out) as file:
-            told = {name: file[name] for name in file.files}
-    return _written(found, case, told, path)
+            computed = {name: file[name] for name in file.files}
+    return _written(found, case, computed, path)
 
 
 def _places(found: Offshore, case, name: str) -> Array:
@@ -98,12 +98,12 @@ def _arrays(found: Offshore, case, name: str) -> dict:
         axis, end = "xy".index(spec.side[0]), -1 if spec.side[1] == "+" else 0
         edge = given["bed"][end] if axis == 0 else given["bed"][:, end]
         floor = float(np.minimum(edge, sea.level).mean())
-        told = record_of(spec, turn, floor, case.case.gravity)
-        depth = np.maximum(told.level[:, 0] - floor, 0.0)
-        inward = (1.0 if spec.side[1] == "-" else -1.0) * depth * told.velocity[:, 0]
-        along = depth * told.sideways[:, 0]
+        record = record_of(spec, turn, floor, case.case.gravity)
+        depth = np.maximum(record.level[:, 0] - floor, 0.0)
+        inward = (1.0 if spec.side[1] == "-" else -1.0) * depth * record.velocity[:, 0]
+        along = depth * record.sideways[:, 0]
         momenta = (inward, along) if axis == 0 else (along, inward)
-        given[f"record {spec.side}"] = np.column_stack([told.time, told.level[:, 0], *momenta])
+        given[f"record {spec.side}"] = np.column_stack([record.time, record.level[:, 0], *momenta])
     return given
 
 
@@ -125,48 +125,48 @@ def _moved(found: Offshore, ground: HeightMap | None, X: Array, Y: Array) -> Arr
     return moved
 
 
-def _written(found: Offshore, case, told: dict, path: Path) -> Path:
+def _written(found: Offshore, case, computed: dict, path: Path) -> Path:
     """The record, level and velocities in the coordinates of the near tank, and a table of what came."""
     near = found.near
     axis = "xy".index(near.side[0])
     low, high = case.tank.lower[1 - axis], case.tank.upper[1 - axis]
     along = [0.0] if near.points == 1 else np.linspace(low, high, near.points)
-    depth = told["stage"] - told["elevation"]
+    depth = computed["stage"] - computed["elevation"]
     wet = depth > DRY
     if not wet.any():
         what = f"{near.side} of {near.case} is dry land in the sea for the whole run"
         raise BadCase([f"{path}: near.side: {what}: check the datum"])
-    u, v = (np.where(wet, told[k] / np.where(wet, depth, 1.0), 0.0) for k in ("xmomentum", "ymomentum"))
+    u, v = (np.where(wet, computed[k] / np.where(wet, depth, 1.0), 0.0) for k in ("xmomentum", "ymomentum"))
     across, sideways = (u, v) if axis == 0 else (v, u)
     velocity = across if near.side[1] == "-" else -across
     out = Path(near.record)
     lines = [
         f"# written by surgebreak offshore from {path.name}: side {near.side} of {Path(near.case).name}, "
-        f"{int(told['triangles'])} triangles of ANUGA"
+        f"{int(computed['triangles'])} triangles of ANUGA"
     ]
     single = near.points == 1
     lines.append(",".join(COLUMNS) if single else ",".join((COLUMNS[0], ALONG, *COLUMNS[1:], SIDEWAYS)))
-    for n, t in enumerate(told["time"]):
+    for n, t in enumerate(computed["time"]):
         for k, place in enumerate(along):
-            values = (told["stage"][n, k], velocity[n, k])
+            values = (computed["stage"][n, k], velocity[n, k])
             row = (t, *values) if single else (t, place, *values, sideways[n, k])
             lines.append(",".join(f"{value:.9g}" for value in row))
     try:
         out.write_text("\n".join(lines) + "\n", encoding="utf-8")
     except OSError as error:
         raise BadCase([f"{path}: near.record: {out}: {error.strerror}"]) from error
-    level = told["stage"] - found.sea.level
+    level = computed["stage"] - found.sea.level
     first = int(np.argmax(np.abs(level).max(axis=1) > 0.05 * np.abs(level).max()))
     terminal.table(
         str(out),
         [
-            Row("sea", int(told["triangles"]), "triangles", f"{found.sea.end:g} s"),
+            Row("sea", int(computed["triangles"]), "triangles", f"{found.sea.end:g} s"),
             Row("highest level", float(level.max() + found.sea.level), "m", "z"),
             Row("lowest level", float(level.min() + found.sea.level), "m", "z"),
             Row("largest velocity", float(np.abs(velocity).max()), "m/s", "across the side"),
             Row(
                 "arrival",
-                float(told["time"][first]),
+                float(computed["time"][first]),
                 "s",
                 "of a twentieth of the largest level; cut by start",
             ),

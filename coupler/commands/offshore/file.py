@@ -161,14 +161,14 @@ def _mistakes(found: Offshore):
                 "sides of the offshore sea let go what comes back anyway; leave it out",
             )
         try:
-            told = record_of(spec)
+            record = record_of(spec)
         except RecordError as error:
             yield ("inflow", i, "path"), str(error)
             continue
-        if told.varies:
+        if record.varies:
             yield (
                 ("inflow", i, "path"),
                 "one place for the whole side is needed here; leave the column along out",
             )
-        elif sea.floor is not None and np.min(told.level) < sea.floor:
-            yield ("inflow", i, "path"), f"its level falls to z = {np.min(told.level):g} m, below sea.floor"
+        elif sea.floor is not None and np.min(record.level) < sea.floor:
+            yield ("inflow", i, "path"), f"its level falls to z = {np.min(record.level):g} m, below sea.floor"

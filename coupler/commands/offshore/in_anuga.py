@@ -54,8 +54,8 @@ def main(source: str, out: str) -> None:
         if t >= end * (shown + 1) / STEPS:
             shown = int(STEPS * t / end)
             print(f"offshore: {100 * shown // STEPS} %", flush=True)
-    told = np.array(rows)
-    np.savez(out, time=time, triangles=len(domain), **{name: told[:, k] for k, name in enumerate(names)})
+    values = np.array(rows)
+    np.savez(out, time=time, triangles=len(domain), **{name: values[:, k] for k, name in enumerate(names)})
 
 
 def _stage(bed, level: float, moved):

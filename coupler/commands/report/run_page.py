@@ -74,7 +74,7 @@ def run_page(run: Path, summary: dict, pictures: Path, remarks: list[str]) -> st
             paragraph(summary["case"]["case"].get("description", "")),
             _verdict(run, summary),
             _doubts(summary),
-            section("Does it stand?", *stands(run, summary, pictures)),
+            section("Does it stand?", *stands(summary, pictures)),
             section("What was run", _what(run, summary)),
             section("Results", _figures(summary), _promises(summary)),
             section("Notes before the run", _notes(summary)),

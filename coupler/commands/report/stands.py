@@ -19,7 +19,7 @@ MOST = 30
 """Rows of a table of walls and floors."""
 
 
-def stands(run: Path, summary: dict, pictures: Path) -> list[str]:
+def stands(summary: dict, pictures: Path) -> list[str]:
     """Pieces of the section; none for a run without a structure."""
     judged = summary["figures"].get("verdict")
     if not judged:

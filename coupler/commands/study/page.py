@@ -23,7 +23,7 @@ def page(study: dict, level: int = 1, pictures: str = "") -> str:
         f"{mark} {study['title']}",
         *([study["note"]] if study["note"] else []),
         _where(study),
-        *(_quantity(study, q, mark, pictures) for q in study["quantities"]),
+        *(_quantity(study, q, pictures) for q in study["quantities"]),
         f"{mark}# Runs\n\n{_ladders(study)}\n\n{_runs(study)}",
         f"{mark}# Cheapest setting for an error\n\n{_cheapest(study)}",
     ]
@@ -59,7 +59,7 @@ def _first_step(study: dict) -> str:
     )
 
 
-def _quantity(study: dict, q: dict, mark: str, pictures: str) -> str:
+def _quantity(study: dict, q: dict, pictures: str) -> str:
     against = AGAINST[q["against"]]
     if q["finest"]:
         against += f" ({q['finest']['ladder']} {q['finest']['label']})"

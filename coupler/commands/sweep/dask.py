@@ -119,7 +119,7 @@ class Dask:
             return
         busy = {address for address, keys in client.processing().items() if keys}
         workers = client.scheduler_info(n_workers=-1)["workers"]
-        idle = [told["name"] for address, told in workers.items() if address not in busy]
+        idle = [worker["name"] for address, worker in workers.items() if address not in busy]
         if idle:
             cluster.sync(cluster.scale_down, idle[: there - target])
 

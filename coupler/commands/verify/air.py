@@ -21,8 +21,6 @@ from fluid.step.parameters import WaterParameters
 from fluid.step.water import Water
 
 GRAVITY = 9.81
-OUTER = 101_325.0
-"""Pressure of the open air [Pa]."""
 INNER, WALL, HEIGHT = 0.64, 0.12, 0.64
 """Bell: inner width, thickness of its walls and inner height [m]."""
 WIDE = INNER + 2.0 * WALL

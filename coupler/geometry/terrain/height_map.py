@@ -7,7 +7,7 @@ Between the points of the raster heights are bilinear.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -79,10 +79,6 @@ class HeightMap:
         along = (np.diff(z, axis=0)[:, 1:] + np.diff(z, axis=0)[:, :-1]) / (2.0 * dx)
         across = (np.diff(z, axis=1)[1:] + np.diff(z, axis=1)[:-1]) / (2.0 * dy)
         return np.hypot(along, across)
-
-    def with_heights(self, z) -> HeightMap:
-        """The same places with other heights (nx, ny) [m]."""
-        return replace(self, z=z)
 
 
 def _cell(place, points: int):

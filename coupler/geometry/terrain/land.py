@@ -159,8 +159,8 @@ def _values(case, above: KeyPath, land, law: str) -> Iterator[Problem]:
     codes = LandMap(there.x, there.y, code, np.nan, there.ground).looked_up(X, Y)[0]
     lost = np.unique(codes[np.isfinite(codes) & ~np.isin(codes, [use.code for use in land.use])])
     if len(lost):
-        told = ", ".join(f"{c:g}" for c in lost[:SHOWN]) + (", ..." if len(lost) > SHOWN else "")
+        shown = ", ".join(f"{c:g}" for c in lost[:SHOWN]) + (", ..." if len(lost) > SHOWN else "")
         yield (
             (*above, "use"),
-            f"{name} has codes in the tank that no [[terrain.land.use]] has: {told}; write one for each",
+            f"{name} has codes in the tank that no [[terrain.land.use]] has: {shown}; write one for each",
         )

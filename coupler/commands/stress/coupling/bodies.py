@@ -41,11 +41,6 @@ def cube(name: str, centre, density: float, **more) -> Block:
     return Block(name, centre, size=EDGE, density=density, **more)
 
 
-def submerged_weight(density: float) -> float:
-    """Weight less buoyancy of a cube [N]."""
-    return (density - DENSITY) * EDGE**3 * G
-
-
 @scene("C01", "cube of a hundredth of the density of water let go under it")
 def light_released() -> Iterator[Measure]:
     """The added mass is 50 times the block's own: a staggered scheme would diverge in two steps. It must not rise
