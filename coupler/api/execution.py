@@ -55,6 +55,7 @@ class _Watch:
     def step(
         self, coupling: CoupledStepper, record: StepRecord, figures: dict[str, Any], readings: dict[str, Any]
     ) -> None:
+        """Call both with the present `Step`."""
         step = Step(coupling, record, figures, readings)
         if self._callback is not None:
             self._callback(step)
@@ -64,6 +65,7 @@ class _Watch:
             self.reason = f"stopped by the script at t = {coupling.time:.6g} s{text}"
 
     def stop_reason(self) -> str | None:
+        """Why the script asked to stop; None while it has not."""
         return self.reason
 
 

@@ -58,6 +58,7 @@ class Balance:
 
     @property
     def interface_residual(self) -> float:
+        """Work that the water gave less what the blocks received [J] so far."""
         return self.work_given - self.work_received
 
 

@@ -32,6 +32,7 @@ class Key:
 
     @property
     def required(self) -> bool:
+        """Whether a case must give it."""
         return self.default == REQUIRED
 
 

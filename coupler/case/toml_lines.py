@@ -46,6 +46,7 @@ class _Scan:
         self.count: dict[Path, int] = {}
 
     def run(self) -> dict[Path, int]:
+        """The line, counted from 1, of every key of the text."""
         table: Path = ()
         while self._skip():
             if self.text[self.at] == "[":

@@ -57,6 +57,7 @@ class CaseFile:
 
     @property
     def directory(self) -> Path:
+        """Directory of the case file, to which its paths are relative."""
         return self.path.parent
 
 
@@ -179,6 +180,7 @@ class _Places:
         self.overrides: dict[KeyPath, str] = {}
 
     def override(self, path: KeyPath, text: str) -> None:
+        """Note that a value at this path comes from `text` of the command line."""
         self.overrides[path] = text
 
     def line(self, path: KeyPath) -> int:
@@ -323,6 +325,7 @@ def _leave_out(table: dict, path: KeyPath, override: str) -> None:
 
 
 def parse_path(name: str) -> KeyPath:
+    """Names and positions of `water.fill[0].upper`, `[+]` as NEW; empty for a text that is no path."""
     if not re.fullmatch(r"[A-Za-z0-9_-]+(\[\d+\]|\.[A-Za-z0-9_-]+)*(\[\+\])?", name):
         return ()
     parts = re.findall(r"\[(\d+|\+)\]|([A-Za-z0-9_-]+)", name)

@@ -92,16 +92,16 @@ class Silent:
     """A Reporter that prints nothing and never asks to stop."""
 
     def step(self, time, figures) -> None:
-        return None
+        """Nothing."""
 
     def expect(self, calm: bool, broken: bool) -> None:
-        return None
+        """Nothing."""
 
     def message(self, text: str) -> None:
-        return None
+        """Nothing."""
 
     def stop_requested(self) -> None:
-        return None
+        """Never asks."""
 
 
 def warm_up(part: str = "both") -> None:

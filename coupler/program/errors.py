@@ -76,6 +76,7 @@ class _Briefly(reprlib.Repr):
         self.maxlevel = 4
 
     def repr_int(self, value: int, level: int) -> str:
+        """A whole number, or how many digits it has where these are many."""
         digits = int(value.bit_length() * 0.30103) + 1
         return repr(value) if digits <= 60 else f"a whole number of about {digits} digits"
 

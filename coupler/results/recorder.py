@@ -310,6 +310,7 @@ class Recorder:
         return verdict(self.coupling.structure, self.watch)
 
     def close(self) -> None:
+        """Close all tables."""
         for table in self._tables.values():
             table.close()
 

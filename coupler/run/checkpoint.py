@@ -131,6 +131,7 @@ class Checkpoints:
         self._next = next_multiple(self._last, every)
 
     def due(self) -> bool:
+        """Whether the interval since the last checkpoint has passed."""
         return self.scene.coupling.time >= self._next * (1.0 - 1e-12)
 
     def write(self, figures: dict, cpu_seconds: dict[str, float]) -> None:

@@ -87,6 +87,7 @@ class RunDirectory:
 
     @property
     def log_path(self) -> Path:
+        """File of the messages."""
         return self.path / "log.txt"
 
     @property

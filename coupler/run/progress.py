@@ -51,6 +51,7 @@ class ProgressFile:
         self._written = -math.inf
 
     def step(self, time: float, figures: Mapping[str, str]) -> None:
+        """Pass a step on, and write the file if the last one is EVERY seconds old."""
         self.inner.step(time, figures)
         if clock.monotonic() - self._written >= EVERY or time >= self.inner.end:
             self._written = clock.monotonic()
@@ -81,6 +82,7 @@ class _Base:
         self._tenth = 0
 
     def expect(self, calm: bool, broken: bool) -> None:
+        """Tell the forecast of the remaining time what the structure is doing; see `Pace.expect`."""
         self.pace.expect(calm, broken)
 
     def _line(self, time: float, figures: Mapping[str, str]) -> str:
@@ -118,12 +120,14 @@ class LineReporter(_Base):
         self.stream = stream
 
     def step(self, time: float, figures: Mapping[str, str]) -> None:
+        """Print a line at each tenth of the run."""
         if self._new_tenth(time):
             line = self._line(time, figures)
             print(line, file=self.stream, flush=True)
             self.log(line)
 
     def message(self, text: str) -> None:
+        """Print a message and log it."""
         print(text, file=self.stream, flush=True)
         self.log(text)
 
@@ -153,6 +157,7 @@ class BarReporter(_Base):
         self._bar.stop()
 
     def step(self, time: float, figures: Mapping[str, str]) -> None:
+        """Redraw the bar; the log gets a line at each tenth."""
         if self._new_tenth(time):
             self.log(self._line(time, figures))
         reported = "  ".join(f"{name} {text}" for name, text in figures.items())
@@ -166,6 +171,7 @@ class BarReporter(_Base):
             self._bar.refresh()
 
     def message(self, text: str) -> None:
+        """Print a message above the bar and log it."""
         self._bar.console.print(text, markup=False)
         self.log(text)
 

@@ -112,6 +112,7 @@ class CoupledStepper:
 
     @property
     def coupled(self) -> bool:
+        """Whether there are both water and structure."""
         return self.water is not None and self.structure is not None
 
     def step_size(self, remaining: float) -> float:

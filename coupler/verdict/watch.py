@@ -40,6 +40,7 @@ class Peaks:
 
     @classmethod
     def none(cls, k: int) -> Peaks:
+        """No value yet, for k rows: zeros at no time (NaN)."""
         return cls(np.zeros(k), np.full(k, np.nan))
 
     def take(self, value: Array, time: float) -> Array:

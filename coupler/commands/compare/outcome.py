@@ -41,14 +41,17 @@ class Outcome:
 
     @property
     def broken(self) -> int:
+        """Number of joints that are broken at the end."""
         return int(self.table["joints_broken"][-1])
 
     @property
     def cpu_seconds(self) -> float:
+        """Processor time of time stepping [s]."""
         return float(self.figures["cpu_seconds"])
 
     @property
     def us_per_substep(self) -> float:
+        """Processor time of a substep [µs]."""
         return 1e6 * self.cpu_seconds / self.figures["substeps"]
 
     @property

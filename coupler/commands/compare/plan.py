@@ -27,10 +27,12 @@ class OwnLaw:
 
     @property
     def title(self) -> str:
+        """Name in tables and figures."""
         return self.name
 
     @property
     def stem(self) -> str:
+        """Name of its files, without an ending."""
         return self.name
 
 

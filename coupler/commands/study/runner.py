@@ -80,6 +80,7 @@ class Measured:
 
     @property
     def failed(self) -> bool:
+        """Whether the run ended with an error; `reason` says which."""
         return bool(self.reason)
 
 

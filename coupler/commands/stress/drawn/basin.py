@@ -36,6 +36,7 @@ class Basin:
 
     @property
     def size(self) -> np.ndarray:
+        """Edges (3,) [m]."""
         return self.upper - self.lower
 
     def floor(self, low, high) -> float:

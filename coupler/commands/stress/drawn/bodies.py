@@ -29,10 +29,12 @@ class Slot:
 
     @property
     def size(self) -> np.ndarray:
+        """Edges (3,) [m]."""
         return self.high - self.low
 
     @property
     def middle(self) -> np.ndarray:
+        """Centre (3,) [m]."""
         return 0.5 * (self.low + self.high)
 
     def edges(self, dice: Dice) -> np.ndarray:
