@@ -77,7 +77,9 @@ def finite_plates():
     for openings in ("all", "wide"):
         for row, width in enumerate(table["L_over_D"][:3]):
             found, exact = jet(width, 8, aside=0.5, openings=openings).force, float(table["F"][row])
-            what = f"edges half a cell from nodes, openings {openings}: force, L/D = {width:g}, 8 cells {TOLD}"
+            what = (
+                f"edges half a cell from nodes, openings {openings}: force, L/D = {width:g}, 8 cells {TOLD}"
+            )
             yield Finding(what, found, exact, ANY)
     open_air = jet(1.0, 8, suction="unlimited")
     exact = float(table["F"][1])
@@ -129,7 +131,14 @@ def jet(
 
 
 def _start(
-    width: float, n: int, angle: float, courant: float, suction: str, finer: float, aside: float, openings: str
+    width: float,
+    n: int,
+    angle: float,
+    courant: float,
+    suction: str,
+    finer: float,
+    aside: float,
+    openings: str,
 ):
     """The water, the middle (3,) of the front of the plate, and the direction (3,) along the plate."""
     cell, turn = 1.0 / n, np.radians(90.0 - angle)

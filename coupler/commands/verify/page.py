@@ -30,12 +30,12 @@ NOTES = {
     "0.087 m, and 0.078 m with the bed moved by 0.1 mm. Since distances to the surface and the correction of its "
     "volume have no jumps ([theory](theory.md#last-digits)), differences of last digits stay small.",
     "P62": "Next to an edge the pressure varies with the square root of the distance; linear cells spread this "
-    "variation over two cells. The plate is half of D thick: with two cells over D and fewer, thinner than two cells. There "
-    "narrow openings are closed (`openings = wide`), elsewhere every opening counts (`all`). With `wide` also there, the "
-    "plate acts as if it were up to half a cell longer at each edge that does not lie on nodes: 1.00 to 1.12 times the "
-    "force on a plate of width D with eight cells over D, depending on its place, and 1.10 to 1.21 with four; with `all` "
-    "0.95 to 1.01 and 0.99 to 1.11. With a quarter of the step the plate of width D receives 4 to 6 % more, depending on "
-    "its place.",
+    "variation over two cells. The plate is half of D thick: with two cells over D and fewer, thinner than "
+    "two cells. There narrow openings are closed (`openings = wide`), elsewhere every opening counts (`all`)."
+    " With `wide` also there, the plate acts as if it were up to half a cell longer at each edge that does "
+    "not lie on nodes: 1.00 to 1.12 times the force on a plate of width D with eight cells over D, depending "
+    "on its place, and 1.10 to 1.21 with four; with `all` 0.95 to 1.01 and 0.99 to 1.11. With a quarter of "
+    "the step the plate of width D receives 4 to 6 % more, depending on its place.",
     "P63": "What is missed are sheets thinner than a cell: of a jet at 30 degrees one fifteenth runs back along the "
     "plate, a quarter of a cell with four cells over the jet. For eight places of plate and jet within the cells the "
     "force is 1.025 ± 0.031 (mean and standard deviation) at 30 degrees with four cells over the jet, 1.028 ± 0.035 "
@@ -67,16 +67,17 @@ NOTES = {
 """What is known about cases that exceed a tolerance."""
 ALWAYS = {
     "P56": "The sheet of water that reaches the cubes is 3 to 5 cm deep: less than a cell of edge/3, three to four "
-    "cells of edge/12. It brings 45 N over the width of a cube from 0.8 to 1.0 s. A part of that passes by: a "
-    "column held in their place receives 37 N on cells of edge/12 and of edge/24, 33 N on edge/6 and "
-    "20 N on edge/3 ([theory](theory.md#3-coupling)). Friction decides how the stack fails, and nobody has measured it. "
-    "In the record the top cube sinks by 10 cm while it moves by 3 cm: the lowest cube leaves the stack and the other "
-    "two tip over backwards. With 0.15 between all faces, from the simulation of this experiment that comes with "
-    "DualSPHysics and whose contacts are between faces, they do so here, 0.1 s before the measured ones. With 0.25 the "
-    "lowest cube is only 25 mm ahead at 1.1 s, and with 0.45 between cubes and 0.35 on the bed, which re-simulations "
-    "with contacts between particles use, the stack slides as a whole: the top cube is then at 1.97, 2.09 and 2.22 m at "
-    "1.2, 1.4 and 1.6 s, and does not fall. Agreement within the limits is therefore evidence for the load on the "
-    "lowest cube, and for the mechanism, but not independent of the choice of this coefficient.",
+    "cells of edge/12. It brings 45 N over the width of a cube from 0.8 to 1.0 s. A part of that passes by: a"
+    " column held in their place receives 37 N on cells of edge/12 and of edge/24, 33 N on edge/6 and 20 N on"
+    " edge/3 ([theory](theory.md#3-coupling)). Friction decides how the stack fails, and nobody has measured "
+    "it. In the record the top cube sinks by 10 cm while it moves by 3 cm: the lowest cube leaves the stack "
+    "and the other two tip over backwards. With 0.15 between all faces, from a simulation of this experiment "
+    "with contacts between faces (an example of DualSPHysics, compared with the same record), they do so "
+    "here, 0.1 s before the measured ones. With 0.25 the lowest cube is only 25 mm ahead at 1.1 s, and with "
+    "0.45 between cubes and 0.35 on the bed, which re-simulations with contacts between particles use, the "
+    "stack slides as a whole: the top cube is then at 1.97, 2.09 and 2.22 m at 1.2, 1.4 and 1.6 s, and does "
+    "not fall. Agreement within the limits is therefore evidence for the load on the lowest cube, and for the"
+    " mechanism, but not independent of the choice of this coefficient.",
 }
 """What has to be known to judge the figures of a case, whether it passes or not."""
 
