@@ -21,6 +21,14 @@ def test_a_jet_loses_nothing_where_finer_cells_begin(width):
     assert jet(width, 4, finer=1.0).force == pytest.approx(jet(width, 4, finer=12.0).force, rel=0.015)
 
 
+def test_the_place_of_the_edges_between_the_nodes_hardly_matters():
+    """Plate and jet moved within a cell: where openings below 0.35 h² were closed, edges half a cell from the nodes
+    cost 12 %, as if the plate were half a cell longer at each of them."""
+    for aside in (0.25, 0.5):
+        assert jet(1.0, 8, aside=aside).force == pytest.approx(EXACT[1.0], rel=0.07)
+    assert jet(1.0, 8, aside=0.5, openings="wide").force > 1.09 * EXACT[1.0]
+
+
 def test_without_the_bound_the_edges_of_a_plate_are_pulled_at():
     """Suction at the edges takes force off the plate; the bound lets air in there, as it is."""
     bounded, pulled = jet(1.0, 4), jet(1.0, 4, suction="unlimited")
