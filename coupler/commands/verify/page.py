@@ -16,15 +16,15 @@ NOTES = {
     "walls reduces it to the measured value, but by an amount that depends on the cells, because nothing "
     "mixes the boundary layer; on cells of H/64 sensors 2 and 3 agree with the measurement: "
     "[water](water.md).",
-    "P39": "H3 lies behind the box. The moment at which the jet falls there differs from run to run, and depends on the "
-    "diagonals along which the cells are split ([water](water.md#which-way-the-cells-are-split)).",
+    "P39": "H3 lies behind the box. The moment at which the jet falls there differs from run to run, and depends on "
+    "the diagonals along which the cells are split ([water](water.md#which-way-the-cells-are-split)).",
     "P40": "P3 is 1.2 cells below the edge of the box. With one unknown for both faces of the edge it gives 0.45 to "
     "0.81 of the measured impulse on cells of 4.2 to 6.3 cm, and with separate unknowns 0.71 to 0.83; the "
     "rest is missing in the first 40 ms. The front is late by this time according to the clock of the record, "
     "which is ahead of a dam that vanishes at t = 0, and because the tip of the front is thinner than a cell "
     "([water](water.md#against-measurements)).",
-    "P61": "The run-up in the lee is where last digits showed most: with the island moved by 1e-6 m an early version gave "
-    "0.094 m instead of 0.0775 m. Distances to the surface and the correction of its volume have no jumps "
+    "P61": "The run-up in the lee is where last digits showed most: with the island moved by 1e-6 m an early version "
+    "gave 0.094 m instead of 0.0775 m. Distances to the surface and the correction of its volume have no jumps "
     "([theory](theory.md#last-digits)), so that differences of last digits stay small.",
     "P62": "Next to an edge the pressure varies with the square root of the distance; linear cells spread this "
     "variation over two cells. The plate is half of D thick: with two cells over D and fewer, thinner than "
