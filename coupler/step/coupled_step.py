@@ -290,6 +290,7 @@ class CoupledStepper:
             corrected_free_velocity,
             defect,
             solve_coupled,
+            start_of_water,
         )
         from fluid.numerics.bounded import solve_bounded
 
@@ -300,7 +301,7 @@ class CoupledStepper:
             wetting = Wetting.of(problem.coupling)
         record.wetted = problem.coupling.nnz > 0
         before, free = self._padded(structure.velocity()), ~structure.still
-        found: CoupledSolution | None = None
+        found, water_from = None, before
         whole = self._joints_broken()
         passes = Passes(self.passes if record.wetted else 1, self.tolerance)
         while not passes.done:
@@ -310,7 +311,7 @@ class CoupledStepper:
             report = self._advance(problem.dt, found, start if passes.number > 0 else None)
             record.iterations += found.iterations
             record.substeps += report.substeps
-            lead = response.lead(found.velocity, before, report.dt_s)
+            lead = response.lead(found.velocity, water_from, report.dt_s)
             assumed = (found.velocity - lead)[: structure.n]
             if record.wetted:
                 floor = self._defect_floor(found.load, problem.dt, free)
@@ -322,7 +323,8 @@ class CoupledStepper:
             if not passes.done:
                 moved = passes.next_start(self._padded(assumed), self._padded(report.mean_velocity))
                 response = self._answer(mass, problem.dt, before, afloat)
-                after = response.at_end(moved, before, report.dt_s)
+                water_from = start_of_water(response.mass, before, self.water.pushed_by, moved)
+                after = response.at_end(moved, water_from, report.dt_s)
                 v_free = corrected_free_velocity(response, after, found.x, problem.coupling)
         record.passes = passes.number
         assert found is not None  # there is one pass at least

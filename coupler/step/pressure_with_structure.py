@@ -35,7 +35,9 @@ motion of the discrete elements under the first load x₁, with the mean velocit
 V_free = V + D⁻¹ Gᵀ x₁ with the V of which W is the mean by (4), V = W + L(V). With the L of the first pass instead, the
 error of blocks that collide within the step, which the first pass could not foresee, would only be halved in each pass.
 D and L are then those of the joints and contacts at the end of the first pass: a block that the water presses to the
-floor is held by contacts that begin within the step.
+floor is held by contacts that begin within the step.  And where the water did not move with a block before the step,
+V^n in (4) is `start_of_water`: a block thrown at the bed through still water comes back within the step, and with its
+own V^n the water would have to turn round with it.
 """
 
 from __future__ import annotations
@@ -265,6 +267,27 @@ def solve_coupled(
         parting=found.parting,
         lower=found.lower,
     )
+
+
+def start_of_water(mass: sp.csr_array, before: Array, pushed_by: Array, mean: Array) -> Array:
+    """V^n (n, 6) of (4) for a second pass: the velocities `before` (n, 6) of the bodies at the start of the step, as
+    far as those are compatible with the ones that the water had beside them, pushed_by (n, 6), and with the mean (n, 6)
+    over the step.
+
+    The water receives the work of F over the mean of its velocities V_w = pushed_by and V, the ledger that over
+    V - L = (V^n + V)/2. With V = 2 mean - V^n and F = -m (V - V_w)/dt for an added mass m it gains
+
+        -½ m (V - V_w)·(V^n - V_w) = -½ m (2 w - d)·d,    d = V^n - V_w,    w = mean - V_w,
+
+    a loss as long as the block goes on as it came, which is what an inelastic start costs. Where it comes back within
+    the step the water gains. d is therefore taken to the closest one without gain, |d - w| <= |w| in the norm of the
+    kinetic energy of each body."""
+    d, w = before - pushed_by, mean - pushed_by
+    ahead = d - w
+    excess = np.sqrt(np.einsum("nk,nk->n", ahead, (mass @ ahead.ravel()).reshape(-1, 6)))
+    allowed = np.sqrt(np.einsum("nk,nk->n", w, (mass @ w.ravel()).reshape(-1, 6)))
+    share = np.where(excess > allowed, allowed / np.where(excess > 0.0, excess, 1.0), 1.0)
+    return np.where(share[:, None] < 1.0, pushed_by + w + share[:, None] * ahead, before)
 
 
 def corrected_free_velocity(

@@ -19,6 +19,7 @@ from coupler.step.pressure_with_structure import (
     impulse_energy,
     mass_matrix,
     solve_coupled,
+    start_of_water,
 )
 from coupler.step.record import StepRecord
 from tests.fakes import direct_solve, no_clock, piston_column
@@ -232,6 +233,36 @@ def test_the_velocity_at_the_end_is_the_one_whose_mean_was_found(stiffness):
         assert end[0, 0] == pytest.approx(0.0, abs=0.05)
 
 
+@pytest.mark.parametrize(
+    ("before", "water", "mean", "start"),
+    [
+        (
+            [5.0, 0.0],
+            [5.0, 0.0],
+            [-1.0, 0.0],
+            [5.0, 0.0],
+        ),  # the water moves with it: it turns round with it, too
+        ([5.0, 0.0], [0.0, 0.0], [4.0, 0.0], [5.0, 0.0]),  # thrown, it goes on as it came
+        ([-4.0, 0.0], [0.0, 0.0], [0.5, 0.0], [0.0, 0.0]),  # thrown, it comes back: the water begins at rest
+        ([-3.0, 0.0], [1.0, 0.0], [1.5, 0.0], [1.0, 0.0]),
+        ([4.0, -3.0], [0.0, 0.0], [1.0, 0.0], [1.0 + 0.5**0.5, -(0.5**0.5)]),  # at the bed, and along it
+    ],
+)
+def test_a_second_pass_begins_where_the_water_gains_nothing(before, water, mean, start):
+    """Beside a body that comes back within the step water that was at rest does not turn round: its work, with the mean
+    of its own velocities, is no more than what the ledger gives it. One of two bodies is left alone."""
+    rows = np.zeros((4, 2, 6))
+    rows[:3, 0, ::2][:, :2] = before, water, mean
+    rows[:, 1] = 2.0
+    M = mass_matrix(np.array([3.0, 2.0]), np.tile(np.eye(3), (2, 1, 1)))
+    found = start_of_water(M, *rows[:3])
+    assert found[0, [0, 2]] == pytest.approx(start)
+    assert (found[0, [1, 3, 4, 5]] == 0.0).all()
+    assert (found[1] == 2.0).all()
+    d, w = found[0] - rows[1, 0], rows[2, 0] - rows[1, 0]
+    assert (2.0 * w - d) @ d >= -1e-12
+
+
 @pytest.mark.parametrize("substeps", [1, 2, 100])
 def test_a_body_afloat_swings_alike_whatever_its_substeps(substeps):
     """ω dt = 0.3 over 400 steps: the load is that of the place at the start, less what half of the way takes off. Taken
@@ -332,11 +363,14 @@ def test_a_wall_that_breaks_before_it_moves_does_not_hold_because_it_would_move(
     )
     monkeypatch.setattr("coupler.step.coupling_rows.Wetting.of", lambda coupling: None)
     stepper = object.__new__(CoupledStepper)
-    stepper.structure, stepper.water, stepper.immersion = gate, None, SimpleNamespace(n_solids=0)
+    stepper.structure, stepper.immersion = gate, SimpleNamespace(n_solids=0)
+    stepper.water = SimpleNamespace(pushed_by=np.zeros((1, 6)))
     stepper.passes, stepper.tolerance, stepper.pause, stepper.rtol = 2, 0.02, None, 1e-8
     stepper.clock, stepper.ledger = no_clock, SimpleNamespace(input_energy=sea)
     response = SimpleNamespace(
-        lead=lambda velocity, before, substep: np.zeros((1, 6)), at_end=lambda mean, before, substep: mean
+        lead=lambda velocity, before, substep: np.zeros((1, 6)),
+        at_end=lambda mean, before, substep: mean,
+        mass=sp.eye_array(6).tocsr(),
     )
     monkeypatch.setattr(
         CoupledStepper, "_response", lambda *_: (sp.eye_array(6).tocsr(), response, np.zeros(6))
