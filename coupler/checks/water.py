@@ -11,15 +11,14 @@ import numpy as np
 from coupler.case.case import Case
 from coupler.case.inflow_records import RecordError, record_of
 from coupler.case.types import KeyPath
+from coupler.checks.inflow_volumes import depth_behind, inflow_volume_problems
 from coupler.geometry.tank_mesh import (
-    bed_along,
     finest_cell,
     floor_along,
     is_measured,
     mean_bed,
-    room_beside,
 )
-from coupler.scene.build_water import SLACK, fills_beside, flow_of, level_at_start, sea_level
+from coupler.scene.build_water import SLACK, fills_beside, level_at_start, sea_level
 
 Problem = tuple[KeyPath, str]
 
@@ -45,17 +44,6 @@ LEAST_DROP = 2.5
 
 STILL = 0.1
 """Share of a cell by which the still water may miss the level that a wave is made for, without a remark."""
-SPRAY = 1.1
-"""What an inflow may bring into a tank with an open top, over the room above its water: a tank of 2 m that filled by
-0.5 m a second lost a tenth of that by its top before it stood full and broke the limit on the volume."""
-
-LEFT_TO_RUN_ON = 0.25
-"""Share of its still water that a wave may not fall below while the rest runs out by open sides. In a tank shorter
-than deep the volume was off from 0.23 on by this count (4 % at 0.20): the water stood as a sheet of one cell
-along the side of the wave, where the surface is given, and the rest of the tank was dry."""
-
-BROUGHT_AT, LAYERS = 401, 8
-"""Instants and layers of water at which what an inflow brings is summed up."""
 
 
 def water_problems(case: Case) -> Iterator[Problem]:
@@ -79,9 +67,7 @@ def water_problems(case: Case) -> Iterator[Problem]:
         wrong = list(_sides(case))
         yield from wrong
         if not wrong:
-            yield from _filled_up(case)
-            yield from _over_its_crest(case)
-            yield from _run_out(case)
+            yield from inflow_volume_problems(case)
             yield from _struck(case)
         yield from _without_air(case)
         yield from _drops(case)
@@ -192,86 +178,6 @@ def _walls(w) -> Iterator[Problem]:
         yield ("water", laws[0]), f'is for walls = "friction"; they are "{w.walls}"'
 
 
-def _filled_up(case: Case) -> Iterator[Problem]:
-    """Inflows into a tank without a way out but its open top, which they fill before the end: their discharge is
-    given, and only spray leaves by the top."""
-    if set(case.tank.open) - {"z+"} or case.water.sea:
-        return
-    way_out, share = ("no way out but its open top", SPRAY) if case.tank.open else ("no way out", 1.0)
-    room = room_beside(case.tank, case.water.fill)
-    for i, spec in enumerate(case.water.inflow):
-        if spec.absorbs:
-            continue
-        brought = _brought(case, spec)
-        if brought > share * room:
-            yield (
-                ("water", "inflow", i),
-                f"brings {brought:.3g} m3 until the end of the run ({case.time.end:g} s) into a tank that has "
-                f"room for {room:.3g} m3 and {way_out}: name open sides (tank.open), let it take back what returns "
-                "(absorbs = true), or end before the tank is full",
-            )
-
-
-def _over_its_crest(case: Case) -> Iterator[Problem]:
-    """Waves and bores into a tank of walls that they fill to above their own crest, or to above the bore that the far
-    side throws back: the surface at their side is given, and the water of the tank would fall into the trough there."""
-    if set(case.tank.open) - {"z+"} or case.water.sea or not case.tank.is_box:
-        return
-    for i, spec in enumerate(case.water.inflow):
-        if spec.kind not in ("solitary", "n-wave", "bore") or spec.absorbs:
-            continue
-        if spec.kind == "bore" and spec.ahead is None:
-            continue
-        if spec.kind == "bore":
-            bed, name = floor_along(case.tank, spec.side), "what the far side throws back"
-            speed = _bore_speed(spec.ahead - bed, spec.level - bed, case.case.gravity)
-            highest = bed + _depth_behind(spec.level - bed, speed, case.case.gravity)
-        else:
-            highest, name = spec.level + abs(spec.height), "the crest"
-        highest = min(highest, case.tank.upper[2])
-        under = case.tank.model_copy(update={"upper": (*case.tank.upper[:2], highest)})
-        brought, room = _brought(case, spec), room_beside(under, case.water.fill)
-        if brought > room:
-            yield (
-                ("water", "inflow", i),
-                f"brings {brought:.3g} m3 until the end of the run ({case.time.end:g} s) into a tank without another "
-                f"side to leave by, which has room for {room:.3g} m3 under {name} (z = {highest:.3g} m): the water "
-                f"would stand above the surface that is given at {spec.side}; let it take back what returns "
-                "(absorbs = true), name open sides or a sea, take a longer tank, or end earlier",
-            )
-
-
-def _run_out(case: Case) -> Iterator[Problem]:
-    """Waves on still water that has run out by open sides before the end: the surface at their side is given, and would
-    stand alone in front of an empty tank.
-
-    An open side lets out q = 8/27 sqrt(g d³) of a depth d over each metre of it (Ritter's wave behind a dam that is
-    gone): the depth of a tank of area A with open sides of width B falls as d = d₀ (1 + 4/27 sqrt(g d₀) B t/A)⁻²."""
-    tank = case.tank
-    if not tank.is_box or case.water.sea:
-        return
-    size = np.subtract(tank.upper, tank.lower)
-    area, open_sides = float(size[0] * size[1]), [side for side in tank.open if side[0] in "xy"]
-    width = sum(float(size[1 - "xy".index(side[0])]) for side in open_sides)
-    if width == 0.0:
-        return
-    for i, spec in enumerate(case.water.inflow):
-        depth = spec.level - tank.lower[2] if spec.kind in ("solitary", "n-wave") else 0.0
-        if depth <= 0.0 or spec.absorbs:
-            continue
-        rate = 4.0 / 27.0 * math.sqrt(case.case.gravity * depth) * width / area
-        left = depth / (1.0 + rate * case.time.end) ** 2 + _brought(case, spec) / area
-        if left < LEFT_TO_RUN_ON * depth:
-            end = (LEFT_TO_RUN_ON**-0.5 - 1.0) / rate
-            yield (
-                ("water", "inflow", i),
-                f"is a wave on still water {depth:.3g} m deep, which runs out by {' and '.join(open_sides)} "
-                f"(tank.open): about {left:.3g} m are left at the end of the run ({case.time.end:g} s), while the "
-                f"surface that is given at {spec.side} stands; give {open_sides[0]} to a sea of that level "
-                f"(water.sea) or close it, or end before {end:.2g} s",
-            )
-
-
 def _without_air(case: Case) -> Iterator[Problem]:
     """Water that fills the tank up to its closed top, with a side that it may leave by: nothing can take its place."""
     tank = case.tank
@@ -297,7 +203,7 @@ def _struck(case: Case) -> Iterator[Problem]:
         still = max([fill.upper[2] for fill in fills_beside(case, spec.side)], default=bed) - bed
         if spec.kind != "steady" or still <= 0.0 or spec.level - bed < WHOLE_DEPTH * still:
             continue
-        behind = _depth_behind(still, spec.velocity, case.case.gravity)
+        behind = depth_behind(still, spec.velocity, case.case.gravity)
         if bed + behind > top:
             yield (
                 ("water", "inflow", i, "velocity"),
@@ -305,43 +211,6 @@ def _struck(case: Case) -> Iterator[Problem]:
                 f"z = {bed + behind:.3g} m at once, above the top of the tank ({top:g} m); take a lower velocity, less "
                 'still water, a higher tank, or a velocity that grows with time (kind = "record")',
             )
-
-
-def _bore_speed(ahead: float, behind: float, gravity: float) -> float:
-    """Speed [m/s] of the water behind a bore between two depths [m] (Stoker 1957, 10.6)."""
-    return (behind - ahead) * math.sqrt(0.5 * gravity * (ahead + behind) / (ahead * behind))
-
-
-def _depth_behind(ahead: float, speed: float, gravity: float) -> float:
-    """Depth [m] behind the bore that a piston of this speed [m/s] pushes into still water of depth `ahead` [m]:
-    u = (h₂ - h₁) sqrt(g (h₁ + h₂) / (2 h₁ h₂))    (Stoker 1957, 10.6)."""
-    low, high = ahead, ahead + max(speed, 0.0) * math.sqrt(2.0 * ahead / gravity)
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        reached = _bore_speed(ahead, middle, gravity)
-        low, high = (middle, high) if reached < speed else (low, middle)
-    return high
-
-
-def _brought(case: Case, spec) -> float:
-    """Largest volume [m³] that an inflow has brought at any time until the end of the run."""
-    along = bed_along(case.tank, spec.side)
-    middle, bed = 0.5 * (along[1:] + along[:-1]).T
-    axis, sign = "xyz".index(spec.side[0]), 1.0 if spec.side[1] == "-" else -1.0
-    width, layer = np.diff(along[:, 0]), (np.arange(LAYERS) + 0.5) / LAYERS
-    flow, rates = flow_of(case, spec), []
-    times = np.linspace(0.0, case.time.end, BROUGHT_AT)
-    for time in times:
-        places = np.zeros((len(middle), LAYERS, 3))
-        places[:, :, axis] = (case.tank.lower if sign > 0.0 else case.tank.upper)[axis]
-        places[:, :, 1 - axis] = middle[:, None]
-        level = np.broadcast_to(flow.level_at(places[:, 0], time), middle.shape)
-        depth = np.maximum(level - bed, 0.0)
-        places[:, :, 2] = bed[:, None] + depth[:, None] * layer
-        speed = sign * flow.velocity(places.reshape(-1, 3), time)[:, axis].reshape(len(middle), LAYERS)
-        rates.append(float((width * depth * speed.mean(axis=1)).sum()))
-    steps = 0.5 * np.diff(times) * np.add(rates[1:], rates[:-1])
-    return float(np.cumsum(steps).max(initial=0.0))
 
 
 def _sides(case: Case) -> Iterator[Problem]:

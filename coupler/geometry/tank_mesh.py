@@ -283,6 +283,29 @@ def room_beside(tank: Tank, boxes) -> float:
     return float(mesh_of(tank).cell_volume.sum()) - water_in(tank, boxes)
 
 
+def room_under(tank: Tank, boxes, level: float) -> float:
+    """Volume [m³] of a tank below a level z [m] without that of the boxes of water in it, as in `room_beside`."""
+    if tank.is_box:
+        return room_beside(tank.model_copy(update={"upper": (*tank.upper[:2], level)}), boxes)
+    mesh = mesh_of(tank)
+    z = mesh.nodes[mesh.cells, 2]
+    low, high = z.min(axis=1), z.max(axis=1)
+    under = np.clip((level - low) / (high - low), 0.0, 1.0)
+    return float(mesh.cell_volume @ under) - water_in(tank, boxes)
+
+
+def water_above(tank: Tank, boxes, level: float) -> float:
+    """Volume [m³] of the boxes of water above a level z [m]: of a box the largest, of a mesh that of the cells whose
+    middle lies in one of them."""
+    if tank.is_box:
+        sizes = [
+            (*np.subtract(box.upper, box.lower)[:2], box.upper[2] - max(level, box.lower[2])) for box in boxes
+        ]
+        return float(max([np.prod(size) for size in sizes if size[2] > 0.0], default=0.0))
+    over = [box.model_copy(update={"lower": (*box.lower[:2], max(level, box.lower[2]))}) for box in boxes]
+    return water_in(tank, over)
+
+
 def water_in(tank: Tank, boxes) -> float:
     """Volume [m³] of the cells of a mesh whose middle lies in one of the boxes."""
     mesh = mesh_of(tank)

@@ -1,5 +1,6 @@
 """The water of a case: what is refused, what is built, and runs through sides whose books must balance."""
 
+import meshio
 import numpy as np
 import pytest
 
@@ -7,11 +8,13 @@ from coupler.case.case import Case, modules
 from coupler.case.inflow_records import RecordError, record_of
 from coupler.case.water import RecordInflow
 from coupler.checks.case import problems, remarks
+from coupler.geometry.tank_mesh import measured
 from coupler.run.forecast import forecast
 from coupler.scene.build import build
 from coupler.scene.build_water import sea_level
 from coupler.scene.side_energy import coming_energy
 from coupler.step.limits import Diverged, check_pressure
+from fluid.mesh.background import box_mesh
 from fluid.numerics import bounded
 from fluid.numerics.solve import NotConverged
 from fluid.sides.waves import record_along
@@ -108,6 +111,52 @@ def test_a_wave_that_lifts_its_tank_above_its_crest_is_refused():
     assert found(1.0, end=1.0) == []
     assert found(1.0, absorbs=True) == []
     assert found(3.0) == []
+
+
+def test_a_wave_that_draws_its_tank_below_its_trough_is_refused():
+    """A trough of 0.05 m on 0.5 m takes (3 sqrt(3)/4) H/γ = 0.0736 m2 in a slice; a wall throws a trough of 0.1 m back:
+    a tank of 0.74 m has that water above it."""
+
+    def found(length, end=8.0, **more):
+        wave = {"kind": "n-wave", "side": "x-", "level": 0.5, "height": 0.05, "middle": 4.0}
+        fill = [{"lower": [0, 0, 0], "upper": [length, 0.2, 0.5]}]
+        tank = TANK | {"upper": [length, 0.2, 1]}
+        with_fill = {"inflow": [wave | more], "fill": fill}
+        return [text for _, text in problems(case(with_fill, tank=tank, time={"end": end}))]
+
+    (drawn,) = found(0.7)
+    assert "draws 0.0147 m3 out of the tank until the end of the run (8 s), which holds 0.0142 m3" in drawn
+    assert "above the trough that the far side throws back (z = 0.399 m)" in drawn
+    assert found(0.8) == []
+    assert found(0.7, end=3.0) == []
+    assert found(0.7, absorbs=True) == []
+
+
+@pytest.mark.parametrize("fitted", [False, True])
+def test_a_record_that_lifts_its_tank_above_what_a_wall_throws_back_is_refused(tmp_path, fitted):
+    """0.2 m x 0.6 m x 0.5 m/s bring 0.06 m3 in a second. Thrown back by a wall that stands 0.73 m deep, and there is
+    room for 0.0918 m3 below; also in a mesh from a file. An open side opposite lets all of it pass, one beside its way
+    what runs over the edge, (2/3)^1.5 sqrt(g d³) a metre."""
+    (tmp_path / "swell.csv").write_text("time,level,velocity\n0,0.6,0.5\n9,0.6,0.5\n")
+    swell = {"kind": "record", "side": "x-", "path": str(tmp_path / "swell.csv")}
+    tank = TANK
+    if fitted:
+        mesh, path = box_mesh(np.zeros(3), [2, 0.2, 1], 0.1), tmp_path / "tank.vtk"
+        meshio.write(path, meshio.Mesh(mesh.nodes, [("tetra", mesh.cells)]))
+        tank = {"mesh": str(path)}
+
+    def found(end, sides=("z+",)):
+        read, wrong = measured(
+            case({"inflow": [swell]}, tank=tank | {"open": list(sides)}, time={"end": end})
+        )
+        assert wrong == []
+        return [text for path, text in problems(read) if path == ("water", "inflow", 0)]
+
+    assert found(1.4) == []
+    assert "brings 0.096 m3" in found(1.6)[0]
+    assert "under what the far side throws back (z = 0.73 m)" in found(1.6)[0]
+    assert found(3.0, ["z+", "x+"]) == []
+    assert found(3.0, ["z+", "y+"]) == []
 
 
 def test_a_wave_whose_still_water_runs_out_is_refused():
