@@ -31,7 +31,7 @@ def bore():
         x = (places - GATE) / UPPER
         curves.append(Curve(f"computed, into {1e3 * lower:.0f} mm", "computed", arrival, x, points=True))
         curves.append(Curve(f"Stoker, into {1e3 * lower:.0f} mm", "exact", x * UPPER / exact, x))
-    axes = ("time [s]", "way of the bore from the gate, $x/h_0$ [–]")
+    axes = ("time [s]", "distance of the bore from the gate, $x/h_0$ [–]")
     yield Figure("P41_bore", (Panel(*axes, tuple(curves)),))
 
 

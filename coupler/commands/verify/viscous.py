@@ -96,9 +96,9 @@ def _vortex(n: int, nu: float, k: float):
 @check("P32", "start of flow between plates that cut the cells; square duct", "series, exact")
 def plates_and_duct():
     table, panels = columns("startup_couette_poiseuille"), []
-    for flow, gravity, speed in (("couette", 1e-9, 1.0), ("poiseuille", 1.0, 0.0)):
-        worst, force, curves = _plates(16, gravity, speed, table, f"u_{flow}")
-        axes = (f"velocity, {flow} [–]", "height between the plates [–]")
+    for flow, gravity, speed in (("Couette", 1e-9, 1.0), ("Poiseuille", 1.0, 0.0)):
+        worst, force, curves = _plates(16, gravity, speed, table, f"u_{flow.lower()}")
+        axes = (f"velocity, {flow} flow [–]", "height between the plates [–]")
         panels.append(Panel(*axes, tuple(curves), None, (0.0, 1.0)))
         yield Finding(
             f"{flow}: largest error / largest speed from t = 0.05 H²/nu on", worst, 0.0, 0.02, False
