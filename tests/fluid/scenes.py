@@ -12,9 +12,9 @@ from fluid.step.parameters import WaterParameters
 from fluid.step.water import Water
 
 
-def tank(size, cell, fill, bodies=None, is_open=None, covers="single", **parameters) -> Water:
+def tank(size, cell, fill, bodies=None, is_open=None, covers="single", split="kuhn", **parameters) -> Water:
     """Water in the box [0, size] with cells of the given size; fill as in Water."""
-    mesh = box_mesh(np.zeros(3), size, cell)
+    mesh = box_mesh(np.zeros(3), size, cell, split=split)
     domain = cut_domain(mesh, ConvexBodies.empty() if bodies is None else bodies, covers)
     return Water(mesh, domain, fill, WaterParameters(**parameters), is_open)
 
