@@ -47,8 +47,8 @@ NOTES = {
     "with 8 layers the tongue is thinner than a cell, and the figure depends on where the columns lie: with beach and "
     "columns moved by 0 to 0.02 d it is 0.074 to 0.089 d. The "
     "shallow-water equations give 0.080 d where a tenth of a cell counts as dry.",
-    "P41": "The bore into two cells of still water is 5.5 % too slow (4.6 % before calm water took the new pressure "
-    "with a smaller weight), the one into four cells 4.4 %.",
+    "P41": "The bore into two cells of still water is 5.5 % too slow (4.6 % with the correction of the level set "
+    "spread over five cells in calm water, too), the one into four cells 4.4 %.",
     "P53": "Each swing is smaller than the reference by 0.02 to 0.03 of the drop height. Half of the step changes the "
     "first swing by 0.002 (in a tank 0.9 m wide). It was 0.03 smaller, and the third one 0.06, while the load of a "
     "sphere that moves in one substep a step was reduced over half of its way as if it took many; cells of R/8 gave "
