@@ -7,7 +7,8 @@ one) by
 
     G_f V_n · A_ff⁻¹ G_f V_n                                                                              (1)
 
-(f: nodes whose cells all lie in films, A: the pressure matrix), the inertia of a sheet of no thickness.  The
+(f: nodes whose cells lie in films but for slivers of water on other faces, A: the pressure
+matrix), the inertia of a sheet of no thickness.  The
 behaviour of a real film depends on the roughness of both faces and not on the cells.  So (1) is left out: in films
 narrower than NARROW h the pressure follows from that of the water around, r, and from the weight of the film,
 
@@ -43,13 +44,16 @@ from kernels.decorators import kernel
 
 NARROW = 0.25
 """Widest film, in cells: narrower ones are no channels that the mesh could see."""
+SLIVER = 0.5
+"""Thickest water, in cells, on faces that lie in no film, that leaves a node to the film."""
 THIN = 0.01
 """Room of a film, in cells, besides that by which bodies are drawn in, up to which it fills with water at once."""
 
 
 @dataclass(frozen=True)
 class Films:
-    """Films of a domain. node (N,) bool: all cells around it lie in films · thinned csr (N, 6 n_bodies): reduction of
+    """Films of a domain. node (N,) bool: all cells around it lie in films, or hold
+    but slivers of other water (SLIVER) · thinned csr (N, 6 n_bodies): reduction of
     G by shares below 1 · drawn_in (S,) [m]: how far the plane of each wetted polygon is cut within its body ·
     thin: the parts of films without room for water."""
 
@@ -68,8 +72,10 @@ class Films:
         reach = NARROW * mesh.local_size[domain.parent_cell]
         polygons = (domain.face_body, domain.face_centroid, domain.face_normal)
         in_film, plane = facing(bodies, polygons, reach[domain.face_cell], mesh.bounds, loose)
-        films = _film_cells(domain.face_cell, domain.face_area, in_film, domain.volume, reach)
-        node = _all_around(topology.node_start, topology.node_cells, films)
+        films, thin = _film_cells(
+            domain.face_cell, domain.face_area, in_film, domain.volume, reach, SLIVER / NARROW
+        )
+        node = _in_films(topology.node_start, topology.node_cells, films, thin)
         partly = np.flatnonzero(in_film & np.isin(plane, share.plane))
         kept_out = 1.0 - share.at(plane[partly], domain.face_centroid[partly])
         thinned = sp.csr_array(wetted_coupling(domain, partly, kept_out))
@@ -249,18 +255,33 @@ def _block(indptr, indices, data, rows, part, place):
 
 
 @kernel
-def _film_cells(face_cell, area, in_film, volume, reach):
-    """(M,) bool: cells whose polygons all lie in films, and whose water lies within reach (M,) [m] of them."""
+def _film_cells(face_cell, area, in_film, volume, reach, beside):
+    """films (M,) bool: cells whose polygons all lie in films, and whose water lies within reach (M,) [m] of them; thin
+    (M,) bool: cells whose water is a sliver on any faces (SLIVER)."""
     n_cells = len(volume)
-    covered, other = np.zeros(n_cells), np.zeros(n_cells, np.bool_)
+    covered, other = np.zeros(n_cells), np.zeros(n_cells)
     for s in range(face_cell.shape[0]):
         if in_film[s]:
             covered[face_cell[s]] += area[s]
         else:
-            other[face_cell[s]] = True
-    found = np.zeros(n_cells, np.bool_)
+            other[face_cell[s]] += area[s]
+    films, thin = np.zeros(n_cells, np.bool_), np.zeros(n_cells, np.bool_)
     for e in range(n_cells):
-        found[e] = covered[e] > 0.0 and not other[e] and volume[e] <= reach[e] * covered[e]
+        films[e] = covered[e] > 0.0 and other[e] == 0.0 and volume[e] <= reach[e] * covered[e]
+        thin[e] = volume[e] <= reach[e] * (covered[e] + beside * other[e])
+    return films, thin
+
+
+@kernel
+def _in_films(node_start, node_cells, films, thin):
+    """(N,) bool: nodes with cells in films, films (M,) bool, and else only slivers, thin (M,) bool."""
+    found = np.zeros(node_start.shape[0] - 1, np.bool_)
+    for i in range(found.shape[0]):
+        every, some = True, False
+        for t in range(node_start[i], node_start[i + 1]):
+            every = every and (films[node_cells[t]] or thin[node_cells[t]])
+            some = some or films[node_cells[t]]
+        found[i] = every and some
     return found
 
 
