@@ -123,9 +123,12 @@ def test_pictures_need_neither_side_of_the_solver(tmp_path):
 
 
 def test_what_cannot_be_shown_is_said(tmp_path):
-    """No such run; a run without fields; a run whose first step is not written yet."""
+    """No such run; a case; a run without fields; a run whose first step is not written yet."""
+    (tmp_path / "case").mkdir()
+    (tmp_path / "case" / "case.toml").write_text("")
     for run, said in (
         (tmp_path / "none", "no such run directory"),
+        (tmp_path / "case", f"a case; name one of its runs, in {tmp_path / 'case' / 'runs'}/"),
         (tmp_path, "neither fields.vtkhdf nor blocks.vtkhdf"),
     ):
         done = render(run)

@@ -18,7 +18,7 @@ def chosen(ids: list[str], quick: bool) -> list[Scene]:
     groups = sorted({s.group for s in known.values()})
     names = [*known, *groups]
     wrong = [
-        f"{word}: unknown scene{did_you_mean(word, names)}; see surgebreak stress --list"
+        f"{word}: unknown scene{did_you_mean(word, names) or '.'} `surgebreak stress --list` names all"
         for word in ids
         if word.upper() not in known and word not in groups
     ]

@@ -26,7 +26,7 @@ def chosen(ids: list[str], quick: bool) -> list[Check]:
 def _unknown(id: str, known) -> str:
     if id.upper() in NOT_COVERED:
         return f"{id}: not covered: {NOT_COVERED[id.upper()]}"
-    return f"{id}: unknown case{did_you_mean(id.upper(), known)}; see surgebreak verify --list"
+    return f"{id}: unknown case{did_you_mean(id.upper(), known) or '.'} `surgebreak verify --list` names all"
 
 
 def run(case: Check, plots: Path | None = None) -> Iterator[Result]:

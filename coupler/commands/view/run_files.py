@@ -137,6 +137,8 @@ def open_run(directory):
     water = _series(WaterSeries, directory / "fields.vtkhdf")
     blocks = _series(BlockSeries, directory / "blocks.vtkhdf")
     if water is None and blocks is None:
+        if (directory / "case.toml").is_file() and not (directory / "run.json").exists():
+            raise NothingToShow(f"{directory}: a case; name one of its runs, in {directory / 'runs'}/")
         raise NothingToShow(
             f"{directory}: neither fields.vtkhdf nor blocks.vtkhdf holds a step; the run has not reached its first "
             "output yet, or it was stopped before"
