@@ -26,9 +26,7 @@ def both_ways(shapes, a, b, x, R):
     gaps[1, 0], faces[1, 0], gaps[1, 1], faces[1, 1] = between_boxes(shapes, a, b, x, R, cosines, shift)
     for way in range(2):
         one, other = (a, b) if way == 0 else (b, a)
-        count = planes_seen_from(
-            shapes.face_start, shapes.normal, shapes.offset, one, other, x, R, planes[0, way]
-        )
+        count = planes_seen_from(shapes, one, other, x, R, planes[0, way])
         gaps[0, way], faces[0, way] = separation(
             shapes.node, shapes.node_start[one], shapes.vertex_end[one], planes[0, way], count
         )

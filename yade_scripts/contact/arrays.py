@@ -126,9 +126,11 @@ class Slots(NamedTuple):
 
     @classmethod
     def empty(cls, size: int) -> Slots:
-        """The history of `size` nodes without contact."""
-        rest, k, spread, push, speed = (np.zeros(size) for _ in range(5))
-        return cls(np.full(size, -1, np.int64), k, rest, np.zeros((size, 3)), spread, push, speed)
+        """The history of `size` nodes without contact, of which nothing but `face` is filled. What is known of a node
+        lies in one line of the cache."""
+        table = np.empty((size, 8))
+        k, rest, spread, push, speed = table[:, :5].T
+        return cls(np.full(size, -1, np.int64), k, rest, table[:, 5:], spread, push, speed)
 
 
 class Rows(NamedTuple):
@@ -162,8 +164,14 @@ class Rows(NamedTuple):
 
 
 def empty_rows(size: int) -> Rows:
-    """Uninitialised rows for up to `size` contacts."""
-    whole, one, three = (np.zeros(size, np.int64) for _ in range(3)), (size,), (size, 3)
-    scalars = [np.zeros(one) for _ in range(8)]
-    vectors = [np.zeros(three) for _ in range(9)]
-    return Rows(*whole, vectors[0], vectors[1], *scalars[:7], *vectors[2:], scalars[7])
+    """Uninitialised rows for up to `size` contacts; what belongs to a contact lies together."""
+    table = np.empty((size, 40))
+    a, b, slot = table[:, :3].view(np.int64).T
+    depth, kn, kt, cn, ct, mu, push, held = table[:, 3:11].T
+    point, normal, force, viscous, shear, arm_a, arm_b, shift, velocity = (
+        table[:, at : at + 3] for at in range(11, 38, 3)
+    )
+    return Rows(
+        a, b, slot, point, normal, depth, kn, kt, cn, ct, mu, push, force, viscous, shear, arm_a, arm_b, shift,
+        velocity, held,
+    )  # fmt: skip

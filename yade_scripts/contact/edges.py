@@ -62,7 +62,7 @@ def find_crossing(shapes, a, b, x, R, deepest, scratch):
     off = SUPPORT * (shapes.radius[a] + shapes.radius[b])
     found = -1
     first_a, first_b = shapes.edge_start[a], shapes.edge_start[b]
-    count_a, count_b = shapes.edge_start[a + 1] - first_a, shapes.edge_start[b + 1] - first_b
+    count_a, count_b = shapes.edge_end[a] - first_a, shapes.edge_end[b] - first_b
     for i in range(count_a):
         if shapes.edge_like[first_a + i] != i:
             continue
@@ -100,8 +100,8 @@ def _outermost(shapes, a, b, like_a, like_b, A, B, n, low, high, scratch):
     above `high` along n (3,), and cross between their ends: its number, or -1."""
     da, db = scratch[4], scratch[5]
     first_a, first_b = shapes.edge_start[a], shapes.edge_start[b]
-    count_b = shapes.edge_start[b + 1] - first_b
-    for i in range(shapes.edge_start[a + 1] - first_a):
+    count_b = shapes.edge_end[b] - first_b
+    for i in range(shapes.edge_end[a] - first_a):
         p = shapes.edge[first_a + i, 0]
         if shapes.edge_like[first_a + i] != like_a or _dot(n, A[p]) >= low:
             continue
@@ -126,7 +126,7 @@ def crossing(shapes, a, b, number, state, plane, point, scratch):
     the edges no longer cross, since the energy left in the springs is computed from them. scratch (8, 3): work space,
     of which rows 4 and 5 are not used."""
     x, R = state.x, state.R
-    count_b = shapes.edge_start[b + 1] - shapes.edge_start[b]
+    count_b = shapes.edge_end[b] - shapes.edge_start[b]
     ea, eb = shapes.edge_start[a] + number // count_b, shapes.edge_start[b] + number % count_b
     pa, da, pb, db, n, outward = scratch[0], scratch[1], scratch[2], scratch[3], scratch[6], 0.0
     _line(shapes, a, ea, R, pa, da)
@@ -162,8 +162,8 @@ def next_beside(shapes, side, n, number, leading, level, most, state, plane, poi
     plane, point, scratch: as in `crossing`   →   (number of the pair or -1, depth [m], negative where they are apart)
     """
     a, b, R = side.a, side.b, state.R
-    count_b = shapes.edge_start[b + 1] - shapes.edge_start[b]
-    count_a = shapes.edge_start[a + 1] - shapes.edge_start[a]
+    count_b = shapes.edge_end[b] - shapes.edge_start[b]
+    count_a = shapes.edge_end[a] - shapes.edge_start[a]
     if not level:
         ea, eb = shapes.edge_start[a] + leading // count_b, shapes.edge_start[b] + leading % count_b
         if leading <= number or not (

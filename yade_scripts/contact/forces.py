@@ -64,7 +64,7 @@ class ContactForces:
             law.stiffness is not None,
         )
         self._free = np.concatenate([free, np.zeros(len(planes), bool)])
-        self._nodes = np.diff(self._shapes.node_start)
+        self._nodes = self._shapes.node_end - self._shapes.node_start
         self._on = np.zeros(self._n, bool)
         self._asleep = np.zeros(len(self._free), bool)
         self._boxes = np.zeros((0, 2, 3))
@@ -191,9 +191,11 @@ class ContactForces:
     def _bounds(self) -> tuple[Array, Array]:
         """Lowest and highest corners (n, 3) of the boxes around the blocks, with the margins of their faces."""
         s, m = self._shapes, self._motion
-        of = np.repeat(np.arange(self._n), self._nodes[: self._n])
-        points = m.x[of] + np.einsum("kij,kj->ki", m.R[of], s.node)
-        margin, first = s.margin[: self._n, None], s.node_start[: self._n]
+        count = self._nodes[: self._n]
+        first, of = np.cumsum(count) - count, np.repeat(np.arange(self._n), count)
+        node = s.node[np.arange(len(of)) + (s.node_start[: self._n] - first)[of]]
+        points = m.x[of] + np.einsum("kij,kj->ki", m.R[of], node)
+        margin = s.margin[: self._n, None]
         return np.minimum.reduceat(points, first) - margin, np.maximum.reduceat(points, first) + margin
 
     def _near_planes(self) -> Array:

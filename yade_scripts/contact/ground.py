@@ -122,8 +122,8 @@ def scan_ground(
     negative where a node is below). plane (4,), scratch (8, 3): work space."""
     a, b, x, R = side.a, side.b, state.x, state.R
     begin, way, n = shapes.node_start[a], scratch[6:8], scratch[4]
-    face, apart = shapes.face_start[b], np.inf
-    for i in range(begin, shapes.node_start[a + 1]):
+    face, apart = shapes.face_number[b], np.inf
+    for i in range(begin, shapes.node_end[a]):
         s = slot + i - begin
         xi0, xi1, xi2 = shapes.node[i, 0], shapes.node[i, 1], shapes.node[i, 2]
         px = x[a, 0] - x[b, 0] + R[a, 0, 0] * xi0 + R[a, 0, 1] * xi1 + R[a, 0, 2] * xi2
@@ -157,7 +157,7 @@ def scan_ground(
             slots.k[s] = stiffness_together(bodies.stiffness[a], bodies.stiffness[b]) / shapes.face_nodes[own]
             slots.spread[s] = shapes.face_spread[own]
             slots.shear[s, 0] = slots.shear[s, 1] = slots.shear[s, 2] = 0.0
-            slots.push[s] = BEGINS
+            slots.push[s], slots.speed[s] = BEGINS, 0.0
             way_of(state, a, b, xi0, xi1, xi2, plane, scratch, way)
             came = ARRIVED * max(way[1, 0], 0.0)
             slots.rest[s] = 0.0 if side.whole else max(0.0, depth - came)

@@ -68,8 +68,8 @@ def _contacts(first_pair, last_pair, shapes, bodies, law, pairs, slots, ground, 
     all_pairs = first_pair == 0 and last_pair == len(pairs.a)
     count = begins
     most = 0
-    for body in range(len(shapes.face_start) - 1):
-        most = max(most, shapes.face_start[body + 1] - shapes.face_start[body])
+    for body in range(len(shapes.face_start)):
+        most = max(most, shapes.face_end[body] - shapes.face_start[body])
     planes, scratch = np.empty((most, 4)), pair_scratch(shapes)
     cosines, shift, half = np.empty((3, 3)), np.empty((2, 3)), shapes.half
     for p in range(first_pair, last_pair):
@@ -95,7 +95,7 @@ def _contacts(first_pair, last_pair, shapes, bodies, law, pairs, slots, ground, 
             gap_a, face_b, gap_b, face_a = between_boxes(shapes, a, b, x, R, cosines, shift)
             clear = CLEAR * (shapes.radius[a] + shapes.radius[b])
         for node_body, face_body in ((a, b), (b, a)):
-            begin, end = shapes.node_start[node_body], shapes.node_start[node_body + 1]
+            begin, end = shapes.node_start[node_body], shapes.node_end[node_body]
             if begin == end or b == ground.row:
                 continue
             if boxes and node_body == a:
@@ -103,9 +103,7 @@ def _contacts(first_pair, last_pair, shapes, bodies, law, pairs, slots, ground, 
             elif boxes:
                 faces, gap, farthest = 6, gap_b, face_a
             else:
-                faces = planes_seen_from(
-                    shapes.face_start, shapes.normal, shapes.offset, node_body, face_body, x, R, planes
-                )
+                faces = planes_seen_from(shapes, node_body, face_body, x, R, planes)
                 gap, farthest = separation(shapes.node, begin, shapes.vertex_end[node_body], planes, faces)
             margin = min(shapes.margin[node_body], shapes.margin[face_body])
             apart = max(apart, gap)

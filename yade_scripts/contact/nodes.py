@@ -25,25 +25,30 @@ FINE = 8
 
 
 class Shapes(NamedTuple):
-    """Blocks, then fixed planes, as bodies 0 .. n-1, n .. n+m-1; points and normals in the frame of their body.
+    """Blocks, then fixed planes, as bodies 0 .. n-1, n .. n+m-1; points and normals in the frame of their body. Blocks
+    alike have theirs in common, so that few of them are in use.
 
-    node_start (n+m+1,) · node (N, 3) [m] · vertex_end (n+m,): the vertices come first
+    node_start, node_end (n+m,) · node (N, 3) [m] · vertex_end (n+m,): the vertices come first
     of_start (N+1,), of (.,): faces that hold a node
-    face_start (n+m+1,) · normal (F, 3) outward · offset (F,) [m]: inside is normal·x < offset
+    face_start, face_end (n+m,) · normal (F, 3) outward · offset (F,) [m]: inside is normal·x < offset
+    face_number (n+m,): number of the first face of each body, if each had its own
     face_nodes (F,): nodes on a face · face_spread (F,): mean distance of its points from its middle over that of its
     nodes
-    radius, margin (n+m,) [m] · swell (n+m,): bound of how far a corner moves as all faces move outwards by 1
+    radius, margin (n+m,) [m] · swell (n+m,): bound of how far a corner moves as faces move out by 1
     half (n+m, 3) [m]: half the edges of a box, nan for other bodies
-    edge_start (n+m+1,) · edge (E, 2) vertices of the block · edge_out (E, 3): sum of the normals of its two faces
+    edge_start, edge_end (n+m,) · edge (E, 2) vertices of the block · edge_out (E, 3): sum of normals of its two faces
     edge_like (E,): the first edge of the block that is parallel, counted from its first one.
     """
 
     node_start: Array
+    node_end: Array
     node: Array
     vertex_end: Array
     of_start: Array
     of: Array
     face_start: Array
+    face_end: Array
+    face_number: Array
     normal: Array
     offset: Array
     face_nodes: Array
@@ -53,6 +58,7 @@ class Shapes(NamedTuple):
     swell: Array
     half: Array
     edge_start: Array
+    edge_end: Array
     edge: Array
     edge_out: Array
     edge_like: Array
@@ -88,58 +94,83 @@ def block_edges(block: Block) -> list[tuple[tuple[int, int], list[int]]]:
 
 def contact_shapes(blocks: list[Block], planes: list[FixedPlane], per_edge: int) -> Shapes:
     """Nodes and faces of all blocks and planes in one set of arrays."""
-    nodes, holders, normals, offsets, counts, spreads, swells = [], [], [], [], [], [], []
-    edges: list[tuple[Array, Array, Array]] = []
-    faces_before = 0
-    known: dict[tuple, tuple] = {}
+    kinds: list[_Kind] = []
+    known: dict[object, int] = {}
+    of_body = []
     for block in blocks:
-        key = (block.vertices.tobytes(), block.faces)
+        key = (block.vertices.tobytes(), block.faces, block.is_box)
         if key not in known:
-            nodes_of = block_nodes(block, per_edge)
-            known[key] = (*nodes_of, *block.planes, _edges(block), _spreads(block, *nodes_of), _swell(block))
-        points, holding, normal, offset, along, spread, swell = known[key]
-        swells.append(swell)
-        spreads.append(spread)
-        edges.append(along)
-        nodes.append(points)
-        holders += [[faces_before + f for f in held] for held in holding]
-        normals.append(normal)
-        offsets.append(offset)
-        counts.append((len(points), len(normal), len(block.vertices)))
-        faces_before += len(normal)
+            known[key] = len(kinds)
+            kinds.append(_of_block(block, per_edge))
+        of_body.append(known[key])
     for plane in planes:
-        normals.append(plane.normal[None])
-        offsets.append(np.zeros(1))
-        spreads.append(np.ones(1))
-        swells.append(0.0)
-        counts.append((0, 1, 0))
-    node_count, face_count, vertex_count = np.array(counts, np.int64).reshape(-1, 3).T
-    node_start = _starts(node_count)
-    of = np.array([f for held in holders for f in held], np.int64)
-    number_of_faces = int(face_count.sum())
+        of_body.append(len(kinds))
+        kinds.append(_of_plane(plane))
+    of = np.array(of_body, np.int64)
+    nodes, faces, edges = (
+        _starts([len(k[column]) for k in kinds])
+        for column in (_Kind._fields.index(name) for name in ("nodes", "normals", "ends"))
+    )
+    holding = [[first + f for f in held] for k, first in zip(kinds, faces) for held in k.holders]
+    holders = np.array([f for held in holding for f in held], np.int64)
+    node_start, face_start, edge_start = nodes[:-1][of], faces[:-1][of], edges[:-1][of]
     inner = np.array([b.planes[1].min() for b in blocks] + [np.inf] * len(planes))
     half = [0.5 * b.size if b.is_box else np.full(3, np.nan) for b in blocks]
-    radius = np.array([b.radius for b in blocks] + [np.inf] * len(planes))
     return Shapes(
-        node_start,
-        np.concatenate(nodes) if nodes else np.zeros((0, 3)),
-        node_start[:-1] + vertex_count,
-        _starts([len(held) for held in holders]),
-        of,
-        _starts(face_count),
-        np.concatenate(normals) if normals else np.zeros((0, 3)),
-        np.concatenate(offsets) if offsets else np.zeros(0),
-        np.bincount(of, minlength=number_of_faces),
-        np.concatenate(spreads) if spreads else np.zeros(0),
-        radius,
-        MARGIN * inner,
-        np.array(swells),
-        np.array([*half, *np.full((len(planes), 3), np.nan)]).reshape(-1, 3),
-        _starts([len(ends) for ends, _, _ in edges] + [0] * len(planes)),
-        np.concatenate([np.zeros((0, 2), np.int64), *(ends for ends, _, _ in edges)]),
-        np.concatenate([np.zeros((0, 3)), *(out for _, out, _ in edges)]),
-        np.concatenate([np.zeros(0, np.int64), *(like for _, _, like in edges)]),
+        node_start=node_start,
+        node_end=nodes[1:][of],
+        node=_joined([k.nodes for k in kinds], 3),
+        vertex_end=node_start + np.array([kinds[k].vertices for k in of_body], np.int64),
+        of_start=_starts([len(held) for held in holding]),
+        of=holders,
+        face_start=face_start,
+        face_end=faces[1:][of],
+        face_number=_starts([len(kinds[k].normals) for k in of_body])[:-1],
+        normal=_joined([k.normals for k in kinds], 3),
+        offset=np.concatenate([np.zeros(0), *(k.offsets for k in kinds)]),
+        face_nodes=np.bincount(holders, minlength=int(faces[-1])),
+        face_spread=np.concatenate([np.zeros(0), *(k.spreads for k in kinds)]),
+        radius=np.array([b.radius for b in blocks] + [np.inf] * len(planes)),
+        margin=MARGIN * inner,
+        swell=np.array([kinds[k].swell for k in of_body]),
+        half=np.array([*half, *np.full((len(planes), 3), np.nan)]).reshape(-1, 3),
+        edge_start=edge_start,
+        edge_end=edges[1:][of],
+        edge=_joined([k.ends for k in kinds], 2).astype(np.int64),
+        edge_out=_joined([k.out for k in kinds], 3),
+        edge_like=np.concatenate([np.zeros(0, np.int64), *(k.like for k in kinds)]),
     )
+
+
+class _Kind(NamedTuple):
+    """Nodes, faces and edges that all bodies alike have; as in `Shapes`, faces counted from the first one."""
+
+    nodes: Array
+    holders: list[list[int]]
+    vertices: int
+    normals: Array
+    offsets: Array
+    spreads: Array
+    swell: float
+    ends: Array
+    out: Array
+    like: Array
+
+
+def _of_block(block: Block, per_edge: int) -> _Kind:
+    nodes, holders = block_nodes(block, per_edge)
+    spreads = _spreads(block, nodes, holders)
+    return _Kind(nodes, holders, len(block.vertices), *block.planes, spreads, _swell(block), *_edges(block))
+
+
+def _of_plane(plane: FixedPlane) -> _Kind:
+    none = np.zeros((0, 3))
+    no_edges = np.zeros((0, 2), np.int64), none, np.zeros(0, np.int64)
+    return _Kind(none, [], 0, plane.normal[None], np.zeros(1), np.ones(1), 0.0, *no_edges)
+
+
+def _joined(tables: list[Array], columns: int) -> Array:
+    return np.concatenate([np.zeros((0, columns)), *tables])
 
 
 def _swell(block: Block) -> float:

@@ -19,10 +19,10 @@ def share_of_overlap(shapes, a, own, b, g, faces, state):
     """2 max(s_a, s_b)/(s_a + s_b) of the face `own` of a and the face g of b, of which each is looked at along its
     normal. faces: those of b in the frame of a. 1 for a plane, which has no nodes."""
     planes, margin = faces.planes, faces.margin
-    if shapes.node_start[b] == shapes.node_start[b + 1]:
+    if shapes.node_start[b] == shapes.node_end[b]:
         return 1.0
     on_a = on_b = 0
-    for i in range(shapes.node_start[a], shapes.node_start[a + 1]):
+    for i in range(shapes.node_start[a], shapes.node_end[a]):
         if _holds(shapes, i, own):
             xi = shapes.node[i]
             d = planes[g, 3] - planes[g, 0] * xi[0] - planes[g, 1] * xi[1] - planes[g, 2] * xi[2]
@@ -33,8 +33,8 @@ def share_of_overlap(shapes, a, own, b, g, faces, state):
                     aside -= planes[h, k] * (xi[k] + d * planes[g, k])
                 inside = inside and (h == g or aside >= -margin)
             on_a += 1 if inside else 0
-    first, end = shapes.face_start[a], shapes.face_start[a + 1]
-    for i in range(shapes.node_start[b], shapes.node_start[b + 1]):
+    first, end = shapes.face_start[a], shapes.face_end[a]
+    for i in range(shapes.node_start[b], shapes.node_end[b]):
         if _holds(shapes, i, shapes.face_start[b] + g):
             y0, y1, y2 = _seen_from(shapes, i, a, b, state.x, state.R)
             n = shapes.normal[own]

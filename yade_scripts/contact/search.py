@@ -54,12 +54,12 @@ def fastest(v, radius):
 
 
 @inner
-def planes_seen_from(face_start, normal, offset, a, b, x, R, planes):
+def planes_seen_from(shapes, a, b, x, R, planes):
     """Face planes of b in the frame of a: depth of a point ξ of a behind face g is d - m·ξ, planes (g, 4) = (m, d).
 
     → number of faces"""
-    first = face_start[b]
-    count = face_start[b + 1] - first
+    first, normal, offset = shapes.face_start[b], shapes.normal, shapes.offset
+    count = shapes.face_end[b] - first
     for g in range(count):
         n0, n1, n2 = normal[first + g, 0], normal[first + g, 1], normal[first + g, 2]
         w0 = R[b, 0, 0] * n0 + R[b, 0, 1] * n1 + R[b, 0, 2] * n2
@@ -94,8 +94,8 @@ def scan(shapes, bodies, law, slots, slot, side, faces, state, rows, count, lost
 
     Most nodes lie outside of the face `farthest`, which is therefore looked at first."""
     a, b, planes, margin = side.a, side.b, faces.planes, faces.margin
-    begin, base, way = shapes.node_start[a], shapes.face_start[b], scratch[6:8]
-    for i in range(begin, shapes.node_start[a + 1]):
+    begin, base, way = shapes.node_start[a], shapes.face_number[b], scratch[6:8]
+    for i in range(begin, shapes.node_end[a]):
         s = np.uint32(slot + i - begin)
         xi0, xi1, xi2 = shapes.node[i, 0], shapes.node[i, 1], shapes.node[i, 2]
         nearest = faces.farthest
@@ -128,7 +128,7 @@ def scan(shapes, bodies, law, slots, slot, side, faces, state, rows, count, lost
                 slots.k[s] *= share_of_overlap(shapes, a, own, b, g, faces, state)
             slots.spread[s] = shapes.face_spread[own]
             slots.shear[s, 0] = slots.shear[s, 1] = slots.shear[s, 2] = 0.0
-            slots.push[s] = BEGINS
+            slots.push[s], slots.speed[s] = BEGINS, 0.0
             way_of(state, a, b, xi0, xi1, xi2, planes[g], scratch, way)
             came = ARRIVED * max(way[1, 0], 0.0)
             slots.rest[s] = 0.0 if side.whole else max(0.0, depth - came)
@@ -191,7 +191,7 @@ def cross(
                 crossing(shapes, a, b, number, state, plane, xi, scratch)
             slots.face[s], slots.k[s], slots.spread[s] = number, k, 1.0
             slots.shear[s, 0] = slots.shear[s, 1] = slots.shear[s, 2] = 0.0
-            slots.push[s] = BEGINS
+            slots.push[s], slots.speed[s] = BEGINS, 0.0
             way_of(state, a, b, xi[0], xi[1], xi[2], plane, scratch, way)
             came = ARRIVED * max(way[1, 0], 0.0)
             slots.rest[s] = 0.0 if side.whole else max(0.0, depth - came)
@@ -291,7 +291,7 @@ def _apart(rows, first, c):
 @inner
 def _has_face(shapes, a, n, R):
     """Whether a face of a is nearly perpendicular to n (3,)."""
-    for f in range(shapes.face_start[a], shapes.face_start[a + 1]):
+    for f in range(shapes.face_start[a], shapes.face_end[a]):
         along = 0.0
         for j in range(3):
             along += shapes.normal[f, j] * (R[a, 0, j] * n[0] + R[a, 1, j] * n[1] + R[a, 2, j] * n[2])
