@@ -102,7 +102,8 @@ class StructureResponse:
             if afloat is None
             else _of_heave(0.5 * (dt - substep) * afloat, mass.diagonal().reshape(-1, 6))
         )
-        self.matrix = sp.csr_array(mass / dt)
+        self._held = sp.csr_array(mass / dt)
+        self.matrix = self._held
         for part in (damping, dt * stiffness, self._restoring):
             if part is not None and part.nnz:
                 self.matrix = self.matrix + part
@@ -147,8 +148,10 @@ class StructureResponse:
         for driven bodies.
 
         substep dt_s [s]."""
-        held, change = self.mass / self.dt, (velocity - before).ravel()
-        gained = held @ change if self._restoring is None else held @ change + self._restoring @ change
+        change = (velocity - before).ravel()
+        gained = self._held @ change
+        if self._restoring is not None:
+            gained += self._restoring @ change
         return 0.5 * (1.0 - substep / self.dt) * self.compliance(gained).reshape(-1, 6)
 
     def at_end(self, mean: Array, before: Array, substep: float) -> Array:

@@ -218,6 +218,8 @@ def carry_slots(old_pairs, old, new_index, old_index, start, new, shear):
         for s in range(start[p + 1] - start[p]):
             to, source = start[p] + s, old_pairs.start[q] + s
             new.face[to] = old.face[source]
+            if old.face[source] < 0:
+                continue
             new.k[to] = old.k[source]
             new.rest[to] = old.rest[source]
             for c in range(3):  # a whole row at once takes numba two seconds to compile

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import struct
 from collections import deque
+from itertools import chain
+from operator import attrgetter
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -28,6 +30,8 @@ STATE = 13
 """Numbers of a body: position 3, velocity 3, angular velocity 3, orientation 4 (x y z w)."""
 _SAVED = [0, 1, 2, 12, 9, 10, 11, 3, 4, 5, 6, 7, 8]
 """Of these, in the order of a saved state: position, orientation (w x y z), velocity, spin."""
+
+_ENDS = attrgetter("id1", "id2")
 
 
 class SceneInUse(YadeError):
@@ -190,7 +194,8 @@ class Scene:
         moved by no more than that."""
         self.collider.doSort = True  # masks may have changed, and bodies may have been moved by hand
         self.collider()
-        return np.array([(i.id1, i.id2) for i in self.O.interactions.all()], np.int64).reshape(-1, 2)
+        numbers = chain.from_iterable(map(_ENDS, self.O.interactions.all()))
+        return np.fromiter(numbers, np.int64).reshape(-1, 2)
 
     def displace(self, rows: Array, shift: Array, turn: Array) -> None:
         """Move the blocks `rows` by shift (m, 3) and turn (m, 3, 3) about their centres."""
