@@ -4,8 +4,7 @@ The corners of the cells that the surface passes through test the triangles of t
 tests those that its neighbours hold as their closest, in two sweeps over its layer: in the first, neighbours of earlier
 layers and those before it in its own; in the second, neighbours of its own layer that hold another triangle than it has
 tested. So each node depends on those before it in its layer. What is handed on need not be the closest of all; nodes
-that are told to (`Descent`) go on from there through cells with a common node, unless they stand right above the
-triangle.
+that are told to go on from there through cells with a common node, unless they stand right above the triangle.
 
 Threads share a sweep nevertheless, and find what one thread finds, bit for bit. Each takes a part of the layer and does
 without the neighbours in the parts before it, and marks the nodes that have any. These few are then done again in the
@@ -17,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from array_types import Array, Floats, Integers, Ints
+from array_types import Array, Floats, Ints
 from fluid.domain.layers import WORK, Layers
 from kernels.decorators import inlined, inner, kernel, plain, ranged, released
 from kernels.threads import over, owning, reach_of_cells
@@ -25,10 +24,11 @@ from kernels.threads import over, owning, reach_of_cells
 TESTED = 64
 """Number of places in which the triangles that a node has tested are noted."""
 NOTED = 256
-"""The same of the cells that a descent has gone through."""
+"""The same of the triangles, and of the nodes, that a descent has gone through."""
 FIRST, SECOND = 0, 1
 BESIDE = 1e-6
-"""Share by which a squared distance may exceed that from the plane of the triangle and still count as the same."""
+"""Share by which a squared distance may exceed that from the plane of the triangle and still count as the same; and
+that by which the one from its box must exceed the least one so far, before the triangle cannot be closer."""
 TESTS = 5
 """Cost of a node and a sweep, in visits of its neighbours."""
 
@@ -80,15 +80,6 @@ class Surface(NamedTuple):
     owner: Ints
 
 
-class Descent(NamedTuple):
-    """Places (k,) in layers of the nodes that go on from the triangle handed to them to the closest of all, and the
-    cells of each node: start (N + 1,), cells."""
-
-    places: Ints
-    node_start: Integers
-    node_cells: Integers
-
-
 class Nearest(NamedTuple):
     """What the nodes in layers hold, by their places: closest (n,) number of a triangle, -1 none · square (n,) [m²] its
     squared distance, ∞ for none."""
@@ -97,17 +88,22 @@ class Nearest(NamedTuple):
     square: Array
 
 
-def squared_distances(layers: Layers, surface: Surface, mesh, around, descent: Descent | None) -> Floats:
+def squared_distances(layers: Layers, surface: Surface, mesh, around, descending: Ints | None) -> Floats:
     """Squared distance [m²] of each node in layers from the closest triangle that was handed to it (n,), ∞ where there
     is none.
 
-    mesh: Corners · around: start (N + 1,), neighbours of each node · descent: nodes that go on from there."""
+    mesh: Corners · around: start (N + 1,), neighbours of each node · descending (k,): places in layers of the nodes
+    that go on from there to the closest of all."""
     n = len(layers.order)
     once, known = (Nearest(np.empty(n, np.int32), np.empty(n)) for _ in range(2))
     first = layers.start[1]
     known.closest[:first], known.square[:first] = -1, np.inf
-    reach, count = reach_of_cells(surface.owner, mesh.cells), len(surface.owner)
-    owning(_of_corners, len(mesh.nodes), reach, count, surface, mesh, layers.place, known, weight=WORK)
+    reach, count, found = (
+        reach_of_cells(surface.owner, mesh.cells),
+        len(surface.owner),
+        np.zeros(first, np.int64),
+    )
+    owning(_of_corners, len(mesh.nodes), reach, count, surface, mesh, layers.place, known, found, weight=WORK)
     behind = np.empty(n, bool)
     for layer, count in enumerate(np.diff(layers.start).tolist()[1:], 1):
         for sweep in (FIRST, SECOND):
@@ -115,16 +111,17 @@ def squared_distances(layers: Layers, surface: Surface, mesh, around, descent: D
             starts = over(_sweep, count, *rows, weight=TESTS * WORK, pieces=1)
             if len(starts) > 1:
                 _mend(starts[1], count, *rows)
-    if descent is not None:
-        triangle_of, count = np.empty(len(mesh.cells), np.int32), len(descent.places)
-        over(_first_triangles, len(surface.owner), surface.owner, triangle_of)
-        over(_descended, count, layers.order, surface, triangle_of, mesh, descent, known, weight=TESTS * WORK)
+    if descending is not None:
+        near, boxes = _triangles_around(layers, surface, mesh, found), np.empty((len(surface.owner), 2, 3))
+        over(_box, len(boxes), surface.triangles, boxes)
+        rows = (descending, layers.order, layers.place, surface, boxes, near, mesh, known)
+        over(_descended, len(descending), *rows, weight=TESTS * WORK)
     return known.square
 
 
 @ranged
-def _of_corners(first, last, runs, surface, mesh, place, known):
-    """Nodes of a range test the triangles of their own cells."""
+def _of_corners(first, last, runs, surface, mesh, place, known, found):
+    """Nodes of a range test the triangles of their own cells; how many these are is added to `found`, by place."""
     triangles, owner = surface
     nodes, cells = mesh
     for run in range(runs.shape[0]):
@@ -133,6 +130,7 @@ def _of_corners(first, last, runs, surface, mesh, place, known):
                 i = cells[owner[t], a]
                 if first <= i < last:
                     d, s = squared_distance(nodes[i], triangles[t]), place[i]
+                    found[s] += 1
                     if d < known.square[s]:
                         known.square[s], known.closest[s] = d, t
 
@@ -229,22 +227,60 @@ def _tested(s, part, layer, sweep, layers, triangles, nodes, around, once, known
     return closest, square, behind
 
 
+class Around(NamedTuple):
+    """Triangles of the cells around each node of layer 0, in ascending order: start (n + 1,) by the place of the node,
+    triangle."""
+
+    start: Ints
+    triangle: Ints
+
+
+def _triangles_around(layers: Layers, surface: Surface, mesh, found) -> Around:
+    """found (n,): how many there are around each node of layer 0."""
+    start = np.zeros(len(found) + 1, np.int64)
+    np.cumsum(found, out=start[1:])
+    filled, triangle = start[:-1].copy(), np.empty(start[-1], np.int32)
+    reach, count = reach_of_cells(surface.owner, mesh.cells), len(surface.owner)
+    rows = (surface.owner, mesh.cells, layers.place, filled, triangle)
+    owning(_listed_around, len(mesh.nodes), reach, count, *rows)
+    return Around(start, triangle)
+
+
+@ranged
+def _listed_around(first, last, runs, owner, cells, place, filled, triangle):
+    for run in range(runs.shape[0]):
+        for t in range(runs[run, 0], runs[run, 1]):
+            for a in range(4):
+                i = cells[owner[t], a]
+                if first <= i < last:
+                    s = place[i]
+                    triangle[filled[s]] = t
+                    filled[s] += 1
+
+
+@ranged
+def _box(first, last, triangles, boxes):
+    """Least and largest coordinates (2, 3) of each triangle."""
+    for t in range(first, last):
+        for k in range(3):
+            a, b, c = triangles[t, 0, k], triangles[t, 1, k], triangles[t, 2, k]
+            boxes[t, 0, k], boxes[t, 1, k] = min(min(a, b), c), max(max(a, b), c)
+
+
 @released
-def _descended(first, last, order, surface, triangle_of, mesh, descent, known):
-    _descend_all(first, last, order, surface, triangle_of, mesh, descent, known, np.full(NOTED, -1))
+def _descended(first, last, descending, order, place, surface, boxes, near, mesh, known):
+    noted = np.full(NOTED, -1), np.full(NOTED, -1)
+    _descend_all(first, last, descending, order, place, surface, boxes, near, mesh, known, noted)
 
 
 @inner
-def _descend_all(first, last, order, surface, triangle_of, mesh, descent, known, noted):
-    """The loop over places in the descent; noted (NOTED,): work space."""
+def _descend_all(first, last, descending, order, place, surface, boxes, near, mesh, known, noted):
+    """The loop over the places `descending` (k,); noted: work space, twice (NOTED,)."""
     for k in range(first, last):
-        s = descent.places[k]
-        x, closest, square = mesh.nodes[order[s]], known.closest[s], known.square[s]
+        s = np.uint64(descending[k])
+        x, closest, square = mesh.nodes[np.uint64(order[s])], np.int64(known.closest[s]), known.square[s]
         if closest >= 0 and not _above(x, surface.triangles[closest], square):
-            of_nodes = (descent.node_start, descent.node_cells)
-            known.square[s] = _descend(
-                x, k, closest, square, surface, triangle_of, mesh.cells, of_nodes, noted
-            )
+            known.square[s] = _descend(x, k, closest, square, place, surface, boxes, near, mesh, noted)
 
 
 @inner
@@ -257,40 +293,38 @@ def _above(p, t, square):
     return square * (nx * nx + ny * ny + nz * nz) <= (1.0 + BESIDE) * height * height
 
 
-@ranged
-def _first_triangles(first, last, owner, found):
-    """The first triangle of each cell that has one, in `found` (n_cells,); the others hold anything."""
-    for k in range(first, last):
-        if k == 0 or owner[k - 1] != owner[k]:
-            found[owner[k]] = k
-
-
 @inlined
-def _descend(x, own, closest, best, surface, first, cells, cells_of_nodes, noted):
+def _descend(x, own, closest, best, place, surface, boxes, near, mesh, noted):
     """Squared distance [m²] of x (3,) to the closest triangle that can be reached from `closest`, at the squared
     distance `best`, through cells with a common node, always coming closer.
 
-    first (n_cells,): the first triangle of each cell that has one; others hold anything · noted: places where cells
-    that were gone through are noted, with the number `own` of x."""
-    triangles, owner = surface
-    node_start, node_cells = cells_of_nodes
-    before = -1
+    A triangle whose box (2, 3) is farther than `best` is passed by · noted: places where the triangles and nodes that
+    were gone through are noted, with the number `own` of x."""
+    (triangles, owner), (start, around), (tested, visited) = surface, near, noted
+    n_triangles, n_nodes = triangles.shape[0], mesh.nodes.shape[0]
+    x0, x1, x2 = x[0], x[1], x[2]
+    before, limit = np.int64(-1), best * (1.0 + BESIDE)
     while closest != before:
         before = closest
         for a in range(4):
-            i = np.uint64(cells[owner[before], a])
-            for s in range(node_start[i], node_start[i + np.uint64(1)]):
-                e = np.int64(node_cells[s])
-                mark, note = own * first.shape[0] + e, np.uint64(e % NOTED)
-                if noted[note] == mark:
+            i = np.int64(mesh.cells[owner[before], a])
+            mark, note = own * n_nodes + i, np.uint64(i % NOTED)
+            if visited[note] == mark:
+                continue
+            visited[note] = mark
+            q = np.uint64(place[np.uint64(i)])
+            for s in range(start[q], start[q + np.uint64(1)]):
+                t = np.uint64(around[np.uint64(s)])
+                mark, note = own * n_triangles + np.int64(t), t % np.uint64(NOTED)
+                if tested[note] == mark:
                     continue
-                noted[note] = mark
-                t = np.int64(first[np.uint64(e)])
-                if not 0 <= t < owner.shape[0] or owner[t] != e:
+                tested[note] = mark
+                dx = max(max(boxes[t, 0, 0] - x0, x0 - boxes[t, 1, 0]), 0.0)
+                dy = max(max(boxes[t, 0, 1] - x1, x1 - boxes[t, 1, 1]), 0.0)
+                dz = max(max(boxes[t, 0, 2] - x2, x2 - boxes[t, 1, 2]), 0.0)
+                if dx * dx + dy * dy + dz * dz > limit:
                     continue
-                while t < owner.shape[0] and owner[t] == e:
-                    d = squared_distance(x, triangles[t])
-                    if d < best:
-                        best, closest = d, t
-                    t += 1
+                d = squared_distance(x, triangles[t])
+                if d < best:
+                    best, closest, limit = d, np.int64(t), d * (1.0 + BESIDE)
     return best

@@ -14,10 +14,12 @@ import numpy as np
 from array_types import Bools, Floats
 from fluid.domain.layers import WORK, layers_around
 from fluid.domain.moments import touching_among
-from kernels.decorators import inner, ranged, released
+from kernels.decorators import inlined, inner, ranged, released
 from kernels.threads import over, owning, reach_of_cells, zeros
 
 LINEAR_LAYERS = 2
+SPACE, ENTRIES = 3, 9
+"""Components of a velocity, and of its gradient: loops of a length that the compiler knows take half the time."""
 SWEEPS = 3
 """Averages of the slope that the velocity is continued with, in calm water; one more takes off what they flatten."""
 BAND = 5
@@ -56,22 +58,24 @@ def continue_outward(order, layer_start, linear_layers, f, gradient, nodes, arou
 
 @released
 def _one_layer(first, last, layer, linear, field, nodes, around):
-    value, _, _, _ = field
-    _continue(first, last, layer, linear, field, nodes, around, np.empty(value.shape[1]))
+    m = field.value.shape[1]
+    if m == SPACE:
+        _continue(first, last, SPACE, layer, linear, field, nodes, around, np.empty(m))
+    else:
+        _continue(first, last, m, layer, linear, field, nodes, around, np.empty(m))
 
 
-@inner
-def _continue(first, last, layer, linear, field, nodes, around_by_cells, total):
+@inlined
+def _continue(first, last, m, layer, linear, field, nodes, around_by_cells, total):
     """The loop of `continue_outward` over the nodes of a layer; total (m,): work space."""
     f, gradient, done, least = field
     start, around, shared = around_by_cells
-    m = f.shape[1]
     for s in range(first, last):
-        i = layer[s]
+        i = np.uint64(layer[s])
         weight = 0.0
         for k in range(m):
             total[k] = 0.0
-        for t in range(start[i], start[i + 1]):
+        for t in range(start[i], start[i + np.uint64(1)]):
             j = around[t]
             if not done[j]:
                 continue
@@ -102,7 +106,7 @@ def _shorten(i, least, f, nodes, around_by_cells, done):
     start, around, shared = around_by_cells
     length = np.sqrt(_square(f[i]))
     mean, weight = 0.0, 0.0
-    for t in range(start[i], start[i + 1]):
+    for t in range(start[i], start[i + np.uint64(1)]):
         j = around[t]
         if not done[j]:
             continue
@@ -115,7 +119,7 @@ def _shorten(i, least, f, nodes, around_by_cells, done):
         mean += shared[t] / square * along
     mean /= max(weight * length, 1e-300)
     most = max(least, mean)
-    for t in range(start[i], start[i + 1]):
+    for t in range(start[i], start[i + np.uint64(1)]):
         j = around[t]
         if not done[j]:
             continue
@@ -140,14 +144,14 @@ def _square(v):
     return total
 
 
-@inner
+@inlined
 def _pass_gradient(i, m, gradient, start, around, shared, done):
     """The gradient of a filled node: the mean of the known ones around it, each as often as they share cells."""
     count = 0
     for k in range(m):
         for d in range(3):
             gradient[i, k, d] = 0.0
-    for t in range(start[i], start[i + 1]):
+    for t in range(start[i], start[i + np.uint64(1)]):
         j = around[t]
         if done[j]:
             count += shared[t]
@@ -172,28 +176,46 @@ def mean_gradients(cell_list, marked, f, fluid, gradient):
 
 @released
 def _mean_gradients(first, last, runs, cell_list, marked, f, fluid, weight, gradient):
-    cells, parent, g, volume = fluid.cells, fluid.parent, fluid.gradients, fluid.volume
     m = f.shape[1]
     local = np.empty((m, 3))
+    if m == SPACE:
+        _add_gradients(first, last, SPACE, runs, cell_list, marked, f, fluid, local, weight, gradient)
+    else:
+        _add_gradients(first, last, m, runs, cell_list, marked, f, fluid, local, weight, gradient)
+
+
+@inlined
+def _add_gradients(first, last, m, runs, cell_list, marked, f, fluid, local, weight, gradient):
+    """The loop of `mean_gradients`; local (m, 3): work space."""
+    cells, parent, g, volume = fluid.cells, fluid.parent, fluid.gradients, fluid.volume
     for run in range(runs.shape[0]):
         for s in range(runs[run, 0], runs[run, 1]):
-            e = cell_list[s]
+            e = np.uint64(cell_list[s])
             if not (
                 marked[cells[e, 0]] and marked[cells[e, 1]] and marked[cells[e, 2]] and marked[cells[e, 3]]
             ):
                 continue
-            local[:] = 0.0
+            p = parent[e]
+            for k in range(m):
+                for d in range(3):
+                    local[k, d] = 0.0
             for a in range(4):
+                i = cells[e, a]
                 for k in range(m):
                     for d in range(3):
-                        local[k, d] += f[cells[e, a], k] * g[parent[e], a, d]
+                        local[k, d] += f[i, k] * g[p, a, d]
+            for k in range(m):
+                for d in range(3):
+                    local[k, d] *= volume[e]
             for a in range(4):
-                if first <= cells[e, a] < last:
-                    weight[cells[e, a]] += volume[e]
+                i = cells[e, a]
+                if first <= i < last:
+                    weight[i] += volume[e]
                     for k in range(m):
                         for d in range(3):
-                            gradient[cells[e, a], k, d] += volume[e] * local[k, d]
-    for i in range(first, last):
+                            gradient[i, k, d] += local[k, d]
+    for j in range(first, last):
+        i = np.uint64(j)
         if weight[i] > 0.0:
             for k in range(m):
                 for d in range(3):
@@ -201,12 +223,12 @@ def _mean_gradients(first, last, runs, cell_list, marked, f, fluid, weight, grad
 
 
 def smoothed_slope(topology, cell_list, marked, u, calm: float):
-    """∇u (N, m, 3) of `mean_gradients`, averaged over the corners of the listed cells, each cell counts: at the nodes
-    beside cells that are not all marked, from which values are continued (elsewhere it is not to be read). Once in fast
-    water, calm = 0; (SWEEPS + 1) Aⁿ - SWEEPS Aⁿ⁺¹ at rest, calm = 1, with the average A and n = SWEEPS; between, in
-    between; zero at other marked nodes. A wave of many cells passes with an error of the second order of what an
-    average takes off it, one of a few cells as little as through Aⁿ, which alone took the slope a cell too deep: 2.5 %
-    of the energy of waves of 14 cells a period.
+    """∇u (N, 3, 3) of `mean_gradients` for u (N, 3), averaged over the corners of the listed cells, each cell counts:
+    at the nodes beside cells that are not all marked, from which values are continued (elsewhere it is not to be read).
+    Once in fast water, calm = 0; (SWEEPS + 1) Aⁿ - SWEEPS Aⁿ⁺¹ at rest, calm = 1, with the average A and n = SWEEPS;
+    between, in between; zero at other marked nodes. A wave of many cells passes with an error of the second order of
+    what an average takes off it, one of a few cells as little as through Aⁿ, which alone took the slope a cell too
+    deep: 2.5 % of the energy of waves of 14 cells a period.
 
     Only nodes of cells whose corners are all marked have a field, the averages run over these. Waves of a few cells,
     whose slope the continuation carries to the surface many times too large, grow without it: by 0.01 to 0.02 a step
@@ -221,11 +243,11 @@ def smoothed_slope(topology, cell_list, marked, u, calm: float):
     near = touching_among(cell_list, reach.pop(), t.cells)
     there = np.zeros(len(u), bool)
     over(mark_nodes, len(near), near, t.cells, there)
-    slope = mean_gradients(near, marked, u, t.fluid_cells, _zero_at(there, there, u.shape[1]))
-    mean = _zero_at(there, marked, u.shape[1])
+    slope = mean_gradients(near, marked, u, t.fluid_cells, _zero_at(there, there))
+    mean = _zero_at(there, marked)
     once = before = slope = _averaged(near, reach.pop(), has, slope, t.cells, mean)
     while reach:
-        mean = _zero_at(there, there, u.shape[1])
+        mean = _zero_at(there, there)
         before, slope = slope, _averaged(near, reach.pop(), has, slope, t.cells, mean)
     if slope is once:
         return once
@@ -242,11 +264,12 @@ def mark_nodes(first, last, cell_list, cells, marked):
 
 @ranged
 def _combined(first, last, there, calm, once, before, slope):
-    """once (N, m, 3) + calm (before + SWEEPS (before - slope) - once) in place at marked nodes."""
-    for i in range(first, last):
+    """once (N, 3, 3) + calm (before + SWEEPS (before - slope) - once) in place at marked nodes."""
+    for j in range(first, last):
+        i = np.uint64(j)
         if there[i]:
-            for k in range(once.shape[1]):
-                for d in range(3):
+            for k in range(SPACE):
+                for d in range(SPACE):
                     ahead = before[i, k, d] + SWEEPS * (before[i, k, d] - slope[i, k, d])
                     once[i, k, d] = once[i, k, d] + calm * (ahead - once[i, k, d])
 
@@ -286,25 +309,26 @@ def _mark_layer(first, last, cell_list, nodes, cells, wider):
                 wider[cells[e, a]] = True
 
 
-def _zero_at(there, also, m: int):
-    """(N, m, 3), zero at nodes that one of the two marks; the others hold anything."""
-    out = np.empty((len(there), m, 3))
+def _zero_at(there, also):
+    """(N, 3, 3), zero at nodes that one of the two marks; the others hold anything."""
+    out = np.empty((len(there), SPACE, SPACE))
     over(_clear_rows, len(there), there, also, out)
     return out
 
 
 @ranged
 def _clear_rows(first, last, there, also, out):
-    for i in range(first, last):
+    for j in range(first, last):
+        i = np.uint64(j)
         if there[i] or also[i]:
-            for k in range(out.shape[1]):
-                for d in range(3):
+            for k in range(SPACE):
+                for d in range(SPACE):
                     out[i, k, d] = 0.0
 
 
 def _averaged(cell_list, reach, has, field, cells, mean):
-    """Mean of the field (N, m, 3) over the corners that have one, of the listed cells around the nodes in reach: what
-    is added to `mean` (N, m, 3), zero at first."""
+    """Mean of the field (N, 3, 3) over the corners that have one, of the listed cells around the nodes in reach: what
+    is added to `mean` (N, 3, 3), zero at first."""
     count, n = zeros((len(field),)), len(field)
     listed, flat = reach_of_cells(cell_list, cells), (field.reshape(n, -1), mean.reshape(n, -1))
     owning(_average, n, listed, len(cell_list), cell_list, (reach, has), flat[0], cells, count, flat[1])
@@ -313,30 +337,37 @@ def _averaged(cell_list, reach, has, field, cells, mean):
 
 @released
 def _average(first, last, runs, cell_list, marks, field, cells, count, mean):
-    """field, mean: the entries of each node in one row."""
+    _add_averages(first, last, runs, cell_list, marks, field, cells, np.empty(ENTRIES), count, mean)
+
+
+@inner
+def _add_averages(first, last, runs, cell_list, marks, field, cells, total, count, mean):
+    """field, mean: the entries of each node in one row · total: work space, as long."""
     reach, has = marks
-    total = np.empty(field.shape[1])
     for run in range(runs.shape[0]):
         for s in range(runs[run, 0], runs[run, 1]):
-            e = cell_list[s]
+            e = np.uint64(cell_list[s])
             if not (reach[cells[e, 0]] or reach[cells[e, 1]] or reach[cells[e, 2]] or reach[cells[e, 3]]):
                 continue
-            total[:] = 0.0
+            for k in range(ENTRIES):
+                total[k] = 0.0
             known = 0
-            # written out entry by entry: sums of array slices take four times as long
             for a in range(4):
-                if has[cells[e, a]]:
+                i = cells[e, a]
+                if has[i]:
                     known += 1
-                    for k in range(field.shape[1]):
-                        total[k] += field[cells[e, a], k]
+                    for k in range(ENTRIES):
+                        total[k] += field[i, k]
             for a in range(4):
-                if has[cells[e, a]] and first <= cells[e, a] < last:
-                    count[cells[e, a]] += known
-                    for k in range(field.shape[1]):
-                        mean[cells[e, a], k] += total[k]
-    for i in range(first, last):
+                i = cells[e, a]
+                if has[i] and first <= i < last:
+                    count[i] += known
+                    for k in range(ENTRIES):
+                        mean[i, k] += total[k]
+    for j in range(first, last):
+        i = np.uint64(j)
         if count[i] > 0.0:
-            for k in range(field.shape[1]):
+            for k in range(ENTRIES):
                 mean[i, k] /= count[i]
 
 

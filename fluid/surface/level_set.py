@@ -33,10 +33,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from fluid.domain.layers import Layers, layers_around
+from fluid.domain.layers import layers_around
 from fluid.mesh.arrays import Corners
 from fluid.numerics.fields import copied
-from fluid.surface.closest_triangles import Descent, Surface, squared_distances
+from fluid.surface.closest_triangles import Surface, squared_distances
 from fluid.surface.extrapolation import continue_outward, mark_nodes, mean_gradients
 from kernels.decorators import ranged, released
 from kernels.threads import found_over, over, owning, reach_of_cells, zeros
@@ -221,7 +221,8 @@ def redistance(topology, phi, spacing, rescale: bool, motion=None):
     over(mark_nodes, len(cut), cut, t.cells, front)
     layers = layers_around(front, LAYERS, *t.around)
     surface, mesh = Surface(*surface_triangles(cut, phi, t.nodes, t.cells)), Corners(t.nodes, t.cells)
-    square = squared_distances(layers, surface, mesh, t.around, _descent(t, layers))
+    exact = np.arange(layers.start[1], layers.start[EXACT_LAYERS + 1])
+    square = squared_distances(layers, surface, mesh, t.around, exact)
     over(_signed, len(layers.order), layers, square, phi, far)
     if rescale:
         corners, slope = layers.order[: layers.start[1]], _mean_slope(t, cut, phi)
@@ -234,11 +235,6 @@ def redistance(topology, phi, spacing, rescale: bool, motion=None):
         beside = layers.order[layers.start[1] : layers.start[2]]
         _past_the_last_polygon(t, cut, front, beside, motion, far)
     return far
-
-
-def _descent(t, layers: Layers) -> Descent:
-    """The nodes that go on to the closest triangle of all."""
-    return Descent(np.arange(layers.start[1], layers.start[EXACT_LAYERS + 1]), t.node_start, t.node_cells)
 
 
 def no_steeper(topology, phi, given):

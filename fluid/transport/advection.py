@@ -17,39 +17,40 @@ import numpy as np
 
 from fluid.mesh.arrays import Paths
 from fluid.numerics.fields import copied
-from kernels.decorators import inlined, inner, ranged, released
+from kernels.decorators import inlined, inner, released
 from kernels.threads import over
 
 _LONGEST_WALK = 100
+SWEEPS = 3
+"""Sweeps of the fixed point."""
+OUTSIDE, COUNTED = -1e-9, 1e-9
+"""Barycentric coordinates below which a point lies beyond a face, and above which a corner has a weight."""
 
 
 @inlined
 def walk(x, e, mesh, lam):
-    """Cell that holds x (3,), walking from cell e; its barycentric coordinates in lam (4,).
+    """Cell that holds x (3,), walking from cell e, both np.uint64; its barycentric coordinates in lam (4,).
 
     A point beyond a wall or an open side is moved to the nearest point of the face, in place: a clip of lam alone
     would shift it along the side, 2-5 % of the profile of a channel fed through that side."""
     nodes, cells, parent, g, neighbours = mesh.nodes, mesh.cells, mesh.parent, mesh.gradients, mesh.neighbours
     for _ in range(_LONGEST_WALK):
-        p = parent[e]
-        o = cells[e, 0]
-        lam[0] = 1.0
-        for a in range(1, 4):
-            lam[a] = (
-                g[p, a, 0] * (x[0] - nodes[o, 0])
-                + g[p, a, 1] * (x[1] - nodes[o, 1])
-                + g[p, a, 2] * (x[2] - nodes[o, 2])
-            )
-            lam[0] -= lam[a]
+        p, o = parent[e], cells[e, 0]
+        dx, dy, dz = x[0] - nodes[o, 0], x[1] - nodes[o, 1], x[2] - nodes[o, 2]
+        one = g[p, 1, 0] * dx + g[p, 1, 1] * dy + g[p, 1, 2] * dz
+        two = g[p, 2, 0] * dx + g[p, 2, 1] * dy + g[p, 2, 2] * dz
+        three = g[p, 3, 0] * dx + g[p, 3, 1] * dy + g[p, 3, 2] * dz
+        lam[0], lam[1], lam[2], lam[3] = 1.0 - one - two - three, one, two, three
+        least = min(min(lam[0], one), min(two, three))
         exit_face, lowest = -1, -1e-12
-        for a in range(4):
-            if lam[a] < lowest and neighbours[e, a] >= 0:
-                exit_face, lowest = a, lam[a]
-        if exit_face < 0:
-            if not _to_face(x, lam, g[p]):
-                break
-        else:
-            e = neighbours[e, exit_face]
+        if least < lowest:
+            for a in range(4):
+                if lam[a] < lowest and neighbours[e, a] >= 0:
+                    exit_face, lowest = a, lam[a]
+        if exit_face >= 0:
+            e = np.uint64(neighbours[e, np.uint64(exit_face)])
+        elif not (least < OUTSIDE and _to_face(x, lam, g[p])):
+            break
     total = 0.0
     for a in range(4):
         lam[a] = max(lam[a], 0.0)
@@ -62,7 +63,7 @@ def walk(x, e, mesh, lam):
 @inner
 def _to_face(x, lam, g):
     """Move x (3,) straight back to the face of the cell that it is farthest beyond, in place; False if it is inside."""
-    face, lowest = -1, -1e-9
+    face, lowest = -1, OUTSIDE
     for a in range(4):
         if lam[a] < lowest:
             face, lowest = a, lam[a]
@@ -86,88 +87,113 @@ def feet(listed, sense, dt, sweeps, u_m, mesh: Paths):
 
 @released
 def _feet(first, last, listed, dt, sweeps, u_m, mesh, cell, weight):
-    _trace(first, last, listed, dt, sweeps, u_m, mesh, np.empty((3, 4)), cell, weight)
+    _all_feet(first, last, listed, dt, sweeps, u_m, mesh, np.empty((2, 4)), cell, weight)
 
 
 @inner
-def _trace(first, last, listed, dt, sweeps, u_m, mesh, scratch, cell, weight):
-    """The loop of `feet`; scratch (3, 4): work space."""
-    x, lam, u = scratch[0], scratch[1], scratch[2]
+def _all_feet(first, last, listed, dt, sweeps, u_m, mesh, scratch, cell, weight):
+    """The loop of `feet`; scratch (2, 4): work space."""
+    x, lam = scratch[0], scratch[1]
     for s in range(first, last):
-        i = listed[s]
-        for k in range(3):
-            u[k] = u_m[i, k]
-        e = np.int64(mesh.node_cells[mesh.node_start[i]])
-        for sweep in range(sweeps + 1):
-            for k in range(3):
-                x[k] = mesh.nodes[i, k] + dt * u[k]
-            e = walk(x, e, mesh, lam)
-            if sweep < sweeps:
-                for k in range(3):
-                    u[k] = 0.0
-                    for a in range(4):
-                        u[k] += lam[a] * u_m[mesh.cells[e, a], k]
-        cell[s] = e
+        cell[s] = _foot(np.uint64(listed[s]), dt, sweeps, u_m, mesh, x, lam)
         for a in range(4):
             weight[s, a] = lam[a]
 
 
-def interpolate(cell, weight, cells, f):
-    """Σ_a weight_a f_a (n, m) at points given by cell (n,) and weights (n, 4); f (N, m)."""
-    out = np.empty((len(cell), f.shape[1]))
-    over(_interpolate, len(cell), cell, weight, cells, f, out)
-    return out
+@inlined
+def _foot(i, dt, sweeps, u_m, mesh, x, lam):
+    """The other end of the path from node i (np.uint64) over dt [s], negative backwards: its cell, and its barycentric
+    coordinates in lam (4,); x (4,): work space."""
+    nodes, cells = mesh.nodes, mesh.cells
+    ux, uy, uz = u_m[i, 0], u_m[i, 1], u_m[i, 2]
+    e = np.uint64(mesh.node_cells[mesh.node_start[i]])
+    for sweep in range(sweeps + 1):
+        x[0], x[1], x[2] = nodes[i, 0] + dt * ux, nodes[i, 1] + dt * uy, nodes[i, 2] + dt * uz
+        e = walk(x, e, mesh, lam)
+        if sweep < sweeps:
+            ux, uy, uz = 0.0, 0.0, 0.0
+            for a in range(4):
+                j = cells[e, a]
+                ux += lam[a] * u_m[j, 0]
+                uy += lam[a] * u_m[j, 1]
+                uz += lam[a] * u_m[j, 2]
+    return e
 
 
-@ranged
-def _interpolate(first, last, cell, weight, cells, f, out):
+@released
+def _brought(first, last, listed, dt, u_m, f, mesh, origin, f1):
+    _bring(first, last, listed, dt, u_m, f, mesh, np.empty((2, 4)), origin, f1)
+
+
+@inner
+def _bring(first, last, listed, dt, u_m, f, mesh, scratch, origin, f1):
+    """f1 (N, 4) at the listed nodes, and the origin of each: cell of its foot and a bit for each corner of it with a
+    weight, both (n,); scratch (2, 4): work space."""
+    x, lam = scratch[0], scratch[1]
+    cells, (cell, corners) = mesh.cells, origin
     for s in range(first, last):
-        for k in range(f.shape[1]):
-            out[s, k] = 0.0
+        i = np.uint64(listed[s])
+        e = _foot(i, -dt, SWEEPS, u_m, mesh, x, lam)
+        f1[i, 0], f1[i, 1], f1[i, 2], f1[i, 3] = _interpolated(e, lam, cells, f)
+        cell[s], corners[s] = e, 0
         for a in range(4):
-            j = cells[cell[s], a]
-            for k in range(f.shape[1]):
-                out[s, k] += weight[s, a] * f[j, k]
-    return out
+            if lam[a] > COUNTED:
+                corners[s] |= 1 << a
 
 
-@ranged
-def _put(first, last, listed, values, out):
-    """out (N, m) at the listed nodes takes the values (n, m), in place: a quarter of the time of indexing by a list."""
-    for s in range(first, last):
-        for k in range(out.shape[1]):
-            out[listed[s], k] = values[s, k]
+@inlined
+def _interpolated(e, lam, cells, f):
+    """f (N, 4) at the point of cell e with the barycentric coordinates lam (4,)."""
+    v0, v1, v2, v3 = 0.0, 0.0, 0.0, 0.0
+    for a in range(4):
+        j = cells[e, a]
+        v0 += lam[a] * f[j, 0]
+        v1 += lam[a] * f[j, 1]
+        v2 += lam[a] * f[j, 2]
+        v3 += lam[a] * f[j, 3]
+    return v0, v1, v2, v3
 
 
-@ranged
-def _limited(first, last, listed, on_open_side, foot, f, f1, f1_ahead, cells, out):
-    """Set out (n, m) to f2 where this stays within the range of f over the cell of the foot, and to f1 elsewhere and on
-    open sides. foot: its cell (n,) and weights (n, 4).
+@released
+def _limited(first, last, listed, dt, u_m, on_open_side, f, mesh, origin, f1, out):
+    _limit(first, last, listed, dt, u_m, on_open_side, f, mesh, origin, f1, np.empty((3, 4)), out)
+
+
+@inner
+def _limit(first, last, listed, dt, u_m, on_open_side, f, mesh, origin, f1, scratch, out):
+    """Set out (n, 4) to f2 where this stays within the range of f over the cell of the foot, and to f1 elsewhere and on
+    open sides. origin: as in `_bring` · scratch (3, 4): work space.
 
     Only corners with a weight count: a foot on a face must not depend on the side it was found from."""
-    back_cell, back_weight = foot
+    x, lam, ahead = scratch[0], scratch[1], scratch[2]
+    cells, (cell, corners) = mesh.cells, origin
     for s in range(first, last):
-        e = back_cell[s]
-        for k in range(f.shape[1]):
+        i = np.uint64(listed[s])
+        if on_open_side[i]:
+            for k in range(4):
+                out[s, k] = f1[i, k]
+            continue
+        e = _foot(i, dt, 0, u_m, mesh, x, lam)
+        ahead[0], ahead[1], ahead[2], ahead[3] = _interpolated(e, lam, cells, f1)
+        e = np.uint64(cell[s])
+        for k in range(4):
             low, high = np.inf, -np.inf
             for a in range(4):
-                if back_weight[s, a] > 1e-9:
+                if corners[s] & (1 << a):
                     low, high = min(low, f[cells[e, a], k]), max(high, f[cells[e, a], k])
-            f2 = f1[s, k] + 0.5 * (f[listed[s], k] - f1_ahead[s, k])
-            out[s, k] = f2 if low <= f2 <= high and not on_open_side[listed[s]] else f1[s, k]
+            f2 = f1[i, k] + 0.5 * (f[i, k] - ahead[k])
+            out[s, k] = f2 if low <= f2 <= high else f1[i, k]
 
 
 def transport(topology, listed, dt: float, u_m, f, on_open_side):
-    """Values of f (N, m) after dt [s] at the listed nodes (n,), carried by u_m (N, 3) [m/s] → (n, m).
+    """Values of f (N, 4) after dt [s] at the listed nodes (n,), carried by u_m (N, 3) [m/s] → (n, 4).
 
-    on_open_side (N,) bool: nodes where water may leave."""
-    t = topology
-    cell, weight = feet(listed, -1.0, dt, 3, u_m, t.paths)
-    f1 = interpolate(cell, weight, t.cells, f)
-    moved = copied(f)
-    over(_put, len(listed), listed, f1, moved)
-    ahead, ahead_weight = feet(listed, 1.0, dt, 0, u_m, t.paths)
-    f1_ahead = interpolate(ahead, ahead_weight, t.cells, moved)
-    out = np.empty_like(f1)
-    over(_limited, len(listed), listed, on_open_side, (cell, weight), f, f1, f1_ahead, t.cells, out)
+    on_open_side (N,) bool: nodes where water may leave. Raises ValueError for fields with other than four columns, the
+    number that the loops are made for."""
+    if f.shape[1:] != (4,):
+        raise ValueError(f"fields {f.shape}: must have four columns")
+    n, f1, out = len(listed), copied(f), np.empty((len(listed), 4))
+    origin = np.empty(n, np.uint32), np.empty(n, np.uint8)
+    over(_brought, n, listed, dt, u_m, f, topology.paths, origin, f1)
+    over(_limited, n, listed, dt, u_m, on_open_side, f, topology.paths, origin, f1, out)
     return out

@@ -25,7 +25,7 @@ def test_linear_field_in_uniform_flow_is_exact(cube, courant):
     """Away from the inflow, where no foot is stopped by a wall."""
     u = np.tile([1.0, 0.6, -0.3], (len(cube.nodes), 1))
     dt = courant * 0.125
-    f = (cube.nodes @ [1.0, 2.0, -1.0])[:, None]
+    f = np.outer(cube.nodes @ [1.0, 2.0, -1.0], [1.0, 2.0, -1.0, 0.0])
     every = np.arange(len(cube.nodes))
     moved = transport(cube, every, dt, u, f, np.zeros(len(f), bool))[:, 0]
     upstream = cube.nodes - dt * u - 0.26 * np.sign(u)
@@ -48,7 +48,7 @@ def _rotation_error(n):
     t = Topology.of(mesh, cut_domain(mesh, ConvexBodies.empty()))
     x = t.nodes - [0.5, 0.5, 0]
     u = np.column_stack([-x[:, 1], x[:, 0], 0 * x[:, 0]])
-    f = np.exp(-25 * ((x[:, 0] - 0.2) ** 2 + x[:, 1] ** 2))[:, None]
+    f = np.exp(-25 * ((x[:, 0] - 0.2) ** 2 + x[:, 1] ** 2))[:, None].repeat(4, axis=1)
     dt = 0.5 * np.pi / n
     inward = -np.column_stack([x[:, 0], x[:, 1], 0 * x[:, 0]])
     for _ in range(n):
@@ -74,3 +74,10 @@ def test_paths_do_not_cross_a_thin_wall():
         t.paths,
     )
     assert domain.centroid[cell, 0].min() > 0.52
+
+
+def test_fields_with_other_than_four_columns_are_refused(cube):
+    """The loops would read beyond their rows."""
+    u, f = np.zeros((len(cube.nodes), 3)), np.zeros((len(cube.nodes), 3))
+    with pytest.raises(ValueError, match="four columns"):
+        transport(cube, np.arange(len(u)), 1.0, u, f, np.zeros(len(u), bool))

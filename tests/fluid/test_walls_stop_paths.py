@@ -33,7 +33,8 @@ def check_sides(t, side, seed, courant):
     """Three steps: a tracer keeps its two values to the bit, a velocity its two directions; all feet on their side."""
     u = wild(seed, len(t.nodes), courant)
     listed = np.flatnonzero(t.active)
-    fields = np.column_stack([side == 1, np.where(side == 1, 3.0, -7.0), side == 0]).astype(float)
+    fields = [side == 1, np.where(side == 1, 3.0, -7.0), side == 0, np.where(side == 1, -7.0, 3.0)]
+    fields = np.column_stack(fields).astype(float)
     start = fields.copy()
     for _ in range(3):
         fields[listed] = transport(t, listed, 1.0, u, fields, np.zeros(len(u), bool))
