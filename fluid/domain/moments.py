@@ -134,7 +134,7 @@ def _nodal_water(first, last, runs, cell_list, shift, phi, parts, water):
     cells, volume, share, share_row = parts.cells, parts.volume, parts.share, parts.share_row
     for run in range(runs.shape[0]):
         for s in range(runs[run, 0], runs[run, 1]):
-            e = cell_list[s]
+            e = np.uint64(cell_list[s])
             n_wet = 0
             for a in range(4):
                 at[a] = phi[cells[e, a]] + shift
@@ -162,7 +162,7 @@ def _wet_fraction(first, last, cell_list, phi, parts, share):
     at, total, local, out = np.empty(4), np.empty(4), np.empty(4), np.empty(4)
     cells, start = parts.cells, parts.start
     for s in range(first, last):
-        e = cell_list[s]
+        e = np.uint64(cell_list[s])
         n_wet = 0
         for a in range(4):
             at[a] = phi[cells[e, a]]

@@ -277,7 +277,7 @@ def cell_velocity(cell_list, u, remainder, fluid):
 def _cell_velocity(first, last, cell_list, u, remainder, fluid, out):
     cells, share, share_row = fluid.cells, fluid.share, fluid.share_row
     for s in range(first, last):
-        e = cell_list[s]
+        e = np.uint64(cell_list[s])
         row = share_row[e]
         for k in range(3):
             out[s, k] = remainder[s, k] if remainder.shape[0] > 0 else 0.0
@@ -300,7 +300,7 @@ def _inflow(first, last, runs, cell_list, u_cell, fluid, out):
     cells, parent, g, volume = fluid.cells, fluid.parent, fluid.gradients, fluid.volume
     for run in range(runs.shape[0]):
         for s in range(runs[run, 0], runs[run, 1]):
-            e = cell_list[s]
+            e = np.uint64(cell_list[s])
             p = parent[e]
             for a in range(4):
                 if first <= cells[e, a] < last:
@@ -330,7 +330,7 @@ def _with_ghosts(first, last, runs, cell_list, state, cells, volume, sums, out):
     up, down = sums
     for run in range(runs.shape[0]):
         for s in range(runs[run, 0], runs[run, 1]):
-            e = cell_list[s]
+            e = np.uint64(cell_list[s])
             for a in range(4):
                 j = cells[e, a]
                 if wet[j] or not first <= j < last:
@@ -355,7 +355,7 @@ def cell_gradient(cell_list, f, cells, parent, g, scale: float = 1.0):
 @ranged
 def _cell_gradient(first, last, cell_list, f, cells, parent, g, scale, out):
     for s in range(first, last):
-        e = cell_list[s]
+        e = np.uint64(cell_list[s])
         x, y, z = 0.0, 0.0, 0.0
         for a in range(4):
             value = f[cells[e, a]]
@@ -379,7 +379,7 @@ def _nodal_mean(first, last, runs, wet, value, fluid, weight, out):
     cells, share, share_row, volume = fluid.cells, fluid.share, fluid.share_row, fluid.volume
     for run in range(runs.shape[0]):
         for s in range(runs[run, 0], runs[run, 1]):
-            e = cell_list[s]
+            e = np.uint64(cell_list[s])
             w, row = volume[e] * max(wet_share[s], 1e-6), share_row[e]
             for a in range(4):
                 i = cells[e, a]
@@ -424,7 +424,7 @@ def _push_of_divergence(first, last, runs, wet, weight, line, u, fluid, sums):
     mass, push = sums
     for run in range(runs.shape[0]):
         for s in range(runs[run, 0], runs[run, 1]):
-            e = cell_list[s]
+            e = np.uint64(cell_list[s])
             p = parent[e]
             highest, beside, divergence, steepness = -np.inf, False, 0.0, 0.0
             for a in range(4):

@@ -201,7 +201,7 @@ def _leave(first, last, cell_list, below, slopes, before, time, fluid, made):
     cells, share, share_row = fluid.cells, fluid.share, fluid.share_row
     remainder, rate = made
     for s in range(first, last):
-        e = cell_list[s]
+        e = np.uint64(cell_list[s])
         highest = max(max(phi[cells[e, 0]], phi[cells[e, 1]]), max(phi[cells[e, 2]], phi[cells[e, 3]]))
         for k in range(3):
             remainder[s, k], rate[s, k] = 0.0, 0.0
@@ -327,7 +327,7 @@ def _cells_of_flux(first, last, cell_list, u, wet, before, fluid, now, middle):
     (wet_place, star, taken), (place, u_before) = wet, before
     cells, share, share_row = fluid.cells, fluid.share, fluid.share_row
     for s in range(first, last):
-        e, w, b = cell_list[s], wet_place[s], place[s]
+        e, w, b = np.uint64(cell_list[s]), wet_place[s], place[s]
         row = share_row[e]
         for k in range(3):
             if w >= 0:

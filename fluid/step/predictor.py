@@ -457,8 +457,8 @@ def _carry_remainder(first, last, cell_list, held, numbers, u, cells, size, out)
     place, remainder, kick = held
     kick_time, dt, nu = numbers
     for s in range(first, last):
-        e, row = cell_list[s], place[s]
-        if row < 0:
+        e, row = np.uint64(cell_list[s]), np.uint64(place[s])
+        if place[s] < 0:
             for k in range(3):
                 out[s, k] = 0.0
             continue

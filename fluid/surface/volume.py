@@ -406,7 +406,7 @@ def _probed(first, last, runs, cell_list, phi, spacing, parts, wider, narrower):
     cells = parts.cells
     for run in range(runs.shape[0]):
         for s in range(runs[run, 0], runs[run, 1]):
-            e = cell_list[s]
+            e = np.uint64(cell_list[s])
             for side, held in ((-_PROBE, wider), (_PROBE, narrower)):
                 for a in range(4):
                     at[a] = phi[cells[e, a]] + side * spacing[cells[e, a]]

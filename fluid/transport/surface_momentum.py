@@ -190,12 +190,12 @@ def _jumps(first, last, nodes, edges, rate, water, capacity, u, a, gravity, spac
     row, start, neighbour = edges.row, edges.start, edges.neighbour
     up, push = np.empty(3), np.empty(3)
     for place in range(first, last):
-        i = nodes[place]
-        r = row[i]
+        i = np.uint64(nodes[place])
+        r = np.uint64(row[i])
         came = 0.0
         up[:] = 0.0
         push[:] = 0.0
-        for s in range(start[r], start[r + 1]):
+        for s in range(start[r], start[r + np.uint64(1)]):
             j = neighbour[s]
             if rate[s] < 0.0 and water[j] > 0.0:
                 part = -rate[s] * min(water[j] / max(capacity[j], 1e-300), 1.0)

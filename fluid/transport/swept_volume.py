@@ -114,9 +114,9 @@ def _after(first, last, nodes, cleared, phi, u, dt, mesh, volume, out):
     cells, parent, g = mesh.cells, mesh.parent, mesh.gradients
     counted, velocity = cleared
     for s in range(first, last):
-        i, weight, rate = nodes[s], 0.0, 0.0
+        i, weight, rate = np.uint64(nodes[s]), 0.0, 0.0
         if not counted[i]:
-            for c in range(mesh.node_start[i], mesh.node_start[i + 1]):
+            for c in range(mesh.node_start[i], mesh.node_start[i + np.uint64(1)]):
                 e = mesh.node_cells[c]
                 n_counted = 0
                 for a in range(4):
@@ -124,7 +124,7 @@ def _after(first, last, nodes, cleared, phi, u, dt, mesh, volume, out):
                 if n_counted == 0:
                     for k in range(3):
                         velocity[e, k] = 0.0
-        for c in range(mesh.node_start[i], mesh.node_start[i + 1]):
+        for c in range(mesh.node_start[i], mesh.node_start[i + np.uint64(1)]):
             e = mesh.node_cells[c]
             p = parent[e]
             weight += volume[e]
@@ -140,7 +140,7 @@ def _by_share(first, last, cell_list, phi, after, parts, u, velocity, beside):
     corners of those that are cut are marked (N,) bool."""
     at, total, local, out = np.empty(4), np.empty(4), np.empty(4), np.empty(4)
     for s in range(first, last):
-        e, share = cell_list[s], 0.0
+        e, share = np.uint64(cell_list[s]), 0.0
         for stage in range(3):
             for a in range(4):
                 i = parts.cells[e, a]
