@@ -123,6 +123,11 @@ def found_over(kernel: Callable, count: int, *args, weight: float = 1, pieces: i
     return found[0] if len(found) == 1 else np.concatenate(found)
 
 
+def joined(parts: list) -> tuple:
+    """The arrays of several results of `over`, each a tuple of arrays, concatenated one by one."""
+    return parts[0] if len(parts) == 1 else tuple(np.concatenate(each) for each in zip(*parts))
+
+
 def owning(kernel: Callable, nodes: int, reach: Callable, count: int, *args, weight: float = 1) -> None:
     """Run kernel(first, last, runs, *args) on ranges that together cover the nodes 0 ... `nodes`.
 
@@ -151,11 +156,16 @@ def summed(kernel: Callable, count: int, shape: tuple[int, ...], *args) -> Array
 
 def marked(mask) -> Array:
     """Numbers of the entries of a mask (n,) bool that are set, in order."""
-    return found_over(_marked, len(mask), np.asarray(mask, bool), weight=PASSED)
+    return found_over(_marked, len(mask), np.asarray(mask, bool), False, weight=PASSED)
+
+
+def taken(mask) -> Array:
+    """`marked`, and none is set any more."""
+    return found_over(_marked, len(mask), mask, True, weight=PASSED)
 
 
 @released
-def _marked(first, last, mask):
+def _marked(first, last, mask, clear):
     """Entries are passed by ROW at a time where none of them is set. Elsewhere every number is written, and the next
     one over it if its entry is not set: no branch that is hard to foresee."""
     at, end = np.uint64(first), np.uint64(last)
@@ -171,6 +181,9 @@ def _marked(first, last, mask):
             for i in range(at, stop):
                 found[k] = i
                 k += np.uint64(mask[i])
+            if clear:
+                for i in range(at, stop):
+                    mask[i] = False
         at = stop
     return found[: np.int64(count)]
 

@@ -9,8 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from array_types import Array, Floats, Ints
-from kernels.decorators import ranged
-from kernels.threads import over
+from kernels.decorators import inner
 
 
 class CellVectors(NamedTuple):
@@ -53,25 +52,16 @@ class CellVectors(NamedTuple):
         return CellVectors(every[order], np.concatenate([self.values, values])[order])
 
 
-def places_of(wanted, cells) -> Array:
-    """Place (k,) of each wanted cell (k,) in a list of cells (n,), -1 where it is not there; both ascend."""
-    place = np.empty(len(wanted), np.int64)
-    over(_places, len(wanted), wanted, cells, place)
-    return place
+@inner
+def first_from(cells, wanted):
+    """Place (np.uint64) of the first cell of an ascending list (n,) that is not below the wanted one, n for none.
 
-
-@ranged
-def _places(first, last, wanted, cells, place):
-    low, high = 0, cells.shape[0]
-    while low < high:  # the first one that is not below the first wanted one
-        middle = (low + high) // 2
-        if cells[middle] < wanted[first]:
-            low = middle + 1
+    Loops over another ascending list start from there in each range, and go on along both."""
+    low, high = np.uint64(0), np.uint64(cells.shape[0])
+    while low < high:
+        middle = (low + high) >> np.uint64(1)
+        if cells[middle] < wanted:
+            low = middle + np.uint64(1)
         else:
             high = middle
-    at, end = np.uint64(low), np.uint64(cells.shape[0])
-    for k in range(first, last):
-        s = np.uint64(k)
-        while at < end and cells[at] < wanted[s]:
-            at += np.uint64(1)
-        place[s] = np.int64(at) if at < end and cells[at] == wanted[s] else -1
+    return low

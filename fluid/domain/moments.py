@@ -13,7 +13,7 @@ import numpy as np
 
 from array_types import Floats, Integers
 from kernels.decorators import inner, kernel, plain, released
-from kernels.threads import found_over, over, owning, reach_of_cells, zeros
+from kernels.threads import found_over, over, owning, reach_of_cells
 
 
 @inner
@@ -122,7 +122,7 @@ def part_moments(e, phi, parts, total, local, out):
 
 def nodal_water(cell_list, shift, phi, parts, n_nodes):
     """∫_{φ+shift<0} N_i dV (N,) [m³] over the listed cells of the FluidParts; phi (N,) [m]."""
-    water = zeros((n_nodes,))
+    water = np.empty(n_nodes)
     reach = reach_of_cells(cell_list, parts.cells)
     owning(_nodal_water, n_nodes, reach, len(cell_list), cell_list, shift, phi, parts, water)
     return water
@@ -132,6 +132,7 @@ def nodal_water(cell_list, shift, phi, parts, n_nodes):
 def _nodal_water(first, last, runs, cell_list, shift, phi, parts, water):
     at, total, local, out = np.empty(4), np.empty(4), np.empty(4), np.empty(4)
     cells, volume, share, share_row = parts.cells, parts.volume, parts.share, parts.share_row
+    water[first:last] = 0.0
     for run in range(runs.shape[0]):
         for s in range(runs[run, 0], runs[run, 1]):
             e = np.uint64(cell_list[s])

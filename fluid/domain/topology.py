@@ -22,7 +22,7 @@ from fluid.mesh.background import Background
 from fluid.mesh.gradients import gradient_rows
 from fluid.numerics.spans import spans
 from kernels.decorators import kernel, ranged, released
-from kernels.threads import marked, over
+from kernels.threads import over, taken
 
 
 @dataclass(frozen=True)
@@ -201,9 +201,18 @@ class Topology:
     def cells_around(self, nodes) -> Array:
         """Numbers of the cells with at least one of these nodes (N,) bool, in order; the cost grows with their number
         only, apart from one byte a cell."""
-        touched = np.zeros(len(self.cells), bool)
-        over(_touched, len(nodes), nodes, self.node_start, self.node_cells, touched)
-        return marked(touched)
+        touched = self._touched
+        try:
+            over(_touch, len(nodes), nodes, self.node_start, self.node_cells, touched)
+            return taken(touched)
+        except BaseException:
+            del self._touched
+            raise
+
+    @cached_property
+    def _touched(self) -> Array:
+        """(M,) bool, False again after each use: to fill as many anew would take longer than to go through them."""
+        return np.zeros(len(self.cells), bool)
 
     def in_cells(self, length) -> Array:
         """Lengths (N,) [m] times `finer`; unchanged where all cells are equal."""
@@ -385,11 +394,12 @@ def _nodes_around(first, last, cells, node_start, node_cells):
 
 
 @ranged
-def _touched(first, last, nodes, node_start, node_cells, touched):
+def _touch(first, last, nodes, node_start, node_cells, touched):
     """(M,) bool: cells around these nodes (N,) bool; several threads may mark one cell."""
-    for i in range(first, last):
+    for k in range(first, last):
+        i = np.uint64(k)
         if nodes[i]:
-            for t in range(node_start[i], node_start[i + 1]):
+            for t in range(node_start[i], node_start[i + np.uint64(1)]):
                 touched[node_cells[t]] = True
 
 
@@ -398,13 +408,14 @@ class Graph:
     """Edges of the listed nodes with the stiffness of the physical domain.
 
     row (N,) place of a node in `nodes`, -1 if not listed · start (n+1,), neighbour, stiffness [m]: CSR without
-    diagonal, K_ij = Σ_e volume_e ∇N_i·∇N_j."""
+    diagonal, K_ij = Σ_e volume_e ∇N_i·∇N_j · whole: all nodes of the domain that have cells are listed."""
 
     nodes: Ints
     row: Ints
     start: Integers
     neighbour: Integers
     stiffness: Floats
+    whole: bool = False
 
     @property
     def edges(self) -> Edges:
@@ -413,7 +424,7 @@ class Graph:
 
     def covers(self, nodes) -> bool:
         """Whether all these nodes (n,) are listed."""
-        return sum(over(_listed_among, len(nodes), nodes, self.row)) == len(nodes)
+        return self.whole or sum(over(_listed_among, len(nodes), nodes, self.row)) == len(nodes)
 
     @classmethod
     def of(cls, topology: Topology, nodes) -> Graph:

@@ -27,9 +27,8 @@ import scipy.sparse as sp
 
 from array_types import Array, Bools, Floats, Integers, Ints
 from fluid.domain.layers import WORK
-from fluid.numerics.fields import copied
 from kernels.decorators import kernel, ranged, released
-from kernels.threads import found_over, over, owning, reach_of_cells, zeros
+from kernels.threads import found_over, over, owning, reach_of_cells
 
 SMALLEST_CUT = 1e-7
 SMALLEST_WET_SHARE = 1e-6
@@ -289,7 +288,7 @@ def inflow(cell_list, u_cell, fluid, n_nodes):
     """∫ u·∇N_i dV (N,) [m³/s] over the listed cells, u_cell (n, 3) one velocity each: exact for P1 velocities.
 
     fluid: FluidCells"""
-    out = zeros((n_nodes,))
+    out = np.empty(n_nodes)
     reach = reach_of_cells(cell_list, fluid.cells)
     owning(_inflow, n_nodes, reach, len(cell_list), cell_list, u_cell, fluid, out)
     return out
@@ -298,6 +297,8 @@ def inflow(cell_list, u_cell, fluid, n_nodes):
 @ranged
 def _inflow(first, last, runs, cell_list, u_cell, fluid, out):
     cells, parent, g, volume = fluid.cells, fluid.parent, fluid.gradients, fluid.volume
+    for i in range(first, last):
+        out[np.uint64(i)] = 0.0
     for run in range(runs.shape[0]):
         for s in range(runs[run, 0], runs[run, 1]):
             e = np.uint64(cell_list[s])
@@ -317,7 +318,7 @@ def with_ghosts(pressure, air, wet, open_node, phi, cell_list, cells, volume):
     volume (M,) [m³]: |e| of the fluid part. With each cell counted alike, the water of a crack of a thousandth of the
     room, at 3 MPa as its sides met, pushed the surface beside the crack with that pressure: 12 J in one step."""
     n = len(pressure)
-    out, up, down = copied(pressure), zeros((n,)), zeros((n,))
+    out, up, down = np.empty(n), np.empty(n), np.empty(n)
     state = Outside(pressure, air, wet, open_node, phi)
     reach = reach_of_cells(cell_list, cells)
     owning(_with_ghosts, n, reach, len(cell_list), cell_list, state, cells, volume, (up, down), out)
@@ -328,6 +329,9 @@ def with_ghosts(pressure, air, wet, open_node, phi, cell_list, cells, volume):
 def _with_ghosts(first, last, runs, cell_list, state, cells, volume, sums, out):
     pressure, air, wet, open_node, phi = state
     up, down = sums
+    for k in range(first, last):
+        j = np.uint64(k)
+        up[j], down[j] = 0.0, 0.0
     for run in range(runs.shape[0]):
         for s in range(runs[run, 0], runs[run, 1]):
             e = np.uint64(cell_list[s])
@@ -340,7 +344,9 @@ def _with_ghosts(first, last, runs, cell_list, state, cells, volume, sums, out):
                     if wet[i] and not open_node[i]:
                         up[j] += volume[e] * (pressure[i] - air[j]) * phi[i]
                         down[j] += volume[e] * phi[i] * phi[i]
-    for j in range(first, last):
+    for k in range(first, last):
+        j = np.uint64(k)
+        out[j] = pressure[j]
         if not wet[j]:
             out[j] = air[j] + (phi[j] * up[j] / down[j] if down[j] > 0.0 else 0.0)
 
@@ -367,7 +373,7 @@ def _cell_gradient(first, last, cell_list, f, cells, parent, g, scale, out):
 
 def nodal_mean(wet, value, fluid, n_nodes):
     """Σ_e w_e value_e / Σ_e w_e (N, 3), w_e = volume_e share_ea wet_e; value (n, 3) of the WetCells."""
-    out, weight = zeros((n_nodes, 3)), zeros((n_nodes,))
+    out, weight = np.empty((n_nodes, 3)), np.empty(n_nodes)
     reach = reach_of_cells(wet.rows, fluid.cells)
     owning(_nodal_mean, n_nodes, reach, len(wet.rows), wet, value, fluid, weight, out)
     return out
@@ -377,6 +383,9 @@ def nodal_mean(wet, value, fluid, n_nodes):
 def _nodal_mean(first, last, runs, wet, value, fluid, weight, out):
     cell_list, wet_share = wet
     cells, share, share_row, volume = fluid.cells, fluid.share, fluid.share_row, fluid.volume
+    for j in range(first, last):
+        i = np.uint64(j)
+        weight[i], out[i, 0], out[i, 1], out[i, 2] = 0.0, 0.0, 0.0, 0.0
     for run in range(runs.shape[0]):
         for s in range(runs[run, 0], runs[run, 1]):
             e = np.uint64(cell_list[s])
@@ -388,7 +397,8 @@ def _nodal_mean(first, last, runs, wet, value, fluid, weight, out):
                     weight[i] += wa
                     for k in range(3):
                         out[i, k] += wa * value[s, k]
-    for i in range(first, last):
+    for j in range(first, last):
+        i = np.uint64(j)
         if weight[i] > 0.0:
             for k in range(3):
                 out[i, k] /= weight[i]
@@ -409,24 +419,38 @@ def damp_divergence(wet, weight, line, u, fluid):
     nodes, satisfies the mass balance, and damping would let the added mass of a body drift (26 % in 25 steps).
 
     wet: WetCells · weight: c_L · line: Waterline · u (N, 3) [m/s] · fluid: FluidCells"""
-    n = len(u)
-    mass, push = zeros((n,)), zeros((n, 3))
+    n, steepness = len(u), np.empty(len(fluid.gradients))
+    over(_steepness, len(steepness), fluid.gradients, steepness)
+    mass, push = np.empty(n), np.empty((n, 3))
     reach = reach_of_cells(wet.rows, fluid.cells)
-    owning(_push_of_divergence, n, reach, len(wet.rows), wet, weight, line, u, fluid, (mass, push))
+    owning(_push_of_divergence, n, reach, len(wet.rows), wet, weight, line, u, fluid, steepness, (mass, push))
     over(_pushed, n, line.level_set, mass, push, u)
 
 
 @ranged
-def _push_of_divergence(first, last, runs, wet, weight, line, u, fluid, sums):
+def _steepness(first, last, g, out):
+    """Σ_a |∇N_a|² of gradients (S, 4, 3)."""
+    for p in range(first, last):
+        out[p] = 0.0
+        for a in range(4):
+            for k in range(3):
+                out[p] += g[p, a, k] * g[p, a, k]
+
+
+@ranged
+def _push_of_divergence(first, last, runs, wet, weight, line, u, fluid, steepness, sums):
     cell_list, wet_share = wet
     phi, beside_solid, deep = line
     cells, parent, g, volume, size = fluid.cells, fluid.parent, fluid.gradients, fluid.volume, fluid.size
     mass, push = sums
+    for j in range(first, last):
+        i = np.uint64(j)
+        mass[i], push[i, 0], push[i, 1], push[i, 2] = 0.0, 0.0, 0.0, 0.0
     for run in range(runs.shape[0]):
         for s in range(runs[run, 0], runs[run, 1]):
             e = np.uint64(cell_list[s])
             p = parent[e]
-            highest, beside, divergence, steepness = -np.inf, False, 0.0, 0.0
+            highest, beside, divergence = -np.inf, False, 0.0
             for a in range(4):
                 i = cells[e, a]
                 if first <= i < last:
@@ -435,10 +459,9 @@ def _push_of_divergence(first, last, runs, wet, weight, line, u, fluid, sums):
                 beside = beside or beside_solid[i]
                 for k in range(3):
                     divergence += u[i, k] * g[p, a, k]
-                    steepness += g[p, a, k] * g[p, a, k]
             if highest < 0.0 and not (beside and highest < deep):
                 c = weight * volume[e] * size[e] * size[e] * divergence
-                bound = 4.0 * weight * size[e] * size[e] * steepness
+                bound = 4.0 * weight * size[e] * size[e] * steepness[p]
                 if bound > MOST_DAMPED:
                     c *= MOST_DAMPED / bound
                 for a in range(4):
@@ -449,7 +472,8 @@ def _push_of_divergence(first, last, runs, wet, weight, line, u, fluid, sums):
 
 @ranged
 def _pushed(first, last, phi, mass, push, u):
-    for i in range(first, last):
+    for j in range(first, last):
+        i = np.uint64(j)
         if phi[i] < 0.0 and mass[i] > 0.0:
             for k in range(3):
                 u[i, k] -= push[i, k] / mass[i]
@@ -518,7 +542,7 @@ def _places_beside(first, last, cell_list, reached, cells):
 
 def _unlike_neighbours(wet_cells, line, wet, u, fluid):
     """M⁻¹L u (N, 3), zero on dry nodes."""
-    mass, out = zeros((len(u),)), zeros(u.shape)
+    mass, out = np.empty(len(u)), np.empty(u.shape)
     reach = reach_of_cells(wet_cells.rows, fluid.cells)
     owning(_unlike, len(u), reach, len(wet_cells.rows), wet_cells, line, wet, u, fluid, mass, out)
     return out
@@ -529,6 +553,7 @@ def _unlike(first, last, runs, wet_cells, line, wet, u, fluid, mass, out):
     cell_list, wet_share = wet_cells
     phi, beside_solid, deep = line
     cells, volume, mean = fluid.cells, fluid.volume, np.empty(3)
+    mass[first:last], out[first:last] = 0.0, 0.0
     for run in range(runs.shape[0]):
         for s in range(runs[run, 0], runs[run, 1]):
             e = cell_list[s]

@@ -14,10 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from array_types import Bools, Floats, Ints
-from fluid.domain.cell_vectors import CellVectors, places_of
+from fluid.domain.cell_vectors import CellVectors, first_from
 from fluid.numerics.fields import copied_at, less
 from fluid.numerics.solve import product
-from fluid.numerics.sums import kinetic_energy
+from fluid.numerics.sums import kinetic_energies, kinetic_energy
 from fluid.pressure.pressure_bound import BoundMet
 from fluid.pressure.projection import (
     Waterline,
@@ -93,7 +93,7 @@ def corrected(water, problem, x, parting) -> Corrected:
     u, a, forced, mean = _projected(t, kept, gradient, dt)
     remainder, kick_remainder = _remainders(water, kept, gradient, mean, dt)
     held, projected_energy = holding_water(water, kept), kinetic_energy(problem.density, kept.nodal_water, u)
-    projected, calm = copied_at(held, u), water.calm(kept.end - water.time)
+    projected, calm = copied_at(held, u), water.calm(kept.end - water.time, kept.crossing)
     clipped, limited, damped = _limit_and_damp(water, kept, u, a, held, projected, calm)
     slipping = copied_at(held, u)
     listed, start = water.layers(kept.wet)
@@ -301,14 +301,14 @@ def _flux(water, kept, listed, start, u, gradient):
     last = water.cell_velocity
     # with implicit Euler the velocity at the end of the step is the stable choice
     before = last if water.parameters.theta < 1.0 else CellVectors.none()
-    wet = (places_of(around, kept.wet_cells), kept.cell_star, gradient)
+    wet = (kept.wet_cells, kept.cell_star, gradient)
     over(
         _cells_of_flux,
         len(around),
         around,
         u,
         wet,
-        (places_of(around, before.cells), before.values),
+        tuple(before),
         t.fluid_cells,
         now,
         middle,
@@ -322,21 +322,30 @@ def _cells_of_flux(first, last, cell_list, u, wet, before, fluid, now, middle):
     """Velocity (n, 3) of the listed cells: that of the projection in wet ones, elsewhere u (N, 3) at the centroid; and
     (M, 3) half a step ahead, 1.5 u - 0.5 u_before, u where none was before. Other cells are not written to.
 
-    wet: place (n,) of each listed cell among the rows of u* (.., 3) and of what the pressure takes from it, -1 for none
-    before: the same of the values (.., 3)."""
-    (wet_place, star, taken), (place, u_before) = wet, before
+    wet: cells (k,), their u* (k, 3) and what the pressure takes from it (k, 3) · before: cells (l,) and their values
+    (l, 3) then. All lists ascend."""
+    (wet_cells, star, taken), (cells_before, u_before) = wet, before
     cells, share, share_row = fluid.cells, fluid.share, fluid.share_row
+    begin = cell_list[first] if first < last else 0
+    w, w_end = first_from(wet_cells, begin), np.uint64(wet_cells.shape[0])
+    b, b_end = first_from(cells_before, begin), np.uint64(cells_before.shape[0])
     for s in range(first, last):
-        e, w, b = np.uint64(cell_list[s]), wet_place[s], place[s]
+        e = np.uint64(cell_list[s])
         row = share_row[e]
+        while w < w_end and wet_cells[w] < cell_list[s]:
+            w += np.uint64(1)
+        while b < b_end and cells_before[b] < cell_list[s]:
+            b += np.uint64(1)
+        is_wet = w < w_end and wet_cells[w] == cell_list[s]
         for k in range(3):
-            if w >= 0:
+            if is_wet:
                 now[s, k] = star[w, k] - taken[w, k]
             else:
                 now[s, k] = 0.0
                 for a in range(4):
                     now[s, k] += share[row, a] * u[cells[e, a], k]
-        known = b >= 0 and (u_before[b, 0] != 0.0 or u_before[b, 1] != 0.0 or u_before[b, 2] != 0.0)
+        known = b < b_end and cells_before[b] == cell_list[s]
+        known = known and (u_before[b, 0] != 0.0 or u_before[b, 1] != 0.0 or u_before[b, 2] != 0.0)
         for k in range(3):
             middle[e, k] = 1.5 * now[s, k] - 0.5 * u_before[b, k] if known else now[s, k]
 
@@ -347,16 +356,15 @@ def _report(water, problem, x, projected_energy, u, clipped, momentum, bound):
     def potential(volume):
         return -p.density * float(volume @ water.nodes_below_floor)
 
-    def energy(volume, velocity):
-        return kinetic_energy(p.density, volume, velocity) + potential(volume)
-
-    of_water = potential(kept.nodal_water)
+    before, carried, W = water.nodal_water, kept.uncorrected_water, kept.nodal_water
+    states = [(before, water.velocity), (carried, kept.u_star), (W, kept.u_star), (W, u)]
+    kinetic, of_water = kinetic_energies(p.density, states), potential(W)
     stages = [
-        energy(water.nodal_water, water.velocity),
-        energy(kept.uncorrected_water, kept.u_star),
-        kinetic_energy(p.density, kept.nodal_water, kept.u_star) + of_water,
+        kinetic[0] + potential(before),
+        kinetic[1] + potential(carried),
+        kinetic[2] + of_water,
         projected_energy + of_water,
-        kinetic_energy(p.density, kept.nodal_water, u) + of_water,
+        kinetic[3] + of_water,
     ]
     names = ("transport and gravity", "volume correction", "pressure", "damping and limit")
     change = dict(zip(names, np.diff(stages)))

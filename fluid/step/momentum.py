@@ -31,9 +31,10 @@ import numpy as np
 
 from array_types import Array, Floats
 from fluid.numerics.sums import about, momenta_of_rows, momentum_of, momentum_of_rows
-from kernels.decorators import inner, ranged, released
+from kernels.decorators import inlined, ranged, released
 from kernels.threads import CHUNK, found_over, over, summed
 
+ZERO = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 NUMERICAL = (
     "transport",
     "volume_correction",
@@ -237,9 +238,10 @@ def _on_bodies(water, p, where=None):
 def _loads(water, problem, p):
     """Impulses: given to the bodies, of it the wall shear, and that of the sides of the tank on the water by shear."""
     centre, dt, shear = water.domain.body_centre, problem.dt, problem.predicted.shear
-    on_bodies = problem.other_load - (problem.coupling.T @ p[problem.dofs]).reshape(
-        -1, 6
-    )  # p is 0 in the air
+    coupling = problem.coupling
+    rows = np.flatnonzero(np.diff(coupling.indptr))
+    of_pressure = coupling[rows].T @ p[problem.dofs[rows]]  # p is 0 in the air
+    on_bodies = problem.other_load - of_pressure.reshape(-1, 6)
     on_bodies = dt * about(water.reference, on_bodies, centre)
     if shear is None:
         return on_bodies, np.zeros(6), np.zeros(6)
@@ -290,7 +292,7 @@ def _hat_forces(first, last, cell_list, fields, at_side, reference, nodes, fluid
     volume, share, share_row = fluid.volume, fluid.share, fluid.share_row
     beside = np.empty(4, np.bool_)
     for c in range(first, last):
-        total_x, total_p, total_side = partial[c, 0], partial[c, 1], partial[c, 2]
+        total_x, total_p, total_side = ZERO, ZERO, partial[c, 2]
         for s in range(c * CHUNK, min((c + 1) * CHUNK, cell_list.shape[0])):
             e = np.uint64(cell_list[s])
             q, row = parent[e], share_row[e]
@@ -312,8 +314,8 @@ def _hat_forces(first, last, cell_list, fields, at_side, reference, nodes, fluid
                 p1 += p[i] * g[q, a, 1]
                 p2 += p[i] * g[q, a, 2]
             arm = (arm0, arm1, arm2)
-            _add_force(arm, volume[e], x0, x1, x2, total_x)
-            _add_force(arm, volume[e], p0, p1, p2, total_p)
+            total_x = _with_force(arm, volume[e], x0, x1, x2, total_x)
+            total_p = _with_force(arm, volume[e], p0, p1, p2, total_p)
             if at_any:
                 p0, p1, p2 = 0.0, 0.0, 0.0
                 for a in range(4):
@@ -322,16 +324,26 @@ def _hat_forces(first, last, cell_list, fields, at_side, reference, nodes, fluid
                         p0 += value * g[q, a, 0]
                         p1 += value * g[q, a, 1]
                         p2 += value * g[q, a, 2]
-                _add_force(arm, volume[e], p0, p1, p2, total_side)
+                side = (
+                    total_side[0], total_side[1], total_side[2], total_side[3], total_side[4], total_side[5]
+                )  # fmt: skip
+                side = _with_force(arm, volume[e], p0, p1, p2, side)
+                for k in range(6):
+                    total_side[k] = side[k]
+        for k in range(6):
+            partial[c, 0, k], partial[c, 1, k] = total_x[k], total_p[k]
 
 
-@inner
-def _add_force(arm, volume, f0, f1, f2, total):
-    """Add the volume times f, and its moment with the arm, to a total (6,)."""
+@inlined
+def _with_force(arm, volume, f0, f1, f2, total):
+    """A total of six with the volume times f, and its moment with the arm. Six numbers in registers: added up in
+    memory, each would wait for the one before to be stored."""
     f0, f1, f2 = volume * f0, volume * f1, volume * f2
-    total[0] += f0
-    total[1] += f1
-    total[2] += f2
-    total[3] += arm[1] * f2 - arm[2] * f1
-    total[4] += arm[2] * f0 - arm[0] * f2
-    total[5] += arm[0] * f1 - arm[1] * f0
+    return (
+        total[0] + f0,
+        total[1] + f1,
+        total[2] + f2,
+        total[3] + (arm[1] * f2 - arm[2] * f1),
+        total[4] + (arm[2] * f0 - arm[0] * f2),
+        total[5] + (arm[0] * f1 - arm[1] * f0),
+    )

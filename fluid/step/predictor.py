@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from array_types import Bools, Floats, Ints
-from fluid.domain.cell_vectors import places_of
+from fluid.domain.cell_vectors import first_from
 from fluid.domain.coupling_matrix import rows_of, wetted_coupling
 from fluid.numerics.fields import added, copied
 from fluid.pressure.active_cells import WetPart
@@ -56,8 +56,8 @@ class Predicted:
     without; end [s]: time at the end of the step; left: what leaves through open sides, None if nothing; through (N,)
     [m³] that enters through sides, None without any; held (N,) [Pa]: unknown part of the pressure on the nodes of seas,
     None without any side; displaced (N,) [m³]: part of nodal_water that the bodies take in this step; in_films: that in
-    films, as `Water.in_films` gives it; given_by_films: `films.Handed.given`; cushions: trapped air
-    (`fluid.air.cushions`), None without any."""
+    films, as `Water.in_films` gives it; crossing [m/s]: `Water.crossing`; given_by_films: `films.Handed.given`;
+    cushions: trapped air (`fluid.air.cushions`), None without any."""
 
     level_set: Floats
     nodal_water: Floats
@@ -81,6 +81,7 @@ class Predicted:
     held: Floats | None
     displaced: Floats
     in_films: tuple[float, float]
+    crossing: float
     cushions: object | None = None
     given_by_films: object | None = None
 
@@ -90,7 +91,8 @@ class Moved:
     """What transport, sides, volume and shear of a step have found before its pressure problem is set up.
 
     surface: VolumeCorrection · conserved_volume [m³] · advected, u_star (N, 3) [m/s], shear, left, through, displaced,
-    in_films: as in `Predicted` · inflow_rate (N,) [m³/s] through sides at given velocity, None without any."""
+    in_films, crossing: as in `Predicted` · inflow_rate (N,) [m³/s] through sides at given velocity, None without
+    any."""
 
     surface: VolumeCorrection
     conserved_volume: float
@@ -102,12 +104,13 @@ class Moved:
     inflow_rate: Floats | None
     displaced: Floats
     in_films: tuple[float, float]
+    crossing: float
 
 
 def predicted(water, dt: float) -> PressureProblem:
     """Carry out the step up to the pressure solve; reads the state of `water` and changes nothing."""
-    theta, parameters = water.theta(dt), water.parameters
-    kick = water.kick_factor()
+    crossing, parameters = water.crossing(), water.parameters
+    theta, kick = water.theta(dt, crossing), water.kick_factor(crossing)
     u_adv, phi = _transported(water, dt, theta, kick)
     found = water.carried(dt, theta, kick)
     carried = added(found.water, found.swept)
@@ -142,7 +145,8 @@ def predicted(water, dt: float) -> PressureProblem:
         carried[filled] = water.topology.node_volume[filled]
         in_films = water.in_films(phi)
     beside = float(displaced.sum()) + in_films[0]
-    surface = _new_surface(water, dt, phi, added(carried, displaced), conserved + beside)
+    calm = water.calm(dt, crossing)
+    surface = _new_surface(water, calm, phi, added(carried, displaced), conserved + beside)
     if found.velocity is not None:
         graph = water.graph_for(water.listed)
         found.into(
@@ -173,6 +177,7 @@ def predicted(water, dt: float) -> PressureProblem:
         inflow_rate=inflow_rate,
         displaced=displaced,
         in_films=in_films,
+        crossing=crossing,
     )
     return _problem(water, dt, theta, kick, moved)
 
@@ -212,11 +217,10 @@ def _transported(water, dt, theta, kick):
     """u_adv (N, 3) and φ̃ (N,); nodes outside the list keep û and φ."""
     to_middle = 0.5 * dt if water.parameters.theta < 1.0 else 0.0
     u_hat, u_m = kicked(water.velocity, water.acceleration, kick, 1.0, (1.0 - theta) * dt, to_middle)
+    wet = water.level_set < 0.0
     for u in (u_hat, u_m):
-        water.hold(u, water.time + dt, water.level_set < 0.0)
-    fields = np.empty((len(u_hat), 4))
-    over(_stacked, len(fields), u_hat, water.level_set, fields)
-    moved = transport(water.topology, water.listed, dt, u_m, fields, water.walls.open_node)
+        water.hold(u, water.time + dt, wet)
+    moved = transport(water.topology, water.listed, dt, u_m, u_hat, water.level_set, water.walls.open_node)
     if water.parameters.advection == "supg":
         from fluid.transport.supg import carried_velocity
 
@@ -232,15 +236,6 @@ def _transported(water, dt, theta, kick):
     water.walls.admit_air(phi, u_m, dt, water.topology.node_size, -np.asarray(water.parameters.down))
     water.hold(u_adv, water.time + dt, phi < 0.0)
     return u_adv, phi
-
-
-@ranged
-def _stacked(first, last, u, phi, out):
-    """out (N, 4): u (N, 3) and φ (N,)."""
-    for i in range(first, last):
-        for k in range(3):
-            out[i, k] = u[i, k]
-        out[i, 3] = phi[i]
 
 
 def kicked(velocity, acceleration, kick, dt: float, whole: float, middle: float):
@@ -273,10 +268,10 @@ def _taken_over(first, last, listed, moved, finer, width, u, phi):
             phi[i] = moved[s, 3]
 
 
-def _new_surface(water, dt, phi, carried, conserved):
-    """φ corrected: VolumeCorrection."""
+def _new_surface(water, calm, phi, carried, conserved):
+    """φ corrected: VolumeCorrection. calm: `Water.calm`."""
     p = water.parameters
-    length = p.correction_length + (p.calm_correction_length - p.correction_length) * water.calm(dt)
+    length = p.correction_length + (p.calm_correction_length - p.correction_length) * calm
     return correct_volume(
         water.topology,
         water.graph_for(water.listed),
@@ -347,6 +342,7 @@ def _problem(water, dt: float, theta: float, kick, moved: Moved) -> PressureProb
         held=held,
         displaced=moved.displaced,
         in_films=moved.in_films,
+        crossing=moved.crossing,
         cushions=cushions,
     )
     acted, unheld = _known_pressure(water, water.pressure, phi), water.walls.open_node
@@ -438,7 +434,7 @@ def _carried_remainder(water, dt, theta, cells):
     t, p = water.topology, water.parameters
     if not p.subscale_memory:
         return np.zeros((len(cells), 3))
-    held = (places_of(cells, water.remainder.cells), water.remainder.values, water.kick_remainder.values)
+    held = (*water.remainder, water.kick_remainder.values)
     nu = p.viscosity / p.density
     return carry_remainder(cells, held, (1.0 - theta) * dt, water.velocity, dt, nu, t.cells, t.size)
 
@@ -446,7 +442,7 @@ def _carried_remainder(water, dt, theta, cells):
 def carry_remainder(cell_list, held, kick_time, u, dt, nu, cells, size):
     """β (u' + kick_time r) (n, 3) of the listed cells (n,); nu: kinematic viscosity [m²/s].
 
-    held: place (n,) of each among the rows of u' (k, 3) [m/s] and of r (k, 3) [m/s²], -1 where both are zero."""
+    held: cells (k,) that have u' (k, 3) [m/s] and r (k, 3) [m/s²]; in others both are zero. Both lists ascend."""
     out = np.empty((len(cell_list), 3))
     over(_carry_remainder, len(cell_list), cell_list, held, (kick_time, dt, nu), u, cells, size, out)
     return out
@@ -454,11 +450,14 @@ def carry_remainder(cell_list, held, kick_time, u, dt, nu, cells, size):
 
 @ranged
 def _carry_remainder(first, last, cell_list, held, numbers, u, cells, size, out):
-    place, remainder, kick = held
+    with_one, remainder, kick = held
     kick_time, dt, nu = numbers
+    row, end = first_from(with_one, cell_list[first] if first < last else 0), np.uint64(with_one.shape[0])
     for s in range(first, last):
-        e, row = np.uint64(cell_list[s]), np.uint64(place[s])
-        if place[s] < 0:
+        e = np.uint64(cell_list[s])
+        while row < end and with_one[row] < cell_list[s]:
+            row += np.uint64(1)
+        if row == end or with_one[row] != cell_list[s]:
             for k in range(3):
                 out[s, k] = 0.0
             continue

@@ -21,8 +21,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from kernels.decorators import kernel, ranged
-from kernels.threads import over
+from kernels.decorators import plain, ranged, released
+from kernels.threads import joined, over
 
 SPRAY = 0.01
 """Largest share of the volume of water that is spray, ..."""
@@ -47,7 +47,8 @@ def pace(u, water, counted) -> float:
 
 def _bulk(least, u, water, counted) -> float:
     """v_s of (1) [m/s], or `least` if that is larger."""
-    speed, volume, total = _faster_than(least, u, water, counted)
+    speed, volume, held = joined(over(_faster_than, len(u), least, u, water, counted))
+    total = _total(held)
     order = np.argsort(speed)[::-1]
     rest = np.searchsorted(np.cumsum(volume[order]), SPRAY * total, side="right")
     return float(speed[order[rest]]) if rest < len(order) else least
@@ -106,16 +107,27 @@ def _fastest_wet(first, last, u, phi, roomy):
     return largest
 
 
-@kernel
-def _faster_than(least, u, water, counted):
-    """Largest component (n,) and volume (n,) of the counted nodes faster than `least`, and the volume of all."""
-    speed, volume = np.empty(u.shape[0]), np.empty(u.shape[0])
-    n, total = 0, 0.0
-    for i in range(u.shape[0]):
+@released
+def _faster_than(first, last, least, u, water, counted):
+    """Largest component (n,) and volume (n,) of the counted nodes faster than `least`, and the volume (m,) of all."""
+    speed, volume, held = (np.empty(last - first), np.empty(last - first), np.empty(last - first))
+    n, m = 0, 0
+    for k in range(first, last):
+        i = np.uint64(k)
         if counted[i]:
-            total += water[i]
+            held[m] = water[i]
+            m += 1
             largest = max(max(abs(u[i, 0]), abs(u[i, 1])), abs(u[i, 2]))
             if largest > least:
                 speed[n], volume[n] = largest, water[i]
                 n += 1
-    return speed[:n].copy(), volume[:n].copy(), total
+    return speed[:n], volume[:n], held[:m]
+
+
+@plain
+def _total(held):
+    """Sum of the entries, one after the other."""
+    total = 0.0
+    for k in range(held.shape[0]):
+        total += held[k]
+    return total

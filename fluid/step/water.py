@@ -182,19 +182,25 @@ class Water:
 
     # ---- the step
 
-    def theta(self, dt: float) -> float:
+    def theta(self, dt: float, crossing: float | None = None) -> float:
         """Weight of the new pressure in a step dt [s]: from `calm_theta` in slow water to `theta` where the fastest
         crosses a cell in a step; 1 for the first two steps, so that a start at rest does not ring, and always where
-        `theta` is 1."""
+        `theta` is 1. crossing: as in `calm`."""
         p = self.parameters
         if self.steps < START_STEPS or p.theta == 1.0:
             return 1.0
-        return min(p.theta, p.theta - (p.theta - p.calm_theta) * self.calm(dt))
+        return min(p.theta, p.theta - (p.theta - p.calm_theta) * self.calm(dt, crossing))
 
-    def calm(self, dt: float) -> float:
-        """1 for water at rest, 0 where the fastest crosses a cell in a step dt [s]."""
-        crossed = fastest_wet(self._cells_crossed(), self.level_set, self._roomy)
-        return 1.0 - min(1.0, crossed * dt / self.mesh.spacing)
+    def calm(self, dt: float, crossing: float | None = None) -> float:
+        """1 for water at rest, 0 where the fastest crosses a cell in a step dt [s]; crossing: `crossing`, None: it is
+        found now."""
+        crossing = self.crossing() if crossing is None else crossing
+        return 1.0 - min(1.0, crossing * dt / self.mesh.spacing)
+
+    def crossing(self) -> float:
+        """Largest component of the velocity [m/s] of the water, in which a cell of any size would be crossed in the
+        time of one of the spacing."""
+        return fastest_wet(self._cells_crossed(), self.level_set, self._roomy)
 
     def stable_step(self) -> float:
         """dt [s]: Courant number of all but spray and trickles (`time_step.py`), and LONGEST_STEP sqrt(h/g)."""
@@ -234,15 +240,16 @@ class Water:
         worst = int(speed.argmax())
         return float(speed[worst]), self.topology.nodes[counted[worst]]
 
-    def kick_factor(self) -> Array:
+    def kick_factor(self, crossing: float | None = None) -> Array:
         """Share (N,) of the acceleration that is carried over to the next step, no more than kick_limit g, or what
         turns the fastest stream aside within two cells, v²/(2 h). More would throw spray on by the acceleration of an
-        impact."""
-        return self._kick_factor(self.acceleration, self.topology.node_size)
+        impact. crossing: as in `calm`."""
+        fastest = self.fastest() if crossing is None or not self.topology.is_uniform else crossing
+        return self._kick_factor(self.acceleration, self.topology.node_size, fastest)
 
-    def _kick_factor(self, acceleration, size):
+    def _kick_factor(self, acceleration, size, fastest):
         p = self.parameters
-        return kick_factor(acceleration, p.kick_limit * p.gravity, 0.5 * self.fastest() ** 2, size)
+        return kick_factor(acceleration, p.kick_limit * p.gravity, 0.5 * fastest**2, size)
 
     def speed_cap(self) -> float:
         """Largest speed [m/s] that is permitted: speed_limit sqrt(g H + v²/2) in a tank of height H whose water starts
@@ -406,7 +413,7 @@ class Water:
         p, flux = self.parameters, self.flux
         u, a, phi, t = self.left_behind or (self.velocity, self.acceleration, self.level_set, self.topology)
         if self.left_behind is not None:
-            kick = self._kick_factor(a, t.node_size)
+            kick = self._kick_factor(a, t.node_size, self.fastest())
         u_hat, u_m = kicked(u, a, kick, dt, 1.0 - theta, 0.5 if p.theta < 1.0 else 0.0)
         found, moved = Carried.by(flux, dt, u_hat, a, p.gravity, p.viscosity / p.density, t.node_size)
         if p.advection == "supg":
@@ -485,8 +492,9 @@ class Water:
         """A graph that lists these nodes: the present one if it does; a graph of all nodes, made once, when the
         solids have been at rest for a step."""
         if self.graph is None or not self.graph.covers(nodes):
-            every = nodes if self._domain_is_new else np.flatnonzero(self.topology.active)
-            self.graph = Graph.of(self.topology, every)
+            whole = not self._domain_is_new
+            every = np.flatnonzero(self.topology.active) if whole else nodes
+            self.graph = replace(Graph.of(self.topology, every), whole=whole)
         return self.graph
 
     def _pressure_at_rest(self):

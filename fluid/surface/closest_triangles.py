@@ -114,8 +114,8 @@ def squared_distances(layers: Layers, surface: Surface, mesh, around, descending
     if descending is not None:
         near, boxes = _triangles_around(layers, surface, mesh, found), np.empty((len(surface.owner), 2, 3))
         over(_box, len(boxes), surface.triangles, boxes)
-        rows = (descending, layers.order, layers.place, surface, boxes, near, mesh, known)
-        over(_descended, len(descending), *rows, weight=TESTS * WORK)
+        places = (descending, layers.order, layers.place)
+        over(_descended, len(descending), *places, surface, boxes, near, mesh, known, weight=TESTS * WORK)
     return known.square
 
 

@@ -15,7 +15,7 @@ from array_types import Bools, Floats
 from fluid.domain.layers import WORK, layers_around
 from fluid.domain.moments import touching_among
 from kernels.decorators import inlined, inner, ranged, released
-from kernels.threads import over, owning, reach_of_cells, zeros
+from kernels.threads import over, owning, reach_of_cells
 
 LINEAR_LAYERS = 2
 SPACE, ENTRIES = 3, 9
@@ -163,21 +163,28 @@ def _pass_gradient(i, m, gradient, start, around, shared, done):
             gradient[i, k, d] /= max(count, 1)
 
 
-def mean_gradients(cell_list, marked, f, fluid, gradient):
-    """Volume-weighted mean of ∇f over the cells around each node whose corners are all marked: what is added to
-    `gradient` (N, m, 3), zero at first.
+def mean_gradients(cell_list, marked, f, fluid, there):
+    """Volume-weighted mean (N, m, 3) of ∇f over the cells around each node whose corners are all marked.
 
-    f (N, m), marked (N,) bool · fluid: FluidCells; it stays zero where there is no such cell."""
-    n_nodes, weight = len(gradient), zeros((len(gradient),))
+    f (N, m), marked (N,) bool · fluid: FluidCells · there (N,) bool: the nodes of the listed cells, at least. Where
+    there is no such cell it is zero; other nodes hold anything."""
+    n = len(f)
+    weight, gradient = np.empty(n), np.empty((*f.shape, 3))
     reach = reach_of_cells(cell_list, fluid.cells)
-    owning(_mean_gradients, n_nodes, reach, len(cell_list), cell_list, marked, f, fluid, weight, gradient)
+    owning(_mean_gradients, n, reach, len(cell_list), cell_list, (marked, there), f, fluid, weight, gradient)
     return gradient
 
 
 @released
-def _mean_gradients(first, last, runs, cell_list, marked, f, fluid, weight, gradient):
-    m = f.shape[1]
+def _mean_gradients(first, last, runs, cell_list, marks, f, fluid, weight, gradient):
+    m, (marked, there) = f.shape[1], marks
     local = np.empty((m, 3))
+    for i in range(first, last):
+        weight[i] = 0.0
+        if there[i]:
+            for k in range(m):
+                for d in range(3):
+                    gradient[i, k, d] = 0.0
     if m == SPACE:
         _add_gradients(first, last, SPACE, runs, cell_list, marked, f, fluid, local, weight, gradient)
     else:
@@ -243,12 +250,10 @@ def smoothed_slope(topology, cell_list, marked, u, calm: float):
     near = touching_among(cell_list, reach.pop(), t.cells)
     there = np.zeros(len(u), bool)
     over(mark_nodes, len(near), near, t.cells, there)
-    slope = mean_gradients(near, marked, u, t.fluid_cells, _zero_at(there, there))
-    mean = _zero_at(there, marked)
-    once = before = slope = _averaged(near, reach.pop(), has, slope, t.cells, mean)
+    slope = mean_gradients(near, marked, u, t.fluid_cells, there)
+    once = before = slope = _averaged(near, (reach.pop(), has, there, marked), slope, t.cells)
     while reach:
-        mean = _zero_at(there, there)
-        before, slope = slope, _averaged(near, reach.pop(), has, slope, t.cells, mean)
+        before, slope = slope, _averaged(near, (reach.pop(), has, there, there), slope, t.cells)
     if slope is once:
         return once
     over(_combined, len(u), there, calm, once, before, slope)
@@ -309,35 +314,27 @@ def _mark_layer(first, last, cell_list, nodes, cells, wider):
                 wider[cells[e, a]] = True
 
 
-def _zero_at(there, also):
-    """(N, 3, 3), zero at nodes that one of the two marks; the others hold anything."""
-    out = np.empty((len(there), SPACE, SPACE))
-    over(_clear_rows, len(there), there, also, out)
-    return out
+def _averaged(cell_list, marks, field, cells):
+    """Mean (N, 3, 3) of the field (N, 3, 3) over the corners that have one, of the listed cells around the nodes in
+    reach.
 
-
-@ranged
-def _clear_rows(first, last, there, also, out):
-    for j in range(first, last):
-        i = np.uint64(j)
-        if there[i] or also[i]:
-            for k in range(SPACE):
-                for d in range(SPACE):
-                    out[i, k, d] = 0.0
-
-
-def _averaged(cell_list, reach, has, field, cells, mean):
-    """Mean of the field (N, 3, 3) over the corners that have one, of the listed cells around the nodes in reach: what
-    is added to `mean` (N, 3, 3), zero at first."""
-    count, n = zeros((len(field),)), len(field)
+    marks (N,) bool: nodes in reach, nodes that have a field, and twice nodes where the mean is zero unless it is found;
+    other nodes hold anything."""
+    count, mean, n = np.empty(len(field)), np.empty(field.shape), len(field)
     listed, flat = reach_of_cells(cell_list, cells), (field.reshape(n, -1), mean.reshape(n, -1))
-    owning(_average, n, listed, len(cell_list), cell_list, (reach, has), flat[0], cells, count, flat[1])
+    owning(_average, n, listed, len(cell_list), cell_list, marks, flat[0], cells, count, flat[1])
     return mean
 
 
 @released
 def _average(first, last, runs, cell_list, marks, field, cells, count, mean):
-    _add_averages(first, last, runs, cell_list, marks, field, cells, np.empty(ENTRIES), count, mean)
+    reach, has, there, also = marks
+    for i in range(first, last):
+        count[i] = 0.0
+        if there[i] or also[i]:
+            for k in range(ENTRIES):
+                mean[i, k] = 0.0
+    _add_averages(first, last, runs, cell_list, (reach, has), field, cells, np.empty(ENTRIES), count, mean)
 
 
 @inner

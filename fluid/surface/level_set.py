@@ -39,7 +39,7 @@ from fluid.numerics.fields import copied
 from fluid.surface.closest_triangles import Surface, squared_distances
 from fluid.surface.extrapolation import continue_outward, mark_nodes, mean_gradients
 from kernels.decorators import ranged, released
-from kernels.threads import found_over, over, owning, reach_of_cells, zeros
+from kernels.threads import found_over, joined, over, owning, reach_of_cells
 
 LAYERS = 6
 EXACT_LAYERS = 2
@@ -110,8 +110,7 @@ def _surface_cells(first, last, phi, cell_list, cells):
 
 def surface_triangles(cut, phi, nodes, cells):
     """φ = 0 in the cut cells as triangles (T, 3, 3) [m] and the cell of each (T,)."""
-    triangles, owner = zip(*over(_surface_triangles, len(cut), cut, phi, nodes, cells))
-    return np.concatenate(triangles), np.concatenate(owner)
+    return joined(over(_surface_triangles, len(cut), cut, phi, nodes, cells))
 
 
 @released
@@ -153,7 +152,7 @@ def _surface_triangles(first, last, cut, phi, nodes, cells):
                 triangles[n, 2, k] = crossing[3, k]
             owner[n] = e
             n += 1
-    return triangles[:n].copy(), owner[:n].copy()
+    return triangles[:n], owner[:n]
 
 
 @ranged
@@ -177,7 +176,7 @@ def _signed(first, last, layers, square, phi, out):
 
 def _mean_slope(t, cut, phi):
     """Mean |∇φ| over the cut cells (n,) around each node, (N,); zero elsewhere."""
-    total, count = zeros((len(phi),)), zeros((len(phi),))
+    total, count = np.empty(len(phi)), np.empty(len(phi))
     reach = reach_of_cells(cut, t.cells)
     owning(_slopes, len(phi), reach, len(cut), cut, phi, t.hats, total, count)
     return total
@@ -185,8 +184,10 @@ def _mean_slope(t, cut, phi):
 
 @ranged
 def _slopes(first, last, runs, cut, phi, hats, total, count):
-    """The means of `_mean_slope` in `total`; total, count (N,): zero at first."""
+    """The means of `_mean_slope` in `total`; count (N,): work space."""
     cells, parent, g = hats.cells, hats.parent, hats.gradients
+    for i in range(first, last):
+        total[i], count[i] = 0.0, 0.0
     for run in range(runs.shape[0]):
         for s in range(runs[run, 0], runs[run, 1]):
             e = cut[s]
@@ -279,7 +280,7 @@ def _past_the_last_polygon(t, cut, front, beside, motion, phi) -> None:
     if len(found) == 0:
         return
     value = copied(phi).reshape(-1, 1)
-    slope = mean_gradients(cut, front, value, t.fluid_cells, zeros((len(phi), 1, 3)))
+    slope = mean_gradients(cut, front, value, t.fluid_cells, front)
     layers, no_limit = np.array([0, 0, len(found)]), np.zeros(0)
     continue_outward(found, layers, 1, value, slope, t.nodes, t.around_by_cells, front.copy(), no_limit)
     least = np.where(t.sloping_bed[found], LEAST_SLOPE, -1.0)

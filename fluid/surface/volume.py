@@ -39,7 +39,7 @@ from fluid.domain.topology import PAIR, Graph
 from fluid.numerics.fields import PLAIN, added, copied
 from fluid.surface.level_set import drain_films
 from kernels.decorators import kernel, ranged, released
-from kernels.threads import found_over, over, owning, reach_of_cells, zeros
+from kernels.threads import found_over, over, owning, reach_of_cells
 
 BAND_WIDTH = 3.0
 LARGEST_SHIFT = 0.3
@@ -393,7 +393,7 @@ def _reached(first, last, cell_list, phi, cells, most, spacing, seen):
 def _volume_slope(t, near, phi, spacing, seen):
     """c (N,) [m²] by a central difference over the cells that the surface can reach."""
     cut = _in_reach(near, phi, t.cells, _PROBE, spacing, seen)
-    wider, narrower = zeros((len(phi),)), zeros((len(phi),))
+    wider, narrower = np.empty(len(phi)), np.empty(len(phi))
     reach = reach_of_cells(cut, t.cells)
     owning(_probed, len(phi), reach, len(cut), cut, phi, spacing, t.parts, wider, narrower)
     return wider
@@ -404,6 +404,7 @@ def _probed(first, last, runs, cell_list, phi, spacing, parts, wider, narrower):
     """Volumes of the nodes (N,) with φ half a step lower and higher, and, in place of the first, their slope."""
     at, total, local, out = np.empty(4), np.empty(4), np.empty(4), np.empty(4)
     cells = parts.cells
+    wider[first:last], narrower[first:last] = 0.0, 0.0
     for run in range(runs.shape[0]):
         for s in range(runs[run, 0], runs[run, 1]):
             e = np.uint64(cell_list[s])

@@ -16,8 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 from fluid.mesh.arrays import Paths
-from fluid.numerics.fields import copied
-from kernels.decorators import inlined, inner, released
+from kernels.decorators import inlined, inner, ranged, released
 from kernels.threads import over
 
 _LONGEST_WALK = 100
@@ -185,15 +184,23 @@ def _limit(first, last, listed, dt, u_m, on_open_side, f, mesh, origin, f1, scra
             out[s, k] = f2 if low <= f2 <= high else f1[i, k]
 
 
-def transport(topology, listed, dt: float, u_m, f, on_open_side):
-    """Values of f (N, 4) after dt [s] at the listed nodes (n,), carried by u_m (N, 3) [m/s] → (n, 4).
+def transport(topology, listed, dt: float, u_m, u, phi, on_open_side):
+    """u (N, 3) [m/s] and φ (N,) [m] after dt [s] at the listed nodes (n,), carried by u_m (N, 3) [m/s] → (n, 4).
 
-    on_open_side (N,) bool: nodes where water may leave. Raises ValueError for fields with other than four columns, the
-    number that the loops are made for."""
-    if f.shape[1:] != (4,):
-        raise ValueError(f"fields {f.shape}: must have four columns")
-    n, f1, out = len(listed), copied(f), np.empty((len(listed), 4))
-    origin = np.empty(n, np.uint32), np.empty(n, np.uint8)
+    on_open_side (N,) bool: nodes where water may leave."""
+    n, size, out = len(listed), len(phi), np.empty((len(listed), 4))
+    f, f1, origin = np.empty((size, 4)), np.empty((size, 4)), (np.empty(n, np.uint32), np.empty(n, np.uint8))
+    over(_stacked, size, u, phi, f, f1)
     over(_brought, n, listed, dt, u_m, f, topology.paths, origin, f1)
     over(_limited, n, listed, dt, u_m, on_open_side, f, topology.paths, origin, f1, out)
     return out
+
+
+@ranged
+def _stacked(first, last, u, phi, f, copy):
+    """u (N, 3) and φ (N,) in one array (N, 4), twice."""
+    for j in range(first, last):
+        i = np.uint64(j)
+        for k in range(3):
+            f[i, k] = copy[i, k] = u[i, k]
+        f[i, 3] = copy[i, 3] = phi[i]

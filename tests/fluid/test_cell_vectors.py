@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from fluid.domain.cell_vectors import CellVectors, places_of
+from fluid.domain.cell_vectors import CellVectors
 from fluid.numerics.fields import added, copied_at, less
+from fluid.step.predictor import carry_remainder
 from kernels.threads import use
 
 
@@ -14,16 +15,21 @@ def random_field(seed, cells, share=0.3):
 
 
 @pytest.mark.parametrize("threads", [1, 3])
-def test_places_in_a_list_are_those_of_a_dictionary(threads):
-    """Also where ranges of several threads begin between cells of the list, before the first and after the last."""
+def test_what_cells_hold_is_found_along_both_lists(threads):
+    """Also where ranges of several threads begin between cells of the list, before the first and after the last: what
+    cells of water at rest hold remains."""
     random = np.random.default_rng(4)
+    corners, size, at_rest = np.zeros((400, 4), np.uint32), np.ones(400), np.zeros((1, 3))
     use(threads, least=7)
     try:
         for held, wanted in ((50, 200), (300, 200), (0, 30), (30, 0), (400, 400)):
             cells = np.sort(random.choice(400, held, replace=False))
             asked = np.sort(random.choice(400, wanted, replace=False))
-            place = {cell: k for k, cell in enumerate(cells.tolist())}
-            assert places_of(asked, cells).tolist() == [place.get(cell, -1) for cell in asked.tolist()]
+            values = random.normal(size=(held, 3))
+            field = CellVectors(cells, values).field(400)
+            known = (cells, values, np.zeros((held, 3)))
+            found = carry_remainder(asked, known, 0.1, at_rest, 0.1, 0.0, corners, size)
+            np.testing.assert_array_equal(found, field[asked])
     finally:
         use(1)
 

@@ -37,7 +37,8 @@ def check_sides(t, side, seed, courant):
     fields = np.column_stack(fields).astype(float)
     start = fields.copy()
     for _ in range(3):
-        fields[listed] = transport(t, listed, 1.0, u, fields, np.zeros(len(u), bool))
+        velocity, level = (np.ascontiguousarray(f) for f in (fields[:, :3], fields[:, 3]))
+        fields[listed] = transport(t, listed, 1.0, u, velocity, level, np.zeros(len(u), bool))
     np.testing.assert_allclose(fields[listed], start[listed], rtol=1e-13, atol=0)
     cell, _ = feet(listed, -1.0, 1.0, 3, u, t.paths)
     np.testing.assert_array_equal(side[t.cells[cell]], np.repeat(side[listed][:, None], 4, axis=1))

@@ -24,7 +24,7 @@ TRIAD = 8_000_000
 """Numbers in each array of the triad: far more than caches hold."""
 ROWS_OF_CELLS = ("_nodal_water", "_wet_fraction", "_cell_velocity", "_inflow", "_with_ghosts", "_cell_gradient",
     "_nodal_mean", "_push_of_divergence", "_mean_gradients", "_average", "_hat_forces", "_leave",
-    "_carry_remainder", "_cells_of_flux", "_unlike", "_places", "_surface_cells", "_touching_among")  # fmt: skip
+    "_carry_remainder", "_cells_of_flux", "_unlike", "_surface_cells", "_touching_among")  # fmt: skip
 """Kernels that go over cells; the others go over nodes."""
 SUMS = ("_hat_forces", "_momentum", "_square_of")
 """Kernels whose range is one of chunks."""
