@@ -1,7 +1,8 @@
 """Memory that a step frees stays in the process, for the fields of the next one.
 
 A step of a million cells makes and frees some 160 MB of fields. Where they go back to the system and are asked for
-again, it fills every page of them with zeros first: a twelfth of a step."""
+again, it fills every page of them with zeros first: a twelfth of a step. This holds for the whole process, so it is for
+what makes steps to ask for it, not for whoever imports these packages."""
 
 from __future__ import annotations
 
@@ -15,7 +16,8 @@ LEFT, OWN = (1 << 31) - 1, 256 << 20
 
 
 def keep_memory() -> None:
-    """Have the C library keep what is freed; one without mallopt, other than glibc's, goes on as it does."""
+    """Have the C library keep what this process frees from now on; one without mallopt, other than glibc's, goes on as
+    it does."""
     library = ctypes.CDLL(None)
     if hasattr(library, "mallopt"):
         library.mallopt(TRIM_THRESHOLD, LEFT)

@@ -27,6 +27,7 @@ from coupler.scene.build import Scene, build, limits_of
 from coupler.step.limits import LimitReached, Limits, Stopped, check_air, check_defect, check_overlap
 from coupler.step.observe import joint_counts, size
 from coupler.step.step_limits import check_step
+from kernels.memory import keep_memory
 
 
 def run(case: Case, directory, reporter, checkpoint=None, each=None) -> ExitCode:
@@ -39,6 +40,7 @@ def run(case: Case, directory, reporter, checkpoint=None, each=None) -> ExitCode
     Raises SurgebreakError (or an error of the water or the structure) when the run ends early; results written
     until then are kept.
     """
+    keep_memory()
     clock = Clock(checkpoint.about["cpu_seconds"] if checkpoint else None)
     figures: dict[str, float] = {"steps": 0, "substeps": 0}
     if checkpoint:

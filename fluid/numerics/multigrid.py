@@ -100,6 +100,7 @@ class Multigrid:
         none = np.zeros(1, np.uint32)
         self._last = Level(*parts, 1.0 / parts[-1], np.full(n, -1, np.int32), none, none[:0])
         self._dense = _dense_inverse(self._last) if n <= COARSEST else None
+        self._blocks = [level.blocks() for level in self.levels]
 
     def __call__(self, r) -> Array:
         """M⁻¹ r (n,)."""
@@ -130,7 +131,8 @@ class Multigrid:
 
     def _by_blocks(self, depth: int, at: Level, n_coarse: int, r):
         """`_cycle` on a large level."""
-        bounds, (x, before, left), coarse = at.blocks(), np.empty((3, len(r))), np.empty(n_coarse)
+        bounds, (x, before, left) = self._blocks[depth], np.empty((3, len(r)))
+        coarse = np.empty(n_coarse)
         count, work = len(bounds) - 1, BLOCK
         over(_down_blocks, count, bounds, at, r, x, weight=work, pieces=count)
         over(_left_over, count, bounds, at, x, left, weight=work, pieces=count)
@@ -220,21 +222,24 @@ def _split_any(indptr, indices, data):
 
 def _aggregates(parts):
     """aggregate (n,) of every unknown, -1 for one without any coupling, and how many aggregates there are."""
-    aggregate, count = _matched(*parts)
+    aggregate, *members = _matched(*parts)
     pairs = aggregate
     for _ in range(PAIRINGS - 1):
-        parts = _split(*_galerkin(Matrix(*parts), pairs, _members(pairs, count), 1.0))
-        pairs, count = _matched(*parts)
+        parts = _split(*_galerkin(Matrix(*parts), pairs, members, 1.0))
+        pairs, *members = _matched(*parts)
         aggregate = _chained(aggregate, pairs)
-    return aggregate, count
+    return aggregate, len(members[0]) - 1
 
 
 @kernel
 def _matched(start, middle, column, entry, diagonal):
-    """Number of the pair of every unknown (n,), -1 without any coupling, and how many there are. Each unknown in turn
-    takes the free one that is coupled to it most strongly, of equals the first, or stays alone."""
+    """Number of the pair of every unknown (n,), -1 without any coupling, and the unknowns of every pair, as `_members`
+    gives them. Each unknown in turn takes the free one that is coupled to it most strongly, of equals the first, or
+    stays alone. That one comes after it: those before are taken."""
     n = len(diagonal)
     pair, count = np.full(n, -1, np.int32), 0
+    first, member, m = np.empty(n + 1, np.uint32), np.empty(n, np.uint32), 0
+    first[0] = 0
     for i in range(n):
         if pair[i] >= 0 or start[i + 1] == start[i]:
             continue
@@ -246,11 +251,14 @@ def _matched(start, middle, column, entry, diagonal):
             j = column[s]
             if pair[j] < 0 and -entry[s] >= SAME * strongest > 0.0 and (partner < 0 or j < partner):
                 partner = j
-        pair[i] = count
+        pair[i], member[m] = count, i
+        m += 1
         if partner >= 0:
-            pair[partner] = count
+            pair[partner], member[m] = count, partner
+            m += 1
         count += 1
-    return pair, count
+        first[count] = m
+    return pair, first[: count + 1].copy(), member[:m].copy()
 
 
 @kernel

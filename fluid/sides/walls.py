@@ -160,11 +160,14 @@ class Walls:
     def slip(self, u, wet=None) -> None:
         """Remove the velocity into the closed sides from u (N, 3) [m/s], in place, and where u = 0 all of it, but for
         nodes that are not wet (N,) bool; None: all are."""
-        dry = np.zeros(0, np.int64) if wet is None else np.flatnonzero(~wet[self.nodes[self.sticking]])
+        dry = np.zeros(0, np.int64)
+        if wet is not None and len(self.sticking):
+            dry = np.flatnonzero(~wet[self.nodes[self.sticking]])
         nodes = self.nodes[self.sticking[dry]]
         kept = u[nodes]
         over(_project, len(self.nodes), self.nodes, self.projector, u)
-        u[nodes] = np.einsum("nij,nj->ni", self.slipping[dry], kept)
+        if len(nodes):
+            u[nodes] = np.einsum("nij,nj->ni", self.slipping[dry], kept)
 
 
 @ranged

@@ -239,8 +239,12 @@ def _loads(water, problem, p):
     """Impulses: given to the bodies, of it the wall shear, and that of the sides of the tank on the water by shear."""
     centre, dt, shear = water.domain.body_centre, problem.dt, problem.predicted.shear
     coupling = problem.coupling
-    rows = np.flatnonzero(np.diff(coupling.indptr))
-    of_pressure = coupling[rows].T @ p[problem.dofs[rows]]  # p is 0 in the air
+    length = np.diff(coupling.indptr)
+    rows = np.flatnonzero(
+        length
+    )  # those of few nodes, which the product with the transpose would seek in all
+    held = np.repeat(p[problem.dofs[rows]], length[rows])  # p is 0 in the air
+    of_pressure = np.bincount(coupling.indices, coupling.data * held, coupling.shape[1])
     on_bodies = problem.other_load - of_pressure.reshape(-1, 6)
     on_bodies = dt * about(water.reference, on_bodies, centre)
     if shear is None:

@@ -14,6 +14,7 @@ import numpy as np
 
 from coupler.commands.benchmark import scenes
 from coupler.commands.benchmark.cutting import cutting
+from kernels.memory import keep_memory
 from yade_scripts.contact.law import ContactLaw
 from yade_scripts.dynamics.equilibrium import settle
 from yade_scripts.dynamics.structure import Structure
@@ -176,6 +177,7 @@ KINDS = {
 
 def main() -> None:
     """Print the measurement as JSON, the last line of the output."""
+    keep_memory()
     kind, size = sys.argv[1], int(sys.argv[2])
     print(json.dumps(KINDS[kind](size)))
 

@@ -10,6 +10,7 @@ from dataclasses import asdict
 
 from coupler.commands.stress.registry import Measure, Outcome, Scene, judged, scenes
 from coupler.program.errors import SurgebreakError
+from kernels.memory import keep_memory
 
 
 def is_refusal(error: Exception) -> bool:
@@ -38,6 +39,7 @@ def outcome(scene: Scene, keep=lambda measure: None) -> Outcome:
 
 def main() -> None:
     """Write the measures one by one, so that those before a crash are kept."""
+    keep_memory()
     id, path = sys.argv[1:]
     with open(path, "w", encoding="utf-8") as file:
 

@@ -12,6 +12,7 @@ from dataclasses import asdict
 
 from coupler.commands.verify.curves import Figure, as_json
 from coupler.commands.verify.registry import Check, Result, checks
+from kernels.memory import keep_memory
 
 
 def results(case: Check, figures=None) -> Iterator[Result]:
@@ -37,6 +38,7 @@ def cpu_seconds() -> float:
 
 def main() -> None:
     """Write the results one by one, so that those before a crash are kept."""
+    keep_memory()
     id, path, *more = sys.argv[1:]
     with open(path, "w", encoding="utf-8") as file, _figures(*more) as figures:
         for result in results(checks()[id], figures):
