@@ -26,7 +26,7 @@ ROWS_OF_CELLS = ("_nodal_water", "_wet_fraction", "_cell_velocity", "_inflow", "
     "_nodal_mean", "_push_of_divergence", "_mean_gradients", "_average", "_hat_forces", "_leave",
     "_carry_remainder", "_cells_of_flux", "_unlike", "_surface_cells", "_touching_among")  # fmt: skip
 """Kernels that go over cells; the others go over nodes."""
-SUMS = ("_hat_forces", "_momentum", "_square_of")
+SUMS = ("_hat_forces", "_momenta", "_squares_of")
 """Kernels whose range is one of chunks."""
 
 
@@ -178,7 +178,7 @@ def _rows(name: str, args) -> int:
     """How many rows a kernel goes over: those of its range, of its runs, or of the chunks that it sums."""
     third = args[2]
     if name in SUMS:
-        return len(third)
+        return len(third[0] if isinstance(third, tuple) else third)
     if isinstance(third, np.ndarray) and third.shape[1:] == (2,):
         return int(third[:, 1].max())
     return args[1] - args[0]
