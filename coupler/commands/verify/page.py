@@ -17,7 +17,8 @@ NOTES = {
     "mixes the boundary layer; on cells of H/64 sensors 2 and 3 agree with the measurement: "
     "[water](water.md).",
     "P39": "H3 lies behind the box. The moment at which the jet falls there differs from run to run, and depends on "
-    "the diagonals along which the cells are split ([water](water.md#which-way-the-cells-are-split)).",
+    "the diagonals along which the cells are split ([water](water.md#which-way-the-cells-are-split)); its rms lies "
+    "at the limit (0.048 to 0.052 m in the last versions).",
     "P40": "P3 is 1.2 cells below the edge of the box. With one unknown for both faces of the edge it gives 0.45 to "
     "0.81 of the measured impulse on cells of 4.2 to 6.3 cm, and with separate unknowns 0.71 to 0.83; the "
     "rest is missing in the first 40 ms. The front is late by this time according to the clock of the record, "
