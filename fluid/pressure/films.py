@@ -7,8 +7,8 @@ one) by
 
     G_f V_n · A_ff⁻¹ G_f V_n                                                                              (1)
 
-(f: nodes whose cells lie in films but for slivers of water on other faces, A: the pressure
-matrix), the inertia of a sheet of no thickness.  The
+(f: nodes whose cells lie in films but for slivers of water on other faces, A: the pressure matrix), the inertia of a
+sheet of no thickness.  The
 behaviour of a real film depends on the roughness of both faces and not on the cells.  So (1) is left out: in films
 narrower than NARROW h the pressure follows from that of the water around, r, and from the weight of the film,
 

@@ -240,10 +240,9 @@ def _loads(water, problem, p):
     centre, dt, shear = water.domain.body_centre, problem.dt, problem.predicted.shear
     coupling = problem.coupling
     length = np.diff(coupling.indptr)
-    rows = np.flatnonzero(
-        length
-    )  # those of few nodes, which the product with the transpose would seek in all
-    held = np.repeat(p[problem.dofs[rows]], length[rows])  # p is 0 in the air
+    # Few nodes have rows that are not empty; the product with the transpose would go through all. p is 0 in the air.
+    rows = np.flatnonzero(length)
+    held = np.repeat(p[problem.dofs[rows]], length[rows])
     of_pressure = np.bincount(coupling.indices, coupling.data * held, coupling.shape[1])
     on_bodies = problem.other_load - of_pressure.reshape(-1, 6)
     on_bodies = dt * about(water.reference, on_bodies, centre)
