@@ -1,7 +1,8 @@
-"""The schema of `expected.toml`: expected results ([[expect]]) and curves over data ([[curve]]), checked before a run
-begins.
+"""The schema of `expected.toml`: expected results ([[expect]]), figures that the README states ([[stated]]) and curves
+over data ([[curve]]), checked before a run begins.
 
-The entries are described where they are used: `expected.py`, `view/over_data.py`, `compare/outcome.py`.
+The entries are described where they are used: `results/expected.py`, `results/stated.py`, `view/over_data.py`,
+`compare/outcome.py`.
 """
 
 from __future__ import annotations
@@ -21,6 +22,8 @@ FILE_NAME = "expected.toml"
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Text = Annotated[str, Field(strict=True, min_length=1)]
 Pair = tuple[Number, Number]
+FIGURE = "{}"
+"""Stands for the figure in the text of [[stated]]."""
 NEEDS = {"at": ("time",), "integral": ("from", "to"), "arrival": ("above",)}
 """Names that a kind of `take` cannot do without."""
 
@@ -29,36 +32,60 @@ class _Entry(BaseModel):
     model_config = ConfigDict(extra="forbid", populate_by_name=True)
 
 
-class Expect(_Entry):
-    """One promise."""
+class _Taken(_Entry):
+    """A number from a column of a history."""
 
-    what: Text
     table: Text
     column: Text
     take: Literal["last", "largest", "max", "min", "mean", "at", "integral", "period", "arrival"]
-    value: Number | None = None
     tolerance: Annotated[Number, Field(ge=0)] | None = None
-    at_least: Number | None = None
-    at_most: Number | None = None
     time: Number | None = None
     from_: Number | None = Field(None, alias="from")
     to: Number | None = None
     above: Number | None = None
-    compare: Literal["peak_force", "dissipated"] | None = None
-    source: str = ""
 
     @model_validator(mode="after")
-    def _whole(self) -> Self:
-        bounds = self.at_least is not None or self.at_most is not None
-        if (self.value is None) == (not bounds) or (self.value is None) != (self.tolerance is None):
-            raise ValueError("give value and tolerance, or at_least, at_most or both of these")
+    def _takes(self) -> Self:
         given = self.model_dump(by_alias=True, exclude_none=True)
         missing = [name for name in NEEDS.get(self.take, ()) if name not in given]
         if missing:
             raise ValueError(f"take = '{self.take}' needs {' and '.join(missing)}")
         start, end = self.from_, self.to
-        if self.take == "integral" and start is not None and end is not None and not start < end:
+        if (start is None) != (end is None):
+            raise ValueError("from and to belong together")
+        if start is not None and end is not None and not start < end:
             raise ValueError(f"from ({start:g}) must be less than to ({end:g})")
+        return self
+
+
+class Expect(_Taken):
+    """One promise."""
+
+    what: Text
+    value: Number | None = None
+    at_least: Number | None = None
+    at_most: Number | None = None
+    compare: Literal["peak_force", "dissipated"] | None = None
+    source: str = ""
+
+    @model_validator(mode="after")
+    def _bounded(self) -> Self:
+        bounds = self.at_least is not None or self.at_most is not None
+        if (self.value is None) == (not bounds) or (self.value is None) != (self.tolerance is None):
+            raise ValueError("give value and tolerance, or at_least, at_most or both of these")
+        return self
+
+
+class Stated(_Taken):
+    """A figure of this program that the README of the case states."""
+
+    text: Text
+    scale: Number = 1.0
+
+    @model_validator(mode="after")
+    def _marked(self) -> Self:
+        if self.text.count(FIGURE) != 1:
+            raise ValueError(f"text must mark the place of the figure once, as {FIGURE}")
         return self
 
 
@@ -112,6 +139,7 @@ class Promises(_Entry):
     """The whole file."""
 
     expect: tuple[Expect, ...] = ()
+    stated: tuple[Stated, ...] = ()
     curve: tuple[Curve, ...] = ()
 
 

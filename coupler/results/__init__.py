@@ -5,7 +5,7 @@ history, columns                       CSV tables of one row a step, and their c
 fields, vtkhdf                         water and blocks for ParaView
 cracks                                 the joints as a table and as surfaces
 gauges, loads, gauge_windows           what a case measures
-expected                               `expected.toml` against the histories
+expected, stated                       `expected.toml` and the figures of the case's README against the histories
 storage                                writing that a full disk cannot leave incomplete
 
 They are described in docs/results.md.  Imports `step`, `balance`, `geometry`, `case` and `program`.

@@ -4,6 +4,7 @@
 what = "..."           for people                    table, column   of the history
 take = "last"          last | largest (by size, sign kept) | max | min | mean | at (time) | integral (from, to) |
                        period | arrival (above): first time that the column exceeds a value
+from, to               of that part of the history alone, whatever is taken
 value, tolerance       |taken - value| ≤ tolerance   or at_least = / at_most =
 source = "..."         where the number comes from
 """
@@ -47,12 +48,25 @@ def _judge(entry: dict, run: Path) -> Verdict:
     exact = "value" in entry
     low, high = entry.get("at_least", -np.inf), entry.get("at_most", np.inf)
     range_text = f"{entry['value']:g} ± {entry['tolerance']:g}" if exact else f"{low:g} to {high:g}"
-    columns, reason = _columns(entry, run)
+    found, reason = taken(entry, run)
     if reason:
         return Verdict(entry["what"], float("nan"), range_text, False, reason)
-    found = float(TAKE[entry["take"]](columns["time"], columns[entry["column"]], entry))
     kept = abs(found - entry["value"]) <= entry["tolerance"] if exact else low <= found <= high
     return Verdict(entry["what"], found, range_text, bool(kept))
+
+
+def taken(entry: dict, run: Path) -> tuple[float, str]:
+    """The value of a run that an entry asks for; NaN with the reason if there is none."""
+    columns, reason = _columns(entry, run)
+    if reason:
+        return float("nan"), reason
+    time, values = columns["time"], columns[entry["column"]]
+    if "from" in entry:
+        start, end = max(entry["from"], time[0]), min(entry["to"], time[-1])
+        if not start < end:
+            return float("nan"), f"the run has nothing from {entry['from']:g} to {entry['to']:g} s"
+        time, values = _window(time, values, start, end)
+    return float(TAKE[entry["take"]](time, values, entry)), ""
 
 
 def _columns(entry: dict, run: Path) -> tuple[dict, str]:
@@ -66,10 +80,16 @@ def _columns(entry: dict, run: Path) -> tuple[dict, str]:
     return columns, "" if len(columns["time"]) else f"{table} has no rows"
 
 
+def _window(time: Array, values: Array, start: float, end: float) -> tuple[Array, Array]:
+    """The part of a history from start to end [s], with its values there."""
+    grid = np.unique(np.concatenate([[start, end], time]))
+    grid = grid[(grid >= start) & (grid <= end)]
+    return grid, np.interp(grid, time, values)
+
+
 def _integral(time: Array, values: Array, entry: dict) -> float:
-    grid = np.unique(np.concatenate([[entry["from"], entry["to"]], time]))
-    grid = grid[(grid >= entry["from"]) & (grid <= entry["to"])]
-    return np.trapezoid(np.interp(grid, time, values), grid)
+    grid, part = _window(time, values, entry["from"], entry["to"])
+    return np.trapezoid(part, grid)
 
 
 def _period(time: Array, values: Array, entry: dict) -> float:

@@ -1,4 +1,5 @@
-"""Every case of the checkout runs to its end as it is written and keeps what its expected.toml promises."""
+"""Every case of the checkout runs to its end as it is written, keeps what its expected.toml promises and gives the
+figures that its README states."""
 
 import json
 
@@ -6,6 +7,7 @@ import pytest
 
 from coupler.checks.read_case import load
 from coupler.program.errors import ExitCode
+from coupler.results.stated import stated
 from coupler.run.directory import RunDirectory
 from coupler.run.execute import execute_case
 from tests.coupler.test_cases import CASES
@@ -30,6 +32,12 @@ def test_a_case_keeps_what_it_promises(place, tmp_path):
     kept = json.loads((directory.path / "run.json").read_text(encoding="utf-8"))["figures"]["expected"]
     assert kept
     assert [what for what, found in kept.items() if not found] == []
+    drifted = [
+        (figure.text, figure.stated, figure.now)
+        for figure in stated(place, directory.path)
+        if not figure.kept
+    ]
+    assert drifted == [], "renew them: python -m coupler.commands.case_pages --write CASE"
 
 
 def test_long_cases_are_cases():
