@@ -11,9 +11,8 @@ from coupler.run.forecast import forecast
 from coupler.run.trapped_air import described_air
 from coupler.scene.build import build
 from coupler.step.limits import Diverged, check_air
+from tests.coupler.water_cases import FILL, case, reported, run
 from tests.fakes import no_clock
-
-from .test_water_case import FILL, case, reported, run
 
 CLOSED = {"lower": [0, 0, 0], "upper": [2, 0.2, 1], "cell": 0.1, "smooth": ["y-", "y+"], "open": []}
 TRAPPED = {"air": {"model": "trapped"}}
@@ -74,7 +73,7 @@ def test_a_gauge_reads_the_pocket_and_the_books_hold_its_energy():
 def test_open_air_loads_nothing_of_it():
     code = (
         "import sys\n"
-        "from tests.coupler.test_water_case import case, run\n"
+        "from tests.coupler.water_cases import case, run\n"
         f"run(case({{'fill': {FILL!r}}}), 0.02)\n"
         "assert 'fluid.step.water' in sys.modules\n"
         "assert not [name for name in sys.modules if name.startswith('fluid.air')]\n"

@@ -1,0 +1,340 @@
+"""What the checks of a case with water refuse or remark."""
+
+import meshio
+import numpy as np
+import pytest
+
+from coupler.case.case import modules
+from coupler.checks.case import problems, remarks
+from coupler.geometry.tank_mesh import measured
+from coupler.scene.build import build
+from coupler.scene.side_energy import coming_energy
+from fluid.mesh.background import box_mesh
+from tests.coupler.water_cases import TANK, case, reported, run
+from tests.fakes import no_clock
+
+
+@pytest.mark.parametrize(
+    ("water", "message"),
+    [
+        ({"walls": "no-slip"}, "water.walls: walls that hold the water need water.viscosity"),
+        ({"walls": "friction"}, "friction needs water.roughness or water.manning"),
+        ({"roughness": 0.01}, 'water.roughness: is for walls = "friction"'),
+        ({"fill": []}, "no water: write at least one"),
+        ({"sea": [{"side": "x+", "level": 1.5}]}, "z = 1.5 m is not between the floor"),
+        (
+            {"sea": [{"side": "x+", "level": 0.5}, {"side": "x+", "level": 0.4}]},
+            "x+ is given to water.sea[0] already",
+        ),
+        (
+            {"inflow": [{"kind": "bore", "side": "x-", "ahead": 0.6, "level": 0.5}]},
+            "z = 0.6 m must lie above the floor",
+        ),
+        (
+            {"inflow": [{"kind": "solitary", "side": "x-", "level": 0.2, "height": 0.2, "crest": 1.0}]},
+            "breaks at once on a depth of 0.2 m",
+        ),
+        ({"inflow": [{"kind": "record", "side": "x-", "path": "/nowhere.csv"}]}, "no such file"),
+        (
+            {"inflow": [{"kind": "steady", "side": "x-", "level": 0.5, "velocity": 3.0}]},
+            "water.inflow.0.velocity: 3 m/s strike still water 0.5 m deep: as a bore it would rise to z = 1.32 m",
+        ),
+    ],
+)
+def test_what_cannot_be_is_refused_with_its_place(water, message):
+    assert any(message in line for line in reported(water)), reported(water)
+
+
+def test_a_tank_that_its_inflow_fills_is_refused():
+    """0.2 m x 0.5 m x 1 m/s bring 0.1 m3 in a second, there is room for 0.2 m3. A side as a way out is
+    enough; an open top lets out spray only, and a stream that takes back what returns does not fill a tank."""
+    stream = {"kind": "steady", "side": "x-", "level": 0.5, "velocity": 1.0}
+    closed = TANK | {"open": []}
+
+    def filled(end, tank, **more):
+        found = problems(case({"inflow": [stream], **more}, tank=tank, time={"end": end}))
+        return [text for path, text in found if path == ("water", "inflow", 0)]
+
+    assert filled(1.9, closed) == []
+    assert "brings 0.21 m3 until the end of the run (2.1 s)" in filled(2.1, closed)[0]
+    assert filled(2.1, TANK) == []
+    assert "room for 0.2 m3 and no way out but its open top" in filled(2.3, TANK)[0]
+    assert filled(2.3, TANK | {"open": ["z+", "x+"]}) == []
+    assert filled(2.3, TANK, inflow=[stream | {"absorbs": True}]) == []
+    assert filled(2.1, closed, sea=[{"side": "x+", "level": 0.5}]) == []
+
+
+def test_a_wave_that_lifts_its_tank_above_its_crest_is_refused():
+    """A crest of 0.1 m on 0.5 m brings sqrt(16/3 0.5³ 0.1) 0.2 m3 in all; a tank of 1 m has room for 0.02 m3 up to the
+    crest, one of 3 m for 0.06."""
+    wave = {"kind": "solitary", "side": "x-", "level": 0.5, "height": 0.1, "crest": 2.0}
+
+    def found(length, end=5.0, **more):
+        fill = [{"lower": [0, 0, 0], "upper": [length, 0.2, 0.5]}]
+        tank = TANK | {"upper": [length, 0.2, 1]}
+        with_fill = {"inflow": [wave | more], "fill": fill}
+        return [text for _, text in problems(case(with_fill, tank=tank, time={"end": end}))]
+
+    assert "room for 0.02 m3 under the crest (z = 0.6 m)" in found(1.0)[0]
+    assert found(1.0, end=1.0) == []
+    assert found(1.0, absorbs=True) == []
+    assert found(3.0) == []
+
+
+def test_a_wave_that_draws_its_tank_below_its_trough_is_refused():
+    """A trough of 0.05 m on 0.5 m takes (3 sqrt(3)/4) H/γ = 0.0736 m2 in a slice; a wall throws a trough of 0.1 m back:
+    a tank of 0.74 m has that water above it."""
+
+    def found(length, end=8.0, **more):
+        wave = {"kind": "n-wave", "side": "x-", "level": 0.5, "height": 0.05, "middle": 4.0}
+        fill = [{"lower": [0, 0, 0], "upper": [length, 0.2, 0.5]}]
+        tank = TANK | {"upper": [length, 0.2, 1]}
+        with_fill = {"inflow": [wave | more], "fill": fill}
+        return [text for _, text in problems(case(with_fill, tank=tank, time={"end": end}))]
+
+    (drawn,) = found(0.7)
+    assert "draws 0.0147 m3 out of the tank until the end of the run (8 s), which holds 0.0142 m3" in drawn
+    assert "above the trough that the far side throws back (z = 0.399 m)" in drawn
+    assert found(0.8) == []
+    assert found(0.7, end=3.0) == []
+    assert found(0.7, absorbs=True) == []
+
+
+@pytest.mark.parametrize("fitted", [False, True])
+def test_a_record_that_lifts_its_tank_above_what_a_wall_throws_back_is_refused(tmp_path, fitted):
+    """0.2 m x 0.6 m x 0.5 m/s bring 0.06 m3 in a second. Thrown back by a wall that stands 0.73 m deep, and there is
+    room for 0.0918 m3 below; also in a mesh from a file. An open side opposite lets all of it pass, one beside its way
+    what runs over the edge, (2/3)^1.5 sqrt(g d³) a metre."""
+    (tmp_path / "swell.csv").write_text("time,level,velocity\n0,0.6,0.5\n9,0.6,0.5\n")
+    swell = {"kind": "record", "side": "x-", "path": str(tmp_path / "swell.csv")}
+    tank = TANK
+    if fitted:
+        mesh, path = box_mesh(np.zeros(3), [2, 0.2, 1], 0.1), tmp_path / "tank.vtk"
+        meshio.write(path, meshio.Mesh(mesh.nodes, [("tetra", mesh.cells)]))
+        tank = {"mesh": str(path)}
+
+    def found(end, sides=("z+",)):
+        read, wrong = measured(
+            case({"inflow": [swell]}, tank=tank | {"open": list(sides)}, time={"end": end})
+        )
+        assert wrong == []
+        return [text for path, text in problems(read) if path == ("water", "inflow", 0)]
+
+    assert found(1.4) == []
+    assert "brings 0.096 m3" in found(1.6)[0]
+    assert "under what the far side throws back (z = 0.73 m)" in found(1.6)[0]
+    assert found(3.0, ["z+", "x+"]) == []
+    assert found(3.0, ["z+", "y+"]) == []
+
+
+def test_a_wave_whose_still_water_runs_out_is_refused():
+    """0.5 m of water leave a tank 1 m long by its open end at 8/27 sqrt(g d³): an eighth of a metre is left when
+    4/27 sqrt(g 0.5 m) t = 1 m, at 3.05 s. The crest is far away and brings nothing."""
+    wave = {"kind": "solitary", "side": "x-", "level": 0.5, "height": 0.1, "crest": 50.0}
+    fill = [{"lower": [0, 0, 0], "upper": [1, 0.2, 0.5]}]
+
+    def found(end, sides=("z+", "x+"), **more):
+        tank = TANK | {"upper": [1, 0.2, 1], "open": list(sides)}
+        read = case({"inflow": [wave], "fill": fill} | more, tank=tank, time={"end": end})
+        return [text for path, text in problems(read) if path == ("water", "inflow", 0)]
+
+    assert found(3.0) == []
+    assert "runs out by x+ (tank.open): about 0.119 m are left" in found(3.2)[0]
+    assert "end before 3 s" in found(3.2)[0]
+    assert "runs out by x+ and y+" in found(3.0, ["z+", "x+", "y+"])[0]
+    assert found(9.0, ["z+"]) == []
+    assert found(9.0, inflow=[wave | {"absorbs": True}]) == []
+    assert found(9.0, inflow=[{"kind": "steady", "side": "x-", "level": 0.5, "velocity": 1.0}]) == []
+    assert found(9.0, ["z+", "y+"], sea=[{"side": "x+", "level": 0.5}]) == []
+
+
+def test_a_side_that_absorbs_is_three_cells_from_the_one_opposite():
+    def found(width, absorbs=True):
+        sea = {"side": "y-", "level": 0.5, "absorbs": absorbs}
+        tank = TANK | {"upper": [1, width, 1], "cell": 0.1}
+        read = case({"sea": [sea], "fill": [{"lower": [0, 0, 0], "upper": [1, width, 0.5]}]}, tank=tank)
+        return [text for path, text in problems(read) if path == ("water", "sea", 0, "absorbs")]
+
+    assert found(0.3) == []
+    assert found(0.2, absorbs=False) == []
+    assert "the side opposite to y- is only 2 cells away" in found(0.2)[0]
+
+
+def test_a_bore_may_run_until_its_reflection_is_back():
+    """0.6 m behind a bore into 0.5 m: water of 0.42 m/s, 0.25 m2/s. A wall throws back 0.71 m; a tank of 1 m that
+    is 0.2 m wide has room for 0.042 m3 up to there."""
+    bore = {"kind": "bore", "side": "x-", "level": 0.6, "ahead": 0.5}
+
+    def found(end, top=1.0, **more):
+        fill = [{"lower": [0, 0, 0], "upper": [1.0, 0.2, 0.5]}]
+        in_tank = case(
+            {"inflow": [bore | more], "fill": fill}, tank=TANK | {"upper": [1, 0.2, top]}, time={"end": end}
+        )
+        return [text for _, text in problems(in_tank)]
+
+    assert found(0.75) == []
+    assert "m3 under what the far side throws back (z = 0.709" in found(0.95)[0]
+    assert found(0.95, absorbs=True) == []
+    # 0.03 m3 up to a lid at 0.65 m
+    assert any("room for 0.03 m3 under what the far side" in text for text in found(0.7, 0.65))
+    assert not any("far side" in text for text in found(0.5, 0.65))
+
+
+def test_what_a_record_takes_back_leaves_room(tmp_path):
+    """To and fro: 0.2 m x 0.5 m x 2/pi x 1 m/s, 0.0637 m3, come in within a second and leave in the next."""
+    rows = [f"{t:.2f},0.5,{np.sin(np.pi * t):.6f}" for t in np.arange(0.0, 20.01, 0.05)]
+    (tmp_path / "swell.csv").write_text("\n".join(["time,level,velocity", *rows]), encoding="utf-8")
+    swell = {"kind": "record", "side": "x-", "path": str(tmp_path / "swell.csv")}
+    for end in (0.9, 20.0):
+        assert problems(case({"inflow": [swell]}, time={"end": end})) == []
+    small = TANK | {"upper": [0.5, 0.2, 1]}
+    fill = {"fill": [{"lower": [0, 0, 0], "upper": [0.5, 0.2, 0.5]}]}
+    assert problems(case({"inflow": [swell]} | fill, tank=small, time={"end": 0.4})) == []
+    found = [text for _, text in problems(case({"inflow": [swell]} | fill, tank=small, time={"end": 20.0}))]
+    assert any("brings 0.0635 m3 until the end" in text for text in found), found
+
+
+def test_water_without_air_above_it_may_not_leave():
+    """Full to its closed top with an open side: what leaves leaves a hole. An open top, or some air, and it may."""
+    whole = {"fill": [{"lower": [0, 0, 0], "upper": [2, 0.2, 1]}]}
+    for sides, wrong in ((["x+"], True), (["x+", "z+"], False), ([], False)):
+        found = problems(case(whole, tank=TANK | {"open": sides}))
+        assert [path for path, text in found if "no air is there" in text] == [("water", "fill", 0)] * wrong
+    below = {"fill": [{"lower": [0, 0, 0], "upper": [2, 0.2, 0.9]}]}
+    assert problems(case(below, tank=TANK | {"open": ["x+"]})) == []
+
+
+def test_water_up_to_the_brim_sinks_as_it_leaves():
+    """A tank full to its open top, open on one side too: without a surface up there nothing could give way, and the
+    water in the tank stayed while 2 % of it had left by 0.09 s, 45 % by 0.4 s. What fell is what energy there is."""
+    tank = {"lower": [0, 0, 0], "upper": [1, 0.4, 1], "cell": 0.2, "open": ["x+", "z+"]}
+    fill = {"fill": [{"lower": [0, 0, 0], "upper": [1, 0.4, 1]}]}
+    coupling, record, _ = run(case(fill, tank=tank), 0.4)
+    assert coupling.water.volume() < 0.27
+    assert abs(coupling.water.volume_error()) < 1e-4
+    assert record.balance.energy_error < 0.01
+    still, _, _ = run(case(fill, tank=tank | {"open": ["z+"]}), 0.4)
+    assert np.abs(still.water.velocity).max() < 1e-9
+    assert still.water.volume() == pytest.approx(0.4, rel=1e-9)
+
+
+def test_a_drop_that_the_cells_cannot_hold_is_refused():
+    """With air on both sides and under two and a half cells; a layer on the floor and a slice between walls are not."""
+    for low, high, wrong in (
+        ([0.5, 0, 0.5], [1.0, 0.2, 0.74], True),
+        ([0.5, 0, 0.5], [1.0, 0.2, 0.76], False),
+        ([0, 0, 0], [2, 0.2, 0.11], False),
+        ([0.5, 0, 0], [0.6, 0.2, 0.5], True),
+    ):
+        found = problems(case({"fill": [{"lower": low, "upper": high}]}))
+        assert [path for path, text in found if "with air on both sides" in text] == [
+            ("water", "fill", 0)
+        ] * wrong
+
+
+@pytest.mark.parametrize(
+    ("fill", "thin"),
+    [
+        ([[0, 0, 0], [2, 0.2, 0.29]], "water.fill[0] is 0.29 m thin, 2.9 cells"),
+        ([[0, 0, 0], [0.15, 0.2, 0.6]], "water.fill[0] is 0.15 m thin, 1.5 cells"),
+        ([[0.5, 0, 0.5], [1.0, 0.2, 0.69]], "water.fill[0] is 0.19 m thin, 1.9 cells"),
+        ([[0, 0, 0], [2, 0.2, 0.3]], None),
+        ([[0, 0, 0], [0.5, 0.2, 0.5]], None),
+    ],
+)
+def test_water_that_the_mesh_does_not_resolve_is_remarked(fill, thin):
+    """From wall to wall any width is a slice, here of two cells and of one."""
+    low, high = fill
+    for width in (0.2, 0.1):
+        found = remarks(
+            case(
+                {"fill": [{"lower": low, "upper": [high[0], width, high[2]]}]},
+                tank=TANK | {"upper": [2, width, 1]},
+            )
+        )
+        assert [thin is not None and text.startswith(thin) for text in found] == [True] * (thin is not None)
+
+
+def test_a_layer_on_other_water_is_not_thin():
+    boxes = [{"lower": [0, 0, 0], "upper": [2, 0.2, 0.3]}, {"lower": [0, 0, 0.3], "upper": [0.5, 0.2, 0.4]}]
+    assert remarks(case({"fill": boxes})) == []
+    assert "water at water.sea[0] is 0.1 m thin" in remarks(case({"sea": [{"side": "x+", "level": 0.1}]}))[0]
+
+
+def test_the_split_of_a_case_is_that_of_its_mesh():
+    """Mirrored bricks: nodes in which diagonals end hold three times the water of the others, away from the walls."""
+    cube = {"lower": [0, 0, 0], "upper": [1, 1, 1], "cell": 0.25}
+    most = {}
+    for split in ("kuhn", "mirrored"):
+        found = case({"fill": [{"lower": [0, 0, 0], "upper": [1, 1, 1]}]}, tank=cube | {"split": split})
+        topology = build(found, no_clock).coupling.water.topology
+        inner = np.all((topology.nodes > 0.01) & (topology.nodes < 0.99), axis=1)
+        most[split] = topology.node_volume[inner].max() / topology.node_volume[inner].min()
+    assert most == pytest.approx({"kuhn": 1.0, "mirrored": 3.0})
+
+
+def test_a_wave_that_has_begun_before_the_start_is_remarked():
+    """At the first step it would come in as a jump, and strike."""
+    wave = {"kind": "solitary", "side": "x-", "level": 0.5, "height": 0.05}
+    early, late = (remarks(case({"inflow": [wave | {"crest": crest}]})) for crest in (0.6, 2.0))
+    assert "59 % of its height" in early[0]
+    assert late == []
+
+
+def test_a_dry_start_is_allowed_where_water_comes_in():
+    assert (
+        reported({"fill": [], "inflow": [{"kind": "steady", "side": "x-", "level": 0.3, "velocity": 1.0}]})
+        == []
+    )
+
+
+def test_energy_that_a_side_can_bring():
+    """A sea 0.2 m above the water: ½ ρ g Δz² over its depth; a stream on a dry bed has its speed too."""
+    sea = coming_energy(case({"sea": [{"side": "x+", "level": 0.7}]}))
+    assert sea(0.0) == sea(0.3) == pytest.approx(0.5 * 1000 * 0.2 * 0.7 * 9.81 * 0.2**2)
+    stream = {"kind": "steady", "side": "x-", "level": 0.3, "velocity": 1.0}
+    both = coming_energy(case({"fill": [], "inflow": [stream]}))
+    assert both(0.0) == pytest.approx(0.5 * 1000 * 0.2 * 0.3 * (9.81 * 0.3**2 + 0.3))
+
+
+def test_a_wave_without_its_still_water_is_remarked():
+    bore = {"kind": "bore", "side": "x-", "ahead": 0.4, "level": 0.8}
+    assert "bore at x- runs into still water up to z = 0.4 m" in remarks(case({"inflow": [bore]}))[0]
+    assert remarks(case({"inflow": [bore | {"ahead": 0.5}]})) == []
+
+
+def test_modules_tell_what_is_on():
+    on = modules(case({"viscosity": "1 mPa s", "sea": [{"side": "x+", "level": 0.5}]}))
+    assert (on["viscosity"], on["wall friction"], on["inflow"]) == (True, False, True)
+
+
+def test_a_record_that_rises_above_the_tank_is_refused(tmp_path):
+    path = tmp_path / "r.csv"
+    path.write_text("time,level,velocity\n0,0.1,0\n1,50,0\n", encoding="utf-8")
+    inflow = {"kind": "record", "side": "x-", "path": str(path)}
+    assert any("above the top of the tank" in line for line in reported({"inflow": [inflow]}))
+
+
+@pytest.mark.parametrize("kind", [{"kind": "solitary", "crest": 2}, {"kind": "n-wave", "middle": 2}])
+def test_a_wave_higher_than_the_sides_is_refused(kind):
+    """Still water of 0.8 m in a tank of 1 m; half of the depth does not break, but runs over."""
+    wave = {"side": "x-", "level": 0.8, "height": 0.4, **kind}
+    found = reported({"fill": [], "inflow": [wave]})
+    assert any("its crest reaches z = 1.2 m, above the top of the tank (1 m)" in line for line in found), (
+        found
+    )
+    assert not reported({"fill": [], "inflow": [wave | {"height": 0.15}]})
+
+
+@pytest.mark.parametrize(
+    "solid",
+    [
+        {},
+        {"centre": [1, 0.1, 0.2]},
+        {"centre": [1, 0.1, 0.2], "size": [0.2, 0.2, 0.2], "vertices": [[0, 0, 0]]},
+        {"vertices": [[1, 0, 0], [1.2, 0, 0], [1, 0.1, 0]]},
+        {"path": "/nowhere.stl"},
+    ],
+)
+def test_solids_that_are_none_are_refused(solid):
+    assert any(line.startswith("solid.0") for line in reported(solid=[solid]))
