@@ -116,7 +116,8 @@ class Tank(Section):
     )
     cell: PositiveLength | None = Field(
         None,
-        description="wanted edge of the mesh cells, needed without mesh; changed so that a whole number fits each side",
+        description="wanted edge of the bricks that the box is divided into, six tetrahedral cells each; needed "
+        "without mesh; changed so that a whole number fits each side",
         examples=["1 m"],
     )
     split: Literal["kuhn", "mirrored"] = Field(

@@ -30,12 +30,17 @@ def test_what_is_taken_from_a_history(take, values, answer):
     assert TAKE[take](TIME, values, ENTRY) == pytest.approx(answer, rel=1e-3)
 
 
-def write_run(folder, expected):
+def write_history(folder):
+    """x is 1, 2, 4 m at 0, 1, 2 s."""
     (folder / "history").mkdir()
     table = HistoryTable(folder / "history" / "a.csv", (("time", "s", "time"), ("x", "m", "a length")))
     for time, x in ((0.0, 1.0), (1.0, 2.0), (2.0, 4.0)):
         table.append(time=time, x=x)
     table.close()
+
+
+def write_run(folder, expected):
+    write_history(folder)
     (folder / "expected.toml").write_text(expected, encoding="utf-8")
     return verdicts(folder, folder / "expected.toml")
 

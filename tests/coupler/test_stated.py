@@ -8,9 +8,9 @@ from coupler.case.promises import mistakes_in
 from coupler.commands.case_pages import compare
 from coupler.program.errors import BadCase
 from coupler.program.provenance import ROOT
-from coupler.results.history import HistoryTable
 from coupler.results.stated import places, renew, stated
 from tests.coupler.test_cases import CASES
+from tests.coupler.test_expected import write_history
 
 README = """The largest is 4.1 m, at the end
 2.00 km.
@@ -21,12 +21,7 @@ ENTRY = '[[stated]]\ntext = "{}"\ntable = "history/a.csv"\ncolumn = "x"\ntake = 
 
 
 def against_a_run(folder, *entries):
-    """x is 1, 2, 4 m at 0, 1, 2 s."""
-    (folder / "history").mkdir()
-    table = HistoryTable(folder / "history" / "a.csv", (("time", "s", "time"), ("x", "m", "a length")))
-    for time, x in ((0.0, 1.0), (1.0, 2.0), (2.0, 4.0)):
-        table.append(time=time, x=x)
-    table.close()
+    write_history(folder)
     (folder / "README.md").write_text(README, encoding="utf-8")
     (folder / "expected.toml").write_text("".join(entries), encoding="utf-8")
     assert mistakes_in(folder) == []
