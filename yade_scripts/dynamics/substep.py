@@ -65,7 +65,8 @@ class Substepper:
             self._turning = self._turning[~asleep[self._turning]]
             watched, pushed = watched & ~asleep, pushed & ~asleep
         self._motion.watch(np.flatnonzero(watched))
-        self._push = self._scene.pushing(np.flatnonzero(pushed))
+        self._pushed = np.flatnonzero(pushed)
+        self._pushed_ids = [self._scene.ids[r] for r in self._pushed]
 
     def missing_weight(self, time: float) -> float:
         """Share of the weight that does not act yet."""
@@ -95,8 +96,7 @@ class Substepper:
         self._impulses.add(dt, m.x, self._joint_F, self._without_contact, self._F)
         if len(self._turning):
             self._spin.add(self._turning, m.R, m.v, dt, m.dt, self._F)
-        self._push(self._F)
-        self._scene.step(dt)
+        self._scene.step(dt, self._pushed_ids, self._F[self._pushed])
         m.dt = dt
         m.read_watched()
         if missing > 0.0:

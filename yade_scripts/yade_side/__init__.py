@@ -2,8 +2,6 @@
 
 engine       loads YADE on one thread, without side effects on the rest of the process
 scene        bodies of blocks and fixed planes, moved by YADE under forces that are given to it
-exchange     states out of YADE and forces into it
-memory       where YADE's objects keep their numbers
 motion       positions and velocities of the blocks, read from YADE's bodies
 
 The only modules that touch YADE's objects.  Imports `blocks`.

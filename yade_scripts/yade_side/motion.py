@@ -11,13 +11,14 @@ from scipy.spatial.transform import Rotation
 from array_types import Array
 from yade_scripts.blocks.faces import FixedPlane
 from yade_scripts.blocks.kinematics import scatter
-from yade_scripts.yade_side.scene import Scene
+from yade_scripts.yade_side.scene import STATE, Scene
 
 
 class Motion:
     """x (n, 3) [m] centres in the scene's coordinates · R (n, 3, 3) body frame → world · v (n, 6) [v, ω]
 
     all_x, all_v, all_R: the same with a row for each fixed plane behind · dt [s]: length of the substep that led here.
+    The lists of bodies persist between readings, because YADE leaks a reference for each fresh item that it is handed.
     """
 
     def __init__(self, scene: Scene, planes: list[FixedPlane]):
@@ -28,15 +29,15 @@ class Motion:
         self.x, self.v, self.R = self.all_x[:n], self.all_v[:n], self.all_R[:n]
         self.all_x[n:] = np.array([p.point for p in planes]).reshape(-1, 3)
         self.dt = 0.0
-        self._all = _Rows(np.arange(n), scene)
-        self._watched = _Rows(np.zeros(0, np.int64), scene)
+        self._all = _Rows(np.arange(n), scene.ids)
+        self._watched = _Rows(np.zeros(0, np.int64), scene.ids)
         self._awake: Array | None = None
 
     def rest(self, asleep: Array) -> None:
         """Keep the sleeping blocks (n,) bool from now on where they were read last."""
         awake = np.flatnonzero(~asleep)
         self._awake = None if len(awake) == len(asleep) else awake
-        self._all = _Rows(awake, self._scene)
+        self._all = _Rows(awake, self._scene.ids)
 
     def put(self, rows: Array, states: Array) -> None:
         """Set the blocks `rows` to the states (n, 16) of `Scene.save`, whether or not the scene holds them still."""
@@ -45,7 +46,7 @@ class Motion:
 
     def watch(self, rows: Array) -> None:
         """Set the rows that `read_watched` reads."""
-        self._watched = _Rows(rows, self._scene)
+        self._watched = _Rows(rows, self._scene.ids)
 
     def read(self) -> None:
         """Read the states of all blocks."""
@@ -57,7 +58,8 @@ class Motion:
 
     def _take(self, which: _Rows) -> None:
         if len(which.rows):
-            scatter(which.read(), which.rows, self._scene.frame, self.x, self.v, self.R)
+            states = self._scene.read(which.ids, which.buffer)
+            scatter(states, which.rows, self._scene.frame, self.x, self.v, self.R)
 
     def before(self) -> tuple[Array, Array]:
         """Places (x, R) one substep ago."""
@@ -80,8 +82,9 @@ class Motion:
 
 
 class _Rows:
-    """Rows, and how their states are read."""
+    """Rows with their bodies in YADE and a buffer for their states."""
 
-    def __init__(self, rows: Array, scene: Scene):
+    def __init__(self, rows: Array, ids: list[int]):
         self.rows = rows
-        self.read = scene.reading(rows)
+        self.ids = [ids[r] for r in rows]
+        self.buffer = bytearray(8 * STATE * len(rows))

@@ -1,13 +1,14 @@
 """The scene in YADE: one body for each block, which YADE moves under given forces.
 
 YADE keeps the bodies, integrates their motion (`NewtonIntegrator`) and looks for neighbours (`InsertionSortCollider`)
-when it is called; the laws of contact and joints give it forces before each step (`exchange.py`).
+when it is called; the laws of contact and joints act through its Python interface: forces go in before each step.
 YADE's own contact geometries are not used, because none of them is right for blocks (docs/theory.md).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import struct
+from collections import deque
 from itertools import chain
 from operator import attrgetter
 
@@ -17,7 +18,6 @@ from scipy.spatial.transform import Rotation
 from array_types import Array
 from yade_scripts.blocks.block import MARGIN, Block
 from yade_scripts.yade_side.engine import Engine, YadeError
-from yade_scripts.yade_side.exchange import exchange_of
 
 STANDING, LOOSE = 5, 1
 """Masks: two bodies are neighbours if they share a bit, unless both are fixed (equal masks that hold `APART`)."""
@@ -26,9 +26,10 @@ VERLET = 0.05
 """Margin of the search for neighbours as a share of the smallest edge of a block."""
 WHITE = (1.0, 1.0, 1.0)
 """Colour of bodies; left to itself, YADE seeds a random generator for each."""
-_SAVED = [0, 1, 2, 12, 9, 10, 11, 3, 4, 5, 6, 7, 8, 13, 14, 15]
-"""Numbers of a state (`exchange.py`) in the order of a saved one: position, orientation (w x y z), velocity, spin,
-angular momentum."""
+STATE = 13
+"""Numbers of a body: position 3, velocity 3, angular velocity 3, orientation 4 (x y z w)."""
+_SAVED = [0, 1, 2, 12, 9, 10, 11, 3, 4, 5, 6, 7, 8]
+"""Of these, in the order of a saved state: position, orientation (w x y z), velocity, spin."""
 
 _ENDS = attrgetter("id1", "id2")
 
@@ -63,10 +64,12 @@ class Scene:
         """Those of all rows. The bodies of blocks that are held still are taken out of YADE's scene: its loops and its
         search for neighbours pass them by."""
         self._loose = np.zeros(len(blocks), bool)
+        self._spins, self._spin_is_read = np.zeros((len(blocks), 3)), np.zeros(len(blocks), bool)
+        """Angular momenta, and which of them were read since the bodies moved."""
+        self._subdomain = engine.wrapper.Subdomain()
         self._set_engines(gravity, meets)
         for row, block in enumerate(blocks):
             self._add_block(row, block)
-        self._exchange = exchange_of(engine, self._bodies)
 
     # ---- building -------------------------------------------------------------------------------------------
 
@@ -118,22 +121,33 @@ class Scene:
 
     # ---- reading and moving ---------------------------------------------------------------------------------
 
-    def reading(self, rows: Array) -> Callable[[], Array]:
-        """A function that reads the places and motions of the blocks `rows` (k,), each a row of 13 numbers: position 3,
-        velocity 3, angular velocity 3, orientation 4 (x y z w)."""
-        return self._exchange.reading(rows)
+    def read(self, rows_ids: list[int], buffer: bytearray) -> Array:
+        """States of body ids into a buffer of 8 * 13 bytes each → (k, 13) view on it.
 
-    def pushing(self, rows: Array) -> Callable[[Array], None]:
-        """A function that gives the blocks `rows` (k,) their forces and moments of F (n, 6), for the next step."""
-        return self._exchange.pushing(rows)
+        The list must persist between calls: YADE leaks a reference per fresh item it is handed.
+        """
+        struct.pack_into(
+            f"{STATE * len(rows_ids)}d", buffer, 0, *self._subdomain.getStateValuesFromIds(rows_ids)
+        )
+        return np.frombuffer(buffer, float, STATE * len(rows_ids)).reshape(-1, STATE)
 
     def angular_momentum(self, rows: Array) -> Array:
         """About their own centres, as the integrator keeps it, of the blocks `rows` (k,) → (k, 3) [N m s]."""
-        return self._exchange.states(rows)[:, 13:]
+        fresh = rows[~self._spin_is_read[rows]]
+        if len(fresh):
+            self._spins[fresh] = [tuple(self._bodies[r].state.angMom) for r in fresh.tolist()]
+            self._spin_is_read[fresh] = True
+        return self._spins[rows]
 
-    def step(self, dt: float) -> None:
-        """Advance by dt [s] under the forces that were given."""
+    def step(self, dt: float, ids: list[int], F: Array) -> None:
+        """Advance by dt [s] under the forces and moments F (k, 6) on the bodies `ids`.
+
+        YADE's permanent forces are not used: its integrator aborts when bodies are added after one was set."""
+        forces = self.O.forces
+        deque(map(forces.addF, ids, F[:, :3].tolist()), maxlen=0)
+        deque(map(forces.addT, ids, F[:, 3:].tolist()), maxlen=0)
         self.O.dt = dt
+        self._spin_is_read[:] = False
         self.O.step()
 
     def set_motion(self, row: int, motion: Array) -> None:
@@ -149,7 +163,7 @@ class Scene:
 
     def hold(self, rows: Array) -> None:
         """Hold freely moving blocks at their positions from now on; the neighbour search leaves them out."""
-        states = self._states(rows)
+        states = self._states(rows.tolist())
         states[:, 7:] = 0.0
         self._write(rows, states)
         for row in rows.tolist():
@@ -198,14 +212,17 @@ class Scene:
     def save(self) -> Array:
         """Position 3, orientation 4 (w x y z), velocity 3, spin 3 and angular momentum 3 of each block, (n, 16)."""
         if not self._still.any():
-            return self._states(np.arange(len(self.ids)))
+            return self._states(range(len(self.ids)))
         found = self._still_states.copy()
-        found[~self._still] = self._states(np.flatnonzero(~self._still))
+        found[~self._still] = self._states(np.flatnonzero(~self._still).tolist())
         return found
 
-    def _states(self, rows: Array) -> Array:
-        """The same of some rows (k,), (k, 16)."""
-        return self._exchange.states(rows)[:, _SAVED]
+    def _states(self, of) -> Array:
+        """The same of the rows `of`, (k, 16)."""
+        rows = np.asarray(of, np.int64)
+        ids = [self.ids[row] for row in rows]
+        read = self.read(ids, bytearray(8 * STATE * len(ids)))
+        return np.concatenate([read[:, _SAVED], self.angular_momentum(rows)], axis=1)
 
     def restore(self, saved: Array) -> None:
         """Return to a saved state, bit for bit."""
@@ -217,6 +234,7 @@ class Scene:
     def _write(self, rows: Array, saved: Array) -> None:
         """States (k, 16) of the blocks `rows`."""
         V, Q = self.engine.Vector3, self.engine.Quaternion
+        self._spin_is_read[rows] = False
         for i, row in zip(rows.tolist(), saved.tolist()):
             state = self._bodies[i].state
             state.pos, state.ori = V(*row[:3]), Q(*row[3:7])
