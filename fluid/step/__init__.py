@@ -3,7 +3,8 @@
 water                       the state, and `predict` and `correct` around the solve
 predictor, corrector        the two halves of a step
 time_step                   the speed that sets the length of a step
-momentum, report            what changed the momentum; what a step did, in numbers
+momentum, potential         what changed the momentum; the potential energy, and that of water at a level
+report                      what a step did, in numbers
 parameters                  numbers that a case may set
 state                       saved and restored, bit for bit
 

@@ -27,6 +27,7 @@ from fluid.pressure.projection import PressureProblem
 from fluid.sides.walls import Walls
 from fluid.step.corrector import Corrected, corrected
 from fluid.step.parameters import WaterParameters
+from fluid.step.potential import level_energy, potential_energy
 from fluid.step.predictor import kick_factor, kicked, predicted
 from fluid.step.report import StepReport
 from fluid.step.time_step import LEAST_COUNTED, LEAST_GATHERED, fastest_wet, gathered, pace
@@ -41,7 +42,6 @@ from kernels.threads import over
 if TYPE_CHECKING:
     from fluid.viscous.viscosity import FreeBodies
 
-LEVEL_HALVINGS = 40
 START_STEPS = 2
 """Steps of a start, which are implicit, and after which the surface lags by no more than by half of each."""
 AT_LEVEL = 1e-6
@@ -564,9 +564,9 @@ class Water:
         Surface and pressure are those at the end of a step. With the volume of the cut alone the level of a pool would
         follow a body that floats in it a step late, which lets it swing higher and higher."""
         way = self.moved_on + dt * self.pushed_by
-        return self._taken_by(way)
+        return self.taken_by(way)
 
-    def _taken_by(self, way) -> Array:
+    def taken_by(self, way) -> Array:
         """Volume (N,) [m³] that bodies displace at the nodes over a motion (n_bodies, 6) [m, rad]."""
         if not way.any():
             return np.zeros(len(self.level_set))
@@ -585,20 +585,13 @@ class Water:
         return kinetic_energy(self.parameters.density, self.nodal_water, self.velocity)
 
     def potential_energy(self) -> float:
-        """-∫ ρ g·x dV [J] above the floor of the tank, at the time of the velocity.
+        """-∫ ρ g·x dV [J] above the floor of the tank, at the time of the velocity (`potential.py`)."""
+        return potential_energy(self, self._surface_lag)
 
-        The surface of water that falls lags by up to half a step, which the rate -∫ ρ g·u dV makes up for (energy of a
-        dam break at steps of 20 to 2.5 ms). In calm water it does not: it moves with the velocity half a step ahead,
-        and where a body swings in it what is made up for would come and go.
-
-        What the volume is off by within the tolerance of its correction counts as if it were put right at the surface:
-        a millionth of a deep pool would outweigh a small wave."""
-        p, held = self.parameters, self.nodal_water - self.displaced
-        found = -p.density * (float(held @ self.nodes_below_floor) - self.film_potential)
-        found -= self._surface_lag * float(self.momentum() @ p.weight)
-        surface, farther = self._surface_potential(), self._taken_by(self.farther)
-        found += p.density * float(farther @ (self.nodes_below_floor - surface))
-        return found + p.density * (self.volume() - self.conserved_volume) * surface
+    def available_energy(self) -> float:
+        """Kinetic energy, and the potential energy above that of the same water at a level between the solids where
+        they stand; where sides are open, of what stays below their lowest edge of it [J]."""
+        return self.kinetic_energy() + max(self.potential_energy() - level_energy(self), 0.0)
 
     def _late(self) -> Array | float:
         """Volume (N,) [m³] that has set out through seas and is not booked, as the surface lags behind the velocity."""
@@ -632,13 +625,6 @@ class Water:
 
             self.air = leaked(self, self.vents, self.pocket_volumes(), dt)
 
-    def _surface_potential(self) -> float:
-        """g·x [m²/s²] of the surface, mean over the nodes within half a cell of it; 0 where there is none."""
-        near = self.listed[
-            np.abs(self.topology.in_cells(self.level_set)[self.listed]) < 0.5 * self.mesh.spacing
-        ]
-        return float(self.below_floor(self.topology.nodes[near]).mean()) if len(near) else 0.0
-
     def head(self) -> Array:
         """½ ρ u² - ρ g·x + p (N,) [J/m³] at the nodes."""
         p = self.parameters
@@ -649,27 +635,6 @@ class Water:
         """g·x (...) [m²/s²] of places x (..., 3) [m], zero at the floor of the tank and negative above it: what leaves
         the tank takes energy with it, wherever the tank lies."""
         return x @ self.parameters.weight - self._lowest
-
-    def available_energy(self) -> float:
-        """Kinetic energy, and the potential energy above that of the same water at a level between the solids where
-        they stand; where sides are open, of what stays below their lowest edge of it [J]."""
-        return self.kinetic_energy() + max(self.potential_energy() - self._level_energy(), 0.0)
-
-    def _level_energy(self) -> float:
-        """Potential energy [J] above the floor of the tank of the water at a level, which an open side may bound."""
-        t, p, weight = self.topology, self.parameters, self.parameters.weight
-        height = -(t.nodes @ weight) / max(p.gravity, 1e-300)
-        low, high = height.min(), height.max()
-        faces, area = self.walls.open_faces, self.walls.open_area
-        upright = area @ weight > -0.9 * p.gravity * np.linalg.norm(area, axis=1)
-        spill = height[faces[upright]].min() if upright.any() else np.inf
-        for _ in range(LEVEL_HALVINGS):
-            level = 0.5 * (low + high)
-            held = nodal_volume(t, height - level)
-            low, high = (level, high) if held.sum() < self.conserved_volume else (low, level)
-        if high > spill:
-            held = nodal_volume(t, height - spill)
-        return -p.density * float(held @ self.nodes_below_floor)
 
 
 def lag_after(lag: float, whole: float, dt: float) -> float:
