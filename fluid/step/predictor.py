@@ -231,6 +231,11 @@ def _transported(water, dt, theta, kick):
             water.topology, water.listed, dt, u_m, phi, water.topology.node_size
         )
         moved[places, 3] = levels
+    if water.parameters.viscosity > 0.0:
+        from fluid.transport.landing import gained
+
+        more, places = gained(water, dt, u_m, water.level_set)
+        moved[places, 3] += more
     width = TRANSPORT_WIDTH * water.mesh.spacing
     over(_taken_over, len(moved), water.listed, moved, water.topology.finer, width, u_adv, phi)
     water.walls.admit_air(phi, u_m, dt, water.topology.node_size, -np.asarray(water.parameters.down))

@@ -416,6 +416,15 @@ def _fill(t, order, start, linear, f, gradient, done, least):
     continue_outward(order, start, linear, f, gradient, t.nodes, t.around_by_cells, done, least)
 
 
+def continued(topology, layers, wet, wet_cells, u):
+    """u (N, 3) of the nodes `wet` (N,) bool continued over layers (order, start) with its slope, no faster than the
+    neighbours allow."""
+    order, start = layers
+    found, slope = u.copy(), smoothed_slope(topology, wet_cells, wet, u, 0.0)
+    _fill(topology, order, start, LINEAR_LAYERS, found, slope, wet.copy(), np.zeros(len(u)))
+    return found
+
+
 def extend_velocity(topology, layers, wet, wet_cells, u, a, calm: float, forced, rubbed=None):
     """Continue u and a (linear, then constant; a with its slope times calm), each (N, 3), over layers (order, start),
     in place; calm as in `smoothed_slope`. rubbed (N,) bool: nodes on walls that rub or hold the water, None: there are
