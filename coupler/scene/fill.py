@@ -14,6 +14,10 @@ count as wet. So a side of a box counts at a node only where water and air can m
 
 c: cell edge, t = TOUCHES c. Elsewhere s stays, so that a level surface stays a plane up to the wall.
 
+Not so at the water line on a slanting face, which leaves the last copies of nodes behind it slivers that hardly reach
+across the surface: where no face around a node lies along the side, and a cell around it is one of nodes whose cells
+reach farther than t beyond the side, s stays, too. Wet or dry, such nodes bent the surface, and still water moved.
+
 Sides that follow an outer edge of a solid cut no cells short at a node beside that edge; but where no fluid part of the
 cells around a node is dry for lying beyond a side alone, this is no surface there either (`_hidden_sides`).
 """
@@ -22,7 +26,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import product
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -31,8 +35,13 @@ from coupler.geometry.start_surfaces import StartSurface
 from fluid.domain.quadrature import part_points
 from fluid.numerics.spans import spans
 
+if TYPE_CHECKING:
+    from fluid.domain.physical_domain import PhysicalDomain
+
 TOUCHES = 0.1
 """Share of a cell edge within which the side of a box counts as the face of the solid."""
+FLAT = 0.99
+"""Cosine of the angle to the side of a box within which a face lies along it: it rises by TOUCHES in a cell or so."""
 MISSING = 0.05
 """Share of a cell edge that a solid must take off the cells around a node to count."""
 FLUSH = 0.01
@@ -70,7 +79,7 @@ def start_level(boxes, tank, mesh, domain, tops=()) -> Array:
     faced_low, faced_high = _facing(domain)
     stars = (domain.nodes, low, high, cut_low & faced_low, cut_high & faced_high)
     hidden = _hidden_sides(boxes, tank, domain, FLUSH * edge)
-    levels = np.array([_box_level(box, tank, stars, edges, *of) for box, of in zip(boxes, hidden)])
+    levels = np.array([_box_level(box, tank, stars, domain, edges, *of) for box, of in zip(boxes, hidden)])
     for box, of_box in zip(boxes, levels):
         if box.top is not None:
             np.maximum(of_box, box.top.distance(domain.nodes, 0.5 * edge), out=of_box)
@@ -243,7 +252,32 @@ def _in_box(box, tank, points, slack: float = 0.0) -> Array:
     return np.all((points > low) & (points < high), axis=1) & ~box.above(points, slack)
 
 
-def _box_level(box, tank, stars, edge: Array, hidden_low: Array, hidden_high: Array) -> Array:
+class _Faces(NamedTuple):
+    """The faces of the solids beside a side of a box: a plane across an axis, the outside of the box in the direction
+    `outward` (1 or -1) along it; edge (N,) [m], cell edge at each node."""
+
+    domain: PhysicalDomain
+    axis: int
+    plane: float
+    outward: float
+    edge: Array
+
+    def at_water_line(self, ending, beyond, looking: float) -> Array:
+        """Those of the nodes `ending` (N,) bool, at which the side seems to end, that have no face along it around
+        them, looking outward (1) or inward (-1), but cells with nodes `beyond` (N,) bool."""
+        d, found = self.domain, np.zeros(len(ending), bool)
+        cells = d.cells[ending[d.cells].any(axis=1)]
+        if len(cells) == 0:
+            return found
+        found[cells[beyond[cells].any(axis=1)]] = True
+        cells = d.cells[d.face_cell]
+        off = np.abs(d.face_corners[:, :, self.axis] - self.plane).max(axis=1)
+        looks = self.outward * looking * d.face_normal[:, self.axis] > FLAT
+        found[cells[looks[:, None] & (off[:, None] < TOUCHES * self.edge[cells])]] = False
+        return found
+
+
+def _box_level(box, tank, stars, domain, edge: Array, hidden_low: Array, hidden_high: Array) -> Array:
     """Signed distance (N,) of one box, its sides at solids and tank walls left out, hidden ones a cell off at least."""
     nodes, low, high, cut_low, cut_high = stars
     (box_low, box_high, _), (tank_low, tank_high) = box, tank
@@ -252,15 +286,15 @@ def _box_level(box, tank, stars, edge: Array, hidden_low: Array, hidden_high: Ar
         x = nodes[:, k]
         if box_high[k] < tank_high[k]:
             plane = box_high[k]
-            side = _side(
-                x - plane, low[:, k] - plane, high[:, k] - plane, cut_low[:, k], cut_high[:, k], edge
-            )
+            s, s_low, s_high = x - plane, low[:, k] - plane, high[:, k] - plane
+            faces = _Faces(domain, k, plane, 1.0, edge)
+            side = _side(s, s_low, s_high, cut_low[:, k], cut_high[:, k], faces)
             level = np.maximum(level, np.where(hidden_high[:, k], np.minimum(side, -edge), side))
         if box_low[k] > tank_low[k]:
             plane = box_low[k]
-            side = _side(
-                plane - x, plane - high[:, k], plane - low[:, k], cut_high[:, k], cut_low[:, k], edge
-            )
+            s, s_low, s_high = plane - x, plane - high[:, k], plane - low[:, k]
+            faces = _Faces(domain, k, plane, -1.0, edge)
+            side = _side(s, s_low, s_high, cut_high[:, k], cut_low[:, k], faces)
             level = np.maximum(level, np.where(hidden_low[:, k], np.minimum(side, -edge), side))
     far = np.ptp(nodes, axis=0).max()  # a distance that no surface reaches
     return np.maximum(level, -far)
@@ -278,16 +312,18 @@ def _goes_on(box, tank, hidden_low: Array, hidden_high: Array) -> Array:
     )
 
 
-def _side(s, s_low, s_high, cut_inner, cut_outer, edge: Array) -> Array:
+def _side(s, s_low, s_high, cut_inner, cut_outer, faces: _Faces) -> Array:
     """Distance (N,) to one side, modified at the solids that it ends at."""
-    touch = TOUCHES * edge
+    touch = TOUCHES * faces.edge
     # a star below the surface, cut short by a slanting solid, keeps its distance
     wet = cut_outer & (s_high < touch) & ((s >= 0.0) | (s_high > -touch))
     dry = cut_inner & (s_low > -touch)
     sliver = wet & dry  # counts to the side on which it mostly lies
     wet &= ~sliver | (-s_low >= s_high)
     dry &= ~wet
-    return np.where(wet, -np.inf, np.where(dry, np.maximum(s, 2.0 * edge), s))
+    wet &= ~faces.at_water_line(wet, s_high >= touch, -1.0)
+    dry &= ~faces.at_water_line(dry, s_low <= -touch, 1.0)
+    return np.where(wet, -np.inf, np.where(dry, np.maximum(s, 2.0 * faces.edge), s))
 
 
 def _cell_edge(mesh) -> float:
