@@ -89,8 +89,11 @@ class Films:
         film = _with_a_rim(p.matrix, self.node[dofs])
         if not film.any():
             return replace(p, coupling=coupling)
-        f, r = np.flatnonzero(film), np.flatnonzero(~film)
+        f = np.flatnonzero(film)
         rows, weight = p.matrix[f], self._weight(water, p)[dofs[f]]
+        beside = np.zeros(len(film), bool)
+        beside[rows.indices] = True
+        r = np.flatnonzero(beside & ~film)
         rim, moved = sp.csr_array(rows[:, r]), sp.csr_array(coupling[f])
         columns = np.unique(moved.indices)
         moved = moved[:, columns]
