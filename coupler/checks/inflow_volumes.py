@@ -53,22 +53,28 @@ def inflow_volume_problems(case: Case) -> Iterator[Problem]:
 
 
 def _filled_up(case: Case) -> Iterator[Problem]:
-    """Inflows into a tank without a way out but its open top, which they fill before the end: their discharge is
-    given, and only spray leaves by the top."""
-    if set(case.tank.open) - {"z+"} or case.water.sea:
-        return
-    way_out, share = ("no way out but its open top", SPRAY) if case.tank.open else ("no way out", 1.0)
-    room = room_beside(case.tank, case.water.fill)
+    """Inflows into a tank that they fill before the end, although sides beside their way let out what a full tank
+    presses over their edge, and only spray leaves by the top: their discharge is given."""
+    tank = case.tank
+    seas = [spec.side for spec in case.water.sea]
+    room = room_beside(tank, case.water.fill)
     for i, spec in enumerate(case.water.inflow):
-        if spec.absorbs:
+        ways = [side for side in (*tank.open, *seas) if side[0] in "xy"]
+        if spec.absorbs or _opposite(spec.side) in ways:
             continue
-        brought = _Entered.of(case, spec).largest
-        if brought > share * room:
+        entered = _Entered.of(case, spec)
+        rate = sum(_over_the_edge(case, side, max(tank.upper[2], entered.highest)) for side in ways)
+        share = SPRAY if "z+" in tank.open else 1.0
+        held = entered.volume - rate * entered.time
+        if float(held.max()) > share * room:
+            exits = [*(["its open top"] if "z+" in tank.open else []), *ways]
+            way_out = f"no way out but {' and '.join(exits)}" if exits else "no way out"
+            taken = f" ({' and '.join(ways)} let out at most {rate:.3g} m3/s)" if ways else ""
             yield (
                 ("water", "inflow", i),
-                f"brings {brought:.3g} m3 until the end of the run ({case.time.end:g} s) into a tank that has "
-                f"room for {room:.3g} m3 and {way_out}: name open sides (tank.open), let it take back what returns "
-                "(absorbs = true), or end before the tank is full",
+                f"brings {entered.largest:.3g} m3 until the end of the run ({case.time.end:g} s) into a tank that has "
+                f"room for {room:.3g} m3 and {way_out}{taken}: name open sides (tank.open), let it take back what "
+                "returns (absorbs = true), or end before the tank is full",
             )
 
 

@@ -1,5 +1,7 @@
 """What the checks of a case with water refuse or remark."""
 
+import math
+
 import meshio
 import numpy as np
 import pytest
@@ -62,6 +64,27 @@ def test_a_tank_that_its_inflow_fills_is_refused():
     assert filled(2.3, TANK | {"open": ["z+", "x+"]}) == []
     assert filled(2.3, TANK, inflow=[stream | {"absorbs": True}]) == []
     assert filled(2.1, closed, sea=[{"side": "x+", "level": 0.5}]) == []
+
+
+def test_a_side_beside_the_way_lets_out_what_a_full_tank_presses_over_its_edge():
+    """0.5 m x 2 m x 1 m/s across a tank whose open side or sea beside the way is 0.2 m wide: 0.2 m3 of room are full
+    in 0.2 s but for what leaves, (2/3)^1.5 sqrt(g d³) 0.2 m of the depth d that the far side throws back."""
+    stream = {"kind": "steady", "side": "y-", "level": 0.5, "velocity": 1.0}
+    deep = 0.5 + 1.0 * math.sqrt(0.5 / 9.81)
+    for _ in range(100):  # u = (d - h) sqrt(g (h + d) / (2 h d)) for the depth d
+        deep = 0.5 + 1.0 / math.sqrt(0.5 * 9.81 * (0.5 + deep) / (0.5 * deep))
+    out = (2.0 / 3.0) ** 1.5 * math.sqrt(9.81 * max(deep, TANK["upper"][2]) ** 3) * 0.2
+
+    def filled(end, **more):
+        tank = TANK | {"open": more.pop("open", [])}
+        found = problems(case({"inflow": [stream], **more}, tank=tank, time={"end": end}))
+        return [text for path, text in found if path == ("water", "inflow", 0)]
+
+    full = 0.2 / (1.0 - out)
+    for way in ({"open": ["x+"]}, {"sea": [{"side": "x+", "level": 0.5}]}):
+        assert filled(0.98 * full, **way) == []
+        assert f"no way out but x+ (x+ let out at most {out:.3g} m3/s)" in filled(1.02 * full, **way)[0]
+    assert filled(1.02 * full, open=["y+"]) == []
 
 
 def test_a_wave_that_lifts_its_tank_above_its_crest_is_refused():
