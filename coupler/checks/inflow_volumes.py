@@ -60,7 +60,7 @@ def _filled_up(case: Case) -> Iterator[Problem]:
     room = room_beside(tank, case.water.fill)
     for i, spec in enumerate(case.water.inflow):
         ways = [side for side in (*tank.open, *seas) if side[0] in "xy"]
-        if spec.absorbs or _opposite(spec.side) in ways:
+        if spec.absorbs or "z-" in tank.open or _opposite(spec.side) in ways:
             continue
         entered = _Entered.of(case, spec)
         rate = sum(_over_the_edge(case, side, max(tank.upper[2], entered.highest)) for side in ways)

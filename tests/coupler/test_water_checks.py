@@ -85,6 +85,7 @@ def test_a_side_beside_the_way_lets_out_what_a_full_tank_presses_over_its_edge()
         assert filled(0.98 * full, **way) == []
         assert f"no way out but x+ (x+ let out at most {out:.3g} m3/s)" in filled(1.02 * full, **way)[0]
     assert filled(1.02 * full, open=["y+"]) == []
+    assert filled(1.02 * full, open=["x+", "z-"]) == []
 
 
 def test_a_wave_that_lifts_its_tank_above_its_crest_is_refused():
