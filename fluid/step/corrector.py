@@ -2,7 +2,7 @@
 
 u_i = u*_i - (dt/ρ) Π(∇x)_i,   a_i = (u_i - u_adv_i) / (θ dt)                 on wet nodes, Π: weighted mean
 p = x + known, mean over the step, acts on the bodies;  x/θ belongs to a_i and starts the next step
-u'_e ← u'_e - (dt/ρ) (∇x_e - mean of Π(∇x) over the cell)                     on deep cells
+u'_e ← u'_e - (dt/ρ) (∇x_e - mean of Π(∇x) over the cell)                     on deep cells, see `remainders.py`
 u_e = u*_e + u'_e - (dt/ρ) ∇x_e                                               balances exactly: carries volume
 speed limit · divergence damping · continuation outside the water
 """
@@ -29,6 +29,7 @@ from fluid.pressure.projection import (
     with_ghosts,
 )
 from fluid.step.momentum import Stages, holding_water, momentum_change
+from fluid.step.remainders import MEMORY_DEPTH, left_in_cells
 from fluid.step.report import StepReport
 from fluid.surface.extrapolation import extend_velocity
 from fluid.surface.gradient_jump_damping import damp_gradient_jumps
@@ -38,8 +39,6 @@ from kernels.threads import over, zeros
 
 FLUX_LAYERS = 3
 """Layers of dry nodes that water may reach within the next step."""
-MEMORY_DEPTH = 2.0
-"""Cells nearer to the surface than this (in cell sizes) keep no remainder: there it feeds surface noise."""
 WATERLINE_DAMPING, WATERLINE_DEPTH = 0.5, 1.0
 """c of `damp_waterline` in calm water, and how far below the surface it acts (in cell sizes). Noise on a slope of 1:20
 grows by 0.03 a step without, and not with 0.5. Less in faster water, none where it crosses a cell in a step: there it
@@ -91,7 +90,7 @@ def corrected(water, problem, x, parting) -> Corrected:
         pressure[in_pocket] = kept.cushions.air.nodal(problem.of_air(x + problem.known))[in_pocket]
     gradient = _pressure_gradient(water, kept, unknown, dt / problem.density)
     u, a, forced, mean = _projected(t, kept, gradient, dt)
-    remainder, kick_remainder = _remainders(water, kept, gradient, mean, dt)
+    remainder, kick_remainder = left_in_cells(water, kept, gradient, mean, dt)
     held, projected_energy = holding_water(water, kept), kinetic_energy(problem.density, kept.nodal_water, u)
     projected, calm = copied_at(held, u), water.calm(kept.end - water.time, kept.crossing)
     clipped, limited, damped = _limit_and_damp(water, kept, u, a, held, projected, calm)
@@ -178,40 +177,6 @@ def _after_pressure(first, last, wet, u_star, mean, advected, time, made):
             if wet[i]:
                 u[i, k] = forced[i, k]
                 a[i, k] = (forced[i, k] - advected[i, k]) / time
-
-
-def _remainders(water, kept, gradient, mean, dt):
-    """u' [m/s] of the wet cells after this step and its rate -(∇x - Π∇x)/(θ ρ) [m/s²] for the next kick."""
-    t, cells = water.topology, kept.wet_cells
-    if not water.parameters.subscale_memory:
-        return CellVectors.none(), CellVectors.none()
-    remainder, rate = np.empty((len(cells), 3)), np.empty((len(cells), 3))
-    below = (t.in_cells(kept.level_set), -MEMORY_DEPTH * water.mesh.spacing)
-    state = (below, (mean, gradient), kept.remainder, kept.theta * dt, t.fluid_cells)
-    over(_leave, len(cells), cells, *state, (remainder, rate))
-    return CellVectors(cells, remainder), CellVectors(cells, rate)
-
-
-@ranged
-def _leave(first, last, cell_list, below, slopes, before, time, fluid, made):
-    """Add the part of the gradient that the nodes cannot represent, Π∇x - ∇x [m/s], to the subscale velocity (n, 3) of
-    the listed cells, and, divided by a time [s], to its rate; both zero where φ < deep does not hold at all corners.
-    below: φ (N,) and deep [m] · slopes: Π∇x (N, 3) and ∇x of the listed cells (n, 3)."""
-    (phi, deep), (mean, gradient) = below, slopes
-    cells, share, share_row = fluid.cells, fluid.share, fluid.share_row
-    remainder, rate = made
-    for s in range(first, last):
-        e = np.uint64(cell_list[s])
-        highest = max(max(phi[cells[e, 0]], phi[cells[e, 1]]), max(phi[cells[e, 2]], phi[cells[e, 3]]))
-        for k in range(3):
-            remainder[s, k], rate[s, k] = 0.0, 0.0
-            if highest < deep:
-                left = 0.0
-                for a in range(4):
-                    left += share[share_row[e], a] * mean[cells[e, a], k]
-                left -= gradient[s, k]
-                remainder[s, k] = before[s, k] + left
-                rate[s, k] = left / time
 
 
 def _limit_and_damp(water, kept, u, a, held, projected, calm):

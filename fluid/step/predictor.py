@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from array_types import Bools, Floats, Ints
-from fluid.domain.cell_vectors import first_from
 from fluid.domain.coupling_matrix import rows_of, wetted_coupling
 from fluid.numerics.fields import added, copied
 from fluid.pressure.active_cells import WetPart
@@ -32,6 +31,7 @@ from fluid.pressure.projection import (
 )
 from fluid.pressure.waterline import waterline_load
 from fluid.sides.outflow import Outflow
+from fluid.step.remainders import carried_remainder
 from fluid.surface.level_set import redistance
 from fluid.surface.volume import VolumeCorrection, correct_volume
 from fluid.transport.advection import transport
@@ -296,7 +296,7 @@ def _problem(water, dt: float, theta: float, kick, moved: Moved) -> PressureProb
     part = WetPart.of(t, water.domain, phi, water.mesh.spacing)
     wet, cells = part.nodes, part.cells
     graph = water.graph_for(water.listed).without(t, part.void)
-    remainder = _carried_remainder(water, dt, theta, cells)
+    remainder = carried_remainder(water, dt, theta, cells)
     star = cell_velocity(cells, moved.u_star, remainder, t.fluid_cells)
     rhs = inflow(cells, star, t.fluid_cells, len(phi))
     dofs = np.flatnonzero(wet & ~water.walls.open_node)
@@ -425,59 +425,6 @@ def _coupling(water, void):
     left_out = np.isin(cell, void)
     coupling = water.coupling - wetted_coupling(water.domain, left_out)
     return coupling, np.flatnonzero(~left_out), np.flatnonzero(left_out) if water.topology.is_obtuse else none
-
-
-def _carried_remainder(water, dt, theta, cells):
-    """u'_e = β (u'_e + (1-θ) dt r_e) (n, 3) of the listed cells, with β = 1/(1 + (n + m s) dt), n = 4 ν/l_e²,
-    s = 2 |u_e|/l_e, m = min(1, |u'_e| (n + s)/|r_e|): the remainder that lives on.
-
-    It is swept out of the cell in the time that the water takes to cross it, and viscosity stops it (dynamic subscales;
-    Codina, Principe, Guasch, Badia, Comput. Methods Appl. Mech. Eng. 196 (2007) 2413). In steady flow the pressure
-    makes up for that, |r_e| = (n + s) |u'_e|, and m = 1. Water that has moved by less than a quarter of a cell since it
-    turned round, |u'_e| s/|r_e| = 4 |way|/l_e, has not yet left it: without m a box that swings by a fiftieth of a cell
-    loses 0.4 % of its amplitude a period at its edges."""
-    t, p = water.topology, water.parameters
-    if not p.subscale_memory:
-        return np.zeros((len(cells), 3))
-    held = (*water.remainder, water.kick_remainder.values)
-    nu = p.viscosity / p.density
-    return carry_remainder(cells, held, (1.0 - theta) * dt, water.velocity, dt, nu, t.cells, t.size)
-
-
-def carry_remainder(cell_list, held, kick_time, u, dt, nu, cells, size):
-    """β (u' + kick_time r) (n, 3) of the listed cells (n,); nu: kinematic viscosity [m²/s].
-
-    held: cells (k,) that have u' (k, 3) [m/s] and r (k, 3) [m/s²]; in others both are zero. Both lists ascend."""
-    out = np.empty((len(cell_list), 3))
-    over(_carry_remainder, len(cell_list), cell_list, held, (kick_time, dt, nu), u, cells, size, out)
-    return out
-
-
-@ranged
-def _carry_remainder(first, last, cell_list, held, numbers, u, cells, size, out):
-    with_one, remainder, kick = held
-    kick_time, dt, nu = numbers
-    row, end = first_from(with_one, cell_list[first] if first < last else 0), np.uint64(with_one.shape[0])
-    for s in range(first, last):
-        e = np.uint64(cell_list[s])
-        while row < end and with_one[row] < cell_list[s]:
-            row += np.uint64(1)
-        if row == end or with_one[row] != cell_list[s]:
-            for k in range(3):
-                out[s, k] = 0.0
-            continue
-        square, own, rate = 0.0, 0.0, 0.0
-        for k in range(3):
-            mean = 0.25 * (u[cells[e, 0], k] + u[cells[e, 1], k] + u[cells[e, 2], k] + u[cells[e, 3], k])
-            square += mean * mean
-            own += remainder[row, k] * remainder[row, k]
-            rate += kick[row, k] * kick[row, k]
-        stopped, swept = 4.0 * nu / (size[e] * size[e]), 2.0 * np.sqrt(square) / size[e]
-        steady = (stopped + swept) * np.sqrt(own)
-        moved = 1.0 if steady * steady >= rate else steady / np.sqrt(rate)
-        beta = 1.0 / (1.0 + (stopped + moved * swept) * dt)
-        for k in range(3):
-            out[s, k] = beta * (remainder[row, k] + kick_time * kick[row, k])
 
 
 def _sealed(water, matrix, anchored, dofs, dt, pressure):

@@ -205,12 +205,15 @@ class Water:
     def stable_step(self) -> float:
         """dt [s]: Courant number of all but spray and trickles (`time_step.py`), and LONGEST_STEP sqrt(h/g)."""
         h, t = self.mesh.spacing, self.topology
-        at_rest = LONGEST_STEP * np.sqrt(self._finest_surface() / self.parameters.gravity)
         least = LEAST_GATHERED * h**3
         water = self.nodal_water if t.is_uniform else self.nodal_water * t.finer**3
         counted = gathered(self._counted(), water, least, *t.around)
         speed = pace(self._cells_crossed(), self.nodal_water, counted)
-        return float(min(at_rest, self.parameters.courant * h / max(speed, 1e-12)))
+        return float(min(self.longest_step(), self.parameters.courant * h / max(speed, 1e-12)))
+
+    def longest_step(self) -> float:
+        """LONGEST_STEP sqrt(h/g) [s]: the step of water at rest."""
+        return float(LONGEST_STEP * np.sqrt(self._finest_surface() / self.parameters.gravity))
 
     def _cells_crossed(self):
         """Velocity (N, 3) [m/s] in which a cell of any size would be crossed in the time of one of the spacing."""

@@ -35,7 +35,7 @@ from coupler.program.start import one_thread
 one_thread()
 import numpy as np
 from fluid.mesh.background import box_mesh
-from fluid.step.predictor import carry_remainder
+from fluid.step.remainders import carry_remainder
 from tests.yade_scripts.test_joints import JointParameters, Pair
 random = np.random.default_rng(3)
 mesh = box_mesh((0, 0, 0), (1, 1, 1), 0.3)

@@ -5,7 +5,7 @@ import pytest
 
 from fluid.domain.cell_vectors import CellVectors
 from fluid.numerics.fields import added, copied_at, less
-from fluid.step.predictor import carry_remainder
+from fluid.step.remainders import carry_remainder
 from kernels.threads import use
 
 

@@ -11,7 +11,7 @@ from fluid.cut.bodies import ConvexBodies
 from fluid.domain.moments import cells_touching
 from fluid.pressure import projection
 from fluid.pressure.projection import cell_gradient, with_ghosts
-from fluid.step.predictor import carry_remainder
+from fluid.step.remainders import carry_remainder
 from tests.fluid.scenes import advance, column, rotation, tank
 
 

@@ -34,8 +34,7 @@ NOTES = {
     " With `wide` also there, the plate acts as if it were up to half a cell longer at each edge that does "
     "not lie on nodes: 1.00 to 1.12 times the force on a plate of width D with eight cells over D, depending "
     "on its place, and 1.10 to 1.21 with four; with `all` 0.95 to 1.01 and 0.99 to 1.11. With a quarter of "
-    "the step the plate of width D receives 4 to 6 % more, depending on its place: near the surface the pressure has "
-    "wiggles beside free edges that grow as steps get shorter ([theory](theory.md#fast-water)).",
+    "the step the plate of width D receives 1 to 3 % more, depending on its place.",
     "P63": "What is missed are sheets thinner than a cell: of a jet at 30 degrees one fifteenth runs back along the "
     "plate, a quarter of a cell with four cells over the jet. For eight places of plate and jet within the cells the "
     "force is 1.025 ± 0.031 (mean and standard deviation) at 30 degrees with four cells over the jet, 1.028 ± 0.035 "
