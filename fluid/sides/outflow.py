@@ -6,6 +6,11 @@ over the open faces, with the velocity at the beginning of the step and the shar
 linear on a face, g·x zero at the floor of the tank; no node loses more than it holds.  The rule is exact to degree 4.
 Taken at the nodes alone, the flux of energy, a cubic of u, is up to 20 % too large at the foot of an outlet, where u
 doubles within a cell; and nodes that are partly full, the high ones, would empty as fast as full ones.
+
+What the fluxes carry to a node of an open side beyond its capacity leaves, too, and a node deeper than DEEP cells lets
+out this alone: the velocity of a node is the mean of the cells around it, half a cell inside, and where the flow grows
+towards the side (1) is less than what the pressure drives out. Between two open sides three cells apart it was 0.6 of
+it; the correction of the volume put the rest back at the surface, and falling water gained 5 % of its energy.
 """
 
 from __future__ import annotations
@@ -29,6 +34,9 @@ _POINTS = np.array(
 )
 _WEIGHTS = np.array([0.223381589678011] * 3 + [0.109951743655322] * 3)
 """Rule of degree 4 on a triangle (Dunavant, Int. J. Numer. Meth. Eng. 21 (1985) 1129)."""
+
+DEEP = 2.0
+"""Cells below the surface from which on the volume that a node of an open side lets out is what it receives."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +64,16 @@ class Outflow:
         volume, energy = np.zeros(len(carried)), np.zeros(len(carried))
         np.add.at(volume, faces, np.einsum("fq,qa->fa", rate, _POINTS))
         np.add.at(energy, faces, np.einsum("fq,qa->fa", rate * head, _POINTS))
-        if not volume.any():
+        rim = np.unique(faces)
+        beyond = np.maximum(carried[rim] - t.node_volume[rim], 0.0)
+        deep = water.level_set[rim] < -DEEP * t.node_size[rim]
+        leaves = np.where(deep, beyond, np.maximum(volume[rim], beyond))
+        leaves = np.minimum(leaves, np.maximum(carried[rim], 0.0))
+        if not leaves.any():
             return None
-        kept = np.minimum(volume, np.maximum(carried, 0.0))
-        return cls(kept, float(np.sum(energy * kept / np.maximum(volume, 1e-300))))
+        u = water.velocity[rim]
+        at_node = p.density * (0.5 * np.einsum("nk,nk->n", u, u) - water.nodes_below_floor[rim])
+        head = np.where(volume[rim] > 0.0, energy[rim] / np.maximum(volume[rim], 1e-300), at_node)
+        kept = np.zeros(len(carried))
+        kept[rim] = leaves
+        return cls(kept, float(leaves @ head))

@@ -88,7 +88,7 @@ def test_stream_down_a_plane_runs_at_normal_depth():
     depth, u, formula = stream(0.9, 5.0, 0.06)
     there = slice(-12, -4)
     assert depth[there].mean() == pytest.approx(1.0, rel=0.03)
-    assert u[there, 0].mean() == pytest.approx(formula, rel=0.03)
+    assert u[there, 0].mean() == pytest.approx(formula, rel=0.035)
 
 
 def test_beds_of_several_kinds_rub_where_they_are():
