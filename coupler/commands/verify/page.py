@@ -37,9 +37,10 @@ NOTES = {
     "the step the plate of width D receives 1 to 3 % more, depending on its place.",
     "P63": "What is missed are sheets thinner than a cell: of a jet at 30 degrees one fifteenth runs back along the "
     "plate, a quarter of a cell with four cells over the jet. For eight places of plate and jet within the cells the "
-    "force is 1.025 ± 0.031 (mean and standard deviation) at 30 degrees with four cells over the jet, 1.028 ± 0.035 "
-    "with two; at 60 degrees 1.020 ± 0.007 with four and 1.069 ± 0.020 with two, which is a bias; at 90 degrees with "
-    "one cell it is 13 to 22 % too large wherever the plate stands.",
+    "force is 1.019 ± 0.024 (mean and standard deviation) at 30 degrees with four cells over the jet, 1.000 ± 0.040 "
+    "with two; at 60 degrees 1.018 ± 0.001 with four and 1.053 ± 0.026 with two, which is a bias; at 90 degrees with "
+    "one cell it is 13 to 22 % too large wherever the plate stands. Jets of one and two cells swell in flight, since "
+    "the correction of the level set moves water upstream ([theory](theory.md#fast-water)).",
     "P42": "The wave is less than half a cell high, and its run-up is one to two cells of water. Up to 0.054 d the tip "
     "follows the shallow-water equations within 0.002 d; from there noise of the level set inside the bed breaks the "
     "tongue, a fifth to a half of a cell deep, into lumps. Variants of damping, step and correction give 0.064 to "
