@@ -16,9 +16,10 @@ narrower than NARROW h the pressure follows from that of the water around, r, an
 
 and the volume that a moving block sets free is drawn in at the rim, Ĝ_r = G_r + Rᵀ G_f, Ĝ_f = 0, the exact adjoint:
 with Ĝ instead of G and the load -G_fᵀ c besides, the system with the structure inside stays symmetric and positive
-definite, and the power that leaves the water is that given to the blocks.  The matrix stays as it is: the rows of the
-film give (2) where their right hand side is ∫ dt g·∇N_f dV - (A known)_f.  The volume that the rim loses goes to the
-film,
+definite, and the power that leaves the water is that given to the blocks.  Matrix and right hand side stay as they are:
+the water of the film keeps the balance of its mass beside bodies at rest.  With (2) in the rows of the film in place of
+that, what its cells brought to the rim or took there had no source: twelve light blocks that came apart under water
+gained as much energy as they had set free.  The volume that the rim loses goes to the film,
 
     dW_r/dt = (Rᵀ G_f V)_r,     dW_f/dt = -(R 1)_f (G_f V)_f.                                             (3)
 
@@ -105,15 +106,12 @@ class Films:
         offset, whole = solved[:, -2], solved[:, -1]
         load = np.zeros(shape[1])
         load[columns] = -(moved.T @ offset)
-        rhs = p.rhs.copy()
-        rhs[f] = weight - rows @ p.known
         bound, at_bound = p.bound, p.at_bound
         if bound is not None:
             bound, at_bound = bound.copy(), at_bound.copy()
             bound[f], at_bound[f] = water.parameters.vapour_pressure, False
         return replace(
             p,
-            rhs=rhs,
             coupling=sp.csr_array(coupling - _placed(moved, f, columns, shape) + to_rim),
             other_load=p.other_load + load.reshape(-1, 6),
             bound=bound,

@@ -5,6 +5,7 @@ import pytest
 
 from coupler.case.case import Case
 from coupler.scene.build import build
+from fluid.pressure.projection import inflow
 from tests.fakes import no_clock
 from tests.physics.scenes import RHO, G, case, run
 
@@ -63,6 +64,21 @@ def test_a_block_on_the_bed_gets_the_share_of_the_pressure_below_that_is_asked_f
     below, above = RHO * G * DEPTH * AREA, RHO * G * (DEPTH - HEIGHT) * AREA
     load = coupling.step(0.01).load
     assert load[0, 2] == pytest.approx(share * below - above, abs=2e-4 * below)
+
+
+def test_beside_blocks_at_rest_the_water_of_a_film_keeps_its_mass(scene):
+    """A stream over a block that lies on the bed: the right hand side of the nodes in films is what the velocity before
+    the pressure brings to them, as at any node. As long as it was that of the pressure of their rim, the cells of films
+    were sources of water."""
+    coupling = scene([block()])
+    run(coupling, 0.02)
+    water = coupling.water
+    water.velocity[:] += [1.0, 0.3, 0.0]
+    problem = water.predict(0.01)
+    kept, found = problem.predicted, water.films.node[problem.dofs]
+    brought = inflow(kept.wet_cells, kept.cell_star, water.topology.fluid_cells, len(kept.wet))[problem.dofs]
+    assert found.sum() > 4
+    np.testing.assert_allclose(problem.rhs, brought, rtol=0.0, atol=1e-12 * np.abs(brought).max())
 
 
 def test_faces_of_edges_apart_keep_the_uplift(scene):
