@@ -35,8 +35,8 @@ LEAST_CELLS = 3
 """Cells of the thinnest water without a remark."""
 
 LEAST_ACROSS = 3
-"""Cells between a side that absorbs and the side opposite to it. With two, a sea before a tank that was partly dry
-filled all of its width, and the volume was off by 3 % after nine milliseconds."""
+"""Cells between a sea, or a side that absorbs, and the side opposite to it. With two, a sea before a tank that was
+partly dry filled all of its width at once, and the volume was off by 3 % after some steps."""
 
 LEAST_DROP = 2.5
 """Cells of the thinnest water with air on both sides: while it falls a drop of one gains up to half of its energy, of
@@ -225,21 +225,23 @@ def _sides(case: Case) -> Iterator[Problem]:
                 )
             taken[spec.side] = f"water.{kind}[{i}]"
             yield from _levels(case, path, spec)
-            if spec.absorbs and case.tank.is_box:
-                yield from _across(case.tank, path, spec.side)
+            if (spec.absorbs or kind == "sea") and case.tank.is_box:
+                yield from _across(case.tank, path, spec)
 
 
-def _across(tank, path: KeyPath, side: str) -> Iterator[Problem]:
-    """A side that absorbs reads the water a cell inside; the side opposite to it must not be the next but one."""
-    axis = "xyz".index(side[0])
+def _across(tank, path: KeyPath, spec) -> Iterator[Problem]:
+    """A side that absorbs reads the water a cell inside, and a sea pushes water into the cells beside it: the side
+    opposite to them must not be the next but one."""
+    axis = "xyz".index(spec.side[0])
     cells = round((tank.upper[axis] - tank.lower[axis]) / finest_cell(tank))
-    if cells < LEAST_ACROSS:
-        yield (
-            (*path, "absorbs"),
-            f"true, but the side opposite to {side} is only {cells} cells away: the side reads the water a cell "
-            f"inside, and at least {LEAST_ACROSS} are needed; take a tank that is wider in {side[0]}, finer cells, or "
-            "no absorbs",
-        )
+    if cells >= LEAST_ACROSS:
+        return
+    where = f"the side opposite to {spec.side} is only {cells} cells away"
+    wider = f"at least {LEAST_ACROSS} are needed; take a tank that is wider in {spec.side[0]}, or finer cells"
+    if spec.absorbs:
+        yield (*path, "absorbs"), f"true, but {where}: the side reads the water a cell inside, and {wider}, or no absorbs"
+    else:
+        yield (*path, "side"), f"{where}: the water of a sea would reach it at once, and {wider}"
 
 
 def _levels(case: Case, path: KeyPath, spec) -> Iterator[Problem]:
