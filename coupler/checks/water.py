@@ -239,7 +239,8 @@ def _across(tank, path: KeyPath, spec) -> Iterator[Problem]:
     where = f"the side opposite to {spec.side} is only {cells} cells away"
     wider = f"at least {LEAST_ACROSS} are needed; take a tank that is wider in {spec.side[0]}, or finer cells"
     if spec.absorbs:
-        yield (*path, "absorbs"), f"true, but {where}: the side reads the water a cell inside, and {wider}, or no absorbs"
+        reads = "the side reads the water a cell inside"
+        yield (*path, "absorbs"), f"true, but {where}: {reads}, and {wider}, or no absorbs"
     else:
         yield (*path, "side"), f"{where}: the water of a sea would reach it at once, and {wider}"
 
