@@ -22,7 +22,7 @@ from coupler.run.fingerprint import differences, program, scene_parts
 
 FOLDER = "checkpoints"
 KEPT = 2
-LAYOUT = 5
+LAYOUT = 6
 """Number of the names, kinds and columns of the arrays; checkpoints of another one are refused."""
 UNSET = (
     "structure/joints/failure_time",

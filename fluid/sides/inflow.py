@@ -18,13 +18,13 @@ dry floor 2.3 to 2.8 times as fast as that fall, and the next one threw it out a
 water's own velocity, of either sign.  A sea is meant for sides far from waves: it partly reflects the waves that reach
 it, as any side does.
 
-The water that the pressure of a sea sets in motion enters half a step later, and by then the pressure may have
-changed.  Its work by the end of a step beyond p V is therefore booked ahead, and taken back at the same pressure,
+In the steps of the start, and with implicit Euler, the water that the pressure of a sea sets in motion enters half a
+step later.  Its work is booked ahead then,
 
-    E += Σ_i p_i (V_i + δ q_i' - δ_0 q_i),                                                               (3)
+    E += Σ_i p_i (V_i + δ (q_i' - q_i)),                                                                 (3)
 
-V_i the volume that enters during the step, q and q' of equation (1) at its beginning and its end, δ_0 and δ the times
-by which the surface lags behind the velocity then.  In a steady stream that is p V.
+V_i the volume that enters during the step of dt, q and q' of equation (1) at its beginning and its end, δ = dt/2 there
+and zero else: water is carried half a step ahead, and V_i is what keeps the level at the side.
 """
 
 from __future__ import annotations

@@ -15,19 +15,13 @@ LEVEL_HALVINGS = 40
 """Halvings of the range of heights in which the level is sought."""
 
 
-def potential_energy(water: Water, lag: float) -> float:
-    """-∫ ρ g·x dV [J] above the floor of the tank, at the time of the velocity; lag [s]: by how much the surface is
-    behind it.
-
-    The surface of water that falls lags by up to half a step, which the rate -∫ ρ g·u dV makes up for (energy of a
-    dam break at steps of 20 to 2.5 ms). In calm water it does not: it moves with the velocity half a step ahead,
-    and where a body swings in it what is made up for would come and go.
+def potential_energy(water: Water) -> float:
+    """-∫ ρ g·x dV [J] above the floor of the tank, where the surface is.
 
     What the volume is off by within the tolerance of its correction counts as if it were put right at the surface:
     a millionth of a deep pool would outweigh a small wave."""
     p, held = water.parameters, water.nodal_water - water.displaced
     found = -p.density * (float(held @ water.nodes_below_floor) - water.film_potential)
-    found -= lag * float(water.momentum() @ p.weight)
     surface, farther = _at_surface(water), water.taken_by(water.farther)
     found += p.density * float(farther @ (water.nodes_below_floor - surface))
     return found + p.density * (water.volume() - water.conserved_volume) * surface

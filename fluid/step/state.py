@@ -36,7 +36,7 @@ NUMBERS = {
     "initial_volume": float,
     "film_volume": float,
     "film_potential": float,
-    "_surface_lag": float,
+    "_late_energy": float,
     "_domain_is_new": bool,
 }
 SIDES = ("entered", "left", "energy")

@@ -88,7 +88,7 @@ class Water:
     ):
         self.mesh, self.parameters = mesh, parameters or WaterParameters()
         self.time, self.steps = 0.0, 0
-        self._surface_lag = 0.0
+        self._late_energy = 0.0
         self.report: StepReport | None = None
         self.sides = sides
         self.slits, self.films, self._film_rules = None, None, None
@@ -285,7 +285,7 @@ class Water:
         """Take over the pressure x (n,) [Pa] of the problem and end the step; parting (n,) [m³/s]: rate at which the
         water parts where x is at its bound, None: nowhere (`bounded.py`)."""
         new: Corrected = corrected(self, problem, np.asarray(x), parting)
-        late = self._late()
+        before = self._rates()
         self.level_set, self.nodal_water = problem.predicted.level_set, new.nodal_water
         self.displaced = problem.predicted.displaced
         self.film_volume, self.film_potential = problem.predicted.in_films
@@ -306,15 +306,29 @@ class Water:
             pressure, dofs = problem.of_water(x + problem.known), problem.of_water(problem.dofs)
             self.slits = self.slits.advanced(dofs, pressure, p.weight, problem.dt, p.density)
         self.report = new.report
-        share = 1.0 - self.calm(problem.dt) if self.pushed_by.any() else 1.0
-        before = self._surface_lag if self.steps >= START_STEPS else 0.0
-        self._surface_lag = lag_after(before, 0.5 * problem.dt * share, problem.dt)
+        late, (power, through) = self._late(problem.dt), self._rates()
+        self._late_energy += late * (power - before[0])
         if self.sides is not None:
-            ahead = float((self._late() - late) @ self.pressure)
+            ahead = late * float((through - before[1]) @ self.pressure)
             self.sides.add_step(problem.predicted.through, self.head(), ahead)
         self.time += problem.dt
         self.steps += 1
         self._domain_is_new, self.renumbered, self.left_behind = False, None, None
+
+    def _late(self, dt: float) -> float:
+        """By how much [s] the velocity that a step of dt [s] adds is ahead of the surface.
+
+        The surface moves with the velocity half a step ahead, which leaves nothing. In the steps of the start it moves
+        with that at the beginning of the step, and keeps what it lacks; with implicit Euler in every step. Calm water
+        that bodies push moves with what they displace."""
+        if self.steps >= START_STEPS and self.parameters.theta < 1.0:
+            return 0.0
+        return 0.5 * dt * (1.0 - self.calm(dt)) if self.pushed_by.any() else 0.5 * dt
+
+    def _rates(self) -> tuple[float, Array | float]:
+        """Power of gravity [W], and what the velocity drives through seas (N,) [m³/s]."""
+        through = 0.0 if self.sides is None else self.sides.sea_rate(self.level_set, self.velocity)
+        return float(self.momentum() @ self.parameters.weight), through
 
     def snapshot(self) -> dict:
         """The present state, for `restore`: references, since a step replaces the arrays that it changes."""
@@ -588,19 +602,13 @@ class Water:
         return kinetic_energy(self.parameters.density, self.nodal_water, self.velocity)
 
     def potential_energy(self) -> float:
-        """-∫ ρ g·x dV [J] above the floor of the tank, at the time of the velocity (`potential.py`)."""
-        return potential_energy(self, self._surface_lag)
+        """-∫ ρ g·x dV [J] above the floor of the tank (`potential.py`), at the time of the velocity (`_late`)."""
+        return potential_energy(self) - self._late_energy
 
     def available_energy(self) -> float:
         """Kinetic energy, and the potential energy above that of the same water at a level between the solids where
         they stand; where sides are open, of what stays below their lowest edge of it [J]."""
         return self.kinetic_energy() + max(self.potential_energy() - level_energy(self), 0.0)
-
-    def _late(self) -> Array | float:
-        """Volume (N,) [m³] that has set out through seas and is not booked, as the surface lags behind the velocity."""
-        if self.sides is None:
-            return 0.0
-        return self._surface_lag * self.sides.sea_rate(self.level_set, self.velocity)
 
     def energy_through_sides(self) -> float:
         """Energy [J] that came in through inflows and seas, less what left, at the time of the velocity."""
@@ -638,15 +646,6 @@ class Water:
         """g·x (...) [m²/s²] of places x (..., 3) [m], zero at the floor of the tank and negative above it: what leaves
         the tank takes energy with it, wherever the tank lies."""
         return x @ self.parameters.weight - self._lowest
-
-
-def lag_after(lag: float, whole: float, dt: float) -> float:
-    """How far [s] the surface lags behind the velocity after a step of dt [s], from the lag before; whole [s]: that of
-    many equal steps, up to dt/2.
-
-    The flux is that of the velocity half of the *last* step ahead.  After a step shorter than those before it the
-    surface therefore still lags by as much as it did, and catches up within about twice the time that it lags by."""
-    return whole if whole >= lag else lag + (whole - lag) * min(1.0, 0.5 * dt / lag)
 
 
 @ranged
