@@ -68,7 +68,11 @@ WATER = (
     ("reinserted", "m3", "volume that the uniform correction moved so far, a sum of absolute values"),
     ("reinserted_net", "m3", "the same with its sign: positive where the transport had lost water"),
     ("clipped", "1", "nodes whose speed was capped so far (spray)"),
-    ("lowest_pressure", "Pa", "lowest pressure of the water in the step, relative to the air"),
+    (
+        "lowest_pressure",
+        "Pa",
+        "lowest pressure of the water in the step, relative to the air; but in films between blocks",
+    ),
     ("wall_at_bound", "1", "share of the wetted walls on which the pressure is at its lower bound"),
     ("parted", "m3", "room that opened so far where the pressure was at its lower bound"),
     ("momentum_x", "N s", "momentum of the water"),

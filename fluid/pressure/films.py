@@ -119,6 +119,7 @@ class Films:
             predicted=replace(
                 p.predicted,
                 given_by_films=to_rim - _placed(sp.diags_array(whole) @ moved, f, columns, shape),
+                in_film=film,
             ),
         )
 

@@ -37,8 +37,8 @@ class BoundMet:
     """Where the pressure of a step met its bound: at_bound (N,) bool, ventilated (N,) bool where the bound is that of
     air · rate (n,) [m³/s] at which water separates at the unknowns, a single number if it does so nowhere · volume [m³]
     that opened · work [J] done to separate water against its vapour pressure (that of the air is zero) · lowest [Pa]
-    pressure of the water · wall: share of the wetted walls, of tank and bodies, on which the pressure is at its
-    bound."""
+    pressure of the water, but in films, where bodies feel that of the rim (`films.py`) · wall: share of the wetted
+    walls, of tank and bodies, on which the pressure is at its bound."""
 
     at_bound: Bools
     ventilated: Bools
@@ -53,7 +53,9 @@ class BoundMet:
         """After a step with x (n,) [Pa] and parting (n,) [m³/s] or None, as in `Water.correct`."""
         n_nodes, n = len(problem.predicted.wet), len(x)
         at_bound, ventilated = np.zeros(n_nodes, bool), np.zeros(n_nodes, bool)
-        least, largest = zip(*over(_extremes, n, x, problem.known))
+        in_film = problem.predicted.in_film
+        in_film = np.zeros(n, bool) if in_film is None else in_film
+        least, largest = zip(*over(_extremes, n, x, problem.known, in_film))
         lowest = float(min(least))
         if problem.bound is None:
             return cls(
@@ -89,12 +91,13 @@ class BoundMet:
 
 
 @ranged
-def _extremes(first, last, x, known):
-    """Least x + known, 0 where none is below, and largest |x|."""
+def _extremes(first, last, x, known, in_film):
+    """Least x + known outside of films, 0 where none is below, and largest |x|."""
     least, largest = 0.0, 0.0
     for k in range(first, last):
         i = np.uint64(k)
-        least, largest = min(least, x[i] + known[i]), max(largest, abs(x[i]))
+        least = least if in_film[i] else min(least, x[i] + known[i])
+        largest = max(largest, abs(x[i]))
     return least, largest
 
 

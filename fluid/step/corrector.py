@@ -90,7 +90,7 @@ def corrected(water, problem, x, parting) -> Corrected:
         pressure[in_pocket] = kept.cushions.air.nodal(problem.of_air(x + problem.known))[in_pocket]
     gradient = _pressure_gradient(water, kept, unknown, dt / problem.density)
     u, a, forced, mean = _projected(t, kept, gradient, dt)
-    remainder, kick_remainder = left_in_cells(water, kept, gradient, mean, dt)
+    remainder, kick_remainder = left_in_cells(water, kept, gradient, mean, u, dt)
     held, projected_energy = holding_water(water, kept), kinetic_energy(problem.density, kept.nodal_water, u)
     projected, calm = copied_at(held, u), water.calm(kept.end - water.time, kept.crossing)
     clipped, limited, damped = _limit_and_damp(water, kept, u, a, held, projected, calm)

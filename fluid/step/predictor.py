@@ -56,8 +56,8 @@ class Predicted:
     without; end [s]: time at the end of the step; left: what leaves through open sides, None if nothing; through (N,)
     [m³] that enters through sides, None without any; held (N,) [Pa]: unknown part of the pressure on the nodes of seas,
     None without any side; displaced (N,) [m³]: part of nodal_water that the bodies take in this step; in_films: that in
-    films, as `Water.in_films` gives it; crossing [m/s]: `Water.crossing`; given_by_films: `films.Handed.given`;
-    cushions: trapped air (`fluid.air.cushions`), None without any."""
+    films, as `Water.in_films` gives it; crossing [m/s]: `Water.crossing`; given_by_films and in_film (n,) bool, the
+    unknowns in films: see `films.py`; cushions: trapped air (`fluid.air.cushions`), None without any."""
 
     level_set: Floats
     nodal_water: Floats
@@ -84,6 +84,7 @@ class Predicted:
     crossing: float
     cushions: object | None = None
     given_by_films: object | None = None
+    in_film: Bools | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

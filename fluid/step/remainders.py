@@ -4,8 +4,8 @@ u'_e = β (u'_e + (1-θ) dt r_e)                    carried into the step, swept
 u'_e ← s (u'_e + Π(∇x) - ∇x_e)                    left after the pressure x
 r_e = s (Π(∇x) - ∇x_e)/(θ dt)                     its rate for the next step
 
-with x in units of ρ/dt, Π: weighted mean; s = 1 in deep cells, a share in steps of fast water that are cut short, 0
-else (`kept_near_the_surface`).
+with x in units of ρ/dt, Π: weighted mean; s = 1 in deep cells, in fast ones near the surface a share in steps that are
+cut short (`kept_near_the_surface`), 0 else.
 """
 
 from __future__ import annotations
@@ -13,13 +13,14 @@ from __future__ import annotations
 import numpy as np
 
 from fluid.domain.cell_vectors import CellVectors, first_from
-from kernels.decorators import ranged
+from kernels.decorators import inner, ranged
 from kernels.threads import over
 
 MEMORY_DEPTH = 2.0
 """Cells nearer to the surface than this, in cell sizes, keep nothing in calm water: there it feeds surface noise."""
 FAST = (1.0, 3.0)
-"""Speeds in √(g h) from the first of which cells near the surface keep a share, and from the second the whole of it."""
+"""Speeds in √(g h) of a cell near the surface from the first of which it keeps a part of the share of
+`kept_near_the_surface`, and from the second the whole."""
 ROUND_OFF = 1e-9
 """Steps shorter than that of Courant number 1 by no more than this, relative to it, are not cut short."""
 
@@ -77,32 +78,42 @@ def _carry_remainder(first, last, cell_list, held, numbers, u, cells, size, out)
             out[s, k] = beta * (remainder[row, k] + kick_time * kick[row, k])
 
 
-def left_in_cells(water, kept, gradient, mean, dt):
-    """u' [m/s] of the wet cells after this step and its rate -(∇x - Π∇x)/(θ ρ) [m/s²] for the next kick."""
+def left_in_cells(water, kept, gradient, mean, u, dt):
+    """u' [m/s] of the wet cells after this step and its rate -(∇x - Π∇x)/(θ ρ) [m/s²] for the next kick; u (N, 3) [m/s]
+    after the pressure."""
     t, cells = water.topology, kept.wet_cells
     if not water.parameters.subscale_memory:
         return CellVectors.none(), CellVectors.none()
     remainder, rate = np.empty((len(cells), 3)), np.empty((len(cells), 3))
-    near = kept_near_the_surface(water, kept.theta, kept.crossing, dt)
-    below = (t.in_cells(kept.level_set), -MEMORY_DEPTH * water.mesh.spacing, near)
-    state = (below, (mean, gradient), kept.remainder, kept.theta * dt, t.fluid_cells)
+    below = (t.in_cells(kept.level_set), -MEMORY_DEPTH * water.mesh.spacing)
+    near = (
+        kept_near_the_surface(water, kept.theta, kept.crossing, dt),
+        u,
+        water.parameters.gravity,
+        t.node_size,
+    )
+    state = (below, near, (mean, gradient), kept.remainder, kept.theta * dt, t.fluid_cells)
     over(_leave, len(cells), cells, *state, (remainder, rate))
     return CellVectors(cells, remainder), CellVectors(cells, rate)
 
 
 @ranged
-def _leave(first, last, cell_list, below, slopes, before, time, fluid, made):
+def _leave(first, last, cell_list, below, near, slopes, before, time, fluid, made):
     """u' + Π∇x - ∇x [m/s] of the listed cells and its rate, (Π∇x - ∇x)/time [m/s²]: in full where φ < deep at all
-    corners, the share `near` of both in other cells under water, zero in cells with a dry corner.
+    corners, a share of both in other fast cells under water, zero in slow ones and in cells with a dry corner.
 
-    below: φ (N,), deep [m], near · slopes: Π∇x (N, 3) and ∇x (n, 3) of the listed cells [m/s] · before: u' (n, 3)."""
-    (phi, deep, near), (mean, gradient) = below, slopes
+    below: φ (N,), deep [m] · near: the share, u (N, 3) [m/s], gravity [m/s²], size (N,) [m] of the cells at the nodes ·
+    slopes: Π∇x (N, 3) and ∇x (n, 3) of the listed cells [m/s] · before: u' (n, 3)."""
+    (phi, deep), (most, u, gravity, size), (mean, gradient) = below, near, slopes
     cells, share, share_row = fluid.cells, fluid.share, fluid.share_row
     remainder, rate = made
     for s in range(first, last):
         e = np.uint64(cell_list[s])
         highest = max(max(phi[cells[e, 0]], phi[cells[e, 1]]), max(phi[cells[e, 2]], phi[cells[e, 3]]))
-        lives_on = 1.0 if highest < deep else near if highest < 0.0 else 0.0
+        lives_on = 1.0
+        if highest >= deep:
+            wet_and_cut_short = highest < 0.0 and most > 0.0
+            lives_on = most * _fast(u, gravity * size[cells[e, 0]], cells, e) if wet_and_cut_short else 0.0
         for k in range(3):
             remainder[s, k], rate[s, k] = 0.0, 0.0
             if lives_on > 0.0:
@@ -114,20 +125,25 @@ def _leave(first, last, cell_list, below, slopes, before, time, fluid, made):
                 rate[s, k] = lives_on * left / time
 
 
+@inner
+def _fast(u, gh, cells, e):
+    """Ramp over FAST of the speed |u|/√(g h) in the middle of cell e."""
+    square = 0.0
+    for k in range(3):
+        middle = 0.25 * (u[cells[e, 0], k] + u[cells[e, 1], k] + u[cells[e, 2], k] + u[cells[e, 3], k])
+        square += middle * middle
+    return min(1.0, max(0.0, (np.sqrt(square / gh) - FAST[0]) / (FAST[1] - FAST[0])))
+
+
 def kept_near_the_surface(water, theta: float, crossing: float, dt: float) -> float:
-    """Share of the remainder that cells near the surface keep in a step of dt [s].
+    """Share of the remainder that fast cells near the surface keep in a step of dt [s].
 
     In steady flow, pressure and divergence of u are coupled by τ = θ dt in cells that keep nothing, and by τ = T + θ dt
     in those that keep the share T/(T + dt). With T = θ_1 dt_1 - θ dt, where dt_1 is the step at Courant number 1 and
-    θ_1 its θ, τ does not depend on the step; T = 0 in this step and longer ones, and in slow water. With τ = θ dt alone
-    the pressure has wiggles beside free edges, the more, the shorter the step. crossing: as in `Water.calm`."""
-    p, h = water.parameters, water.mesh.spacing
-    low, high = FAST
-    fast = min(1.0, max(0.0, (crossing / np.sqrt(p.gravity * h) - low) / (high - low)))
-    if fast == 0.0:
-        return 0.0
-    at_courant_1 = min(water.longest_step(), h / crossing)
+    θ_1 its θ, τ does not depend on the step; T = 0 in this step and longer ones. With τ = θ dt alone the pressure has
+    wiggles beside free edges, the more, the shorter the step. crossing: as in `Water.calm`."""
+    at_courant_1 = min(water.longest_step(), water.mesh.spacing / max(crossing, 1e-12))
     if dt > (1.0 - ROUND_OFF) * at_courant_1:
         return 0.0
     longer = max(water.theta(at_courant_1, crossing) * at_courant_1 - theta * dt, 0.0)
-    return fast * longer / (longer + dt)
+    return longer / (longer + dt)
