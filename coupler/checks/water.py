@@ -225,12 +225,12 @@ def _sides(case: Case) -> Iterator[Problem]:
                 )
             taken[spec.side] = f"water.{kind}[{i}]"
             yield from _levels(case, path, spec)
-            if (spec.absorbs or kind == "sea") and case.tank.is_box:
+            if (spec.absorbs or (kind == "sea" and not _stands_beside(case, spec))) and case.tank.is_box:
                 yield from _across(case.tank, path, spec)
 
 
 def _across(tank, path: KeyPath, spec) -> Iterator[Problem]:
-    """A side that absorbs reads the water a cell inside, and a sea pushes water into the cells beside it: the side
+    """A side that absorbs reads the water a cell inside, and a sea pushes water into dry cells beside it: the side
     opposite to them must not be the next but one."""
     axis = "xyz".index(spec.side[0])
     cells = round((tank.upper[axis] - tank.lower[axis]) / finest_cell(tank))
@@ -243,6 +243,19 @@ def _across(tank, path: KeyPath, spec) -> Iterator[Problem]:
         yield (*path, "absorbs"), f"true, but {where}: {reads}, and {wider}, or no absorbs"
     else:
         yield (*path, "side"), f"{where}: the water of a sea would reach it at once, and {wider}"
+
+
+def _stands_beside(case: Case, sea) -> bool:
+    """Whether one box of the initial water stands as high as a sea, but for a cell, along all of its side."""
+    tank, along = case.tank, 1 - "xy".index(sea.side[0])
+    level, slack = level_at_start(sea) - tank.cell, SLACK * tank.cell
+    return any(
+        fill.upper[2] >= level
+        and fill.lower[2] <= tank.lower[2] + slack
+        and fill.lower[along] <= tank.lower[along] + slack
+        and fill.upper[along] >= tank.upper[along] - slack
+        for fill in fills_beside(case, sea.side)
+    )
 
 
 def _levels(case: Case, path: KeyPath, spec) -> Iterator[Problem]:

@@ -172,17 +172,22 @@ def test_a_wave_whose_still_water_runs_out_is_refused():
     assert found(9.0, ["z+", "y+"], sea=[{"side": "x+", "level": 0.5}]) == []
 
 
-def test_a_side_that_absorbs_and_a_sea_are_three_cells_from_the_one_opposite():
-    def found(width, absorbs=True):
+def test_a_side_that_absorbs_is_three_cells_from_the_one_opposite_and_a_sea_before_dry_cells():
+    def found(width, absorbs=True, filled=0.5):
         sea = {"side": "y-", "level": 0.5, "absorbs": absorbs}
         tank = TANK | {"upper": [1, width, 1], "cell": 0.1}
-        read = case({"sea": [sea], "fill": [{"lower": [0, 0, 0], "upper": [1, width, 0.5]}]}, tank=tank)
+        fills = [
+            {"lower": [0, 0, 0], "upper": [filled, width, 0.5]},
+            {"lower": [0, 0, 0], "upper": [1, width, 0.3]},
+        ]
+        read = case({"sea": [sea], "fill": fills}, tank=tank)
         return [text for path, text in problems(read) if path[:3] == ("water", "sea", 0)]
 
     assert found(0.3) == []
-    assert "the water of a sea would reach it at once" in found(0.2, absorbs=False)[0]
-    assert found(0.3, absorbs=False) == []
     assert "the side opposite to y- is only 2 cells away" in found(0.2)[0]
+    assert "the water of a sea would reach it at once" in found(0.2, absorbs=False)[0]
+    assert found(0.2, absorbs=False, filled=1.0) == []
+    assert found(0.3, absorbs=False) == []
 
 
 def test_a_bore_may_run_until_its_reflection_is_back():
