@@ -28,7 +28,7 @@ STAGES = {
     "solver, iterations": (("numerics.bounded", "solve_bounded"),),
     "correction": (
         ("step.corrector", "_projected"),
-        ("step.corrector", "_remainders"),
+        ("step.corrector", "left_in_cells"),
         ("step.corrector", "_limit_and_damp"),
     ),
     "continuation": (("step.corrector", "extend_velocity"),),
