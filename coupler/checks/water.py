@@ -224,8 +224,11 @@ def _sides(case: Case) -> Iterator[Problem]:
                     f"{spec.side} is given to {taken[spec.side]} already; take it out of one of them",
                 )
             taken[spec.side] = f"water.{kind}[{i}]"
-            yield from _levels(case, path, spec)
-            if (spec.absorbs or (kind == "sea" and not _stands_beside(case, spec))) and case.tank.is_box:
+            wrong = list(_levels(case, path, spec))
+            yield from wrong
+            if wrong or not case.tank.is_box:
+                continue
+            if spec.absorbs or (kind == "sea" and not _stands_beside(case, spec)):
                 yield from _across(case.tank, path, spec)
 
 
