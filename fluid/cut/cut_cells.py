@@ -159,14 +159,16 @@ def _subtract(w, piece, at, round_off, thin, top, n_vertices):
 
     Fragments are left on top of the stack -> (state, whole, new top, number of vertices)."""
     start, end = w.near_start[at], w.near_start[at + 1]
-    for r in range(start, end):
-        low, _ = classify(w, piece, w.near_distance[r], round_off)
+    low, high = 0.0, 0.0
+    for r in range(end - 1, start - 1, -1):  # the first plane last: its distances are needed next
+        low, high = classify(w, piece, w.near_distance[r], round_off)
         if low == 0.0:
             return DONE, True, top, n_vertices
     # Fragments stack up from `top`; what is still inside alternates between the last two slots.
     current, fresh, spare = piece, top, len(w.faces) - 1
     for r in range(start, end):
-        low, high = classify(w, current, w.near_distance[r], round_off)
+        if r > start:
+            low, high = classify(w, current, w.near_distance[r], round_off)
         if fresh + 3 > len(w.faces):
             return WORKSPACE_FULL, False, top, n_vertices
         if low == 0.0:

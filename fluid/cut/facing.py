@@ -9,6 +9,8 @@ from kernels.threads import over
 
 WORK = 30
 """Cost of a polygon, in usual rows."""
+ROUNDING = 1e-3
+"""Share of the reach of a polygon by which a body must be beyond it to be passed by without looking at its planes."""
 
 
 def facing(bodies, polygons, reach, bounds, loose):
@@ -24,7 +26,18 @@ def facing(bodies, polygons, reach, bounds, loose):
     polygons = (body, np.ascontiguousarray(centroid), np.ascontiguousarray(normal))
     in_film, plane = np.zeros(len(body), bool), np.empty(len(body), np.int64)
     over(
-        _facing, len(body), polygons, bodies.planes(), loose, near, bounds, reach, in_film, plane, weight=WORK
+        _facing,
+        len(body),
+        polygons,
+        bodies.planes(),
+        box,
+        loose,
+        near,
+        bounds,
+        reach,
+        in_film,
+        plane,
+        weight=WORK,
     )
     return in_film, plane
 
@@ -69,8 +82,9 @@ def _near_pairs(low, high, loose, reach, axis, order):
 
 
 @ranged
-def _facing(begin, end, polygons, planes, loose, near, bounds, reach, in_film, plane):
-    """What `facing` returns for the polygons from `begin` to before `end`; near: (start, members) of `near_bodies`."""
+def _facing(begin, end, polygons, planes, box, loose, near, bounds, reach, in_film, plane):
+    """What `facing` returns for the polygons from `begin` to before `end`; box (n, 2, 3) around each body · near:
+    (start, members) of `near_bodies`."""
     face_body, centroid, normal = polygons
     normals, offsets, plane_start = planes
     near_start, members = near
@@ -92,7 +106,13 @@ def _facing(begin, end, polygons, planes, loose, near, bounds, reach, in_film, p
         for t in range(near_start[b], near_start[b + 1]):
             if in_film[s]:
                 break
-            other = members[t]
+            other, beyond = members[t], False
+            for k in range(3):
+                here, there = centroid[s, k], centroid[s, k] + reach[s] * normal[s, k]
+                beyond = beyond or min(here, there) - ROUNDING * reach[s] > box[other, 1, k]
+                beyond = beyond or max(here, there) + ROUNDING * reach[s] < box[other, 0, k]
+            if beyond:
+                continue
             first, last = 0.0, reach[s]
             for g in range(plane_start[other], plane_start[other + 1]):
                 along, room = 0.0, offsets[g]
@@ -105,4 +125,6 @@ def _facing(begin, end, polygons, planes, loose, near, bounds, reach, in_film, p
                     first = max(first, room / along)
                 elif room < 0.0:
                     last = -1.0
+                if first > last:
+                    break
             in_film[s] = first <= last

@@ -57,9 +57,9 @@ def workspace(scale: int, n_bodies: int, n_planes: int) -> Workspace:
     return Workspace(
         np.empty((vertices, 7)),
         np.zeros(vertices),
-        np.zeros((2, 4 * corners, 2), dtype=np.int32),
-        np.zeros((vertices, 2), dtype=np.int32),
-        np.zeros((pieces, loops, corners), dtype=np.int32),
+        np.zeros((2, 4 * corners, 2), dtype=np.uint32),
+        np.zeros((vertices, 2), dtype=np.uint32),
+        np.zeros((pieces, loops, corners), dtype=np.uint32),
         np.zeros((pieces, loops), dtype=np.int32),
         np.zeros((pieces, loops), dtype=np.int64),
         np.zeros(pieces, dtype=np.int32),

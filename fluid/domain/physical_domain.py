@@ -308,7 +308,7 @@ def _cut_moved(memory, bodies, moved, covers):
     touched[new_cell] = True
     cell = np.concatenate([memory.pair_cell[~gone], new_cell])
     body = np.concatenate([memory.pair_body[~gone], new_body])
-    order = np.argsort(cell * len(bodies) + body, kind="stable")
+    order = np.argsort(cell * len(bodies) + body)  # no two are alike
     cell, body = cell[order], body[order]
     again = touched[cell]
     fresh = _cut_pairs(mesh, bodies, cell[again], body[again], covers, memory.connection)
