@@ -81,10 +81,12 @@ def in_use() -> int:
 
 
 class Call(NamedTuple):
-    """A kernel that more threads would share, its rows, and the processor time [s] that it took on one."""
+    """A kernel that more threads would share, its rows, the processor time [s] of the process when it began on one
+    thread, and that which it took."""
 
     name: str
     rows: int
+    began: float
     seconds: float
 
 
@@ -214,7 +216,7 @@ def _alone(kernel, count, args):
         return kernel(*args)
     began = time.process_time()
     found = kernel(*args)
-    _settings.calls.append(Call(kernel.__name__, count, time.process_time() - began))
+    _settings.calls.append(Call(kernel.__name__, count, began, time.process_time() - began))
     return found
 
 

@@ -257,6 +257,7 @@ def _threads(sizes):
                 )
         goal = MOST_SERIAL if nodes == THREADS_NODES[-1] else None
         yield Line("  serial share of one thread's processor time", n, 0, found["serial"], "of all", goal)
+        yield Line("  the same as time", n, 0, 1e6 * found["outside"], "a step")
         for cores in threads.MORE:
             yield Line(
                 f"  {cores} cores by Amdahl's law",

@@ -2,15 +2,16 @@
 `part.py roofline NODES`.
 
 Speed-ups are ratios of wall times, the least of REPEATS with the numbers of threads in turn, all from one state.
-The serial share is the part of the processor time of one thread that is spent outside of the threaded kernels; Amdahl's
-law gives the speed-up with more cores from it. Bytes are the least that a kernel must read and write, each once, of
+The serial share is the part of the processor time of one thread that is spent outside of the threaded kernels, each of
+them and each piece between two of them by the least of REPEATS; Amdahl's law gives the speed-up with more cores from
+it. Bytes are the least that a kernel must read and write, each once, of
 the parts of the arrays that it uses; bandwidth is that of a triad a = b + s c in the same process.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 import numpy as np
@@ -53,10 +54,10 @@ def started(nodes: int):
 
 
 def threads(nodes: int) -> dict:
-    """Wall time [s] of a step by number of threads, the serial share, the size of the scene, and what threads give on
-    this machine (`machine.py`)."""
+    """Wall time [s] of a step by number of threads, processor time [s] of a step on one thread, and of that outside of
+    the threaded kernels, its share, the size of the scene, and what threads give on this machine (`machine.py`)."""
     from coupler.commands.benchmark.machine import machine
-    from kernels.threads import use, watched
+    from kernels.threads import use
 
     scene = started(nodes)
     start, wall = scene.snapshot(), {n: np.inf for n in numbers()}
@@ -67,18 +68,36 @@ def threads(nodes: int) -> dict:
             _steps(scene, start)
             wall[n] = min(wall[n], (time.perf_counter() - began) / STEPS)
     use(1)
-    with watched() as calls:
-        began = time.process_time()
-        _steps(scene, start)
-        spent = time.process_time() - began
+    shared, outside = least_times(lambda: _steps(scene, start))
     return {
         "nodes": len(scene.mesh.nodes),
         "cells": len(scene.mesh.cells),
         "wall": {str(n): seconds for n, seconds in wall.items()},
-        "step": spent / STEPS,
-        "serial": 1.0 - sum(call.seconds for call in calls) / spent,
+        "step": (shared + outside) / STEPS,
+        "outside": outside / STEPS,
+        "serial": outside / (shared + outside),
         "machine": machine(numbers()),
     }
+
+
+def least_times(work: Callable[[], None]) -> tuple[float, float]:
+    """Processor seconds of work() on one thread in and outside of the threaded kernels: the least of REPEATS for each
+    of them and for each piece between two of them, added up. Other programs lengthen now one piece, now another.
+
+    Repeats that call fewer or more kernels than the last one, which fill what is kept, do not count."""
+    from kernels.threads import watched
+
+    found = []
+    for _ in range(REPEATS):
+        with watched() as calls:
+            first = time.process_time()
+            work()
+            last = time.process_time()
+        begin, spent = (np.array([getattr(call, name) for call in calls]) for name in ("began", "seconds"))
+        found.append((spent, np.append(begin, last) - np.append(first, begin + spent)))
+    alike = [pair for pair in found if len(pair[0]) == len(found[-1][0])]
+    shared, outside = (np.min(times, axis=0).sum() for times in zip(*alike))
+    return float(shared), float(outside)
 
 
 def _steps(scene, start) -> None:
