@@ -145,7 +145,7 @@ class ContactForces:
         moves = self._free[: self._n] | self._motion.v.any(axis=1)
         on = np.flatnonzero(self._on & moves & ~self._asleep[: self._n])
         row, group = np.indices((len(on), len(self._boxes))).reshape(2, -1)
-        comes = self._within(on[row], group, 3.0 * self._reach)
+        comes = self._within(on[row], group, 2.0 * self._reach)
         self._comers = np.stack([on[row], group], axis=1)[comes]
         p = self._pairs
         pressed = self._key(p.a, p.b)[p.touching & (p.b >= self._n)]
@@ -161,7 +161,7 @@ class ContactForces:
         """(groups,) bool: sleeping groups of blocks that a loose body has approached."""
         rows, groups = self._comers.T
         found = np.zeros(len(self._boxes), bool)
-        found[groups[self._within(rows, groups, 2.0 * self._reach)]] = True
+        found[groups[self._within(rows, groups, self._reach)]] = True
         return found
 
     def set_asleep(self, asleep: Array, groups: list[Array]) -> None:

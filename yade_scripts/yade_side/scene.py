@@ -22,8 +22,9 @@ from yade_scripts.yade_side.engine import Engine, YadeError
 STANDING, LOOSE = 5, 1
 """Masks: two bodies are neighbours if they share a bit, unless both are fixed (equal masks that hold `APART`)."""
 APART = 4
-VERLET = 0.05
-"""Margin of the search for neighbours as a share of the smallest edge of a block."""
+VERLET = 0.1
+"""Margin of the search for neighbours as a share of the smallest edge of a block: half of it finds fewer pairs that do
+not touch, but has to search twice as often, which takes longer."""
 WHITE = (1.0, 1.0, 1.0)
 """Colour of bodies; left to itself, YADE seeds a random generator for each."""
 STATE = 13
