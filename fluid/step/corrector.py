@@ -121,7 +121,7 @@ def corrected(water, problem, x, parting) -> Corrected:
         listed=listed,
         layer_start=start,
         at_bound=bound.at_bound,
-        ventilated=bound.ventilated,
+        ventilated=bound.ventilated if kept.on_walls is None else bound.ventilated | kept.on_walls,
         given_by_films=_given_by_films(water, problem),
         report=report,
     )

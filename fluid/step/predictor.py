@@ -32,6 +32,7 @@ from fluid.pressure.projection import (
 from fluid.pressure.waterline import waterline_load
 from fluid.sides.outflow import Outflow
 from fluid.step.remainders import carried_remainder
+from fluid.surface.cavities import air_on_walls
 from fluid.surface.level_set import redistance
 from fluid.surface.volume import VolumeCorrection, correct_volume
 from fluid.transport.advection import transport
@@ -57,7 +58,8 @@ class Predicted:
     [m³] that enters through sides, None without any; held (N,) [Pa]: unknown part of the pressure on the nodes of seas,
     None without any side; displaced (N,) [m³]: part of nodal_water that the bodies take in this step; in_films: that in
     films, as `Water.in_films` gives it; crossing [m/s]: `Water.crossing`; given_by_films and in_film (n,) bool, the
-    unknowns in films: see `films.py`; cushions: trapped air (`fluid.air.cushions`), None without any."""
+    unknowns in films: see `films.py`; cushions: trapped air (`fluid.air.cushions`), None without any; on_walls
+    (N,) bool: nodes with air on a wall (`cavities.py`), None without any."""
 
     level_set: Floats
     nodal_water: Floats
@@ -85,6 +87,7 @@ class Predicted:
     cushions: object | None = None
     given_by_films: object | None = None
     in_film: Bools | None = None
+    on_walls: Bools | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,8 +95,8 @@ class Moved:
     """What transport, sides, volume and shear of a step have found before its pressure problem is set up.
 
     surface: VolumeCorrection · conserved_volume [m³] · advected, u_star (N, 3) [m/s], shear, left, through, displaced,
-    in_films, crossing: as in `Predicted` · inflow_rate (N,) [m³/s] through sides at given velocity, None without
-    any."""
+    in_films, crossing, on_walls: as in `Predicted` · inflow_rate (N,) [m³/s] through sides at given velocity, None
+    without any."""
 
     surface: VolumeCorrection
     conserved_volume: float
@@ -106,6 +109,7 @@ class Moved:
     displaced: Floats
     in_films: tuple[float, float]
     crossing: float
+    on_walls: Bools | None
 
 
 def predicted(water, dt: float) -> PressureProblem:
@@ -147,7 +151,10 @@ def predicted(water, dt: float) -> PressureProblem:
         in_films = water.in_films(phi)
     beside = float(displaced.sum()) + in_films[0]
     calm = water.calm(dt, crossing)
-    surface = _new_surface(water, calm, phi, added(carried, displaced), conserved + beside)
+    held = added(carried, displaced)
+    walls, _ = water.beside_bodies
+    phi, on_walls = air_on_walls(water.topology, phi, held, water.ventilated, walls)
+    surface = _new_surface(water, calm, phi, held, conserved + beside)
     if found.velocity is not None:
         graph = water.graph_for(water.listed)
         found.into(
@@ -179,6 +186,7 @@ def predicted(water, dt: float) -> PressureProblem:
         displaced=displaced,
         in_films=in_films,
         crossing=crossing,
+        on_walls=on_walls,
     )
     return _problem(water, dt, theta, kick, moved)
 
@@ -350,6 +358,7 @@ def _problem(water, dt: float, theta: float, kick, moved: Moved) -> PressureProb
         in_films=moved.in_films,
         crossing=moved.crossing,
         cushions=cushions,
+        on_walls=moved.on_walls,
     )
     acted, unheld = _known_pressure(water, water.pressure, phi), water.walls.open_node
     if held is not None:

@@ -2,6 +2,7 @@
 
 level_set                     signed distance near the surface
 volume                        the conservative volume, its fluxes, and the level set corrected towards it
+cavities                      air on walls that the water has left
 extrapolation                 values continued from the water into the nodes around it
 gradient_jump_damping         velocity of single nodes along a calm surface on meshes with obtuse cells
 

@@ -1,0 +1,50 @@
+"""Air on walls that the water has left: the level set follows the volume there.
+
+Where air reaches a wall and the pressure is at its bound, water leaves the wall (`pressure_bound.py`), and the volume W
+of the nodes of the wall falls below that of the level set. Carried along paths, φ finds no air there: a path that comes
+out of the wall begins in a cell that the water before the edge fills. Nor does the correction of φ towards W
+(`volume.py`) open a cavity: far below the surface φ has no slope of volume, and what the node lacks is taken from the
+nearest surface. So a jet went on along the sides of a plate behind its edges, up to a sixth of its volume came out
+of these sides, and as much was taken from its surface.
+
+There φ is therefore that of a layer of air on the wall, as thick as the volume says,
+
+    φ_i = (1 - √s) h,    s = W_i/V_i,
+
+since a layer of the thickness d leaves the share (1 - d/h)² of the hat function of a node on a plane wall. Such nodes
+count as reached by air in the next step, also while they are dry."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from array_types import Array, Bools
+from fluid.domain.moments import nodal_water
+from fluid.numerics.fields import copied
+
+LEAST_LACKING = 0.05
+"""Share of what a node can hold by which its volume must fall short of that of φ: a layer of a fortieth of a cell.
+Volume and level set differ by some per cent wherever the surface moves fast."""
+
+
+def air_on_walls(topology, phi, water, reached, walls) -> tuple[Array, Bools | None]:
+    """φ (N,) [m] with layers of air on the walls of solids that the water has left, and the nodes (N,) bool that have
+    one; φ itself and None where there is none.
+
+    water (N,) [m³]: volume of the nodes · reached (N,) bool: nodes with the pressure of the air in the last step, or
+    with a layer of air · walls (n,): nodes whose hat functions reach a wall of a solid."""
+    t = topology
+    near = walls[reached[walls] & t.active[walls] & (phi[walls] < t.node_size[walls])]
+    if len(near) == 0:
+        return phi, None
+    found = np.zeros(len(phi), bool)
+    found[near] = True
+    lacking = nodal_water(t.cells_around(found), 0.0, phi, t.parts, len(phi)) - water
+    found &= lacking > LEAST_LACKING * t.node_volume
+    nodes = np.flatnonzero(found)
+    if len(nodes) == 0:
+        return phi, None
+    share = np.clip(water[nodes] / t.node_volume[nodes], 0.0, 1.0)
+    phi = copied(phi)
+    phi[nodes] = np.maximum(phi[nodes], (1.0 - np.sqrt(share)) * t.node_size[nodes])
+    return phi, found
