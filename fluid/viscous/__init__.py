@@ -2,6 +2,7 @@
 
 viscosity            the stage and its right hand side
 kernels              stresses as products without a matrix, and conjugate gradients on them
+beyond               dry nodes of cut cells, which change with those in the water
 strain               strain rates smoothed over the edges of the cells
 wall_friction        the log law of rough walls
 

@@ -9,7 +9,8 @@ and u_Γ is the velocity of the body there.  The second and third terms hold u =
 is wall friction.  With λ = 4 μ A/V, where A is the wetted area and V the water volume of the cell, the form is positive
 definite on every cut, since ε is constant in a cell (trace inequality ∫_Γ |ε n|² ≤ A/V ∫ |ε|²; De Prenter, Lehrenfeld,
 Massing, Comput. Math. Appl. 75 (2018) 4322). The force on the body is the sum over the hat functions, -∫ (t - λ (u -
-u_Γ) - C (u - u_Γ)_t) dA, so momentum is conserved to round-off.
+u_Γ) - C (u - u_Γ)_t) dA, so momentum is conserved to round-off. Nodes beyond the surface change with those in the water
+(`beyond`).
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ import numpy as np
 
 from array_types import Bools, Floats, Ints
 from fluid.mesh.arrays import Hats
+from fluid.viscous.beyond import Beyond, follow, hand_on
 from fluid.viscous.strain import (
     COLUMN,
     ROW,
@@ -52,7 +54,7 @@ class ViscousTerms(NamedTuple):
     """The data that K and f are assembled from: cells (n,) in the water, weight (n,) 2μ times their water · walls ·
     viscosity μ · node_drag (N,) [kg/s] of nodes on sides of the tank · held (k,) nodes on sides, projector (k, 3, 3)
     onto the directions that are free there · idle (N,) bool: nodes that keep their velocity · hats · edges of the cells
-    in the water."""
+    in the water · beyond: nodes that change with those in the water."""
 
     cells: Ints
     weight: Floats
@@ -64,6 +66,7 @@ class ViscousTerms(NamedTuple):
     idle: Bools
     hats: Hats
     edges: StrainEdges
+    beyond: Beyond
 
 
 @kernel
@@ -124,20 +127,29 @@ def _slip_velocity(walls, s, q, u, V, cells, v):
 
 @kernel
 def momentum_rate(terms, u, body_velocity):
-    """r (N, 3) [N] and load (n_bodies, 6) [N, N m].  terms: ViscousTerms."""
-    node_drag = terms.node_drag
+    """r (N, 3) [N] and load (n_bodies, 6) [N, N m]: what acts on the nodes beyond the surface is handed on to those in
+    the water.  terms: ViscousTerms."""
     r, load = unheld_rate(terms, u, body_velocity)
-    for i in range(u.shape[0]):
-        if node_drag[i] != 0.0:
-            for k in range(3):
-                r[i, k] -= node_drag[i] * u[i, k]
-    _restrict(r, terms.held, terms.projector, terms.idle)
+    hold_rate(terms, u, r)
+    hand_in(terms, r)
     return r, load
 
 
 @kernel
+def hold_rate(terms, u, r):
+    """Add the drag of the sides of the tank to r (N, 3) [N], and set what they constrain to zero, in place."""
+    node_drag = terms.node_drag
+    for i in range(u.shape[0]):
+        if node_drag[i] != 0.0:
+            for k in range(3):
+                r[i, k] -= node_drag[i] * u[i, k]
+    restrict(r, terms.held, terms.projector, terms.idle)
+
+
+@kernel
 def unheld_rate(terms, u, body_velocity):
-    """r and load as of `momentum_rate`, without the drag and the constraints of the sides of the tank."""
+    """r and load as of `momentum_rate`, where the stresses act, without the drag and the constraints of the sides of
+    the tank."""
     cells, weight, hats, edges = terms.cells, terms.weight, terms.hats, terms.edges
     r = np.zeros_like(u)
     load = np.zeros_like(body_velocity)
@@ -149,7 +161,7 @@ def unheld_rate(terms, u, body_velocity):
 
 
 @kernel
-def _restrict(r, node, projector, idle):
+def restrict(r, node, projector, idle):
     """Set to zero the components that the sides of the tank constrain, in place."""
     moved = np.empty(3)
     for s in range(node.shape[0]):
@@ -165,6 +177,23 @@ def _restrict(r, node, projector, idle):
 
 
 @kernel
+def hand_in(terms, r):
+    """Pass r (N, 3) of the nodes beyond the surface on to those in the water, as far as sides let these go, in
+    place."""
+    if len(terms.beyond.nodes) > 0:
+        hand_on(terms.beyond, r)
+        restrict(r, terms.held, terms.projector, terms.idle)
+
+
+@kernel
+def _follow(terms, d):
+    """Give the nodes beyond the surface what (1) of `beyond.py` gives them, in place; d (N, 3)."""
+    if len(terms.beyond.nodes) > 0:
+        follow(terms.beyond, d)
+        restrict(d, terms.held, terms.projector, terms.idle)
+
+
+@kernel
 def preconditioner(terms, mass, tau):
     """1 / diagonal (N,) of M + τ K without the flux terms; 0 on idle nodes."""
     cell_list, weight, idle = terms.cells, terms.weight, terms.idle
@@ -172,6 +201,7 @@ def preconditioner(terms, mass, tau):
     cell, hat, area = terms.walls.cell, terms.walls.hat, terms.walls.area
     nitsche, drag = terms.walls.nitsche, terms.walls.drag
     diagonal = mass + tau * terms.node_drag
+    _hand_on_mass(terms.beyond, mass, diagonal)
     for s in range(cell_list.shape[0]):
         e = cell_list[s]
         for a in range(4):
@@ -188,6 +218,14 @@ def preconditioner(terms, mass, tau):
         if not idle[i] and diagonal[i] > 0.0:
             inverse[i] = 1.0 / diagonal[i]
     return inverse
+
+
+@kernel
+def _hand_on_mass(beyond, mass, total):
+    """Add the mass (N,) of the nodes beyond the surface to the total (N,) of those that they change with, in place."""
+    for s in range(len(beyond.nodes)):
+        for t in range(beyond.start[s], beyond.start[s + 1]):
+            total[beyond.wet[t]] += beyond.share[t] * mass[beyond.nodes[s]]
 
 
 @kernel
@@ -244,15 +282,18 @@ def implicit_change(terms, mass, tau, right, bodies, body_right, tolerance, most
     D, R = np.zeros_like(body_right), body_right.copy()
     z, Z = _scaled(inverse, r), _answers(body_inverse, R)
     p, P = z.copy(), Z.copy()
+    _follow(terms, p)
     rz = np.sum(r * z) + np.sum(R * Z)
     first = rz
     count = 0
     while rz > tolerance * tolerance * first and count < most:
-        change, load = momentum_rate(terms, p, P)
+        change, load = unheld_rate(terms, p, P)
+        hold_rate(terms, p, change)
         Ap, AP = np.empty_like(p), np.zeros_like(P)
         for i in range(p.shape[0]):
             for k in range(3):
                 Ap[i, k] = mass[i] * p[i, k] - tau * change[i, k]
+        hand_in(terms, Ap)
         for b in range(len(moves)):
             if moves[b]:
                 AP[b] = body_mass[b] @ P[b] - tau * load[b]
@@ -264,6 +305,7 @@ def implicit_change(terms, mass, tau, right, bodies, body_right, tolerance, most
         z, Z = _scaled(inverse, r), _answers(body_inverse, R)
         before, rz = rz, np.sum(r * z) + np.sum(R * Z)
         p = z + (rz / before) * p
+        _follow(terms, p)
         P = Z + (rz / before) * P
         count += 1
     return d, D, count, np.sqrt(rz / first) if first > 0.0 else 0.0

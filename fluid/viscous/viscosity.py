@@ -14,7 +14,8 @@ Bodies that move freely are part of the stage, with their own mass and the motio
 step would give them (`FreeBodies`): so the momentum that a light body and the water that sticks to it exchange does not
 depend on dt.
 
-M: the water at each node, ∫_{φ<0} ρ N_i dV; cells count by their water.  No traction on the free surface (natural).
+M: the water at each node, ∫_{φ<0} ρ N_i dV; cells count by their water.  No traction on the free surface (natural);
+dry nodes of cells that the surface cuts change with those in the water (`beyond`).
 Sides of the tank: no-slip holds u = 0 on their nodes; friction acts on their nodes.  On open sides only the normal
 velocity changes: the tangential one is left unchanged, since otherwise the missing ∇uᵀ n would bend a parallel stream.
 """
@@ -30,7 +31,16 @@ from fluid.domain.moments import wet_fraction
 from fluid.domain.physical_domain import hat_values
 from fluid.numerics.solve import NotConverged
 from fluid.numerics.sums import momentum_of
-from fluid.viscous.kernels import ViscousTerms, Walls, implicit_change, momentum_rate, unheld_rate
+from fluid.viscous.beyond import Beyond, beyond_surface, hand_on
+from fluid.viscous.kernels import (
+    ViscousTerms,
+    Walls,
+    hold_rate,
+    implicit_change,
+    momentum_rate,
+    restrict,
+    unheld_rate,
+)
 from fluid.viscous.strain import StrainEdges, edges_of
 
 GAMMA = 1.0 - np.sqrt(0.5)
@@ -43,8 +53,9 @@ STEEPEST = 1e6
 @dataclass(frozen=True, kw_only=True)
 class ViscousChange:
     """velocity change δ (N, 3) [m/s] · load (n_bodies, 6) [N, N m], mean over the step · energy [J]: work of the
-    stresses on the water, their impulse times the mean of the velocities at both ends of the step (at the velocities of
-    the two stages it is not what the water gains: a cube that is spun in a thick liquid gained 3 % of its energy so)
+    stresses on the water, their impulse where they act times the mean of the velocities at both ends of the step (at
+    the velocities of the two stages it is not what the water gains: a cube that is spun in a thick liquid gained 3 % of
+    its energy so)
     · iterations · tank (6,) [N, N m] of the sides of the tank on the water,
     mean over the step."""
 
@@ -143,14 +154,16 @@ class Viscosity:
         moved, lead = dt * bodies.acceleration, (1.0 - GAMMA) / GAMMA
         half_way, V_half_way = water.velocity + GAMMA * (w - water.velocity), V + GAMMA * moved
         first, first_V, n1 = self._stage(terms, mass, bodies, dt, half_way, V_half_way)
-        load1, tank1 = _acting(water, terms, half_way + first, V_half_way + first_V)
+        rate1, load1, tank1 = _acting(water, terms, half_way + first, V_half_way + first_V)
         start, V_start = w + lead * first, V + moved + lead * first_V
         second, second_V, n2 = self._stage(terms, mass, bodies, dt, start, V_start)
         u = start + second
-        load2, tank2 = _acting(water, terms, u, V_start + second_V)
-        load, tank = ((1.0 - GAMMA) * one + GAMMA * two for one, two in ((load1, load2), (tank1, tank2)))
+        rate2, load2, tank2 = _acting(water, terms, u, V_start + second_V)
+        both = (rate1, rate2), (load1, load2), (tank1, tank2)
+        rate, load, tank = ((1.0 - GAMMA) * one + GAMMA * two for one, two in both)
         change = u - w
-        energy = 0.5 * float(mass @ (change * (water.velocity + u)).sum(axis=1))
+        energy = 0.5 * dt * float((rate * (water.velocity + u)).sum(axis=1).sum())
+        tank += _held_back(water, terms, mass[:, None] * change / dt - rate)
         return ViscousChange(change=change, load=load, energy=energy, iterations=n1 + n2, tank=tank)
 
     def _stage(self, terms, mass, bodies, dt, start, V):
@@ -196,7 +209,14 @@ class Viscosity:
             idle=idle,
             hats=t.hats,
             edges=StrainEdges(*edges_of(cells, weight, t.cells, len(phi))),
+            beyond=self._beyond(t, phi, wet, idle),
         )
+
+    def _beyond(self, t, phi, wet, idle) -> Beyond:
+        """The nodes that change with the water. Friction alone acts on wet nodes."""
+        if self.parameters.viscosity == 0.0:
+            return Beyond.none()
+        return beyond_surface(t, np.flatnonzero((phi >= 0.0) & ~idle), wet & ~idle)
 
     def _wall_terms(self, water, phi, columns, w, wet_cells, share):
         """The polygons that the water touches, with λ and C; λ is larger where the free surface leaves less water in a
@@ -218,9 +238,24 @@ class Viscosity:
 
 
 def _acting(water, terms, u, V):
-    """Loads (n_bodies, 6) of the velocity u (N, 3) on bodies with the velocity V, and (6,) of the sides of the tank on
-    the water."""
-    held, load = momentum_rate(terms, u, V)
-    free, _ = unheld_rate(terms, u, V)
-    arm = water.topology.nodes - water.reference
-    return load, momentum_of(np.ones(len(u)), held - free, arm)
+    """What acts on the nodes (N, 3) [N] at the velocity u (N, 3), as far as sides let them go; the loads (n_bodies, 6)
+    on bodies with the velocity V, and (6,) of the sides of the tank on the water."""
+    free, load = unheld_rate(terms, u, V)
+    held = free.copy()
+    hold_rate(terms, u, held)
+    return held, load, _moments(water, held - free)
+
+
+def _held_back(water, terms, missing):
+    """The force and moment (6,) of the sides of the tank on nodes that those beyond the surface have handed on to what
+    they miss (N, 3) [N] of their change."""
+    if len(terms.beyond.nodes) == 0:
+        return np.zeros(6)
+    hand_on(terms.beyond, missing)
+    left = missing.copy()
+    restrict(left, terms.held, terms.projector, terms.idle)
+    return _moments(water, missing - left)
+
+
+def _moments(water, force):
+    return momentum_of(np.ones(len(force)), force, water.topology.nodes - water.reference)

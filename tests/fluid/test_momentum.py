@@ -95,7 +95,8 @@ def test_without_a_surface_the_scheme_adds_nothing_to_the_pressure():
     "walls", [{"viscosity": 1.0, "walls": "no-slip"}, {"walls": "friction", "roughness": 0.01}]
 )
 def test_wall_shear_is_shared_by_bodies_and_sides(walls):
-    """What viscosity takes out of the water, bodies and sides get, as far as its linear solver goes (1e-7)."""
+    """What viscosity takes out of the water, bodies and sides get, as far as its linear solver goes (1e-7). What acts
+    beyond the surface acts on the nodes beside it, with a moment that differs by up to 2 % of the shear."""
     water = tank(SIZE, 0.0625, column(0.5, 0.4), tilted_boxes(), **walls)
     largest = 0.0
     for _ in range(20):
@@ -104,7 +105,10 @@ def test_wall_shear_is_shared_by_bodies_and_sides(walls):
         lines = water.report.momentum.lines
         shear = np.linalg.norm(lines["tank_shear"][:3])
         largest = max(largest, shear)
-        assert np.abs(lines["shear_solve"]).max() < 1e-5 * max(shear, 1e-3)
+        assert np.abs(lines["shear_solve"][:3]).max() < 1e-5 * max(shear, 1e-3)
+        assert np.abs(lines["shear_solve"][3:]).max() < (0.02 if "viscosity" in walls else 1e-5) * max(
+            shear, 1e-3
+        )
     assert largest > 1e-3
 
 

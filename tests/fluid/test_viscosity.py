@@ -13,6 +13,7 @@ from fluid.readings import gauges
 from fluid.step.parameters import WaterParameters
 from fluid.step.water import Water
 from fluid.surface.extrapolation import extend_velocity
+from fluid.viscous.beyond import Beyond
 from fluid.viscous.kernels import momentum_rate
 from fluid.viscous.viscosity import Viscosity
 from fluid.viscous.wall_friction import Columns, WallFriction, log_law
@@ -116,7 +117,10 @@ def test_what_the_water_loses_the_body_gets(walls, more):
     stage = Viscosity(water.parameters)
     terms = stage._terms(water, water.level_set, DENSITY * water.nodal_water, u, 0.1)
     free = terms._replace(
-        held=np.zeros(0, np.int64), projector=np.zeros((0, 3, 3)), idle=np.zeros(len(u), bool)
+        held=np.zeros(0, np.int64),
+        projector=np.zeros((0, 3, 3)),
+        idle=np.zeros(len(u), bool),
+        beyond=Beyond.none(),  # to hand forces on keeps them, but not their moments
     )
     rate, load = momentum_rate(free, u, water.body_velocity)
     arm = water.topology.nodes - water.domain.body_centre[0]
