@@ -9,6 +9,7 @@ import numpy as np
 from array_types import Array
 from coupler.case.case import Case
 from coupler.case.inflow_records import levels_of, record_of
+from coupler.geometry.solid_ground import raised_by
 from coupler.geometry.start_surfaces import surface_of
 from coupler.geometry.tank_mesh import bed_along, bed_under, floor_along, mean_bed, mesh_of, on_side
 from coupler.geometry.terrain.land import friction_of
@@ -69,7 +70,7 @@ def water_of(case: Case, structure, solids, mesh=None):
         parameters,
         opened,
         smooth,
-        _flows(case, mesh),
+        _flows(case, mesh, solids),
         velocity=velocity,
         **_trapped_air(w.air, structure, immersion.domain),
     )
@@ -188,7 +189,7 @@ def _outward(side: str) -> Array:
     return direction
 
 
-def _flows(case: Case, mesh):
+def _flows(case: Case, mesh, solids):
     """Inflows and seas; None, and their code is not loaded, without any."""
     if not (case.water.inflow or case.water.sea):
         return None
@@ -198,11 +199,12 @@ def _flows(case: Case, mesh):
     sides = []
     for spec in case.water.inflow:
         flow = flow_of(case, spec)
-        flow = _absorbing(case, spec, flow, mesh) if spec.absorbs else flow
+        flow = _absorbing(case, spec, flow, mesh, solids) if spec.absorbs else flow
         sides.append(Side.of(mesh, sides_named([spec.side], mesh), flow))
     for sea in case.water.sea:
         if sea.absorbs:
-            flow = _absorbing(case, sea, waves.tide(-_outward(sea.side), sea_level(sea)), mesh)
+            tide = waves.tide(-_outward(sea.side), sea_level(sea))
+            flow = _absorbing(case, sea, tide, mesh, solids)
             sides.append(Side.of(mesh, sides_named([sea.side], mesh), flow))
             continue
         sides.append(Side.of(mesh, sides_named([sea.side], mesh), level=sea_level(sea)))
@@ -222,8 +224,9 @@ def sea_level(sea):
     )
 
 
-def _absorbing(case: Case, spec, flow, mesh):
-    """The flow of an absorbing side; the outgoing wave is read one cell inside, at columns of the mesh.
+def _absorbing(case: Case, spec, flow, mesh, solids=()):
+    """The flow of an absorbing side; the outgoing wave is read one cell inside, at columns of the mesh, over what
+    solids leave of the depth.
 
     Raises AbsorbingSideBlocked."""
     from fluid.sides.absorbing import Absorber
@@ -246,7 +249,8 @@ def _absorbing(case: Case, spec, flow, mesh):
             f"side {spec.side} absorbs, but {mesh.spacing:.3g} m inside of it, where the water is read, the tank has "
             f"no room for water: the ground reaches its upper side; let another side absorb, or move this one"
         )
-    return Absorber(flow, -_outward(spec.side), places[there], bed[there], case.case.gravity).as_flow()
+    places, bed = places[there], raised_by(bed[there], places[there], solids)
+    return Absorber(flow, -_outward(spec.side), places, bed, case.case.gravity).as_flow()
 
 
 def instants_of(case: Case, spec) -> np.ndarray:

@@ -24,14 +24,17 @@ def level(water, xy) -> float:
     return float(levels(water, [xy])[0])
 
 
-def levels(water, places) -> Array:
-    """Depths (m,) [m] of water over places (m, 2) [m], each as of `level`."""
+def levels(water, places, foot=None) -> Array:
+    """Depths (m,) [m] of water over places (m, 2) [m], each as of `level`; foot (m,) [m]: heights z from which on water
+    counts there, where they are known: in the seam of two solids a line may run beside both. None: from the lowest."""
     places = np.asarray(places, float)
+    foot = np.full(len(places), -np.inf) if foot is None else foot
     low, high = water.mesh.bounds[:, 2]
     count = int(np.ceil(SAMPLES_PER_CELL * (high - low) / water.mesh.finest)) + 1
     z = np.linspace(low, high, count)
     lines = np.column_stack([np.repeat(places, count, axis=0), np.tile(z, len(places))])
     phi = Places.of(water, lines, beyond=True).read(water.level_set).reshape(-1, count)
+    phi[z < foot[:, None]] = np.nan
     wet = np.fmax(-phi, 0.0)  # NaN inside solids and outside a mesh of another shape than a box
     length = np.abs(np.diff(phi, axis=1))
     share = np.divide(np.abs(np.diff(wet, axis=1)), length, out=(wet[:, 1:] > 0.0) * 1.0, where=length > 0.0)
@@ -41,10 +44,10 @@ def levels(water, places) -> Array:
     depth = np.array(
         [(z[1] - z[0]) * row[here].sum() for row, here in zip(np.where(both, 1.0, share), open_water)]
     )
-    return depth + _beside_solids(water, places, z, phi, is_open)
+    return depth + _beside_solids(water, places, foot, z, phi, is_open)
 
 
-def _beside_solids(water, places, z, phi, is_open) -> Array:
+def _beside_solids(water, places, foot, z, phi, is_open) -> Array:
     """Wet length (m,) [m] between the last sample in a solid, or below the bed, and the first in the open; where the
     solid ends is found by halving."""
     found = np.zeros(len(places))
@@ -60,6 +63,7 @@ def _beside_solids(water, places, z, phi, is_open) -> Array:
         # together with the samples in the open: points that all lie outside the mesh would not be looked up
         points = np.column_stack([np.tile(places[row], (2, 1)), np.concatenate([middle, z[inner]])])
         free = np.isfinite(Places.of(water, points, beyond=True).read(water.level_set)[: len(row)])
+        free &= middle >= foot[row]
         inside, outside = np.where(free, middle, inside), np.where(free, outside, middle)
     np.add.at(found, row, np.abs(0.5 * (inside + outside) - z[inner]))
     return found

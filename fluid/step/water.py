@@ -275,7 +275,7 @@ class Water:
         for absorber in () if self.sides is None else self.sides.absorbers():
             from fluid.readings.gauges import levels, velocity
 
-            depths = levels(self, absorber.places)
+            depths = levels(self, absorber.places, absorber.bed)
             wet, velocities = depths > 0.0, np.zeros((len(depths), 3))
             if wet.any():
                 velocities[wet] = velocity(self, absorber.points(depths)[wet])
