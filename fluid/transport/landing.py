@@ -14,10 +14,10 @@ dissipates next to nothing else, and gained up to a quarter of what it released.
 At a dry node of a side φ is therefore carried by the velocity of the water continued to there as if the side were not
 (`free_velocity`), by the part of it into the side as much as viscosity diffuses momentum within a cell:
 
-    u = P u_c + (1 - R(|u_c| h/ν; 10, 100)) (I - P) u_c,      R(x; b, c) = (x - b)/(c - b) within 0 and 1   (2)
+    u = P u_c + (1 - R(|u_c| h/ν; 10, 100)) (I - P) u_c                                                     (2)
 
-with the projector P onto the directions along the side; R as where the momentum of the volume takes over in fast water
-(`surface_momentum.py`).  A side that is wet to beside the node has no velocity into it, and neither has u_c.
+with the projector P onto the directions along the side, R(x; b, c) = (x - b)/(c - b) within 0 and 1.  A side that is
+wet to beside the node has no velocity into it, and neither has u_c.
 """
 
 from __future__ import annotations
@@ -26,7 +26,9 @@ import numpy as np
 
 from fluid.surface.extrapolation import LINEAR_LAYERS, continued
 from fluid.transport.advection import transport
-from fluid.transport.surface_momentum import RESOLVED
+
+RESOLVED = (10.0, 100.0)
+"""|u| h/ν between which this ends: faster liquids splash, and what that dissipates hides the lag."""
 
 
 def gained(water, dt: float, u, phi):

@@ -18,8 +18,9 @@ In fast water w = R(|u|/√(g h); 1, 3), h the size of the cells and R(x; b, c) 
 where water is faster than the shallow-water wave of one cell, its motion within a cell is governed by momentum.  Slower
 water conserves its head, and its waves are not damped by fluxes that are of first order at their crests.  The fluxes
 act like a viscosity |u| h/2.  In liquids whose viscosity ν is not far below that, semi-Lagrangian transport loses no
-momentum within a cell that viscosity would not have diffused: there w is multiplied with R(|u| h/ν; 10, 100), which is
-1 for water on cells of a millimetre and more.
+momentum within a cell that viscosity would not have diffused: while the liquid crosses a cell, in h/|u|, viscosity
+spreads momentum over sqrt(ν h/|u|). There w is multiplied with R(|u| h/ν; 10, 30), from a third of a cell down to a
+fifth; it is 1 for water on cells of a millimetre and more.
 
 In slow water w is 0 deeper than 3 h and within two layers around cut cells, where pressure is what stops water, and in
 full between the surface and 2 h, within RINGS nodes around a jump: a node with water s V, less fast than the water that
@@ -53,8 +54,9 @@ SHALLOW, DEEP = 2.0, 3.0
 RINGS = 4
 FAST = (1.0, 3.0)
 """Speeds in √(g h) between which velocity goes over to the momentum of the volume anywhere."""
-RESOLVED = (10.0, 100.0)
-"""|u| h/ν between which that sets in."""
+RESOLVED = (10.0, 30.0)
+"""|u| h/ν between which that sets in. Up to 100, the tip of a column of a thick liquid followed the paths, and gained
+energy as that of water does without the momentum of the volume."""
 DROP, LOST, FULL = (0.1, 0.3), (0.5, 0.9), (0.25, 0.75)
 """Where the ramps of (3) begin and end."""
 
