@@ -68,10 +68,29 @@ def _dry(first, last, cells, is_cut, holding):
 def _holding(d, t, phi, dry):
     """(M,) bool: cells with φ < dry at a corner outside the solids, or at a corner of a wetted polygon.
 
-    These are all corners of the fluid part, on which φ is linear."""
-    return _lowest_below(
+    These are all corners of the fluid part, on which φ is linear; but not where thresholds of the covers part the water
+    of a cell: a part may lie on no body there. The corners of such parts are those of the tetrahedra that fill them."""
+    holds = _lowest_below(
         d.face_cell, d.face_corners, t.nodes, t.cells, t.parent, t.gradients, t.covered, phi, dry
     )
+    if d.memory.connection is not None and d.memory.connection.face > 0.0:
+        bare = d.is_cut.copy()
+        bare[d.face_cell] = False
+        _bare_below(np.flatnonzero(bare), t.cells, d.fan_start, d.fan_corners, phi, dry, holds)
+    return holds
+
+
+@kernel
+def _bare_below(bare, cells, fan_start, corners, phi, dry, holds):
+    """Set holds (M,) in place for the cells bare (n,) with φ < dry at a corner of a tetrahedron of theirs; corners
+    (T, 4, 4): barycentric coordinates."""
+    for e in bare:
+        for s in range(fan_start[e], fan_start[e + 1]):
+            for q in range(4):
+                level = 0.0
+                for a in range(4):
+                    level += corners[s, q, a] * phi[cells[e, a]]
+                holds[e] = holds[e] or level < dry
 
 
 @kernel
