@@ -132,7 +132,9 @@ def _run_out(case: Case) -> Iterator[Problem]:
     stand alone in front of an empty tank.
 
     An open side lets out q = 8/27 sqrt(g d³) of a depth d over each metre of it (Ritter's wave behind a dam that is
-    gone): the depth of a tank of area A with open sides of width B falls as d = d₀ (1 + 4/27 sqrt(g d₀) B t/A)⁻²."""
+    gone): the depth of a tank of area A with open sides of width B falls as d = d₀ (1 + 4/27 sqrt(g d₀) B t/A)⁻² within
+    each of the intervals between which the wave brings or takes water. An N-wave that came with its crest first took
+    its trough out of a tank whose water had run out meanwhile (3.7 % of the volume)."""
     tank = case.tank
     if not tank.is_box or case.water.sea:
         return
@@ -145,17 +147,29 @@ def _run_out(case: Case) -> Iterator[Problem]:
         depth = spec.level - tank.lower[2] if spec.kind in ("solitary", "n-wave") else 0.0
         if depth <= 0.0 or spec.absorbs:
             continue
-        rate = 4.0 / 27.0 * math.sqrt(case.case.gravity * depth) * width / area
-        left = depth / (1.0 + rate * case.time.end) ** 2 + _Entered.of(case, spec).largest / area
-        if left < LEFT_TO_RUN_ON * depth:
-            end = (LEFT_TO_RUN_ON**-0.5 - 1.0) / rate
+        times, depths = _depths_left(depth, _Entered.of(case, spec), area, width, case.case.gravity)
+        if depths.min() < LEFT_TO_RUN_ON * depth:
+            end, left = times[depths < LEFT_TO_RUN_ON * depth][0], depths.min()
             yield (
                 ("water", "inflow", i),
                 f"is a wave on still water {depth:.3g} m deep, which runs out by {' and '.join(open_sides)} "
-                f"(tank.open): about {left:.3g} m are left at the end of the run ({case.time.end:g} s), while the "
+                f"(tank.open): about {left:.3g} m are left before the end of the run ({case.time.end:g} s), while the "
                 f"surface that is given at {spec.side} stands; give {open_sides[0]} to a sea of that level "
                 f"(water.sea) or close it, or end before {end:.2g} s",
             )
+
+
+def _depths_left(
+    depth: float, entered: _Entered, area: float, width: float, gravity: float
+) -> tuple[Array, Array]:
+    """Times [s] and mean depths [m] of a tank of this area [m²] that begins with a depth [m] and runs out by open sides
+    of this width [m], while a wave brings and takes water."""
+    rate = 4.0 / 27.0 * math.sqrt(gravity) * width / area
+    depths = [depth]
+    for step, brought in zip(np.diff(entered.time), np.diff(entered.volume)):
+        left = depths[-1] / (1.0 + rate * math.sqrt(depths[-1]) * step) ** 2
+        depths.append(max(left + brought / area, 0.0))
+    return entered.time, np.array(depths)
 
 
 def bore_speed(ahead: float, behind: float, gravity: float) -> float:

@@ -172,6 +172,28 @@ def test_a_wave_whose_still_water_runs_out_is_refused():
     assert found(9.0, ["z+", "y+"], sea=[{"side": "x+", "level": 0.5}]) == []
 
 
+def test_an_n_wave_whose_trough_comes_when_the_water_has_run_out_is_refused():
+    """Its crest keeps the tank at half of its depth until 2 s, and its trough leaves less than a quarter at 2.7 s; as
+    long as what the crest brought counted as there until the end, two fifths were left."""
+    wave = {
+        "kind": "n-wave",
+        "side": "x-",
+        "level": 0.5,
+        "height": 0.1,
+        "middle": 2.0,
+        "leading": "elevation",
+    }
+    fill = [{"lower": [0, 0, 0], "upper": [1, 0.2, 0.5]}]
+    tank = TANK | {"upper": [1, 0.2, 1], "open": ["z+", "x+"]}
+
+    def found(end):
+        read = case({"inflow": [wave], "fill": fill}, tank=tank, time={"end": end})
+        return [text for path, text in problems(read) if path == ("water", "inflow", 0)]
+
+    assert found(2.2) == []
+    assert "runs out by x+ (tank.open)" in found(4.0)[0]
+
+
 def test_a_side_that_absorbs_is_three_cells_from_the_one_opposite_and_a_sea_before_dry_cells():
     def found(width, absorbs=True, filled=0.5):
         sea = {"side": "y-", "level": 0.5, "absorbs": absorbs}
