@@ -152,8 +152,7 @@ def predicted(water, dt: float) -> PressureProblem:
     beside = float(displaced.sum()) + in_films[0]
     calm = water.calm(dt, crossing)
     held = added(carried, displaced)
-    walls, _ = water.beside_bodies
-    phi, on_walls = air_on_walls(water.topology, phi, held, water.ventilated, walls)
+    phi, on_walls = air_on_walls(water.topology, phi, held, water.ventilated, water.on_one_side)
     surface = _new_surface(water, calm, phi, held, conserved + beside)
     if found.velocity is not None:
         graph = water.graph_for(water.listed)

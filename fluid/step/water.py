@@ -31,6 +31,7 @@ from fluid.step.potential import level_energy, potential_energy
 from fluid.step.predictor import kick_factor, kicked, predicted
 from fluid.step.report import StepReport
 from fluid.step.time_step import LEAST_COUNTED, LEAST_GATHERED, fastest_wet, gathered, pace
+from fluid.surface.cavities import on_one_side
 from fluid.surface.extrapolation import BAND, fill_missing
 from fluid.surface.level_set import FAR, drain_films, no_steeper, redistance
 from fluid.surface.volume import edge_flux, nodal_volume, renumbering
@@ -477,6 +478,8 @@ class Water:
         beside = np.flatnonzero(np.diff(self.coupling.indptr))
         self.beside_bodies = beside, self.coupling[beside].T
         """Nodes (n,) with an entry in the coupling, and their rows of it as columns."""
+        self.on_one_side = on_one_side(domain, beside)
+        """Those of them (n,) that reach walls from one side alone."""
         self.walls = self._sides.on_copies(domain.parent_node)
         self.on_sides = self._on_sides[domain.parent_node]
         """(N,) bool: nodes on the sides of the tank."""

@@ -12,7 +12,10 @@ There φ is therefore that of a layer of air on the wall, as thick as the volume
     φ_i = (1 - √s) h,    s = W_i/V_i,
 
 since a layer of the thickness d leaves the share (1 - d/h)² of the hat function of a node on a plane wall. Such nodes
-count as reached by air in the next step, also while they are dry."""
+count as reached by air in the next step, also while they are dry.
+
+A node whose hat function reaches both sides of a wall thinner than a cell has one φ and one volume for both (single
+covers): where one side is dry, the volume falls short of φ without any air on the other. Such nodes are left out."""
 
 from __future__ import annotations
 
@@ -20,11 +23,29 @@ import numpy as np
 
 from array_types import Array, Bools
 from fluid.domain.moments import nodal_water
+from fluid.domain.physical_domain import hat_values
 from fluid.numerics.fields import copied
 
 LEAST_LACKING = 0.05
 """Share of what a node can hold by which its volume must fall short of that of φ: a layer of a fortieth of a cell.
 Volume and level set differ by some per cent wherever the surface moves fast."""
+
+ONE_SIDED = 0.5
+"""Length of the mean normal of the walls that a hat function reaches from which these count as one side: 1 on a plane
+wall, 0.7 at a square edge, 0 on both sides of a thin plate."""
+
+
+def on_one_side(domain, nodes) -> Array:
+    """Those of the nodes (n,) whose hat functions reach walls of solids from one side."""
+    cells = domain.cells[domain.face_cell]
+    weight = domain.face_area[:, None] * hat_values(domain.nodes[cells], domain.face_centroid[:, None])[:, 0]
+    corner, count = cells.ravel(), len(domain.nodes)
+    area = np.bincount(corner, weight.ravel(), count)[nodes]
+    along = [
+        np.bincount(corner, (weight * normal[:, None]).ravel(), count)[nodes]
+        for normal in domain.face_normal.T
+    ]
+    return nodes[np.linalg.norm(along, axis=0) >= ONE_SIDED * area]
 
 
 def air_on_walls(topology, phi, water, reached, walls) -> tuple[Array, Bools | None]:
@@ -32,7 +53,7 @@ def air_on_walls(topology, phi, water, reached, walls) -> tuple[Array, Bools | N
     one; φ itself and None where there is none.
 
     water (N,) [m³]: volume of the nodes · reached (N,) bool: nodes with the pressure of the air in the last step, or
-    with a layer of air · walls (n,): nodes whose hat functions reach a wall of a solid."""
+    with a layer of air · walls (n,): nodes whose hat functions reach walls of solids from one side."""
     t = topology
     near = walls[reached[walls] & t.active[walls] & (phi[walls] < t.node_size[walls])]
     if len(near) == 0:

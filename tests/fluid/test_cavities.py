@@ -8,7 +8,7 @@ from fluid.domain.moments import nodal_water
 from fluid.domain.physical_domain import cut_domain
 from fluid.domain.topology import Topology
 from fluid.mesh.background import box_mesh
-from fluid.surface.cavities import LEAST_LACKING, air_on_walls
+from fluid.surface.cavities import LEAST_LACKING, air_on_walls, on_one_side
 
 CELL = 0.1
 
@@ -55,3 +55,18 @@ def test_walls_that_lack_no_water_or_that_no_air_reaches_keep_the_level_set(over
     found, layer = air_on_walls(t, phi, less, reached, top)
     assert found is phi
     assert layer is None
+
+
+@pytest.mark.parametrize(("thickness", "one_sided"), [(0.25 * CELL, False), (3.0 * CELL, True)])
+def test_nodes_on_both_sides_of_a_thin_wall_are_left_out(thickness, one_sided):
+    """One level set for both sides: the water of a full side and a dry one falls short of it, without a layer of air.
+    Waves lost their load on the houses of a town whose walls are a sixth of a cell thick."""
+    mesh = box_mesh((0.0, 0.0, 0.0), (1.0, 0.8, 0.8), CELL)
+    wall = ConvexBodies.boxes([[0.53, 0.4, 0.4]], [[0.5 * thickness, 0.5, 0.5]])
+    domain = cut_domain(mesh, wall)
+    nodes = np.unique(domain.cells[domain.face_cell])
+    inside = (np.abs(domain.nodes[nodes][:, 1:] - 0.4) < 0.25).all(axis=1)
+    nodes = nodes[inside]
+    found = on_one_side(domain, nodes)
+    assert len(nodes) > 0
+    assert len(found) == (len(nodes) if one_sided else 0)
