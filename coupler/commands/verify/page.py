@@ -24,7 +24,7 @@ NOTES = {
     "in the pressure beyond the surface ([theory](theory.md#22-step)) it is 0.0528 ± 0.0033 m, within the "
     "limit in three of 18: no difference within the scatter.",
     "P40": "P3 is 1.2 cells below the edge of the box. With one unknown for both faces of the edge it gives 0.45 to "
-    "0.81 of the measured impulse on cells of 4.2 to 6.3 cm, and with separate unknowns 0.71 to 0.83; the "
+    "0.81 of the measured impulse on cells of 4.2 to 6.3 cm, and with separate unknowns 0.70 to 0.84; the "
     "rest is missing in the first 40 ms. The front is late by this time according to the clock of the record, "
     "which is ahead of a dam that vanishes at t = 0, and because the tip of the front is thinner than a cell "
     "([water](water.md#against-measurements)).",
