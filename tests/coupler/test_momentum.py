@@ -185,7 +185,7 @@ def test_a_block_that_strikes_a_held_one_is_stopped_by_it():
 
 
 def test_what_closes_narrow_openings_has_a_line():
-    """A pillar in the water of coarse cells: what closes the openings beside it holds the water."""
+    """A block in falling water of coarse cells: what closes the openings beside it holds the water."""
     errors, held = [], []
 
     def each(coupling, record):
@@ -197,7 +197,7 @@ def test_what_closes_narrow_openings_has_a_line():
         "water": {
             "covers": "multiple",
             "openings": "wide",
-            "fill": [{"lower": [0, 0, 0], "upper": [1, 1, 0.6]}],
+            "fill": [{"lower": [0, 0, 0], "upper": [0.6, 1, 0.8]}],
         },
         "solid": [{"name": "b", "centre": [0.5, 0.5, 0.5], "size": [0.3, 0.3, 0.3]}],
     }

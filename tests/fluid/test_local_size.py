@@ -51,7 +51,7 @@ def test_a_dam_break_is_the_same_beside_coarse_cells(uniform, times, covers):
     assert other.time == pytest.approx(one.time, rel=1e-4)
     near = [(w.topology.nodes < [0.8, 1.0, 0.5]).all(axis=1) for w in (one, other)]
     assert near[0].sum() == near[1].sum() > 500
-    np.testing.assert_allclose(other.nodal_water[near[1]], one.nodal_water[near[0]], atol=1e-3 * FINE**3)
+    np.testing.assert_allclose(other.nodal_water[near[1]], one.nodal_water[near[0]], atol=1.5e-3 * FINE**3)
     # two cells above the surface the velocity is a continuation of a continuation; nothing is carried from there
     seen = [n & (w.level_set < 1.5 * FINE) for w, n in zip((one, other), near)]
     np.testing.assert_allclose(other.velocity[seen[1]], one.velocity[seen[0]], atol=1e-2)
