@@ -36,7 +36,8 @@ wall, 0.7 at a square edge, 0 on both sides of a thin plate."""
 
 
 def on_one_side(domain, nodes) -> Array:
-    """Those of the nodes (n,) whose hat functions reach walls of solids from one side."""
+    """Those of the nodes (n,) whose hat functions reach walls of solids from one side: where |∫ N_i n dA| is at least
+    ONE_SIDED ∫ N_i dA [m²] over the wetted polygons, by the values at their centroids. domain: PhysicalDomain."""
     cells = domain.cells[domain.face_cell]
     weight = domain.face_area[:, None] * hat_values(domain.nodes[cells], domain.face_centroid[:, None])[:, 0]
     corner, count = cells.ravel(), len(domain.nodes)
