@@ -1,4 +1,4 @@
-"""The old copy of a node that each new copy continues when solids have moved through multiple covers."""
+"""The old copy of a node or cell that each new copy continues when solids have moved through multiple covers."""
 
 from __future__ import annotations
 
@@ -44,6 +44,30 @@ def pick_old_nodes(old, new) -> Array:
     elected = _elected(voters, matched, new.cells, old.cells, new.volume, old.volume, new.parent_node, copies)
     source[chosen] = elected[chosen]
     return source
+
+
+def pick_old_cells(old, new, source) -> Array:
+    """(M_new,) row of the old cell of the same background cell that each new one continues: the copy with the most
+    corners in common, and of those the largest; -1 = none.
+
+    source (N_new,): old node of each new one (`pick_old_nodes`). A copy may be a sliver between two blocks, whose water
+    is fast and next to nothing in volume."""
+    start = first_rows(old.parent_cell, len(old.memory.mesh.cells))
+    return _continued_cells(source, new.cells, new.parent_cell, old.cells, old.volume, start)
+
+
+@kernel
+def _continued_cells(source, cells, parent, old_cells, old_volume, start):
+    found = np.full(len(cells), -1, np.int64)
+    for e in range(len(cells)):
+        most, largest = 0, 0.0
+        for o in range(start[parent[e]], start[parent[e] + 1]):
+            common = 0
+            for a in range(4):
+                common += source[cells[e, a]] == old_cells[o, a]
+            if common > most or (common == most and common > 0 and old_volume[o] > largest):
+                most, largest, found[e] = common, old_volume[o], o
+    return found
 
 
 def _near_bodies(domain):

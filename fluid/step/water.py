@@ -17,6 +17,7 @@ import numpy as np
 
 from array_types import Array, Floats, Ints
 from fluid.domain.cell_vectors import CellVectors
+from fluid.domain.continued_nodes import pick_old_cells
 from fluid.domain.layers import layers_around
 from fluid.domain.physical_domain import carry, wetted_coupling
 from fluid.domain.topology import Graph, Topology
@@ -37,7 +38,7 @@ from fluid.surface.level_set import FAR, drain_films, no_steeper, redistance
 from fluid.surface.volume import edge_flux, nodal_volume, renumbering
 from fluid.transport.surface_momentum import Carried
 from fluid.transport.swept_volume import swept
-from kernels.decorators import kernel, ranged
+from kernels.decorators import ranged
 from kernels.threads import over
 
 if TYPE_CHECKING:
@@ -359,7 +360,7 @@ class Water:
         if self.left_behind is None:
             self.left_behind = (self.velocity, self.acceleration, self.level_set, old_topology)
         self._carry_nodes(source, known)
-        self._carry_cells(old_topology)
+        self._carry_cells(old, source)
         self._find_band()
         if not np.array_equal(source, np.arange(len(source))):
             handed_on = renumbering(source, old.parent_node, domain.parent_node, self.topology.node_volume)
@@ -454,14 +455,14 @@ class Water:
             self.moved_by_end = np.zeros_like(self.moved_by_end)
         self.hold(self.velocity, self.time)
 
-    def _carry_cells(self, old: Topology):
-        """Cell fields go to the cell of the same parent (of several covers: the first)."""
-        if np.array_equal(old.background, self.topology.background):
+    def _carry_cells(self, old, source):
+        """Cell fields go on in the cells that continue the old ones; source (N,): old node of each node."""
+        cells = pick_old_cells(old, self.domain, source)
+        if np.array_equal(cells, np.arange(len(old.cells))):
             return
-        source = same_cells(old.background, self.topology.background, len(self.mesh.cells))
         for name in ("cell_velocity", "remainder", "kick_remainder"):
-            setattr(self, name, getattr(self, name).carried(source, len(old.cells)))
-        fresh = np.flatnonzero(source < 0)
+            setattr(self, name, getattr(self, name).carried(cells, len(old.cells)))
+        fresh = np.flatnonzero(cells < 0)
         of_nodes = self.velocity[self.topology.cells[fresh]].mean(axis=1)
         self.cell_velocity = self.cell_velocity.joined(fresh, of_nodes)
 
@@ -664,12 +665,3 @@ def _viscosity(parameters: WaterParameters):
     from fluid.viscous.viscosity import Viscosity
 
     return Viscosity(parameters)
-
-
-@kernel
-def same_cells(old_parent, new_parent, n_parents):
-    """Row of the old cell with the same parent for each new one (n,), -1 if none; of several the first."""
-    row = np.full(n_parents, -1, np.int64)
-    for e in range(old_parent.shape[0] - 1, -1, -1):
-        row[old_parent[e]] = e
-    return row[new_parent]
