@@ -21,8 +21,8 @@ STEP_SHARE = 0.25
 """Share of `limits.energy_error` that a single step may put out of balance."""
 HELPS = 0.5 ** (1.0 / 3.0)
 """Share to which every halving must bring what the longest attempt broke, over the same time, so that three of them
-bring it to a half: an error of the first order in the step falls to an eighth in three halvings, one that the step has
-no part in stays."""
+bring it to a half: an error of the first order in the step falls to an eighth in them, one that the step has no part
+in stays."""
 A_PART = 0.01
 """Share of the energy [J] that a step puts out of balance from which a block's missing work is named as its place."""
 ONE_PASS = "which had a single pass: raise coupling.passes"
