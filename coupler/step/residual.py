@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 DEFECT_STEPS = 20
 """Steps over which the defect is averaged: a breaking joint may spoil one of them."""
 RETRIES = 5
-"""Times that a step which failed is halved and taken again: light wedges under water that bounce on one another needed four
-(three left 55 % of the energy out of balance)."""
+"""Times that a step which failed is halved and taken again: light wedges under water that bounce on one another
+needed four (three left 55 % of the energy out of balance)."""
 SHORTEST = 0.5**RETRIES
 """Smallest share of the step asked for that a step begins with."""
 RETRY_AT = 0.6

@@ -309,7 +309,10 @@ class Water:
             self.slits = self.slits.advanced(dofs, pressure, p.weight, problem.dt, p.density)
         self.report = new.report
         late, (power, through) = self._late(problem.dt), self._rates()
-        self._late_energy += late * (power - before[0])
+        displacing = problem.coupling.nnz > 0 and self.pushed_by.any()
+        # calm water that bodies push moves with what they displace
+        of_surface = late * (1.0 - self.calm(problem.dt)) if displacing else late
+        self._late_energy += of_surface * (power - before[0])
         if self.sides is not None:
             ahead = late * float((through - before[1]) @ self.pressure)
             self.sides.add_step(problem.predicted.through, self.head(), ahead)
@@ -321,11 +324,8 @@ class Water:
         """By how much [s] the velocity that a step of dt [s] adds is ahead of the surface.
 
         The surface moves with the velocity half a step ahead, which leaves nothing. In the steps of the start it moves
-        with that at the beginning of the step, and keeps what it lacks; with implicit Euler in every step. Calm water
-        that bodies push moves with what they displace."""
-        if self.steps >= START_STEPS and self.parameters.theta < 1.0:
-            return 0.0
-        return 0.5 * dt * (1.0 - self.calm(dt)) if self.pushed_by.any() else 0.5 * dt
+        with that at the beginning of the step, and keeps what it lacks; with implicit Euler in every step."""
+        return 0.0 if self.steps >= START_STEPS and self.parameters.theta < 1.0 else 0.5 * dt
 
     def _rates(self) -> tuple[float, Array | float]:
         """Power of gravity [W], and what the velocity drives through seas (N,) [m³/s]."""
