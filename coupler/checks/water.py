@@ -179,19 +179,25 @@ def _walls(w) -> Iterator[Problem]:
 
 
 def _without_air(case: Case) -> Iterator[Problem]:
-    """Water that fills the tank up to its closed top, with a side that it may leave by: nothing can take its place."""
+    """Water that fills the tank up to its closed top, with a side or a lower sea that it may leave by: nothing can take
+    its place."""
     tank = case.tank
-    if tank.mesh is not None or not tank.open or "z+" in tank.open:
-        return
     slack = SLACK * tank.cell
+    exits = [f"open at {side}" for side in tank.open]
+    exits += [
+        f"beside a sea at z = {level_at_start(sea):g} m ({sea.side})"
+        for sea in case.water.sea
+        if level_at_start(sea) < tank.upper[2] - slack
+    ]
+    if tank.mesh is not None or not exits or "z+" in tank.open:
+        return
     for i, fill in enumerate(case.water.fill):
         low = all(end <= wall + slack for end, wall in zip(fill.lower, tank.lower))
         if low and all(end >= wall - slack for end, wall in zip(fill.upper, tank.upper)):
-            sides = " and ".join(tank.open)
             yield (
                 ("water", "fill", i),
-                f"fills the whole tank, which is open at {sides} and closed above: no air is there to take the place "
-                'of what leaves; open the top (tank.open with "z+"), or end the water below it',
+                f"fills the whole tank, which is {' and '.join(exits)} and closed above: no air is there to take the "
+                'place of what leaves; open the top (tank.open with "z+"), or end the water below it',
             )
 
 

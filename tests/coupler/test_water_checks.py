@@ -390,3 +390,21 @@ def test_a_wave_higher_than_the_sides_is_refused(kind):
 )
 def test_solids_that_are_none_are_refused(solid):
     assert any(line.startswith("solid.0") for line in reported(solid=[solid]))
+
+
+@pytest.mark.parametrize(
+    ("more", "tank", "where"),
+    [
+        ({}, {"open": ["x+"]}, "open at x+"),
+        ({"sea": [{"side": "x+", "level": 0.7}]}, {}, r"beside a sea at z = 0.7 m (x+)"),
+        ({"sea": [{"side": "x+", "level": 0.7}]}, {"open": ["z+"]}, None),
+        ({"sea": [{"side": "x+", "level": 1.0}]}, {}, None),
+    ],
+)
+def test_water_up_to_a_closed_top_has_no_way_out(more, tank, where):
+    """It would hang under the top: a sea below it drew it out against nothing, and gained a fifth of the energy."""
+    found = case(
+        {"fill": [{"lower": TANK["lower"], "upper": TANK["upper"]}]} | more, tank=TANK | {"open": []} | tank
+    )
+    told = [text for _, text in problems(found) if "no air is there" in text]
+    assert (where is None and told == []) or (len(told) == 1 and f"which is {where} and closed" in told[0])
