@@ -457,6 +457,8 @@ class Water:
 
     def _carry_cells(self, old, source):
         """Cell fields go on in the cells that continue the old ones; source (N,): old node of each node."""
+        if old.covers == "single" and np.array_equal(old.parent_cell, self.domain.parent_cell):
+            return
         cells = pick_old_cells(old, self.domain, source)
         if np.array_equal(cells, np.arange(len(old.cells))):
             return
