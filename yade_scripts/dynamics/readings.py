@@ -6,6 +6,7 @@ World coordinates and SI units; one row a block; motions and forces are six numb
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
@@ -135,7 +136,9 @@ class StructureReadings:
 
     def tangent(self) -> tuple[sp.csr_array, sp.csr_array]:
         """(K, C), each (6n, 6n): secant stiffness and damping of live joints and of contacts; none of blocks asleep."""
-        springs = self.contacts().springs(self._motion.v, self._motion.x, self.substep())
+        substep = self.substep()
+        dt = substep if math.isfinite(substep) else 0.0  # while all blocks sleep, nothing limits it
+        springs = self.contacts().springs(self._motion.v, self._motion.x, dt)
         return tangent.assemble(self._with_joints(springs), self.n)
 
     def secant_without_friction(self) -> sp.csr_array:
