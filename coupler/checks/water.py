@@ -69,7 +69,7 @@ def water_problems(case: Case) -> Iterator[Problem]:
         if not wrong:
             yield from inflow_volume_problems(case)
             yield from _struck(case)
-        yield from _without_air(case)
+            yield from _without_air(case)
         yield from _drops(case)
 
 

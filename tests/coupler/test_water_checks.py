@@ -408,3 +408,11 @@ def test_water_up_to_a_closed_top_has_no_way_out(more, tank, where):
     )
     told = [text for _, text in problems(found) if "no air is there" in text]
     assert (where is None and told == []) or (len(told) == 1 and f"which is {where} and closed" in told[0])
+
+
+def test_a_sea_whose_tide_cannot_be_read_beside_a_full_tank_is_refused_for_its_tide():
+    """Other checks ask for its level only where it has one."""
+    full = [{"lower": TANK["lower"], "upper": TANK["upper"]}]
+    sea = [{"side": "x+", "level": 0.7, "tide": {"path": "nowhere.csv"}}]
+    found = problems(case({"fill": full, "sea": sea}, tank=TANK | {"open": []}))
+    assert [path for path, _ in found] == [("water", "sea", 0, "tide", "path")]
