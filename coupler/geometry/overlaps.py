@@ -12,12 +12,13 @@ from coupler.geometry.bodies import Body, overlap_depth
 @dataclass(frozen=True)
 class Overlap:
     """block, other: names, the other with its article or in quotes · depth [m] that parts them · share: of the
-    thickness of the thinner one."""
+    thickness of the thinner one · joined: a live joint holds them apart, not a contact."""
 
     block: str
     other: str
     depth: float
     share: float
+    joined: bool = False
 
 
 def deepest_overlap(structure, limit: float) -> Overlap | None:
@@ -32,8 +33,19 @@ def deepest_overlap(structure, limit: float) -> Overlap | None:
         part = float(exact * share[p] / depth[p])
         if part > limit:
             other = f"'{structure.names[b[p]]}'" if b[p] >= 0 else f"the {structure.planes[-1 - b[p]].name}"
-            return Overlap(structure.names[a[p]], other, float(exact), part)
+            joined = _joined(structure.joints, int(a[p]), int(b[p]))
+            return Overlap(structure.names[a[p]], other, float(exact), part, joined)
     return None
+
+
+def _joined(joints, a: int, b: int) -> bool:
+    """Whether a live joint holds two blocks; b: as in `deepest`."""
+    if joints is None:
+        return False
+    live = joints.live
+    other = np.where(joints.b < 0, -1 - joints.plane, joints.b)[live]
+    mine = joints.a[live]
+    return bool(np.any(((mine == a) & (other == b)) | ((mine == b) & (other == a))))
 
 
 def _exact(structure, a: int, b: int) -> float:

@@ -112,12 +112,21 @@ def check_overlap(time: float, found: Overlap | None, limit: float) -> None:
     """
     if found is None:
         return
-    stiffer = max(2.0, (found.share / limit) ** 2)
+    over = found.share / limit
+    if found.joined:  # loaded by weight and water: the closing goes with 1/K
+        advice = (
+            "The joint between them is too soft in compression for what presses on it: try a joints.closing_ratio "
+            f"about {max(2.0, over):.2g} times as high, or thicker blocks."
+        )
+    else:  # hit: a block goes in by v sqrt(m/K)
+        advice = (
+            "What holds them apart is too soft for the weight or the speed of the blocks: try a contact.stiffness "
+            f"(absent: by joints.closing_ratio) about {max(2.0, over**2):.2g} times as high, or thicker or slower "
+            "blocks."
+        )
     raise Diverged(
         f"'{found.block}' is {found.depth:.3g} m deep in {found.other} at t = {time:.4g} s, {found.share:.2g} of the "
-        f"thickness of the thinner one ({found.depth / found.share:.3g} m); limit {limit:g} (limits.overlap). What "
-        "holds them apart is too soft for the weight or the speed of the blocks: try a contact.stiffness (absent: by "
-        f"joints.closing_ratio) about {stiffer:.2g} times as high, or thicker or slower blocks."
+        f"thickness of the thinner one ({found.depth / found.share:.3g} m); limit {limit:g} (limits.overlap). {advice}"
     )
 
 

@@ -33,6 +33,8 @@ def test_contact_is_to_be_stiffer_by_the_square_of_what_the_overlap_exceeds():
         check_overlap(1.0, Overlap("brick", "the ground", 0.2, 0.4), 0.1)
     with pytest.raises(Diverged, match="about 2 times as high"):
         check_overlap(1.0, Overlap("brick", "the ground", 0.2, 0.11), 0.1)
+    with pytest.raises(Diverged, match=r"joints\.closing_ratio about 4 times as high"):
+        check_overlap(1.0, Overlap("brick", "the ground", 0.2, 0.4, joined=True), 0.1)
     check_overlap(1.0, None, 0.1)
 
 

@@ -81,6 +81,7 @@ def test_a_joint_that_closes_too_far_counts():
         found = deepest_overlap(s, 0.1)
     assert found.other in ("'high'", "the ground")
     assert found.share > 0.1
+    assert found.joined
 
 
 def test_one_block_between_the_sides_of_a_tank(tmp_path):
