@@ -312,16 +312,21 @@ class _Worker:
 
     def _work(self) -> None:
         while _serve(self.box, SPIN):
-            try:
-                self.found = self.job(), None
-            except BaseException as failure:
-                self.found = None, failure
+            self.found = _outcome(self.job)
             self.job = _nothing
             _finished(self.box)
 
 
 def _nothing() -> None:
     return None
+
+
+def _outcome(job: Callable[[], Any]) -> tuple[Any, BaseException | None]:
+    """What a job returns, and the exception that it ends with instead."""
+    try:
+        return job(), None
+    except BaseException as failure:
+        return None, failure
 
 
 class Team:
@@ -410,7 +415,7 @@ class Team:
             own = jobs[0]()
             for k, worker in enumerate(busy, 1):
                 if _took_back(plan, k):
-                    worker.found = worker.job(), None
+                    worker.found = _outcome(worker.job)
         finally:
             _end(plan, SPIN)
         for _, failure in (worker.found for worker in busy):

@@ -22,6 +22,7 @@ from coupler.program import threads
 from coupler.program.provenance import ROOT
 from fluid.mesh.arrays import Corners
 from fluid.numerics.fields import copied
+from kernels import team
 from kernels.decorators import ranged, released
 
 SCENE = tomllib.loads(CASE)
@@ -101,17 +102,23 @@ def _added(first, last, runs, cell_list, cells, value, out):
                     out[cells[cell_list[s], a]] += value[s]
 
 
-def test_a_kernel_that_fails_on_another_thread_fails_here(divided):
-    """And the threads are there for the next one."""
+@pytest.mark.parametrize("taken_back", [False, True])
+def test_a_kernel_that_fails_on_another_thread_fails_here(divided, monkeypatch, taken_back):
+    """The first failing range tells, whichever fails first: this thread may take the last one back before another has
+    begun with it. And the threads are there for the next one."""
     kernels.use(3)
 
     def kernel(first, last):
         if first > 0:
+            time.sleep(0.02)
             raise ValueError(f"row {first}")
         return last
 
-    with pytest.raises(ValueError, match="row 4"):
-        kernels.over(kernel, 12, weight=10)
+    with monkeypatch.context() as patched:
+        if taken_back:
+            patched.setattr(team, "_took_back", lambda plan, number: number == 2)
+        with pytest.raises(ValueError, match="row 4"):
+            kernels.over(kernel, 12, weight=10)
     assert kernels.over(lambda first, last: (first, last), 12, weight=10) == [(0, 4), (4, 8), (8, 12)]
 
 
