@@ -25,7 +25,7 @@ def deepest_overlap(structure, limit: float) -> Overlap | None:
     """The pair with the largest relative overlap, if that is more than `limit` of the thinner block; else None.
 
     The contacts give upper bounds of the depths; those that seem too large are computed exactly."""
-    a, b, depth, share = structure.deepest()
+    a, b, depth, share, joined = structure.deepest()
     for p in np.argsort(-share, kind="stable"):
         if share[p] <= limit:
             return None
@@ -33,19 +33,8 @@ def deepest_overlap(structure, limit: float) -> Overlap | None:
         part = float(exact * share[p] / depth[p])
         if part > limit:
             other = f"'{structure.names[b[p]]}'" if b[p] >= 0 else f"the {structure.planes[-1 - b[p]].name}"
-            joined = _joined(structure.joints, int(a[p]), int(b[p]))
-            return Overlap(structure.names[a[p]], other, float(exact), part, joined)
+            return Overlap(structure.names[a[p]], other, float(exact), part, bool(joined[p]))
     return None
-
-
-def _joined(joints, a: int, b: int) -> bool:
-    """Whether a live joint holds two blocks; b: as in `deepest`."""
-    if joints is None:
-        return False
-    live = joints.live
-    other = np.where(joints.b < 0, -1 - joints.plane, joints.b)[live]
-    mine = joints.a[live]
-    return bool(np.any(((mine == a) & (other == b)) | ((mine == b) & (other == a))))
 
 
 def _exact(structure, a: int, b: int) -> float:

@@ -309,9 +309,10 @@ class Water:
             self.slits = self.slits.advanced(dofs, pressure, p.weight, problem.dt, p.density)
         self.report = new.report
         late, (power, through) = self._late(problem.dt), self._rates()
-        displacing = problem.coupling.nnz > 0 and self.pushed_by.any()
-        # calm water that bodies push moves with what they displace
-        of_surface = late * (1.0 - self.calm(problem.dt)) if displacing else late
+        of_surface = late
+        if late > 0.0 and problem.coupling.nnz > 0 and self.pushed_by.any():
+            # calm water that bodies push moves with what they displace
+            of_surface *= 1.0 - self.calm(problem.dt)
         self._late_energy += of_surface * (power - before[0])
         if self.sides is not None:
             ahead = late * float((through - before[1]) @ self.pressure)

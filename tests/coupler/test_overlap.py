@@ -93,9 +93,10 @@ def test_one_block_between_the_sides_of_a_tank(tmp_path):
     structure = build(load(write(tmp_path, text)).case, no_clock).coupling.structure
     try:
         structure.advance(1e-4)
-        a, b, depth, share = structure.deepest()
+        a, b, depth, share, joined = structure.deepest()
         assert a.tolist() == [0] * len(a)
         assert (b < 0).all()
+        assert not joined.any()
         assert share == pytest.approx(depth / 0.1)
         assert share.max() == pytest.approx(1e-3, rel=0.2)
     finally:

@@ -210,22 +210,25 @@ class StructureReadings:
         outward = [face.normal for face in found] + [-face.normal for face in both]
         return np.array(rows, np.int64), np.array(outward, float).reshape(-1, 3)
 
-    def deepest(self) -> tuple[Array, Array, Array, Array]:
-        """Pairs that are in one another: blocks a (p,) and b (p,), -1 - number for a fixed plane, depth (p,) [m] and
-        depth over the thickness of the thinner block (p,). Of contacts: the way that parts the two, at most (faces are
-        tried, and edges that cross where these carry); of live joints: the mean closing."""
+    def deepest(self) -> tuple[Array, Array, Array, Array, Array]:
+        """Pairs that are in one another: blocks a (p,) and b (p,), -1 - number for a fixed plane, depth (p,) [m], depth
+        over the thickness of the thinner block (p,), and (p,) bool: those of live joints. Of contacts: the way that
+        parts the two, at most (faces are tried, and edges that cross where these carry); of live joints: the mean
+        closing."""
         thickness = 2.0 * np.array([b.planes[1].min() for b in self.blocks])
         a, b, depth = (np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0))
         if self._contacts is not None:
             a, b, depth = self._contacts.deepest()
+        joined = np.zeros(len(a), bool)
         if self.joints is not None:
             live = self.joints.live
             closing = -self.joints.openings(live, self._motion.x, self._motion.R)[:, 0]
             other = np.where(self.joints.b < 0, -1 - self.joints.plane, self.joints.b)
             a, b = np.concatenate([a, self.joints.a[live]]), np.concatenate([b, other[live]])
             depth = np.concatenate([depth, np.maximum(closing, 0.0)])
+            joined = np.arange(len(depth)) >= len(joined)
         thinner = np.minimum(thickness[a], np.where(b >= 0, thickness[np.maximum(b, 0)], np.inf))
-        return a, b, depth, depth / thinner
+        return a, b, depth, depth / thinner, joined
 
     def joined_planes(self) -> tuple[Array, Array, Array]:
         """Faces sealed by a live joint, or by lying on one another where no water comes between: block (m,), face (m,),
