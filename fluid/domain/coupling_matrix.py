@@ -5,8 +5,12 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from kernels.decorators import kernel, ranged
+from fluid.domain.hats import hats_at
+from kernels.decorators import kernel, ranged, released
 from kernels.threads import over
+
+WEIGHT = 20
+"""Cost of a polygon, in usual rows of `over`."""
 
 
 def wetted_coupling(domain, polygons=slice(None), weight=1.0) -> sp.csr_matrix:
@@ -20,10 +24,14 @@ def wetted_coupling(domain, polygons=slice(None), weight=1.0) -> sp.csr_matrix:
     wetted = wetted._replace(area=weight * wetted.area)
     if len(wetted.cell) == 0:
         return sp.csr_matrix(shape)
-    block = _blocks(wetted, domain.body_centre, domain.nodes, domain.hats)
-    start, members = polygons_of_nodes(wetted.cell, domain.cells, shape[0])
-    row = _distinct(start, members, wetted.body, domain.n_bodies)
-    values, columns = _summed(start, members, wetted.body, block, row, domain.n_bodies)
+    n, bodies = len(domain.nodes), (wetted.body, domain.n_bodies)
+    block, row = np.empty((len(wetted.cell), 4, 6)), np.zeros(n + 1, np.int64)
+    over(_blocks, len(block), wetted, domain.body_centre, domain.nodes, domain.hats, block, weight=WEIGHT)
+    start, members = polygons_of_nodes(wetted.cell, domain.cells, n)
+    over(_distinct, n, start, members, *bodies, row[1:])
+    np.cumsum(row, out=row)
+    values, columns = np.empty((row[-1], 6)), np.empty((row[-1], 6), np.int64)
+    over(_summed, n, start, members, wetted.body, block, row, domain.n_bodies, values, columns, weight=3)
     return sp.csr_matrix((values.ravel(), columns.ravel(), 6 * row), shape=shape)
 
 
@@ -55,41 +63,33 @@ def _copy_rows(first, last, rows, given, made):
             column_there[to[r] + k], entry_there[to[r] + k] = column[at + k], entry[at + k]
 
 
-@kernel
-def _blocks(polygons, centre, nodes, hats):
-    """∫ N_a (n, (x - x_b) x n) dA over every polygon, (S, 4, 6), a the corners of its cell."""
-    face_cell, face_body, area, normal, points = polygons
-    cells, parent, g = hats
-    block = np.zeros((len(face_cell), 4, 6))
+@released
+def _blocks(first, last, polygons, centre, nodes, hats, block):
+    """block (S, 4, 6) ← ∫ N_a (n, (x - x_b) x n) dA over every polygon, a the corners of its cell."""
     x, hat, turning = np.empty(3), np.empty(4), np.empty(3)
-    for s in range(len(face_cell)):
-        e, b = face_cell[s], face_body[s]
-        p, o = parent[e], cells[e, 0]
-        n0, n1, n2 = normal[s, 0], normal[s, 1], normal[s, 2]
+    for row in range(first, last):
+        s = np.uint64(row)
+        e, b = polygons.cell[s], np.uint64(polygons.body[s])
+        n0, n1, n2 = polygons.normal[s, 0], polygons.normal[s, 1], polygons.normal[s, 2]
+        for a in range(4):
+            for c in range(6):
+                block[s, a, c] = 0.0
         for q in range(3):
+            hats_at(e, polygons.points[s, q], hats, nodes, hat)
             for c in range(3):
-                x[c] = points[s, q, c]
-            hat[0] = 1.0
-            for a in range(1, 4):
-                hat[a] = 0.0
-                for c in range(3):
-                    hat[a] += g[p, a, c] * (x[c] - nodes[o, c])
-                hat[0] -= hat[a]
-            for c in range(3):
-                x[c] -= centre[b, c]
+                x[c] = polygons.points[s, q, c] - centre[b, c]
             turning[0], turning[1], turning[2] = (
                 x[1] * n2 - x[2] * n1,
                 x[2] * n0 - x[0] * n2,
                 x[0] * n1 - x[1] * n0,
             )
             for a in range(4):
-                w = hat[a] * area[s] / 3.0
+                w = hat[a] * polygons.area[s] / 3.0
                 block[s, a, 0] += w * n0
                 block[s, a, 1] += w * n1
                 block[s, a, 2] += w * n2
                 for c in range(3):
                     block[s, a, 3 + c] += w * turning[c]
-    return block
 
 
 @kernel
@@ -110,27 +110,25 @@ def polygons_of_nodes(face_cell, cells, n_nodes):
     return start, members
 
 
-@kernel
-def _distinct(start, members, body, n_bodies):
-    """Row start (N + 1,) of the pairs (node, body)."""
-    row = np.zeros(len(start), np.int64)
+@released
+def _distinct(first, last, start, members, body, n_bodies, count):
+    """count (N,) ← how many bodies each node has polygons of."""
     seen = np.full(n_bodies, -1, np.int64)
-    for i in range(len(start) - 1):
-        row[i + 1] = row[i]
+    for i in range(first, last):
+        count[i] = 0
         for t in range(start[i], start[i + 1]):
             b = body[members[t] // 4]
             if seen[b] != i:
                 seen[b] = i
-                row[i + 1] += 1
-    return row
+                count[i] += 1
 
 
-@kernel
-def _summed(start, members, body, block, row, n_bodies):
-    """Values and columns (pairs, 6) of the rows, bodies in ascending order."""
-    values, columns = np.zeros((row[-1], 6)), np.empty((row[-1], 6), np.int64)
+@released
+def _summed(first, last, start, members, body, block, row, n_bodies, values, columns):
+    """values and columns (pairs, 6) of the rows, bodies in ascending order; row (N + 1,): start of each node's
+    pairs."""
     place = np.full(n_bodies, -1, np.int64)
-    for i in range(len(start) - 1):
+    for i in range(first, last):
         n = 0
         around = columns[row[i] : row[i + 1], 0]
         for t in range(start[i], start[i + 1]):
@@ -145,13 +143,14 @@ def _summed(start, members, body, block, row, n_bodies):
                 n += 1
         for k in range(n):
             place[around[k]] = row[i] + k
+            for c in range(6):
+                values[row[i] + k, c] = 0.0
         for t in range(start[i], start[i + 1]):
             s, a = members[t] // 4, members[t] % 4
             at = place[body[s]]
             for c in range(6):
                 values[at, c] += block[s, a, c]
         for k in range(n):
-            first = 6 * around[k]
+            column = 6 * around[k]
             for c in range(6):
-                columns[row[i] + k, c] = first + c
-    return values, columns
+                columns[row[i] + k, c] = column + c

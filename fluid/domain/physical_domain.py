@@ -215,44 +215,6 @@ def _whole_second(mesh, cells):
     return (d[:, :, XX] * d[:, :, YY]).sum(axis=1) * (mesh.cell_volume[cells] / 20)[:, None]
 
 
-def hat_values(corners, points) -> Array:
-    """P1 functions of tetrahedra corners (k, 4, 3) [m] at points (k, q, 3) [m] -> (k, q, 4)."""
-    rest = (points - corners[:, :1]) @ _gradients(corners)
-    return _with_first(rest)
-
-
-@kernel
-def _gradients(corners):
-    """Gradients [1/m] of the last three P1 functions of tetrahedra, as columns (k, 3, 3); corners (k, 4, 3) [m]."""
-    found, e = np.empty((len(corners), 3, 3)), np.empty((3, 3))
-    for i in range(len(corners)):
-        for a in range(3):
-            for k in range(3):
-                e[a, k] = corners[i, a + 1, k] - corners[i, 0, k]
-        for a in range(3):
-            u, w = e[(a + 1) % 3], e[(a + 2) % 3]
-            for k in range(3):
-                m, n = (k + 1) % 3, (k + 2) % 3
-                found[i, k, a] = u[m] * w[n] - u[n] * w[m]
-        volume = e[0, 0] * found[i, 0, 0] + e[0, 1] * found[i, 1, 0] + e[0, 2] * found[i, 2, 0]
-        for k in range(3):
-            for a in range(3):
-                found[i, k, a] /= volume
-    return found
-
-
-@kernel
-def _with_first(rest):
-    """All four P1 functions (k, q, 4) at points from the last three `rest` (k, q, 3): their sum is one."""
-    hats = np.empty((rest.shape[0], rest.shape[1], 4))
-    for i in range(rest.shape[0]):
-        for q in range(rest.shape[1]):
-            hats[i, q, 0] = 1.0 - ((rest[i, q, 0] + rest[i, q, 1]) + rest[i, q, 2])
-            for a in range(3):
-                hats[i, q, a + 1] = rest[i, q, a]
-    return hats
-
-
 def carry(old: PhysicalDomain, new: PhysicalDomain) -> Array:
     """(N_new,) index of the old node each new node takes its values from, -1 = no source.
 

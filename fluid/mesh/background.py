@@ -178,6 +178,12 @@ class Background:
         x = self.nodes[self.boundary_faces]
         return 0.5 * np.linalg.norm(np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), axis=1)
 
+    @cached_property
+    def boundary_of_nodes(self) -> Array:
+        """(N,) [m²] of the boundary faces, a third to each of their corners."""
+        thirds = np.repeat(self.boundary_area / 3.0, 3)
+        return np.bincount(self.boundary_faces.ravel(), thirds, minlength=len(self.nodes))
+
     @property
     def products(self) -> Array:
         """∇N_a·∇N_b (M, 6) [1/m²] of the pairs ab = 01, 02, 03, 12, 13, 23."""

@@ -11,8 +11,11 @@ from __future__ import annotations
 import numpy as np
 
 from array_types import Array
-from fluid.pressure.waterline import relative_area, wet_triangles
-from kernels.decorators import inner, kernel
+from fluid.domain.hats import hats_at, value_at
+from fluid.domain.moments import marked_corners
+from fluid.pressure.waterline import WEIGHT, relative_area, wet_triangles
+from kernels.decorators import inner, kernel, released
+from kernels.threads import over
 
 
 def taken_from_nodes(domain, coupling, phi: Array, way: Array) -> Array:
@@ -20,61 +23,73 @@ def taken_from_nodes(domain, coupling, phi: Array, way: Array) -> Array:
 
     domain: PhysicalDomain · coupling: its G · phi (N,) [m] · way (n_bodies, 6) [m, rad]."""
     taken = coupling @ way.ravel()
-    if len(domain.face_cell):
-        faces = (domain.polygons(), domain.face_corners)
-        _take_off_dry(faces, domain.hats, domain.nodes, domain.body_centre, phi, way, taken)
+    at = np.flatnonzero(marked_corners(domain.face_cell, phi >= 0.0, domain.cells))
+    if len(at):
+        faces, found = (domain.polygons(), domain.face_corners), np.empty((len(at), 4))
+        over(
+            _dry,
+            len(at),
+            at,
+            faces,
+            domain.hats,
+            domain.nodes,
+            domain.body_centre,
+            phi,
+            way,
+            found,
+            weight=WEIGHT,
+        )
+        _take_off(at, domain.face_cell, domain.cells, found, taken)
     return taken
 
 
-@kernel
-def _take_off_dry(faces, hats, nodes, centre, phi, way, taken):
-    """Take ∫_{φ≥0} N_i w·n dA off what was taken (N,), exactly: φ and N_i are linear in a cell, w over a polygon."""
-    (face_cell, face_body, area, normal, _), corners = faces
-    cells, parent, g = hats
-    hat, flux, height = np.empty((3, 4)), np.empty(3), np.empty(3)
-    share, whole = np.empty((2, 3, 3)), np.eye(3)
-    for s in range(len(face_cell)):
-        e, b = face_cell[s], face_body[s]
-        dry = 0
-        for a in range(4):
-            dry += phi[cells[e, a]] >= 0.0
-        if dry == 0:
-            continue
-        p, o = parent[e], cells[e, 0]
+@released
+def _dry(first, last, at, faces, hats, nodes, centre, phi, way, found):
+    """found (k, 4): -∫_{φ≥0} N_a w·n dA of the corners a of the cells of the listed triangles, exactly: φ and N_a are
+    linear in a cell, w over a triangle."""
+    polygons, corners = faces
+    hat, x, flux, height = np.empty((3, 4)), np.empty(3), np.empty(3), np.empty(3)
+    share, part_hat, part_flux = np.empty((2, 3, 3)), np.empty((3, 4)), np.empty(3)
+    for s in range(first, last):
+        row = at[s]
+        e, b, area, n = polygons.cell[row], polygons.body[row], polygons.area[row], polygons.normal[row]
         for q in range(3):
-            hat[q, 0] = 1.0
-            for a in range(1, 4):
-                hat[q, a] = 0.0
-                for c in range(3):
-                    hat[q, a] += g[p, a, c] * (corners[s, q, c] - nodes[o, c])
-                hat[q, 0] -= hat[q, a]
-            height[q] = 0.0
-            for a in range(4):
-                height[q] += hat[q, a] * phi[cells[e, a]]
-            x0, x1, x2 = (
-                corners[s, q, 0] - centre[b, 0],
-                corners[s, q, 1] - centre[b, 1],
-                corners[s, q, 2] - centre[b, 2],
-            )
+            hats_at(e, corners[row, q], hats, nodes, hat[q])
+            height[q] = value_at(e, hat[q], phi, hats.cells)
+            for c in range(3):
+                x[c] = corners[row, q, c] - centre[b, c]
             flux[q] = (
-                (way[b, 0] + way[b, 4] * x2 - way[b, 5] * x1) * normal[s, 0]
-                + (way[b, 1] + way[b, 5] * x0 - way[b, 3] * x2) * normal[s, 1]
-                + (way[b, 2] + way[b, 3] * x1 - way[b, 4] * x0) * normal[s, 2]
+                (way[b, 0] + way[b, 4] * x[2] - way[b, 5] * x[1]) * n[0]
+                + (way[b, 1] + way[b, 5] * x[0] - way[b, 3] * x[2]) * n[1]
+                + (way[b, 2] + way[b, 3] * x[1] - way[b, 4] * x[0]) * n[2]
             )
-        triangles = wet_triangles(height, share)
+        wet = (height[0] < 0.0) + (height[1] < 0.0) + (height[2] < 0.0)
         for a in range(4):
-            found = -_product(area[s], whole, hat, a, flux)
-            for k in range(triangles):
-                found += _product(area[s] * relative_area(share[k]), share[k], hat, a, flux)
-            taken[cells[e, a]] += found
+            found[s, a] = 0.0 if wet == 3 else -_product(area, hat, a, flux)
+        if wet == 1 or wet == 2:
+            for t in range(wet_triangles(height, share)):
+                part = share[t]
+                for k in range(3):
+                    part_flux[k] = part[k, 0] * flux[0] + part[k, 1] * flux[1] + part[k, 2] * flux[2]
+                    for a in range(4):
+                        h = part[k, 0] * hat[0, a] + part[k, 1] * hat[1, a] + part[k, 2] * hat[2, a]
+                        part_hat[k, a] = h
+                for a in range(4):
+                    found[s, a] += _product(area * relative_area(part), part_hat, a, part_flux)
+
+
+@kernel
+def _take_off(at, face_cell, cells, found, taken):
+    """taken (N,) += found (k, 4) at the corners of the cells of the listed triangles, in their order."""
+    for s in range(at.shape[0]):
+        e = face_cell[at[s]]
+        for a in range(4):
+            taken[cells[e, a]] += found[s, a]
 
 
 @inner
-def _product(area, part, hat, a, flux):
-    """∫ N_a f dA over a part with barycentric corners (3, 3), from the values at the corners of the whole."""
-    both = sum_hat = sum_flux = 0.0
-    for k in range(3):
-        h = part[k, 0] * hat[0, a] + part[k, 1] * hat[1, a] + part[k, 2] * hat[2, a]
-        f = part[k, 0] * flux[0] + part[k, 1] * flux[1] + part[k, 2] * flux[2]
-        both, sum_hat, sum_flux = both + h * f, sum_hat + h, sum_flux + f
+def _product(area, hat, a, flux):
+    """∫ N_a f dA over a triangle, from the values at its corners."""
+    both = hat[0, a] * flux[0] + hat[1, a] * flux[1] + hat[2, a] * flux[2]
+    sum_hat, sum_flux = hat[0, a] + hat[1, a] + hat[2, a], flux[0] + flux[1] + flux[2]
     return area / 12.0 * (both + sum_hat * sum_flux)

@@ -16,9 +16,11 @@ from __future__ import annotations
 import numpy as np
 
 from array_types import Array
+from fluid.domain.hats import hats_at, value_at
 from fluid.domain.moments import marked_corners
-from fluid.domain.physical_domain import hat_values
-from fluid.pressure.waterline import differences
+from fluid.pressure.waterline import WEIGHT, add_over_wet
+from kernels.decorators import released
+from kernels.threads import over
 
 
 def film_volume(domain, drawn_in: Array, phi: Array, potential: Array) -> tuple[float, float]:
@@ -30,11 +32,28 @@ def film_volume(domain, drawn_in: Array, phi: Array, potential: Array) -> tuple[
     at = at[marked_corners(domain.face_cell[at], phi < 0.0, domain.cells) > 0]
     if len(at) == 0:
         return 0.0, 0.0
-    corners = domain.cells[domain.face_cell[at]]
-    hats = hat_values(domain.nodes[corners], domain.face_corners[at])
-    height, weight = (np.einsum("kqa,ka->kq", hats, f[corners]) for f in (phi, potential))
-    depth = np.repeat(drawn_in[at, None], 3, axis=1)
-    weights = np.zeros((len(at), 3, 3))
-    weights[:, :, 0] = weight
-    volume, first = differences(height, depth, np.zeros_like(depth), weights, domain.face_area[at])
-    return -float(volume.sum()), -float(first[:, 0].sum())
+    faces, found = (domain.polygons(), domain.face_corners), np.empty((len(at), 2))
+    over(
+        _films, len(at), at, faces, domain.hats, domain.nodes, drawn_in, phi, potential, found, weight=WEIGHT
+    )
+    volume, weighted = found.sum(axis=0).tolist()
+    return volume, weighted
+
+
+@released
+def _films(first, last, at, faces, hats, nodes, drawn_in, phi, potential, found):
+    """found (k, 2): ∫_{φ<0} d dA [m³] and ∫_{φ<0} d g·x dA [m⁵/s²] of the listed triangles."""
+    polygons, corners = faces
+    hat, height, depth, arm = np.empty(4), np.empty(3), np.empty(3), np.zeros((3, 3))
+    room, sums = (np.empty((2, 3, 3)), np.empty((4, 3))), np.empty(4)
+    for s in range(first, last):
+        row = at[s]
+        e = polygons.cell[row]
+        for q in range(3):
+            hats_at(e, corners[row, q], hats, nodes, hat)
+            height[q] = value_at(e, hat, phi, hats.cells)
+            arm[q, 0] = value_at(e, hat, potential, hats.cells)
+            depth[q] = drawn_in[row]
+        sums[:] = 0.0
+        add_over_wet(1.0, polygons.area[row], height, depth, arm, room, sums)
+        found[s, 0], found[s, 1] = sums[0], sums[1]

@@ -13,7 +13,7 @@ import numpy as np
 
 from array_types import Array, Bools, Floats
 from fluid.numerics.bounded import SLACK
-from kernels.decorators import ranged
+from kernels.decorators import plain, ranged
 from kernels.threads import over
 
 
@@ -122,12 +122,16 @@ def _met(first, last, dofs, x, known, bound, of_air, in_water, slack, vented, at
 def wall_area(mesh, domain) -> Array:
     """Area (N,) [m²] of the walls around each node: of the sides of the tank a third to each corner of a face, of
     bodies a quarter to each corner of the cell that a polygon lies in."""
-    of_tank = np.bincount(
-        mesh.boundary_faces.ravel(), np.repeat(mesh.boundary_area / 3.0, 3), minlength=len(mesh.nodes)
-    )
-    corners, quarter = domain.cells[domain.face_cell], 0.25 * domain.face_area
-    of_bodies = np.bincount(corners.ravel(), np.repeat(quarter, 4), minlength=len(domain.nodes))
-    return of_tank[domain.parent_node] + of_bodies
+    of_bodies = np.zeros(len(domain.nodes))
+    _add_quarters(domain.face_cell, domain.face_area, domain.cells, of_bodies)
+    return mesh.boundary_of_nodes[domain.parent_node] + of_bodies
+
+
+@plain
+def _add_quarters(face_cell, area, cells, of_nodes):
+    for s in range(face_cell.shape[0]):
+        for a in range(4):
+            of_nodes[cells[face_cell[s], a]] += 0.25 * area[s]
 
 
 @ranged

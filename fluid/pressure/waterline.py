@@ -20,10 +20,14 @@ from __future__ import annotations
 import numpy as np
 
 from array_types import Array
+from fluid.domain.hats import hats_at, value_at
 from fluid.domain.moments import cells_touching, marked_corners
-from fluid.domain.physical_domain import hat_values
 from fluid.pressure.projection import with_ghosts
-from kernels.decorators import inner, kernel
+from kernels.decorators import inner, kernel, released
+from kernels.threads import over
+
+WEIGHT = 20
+"""Cost of a triangle, in usual rows of `over`."""
 
 
 def waterline_load(domain, faces, left_out, phi, wet, pressure, open_node, air=None) -> Array:
@@ -39,27 +43,63 @@ def waterline_load(domain, faces, left_out, phi, wet, pressure, open_node, air=N
     at = np.concatenate([mixed, left_out])
     if len(at) == 0:
         return load
-    corners = domain.cells[domain.face_cell[at]]
-    p = np.where(wet & ~open_node, pressure, 0.0)
+    solved = wet & ~open_node
+    p = np.where(solved, pressure, 0.0)
     reached = np.zeros(len(phi), bool)
-    reached[corners] = True
+    reached[domain.cells[domain.face_cell[at]]] = True
     beside = cells_touching(reached, domain.cells)
     outside = np.zeros(len(phi)) if air is None else air
     ghosts = with_ghosts(p, outside, wet, open_node, phi, beside, domain.cells, domain.volume)
-    hats = hat_values(domain.nodes[corners], domain.face_corners[at])
-    full, acting = ghosts[corners], p[corners]
-    if air is not None:
-        above = outside[corners][np.arange(len(at)), np.abs(outside[corners]).argmax(axis=1)][:, None]
-        full, acting = full - above, np.where(wet[corners] & ~open_node[corners], acting - above, 0.0)
-    height, full, acting = (np.einsum("kqa,ka->kq", hats, f) for f in (phi[corners], full, acting))
-    acting[len(mixed) :] = 0.0
-    body = domain.face_body[at]
-    arm = domain.face_corners[at] - domain.body_centre[body][:, None]
-    force, first = differences(height, full, acting, arm, domain.face_area[at])
-    normal = domain.face_normal[at]
-    np.add.at(load[:, :3], body, force[:, None] * normal)
-    np.add.at(load[:, 3:], body, np.cross(first, normal))
+    found = np.empty((len(at), 6))
+    fields = (phi, ghosts, p, outside, solved)
+    over(_differences, len(at), at, len(mixed), _surface_of(domain), fields, found, weight=WEIGHT)
+    _sum_on_bodies(at, domain.face_body, found, load)
     return load
+
+
+def _surface_of(domain):
+    """Wetted polygons with their corners, hats and nodes, and the centres of the bodies, as the loops here take
+    them."""
+    return (domain.polygons(), domain.face_corners), domain.hats, domain.nodes, domain.body_centre
+
+
+@released
+def _differences(first, last, at, in_coupling, surface, fields, found):
+    """found (k, 6): force and moment of (2) on the listed triangles, of which the first `in_coupling` are in G."""
+    (polygons, corners), hats, nodes, centre = surface
+    phi, ghosts, p, outside, solved = fields
+    hat, arm = np.empty(4), np.empty((3, 3))
+    height, full, acting = np.empty(3), np.empty(3), np.empty(3)
+    share, room, mean = np.empty((2, 3, 3)), np.empty((4, 3)), np.empty(4)
+    for s in range(first, last):
+        row = at[s]
+        e, b, area, n = polygons.cell[row], polygons.body[row], polygons.area[row], polygons.normal[row]
+        above = 0.0  # the pressure of the air, if there is any
+        for a in range(4):
+            there = outside[hats.cells[e, a]]
+            if abs(there) > abs(above):
+                above = there
+        for q in range(3):
+            hats_at(e, corners[row, q], hats, nodes, hat)
+            height[q] = full[q] = acting[q] = 0.0
+            for a in range(4):
+                i = hats.cells[e, a]
+                height[q] += hat[a] * phi[i]
+                full[q] += hat[a] * (ghosts[i] - above)
+                if solved[i] and s < in_coupling:
+                    acting[q] += hat[a] * (p[i] - above)
+            for c in range(3):
+                arm[q, c] = corners[row, q, c] - centre[b, c]
+        for c in range(4):
+            mean[c] = 0.0
+        if acting[0] != 0.0 or acting[1] != 0.0 or acting[2] != 0.0:
+            add_over_whole(1.0, area, acting, arm, mean)
+        add_over_wet(-1.0, area, height, full, arm, (share, room), mean)
+        for c in range(3):
+            found[s, c] = mean[0] * n[c]
+        found[s, 3] = mean[2] * n[2] - mean[3] * n[1]
+        found[s, 4] = mean[3] * n[0] - mean[1] * n[2]
+        found[s, 5] = mean[1] * n[1] - mean[2] * n[0]
 
 
 def hydrostatic_stiffness(water, phi, bodies) -> Array | None:
@@ -78,50 +118,43 @@ def hydrostatic_stiffness(water, phi, bodies) -> Array | None:
     at = np.flatnonzero((cut & bodies)[domain.face_body] & (below > 0))
     if len(at) == 0:
         return None
-    corners = domain.cells[domain.face_cell[at]]
-    stiffness = np.zeros((domain.n_bodies, 3, 3))
-    hats = hat_values(domain.nodes[corners], domain.face_corners[at])
-    height = np.einsum("kqa,ka->kq", hats, phi[corners])
-    body, normal, area = domain.face_body[at], domain.face_normal[at], domain.face_area[at]
-    arm = domain.face_corners[at] - domain.body_centre[body][:, None]
-    _add_stiffness(height, arm, area, normal, body, weight, stiffness)
-    return stiffness
+    found, stiffness = np.empty((len(at), 9)), np.zeros((domain.n_bodies, 9))
+    over(_stiffnesses, len(at), at, _surface_of(domain), phi, weight, found, weight=WEIGHT)
+    _sum_on_bodies(at, domain.face_body, found, stiffness)
+    return stiffness.reshape(-1, 3, 3)
 
 
-@kernel
-def _add_stiffness(height, arm, area, normal, body, weight, stiffness):
-    """Add (3) of triangles with corner values `height` (k, 3) and arms (k, 3, 3) to that of their bodies."""
-    share, room, lift = np.empty((2, 3, 3)), np.empty((5, 3)), np.ones((3, 3))
-    force, first = np.empty(3), np.empty((3, 3))
-    for s in range(height.shape[0]):
-        n, b = normal[s], body[s]
+@released
+def _stiffnesses(first, last, at, surface, phi, weight, found):
+    """found (k, 9): (3) of the listed triangles."""
+    (polygons, corners), hats, nodes, centre = surface
+    hat, height, arm = np.empty(4), np.empty(3), np.empty((3, 3))
+    share, room, lift, sums = np.empty((2, 3, 3)), np.empty((4, 3)), np.ones((3, 3)), np.empty((3, 4))
+    for s in range(first, last):
+        row = at[s]
+        e, b, n = polygons.cell[row], polygons.body[row], polygons.normal[row]
         for q in range(3):
-            lift[1, q], lift[2, q] = arm[s, q, 1], -arm[s, q, 0]
-        force[:], first[:] = 0.0, 0.0
-        for t in range(wet_triangles(height[s], share)):
-            wet = area[s] * relative_area(share[t])
-            for k in range(3):
-                _add(-1.0, wet, share[t], lift[k], arm[s], room, force, first, k)
+            hats_at(e, corners[row, q], hats, nodes, hat)
+            height[q] = value_at(e, hat, phi, hats.cells)
+            for c in range(3):
+                arm[q, c] = corners[row, q, c] - centre[b, c]
+            lift[1, q], lift[2, q] = arm[q, 1], -arm[q, 0]
+        sums[:] = 0.0
         for k in range(3):
-            stiffness[b, 0, k] += weight * (force[k] * n[2])
-            stiffness[b, 1, k] += weight * (first[k, 1] * n[2] - first[k, 2] * n[1])
-            stiffness[b, 2, k] += weight * (first[k, 2] * n[0] - first[k, 0] * n[2])
+            add_over_wet(-1.0, polygons.area[row], height, lift[k], arm, (share, room), sums[k])
+        for k in range(3):
+            found[s, k] = weight * (sums[k, 0] * n[2])
+            found[s, 3 + k] = weight * (sums[k, 2] * n[2] - sums[k, 3] * n[1])
+            found[s, 6 + k] = weight * (sums[k, 3] * n[0] - sums[k, 1] * n[2])
 
 
 @kernel
-def differences(height, full, acting, arm, area):
-    """∫ p_acting - ∫_{height<0} p_full over triangles with corner values (k, 3): (k,), and times the arm: (k, 3)."""
-    n = height.shape[0]
-    force, first = np.zeros(n), np.zeros((n, 3))
-    share, room = np.empty((2, 3, 3)), np.empty((5, 3))
-    corner = np.eye(3)
-    for s in range(n):
-        if acting[s, 0] != 0.0 or acting[s, 1] != 0.0 or acting[s, 2] != 0.0:
-            _add(1.0, area[s], corner, acting[s], arm[s], room, force, first, s)
-        for k in range(wet_triangles(height[s], share)):
-            part = share[k]
-            _add(-1.0, area[s] * relative_area(part), part, full[s], arm[s], room, force, first, s)
-    return force, first
+def _sum_on_bodies(at, face_body, found, out):
+    """out (n_bodies, m) += found (k, m) of the listed triangles, in their order."""
+    for s in range(at.shape[0]):
+        b = face_body[at[s]]
+        for c in range(found.shape[1]):
+            out[b, c] += found[s, c]
 
 
 @inner
@@ -165,25 +198,33 @@ def relative_area(part):
 
 
 @inner
-def _add(sign, area, part, p, arm, room, force, first, s):
-    """force[s] += sign ∫ p dA, first[s] += sign ∫ p arm dA over the part with barycentric corners (3, 3).
+def add_over_wet(sign, area, height, p, arm, room, sums):
+    """sums (4,) += sign (∫ p dA, ∫ p arm dA) over the part of a triangle with height < 0.
 
-    Products of linear functions f, g over a triangle: A/12 (Σ f_k g_k + Σ f_k Σ g_k) · room (5, 3): work space."""
-    total = 0.0
-    value, sum_place, place = room[0], room[1], room[2:]
+    height, p (3,), arm (3, 3): at its corners · room (2, 3, 3), (4, 3): work space"""
+    wet = (height[0] < 0.0) + (height[1] < 0.0) + (height[2] < 0.0)
+    if wet == 3:
+        add_over_whole(sign, area, p, arm, sums)
+    elif wet:
+        share, (value, place) = room[0], (room[1][0], room[1][1:])
+        for t in range(wet_triangles(height, share)):
+            part = share[t]
+            for k in range(3):
+                value[k] = part[k, 0] * p[0] + part[k, 1] * p[1] + part[k, 2] * p[2]
+                for c in range(3):
+                    place[k, c] = part[k, 0] * arm[0, c] + part[k, 1] * arm[1, c] + part[k, 2] * arm[2, c]
+            add_over_whole(sign, area * relative_area(part), value, place, sums)
+
+
+@inner
+def add_over_whole(sign, area, p, arm, sums):
+    """`add_over_wet` over a whole triangle.
+
+    Products of linear functions f, g over a triangle: A/12 (Σ f_k g_k + Σ f_k Σ g_k)."""
+    total = p[0] + p[1] + p[2]
+    sums[0] += sign * area * total / 3.0
     for c in range(3):
-        sum_place[c] = 0.0
-    for k in range(3):
-        value[k] = part[k, 0] * p[0] + part[k, 1] * p[1] + part[k, 2] * p[2]
-        total += value[k]
-        for c in range(3):
-            place[k, c] = 0.0
-            for q in range(3):
-                place[k, c] += part[k, q] * arm[q, c]
-            sum_place[c] += place[k, c]
-    force[s] += sign * area * total / 3.0
-    for c in range(3):
-        mixed = total * sum_place[c]
+        mixed = total * (arm[0, c] + arm[1, c] + arm[2, c])
         for k in range(3):
-            mixed += value[k] * place[k, c]
-        first[s, c] += sign * area * mixed / 12.0
+            mixed += p[k] * arm[k, c]
+        sums[1 + c] += sign * area * mixed / 12.0

@@ -22,9 +22,10 @@ from __future__ import annotations
 import numpy as np
 
 from array_types import Array, Bools
+from fluid.domain.hats import hats_at
 from fluid.domain.moments import nodal_water
-from fluid.domain.physical_domain import hat_values
 from fluid.numerics.fields import copied
+from kernels.decorators import plain
 
 LEAST_LACKING = 0.05
 """Share of what a node can hold by which its volume must fall short of that of φ: a layer of a fortieth of a cell.
@@ -38,15 +39,24 @@ wall, 0.7 at a square edge, 0 on both sides of a thin plate."""
 def on_one_side(domain, nodes) -> Array:
     """Those of the nodes (n,) whose hat functions reach walls of solids from one side: where |∫ N_i n dA| is at least
     ONE_SIDED ∫ N_i dA [m²] over the wetted polygons, by the values at their centroids. domain: PhysicalDomain."""
-    cells = domain.cells[domain.face_cell]
-    weight = domain.face_area[:, None] * hat_values(domain.nodes[cells], domain.face_centroid[:, None])[:, 0]
-    corner, count = cells.ravel(), len(domain.nodes)
-    area = np.bincount(corner, weight.ravel(), count)[nodes]
-    along = [
-        np.bincount(corner, (weight * normal[:, None]).ravel(), count)[nodes]
-        for normal in domain.face_normal.T
-    ]
-    return nodes[np.linalg.norm(along, axis=0) >= ONE_SIDED * area]
+    sums = np.zeros((len(domain.nodes), 4))
+    _add_walls(domain.polygons(), domain.face_centroid, domain.hats, domain.nodes, np.empty(4), sums)
+    area, along = sums[nodes, 0], sums[nodes, 1:]
+    return nodes[np.linalg.norm(along, axis=1) >= ONE_SIDED * area]
+
+
+@plain
+def _add_walls(polygons, centroid, hats, nodes, hat, sums):
+    """sums (N, 4) += ∫ N_i dA and ∫ N_i n dA of every polygon · hat (4,): work space."""
+    for s in range(centroid.shape[0]):
+        e = polygons.cell[s]
+        hats_at(e, centroid[s], hats, nodes, hat)
+        for a in range(4):
+            i = np.uint64(hats.cells[e, a])
+            weight = polygons.area[s] * hat[a]
+            sums[i, 0] += weight
+            for c in range(3):
+                sums[i, 1 + c] += weight * polygons.normal[s, c]
 
 
 def air_on_walls(topology, phi, water, reached, walls) -> tuple[Array, Bools | None]:

@@ -27,8 +27,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from array_types import Bools, Floats
+from fluid.domain.hats import hat_values
 from fluid.domain.moments import wet_fraction
-from fluid.domain.physical_domain import hat_values
 from fluid.numerics.solve import NotConverged
 from fluid.numerics.sums import momentum_of
 from fluid.viscous.beyond import Beyond, beyond_surface, hand_on
@@ -91,14 +91,9 @@ class WettedWalls:
     def __init__(self, domain):
         d = domain
         self.domain = d
-        corners = d.nodes[d.cells[d.face_cell]]
         self.cell, self.body = d.face_cell.astype(np.int64), d.face_body.astype(np.int64)
         self.normal = np.ascontiguousarray(d.face_normal)
-        self.hat = (
-            np.ascontiguousarray(hat_values(corners, d.face_points))
-            if len(self.cell)
-            else np.zeros((0, 3, 4))
-        )
+        self.hat = hat_values(self.cell, d.face_points, d.hats, d.nodes)
         self.arm = np.ascontiguousarray(d.face_points - d.body_centre[d.face_body][:, None])
         self.area = d.face_area
         wetted = np.bincount(d.face_cell, d.face_area, minlength=len(d.cells))[d.face_cell]

@@ -10,8 +10,11 @@ from scipy.spatial.transform import Rotation
 
 from fluid.cut.bodies import ConvexBodies
 from fluid.domain.coupling_matrix import rows_of
-from fluid.domain.physical_domain import cut_domain, hat_values, wetted_coupling
+from fluid.domain.hats import hat_values
+from fluid.domain.physical_domain import cut_domain, wetted_coupling
+from fluid.mesh.arrays import Hats
 from fluid.mesh.background import box_mesh
+from fluid.mesh.gradients import gradients
 
 MESH = box_mesh((0, 0, 0), (4, 4, 4), 1.0)
 EMPTY = ConvexBodies.empty()
@@ -138,11 +141,11 @@ def test_values_of_hat_functions_are_those_of_scikit_fem():
     """The last three hats of a tetrahedron are the coordinates of its reference cell."""
     random = np.random.default_rng(5)
     corners, points = random.normal(size=(30, 4, 3)), random.normal(size=(30, 7, 3))
-    mesh = skfem.MeshTet(
-        corners.reshape(-1, 3).T.copy(), np.arange(120).reshape(30, 4).T.copy(), sort_t=False
-    )
+    nodes, cells = corners.reshape(-1, 3), np.arange(120).reshape(30, 4)
+    mesh = skfem.MeshTet(nodes.T.copy(), cells.T.copy(), sort_t=False)
     reference = mesh.mapping().invF(points.transpose(2, 0, 1), tind=np.arange(30)).transpose(1, 2, 0)
-    found = hat_values(corners, points)
+    hats = Hats(cells, np.arange(30), gradients(nodes, cells)[0])
+    found = hat_values(np.arange(30), points, hats, nodes)
     np.testing.assert_allclose(found[:, :, 1:], reference, rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(found.sum(axis=2), 1.0, atol=1e-9)
 

@@ -8,7 +8,8 @@ from scipy.spatial.transform import Rotation
 from fluid.cut.bodies import ConvexBodies
 from fluid.domain.coupling_matrix import wetted_coupling
 from fluid.domain.covers import EDGES_APART, WIDE_OPENINGS, components
-from fluid.domain.physical_domain import cut_domain, hat_values
+from fluid.domain.hats import hat_values
+from fluid.domain.physical_domain import cut_domain
 from fluid.mesh.background import box_mesh
 from fluid.numerics.solve import solve
 from tests.fluid.plane_reference import released
@@ -147,7 +148,7 @@ def test_openings_to_pockets_that_are_dropped_count_as_closed():
     for a in range(4):
         np.add.at(missed, domain.cells[:, a], domain.volume[:, None] * gradients[:, a])
     around = domain.cells[domain.face_cell]
-    hats = hat_values(domain.nodes[around], domain.face_points).mean(axis=1)
+    hats = hat_values(domain.face_cell, domain.face_points, domain.hats, domain.nodes).mean(axis=1)
     for a in range(4):
         np.add.at(missed, around[:, a], (domain.face_area * hats[:, a])[:, None] * domain.face_normal)
     inside = ((domain.nodes > 0.5 * h) & (domain.nodes < 1.0 - 0.5 * h)).all(axis=1)
