@@ -39,6 +39,8 @@ from kernels.threads import over, zeros
 
 FLUX_LAYERS = 3
 """Layers of dry nodes that water may reach within the next step."""
+HELD = 0.02
+"""Share of what a node above the surface can hold from which water around jumps keeps its own momentum in full."""
 WATERLINE_DAMPING, WATERLINE_DEPTH = 0.5, 1.0
 """c of `damp_waterline` in calm water, and how far below the surface it acts (in cell sizes). Noise on a slope of 1:20
 grows by 0.03 a step without, and not with 0.5. Less in faster water, none where it crosses a cell in a step: there it
@@ -249,9 +251,24 @@ def _continue(water, kept, listed, start, u, a, forced, calm) -> None:
 
     forced: see `extend_velocity` · calm: `Water.calm`"""
     rubbed = water.nodes_at_rough_walls()
-    extend_velocity(water.topology, (listed, start), kept.wet, kept.wet_cells, u, a, calm, forced, rubbed)
+    t = water.topology
+    extend_velocity(t, (listed, start), kept.wet, kept.wet_cells, u, a, calm, forced, rubbed)
+    if kept.in_jumps is not None:
+        over(_keep_momentum, len(u), kept.in_jumps, kept.wet, kept.nodal_water, t.node_volume, forced, u)
     _limit_speed(water, u, a)
     water.hold(u, kept.end, kept.wet)
+
+
+@ranged
+def _keep_momentum(first, last, share, wet, water, capacity, forced, u):
+    """u (N, 3) goes over to `forced` in place by the share (N,) at nodes above the surface, as far as they hold HELD of
+    what they could."""
+    for j in range(first, last):
+        i = np.uint64(j)
+        if share[i] > 0.0 and water[i] > 0.0 and not wet[i]:
+            weight = share[i] * min(water[i] / (HELD * capacity[i]), 1.0)
+            for k in range(3):
+                u[i, k] += weight * (forced[i, k] - u[i, k])
 
 
 def _flux(water, kept, listed, start, u, gradient):

@@ -59,7 +59,8 @@ class Predicted:
     None without any side; displaced (N,) [m³]: part of nodal_water that the bodies take in this step; in_films: that in
     films, as `Water.in_films` gives it; crossing [m/s]: `Water.crossing`; given_by_films and in_film (n,) bool, the
     unknowns in films: see `films.py`; cushions: trapped air (`fluid.air.cushions`), None without any; on_walls
-    (N,) bool: nodes with air on a wall (`cavities.py`), None without any."""
+    (N,) bool: nodes with air on a wall (`cavities.py`), None without any; in_jumps (N,): share to which water at nodes
+    above the surface keeps its own momentum (`surface_momentum.py`), None where it does nowhere."""
 
     level_set: Floats
     nodal_water: Floats
@@ -88,6 +89,7 @@ class Predicted:
     given_by_films: object | None = None
     in_film: Bools | None = None
     on_walls: Bools | None = None
+    in_jumps: Floats | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,8 +97,8 @@ class Moved:
     """What transport, sides, volume and shear of a step have found before its pressure problem is set up.
 
     surface: VolumeCorrection · conserved_volume [m³] · advected, u_star (N, 3) [m/s], shear, left, through, displaced,
-    in_films, crossing, on_walls: as in `Predicted` · inflow_rate (N,) [m³/s] through sides at given velocity, None
-    without any."""
+    in_films, crossing, on_walls, in_jumps: as in `Predicted` · inflow_rate (N,) [m³/s] through sides at given velocity,
+    None without any."""
 
     surface: VolumeCorrection
     conserved_volume: float
@@ -110,6 +112,7 @@ class Moved:
     in_films: tuple[float, float]
     crossing: float
     on_walls: Bools | None
+    in_jumps: Floats | None
 
 
 def predicted(water, dt: float) -> PressureProblem:
@@ -154,9 +157,10 @@ def predicted(water, dt: float) -> PressureProblem:
     held = added(carried, displaced)
     phi, on_walls = air_on_walls(water.topology, phi, held, water.ventilated, water.on_one_side)
     surface = _new_surface(water, calm, phi, held, conserved + beside)
+    in_jumps = None
     if found.velocity is not None:
         graph = water.graph_for(water.listed)
-        found.into(
+        in_jumps = found.into(
             u_adv,
             water.listed,
             phi,
@@ -186,6 +190,7 @@ def predicted(water, dt: float) -> PressureProblem:
         in_films=in_films,
         crossing=crossing,
         on_walls=on_walls,
+        in_jumps=in_jumps,
     )
     return _problem(water, dt, theta, kick, moved)
 
@@ -358,6 +363,7 @@ def _problem(water, dt: float, theta: float, kick, moved: Moved) -> PressureProb
         crossing=moved.crossing,
         cushions=cushions,
         on_walls=moved.on_walls,
+        in_jumps=moved.in_jumps,
     )
     acted, unheld = _known_pressure(water, water.pressure, phi), water.walls.open_node
     if held is not None:

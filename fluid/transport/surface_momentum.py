@@ -32,7 +32,11 @@ flows into it, u_up with acceleration a_up,
 η is the share of the head that is lost between the two nodes and not spent against pressure and weight. To conserve
 momentum where water slows down in jumps, and head elsewhere, is the rule of Stelling and Duinmeijer (Int. J. Numer.
 Methods Fluids 43 (2003) 1329).  The rings matter: where neighbouring nodes follow different laws, neither momentum nor
-head is conserved, and the speed of a bore varies by a tenth with the step; with the rings it varies by a hundredth."""
+head is conserved, and the speed of a bore varies by a tenth with the step; with the rings it varies by a hundredth.
+
+Nodes above the surface hold the water of cells that it cuts.  Around a jump they keep the momentum of that water, and
+what the pressure adds to it, instead of the velocity that is extrapolated from the water around them (`corrector.py`):
+in cells wider than high the closest water of a node in the face of a bore is the slow one that the bore runs over."""
 
 from __future__ import annotations
 
@@ -65,13 +69,15 @@ DROP, LOST, FULL = (0.1, 0.3), (0.5, 0.9), (0.25, 0.75)
 class Carried:
     """Result of the fluxes of a step at the nodes: water (N,) [m³], that of the fluxes along the edges, and swept (N,)
     [m³] what the surface brings beyond that (`swept_volume.py`); velocity (N, 3) [m/s], the weight w (N,) of it
-    around jumps before it is cut off at depth, and that in fast water (N,); None where there is neither."""
+    around jumps before it is cut off at depth, and that in fast water (N,); None where there is neither. jumps (N,):
+    the weight around jumps alone, whatever `weight` contains."""
 
     water: np.ndarray
     velocity: np.ndarray | None = None
     weight: np.ndarray | None = None
     fast: np.ndarray | None = None
     swept: np.ndarray | None = None
+    jumps: np.ndarray | None = None
 
     @classmethod
     def by(
@@ -94,7 +100,7 @@ class Carried:
             volume, moved = carry_volume(flux, dt)
             return cls(volume), moved
         volume, moved = carry_volume(flux, dt, velocity)
-        return cls(volume, velocity, weight, fast), moved
+        return cls(volume, velocity, weight, fast, jumps=weight), moved
 
     def near_the_surface(self) -> Carried:
         """The same with the velocity of fast water, too, only where that around jumps counts."""
@@ -108,12 +114,14 @@ class Carried:
         if self.velocity is None:
             return Carried(water, swept=swept)
         held = np.maximum(self.water, 0.0)[:, None]
-        fields = np.column_stack([self.velocity, self.weight, self.fast])
+        fields = np.column_stack([self.velocity, self.weight, self.fast, self.jumps])
         fields = (heirs @ (held * fields)) / np.maximum(heirs @ held, 1e-300)
-        return Carried(water, fields[:, :3].copy(), fields[:, 3].copy(), fields[:, 4].copy(), swept)
+        weight, fast, jumps = (fields[:, k].copy() for k in (3, 4, 5))
+        return Carried(water, fields[:, :3].copy(), weight, fast, swept, jumps)
 
-    def into(self, u, nodes, phi, spacing, graph: Graph, shift: Shift, t: Topology, on_open_side) -> None:
+    def into(self, u, nodes, phi, spacing, graph: Graph, shift: Shift, t: Topology, on_open_side) -> Array:
         """Equations (1) and (2) for u (N, 3) [m/s] at the listed nodes (n,) that hold water, in place; φ (N,) [m].
+        → share (N,) to which water at nodes above the surface keeps its own momentum.
 
         on_open_side (N,) bool: nodes that water leaves through: what the fluxes bring there is not yet all that came.
         Only where some water is fast, or there is a jump; `velocity` is overwritten."""
@@ -121,6 +129,7 @@ class Carried:
         at_surface = (phi, spacing, t.near_solids)
         state = (self.water, (self.weight, self.fast), at_surface, on_open_side)
         over(_mixed, len(nodes), nodes, *state, self.velocity, u)
+        return np.where(t.near_solids | on_open_side, 0.0, self.jumps)
 
 
 @ranged
