@@ -166,7 +166,8 @@ def predicted(water, dt: float) -> PressureProblem:
             phi,
             water.topology.node_size,
             graph,
-            surface.shift,
+            surface,
+            held,
             water.topology,
             water.walls.open_node,
         )
