@@ -165,7 +165,7 @@ def _pass_on(graph: Graph, shift: Shift, gained, water, u) -> None:
     band, guess = shift.band[holds], shift.kappa * shift.value[holds]
     came = np.zeros(len(water))
     for _ in range(TURNS):
-        _pass_once(graph, band, shift.spacing, gained - came, water + came, u, guess, came)
+        _pass_once(graph, band, shift.spacing, gained - came, np.maximum(water + came, 0.0), u, guess, came)
         guess = None
 
 
