@@ -125,24 +125,18 @@ def edge_rates(topology, graph, listed, u_cell):
     return rate
 
 
-def diffused_shift(band, place, edges, c, residual, kappa, spacing, tolerance, most, guess=None):
+def diffused_shift(band, place, edges, c, residual, kappa, spacing, tolerance, most):
     """Equation (2) on the band nodes (n,) by conjugate gradients with the diagonal as preconditioner, (n,).
 
     place (N,): their places in the band, -1 elsewhere · κ = kappa times the spacing (N,) [m] · at most `most`
-    iterations, until the residual has fallen by the tolerance, from zero, or from a guess (n,): c then holds back what
-    is added to it."""
+    iterations, until the residual has fallen by the tolerance."""
     n, diagonal = len(band), c.copy()
     found = np.zeros(n + 1, np.uint32)
     over(_length_of_rows, n, band, place, edges, found[1:])
     first = np.cumsum(found, dtype=np.uint32)
     made = MadeRows(first, np.empty(first[-1], np.uint32), np.empty(first[-1]), diagonal)
     over(_rows_of_shift, n, band, place, edges, kappa, spacing, made)
-    rows = (first, made.column, made.entry, diagonal)
-    if guess is None:
-        return _shift(*rows, residual, tolerance, most)
-    explained = np.empty(n)
-    over(_product, n, *rows, guess, explained)
-    return guess + _shift(*rows, residual - (explained - c * guess), tolerance, most)
+    return _shift(first, made.column, made.entry, diagonal, residual, tolerance, most)
 
 
 class MadeRows(NamedTuple):

@@ -8,13 +8,17 @@ runs up a wall lose momentum in the same way, and the more, the fewer cells they
 
 where u_volume is carried by the fluxes of the volume (`volume_transport.py`).  The level set that is then corrected
 towards the volume contains other volumes at the nodes than the fluxes brought: what one node has too much, others
-receive, and the surface sweeps what the fluxes do not know of.  A node gains m_i by both, and the volumes
+receive.  In the equation of that correction (`volume.py`, 2), c ψ + κ K ψ = r, the volumes
 
-    v_ij = -h K_ij (χ_i - χ_j),      Σ_j v_ij = -m_i                                                         (2)
+    v_ij = -κ K_ij (ψ_i - ψ_j)                                                                              (2)
 
-pass from node to node, and they carry momentum as the fluxes do.  (The linear equation of the correction, `volume.py`
-(2), contains such volumes too, with κ ψ for h χ.  They are not what the corrected level set holds where the surface is
-steep: with them a bore over thin water lost 2 to 3 % of its momentum, twice as much as now.)
+pass from node to node, and they carry momentum as the fluxes do.  A node gains m_i by the correction, and by what the
+surface sweeps beyond the fluxes.  Where the surface is steep that is not Σ_j v_ji, since (2) is linear.  Around jumps
+the rest passes on, too:
+
+    v'_ij = -h K'_ij (χ_i - χ_j),      Σ_j v'_ji = m_i - Σ_j v_ji,                                           (3)
+
+K' between nodes that hold water.
 
 In fast water w = R(|u|/√(g h); 1, 3), h the size of the cells and R(x; b, c) = (x - b)/(c - b) kept within 0 and 1:
 where water is faster than the shallow-water wave of one cell, its motion within a cell is governed by momentum.  Slower
@@ -29,7 +33,7 @@ full between the surface and 2 h, within RINGS nodes around a jump: a node with 
 flows into it, u_up with acceleration a_up,
 
     R(d/√(g h); 0.1, 0.3) R(η; 0.5, 0.9) R(s; 0.25, 0.75),    d = |u_up| - |u|,
-    η = 1 + (h (a + a_up)·u_up/|u_up| - |u|²) / |u_up|²                                                     (3)
+    η = 1 + (h (a + a_up)·u_up/|u_up| - |u|²) / |u_up|²                                                     (4)
 
 η is the share of the head that is lost between the two nodes and not spent against pressure and weight. To conserve
 momentum where water slows down in jumps, and head elsewhere, is the rule of Stelling and Duinmeijer (Int. J. Numer.
@@ -63,11 +67,14 @@ FAST = (1.0, 3.0)
 RESOLVED = (10.0, 30.0)
 """|u| h/ν between which that sets in. Up to 100, the tip of a column of a thick liquid followed the paths, and gained
 energy as that of water does without the momentum of the volume."""
-TURNS, ANCHOR, TOLERANCE, MOST_ITERATIONS = 2, 0.02, 1e-2, 100
-"""How often (2) is solved, for what is left of m_i; share of its edges that is added to the diagonal of a node, so that
-what comes to all nodes of a region alike is not sought from far away; and where conjugate gradients end."""
+CONDUCTING, ANCHOR = 0.05, 0.02
+"""Of the matrix of (3): share of what a node can hold from which water passes through it as everywhere, so that nodes
+that hold next to none take no part; and share of its edges that is added to the diagonal of a node, so that what comes
+to all nodes of a region alike is not sought from far away."""
+TOLERANCE, MOST_ITERATIONS = 1e-2, 100
+"""Where the conjugate gradients of (3) end."""
 DROP, LOST, FULL = (0.1, 0.3), (0.5, 0.9), (0.25, 0.75)
-"""Where the ramps of (3) begin and end."""
+"""Where the ramps of (4) begin and end."""
 
 
 @dataclass(frozen=True)
@@ -133,12 +140,13 @@ class Carried:
         correction: `volume.VolumeCorrection` of what the nodes held (N,) [m³] · on_open_side (N,) bool: nodes that
         water leaves through: what the fluxes bring there is not yet all that came. Only where some water is fast, or
         there is a jump; `velocity` is overwritten."""
+        jumps = np.where(t.near_solids | on_open_side, 0.0, self.jumps)
         gained = correction.nodal_water - held + self.swept
-        _pass_on(graph, correction.shift, gained, self.water, self.velocity)
+        _pass_on(graph, correction.shift, (gained, jumps), self.water, t.node_volume, self.velocity)
         at_surface = (phi, spacing, t.near_solids)
         state = (self.water, (self.weight, self.fast), at_surface, on_open_side)
         over(_mixed, len(nodes), nodes, *state, self.velocity, u)
-        return np.where(t.near_solids | on_open_side, 0.0, self.jumps)
+        return jumps
 
 
 @ranged
@@ -156,49 +164,52 @@ def _mixed(first, last, nodes, water, weights, at_surface, on_open_side, carried
             u[i, k] += weight * (carried[i, k] - u[i, k])
 
 
-def _pass_on(graph: Graph, shift: Shift, gained, water, u) -> None:
-    """Velocity u (N, 3) [m/s] carried along with the volumes (2), in place; gained (N,) [m³], water (N,) [m³] before
-    them.
+def _pass_on(graph: Graph, shift: Shift, gained, water, capacity, u) -> None:
+    """Velocity u (N, 3) [m/s] carried along with the volumes (2) and (3), in place.
 
-    A node that is to give more than it holds, as it also receives, gives the rest in a second turn."""
+    gained: m_i (N,) [m³], and the share (N,) of its rest that is passed on · water, capacity (N,) [m³]: what the nodes
+    hold before, and could hold."""
+    n, edges, spacing = len(water), graph.edges, shift.spacing
     holds = water[shift.band] > 0.0
-    band, guess = shift.band[holds], shift.kappa * shift.value[holds]
-    came = np.zeros(len(water))
-    for _ in range(TURNS):
-        _pass_once(graph, band, shift.spacing, gained - came, np.maximum(water + came, 0.0), u, guess, came)
-        guess = None
-
-
-def _pass_once(graph: Graph, band, spacing, gained, water, u, guess, came) -> None:
-    """One turn of `_pass_on` among the nodes of the band (n,); guess (n,): h χ, None: zero. What came to each node less
-    what left it is added to `came` (N,) [m³]."""
-    edges, n = graph.edges, len(water)
-    place = np.full(n, -1, np.int64)
-    place[band] = np.arange(len(band))
-    anchor = np.empty(len(band))
-    over(_anchors, len(band), band, place, edges, spacing, anchor)
-    ends = (TOLERANCE, MOST_ITERATIONS)
-    chi, inside, moved = zeros((n,)), place >= 0, np.empty(len(graph.neighbour))
-    chi[band] = diffused_shift(band, place, edges, anchor, -gained[band], 1.0, spacing, *ends, guess)
+    band, moved = shift.band[holds], np.empty(len(graph.neighbour))
+    chi, inside, came = zeros((n,)), np.zeros(n, bool), np.zeros(n)
+    chi[band], inside[band] = shift.kappa * shift.value[holds], True
     over(_passed, len(band), band, edges, chi, inside, spacing, water, moved)
     carry_velocity(band, edges, moved, water, u, came)
+    rest = gained[1] * (gained[0] - came)
+    if not rest[band].any():
+        return
+    place = np.full(n, -1, np.int64)
+    place[band] = np.arange(len(band))
+    stiffness, anchor = np.empty(len(edges.stiffness)), np.empty(len(band))
+    over(_through_water, len(band), band, edges, spacing, water, capacity, (stiffness, anchor))
+    edges, left = edges._replace(stiffness=stiffness), np.maximum(water + came, 0.0)
+    chi[band] = diffused_shift(
+        band, place, edges, anchor, -rest[band], 1.0, spacing, TOLERANCE, MOST_ITERATIONS
+    )
+    over(_passed, len(band), band, edges, chi, inside, spacing, left, moved)
+    carry_velocity(band, edges, moved, left, u)
 
 
 @ranged
-def _anchors(first, last, band, place, edges, spacing, anchor):
-    """ANCHOR times the sum of the stiffness of the edges to other nodes of the band, times h, (n,)."""
-    start, neighbour, stiffness = edges.start, edges.neighbour, edges.stiffness
+def _through_water(first, last, band, edges, spacing, water, capacity, made):
+    """made: K (edges,) times the least share of CONDUCTING that both ends hold of what they could; ANCHOR times the sum
+    of it times h (n,)."""
+    stiffness, anchor = made
     for r in range(first, last):
         i, total = band[r], 0.0
-        for s in range(start[edges.row[i]], start[edges.row[i] + 1]):
-            if place[neighbour[s]] >= 0:
-                total -= 0.5 * (spacing[i] + spacing[neighbour[s]]) * stiffness[s]
+        own = water[i] / capacity[i]
+        for s in range(edges.start[edges.row[i]], edges.start[edges.row[i] + 1]):
+            j = edges.neighbour[s]
+            least = min(own, max(water[j], 0.0) / max(capacity[j], 1e-300))
+            stiffness[s] = edges.stiffness[s] * min(least / CONDUCTING, 1.0)
+            total -= 0.5 * (spacing[i] + spacing[j]) * stiffness[s]
         anchor[r] = ANCHOR * total
 
 
 @ranged
 def _passed(first, last, band, edges, chi, inside, spacing, water, moved):
-    """v_ij (edges,) [m³] of (2) out of each node of the band, where both hold water; none gives more than it holds.
+    """Volumes (edges,) [m³] of (2) out of each node of the band, where both hold water; none gives more than it holds.
     χ (N,), inside (N,) bool: where the band holds water."""
     start, neighbour, stiffness = edges.start, edges.neighbour, edges.stiffness
     for place in range(first, last):
@@ -217,7 +228,7 @@ def _passed(first, last, band, edges, chi, inside, spacing, water, moved):
 
 @released
 def _jumps(first, last, nodes, edges, rate, water, capacity, u, a, gravity, spacing, weight):
-    """Equation (3), (N,), in `weight`, zero at first, and at how many nodes it is not zero."""
+    """Equation (4), (N,), in `weight`, zero at first, and at how many nodes it is not zero."""
     n_jumps = 0
     row, start, neighbour = edges.row, edges.start, edges.neighbour
     up, push = np.empty(3), np.empty(3)
