@@ -83,9 +83,10 @@ def test_a_column_of_a_thick_liquid_gains_no_more_than_one_of_water():
 @pytest.mark.parametrize("wide", [1, 3])
 def test_a_bore_over_thin_water_keeps_its_momentum(wide):
     """A dam of eight layers breaks over water 0.4 of a layer deep, on cubes and on cells three times as wide as high.
-    The momentum is what the water at rest behind it pushes, ½ ρ g (h² - h₁²) a metre of width; 3.8 and 5.4 % are lost.
-    With the velocity of the water below in the face of the bore it was 4.2 and 10.5 %, and the bore 16 % too slow on
-    the wide cells (5 % now)."""
+    The momentum is what the water at rest behind it pushes, ½ ρ g (h² - h₁²) a metre of width; 3.1 and 3.5 % are lost.
+    With the velocity of the water below in the face of the bore, and momentum that goes with the linear equation of the
+    correction of the level set alone, it was 4.2 and 10.5 %, and the bore 16 % too slow on the wide cells; with the
+    first cured, 3.8 and 5.4 %."""
     depth, thin, layer = 0.15, 0.0075, 0.15 / 8
     size = layer * np.array([81, 2 * wide, 12])
     dam = 0.5 * size[0]
@@ -95,4 +96,4 @@ def test_a_bore_over_thin_water_keeps_its_momentum(wide):
         advance(water)
     found = water.nodal_water @ water.velocity[:, 0]
     pushed = 0.5 * 9.81 * (depth**2 - thin**2) * size[1] * water.time
-    assert found == pytest.approx(pushed, rel=0.07)
+    assert found == pytest.approx(pushed, rel=0.045)
