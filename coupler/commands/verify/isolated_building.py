@@ -33,7 +33,7 @@ GAUGES = {
 DOWNSTREAM = ("G1", "G2", "G3", "G4", "G5")
 UNTIL = 10.0
 FOUND = 0.10
-"""[m] given with each gauge; the case is not judged."""
+"""[m] given with each gauge; the depths are not judged."""
 SQUARE, FRONT, ARRIVED = 0.05, 0.01, 5.0
 """Squares of the shallow-water equations [m], rise above the water ahead that counts as the front [m], and time until
 which they are solved [s]."""
