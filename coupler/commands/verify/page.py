@@ -90,7 +90,7 @@ ALWAYS = {
     "P39": "H3 lies behind the box. When the jet falls there is chance, and depends on the diagonals along which "
     "the cells are split ([water](water.md#which-way-the-cells-are-split)). For 18 columns whose widths differ "
     "by up to 1 mm (8e-4 of the width) an earlier version had an rms of 0.0515 ± 0.0038 m there (mean and standard "
-    "deviation; 0.045 to 0.060), and six of 18 kept the limit: that one run keeps it says little. H1, H2 and H4 "
+    "deviation; 0.045 to 0.060), and six of 18 kept the limit: whether one run keeps it says little. H1, H2 and H4 "
     "varied by less than 0.002.",
     "P40": "The lowest pressure is chance: for the 18 columns of [P39](#p39-spheric-test-2-levels) it lies between"
     " 0 and −131 Pa (median −26, below −50 in seven), 13 mm of water, and below −20 Pa in three of 121 "
