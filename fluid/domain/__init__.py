@@ -4,6 +4,7 @@ covers, continued_nodes         unknowns for each connected part of a star; the 
 physical_domain                 cells, moments and wetted surface, made from the cut
 topology                        the connectivity of nodes and cells, laid out for the kernels of a step
 moments, quadrature             volumes of water below a linear level set; points and weights in cut cells
+hats                            the linear functions of a cell at points in it
 coupling_matrix                 G: pressure at nodes to loads on bodies, and its transpose
 point_location                  the cell that a point is in
 
