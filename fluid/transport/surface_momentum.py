@@ -134,7 +134,7 @@ class Carried:
     def into(
         self, u, nodes, phi, spacing, graph: Graph, correction, held, t: Topology, on_open_side
     ) -> Array:
-        """Equations (1) and (2) for u (N, 3) [m/s] at the listed nodes (n,) that hold water, in place; φ (N,) [m].
+        """Equations (1) to (3) for u (N, 3) [m/s] at the listed nodes (n,) that hold water, in place; φ (N,) [m].
         → share (N,) to which water at nodes above the surface keeps its own momentum.
 
         correction: `volume.VolumeCorrection` of what the nodes held (N,) [m³] · on_open_side (N,) bool: nodes that
@@ -198,7 +198,9 @@ def _through_water(first, last, band, edges, spacing, water, capacity, made):
     stiffness, anchor = made
     for r in range(first, last):
         i, total = band[r], 0.0
-        own = water[i] / capacity[i]
+        own = water[i] / max(
+            capacity[i], 1e-300
+        )  # a body may have taken all room of a node that still holds water
         for s in range(edges.start[edges.row[i]], edges.start[edges.row[i] + 1]):
             j = edges.neighbour[s]
             least = min(own, max(water[j], 0.0) / max(capacity[j], 1e-300))
@@ -209,8 +211,8 @@ def _through_water(first, last, band, edges, spacing, water, capacity, made):
 
 @ranged
 def _passed(first, last, band, edges, chi, inside, spacing, water, moved):
-    """Volumes (edges,) [m³] of (2) out of each node of the band, where both hold water; none gives more than it holds.
-    χ (N,), inside (N,) bool: where the band holds water."""
+    """Volumes (edges,) [m³] of (2) or (3) out of each node of the band, where both hold water; none gives more than it
+    holds. χ (N,), inside (N,) bool: where the band holds water."""
     start, neighbour, stiffness = edges.start, edges.neighbour, edges.stiffness
     for place in range(first, last):
         i = band[place]
