@@ -17,8 +17,9 @@ from coupler.program.errors import FULL
 from coupler.results.storage import DiskFull, claim, finite
 
 LAYOUT = ("v110", "v110")
-SMALL = 512
-"""Numbers below which an array is not worth compressing."""
+SMALL, FULL_FROM = 512, 0.5
+"""Numbers below which an array is not worth compressing, and share of its entries that are not zero from which it is
+not either: these are digits that nothing makes shorter, and compressing all of a state takes three times as long."""
 HEADROOM = 1 << 16
 
 
@@ -52,12 +53,18 @@ def write_arrays(path: Path, arrays: dict[str, np.ndarray], text: str, unset=())
 def _write(path: Path, arrays: dict[str, np.ndarray], text: str) -> None:
     with h5py.File(path, "w", libver=LAYOUT, locking=False) as file:
         for name, array in arrays.items():
-            packed = {"compression": "lzf", "shuffle": True} if array.size > SMALL else {}
-            file.create_dataset(name, data=array, **packed)
+            file.create_dataset(name, data=array, **_packed(array))
         file["text"] = np.frombuffer(text.encode("utf-8"), np.uint8)
         file.attrs["digest"] = digest(arrays, text)
     with path.open("rb") as stream:
         os.fsync(stream.fileno())
+
+
+def _packed(array: np.ndarray) -> dict:
+    """How h5py is to store an array."""
+    if array.size <= SMALL or np.count_nonzero(array) >= FULL_FROM * array.size:
+        return {}
+    return {"compression": "lzf", "shuffle": True, "chunks": array.shape}
 
 
 def _flush_directory(path: Path) -> None:

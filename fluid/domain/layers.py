@@ -19,21 +19,28 @@ WORK = 10
 """Cost of going through the neighbours of a node, or the cells around it, in visits of a node."""
 
 
+BARRED = np.int32(np.iinfo(np.int32).max)
+"""Place of nodes that layers may not hold."""
+
+
 class Layers(NamedTuple):
     """order (n,): nodes, layer by layer · start (depth + 2,): layer k is order[start[k] : start[k + 1]] · place (N,)
-    int32: where each node stands in `order`, -1 if it does not."""
+    int32: where each node stands in `order`, -1 if it does not, BARRED if it may not."""
 
     order: Ints
     start: Ints
     place: Array
 
 
-def layers_around(seed, depth: int, start, around) -> Layers:
+_ANY = np.zeros(0, bool)
+
+
+def layers_around(seed, depth: int, start, around, among=None) -> Layers:
     """The seed nodes (N,) bool that have neighbours, in their order, as layer 0, and `depth` layers around them.
 
-    start, around: `Topology.around`."""
+    start, around: `Topology.around` · among (N,) bool: the nodes that layers may hold, None: all."""
     place, layer_start = np.empty(len(seed), np.int32), np.zeros(depth + 2, np.int64)
-    over(_nowhere, len(seed), place)
+    over(_nowhere, len(seed), _ANY if among is None else among, place)
     order, found, count = np.empty(len(seed), np.int64), marked(seed), 0
     for layer in range(depth + 1):
         if layer > 0:
@@ -46,9 +53,10 @@ def layers_around(seed, depth: int, start, around) -> Layers:
 
 
 @ranged
-def _nowhere(first, last, place):
-    for i in range(first, last):
-        place[np.uint64(i)] = -1
+def _nowhere(first, last, among, place):
+    for j in range(first, last):
+        i = np.uint64(j)
+        place[i] = -1 if among.shape[0] == 0 or among[i] else BARRED
 
 
 @plain

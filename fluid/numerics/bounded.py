@@ -113,7 +113,7 @@ def solve_bounded(
         x, iterations = found.x, iterations + found.iterations
         parting = apply(x) - b if free is not None else None
         wrong = signs.wrong(x, held, parting, UNSETTLED * rtol * scale)
-        if not wrong.any():
+        if wrong is None:
             if found.residual > rtol:
                 continue
             apart = np.zeros_like(b) if parting is None else np.where(held, np.maximum(parting, 0.0), 0.0)
@@ -133,10 +133,10 @@ def solve_bounded(
             continue
         held = signs.exchanged(held, wrong)
     raise NotConverged(
-        f"the bound of the pressure was not settled in {MOST_ROUNDS} rounds: {int(wrong.sum())} of {len(b)} unknowns "
-        "still change sides. Reduce time.cfl.",
+        f"the bound of the pressure was not settled in {MOST_ROUNDS} rounds: "
+        f"{0 if wrong is None else int(wrong.sum())} of {len(b)} unknowns still change sides. Reduce time.cfl.",
         np.array([found.residual]),
-        int(np.flatnonzero(wrong)[-1]) if wrong.any() else None,
+        None if wrong is None else int(np.flatnonzero(wrong)[-1]),
     )
 
 
@@ -150,7 +150,7 @@ def solve_pressure(problem, rtol: float, moved=0.0) -> BoundedResult:
 def at_air(x, air):
     """(n,) bool: where x is at the bound of air within the slack of the solver, so that round-off above it does not
     decide where air advances."""
-    return x <= air + SLACK * np.abs(x).max(initial=0.0)
+    return x <= air + SLACK * _largest(x)
 
 
 def _air_goes_on(A, x, lower, air):
@@ -173,6 +173,30 @@ def _beside(indptr, indices, source):
     return found
 
 
+def _largest(x) -> float:
+    """max |x_i|, 0 without any."""
+    return max(over(_largest_of, len(x), x))
+
+
+@ranged
+def _largest_of(first, last, x):
+    largest = 0.0
+    for j in range(first, last):
+        largest = max(largest, abs(x[np.uint64(j)]))
+    return largest
+
+
+@ranged
+def _far_below(first, last, x, lower, held, slack, found):
+    """Mark which x lie below their bound by more than the slack and are not held; how many."""
+    count = 0
+    for j in range(first, last):
+        i = np.uint64(j)
+        found[i] = x[i] < lower[i] - slack and not held[i]
+        count += found[i]
+    return count
+
+
 @ranged
 def _some_below(first, last, x, lower, held):
     """How many x lie below their bound and are not held."""
@@ -189,18 +213,24 @@ class _Signs:
         self.lower, self.fewest, self.patience, self.singles = lower, len(lower) + 1, PATIENCE, 0
 
     def _below(self, x, held, share: float):
-        return ~held & (x < self.lower - share * np.abs(x).max(initial=0.0))
+        """(n,) bool: below the bound by more than this share of the largest |x|, and not held; None: nowhere."""
+        slack, found = share * _largest(x), np.empty(len(x), bool)
+        return found if any(over(_far_below, len(x), x, self.lower, held, slack, found)) else None
 
     def early(self, x, residual: float, held) -> bool:
         """Whether to end a round early: it is solved to a loose tolerance, and some value lies far below its bound."""
         if residual > LOOSE or not any(over(_some_below, len(x), x, self.lower, held)):
             return False
-        return bool(self._below(x, held, FAR_BELOW).any())
+        return self._below(x, held, FAR_BELOW) is not None
 
     def wrong(self, x, held, parting, tolerance: float):
-        """(n,) bool: below the bound, or held there although water converges."""
+        """(n,) bool: below the bound, or held there although water converges; None: nowhere."""
         below = self._below(x, held, SLACK)
-        return below if parting is None else below | (held & (parting < -tolerance))
+        if parting is None:
+            return below
+        wrong = held & (parting < -tolerance)
+        wrong = wrong if below is None else below | wrong
+        return wrong if wrong.any() else None
 
     def exchanged(self, held, wrong):
         """The next set (n,) bool."""

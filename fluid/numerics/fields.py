@@ -26,6 +26,21 @@ def copied_at(rows, array) -> np.ndarray:
     return out
 
 
+def taken_at(rows, array) -> Array:
+    """array[rows] (n,) of a field (N,)."""
+    out = np.empty(len(rows))
+    over(_take, len(rows), rows, array, out)
+    return out
+
+
+def places_of(rows, n: int) -> Array:
+    """Place (n,) of each of the numbers 0 ... n in the list `rows`, -1 where it is not in it."""
+    out = np.empty(n, np.int64)
+    over(_nowhere, n, out, weight=PLAIN)
+    over(_number, len(rows), rows, out)
+    return out
+
+
 def added(a, b) -> Array:
     """a + b (N,)."""
     out = np.empty(len(a))
@@ -52,6 +67,24 @@ def _copy_rows(first, last, rows, array, out):
     for s in range(first, last):
         for k in range(3):
             out[rows[s], k] = array[rows[s], k]
+
+
+@ranged
+def _nowhere(first, last, out):
+    for j in range(first, last):
+        out[np.uint64(j)] = -1
+
+
+@ranged
+def _number(first, last, rows, out):
+    for s in range(first, last):
+        out[rows[s]] = s
+
+
+@ranged
+def _take(first, last, rows, array, out):
+    for s in range(first, last):
+        out[s] = array[rows[s]]
 
 
 @ranged

@@ -138,7 +138,7 @@ class Multigrid:
         over(_left_over, count, bounds, at, x, left, weight=work, pieces=count)
         over(_restricted, n_coarse, at.first, at.member, left, coarse, weight=AGGREGATE)
         coarse = self._cycle(depth + 1, coarse)
-        over(_add, len(r), at.aggregate, coarse, x, before)
+        over(_onto, len(r), at.aggregate, coarse, x, before)
         over(_up_blocks, count, bounds, at, r, before, x, weight=work, pieces=count)
         return x
 
@@ -414,25 +414,27 @@ def _restricted(begin, end, first, member, left, coarse):
 
 
 @ranged
-def _add(first, last, aggregate, coarse, x, copy):
-    """x + P coarse in place, and a copy of it."""
-    for i in range(first, last):
-        if aggregate[i] >= 0:
-            x[i] += coarse[aggregate[i]]
-        copy[i] = x[i]
+def _onto(first, last, aggregate, coarse, x, out):
+    """x + P coarse."""
+    for j in range(first, last):
+        i = np.uint64(j)
+        k = aggregate[i]
+        out[i] = x[i] + coarse[np.uint64(k)] if k >= 0 else x[i]
 
 
 @ranged
 def _up_blocks(first, last, bounds, at, r, before, x):
-    """Backward sweeps of blocks in place; before (n,): x before the sweeps, which the other blocks see."""
-    start, column, entry, inverse = at.start, at.column, at.entry, at.inverse
+    """Backward sweeps of blocks → x; before (n,): what they begin with, which the other blocks see."""
+    start, middle, column, entry, inverse = at.start, at.middle, at.column, at.entry, at.inverse
     for b in range(first, last):
         low, high = bounds[b], bounds[b + 1]
         for i in range(high - 1, low - 1, -1):
             total = r[i]
-            for s in range(start[i], start[i + 1]):
+            for s in range(start[i], middle[i]):
+                total -= entry[s] * before[column[s]]
+            for s in range(middle[i], start[i + 1]):
                 j = column[s]
-                total -= entry[s] * (x[j] if low <= j < high else before[j])
+                total -= entry[s] * (x[j] if j < high else before[j])
             x[i] = total * inverse[i]
 
 

@@ -68,6 +68,23 @@ def kinetic_energies(density, states) -> list[float]:
     return [0.5 * density * float(square) for square in total]
 
 
+def dots(volumes, weight) -> Array:
+    """Σ_i V_i w_i of each of several V (N,), and Σ_i V_i, (m, 2), in one loop; weight (N,)."""
+    return summed(_dots, len(weight), (len(volumes), 2), tuple(volumes), weight)
+
+
+@ranged
+def _dots(first, last, volumes, weight, partial):
+    for c in range(first, last):
+        for field in range(len(volumes)):
+            volume, total, plain = volumes[field], 0.0, 0.0
+            for k in range(c * CHUNK, min((c + 1) * CHUNK, volume.shape[0])):
+                i = np.uint64(k)
+                total += volume[i] * weight[i]
+                plain += volume[i]
+            partial[c, field, 0], partial[c, field, 1] = total, plain
+
+
 @ranged
 def _squares_of(first, last, volumes, velocities, partial):
     for c in range(first, last):

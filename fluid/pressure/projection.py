@@ -27,6 +27,7 @@ import scipy.sparse as sp
 
 from array_types import Array, Bools, Floats, Integers, Ints
 from fluid.domain.layers import WORK
+from fluid.numerics.fields import places_of
 from kernels.decorators import kernel, ranged, released
 from kernels.threads import found_over, over, owning, reach_of_cells
 
@@ -185,8 +186,7 @@ def pressure_matrix(graph, phi, dofs, open_node, scale: float, reserve):
 
     open_node (N,) bool: nodes on open sides, p = 0 · reserve (N,) [m] of `obtuse.reserve`, zeros without obtuse cells.
     """
-    column = np.full(len(phi), -1, np.int64)
-    column[dofs] = np.arange(len(dofs))
+    column = places_of(dofs, len(phi))
     n, edges = len(dofs), graph.edges
     indptr = np.zeros(n + 1, np.int32)
     over(_row_lengths, n, dofs, column, edges, indptr[1:])

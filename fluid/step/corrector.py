@@ -16,8 +16,8 @@ import numpy as np
 from array_types import Bools, Floats, Ints
 from fluid.domain.cell_vectors import CellVectors, first_from
 from fluid.numerics.fields import copied_at, less
-from fluid.numerics.solve import product
-from fluid.numerics.sums import kinetic_energies, kinetic_energy
+from fluid.numerics.multigrid import unsigned
+from fluid.numerics.sums import dots, kinetic_energies, kinetic_energy
 from fluid.pressure.pressure_bound import BoundMet
 from fluid.pressure.projection import (
     Waterline,
@@ -35,7 +35,7 @@ from fluid.surface.extrapolation import extend_velocity
 from fluid.surface.gradient_jump_damping import damp_gradient_jumps
 from fluid.surface.volume import Flux, edge_flux
 from kernels.decorators import ranged
-from kernels.threads import over, zeros
+from kernels.threads import CHUNK, over, summed, zeros
 
 FLUX_LAYERS = 3
 """Layers of dry nodes that water may reach within the next step."""
@@ -334,16 +334,16 @@ def _cells_of_flux(first, last, cell_list, u, wet, before, fluid, now, middle):
 
 def _report(water, problem, x, projected_energy, u, clipped, momentum, bound):
     kept, p = problem.predicted, water.parameters
-
-    def potential(volume):
-        return -p.density * float(volume @ water.nodes_below_floor)
-
     before, carried, W = water.nodal_water, kept.uncorrected_water, kept.nodal_water
     states = [(before, water.velocity), (carried, kept.u_star), (W, kept.u_star), (W, u)]
-    kinetic, of_water = kinetic_energies(p.density, states), potential(W)
+    moments = dots((before, carried, W), water.nodes_below_floor)
+    kinetic, (at_start, of_carried, of_water) = (
+        kinetic_energies(p.density, states),
+        -p.density * moments[:, 0],
+    )
     stages = [
-        kinetic[0] + potential(before),
-        kinetic[1] + potential(carried),
+        kinetic[0] + at_start,
+        kinetic[1] + of_carried,
         kinetic[2] + of_water,
         projected_energy + of_water,
         kinetic[3] + of_water,
@@ -353,9 +353,8 @@ def _report(water, problem, x, projected_energy, u, clipped, momentum, bound):
     if water.viscous is not None:
         change["transport and gravity"] -= kept.shear.energy
         change["viscosity and friction"] = kept.shear.energy
-    volume = float(kept.nodal_water.sum()) - float(kept.displaced.sum()) - kept.in_films[0]
+    volume = float(moments[2, 1]) - float(kept.displaced.sum()) - kept.in_films[0]
     left = kept.left
-    moved_by_bodies = product(problem.matrix, x) - problem.rhs - bound.rate
     return StepReport(
         dt=problem.dt,
         volume=volume,
@@ -363,10 +362,28 @@ def _report(water, problem, x, projected_energy, u, clipped, momentum, bound):
         reinserted=kept.reinserted,
         clipped=clipped,
         unknowns=len(x),
-        work_on_bodies=-problem.dt * float((x + problem.known) @ moved_by_bodies),
+        work_on_bodies=-problem.dt * _power_on_bodies(problem, x, bound.rate),
         energy_change=change,
         momentum=momentum,
         left=0.0 if left is None else float(left.volume.sum()),
         left_energy=0.0 if left is None else left.energy,
         bound=bound,
     )
+
+
+def _power_on_bodies(problem, x, rate) -> float:
+    """(x + known)·(A x - b - rate) [W], what bodies move times the pressure; rate (n,) [m³/s], or zero for all."""
+    A, rate = problem.matrix, np.zeros(0) if np.ndim(rate) == 0 else rate
+    rows = (*unsigned(A), A.data)
+    return float(summed(_powers, len(x), (1,), *rows, x, problem.known, problem.rhs, rate)[0])
+
+
+@ranged
+def _powers(first, last, indptr, indices, data, x, known, rhs, rate, partial):
+    for c in range(first, last):
+        for k in range(c * CHUNK, min((c + 1) * CHUNK, x.shape[0])):
+            i = np.uint64(k)
+            moved = -rhs[i] if rate.shape[0] == 0 else -rhs[i] - rate[i]
+            for s in range(indptr[i], indptr[i + np.uint64(1)]):
+                moved += data[s] * x[indices[s]]
+            partial[c, 0] += (x[i] + known[i]) * moved

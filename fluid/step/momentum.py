@@ -239,16 +239,26 @@ def _loads(water, problem, p):
     """Impulses: given to the bodies, of it the wall shear, and that of the sides of the tank on the water by shear."""
     centre, dt, shear = water.domain.body_centre, problem.dt, problem.predicted.shear
     coupling = problem.coupling
-    length = np.diff(coupling.indptr)
     # Few nodes have rows that are not empty; the product with the transpose would go through all. p is 0 in the air.
-    rows = np.flatnonzero(length)
-    held = np.repeat(p[problem.dofs[rows]], length[rows])
+    rows = found_over(_not_empty, coupling.shape[0], coupling.indptr)
+    held = np.repeat(p[problem.dofs[rows]], coupling.indptr[rows + 1] - coupling.indptr[rows])
     of_pressure = np.bincount(coupling.indices, coupling.data * held, coupling.shape[1])
     on_bodies = problem.other_load - of_pressure.reshape(-1, 6)
     on_bodies = dt * about(water.reference, on_bodies, centre)
     if shear is None:
         return on_bodies, np.zeros(6), np.zeros(6)
     return on_bodies, dt * about(water.reference, shear.load, centre), dt * shear.tank
+
+
+@released
+def _not_empty(first, last, indptr):
+    """Rows of a csr matrix that have entries, in order."""
+    found, n = np.empty(last - first, np.int64), 0
+    for i in range(first, last):
+        if indptr[i] < indptr[i + 1]:
+            found[n] = i
+            n += 1
+    return found[:n].copy()
 
 
 def _through(water, kept):

@@ -16,7 +16,7 @@ import numpy as np
 
 from array_types import Bools, Floats, Ints
 from fluid.domain.coupling_matrix import rows_of, wetted_coupling
-from fluid.numerics.fields import added, copied
+from fluid.numerics.fields import added, copied, taken_at
 from fluid.pressure.active_cells import WetPart
 from fluid.pressure.indefinite_cells import about, reserve
 from fluid.pressure.pressure_bound import lowest_pressure
@@ -37,8 +37,8 @@ from fluid.surface.level_set import redistance
 from fluid.surface.volume import VolumeCorrection, correct_volume
 from fluid.transport.advection import transport
 from fluid.transport.paths_in_solids import levels_in_solids
-from kernels.decorators import ranged
-from kernels.threads import over, zeros
+from kernels.decorators import ranged, released
+from kernels.threads import found_over, over, zeros
 
 if TYPE_CHECKING:
     from fluid.viscous.viscosity import ViscousChange
@@ -313,7 +313,7 @@ def _problem(water, dt: float, theta: float, kick, moved: Moved) -> PressureProb
     remainder = carried_remainder(water, dt, theta, cells)
     star = cell_velocity(cells, moved.u_star, remainder, t.fluid_cells)
     rhs = inflow(cells, star, t.fluid_cells, len(phi))
-    dofs = np.flatnonzero(wet & ~water.walls.open_node)
+    dofs = found_over(_unknowns, len(wet), wet, water.walls.open_node)
     matrix, anchored, held_back = _definite(water, graph, phi, cells, dofs, dt / density, theta)
     if held_back is not None:
         rhs[dofs] += held_back
@@ -330,7 +330,7 @@ def _problem(water, dt: float, theta: float, kick, moved: Moved) -> PressureProb
     matrix, extra = _sealed(water, matrix, anchored, dofs, dt, guess)
     if water.slits is not None:
         lumped, drive = water.slits.pressure_terms(dofs, known, water.parameters.weight, dt, density)
-        matrix, extra = matrix + lumped, extra + drive
+        matrix, extra = matrix + lumped, drive if extra is None else extra + drive
     cushions = None
     if water.air is not None:
         from fluid.air.cushions import Cushions
@@ -380,7 +380,7 @@ def _problem(water, dt: float, theta: float, kick, moved: Moved) -> PressureProb
         other += moved.shear.load
     problem = PressureProblem(
         matrix=matrix,
-        rhs=rhs[dofs] + extra,
+        rhs=taken_at(dofs, rhs) if extra is None else rhs[dofs] + extra,
         coupling=rows_of(coupling, dofs),
         known=known,
         guess=guess,
@@ -406,6 +406,17 @@ def _of_last_step(first, last, dofs, theta, kick, pressure, known, guess):
         i = dofs[s]
         known[s] = (1.0 - theta) * kick[i] * pressure[i]
         guess[s] = theta * pressure[i]
+
+
+@released
+def _unknowns(first, last, wet, open_node):
+    """Wet nodes that are not on open sides, in order."""
+    found, n = np.empty(last - first, np.int64), 0
+    for i in range(first, last):
+        if wet[i] and not open_node[i]:
+            found[n] = i
+            n += 1
+    return found[:n].copy()
 
 
 def _known_pressure(water, pressure, phi):
@@ -444,11 +455,13 @@ def _coupling(water, void):
 
 
 def _sealed(water, matrix, anchored, dofs, dt, pressure):
-    """Closed pockets get a compliance far below that at which it affects their pressure differences, c ρ h²/dt ≪ (π
-    h/L)²: real water is softer than that in short steps, and its waves would take part in the added mass of bodies."""
+    """The matrix, and what is added to the right hand side, None: nothing.
+
+    Closed pockets get a compliance far below that at which it affects their pressure differences, c ρ h²/dt ≪ (π h/L)²:
+    real water is softer than that in short steps, and its waves would take part in the added mass of bodies."""
     floating = cut_off(matrix, anchored)
     if not floating.any():
-        return matrix, np.zeros(len(dofs))
+        return matrix, None
     p = water.parameters
     compliance = (
         p.pocket_compliance * dt / (p.density * water.mesh.spacing**2) * water.topology.finer[dofs] ** 2

@@ -21,8 +21,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from kernels.decorators import plain, ranged, released
-from kernels.threads import joined, over
+from kernels.decorators import ranged, released
+from kernels.threads import CHUNK, joined, over, summed
 
 SPRAY = 0.01
 """Largest share of the volume of water that is spray, ..."""
@@ -47,8 +47,8 @@ def pace(u, water, counted) -> float:
 
 def _bulk(least, u, water, counted) -> float:
     """v_s of (1) [m/s], or `least` if that is larger."""
-    speed, volume, held = joined(over(_faster_than, len(u), least, u, water, counted))
-    total = _total(held)
+    speed, volume = joined(over(_faster_than, len(u), least, u, water, counted))
+    total = float(summed(_counted_water, len(u), (1,), water, counted)[0])
     order = np.argsort(speed)[::-1]
     rest = np.searchsorted(np.cumsum(volume[order]), SPRAY * total, side="right")
     return float(speed[order[rest]]) if rest < len(order) else least
@@ -109,25 +109,22 @@ def _fastest_wet(first, last, u, phi, roomy):
 
 @released
 def _faster_than(first, last, least, u, water, counted):
-    """Largest component (n,) and volume (n,) of the counted nodes faster than `least`, and the volume (m,) of all."""
-    speed, volume, held = (np.empty(last - first), np.empty(last - first), np.empty(last - first))
-    n, m = 0, 0
+    """Largest component (n,) and volume (n,) of the counted nodes faster than `least`."""
+    speed, volume, n = np.empty(last - first), np.empty(last - first), 0
     for k in range(first, last):
         i = np.uint64(k)
         if counted[i]:
-            held[m] = water[i]
-            m += 1
             largest = max(max(abs(u[i, 0]), abs(u[i, 1])), abs(u[i, 2]))
             if largest > least:
                 speed[n], volume[n] = largest, water[i]
                 n += 1
-    return speed[:n], volume[:n], held[:m]
+    return speed[:n].copy(), volume[:n].copy()
 
 
-@plain
-def _total(held):
-    """Sum of the entries, one after the other."""
-    total = 0.0
-    for k in range(held.shape[0]):
-        total += held[k]
-    return total
+@ranged
+def _counted_water(first, last, water, counted, partial):
+    for c in range(first, last):
+        for k in range(c * CHUNK, min((c + 1) * CHUNK, water.shape[0])):
+            i = np.uint64(k)
+            if counted[i]:
+                partial[c, 0] += water[i]

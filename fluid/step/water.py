@@ -287,7 +287,8 @@ class Water:
         """Take over the pressure x (n,) [Pa] of the problem and end the step; parting (n,) [m³/s]: rate at which the
         water parts where x is at its bound, None: nowhere (`bounded.py`)."""
         new: Corrected = corrected(self, problem, np.asarray(x), parting)
-        before = self._rates()
+        late = self._late(problem.dt)
+        before = self._rates() if late > 0.0 else None
         self.level_set, self.nodal_water = problem.predicted.level_set, new.nodal_water
         self.displaced = problem.predicted.displaced
         self.film_volume, self.film_potential = problem.predicted.in_films
@@ -308,14 +309,17 @@ class Water:
             pressure, dofs = problem.of_water(x + problem.known), problem.of_water(problem.dofs)
             self.slits = self.slits.advanced(dofs, pressure, p.weight, problem.dt, p.density)
         self.report = new.report
-        late, (power, through) = self._late(problem.dt), self._rates()
-        of_surface = late
-        if late > 0.0 and problem.coupling.nnz > 0 and self.pushed_by.any():
-            # calm water that bodies push moves with what they displace
-            of_surface *= 1.0 - self.calm(problem.dt)
-        self._late_energy += of_surface * (power - before[0])
+        ahead = 0.0
+        if before is not None:
+            power, through = self._rates()
+            of_surface = late
+            if problem.coupling.nnz > 0 and self.pushed_by.any():
+                # calm water that bodies push moves with what they displace
+                of_surface *= 1.0 - self.calm(problem.dt)
+            self._late_energy += of_surface * (power - before[0])
+            if self.sides is not None:
+                ahead = late * float((through - before[1]) @ self.pressure)
         if self.sides is not None:
-            ahead = late * float((through - before[1]) @ self.pressure)
             self.sides.add_step(problem.predicted.through, self.head(), ahead)
         self.time += problem.dt
         self.steps += 1

@@ -230,53 +230,69 @@ def _add_gradients(first, last, m, runs, cell_list, marked, f, fluid, local, wei
 
 
 def smoothed_slope(topology, cell_list, marked, u, calm: float):
-    """∇u (N, 3, 3) of `mean_gradients` for u (N, 3), averaged over the corners of the listed cells, each cell counts:
-    at the nodes beside cells that are not all marked, from which values are continued (elsewhere it is not to be read).
-    Once in fast water, calm = 0; (SWEEPS + 1) Aⁿ - SWEEPS Aⁿ⁺¹ at rest, calm = 1, with the average A and n = SWEEPS;
-    between, in between; zero at other marked nodes. A wave of many cells passes with an error of the second order of
-    what an average takes off it, one of a few cells as little as through Aⁿ, which alone took the slope a cell too
-    deep: 2.5 % of the energy of waves of 14 cells a period.
+    """∇u (N, 3, 3) of `mean_gradients` for u (N, 3), averaged over the corners of the cells around a node, each cell
+    counts: at the marked nodes of listed cells that are not all marked, from which values are continued (elsewhere it
+    is not to be read). Once in fast water, calm = 0; (SWEEPS + 1) Aⁿ - SWEEPS Aⁿ⁺¹ at rest, calm = 1, with the average
+    A and n = SWEEPS; between, in between. A wave of many cells passes with an error of the second order of what an
+    average takes off it, one of a few cells as little as through Aⁿ, which alone took the slope a cell too deep: 2.5 %
+    of the energy of waves of 14 cells a period.
 
-    Only nodes of cells whose corners are all marked have a field, the averages run over these. Waves of a few cells,
-    whose slope the continuation carries to the surface many times too large, grow without it: by 0.01 to 0.02 a step
-    where the surface lies just below a layer of nodes, by 0.005 after one sweep. More than one slows a bore into two
-    cells of water by 15 %."""
-    t = topology
+    Only nodes of cells whose corners are all marked have a field, over which the averages run; it is zero at the other
+    marked nodes. Waves of a few cells, whose slope the continuation carries to the surface many times too large, grow
+    without averages: by 0.01 to 0.02 a step where the surface lies just below a layer of nodes, by 0.005 after one
+    sweep. More than one slows a bore into two cells of water by 15 %."""
+    t, sweeps = topology, SWEEPS + 1 if calm > 0.0 else 1
     has, beside = _with_field(cell_list, marked, t.cells)
-    reach = [beside]
-    for _ in range(SWEEPS + 1 if calm > 0.0 else 1):
-        # each sweep reads one layer of nodes farther in than it is to be right on
-        reach.append(_one_layer_more(cell_list, reach[-1], t.cells))
-    near = touching_among(cell_list, reach.pop(), t.cells)
-    there = np.zeros(len(u), bool)
-    over(mark_nodes, len(near), near, t.cells, there)
-    slope = mean_gradients(near, marked, u, t.fluid_cells, there)
-    once = before = slope = _averaged(near, (reach.pop(), has, there, marked), slope, t.cells)
-    while reach:
-        before, slope = slope, _averaged(near, (reach.pop(), has, there, there), slope, t.cells)
-    if slope is once:
-        return once
-    over(_combined, len(u), there, calm, once, before, slope)
+    # each sweep reads one layer of nodes farther in than it is to be right on
+    order, start, _ = layers_around(beside & has, sweeps, t.around[0], t.around[1], has)
+    slope = mean_gradients(_cells_of(order, cell_list, t.cells, len(u)), marked, u, t.fluid_cells, has)
+    found = [slope]
+    for k in range(sweeps):
+        found.append(_averaged(order[: start[sweeps - k]], has, found[-1], t))
+    once, before, slope = found[1], *found[-2:]
+    if sweeps > 1:
+        over(_combined, start[1], order, calm, once, before, slope)
+    over(_clear_unless, len(u), has, marked, once.reshape(len(u), -1))
     return once
 
 
+def _cells_of(nodes, cell_list, cells, n):
+    """Those of the listed cells that have one of these nodes, of 0 ... n."""
+    return touching_among(cell_list, _listed(nodes, n), cells)
+
+
+def _listed(nodes, n):
+    """Which of 0 ... n are in a list, (n,) bool."""
+    listed = np.zeros(n, bool)
+    over(_mark, len(nodes), nodes, listed)
+    return listed
+
+
 @ranged
-def mark_nodes(first, last, cell_list, cells, marked):
+def _mark(first, last, nodes, marked):
     for s in range(first, last):
-        for a in range(4):
-            marked[cells[cell_list[s], a]] = True
+        marked[np.uint64(nodes[np.uint64(s)])] = True
 
 
 @ranged
-def _combined(first, last, there, calm, once, before, slope):
-    """once (N, 3, 3) + calm (before + SWEEPS (before - slope) - once) in place at marked nodes."""
+def _clear_unless(first, last, has, marked, field):
+    """field (N, m) ← 0 at marked nodes that have none."""
     for j in range(first, last):
         i = np.uint64(j)
-        if there[i]:
-            for k in range(SPACE):
-                for d in range(SPACE):
-                    ahead = before[i, k, d] + SWEEPS * (before[i, k, d] - slope[i, k, d])
-                    once[i, k, d] = once[i, k, d] + calm * (ahead - once[i, k, d])
+        if marked[i] and not has[i]:
+            for k in range(ENTRIES):
+                field[i, k] = 0.0
+
+
+@ranged
+def _combined(first, last, nodes, calm, once, before, slope):
+    """once (N, 3, 3) + calm (before + SWEEPS (before - slope) - once) in place at these nodes."""
+    for s in range(first, last):
+        i = np.uint64(nodes[np.uint64(s)])
+        for k in range(SPACE):
+            for d in range(SPACE):
+                ahead = before[i, k, d] + SWEEPS * (before[i, k, d] - slope[i, k, d])
+                once[i, k, d] = once[i, k, d] + calm * (ahead - once[i, k, d])
 
 
 def _with_field(cell_list, marked, cells):
@@ -298,74 +314,32 @@ def _mark_field(first, last, cell_list, marked, cells, has, beside):
                 beside[cells[e, a]] = True
 
 
-def _one_layer_more(cell_list, nodes, cells):
-    """The marked nodes (N,) bool and all that share a listed cell with them."""
-    wider = nodes.copy()
-    over(_mark_layer, len(cell_list), cell_list, nodes, cells, wider)
-    return wider
-
-
-@ranged
-def _mark_layer(first, last, cell_list, nodes, cells, wider):
-    for s in range(first, last):
-        e = cell_list[s]
-        if nodes[cells[e, 0]] or nodes[cells[e, 1]] or nodes[cells[e, 2]] or nodes[cells[e, 3]]:
-            for a in range(4):
-                wider[cells[e, a]] = True
-
-
-def _averaged(cell_list, marks, field, cells):
-    """Mean (N, 3, 3) of the field (N, 3, 3) over the corners that have one, of the listed cells around the nodes in
-    reach.
-
-    marks (N,) bool: nodes in reach, nodes that have a field, and twice nodes where the mean is zero unless it is found;
-    other nodes hold anything."""
-    count, mean, n = np.empty(len(field)), np.empty(field.shape), len(field)
-    listed, flat = reach_of_cells(cell_list, cells), (field.reshape(n, -1), mean.reshape(n, -1))
-    owning(_average, n, listed, len(cell_list), cell_list, marks, flat[0], cells, count, flat[1])
+def _averaged(nodes, has, field, topology):
+    """Mean (N, 3, 3) of the field (N, 3, 3) over the corners that have one, has (N,) bool, of the cells around each of
+    these nodes, which have one too; other nodes hold anything."""
+    t, n, mean = topology, len(field), np.empty(field.shape)
+    flat = (field.reshape(n, -1), mean.reshape(n, -1))
+    over(_average, len(nodes), nodes, has, t.node_start, t.around_by_cells, *flat, weight=WORK)
     return mean
 
 
 @released
-def _average(first, last, runs, cell_list, marks, field, cells, count, mean):
-    reach, has, there, also = marks
-    for i in range(first, last):
-        count[i] = 0.0
-        if there[i] or also[i]:
-            for k in range(ENTRIES):
-                mean[i, k] = 0.0
-    _add_averages(first, last, runs, cell_list, (reach, has), field, cells, np.empty(ENTRIES), count, mean)
-
-
-@inner
-def _add_averages(first, last, runs, cell_list, marks, field, cells, total, count, mean):
-    """field, mean: the entries of each node in one row · total: work space, as long."""
-    reach, has = marks
-    for run in range(runs.shape[0]):
-        for s in range(runs[run, 0], runs[run, 1]):
-            e = np.uint64(cell_list[s])
-            if not (reach[cells[e, 0]] or reach[cells[e, 1]] or reach[cells[e, 2]] or reach[cells[e, 3]]):
-                continue
-            for k in range(ENTRIES):
-                total[k] = 0.0
-            known = 0
-            for a in range(4):
-                i = cells[e, a]
-                if has[i]:
-                    known += 1
-                    for k in range(ENTRIES):
-                        total[k] += field[i, k]
-            for a in range(4):
-                i = cells[e, a]
-                if has[i] and first <= i < last:
-                    count[i] += known
-                    for k in range(ENTRIES):
-                        mean[i, k] += total[k]
-    for j in range(first, last):
-        i = np.uint64(j)
-        if count[i] > 0.0:
-            for k in range(ENTRIES):
-                mean[i, k] /= count[i]
+def _average(first, last, nodes, has, node_start, around_by_cells, field, mean):
+    (start, around, shared), total = around_by_cells, np.empty(ENTRIES)
+    for s in range(first, last):
+        i = np.uint64(nodes[np.uint64(s)])
+        count = float(node_start[i + np.uint64(1)] - node_start[i])
+        for k in range(ENTRIES):
+            total[k] = count * field[i, k]
+        for t in range(start[i], start[i + np.uint64(1)]):
+            j = around[t]
+            if has[j]:
+                weight = float(shared[t])
+                count += weight
+                for k in range(ENTRIES):
+                    total[k] += weight * field[j, k]
+        for k in range(ENTRIES):
+            mean[i, k] = total[k] / count
 
 
 def _own_speed(nodes, factor, forced):
@@ -383,8 +357,7 @@ def _speed_of(first, last, nodes, factor, forced, out):
 
 def _clear_outside(order, u, a):
     """u, a (N, 3) ← 0 at the nodes that are not in the list, in place."""
-    listed = np.zeros(len(u), bool)
-    listed[order] = True
+    listed = _listed(order, len(u))
     over(_clear, len(u), listed, u, a)
 
 

@@ -37,7 +37,7 @@ from fluid.domain.layers import layers_around
 from fluid.mesh.arrays import Corners
 from fluid.numerics.fields import copied
 from fluid.surface.closest_triangles import Surface, squared_distances
-from fluid.surface.extrapolation import continue_outward, mark_nodes, mean_gradients
+from fluid.surface.extrapolation import continue_outward, mean_gradients
 from kernels.decorators import ranged, released
 from kernels.threads import found_over, joined, over, owning, reach_of_cells
 
@@ -219,7 +219,7 @@ def redistance(topology, phi, spacing, rescale: bool, motion=None):
     if len(cut) == 0:
         return far
     front = np.zeros(len(phi), bool)
-    over(mark_nodes, len(cut), cut, t.cells, front)
+    over(_mark_nodes, len(cut), cut, t.cells, front)
     layers = layers_around(front, LAYERS, *t.around)
     surface, mesh = Surface(*surface_triangles(cut, phi, t.nodes, t.cells)), Corners(t.nodes, t.cells)
     exact = np.arange(layers.start[1], layers.start[EXACT_LAYERS + 1])
@@ -236,6 +236,13 @@ def redistance(topology, phi, spacing, rescale: bool, motion=None):
         beside = layers.order[layers.start[1] : layers.start[2]]
         _past_the_last_polygon(t, cut, front, beside, motion, far)
     return far
+
+
+@ranged
+def _mark_nodes(first, last, cell_list, cells, marked):
+    for s in range(first, last):
+        for a in range(4):
+            marked[cells[cell_list[s], a]] = True
 
 
 def no_steeper(topology, phi, given):

@@ -36,7 +36,7 @@ from array_types import Floats, Ints
 from fluid.domain.layers import WORK
 from fluid.domain.moments import nodal_water, part_moments
 from fluid.domain.topology import PAIR, Graph
-from fluid.numerics.fields import PLAIN, added, copied
+from fluid.numerics.fields import PLAIN, added, copied, places_of
 from fluid.surface.level_set import drain_films
 from kernels.decorators import kernel, ranged, released
 from kernels.threads import found_over, over, owning, reach_of_cells
@@ -275,8 +275,7 @@ def correct_volume(topology, graph, listed, phi, carried, target: float, kappa: 
     own = added(inner, nodal_water(near, 0.0, phi, topology.parts, n))
     slope = _volume_slope(topology, near, phi, spacing, seen)
     band = found_over(_in_band, len(listed), listed, phi, spacing)
-    place = np.full(n, -1, np.int64)
-    place[band] = np.arange(len(band))
+    place = places_of(band, n)
     c, residual = np.empty(len(band)), np.empty(len(band))
     over(_equation, len(band), band, slope, topology.node_volume, spacing, (carried, own), c, residual)
     shift = diffused_shift(band, place, graph.edges, c, residual, kappa, spacing, 1e-2, 40)

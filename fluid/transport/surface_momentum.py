@@ -52,7 +52,7 @@ import numpy as np
 
 from array_types import Array
 from fluid.domain.topology import Graph, Topology
-from fluid.numerics.fields import copied
+from fluid.numerics.fields import copied, places_of
 from fluid.surface.volume import Flux, Shift, diffused_shift
 from fluid.transport.velocity_transport import carry_velocity
 from fluid.transport.volume_transport import carry_volume
@@ -140,9 +140,10 @@ class Carried:
         correction: `volume.VolumeCorrection` of what the nodes held (N,) [m³] · on_open_side (N,) bool: nodes that
         water leaves through: what the fluxes bring there is not yet all that came. Only where some water is fast, or
         there is a jump; `velocity` is overwritten."""
-        jumps = np.where(t.near_solids | on_open_side, 0.0, self.jumps)
-        gained = correction.nodal_water - held + self.swept
-        _pass_on(graph, correction.shift, (gained, jumps), self.water, t.node_volume, self.velocity)
+        jumps = np.empty(len(phi))
+        over(_without, len(phi), self.jumps, t.near_solids, on_open_side, jumps)
+        gained = (correction.nodal_water, held, self.swept)
+        _pass_on(graph, correction.shift, gained, jumps, self.water, t.node_volume, self.velocity)
         at_surface = (phi, spacing, t.near_solids)
         state = (self.water, (self.weight, self.fast), at_surface, on_open_side)
         over(_mixed, len(nodes), nodes, *state, self.velocity, u)
@@ -164,11 +165,19 @@ def _mixed(first, last, nodes, water, weights, at_surface, on_open_side, carried
             u[i, k] += weight * (carried[i, k] - u[i, k])
 
 
-def _pass_on(graph: Graph, shift: Shift, gained, water, capacity, u) -> None:
+@ranged
+def _without(first, last, weight, some, others, out):
+    """weight (N,), zero at nodes that are in one of two sets (N,) bool."""
+    for j in range(first, last):
+        i = np.uint64(j)
+        out[i] = 0.0 if some[i] or others[i] else weight[i]
+
+
+def _pass_on(graph: Graph, shift: Shift, gained, share, water, capacity, u) -> None:
     """Velocity u (N, 3) [m/s] carried along with the volumes (2) and (3), in place.
 
-    gained: m_i (N,) [m³], and the share (N,) of its rest that is passed on · water, capacity (N,) [m³]: what the nodes
-    hold before, and could hold."""
+    gained: m_i = first - second + third (N,) [m³] · share (N,) of its rest that is passed on · water, capacity (N,)
+    [m³]: what the nodes hold before, and could hold."""
     n, edges, spacing = len(water), graph.edges, shift.spacing
     holds = water[shift.band] > 0.0
     band, moved = shift.band[holds], np.empty(len(graph.neighbour))
@@ -176,19 +185,29 @@ def _pass_on(graph: Graph, shift: Shift, gained, water, capacity, u) -> None:
     chi[band], inside[band] = shift.kappa * shift.value[holds], True
     over(_passed, len(band), band, edges, chi, inside, spacing, water, moved)
     carry_velocity(band, edges, moved, water, u, came)
-    rest = gained[1] * (gained[0] - came)
-    if not rest[band].any():
+    sought = np.empty(len(band))
+    if not sum(over(_sought, len(band), band, gained, share, came, sought)):
         return
-    place = np.full(n, -1, np.int64)
-    place[band] = np.arange(len(band))
+    place = places_of(band, n)
     stiffness, anchor = np.empty(len(edges.stiffness)), np.empty(len(band))
     over(_through_water, len(band), band, edges, spacing, water, capacity, (stiffness, anchor))
     edges, left = edges._replace(stiffness=stiffness), np.maximum(water + came, 0.0)
-    chi[band] = diffused_shift(
-        band, place, edges, anchor, -rest[band], 1.0, spacing, TOLERANCE, MOST_ITERATIONS
-    )
+    chi[band] = diffused_shift(band, place, edges, anchor, sought, 1.0, spacing, TOLERANCE, MOST_ITERATIONS)
     over(_passed, len(band), band, edges, chi, inside, spacing, left, moved)
     carry_velocity(band, edges, moved, left, u)
+
+
+@released
+def _sought(first, last, band, gained, share, came, out):
+    """What (3) is to take from the nodes of the band (n,) [m³], in `out`; at how many that is not zero.
+
+    came (N,) [m³]: what (2) brought."""
+    (first_of, less, more), count = gained, 0
+    for s in range(first, last):
+        i = band[s]
+        out[s] = -(share[i] * (first_of[i] - less[i] + more[i] - came[i]))
+        count += out[s] != 0.0
+    return count
 
 
 @ranged

@@ -118,7 +118,8 @@ def test_what_the_correction_moves_takes_its_momentum_along_even_past_a_node_wit
     before = found.water @ u
     nothing = Shift(band, np.zeros(len(band)), 5.0, t.node_size)
     graph, everywhere = water.graph_for(water.listed), np.ones(len(u))
-    surface_momentum._pass_on(graph, nothing, (gained, everywhere), found.water, room, u)
+    gains = (gained, np.zeros(len(u)), np.zeros(len(u)))
+    surface_momentum._pass_on(graph, nothing, gains, everywhere, found.water, room, u)
     assert np.isfinite(u).all()
     after = (found.water + gained) @ u
     assert after[0] == pytest.approx(before[0], rel=0.01)

@@ -10,6 +10,9 @@ import sys
 import time
 from collections.abc import Callable
 
+import surgebreak  # noqa: F401 - before NumPy, which takes from it how many threads it may use
+
+# isort: split
 import numpy as np
 
 from coupler.commands.benchmark import scenes
