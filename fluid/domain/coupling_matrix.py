@@ -5,12 +5,9 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from fluid.domain.hats import hats_at
+from fluid.domain.hats import POLYGON, hats_at
 from kernels.decorators import kernel, ranged, released
 from kernels.threads import over
-
-WEIGHT = 20
-"""Cost of a polygon, in usual rows of `over`."""
 
 
 def wetted_coupling(domain, polygons=slice(None), weight=1.0) -> sp.csr_matrix:
@@ -26,7 +23,7 @@ def wetted_coupling(domain, polygons=slice(None), weight=1.0) -> sp.csr_matrix:
         return sp.csr_matrix(shape)
     n, bodies = len(domain.nodes), (wetted.body, domain.n_bodies)
     block, row = np.empty((len(wetted.cell), 4, 6)), np.zeros(n + 1, np.int64)
-    over(_blocks, len(block), wetted, domain.body_centre, domain.nodes, domain.hats, block, weight=WEIGHT)
+    over(_blocks, len(block), wetted, domain.body_centre, domain.nodes, domain.hats, block, weight=POLYGON)
     start, members = polygons_of_nodes(wetted.cell, domain.cells, n)
     over(_distinct, n, start, members, *bodies, row[1:])
     np.cumsum(row, out=row)

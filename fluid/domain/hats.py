@@ -7,6 +7,9 @@ import numpy as np
 from array_types import Array
 from kernels.decorators import inlined, inner, kernel
 
+POLYGON = 20
+"""Cost of an integral over one polygon of a wall, in usual rows of a loop."""
+
 
 def hat_values(cell_list, points, hats, nodes) -> Array:
     """N_a (k, q, 4) of the listed cells (k,) at points (k, q, 3) [m]; hats, nodes: as in `hats_at`."""

@@ -11,9 +11,9 @@ from __future__ import annotations
 import numpy as np
 
 from array_types import Array
-from fluid.domain.hats import hats_at, value_at
+from fluid.domain.hats import POLYGON, hats_at, value_at
 from fluid.domain.moments import marked_corners
-from fluid.pressure.waterline import WEIGHT, relative_area, wet_triangles
+from fluid.pressure.waterline import relative_area, wet_triangles
 from kernels.decorators import inner, kernel, released
 from kernels.threads import over
 
@@ -37,7 +37,7 @@ def taken_from_nodes(domain, coupling, phi: Array, way: Array) -> Array:
             phi,
             way,
             found,
-            weight=WEIGHT,
+            weight=POLYGON,
         )
         _take_off(at, domain.face_cell, domain.cells, found, taken)
     return taken

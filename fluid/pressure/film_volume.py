@@ -16,9 +16,9 @@ from __future__ import annotations
 import numpy as np
 
 from array_types import Array
-from fluid.domain.hats import hats_at, value_at
+from fluid.domain.hats import POLYGON, hats_at, value_at
 from fluid.domain.moments import marked_corners
-from fluid.pressure.waterline import WEIGHT, add_over_wet
+from fluid.pressure.waterline import add_over_wet
 from kernels.decorators import released
 from kernels.threads import over
 
@@ -34,7 +34,7 @@ def film_volume(domain, drawn_in: Array, phi: Array, potential: Array) -> tuple[
         return 0.0, 0.0
     faces, found = (domain.polygons(), domain.face_corners), np.empty((len(at), 2))
     over(
-        _films, len(at), at, faces, domain.hats, domain.nodes, drawn_in, phi, potential, found, weight=WEIGHT
+        _films, len(at), at, faces, domain.hats, domain.nodes, drawn_in, phi, potential, found, weight=POLYGON
     )
     volume, weighted = found.sum(axis=0).tolist()
     return volume, weighted

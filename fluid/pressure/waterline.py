@@ -20,14 +20,11 @@ from __future__ import annotations
 import numpy as np
 
 from array_types import Array
-from fluid.domain.hats import hats_at, value_at
+from fluid.domain.hats import POLYGON, hats_at, value_at
 from fluid.domain.moments import cells_touching, marked_corners
 from fluid.pressure.projection import with_ghosts
 from kernels.decorators import inner, kernel, released
 from kernels.threads import over
-
-WEIGHT = 20
-"""Cost of a triangle, in usual rows of `over`."""
 
 
 def waterline_load(domain, faces, left_out, phi, wet, pressure, open_node, air=None) -> Array:
@@ -52,7 +49,7 @@ def waterline_load(domain, faces, left_out, phi, wet, pressure, open_node, air=N
     ghosts = with_ghosts(p, outside, wet, open_node, phi, beside, domain.cells, domain.volume)
     found = np.empty((len(at), 6))
     fields = (phi, ghosts, p, outside, solved)
-    over(_differences, len(at), at, len(mixed), _surface_of(domain), fields, found, weight=WEIGHT)
+    over(_differences, len(at), at, len(mixed), _surface_of(domain), fields, found, weight=POLYGON)
     _sum_on_bodies(at, domain.face_body, found, load)
     return load
 
@@ -119,7 +116,7 @@ def hydrostatic_stiffness(water, phi, bodies) -> Array | None:
     if len(at) == 0:
         return None
     found, stiffness = np.empty((len(at), 9)), np.zeros((domain.n_bodies, 9))
-    over(_stiffnesses, len(at), at, _surface_of(domain), phi, weight, found, weight=WEIGHT)
+    over(_stiffnesses, len(at), at, _surface_of(domain), phi, weight, found, weight=POLYGON)
     _sum_on_bodies(at, domain.face_body, found, stiffness)
     return stiffness.reshape(-1, 3, 3)
 

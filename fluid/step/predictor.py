@@ -164,7 +164,6 @@ def predicted(water, dt: float) -> PressureProblem:
             u_adv,
             water.listed,
             phi,
-            water.topology.node_size,
             graph,
             surface,
             held,

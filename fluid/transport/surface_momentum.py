@@ -131,9 +131,7 @@ class Carried:
         weight, fast, jumps = (fields[:, k].copy() for k in (3, 4, 5))
         return Carried(water, fields[:, :3].copy(), weight, fast, swept, jumps)
 
-    def into(
-        self, u, nodes, phi, spacing, graph: Graph, correction, held, t: Topology, on_open_side
-    ) -> Array:
+    def into(self, u, nodes, phi, graph: Graph, correction, held, t: Topology, on_open_side) -> Array:
         """Equations (1) to (3) for u (N, 3) [m/s] at the listed nodes (n,) that hold water, in place; φ (N,) [m].
         → share (N,) to which water at nodes above the surface keeps its own momentum.
 
@@ -144,7 +142,7 @@ class Carried:
         over(_without, len(phi), self.jumps, t.near_solids, on_open_side, jumps)
         gained = (correction.nodal_water, held, self.swept)
         _pass_on(graph, correction.shift, gained, jumps, self.water, t.node_volume, self.velocity)
-        at_surface = (phi, spacing, t.near_solids)
+        at_surface = (phi, t.node_size, t.near_solids)
         state = (self.water, (self.weight, self.fast), at_surface, on_open_side)
         over(_mixed, len(nodes), nodes, *state, self.velocity, u)
         return jumps
