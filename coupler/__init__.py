@@ -2,7 +2,9 @@
 
 Its chapters, each of which imports only those below it (import contracts in pyproject.toml hold this):
 
+    cli          the command line by a short name, `python -m coupler.cli`
     commands     what `surgebreak NAME` does, one module or package a command
+    api          `import surgebreak`: cases and runs for scripts
     run          a run from its start to its end: time loop, checkpoints, resuming, the run directory
     checks       what is wrong with a case before it is run
     scene        a case becomes water, structure and what joins them

@@ -41,12 +41,12 @@ ENERGY = (
 COUPLING = (
     ("time", "s", "time at the end of the step"),
     ("dt", "s", "length of the step"),
-    ("passes", "1", "pressure solves in the step"),
-    ("iterations", "1", "iterations of the linear solver"),
+    ("passes", "1", "pressure solves in the step as it was taken"),
+    ("iterations", "1", "iterations of the linear solver, those of steps that were halved included"),
     ("unknowns", "1", "pressure unknowns (wet nodes)"),
     ("bodies_cut", "1", "bodies whose cells were cut again"),
     ("retries", "1", "times that the step was halved and taken again"),
-    ("substeps", "1", "YADE substeps"),
+    ("substeps", "1", "YADE substeps, those of steps that were halved included"),
     ("substep", "s", "length of a substep"),
     (
         "defect",

@@ -18,11 +18,11 @@ from pydantic import BaseModel
 from coupler.case.schedule import Schedule, next_multiple
 from coupler.program.errors import ExitCode, SurgebreakError
 from coupler.run.array_file import Damaged, read_arrays, write_arrays
-from coupler.run.fingerprint import differences, program, scene_parts
+from coupler.run.fingerprint import differences, file_digests, program, scene_parts
 
 FOLDER = "checkpoints"
 KEPT = 2
-LAYOUT = 6
+LAYOUT = 7
 """Number of the names, kinds and columns of the arrays; checkpoints of another one are refused."""
 UNSET = (
     "structure/joints/failure_time",
@@ -92,6 +92,7 @@ class _About(BaseModel):
 
     layout: int
     case: dict
+    files: dict[str, str]
     program: dict[str, str]
     scene: dict[str, str]
     outputs: tuple[float, int]
@@ -123,6 +124,7 @@ class Checkpoints:
         self._about = {
             "layout": LAYOUT,
             "case": case,
+            "files": file_digests(case),
             "program": program(),
             "scene": scene_parts(scene.coupling),
             "outputs": [schedule.span, schedule.count],

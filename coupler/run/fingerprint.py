@@ -4,6 +4,8 @@ refused."""
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 
@@ -11,6 +13,8 @@ from coupler.program import provenance
 
 FREE = ("time.end", "time.step_max", "time.cfl", "time.checkpoint_every", "coupling.", "limits.")
 """Names of the case that may change when a run goes on; with a dot at the end: a whole section."""
+FILE_KEYS = ("path", "surface", "mesh")
+"""Keys of a case whose values name files."""
 
 
 def scene_parts(coupling) -> dict[str, str]:
@@ -32,11 +36,36 @@ def scene_parts(coupling) -> dict[str, str]:
     return parts
 
 
-def _reported(count: str, *arrays) -> str:
+def file_digests(case: dict) -> dict[str, str]:
+    """Digest of each file that an effective case names, by its path; files of a study, which no run reads, left out."""
+    named = {section: value for section, value in case.items() if section != "study"}
+    return {
+        name: _digest(Path(name).read_bytes()) for name in sorted(set(_named(named))) if Path(name).is_file()
+    }
+
+
+def _named(value: object) -> Iterator[str]:
+    """Strings under FILE_KEYS, anywhere in a table."""
+    if isinstance(value, dict):
+        for key, entry in value.items():
+            if key in FILE_KEYS and isinstance(entry, str):
+                yield entry
+            else:
+                yield from _named(entry)
+    elif isinstance(value, list):
+        for entry in value:
+            yield from _named(entry)
+
+
+def _digest(*parts: bytes) -> str:
     digest = hashlib.blake2b(digest_size=4)
-    for array in arrays:
-        digest.update(np.ascontiguousarray(array).tobytes())
-    return f"{count} ({digest.hexdigest()})"
+    for part in parts:
+        digest.update(part)
+    return digest.hexdigest()
+
+
+def _reported(count: str, *arrays) -> str:
+    return f"{count} ({_digest(*(np.ascontiguousarray(array).tobytes() for array in arrays))})"
 
 
 def program() -> dict[str, str]:

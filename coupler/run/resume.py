@@ -19,7 +19,7 @@ from coupler.results import vtkhdf
 from coupler.run.array_file import Damaged
 from coupler.run.checkpoint import FOLDER, LAYOUT, Checkpoint, listed
 from coupler.run.directory import RunDirectory
-from coupler.run.fingerprint import FREE, case_differences, differences, is_free, program
+from coupler.run.fingerprint import FREE, case_differences, differences, file_digests, is_free, program
 from coupler.run.lock import RunLock
 from coupler.run.stop import FILE_NAME
 from coupler.run.summary import read_summary
@@ -181,6 +181,12 @@ def _check_case(path: Path, checkpoint: Checkpoint, file: CaseFile) -> None:
         raise CannotResume(
             f"{path / 'case.toml'} is not the case that the run began with: {'; '.join(found)}. "
             "Undo that, or run it as a new case."
+        )
+    files = differences(checkpoint.about["files"], file_digests(effective(file.case)))
+    if files:
+        raise CannotResume(
+            f"files that {path / 'case.toml'} names have changed since the run began: {'; '.join(files)} (checksums). "
+            "Put them back, or run it as a new case."
         )
 
 

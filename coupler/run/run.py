@@ -136,8 +136,8 @@ def _steps(
     )
     checkpoints = _checkpoints(case, scene, directory, recorder, schedule)
     way_on = f"; `surgebreak resume {quote(str(directory.path))}` goes on" if checkpoints is not None else ""
-    long = _long_steps(coupling, limits, reporter, clock, figures, checkpoints)
-    calm, fall = Calm(), Fall()
+    long = _long_steps(coupling, limits, reporter, clock, figures, checkpoints, recorder)
+    calm, fall, verdict = Calm(), Fall(), recorder.verdict
     try:
         if checkpoint is None:
             with clock("output"):
@@ -171,13 +171,15 @@ def _steps(
             if reason:
                 raise _end(reporter)(reason + way_on)
     except StepLeft as left:
+        before, found = long.held
+        verdict = lambda: found  # noqa: E731 - that of the last complete step
         if checkpoints is not None:
             with clock("output"):
-                checkpoints.put(long.held)
+                checkpoints.put(before)
         raise _end(reporter)(str(left) + way_on) from None
     finally:
         recorder.close()
-        _report_verdict(case, recorder, figures, directory, reporter, coupling.coupled)
+        _report_verdict(case, verdict(), figures, directory, reporter, coupling.coupled)
 
 
 def _note_top(case: Case, recorder: Recorder, coupling, figures: dict, reporter) -> None:
@@ -193,12 +195,11 @@ def _note_top(case: Case, recorder: Recorder, coupling, figures: dict, reporter)
 
 
 def _report_verdict(
-    case: Case, recorder: Recorder, figures: dict, directory, reporter, is_coupled: bool
+    case: Case, reported: dict | None, figures: dict, directory, reporter, is_coupled: bool
 ) -> None:
     """Write the verdict to run.json and the log, however the run ends, with the reasons to doubt its loads."""
     from coupler.verdict.words import sentences, unreached
 
-    reported = recorder.verdict()
     doubts = [*thin_remarks(case), *thin_water_remarks(case)]
     doubts += [in_all(figures["tank_top"])] if "tank_top" in figures else []
     if reported is not None and is_coupled and figures["steps"]:
@@ -212,11 +213,15 @@ def _report_verdict(
         reporter.message(f"but: {line}")
 
 
-def _long_steps(coupling, limits: Limits, reporter, clock: Clock, figures: dict, checkpoints) -> LongSteps:
-    """The object that both solvers call within a long step, to abandon it where the run is to end."""
+def _long_steps(
+    coupling, limits: Limits, reporter, clock: Clock, figures: dict, checkpoints, recorder: Recorder
+) -> LongSteps:
+    """The object that both solvers call within a long step, to abandon it where the run is to end. It holds the state
+    before the step, None without checkpoints, and the verdict then."""
 
     def hold():
-        return None if checkpoints is None else checkpoints.hold(figures, clock.split())
+        state = None if checkpoints is None else checkpoints.hold(figures, clock.split())
+        return state, recorder.verdict()
 
     long = LongSteps(lambda: _stop_reason(clock, limits, reporter), hold)
     coupling.pause = long

@@ -10,6 +10,7 @@ residual                               the coupling residual, and its history ov
 step_limits, step_start, limits        when a step is taken again, and when a run ends
 sides                                  the interface of the two sides that these parts use
 observe                                readings of a structure for a step
+record                                 what a step did, in numbers
 
 Imports `balance`, `fluid` and `yade_scripts`; knows no case and writes no file.
 """

@@ -426,13 +426,15 @@ class CoupledStepper:
         with self.clock("water"):
             self.water.correct(problem, result.x, result.parting)
         record.load = water_load(problem, result.x)
-        record.iterations, record.passes, record.unknowns = result.iterations, 1, len(result.x)
+        record.iterations += result.iterations
+        record.passes, record.unknowns = 1, len(result.x)
         self._note_loads(problem, record, self.water.body_velocity)
 
     def _structure_step(self, dt: float, record: StepRecord) -> None:
         with self.clock("structure"):
             report = self.structure.advance(dt)
-        record.substeps, record.substep = report.substeps, report.dt_s
+        record.substeps += report.substeps
+        record.substep = report.dt_s
         record.opening_rate, record.impulses = report.opening_rate, report.impulses
 
     def _padded(self, values: Array) -> Array:
@@ -457,9 +459,12 @@ class CoupledStepper:
     def _structure_energies(self) -> dict[str, float] | None:
         return None if self.structure is None else self.structure.energies()
 
-    def _driven_by(self) -> tuple[bool, bool]:
-        """Whether blocks may move, and whether water enters through sides."""
-        return self.structure is not None and not self.structure.fixed.all(), self.water.sides is not None
+    def _driven_by(self) -> tuple[bool, bool, bool]:
+        """Whether blocks may move, whether water enters through sides, and whether narrow openings are closed."""
+        moves, connection = self.structure is not None and not self.structure.fixed.all(), None
+        if self.immersion is not None:
+            connection = self.immersion.connection
+        return moves, self.water.sides is not None, connection is not None and connection.face > 0.0
 
     @contextmanager
     def _with_place(self, problem: PressureProblem) -> Iterator[None]:
@@ -480,7 +485,7 @@ class CoupledStepper:
             check_finite(self.time, "the velocity of the water", self.water.velocity, "node")
             pressure, nodes = self.water.pressure, self.water.topology.nodes
             to_start = partial(pressure_to_start, self.water, dt)
-            check_pressure(self.time, pressure, nodes, *self._driven_by(), to_start)
+            check_pressure(self.time, pressure, nodes, self._driven_by(), to_start)
         if self.structure is not None:
             check_finite(self.time, "the velocity of the structure", self.structure.velocity(), "block")
 

@@ -74,7 +74,7 @@ class Immersion:
         """Blocks that are long enough to reach from one side of the tank to the opposite one."""
         self._tolerance = STILL * mesh.finest
         self._centre, self._rotation = self._pose()
-        self._first_pose = self._centre, self._rotation
+        self._first_pose = self._centre.copy(), self._rotation.copy()
         none = np.zeros(0, np.int64), np.zeros((0, 3))
         self._flush = none if structure is None else structure.touching_at_start()
         self._growth = self._new_growth(np.full(len(self._body_of_plane), -np.inf))
@@ -138,17 +138,21 @@ class Immersion:
         return np.concatenate([centre - self._centre, axial], axis=1)
 
     def save(self) -> dict[str, Array]:
-        """The positions of the solids when their cells were last cut."""
+        """The positions of the solids when their cells were last cut, and at the start."""
+        centre, rotation = self._first_pose
         return {
             "centre": self._centre.copy(),
             "rotation": self._rotation.copy(),
             "growth": self._growth.copy(),
+            "first_centre": centre.copy(),
+            "first_rotation": rotation.copy(),
         }
 
     def restore(self, saved: dict[str, Array]) -> None:
         """Cut the cells again with the bodies at the saved positions, which gives the same domain bit for bit."""
         self._centre, self._rotation = saved["centre"].copy(), saved["rotation"].copy()
         self._growth = saved["growth"].copy()
+        self._first_pose = saved["first_centre"].copy(), saved["first_rotation"].copy()
         self.bodies = self._placed()
         self.domain = cut_domain(self.mesh, self.bodies, self.covers, connection=self.connection)
         self.cut_again = 0

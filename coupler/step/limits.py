@@ -152,13 +152,15 @@ HIGHEST_PRESSURE = 1e8
 """[Pa], which exceeds that of any impact: water hammer at 70 m/s."""
 
 
-def no_room(place: Array, blocks: bool, sides: bool) -> str:
+def no_room(place: Array, blocks: bool, sides: bool, closes: bool = False) -> str:
     """A message for a place (3,) [m] at which no pressure can be found, with the possible cause: moving blocks, sides
-    through which water enters, or neither."""
+    through which water enters, or neither; closes: whether the case closes narrow openings (`water.openings`)."""
     causes = ["a block closes or makes smaller"] * blocks + ["an inflow or a sea fills"] * sides
     at = ", ".join(f"{x:.3g}" for x in place)
     if causes:
         remedy = f"look for a full chamber that {' or '.join(causes)}, and leave it an opening or some air"
+        if closes:
+            remedy += ', or take water.openings = "all", which closes no narrow opening'
     else:
         remedy = (
             "nothing moves or flows in, so look at the mesh and for slivers of water between solids there, and move "
@@ -168,12 +170,12 @@ def no_room(place: Array, blocks: bool, sides: bool) -> str:
 
 
 def check_pressure(
-    time: float, pressure: Array, nodes: Array, blocks: bool, sides: bool, to_start: Callable[[], float]
+    time: float, pressure: Array, nodes: Array, causes: tuple[bool, bool, bool], to_start: Callable[[], float]
 ) -> None:
     """Stop if the water cannot keep its volume, because a driven body reduces a chamber without a free surface.
 
-    pressure (N,) [Pa] at nodes (N, 3) [m]; blocks, sides as in `no_room` · to_start(): `pressure_to_start`, asked where
-    the pressure is beyond that of any impact. Raises Diverged.
+    pressure (N,) [Pa] at nodes (N, 3) [m]; causes: the last arguments of `no_room` · to_start(): `pressure_to_start`,
+    asked where the pressure is beyond that of any impact. Raises Diverged.
     """
     worst = int(np.argmax(np.abs(pressure))) if len(pressure) else 0
     if len(pressure) == 0 or abs(pressure[worst]) <= HIGHEST_PRESSURE:
@@ -183,7 +185,7 @@ def check_pressure(
         return
     raise Diverged(
         f"the pressure is {pressure[worst]:.3g} Pa at t = {time:.4g} s; limit {limit:.0e} Pa. "
-        f"{no_room(nodes[worst], blocks, sides)}"
+        f"{no_room(nodes[worst], *causes)}"
     )
 
 

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from array_types import Array
+from fluid.domain.moments import cells_touching
 from fluid.domain.topology import first_rows
 from kernels.decorators import inner, kernel
 
@@ -37,7 +38,7 @@ def pick_old_nodes(old, new) -> Array:
     only = np.full(n, -1, dtype=np.int64)
     only[old.parent_node] = np.arange(len(old.nodes))
     source = only[new.parent_node]
-    voters = _touching(near[new.parent_node], new.cells)
+    voters = cells_touching(near[new.parent_node], new.cells)
     matched = _old_elements(old, new, voters)
     chosen = near[new.parent_node]
     copies = np.searchsorted(old.parent_node, np.arange(n + 1))
@@ -76,18 +77,6 @@ def _near_bodies(domain):
     near = np.zeros(len(memory.mesh.nodes), dtype=bool)
     near[memory.mesh.cells[memory.pair_cell]] = True
     return near
-
-
-@kernel
-def _touching(marked, cells):
-    """Cells with a marked corner."""
-    found = np.empty(len(cells), np.int64)
-    n = 0
-    for e in range(len(cells)):
-        if marked[cells[e, 0]] or marked[cells[e, 1]] or marked[cells[e, 2]] or marked[cells[e, 3]]:
-            found[n] = e
-            n += 1
-    return found[:n].copy()
 
 
 @kernel

@@ -6,6 +6,9 @@ neighbours       which cells share a face
 bricks           lattices of bricks, each split into six tetrahedra
 shapes           cells of one shape share their gradients
 fitted_mesh      a mesh whose boundary is the bed
+refinement       regions of finer cells in boxes and over beds
+bisection        cells halved, conforming
+arrays           arrays that belong together, as one argument of kernels
 
 Imports `numerics`.
 """

@@ -47,6 +47,8 @@ NARROW = 0.25
 """Widest film, in cells: narrower ones are no channels that the mesh could see."""
 SLIVER = 0.5
 """Thickest water, in cells, on faces that lie in no film, that leaves a node to the film."""
+SHEET = 1e-3
+"""Thickness of water, in cells, up to which it is a film whatever lies before it: more than drawn in faces leave."""
 THIN = 0.01
 """Room of a film, in cells, besides that by which bodies are drawn in, up to which it fills with water at once."""
 
@@ -74,7 +76,7 @@ class Films:
         polygons = (domain.face_body, domain.face_centroid, domain.face_normal)
         in_film, plane = facing(bodies, polygons, reach[domain.face_cell], mesh.bounds, loose)
         films, thin = _film_cells(
-            domain.face_cell, domain.face_area, in_film, domain.volume, reach, SLIVER / NARROW
+            domain.face_cell, domain.face_area, in_film, domain.volume, reach, SLIVER / NARROW, SHEET / NARROW
         )
         node = _in_films(topology.node_start, topology.node_cells, films, thin)
         partly = np.flatnonzero(in_film & np.isin(plane, share.plane))
@@ -257,9 +259,10 @@ def _block(indptr, indices, data, rows, part, place):
 
 
 @kernel
-def _film_cells(face_cell, area, in_film, volume, reach, beside):
-    """films (M,) bool: cells whose polygons all lie in films, and whose water lies within reach (M,) [m] of them; thin
-    (M,) bool: cells whose water is a sliver on any faces (SLIVER)."""
+def _film_cells(face_cell, area, in_film, volume, reach, beside, sheet):
+    """films (M,) bool: cells whose polygons all lie in films, and whose water lies within reach (M,) [m] of them, and
+    those whose water is a sheet on any faces (SHEET); thin (M,) bool: cells whose water is a sliver on any faces
+    (SLIVER)."""
     n_cells = len(volume)
     covered, other = np.zeros(n_cells), np.zeros(n_cells)
     for s in range(face_cell.shape[0]):
@@ -270,6 +273,7 @@ def _film_cells(face_cell, area, in_film, volume, reach, beside):
     films, thin = np.zeros(n_cells, np.bool_), np.zeros(n_cells, np.bool_)
     for e in range(n_cells):
         films[e] = covered[e] > 0.0 and other[e] == 0.0 and volume[e] <= reach[e] * covered[e]
+        films[e] = films[e] or volume[e] <= sheet * reach[e] * (covered[e] + other[e])
         thin[e] = volume[e] <= reach[e] * (covered[e] + beside * other[e])
     return films, thin
 

@@ -2,6 +2,7 @@
 
 walls        closed sides, with free slip or no slip, and open ones
 inflow       sides with a given velocity, or with the level of a still sea
+absorbing    sides that let a given flow in and waves against it out
 waves        streams, records, bores and solitary waves that enter
 outflow      what leaves through open sides
 

@@ -3,6 +3,7 @@
 water                       the state, and `predict` and `correct` around the solve
 predictor, corrector        the two halves of a step
 time_step                   the speed that sets the length of a step
+remainders                  the part of the velocity of cells that nodes cannot represent
 momentum, potential         what changed the momentum; the potential energy, and that of water at a level
 report                      what a step did, in numbers
 parameters                  numbers that a case may set

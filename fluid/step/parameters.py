@@ -22,8 +22,8 @@ class WaterParameters:
         calm_correction_length: in water that hardly moves, where what is left of the correction is a lag of the
         surface behind the water, which feeds waves (`volume.py`).
     kick_limit: largest acceleration carried over to the next step in slow water, in g (`Water.kick_factor`).
-    speed_limit: cap of the speed in units of sqrt(g H), H the height of the tank (`Water.speed_cap`); clipped nodes are
-        counted.
+    speed_limit: cap of the speed in units of sqrt(g H + v²/2), H the height of the tank, v the largest speed at the
+        start; clipped nodes are counted.
     subscale_memory: keep the element-wise remainder of the velocity correction (added mass of bodies).
     advection: "semi-lagrangian", or "supg" for stabilised finite elements (the reference; slower).
     viscosity: dynamic viscosity [Pa s]; 0 leaves the term out.

@@ -116,7 +116,7 @@ class Moved:
 
 
 def predicted(water, dt: float) -> PressureProblem:
-    """Carry out the step up to the pressure solve; reads the state of `water` and changes nothing."""
+    """Carry out the step up to the pressure solve; reads the state of `water`."""
     crossing, parameters = water.crossing(), water.parameters
     theta, kick = water.theta(dt, crossing), water.kick_factor(crossing)
     u_adv, phi = _transported(water, dt, theta, kick)

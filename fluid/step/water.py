@@ -4,7 +4,8 @@
     x = ...                            solved by the caller, with the structure inside if there is one
     water.correct(problem, x)          velocity, divergence damping, extension
 
-`predict` changes nothing; a caller may drop its problem and ask again with another dt.  Scheme: theory 2.2.
+`predict` changes nothing but what absorbing sides have read; a caller may drop its problem and ask again with another
+dt.  Scheme: theory 2.2.
 """
 
 from __future__ import annotations
@@ -48,6 +49,8 @@ START_STEPS = 2
 """Steps of a start, which are implicit, and after which the surface lags by no more than by half of each."""
 AT_LEVEL = 1e-6
 """Share of a cell by which water at the start may be off the level of an absorbing side and still count as level."""
+MOST_READINGS = 10
+"""Most times that an absorbing side reads the water at the start."""
 LONGEST_STEP = 0.3
 """dt ≤ LONGEST_STEP sqrt(h/g): a step at rest, h the least size of the cells at the surface ..."""
 AT_SURFACE = 3.0
@@ -120,13 +123,11 @@ class Water:
         n = len(self.topology.nodes)
         level = fill(self.topology.nodes) if callable(fill) else np.asarray(fill, float)
         given = np.zeros(n, bool)
-        if sides is not None:
-            self._start_absorbing_sides(level, velocity)
-            sides.surface(level, 0.0)
+        if sides is None:
+            self.level_set = self._surface_of(level, given)
+        else:
             given[sides.nodes()] = True
-        level = self._dry_if_inactive(level)
-        level = redistance(self.topology, level, self.topology.node_size, rescale=False)
-        self.level_set = no_steeper(self.topology, level, given)
+            self._start_beside_sides(level, given, velocity)
         drain_films(self.level_set, self.topology.node_size)
         self.velocity, self.acceleration = np.zeros((n, 3)), np.zeros((n, 3))
         self.air, self.vents = None, tuple(vents)
@@ -154,14 +155,29 @@ class Water:
         self.renumbered, self.left_behind = None, None
         self.flux = self._flux_at_start()
 
-    def _start_absorbing_sides(self, level, velocity) -> None:
-        """Set the absorbing sides to the water at the start, which may be lower beside them: a side at its own level at
-        the start would give water that it takes back in the first step."""
+    def _surface_of(self, level, given):
+        """φ (N,) [m] of a surface at the start; given (N,) bool: nodes where it is known."""
+        level = self._dry_if_inactive(level)
+        level = redistance(self.topology, level, self.topology.node_size, rescale=False)
+        return no_steeper(self.topology, level, given)
+
+    def _start_beside_sides(self, level, given, velocity) -> None:
+        """φ with the levels of the sides, the absorbing ones set to the water at the start, which may be lower beside
+        them: a side at its own level at the start would give water that it takes back in the first step. What such a
+        side reads depends on the surface that its level makes, so this goes on until both agree."""
         self.level_set, self.velocity = level, np.zeros((len(level), 3)) if velocity is None else velocity
-        self._read_absorbing_sides()
-        for absorber in self.sides.absorbers():
-            if abs(absorber.height) < AT_LEVEL * self.mesh.spacing:
-                absorber.height = absorber.speed = 0.0
+        absorbers, close = self.sides.absorbers(), AT_LEVEL * self.mesh.spacing
+        for _ in range(MOST_READINGS):
+            heights = [absorber.height for absorber in absorbers]
+            self._read_absorbing_sides()
+            for absorber in absorbers:
+                if abs(absorber.height) < close:
+                    absorber.height = absorber.speed = 0.0
+            surface = level.copy()
+            self.sides.surface(surface, 0.0)
+            self.level_set = self._surface_of(surface, given)
+            if all(abs(a.height - before) < close for a, before in zip(absorbers, heights)):
+                return
 
     def _flux_at_start(self):
         """The fluxes of the velocity of the cells at the start."""
@@ -268,7 +284,8 @@ class Water:
         return counted
 
     def predict(self, dt: float) -> PressureProblem:
-        """Advection, volume and gravity over dt [s], and the system for the pressure."""
+        """Advection, volume and gravity over dt [s], and the system for the pressure. Nothing of the state changes but
+        what absorbing sides have read."""
         self._read_absorbing_sides()
         return predicted(self, dt)
 

@@ -1,6 +1,7 @@
 """The free surface: a level set, and a volume of water at the nodes that is conserved (theory 2.2).
 
 level_set                     signed distance near the surface
+closest_triangles             distances of nodes from the triangles of a surface
 volume                        the conservative volume, its fluxes, and the level set corrected towards it
 cavities                      air on walls that the water has left
 extrapolation                 values continued from the water into the nodes around it

@@ -231,16 +231,16 @@ def _add_gradients(first, last, m, runs, cell_list, marked, f, fluid, local, wei
 
 def smoothed_slope(topology, cell_list, marked, u, calm: float):
     """∇u (N, 3, 3) of `mean_gradients` for u (N, 3), averaged over the corners of the cells around a node, each cell
-    counts: at the marked nodes of listed cells that are not all marked, from which values are continued (elsewhere it
-    is not to be read). Once in fast water, calm = 0; (SWEEPS + 1) Aⁿ - SWEEPS Aⁿ⁺¹ at rest, calm = 1, with the average
+    counts, at the marked nodes of listed cells that are not all marked; zero at other marked nodes, anything at nodes
+    that are not marked. Once in fast water, calm = 0; (SWEEPS + 1) Aⁿ - SWEEPS Aⁿ⁺¹ at rest, calm = 1, with the average
     A and n = SWEEPS; between, in between. A wave of many cells passes with an error of the second order of what an
     average takes off it, one of a few cells as little as through Aⁿ, which alone took the slope a cell too deep: 2.5 %
     of the energy of waves of 14 cells a period.
 
-    Only nodes of cells whose corners are all marked have a field, over which the averages run; it is zero at the other
-    marked nodes. Waves of a few cells, whose slope the continuation carries to the surface many times too large, grow
-    without averages: by 0.01 to 0.02 a step where the surface lies just below a layer of nodes, by 0.005 after one
-    sweep. More than one slows a bore into two cells of water by 15 %."""
+    Only nodes of listed cells whose corners are all marked have a field, over which the averages run. Waves of a few
+    cells, whose slope the continuation carries to the surface many times too large, grow without averages: by 0.01 to
+    0.02 a step where the surface lies just below a layer of nodes, by 0.005 after one sweep. More than one slows a bore
+    into two cells of water by 15 %."""
     t, sweeps = topology, SWEEPS + 1 if calm > 0.0 else 1
     has, beside = _with_field(cell_list, marked, t.cells)
     # each sweep reads one layer of nodes farther in than it is to be right on
@@ -252,7 +252,8 @@ def smoothed_slope(topology, cell_list, marked, u, calm: float):
     once, before, slope = found[1], *found[-2:]
     if sweeps > 1:
         over(_combined, start[1], order, calm, once, before, slope)
-    over(_clear_unless, len(u), has, marked, once.reshape(len(u), -1))
+    # values are also continued from marked nodes whose other cells with dry corners are not listed
+    over(_clear_unless, len(u), _listed(order[: start[1]], len(u)), marked, once.reshape(len(u), -1))
     return once
 
 
@@ -275,11 +276,11 @@ def _mark(first, last, nodes, marked):
 
 
 @ranged
-def _clear_unless(first, last, has, marked, field):
-    """field (N, m) ← 0 at marked nodes that have none."""
+def _clear_unless(first, last, kept, marked, field):
+    """field (N, 9) ← 0 at the marked nodes that are not kept, (N,) bool."""
     for j in range(first, last):
         i = np.uint64(j)
-        if marked[i] and not has[i]:
+        if marked[i] and not kept[i]:
             for k in range(ENTRIES):
                 field[i, k] = 0.0
 

@@ -2,6 +2,8 @@
 
 advection, paths_in_solids                 semi-Lagrangian transport with the MacCormack correction
 velocity_transport, volume_transport       momentum and volume by the same fluxes, both conserved
+swept_volume                               volume of nodes near the surface, as the surface sweeps it
+landing                                    a viscous surface where it comes to dry sides
 surface_momentum                           where velocity follows the momentum that the volume carries
 supg, forms                                stabilised finite elements instead, assembled from scikit-fem forms
 

@@ -1,6 +1,6 @@
 """Viscosity and no-slip walls: the stage of a step between transport and pressure.
 
-    M du/dt = r(u) + M (w - uⁿ)/dt,   u(0) = uⁿ         r = f - K u: `viscous_kernels`, symmetric gradient, walls
+    M du/dt = r(u) + M (w - uⁿ)/dt,   u(0) = uⁿ         r = f - K u: `kernels.py`, symmetric gradient, walls
 
 w = u_adv + θ dt âⁿ is the velocity that transport and the last pressure would lead to without viscosity. Its rate is
 the source, so that a steady state is steady for any dt (transport followed by diffusion is 5 % off in a channel), and

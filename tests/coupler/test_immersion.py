@@ -71,3 +71,30 @@ def test_only_a_loose_block_is_drawn_in_where_it_stands_on_another():
             else:
                 assert (growth > 0.0).sum() == 1
                 assert (growth == 0.0).sum() == len(growth) - 1
+
+
+def test_a_block_that_has_left_its_place_has_no_film_there_before_and_after_a_restart():
+    """A block stands on the ground at the start, where a film lies under it though its contact has yet to begin. Where
+    it hangs later nothing touches it. Its place at the start was once that where it was last cut, so that it kept the
+    film, until a restart took it away."""
+    away = np.array([[0.7, 0.0, 0.3]])
+
+    def scene():
+        return Structure(
+            [Block("b", (0.5, 0.5, 0.2), size=0.4)], ContactLaw(1e8), ground=0.0, gravity=(0, 0, 0)
+        )
+
+    mesh = box_mesh((0, 0, 0), (2, 1, 1), CELL)
+    with scene() as s:
+        immersion = Immersion(mesh, s, [], "single")
+        assert immersion.bodies.growth.min() < 0.0
+        s.displace(np.array([0]), away, np.eye(3)[None])
+        for _ in range(2):
+            immersion.update()
+            assert immersion.bodies.growth.min() == 0.0
+        saved, moved = immersion.save(), s.save()
+    with scene() as s:
+        resumed = Immersion(mesh, s, [], "single")
+        s.restore(moved)
+        resumed.restore(saved)
+        assert not resumed.update()

@@ -12,7 +12,29 @@ from coupler.program.errors import BadCase, ExitCode, NoRun
 from coupler.run.array_file import write_arrays
 from coupler.run.checkpoint import FOLDER, LAYOUT, UNSET, Checkpoint, OtherScene, listed
 from coupler.run.resume import CannotResume, prepare
-from tests.coupler.resumed import command, go_on
+from tests.coupler.resumed import begin, command, go_on
+
+INFLOW = """\
+[case]
+title = "a record drives the water"
+[time]
+end = "0.04 s"
+step_max = "10 ms"
+output_every = "20 ms"
+checkpoint_every = "20 ms"
+[tank]
+lower = [0, 0, 0]
+upper = [1, 0.2, 0.8]
+cell = 0.1
+[water]
+[[water.fill]]
+lower = [0, 0, 0]
+upper = [1, 0.2, 0.5]
+[[water.inflow]]
+kind = "record"
+side = "x-"
+path = "wave.csv"
+"""
 
 
 def test_what_is_no_run_is_reported(tmp_path):
@@ -39,6 +61,18 @@ def test_only_what_leaves_the_scene_alone_may_be_set(stopped):
     with pytest.raises(BadCase, match=r"limits\.defect: -1 is out of range"):
         prepare(stopped, ["limits.defect=-1"])
     assert go_on(stopped, "limits.energy_error=0.5").file.case.limits.energy_error == 0.5
+
+
+def test_a_file_that_the_case_names_and_that_changed_is_refused(tmp_path):
+    """A record of an inflow has no part in the mesh or the blocks. It could change between the two parts of a run."""
+    wave = tmp_path / "case" / "wave.csv"
+    wave.parent.mkdir()
+    wave.write_text("time,level,velocity\n0,0.5,0\n1,0.52,0.05\n", encoding="utf-8")
+    run = begin(tmp_path / "case", INFLOW, tmp_path / "run")
+    go_on(run, "time.end=0.05")
+    wave.write_text("time,level,velocity\n0,0.5,0\n1,0.62,0.05\n", encoding="utf-8")
+    with pytest.raises(CannotResume, match=r"have changed since the run began: .*wave\.csv: was \w+, is \w+"):
+        prepare(run, any_version=True)
 
 
 def rewritten(path, **about):

@@ -158,14 +158,16 @@ def test_a_pressure_that_is_not_found_is_reported_with_its_place_and_cause(monke
 def test_a_pressure_beyond_all_bounds_is_reported_with_its_place_and_cause():
     pressure, nodes = np.array([0.0, -2e9]), np.array([[0.0, 0, 0], [1.0, 2, 3.5]])
     never, most = (lambda: 0.0), (lambda: 3e9)
-    check_pressure(1.0, pressure[:1], nodes, blocks=True, sides=True, to_start=never)
-    check_pressure(1.0, pressure, nodes, blocks=True, sides=True, to_start=most)
+    check_pressure(1.0, pressure[:1], nodes, causes=(True, True, False), to_start=never)
+    check_pressure(1.0, pressure, nodes, causes=(True, True, False), to_start=most)
     with pytest.raises(
         Diverged, match=r"-2e\+09 Pa .* at \(1, 2, 3.5\) m: .* a block closes or makes smaller or an inflow"
     ):
-        check_pressure(1.0, pressure, nodes, blocks=True, sides=True, to_start=never)
+        check_pressure(1.0, pressure, nodes, causes=(True, True, False), to_start=never)
+    with pytest.raises(Diverged, match=r'or take water.openings = "all"'):
+        check_pressure(1.0, pressure, nodes, causes=(True, False, True), to_start=never)
     with pytest.raises(Diverged, match="slivers of water"):
-        check_pressure(1.0, pressure, nodes, blocks=False, sides=False, to_start=never)
+        check_pressure(1.0, pressure, nodes, causes=(False, False, True), to_start=never)
 
 
 def test_an_inflow_sets_the_water_going_in_a_step_however_short():

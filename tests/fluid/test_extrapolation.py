@@ -50,3 +50,19 @@ def test_slopes_are_averaged_over_the_corners_of_the_cells_around(calm, has_post
     assert (read & has).sum() > 20
     expected[~has] = 0.0
     assert found[read] == pytest.approx(expected[read], abs=1e-12 * np.abs(expected).max())
+
+
+def test_slopes_are_set_wherever_water_is_continued_from(monkeypatch):
+    """With friction no slope comes from cells beside the wall, and some wet nodes below the surface are then in none of
+    the cells that count. Their slope is zero, not what the memory held before."""
+    water = tank([0.6, 0.25, 0.4], 0.05, lambda x: x[:, 2] - 0.12 - 0.1 * x[:, 0])
+    t, wet = water.topology, water.level_set < 0.0
+    rubbed = t.nodes[:, 2] < 1e-9
+    cell_list = np.flatnonzero(wet[t.cells].any(axis=1) & ~rubbed[t.cells].any(axis=1))
+    empty = np.empty
+    monkeypatch.setattr(
+        np, "empty", lambda *a, **k: np.full(*a, np.nan, **k) if not a[1:] else empty(*a, **k)
+    )
+    for calm in (0.0, 0.5):
+        found = smoothed_slope(t, cell_list, wet, np.ones((len(wet), 3)), calm)
+        assert np.isfinite(found[wet]).all()

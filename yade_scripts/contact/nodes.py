@@ -3,7 +3,7 @@
 A node of one block inside another, near one of its faces, is one contact point. Nodes are the vertices, points along
 the edges and the middle of every face: with three an edge a box carries 26, nine on a face, so that resting, stacking,
 toppling and sliding come out right (two an edge let offset blocks fall over). Edges that cross between nodes carry each
-other (`contact_edges`).
+other (`edges.py`).
 """
 
 from __future__ import annotations

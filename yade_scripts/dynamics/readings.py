@@ -23,7 +23,7 @@ from yade_scripts.dynamics.onset import ContactOnset
 from yade_scripts.dynamics.spin import SpinCorrection
 from yade_scripts.dynamics.substep import Substepper
 from yade_scripts.joints.joints import Joints, JointTable
-from yade_scripts.joints.seals import Seals
+from yade_scripts.joints.seals import Seals, both_faces
 from yade_scripts.yade_side.motion import Motion
 from yade_scripts.yade_side.scene import Scene
 
@@ -253,7 +253,7 @@ class StructureReadings:
         found = [(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros(0))]
         if self._partly is not None:
             on = self._partly.closed(self._motion.x, self._motion.R)
-            block, face, share = self._partly.both_faces(on, self._shares[on])
+            block, face, share = both_faces(self._partly, on, self._shares[on])
             found.append((block, face, self._partly.middles(on), share))
         if self.joints is not None:
             found.append(self.joints.uplift_points())

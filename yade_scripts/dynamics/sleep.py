@@ -23,7 +23,7 @@ settled, nothing moves at all. What motion is left is taken by the joints, and b
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import csc_matrix
@@ -261,7 +261,8 @@ class Sleep:
             self._since[island.joints] = time  # not again before another period
             return False
         self._stop(island.rows)
-        self._sleepers.append(sleeper)
+        # as contacts press on the blocks at rest, which is what a restart finds
+        self._sleepers.append(replace(sleeper, pressed=self._pressed(island.rows)))
         self.falls += 1
         return True
 

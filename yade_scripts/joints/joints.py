@@ -16,6 +16,7 @@ from yade_scripts.joints import kernel
 from yade_scripts.joints.arrays import JointPoints, Placement, PointMemory, Taken
 from yade_scripts.joints.cohesion import JointParameters
 from yade_scripts.joints.forces import MU, NOT_GROWING, PULL, JointKernels, kernels_of
+from yade_scripts.joints.seals import both_faces
 
 JOINT = 20
 """Cost of a joint, in rows of an ordinary loop: it decides how joints are divided among threads."""
@@ -256,14 +257,14 @@ class Joints:
         opening (m,) [m]."""
         live = self.live[self._keeps_out[self.live]]
         half = 0.5 * self.openings(live, x, R)[:, 2]
-        return self._both_faces(live, half)
+        return both_faces(self, live, half)
 
     def wet_faces(self, x: Array, R: Array) -> tuple[Array, Array, Array]:
         """Both faces of each live joint that lets water between them: block (m,), face (m,), depth (m,) [m] by which
         they are in one another where they are most, zero where they are nowhere."""
         live = self.live[~self._keeps_out[self.live]]
         opening = self.openings(live, x, R)
-        return self._both_faces(live, np.maximum(opening[:, 2] - 2.0 * opening[:, 0], 0.0))
+        return both_faces(self, live, np.maximum(opening[:, 2] - 2.0 * opening[:, 0], 0.0))
 
     def uplift_points(self) -> tuple[Array, Array, Array, Array]:
         """Where live joints whose `uplift` is damage let a share of the pressure of the surrounding water act: block
@@ -282,15 +283,6 @@ class Joints:
             np.concatenate([self.face_a[joint], self.face_b[joint][inner]]),
             np.concatenate([self.xi_a[points], self.xi_b[points][inner]]),
             np.concatenate([share, share[inner]]),
-        )
-
-    def _both_faces(self, joints: Array, values: Array) -> tuple[Array, Array, Array]:
-        """Both faces of `joints` (k,), with values (k,) of theirs: block (m,), face (m,), value (m,)."""
-        inner = self.b[joints] >= 0
-        return (
-            np.concatenate([self.a[joints], self.b[joints][inner]]),
-            np.concatenate([self.face_a[joints], self.face_b[joints][inner]]),
-            np.concatenate([values, values[inner]]),
         )
 
     def rows(self) -> Array:

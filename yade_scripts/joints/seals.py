@@ -1,8 +1,7 @@
 """Faces that rest on one another without a joint and keep water out as long as they do.
 
 A pair of faces that touched at the start is closed while its outline has opened by less than `OPENED` of its size and
-slid by
-less than `SLID` of it. Contact forces move blocks that rest on one another by far less than that.
+slid by less than `SLID` of it. Contact forces move blocks that rest on one another by far less than that.
 """
 
 from __future__ import annotations
@@ -40,7 +39,7 @@ class Seals:
         """Both faces of each closed pair: block (m,), face (m,), half of the largest opening (m,) [m]; x (n, 3) [m] and
         R (n, 3, 3): places of the blocks."""
         opened, on = self._opened(x, R)
-        return self.both_faces(on, 0.5 * opened[on])
+        return both_faces(self, on, 0.5 * opened[on])
 
     def closed(self, x: Array, R: Array) -> Array:
         """Numbers (k,) of the closed pairs."""
@@ -61,14 +60,16 @@ class Seals:
         in_a, in_b = (np.add.reduceat(local, first) / count for local in (self._in_a, self._in_b))
         return np.concatenate([in_a[on], in_b[on][self.b[on] >= 0]])
 
-    def both_faces(self, on, values) -> tuple[Array, Array, Array]:
-        """Both faces of the pairs `on` (k,), with values (k,) of theirs: block (m,), face (m,), value (m,)."""
-        inner = self.b[on] >= 0
-        return (
-            np.concatenate([self.a[on], self.b[on][inner]]),
-            np.concatenate([self.face_a[on], self.face_b[on][inner]]),
-            np.concatenate([values, values[inner]]),
-        )
+
+def both_faces(pairs, on, values) -> tuple[Array, Array, Array]:
+    """Both faces of some of the pairs of blocks, `on` (k,), with values (k,) of theirs: block (m,), face (m,), value
+    (m,). pairs: has a, b, face_a and face_b of each; b < 0: no block."""
+    inner = pairs.b[on] >= 0
+    return (
+        np.concatenate([pairs.a[on], pairs.b[on][inner]]),
+        np.concatenate([pairs.face_a[on], pairs.face_b[on][inner]]),
+        np.concatenate([values, values[inner]]),
+    )
 
 
 def _in_world(local: Array, row: Array, x: Array, R: Array) -> Array:

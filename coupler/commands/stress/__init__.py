@@ -6,4 +6,5 @@ runner    scenes one after the other              report  table and JSON
 page      tables for docs/stress.md                  flow      limits for scenes with water
 structure dry scenes                                 water     water alone
 coupling  water and blocks                           drawn     scenes drawn at random
+arguments the arguments of the command
 """

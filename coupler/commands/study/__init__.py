@@ -8,9 +8,11 @@ reference  the reference of a quantity: exact, measured, or the finest run
 formula    formulas of keys of the case
 results    errors of all runs
 order      observed order of convergence
+laws       ladders of laws, ours and YADE's own
 cheapest   the cheapest setting for an error; the cost of parts of the program
 report     JSON, CSV, tables
 against    comparison of two studies of one case
+arguments  the arguments of the command
 command    the command; figures are made by coupler/commands/view/study.py
 page       a study as Markdown
 pages      docs/studies.md from several studies

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from coupler.geometry.solids import BOX_CORNERS, BOX_FACES
 from coupler.run.clock import Clock
 from coupler.scene.fill import start_level
 from coupler.step.coupled_step import CoupledStepper
@@ -18,17 +19,26 @@ from fluid.step.water import Water
 
 G = 9.81
 DENSITY = 1000.0
-BOX = np.array(
-    [[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]],
-    float,
-)
-BOX_FACES = ((0, 4, 7, 3), (1, 2, 6, 5), (0, 1, 5, 4), (3, 7, 6, 2), (0, 3, 2, 1), (4, 5, 6, 7))
 
 
 def box(centre, size, rotation=None) -> tuple[np.ndarray, tuple]:
     """A fixed box for `tank`: vertices (8, 3) [m] and faces."""
     turn = np.eye(3) if rotation is None else rotation
-    return np.asarray(centre) + (0.5 * np.asarray(size) * BOX) @ turn.T, BOX_FACES
+    return np.asarray(centre) + (0.5 * np.asarray(size) * BOX_CORNERS) @ turn.T, BOX_FACES
+
+
+def graded(low: float, high: float, fine: tuple[float, float], h: float, most: float, growth: float = 1.2):
+    """Coordinates from low to high [m]: steps of h within `fine`, growing outside it up to `most`."""
+    middle = np.linspace(*fine, round((fine[1] - fine[0]) / h) + 1)
+
+    def away(length):
+        if length <= 0.0:
+            return np.zeros(0)
+        steps = np.minimum(h * growth ** np.arange(1, 1000), most)
+        steps = steps[: np.searchsorted(np.cumsum(steps), length) + 1]
+        return np.cumsum(steps) * length / steps.sum()
+
+    return np.concatenate([fine[0] - away(fine[0] - low)[::-1], middle, fine[1] + away(high - fine[1])])
 
 
 def around(centre, size, margin: float, levels: int = 1) -> InBox:

@@ -10,7 +10,7 @@ from scipy.signal import argrelextrema
 
 from coupler.commands.verify.figures import columns
 from coupler.commands.verify.registry import Finding, check
-from coupler.commands.verify.scenes import level_at, top
+from coupler.commands.verify.scenes import graded, level_at, top
 from coupler.run.clock import Clock
 from coupler.step.coupled_step import CoupledStepper
 from coupler.step.immersion import Immersion
@@ -20,20 +20,6 @@ from fluid.step.water import Water
 from yade_scripts.blocks.block import Block
 from yade_scripts.blocks.generators.sphere import sphere_vertices
 from yade_scripts.dynamics.structure import Structure
-
-
-def graded(low: float, high: float, fine: tuple[float, float], h: float, most: float, growth: float = 1.2):
-    """Coordinates from low to high [m]: steps of h within `fine`, growing outside it up to `most`."""
-    middle = np.linspace(*fine, round((fine[1] - fine[0]) / h) + 1)
-
-    def away(length):
-        if length <= 0.0:
-            return np.zeros(0)
-        steps = np.minimum(h * growth ** np.arange(1, 1000), most)
-        steps = steps[: np.searchsorted(np.cumsum(steps), length) + 1]
-        return np.cumsum(steps) * length / steps.sum()
-
-    return np.concatenate([fine[0] - away(fine[0] - low)[::-1], middle, fine[1] + away(high - fine[1])])
 
 
 def _scene(axes, level, body, parameters: WaterParameters, smooth=None) -> CoupledStepper:

@@ -7,6 +7,7 @@ import numpy as np
 from coupler.commands.verify.curves import Curve, Figure, Panel
 from coupler.commands.verify.figures import columns
 from coupler.commands.verify.registry import Finding, check
+from coupler.commands.verify.scenes import graded
 from fluid.cut.bodies import ConvexBodies
 from fluid.domain.physical_domain import cut_domain
 from fluid.mesh.background import box_mesh
@@ -175,9 +176,9 @@ def _cylinder(h: float, end: float) -> tuple[float, float, float]:
     1 m/s² gives the outflow its pressure; its contribution to the lift is subtracted."""
     thickness, far = 2 * h, 0.04
     axes = [
-        _graded(0.0, 2.2, (0.12, 0.32), h, far),
+        graded(0.0, 2.2, (0.12, 0.32), h, far, 1.1),
         np.array([0.0, thickness]),
-        _graded(0.0, 0.41, (0.12, 0.28), h, 0.3 * far),
+        graded(0.0, 0.41, (0.12, 0.28), h, 0.3 * far, 1.1),
     ]
     mesh = box_mesh(None, None, axes=axes)
     inflow = Flow(lambda time: 1.0, _parabola)
@@ -211,15 +212,3 @@ def _prism(x: float, z: float, radius: float, corners: int = 48):
     ring = np.column_stack([x + radius * np.cos(angle), np.zeros(corners), z + radius * np.sin(angle)])
     ahead = np.array([0.0, 1.0, 0.0])
     return np.concatenate([ring - ahead, ring + ahead])
-
-
-def _graded(low: float, high: float, fine: tuple[float, float], h: float, most: float):
-    """Coordinates: steps of h within `fine`, growing by a tenth outside up to `most`."""
-    middle = np.linspace(*fine, round((fine[1] - fine[0]) / h) + 1)
-
-    def away(length):
-        steps = np.minimum(h * 1.1 ** np.arange(1, 1000), most)
-        steps = steps[: np.searchsorted(np.cumsum(steps), length) + 1]
-        return np.cumsum(steps) * length / steps.sum()
-
-    return np.concatenate([fine[0] - away(fine[0] - low)[::-1], middle, fine[1] + away(high - fine[1])])

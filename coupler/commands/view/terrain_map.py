@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-SEA, LAND = 0.35, 0.65
-"""Shares of the colour map that lie below and above z = 0."""
+SEA, LAND = 0.17, 0.25
+"""Where the colours of the map end for the sea, and begin for the land."""
 
 
 def draw(place: Path, picture: Path, title: str) -> None:
@@ -28,7 +28,7 @@ def draw(place: Path, picture: Path, title: str) -> None:
     norm = TwoSlopeNorm(0.0, min(low, -1e-3), max(high, 1e-3))
     colours = plt.get_cmap("terrain")
     shown = matplotlib.colors.ListedColormap(
-        np.concatenate([colours(np.linspace(0.0, 0.17, 128)), colours(np.linspace(0.25, 1.0, 128))])
+        np.concatenate([colours(np.linspace(0.0, SEA, 128)), colours(np.linspace(LAND, 1.0, 128))])
     )
     rise = 0.15 * max(np.ptp(x), np.ptp(y)) / max(high - low, 1e-9)
     light = LightSource(315, 45).hillshade(
