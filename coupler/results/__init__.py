@@ -10,5 +10,6 @@ damage_table, buildings_table          a row for each block, and for each buildi
 expected, stated                       `expected.toml` and the figures of the case's README against the histories
 storage                                writing that a full disk cannot leave incomplete
 
-They are described in docs/results.md.  Imports `step`, `balance`, `geometry`, `case` and `program`.
+They are described in docs/results.md.  Imports `verdict`, `step`, `balance`, `geometry`, `case`, `program` and the
+readings of `fluid`.
 """

@@ -12,5 +12,5 @@ sides                                  the interface of the two sides that these
 observe                                readings of a structure for a step
 record                                 what a step did, in numbers
 
-Imports `balance`, `fluid` and `yade_scripts`; knows no case and writes no file.
+Imports `balance`, `geometry`, `program`, `fluid` and `yade_scripts`; knows no case and writes no file.
 """

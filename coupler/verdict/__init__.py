@@ -7,5 +7,6 @@ watch          what is followed from step to step
 judge          the verdict
 words          the verdict in sentences
 
-Arrays in, so that a run, a town and a sweep can all use it.  Imports `program` and the gauges of `fluid`.
+Arrays in, so that a run, a town and a sweep can all use it.  Imports `step`, `program`, `yade_scripts` and the gauges
+of `fluid`.
 """

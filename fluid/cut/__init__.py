@@ -8,5 +8,5 @@ wetted_polygons, unclaimed_faces       the faces of a piece that are surfaces of
 facing                                 what lies opposite to wetted polygons across the water
 openings                               areas over which parts of neighbouring cells touch
 
-Imports `mesh` and `numerics`.
+Imports `mesh`.
 """

@@ -6,5 +6,5 @@ absorbing    sides that let a given flow in and waves against it out
 waves        streams, records, bores and solitary waves that enter
 outflow      what leaves through open sides
 
-Imports nothing of the project.
+Imports `surface` and the chapters below it.
 """

@@ -9,5 +9,5 @@ report                      what a step did, in numbers
 parameters                  numbers that a case may set
 state                       saved and restored, bit for bit
 
-Imports every other chapter of fluid but `readings`.
+Imports every other chapter of fluid.
 """
