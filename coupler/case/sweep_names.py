@@ -8,6 +8,7 @@ from functools import lru_cache
 from coupler.case.keys import keys
 from coupler.case.study_names import without_places
 from coupler.case.sweep import PARAMETERS, Sweep, Varied
+from coupler.case.types import Problem
 from coupler.case.units import DIMENSIONS, to_si
 from coupler.program.errors import UnitError, did_you_mean
 
@@ -25,7 +26,6 @@ PLAIN = {
     ),
 }
 """Figures of run.json that are read where [sweep] has no quantities: what they are, their unit."""
-Problem = tuple[tuple[str | int, ...], str]
 
 
 def sweep_problems(sweep: Sweep) -> Iterator[Problem]:

@@ -10,6 +10,8 @@ from coupler.case.units import InSI
 
 KeyPath = tuple[str | int, ...]
 """Place in a case: names of tables and keys, numbers of entries of lists."""
+Problem = tuple[KeyPath, str]
+"""A place in a case, and what is wrong there."""
 
 Number = Annotated[float, InSI("")]
 Length = Annotated[float, InSI("m")]

@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from coupler.case.case import Case
+from coupler.case.types import KeyPath, Problem
 from coupler.program.errors import did_you_mean
-
-KeyPath = tuple[str | int, ...]
-Problem = tuple[KeyPath, str]
 
 
 def air_problems(case: Case, blocks: list[str]) -> Iterator[Problem]:

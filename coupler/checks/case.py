@@ -15,7 +15,7 @@ from coupler.case.case import Case
 from coupler.case.materials import material_remarks
 from coupler.case.schedule import MOST_OUTPUTS
 from coupler.case.toml_lines import shown
-from coupler.case.types import KeyPath
+from coupler.case.types import KeyPath, Problem
 from coupler.case.verdict import Verdict
 from coupler.checks.air import air_problems
 from coupler.checks.joints import joint_problems, pair_problems, uplift_problems
@@ -31,8 +31,6 @@ from coupler.geometry.terrain.land import land_problems
 from coupler.geometry.town import town_problems, town_remarks
 from coupler.program.errors import did_you_mean
 from coupler.verdict.divisions import member, storey
-
-Problem = tuple[KeyPath, str]
 
 LIGHTEST, HEAVIEST = 5.0, 25e3
 """Densities [kg/m3] between which solids lie: foam and platinum."""

@@ -14,11 +14,9 @@ import numpy as np
 
 from array_types import Array
 from coupler.case.case import Case
-from coupler.case.types import KeyPath
+from coupler.case.types import Problem
 from coupler.geometry.tank_mesh import bed_along, floor_along, room_beside, room_under, water_above
 from coupler.scene.build_water import flow_of
-
-Problem = tuple[KeyPath, str]
 
 SPRAY = 1.1
 """What an inflow may bring into a tank with an open top, over the room above its water: a tank of 2 m that filled by

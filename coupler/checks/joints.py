@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from coupler.case.case import Case
-from coupler.case.types import KeyPath
+from coupler.case.types import Problem
 from coupler.geometry.parts import Part
 from coupler.geometry.tank_mesh import finest_cell, is_measured
 from coupler.program.errors import did_you_mean
-
-Problem = tuple[KeyPath, str]
 
 
 def joint_problems(case: Case, parts: list[Part]) -> Iterator[Problem]:

@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from coupler.case.case import Case
-from coupler.case.types import KeyPath
+from coupler.case.types import KeyPath, Problem
 from coupler.geometry.bodies import Body
 from coupler.geometry.parts import Part
-
-Problem = tuple[KeyPath, str]
 
 THROUGH = 1e-3
 """Share of its thickness by which a driven block may enter a wall: what rounding of speeds and times leaves."""

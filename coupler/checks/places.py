@@ -11,7 +11,7 @@ import numpy as np
 from coupler.case.case import Case
 from coupler.case.paths import BadPath
 from coupler.case.structure import Building
-from coupler.case.types import KeyPath
+from coupler.case.types import KeyPath, Problem
 from coupler.geometry.basin import basin_problem, outside_of
 from coupler.geometry.bodies import Body, overlap_depth
 from coupler.geometry.parts import Part, standing_on_terrain
@@ -21,7 +21,6 @@ from coupler.geometry.tank_mesh import beside_mesh, is_basin, is_measured, mesh_
 from coupler.geometry.tank_regions import bytes_of_cells
 from coupler.geometry.terrain.grid import TerrainError
 
-Problem = tuple[KeyPath, str]
 Placed = tuple[KeyPath, str, Body]
 
 TOUCH = 1e-5

@@ -9,10 +9,8 @@ import numpy as np
 
 from coupler.case.case import Case
 from coupler.case.toml_lines import shown
-from coupler.case.types import KeyPath
+from coupler.case.types import KeyPath, Problem
 from coupler.results.gauges import make_gauge
-
-Problem = tuple[KeyPath, str]
 
 
 def table_problems(case: Case) -> Iterator[Problem]:

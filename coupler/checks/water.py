@@ -10,7 +10,7 @@ import numpy as np
 
 from coupler.case.case import Case
 from coupler.case.inflow_records import RecordError, record_of
-from coupler.case.types import KeyPath
+from coupler.case.types import KeyPath, Problem
 from coupler.checks.inflow_volumes import depth_behind, inflow_volume_problems
 from coupler.geometry.tank_mesh import (
     finest_cell,
@@ -19,8 +19,6 @@ from coupler.geometry.tank_mesh import (
     mean_bed,
 )
 from coupler.scene.build_water import SLACK, fills_beside, level_at_start, sea_level
-
-Problem = tuple[KeyPath, str]
 
 HIGHEST_WAVE = 0.78
 """Height of a solitary wave over the depth beyond which it breaks."""

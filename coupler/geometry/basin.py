@@ -13,9 +13,8 @@ from functools import lru_cache
 
 import numpy as np
 
+from array_types import Array
 from coupler.geometry.tetrahedra import shown
-
-Array = np.ndarray
 
 STEEPEST_BED = 3.0
 """Rise over run of a face that is still bed; that of the bed under a [terrain] too."""

@@ -14,13 +14,12 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from array_types import Array
 from coupler.geometry.closed_surfaces import SurfaceError, closed_surfaces, convex_corners
 from coupler.geometry.mesh_files import MeshFileError, read_mesh
 from yade_scripts.blocks.block import Block
 from yade_scripts.blocks.generators.cuts import check_count
 from yade_scripts.blocks.polyhedra import BlockError, fans, shown
-
-Array = np.ndarray
 
 VOLUME_FACES = {
     "tetra": ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)),

@@ -13,9 +13,8 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, QhullError
 
+from array_types import Array
 from yade_scripts.blocks.polyhedra import fans, polygon_area_vector, shown
-
-Array = np.ndarray
 
 SAME_ANGLE = 1e-4
 """Polygons at an edge within this angle [rad] of each other lie on one another."""

@@ -16,10 +16,9 @@ from pathlib import Path
 
 import numpy as np
 
+from array_types import Array
 from coupler.case.paths import BadPath, read_text
 from coupler.program.errors import ExitCode, SurgebreakError, briefly
-
-Array = np.ndarray
 
 SAME = 1e-6
 """Share of its extent within which two corners of a footprint are one."""

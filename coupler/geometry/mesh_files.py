@@ -15,11 +15,10 @@ from pathlib import Path
 
 import numpy as np
 
+from array_types import Array
 from coupler.case.paths import BadPath, check_file
 from coupler.case.units import MOST
 from coupler.program.errors import ExitCode, SurgebreakError
-
-Array = np.ndarray
 
 UNREADABLE = (
     SystemExit,

@@ -11,9 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
+from array_types import Array
 from coupler.case.case import Case, Tank
 from coupler.case.paths import stamp
-from coupler.case.types import KeyPath
+from coupler.case.types import Problem
 from coupler.geometry.basin import basin_problem
 from coupler.geometry.mesh_files import MeshFileError
 from coupler.geometry.start_surfaces import surface_of
@@ -22,9 +23,6 @@ from coupler.geometry.tank_regions import regions_of, stretch_problems, too_many
 from coupler.geometry.terrain.bed_mesh import fitted_of
 from coupler.geometry.tetrahedra import read_tetrahedra, shown
 from coupler.program.errors import SurgebreakError
-
-Array = np.ndarray
-Problem = tuple[KeyPath, str]
 
 OF_BOX = {
     "lower": "corner with the smallest coordinates [m]",

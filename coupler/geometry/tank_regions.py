@@ -9,14 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from coupler.case.case import Case, Tank
-from coupler.case.types import KeyPath
+from coupler.case.types import KeyPath, Problem
 from coupler.geometry.bodies import Body
 from coupler.geometry.parts import parts_of
 from coupler.geometry.solids import solids_of
 from coupler.geometry.stretches import axes_of
 from coupler.program.errors import did_you_mean
-
-Problem = tuple[KeyPath, str]
 
 ALL = ("solids", "blocks", "terrain")
 """Names in `around` that stand for everything of a kind."""

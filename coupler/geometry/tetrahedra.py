@@ -10,9 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
+from array_types import Array
 from coupler.geometry.mesh_files import MeshFileError, read_mesh
-
-Array = np.ndarray
 
 BOUNDARY_KINDS = ("vertex", "line", "triangle", "quad", "polygon")
 """Cells that meshers write along with the volume, for marks on its boundary."""

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from array_types import Array
 from coupler.case.case import Case
 from coupler.case.structure import Building
 from coupler.case.types import Rotation
@@ -20,8 +21,6 @@ from coupler.geometry.footprints import (
     read_footprints,
 )
 from coupler.program.errors import did_you_mean
-
-Array = np.ndarray
 
 FILLED = 0.7
 """Least share of its rectangle that a footprint must fill to be built on it."""

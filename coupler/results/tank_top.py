@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from array_types import Array
 from coupler.program.quantities import moment_of
 
 if TYPE_CHECKING:
     from fluid.step.water import Water
 
-Array = np.ndarray
 
 NEAR = 1e-9
 """Share of the height of the tank within which a node is at its top."""

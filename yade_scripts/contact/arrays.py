@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-Array = np.ndarray
+from array_types import Array
 
 BEGINS = -1.0
 """In place of the last normal force of a contact that has not pushed yet."""

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from array_types import Array
 from kernels.ranges import alone
 from yade_scripts.blocks.block import Block
 from yade_scripts.blocks.faces import FixedPlane
@@ -18,8 +19,6 @@ from yade_scripts.contact.search import fastest
 from yade_scripts.contact.springs import contact_work
 from yade_scripts.contact.state import Contacts, contacts_of_rows
 from yade_scripts.yade_side.motion import Motion
-
-Array = np.ndarray
 
 
 class ContactForces:

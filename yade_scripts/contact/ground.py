@@ -15,13 +15,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from array_types import Array
 from kernels.decorators import inner, plain
 from yade_scripts.blocks.faces import FixedPlane
 from yade_scripts.contact.arrays import BEGINS
 from yade_scripts.contact.search import ALIGNED, write_row
 from yade_scripts.contact.springs import ARRIVED, release, stiffness_together, way_of
-
-Array = np.ndarray
 
 
 class Ground(NamedTuple):

@@ -13,12 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from array_types import Array
 from yade_scripts.blocks.block import MARGIN, Block
 from yade_scripts.blocks.faces import FixedPlane, gauss_points
 from yade_scripts.contact.edges import ROUND_OFF
-
-Array = np.ndarray
-
 
 FINE = 8
 """Gauss points along an edge for the mean distance within a face."""

@@ -6,10 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from array_types import Array
 from yade_scripts.blocks.tangent import Springs
 from yade_scripts.contact.arrays import Rows, empty_rows
-
-Array = np.ndarray
 
 SLIPS = 1.0 - 1e-9
 """Share of μ F_n from which a contact counts as sliding."""

@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from array_types import Array
 from yade_scripts.blocks.block import Block
 from yade_scripts.blocks.faces import TouchingFaces, gauss_points
 from yade_scripts.joints.cohesion import JointParameters
-
-Array = np.ndarray
 
 INSET = 0.8
 """Radius of a bond's spheres over the distance of its point from the border of the face: the spheres stay inside their

@@ -8,10 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
+from array_types import Array
 from coupler.commands.compare.plan import OwnLaw
 from yade_scripts.stock.script import StockLaw
-
-Array = np.ndarray
 
 KINDS = ("peak_force", "dissipated")
 """What `compare = ...` in expected.toml may say: the largest force on the driven blocks until a joint

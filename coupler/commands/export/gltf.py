@@ -12,13 +12,13 @@ from pathlib import Path
 
 import numpy as np
 
+from array_types import Array
 from coupler.commands.export.stored import Stored, stored
 from coupler.commands.view import palette
 from coupler.commands.view.water_surface import shading_normals, skin
 from coupler.program.extras import need
 from coupler.results import vtkhdf
 
-Array = np.ndarray
 Y_UP = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
 
 

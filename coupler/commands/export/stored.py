@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
+from array_types import Array
 from coupler.results import vtkhdf
 
-Array = np.ndarray
 Cells = list[tuple[str, Array, Array]]
 """Kind as meshio names it, corners (m, k), and the numbers (m,) of these cells in the file."""
 

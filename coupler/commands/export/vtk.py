@@ -16,8 +16,6 @@ import numpy as np
 from coupler.commands.export.stored import Stored, stored
 from coupler.results import vtkhdf
 
-Array = np.ndarray
-
 
 def write_vtk(run: Path, to: Path, chosen: Callable[[float], bool]) -> Iterator[Path]:
     """Write the files of a run and yield each one when it is complete. chosen: whether a time [s] is wanted."""

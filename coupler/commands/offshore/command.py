@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from array_types import Array
 from coupler.case.inflow_records import ALONG, COLUMNS, DRY, SIDEWAYS, record_of
 from coupler.checks.read_case import load
 from coupler.commands.offshore.file import Offshore, read
@@ -18,8 +19,6 @@ from coupler.program.errors import BadCase
 from coupler.program.extras import NotInstalled, missing
 from coupler.program.process import run_module, trouble
 from coupler.program.terminal import Row
-
-Array = np.ndarray
 
 
 class OffshoreFailed(BadCase):

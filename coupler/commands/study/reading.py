@@ -7,13 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
+from array_types import Array
 from coupler.case.study import Quantity
 from coupler.program.errors import BadCase, did_you_mean
 from coupler.results.expected import TAKE
 from coupler.results.history import read_history
 from coupler.run.summary import read_summary
-
-Array = np.ndarray
 
 
 @dataclass(frozen=True)

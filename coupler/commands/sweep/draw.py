@@ -20,7 +20,7 @@ from scipy.optimize import brentq
 from scipy.special import gammaln
 from scipy.stats import qmc
 
-Array = np.ndarray
+from array_types import Array
 
 
 def seed_of(*what: object) -> int:

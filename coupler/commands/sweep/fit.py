@@ -17,7 +17,8 @@ import numpy as np
 from scipy.optimize import minimize
 from scipy.special import log_ndtr, ndtr, ndtri
 
-Array = np.ndarray
+from array_types import Array
+
 MOST_ITERATIONS = 60
 MOST_HALVINGS = 30
 ENOUGH = 1e-10

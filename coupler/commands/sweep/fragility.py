@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import binomtest
 
+from array_types import Array
 from coupler.case.paths import BadPath, place_of
 from coupler.case.records import NoSuchData, read_record
 from coupler.case.sweep import DamageState, Fragility
@@ -21,7 +22,6 @@ from coupler.commands.sweep.fit import Fits, bootstrap, check, fit, separation
 from coupler.commands.sweep.folder import Spec
 from coupler.commands.sweep.results import FREE, Results
 
-Array = np.ndarray
 POINTS = 121
 """Number of points of a curve."""
 MOST_LEVELS = 20

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from array_types import Array
 from coupler.case.sweep import Sweep, SweepQuantity
 from coupler.case.sweep_names import PLAIN
 from coupler.commands.study.formula import BadFormula, evaluate_columns
@@ -17,8 +18,6 @@ from coupler.commands.study.reading import Curve, read, taken
 from coupler.program.errors import BadCase, SurgebreakError, did_you_mean
 from coupler.results import vtkhdf
 from coupler.results.history import BadTable, read_history
-
-Array = np.ndarray
 
 
 class NoReading(SurgebreakError):

@@ -11,10 +11,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.stats import rankdata, sobol_indices
 
+from array_types import Array
 from coupler.commands.sweep.folder import Spec
 from coupler.commands.sweep.results import Results
 
-Array = np.ndarray
 SAMPLES = 1000
 """Number of samples of a bootstrap."""
 CONFIDENCE = 0.9

@@ -8,9 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+from array_types import Array
 from coupler.geometry.mesh_files import MeshFileError
-
-Array = np.ndarray
 
 TRIANGLE = 2
 """The kind of an element, as gmsh counts them."""

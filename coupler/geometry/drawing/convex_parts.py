@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-Array = np.ndarray
+from array_types import Array
 
 MOST_TRIED = 12
 """Planes whose cut is measured; those that end most of reflex edges."""

@@ -6,9 +6,8 @@ import math
 
 import numpy as np
 
+from array_types import Array
 from coupler.geometry.drawing.convex_parts import ROUND_OFF, Part, directions
-
-Array = np.ndarray
 
 
 def divided(body, part: Part, size: tuple[float, float], bond: str) -> list[Part]:

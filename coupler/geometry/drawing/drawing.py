@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from array_types import Array
 from coupler.geometry.drawing.convex_parts import CannotCut, Part, convex_parts, merged, smallest_width
 from coupler.geometry.drawing.division import divided, how_many
 from coupler.geometry.drawing.names import member_names
@@ -16,8 +17,6 @@ from coupler.geometry.drawing.reading import BadDrawing, Layer, read_layers
 from yade_scripts.blocks.block import Block
 from yade_scripts.blocks.generators.cuts import check_count
 from yade_scripts.blocks.polyhedra import BlockError, shown
-
-Array = np.ndarray
 
 SLIVER = 0.25
 """Of the usual thickness of a layer: parts narrower than this are merged with a neighbour where that is convex."""

@@ -11,9 +11,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from array_types import Array
 from coupler.geometry.drawing.convex_parts import directions
-
-Array = np.ndarray
 
 THIN = 0.5
 """Largest ratio of the smallest to the middle width of a wall or floor."""

@@ -8,14 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
+from array_types import Array
 from coupler.case.paths import BadPath, check_file
 from coupler.geometry.block_files import STL_DIGITS, WELD, welded
 from coupler.geometry.closed_surfaces import SurfaceError, closed_surfaces
 from coupler.geometry.mesh_files import MeshFileError
 from coupler.program.extras import need
 from yade_scripts.blocks.polyhedra import shown
-
-Array = np.ndarray
 
 SURFACES = ("stl", "obj", "ply", "off", "glb", "gltf", "3mf")
 CAD = {"step": "cad", "stp": "cad", "iges": "cad", "igs": "cad", "brep": "cad", "ifc": "ifc"}

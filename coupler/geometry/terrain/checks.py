@@ -6,10 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from coupler.case.types import KeyPath
+from coupler.case.types import Problem
 from coupler.geometry.terrain.height_map import HeightMap
-
-Problem = tuple[KeyPath, str]
 
 FINE = 200
 """Places along each side of the tank at which the ground is looked up."""

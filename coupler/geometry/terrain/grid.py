@@ -4,11 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
+from array_types import Array
 from coupler.program.errors import ExitCode, SurgebreakError
-
-Array = np.ndarray
 
 
 class TerrainError(SurgebreakError):

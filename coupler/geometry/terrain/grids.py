@@ -10,11 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
+from array_types import Array
 from coupler.case.paths import BadPath, check_file, read_text
 from coupler.geometry.terrain.grid import Grid, TerrainError
 from coupler.program.errors import briefly, did_you_mean
-
-Array = np.ndarray
 
 EVEN = 1e-3
 """Share of a spacing by which the points of a raster may be off."""

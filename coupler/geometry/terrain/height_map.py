@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-Array = np.ndarray
+from array_types import Array
 
 BESIDE = 1e-6
 """Share of a spacing by which a place may lie beside the raster and count as on its edge."""

@@ -9,14 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
+from array_types import Array
 from coupler.case.paths import stamp
-from coupler.case.types import KeyPath
+from coupler.case.types import KeyPath, Problem
 from coupler.geometry.terrain.grid import TerrainError
 from coupler.geometry.terrain.grids import read_grid
 from coupler.geometry.terrain.height_map import HeightMap
-
-Array = np.ndarray
-Problem = tuple[KeyPath, str]
 
 LAWS = ("manning", "roughness")
 MOST_N = 1.0

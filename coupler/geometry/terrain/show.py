@@ -11,8 +11,6 @@ from coupler.geometry.terrain.grids import read_grid
 from coupler.geometry.terrain.height_map import HeightMap
 from coupler.program.terminal import Row
 
-Array = np.ndarray
-
 SIZES = 6
 """Cells that are tried, each twice the one before."""
 MOST = 2e6

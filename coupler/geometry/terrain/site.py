@@ -17,11 +17,10 @@ from pathlib import Path
 
 import numpy as np
 
+from array_types import Array
 from coupler.geometry.terrain.grid import Grid, TerrainError
 from coupler.geometry.terrain.grids import MOST_POINTS, read_grid
 from coupler.geometry.terrain.height_map import HeightMap
-
-Array = np.ndarray
 
 KEPT = ".terrain"
 """Folder beside the file."""

@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from array_types import Array
 from coupler.geometry.terrain.bed_mesh import fitted_of
-
-Array = np.ndarray
 
 INTO_GROUND = 0.5
 """Cells that a footing reaches below the lowest ground under it."""
