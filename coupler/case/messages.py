@@ -67,8 +67,10 @@ def _unknown(path: KeyPath) -> str:
     name = str(path[-1])
     here = [known for known in names_in(path[:-1]) if known != name]
     elsewhere = [key.path for key in keys() if key.path.endswith(f".{name}") or key.path == name]
+    if ".".join(part for part in path if isinstance(part, str)) in elsewhere:
+        return f"unknown name for this kind; it belongs to {_kinds_with(path)}"
     if elsewhere:  # an exact name is a better hint than a similar one
-        nearest = max(elsewhere, key=lambda known: _shared(known, path))
+        nearest = max(elsewhere, key=lambda known: _preferred(known, path))
         inside = _shared(nearest, path) == nearest.count(".")
         other = "" if inside or not here else f" Known here: {', '.join(here)}"
         return f"unknown name here; did you mean '{nearest}'?{other}"
@@ -76,6 +78,22 @@ def _unknown(path: KeyPath) -> str:
     if hint:
         return f"unknown name{hint}"
     return f"unknown name; known here: {', '.join(here)}" if here else "unknown name"
+
+
+def _kinds_with(path: KeyPath) -> str:
+    """The kinds of a list of several that have a name, in words."""
+    key = find(path[:-1])
+    sections = () if key is None else key.sections
+    found = [s for s in sections if str(path[-1]) in s.model_fields]
+    kinds = [get_args(s.model_fields["kind"].annotation)[0] for s in found if "kind" in s.model_fields]
+    return "kind = " + ", ".join(f"'{kind}'" for kind in kinds) if kinds else "others"
+
+
+def _preferred(known: str, path: KeyPath) -> tuple[int, bool, int]:
+    """Order of the names that are as well known elsewhere: sections in common with the place; a section itself; few
+    sections above it."""
+    key = find(tuple(known.split(".")))
+    return _shared(known, path), key is not None and bool(key.sections), -known.count(".")
 
 
 def _shared(known: str, path: KeyPath) -> int:
@@ -123,7 +141,7 @@ def _shape(kind: str, value: object, context: dict, key: Key | None, message: st
         return f"{briefly(value)} is no name; use letters, digits, - and _, beginning with a letter"
     if kind in ("tuple_type", "list_type") and key is not None and key.several:
         return f"write [[{key.path}]] with double brackets: there may be several"
-    if kind in ("tuple_type", "list_type") and isinstance(value, str):
+    if kind == "list_type" and isinstance(value, str):
         return f"{briefly(value)} is not a list; write [{briefly(value)}]"
     if kind in ("tuple_type", "list_type"):
         return f"{briefly(value)} is not a list of numbers; {_is(key)}"

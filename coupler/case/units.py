@@ -142,6 +142,8 @@ def _factor(given: str, unit: str, value: str) -> float:
         raise UnitError(f"{value!r}: unknown unit '{given}'{_near(given)}{_example(unit)}") from error
     target = _si(unit)
     of_other_kind = source.dimensionality != target.dimensionality
+    if unit == "kg/m3" and source.dimensionality == _si("N/m3").dimensionality:
+        raise UnitError(f"{value!r} is a unit weight, needs a density [kg/m3]; divide it by 9.81 m/s2")
     if of_other_kind or _is_angle(source) != _is_angle(target):
         raise UnitError(f"{value!r} is {_kind(source)}, needs {DIMENSIONS[unit]}{_in(unit)}")
     return float(source.to(target.units).magnitude)

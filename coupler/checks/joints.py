@@ -53,6 +53,8 @@ def pair_problems(case: Case, parts: list[Part]) -> Iterator[Problem]:
         for name in dict.fromkeys(pair.between):
             if name not in known:
                 hint = did_you_mean(name, known) or f"; there are {', '.join(known[:8])}"
+                if name == "ground" and "tank" in known:
+                    hint = ", since there is no [structure.ground]; the floor of the tank is 'tank'"
                 yield ("joints", "pair", i, "between"), f"nothing is called '{name}'{hint}"
         yield from _pair_law(case, i, pair)
 

@@ -276,6 +276,14 @@ def test_walls_thinner_than_a_cell_are_remarked():
     thin = {"centre": [7, 5, 1], "size": [0.2, 2, 2]}
     assert remarks(case(**structure({"centre": [7, 5, 0.5]}))) == []
     assert remarks(case(**structure(thin)))[0].startswith("b0 is 0.2 m thick, thinner than a cell (1 m)")
+    wall = {"name": "w", "lower": [6, 2, 0], "size": [1.4, 4, 2], "block": [1.4, 2, 1]}
+    found = [
+        text
+        for text in remarks(case(structure={"wall": [wall]}, contact={"stiffness": 1e8}))
+        if "thin" in text
+    ]
+    assert found[0].startswith("w is 1.4 m thick, thinner than two cells (1 m): with single covers")
+    assert "water pass through" in found[0]
 
 
 def test_a_single_pass_with_blocks_lighter_than_the_water_is_remarked():
