@@ -460,8 +460,10 @@ class CoupledStepper:
         return None if self.structure is None else self.structure.energies()
 
     def _driven_by(self) -> tuple[bool, bool, bool]:
-        """Whether blocks may move, whether water enters through sides, and whether narrow openings are closed."""
-        moves, connection = self.structure is not None and not self.structure.fixed.all(), None
+        """Whether blocks move, driven or free, whether water enters through sides, and whether narrow openings are
+        closed."""
+        moves = self.structure is not None and any(not block.fixed for block in self.structure.blocks)
+        connection = None
         if self.immersion is not None:
             connection = self.immersion.connection
         return moves, self.water.sides is not None, connection is not None and connection.face > 0.0
