@@ -29,6 +29,9 @@ from coupler.step.observe import joint_counts, size
 from coupler.step.step_limits import check_step
 from kernels.memory import keep_memory
 
+MOST_CLOSED = 3
+"""Parts of the water without a surface that are reported at the start."""
+
 
 def run(case: Case, directory, reporter, checkpoint=None, each=None) -> ExitCode:
     """Run a case into a RunDirectory; its figures go into run.json however the run ends.
@@ -94,6 +97,8 @@ def _describe(scene: Scene, reporter) -> None:
             f"water: {len(c.water.mesh.cells)} cells in the mesh, {len(d.cells)} outside the solids "
             f"({int(d.is_cut.sum())} cut{divided}), {c.water.volume():.6g} m3"
         )
+        if d.is_cut.any():
+            _describe_closed_off(c.water, reporter)
     if c.water is not None and c.water.air is not None:
         from coupler.run.trapped_air import described_air
 
@@ -112,6 +117,20 @@ def _describe(scene: Scene, reporter) -> None:
             reporter.message(f"note: {limit.remark(substep)}")
         for what, law in laws_of(c.structure).items():
             reporter.message(f"{what}: {law}")
+
+
+def _describe_closed_off(water, reporter) -> None:
+    """Notes on water without a surface at the start, whose pressure anything that moves there sets."""
+    from fluid.readings.closed_off import closed_off
+
+    closes = water.domain.memory.connection is not None and water.domain.memory.connection.face > 0.0
+    why = '; water.openings = "all" leaves narrow openings open, which may connect it' if closes else ""
+    for part in closed_off(water)[:MOST_CLOSED]:
+        at = ", ".join(f"{x:.3g}" for x in part.place)
+        reporter.message(
+            f"note: {part.volume:.3g} m3 of water around ({at}) m have no surface and no open side: the pressure there "
+            f"follows from what moves beside them alone{why}"
+        )
 
 
 def laws_of(structure) -> dict[str, str]:

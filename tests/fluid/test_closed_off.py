@@ -1,0 +1,41 @@
+"""Water without a surface is found where it is, however it is closed in."""
+
+import numpy as np
+import pytest
+
+from fluid.cut.bodies import ConvexBodies
+from fluid.domain.covers import OPENINGS
+from fluid.domain.physical_domain import cut_domain
+from fluid.mesh.background import box_mesh
+from fluid.readings.closed_off import closed_off
+from fluid.step.water import Water
+
+
+def tank(gap, openings="all", is_open=None):
+    """A tank of 2 m by 0.5 m by 1 m, full to 0.8 m, whose right half a lid at 0.5 m covers up to a wall, but for a gap
+    above the bed."""
+    mesh = box_mesh((0, 0, 0), (2, 0.5, 1), 0.125)
+    low, high = gap, 0.55
+    bodies = ConvexBodies.boxes(
+        [[1.03, 0.25, 0.5 * (low + high)], [1.53, 0.25, 0.53]], [[0.06, 0.6, high - low], [1.06, 0.6, 0.06]]
+    )
+    domain = cut_domain(mesh, bodies, "multiple", connection=OPENINGS[openings])
+    return Water(mesh, domain, lambda x: x[:, 2] - 0.8, is_open=is_open)
+
+
+def test_a_chamber_without_a_way_out_is_found_with_its_volume():
+    (found,) = closed_off(tank(gap=-0.1))
+    assert found.volume == pytest.approx(0.94 * 0.5 * 0.5, rel=1e-6)
+    np.testing.assert_allclose(found.place, [1.53, 0.25, 0.25], atol=0.02)
+
+
+def test_an_opening_or_an_open_side_connects_it():
+    assert closed_off(tank(gap=0.25)) == []
+    assert closed_off(tank(gap=-0.1, is_open=lambda normals, centres: normals[:, 0] > 0.5)) == []
+
+
+def test_thresholds_of_the_covers_close_narrow_openings():
+    """Two centimetres above the bed are a sixth of a cell."""
+    assert closed_off(tank(gap=0.02)) == []
+    (found,) = closed_off(tank(gap=0.02, openings="wide"))
+    assert found.volume == pytest.approx(0.94 * 0.5 * 0.5, rel=0.05)
