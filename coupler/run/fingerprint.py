@@ -13,8 +13,8 @@ from coupler.program import provenance
 
 FREE = ("time.end", "time.step_max", "time.cfl", "time.checkpoint_every", "coupling.", "limits.")
 """Names of the case that may change when a run goes on; with a dot at the end: a whole section."""
-FILE_KEYS = ("path", "surface", "mesh")
-"""Keys of a case whose values name files."""
+FILE_KEYS = ("path", "surface")
+"""Keys of a case whose values name files, that of the mesh aside, which is compared as a mesh."""
 
 
 def scene_parts(coupling) -> dict[str, str]:

@@ -119,6 +119,7 @@ def coupling(pipe, piston, step_max=0.1, **more):
         moved_on=lambda: np.zeros((1, 6)),
         films=lambda: (np.zeros(1, bool), np.zeros(1)),
         cut_again=0,
+        connection=None,
         n_solids=0,
     )
     return CoupledStepper(pipe, piston, still, rtol=1e-10, step_max=step_max, clock=no_clock, **more)
