@@ -166,6 +166,7 @@ def make(options):
     if options.still:
         from coupler.commands.view.pictures import still
 
+        run.check(options.time)
         report(still, run, folder, options.size, options.time, **camera)
     if options.plots:
         from coupler.commands.view.plots import plots

@@ -122,6 +122,13 @@ class RunFiles:
     basin: np.ndarray | None = None
     bed: object = None
 
+    def check(self, time) -> None:
+        """Raise NothingToShow for a time [s] that no stored step is near to; None is the last one."""
+        near = np.diff(self.times).max(initial=0.0)
+        if time is not None and not self.times[0] - near <= time <= self.times[-1] + near:
+            first, last = self.times[0], self.times[-1]
+            raise NothingToShow(f"--time {time:g}: {self.directory} has states from {first:g} s to {last:g} s")
+
     def nearest(self, time):
         """The stored time nearest to `time`; the last one for None."""
         return self.times[-1] if time is None else self.times[np.argmin(np.abs(self.times - time))]
