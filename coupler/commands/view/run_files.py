@@ -127,7 +127,9 @@ class RunFiles:
         near = np.diff(self.times).max(initial=0.0)
         if time is not None and not self.times[0] - near <= time <= self.times[-1] + near:
             first, last = self.times[0], self.times[-1]
-            raise NothingToShow(f"--time {time:g}: {self.directory} has states from {first:g} s to {last:g} s")
+            raise NothingToShow(
+                f"--time {time:g}: {self.directory} has states from {first:g} s to {last:g} s"
+            )
 
     def nearest(self, time):
         """The stored time nearest to `time`; the last one for None."""
