@@ -92,7 +92,7 @@ class _About(BaseModel):
 
     layout: int
     case: dict
-    files: dict[str, str]
+    files: dict[str, str] = {}  # absent before layout 7, which is refused with that reason
     program: dict[str, str]
     scene: dict[str, str]
     outputs: tuple[float, int]
