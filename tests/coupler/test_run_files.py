@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 
-
 @pytest.mark.before_yade
 def test_a_time_that_the_run_has_not_is_refused():
     """It was drawn as the last state, in silence. A time between two states, or just behind the last one, is shown."""
