@@ -39,9 +39,7 @@ def scene_parts(coupling) -> dict[str, str]:
 def file_digests(case: dict) -> dict[str, str]:
     """Digest of each file that an effective case names, by its path; files of a study, which no run reads, left out."""
     named = {section: value for section, value in case.items() if section != "study"}
-    return {
-        name: _digest(Path(name).read_bytes()) for name in sorted(set(_named(named))) if Path(name).is_file()
-    }
+    return {name: _of_file(Path(name)) for name in sorted(set(_named(named))) if Path(name).is_file()}
 
 
 def _named(value: object) -> Iterator[str]:
@@ -57,8 +55,18 @@ def _named(value: object) -> Iterator[str]:
             yield from _named(entry)
 
 
+def _of_file(path: Path) -> str:
+    """Read piece by piece: a raster may be larger than the memory that a run has to spare."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, _new_digest).hexdigest()
+
+
+def _new_digest():
+    return hashlib.blake2b(digest_size=4)
+
+
 def _digest(*parts: bytes) -> str:
-    digest = hashlib.blake2b(digest_size=4)
+    digest = _new_digest()
     for part in parts:
         digest.update(part)
     return digest.hexdigest()
