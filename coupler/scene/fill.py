@@ -20,6 +20,9 @@ reach farther than t beyond the side, s stays, too. Wet or dry, such nodes bent 
 
 Sides that follow an outer edge of a solid cut no cells short at a node beside that edge; but where no fluid part of the
 cells around a node is dry for lying beyond a side alone, this is no surface there either (`_hidden_sides`).
+An edge of a box that lies on planes of nodes has all corners of some cells on the surface, where the diagonal of the
+bricks runs across the edge, and cells without a corner in the water are dry: half a brick along the edge. So nodes on
+an edge lie in the water, by the least depth that is no film (EDGE).
 """
 
 from __future__ import annotations
@@ -34,6 +37,7 @@ from array_types import Array
 from coupler.geometry.start_surfaces import StartSurface
 from fluid.domain.quadrature import part_points
 from fluid.numerics.spans import spans
+from fluid.surface.level_set import FILM
 
 if TYPE_CHECKING:
     from fluid.domain.physical_domain import PhysicalDomain
@@ -48,6 +52,8 @@ FLUSH = 0.01
 """Share of a cell edge by which a solid may stand beyond the end of a box that is meant to reach up to it."""
 SEAM = 1e-6
 """Share of a cell edge within which two boxes touch."""
+EDGE = 2.0 * FILM
+"""Share of a cell edge by which a node on an edge of a box lies in the water."""
 NO_CELLS, NO_BOUNDS = np.zeros(0, np.int64), np.zeros((0, 3))
 
 
@@ -281,7 +287,7 @@ def _box_level(box, tank, stars, domain, edge: Array, hidden_low: Array, hidden_
     """Signed distance (N,) of one box, its sides at solids and tank walls left out, hidden ones a cell off at least."""
     nodes, low, high, cut_low, cut_high = stars
     (box_low, box_high, _), (tank_low, tank_high) = box, tank
-    level = np.full(len(nodes), -np.inf)
+    level, ends = np.full(len(nodes), -np.inf), np.zeros(len(nodes), np.int64)
     for k in range(3):
         x = nodes[:, k]
         if box_high[k] < tank_high[k]:
@@ -289,15 +295,24 @@ def _box_level(box, tank, stars, domain, edge: Array, hidden_low: Array, hidden_
             s, s_low, s_high = x - plane, low[:, k] - plane, high[:, k] - plane
             faces = _Faces(domain, k, plane, 1.0, edge)
             side = _side(s, s_low, s_high, cut_low[:, k], cut_high[:, k], faces)
-            level = np.maximum(level, np.where(hidden_high[:, k], np.minimum(side, -edge), side))
+            side = np.where(hidden_high[:, k], np.minimum(side, -edge), side)
+            level, ends = np.maximum(level, side), ends + _close_to(side, edge)
         if box_low[k] > tank_low[k]:
             plane = box_low[k]
             s, s_low, s_high = plane - x, plane - high[:, k], plane - low[:, k]
             faces = _Faces(domain, k, plane, -1.0, edge)
             side = _side(s, s_low, s_high, cut_high[:, k], cut_low[:, k], faces)
-            level = np.maximum(level, np.where(hidden_low[:, k], np.minimum(side, -edge), side))
+            side = np.where(hidden_low[:, k], np.minimum(side, -edge), side)
+            level, ends = np.maximum(level, side), ends + _close_to(side, edge)
+    at_edge = (ends > 1) & _close_to(level, edge)
+    level[at_edge] = -EDGE * edge[at_edge]
     far = np.ptp(nodes, axis=0).max()  # a distance that no surface reaches
     return np.maximum(level, -far)
+
+
+def _close_to(side, edge: Array) -> Array:
+    """Nodes (N,) bool on a side, give or take what rounding does to a place."""
+    return np.abs(side) < SEAM * edge
 
 
 def _goes_on(box, tank, hidden_low: Array, hidden_high: Array) -> Array:

@@ -53,6 +53,20 @@ def test_where_boxes_touch_makes_no_difference_to_the_water(seam):
     np.testing.assert_array_equal(water_in(parts).level_set, whole.level_set)
 
 
+@pytest.mark.parametrize(
+    "box",
+    [
+        ((0.0, 0.0, 0.0), (0.5, 0.5, 0.25)),
+        ((0.5, 0.0, 0.0), (1.0, 0.5, 0.25)),
+        ((0.25, 0.125, 0.125), (0.75, 0.375, 0.375)),
+    ],
+)
+def test_a_box_between_planes_of_nodes_holds_its_volume(box):
+    """At every edge and corner, on both sides of the diagonal of the bricks."""
+    low, high = np.array(box)
+    assert water_in([box]).volume() == pytest.approx(np.prod(high - low), rel=1e-6)
+
+
 def test_boxes_become_one_where_they_fill_one():
     box = ((0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
     eight = [
