@@ -1,7 +1,7 @@
 """The smallest water and the smallest structure, so that the coupler is tested without either engine."""
 
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import SimpleNamespace
 
 import numpy as np
@@ -23,6 +23,16 @@ class FakeProblem:
     lower: np.ndarray | None = None
     at_bound: np.ndarray | None = None
     air: np.ndarray | None = None
+    dt: float = 0.0
+    predicted: SimpleNamespace = field(default_factory=lambda: SimpleNamespace(shear=None))
+
+    def with_waterline_of(self, x):
+        """Its bodies have no water line."""
+        return self
+
+    def load(self, x):
+        """-Gᵀp + other_load (n, 6)."""
+        return self.other_load - (self.coupling.T @ (x + self.known)).reshape(-1, 6)
 
 
 def piston_column(length=1.0, area=1.0, cells=10, dt=0.01, density=1000.0, known=0.0) -> FakeProblem:
@@ -43,6 +53,7 @@ def piston_column(length=1.0, area=1.0, cells=10, dt=0.01, density=1000.0, known
         np.full(cells, known),
         np.zeros(cells),
         np.zeros((1, 6)),
+        dt=dt,
     )
 
 

@@ -148,13 +148,13 @@ def _settled(structure, water, immersion) -> bool:
 
 def _load_at_rest(structure, water) -> Array:
     """Force and moment (n, 6) of the water on the blocks when they do not move."""
-    from coupler.step.pressure_with_structure import water_load
     from fluid.numerics.bounded import solve_pressure
 
     problem = water.predict(water.stable_step())
     if problem.coupling.nnz == 0:
         return np.zeros((structure.n, 6))
-    return water_load(problem, solve_pressure(problem, PRESSURE_RTOL).x)[: structure.n]
+    x = solve_pressure(problem, PRESSURE_RTOL).x
+    return problem.with_waterline_of(x).load(x)[: structure.n]
 
 
 def build_structure(case: Case):

@@ -250,19 +250,19 @@ class CoupledStepper:
         with self.clock("water"):
             problem = self.water.predict(dt)
         with self._with_place(problem):
-            problem, found, moved, assumed = self._exchange(problem, record, start)
+            found, moved, assumed = self._exchange(problem, record, start)
         self.water.farther = dt * (self._padded(moved) - self.water.pushed_by)
         self.water.moved_by_end = self.water.moved_on + dt * self._padded(moved)
         self.water.pushed_by = found.velocity
         with self.clock("water"):
-            self.water.correct(problem, found.x, found.parting)
+            self.water.correct(found.problem, found.x, found.parting)
         record.load, record.unknowns = found.load, len(found.x)
         given = found.load[:n] * assumed
         gained = (self.structure.velocity() - before)[~self.structure.fixed]
         behind = 0.5 * record.substep * float(np.sum(found.load[:n][~self.structure.fixed] * gained))
         self.ledger.give(dt * float(np.sum(given)), behind)
         record.missed_work = dt * np.sum(given - found.load[:n] * moved, axis=1)
-        self._note_loads(problem, record, self._padded(assumed))
+        self._note_loads(found.problem, record, self._padded(assumed))
 
     def _note_loads(self, problem: PressureProblem, record: StepRecord, velocity: Array) -> None:
         """Record the parts of the load and the energy that shear and outflow take from the water; velocity (n_bodies,
@@ -279,12 +279,11 @@ class CoupledStepper:
 
     def _exchange(
         self, problem: PressureProblem, record: StepRecord, start: StepStart | None
-    ) -> tuple[PressureProblem, CoupledSolution, Array, Array]:
+    ) -> tuple[CoupledSolution, Array, Array]:
         """Solve for the pressure with the structure inside and move the structure under it, as often as the passes
         permit; once if no block is wetted.
 
-        Returns the problem with all of its load, the solution, and the mean velocities (n, 6) with which the blocks
-        moved and were assumed to move."""
+        Returns the solution, and the mean velocities (n, 6) with which the blocks moved and were assumed to move."""
         from coupler.step.coupling_rows import Wetting
         from coupler.step.pressure_with_structure import (
             corrected_free_velocity,
@@ -335,9 +334,7 @@ class CoupledStepper:
             record.substeps += report.substeps
         record.substep, record.opening_rate = report.dt_s, report.opening_rate
         record.impulses = report.impulses
-        if found.restoring.any():
-            problem = replace(problem, other_load=problem.other_load + found.restoring)
-        return problem, found, report.mean_velocity, assumed
+        return found, report.mean_velocity, assumed
 
     def _defect_floor(self, load: Array, dt: float, free: Array) -> float:
         """`defect_floor` of the blocks that water touches, under its load (n_bodies, 6) and their weight over dt [s].
@@ -372,13 +369,13 @@ class CoupledStepper:
         self, problem: PressureProblem, afloat: Array | None
     ) -> tuple[sp.csr_array, StructureResponse, Array]:
         """Mass of the blocks, the response of all bodies to forces, and V_free of the first pass."""
-        from coupler.step.pressure_with_structure import mass_matrix, water_load
+        from coupler.step.pressure_with_structure import mass_matrix
 
         structure = self.structure
         mass = mass_matrix(structure.mass, structure.inertia())
         velocity = self._padded(structure.velocity())
         response = self._answer(mass, problem.dt, velocity, afloat)
-        known = water_load(problem, 0.0)
+        known = problem.load(0.0)
         force = structure.weight_now() + structure.internal_force()
         return mass, response, response.free_velocity(velocity, self._padded(force) + known)
 
@@ -415,7 +412,6 @@ class CoupledStepper:
         return replace(problem, other_load=load), stiffness
 
     def _water_step(self, dt: float, record: StepRecord) -> None:
-        from coupler.step.pressure_with_structure import water_load
         from fluid.numerics.bounded import solve_pressure
 
         with self.clock("water"):
@@ -424,8 +420,9 @@ class CoupledStepper:
         with self.clock("pressure"), self._with_place(problem):
             result = solve_pressure(problem, self.rtol)
         with self.clock("water"):
+            problem = problem.with_waterline_of(result.x)
             self.water.correct(problem, result.x, result.parting)
-        record.load = water_load(problem, result.x)
+        record.load = problem.load(result.x)
         record.iterations += result.iterations
         record.passes, record.unknowns = 1, len(result.x)
         self._note_loads(problem, record, self.water.body_velocity)

@@ -43,7 +43,7 @@ own V^n the water would have to turn round with it.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -143,6 +143,23 @@ class StructureResponse:
             return np.zeros_like(velocity)
         return -(self._restoring @ velocity.ravel()).reshape(-1, 6)
 
+    def held(self, force: Array) -> Array:
+        """Share (n, 1), 0 to 1, of a force (n, 6) on each body that joints, contacts and imposed rest hold: 0 where it
+        moves the body within the step as if that were loose, and where a motion is imposed."""
+        share = np.where(self.imposed.reshape(-1, 6).any(axis=1), 0.0, 1.0)
+        free = np.zeros(len(share), bool)
+        free[self.free // 6] = True
+        bodies = np.flatnonzero(free & force.any(axis=1))
+        if len(bodies):
+            inertia = _own_blocks(self._held.indptr, self._held.indices, self._held.data, len(share))[0][
+                bodies
+            ]
+            answer = self.compliance(force.ravel()).reshape(-1, 6)[bodies]
+            loose = np.linalg.solve(inertia, force[bodies][:, :, None])[:, :, 0]
+            moved, whole = (np.einsum("ni,nij,nj->n", v, inertia, v) for v in (answer, loose))
+            share[bodies] = np.clip(1.0 - np.sqrt(moved / whole), 0.0, 1.0)
+        return share[:, None]
+
     def lead(self, velocity: Array, before: Array, substep: float) -> Array:
         """L (n, 6) of (4) from V and V^n (n, 6): the difference between V and the mean velocity over the step; zero
         for driven bodies.
@@ -209,22 +226,17 @@ def _answer(bodies: Array, inverse: Array, force: Array, velocity: Array) -> Non
 @dataclass(frozen=True, kw_only=True)
 class CoupledSolution:
     """x (n_dofs,) [Pa] · velocity (n_bodies, 6) [m/s, rad/s] at the end of the step · load (n_bodies, 6) [N, N m] on
-    the bodies · restoring (n_bodies, 6): the change of the hydrostatic load on floating bodies over their displacement
-    · at_bound (n_dofs,) bool, parting (n_dofs,) [m³/s], lower (n_dofs,) [Pa]: see `fluid.numerics.bounded`."""
+    the bodies · problem: with all of this load (`_acting`) · at_bound (n_dofs,) bool, parting (n_dofs,) [m³/s], lower
+    (n_dofs,) [Pa]: see `fluid.numerics.bounded`."""
 
     x: Floats
     velocity: Floats
     load: Floats
-    restoring: Floats
+    problem: PressureProblem
     iterations: int
     at_bound: Bools
     parting: Floats
     lower: Floats
-
-
-def water_load(problem: PressureProblem, x: Array | float) -> Array:
-    """−Gᵀ (x + known) + other_load: force and moment of the water on each body, (n_bodies, 6) [N, N m]."""
-    return problem.other_load - (problem.coupling.T @ (x + problem.known)).reshape(-1, 6)
 
 
 def solve_coupled(
@@ -258,18 +270,29 @@ def solve_coupled(
         extra=added_inertia if feels_water else None,
     )
     velocity = (v_free - response.compliance(wets.on_bodies(found.x))).reshape(-1, 6)
-    restoring = response.restoring_load(velocity)
-    load = water_load(problem, found.x) + restoring
+    acting = _acting(problem, response, found.x, velocity)
     return CoupledSolution(
         x=found.x,
         velocity=velocity,
-        load=load,
-        restoring=restoring,
+        load=acting.load(found.x),
+        problem=acting,
         iterations=found.iterations,
         at_bound=found.at_bound,
         parting=found.parting,
         lower=found.lower,
     )
+
+
+def _acting(
+    problem: PressureProblem, response: StructureResponse, x: Array, velocity: Array
+) -> PressureProblem:
+    """The problem with what the solve did not know of the load: its change over the displacement of floating bodies
+    with the velocities (n, 6), and at the water line the pressure x instead of that of the last step, as far as bodies
+    are held."""
+    change = problem.with_waterline_of(x).other_load - problem.other_load
+    share = response.held(change) if np.any(change) else 1.0
+    restoring = response.restoring_load(velocity)
+    return replace(problem, other_load=problem.other_load + share * change + restoring)
 
 
 def start_of_water(mass: sp.csr_array, before: Array, pushed_by: Array, mean: Array) -> Array:

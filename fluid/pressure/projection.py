@@ -19,8 +19,8 @@ water in it must not push (growth of 0.1 a step otherwise).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -30,6 +30,9 @@ from fluid.domain.layers import WORK
 from fluid.numerics.fields import places_of
 from kernels.decorators import kernel, ranged, released
 from kernels.threads import found_over, over, owning, reach_of_cells
+
+if TYPE_CHECKING:
+    from fluid.pressure.waterline import WaterlineLoad
 
 SMALLEST_CUT = 1e-7
 SMALLEST_WET_SHARE = 1e-6
@@ -45,6 +48,7 @@ class PressureProblem:
     matrix csr (n, n) [m³/(s Pa)], SPD · rhs (n,) [m³/s], without body velocities · coupling csr (n, 6 n_bodies)
     [m², m³] · known (n,) [Pa] · guess (n,) [Pa] · dofs (n,) node of each unknown · dt [s] · density [kg/m³] ·
     other_load (n_bodies, 6) [N, N m]: loads beside that of the pressure (wall shear) and its correction
+    at_waterline (n_bodies, 6), that of `waterline` for the pressure of the last step or for the one found
     (`waterline.py`) · bound (n,) [Pa]: lower bound of p = x + known, or None · at_bound (n,) bool: unknowns that the
     iteration first assumes to be at the bound (`bounded.py`)."""
 
@@ -57,6 +61,8 @@ class PressureProblem:
     dt: float
     density: float
     other_load: Floats
+    waterline: WaterlineLoad | None = None
+    at_waterline: Floats | float = 0.0
     predicted: Any = None
     """What the water keeps between predict and correct."""
     bound: Floats | None = None
@@ -79,6 +85,19 @@ class PressureProblem:
         air = self.of_open_air - self.known
         air[len(air) - self.pockets :] = -np.inf
         return air
+
+    def with_waterline_of(self, x) -> PressureProblem:
+        """The problem whose other_load is that of the pressure x + known (n,) [Pa] at the water line, too."""
+        if self.waterline is None:
+            return self
+        pressure = x + self.known
+        there = self.waterline.of(self.of_water(self.dofs), self.of_water(pressure), self.of_air(pressure))
+        return replace(self, other_load=self.other_load + (there - self.at_waterline), at_waterline=there)
+
+    def load(self, x) -> Array:
+        """Force and moment (n_bodies, 6) [N, N m] of the water on the bodies under the pressure x + known: -Gᵀp +
+        other_load, with x = 0 the part that is known."""
+        return self.other_load - (self.coupling.T @ (x + self.known)).reshape(-1, 6)
 
     def of_water(self, values) -> Array:
         """values (n, ...) of the unknowns, without those of trapped air."""

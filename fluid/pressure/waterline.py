@@ -11,9 +11,11 @@ with the dry values p_j continued through the zero at the surface (`projection.w
 
     R = F + Gᵀp = -∫_{φ<0} p n dA + ∫ Σ_wet p_i N_i n dA                                                  (2)
 
-is added to the load as a known force, with the pressure of the last step.  It opposes a share of Gᵀp, which is part of
-the solve, so the error of this delay cannot grow: with a share ε of the added mass m_a of a body of mass m, an error of
-the acceleration is multiplied by ε m_a / (m + m_a) < 1 in every step."""
+is added to the load, of bodies that are held with the pressure found in the step.  G V drives the water with the dry
+part of the faces, too, so a body that moves has to keep what this takes: its R is that of the pressure of the last
+step, which is known to the solve.  It opposes a share of Gᵀp, which is part of the solve, so the error of this delay
+cannot grow: with a share ε of the added mass m_a of a body of mass m, an error of the acceleration is multiplied by
+ε m_a / (m + m_a) < 1 in every step."""
 
 from __future__ import annotations
 
@@ -27,31 +29,61 @@ from kernels.decorators import inner, kernel, released
 from kernels.threads import over
 
 
-def waterline_load(domain, faces, left_out, phi, wet, pressure, open_node, air=None) -> Array:
-    """R of (2): force and moment on every body (n_bodies, 6) [N, N m].
+class WaterlineLoad:
+    """R of (2) over the bodies of a domain, of any pressure.
 
     faces (k,) rows of the polygons of G · left_out (l,) rows of those not in G though their cells hold water ·
-    phi (N,) [m] · wet (N,) bool · pressure (N,) [Pa], read on wet nodes · open_node (N,) bool: p = 0, no seas ·
-    air (N,) [Pa]: pressure of trapped air at dry nodes, None: there is none. It acts on both sides of the surface, so
-    that the correction is that of the pressure above it."""
-    load = np.zeros((domain.n_bodies, 6))
-    count = marked_corners(domain.face_cell[faces], wet, domain.cells)
-    mixed = faces[(count > 0) & (count < 4)]
-    at = np.concatenate([mixed, left_out])
-    if len(at) == 0:
+    phi (N,) [m] · wet (N,) bool · before (N,) [Pa]: pressure of the last step, read on wet nodes · open_node (N,) bool:
+    p = 0, no seas · air: pressures (K,) [Pa] of trapped air → (N,) [Pa] at dry nodes, None: there is none. It acts on
+    both sides of the surface, so that R is that of the pressure above it."""
+
+    def __init__(self, domain, faces, left_out, phi, wet, before, open_node, air=None):
+        self._domain, self._phi, self._wet, self._before, self._air = domain, phi, wet, before, air
+        count = marked_corners(domain.face_cell[faces], wet, domain.cells)
+        mixed = faces[(count > 0) & (count < 4)]
+        self._rows, self._mixed = np.concatenate([mixed, left_out]), len(mixed)
+        self._open, self._beside = open_node, None
+
+    def before(self, of_air=()) -> Array:
+        """R (n_bodies, 6) [N, N m] of the pressure of the last step, with pockets at of_air (K,) [Pa]."""
+        return self._of(self._before, of_air)
+
+    def of(self, nodes, values, of_air=()) -> Array:
+        """R (n_bodies, 6) [N, N m] of the pressures values (n,) [Pa] at wet nodes (n,), elsewhere that of the last
+        step, with pockets at of_air (K,) [Pa]."""
+        if len(self._rows) == 0:
+            return np.zeros((self._domain.n_bodies, 6))
+        pressure = self._before.copy()
+        pressure[nodes] = values
+        return self._of(pressure, of_air)
+
+    def _of(self, pressure, of_air) -> Array:
+        domain, load = self._domain, np.zeros((self._domain.n_bodies, 6))
+        if len(self._rows) == 0:
+            return load
+        if self._beside is None:
+            reached = np.zeros(len(self._phi), bool)
+            reached[domain.cells[domain.face_cell[self._rows]]] = True
+            self._beside = cells_touching(reached, domain.cells)
+        solved = self._wet & ~self._open
+        p = np.where(solved, pressure, 0.0)
+        outside = np.zeros(len(p)) if self._air is None else self._air(of_air)
+        mesh = (self._beside, domain.cells, domain.volume)
+        ghosts = with_ghosts(p, outside, self._wet, self._open, self._phi, *mesh)
+        found = np.empty((len(self._rows), 6))
+        fields = (self._phi, ghosts, p, outside, solved)
+        over(
+            _differences,
+            len(found),
+            self._rows,
+            self._mixed,
+            _surface_of(domain),
+            fields,
+            found,
+            weight=POLYGON,
+        )
+        _sum_on_bodies(self._rows, domain.face_body, found, load)
         return load
-    solved = wet & ~open_node
-    p = np.where(solved, pressure, 0.0)
-    reached = np.zeros(len(phi), bool)
-    reached[domain.cells[domain.face_cell[at]]] = True
-    beside = cells_touching(reached, domain.cells)
-    outside = np.zeros(len(phi)) if air is None else air
-    ghosts = with_ghosts(p, outside, wet, open_node, phi, beside, domain.cells, domain.volume)
-    found = np.empty((len(at), 6))
-    fields = (phi, ghosts, p, outside, solved)
-    over(_differences, len(at), at, len(mixed), _surface_of(domain), fields, found, weight=POLYGON)
-    _sum_on_bodies(at, domain.face_body, found, load)
-    return load
 
 
 def _surface_of(domain):

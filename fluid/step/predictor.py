@@ -29,7 +29,7 @@ from fluid.pressure.projection import (
     pull_of_held,
     seal_pockets,
 )
-from fluid.pressure.waterline import waterline_load
+from fluid.pressure.waterline import WaterlineLoad
 from fluid.sides.outflow import Outflow
 from fluid.step.remainders import carried_remainder
 from fluid.surface.cavities import air_on_walls
@@ -369,14 +369,15 @@ def _problem(water, dt: float, theta: float, kick, moved: Moved) -> PressureProb
     if held is not None:
         unheld = unheld & (held == 0.0)
         acted = np.where(held == 0.0, acted, held / theta)
-    air = None if cushions is None else cushions.air.nodal(cushions.pressure)
+    air, of_air = (None, ()) if cushions is None else (cushions.air.nodal, cushions.pressure)
     least = 0.0 if cushions is None else cushions.lowest(dt)
-    other = waterline_load(water.domain, faces, left_out, phi, wet, acted, unheld, air)
+    waterline = WaterlineLoad(water.domain, faces, left_out, phi, wet, acted, unheld, air)
+    other = at_waterline = waterline.before(of_air)
     if held is not None:
         beside = np.flatnonzero(wet & (held != 0.0))
-        other -= (coupling[beside].T @ acted[beside]).reshape(-1, 6)
+        other = other - (coupling[beside].T @ acted[beside]).reshape(-1, 6)
     if moved.shear is not None:
-        other += moved.shear.load
+        other = other + moved.shear.load
     problem = PressureProblem(
         matrix=matrix,
         rhs=taken_at(dofs, rhs) if extra is None else rhs[dofs] + extra,
@@ -387,6 +388,8 @@ def _problem(water, dt: float, theta: float, kick, moved: Moved) -> PressureProb
         dt=dt,
         density=density,
         other_load=other,
+        waterline=waterline,
+        at_waterline=at_waterline,
         predicted=kept,
         bound=lowest_pressure(water, graph, dofs, phi, least),
         at_bound=water.at_bound[dofs],

@@ -62,8 +62,7 @@ class Pipe:
     def predict(self, dt):
         if dt > self.fails_above or dt < self.fails_below:
             raise NotConverged("pressure solver did not converge.", np.zeros(1))
-        problem = piston_column(dt=dt)
-        return SimpleNamespace(**vars(problem) | {"predicted": SimpleNamespace(shear=None)}, dt=dt)
+        return piston_column(dt=dt)
 
     def correct(self, problem, x, parting):
         self.taken.append(problem.dt)

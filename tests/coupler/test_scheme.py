@@ -289,6 +289,20 @@ def test_a_body_afloat_swings_alike_whatever_its_substeps(substeps):
     assert max(reached[-40:]) == pytest.approx(max(reached[:40]), rel=0.02)
 
 
+def test_a_force_is_held_as_far_as_a_body_does_not_give_way_to_it():
+    """Loose, on a spring that lets it go two thirds of its way in the step, fixed, and moved as a motion imposes."""
+    dt, mass = 0.1, np.full(4, 3.0)
+    stiffness = np.zeros((24, 24))
+    stiffness[6, 6] = 0.5 * mass[1] / dt**2
+    driven, velocity = np.array([False, False, True, True]), np.zeros((4, 6))
+    velocity[3, 2] = 1.0
+    M = mass_matrix(mass, np.tile(np.eye(3), (4, 1, 1)))
+    response = StructureResponse(M, sp.csr_array(stiffness), sp.csr_array((24, 24)), dt, driven, velocity)
+    force = np.zeros((4, 6))
+    force[:, 0] = 7.0
+    np.testing.assert_allclose(response.held(force)[:, 0], [0.0, 1.0 / 3.0, 1.0, 0.0], atol=1e-12)
+
+
 def test_defect_of_a_body_that_stood_still_is_whole():
     """The larger of what was found and what was assumed is the measure: neither alone may vanish."""
     M = mass_matrix(np.array([2.0]), np.eye(3)[None])
@@ -354,7 +368,7 @@ def test_a_wall_that_breaks_before_it_moves_does_not_hold_because_it_would_move(
         push = before_it_moves * (1.0 - v_free[0] / before_it_moves)
         return SimpleNamespace(
             load=np.array([[push, 0, 0, 0, 0, 0]]), velocity=share * v_free.reshape(1, 6), x=np.zeros(1), iterations=1,
-            restoring=np.zeros((1, 6)),
+            problem=problem,
         )  # fmt: skip
 
     monkeypatch.setattr(pressure_with_structure, "solve_coupled", solution)
@@ -379,7 +393,7 @@ def test_a_wall_that_breaks_before_it_moves_does_not_hold_because_it_would_move(
     monkeypatch.setattr(CoupledStepper, "_afloat", lambda self, problem: (problem, None))
     problem = SimpleNamespace(dt=dt, coupling=sp.csr_matrix(np.ones((1, 6))))
     record = StepRecord(time=0.0, dt=dt)
-    _, found, moved, _ = stepper._exchange(problem, record, SimpleNamespace(structure=False))
+    found, moved, _ = stepper._exchange(problem, record, SimpleNamespace(structure=False))
     assert gate.broken == broken
     assert record.passes <= 4
     if broken:

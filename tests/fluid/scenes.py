@@ -24,13 +24,15 @@ def advance(water: Water, dt=None, body_velocity=None, rtol=1e-9):
     problem = water.predict(water.stable_step() if dt is None else dt)
     moved = 0.0 if body_velocity is None else problem.coupling @ body_velocity
     found = solve_pressure(problem, rtol, moved)
+    if body_velocity is None:
+        problem = problem.with_waterline_of(found.x)
     water.correct(problem, found.x, found.parting)
     return problem, found.x
 
 
 def load(problem, x):
     """Force and moment on each body, (n_bodies, 6) [N, N m]."""
-    return problem.other_load - (problem.coupling.T @ (x + problem.known)).reshape(-1, 6)
+    return problem.load(x)
 
 
 def rotation(axis, angle):

@@ -75,7 +75,7 @@ def plate_that_leaves(steps: int, **settings):
     water = tank([1, 1, 1], 0.1, lambda x: x[:, 2] - 0.52, plate, **settings)
     for _ in range(steps):
         problem, x = advance(water, 0.01, np.array([0, 0, 1.0, 0, 0, 0]))
-    lift = (problem.other_load - (problem.coupling.T @ (x + problem.known)).reshape(-1, 6))[0, 2]
+    lift = problem.load(x)[0, 2]
     return water, problem.bound, x + problem.known, lift
 
 

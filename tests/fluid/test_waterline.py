@@ -7,7 +7,7 @@ import pytest
 from fluid.cut.bodies import ConvexBodies
 from fluid.domain.physical_domain import cut_domain
 from fluid.mesh.background import box_mesh
-from fluid.pressure.waterline import waterline_load
+from fluid.pressure.waterline import WaterlineLoad
 from tests.fluid.scenes import advance, load, rotation, tank
 
 SIZE = np.array([0.3, 0.25, 0.2])
@@ -71,4 +71,4 @@ def test_solids_wholly_under_water_need_no_correction():
     domain = cut_domain(mesh, boxes([0.5, 0.5, 0.3]))
     phi = domain.nodes[:, 2] - 0.9
     faces, none, no_side = np.arange(len(domain.face_cell)), np.zeros(0, int), np.zeros(len(phi), bool)
-    assert not waterline_load(domain, faces, none, phi, phi < 0.0, -WEIGHT * phi, no_side).any()
+    assert not WaterlineLoad(domain, faces, none, phi, phi < 0.0, -WEIGHT * phi, no_side).before().any()

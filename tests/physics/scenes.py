@@ -76,11 +76,11 @@ def _still_water(structure, mesh, tank, upper, covers):
 
 def load_at_rest(water):
     """Force and moment (n, 6) of the water on bodies that are held."""
-    from coupler.step.pressure_with_structure import water_load
     from fluid.numerics.bounded import solve_pressure
 
     problem = water.predict(water.stable_step())
-    return water_load(problem, solve_pressure(problem, 1e-12).x)
+    x = solve_pressure(problem, 1e-12).x
+    return problem.with_waterline_of(x).load(x)
 
 
 def moment_about_base(coupling, load, face, thickness):

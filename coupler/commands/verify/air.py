@@ -86,7 +86,7 @@ def _lowered() -> dict[str, float]:
         result = solve_pressure(problem, 1e-9, problem.coupling @ speed.ravel())
         water.pushed_by, water.moved_by_end = speed, dt * speed
         water.correct(problem, result.x, result.parting)
-        load = problem.other_load - (problem.coupling.T @ (result.x + problem.known)).reshape(-1, 6)
+        load = problem.load(result.x)
         if water.time > TIME + 1.0:
             volumes = water.pocket_volumes()
             k = int(volumes.argmax())

@@ -120,8 +120,9 @@ def jet(
     while water.time < STEADY[1]:
         problem = water.predict(min(water.stable_step(), courant * water.mesh.finest))
         found = solve_pressure(problem, 1e-9)
+        problem = problem.with_waterline_of(found.x)
         water.correct(problem, found.x, found.parting)
-        load = problem.other_load - (problem.coupling.T @ (found.x + problem.known)).reshape(-1, 6)
+        load = problem.load(found.x)
         lowest = min(lowest, water.report.bound.lowest)
         if water.time > STEADY[0]:
             total += problem.dt

@@ -34,8 +34,9 @@ def step(water: Water, dt: float, rtol: float = 1e-8):
     """One step; the force and moment on the bodies (n_bodies, 6)."""
     problem = water.predict(dt)
     found = solve_pressure(problem, rtol)
+    problem = problem.with_waterline_of(found.x)
     water.correct(problem, found.x, found.parting)
-    return problem.other_load - (problem.coupling.T @ (found.x + problem.known)).reshape(-1, 6)
+    return problem.load(found.x)
 
 
 @check("P31", "decay of Taylor-Green vortices", "exp(-4 nu k² t), exact", "M")

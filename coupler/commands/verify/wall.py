@@ -14,7 +14,6 @@ from coupler.commands.verify.figures import columns
 from coupler.commands.verify.registry import Finding, check
 from coupler.run.clock import Clock
 from coupler.scene.build import build
-from coupler.step.pressure_with_structure import water_load
 from fluid.numerics.bounded import solve_pressure
 from yade_scripts.dynamics.equilibrium import CannotStand, settle
 
@@ -108,7 +107,8 @@ def _stands(depth: float, ratio: float) -> bool:
 def _load_at_rest(water) -> np.ndarray:
     """Force and moment (n, 6) of still water on the blocks while they are held."""
     problem = water.predict(water.stable_step())
-    return water_load(problem, solve_pressure(problem, 1e-10).x)
+    x = solve_pressure(problem, 1e-10).x
+    return problem.with_waterline_of(x).load(x)
 
 
 def _run(coupling, end: float) -> None:
