@@ -21,8 +21,10 @@ reach farther than t beyond the side, s stays, too. Wet or dry, such nodes bent 
 Sides that follow an outer edge of a solid cut no cells short at a node beside that edge; but where no fluid part of the
 cells around a node is dry for lying beyond a side alone, this is no surface there either (`_hidden_sides`).
 An edge of a box that lies on planes of nodes has all corners of some cells on the surface, where the diagonal of the
-bricks runs across the edge, and cells without a corner in the water are dry: half a brick along the edge. So nodes on
-an edge lie in the water, by the least depth that is no film (EDGE).
+bricks runs across the edge, and cells without a corner in the water are dry: half a brick along the edge. There the
+nodes on the edge lie in the water, by EDGE of a cell: a tenth of a brick too much instead of half of one too little. By
+next to nothing it would be the exact volume, but one that no small motion of the surface keeps: where all corners are
+close to it, whether such a cell is full or empty depends on the sign of one of them.
 """
 
 from __future__ import annotations
@@ -37,7 +39,6 @@ from array_types import Array
 from coupler.geometry.start_surfaces import StartSurface
 from fluid.domain.quadrature import part_points
 from fluid.numerics.spans import spans
-from fluid.surface.level_set import FILM
 
 if TYPE_CHECKING:
     from fluid.domain.physical_domain import PhysicalDomain
@@ -52,8 +53,8 @@ FLUSH = 0.01
 """Share of a cell edge by which a solid may stand beyond the end of a box that is meant to reach up to it."""
 SEAM = 1e-6
 """Share of a cell edge within which two boxes touch."""
-EDGE = 2.0 * FILM
-"""Share of a cell edge by which a node on an edge of a box lies in the water."""
+EDGE = 0.1
+"""Share of a cell edge by which a node on an edge of a box lies in the water where cells would be lost."""
 NO_CELLS, NO_BOUNDS = np.zeros(0, np.int64), np.zeros((0, 3))
 
 
@@ -85,7 +86,8 @@ def start_level(boxes, tank, mesh, domain, tops=()) -> Array:
     faced_low, faced_high = _facing(domain)
     stars = (domain.nodes, low, high, cut_low & faced_low, cut_high & faced_high)
     hidden = _hidden_sides(boxes, tank, domain, FLUSH * edge)
-    levels = np.array([_box_level(box, tank, stars, domain, edges, *of) for box, of in zip(boxes, hidden)])
+    found = [_box_level(box, tank, stars, domain, edges, *of) for box, of in zip(boxes, hidden)]
+    levels = np.array([of_box for of_box, _ in found])
     for box, of_box in zip(boxes, levels):
         if box.top is not None:
             np.maximum(of_box, box.top.distance(domain.nodes, 0.5 * edge), out=of_box)
@@ -94,7 +96,8 @@ def start_level(boxes, tank, mesh, domain, tops=()) -> Array:
     others = np.where(inner, np.inf, levels).min(axis=0)  # a surface near the node is one of theirs
     deep = inner.any(axis=0)
     level[deep] = np.where(others < 0.0, np.maximum(others, -edges), -edges)[deep]
-    return _without_seams(level, boxes, tank, domain.nodes, edge)
+    level = _without_seams(level, boxes, tank, domain.nodes, edge)
+    return _with_edges(level, np.any([at_edge for _, at_edge in found], axis=0), domain.cells, edges)
 
 
 def _with_tops(boxes, tops, tank, slack: float) -> list[_Box]:
@@ -237,6 +240,17 @@ def _without_seams(level, boxes, tank, nodes, edge: float) -> Array:
     return level
 
 
+def _with_edges(level, at_edge, cells, edge: Array) -> Array:
+    """The level (N,), negative at nodes on edges of boxes beside cells that would have none of its corners in the water
+    for lying on the surface with all of them."""
+    on_surface = _close_to(level, edge)
+    lost = np.zeros(len(level), bool)
+    lost[cells[on_surface[cells].all(axis=1)]] = True
+    lost &= at_edge & on_surface
+    level[lost] = -EDGE * edge[lost]
+    return level
+
+
 def _reach_of(boxes, tank, points, axis: int, sign: int, step: float) -> Array:
     """How far (n,) [m] the union of the boxes reaches from points (n, 3) in it along an axis."""
     way, whole = np.zeros(len(points)), np.ptp(np.array(tank))
@@ -283,8 +297,11 @@ class _Faces(NamedTuple):
         return found
 
 
-def _box_level(box, tank, stars, domain, edge: Array, hidden_low: Array, hidden_high: Array) -> Array:
-    """Signed distance (N,) of one box, its sides at solids and tank walls left out, hidden ones a cell off at least."""
+def _box_level(
+    box, tank, stars, domain, edge: Array, hidden_low: Array, hidden_high: Array
+) -> tuple[Array, Array]:
+    """Signed distance (N,) of one box, its sides at solids and tank walls left out, hidden ones a cell off at least,
+    and which nodes (N,) bool lie on two of them."""
     nodes, low, high, cut_low, cut_high = stars
     (box_low, box_high, _), (tank_low, tank_high) = box, tank
     level, ends = np.full(len(nodes), -np.inf), np.zeros(len(nodes), np.int64)
@@ -304,10 +321,8 @@ def _box_level(box, tank, stars, domain, edge: Array, hidden_low: Array, hidden_
             side = _side(s, s_low, s_high, cut_high[:, k], cut_low[:, k], faces)
             side = np.where(hidden_low[:, k], np.minimum(side, -edge), side)
             level, ends = np.maximum(level, side), ends + _close_to(side, edge)
-    at_edge = (ends > 1) & _close_to(level, edge)
-    level[at_edge] = -EDGE * edge[at_edge]
     far = np.ptp(nodes, axis=0).max()  # a distance that no surface reaches
-    return np.maximum(level, -far)
+    return np.maximum(level, -far), ends > 1
 
 
 def _close_to(side, edge: Array) -> Array:

@@ -166,13 +166,6 @@ class Topology:
         return near
 
     @cached_property
-    def row_of_background(self) -> Array:
-        """Row of the (first) cell of each background cell, -1 inside solids; a final -1 stands for "no cell"."""
-        row = np.full(self.n_background + 1, -1, np.int32)
-        row[self.background[::-1]] = np.arange(len(self.background), dtype=np.int32)[::-1]
-        return row
-
-    @cached_property
     def rows_of_background(self) -> tuple[Array, Array]:
         """First row and number of the cells of each background cell: none inside solids, several where a thin wall
         divides it."""

@@ -37,10 +37,8 @@ import numpy as np
 
 from array_types import Array, Floats, Ints
 from fluid.domain.moments import nodal_water
+from fluid.sides.open_parts import corner_opposite, faces_of, open_triangles
 from kernels.decorators import kernel
-
-ON_FACE = 1e-9
-"""Hat value below which a corner of a tetrahedron lies on the face of its cell."""
 
 
 @dataclass(frozen=True)
@@ -92,14 +90,14 @@ class Side:
         np.add.at(normal, row.reshape(faces.shape), area[there][:, None])
         normal /= np.linalg.norm(normal, axis=1, keepdims=True)
         cell = mesh.boundary_cell[there]
-        beside = (mesh.cells[cell][:, :, None] == faces[:, None, :]).any(axis=2)
+        corner = corner_opposite(mesh.cells[cell], faces)
         return cls(
             chosen=chosen,
             flow=flow,
             level=flow.level if flow else cast("Callable", level),
             cell=cell,
-            corner=np.argmin(beside, axis=1),
-            faces=mesh.cells[cell][beside].reshape(-1, 3).astype(np.int64),
+            corner=corner,
+            faces=faces_of(mesh.cells[cell], corner),
             hats=np.broadcast_to(np.eye(3), (len(cell), 3, 3)),
             area=area[there],
             nodes=nodes,
@@ -113,9 +111,8 @@ class Side:
         row[self.nodes] = np.arange(len(self.nodes))
         row = row[domain.parent_node]
         nodes = np.flatnonzero(row >= 0)
-        face, element, hats, share = _open_triangles(domain, self.cell, self.corner)
-        corners = beside_corner(self.corner[face])
-        faces = np.take_along_axis(domain.cells[element].astype(np.int64), corners, axis=1)
+        face, element, hats, share = open_triangles(domain, self.cell, self.corner)
+        faces = faces_of(domain.cells[element], self.corner[face])
         kept = active[faces].all(axis=1)
         return replace(
             self,
@@ -165,47 +162,6 @@ class Side:
         inward = -np.einsum("fak,fk->fa", u[self.faces], self.area)
         np.add.at(q, self.faces, share * inward)
         return q
-
-
-def beside_corner(corner):
-    """The three corners (F, 3) of a cell beside corner (F,), in order."""
-    every = np.broadcast_to(np.arange(4), (len(corner), 4))
-    return every[every != corner[:, None]].reshape(-1, 3)
-
-
-def _open_triangles(domain, cell, corner):
-    """Faces opposite to corner (F,) of background cells (F,) as triangles in the fluid: number (n,) of the face,
-    element (n,) of the domain, hats (n, 3, 3), share (n,) of the area of the face; a whole face is one triangle."""
-    low = np.searchsorted(domain.parent_cell, cell, "left")
-    count = np.searchsorted(domain.parent_cell, cell, "right") - low
-    face = np.repeat(np.arange(len(cell)), count)
-    element = np.repeat(low - np.concatenate([[0], np.cumsum(count)[:-1]]), count) + np.arange(len(face))
-    cut = domain.is_cut[element]
-    whole = (face[~cut], element[~cut], np.broadcast_to(np.eye(3), (int((~cut).sum()), 3, 3)))
-    parts = [(*whole, np.ones(len(whole[0])))]
-    if cut.any():
-        parts.append(_on_faces(domain, face[cut], element[cut], corner[face[cut]]))
-    joined = [np.concatenate(arrays) for arrays in zip(*parts)]
-    order = np.argsort(joined[0], kind="stable")
-    return tuple(array[order] for array in joined)
-
-
-def _on_faces(domain, face, element, corner):
-    """The same for cut elements: the faces of their tetrahedra on which the hat function of the corner is zero."""
-    count = domain.fan_start[element + 1] - domain.fan_start[element]
-    which = np.repeat(np.arange(len(element)), count)
-    first = np.repeat(domain.fan_start[element] - np.concatenate([[0], np.cumsum(count)[:-1]]), count)
-    corners = domain.fan_corners[
-        first + np.arange(len(which))
-    ]  # (T, corner of the tetrahedron, hat of the cell)
-    off = np.abs(np.take_along_axis(corners, corner[which][:, None, None], axis=2)[:, :, 0]) > ON_FACE
-    there = off.sum(axis=1) == 1
-    which, corners = which[there], corners[there]
-    of_tet, of_cell = beside_corner(np.argmax(off[there], axis=1)), beside_corner(corner[which])
-    hats = np.take_along_axis(
-        np.take_along_axis(corners, of_tet[:, :, None], axis=1), of_cell[:, None, :], axis=2
-    )
-    return face[which], element[which], hats, np.abs(np.linalg.det(hats))
 
 
 @kernel

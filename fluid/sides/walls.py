@@ -7,10 +7,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from array_types import Bools, Floats, Ints
+from fluid.sides.open_parts import corner_opposite, faces_of, open_faces
 from fluid.surface.level_set import drain_films
 from kernels.decorators import ranged
 from kernels.threads import over
@@ -27,9 +29,9 @@ class Walls:
     """nodes (n,) on closed sides · projector (n, 3, 3) onto the directions they leave free to water ·
     sticking (k,) rows of those where u = 0, slipping (k, 3, 3) onto the directions they leave free where they are dry ·
     open_node (N,) bool, p = 0; open_nodes (k,) their numbers, open_projector (k, 3, 3) onto their normals ·
-    open_faces (F, 3) nodes, open_area (F, 3) [m²] outward area vectors ·
-    rough_faces (C, 3), rough_area (C, 3) [m²], rough_cell (C,) background cell: the same for closed sides with no slip
-    or friction."""
+    open_faces (F, 3) nodes, open_area (F, 3) [m²] outward area vectors of the parts that solids leave open, open_cell
+    (F,) behind them · rough_faces (C, 3), rough_area (C, 3) [m²] of the whole faces, rough_cell (C,): the same for
+    closed sides with no slip or friction. Cells are those of the background mesh, or of a domain (`on_domain`)."""
 
     nodes: Ints
     projector: Floats
@@ -40,6 +42,7 @@ class Walls:
     open_projector: Floats
     open_faces: Ints
     open_area: Floats
+    open_cell: Ints
     rough_faces: Ints
     rough_area: Floats
     rough_cell: Ints
@@ -81,23 +84,25 @@ class Walls:
             open_projector=np.eye(3) - tangential,
             open_faces=faces[free],
             open_area=area[free],
+            open_cell=mesh.boundary_cell[free],
             rough_faces=faces[rough],
             rough_area=area[rough],
             rough_cell=mesh.boundary_cell[rough],
             flowing=np.unique(faces[flowing]),
         )
 
-    def on_copies(self, parent_node) -> Walls:
-        """The same sides for nodes that are copies of background nodes, parent_node (N,)."""
-        if np.array_equal(parent_node, np.arange(len(self.open_node))):
+    def on_domain(self, domain, mesh) -> Walls:
+        """The same sides on a PhysicalDomain of the background mesh, whose nodes are copies of those of the mesh: faces
+        in every cell of the domain beside them."""
+        parent_node = domain.parent_node
+        as_it_was = len(domain.cells) == len(mesh.cells) and not domain.is_cut.any()
+        if as_it_was and np.array_equal(parent_node, np.arange(len(self.open_node))):
             return self
         copies, row = _copies(self.nodes, parent_node)
         open_copies, open_row = _copies(self.open_nodes, parent_node)
         sticking, sticking_row = _copies(self.sticking, row)
-        first = np.full(len(self.open_node), -1)
-        first[parent_node[::-1]] = np.arange(len(parent_node))[::-1]
-        faces, rough = first[self.open_faces], first[self.rough_faces]
-        kept, left = (faces >= 0).all(axis=1), (rough >= 0).all(axis=1)
+        opened = _faces_on(domain, mesh, self.open_faces, self.open_cell)
+        rough = _faces_on(domain, mesh, self.rough_faces, self.rough_cell)
         return Walls(
             nodes=copies,
             projector=self.projector[row],
@@ -106,11 +111,12 @@ class Walls:
             open_node=self.open_node[parent_node],
             open_nodes=open_copies,
             open_projector=self.open_projector[open_row],
-            open_faces=faces[kept],
-            open_area=self.open_area[kept],
-            rough_faces=rough[left],
-            rough_area=self.rough_area[left],
-            rough_cell=self.rough_cell[left],
+            open_faces=opened.nodes,
+            open_area=opened.share[:, None] * self.open_area[opened.row],
+            open_cell=opened.cell,
+            rough_faces=rough.nodes,
+            rough_area=self.rough_area[rough.row],
+            rough_cell=rough.cell,
             flowing=_copies(self.flowing, parent_node)[0],
         )
 
@@ -187,6 +193,23 @@ def _chosen(sides, mesh, x, of_sea: bool):
         if side.is_sea == of_sea:
             chosen |= side.chosen(mesh.boundary_normal, x.mean(axis=1))
     return chosen
+
+
+class _Faces(NamedTuple):
+    """Faces on a domain: nodes (n, 3) · row (n,) of each in the faces of the mesh · cell (n,) of the domain behind it ·
+    share (n,) of the area that is open."""
+
+    nodes: Ints
+    row: Ints
+    cell: Ints
+    share: Floats
+
+
+def _faces_on(domain, mesh, faces, cell) -> _Faces:
+    """The faces (F, 3) of background cells (F,) in all cells of the domain beside them."""
+    corner = corner_opposite(mesh.cells[cell], faces)
+    row, element, share = open_faces(domain, cell, corner)
+    return _Faces(faces_of(domain.cells[element], corner[row]), row, element, share)
 
 
 def _copies(nodes, parent_node):

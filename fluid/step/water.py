@@ -505,7 +505,7 @@ class Water:
         """Nodes (n,) with an entry in the coupling, and their rows of it as columns."""
         self.on_one_side = on_one_side(domain, beside)
         """Those of them (n,) that reach walls from one side alone."""
-        self.walls = self._sides.on_copies(domain.parent_node)
+        self.walls = self._sides.on_domain(domain, self.mesh)
         self.on_sides = self._on_sides[domain.parent_node]
         """(N,) bool: nodes on the sides of the tank."""
         self.open_to_air = np.zeros(len(domain.nodes), bool)
@@ -588,13 +588,6 @@ class Water:
         rubbed = self.topology.beside_solid.copy()
         rubbed[self.walls.rough_faces] = True
         return rubbed
-
-    def rough_faces(self):
-        """Faces of the closed sides that rub the water: (nodes (C, 3), outward area (C, 3) [m²], cell (C,))."""
-        w = self.walls
-        cell = self.topology.row_of_background[w.rough_cell]
-        there = cell >= 0
-        return w.rough_faces[there], w.rough_area[there], cell[there]
 
     # ---- figures
 

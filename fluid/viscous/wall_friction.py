@@ -96,7 +96,8 @@ class WallFriction:
 
     def of_nodes(self, water, phi, columns, u):
         """Drag (N,) [kg/s] of the nodes on closed sides of the tank: C times the wet area of each."""
-        t, (faces, area, cell) = water.topology, water.rough_faces()
+        t, w = water.topology, water.walls
+        faces, area, cell = w.rough_faces, w.rough_area, w.rough_cell
         size = np.linalg.norm(area, axis=1)
         unit = area / size[:, None]
         if columns is not None:
