@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
+from itertools import pairwise, permutations
 
 import numpy as np
 
@@ -92,7 +92,25 @@ def _level_beside_films(immersion, level_of) -> Array:
     active[sealed.cells] = True
     there = (source >= 0) & active[source]
     level[there] = level_of(sealed)[source[there]]
-    return level
+    return _as_beside(level, there, immersion.domain)
+
+
+def _as_beside(level, there, domain) -> Array:
+    """The level (N,) with that of the nearest of the nodes `there` (N,) bool around them at the other nodes: in a solid
+    that is drawn in by a film along all of its faces, they have no more than slivers of fluid around."""
+    cells, nodes = domain.cells, domain.nodes
+    known = there[cells]
+    mixed = cells[known.any(axis=1) & ~known.all(axis=1)].astype(np.int64)
+    distance, found = np.full(len(level), np.inf), level.copy()
+    for a, b in permutations(range(4), 2):
+        use = ~there[mixed[:, a]] & there[mixed[:, b]]
+        to, of = mixed[use, a], mixed[use, b]
+        way = np.linalg.norm(nodes[to] - nodes[of], axis=1)
+        order = np.lexsort((of, -way))  # the last one written is the nearest
+        to, of, way = to[order], of[order], way[order]
+        nearer = way < distance[to]
+        found[to[nearer]], distance[to[nearer]] = level[of[nearer]], way[nearer]
+    return found
 
 
 def _trapped_air(air, structure, domain) -> dict:

@@ -75,7 +75,9 @@ class Immersion:
         self._body_of_plane = np.repeat(np.arange(len(shapes)), np.diff(self._reference.plane_start))
         self._radius = np.array([np.linalg.norm(v, axis=1).max() for v, _ in shapes])
         low, high = mesh.bounds
-        self._long = np.flatnonzero(2.0 * self._radius[: self.n_blocks] > (high - low).min() - mesh.finest)
+        self._long = np.flatnonzero(
+            2.0 * self._radius[: self.n_blocks] > (high - low)[:2].min() - mesh.finest
+        )
         """Blocks that are long enough to reach from one side of the tank to the opposite one."""
         self._in_side = self._faces_in_sides()
         self._tolerance = STILL * mesh.finest
@@ -117,10 +119,12 @@ class Immersion:
         return True
 
     def sealed_domain(self) -> PhysicalDomain:
-        """The domain without the films by which blocks are drawn in: what touches has no water between."""
+        """The domain without the films by which blocks are drawn in: what touches, or did so before the structure
+        settled, has no water between."""
         if (self._growth >= 0.0).all():
             return self.domain
-        closed = np.where(self._growth < 0.0, self._tolerance, self._growth)
+        settled = 2.0 * self._way_since(*self._given_pose()).max(initial=0.0)
+        closed = np.where(self._growth < 0.0, self._tolerance + settled, self._growth)
         bodies = self._reference.moved(self._centre, self._rotation).grown(closed)
         return cut_domain(self.mesh, bodies, self.covers, connection=self.connection)
 
@@ -172,6 +176,13 @@ class Immersion:
             np.concatenate([self.structure.centre(), self._solid_centre]),
             np.concatenate([self.structure.rotation(), fixed]),
         )
+
+    def _given_pose(self) -> tuple[Array, Array]:
+        """Centres (n + m, 3) and rotations (n + m, 3, 3) as the blocks were given, before they settled."""
+        blocks, fixed = self._blocks(), np.broadcast_to(np.eye(3), (self.n_solids, 3, 3))
+        centre = np.array([b.centre for b in blocks]).reshape(-1, 3)
+        rotation = np.array([b.rotation for b in blocks]).reshape(-1, 3, 3)
+        return np.concatenate([centre, self._solid_centre]), np.concatenate([rotation, fixed])
 
     def _new_growth(self, before: Array) -> Array:
         """Outward shift of each plane (P,) [m]: sealed faces reach over the gap to the other block, or are drawn in
@@ -243,15 +254,19 @@ class Immersion:
         rows, outward = self._flush
         if len(rows) == 0:
             return block, direction, depth
-        (centre, rotation), (first, turned) = self._pose(), self._first_pose
-        way = (
-            np.linalg.norm(centre - first, axis=1) + np.abs(rotation - turned).max(axis=(1, 2)) * self._radius
-        )
-        there = way[rows] <= self._tolerance
+        there = self._way_since(*self._first_pose)[rows] <= self._tolerance
         return (
             np.concatenate([block, rows[there]]),
             np.concatenate([direction, outward[there]]),
             np.concatenate([depth, np.zeros(there.sum())]),
+        )
+
+    def _way_since(self, centre: Array, rotation: Array) -> Array:
+        """How far (n + m,) [m] points of the bodies have come since a pose, centres (n + m, 3) [m] and rotations (n + m,
+        3, 3), at most."""
+        now, turned = self._pose()
+        return (
+            np.linalg.norm(now - centre, axis=1) + np.abs(turned - rotation).max(axis=(1, 2)) * self._radius
         )
 
     def _faces_in_sides(self) -> tuple[Array, Array, Array]:
@@ -277,7 +292,7 @@ class Immersion:
         return [] if self.structure is None else self.structure.blocks
 
     def _closing_planes(self, loose: Array) -> Array:
-        """(P,) bool: faces along the tank sides of blocks that reach from one side to the opposite one, and of those
+        """(P,) bool: faces along the tank sides of blocks that reach from one upright side to the opposite one, and of those
         not loose (n,) bool that are still in the side in which they lay at the start."""
         closing = np.zeros(len(self._body_of_plane), bool)
         rows, axes, ends = self._in_side
@@ -295,6 +310,7 @@ class Immersion:
         for b in self._long:
             corners = centre[b] + self.structure.shape_vertices[b] @ rotation[b].T
             spans = (corners.min(axis=0) < low + margin) & (corners.max(axis=0) > high - margin)
+            spans[2] = False  # water gets under a block as high as the tank
             if spans.any():
                 own = self._body_of_plane == b
                 closing[own] = (np.abs(normals[own][:, spans]) > 1.0 - ALONG).any(axis=1)
