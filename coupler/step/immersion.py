@@ -262,8 +262,8 @@ class Immersion:
         )
 
     def _way_since(self, centre: Array, rotation: Array) -> Array:
-        """How far (n + m,) [m] points of the bodies have come since a pose, centres (n + m, 3) [m] and rotations (n + m,
-        3, 3), at most."""
+        """How far (n + m,) [m] points of the bodies have come at most since a pose: centres (n + m, 3) [m] and rotations
+        (n + m, 3, 3)."""
         now, turned = self._pose()
         return (
             np.linalg.norm(now - centre, axis=1) + np.abs(turned - rotation).max(axis=(1, 2)) * self._radius
@@ -292,8 +292,8 @@ class Immersion:
         return [] if self.structure is None else self.structure.blocks
 
     def _closing_planes(self, loose: Array) -> Array:
-        """(P,) bool: faces along the tank sides of blocks that reach from one upright side to the opposite one, and of those
-        not loose (n,) bool that are still in the side in which they lay at the start."""
+        """(P,) bool: faces along the tank sides of blocks that reach from one upright side to the opposite one, and of
+        those not loose (n,) bool that are still in the side in which they lay at the start."""
         closing = np.zeros(len(self._body_of_plane), bool)
         rows, axes, ends = self._in_side
         if len(self._long) == 0 and len(rows) == 0:

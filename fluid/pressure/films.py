@@ -139,7 +139,10 @@ class Films:
 class ThinFilms:
     """Films without room for water of their own: wet at once wherever water stands higher at their rim.
 
-    node (n,) · part (n,) of it, of the connected ones · rim (m,): nodes beside, beside (m,): the part each touches.
+    node (n,) · part (n,) of it, of the connected ones · rim (m,): nodes beside, beside (m,): the part each touches ·
+    cell (k,): their cells, in order. Their water hands on the pressure and stands still: moved by it, it squirted out of
+    the film at the dry foot of a dam with all of the head, and carried the surface, which cannot be as thin as the jet,
+    along with it.
 
     Else they fill as the level set runs along them: a dam of 1 m with water on one side had a third of its uplift
     after 0.3 s, and as long as the film was dry, the surface of this water lay at the heel of the dam."""
@@ -148,6 +151,7 @@ class ThinFilms:
     part: Ints
     rim: Ints
     beside: Ints
+    cell: Ints
 
     @classmethod
     def of(cls, domain, topology, in_film, drawn_in, films) -> ThinFilms:
@@ -159,7 +163,7 @@ class ThinFilms:
         found = _all_around(topology.node_start, topology.node_cells, thin)
         node = np.flatnonzero(found)
         if len(node) == 0:
-            return cls(node, node, node, node)
+            return cls(node, node, node, node, np.flatnonzero(thin))
         start, around = topology.around
         first, last = (start[at].astype(np.int64) for at in (node, node + 1))
         row = np.repeat(np.arange(len(node)), last - first)
@@ -172,7 +176,7 @@ class ThinFilms:
         )
         part = connected_components(links, directed=False)[1]
         pairs = np.unique(np.column_stack([other[~inner], part[row[~inner]]]), axis=0)
-        return cls(node, part, pairs[:, 0], pairs[:, 1])
+        return cls(node, part, pairs[:, 0], pairs[:, 1], np.flatnonzero(thin))
 
     def filled(self, phi, height, size, among=None) -> tuple[Floats, Ints]:
         """φ (N,) [m] with water wherever the rim of a film holds some to a higher level, and the nodes that this made

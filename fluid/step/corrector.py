@@ -91,6 +91,9 @@ def corrected(water, problem, x, parting) -> Corrected:
         unknown[in_pocket] = kept.cushions.air.nodal(problem.of_air(x))[in_pocket]
         pressure[in_pocket] = kept.cushions.air.nodal(problem.of_air(x + problem.known))[in_pocket]
     gradient = _pressure_gradient(water, kept, unknown, dt / problem.density)
+    if water.films is not None:
+        still = np.isin(kept.wet_cells, water.films.thin.cell, assume_unique=True)
+        gradient[still] = kept.cell_star[still]
     u, a, forced, mean = _projected(t, kept, gradient, dt)
     remainder, kick_remainder = left_in_cells(water, kept, gradient, mean, u, dt)
     held, projected_energy = holding_water(water, kept), kinetic_energy(problem.density, kept.nodal_water, u)
