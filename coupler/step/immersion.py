@@ -262,8 +262,8 @@ class Immersion:
         )
 
     def _way_since(self, centre: Array, rotation: Array) -> Array:
-        """How far (n + m,) [m] points of the bodies have come at most since a pose: centres (n + m, 3) [m] and rotations
-        (n + m, 3, 3)."""
+        """How far (n + m,) [m] points of the bodies have come at most since a pose: centres (n + m, 3) [m] and
+        rotations (n + m, 3, 3)."""
         now, turned = self._pose()
         return (
             np.linalg.norm(now - centre, axis=1) + np.abs(turned - rotation).max(axis=(1, 2)) * self._radius

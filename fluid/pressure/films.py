@@ -140,9 +140,9 @@ class ThinFilms:
     """Films without room for water of their own: wet at once wherever water stands higher at their rim.
 
     node (n,) · part (n,) of it, of the connected ones · rim (m,): nodes beside, beside (m,): the part each touches ·
-    cell (k,): their cells, in order. Their water hands on the pressure and stands still: moved by it, it squirted out of
-    the film at the dry foot of a dam with all of the head, and carried the surface, which cannot be as thin as the jet,
-    along with it.
+    cell (k,): their cells, in order. Their water hands on the pressure and stands still: moved by it, it squirted out
+    of the film at the dry foot of a dam with all of the head, and carried the surface, which cannot be as thin as the
+    jet, along with it.
 
     Else they fill as the level set runs along them: a dam of 1 m with water on one side had a third of its uplift
     after 0.3 s, and as long as the film was dry, the surface of this water lay at the heel of the dam."""
