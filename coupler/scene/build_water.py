@@ -54,7 +54,7 @@ def water_of(case: Case, structure, solids, mesh=None):
         vapour_pressure=w.vapour_pressure,
     )
     level = np.full(len(immersion.domain.nodes), np.ptp(mesh.bounds, axis=0).max())
-    boxes = [_reaching(case.tank, fill) for fill in w.fill] + _strips(case)
+    boxes = [_reaching(case.tank, fill) for fill in w.fill] + _strips(case, mesh)
     velocity = None
     if boxes:
         tops = [surface_of(fill) for fill in w.fill]
@@ -146,21 +146,27 @@ def _walls(tank) -> tuple:
     return (lower, (*upper[:2], 2.0 * upper[2] - lower[2])) if "z+" in tank.open else (lower, upper)
 
 
-def _strips(case: Case) -> list[tuple]:
-    """Boxes (lower, upper) of water, one cell wide, beside inflows and seas that no fill reaches. Without water
+def _strips(case: Case, mesh) -> list[tuple]:
+    """Boxes (lower, upper) of water, one cell wide there, beside inflows and seas that no fill reaches. Without water
     beside it a side would begin with a film, which is too thin to resolve pressure or volume."""
     found = []
     for spec in (*case.water.inflow, *case.water.sea):
         top = level_at_start(spec)
         if top > floor_along(case.tank, spec.side) and not fills_beside(case, spec.side):
             lower, upper = [*case.tank.lower], [*case.tank.upper]
-            axis, end = "xyz".index(spec.side[0]), spec.side[1]
-            if end == "-":
-                upper[axis] = lower[axis] + case.tank.cell
+            axis, at_end = "xyz".index(spec.side[0]), spec.side[1] == "+"
+            if at_end:
+                lower[axis] = upper[axis] - _cell_beside(mesh, spec.side)
             else:
-                lower[axis] = upper[axis] - case.tank.cell
+                upper[axis] = lower[axis] + _cell_beside(mesh, spec.side)
             found.append((lower, [*upper[:2], top]))
     return found
+
+
+def _cell_beside(mesh, side: str) -> float:
+    """Length [m] across a side of the tank of the cells beside it."""
+    planes = mesh.axes["xyz".index(side[0])]
+    return float(planes[-1] - planes[-2] if side[1] == "+" else planes[1] - planes[0])
 
 
 def level_at_start(spec) -> float:
@@ -257,14 +263,15 @@ def _absorbing(case: Case, spec, flow, mesh, solids=()):
         )
     along = along[1:-1][:: max(1, (len(along) - 2) // READING_POINTS)]
     places = np.empty((len(along), 2))
-    inside = -_outward(spec.side)[axis] * mesh.spacing
+    cell = _cell_beside(mesh, spec.side)
+    inside = -_outward(spec.side)[axis] * cell
     places[:, axis] = mesh.bounds[int(spec.side[1] == "+"), axis] + inside
     places[:, 1 - axis] = along[:, 0]
     bed = bed_under(mesh, places)  # there, not at the side: a bed that rises inwards is higher
     there = np.isfinite(bed)
     if not there.any():
         raise AbsorbingSideBlocked(
-            f"side {spec.side} absorbs, but {mesh.spacing:.3g} m inside of it, where the water is read, the tank has "
+            f"side {spec.side} absorbs, but {cell:.3g} m inside of it, where the water is read, the tank has "
             f"no room for water: the ground reaches its upper side; let another side absorb, or move this one"
         )
     places, bed = places[there], raised_by(bed[there], places[there], solids)
